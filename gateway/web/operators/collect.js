@@ -11,17 +11,18 @@ const sleep = (ms) => new Promise((done) => setTimeout(done, ms));
 
 /** Whoever sits on `seat` drives, marks and waits until all episodes are there. */
 export async function collect(main, seat) {
+  let ended = null;
   for (let driven = null; ;) {
     const progress = await ask(main, seat);
     const { stage, episode } = progress;
     if (stage === "over") return show(main, progress, element("p", {}, "That was the last one. Thank you."));
     if (stage === "playing" && driven !== episode.episode_id + episode.number) {
-      await invited(main, progress, seat.robot);
-      const leave = await drive(main, { ...seat, episode: episode.episode_id });
-      leave?.();
+      await invited(main, progress, seat);
+      ended = await drive(main, { ...seat, episode: episode.episode_id });
+      ended?.leave();
       driven = episode.episode_id + episode.number;
     } else if (stage === "marking" && progress.marks[progress.robots.indexOf(seat.robot)] === null) {
-      await marked(main, progress, seat);
+      await marked(main, progress, seat, ended?.result);
     } else {
       show(main, progress, element("p", { role: "status" }, stage === "marking" ? `Waiting for ${missing(progress)} to mark it.` : "The next episode is made ready."));
       await sleep(POLL_MS);
@@ -49,18 +50,30 @@ function show(main, { episode, planned, good, bad }, ...below) {
   main.replaceChildren(element("h1", {}, title), ...[counts, ...below].filter(Boolean));
 }
 
-/** Time begins when everybody has said that they are there. */
-const invited = (main, progress, robot) => new Promise((done) => {
-  const begin = element("button", { type: "button", class: "large", onclick: done }, "Begin");
-  show(main, progress, element("p", {}, `You drive robot ${robot}. Time passes once everybody has begun.`), begin);
-  begin.focus();
-});
+/** What a person is to do. Time begins when everybody has said that they are there. */
+async function invited(main, progress, { robot, token }) {
+  const briefing = await call(`/v1/episodes/${encodeURIComponent(progress.episode.episode_id)}/briefing`, token).catch(() => null);
+  const part = briefing?.instructions.find((entry) => entry.robot === robot)?.instruction;
+  await new Promise((done) => {
+    const begin = element("button", { type: "button", class: "large primary", onclick: done }, "Begin");
+    show(main, progress, element("p", {}, `You drive robot ${robot}. ${part ?? ""}`),
+      element("p", { class: "soft" }, "Time passes once everybody has begun. The episode ends when the task is done or its time is over, or when everybody has pressed Finish."), begin);
+    begin.focus();
+  });
+}
+
+/** What came of an episode, in a sentence. */
+function outcome({ ended, phases }) {
+  const times = Object.values(phases ?? {});
+  const counted = times.length ? `, with ${times.filter((time) => time !== null).length} of ${times.length} phases reached` : "";
+  return `It has ended: ${words(ended)}${counted}.`;
+}
 
 /** What one person says of the episode. */
-const marked = (main, progress, seat) => new Promise((done) => {
+const marked = (main, progress, seat, result) => new Promise((done) => {
   const refusal = element("p", { class: "bad", role: "alert" });
   const say = (good) => call("/operate/mark", seat.token, { good }).then(done, (error) => { refusal.textContent = error.message; });
-  show(main, progress,
+  show(main, progress, result && element("p", {}, outcome(result)),
     element("p", {}, "Was it good? It is kept as a demonstration if everybody says so. Otherwise it is put aside, and played again when the collection is run again."),
     element("div", { class: "tools" },
       element("button", { type: "button", class: "large", onclick: () => say(true) }, "Good"),

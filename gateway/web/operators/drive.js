@@ -22,7 +22,7 @@ const FINISH_AGAIN_MS = 300;
 /** How much of the height the robot's picture takes: below it are the robot's own hands, where they hang. */
 const PICTURE_SHARE = 0.7;
 
-/** Shows the page of `seat` and drives until the episode has ended. Returns what gives back what it draws with, if it has drawn. */
+/** Shows the page of `seat` and drives until the episode has ended. Returns its result, and what gives back what the page draws with. */
 export async function drive(main, seat) {
   const root = `/v1/episodes/${encodeURIComponent(seat.episode)}`;
   try {
@@ -73,14 +73,15 @@ class DrivePage {
     document.addEventListener("visibilitychange", () => this.say(0), { signal: this.over.signal });
     this.pace = new Pace(SLOW_FRAME_MS);
     requestAnimationFrame((now) => this.draw(now, now));
-    return new Promise((done) => { this.done = done; }).then(() => {
+    return new Promise((done) => { this.done = done; }).then((result) => {
       clearInterval(saying);
       this.over.abort();
       this.wheel.close();
-      return () => {
+      const leave = () => {
         this.headset?.leave();
         this.stage?.leave();
       };
+      return { result, leave };
     });
   }
 
@@ -188,7 +189,7 @@ class DrivePage {
     if (message.kind === "replaced") this.panel.status("Another page drives this robot now.");
     if (message.kind === "ended") {
       this.panel.ended(message.result);
-      this.done();
+      this.done(message.result);
     }
     if (message.kind !== "refused" && message.kind !== "ended" && message.kind !== "replaced") this.standing();
   }

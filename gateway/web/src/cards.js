@@ -3,6 +3,8 @@
 import { ask, element, words } from "./dom.js";
 
 const EVERY_MS = 1500;
+/** How wide a strip's cells are. */
+const CELL_PIXELS = 400;
 
 export function cards(main) {
   document.title = "Tandem: episodes";
@@ -29,12 +31,15 @@ export function cards(main) {
       const text = JSON.stringify(list);
       if (text === shown) return;
       shown = text;
-      none.textContent = list.held.length ? "" : "None runs. An episode appears here by itself once a policy or a person starts it, and so does an evaluation that is written into this server's folder of runs.";
-      running.replaceChildren(...list.held.map(heldCard));
+      // One that has ended is looked at as its folder has it, once that is written.
+      const finishedRuns = new Set(list.finished.map(({ run }) => run));
+      const held = list.held.filter((entry) => !finishedRuns.has(entry.episode_id));
+      none.textContent = held.length ? "" : "None runs. An episode appears here by itself once a policy or a person starts it, and so does an evaluation that is written into this server's folder of runs.";
+      running.replaceChildren(...held.map(heldCard));
       evaluated.hidden = !list.evaluations.length;
       evaluations.replaceChildren(...list.evaluations.map(evaluationCard));
       finished.replaceChildren(...list.finished.map(finishedCard));
-      if (!list.finished.length) finished.append(element("p", { class: "soft" }, "None yet."));
+      if (!list.finished.length) finished.append(element("p", { class: "soft" }, "None yet. ", element("code", {}, "tandem demo"), ", run where this server was started, plays one within seconds."));
     } catch (error) {
       problem.textContent = `Not up to date: ${error.message}`;
     }
@@ -69,7 +74,7 @@ function finishedCard({ run, result, ended_unix_s: endedS, recorded, strip }) {
   const reached = phases.filter(([, time]) => time !== null).length;
   const done = phases.length > 0 && reached === phases.length;
   const inside = [
-    strip ? element("img", { src: `/watch/file?run=${encodeURIComponent(run)}&file=strip.png`, alt: "", loading: "lazy" }) : null,
+    strip ? element("div", { class: "strip" }, lastMoment(`/watch/file?run=${encodeURIComponent(run)}&file=strip.png`)) : null,
     element("div", { class: "line" }, element("strong", {}, words(result.task)), badge(`${reached} of ${phases.length} phases`, done ? "good" : "bad")),
     element("div", { class: "soft" }, `seed ${result.seed}, ${result.protocol}, ${words(result.ended)}`),
     element("div", {}, `${(result.env_steps / 50).toFixed(1)} s, ${result.tool_calls} calls, ${result.falls} falls`),
@@ -80,6 +85,12 @@ function finishedCard({ run, result, ended_unix_s: endedS, recorded, strip }) {
   return recorded
     ? element("a", { class: "card", href: `/watch?run=${encodeURIComponent(run)}${at}` }, ...inside)
     : element("div", { class: "card" }, ...inside, element("div", { class: "soft" }, "Not recorded."));
+}
+
+/** A strip, as wide that a cell of it fills its card. */
+function lastMoment(src) {
+  const image = element("img", { src, alt: "", loading: "lazy", onload: () => { image.style.width = `${(100 * image.naturalWidth) / CELL_PIXELS}cqw`; } });
+  return image;
 }
 
 export const badge = (text, kind) => element("span", { class: `badge ${kind}` }, text);

@@ -22,6 +22,7 @@ async function play(people, marks, looked) {
   await people[0].waitForTimeout(1500);
   for (const page of people) await page.getByRole("button", { name: "Finish" }).click();
   for (const page of people) await page.getByRole("button", { name: "Good" }).waitFor({ timeout: PATIENCE_MS });
+  await people[0].getByText("It has ended: finished").waitFor();
   if (looked) await pictures(people[0], "mark");
   for (const [index, page] of people.entries()) await page.getByRole("button", { name: marks[index] }).click();
 }
@@ -34,6 +35,7 @@ await pictures(overview, "overview");
 let people = await Promise.all(first.links.slice(0, 2).map((link) => open(link)));
 await people[0].getByRole("button", { name: "Begin" }).waitFor();
 assert.ok(!people[0].url().includes("token"), "the token is still in the address");
+await people[0].getByText("Take the bottle in front of you").waitFor();
 await pictures(people[0], "begin");
 await play(people, ["Good", "Good"], true);
 await play(people, ["Good", "Bad"], false);

@@ -34,6 +34,14 @@ let pageB = await person(b);
 await Promise.all([running(pageA), running(pageB)]);
 assert.ok(!pageA.url().includes("token"), "the token is still in the address");
 
+// Hands that hang are below the robot's picture, and their handles in sight; what is asked is told phase by phase.
+const insideBy = (page, side) => page.locator(`.handle.${side}`).evaluate((handle) => {
+  const [own, place] = [handle, document.querySelector(".operate-view")].map((one) => one.getBoundingClientRect());
+  return Math.min(own.left - place.left, place.right - own.right, own.top - place.top, place.bottom - own.bottom);
+});
+for (const side of ["left", "right"]) assert.ok(await insideBy(pageA, side) > 20, `the ${side} handle is at the border`);
+assert.deepEqual(await pageA.locator(".phases li > :last-child").allInnerTexts(), ["not yet", "not yet", "not yet"]);
+
 const withPad = (page, axes, buttons) => page.evaluate(([some, values]) => {
   window.pad = { connected: true, axes: some, buttons: values.map((value) => ({ value, pressed: value > 0.5 })) };
 }, [axes, Array.from({ length: 17 }, (_, index) => buttons[index] ?? 0)]);
@@ -98,6 +106,7 @@ await pageA.keyboard.up("PageUp");
 await pageA.screenshot({ path: "drive-lift.png" });
 console.log("the first phase is reached");
 await pageA.evaluate(() => { window.pad = null; });
+await pageA.locator(".phases .done", { hasText: "p1 grasp and lift" }).waitFor();
 
 // A drags its right hand upwards in the picture and closes it; B walks by keys.
 const episode = new URLSearchParams(a.split("#")[1]).get("episode");
@@ -177,7 +186,15 @@ const forged = await person(a.replace(/token=[^&]*/, "token=0123456789abcdef0123
 await forged.getByRole("heading", { name: "Nothing to drive" }).waitFor();
 assert.equal(await forged.getByRole("status").count(), 0, "a forged link drives");
 
+// It ends, and both pages say what came of it and where it is found.
 await fetch(`${base}/v1/episodes/${episode}`, { method: "DELETE" });
+for (const page of [pageA, pageB]) {
+  await page.getByText("The episode has ended").waitFor();
+  assert.equal(await page.getByRole("link", { name: "Look at it again" }).getAttribute("href"), `/watch?run=${episode}`);
+  assert.equal(await page.locator("button:visible").count(), 0, "there is still something to press");
+}
+assert.match(await pageA.locator(".phases").innerText(), /p1 grasp and lift[^]*\d s[^]*p2 transfer[^]*not reached/);
+await accessible(pageA, "an episode that is over");
 const recording = join(runs, episode, "episode.mcap");
 console.log(execFileSync(program, ["replay", recording, "--verify"], { encoding: "utf8" }).trim());
 await done();

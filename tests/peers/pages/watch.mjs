@@ -96,6 +96,9 @@ await page.getByRole("button", { name: "Start" }).click();
 const over = await page.getByRole("link", { name: "Drive robot A" }).getAttribute("href");
 const taker = await open(over);
 await taker.getByRole("status").filter({ hasText: "Running" }).waitFor();
+// Nobody else would finish for the robot that stands still.
+await taker.getByRole("button", { name: "Finish" }).click();
+await taker.getByText("The episode has ended: finished.").waitFor();
 await taker.context().close();
 await page.goBack();
 await page.waitForSelector(".scrubber");

@@ -185,6 +185,19 @@ fn watching_changes_nothing() {
 }
 
 #[test]
+fn an_episode_that_has_ended_is_among_the_finished_while_it_is_held() {
+    let server = TestServer::start();
+    let id = server.episode("benchmark");
+    let listed = || {
+        let list: Value = serde_json::from_slice(&get(&server, "/watch/episodes").1).expect("JSON");
+        (list["held"][0]["ended"].clone(), list["finished"][0]["run"].clone())
+    };
+    assert_eq!(listed(), (Value::Null, Value::Null));
+    server.tool(&id, "finish", &json!({})).ok();
+    assert_eq!(listed(), (json!("finished"), json!(id)));
+}
+
+#[test]
 fn a_finished_episode_can_be_looked_at_again() {
     let server = TestServer::start();
     let id = server.episode("benchmark");

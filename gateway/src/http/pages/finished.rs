@@ -38,14 +38,14 @@ const FILES: [(&str, &str); 4] = [
     ("report.html", "text/html; charset=utf-8"),
 ];
 
-/// The finished episodes below `runs`, the newest first, without those that are `held`.
-pub fn list(runs: &Path, held: &[String]) -> Vec<Value> {
+/// The finished episodes below `runs`, the newest first, without those that are `running`.
+pub fn list(runs: &Path, running: &[String]) -> Vec<Value> {
     let mut found = Vec::new();
     collect(runs, DEPTH, &mut found);
     found.sort_by_key(|(at, _)| std::cmp::Reverse(*at));
     let entry = |(at, folder): (SystemTime, PathBuf)| {
         let run = folder.strip_prefix(runs).ok()?.to_str()?.replace('\\', "/");
-        if held.contains(&run) {
+        if running.contains(&run) {
             return None;
         }
         let result: Value = serde_json::from_slice(&fs::read(folder.join(RESULT_FILE)).ok()?).ok()?;

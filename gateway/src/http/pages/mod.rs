@@ -125,8 +125,9 @@ fn asset(kind: &'static str, text: &'static str) -> Response {
 async fn episodes(State(app): State<AppState>) -> Result<Response, ApiError> {
     let held = app.table.list(&Caller::Host);
     let runs = app.settings.runs.clone();
-    let known: Vec<String> = held.episodes.iter().map(|entry| entry.episode_id.clone()).collect();
-    let found = blocking(move || Ok((finished::list(&runs, &known), app.evaluations.list(&runs)))).await?;
+    let go_on = held.episodes.iter().filter(|entry| entry.ended.is_none());
+    let running: Vec<String> = go_on.map(|entry| entry.episode_id.clone()).collect();
+    let found = blocking(move || Ok((finished::list(&runs, &running), app.evaluations.list(&runs)))).await?;
     let (finished, evaluations) = found;
     let told = json!({
         "version": super::app::VERSION, "held": held.episodes, "evaluations": evaluations, "finished": finished,
