@@ -18,7 +18,7 @@ export function cards(main) {
   main.replaceChildren(
     element("header", { class: "top" }, element("h1", {}, "Tandem"), version, element("a", { href: "/operate" }, "Drive robots yourself")),
     problem,
-    element("h2", {}, "On this server"), none, running,
+    element("h2", {}, "Running"), none, running,
     evaluated,
     element("h2", {}, "Finished"), finished,
   );
