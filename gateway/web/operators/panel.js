@@ -8,7 +8,7 @@ const WAYS = [
   ["Move a hand", "drag L or R; with Shift, or by the wheel, towards you and away; or arrow keys, Page Up and Page Down"],
   ["Turn it", "Ctrl and drag, or I K, J L, U M; Level points its fingers ahead"],
   ["Walk", "W A S D; turn by Q and E; rise and sink by R and F"],
-  ["Gamepad", "sticks walk and turn, triggers close the hands, bumpers let go of targets"],
+  ["Gamepad", "sticks walk and turn, triggers close the hands, bumpers rest the arms where they are"],
 ];
 
 /** No handle is nearer to the border. */
@@ -78,7 +78,7 @@ export function layOut(main, { robot, episode, collection }, briefing, on) {
     cursor: (name, side, at) => {
       const key = name + side;
       if (!cursors.has(key)) {
-        cursors.set(key, element("span", { class: "cursor", "aria-hidden": "true" }, `${name} ${side}`));
+        cursors.set(key, element("span", { class: "cursor", "aria-hidden": "true" }, `${name} ${side[0].toUpperCase()}`));
         place.append(cursors.get(key));
       }
       put(cursors.get(key), at, false, size);

@@ -66,7 +66,7 @@ export function start(main, from = null) {
     refusal.textContent = "";
     const chosen = new FormData(event.target);
     if (!["A", "B", "C"].some((robot) => chosen.get(robot) === "person")) {
-      refusal.textContent = "Somebody has to drive a robot: choose a person for one of them.";
+      refusal.textContent = "Somebody has to drive a robot: choose a person for one of them. (The command tandem demo has experts play by themselves.)";
       return;
     }
     // A second press would begin a second episode.

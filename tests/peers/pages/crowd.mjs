@@ -1,5 +1,5 @@
 // 20 people watch and three drive BigTable for ten minutes, one episode after another, and all who watched look at each again once it is
-// over: the server's memory stays as it is, and no command is dropped. No browser is needed.
+// over, and at all of them ten times at the end: the server's memory stays as it is, and no command is dropped. No browser is needed.
 //
 //     node REPOSITORY/tests/peers/pages/crowd.mjs REPOSITORY/target/release/tandem [MINUTES]
 import assert from "node:assert/strict";
@@ -9,6 +9,8 @@ import { driver, watcher } from "./shared/socket.mjs";
 
 const minutes = Number(process.argv[3] ?? 10);
 const WATCHERS = 20;
+/** How often all episodes are looked at again at the end. */
+const ROUNDS = 10;
 /** An episode is no shorter: what it takes at its beginning is not what it takes. */
 const LEAST_MS = 20_000;
 const { link, base, server } = await serve();
@@ -17,6 +19,7 @@ const megabytes = () => Number(readFileSync(`/proc/${server.pid}/status`, "utf8"
 
 const began = performance.now();
 const memory = [];
+const episodes = [];
 const refusals = new Set();
 const total = { steps: 0, rows: 0, seen: 0, refused: 0, recorded: 0 };
 let rate = 1;
@@ -24,6 +27,7 @@ const look = async (id) => (await fetch(`${base}/watch/run?run=${id}`, { headers
 for (let seed = 2000; 60_000 * minutes - (performance.now() - began) > LEAST_MS; seed += 1) {
   const started = await post(base, "/v1/episodes", { task: "big_table", seed, operators: "per_robot", patience_s: 600, talk: true });
   const id = started.episode_id;
+  episodes.push(id);
   const people = await Promise.all(started.operators.map(({ robot, token }) => driver(base, robot, token)));
   const watching = await Promise.all(Array.from({ length: WATCHERS }, () => watcher(base, id, key)));
   const homes = people.map((one) => one.poses());
@@ -67,7 +71,15 @@ for (let seed = 2000; 60_000 * minutes - (performance.now() - began) > LEAST_MS;
   }
 }
 console.log(`${total.steps} steps, each told ${(total.rows / total.steps).toFixed(2)} times to three drivers, ${total.recorded} with three commands each in the recordings; ${total.refused} refused; a watcher saw ${(total.seen / total.steps).toFixed(2)} of them; at least ${rate.toFixed(2)} of real time; memory after each episode ${memory.map((value) => value.toFixed(0)).join(", ")} MB`);
+const rounds = [];
+for (let round = 0; round < ROUNDS; round += 1) {
+  for (const id of episodes) await Promise.all(Array.from({ length: WATCHERS }, () => look(id)));
+  rounds.push(megabytes());
+}
+console.log(`all looked at again by ${WATCHERS}, ${ROUNDS} times: ${rounds.map((value) => value.toFixed(0)).join(", ")} MB`);
 assert.equal(total.refused, 0, JSON.stringify([...refusals]));
 assert.equal(total.recorded, total.steps, "a command is missing");
 assert.ok(memory.at(-1) < 1.1 * memory[Math.min(1, memory.length - 1)], "memory grows");
+const half = ROUNDS / 2;
+assert.ok(Math.max(...rounds.slice(half)) < 1.1 * Math.max(...rounds.slice(0, half)), "memory grows from look to look");
 process.exit(0);

@@ -74,9 +74,11 @@ await page.goto(`${base}/watch`);
 await page.locator("progress").first().waitFor();
 await pictures(page, "cards", { settleMs: 500 });
 
-// It is looked at again, and somebody takes over.
-await driver.context().close();
+// It ends, is looked at again, and somebody takes over.
 await fetch(`${base}/v1/episodes/${episode}`, { method: "DELETE" });
+await driver.getByText("The episode has ended").waitFor({ timeout: PATIENCE_MS });
+await pictures(driver, "drive-over", SCENE);
+await driver.context().close();
 await page.goto(`${base}/watch?run=${episode}`);
 await page.waitForSelector(".scrubber");
 await page.locator(".track input").fill("1");
