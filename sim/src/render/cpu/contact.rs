@@ -103,12 +103,17 @@ impl ContactMap {
                 continue;
             }
             let world_from_mesh = Affine::of(pose);
-            prepared.points[number].map_into(&mut self.corners_m, |block| world_from_mesh.map_lanes(block));
+            prepared.points[number].map_into(
+                &mut self.corners_m,
+                #[inline(always)]
+                |block| world_from_mesh.map_lanes(block),
+            );
             let too_high = |[_, _, z_m]: &[f32; 3]| *z_m > HIGHEST_SUPPORT_M;
-            if layer == HeightLayer::Support && self.corners_m.iter().any(too_high) {
+            let mut corners_m = self.corners_m[..prepared.points[number].count()].iter();
+            if layer == HeightLayer::Support && corners_m.any(too_high) {
                 continue;
             }
-            for triangle in &part.mesh.triangles {
+            for triangle in &prepared.triangles[number] {
                 batch.push(self.projected(layer, triangle.map(|corner| self.corners_m[corner as usize])), 0);
                 if batch.is_full() {
                     self.fill(simd, layer, &batch.take());

@@ -164,7 +164,7 @@ impl WithSimd for PictureDrawing<'_> {
         let Canvas { row, samples, centres } = canvas;
         let measured = (wanted == Wanted::All).then_some(&mut *centres);
         target::draw(simd, samples, measured, prepared, &state.placed, camera);
-        let view = View {
+        let mut view = View {
             prepared,
             facets: &state.facets,
             target: samples,
@@ -185,6 +185,7 @@ impl WithSimd for PictureDrawing<'_> {
         frame.depth_m.reserve_exact((camera.width * camera.height) as usize);
         frame.ids.reserve_exact((camera.width * camera.height) as usize);
         for row in 0..camera.height as usize {
+            centres.finish_row(row);
             frame.depth_m.extend(centres.nearness_1_m(row).iter().map(|nearness| 1.0 / nearness));
             frame.ids.extend(centres.sheets(row).iter().map(|sheet| prepared.id(*sheet)));
         }

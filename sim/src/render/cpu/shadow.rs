@@ -90,8 +90,12 @@ impl ShadowMap {
             if around.iter().any(Range::is_empty) {
                 continue;
             }
-            prepared.points[number].map_into(&mut self.corners, |block| map_from_mesh.map_lanes(block));
-            let [columns, rows] = reached_cells(&self.corners[..part.mesh.vertices.len()]);
+            prepared.points[number].map_into(
+                &mut self.corners,
+                #[inline(always)]
+                |block| map_from_mesh.map_lanes(block),
+            );
+            let [columns, rows] = reached_cells(&self.corners[..prepared.points[number].count()]);
             let reached =
                 u128::MAX.unbounded_shl(columns.start as u32) & !u128::MAX.unbounded_shl(columns.end as u32);
             for moving in &mut self.moving[rows] {
@@ -101,8 +105,8 @@ impl ShadowMap {
                 placed.world_from_mesh[number].rotation.inverse() * prepared.scenery.light.sun_direction;
             prepared.faces[number].put_front(&mut self.front, [to_sun.x, to_sun.y, to_sun.z, 0.0]);
             for triangle in &self.front {
-                let corners =
-                    part.mesh.triangles[*triangle as usize].map(|corner| self.corners[corner as usize]);
+                let corners = prepared.triangles[number][*triangle as usize]
+                    .map(|corner| self.corners[corner as usize]);
                 batch.push(corners, 0);
                 if batch.is_full() {
                     layer.fill(simd, &batch.take());

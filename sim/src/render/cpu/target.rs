@@ -51,19 +51,19 @@ pub(super) fn draw<S: Simd>(
             let row = lanes(|i| cy - y[i] * focal * nearness[i]);
             [column, row, nearness, z]
         });
-        let sheets = prepared.sheets_of(number);
+        let (sheets, triangles) = (prepared.sheets_of(number), &prepared.triangles[number]);
         let eye_m = camera_from_mesh.inverse().translation;
         prepared.faces[number].put_front(&mut front, [eye_m.x, eye_m.y, eye_m.z, 1.0]);
         for number in &front {
-            let (sheet, triangle) = (sheets[*number as usize], part.mesh.triangles[*number as usize]);
+            let (sheet, triangle) = (sheets[*number as usize], triangles[*number as usize]);
             let [a, b, c] = triangle.map(|corner| corners[corner as usize]);
             let visible = [a, b, c].map(|[_, _, _, z]| u32::from(z < -NEAR_M)).into_iter().sum::<u32>();
             if visible == 3 {
                 batch.push([a, b, c].map(|[u, v, nearness, _]| [u, v, nearness]), sheet);
             } else if visible > 0 {
-                let position = |corner: u32| part.mesh.vertices[corner as usize].position_m;
-                let (clipped, count) =
-                    clip_near(triangle.map(|corner| Vector::from(map.map(position(corner)))));
+                let corners_m = part.mesh.triangles[*number as usize]
+                    .map(|corner| map.map(part.mesh.vertices[corner as usize].position_m));
+                let (clipped, count) = clip_near(corners_m.map(Vector::from));
                 for i in 1..count - 1 {
                     let corners = [clipped[0], clipped[i], clipped[i + 1]];
                     if batch.is_full() {
@@ -139,7 +139,7 @@ impl RenderTarget {
         self.nearness_1_m.row(row)
     }
 
-    /// Numbers of the sheets that a row shows.
+    /// Numbers of the sheets that a finished row shows.
     #[inline(always)]
     pub(super) fn sheets(&self, row: usize) -> &[u32] {
         self.sheet.row(row)
@@ -148,7 +148,19 @@ impl RenderTarget {
     fn reset(&mut self, grid: Grid) {
         self.grid = grid;
         self.nearness_1_m.reset(grid, 0.0);
-        self.sheet.reset(grid, NOTHING);
+        self.sheet.fit(grid, NOTHING);
+    }
+
+    /// Has a row show nothing where nothing was drawn: before, there is what other pictures showed. Hardly a row has such samples, so that
+    /// this takes less time than making all sheets nothing at first.
+    #[inline(always)]
+    pub(super) fn finish_row(&mut self, row: usize) {
+        let nearness_1_m = self.nearness_1_m.row(row);
+        if nearness_1_m.iter().fold(false, |any, nearness| any | (*nearness == 0.0)) {
+            for (sheet, nearness) in self.sheet.row_mut(row).iter_mut().zip(nearness_1_m) {
+                *sheet = if *nearness == 0.0 { NOTHING } else { *sheet };
+            }
+        }
     }
 
     /// Puts triangles, tagged with their sheets, into those samples that they are the nearest of.

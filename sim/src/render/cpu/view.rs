@@ -22,7 +22,7 @@ pub(super) struct View<'a> {
     pub prepared: &'a Prepared,
     /// The facet of each sheet.
     pub facets: &'a [Facet],
-    pub target: &'a RenderTarget,
+    pub target: &'a mut RenderTarget,
     pub shadow: &'a ShadowMap,
     pub contact: &'a ContactMap,
     pub rays: Rays,
@@ -42,10 +42,16 @@ pub(super) struct Row {
 impl View<'_> {
     /// The picture, three bytes a pixel.
     #[inline(always)]
-    pub(super) fn rgb(&self, row: &mut Row, srgb: &SrgbTable) -> Vec<u8> {
+    pub(super) fn rgb(&mut self, row: &mut Row, srgb: &SrgbTable) -> Vec<u8> {
         let (width, height) = (self.target.width() / SAMPLES, self.target.height() / SAMPLES);
         let mut rgb = vec![0; width * height * 3];
+        let mut finished = 0;
         for (y, bytes) in rgb.chunks_exact_mut(width * 3).enumerate() {
+            // Pixels are compared with the samples below them.
+            let seen = ((y + 1) * SAMPLES + 1).min(self.target.height());
+            for row in std::mem::replace(&mut finished, seen)..seen {
+                self.target.finish_row(row);
+            }
             for sum in &mut row.sum_rgb {
                 sum.clear();
                 sum.resize(width, 0.0);

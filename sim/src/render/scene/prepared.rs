@@ -1,20 +1,25 @@
 //! A scenery with what drawing wants to know of it and what never changes.
 
+use std::collections::HashMap;
+
 use rapier3d::math::Vector;
 
 use super::bend::Bend;
 use super::faces::Faces;
 use crate::render::shading::lanes::Points;
 use crate::render::shading::linear;
-use crate::render::{Part, Pattern, Scenery};
+use crate::render::{Part, Pattern, Scenery, TriangleMesh};
 
 /// Marks a sample at which nothing is.
 pub const NOTHING: u32 = u32::MAX;
 
 pub struct Prepared {
     pub scenery: Scenery,
-    /// Corners of each part's triangles.
+    /// Where corners of each part's triangles are. A mesh with flat faces names a place once for each triangle there; here it is named
+    /// once.
     pub points: Vec<Points>,
+    /// Each part's triangles, by the numbers of their corners' points.
+    pub triangles: Vec<Vec<[u32; 3]>>,
     /// Planes of each part's triangles.
     pub faces: Vec<Faces>,
     pub sheets: Vec<Sheet>,
@@ -50,8 +55,10 @@ impl Prepared {
         }
         first.push(sheet_of.len());
         let id = |sheet: &Sheet| scenery.parts[sheet.part as usize].id;
+        let (points, triangles) = scenery.parts.iter().map(|part| joined(&part.mesh)).unzip();
         Prepared {
-            points: scenery.parts.iter().map(points).collect(),
+            points,
+            triangles,
             faces: scenery.parts.iter().map(|part| Faces::of(&part.mesh)).collect(),
             ids: sheets.iter().map(id).collect(),
             sheets,
@@ -82,8 +89,18 @@ fn grain(part: &Part) -> usize {
     if part.pattern == Pattern::Print { 0 } else { part.mesh.longest_axis() }
 }
 
-fn points(part: &Part) -> Points {
-    Points::new(part.mesh.vertices.iter().map(|vertex| vertex.position_m))
+/// The places of a mesh's corners, each once, and its triangles by their numbers.
+fn joined(mesh: &TriangleMesh) -> (Points, Vec<[u32; 3]>) {
+    let (mut numbers, mut places_m) = (HashMap::new(), Vec::new());
+    let mut number = |corner: u32| {
+        let place_m = mesh.vertices[corner as usize].position_m;
+        *numbers.entry(place_m.to_array().map(f32::to_bits)).or_insert_with(|| {
+            places_m.push(place_m);
+            places_m.len() as u32 - 1
+        })
+    };
+    let triangles = mesh.triangles.iter().map(|corners| corners.map(&mut number)).collect();
+    (Points::new(&places_m), triangles)
 }
 
 /// The two linear colours of a part.

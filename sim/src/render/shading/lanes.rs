@@ -31,6 +31,7 @@ pub struct Affine(pub [(Vector, f32); 3]);
 /// Points, coordinate by coordinate, in whole blocks: the last one may hold a few of no meaning.
 #[derive(Default)]
 pub struct Points {
+    count: usize,
     blocks_m: Vec<[Lanes; 3]>,
 }
 
@@ -73,14 +74,18 @@ impl Affine {
 }
 
 impl Points {
-    pub fn new(points_m: impl ExactSizeIterator<Item = Vector>) -> Points {
+    pub fn new(points_m: &[Vector]) -> Points {
         let mut blocks_m = vec![[[0.0; LANES]; 3]; points_m.len().div_ceil(LANES)];
-        for (number, point_m) in points_m.enumerate() {
+        for (number, point_m) in points_m.iter().enumerate() {
             for (axis, coordinates_m) in blocks_m[number / LANES].iter_mut().enumerate() {
                 coordinates_m[number % LANES] = point_m[axis];
             }
         }
-        Points { blocks_m }
+        Points { count: points_m.len(), blocks_m }
+    }
+
+    pub fn count(&self) -> usize {
+        self.count
     }
 
     /// Puts what `map` makes of each point, by the points' numbers.

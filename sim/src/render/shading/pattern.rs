@@ -81,16 +81,23 @@ impl Pattern {
     /// Shares of the second colour, from 0 to 1, at several points of [`Pattern::frame`].
     #[inline(always)]
     pub(in crate::render) fn shares<const N: usize>(self, points_m: [Lanes<N>; 3]) -> Lanes<N> {
-        let [x_m, y_m, z_m] = points_m;
-        let point = |i: usize| [x_m[i], y_m[i], z_m[i]];
         match self {
             Pattern::Plain => lanes(|_| 0.0),
-            Pattern::Checker(_) => lanes(|i| checker(point(i))),
-            Pattern::Wood => lanes(|i| wood(point(i))),
-            Pattern::Fabric => lanes(|i| fabric(point(i))),
-            Pattern::Print => lanes(|i| print(point(i))),
+            Pattern::Checker(_) => each(&points_m, checker),
+            Pattern::Wood => each(&points_m, wood),
+            Pattern::Fabric => each(&points_m, fabric),
+            Pattern::Print => each(&points_m, print),
         }
     }
+}
+
+/// Inlined to the last, or else it would not be compiled for wide registers.
+#[inline(always)]
+fn each<const N: usize>([x_m, y_m, z_m]: &[Lanes<N>; 3], share: impl Fn([f32; 3]) -> f32) -> Lanes<N> {
+    lanes(
+        #[inline(always)]
+        |i| share([x_m[i], y_m[i], z_m[i]]),
+    )
 }
 
 /// 1 where the sum of two whole numbers is even.

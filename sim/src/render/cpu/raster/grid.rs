@@ -36,6 +36,12 @@ impl<T: Copy> SampleRows<T> {
         self.numbers.resize(grid.stride() * grid.height, value);
     }
 
+    /// Makes room for a number at each sample. What it is stays open: `value`, or something of an earlier grid.
+    pub fn fit(&mut self, grid: Grid, value: T) {
+        self.grid = grid;
+        self.numbers.resize(grid.stride() * grid.height, value);
+    }
+
     #[inline(always)]
     pub fn row(&self, row: usize) -> &[T] {
         let start = row * self.grid.stride();
@@ -49,6 +55,7 @@ impl<T: Copy> SampleRows<T> {
         self.numbers[row * stride + column..].chunks(stride)
     }
 
+    #[inline(always)]
     pub fn row_mut(&mut self, row: usize) -> &mut [T] {
         let start = row * self.grid.stride();
         &mut self.numbers[start..start + self.grid.width]
