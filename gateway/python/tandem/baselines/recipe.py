@@ -26,7 +26,7 @@ SOONER = {"trash_collection": 2}
 being corrected."""
 
 LONGER = ("trash_collection", "co_carry", "table_align", "move_house", "cart_service", "big_table")
-"""Tasks in which robots walk: their demonstrations are several times as long, and hands have to meet what the last step leaves."""
+"""Tasks in which robots walk: their demonstrations are longer, and hands have to meet what the last step leaves."""
 
 LONGER_STEPS = 12000
 
