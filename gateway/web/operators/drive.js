@@ -37,7 +37,7 @@ export async function drive(main, seat) {
 
 class DrivePage {
   constructor(main, seat, root, briefing) {
-    Object.assign(this, { seat, root, hand: "right", fingers: {}, shares: {}, heightM: null, paused: null, stepwise: false, steps: 0, gone: new Set(), over: new AbortController() });
+    Object.assign(this, { seat, root, hand: "right", fingers: {}, shares: {}, heightM: null, paused: null, stepwise: false, steps: 0, gone: new Set(), over: new AbortController(), left: false });
     this.panel = layOut(main, seat, briefing, {
       act: (action) => this.act(action),
       speak: (text) => call(`${root}/tools/say`, seat.token, { text }),
@@ -78,6 +78,7 @@ class DrivePage {
       this.over.abort();
       this.wheel.close();
       const leave = () => {
+        this.left = true;
         this.headset?.leave();
         this.stage?.leave();
       };
@@ -162,21 +163,26 @@ class DrivePage {
     }
   }
 
-  /** Draws what is newest. */
+  /** Draws what is newest, and when the episode is over, its end, until the page is left. */
   draw(now, last) {
-    if (this.wheel.over) return;
+    if (this.left) return;
     if (this.stage && !this.headset.session) {
       this.show();
       if (this.stage.draw() && this.pace.isSlow(now - last)) this.stage.simplify();
-      for (const side of SIDES) this.panel.handle(side, this.stage.project(this.hands.handle(side)));
-      for (const { name, index } of this.partners) {
-        SIDES.forEach((side, place) => {
-          const target = new Vector3().fromArray(this.frame.row, this.frame.hand(index, place).target);
-          this.panel.cursor(name, side, this.stage.project(target));
-        });
-      }
+      if (!this.wheel.over) this.point();
     }
     requestAnimationFrame((next) => this.draw(next, now));
+  }
+
+  /** Puts handles and partners' cursors to where they are seen. */
+  point() {
+    for (const side of SIDES) this.panel.handle(side, this.stage.project(this.hands.handle(side)));
+    for (const { name, index } of this.partners) {
+      SIDES.forEach((side, place) => {
+        const target = new Vector3().fromArray(this.frame.row, this.frame.hand(index, place).target);
+        this.panel.cursor(name, side, this.stage.project(target));
+      });
+    }
   }
 
   told(message) {

@@ -195,6 +195,9 @@ for (const page of [pageA, pageB]) {
 }
 assert.match(await pageA.locator(".phases").innerText(), /p1 grasp and lift[^]*\d s[^]*p2 transfer[^]*not reached/);
 await accessible(pageA, "an episode that is over");
+// What a window of another size shows of it is drawn anew.
+await pageA.setViewportSize({ width: 900, height: 700 });
+await until("bytes of the end's picture", async () => (await pageA.locator(".view canvas").screenshot()).length, 20_000);
 const recording = join(runs, episode, "episode.mcap");
 console.log(execFileSync(program, ["replay", recording, "--verify"], { encoding: "utf8" }).trim());
 await done();
