@@ -39,7 +39,7 @@ const insideBy = (page, side) => page.locator(`.handle.${side}`).evaluate((handl
   const [own, place] = [handle, document.querySelector(".operate-view")].map((one) => one.getBoundingClientRect());
   return Math.min(own.left - place.left, place.right - own.right, own.top - place.top, place.bottom - own.bottom);
 });
-for (const side of ["left", "right"]) assert.ok(await insideBy(pageA, side) > 20, `the ${side} handle is at the border`);
+for (const side of ["left", "right"]) await until(`pixels from the ${side} handle to the border`, () => insideBy(pageA, side), 20);
 assert.deepEqual(await pageA.locator(".phases li > :last-child").allInnerTexts(), ["not yet", "not yet", "not yet"]);
 
 const withPad = (page, axes, buttons) => page.evaluate(([some, values]) => {
