@@ -164,6 +164,23 @@ def test_all_kinds_learn_and_answer(kind: PolicyKind, scope: Scope, sharing: Sha
     assert len(policy["networks"]) == (1 if sharing == "shared" else 2)
 
 
+def test_eyes_are_shown_the_same_in_training_as_in_play() -> None:
+    torch()
+    as_seen: Any = import_module("tandem.baselines.networks").as_seen
+    generator = np.random.default_rng(1)
+    pictures = generator.integers(0, 256, (3, 2, 6, 8, 3), dtype=np.uint8)
+    gain = generator.uniform(0.7, 1.3, (3, 2, 1, 1, 3)).astype(np.float32)
+    offset = generator.uniform(-0.1, 0.1, (3, 2, 1, 1, 1)).astype(np.float32)
+    told, varied = (2 * values - 1 for values in (pictures / 255, np.clip(pictures / 255 * gain + offset, 0, 1)))
+    shown = as_seen(torch().from_numpy(pictures))
+    assert shown.shape == (3, 2, 3, 6, 8)
+    assert np.allclose(shown.permute(0, 1, 3, 4, 2), told, atol=1e-5)
+    for kind, error in ((torch().float32, 1e-5), (torch().bfloat16, 3 / 255)):
+        shown = as_seen(*(torch().from_numpy(values) for values in (pictures, gain, offset)), kind)
+        assert shown.dtype == kind
+        assert np.allclose(shown.float().permute(0, 1, 3, 4, 2), varied, atol=error)
+
+
 @pytest.mark.parametrize("kind", get_args(PolicyKind))
 def test_nothing_is_learned_from_rows_after_the_end(kind: PolicyKind) -> None:
     torch()

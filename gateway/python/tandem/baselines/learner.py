@@ -14,7 +14,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from .data import BASE, CLOCK_S, JOINTS, STATES, Demonstrations
-from .networks import PolicyNetwork
+from .networks import PolicyNetwork, as_seen, multiplies_halves
 from .settings import TrainingSettings
 from .views import View
 
@@ -69,7 +69,7 @@ class Learner:
         objects = len(demonstrations.objects)
         self.network = PolicyNetwork(settings, len(views[0].inputs), len(views[0].outputs), objects).to(device)
         self.averaged = {name: value.clone() for name, value in self.network.state_dict().items()}
-        self._optimizer = torch.optim.AdamW(self.network.parameters(), weight_decay=settings.weight_decay)
+        self._optimizer = torch.optim.AdamW(self.network.parameters(), weight_decay=settings.weight_decay, fused=True)
 
     def step(self, step: int) -> tuple[float, float]:
         """One step of the optimiser. Returns what the actions and the second task cost."""
@@ -146,17 +146,22 @@ class Learner:
         return self.network.loss(known, chunks, told, generator), functional.l1_loss(places, objects)
 
     def _look(self, moments: Tensor, views: Tensor, generator: torch.Generator | None) -> tuple[Tensor, Tensor]:
-        pictures = self._pictures[moments[:, None], self._inputs[views]].permute(0, 1, 4, 2, 3).float().div_(255)
+        # Robots first, so that the pictures of each lie together.
+        pictures = self._pictures[moments, self._inputs[views].T].to(self._device)
         states = self._values["states"][moments[:, None], self._inputs[views]]
-        if generator is not None:
+        if generator is None:
+            seen = as_seen(pictures)
+        else:
             # Colour, brightness and contrast vary; no shifts, since a place in the picture is what is learned.
-            each = (*pictures.shape[:2], 1, 1, 1)
-            colours = 1 + 0.2 * (torch.rand((*pictures.shape[:3], 1, 1), generator=generator) - 0.5)
-            gain = colours * (1 + 0.3 * (torch.rand(each, generator=generator) - 0.5))
-            pictures = (pictures * gain + 0.1 * (torch.rand(each, generator=generator) - 0.5)).clamp_(0, 1)
+            each = (*pictures.shape[:2], 1, 1)
+            colours = 1 + 0.2 * (torch.rand((*each, 3), generator=generator) - 0.5)
+            gain = colours * (1 + 0.3 * (torch.rand((*each, 1), generator=generator) - 0.5))
+            offset = 0.1 * (torch.rand((*each, 1), generator=generator) - 0.5)
+            kind = torch.bfloat16 if multiplies_halves(pictures.device) else torch.float32
+            seen = as_seen(pictures, gain, offset, kind)
             states = states + self._noise * torch.randn(states.shape, generator=generator)
         states = scaled(states, self.scales["states"])
-        return self.network.look(pictures.to(self._device), states.to(self._device))
+        return self.network.look(seen.transpose(0, 1), states.to(self._device))
 
     def _of_inputs(self, name: str, moments: Tensor, views: Tensor) -> Tensor:
         return self._values[name][moments[:, None], self._inputs[views]].to(self._device)

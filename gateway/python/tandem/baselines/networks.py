@@ -28,8 +28,28 @@ def multiplies_halves(device: torch.device) -> bool:
     return device.type == "cpu" and any(told.get(name) for name in ("avx512_bf16", "amx_bf16"))
 
 
+def as_seen(
+    pictures: Tensor, gain: Tensor | float = 1.0, offset: Tensor | float = 0.0, kind: torch.dtype = torch.float32
+) -> Tensor:
+    """Pictures of bytes, ... by height by width by 3, as eyes take them: ... by 3 by height by width in -1..1.
+
+    gain, offset: Of a picture's colours in 0..1, ... by 1 by 1 by 3.
+    kind: Of the numbers.
+    """
+    height, width, colours = pictures.shape[-3:]
+
+    def of_rows(values: Tensor | float) -> Tensor:
+        whole = torch.as_tensor(values, device=pictures.device).expand(*pictures.shape[:-3], 1, width, colours)
+        return whole.reshape(*pictures.shape[:-3], 1, width * colours).to(kind)
+
+    # In rows of all their colours, the processor's vectors are full.
+    rows = pictures.reshape(*pictures.shape[:-3], height, width * colours).to(kind)
+    seen = torch.addcmul(of_rows(2 * offset - 1), rows, of_rows(2 / 255 * gain)).clamp_(-1, 1)
+    return seen.view(pictures.shape).movedim(-1, -3)
+
+
 class Eye(nn.Module):
-    """A picture, batch by 3 by height by width in 0..1, to features, batch by `width`.
+    """A picture, batch by 3 by height by width in -1..1, to features, batch by `width`.
 
     Keypoints by spatial softmax (Levine et al. 2016): of each of k maps, where its softmax has its mean; and a coarse look at
     all maps. A pixel of a small picture is 6 mm of a table: no layer but the first takes pixels together, and nothing is
@@ -40,11 +60,11 @@ class Eye(nn.Module):
         super().__init__()
         self.convolutions = nn.Sequential(
             nn.Conv2d(3, 24, 8, stride=4, padding=2),
-            nn.ReLU(),
+            nn.ReLU(inplace=True),
             nn.Conv2d(24, 32, 3, padding=1),
-            nn.ReLU(),
+            nn.ReLU(inplace=True),
             nn.Conv2d(32, 32, 3, padding=2, dilation=2),
-            nn.ReLU(),
+            nn.ReLU(inplace=True),
             nn.Conv2d(32, keypoints, 1),
         )
         for name, parameter in self.convolutions.named_parameters():
@@ -53,21 +73,19 @@ class Eye(nn.Module):
             else:
                 nn.init.zeros_(parameter)
         self.convolutions.to(memory_format=torch.channels_last)
-        self.sharpness = nn.Parameter(torch.ones(keypoints))
         self.coarse = nn.Sequential(nn.AdaptiveAvgPool2d((3, 4)), nn.Flatten(), nn.Linear(keypoints * 12, 64), nn.ReLU())
         self.width = 2 * keypoints + 64
 
     def forward(self, pictures: Tensor) -> Tensor:
-        channels_last = (2 * pictures - 1).contiguous(memory_format=torch.channels_last)
-        # Two thirds of a training step are these convolutions. Places in the picture need all of a float32.
-        halves = self.training and multiplies_halves(pictures.device)
-        with torch.autocast(pictures.device.type, torch.bfloat16, enabled=halves):
-            maps = self.convolutions(channels_last).float().contiguous()
+        with torch.autocast(pictures.device.type, torch.bfloat16, enabled=pictures.dtype == torch.bfloat16):
+            maps = self.convolutions(pictures.contiguous(memory_format=torch.channels_last))
+        # Places in the picture need all of a float32.
+        maps = maps.to(torch.float32, memory_format=torch.contiguous_format)
         height, width = maps.shape[-2:]
-        weights = functional.softmax((maps * self.sharpness[:, None, None]).flatten(2), dim=-1).view_as(maps)
-        x = (weights.sum(2) * torch.linspace(-1, 1, width, device=maps.device)).sum(-1)
-        y = (weights.sum(3) * torch.linspace(-1, 1, height, device=maps.device)).sum(-1)
-        return torch.cat([x, y, self.coarse(maps)], dim=1)
+        weights = functional.softmax(maps.flatten(2), dim=-1)
+        y, x = (torch.linspace(-1, 1, count, device=maps.device) for count in (height, width))
+        places = weights @ torch.cartesian_prod(y, x)
+        return torch.cat([places.flatten(1), self.coarse(maps)], dim=1)
 
 
 class PolicyNetwork(nn.Module):

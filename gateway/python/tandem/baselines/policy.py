@@ -18,7 +18,7 @@ from ..policy_server import Infer, PolicyServer, serve_policy
 from .data import CLOCK_S
 from .learner import scaled, unscaled
 from .maps import key
-from .networks import PolicyNetwork
+from .networks import PolicyNetwork, as_seen
 from .settings import TrainingSettings
 from .training import POLICY_FILE
 
@@ -70,7 +70,7 @@ class Baseline:
         """
         chunks = np.empty((self.settings.chunk_rows, len(robots), 35), np.float32)
         place = {robot: number for number, robot in enumerate(robots)}
-        seen = torch.from_numpy(pictures).permute(0, 3, 1, 2).float().div(255)
+        seen = as_seen(torch.from_numpy(pictures))
         sensed = torch.from_numpy(states)
         for outputs, (network, inputs, scales) in self._answers.items():
             if not set(outputs) <= place.keys():
