@@ -181,6 +181,17 @@ def test_eyes_are_shown_the_same_in_training_as_in_play() -> None:
         assert np.allclose(shown.float().permute(0, 1, 3, 4, 2), varied, atol=error)
 
 
+def test_robots_that_are_told_to_hardly_walk_stand() -> None:
+    torch()
+    policy: Any = import_module("tandem.baselines.policy")
+    rows = np.full((3, 2, 35), 0.01, np.float32)
+    rows[1, 0, 31:34] = [0.0, -0.031, 0.0]
+    rows[1, 1, 31:34] = [-0.02, 0.02, -0.051]
+    told = rows.copy()
+    told[[0, 2], :, 31:34] = 0.0
+    assert np.array_equal(policy.stood_still(rows), told)
+
+
 @pytest.mark.parametrize("kind", get_args(PolicyKind))
 def test_nothing_is_learned_from_rows_after_the_end(kind: PolicyKind) -> None:
     torch()
