@@ -171,7 +171,7 @@ def test_eyes_are_shown_the_same_in_training_as_in_play() -> None:
     pictures = generator.integers(0, 256, (3, 2, 6, 8, 3), dtype=np.uint8)
     gain = generator.uniform(0.7, 1.3, (3, 2, 1, 1, 3)).astype(np.float32)
     offset = generator.uniform(-0.1, 0.1, (3, 2, 1, 1, 1)).astype(np.float32)
-    told, varied = (2 * values - 1 for values in (pictures / 255, np.clip(pictures / 255 * gain + offset, 0, 1)))
+    told, varied = (2 * values - 1 for values in (pictures / 255, np.minimum(1, np.maximum(0, pictures / 255 * gain + offset))))
     shown = as_seen(torch().from_numpy(pictures))
     assert shown.shape == (3, 2, 3, 6, 8)
     assert np.allclose(shown.permute(0, 1, 3, 4, 2), told, atol=1e-5)
@@ -184,11 +184,14 @@ def test_eyes_are_shown_the_same_in_training_as_in_play() -> None:
 def test_robots_that_are_told_to_hardly_walk_stand() -> None:
     torch()
     policy: Any = import_module("tandem.baselines.policy")
-    rows = np.full((3, 2, 35), 0.01, np.float32)
-    rows[1, 0, 31:34] = [0.0, -0.031, 0.0]
-    rows[1, 1, 31:34] = [-0.02, 0.02, -0.051]
-    told = rows.copy()
-    told[[0, 2], :, 31:34] = 0.0
+    walks = np.array([[0.0, -0.031, 0.0], [-0.02, 0.02, -0.051]], np.float32)
+    stands = np.array([[0.02, -0.02, 0.04], [0.0, 0.0, 0.0]], np.float32)
+    held = np.full((2, 31), 0.01, np.float32)
+    height = np.full((2, 1), 0.75, np.float32)
+    rows, told = (
+        np.stack([np.concatenate([held, velocities, height], axis=1) for velocities in (walks, slow)])
+        for slow in (stands, np.zeros_like(stands))
+    )
     assert np.array_equal(policy.stood_still(rows), told)
 
 
