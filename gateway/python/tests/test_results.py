@@ -197,10 +197,10 @@ def test_the_command_line_is_whole(tmp_path: Path, capfd: pytest.CaptureFixture[
 
 
 ENDLESS = """
-import sys, tandem
+import os, sys, tandem
 
 def policy(episode):
-    print("begun", flush=True)
+    os.write(1, b"begun\\n")  # whole, where `print` of two threads mixes its lines
     while True:
         episode.wait(1)
 
