@@ -40,7 +40,7 @@ def parser() -> argparse.ArgumentParser:
     recipe.add_argument("task", metavar="TASK")
     recipe.add_argument("--out", metavar="DIR", help="folder for all of it [default: runs/baselines/TASK]")
     defaults = Recipe()
-    recipe.add_argument("--demonstrations", metavar="SEEDS", help="[default: as the task asks for]")
+    recipe.add_argument("--demonstrations", default=defaults.demonstrations, metavar="SEEDS", help="[default: %(default)s]")
     recipe.add_argument("--seeds", default=defaults.seeds, metavar="SEEDS", help="of the evaluations [default: %(default)s]")
     recipe.add_argument("--jobs", type=int, metavar="N", help="worlds side by side, and threads [default: the machine's cores]")
     _add_settings(recipe)

@@ -15,9 +15,6 @@ from ..errors import TandemError
 from .maps import MAP_FILE
 from .settings import TrainingSettings
 
-DEMONSTRATIONS = "2000-2249"
-"""Seeds of a task's demonstrations."""
-
 DISTURB = 1.0
 """How much demonstrations are disturbed: a policy needs to have seen how it goes on from beside the way."""
 
@@ -33,9 +30,6 @@ LONGER = ("trash_collection", "co_carry", "table_align", "move_house", "cart_ser
 
 LONGER_STEPS = 12000
 
-MORE_DEMONSTRATIONS = "2000-2499"
-"""Theirs: robots that walk come from more places, and errors on held-out episodes no longer fall with more steps."""
-
 WIDE = 2
 """How many times as far as the benchmark's randomisation things are moved where that shows what a policy sees."""
 
@@ -47,8 +41,8 @@ WIDER = {"handover": 4, "co_pouring": 4}
 class Recipe:
     """What is made and played."""
 
-    demonstrations: str | None = None
-    """Seeds of the demonstrations, of which those are kept that succeed. None: `DEMONSTRATIONS`, or more where robots walk."""
+    demonstrations: str = "2000-2249"
+    """Seeds of the demonstrations, of which those are kept that succeed."""
 
     seeds: str = "1-100"
     """Seeds of the evaluations."""
@@ -94,7 +88,7 @@ def run_recipe(
     # An episode that does not end with its success shows how hands are drawn back from what they have put down.
     disturbed = ["--disturb", f"{DISTURB:g}", "--disclosure", "end", "--only-successful", "--no-reports"]
     spread = ["--spread", str(wide_spread(task))]
-    seeds = ["--seeds", recipe.demonstrations or (MORE_DEMONSTRATIONS if task in LONGER else DEMONSTRATIONS)]
+    seeds = ["--seeds", recipe.demonstrations]
     tandem("collect", *benchmark, *spread, *disturbed, *seeds, *side_by_side, "--out", demonstrations)
     pictures = ["--images", "png", "--size", SIZE, "--rate", str(RATE_HZ)]
     tandem("export", "lerobot", demonstrations, data, *pictures, *side_by_side)
