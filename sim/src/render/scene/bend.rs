@@ -12,18 +12,19 @@ pub struct Bend {
     pub slope_1_m: Option<Matrix>,
 }
 
-/// Corners have the normals that a bend gives them, but for this.
+/// Corners have the normals that a bend gives them, but for this much of their direction.
 const TOLERANCE: f32 = 1e-3;
 
 impl TriangleMesh {
     /// The bends of the mesh, and of each triangle which of them is its.
     pub(in crate::render) fn bends(&self) -> (Vec<Bend>, Vec<usize>) {
+        let ellipsoid = Bend::of_ellipsoid(self.corners_m());
         let mut bends: Vec<Bend> = Vec::new();
         let mut of_triangles = Vec::with_capacity(self.triangles.len());
         for corners in &self.triangles {
             let corners = corners.map(|corner| self.vertices[corner as usize]);
             let same = bends.iter().rposition(|bend| bend.fits(&corners)).unwrap_or_else(|| {
-                bends.push(Bend::of(&corners));
+                bends.push(Bend::of(&corners, ellipsoid));
                 bends.len() - 1
             });
             of_triangles.push(same);
@@ -33,31 +34,34 @@ impl TriangleMesh {
 }
 
 impl Bend {
-    /// The bend of a plane, else of a cylinder along z, else of a sphere, else of these corners alone.
-    fn of(corners: &[Vertex; 3]) -> Bend {
+    /// That of the ellipsoid in a box: the gradient of (x / r_x)^2 + (y / r_y)^2 + (z / r_z)^2 about the middle.
+    fn of_ellipsoid([low, high]: [Vector; 2]) -> Bend {
+        let (middle, radii_m) = ((low + high) * 0.5, ((high - low) * 0.5).max(Vector::splat(f32::EPSILON)));
+        let slope_1_m = Matrix::from_diagonal(radii_m.min_element() / (radii_m * radii_m));
+        Bend { normal: -(slope_1_m * middle), slope_1_m: Some(slope_1_m) }
+    }
+
+    /// The bend of a plane, else of a surface whose normals are linear in each coordinate by itself, as spheres' and those of
+    /// cylinders along an axis, else of the whole mesh's ellipsoid, else of these corners alone.
+    fn of(corners: &[Vertex; 3], ellipsoid: Bend) -> Bend {
         let [a, b, c] = corners;
         let flat = Bend { normal: a.normal, slope_1_m: None };
-        // The longest difference says most about the radius.
-        let by_length = |(p, q): &(&Vertex, &Vertex)| (q.normal - p.normal).length();
-        let (p, q) = [(a, b), (b, c), (c, a)]
-            .into_iter()
-            .max_by(|one, other| by_length(one).total_cmp(&by_length(other)))
-            .expect("there are three");
-        let round = |axes: Vector| {
-            let (across_m, turned) = ((q.position_m - p.position_m) * axes, (q.normal - p.normal) * axes);
-            let slope_1_m = Matrix::from_diagonal(axes * (turned.dot(across_m) / across_m.length_squared()));
-            Bend { normal: p.normal - slope_1_m * p.position_m, slope_1_m: Some(slope_1_m) }
-        };
-        [flat, round(Vector::new(1.0, 1.0, 0.0)), round(Vector::ONE)]
-            .into_iter()
-            .find(|bend| bend.fits(corners))
-            .unwrap_or_else(|| Bend::between(corners))
+        let (mut turned, mut across_m2) = (Vector::ZERO, Vector::ZERO);
+        for (p, q) in [(a, b), (b, c), (c, a)] {
+            let across_m = q.position_m - p.position_m;
+            turned += (q.normal - p.normal) * across_m;
+            across_m2 += across_m * across_m;
+        }
+        let slope_1_m = Matrix::from_diagonal(turned / across_m2.max(Vector::splat(f32::MIN_POSITIVE)));
+        let round = Bend { normal: a.normal - slope_1_m * a.position_m, slope_1_m: Some(slope_1_m) };
+        let known = [flat, round, ellipsoid].into_iter().find(|bend| bend.fits(corners));
+        known.unwrap_or_else(|| Bend::between(corners))
     }
 
     fn fits(&self, corners: &[Vertex; 3]) -> bool {
         corners.iter().all(|corner| {
             let bent = self.slope_1_m.map_or(Vector::ZERO, |slope_1_m| slope_1_m * corner.position_m);
-            (self.normal + bent - corner.normal).length() < TOLERANCE
+            ((self.normal + bent).normalize_or_zero() - corner.normal).length() < TOLERANCE
         })
     }
 

@@ -20,9 +20,12 @@ pub struct TriangleMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Around a circle, and from pole to pole: 120 triangles a sphere.
-const SEGMENTS: u32 = 12;
-const RINGS: u32 = 6;
+/// Bands from pole to pole of a shape with so large a radius, an even number, and half as many as there are corners around it. Edges lie
+/// up to 1.1 mm inside of thin shapes, of larger ones a thirtieth of the radius.
+fn rings(radius_m: f32) -> u32 {
+    if radius_m < 0.015 { 4 } else { 6 }
+}
+
 /// An unbounded plane is drawn this large.
 const PLANE_M: f32 = 20.0;
 
@@ -54,25 +57,11 @@ impl TriangleMesh {
 
     /// A capsule along z; with no length, a sphere.
     pub fn capsule(radius_m: f32, half_length_m: f32) -> TriangleMesh {
-        let mut mesh = TriangleMesh::default();
-        for ring in 0..=RINGS {
-            let polar_rad = PI * ring as f32 / RINGS as f32;
-            let middle = 2 * ring == RINGS;
-            let upper = 2 * ring <= RINGS;
-            mesh.ring(polar_rad, radius_m, if upper { half_length_m } else { -half_length_m });
-            if middle && half_length_m > 0.0 {
-                mesh.ring(polar_rad, radius_m, -half_length_m);
-            }
-        }
-        let rings = mesh.vertices.len() as u32 / (SEGMENTS + 1);
-        for ring in 0..rings - 1 {
-            mesh.join(ring * (SEGMENTS + 1), (ring + 1) * (SEGMENTS + 1));
-        }
-        mesh
+        TriangleMesh::round(rings(radius_m), radius_m, half_length_m)
     }
 
     pub fn ellipsoid(radii_m: Vector) -> TriangleMesh {
-        let mut mesh = TriangleMesh::sphere(1.0);
+        let mut mesh = TriangleMesh::round(rings(radii_m.max_element()), 1.0, 0.0);
         for vertex in &mut mesh.vertices {
             vertex.position_m *= radii_m;
             vertex.normal = (vertex.normal / radii_m).normalize();
@@ -83,21 +72,22 @@ impl TriangleMesh {
     /// A cylinder along z.
     pub fn cylinder(radius_m: f32, half_length_m: f32) -> TriangleMesh {
         let mut mesh = TriangleMesh::default();
+        let segments = 2 * rings(radius_m);
         let rim = |z| {
-            (0..=SEGMENTS).map(move |i| {
-                let (sin, cos) = (TAU * i as f32 / SEGMENTS as f32).sin_cos();
+            (0..=segments).map(move |i| {
+                let (sin, cos) = (TAU * i as f32 / segments as f32).sin_cos();
                 (Vector::new(radius_m * cos, radius_m * sin, z), Vector::new(cos, sin, 0.0))
             })
         };
         for z in [half_length_m, -half_length_m] {
             mesh.vertices.extend(rim(z).map(|(position_m, normal)| Vertex { position_m, normal }));
         }
-        mesh.join(0, SEGMENTS + 1);
+        mesh.join(0, segments + 1, segments);
         for z in [half_length_m, -half_length_m] {
             let normal = Vector::Z * z.signum();
             let first = mesh.vertices.len() as u32;
             mesh.vertices.extend(rim(z).map(|(position_m, _)| Vertex { position_m, normal }));
-            for i in 1..SEGMENTS - 1 {
+            for i in 1..segments - 1 {
                 let fan = if z > 0.0 { [0, i, i + 1] } else { [0, i + 1, i] };
                 mesh.triangles.push(fan.map(|corner| first + corner));
             }
@@ -149,25 +139,46 @@ impl TriangleMesh {
 
     /// Centre and radius of a sphere around the mesh.
     pub fn bounds(&self) -> (Vector, f32) {
-        let points = self.vertices.iter().map(|vertex| vertex.position_m);
-        let low = points.clone().fold(Vector::INFINITY, Vector::min);
-        let high = points.fold(Vector::NEG_INFINITY, Vector::max);
+        let [low, high] = self.corners_m();
         ((low + high) * 0.5, (high - low).length() * 0.5)
+    }
+
+    /// The corners of the box around the mesh, with the least coordinates and the greatest.
+    pub fn corners_m(&self) -> [Vector; 2] {
+        let points = self.vertices.iter().map(|vertex| vertex.position_m);
+        [points.clone().fold(Vector::INFINITY, Vector::min), points.fold(Vector::NEG_INFINITY, Vector::max)]
     }
 
     /// The number of the axis along which the mesh is longest.
     pub fn longest_axis(&self) -> usize {
-        let points = self.vertices.iter().map(|vertex| vertex.position_m);
-        let low = points.clone().fold(Vector::INFINITY, Vector::min);
-        (points.fold(Vector::NEG_INFINITY, Vector::max) - low).max_position()
+        let [low, high] = self.corners_m();
+        (high - low).max_position()
+    }
+
+    /// A capsule of so many bands; with no length, a sphere.
+    fn round(rings: u32, radius_m: f32, half_length_m: f32) -> TriangleMesh {
+        let (mut mesh, segments) = (TriangleMesh::default(), 2 * rings);
+        for ring in 0..=rings {
+            let polar_rad = PI * ring as f32 / rings as f32;
+            let upper = 2 * ring <= rings;
+            mesh.ring(polar_rad, radius_m, if upper { half_length_m } else { -half_length_m }, segments);
+            if 2 * ring == rings && half_length_m > 0.0 {
+                mesh.ring(polar_rad, radius_m, -half_length_m, segments);
+            }
+        }
+        let circles = mesh.vertices.len() as u32 / (segments + 1);
+        for circle in 0..circles - 1 {
+            mesh.join(circle * (segments + 1), (circle + 1) * (segments + 1), segments);
+        }
+        mesh
     }
 
     /// One circle of a sphere, moved along z.
-    fn ring(&mut self, polar_rad: f32, radius_m: f32, shift_m: f32) {
+    fn ring(&mut self, polar_rad: f32, radius_m: f32, shift_m: f32, segments: u32) {
         // Rounding makes the sine negative at the lower pole, where all points must be one.
         let across = polar_rad.sin().max(0.0);
-        for i in 0..=SEGMENTS {
-            let (sin, cos) = (TAU * i as f32 / SEGMENTS as f32).sin_cos();
+        for i in 0..=segments {
+            let (sin, cos) = (TAU * i as f32 / segments as f32).sin_cos();
             let normal = Vector::new(across * cos, across * sin, polar_rad.cos());
             let position_m = normal * radius_m + Vector::new(0.0, 0.0, shift_m);
             self.vertices.push(Vertex { position_m, normal });
@@ -175,8 +186,8 @@ impl TriangleMesh {
     }
 
     /// A band of triangles between two circles, the upper one first.
-    fn join(&mut self, upper: u32, lower: u32) {
-        for i in 0..SEGMENTS {
+    fn join(&mut self, upper: u32, lower: u32, segments: u32) {
+        for i in 0..segments {
             let (a, b, c, d) = (upper + i, upper + i + 1, lower + i, lower + i + 1);
             for triangle in [[a, c, d], [a, d, b]] {
                 let [p, q, r] = triangle.map(|corner| self.vertices[corner as usize].position_m);

@@ -3,6 +3,7 @@
 pub mod bend;
 pub mod camera;
 pub mod faces;
+mod hidden;
 pub mod mesh;
 pub mod prepared;
 
@@ -90,6 +91,7 @@ impl Scenery {
             let carrier = Carrier::Object(object);
             parts.extend(drawn(&model.geoms).map(|geom| part(geom, carrier, geom.rgba, id)));
         }
+        hidden::take_out(&mut parts);
         Scenery { parts, focus_radius_m: FOCUS_RADIUS_M, light: Light::default() }
     }
 
