@@ -22,10 +22,10 @@ pub struct Outstanding {
 pub struct Busy<'a>(&'a Outstanding);
 
 impl Outstanding {
-    /// One answer more is waited for.
-    pub fn one(&self) -> Busy<'_> {
-        *self.left() += 1;
-        Busy(self)
+    /// So many answers more are waited for: all of them from now on, however soon the first one comes.
+    pub fn more(&self, count: usize) -> Vec<Busy<'_>> {
+        *self.left() += count;
+        (0..count).map(|_| Busy(self)).collect()
     }
 
     /// Keeps the connection of one that has answered alive until all have.
@@ -70,7 +70,8 @@ mod tests {
     #[test]
     fn who_is_done_is_kept_alive_until_all_are() {
         let outstanding = Outstanding::default();
-        let (first, second) = (outstanding.one(), outstanding.one());
+        let mut busy = outstanding.more(2).into_iter();
+        let (first, second) = (busy.next(), busy.next());
         let (beaten, beats) = mpsc::channel();
         std::thread::scope(|scope| {
             let outstanding = &outstanding;

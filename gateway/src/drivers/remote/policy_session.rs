@@ -58,12 +58,9 @@ impl<'a> PolicySession<'a> {
         };
         let opened: Vec<Result<Box<dyn PolicyClient>, RemoteError>> = thread::scope(|scope| {
             let connect = &connect;
-            let connecting = urls.iter().zip(plan.queries());
+            let connecting = urls.iter().zip(plan.queries()).zip(outstanding.more(urls.len()));
             let connecting: Vec<_> = connecting
-                .map(|(url, robots)| {
-                    let busy = outstanding.one();
-                    scope.spawn(move || connect(url, &robots, busy))
-                })
+                .map(|((url, robots), busy)| scope.spawn(move || connect(url, &robots, busy)))
                 .collect();
             connecting.into_iter().map(joined).collect()
         });
@@ -127,10 +124,10 @@ impl<'a> PolicySession<'a> {
                 let outstanding = Outstanding::default();
                 thread::scope(|scope| {
                     let (ask, outstanding) = (&ask, &outstanding);
-                    let asking = own.iter_mut().zip(&queries);
+                    let busy = outstanding.more(own.len());
+                    let asking = own.iter_mut().zip(&queries).zip(busy);
                     let asked: Vec<_> = asking
-                        .map(|(client, robots)| {
-                            let busy = outstanding.one();
+                        .map(|((client, robots), busy)| {
                             scope.spawn(move || {
                                 let answer = ask(&mut **client, robots);
                                 drop(busy);
