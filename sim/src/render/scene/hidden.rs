@@ -2,73 +2,73 @@
 
 use rapier3d::math::Vector;
 
-use crate::render::Part;
+use crate::render::{Carrier, Part};
 
 /// What lies less deep stays: rounding may bring it out.
 const DEPTH_M: f32 = 1e-4;
 /// Corners of a convex mesh may lie so far in front of its faces.
 const ROUNDING_M: f32 = 1e-5;
 
-/// A convex part, in its carrier's frame.
-struct Hull {
-    part: usize,
-    /// Normals of its faces, outwards, and how far along them the faces lie.
-    planes_m: Vec<(Vector, f32)>,
+/// A part in its carrier's frame.
+struct Placed {
+    corners_m: Vec<Vector>,
+    /// Of a sphere around it.
     centre_m: Vector,
     radius_m: f32,
+    /// Normals of its faces, outwards, and how far along them the faces lie, if it is convex.
+    hull_m: Option<Vec<(Vector, f32)>>,
 }
 
 /// Takes triangles that lie inside of another part of their carrier out of the parts' meshes, and parts that have no other.
 pub fn take_out(parts: &mut Vec<Part>) {
-    let hulls: Vec<Hull> = (0..).zip(&**parts).filter_map(|(number, part)| Hull::of(number, part)).collect();
-    for number in 0..parts.len() {
-        let (corners_m, centre_m, radius_m) = placed(&parts[number]);
-        let reaches = |hull: &Hull| (hull.centre_m - centre_m).length() < hull.radius_m + radius_m;
-        let around = |hull: &&Hull| {
-            hull.part != number && parts[hull.part].carrier == parts[number].carrier && reaches(hull)
+    let placed: Vec<Placed> = parts.iter().map(Placed::of).collect();
+    let carriers: Vec<Carrier> = parts.iter().map(|part| part.carrier).collect();
+    for (number, part) in parts.iter_mut().enumerate() {
+        let own = &placed[number];
+        let others = placed.iter().enumerate().filter(|(other, _)| *other != number);
+        let around = others.filter(|(other, placed)| carriers[*other] == part.carrier && placed.reaches(own));
+        let hulls: Vec<_> = around.filter_map(|(_, placed)| placed.hull_m.as_deref()).collect();
+        let hides = |hull: &[(Vector, f32)], triangle: &[u32; 3]| {
+            triangle.iter().all(|corner| is_deeper(hull, own.corners_m[*corner as usize], DEPTH_M))
         };
-        let around: Vec<&Hull> = hulls.iter().filter(around).collect();
-        let hidden = |hull: &&Hull, triangle: &[u32; 3]| {
-            triangle.iter().all(|corner| hull.is_deeper(corners_m[*corner as usize], DEPTH_M))
-        };
-        let mesh = &mut parts[number].mesh;
-        mesh.triangles.retain(|triangle| !around.iter().any(|hull| hidden(hull, triangle)));
+        part.mesh.triangles.retain(|triangle| !hulls.iter().any(|hull| hides(hull, triangle)));
     }
     parts.retain(|part| !part.mesh.triangles.is_empty());
 }
 
-/// Corners of a part, and centre and radius of a sphere around it, in its carrier's frame.
-fn placed(part: &Part) -> (Vec<Vector>, Vector, f32) {
-    let (centre_m, radius_m) = part.mesh.bounds();
-    let corners = part.mesh.vertices.iter();
-    let corners_m = corners.map(|corner| part.carrier_from_mesh * corner.position_m).collect();
-    (corners_m, part.carrier_from_mesh * centre_m, radius_m)
-}
-
-impl Hull {
-    /// `None` where a part is not convex, or has no inside.
-    fn of(number: usize, part: &Part) -> Option<Hull> {
-        let (corners_m, centre_m, radius_m) = placed(part);
-        let plane = |triangle: &[u32; 3]| {
+impl Placed {
+    fn of(part: &Part) -> Placed {
+        let (centre_m, radius_m) = part.mesh.bounds();
+        let centre_m = part.carrier_from_mesh * centre_m;
+        let corners = part.mesh.vertices.iter();
+        let corners_m: Vec<Vector> =
+            corners.map(|corner| part.carrier_from_mesh * corner.position_m).collect();
+        let face = |triangle: &[u32; 3]| {
             let [a, b, c] = triangle.map(|corner| corners_m[corner as usize]);
             let normal = (b - a).cross(c - a).normalize_or_zero();
             (normal, normal.dot(a))
         };
-        let planes_m = part.mesh.triangles.iter().map(plane).collect();
-        let hull = Hull { part: number, planes_m, centre_m, radius_m };
-        let is_convex = corners_m.iter().all(|corner_m| hull.is_deeper(*corner_m, -ROUNDING_M));
-        (is_convex && hull.is_deeper(centre_m, DEPTH_M)).then_some(hull)
+        let faces_m: Vec<_> = part.mesh.triangles.iter().map(face).collect();
+        let is_convex = corners_m.iter().all(|corner_m| is_deeper(&faces_m, *corner_m, -ROUNDING_M));
+        // What is flat has no inside.
+        let hull_m = (is_convex && is_deeper(&faces_m, centre_m, DEPTH_M)).then_some(faces_m);
+        Placed { corners_m, centre_m, radius_m, hull_m }
     }
 
-    fn is_deeper(&self, point_m: Vector, depth_m: f32) -> bool {
-        self.planes_m.iter().all(|(normal, along_m)| normal.dot(point_m) < along_m - depth_m)
+    fn reaches(&self, other: &Placed) -> bool {
+        (self.centre_m - other.centre_m).length() < self.radius_m + other.radius_m
     }
+}
+
+/// Whether a point is so deep behind all of some faces.
+fn is_deeper(faces_m: &[(Vector, f32)], point_m: Vector, depth_m: f32) -> bool {
+    faces_m.iter().all(|(normal, along_m)| normal.dot(point_m) < along_m - depth_m)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::{Carrier, Pattern, TriangleMesh};
+    use crate::render::{Pattern, TriangleMesh};
     use rapier3d::math::Pose;
 
     fn part(mesh: TriangleMesh, x_m: f32, carrier: Carrier) -> Part {
