@@ -46,12 +46,12 @@ def rows_of(data_set: Path) -> dict[str, Any]:
     return {key: np.array(table[key].to_pylist()) for key in table.column_names if not key.startswith("observation.images")}
 
 
-def film(data_set: Path, key: str) -> list[NDArray[np.uint8]]:
+def film(data_set: Path, key: str, pixels: str = "rgb24") -> list[NDArray[Any]]:
     with av.open(str(data_set / f"videos/{key}/chunk-000/file-000.mp4")) as container:
         frames = list(container.decode(video=0))
     times = [float(frame.pts * frame.time_base) for frame in frames]
     assert times == pytest.approx([number / 10 for number in range(len(frames))])
-    return [frame.to_ndarray(format="rgb24") for frame in frames]
+    return [frame.to_ndarray(format=pixels) for frame in frames]
 
 
 def noise_ratio_db(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> float:
@@ -181,6 +181,43 @@ def test_a_robot_has_episodes_of_its_own_and_pictures_in_the_table(runs: Path, t
     assert [row["task"] for row in tasks] == list(recording.instructions.values())
 
 
+def test_depth_lies_beside_the_pictures_as_lerobot_stores_it(runs: Path, tmp_path: Path) -> None:
+    size = (64, 48)
+    (exported,) = export_lerobot(runs, tmp_path / "films", ExportSettings(size=size, depth=True))
+    info = json.loads((exported.folder / "meta/info.json").read_text())
+    feature = info["features"][f"{EYES}_depth"]
+    assert (feature["dtype"], feature["shape"]) == ("video", [48, 64, 1])
+    about = feature["info"]
+    assert about["is_depth_map"] and not info["features"][EYES]["info"]["is_depth_map"]
+    assert (about["video.codec"], about["video.pix_fmt"], about["video.channels"]) == ("hevc", "gray12le", 1)
+    recording = tandem.Recording(runs / "handover-2011")
+    nearest_m, farthest_m, shift_m = (about[f"video.{name}"] for name in ("depth_min", "depth_max", "shift"))
+    assert about["video.use_log"]
+    low, high = math.log(nearest_m + shift_m), math.log(farthest_m + shift_m)
+    told = film(exported.folder, f"{EYES}_depth", "gray12le")
+    for row, step in ((5, 0), (9, 20), (12, 35)):
+        seen_m = recording.picture("A", step, size=size).depth_m
+        told_m = np.exp(low + told[row] / 4095 * (high - low)) - shift_m
+        assert np.abs(told_m - seen_m.clip(nearest_m, farthest_m)).max() < 0.0017
+        assert 0.2 < np.median(told_m) < 5.0
+    found = json.loads((exported.folder / "meta/stats.json").read_text())[f"{EYES}_depth"]
+    told_mm = (np.exp(low + np.stack(told) / 4095 * (high - low)) - shift_m) * 1000
+    assert np.ravel(found["mean"]) == pytest.approx([told_mm.mean()])
+    assert np.ravel(found["max"]) == pytest.approx([told_mm.max()])
+    assert np.array(found["q50"]).shape == (1, 1, 1)
+
+    settings = ExportSettings(view="robot", images="png", size=size, depth=True)
+    (exported,) = export_lerobot(runs, tmp_path / "files", settings, only_good=True)
+    key = "observation.images.egocentric_depth"
+    feature = json.loads((exported.folder / "meta/info.json").read_text())["features"][key]
+    assert (feature["dtype"], feature["info"]) == ("image", {"is_depth_map": True, "depth_unit": "mm"})
+    files = parquet.read_table(exported.folder / "data/chunk-000/file-000.parquet")[key]
+    with av.open(BytesIO(files[8 + 2].as_py()["bytes"])) as container:
+        (frame,) = container.decode(video=0)
+    seen_mm = recording.picture("B", 10, size=size).depth_m.clip(0.01, 10.0) * 1000
+    assert np.abs(frame.to_ndarray(format="gray16le") - seen_mm).max() <= 0.51
+
+
 def test_version_2_has_files_for_each_episode(runs: Path, whole: Path, tmp_path: Path) -> None:
     settings = ExportSettings(version="v2", size=SIZE, codec="h264")
     (exported,) = export_lerobot(runs, tmp_path / "set", settings)
@@ -205,6 +242,10 @@ def test_what_cannot_be_exported_is_said(runs: Path, tmp_path: Path, capsys: pyt
         export_lerobot(runs, tmp_path / "set", ExportSettings(cameras=("C",)))
     with pytest.raises(tandem.TandemError, match="even number"):
         ExportSettings(size=(321, 240))
+    with pytest.raises(tandem.TandemError, match="since version 3"):
+        ExportSettings(version="v2", depth=True)
+    with pytest.raises(tandem.TandemError, match="name cameras"):
+        ExportSettings(cameras=(), depth=True)
     assert main(["lerobot", "--cameras=none", str(tmp_path / "nothing"), str(tmp_path / "set2")]) == 1
     assert "no episode.mcap in" in capsys.readouterr().err
     assert not (tmp_path / "set2").exists()

@@ -49,6 +49,9 @@ struct LerobotArgs {
     /// What films are written with: H.264, which is written and read faster, or AV1, as LeRobot writes them itself.
     #[arg(long, value_name = "CODEC", default_value = "h264", value_parser = ["h264", "av1"])]
     codec: String,
+    /// Depth beside the pictures, as LeRobot stores it since 0.6: films of 12 bits in HEVC, or TIFF files within the tables.
+    #[arg(long)]
+    depth: bool,
     /// Size of the pictures.
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "320x240")]
     size: String,
@@ -80,7 +83,11 @@ impl LerobotArgs {
             ("rate", rate),
         ];
         let texts = texts.into_iter().map(|(flag, value)| format!("--{flag}={value}"));
-        let switches = [(self.only_successful, "--only-successful"), (self.only_good, "--only-good")];
+        let switches = [
+            (self.depth, "--depth"),
+            (self.only_successful, "--only-successful"),
+            (self.only_good, "--only-good"),
+        ];
         let switches = switches.into_iter().filter(|(given, _)| *given).map(|(_, flag)| flag.into());
         let jobs = self.jobs.map(|jobs| format!("--jobs={jobs}"));
         let paths = [runs, out].map(|path| path.display().to_string());

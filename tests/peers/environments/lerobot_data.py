@@ -4,10 +4,10 @@
     pip install "./gateway/python[lerobot]"
     python tests/peers/environments/lerobot_data.py
 
-Two demonstrations of Handover are recorded and exported with both codecs, as PNG, for each robot, and as version 2.1, which
-LeRobot's own converter takes over. Ten rows of each are drawn again from the recording and compared with what LeRobot reads; its
-statistics of the same rows are compared with ours; the actions are played in a new episode of the seed; `lerobot-train` trains an
-ACT for two steps.
+Two demonstrations of Handover are recorded and exported with both codecs, as PNG, for each robot, with depth as films and as
+files, and as version 2.1, which LeRobot's own converter takes over. Ten rows of each are drawn again from the recording and
+compared with what LeRobot reads; its statistics of the same rows are compared with ours; the actions are played in a new episode
+of the seed; `lerobot-train` trains an ACT for two steps.
 """
 
 import subprocess
@@ -28,7 +28,9 @@ PROGRAMS = Path(sys.executable).parent
 SEEDS = (2000, 2001)
 SAMPLES = 10
 # What the codecs lose at their settings, small pictures more than large ones; PNG loses nothing.
-LEAST_DB = {"av1": 30.0, "h264": 28.0, "png": 90.0}
+LEAST_DB = {"av1": 30.0, "h264": 28.0, "png": 90.0, "depth_png": 90.0}
+# Half of a step at 10 m and of a millimetre, to which LeRobot rounds.
+DEPTH_MM = 2.2
 ACT = {
     "dim_model": 64,
     "n_heads": 2,
@@ -53,7 +55,7 @@ def opened(folder):
 def compare(name, folder, recordings, stride, robot=None):
     """Rows that LeRobot reads against the recordings."""
     data_set = opened(folder)
-    worst_db = np.inf
+    worst_db, worst_mm = np.inf, 0.0
     for row in np.linspace(0, len(data_set) - 1, SAMPLES).astype(int):
         item = data_set[int(row)]
         episode, frame = item["episode_index"].item(), item["frame_index"].item()
@@ -65,13 +67,20 @@ def compare(name, folder, recordings, stride, robot=None):
             item["task"]
         )
         for key in data_set.meta.camera_keys:
-            camera = key.removeprefix("observation.images.").removesuffix("_egocentric")
+            camera = key.removeprefix("observation.images.").removesuffix("_depth").removesuffix("_egocentric")
             if camera == "egocentric":
                 camera = recording.robots[own]
             height, width = item[key].shape[1:]
+            if key in data_set.meta.depth_keys:
+                seen_mm = np.clip(recording.picture(camera, step, size=(width, height)).depth_m, 0.01, 10.0) * 1000
+                worst_mm = max(worst_mm, np.abs(item[key].numpy()[0] - seen_mm).max())
+                continue
             shown = np.round(item[key].numpy().transpose(1, 2, 0) * 255).astype(np.uint8)
             worst_db = min(worst_db, noise_ratio_db(shown, recording.colours(camera, step, size=(width, height))))
-    print(f"{name}: {data_set.num_episodes} episodes, {len(data_set)} rows, pictures at least {worst_db:.1f} dB")
+    assert bool(data_set.meta.depth_keys) == name.startswith("depth"), data_set.meta.depth_keys
+    assert worst_mm < DEPTH_MM, (name, worst_mm)
+    depth = f", depth within {worst_mm:.1f} mm" * bool(data_set.meta.depth_keys)
+    print(f"{name}: {data_set.num_episodes} episodes, {len(data_set)} rows, pictures at least {worst_db:.1f} dB{depth}")
     return data_set, worst_db
 
 
@@ -148,10 +157,12 @@ def main():
         tandem.main(["collect", "--tasks", "handover", "--seeds", seeds, "--protocol", "benchmark", "--out", str(runs)])
         recordings = [tandem.Recording(runs / f"episodes/handover-{seed}") for seed in SEEDS]
         cases = {
-            "av1": (ExportSettings(cameras=("egocentric", "third_person")), None),
-            "h264": (ExportSettings(codec="h264", rate_hz=25, size=(160, 120)), None),
+            "av1": (ExportSettings(cameras=("egocentric", "third_person"), codec="av1"), None),
+            "h264": (ExportSettings(rate_hz=25, size=(160, 120)), None),
             "png": (ExportSettings(images="png", size=(160, 120)), None),
             "robot": (ExportSettings(view="robot"), True),
+            "depth": (ExportSettings(cameras=("A", "third_person"), depth=True), None),
+            "depth_png": (ExportSettings(view="robot", images="png", size=(160, 120), depth=True), True),
             "v2": (ExportSettings(version="v2", size=(160, 120)), None),
         }
         for name, (settings, robot) in cases.items():

@@ -33,7 +33,7 @@ LONGER_STEPS = 12000
 WIDE = 2
 """How many times as far as the benchmark's randomisation things are moved where that shows what a policy sees."""
 
-WIDER = {"handover": 4, "co_pouring": 4}
+WIDER = {"handover": 4, "co_pouring": 4, "co_carry": 4}
 """Tasks that one demonstration, replayed blindly, solves too often even then."""
 
 

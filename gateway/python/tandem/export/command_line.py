@@ -28,6 +28,7 @@ def parser() -> argparse.ArgumentParser:
     lerobot.add_argument("--cameras", default="egocentric", metavar="CAMERAS")
     lerobot.add_argument("--images", choices=("video", "png"), default="video")
     lerobot.add_argument("--codec", choices=("h264", "av1"), default="h264")
+    lerobot.add_argument("--depth", action="store_true")
     lerobot.add_argument("--size", default="320x240", metavar="WIDTHxHEIGHT")
     lerobot.add_argument("--rate", type=int, choices=RATES_HZ, default=10)
     lerobot.add_argument("--only-successful", action="store_true")
@@ -67,6 +68,7 @@ def settings_of(given: argparse.Namespace) -> ExportSettings:
         cameras=cameras,
         images=given.images,
         codec=given.codec,
+        depth=given.depth,
         size=(int(sides[0]), int(sides[1])),
         rate_hz=given.rate,
     )

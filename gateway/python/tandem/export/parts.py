@@ -12,9 +12,9 @@ import numpy as np
 
 from ..recording import Recording
 from .columns import Column, View, columns, is_successful, moments, views
-from .pictures import Film, png
 from .settings import ExportSettings, library
-from .statistics import Colours, sampled
+from .shown import counted, shown
+from .statistics import Levels, sampled
 
 ROWS_FILE = "rows.parquet"
 PART_FILE = "part.json"
@@ -50,10 +50,9 @@ class Part:
         """Its film of a camera."""
         return self.folder / f"{key}.mp4"
 
-    def colours(self, key: str) -> Colours:
+    def counted(self, key: str) -> Levels:
         """What was counted of a camera's pictures."""
-        counted = self.about["colours"][key]
-        return Colours(counted["pictures"], counted["levels"])
+        return counted(self.about["counted"][key], self.features[key])
 
 
 def make_parts(path: Path, source: str, folder: Path, settings: ExportSettings, stop: threading.Event) -> list[Part]:
@@ -98,32 +97,18 @@ def _make(recording: Recording, view: View, source: str, folder: Path, settings:
     rows = moments(recording, settings)
     held = columns(recording, view, rows, settings.stride)
     features = {key: column.feature() for key, column in held.items()}
-    width, height = settings.size
-    colours = {key: Colours() for key in view.cameras}
-    files: dict[str, list[bytes]] = {}
-    films: dict[str, Film] = {}
-    for key in view.cameras:
-        if settings.images == "video":
-            films[key] = Film(folder / f"{key}.mp4", settings.size, settings.rate_hz, settings.codec)
-        else:
-            files[key] = []
-        kind = "video" if settings.images == "video" else "image"
-        features[key] = {"dtype": kind, "shape": [height, width, 3], "names": ["height", "width", "channels"]}
-    counted = sampled(len(rows))
+    seen = shown(view, folder, settings)
+    features |= {column.key: column.feature() for column in seen}
+    looked_at = sampled(len(rows))
     for number, step in enumerate(rows.tolist()):
         if stop.is_set():
             raise Stopped
         # All cameras of a moment one after another: they share its shadows.
-        for key, camera in view.cameras.items():
-            pixels = recording.colours(camera, step, size=settings.size)
-            if number in counted:
-                colours[key].add(pixels)
-            if key in films:
-                films[key].add(pixels)
-            else:
-                files[key].append(png(pixels))
-    for film in films.values():
-        film.finish()
+        for column in seen:
+            column.add(recording, step, is_counted=number in looked_at)
+    for column in seen:
+        column.finish()
+    files = {column.key: column.files for column in seen if column.files is not None}
     _write_rows(folder / ROWS_FILE, held, files)
     about = {
         "recording": source,
@@ -137,7 +122,9 @@ def _make(recording: Recording, view: View, source: str, folder: Path, settings:
         "build": recording.build,
         "length": len(rows),
         "features": features,
-        "colours": {key: {"pictures": seen.pictures, "levels": seen.levels.tolist()} for key, seen in colours.items()},
+        "counted": {
+            column.key: {"pictures": column.counted.pictures, "levels": column.counted.levels.tolist()} for column in seen
+        },
     }
     write_whole(folder / PART_FILE, json.dumps(about))
 

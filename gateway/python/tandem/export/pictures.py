@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from fractions import Fraction
 from io import BytesIO
 from pathlib import Path
@@ -14,38 +15,51 @@ from numpy.typing import NDArray
 from ..errors import TandemError
 from .settings import Codec, library
 
-Pixels = NDArray[np.uint8]
+Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
 KEY_FRAME_EVERY = 2
 """As LeRobot writes films: any picture is found by decoding two."""
 
-ENCODERS: dict[Codec, tuple[str, dict[str, str]]] = {
-    # A thread for each recording has the cores busy already.
-    "av1": ("libsvtav1", {"crf": "30", "preset": "12", "svtav1-params": "lp=1"}),
-    # Pictures follow each other as they are shown, so that films can be put behind one another.
-    "h264": ("libx264", {"crf": "23", "preset": "veryfast", "bf": "0", "threads": "1"}),
+
+@dataclass(frozen=True)
+class Encoding:
+    """How films are written. A thread for each recording has the cores busy already; and pictures follow each other as they
+    are shown, so that films can be put behind one another.
+    """
+
+    encoder: str
+    options: dict[str, str]
+    given: str = "rgb24"
+    """FFmpeg's name of what pictures are before they are encoded, and of what they are then."""
+    pixels: str = "yuv420p"
+
+
+ENCODINGS: dict[Codec, Encoding] = {
+    "av1": Encoding("libsvtav1", {"crf": "30", "preset": "12", "svtav1-params": "lp=1"}),
+    "h264": Encoding("libx264", {"crf": "23", "preset": "veryfast", "bf": "0", "threads": "1"}),
 }
 
 
 class Film:
     """A film under way; what is at `path` in the end is whole."""
 
-    def __init__(self, path: Path, size: tuple[int, int], rate_hz: int, codec: Codec) -> None:
+    def __init__(self, path: Path, size: tuple[int, int], rate_hz: int, encoding: Encoding) -> None:
         # The encoder of AV1 tells its settings to everybody's terminal.
         os.environ.setdefault("SVT_LOG", "1")
         self._av = library("av")
-        encoder, options = ENCODERS[codec]
         self._path, self._partial = path, path.with_suffix(".partial")
+        options = {**encoding.options, "g": str(KEY_FRAME_EVERY)}
         self._time_base = Fraction(1, rate_hz)
         self._pictures = 0
+        self._given = encoding.given
         self._container: Any = self._av.open(str(self._partial), "w", format="mp4")
-        self._stream = self._container.add_stream(encoder, rate=rate_hz, options={**options, "g": str(KEY_FRAME_EVERY)})
+        self._stream = self._container.add_stream(encoding.encoder, rate=rate_hz, options=options)
         self._stream.width, self._stream.height = size
-        self._stream.pix_fmt = "yuv420p"
+        self._stream.pix_fmt = encoding.pixels
 
     def add(self, pixels: Pixels) -> None:
         """Writes the next picture."""
-        frame = self._av.VideoFrame.from_ndarray(pixels, format="rgb24")
+        frame = self._av.VideoFrame.from_ndarray(pixels, format=self._given)
         frame.pts, frame.time_base = self._pictures, self._time_base
         self._pictures += 1
         self._container.mux(self._stream.encode(frame))
@@ -94,22 +108,27 @@ def film_info(path: Path, rate_hz: int) -> dict[str, Any]:
             "video.codec": stream.codec.canonical_name,
             "video.pix_fmt": stream.pix_fmt,
             "video.fps": rate_hz,
-            "video.channels": 3,
+            "video.channels": len(stream.format.components),
             "has_audio": False,
             "video.g": KEY_FRAME_EVERY,
             "is_depth_map": False,
         }
 
 
-def png(pixels: Pixels) -> bytes:
+def png(pixels: NDArray[np.uint8]) -> bytes:
     """A PNG file."""
-    av = library("av")
-    height, width, _ = pixels.shape
-    codec = av.CodecContext.create("png", "w")
-    codec.width, codec.height, codec.pix_fmt, codec.time_base = width, height, "rgb24", Fraction(1, 1)
     # A third of the time that FFmpeg's own level takes, for an eighth more bytes.
-    codec.options = {"compression_level": "1"}
+    return still(pixels, "png", "rgb24", {"compression_level": "1"})
+
+
+def still(pixels: Pixels, encoder: str, pixel_format: str, options: dict[str, str]) -> bytes:
+    """A file of one picture, by FFmpeg's names."""
+    av = library("av")
+    codec = av.CodecContext.create(encoder, "w")
+    codec.height, codec.width = pixels.shape[:2]
+    codec.pix_fmt, codec.time_base = pixel_format, Fraction(1, 1)
+    codec.options = options
     written = BytesIO()
-    for packet in [*codec.encode(av.VideoFrame.from_ndarray(pixels, format="rgb24")), *codec.encode(None)]:
+    for packet in [*codec.encode(av.VideoFrame.from_ndarray(pixels, format=pixel_format)), *codec.encode(None)]:
         written.write(bytes(packet))
     return written.getvalue()

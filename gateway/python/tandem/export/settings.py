@@ -42,6 +42,9 @@ class ExportSettings:
     codec: Codec = "h264"
     """What films are written with: H.264, which is written and read faster, or AV1, as LeRobot writes them itself."""
 
+    depth: bool = False
+    """Depth beside the pictures of every camera, as LeRobot stores it since 0.6."""
+
     size: tuple[int, int] = (320, 240)
     """Width and height of pictures in pixels."""
 
@@ -58,6 +61,10 @@ class ExportSettings:
             raise TandemError(f"no size; give width and height in pixels, each {SIDES_PX[0]} to {SIDES_PX[-1]}, as 320x240")
         if self.images == "video" and any(side % 2 for side in self.size):
             raise TandemError("films have an even number of pixels each way; give such a size, or images as png")
+        if self.depth and self.version == "v2":
+            raise TandemError("LeRobot stores depth since version 3 of its format; give that, or no depth")
+        if self.depth and not self.cameras:
+            raise TandemError("depth is what cameras see; name cameras, or ask for no depth")
 
     @property
     def stride(self) -> int:

@@ -5,14 +5,15 @@ histograms, and means of episodes' quantiles for a whole data set.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
+if TYPE_CHECKING:
+    from typing_extensions import Self
 
-LEVELS = 256
+QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 
 FEWEST_SAMPLES = 100
 MOST_SAMPLES = 10_000
@@ -45,29 +46,35 @@ def sampled(pictures: int) -> set[int]:
     return set(np.round(np.linspace(0, pictures - 1, count)).astype(int).tolist())
 
 
-class Colours:
-    """How often each level of red, green and blue occurs in pictures."""
+class Levels:
+    """How often each level of each channel occurs in pictures."""
+
+    channels: ClassVar[int]
+    values: ClassVar[NDArray[np.float64]]
+    """What levels stand for."""
 
     def __init__(self, pictures: int = 0, levels: Sequence[Sequence[int]] | None = None) -> None:
         self.pictures = pictures
-        self.levels = np.zeros((3, LEVELS), np.int64) if levels is None else np.asarray(levels, np.int64)
+        shape = (self.channels, len(self.values))
+        self.levels = np.zeros(shape, np.int64) if levels is None else np.asarray(levels, np.int64)
 
-    def add(self, pixels: NDArray[np.uint8]) -> None:
-        """Counts a picture, or every so manieth pixel of a large one."""
-        height, width, _ = pixels.shape
+    def add(self, pixels: NDArray[Any]) -> None:
+        """Counts a picture, height by width by channels if there are several, or every so manieth pixel of a large one."""
+        height, width = pixels.shape[:2]
         if max(width, height) >= LARGEST_SIDE_PX:
             factor = max(width, height) // SAMPLED_SIDE_PX
             pixels = pixels[::factor, ::factor]
         self.pictures += 1
-        for channel in range(3):
-            self.levels[channel] += np.bincount(pixels[..., channel].ravel(), minlength=LEVELS)
+        for channel in range(self.channels):
+            seen = pixels if self.channels == 1 else pixels[..., channel]
+            self.levels[channel] += np.bincount(seen.ravel(), minlength=len(self.values))
 
-    def __add__(self, other: Colours) -> Colours:
-        return Colours(self.pictures + other.pictures, (self.levels + other.levels).tolist())
+    def __add__(self, other: Self) -> Self:
+        return type(self)(self.pictures + other.pictures, (self.levels + other.levels).tolist())
 
     def statistics(self) -> Statistics:
-        """Statistics of each channel, from 0 to 1, in the shape of pictures: channels by one by one."""
-        counted, level = self.levels, np.arange(LEVELS) / (LEVELS - 1)
+        """Statistics of each channel in the shape of pictures: channels by one by one."""
+        counted, level = self.levels, self.values
         total = counted.sum(axis=1)
         mean = counted @ level / total
         deviation = np.sqrt(np.maximum(counted @ level**2 / total - mean**2, 0.0))
@@ -79,9 +86,16 @@ class Colours:
         seen = counted > 0
         rows = {
             "min": level[seen.argmax(axis=1)],
-            "max": level[LEVELS - 1 - seen[:, ::-1].argmax(axis=1)],
+            "max": level[len(level) - 1 - seen[:, ::-1].argmax(axis=1)],
             "mean": mean,
             "std": deviation,
             **{name: at(share) for name, share in QUANTILES.items()},
         }
         return {**{name: [[[value]] for value in row.tolist()] for name, row in rows.items()}, "count": [self.pictures]}
+
+
+class Colours(Levels):
+    """Red, green and blue, from 0 to 1."""
+
+    channels = 3
+    values = np.arange(256) / 255

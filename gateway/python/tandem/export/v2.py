@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from .parts import Part
-from .pictures import film_info
 from .settings import ExportSettings, library
-from .v3 import FILES_A_CHUNK, NUMBERING, ROBOT_TYPE, films_of, numbered, part_statistics
+from .v3 import FILES_A_CHUNK, NUMBERING, ROBOT_TYPE, described_film, films_of, numbered, part_statistics
 
 DATA_PATH = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
 VIDEO_PATH = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4"
@@ -34,7 +33,7 @@ def write_v2(out: Path, parts: Sequence[Part], splits: dict[str, str], settings:
             path = _made(out, VIDEO_PATH, number, key)
             shutil.copyfile(part.film(key), path)
             if number == 0:
-                features[key] = {**features[key], "info": film_info(path, settings.rate_hz)}
+                features[key] = described_film(features[key], path, settings.rate_hz)
         about = {name: part.about[name] for name in ("recording", "seed", "robot", "success", "instructions")}
         episodes.append({"episode_index": number, "tasks": [instruction], "length": part.length, "tandem": about})
         statistics.append({"episode_index": number, "stats": part_statistics(part, table)})

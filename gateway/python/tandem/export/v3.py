@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from functools import reduce
+from operator import add
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,7 @@ import numpy as np
 from .parts import Part
 from .pictures import film_info, join_films
 from .settings import ExportSettings, library
-from .statistics import Colours, Statistics, of_numbers
+from .statistics import Statistics, of_numbers
 
 MB = 1024**2
 FILES_A_CHUNK = 1000
@@ -55,7 +57,7 @@ def write_v3(out: Path, parts: Sequence[Part], splits: dict[str, str], settings:
     _write_data(out, parts, tasks, episodes, settings)
     for key in films_of(features):
         path = _write_films(out, key, parts, episodes, settings)
-        features[key] = {**features[key], "info": film_info(path, settings.rate_hz)}
+        features[key] = described_film(features[key], path, settings.rate_hz)
     features |= {key: {"dtype": kind, "shape": [1], "names": None} for key, kind in NUMBERING.items()}
     for part, episode in zip(parts, episodes, strict=True):
         episode["meta/episodes/chunk_index"], episode["meta/episodes/file_index"] = 0, 0
@@ -87,6 +89,11 @@ def write_v3(out: Path, parts: Sequence[Part], splits: dict[str, str], settings:
 def films_of(features: dict[str, Any]) -> list[str]:
     """The columns that are films."""
     return [key for key, feature in features.items() if feature["dtype"] == "video"]
+
+
+def described_film(feature: dict[str, Any], path: Path, rate_hz: int) -> dict[str, Any]:
+    """A column of films with what one of them, and only that, says."""
+    return feature | {"info": film_info(path, rate_hz) | feature.get("info", {})}
 
 
 def place(files: int) -> dict[str, int]:
@@ -179,7 +186,7 @@ def _write_films(out: Path, key: str, parts: Sequence[Part], episodes: list[dict
 
 def part_statistics(part: Part, table: Any) -> dict[str, Statistics]:
     """Statistics of an episode's columns."""
-    found = {key: part.colours(key).statistics() for key in part.about["colours"]}
+    found = {key: part.counted(key).statistics() for key in part.about["counted"]}
     return found | {key: of_numbers(numbers_of(table, key)) for key in table.column_names if key not in found}
 
 
@@ -200,7 +207,7 @@ def _whole_statistics(out: Path, parts: Sequence[Part], features: dict[str, Any]
     found: dict[str, Statistics] = {}
     for key, feature in features.items():
         if feature["dtype"] in ("video", "image"):
-            found[key] = sum((part.colours(key) for part in parts), Colours()).statistics()
+            found[key] = reduce(add, (part.counted(key) for part in parts)).statistics()
         else:
             table = pa.concat_tables([pq.read_table(file, columns=[key]) for file in files])
             found[key] = of_numbers(numbers_of(table, key))
