@@ -12,8 +12,8 @@ import numpy as np
 
 from ..recording import Recording
 from .columns import Column, View, columns, is_successful, moments, views
+from .pictures.shown import counted, shown
 from .settings import ExportSettings, library
-from .shown import counted, shown
 from .statistics import Levels, sampled
 
 ROWS_FILE = "rows.parquet"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from .parts import Part
-from .pictures import film_info, join_films
+from .pictures.encoding import film_info, join_films
 from .settings import ExportSettings, library
 from .statistics import Statistics, of_numbers
 

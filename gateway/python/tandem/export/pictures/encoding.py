@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import TandemError
-from .settings import Codec, library
+from ...errors import TandemError
+from ..settings import Codec, library
 
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .pictures import Encoding, still
-from .statistics import Levels
+from ..statistics import Levels
+from .encoding import Encoding, still
 
 NEAREST_M = 0.01
 FARTHEST_M = 10.0

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ..recording import Recording
+from ...recording import Recording
+from ..columns import View
+from ..settings import ExportSettings
+from ..statistics import Colours, Levels
 from . import depth
-from .columns import View
-from .pictures import ENCODINGS, Film, Pixels, png
-from .settings import ExportSettings
-from .statistics import Colours, Levels
+from .encoding import ENCODINGS, Film, Pixels, png
 
 DEPTH = "_depth"
 """What a camera's column of depth is called beside that of its colours, as LeRobot does."""
