@@ -198,7 +198,7 @@ def test_depth_lies_beside_the_pictures_as_lerobot_stores_it(runs: Path, tmp_pat
     for row, step in ((5, 0), (9, 20), (12, 35)):
         seen_m = recording.picture("A", step, size=size).depth_m
         told_m = np.exp(low + told[row] / 4095 * (high - low)) - shift_m
-        assert np.abs(told_m - seen_m.clip(nearest_m, farthest_m)).max() < 0.0017
+        assert np.abs(told_m - seen_m.clip(nearest_m, farthest_m)).max() < 0.0023
         assert 0.2 < np.median(told_m) < 5.0
     found = json.loads((exported.folder / "meta/stats.json").read_text())[f"{EYES}_depth"]
     told_mm = (np.exp(low + np.stack(told) / 4095 * (high - low)) - shift_m) * 1000

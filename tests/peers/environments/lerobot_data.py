@@ -30,7 +30,7 @@ SAMPLES = 10
 # What the codecs lose at their settings, small pictures more than large ones; PNG loses nothing.
 LEAST_DB = {"av1": 30.0, "h264": 28.0, "png": 90.0, "depth_png": 90.0}
 # Half of a step at 10 m and of a millimetre, to which LeRobot rounds.
-DEPTH_MM = 2.2
+DEPTH_MM = 2.8
 ACT = {
     "dim_model": 64,
     "n_heads": 2,

@@ -1,4 +1,4 @@
-"""Depth as LeRobot stores it since 0.6: 12 bits, closer to each other where things are near."""
+"""Depth as LeRobot stores it since 0.6: in 12 bits, whose steps are smaller where things are near."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NEAREST_M = 0.01
 FARTHEST_M = 10.0
 SHIFT_M = 3.5
 CODES = 4096
-"""LeRobot's own range and steps: of 0.9 mm near the camera and 3.3 mm at the far end. What is farther is told as that."""
+"""LeRobot's own range and steps: of 1.2 mm near the camera and 4.4 mm at the far end. What is farther is told as that."""
 
 ENCODING = Encoding(
     "libx265",

@@ -30,8 +30,10 @@ class Encoding:
     encoder: str
     options: dict[str, str]
     given: str = "rgb24"
-    """FFmpeg's name of what pictures are before they are encoded, and of what they are then."""
+    """What pictures are before they are encoded, as FFmpeg calls it."""
+
     pixels: str = "yuv420p"
+    """What they are then."""
 
 
 ENCODINGS: dict[Codec, Encoding] = {
