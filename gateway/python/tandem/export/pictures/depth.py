@@ -17,6 +17,9 @@ SHIFT_M = 3.5
 CODES = 4096
 """LeRobot's own range and steps: of 1.2 mm near the camera and 4.4 mm at the far end. What is farther is told as that."""
 
+LOG_NEAREST = math.log(NEAREST_M + SHIFT_M)
+LOG_RANGE = math.log(FARTHEST_M + SHIFT_M) - LOG_NEAREST
+
 ENCODING = Encoding(
     "libx265",
     {"preset": "superfast", "x265-params": "lossless=1:bframes=0:pools=none:frame-threads=1:log-level=error"},
@@ -38,15 +41,13 @@ FILM_FEATURE: dict[str, Any] = FEATURE | {
 
 def codes(depth_m: NDArray[np.float32]) -> NDArray[np.uint16]:
     """Depth, height by width in metres, as films hold it."""
-    low, high = math.log(NEAREST_M + SHIFT_M), math.log(FARTHEST_M + SHIFT_M)
-    share = (np.log(depth_m.clip(NEAREST_M, FARTHEST_M) + SHIFT_M) - low) / (high - low)
+    share = (np.log(depth_m.clip(NEAREST_M, FARTHEST_M) + SHIFT_M) - LOG_NEAREST) / LOG_RANGE
     return np.rint(share * (CODES - 1)).astype(np.uint16)
 
 
 def metres(codes: NDArray[Any]) -> NDArray[np.float64]:
     """The depth that codes stand for."""
-    low, high = math.log(NEAREST_M + SHIFT_M), math.log(FARTHEST_M + SHIFT_M)
-    return np.exp(low + codes / (CODES - 1) * (high - low)) - SHIFT_M
+    return np.exp(LOG_NEAREST + codes / (CODES - 1) * LOG_RANGE) - SHIFT_M
 
 
 def tiff(depth_m: NDArray[np.float32]) -> bytes:
