@@ -55,7 +55,7 @@ const PACE_M_S: f32 = 0.2;
 /// A way is looked at in so many points a leg.
 const WAY_POINTS: usize = 200;
 
-const TASK: Task = Task {
+pub(super) const TASK: Task = Task {
     id: "carry_bar",
     scene: "floor",
     robots: &[beside("A", APART_M), beside("B", -APART_M)],

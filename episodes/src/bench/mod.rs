@@ -3,6 +3,7 @@
 mod carrying;
 mod env;
 mod falls;
+mod holding;
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -73,6 +74,10 @@ pub fn locomotion(
         done(&carried);
         report.cases.push(carried);
     }
+    holding::run(robot, controller, sensing, filter, seeds, &mut |held| {
+        done(&held);
+        report.cases.push(held);
+    })?;
     Ok(report)
 }
 

@@ -13,6 +13,11 @@ use crate::scoring::Phase;
 use crate::spec::EpisodeSpec;
 
 impl Session {
+    /// The world, for benches that tell robots what no command can.
+    pub(crate) fn world_mut(&mut self) -> &mut tandem_sim::World {
+        &mut self.world
+    }
+
     pub(super) fn steps_left(&self) -> u32 {
         self.rules.episode_steps.saturating_sub(self.env_steps())
     }

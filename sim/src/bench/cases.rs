@@ -27,7 +27,34 @@ pub(super) enum Plan {
         high_m: f32,
         low_m: f32,
     },
+    /// From standing to standing: a velocity along one axis for a while, both drawn by the seed.
+    Pulse(PulseAxis),
     Tour(Tour),
+}
+
+/// Along which a robot is told to go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum PulseAxis {
+    Ahead,
+    Aside,
+    Turn,
+}
+
+/// Speeds (m/s and rad/s) and durations of pulses: each seed has one of ten speeds, and the duration of its decade and place.
+const PULSE_SPEEDS: [f32; 10] = [0.03, -0.05, 0.1, -0.1, 0.15, -0.15, 0.2, -0.3, 0.3, -0.2];
+const PULSE_S: [f32; 4] = [0.5, 1.0, 2.0, 3.0];
+
+/// The velocity of a seed's pulse, and for how long it is told.
+pub(super) fn pulse(axis: PulseAxis, seed: u32, scale: &BodyScale) -> (BaseVelocity, f32) {
+    let speed = PULSE_SPEEDS[seed as usize % PULSE_SPEEDS.len()];
+    let duration_s = PULSE_S[(seed as usize + seed as usize / PULSE_SPEEDS.len()) % PULSE_S.len()];
+    let still = BaseVelocity::STILL;
+    let velocity = match axis {
+        PulseAxis::Ahead => BaseVelocity { vx_m_s: scale.speed_m_s(speed), ..still },
+        PulseAxis::Aside => BaseVelocity { vy_m_s: scale.speed_m_s(speed), ..still },
+        PulseAxis::Turn => BaseVelocity { yaw_rate_rad_s: scale.rate_1_s(speed), ..still },
+    };
+    (velocity, duration_s)
 }
 
 /// What else happens.
@@ -55,6 +82,7 @@ impl Case {
     pub(super) fn of_size(&self, scale: &BodyScale) -> Case {
         let plan = match self.plan.clone() {
             Plan::Hold => Plan::Hold,
+            Plan::Pulse(axis) => Plan::Pulse(axis),
             Plan::Move(BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s }) => Plan::Move(BaseVelocity {
                 vx_m_s: scale.speed_m_s(vx_m_s),
                 vy_m_s: scale.speed_m_s(vy_m_s),
@@ -118,7 +146,11 @@ const fn pulled(name: &'static str, force_n: f32, hands: PulledHands, end_s: f32
     Case { name, disturbance: Disturbance::LevelPull { force_n, hands, end_s }, ..HOLD }
 }
 
-pub const CASES: [Case; 30] = [
+const fn pulsed(name: &'static str, axis: PulseAxis, hand_load_kg: f32) -> Case {
+    Case { name, duration_s: 9.0, plan: Plan::Pulse(axis), hand_load_kg, ..HOLD }
+}
+
+pub const CASES: [Case; 36] = [
     Case { name: "stand", ..HOLD },
     Case { name: "stand_waving", duration_s: 60.0, arms: Arms::Waving, ..HOLD },
     Case { name: "stand_1kg", hand_load_kg: 1.0, ..HOLD },
@@ -152,6 +184,12 @@ pub const CASES: [Case; 30] = [
         disturbance: Disturbance::Pull { force_n: 15.0 },
         ..moving("forward_0.3_pull_15n", [0.3, 0.0, 0.0])
     },
+    pulsed("pulse_ahead", PulseAxis::Ahead, 0.0),
+    pulsed("pulse_aside", PulseAxis::Aside, 0.0),
+    pulsed("pulse_turn", PulseAxis::Turn, 0.0),
+    pulsed("pulse_ahead_2kg", PulseAxis::Ahead, 2.0),
+    pulsed("pulse_aside_2kg", PulseAxis::Aside, 2.0),
+    pulsed("pulse_turn_2kg", PulseAxis::Turn, 2.0),
     Case { name: "squat", plan: Plan::Squat { high_m: 0.75, low_m: 0.55 }, ..HOLD },
     Case { name: "squat_1kg", hand_load_kg: 1.0, plan: Plan::Squat { high_m: 0.75, low_m: 0.55 }, ..HOLD },
     Case { name: "push_40n", disturbance: Disturbance::Push { force_n: 40.0 }, ..HOLD },

@@ -1,10 +1,11 @@
 //! Numbers of a trial, from its log.
 
-use rapier3d::math::Vector;
+use rapier3d::math::{Rotation, Vector};
 
-use super::cases::{Case, Plan, STOP_S};
+use super::cases::{Case, Plan, STOP_S, pulse};
 use super::tour::Leg;
 use crate::CONTROL_DT_S as DT_S;
+use crate::body::BodyScale;
 use crate::locomotion::{BaseCommand, BaseVelocity};
 use crate::plane::flat;
 use crate::{Side, Sides};
@@ -42,7 +43,14 @@ pub(super) struct Sample {
 }
 
 /// Fills in what the case measures; the robot stands.
-pub(super) fn measure(case: &Case, log: &[Sample], legs: &[Leg], trial: &mut Trial) {
+pub(super) fn measure(
+    case: &Case,
+    seed: u32,
+    scale: &BodyScale,
+    log: &[Sample],
+    legs: &[Leg],
+    trial: &mut Trial,
+) {
     let at = |time_s: f32| ((time_s / DT_S) as usize).min(log.len() - 1);
     let (start, end) = (at(SETTLE_S), log.len() - 1);
     match &case.plan {
@@ -67,6 +75,15 @@ pub(super) fn measure(case: &Case, log: &[Sample], legs: &[Leg], trial: &mut Tri
             trial.standing_after_s = Some(slower_after_s(&log[stop..], 0.1));
             trial.still_after_s = Some(slower_after_s(&log[stop..], 0.02));
         }
+        Plan::Pulse(axis) => {
+            let (velocity, pulse_s) = pulse(*axis, seed, scale);
+            let stop = at(SETTLE_S + pulse_s);
+            let [off_m, off_rad] = off_pulse(&log[start], &log[end], velocity, pulse_s);
+            trial.final_drift_m = Some(off_m);
+            trial.heading_error_deg = Some(off_rad.to_degrees());
+            trial.standing_after_s = Some(slower_after_s(&log[stop..], 0.1));
+            trial.still_after_s = Some(slower_after_s(&log[stop..], 0.02));
+        }
         Plan::Tour(tour) => {
             let error_m = |leg: usize| {
                 let last = at((leg + 1) as f32 * tour.leg_s - DT_S);
@@ -83,6 +100,15 @@ pub(super) fn measure(case: &Case, log: &[Sample], legs: &[Leg], trial: &mut Tri
         };
         trial.height_error_m = ends.iter().map(error_m).reduce(f32::max);
     }
+}
+
+/// How far a robot came to rest from where a pulse should have taken it, and how far it is turned from there.
+fn off_pulse(from: &Sample, to: &Sample, velocity: BaseVelocity, pulse_s: f32) -> [f32; 2] {
+    let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } = velocity;
+    let way_m = Vector::new(vx_m_s, vy_m_s, 0.0) * pulse_s;
+    let way_m = Rotation::from_rotation_z(from.heading_rad) * way_m;
+    let turned_rad = to.heading_rad - from.heading_rad - yaw_rate_rad_s * pulse_s;
+    [flat(to.pelvis_m - from.pelvis_m - way_m).length(), turned_rad.abs()]
 }
 
 /// How often a foot left the ground.

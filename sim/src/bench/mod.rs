@@ -63,6 +63,8 @@ pub struct CaseReport {
     pub steps: Option<u32>,
     /// The most that what robots carried between them was ever tilted.
     pub load_tilt_deg: Option<f32>,
+    /// How far what robots held went after they had come to rest: the mean of each second, horizontally.
+    pub load_drift_m: Option<f32>,
     /// Mean absolute mechanical power of all joints.
     pub power_w: f32,
 }
@@ -177,7 +179,7 @@ fn summarise(case: &Case, trials: &[Trial]) -> CaseReport {
 
 impl CaseReport {
     /// Column heads of [`CaseReport`]'s lines.
-    pub const HEAD: &str = "case                        alive  v err  heading    drift     sway   height  stands  still  steps   tilt  power";
+    pub const HEAD: &str = "case                        alive  v err  heading    drift     sway   height  stands  still  steps   tilt     load  power";
 
     /// The report of a case in which nothing has been measured yet.
     pub fn of(case: &str, seeds: usize) -> CaseReport {
@@ -194,6 +196,7 @@ impl CaseReport {
             still_after_s: None,
             steps: None,
             load_tilt_deg: None,
+            load_drift_m: None,
             power_w: 0.0,
         }
     }
@@ -206,7 +209,7 @@ impl fmt::Display for CaseReport {
         };
         write!(
             f,
-            "{:26} {:>2}/{:<2}  {:>5}  {:>7}  {:>7}  {:>7}  {:>7}  {:>6}  {:>5}  {:>5}  {:>5}  {:>5}",
+            "{:26} {:>2}/{:<2}  {:>5}  {:>7}  {:>7}  {:>7}  {:>7}  {:>6}  {:>5}  {:>5}  {:>5}  {:>7}  {:>5}",
             self.case,
             self.survived,
             self.seeds,
@@ -219,6 +222,7 @@ impl fmt::Display for CaseReport {
             show(self.still_after_s, 1.0, "s"),
             self.steps.map_or("-".into(), |steps| steps.to_string()),
             show(self.load_tilt_deg, 1.0, "°"),
+            show(self.load_drift_m, 100.0, "cm"),
             show(Some(self.power_w), 1.0, "W"),
         )
     }

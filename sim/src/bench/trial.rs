@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rapier3d::math::Vector;
 
-use super::cases::{Case, Disturbance, PULL_RISE_S, Plan, PulledHands, STOP_S};
+use super::cases::{Case, Disturbance, PULL_RISE_S, Plan, PulledHands, STOP_S, pulse};
 use super::measure::{SETTLE_S, Sample, Trial, measure};
 use super::motion::ArmMotion;
 use super::tour::{self, Leg};
@@ -55,7 +55,7 @@ pub(super) fn run(
         }
         let heading_rad =
             unwrap(heading_rad(&robot.truth.world_from_pelvis()), log.last().map_or(0.0, |s| s.heading_rad));
-        let base = base_command(case, &world, &robot.truth, heading_rad, &legs, time_s, rest.base);
+        let base = base_command(case, seed, &world, &robot.truth, heading_rad, &legs, time_s, rest.base);
         disturb(case, &mut world, seed, direction, &legs, time_s);
         let upper_rad = arms.at(&rest.upper_rad, time_s);
         work_j += robot.sensed.power_w() * DT_S;
@@ -69,13 +69,14 @@ pub(super) fn run(
     }
     trial.power_w = work_j / (log.len() as f32 * DT_S);
     if !trial.fell {
-        measure(case, &log, &legs, &mut trial);
+        measure(case, seed, &model.scale, &log, &legs, &mut trial);
     }
     Ok(trial)
 }
 
 fn base_command(
     case: &Case,
+    seed: u32,
     world: &World,
     truth: &RobotTruth,
     heading_rad: f32,
@@ -90,6 +91,13 @@ fn base_command(
             BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m: rest.pelvis_height_m }
         }
         Plan::Move(_) => rest,
+        Plan::Pulse(axis) => {
+            let (velocity, pulse_s) = pulse(*axis, seed, &world.robots()[0].model.scale);
+            let told = (SETTLE_S..SETTLE_S + pulse_s - 0.5 * DT_S).contains(&time_s);
+            let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } =
+                if told { velocity } else { BaseVelocity::STILL };
+            BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m: rest.pelvis_height_m }
+        }
         Plan::Squat { high_m, low_m } => {
             let middle = (case.duration_s / 3.0..case.duration_s * 2.0 / 3.0).contains(&time_s);
             BaseCommand { pelvis_height_m: if middle { *low_m } else { *high_m }, ..rest }
@@ -104,7 +112,8 @@ fn base_command(
 }
 
 fn disturb(case: &Case, world: &mut World, seed: u32, direction: Vector, legs: &[Leg], time_s: f32) {
-    let pulled_s = time_s - if matches!(case.plan, Plan::Hold) { PULLS_AT_S } else { 0.5 * SETTLE_S };
+    let pulled_s =
+        time_s - if matches!(case.plan, Plan::Hold | Plan::Pulse(_)) { PULLS_AT_S } else { 0.5 * SETTLE_S };
     let risen = (pulled_s / PULL_RISE_S).min(1.0);
     match &case.disturbance {
         Disturbance::Pull { force_n } if pulled_s > 0.0 => {

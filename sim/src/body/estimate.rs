@@ -25,6 +25,8 @@ pub struct BodyEstimate {
     pub hand_reaction_n: Sides<Vector>,
     /// Thumb and fingers press on something.
     pub hand_holds: Sides<bool>,
+    /// Thumb or fingers press on something.
+    pub hand_presses: Sides<bool>,
     /// Arms or fingers are told to move.
     pub arms_told: bool,
     /// Where the task wants the waist: yaw, roll, pitch.
@@ -116,6 +118,7 @@ impl BodyEstimate {
             palm_velocity_m_s,
             hand_reaction_n: Sides::both(Vector::ZERO),
             hand_holds: Sides::both(false),
+            hand_presses: Sides::both(false),
             arms_told: false,
             waist_target_rad: [0.0; WAIST_JOINTS],
             known: KnownOfBody { link_motions: motions.into(), ..KnownOfBody::default() },

@@ -7,7 +7,7 @@ pub const JOINTS: usize = 43;
 /// Joints a task commands: arms 14, hands 14, waist 3.
 pub const UPPER_JOINTS: usize = 31;
 pub(crate) const LEG_JOINTS: usize = 6;
-pub(crate) const WAIST_JOINTS: usize = 3;
+pub const WAIST_JOINTS: usize = 3;
 pub const ARM_JOINTS: usize = 7;
 pub const HAND_JOINTS: usize = 7;
 /// Of a hand's joints the first.

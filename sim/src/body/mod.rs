@@ -15,12 +15,12 @@ pub use estimate::BodyEstimate;
 pub use inverse_dynamics::{Acceleration, Effort};
 pub use layout::{
     ARM_COLUMNS, ARM_JOINTS, HAND_COLUMNS, HAND_JOINTS, JOINTS, UPPER, UPPER_JOINTS, WAIST_COLUMN,
-    joint_names,
+    WAIST_JOINTS, joint_names,
 };
 pub use model::{BodyScale, HandLinks, JointModel, LinkModel, RobotModel, RobotSource, SiteModel};
 
 pub(crate) use estimate::{KnownOfBody, LinkMotion, PelvisMotion};
-pub(crate) use layout::{ARMS, HANDS, LEG_JOINTS, LEGS, MIRRORED_ARM, WAIST, WAIST_JOINTS};
+pub(crate) use layout::{ARMS, HANDS, LEG_JOINTS, LEGS, MIRRORED_ARM, WAIST};
 
 /// Spring, damper and feedforward of one joint for one physics step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

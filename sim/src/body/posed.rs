@@ -100,6 +100,7 @@ impl Posed {
             palm_velocity_m_s: Sides::both(Vector::ZERO),
             hand_reaction_n: Sides::both(Vector::ZERO),
             hand_holds: Sides::both(false),
+            hand_presses: Sides::both(false),
             arms_told: false,
             waist_target_rad: [0.0; 3],
             known: KnownOfBody::default(),

@@ -100,6 +100,11 @@ impl HandLoads {
         self.reaction.each_ref().map(HandForce::force_n)
     }
 
+    /// Whose thumb or fingers press on something.
+    pub(super) fn presses(&self) -> Sides<bool> {
+        self.grip.each_ref().map(|grip| grip.presses)
+    }
+
     /// Whose thumb and fingers both press on something.
     pub(super) fn holds(&self) -> Sides<bool> {
         self.grip.each_ref().map(Grip::holds)
@@ -116,6 +121,7 @@ impl HandLoads {
 struct Grip {
     torque_n_m: [f32; HAND_JOINTS],
     holds: bool,
+    presses: bool,
 }
 
 impl Grip {
@@ -125,9 +131,13 @@ impl Grip {
             *felt_n_m += (torque_n_m - *felt_n_m) * (dt_s / GRIP_FILTER_TIME_S);
         }
         let (thumb, fingers) = self.torque_n_m.split_at(THUMB_JOINTS);
-        let least_n_m = if self.holds { LEAST_PRESS_N_M * STILL_PRESSES } else { LEAST_PRESS_N_M };
-        self.holds =
-            [thumb, fingers].iter().all(|joints| joints.iter().any(|torque| torque.abs() > least_n_m));
+        let press = |joints: &&[f32], pressed: bool| {
+            let least_n_m = if pressed { LEAST_PRESS_N_M * STILL_PRESSES } else { LEAST_PRESS_N_M };
+            joints.iter().any(|torque| torque.abs() > least_n_m)
+        };
+        let parts = [thumb, fingers];
+        self.holds = parts.iter().all(|joints| press(joints, self.holds));
+        self.presses = parts.iter().any(|joints| press(joints, self.presses));
     }
 
     fn holds(&self) -> bool {

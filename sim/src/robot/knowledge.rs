@@ -137,6 +137,7 @@ fn from_truth(model: &Arc<RobotModel>, tree: &Tree, readings: &SensorReadings) -
         palm_velocity_m_s,
         hand_reaction_n: Sides::both(Vector::ZERO),
         hand_holds: Sides::both(false),
+        hand_presses: Sides::both(false),
         arms_told: false,
         waist_target_rad: [0.0; WAIST_JOINTS],
         known: KnownOfBody::default(),

@@ -102,8 +102,9 @@ impl Robot {
     fn take(&mut self, body: BodyEstimate) {
         let hand_reaction_n = self.memory.hand_loads.reaction_n();
         let hand_holds = self.memory.hand_loads.holds();
+        let hand_presses = self.memory.hand_loads.presses();
         let waist_target_rad = self.waist_target_rad();
-        self.body = BodyEstimate { hand_reaction_n, hand_holds, waist_target_rad, ..body };
+        self.body = BodyEstimate { hand_reaction_n, hand_holds, hand_presses, waist_target_rad, ..body };
     }
 
     /// Sets this robot's joint drives for one physics step, `substep` counting from 0 within the control step.

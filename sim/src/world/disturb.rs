@@ -81,6 +81,16 @@ impl World {
         }
     }
 
+    /// Makes an object, with all that moves on it, weigh this much in all. It is part of the set-up.
+    pub fn set_mass(&mut self, object: &str, mass_kg: f64) {
+        let link_kg = |index: usize| {
+            let link = self.objects[index].link?;
+            Some(self.dynamics.tree(link.tree).links()[link.link].mass.mass_kg)
+        };
+        let now_kg: f64 = self.parts_of(object).into_iter().filter_map(link_kg).sum();
+        self.scale_mass(object, mass_kg / now_kg);
+    }
+
     /// Leaves an object, with all that moves on it, only this share of its friction with whatever it touches. It is part of the set-up.
     pub fn leave_friction(&mut self, object: &str, share: f64) {
         for index in self.parts_of(object) {

@@ -2,7 +2,7 @@
 
 use rapier3d::math::Vector;
 
-use super::observer::ObservedPush;
+use super::observer::SplitPush;
 use crate::body::BodyEstimate;
 use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Sides};
@@ -44,6 +44,8 @@ pub(super) struct Load {
     pub velocity_m_s: Vector,
     /// How much the robot leans ahead of pulls, 0 to 1: see [`super::stand::Ahead`].
     pub ahead: f32,
+    /// How much the robot gives way to what pulls its hands, 0 to 1: see [`super::stand::Partner`].
+    pub gives_way: f32,
 }
 
 /// Pushes and pulls are taken to act this high over the centre of mass: at the chest and the hands.
@@ -62,9 +64,10 @@ impl Load {
         body: &BodyEstimate,
         laden: &LadenRobot,
         ground_m: f32,
-        push: ObservedPush,
+        push: impl Into<SplitPush>,
         ahead: f32,
     ) -> Load {
+        let SplitPush { rest: push, hands_m_s2, hands_lever_m, gives_way } = push.into();
         let scale = &body.model.scale;
         let push_lever_m = scale.length_m(PUSH_LEVER_M);
         let height_m = body.com_m.z - ground_m;
@@ -92,6 +95,9 @@ impl Load {
         let pushing_n = push.acceleration_m_s2 * laden.mass_kg;
         force_n += pushing_n;
         moment_n_m += Vector::new(0.0, 0.0, push_lever_m).cross(pushing_n);
+        let pulling_n = hands_m_s2 * laden.mass_kg;
+        force_n += pulling_n;
+        moment_n_m += Vector::new(0.0, 0.0, hands_lever_m).cross(pulling_n);
         let balance_point_m = balanced_m(force_n, moment_n_m);
         let balance_point_m_s = push.growth_m_s3 * ((height_m + push_lever_m) / GRAVITY_M_S2);
         Load {
@@ -102,12 +108,14 @@ impl Load {
             balance_point_m_s,
             velocity_m_s: laden.velocity_m_s,
             ahead,
+            gives_way,
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::observer::ObservedPush;
     use super::*;
     use crate::Sides;
     use crate::body::posed::Posed;

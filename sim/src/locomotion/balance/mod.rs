@@ -18,11 +18,11 @@ use serde::{Deserialize, Serialize};
 use super::{BaseCommand, BaseLimits, BaseVelocity, LegCommand, Locomotion};
 use crate::GRAVITY_M_S2;
 use crate::body::{BodyEstimate, BodyScale};
-use crate::plane::{flat, heading_rad};
+use crate::plane::heading_rad;
 use ground::middle_m;
 use load::{LadenRobot, Load};
 use observer::{CALM, PushObserver, QUICK};
-use stand::{Ahead, Stand};
+use stand::{Ahead, Partner, Resting, Stand, StandingPlace};
 use step::Stepping;
 
 const LIMITS: BaseLimits = BaseLimits {
@@ -59,14 +59,10 @@ const CAPTURED_M: f32 = 0.066;
 /// A robot that leans farther against a push would fall when the push ends.
 const LARGEST_LEAN_M: f32 = 0.1;
 
-/// A robot that stood and was pushed out of its stance steps back to where it stood: farther than the leash it does not come
-/// back, nearer than these it is back, and what keeps it away for so long keeps it for good.
-const LEASH_M: f32 = 1.0;
-const BACK_M: f32 = 0.04;
+/// A robot that was pushed out of its stance is back once it is turned by less than this from where it stood, and does not come back
+/// after this time.
 const BACK_RAD: f32 = 0.1;
 const LONGEST_RETURN_S: f32 = 10.0;
-const RETURN_1_S: f32 = 1.0;
-const RETURN_M_S: f32 = 0.15;
 
 /// Stands or steps; see the module's text.
 #[derive(Default)]
@@ -86,15 +82,9 @@ struct BalanceState {
     observer: PushObserver,
     quick_observer: PushObserver,
     ahead: Ahead,
-    /// Of a robot that stands with empty hands, or steps because it was pushed then.
+    partner: Partner,
+    /// Place of a robot that stands with empty hands or was pushed then, and of one that commands move.
     place: Option<StandingPlace>,
-}
-
-/// Where a robot stood: the middle of its soles, and its heading.
-#[derive(Clone, Copy, Serialize, Deserialize)]
-struct StandingPlace {
-    middle_m: Vector,
-    heading_rad: f32,
 }
 
 #[derive(Clone, Serialize, Deserialize)]
@@ -120,8 +110,6 @@ impl Locomotion for Balance {
         let command = limits(&body.model.scale).clamp(*command);
         state.time_in_mode_s += dt_s;
         state.ahead.update(body, &command, dt_s);
-        let told = state.velocity_to_place(body, command.velocity());
-        state.velocity = ramped(state.velocity, told, &body.model.scale, dt_s);
         let ground_m =
             body.world_from_soles().iter().map(|sole| sole.translation.z).fold(f32::INFINITY, f32::min);
         let laden = LadenRobot::of(body);
@@ -129,7 +117,10 @@ impl Locomotion for Balance {
         state.quick_observer.update(laden.velocity_m_s, &QUICK, dt_s);
         let ahead = if matches!(state.mode, Mode::Stand(_)) { state.ahead.share() } else { 0.0 };
         let push = state.observer.push_ahead(&state.quick_observer, ahead);
+        let push = state.partner.split(body, push, laden.mass_kg, dt_s);
         let load = Load::of(body, &laden, ground_m, push, ahead);
+        let told = state.velocity_to_place(body, &load, command.velocity(), dt_s);
+        state.velocity = ramped(state.velocity, told, &body.model.scale, dt_s);
         state.change_mode(body, &load);
         let (legs, expected_m_s2) = match &mut state.mode {
             Mode::Stand(stand) => stand.tick(body, &load, command.pelvis_height_m, dt_s),
@@ -176,31 +167,55 @@ impl BalanceState {
             observer: PushObserver::default(),
             quick_observer: PushObserver::default(),
             ahead: Ahead::default(),
+            partner: Partner::default(),
             place: None,
         }
     }
 
-    /// The commanded velocity; that back to its place for a robot that is to stand and was pushed out of its stance.
-    fn velocity_to_place(&mut self, body: &BodyEstimate, command: BaseVelocity) -> BaseVelocity {
+    /// Returns the commanded velocity, or that to its place for a robot that is to stand and was pushed out of its stance or has
+    /// not yet come to where commands took it.
+    fn velocity_to_place(
+        &mut self,
+        body: &BodyEstimate,
+        load: &Load,
+        command: BaseVelocity,
+        dt_s: f32,
+    ) -> BaseVelocity {
         let scale = &body.model.scale;
-        let steps = matches!(self.mode, Mode::Step(_));
-        let longest_return_s = scale.time_s(LONGEST_RETURN_S);
-        if is_moving(&command) || !self.ahead.is_free() || steps && self.time_in_mode_s > longest_return_s {
-            self.place = None;
-        }
-        let middle_m = middle_m(&body.world_from_soles());
-        if !steps && !is_moving(&command) && self.ahead.share() == 1.0 {
-            self.place.get_or_insert(StandingPlace { middle_m, heading_rad: self.heading_rad });
-        }
-        let (true, Some(place)) = (steps, &mut self.place) else { return command };
-        let away_m = flat(place.middle_m - middle_m).clamp_length_max(scale.length_m(LEASH_M));
-        place.middle_m = middle_m + away_m;
-        if away_m.length() < scale.length_m(BACK_M) {
+        let heading_rad = self.heading_rad;
+        if is_moving(&command) {
+            let mut place = self
+                .place
+                .filter(StandingPlace::is_moved)
+                .unwrap_or_else(|| StandingPlace::of_mover(body, heading_rad));
+            place.advance(scale, load, &command, heading_rad, dt_s);
+            self.place = Some(place);
             return command;
         }
-        let back_m_s = (Rotation::from_rotation_z(-self.heading_rad) * away_m * scale.rate_1_s(RETURN_1_S))
-            .clamp_length_max(scale.speed_m_s(RETURN_M_S));
-        BaseVelocity { vx_m_s: back_m_s.x, vy_m_s: back_m_s.y, ..command }
+        let Mode::Step(step) = &self.mode else {
+            self.keep_place(body);
+            return command;
+        };
+        let gives_up = self.time_in_mode_s > scale.time_s(LONGEST_RETURN_S) || !self.ahead.is_free();
+        if gives_up && self.place.is_some_and(|place| !place.is_moved()) {
+            self.place = None;
+        }
+        let velocity_m_s = self
+            .place
+            .as_mut()
+            .and_then(|place| place.velocity_m_s(body, load, heading_rad, step.just_landed(), dt_s));
+        velocity_m_s.map_or(command, |to_m_s| BaseVelocity { vx_m_s: to_m_s.x, vy_m_s: to_m_s.y, ..command })
+    }
+
+    /// Remembers where a robot with empty hands stands.
+    fn keep_place(&mut self, body: &BodyEstimate) {
+        if !self.ahead.is_free() || self.place.is_some_and(|place| place.is_moved()) {
+            self.place = None;
+        }
+        if self.ahead.share() == 1.0 {
+            let middle_m = middle_m(&body.world_from_soles());
+            self.place.get_or_insert(StandingPlace::new(middle_m, self.heading_rad));
+        }
     }
 
     fn change_mode(&mut self, body: &BodyEstimate, load: &Load) {
@@ -230,10 +245,13 @@ impl BalanceState {
                     && stance.com_m.y.abs() < half_width_m;
                 let feet_together = stance.left_from_right_m.x.abs() < scale.length_m(LARGEST_STAGGER_M)
                     && stance.left_from_right_m.y < scale.stance_width_m(LARGEST_WIDTH_M);
-                let back = self.place.is_none() || step.to_turn_rad() < BACK_RAD;
+                let back = self.place.is_none_or(|place| place.is_moved()) || step.to_turn_rad() < BACK_RAD;
                 let landed = step.just_landed() && step.steps() >= LEAST_STEPS;
                 if !moving && back && landed && captured && feet_together {
-                    let stand = Stand::plant(body, self.heading_rad, Some((self.pelvis_from_middle_m, load)));
+                    let kept_m = self.place.and_then(|place| place.rest_m(body, self.heading_rad));
+                    let rest_m = kept_m.unwrap_or(self.pelvis_from_middle_m);
+                    let resting = Resting { rest_m, keeps: kept_m.is_some(), load };
+                    let stand = Stand::plant(body, self.heading_rad, Some(resting));
                     self.mode = Mode::Stand(stand);
                     self.time_in_mode_s = 0.0;
                 }

@@ -32,6 +32,25 @@ pub(super) struct ObservedPush {
     pub growth_m_s3: Vector,
 }
 
+/// A push taken apart by what it comes through.
+pub(super) struct SplitPush {
+    /// What does not come through hands that hold something; horizontal.
+    pub rest: ObservedPush,
+    /// What does, as far as the robot withstands it; horizontal.
+    pub hands_m_s2: Vector,
+    /// Height of the palms over the centre of mass.
+    pub hands_lever_m: f32,
+    /// Share of the hands' part to which the robot gives way, 0 to 1.
+    pub gives_way: f32,
+}
+
+impl From<ObservedPush> for SplitPush {
+    /// The push on a robot whose hands hold nothing.
+    fn from(rest: ObservedPush) -> SplitPush {
+        SplitPush { rest, hands_m_s2: Vector::ZERO, hands_lever_m: 0.0, gives_way: 0.0 }
+    }
+}
+
 /// Luenberger observer of the horizontal  v' = expected + d,  d' = 0,  both poles at -`poles_1_s`.
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub(super) struct PushObserver {

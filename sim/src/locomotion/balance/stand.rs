@@ -5,6 +5,8 @@
 //! feet as ground reaction forces. PD and feedforward act through the leg joints alone.
 
 mod ahead;
+mod partner;
+mod place;
 
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
@@ -19,6 +21,8 @@ use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
 
 pub(super) use ahead::Ahead;
+pub(super) use partner::Partner;
+pub(super) use place::StandingPlace;
 
 /// The centre of mass, with what the hands carry, may lie this far from the middle of the feet before the pelvis gives way.
 const COM_ZONE_M: f32 = 0.0435;
@@ -47,6 +51,13 @@ const FARTHER_ASIDE_M: f32 = 0.025;
 /// The lean leaves out little changes of the push: one that followed them would sway for ever, for joints rub.
 const LEAN_PLAY_M: f32 = 0.01;
 const LEANING_TIME_S: f32 = 0.25;
+/// Centre of mass of a robot that holds something with partners: nearer to the middle, for the feet have to hold what partners pull.
+const HELD_ZONE_M: f32 = 0.028;
+/// A robot pulled harder than this by what it holds with partners goes where its hands are pulled, at this rate per newton, while its
+/// centre of mass stays in a zone: what pulls between robots that stand fades.
+const PULLED_N: f32 = 12.0;
+const GIVING_WAY_M_S_N: f32 = 0.002;
+const GIVING_WAY_ZONE_M: f32 = 0.035;
 /// Below this pelvis height the trunk leans forward, so that the hips can go back.
 const LEAN_BELOW_M: f32 = 0.70;
 const LEAN_RAD_PER_M: f32 = 2.0;
@@ -92,15 +103,25 @@ pub(super) struct Stand {
     q_rad: Sides<LegAngles>,
 }
 
+/// How a robot that stepped comes to rest.
+pub(super) struct Resting<'a> {
+    /// Pelvis over the middle of the soles, heading frame.
+    pub rest_m: Vector,
+    /// Whether the pelvis keeps to that as one that stands does, rather than to the middle of the feet.
+    pub keeps: bool,
+    /// Load against which the robot leans.
+    pub load: &'a Load,
+}
+
 impl Stand {
-    /// Plants the feet where they are. `moving` is a robot's that comes to rest: where the pelvis rests relative to the
-    /// middle of the soles, in the heading frame, and what it leans against. `None` keeps the pelvis where it is.
-    pub(super) fn plant(body: &BodyEstimate, heading_rad: f32, moving: Option<(Vector, &Load)>) -> Stand {
+    /// Plants the feet where they are. `None` keeps the pelvis where it is.
+    pub(super) fn plant(body: &BodyEstimate, heading_rad: f32, moving: Option<Resting>) -> Stand {
         let pelvis = body.world_from_pelvis();
         let soles = body.world_from_soles();
         let middle_m = middle_m(&soles);
         let heading = Rotation::from_rotation_z(heading_rad);
-        let home_m = moving.map_or(pelvis.translation, |(rest_m, _)| middle_m + heading * rest_m);
+        let home_m =
+            moving.as_ref().map_or(pelvis.translation, |resting| middle_m + heading * resting.rest_m);
         let mut stand = Stand {
             feet: Sides::from_fn(|side| body.world_from_foot(side)),
             soles,
@@ -115,9 +136,10 @@ impl Stand {
             height_m: pelvis.translation.z - middle_m.z,
             q_rad: Sides::from_fn(|side| std::array::from_fn(|i| body.q_rad[LEGS[side] + i])),
         };
-        if let Some((_, load)) = moving {
+        if let Some(Resting { load, keeps, .. }) = moving {
             let scale = &body.model.scale;
-            stand.home_m += heading * back_into_m(RESTING_ZONE_M, scale, stand.weights_m(body, load));
+            let zone_m = if keeps { com_zone_m(load) } else { RESTING_ZONE_M };
+            stand.home_m += heading * back_into_m(zone_m, scale, stand.weights_m(body, load));
             stand.lean_m = stand.against_push_m(scale, stand.weights_m(body, load), load);
             stand.lean_goal_m = stand.lean_m;
             stand.offset_m = flat(pelvis.translation - stand.home_m) - heading * stand.lean_m;
@@ -197,9 +219,10 @@ impl Stand {
         let heading = Rotation::from_rotation_z(self.heading_rad);
         let weights_m = self.weights_m(body, load);
         let scale = &body.model.scale;
-        let shift_m = back_into_m(COM_ZONE_M, scale, weights_m);
+        let shift_m = back_into_m(com_zone_m(load), scale, weights_m);
         let against_m = self.against_push_m(scale, weights_m + shift_m, load);
         let leaning_m_s2 = self.lean(scale, against_m, load.ahead, dt_s);
+        self.home_m += heading * self.giving_way_m(body, load, weights_m + shift_m, dt_s);
         let mut position_m = self.home_m + self.offset_m + heading * (shift_m + self.lean_m);
         position_m.z = middle_m(&self.soles).z + self.height_m;
         position_m.z -= (position_m.z - self.highest_m(body, position_m)).max(0.0) * load.ahead;
@@ -210,6 +233,22 @@ impl Stand {
             velocity_m_s: flat(self.offset_rate_m_s + heading * self.lean_rate_m_s),
             acceleration_m_s2: heading * leaning_m_s2,
         }
+    }
+
+    /// Returns how far a robot that gives way to its partners goes in one physics step where its hands are pulled, with the centre
+    /// of mass at `weights_m`; all in the heading frame.
+    fn giving_way_m(&self, body: &BodyEstimate, load: &Load, weights_m: Vector, dt_s: f32) -> Vector {
+        let scale = &body.model.scale;
+        let pull_n = flat(body.hand_reaction_n.left + body.hand_reaction_n.right);
+        let rate_m_s_n = scale.speed_m_s(GIVING_WAY_M_S_N) / scale.force_n(1.0) * load.gives_way;
+        let pull_n = pull_n - pull_n.clamp_length_max(scale.force_n(PULLED_N));
+        let way_m = Rotation::from_rotation_z(-self.heading_rad) * pull_n * (rate_m_s_n * dt_s);
+        let most_m = scale.length_m(GIVING_WAY_ZONE_M);
+        let within = |way_m: f32, at_m: f32| {
+            let there_m = (at_m + way_m).abs();
+            if there_m < most_m || there_m < at_m.abs() { way_m } else { 0.0 }
+        };
+        Vector::new(within(way_m.x, weights_m.x), within(way_m.y, weights_m.y), 0.0)
     }
 
     /// One physics step of the lean towards `wanted_m`, without a jerk if it leans ahead of pulls; gives its acceleration.
@@ -244,6 +283,11 @@ impl Stand {
         };
         height_m(Side::Left).min(height_m(Side::Right))
     }
+}
+
+/// Returns how far the centre of mass may be from the middle of the feet under a load, on a G1.
+fn com_zone_m(load: &Load) -> f32 {
+    COM_ZONE_M + (HELD_ZONE_M - COM_ZONE_M) * load.gives_way
 }
 
 /// Shift that brings a point back into a zone round the middle of the feet.

@@ -1,0 +1,89 @@
+//! What happens to a team that holds something and is told to stand.
+
+use std::f32::consts::PI;
+
+use tandem_sim::body::{
+    ARM_COLUMNS, ARM_JOINTS, HAND_COLUMNS, HAND_JOINTS, UPPER_JOINTS, WAIST_COLUMN, WAIST_JOINTS,
+};
+use tandem_sim::{CONTROL_HZ, RobotCommand, Side, SplitMix64};
+
+/// What is added to the targets of arms, waist and fingers; nothing corrects it, because no robot knows where the load or the
+/// others are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Disturbance {
+    None,
+    /// To both shoulders' pitch of every robot within a second, rad: below zero hands press towards what is before them.
+    Shoulders(f32),
+    /// The same, with the other sign for every second robot: all hands move the load one way.
+    OneWay(f32),
+    /// Normal noise of this deviation (rad) on arms and waist, drawn anew five times a second.
+    Noise(f32),
+    /// The hands of the last robot open.
+    LastOpens,
+}
+
+/// Targets move from where they are to where the disturbance takes them within this time.
+const COMES_S: f32 = 1.0;
+const NOISE_STEPS: u32 = 10;
+
+/// One disturbance under way.
+pub(super) struct Disturber {
+    disturbance: Disturbance,
+    random: SplitMix64,
+    noise_rad: Vec<[f32; UPPER_JOINTS]>,
+}
+
+impl Disturber {
+    pub(super) fn new(disturbance: Disturbance, seed: u32, team_size: usize) -> Disturber {
+        let noise_rad = vec![[0.0; UPPER_JOINTS]; team_size];
+        Disturber { disturbance, random: SplitMix64(seed.into()), noise_rad }
+    }
+
+    /// Changes the commands of the team for one control step, the first being 0; `team` are their places in `commands`.
+    pub(super) fn disturb(&mut self, control_step: u32, team: &[usize], commands: &mut [RobotCommand]) {
+        let share = (control_step as f32 / (COMES_S * CONTROL_HZ as f32)).min(1.0);
+        for (place, robot) in team.iter().enumerate() {
+            let upper_rad = &mut commands[*robot].upper_rad;
+            match self.disturbance {
+                Disturbance::None => {}
+                Disturbance::Shoulders(by_rad) => pitch_shoulders(upper_rad, by_rad * share),
+                Disturbance::OneWay(by_rad) => {
+                    let sign = if place % 2 == 0 { 1.0 } else { -1.0 };
+                    pitch_shoulders(upper_rad, by_rad * share * sign);
+                }
+                Disturbance::Noise(deviation_rad) => {
+                    if control_step % NOISE_STEPS == 0 {
+                        self.noise_rad[place] = noise(deviation_rad, &mut self.random);
+                    }
+                    upper_rad
+                        .iter_mut()
+                        .zip(self.noise_rad[place])
+                        .for_each(|(target, noise)| *target += noise);
+                }
+                Disturbance::LastOpens if place + 1 == team.len() => {
+                    for first in HAND_COLUMNS.iter() {
+                        upper_rad[*first..*first + HAND_JOINTS].iter_mut().for_each(|q| *q *= 1.0 - share);
+                    }
+                }
+                Disturbance::LastOpens => {}
+            }
+        }
+    }
+}
+
+fn pitch_shoulders(upper_rad: &mut [f32; UPPER_JOINTS], by_rad: f32) {
+    for side in Side::BOTH {
+        upper_rad[ARM_COLUMNS[side]] += by_rad;
+    }
+}
+
+/// Normal noise on arms and waist.
+fn noise(deviation_rad: f32, random: &mut SplitMix64) -> [f32; UPPER_JOINTS] {
+    let mut noise_rad = [0.0; UPPER_JOINTS];
+    let arms = Side::BOTH.into_iter().flat_map(|side| ARM_COLUMNS[side]..ARM_COLUMNS[side] + ARM_JOINTS);
+    for column in arms.chain(WAIST_COLUMN..WAIST_COLUMN + WAIST_JOINTS) {
+        let (size, angle) = (random.uniform([1e-6, 1.0]), random.uniform([0.0, 2.0 * PI]));
+        noise_rad[column] = deviation_rad * (-2.0 * size.ln()).sqrt() * angle.cos();
+    }
+    noise_rad
+}

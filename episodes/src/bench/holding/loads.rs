@@ -1,0 +1,178 @@
+//! What teams of the bench hold between them, and how they come to hold it.
+
+use std::f32::consts::PI;
+
+use tandem_sim::{Pose, Vector};
+
+use crate::EpisodeError;
+use crate::bench::carrying;
+use crate::players::experts::skills::{
+    CarryTeam, Commander, FREE, HandGrasp, Hold, ObjectPath, grasp_compliantly, grasp_reached,
+};
+use crate::players::{InProcess, PlayerError};
+use crate::scoring::{A, B, C};
+use crate::tasks::{self, Task};
+
+/// Something that a team holds, and the task from whose start the team takes it.
+pub(super) struct SharedLoad {
+    pub name: &'static str,
+    task: LoadTask,
+    pub object: &'static str,
+    /// Robot, its two places on the object, and which way it faces in the object's frame.
+    holders: &'static [(usize, [&'static str; 2], f32)],
+    hold: &'static Hold,
+    /// Whether hands reach out while their robots walk to the object: legs of a table are taken so.
+    reaching: bool,
+    /// Pelvis over the floor while the object is taken and while it is held; `None` leaves it as it is.
+    pelvis_m: Option<[f32; 2]>,
+    lift_m: f32,
+    /// Where the team goes with it: ahead and to the left, world frame.
+    way_m: [f32; 2],
+}
+
+enum LoadTask {
+    /// One of the tasks, by its id.
+    Of(&'static str),
+    Bar,
+}
+
+const TWO_THIRDS_RAD: f32 = 2.0 * PI / 3.0;
+
+pub(super) const TABLE: SharedLoad = SharedLoad {
+    name: "shared_table",
+    task: LoadTask::Of("table_align"),
+    object: "office_table",
+    holders: &[(A, ["a_left", "a_right"], 0.0), (B, ["b_left", "b_right"], PI)],
+    hold: &Hold::EDGE,
+    reaching: false,
+    pelvis_m: Some([0.75, 0.75]),
+    lift_m: 0.07,
+    way_m: [0.0, -0.3],
+};
+
+pub(super) const ROUND_TABLE: SharedLoad = SharedLoad {
+    name: "shared_round_table",
+    task: LoadTask::Of("big_table"),
+    object: "round_table",
+    holders: &[
+        (A, ["a_left", "a_right"], 0.0),
+        (B, ["b_left", "b_right"], TWO_THIRDS_RAD),
+        (C, ["c_left", "c_right"], -TWO_THIRDS_RAD),
+    ],
+    hold: &Hold::ROUND_EDGE,
+    reaching: false,
+    pelvis_m: Some([0.75, 0.75]),
+    lift_m: 0.07,
+    way_m: [0.3, 0.0],
+};
+
+pub(super) const LEGS: SharedLoad = SharedLoad {
+    name: "shared_legs",
+    task: LoadTask::Of("move_house"),
+    object: "console_table",
+    holders: &[(B, ["b_left", "b_right"], PI), (C, ["c_left", "c_right"], 0.0)],
+    hold: &Hold::LEG,
+    reaching: true,
+    pelvis_m: Some([0.64, 0.70]),
+    lift_m: 0.07,
+    way_m: [0.3, 0.0],
+};
+
+pub(super) const BASKET: SharedLoad = SharedLoad {
+    name: "shared_basket",
+    task: LoadTask::Of("co_carry"),
+    object: "basket",
+    holders: &[(A, ["a_left", "a_right"], 0.0), (B, ["b_left", "b_right"], PI)],
+    hold: &Hold::RIM,
+    reaching: false,
+    pelvis_m: None,
+    lift_m: 0.09,
+    way_m: [0.0, -0.3],
+};
+
+pub(super) const BAR: SharedLoad = SharedLoad {
+    name: "shared_bar",
+    task: LoadTask::Bar,
+    object: "bar",
+    holders: &[(A, ["a_left", "a_right"], 0.0), (B, ["b_left", "b_right"], 0.0)],
+    hold: &Hold::BAR,
+    reaching: false,
+    pelvis_m: None,
+    lift_m: 0.1,
+    way_m: [-0.3, 0.0],
+};
+
+const PACE_M_S: f32 = 0.2;
+
+impl SharedLoad {
+    pub(super) fn task(&self) -> Result<&'static Task, EpisodeError> {
+        match self.task {
+            LoadTask::Of(id) => tasks::find(id),
+            LoadTask::Bar => Ok(&carrying::TASK),
+        }
+    }
+
+    /// Number of robots that hold it.
+    pub(super) fn team_size(&self) -> usize {
+        self.holders.len()
+    }
+
+    /// The robots that hold it.
+    pub(super) fn team(&self) -> impl Iterator<Item = usize> {
+        self.holders.iter().map(|(robot, ..)| *robot)
+    }
+
+    /// Takes the object and lifts it; if `carried`, goes a little way with it.
+    pub(super) fn take(&self, episode: &mut InProcess, carried: bool) -> Result<(), PlayerError> {
+        self.with_team(episode, |commander, team| {
+            if !carried {
+                return Ok(());
+            }
+            let from = team.object(commander)?;
+            let [ahead_m, left_m] = self.way_m;
+            let way_m = Vector::new(ahead_m, left_m, 0.0);
+            let length_m = way_m.length();
+            let at =
+                |gone_m: f32| Pose::from_parts(from.translation + way_m * (gone_m / length_m), from.rotation);
+            team.carry(commander, &ObjectPath { at: &at, length_m, pace_m_s: PACE_M_S, free_m: &FREE })
+        })
+    }
+
+    /// Takes the object, lifts it, and goes on as `then` says.
+    pub(super) fn with_team(
+        &self,
+        episode: &mut InProcess,
+        then: impl FnOnce(&mut Commander, &mut CarryTeam) -> Result<(), PlayerError>,
+    ) -> Result<(), PlayerError> {
+        let task = self.task().map_err(|error| PlayerError::GaveUp(error.to_string()))?;
+        let commander = &mut Commander::new(task, episode)?;
+        let grasps: Vec<HandGrasp> = self
+            .holders
+            .iter()
+            .flat_map(|(robot, places, heading_rad)| {
+                HandGrasp::with_both_hands(*robot, self.object, *places, *heading_rad, self.hold)
+            })
+            .collect();
+        let mut team = CarryTeam::new(commander, &grasps)?;
+        self.set_heights(commander, 0);
+        if self.reaching {
+            team.gather_reaching(commander)?;
+            grasp_reached(commander, &grasps)?;
+            team.give_way(commander, true);
+        } else {
+            team.gather(commander)?;
+            grasp_compliantly(commander, &grasps)?;
+        }
+        team.lift(commander, self.lift_m)?;
+        self.set_heights(commander, 1);
+        then(commander, &mut team)
+    }
+
+    fn set_heights(&self, commander: &mut Commander, which: usize) {
+        for robot in self.team() {
+            if let Some(pelvis_m) = self.pelvis_m {
+                commander.set_height(robot, pelvis_m[which]);
+            }
+        }
+    }
+}

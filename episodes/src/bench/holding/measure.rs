@@ -1,0 +1,126 @@
+//! How far a team that was told to stand, and what it holds, went from there.
+
+use std::collections::VecDeque;
+
+use tandem_sim::{CONTROL_HZ, Step, Vector};
+
+/// What came of a team of which nobody fell.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Held {
+    /// The farthest that a pelvis ever was from where it was when the team was told to stand, or to set down; horizontal.
+    pub drift_m: f32,
+    /// The same from where it was [`RESTS_AFTER_S`] later.
+    pub late_drift_m: f32,
+    /// The same of the object where it is held, in the mean of each second.
+    pub load_drift_m: f32,
+    /// When the last robot stood for good.
+    pub standing_after_s: f32,
+    /// The most that the object's vertical axis ever was tilted.
+    pub tilt_deg: f32,
+    /// Mean mechanical power of a robot.
+    pub power_w: f32,
+}
+
+/// Robots that walked come to rest within this time.
+const RESTS_AFTER_S: f32 = 1.5;
+const MEAN_STEPS: usize = CONTROL_HZ as usize;
+
+/// Adds up what happens, control step by control step.
+pub(super) struct Measure<'a> {
+    object: &'a str,
+    team: &'a [usize],
+    steps: u32,
+    began_m: Vec<Vector>,
+    rested_m: Vec<Vector>,
+    /// The middle of the wrists when the team is told to stand, in the object's frame: below it, a table swings.
+    held_in_object_m: Vector,
+    load_m: VecDeque<Vector>,
+    load_rested_m: Option<Vector>,
+    fell: bool,
+    held: Held,
+}
+
+impl<'a> Measure<'a> {
+    /// From the step at which the team is told to stand; `began_m` are the places of pelvises to measure drift from, if they are
+    /// others.
+    pub(super) fn new(
+        begin: &Step,
+        object: &'a str,
+        team: &'a [usize],
+        began_m: Option<&[Vector]>,
+    ) -> Measure<'a> {
+        Measure {
+            object,
+            team,
+            steps: 0,
+            began_m: began_m.map_or_else(|| pelvises_m(begin, team), <[Vector]>::to_vec),
+            rested_m: Vec::new(),
+            held_in_object_m: held_in_object_m(begin, object, team),
+            load_m: VecDeque::new(),
+            load_rested_m: None,
+            fell: false,
+            held: Held::default(),
+        }
+    }
+
+    pub(super) fn add(&mut self, step: &Step) {
+        self.steps += 1;
+        let time_s = self.steps as f32 / CONTROL_HZ as f32;
+        let at_m = pelvises_m(step, self.team);
+        if time_s >= RESTS_AFTER_S && self.rested_m.is_empty() {
+            self.rested_m.clone_from(&at_m);
+        }
+        self.held.drift_m = self.held.drift_m.max(farthest_m(&at_m, &self.began_m));
+        self.held.late_drift_m = self.held.late_drift_m.max(farthest_m(&at_m, &self.rested_m));
+        for robot in self.team {
+            let robot = &step.robots[*robot];
+            self.fell |= robot.truth.fallen;
+            if robot.sensed.is_stepping == Some(true) {
+                self.held.standing_after_s = time_s;
+            }
+            self.held.power_w += robot.sensed.power_w() / self.team.len() as f32;
+        }
+        if let Some(load) = step.object(self.object) {
+            let upwards = load.world_from_object.rotation * Vector::Z;
+            self.held.tilt_deg = self.held.tilt_deg.max(upwards.z.clamp(-1.0, 1.0).acos().to_degrees());
+            self.add_load(time_s, load.world_from_object * self.held_in_object_m);
+        }
+    }
+
+    fn add_load(&mut self, time_s: f32, at_m: Vector) {
+        self.load_m.push_back(at_m);
+        if self.load_m.len() > MEAN_STEPS {
+            self.load_m.pop_front();
+        }
+        let mean_m = self.load_m.iter().copied().sum::<Vector>() / self.load_m.len() as f32;
+        if time_s >= RESTS_AFTER_S + 1.0 {
+            let rested_m = *self.load_rested_m.get_or_insert(mean_m);
+            let away_m = (mean_m - rested_m).truncate().length();
+            self.held.load_drift_m = self.held.load_drift_m.max(away_m);
+        }
+    }
+
+    /// What came of it; `None` if a robot fell.
+    pub(super) fn held(self) -> Option<Held> {
+        let power_w = self.held.power_w / self.steps.max(1) as f32;
+        (!self.fell).then_some(Held { power_w, ..self.held })
+    }
+}
+
+fn held_in_object_m(step: &Step, object: &str, team: &[usize]) -> Vector {
+    let wrists_m = team
+        .iter()
+        .flat_map(|robot| step.robots[*robot].truth.world_from_wrist.map(|wrist| wrist.translation));
+    let wrists_m: Vec<Vector> = wrists_m.collect();
+    let middle_m = wrists_m.iter().copied().sum::<Vector>() / wrists_m.len() as f32;
+    step.object(object).map_or(middle_m, |load| load.world_from_object.inverse() * middle_m)
+}
+
+fn pelvises_m(step: &Step, team: &[usize]) -> Vec<Vector> {
+    team.iter().map(|robot| step.robots[*robot].truth.world_from_pelvis().translation).collect()
+}
+
+/// The farthest of these points from its partner among the others, horizontally.
+fn farthest_m(at_m: &[Vector], from_m: &[Vector]) -> f32 {
+    at_m.iter().zip(from_m).map(|(at, from)| (*at - *from).truncate().length()).fold(0.0, f32::max)
+}

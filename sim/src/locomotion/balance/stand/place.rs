@@ -1,0 +1,194 @@
+//! The place at which a robot stands or is to stand.
+
+use rapier3d::math::{Rotation, Vector};
+use serde::{Deserialize, Serialize};
+
+use super::super::ground::middle_m;
+use super::super::load::Load;
+use crate::body::{BodyEstimate, BodyScale};
+use crate::locomotion::BaseVelocity;
+use crate::plane::flat;
+
+/// A robot that stood and was pushed out of its stance steps back to where it stood: farther than the leash it does not come
+/// back, nearer than this it is back.
+const LEASH_M: f32 = 1.0;
+const BACK_M: f32 = 0.04;
+const RETURN_1_S: f32 = 1.0;
+const RETURN_M_S: f32 = 0.15;
+
+/// A robot that stops coasts for this long at the speed that it has.
+const COASTS_S: f32 = 0.2;
+/// What a robot stays behind its command, or is ahead of it, is forgotten in this time, and beyond the leash at once: who walks far
+/// corrects the command by what he sees.
+const FORGETS_S: f32 = 4.0;
+const MOVED_LEASH_M: f32 = 0.25;
+/// A robot that was told to stop steps on until its feet are this near to where commands took it, or for this long.
+const MOVED_NEAR_M: f32 = 0.02;
+const MOVED_LONGEST_S: f32 = 0.6;
+const MOVED_RETURN_1_S: f32 = 2.0;
+const MOVED_RETURN_M_S: f32 = 0.2;
+/// The pelvis of a robot that has stopped makes up for as much of what its feet are off.
+const MOVED_SHIFT_M: f32 = 0.015;
+
+/// Middle of the soles and heading of a robot that stands.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+pub(in crate::locomotion::balance) struct StandingPlace {
+    pub middle_m: Vector,
+    pub heading_rad: f32,
+    moved: Option<MovedPlace>,
+}
+
+/// What is known of a place that commands move.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+struct MovedPlace {
+    /// Pelvis over the middle of the soles as the robot last stood, heading frame.
+    rest_m: Vector,
+    /// Time since the commands ended.
+    ended_s: f32,
+}
+
+impl StandingPlace {
+    /// The place of a robot that stands where it is.
+    pub(in crate::locomotion::balance) fn new(middle_m: Vector, heading_rad: f32) -> StandingPlace {
+        StandingPlace { middle_m, heading_rad, moved: None }
+    }
+
+    /// The place from which commands take a robot with its feet and its pelvis here.
+    pub(in crate::locomotion::balance) fn of_mover(body: &BodyEstimate, heading_rad: f32) -> StandingPlace {
+        let feet_m = middle_m(&body.world_from_soles());
+        let away_m = flat(body.world_from_pelvis().translation - feet_m);
+        let rest_m = Rotation::from_rotation_z(-heading_rad) * away_m;
+        StandingPlace { middle_m: feet_m, heading_rad, moved: Some(MovedPlace { rest_m, ended_s: 0.0 }) }
+    }
+
+    /// Whether commands took the robot here.
+    pub(in crate::locomotion::balance) fn is_moved(&self) -> bool {
+        self.moved.is_some()
+    }
+
+    /// Goes on with the robot as a command has it for one physics step.
+    pub(in crate::locomotion::balance) fn advance(
+        &mut self,
+        scale: &BodyScale,
+        load: &Load,
+        command: &BaseVelocity,
+        heading_rad: f32,
+        dt_s: f32,
+    ) {
+        let way_m = Vector::new(command.vx_m_s, command.vy_m_s, 0.0) * dt_s;
+        let coming_m = flat(load.velocity_m_s) * scale.time_s(COASTS_S);
+        let robot_m = flat(load.weights_point_m);
+        let away_m = flat(self.middle_m) + Rotation::from_rotation_z(heading_rad) * way_m - robot_m;
+        let away_m = away_m + (coming_m - away_m) * (dt_s / scale.time_s(FORGETS_S));
+        self.middle_m = robot_m + away_m.clamp_length_max(scale.length_m(MOVED_LEASH_M));
+        self.heading_rad = heading_rad;
+        if let Some(moved) = &mut self.moved {
+            moved.ended_s = 0.0;
+        }
+    }
+
+    /// Returns the velocity (heading frame) with which a robot that steps comes to its place, one physics step later; `None` once
+    /// it is there, or has tried for long enough. `landed`: a foot has just touched down.
+    pub(in crate::locomotion::balance) fn velocity_m_s(
+        &mut self,
+        body: &BodyEstimate,
+        load: &Load,
+        heading_rad: f32,
+        landed: bool,
+        dt_s: f32,
+    ) -> Option<Vector> {
+        let scale = &body.model.scale;
+        let feet_m = middle_m(&body.world_from_soles());
+        let Some(moved) = &mut self.moved else {
+            let away_m = flat(self.middle_m - feet_m).clamp_length_max(scale.length_m(LEASH_M));
+            self.middle_m = feet_m + away_m;
+            let back = away_m.length() < scale.length_m(BACK_M);
+            return (!back).then(|| towards_m_s(scale, away_m, heading_rad, RETURN_1_S, RETURN_M_S));
+        };
+        moved.ended_s += dt_s;
+        let there = landed && flat(self.middle_m - feet_m).length() < scale.length_m(MOVED_NEAR_M);
+        if there {
+            moved.ended_s = f32::INFINITY;
+        }
+        let goes_on = moved.ended_s < scale.time_s(MOVED_LONGEST_S);
+        let away_m = flat(self.middle_m - load.weights_point_m);
+        goes_on.then(|| towards_m_s(scale, away_m, heading_rad, MOVED_RETURN_1_S, MOVED_RETURN_M_S))
+    }
+
+    /// Returns where the pelvis of a robot that stops with its feet here rests over their middle, heading frame; `None` if no
+    /// command moved it.
+    pub(in crate::locomotion::balance) fn rest_m(
+        &self,
+        body: &BodyEstimate,
+        heading_rad: f32,
+    ) -> Option<Vector> {
+        let off_m = flat(self.middle_m - middle_m(&body.world_from_soles()));
+        let shift_m = Rotation::from_rotation_z(-heading_rad) * off_m;
+        let most_m = body.model.scale.length_m(MOVED_SHIFT_M);
+        self.moved.map(|moved| moved.rest_m + shift_m.clamp_length_max(most_m))
+    }
+}
+
+fn towards_m_s(scale: &BodyScale, away_m: Vector, heading_rad: f32, rate_1_s: f32, most_m_s: f32) -> Vector {
+    let away_m = Rotation::from_rotation_z(-heading_rad) * away_m;
+    (away_m * scale.rate_1_s(rate_1_s)).clamp_length_max(scale.speed_m_s(most_m_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::load::LadenRobot;
+    use super::super::super::observer::ObservedPush;
+    use super::*;
+    use crate::body::posed::Posed;
+
+    const DT_S: f32 = 1.0 / 200.0;
+
+    fn load(body: &BodyEstimate) -> Load {
+        Load::of(body, &LadenRobot::of(body), 0.0, ObservedPush::default(), 0.0)
+    }
+
+    /// Where commands of some seconds take the place of a robot that has not moved, from its feet.
+    fn moved(command: &BaseVelocity, seconds: f32) -> (BodyEstimate, StandingPlace) {
+        let body = Posed::standing().body();
+        let mut place = StandingPlace::of_mover(&body, 0.0);
+        for _ in 0..(seconds / DT_S) as usize {
+            place.advance(&body.model.scale, &load(&body), command, 0.0, DT_S);
+        }
+        (body, place)
+    }
+
+    #[test]
+    fn a_short_command_moves_the_place_by_its_velocity_times_its_duration() {
+        let command = BaseVelocity { vx_m_s: 0.2, ..BaseVelocity::STILL };
+        let (body, place) = moved(&command, 0.5);
+        let way_m = flat(place.middle_m - middle_m(&body.world_from_soles()));
+        assert!((way_m.x - 0.1).abs() < 0.01 && way_m.y.abs() < 1e-3, "{way_m}");
+        let (body, place) = moved(&command, 10.0);
+        let away_m = flat(place.middle_m - load(&body).weights_point_m).length();
+        assert!(away_m < MOVED_LEASH_M + 1e-4, "a robot that is held back is not owed {away_m} m");
+    }
+
+    #[test]
+    fn a_robot_that_stopped_goes_to_its_place_until_it_is_there_or_time_is_up() {
+        let command = BaseVelocity { vx_m_s: 0.2, ..BaseVelocity::STILL };
+        let (body, mut place) = moved(&command, 0.5);
+        let load = load(&body);
+        let mut to_m_s = |landed: bool| place.velocity_m_s(&body, &load, 0.0, landed, DT_S);
+        assert!(to_m_s(true).expect("it is 10 cm away").x > 0.1);
+        let steps = (0..1000).take_while(|_| to_m_s(false).is_some()).count();
+        assert!((steps as f32 * DT_S - MOVED_LONGEST_S).abs() < 0.02, "{steps} steps");
+        let (body, mut place) = moved(&command, 0.05);
+        assert_eq!(place.velocity_m_s(&body, &load, 0.0, true, DT_S), None, "feet are within a centimetre");
+        assert_eq!(place.velocity_m_s(&body, &load, 0.0, false, DT_S), None);
+    }
+
+    #[test]
+    fn the_pelvis_makes_up_for_a_little_of_what_the_feet_are_off() {
+        let (body, place) = moved(&BaseVelocity { vy_m_s: 0.1, ..BaseVelocity::STILL }, 0.5);
+        let (_, start) = moved(&BaseVelocity::STILL, 0.0);
+        let rest_m = |place: &StandingPlace| place.rest_m(&body, 0.0).expect("commands moved it");
+        let shift_m = rest_m(&place) - rest_m(&start);
+        assert!((shift_m.length() - MOVED_SHIFT_M).abs() < 1e-4 && shift_m.y > 0.0, "{shift_m}");
+        assert_eq!(StandingPlace::new(Vector::ZERO, 0.0).rest_m(&body, 0.0), None);
+    }
+}
