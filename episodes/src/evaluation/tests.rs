@@ -16,7 +16,7 @@ use crate::{players, scoring::Phase};
 fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultReply {
     ResultReply {
         task: task.into(),
-        seed,
+        seed: Some(seed),
         protocol: Protocol::Benchmark,
         phases: PhaseTimes(phases),
         ended: EndReason::Finished,
@@ -26,7 +26,7 @@ fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultRe
         thinking_s: 0.0,
         falls: 0,
         realtime_factor: 3.5,
-        state_hash: "00c0ffee00c0ffee".into(),
+        state_hash: Some("00c0ffee00c0ffee".into()),
         simulator_failure: None,
         assistance: Assistance::Full,
         extra_information: vec![],
@@ -48,6 +48,7 @@ fn played(cache: &EpisodeCache, spec: &EpisodeSpec) -> PlayedEpisode {
         thought_s: 1.5,
         note: None,
         keep_failed: false,
+        attempts: Vec::new(),
     }
 }
 
@@ -98,7 +99,8 @@ fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         jobs: 1,
         record: false,
         files: KeptFiles::default(),
-        keep_failed: false,
+        retries: EvaluationPlan::DEFAULT_RETRIES,
+        seed_key: None,
     }
 }
 
@@ -205,7 +207,7 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     type Change = fn(&mut PlayedEpisode);
     for (what, change) in [
         ("task", (|played| played.result.task = "handover".into()) as Change),
-        ("seed", |played| played.result.seed = 8),
+        ("seed", |played| played.result.seed = Some(8)),
         ("protocol", |played| played.spec.protocol = Protocol::Benchmark),
         ("assistance", |played| played.spec.assistance = Assistance::Paper),
         ("disclosure", |played| played.spec.disclosure = Disclosure::End),
@@ -301,7 +303,7 @@ fn what_failed_itself_is_counted_apart_and_played_again() {
     let plan = plan(vec![handover], vec![1, 2, 3, 4, 5]);
     let build = fingerprint::build().unwrap();
     let cache = EpisodeCache { plan: &plan, folder: folder.path(), locomotion: "balance".into(), build };
-    let keeping_plan = EvaluationPlan { keep_failed: true, ..plan.clone() };
+    let keeping_plan = EvaluationPlan { retries: 0, ..plan.clone() };
     let keeping = EpisodeCache { plan: &keeping_plan, locomotion: "balance".into(), ..cache };
     let spec = |seed: u32| plan.spec(handover, seed, Start::Task);
     let outcomes = [

@@ -124,7 +124,7 @@ impl HostedEpisode {
         EpisodeEntry {
             episode_id: self.id.clone(),
             task: spec.task.id.into(),
-            seed: spec.seed,
+            seed: spec.told_seed(),
             protocol: spec.protocol,
             operators: if self.team.is_some() { Operators::PerRobot } else { Operators::One },
             step: self.thread.env_steps(),

@@ -21,7 +21,7 @@ pub fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Pl
         build: "0.1.0+test".into(),
         result: ResultReply {
             task: task.id.into(),
-            seed,
+            seed: Some(seed),
             protocol: Protocol::Benchmark,
             phases: PhaseTimes(times.collect()),
             ended,
@@ -31,7 +31,7 @@ pub fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Pl
             thinking_s: 0.0,
             falls: u32::from(phases == 0),
             realtime_factor: 3.5,
-            state_hash: format!("{seed:016x}"),
+            state_hash: Some(format!("{seed:016x}")),
             simulator_failure: None,
             assistance: Assistance::Paper,
             extra_information: vec![],
@@ -43,6 +43,7 @@ pub fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Pl
         thought_s: f64::from(seed),
         note: None,
         keep_failed: false,
+        attempts: Vec::new(),
     }
 }
 
@@ -308,7 +309,11 @@ fn what_failed_itself_is_told_apart_and_in_no_rate() {
         // It was played again elsewhere.
         failed("one", 3, EndReason::PolicyFailed, crash),
         failed("other", 20, EndReason::Finished, "it is too hard"),
-        PlayedEpisode { keep_failed: true, ..failed("other", 21, EndReason::PolicyFailed, crash) },
+        PlayedEpisode {
+            keep_failed: true,
+            attempts: failed("other", 21, EndReason::PolicyFailed, "no plan").into_attempts(),
+            ..failed("other", 21, EndReason::PolicyFailed, crash)
+        },
     ]);
     let folder = tempfile::tempdir().unwrap();
     let strip = folder.path().join("strip.png");
@@ -322,6 +327,13 @@ fn what_failed_itself_is_told_apart_and_in_no_rate() {
     let listed: Vec<_> = one.excluded.iter().map(|e| (e.what.name(), &*e.why, &*e.seeds)).collect();
     let simulator = ("simulator failed", "a velocity is not finite", &[22][..]);
     assert_eq!(listed, [("policy failed", crash, &[20, 21][..]), simulator]);
+    // Who crashes when it is about to lose, and wins the next time, leaves a trace.
+    let again = |policy: &PolicyReport| -> Vec<_> {
+        let all = policy.played_again.iter();
+        all.map(|again| (again.seed, again.earlier.clone(), again.last.clone())).collect()
+    };
+    assert_eq!(again(one), [(3, vec![crash.to_owned()], "success".to_owned())]);
+    assert_eq!(again(other), [(21, vec!["no plan".to_owned()], "policy failed".to_owned())]);
     assert!(other.excluded.is_empty() && other.reasons.iter().any(|reason| reason.why == crash));
     assert_eq!(report.comparisons[0].rows[0].pairs.total(), 10);
     let shown: Vec<_> =

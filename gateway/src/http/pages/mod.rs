@@ -61,7 +61,7 @@ pub fn router() -> Router<AppState> {
         .route("/watch/file", get(finished::file))
         .route("/watch/take_over", post(taking_over::take_over))
         .layer(middleware::from_fn(only_watchers));
-    inside.route(WATCH, get(page).merge(post(enter))).merge(operate::router())
+    inside.route(WATCH, get(page).merge(post(enter)))
 }
 
 /// Lets nobody in who has not come by the link.

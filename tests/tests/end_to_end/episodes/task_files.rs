@@ -32,7 +32,8 @@ fn played(task: &'static Task) -> Vec<(PhaseTimes, String)> {
         jobs: 2,
         record: false,
         files: KeptFiles::default(),
-        keep_failed: false,
+        retries: EvaluationPlan::DEFAULT_RETRIES,
+        seed_key: None,
     };
     let folder = tempfile::tempdir().expect("a temporary folder");
     let episodes = evaluate(&plan, folder.path(), &|_| {}).expect("worlds can be built").episodes;
