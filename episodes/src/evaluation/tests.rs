@@ -1,6 +1,8 @@
 //! Which episodes are cached, what is noted, and how they are counted.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
 
 use tandem_sim::{Sensing, dynamics::Diverged, render::RendererKind};
 use tandem_tools_spec::{Assistance, Disclosure, EndReason, Hints, PhaseTimes, Protocol, ResultReply};
@@ -249,6 +251,46 @@ impl Policy for Unplayable {
     fn play_episode(&self, _: &EpisodeSpec, _: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
         Err((self.0)())
     }
+}
+
+/// A policy that fails itself in every episode.
+#[derive(Debug, Default)]
+struct Failing(AtomicU32);
+
+impl Policy for Failing {
+    fn card(&self) -> PolicyCard {
+        "failing".into()
+    }
+
+    fn play_episode(&self, spec: &EpisodeSpec, _: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
+        let number = self.0.fetch_add(1, Ordering::Relaxed) + 1;
+        let phases = vec![("p1".into(), None), ("p2".into(), None), ("p3".into(), None)];
+        let result = ResultReply { ended: EndReason::PolicyFailed, ..result("handover", spec.seed, phases) };
+        let stopped = Some(format!("crash {number}"));
+        Ok(PlayOutcome { result, thought: Duration::from_secs(1), stopped })
+    }
+}
+
+/// Whoever fails itself when it is about to lose is played again as often as is asked for, and every attempt stays.
+#[test]
+fn a_policy_that_fails_itself_again_and_again_has_failed() {
+    let folder = tempfile::tempdir().unwrap();
+    let player = Failing::default();
+    let plan = EvaluationPlan { player: &player, ..plan(vec![tasks::find("handover").unwrap()], vec![1]) };
+    let run = |retries: u32| {
+        let evaluation =
+            evaluate(&EvaluationPlan { retries, ..plan.clone() }, folder.path(), &|_| {}).unwrap();
+        let (played, task) = (evaluation.episodes[0].clone(), evaluation.tasks["handover"].clone());
+        let notes: Vec<String> =
+            played.into_attempts().into_iter().filter_map(|attempt| attempt.note).collect();
+        (task.episodes, task.policy_failed, notes.join(", "))
+    };
+    assert_eq!(run(2), (0, 1, "crash 1".into()));
+    assert_eq!(run(2), (0, 1, "crash 1, crash 2".into()));
+    assert_eq!(run(2), (1, 0, "crash 1, crash 2, crash 3".into()), "it counts as a failure");
+    assert_eq!(run(2), (1, 0, "crash 1, crash 2, crash 3".into()), "and is kept");
+    assert_eq!(run(0), (1, 0, "crash 1, crash 2, crash 3".into()));
+    assert_eq!(run(3), (1, 0, "crash 1, crash 2, crash 3, crash 4".into()), "whoever asks for more has more");
 }
 
 #[test]

@@ -19,7 +19,7 @@ use tokio::{
 use super::{
     Caller, EpisodeThread, HostedEpisode, HostingError,
     idempotency_cache::{IdempotencyCache, IdempotentReply},
-    run_folder::RunFolders,
+    run_folder::{RunFolders, episode_name},
     team::{Collection, Team},
 };
 use crate::{metrics::Metrics, settings::Settings};
@@ -147,7 +147,7 @@ impl EpisodeTable {
     pub async fn start_spec(&self, spec: EpisodeSpec, driving: &Driving) -> Result<StartReply, HostingError> {
         self.check_starts()?;
         let place = self.take_place().await?;
-        let (id, path) = self.folders.create(&self.settings.runs, spec.task.id, spec.seed);
+        let (id, path) = self.folders.create(&self.settings.runs, &episode_name(&spec)?);
         let folder = RunFolder { path, visibility: self.settings.record, pages: true };
         self.begin(&id, spec, driving, folder, place).await
     }
@@ -250,7 +250,12 @@ impl EpisodeTable {
     pub fn list(&self, who: &Caller) -> EpisodeList {
         let held = self.lock();
         let known = held.episodes.values().filter(|episode| episode.admit(who).is_ok());
-        EpisodeList { episodes: known.map(HostedEpisode::entry).collect() }
+        EpisodeList { episodes: known.map(HostedEpisode::told_entry).collect() }
+    }
+
+    /// All episodes, for those who watch.
+    pub fn watched(&self) -> EpisodeList {
+        EpisodeList { episodes: self.lock().episodes.values().map(HostedEpisode::entry).collect() }
     }
 
     /// Whether `who` is an operator who may talk to others.

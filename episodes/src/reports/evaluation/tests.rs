@@ -290,6 +290,30 @@ fn reports_quote_what_they_are_told() {
     assert_eq!(json["policies"][0]["tasks"][0]["phases"][1]["cumulative"]["successes"], 6);
 }
 
+/// Who crashes when it is about to lose, and wins the next time, leaves a trace.
+#[test]
+fn an_episode_that_was_played_again_is_listed() {
+    let handover = tasks::find("handover").unwrap();
+    let failed = |seed: u32, why: &str| {
+        let mut played = played("one", handover, seed, 1);
+        (played.result.ended, played.note) = (EndReason::PolicyFailed, Some(why.into()));
+        played
+    };
+    let mut episodes = nine_six_three("one");
+    // One was played again in another folder, one in the same, and one as often as was asked for.
+    episodes[0].attempts = failed(0, "no plan").into_attempts();
+    episodes.push(failed(3, "crash"));
+    let attempts = failed(21, "no plan").into_attempts();
+    episodes.push(PlayedEpisode { keep_failed: true, attempts, ..failed(21, "crash") });
+    let report = EvaluationReport::of(&found(episodes));
+    let again = report.policies[0].played_again.iter();
+    let again: Vec<_> = again.map(|again| (again.seed, again.earlier.join(", "), &*again.last)).collect();
+    let expected = [(0, "no plan", "success"), (3, "crash", "failure"), (21, "no plan", "policy failed")];
+    assert_eq!(again, expected.map(|(seed, earlier, last)| (seed, earlier.to_owned(), last)));
+    let text = report.write(ReportFormat::Markdown, &ReportPictures::default()).unwrap();
+    assert!(text.contains("Played again"), "{text}");
+}
+
 #[test]
 fn what_failed_itself_is_told_apart_and_in_no_rate() {
     let handover = tasks::find("handover").unwrap();
@@ -309,11 +333,7 @@ fn what_failed_itself_is_told_apart_and_in_no_rate() {
         // It was played again elsewhere.
         failed("one", 3, EndReason::PolicyFailed, crash),
         failed("other", 20, EndReason::Finished, "it is too hard"),
-        PlayedEpisode {
-            keep_failed: true,
-            attempts: failed("other", 21, EndReason::PolicyFailed, "no plan").into_attempts(),
-            ..failed("other", 21, EndReason::PolicyFailed, crash)
-        },
+        PlayedEpisode { keep_failed: true, ..failed("other", 21, EndReason::PolicyFailed, crash) },
     ]);
     let folder = tempfile::tempdir().unwrap();
     let strip = folder.path().join("strip.png");
@@ -327,13 +347,6 @@ fn what_failed_itself_is_told_apart_and_in_no_rate() {
     let listed: Vec<_> = one.excluded.iter().map(|e| (e.what.name(), &*e.why, &*e.seeds)).collect();
     let simulator = ("simulator failed", "a velocity is not finite", &[22][..]);
     assert_eq!(listed, [("policy failed", crash, &[20, 21][..]), simulator]);
-    // Who crashes when it is about to lose, and wins the next time, leaves a trace.
-    let again = |policy: &PolicyReport| -> Vec<_> {
-        let all = policy.played_again.iter();
-        all.map(|again| (again.seed, again.earlier.clone(), again.last.clone())).collect()
-    };
-    assert_eq!(again(one), [(3, vec![crash.to_owned()], "success".to_owned())]);
-    assert_eq!(again(other), [(21, vec!["no plan".to_owned()], "policy failed".to_owned())]);
     assert!(other.excluded.is_empty() && other.reasons.iter().any(|reason| reason.why == crash));
     assert_eq!(report.comparisons[0].rows[0].pairs.total(), 10);
     let shown: Vec<_> =

@@ -204,6 +204,7 @@ fn withhold_hand(hand: &mut HandReport) {
     let HandReport {
         state,
         grip,
+        hold_lacks,
         touches,
         target: _,
         measured: _,
@@ -217,6 +218,7 @@ fn withhold_hand(hand: &mut HandReport) {
         joints_at_limit: _,
     } = hand;
     (*state, *grip, *touches, *compliance_offset_m) = (None, None, None, None);
+    *hold_lacks = None;
     (*largest_effort, *force_n) = (None, None);
     if let Some(FingerReport { state, target_rad: _, measured_rad: _ }) = fingers {
         *state = None;

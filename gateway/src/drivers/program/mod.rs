@@ -19,11 +19,11 @@ use tandem_episodes::{
     players::{EpisodeOutput, PlayError, PlayOutcome, Policy},
     results::{PolicyCard, write_result},
 };
-use tandem_tools_spec::{Assistance, Driving, EndReason, ResultReply, StartReply};
+use tandem_tools_spec::{Driving, EndReason, ResultReply, StartReply};
 
 use super::{lost, own_result, python::PythonModule, remove_old_result};
 use crate::{
-    hosting::{EpisodeThread, HostingError, Purpose},
+    hosting::{EpisodeThread, HostingError, Purpose, episode_name},
     http::{Guests, Server},
     settings::{Layer, Record, Settings, SettingsError},
     token::Token,
@@ -258,14 +258,7 @@ impl Policy for Program {
         let guests = Guests { purpose: Purpose::Evaluation, ..Guests::default() };
         let server = Server::start_for(self.settings_for(spec, token)?, guests);
         let server = server.map_err(|error| lost("no server", error))?;
-        let id = match spec.assistance {
-            // A name with the seed would tell the policy which episode it is.
-            Assistance::Paper => {
-                let (_, random) = Token::random().map_err(HostingError::from)?;
-                format!("{}-{}", spec.task.id, &random[..8])
-            }
-            Assistance::Full => format!("{}-seed{}", spec.task.id, spec.seed),
-        };
+        let id = episode_name(spec).map_err(HostingError::from)?;
         let files = RunFolder { path: absolute.clone(), visibility: Visibility::After, pages: true };
         let (episode, start) = server.host(&id, spec.clone(), &self.driving, files)?;
         if let Some(reason) = start.briefing.recording_failed {
