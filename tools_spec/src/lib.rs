@@ -30,7 +30,7 @@ pub use listing::{EpisodeEntry, EpisodeList};
 pub use parts::{
     Assistance, BASE_COLUMNS, BaseCommand, BaseLimits, BaseMotion, BaseReport, BaseState, Budget, Bytes,
     CameraArrays, CommandReply, DepthFormat, Disclosure, Driving, Effort, ExtraInformation, FingerReport,
-    Formats, Grip, HandReport, HandState, Heard, Hints, HoldLack, ImageFormat, JointValues, Note, NoteKind,
+    Formats, Grip, HandReport, HandState, Heard, Hints, ImageFormat, JointValues, Note, NoteKind,
     OperatorToken, Operators, Partner, PartnerDid, PhaseReached, PixelRegion, Png, Pose, PoseFrame, Protocol,
     Range, RobotFallen, RobotReport, StopReason, TokenCount, Touch, Usage, Wording,
 };

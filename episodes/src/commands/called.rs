@@ -37,6 +37,18 @@ pub struct OperatorCommand {
     pub(crate) steps: u32,
 }
 
+/// Calls that have been checked, and show their callers nothing that is withheld. [`Called::allowed`] alone makes them, and no call is
+/// answered without.
+#[derive(Clone, Copy)]
+pub(crate) struct Allowed<'a>(&'a Called);
+
+impl<'a> Allowed<'a> {
+    /// What is called.
+    pub(crate) fn called(self) -> &'a Called {
+        self.0
+    }
+}
+
 /// What stands around a caller's call.
 pub(crate) struct Surroundings {
     /// The caller's robot, where each has an operator and several call together.
@@ -80,6 +92,18 @@ impl Called {
             Called::One(call) => vec![call],
             Called::Together(calls) => calls.iter().map(OperatorCall::call).collect(),
         }
+    }
+
+    /// The calls, if each fits the contract and `check` refuses none.
+    pub(crate) fn allowed(
+        &self,
+        check: impl Fn(&ToolCall) -> Result<(), EpisodeError>,
+    ) -> Result<Allowed<'_>, EpisodeError> {
+        for call in self.calls() {
+            call.validate()?;
+            check(&call.tool)?;
+        }
+        Ok(Allowed(self))
     }
 
     /// How pictures are to come.

@@ -255,9 +255,9 @@ impl Policy for Unplayable {
 
 /// A policy that fails itself in every episode.
 #[derive(Debug, Default)]
-struct Failing(AtomicU32);
+struct FailingPolicy(AtomicU32);
 
-impl Policy for Failing {
+impl Policy for FailingPolicy {
     fn card(&self) -> PolicyCard {
         "failing".into()
     }
@@ -275,7 +275,7 @@ impl Policy for Failing {
 #[test]
 fn a_policy_that_fails_itself_again_and_again_has_failed() {
     let folder = tempfile::tempdir().unwrap();
-    let player = Failing::default();
+    let player = FailingPolicy::default();
     let plan = EvaluationPlan { player: &player, ..plan(vec![tasks::find("handover").unwrap()], vec![1]) };
     let run = |retries: u32| {
         let evaluation =

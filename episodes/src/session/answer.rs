@@ -7,9 +7,8 @@ use tandem_tools_spec::{
 };
 
 use super::Session;
-use super::told::Allowed;
 use crate::EpisodeError;
-use crate::commands::{self, Called, Command, RobotSheet, check_reach, report};
+use crate::commands::{self, Allowed, Called, Command, RobotSheet, check_reach, report};
 use crate::observation::{Detail, Proprioception, TeamObservation, check_formats, robot_state};
 use crate::recording::CallOutcome;
 

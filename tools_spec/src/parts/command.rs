@@ -143,10 +143,6 @@ pub struct HandReport {
     /// What the fingers feel between them, by their own torques; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grip: Option<Grip>,
-    /// What is missing for a hold that is scored, as far as the fingers feel it: one has the thumb press against fingers or palm, with 1.5 N
-    /// or more to begin. Left out where nothing is pressed or nothing is missing, and where the assistance is "paper".
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub hold_lacks: Option<HoldLack>,
     /// What stops the hand, as far as it can feel that; left out where it feels nothing, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub touches: Option<Touch>,
@@ -201,18 +197,6 @@ pub enum Grip {
     OneSided,
     /// The thumb presses on one side and the fingers on the other.
     Holding,
-}
-
-/// What is missing for a hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum HoldLack {
-    /// Fingers press, and the thumb does not.
-    Thumb,
-    /// The thumb presses, and no finger does.
-    Fingers,
-    /// Both press, and not against each other: the angle between them is less than 120 degrees, as on something too thick.
-    Opposition,
 }
 
 /// What a hand touches, as far as it can feel that.

@@ -10,7 +10,7 @@ mod quantities;
 
 pub use command::{
     BaseMotion, BaseReport, BaseState, CommandReply, Effort, FingerReport, Grip, HandReport, HandState,
-    HoldLack, RobotReport, StopReason, Touch,
+    RobotReport, StopReason, Touch,
 };
 pub use driving::{Driving, Heard, OperatorToken, Operators, Partner, PartnerDid};
 pub use episode::{

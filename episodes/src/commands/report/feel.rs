@@ -3,7 +3,7 @@
 
 use tandem_sim::mjcf::{Geom, Primitive};
 use tandem_sim::{HAND_JOINTS, Pose, RobotModel, RobotSensed, Side, UPPER, Vector};
-use tandem_tools_spec::{Grip, HoldLack, Touch};
+use tandem_tools_spec::{Grip, Touch};
 
 use crate::commands::columns;
 
@@ -21,8 +21,6 @@ const NEAR_M: f32 = 0.004;
 const THUMB_JOINTS: usize = 3;
 /// thumb_0 swings the thumb to the side, and neither opens nor closes it.
 const SWINGING: usize = 0;
-/// Presses are opposed if the angle between them is at least 120 degrees, as the scorer has it.
-const OPPOSED_COSINE: f32 = -0.5;
 /// Points along a capsule at which its distance from another shape is taken.
 const POINTS: usize = 9;
 
@@ -50,56 +48,6 @@ pub fn grip(side: Side, sensed: &RobotSensed, model: &RobotModel) -> (Grip, Opti
         Grip::Touching | Grip::OneSided | Grip::Holding => Some(Touch::Something),
     };
     (grip, touch)
-}
-
-/// What is missing of a hold that is scored, in a hand that feels `grip`.
-pub fn hold_lacks(side: Side, grip: Grip, sensed: &RobotSensed, model: &RobotModel) -> Option<HoldLack> {
-    let closing: [f32; HAND_JOINTS] = std::array::from_fn(|finger| closing_n_m(side, finger, sensed));
-    let presses = |torques_n_m: &[f32]| torques_n_m.iter().any(|torque_n_m| *torque_n_m >= PRESSES_N_M);
-    let (thumb, fingers) = closing.split_at(THUMB_JOINTS);
-    match (grip, presses(thumb), presses(fingers)) {
-        (Grip::None | Grip::Touching, _, _) | (_, false, false) => None,
-        (Grip::OneSided, true, false) => Some(HoldLack::Fingers),
-        (Grip::OneSided | Grip::Holding, false, true) => Some(HoldLack::Thumb),
-        // The thumb presses on something in the palm.
-        (Grip::Holding, true, false) => None,
-        (Grip::OneSided | Grip::Holding, true, true) => {
-            let [thumb_n, fingers_n] = presses_n(side, &closing, sensed, model);
-            let most = OPPOSED_COSINE * thumb_n.length() * fingers_n.length();
-            (thumb_n.dot(fingers_n) > most).then_some(HoldLack::Opposition)
-        }
-    }
-}
-
-/// What thumb and fingers press with, pelvis frame, if each presses with the middle of its last link:
-///   f = sum over its joints of tau (a x r) / |r|^2,   a: axis, r: from the joint to that point.
-fn presses_n(
-    side: Side,
-    closing_n_m: &[f32; HAND_JOINTS],
-    sensed: &RobotSensed,
-    model: &RobotModel,
-) -> [Vector; 2] {
-    let hand = &model.hands[side];
-    let poses = model.forward_kinematics(Pose::IDENTITY, &sensed.joints.q_rad);
-    let press_n = |finger: usize| {
-        let joint = UPPER[columns::hand(side).start + finger];
-        let (joint_model, torque_n_m) = (&model.joints[joint], sensed.joints.torque_n_m[joint]);
-        let links = if finger < THUMB_JOINTS { &hand.thumb } else { &hand.fingers };
-        let last = links.iter().rev().find(|link| is_carried_by(model, **link, joint_model.link));
-        let tip_m = last.map(|link| poses[*link] * model.links[*link].mass.local_com);
-        let pose = poses[joint_model.link];
-        let lever_m = tip_m.map_or(Vector::ZERO, |tip_m| tip_m - pose.translation);
-        let axis = pose.rotation * joint_model.axis;
-        let presses = closing_n_m[finger] > 0.0 && lever_m.length_squared() > 0.0;
-        if presses { axis.cross(lever_m) * torque_n_m / lever_m.length_squared() } else { Vector::ZERO }
-    };
-    let sum = |fingers: std::ops::Range<usize>| fingers.map(&press_n).fold(Vector::ZERO, |sum, n| sum + n);
-    [sum(0..THUMB_JOINTS), sum(THUMB_JOINTS..HAND_JOINTS)]
-}
-
-/// Whether a link is `by`, or further out than that.
-fn is_carried_by(model: &RobotModel, link: usize, by: usize) -> bool {
-    std::iter::successors(Some(link), |link| model.links[*link].parent).any(|link| link == by)
 }
 
 /// The torque with which a finger joint's drive closes it; 0 of joints that turn, and of the one that neither opens nor closes.

@@ -99,7 +99,6 @@ fn hand_report(
     HandReport {
         state: Some(state),
         grip: Some(grip),
-        hold_lacks: feel::hold_lacks(side, grip, sensed, &robot.model),
         touches: touch.or(presses.then_some(Touch::Something)),
         target: Some(target_told),
         measured: Some(measured_told),

@@ -16,7 +16,7 @@ use tandem_tools_spec::{
 use super::Session;
 use super::answer::Answer;
 use crate::EpisodeError;
-use crate::commands::Called;
+use crate::commands::{Allowed, Called};
 use crate::observation::TeamObservation;
 
 /// How many replies showed what the benchmark's own policies are not shown.
@@ -204,7 +204,6 @@ fn withhold_hand(hand: &mut HandReport) {
     let HandReport {
         state,
         grip,
-        hold_lacks,
         touches,
         target: _,
         measured: _,
@@ -218,31 +217,16 @@ fn withhold_hand(hand: &mut HandReport) {
         joints_at_limit: _,
     } = hand;
     (*state, *grip, *touches, *compliance_offset_m) = (None, None, None, None);
-    *hold_lacks = None;
     (*largest_effort, *force_n) = (None, None);
     if let Some(FingerReport { state, target_rad: _, measured_rad: _ }) = fingers {
         *state = None;
     }
 }
 
-/// A call that shows its caller nothing that the episode withholds. [`Session::allow`] alone makes one, and no call is answered without.
-#[derive(Clone, Copy)]
-pub struct Allowed<'a>(&'a Called);
-
-impl<'a> Allowed<'a> {
-    pub fn called(self) -> &'a Called {
-        self.0
-    }
-}
-
 impl Session {
-    /// Checks every caller's call.
+    /// Checks that no caller's call shows what the episode withholds.
     pub(super) fn allow<'a>(&self, called: &'a Called) -> Result<Allowed<'a>, EpisodeError> {
-        for call in called.calls() {
-            call.validate()?;
-            self.check_told(&call.tool)?;
-        }
-        Ok(Allowed(called))
+        called.allowed(|tool| self.check_told(tool))
     }
 
     /// Refuses a call that would show what the policy is not told.

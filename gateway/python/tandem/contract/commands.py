@@ -36,13 +36,6 @@ HandState: TypeAlias = Literal[
 ]
 """How a wrist or fingers stand to their target."""
 
-HoldLack: TypeAlias = Literal[
-    "thumb",
-    "fingers",
-    "opposition",
-]
-"""What is missing for a hold."""
-
 PoseFrame: TypeAlias = Literal[
     "pelvis",
     "level",
@@ -255,12 +248,6 @@ class HandReport:
     grip: Grip | None
     """What the fingers feel between them, by their own torques; left out where the assistance is "paper"."""
 
-    hold_lacks: HoldLack | None
-    """What is missing for a hold that is scored, as far as the fingers feel it: one has the thumb press against
-    fingers or palm, with 1.5 N or more to begin. Left out where nothing is pressed or nothing is missing, and
-    where the assistance is "paper".
-    """
-
     touches: Touch | None
     """What stops the hand, as far as it can feel that; left out where it feels nothing, and where the assistance
     is "paper".
@@ -321,7 +308,6 @@ class HandReport:
         return HandReport(
             state=value.get("state"),
             grip=value.get("grip"),
-            hold_lacks=value.get("hold_lacks"),
             touches=value.get("touches"),
             target=None if (got := value.get("target")) is None else Pose.of(got),
             measured=None if (got := value.get("measured")) is None else Pose.of(got),

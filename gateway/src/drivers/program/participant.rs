@@ -7,11 +7,8 @@ use tandem_episodes::{EpisodeError, OutputError, create_private_folder, players:
 use tandem_tools_spec::{Driving, StartReply};
 use tempfile::TempDir;
 
-use super::process::{STDERR_FILE, STDOUT_FILE};
+use super::process::{BRIEF_FILE, STDERR_FILE, STDOUT_FILE};
 use crate::drivers::lost;
-
-/// The file with the brief, which the program reads on its standard input, too.
-pub const BRIEF_FILE: &str = "brief.txt";
 
 /// The file with the server's reply to the start, for programs that read JSON.
 const START_FILE: &str = "start.json";
