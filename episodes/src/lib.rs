@@ -63,9 +63,12 @@ pub use recording::{
 pub use results::RESULT_FILE;
 pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, RobotFacts, Scores, StepScore};
 pub use session::{
-    CallReply, Checkpoint, Clock, FAILED_STEP_FILE, FailedStep, RunFiles, RunFolder, Session, monotonic,
+    Audience, CallReply, Caller, Checkpoint, Clock, FAILED_STEP_FILE, FailedStep, Outcome, Request, RunFiles,
+    RunFolder, Session, monotonic,
 };
-pub use spec::{Controller, EpisodeSpec, MomentStart, OwnRobot, PhaseStart, RobotFile, SceneFile, Start};
+pub use spec::{
+    Controller, EpisodeSpec, KeyedSeed, MomentStart, OwnRobot, PhaseStart, RobotFile, SceneFile, Start,
+};
 pub use tandem_sim::{
     BaseLimits, CONTROL_HZ, LocomotionChoice, Sensing, SensorModel, SimError, StateSource,
     assets::{DEFAULT_ROBOT, ROBOTS, robot as embedded_robot},

@@ -58,6 +58,18 @@ pub struct EpisodeSpec {
     /// How long the policy may think, if not as long as the protocol has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thinking_limit_s: Option<u32>,
+    /// What an evaluator's key makes of the seed, where there is a key.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub keyed_seed: Option<KeyedSeed>,
+}
+
+/// The seed that an evaluator's key draws for a public one.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct KeyedSeed {
+    /// Names the key and tells nothing of it.
+    pub key_fingerprint: String,
+    /// The seed in whose place it stands.
+    pub drawn: u32,
 }
 
 /// Which file describes the robots.
@@ -157,12 +169,32 @@ impl EpisodeSpec {
             variation: Variation::default(),
             stress: None,
             thinking_limit_s: None,
+            keyed_seed: None,
         }
     }
 
     /// The same with another seed, and what that chooses.
     pub fn seeded(&self, seed: u32) -> EpisodeSpec {
-        EpisodeSpec { task: self.task.under(seed), seed, ..self.clone() }
+        EpisodeSpec { task: self.task.under(seed), seed, keyed_seed: None, ..self.clone() }
+    }
+
+    /// The same with what an evaluator's key makes of the seed.
+    pub fn keyed(self, keyed_seed: Option<KeyedSeed>) -> EpisodeSpec {
+        let drawn = keyed_seed.as_ref().map_or(self.seed, |keyed| keyed.drawn);
+        EpisodeSpec { task: self.task.under(drawn), keyed_seed, ..self }
+    }
+
+    /// The seed that decides what happens: the evaluator's, where a key has drawn one.
+    pub fn world_seed(&self) -> u32 {
+        self.keyed_seed.as_ref().map_or(self.seed, |keyed| keyed.drawn)
+    }
+
+    /// The seed, as far as the policy is told.
+    pub fn told_seed(&self) -> Option<u32> {
+        match self.assistance {
+            Assistance::Paper => None,
+            Assistance::Full => Some(self.seed),
+        }
     }
 
     /// How far the seed moves things.
@@ -220,6 +252,7 @@ impl EpisodeSpec {
             variation,
             stress,
             thinking_limit_s,
+            keyed_seed,
         } = self;
         let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let departures = [
@@ -244,6 +277,7 @@ impl EpisodeSpec {
             (*sensors != SensorModel::default()).then(|| format!("sensors: {}", sensors.name())),
             instructions.as_ref().map(|xxh3| format!("instructions: {xxh3}")),
             thinking_limit_s.map(|limit_s| format!("thinking limit: {limit_s} s")),
+            keyed_seed.as_ref().map(|keyed| format!("seed key: {}", keyed.key_fingerprint)),
             stress.map(|stress| format!("stress: {stress}")),
             match start {
                 Start::Moment(MomentStart { before_s: Some(before_s), .. }) => {

@@ -21,8 +21,9 @@ pub struct EpisodeEntry {
     pub episode_id: String,
     /// The task's id.
     pub task: String,
-    /// The seed.
-    pub seed: u32,
+    /// The seed; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u32>,
     /// The rules in force.
     pub protocol: Protocol,
     /// Whether each robot has an operator of its own.

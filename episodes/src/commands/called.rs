@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tandem_tools_spec::{
-    ActCall, Call, JointChunk, Look, MoveWrists, SendJointChunk, SpecError, ToolCall, Wait, Walk,
+    ActCall, Call, Formats, JointChunk, Look, MoveWrists, SendJointChunk, SpecError, ToolCall, Wait, Walk,
 };
 
 use super::{Command, Motion, RobotAction, RobotOrder, find};
@@ -33,7 +33,30 @@ pub struct OperatorCall {
 pub struct OperatorCommand {
     /// The call, as a recording will hold it.
     pub(crate) call: OperatorCall,
-    pub(crate) order: RobotOrder,
+    /// Control steps that it asks for.
+    pub(crate) steps: u32,
+}
+
+/// Calls that have been checked, and show their callers nothing that is withheld. [`Called::allowed`] alone makes them, and no call is
+/// answered without.
+#[derive(Clone, Copy)]
+pub(crate) struct Allowed<'a>(&'a Called);
+
+impl<'a> Allowed<'a> {
+    /// What is called.
+    pub(crate) fn called(self) -> &'a Called {
+        self.0
+    }
+}
+
+/// What stands around a caller's call.
+pub(crate) struct Surroundings {
+    /// The caller's robot, where each has an operator and several call together.
+    pub operator: Option<String>,
+    /// The look afterwards.
+    pub then: Option<Look>,
+    /// Whether the reply is a short one.
+    pub short: bool,
 }
 
 /// Arguments of [`Called::Together`] as a recording has them.
@@ -60,6 +83,53 @@ impl Called {
         match self {
             Called::One(call) => call.name(),
             Called::Together(_) => Called::TOGETHER,
+        }
+    }
+
+    /// Every caller's call.
+    pub(crate) fn calls(&self) -> Vec<&Call> {
+        match self {
+            Called::One(call) => vec![call],
+            Called::Together(calls) => calls.iter().map(OperatorCall::call).collect(),
+        }
+    }
+
+    /// The calls, if each fits the contract and `check` refuses none.
+    pub(crate) fn allowed(
+        &self,
+        check: impl Fn(&ToolCall) -> Result<(), EpisodeError>,
+    ) -> Result<Allowed<'_>, EpisodeError> {
+        for call in self.calls() {
+            call.validate()?;
+            check(&call.tool)?;
+        }
+        Ok(Allowed(self))
+    }
+
+    /// How pictures are to come.
+    pub(crate) fn formats(&self) -> Formats {
+        match self {
+            Called::One(call) => call.formats,
+            Called::Together(_) => Formats::default(),
+        }
+    }
+
+    /// Whether it looks and moves nothing.
+    pub(crate) fn is_look(&self) -> bool {
+        matches!(self, Called::One(Call { tool: ToolCall::Look(_), .. }))
+    }
+
+    /// Takes from every caller's call what stands around it, so that what a recording holds is left.
+    pub(crate) fn take_surroundings(&mut self) -> Vec<Surroundings> {
+        let take = |call: &mut Call, operator: Option<String>| {
+            call.expected_step = None;
+            Surroundings { operator, then: call.then.take(), short: call.short }
+        };
+        match self {
+            Called::One(call) => vec![take(call, None)],
+            Called::Together(calls) => {
+                calls.iter_mut().map(|own| take(&mut own.call, Some(own.robot.clone()))).collect()
+            }
         }
     }
 
@@ -94,6 +164,12 @@ impl Called {
 impl From<ToolCall> for Called {
     fn from(tool: ToolCall) -> Called {
         Called::One(tool.into())
+    }
+}
+
+impl From<Call> for Called {
+    fn from(call: Call) -> Called {
+        Called::One(call)
     }
 }
 
@@ -149,9 +225,10 @@ impl OperatorCall {
         Some(OperatorCall { robot: self.robot.clone(), call })
     }
 
-    /// What the operator wants to look at once its command is done.
-    pub(crate) fn take_look(&mut self) -> Option<Look> {
-        self.call.then.take()
+    /// The command, whichever step the episode stands at: that has been checked.
+    pub(crate) fn at_any_step(mut self) -> OperatorCall {
+        self.call.expected_step = None;
+        self
     }
 
     /// Reads a command for the robots that `motions` move: what the operator's own is to do.
@@ -196,7 +273,7 @@ impl OperatorCommand {
 
     /// Control steps that it asks for.
     pub fn steps(&self) -> u32 {
-        self.order.steps
+        self.steps
     }
 }
 

@@ -14,6 +14,7 @@ mod upper_body;
 mod wait;
 mod walk;
 
+pub(crate) use called::Allowed;
 pub use called::{Called, OperatorCall, OperatorCommand};
 pub use check_reach::check_reach;
 pub use columns::{Clamped, action_row, base_row};

@@ -8,7 +8,7 @@ use super::retry::again_name;
 use super::{EvaluationError, EvaluationPlan, KeptFiles};
 use crate::output::write_whole;
 use crate::players::{EpisodeOutput, PlayError, PlayOutcome};
-use crate::results::{PlayedEpisode, RESULT_FILE, episode_note};
+use crate::results::{Attempt, PlayedEpisode, RESULT_FILE, episode_note, failures_of_policy};
 use crate::spec::{EpisodeSpec, Start};
 use crate::{CheckpointError, EpisodeError};
 
@@ -34,11 +34,14 @@ impl EpisodeCache<'_> {
         if let Some(cached) = self.load(spec) {
             return self.keep(spec, cached).map(|kept| PlannedOutcome::Kept(Box::new(kept)));
         }
+        let attempts = self.earlier(spec).map(PlayedEpisode::into_attempts).unwrap_or_default();
         let folder = self.folder.join(name(spec));
         let KeptFiles { pages, .. } = self.plan.files;
         let output = EpisodeOutput { folder: &folder, record: self.plan.record, pages };
         match self.plan.player.play_episode(spec, output) {
-            Ok(outcome) => self.store(spec, outcome).map(|played| PlannedOutcome::Played(Box::new(played))),
+            Ok(outcome) => {
+                self.store(spec, outcome, attempts).map(|played| PlannedOutcome::Played(Box::new(played)))
+            }
             Err(PlayError::Episode(EpisodeError::Checkpoint(CheckpointError::NoPhase { .. }))) => {
                 Ok(PlannedOutcome::LeftOut("its demonstration did not come so far".into()))
             }
@@ -57,21 +60,27 @@ impl EpisodeCache<'_> {
 
     /// An earlier run's episode, if it is this one and counts: a file that is torn, renamed or from other rules counts as missing.
     pub fn load(&self, spec: &EpisodeSpec) -> Option<PlayedEpisode> {
+        let cached = self.earlier(spec)?;
+        let is_whole = self.is_not_kept(&cached)
+            || self.recording(spec).is_none_or(|folder| folder.join(RESULT_FILE).exists());
+        (is_whole && cached.counts()).then_some(cached)
+    }
+
+    /// What an earlier run has left of this episode, whether it counts or is played again.
+    fn earlier(&self, spec: &EpisodeSpec) -> Option<PlayedEpisode> {
         let bytes = std::fs::read(self.folder.join(format!("{}.json", name(spec)))).ok()?;
         let cached: PlayedEpisode = serde_json::from_slice(&bytes).ok()?;
         let by = (&cached.policy, cached.locomotion.as_str(), cached.build.as_str());
         let same = by == (&self.plan.player.card(), &self.locomotion, self.build)
             && cached.spec == *spec
-            && (cached.result.task.as_str(), cached.result.seed) == (spec.task.id, spec.seed)
-            && (self.is_not_kept(&cached)
-                || self.recording(spec).is_none_or(|folder| folder.join(RESULT_FILE).exists()));
-        let cached = PlayedEpisode { keep_failed: self.keeps_failure(&cached.result), ..cached };
-        (same && cached.counts()).then_some(cached)
+            && (cached.result.task.as_str(), cached.result.seed) == (spec.task.id, Some(spec.seed));
+        let keep_failed = self.keeps_failure(&cached.result, &cached.attempts);
+        same.then_some(PlayedEpisode { keep_failed, ..cached })
     }
 
-    /// Whether a result is of a policy that failed itself, which counts here.
-    fn keeps_failure(&self, result: &ResultReply) -> bool {
-        self.plan.keep_failed && result.ended == EndReason::PolicyFailed
+    /// Whether a result is of a policy that failed itself, and has been played again as often as is asked for.
+    fn keeps_failure(&self, result: &ResultReply, attempts: &[Attempt]) -> bool {
+        result.ended == EndReason::PolicyFailed && failures_of_policy(attempts) >= self.plan.retries as usize
     }
 
     /// Whether no recording of an episode is wanted, since it failed.
@@ -92,8 +101,13 @@ impl EpisodeCache<'_> {
         self.plan.record.then(|| self.folder.join(name(spec)))
     }
 
-    /// Writes what an episode came to.
-    fn store(&self, spec: &EpisodeSpec, outcome: PlayOutcome) -> Result<PlayedEpisode, EvaluationError> {
+    /// Writes what an episode came to after these attempts.
+    fn store(
+        &self,
+        spec: &EpisodeSpec,
+        outcome: PlayOutcome,
+        attempts: Vec<Attempt>,
+    ) -> Result<PlayedEpisode, EvaluationError> {
         let PlayOutcome { result, thought, stopped } = outcome;
         if let Some(reason) = result.recording_failed {
             return Err(unrecorded(spec, reason));
@@ -108,7 +122,8 @@ impl EpisodeCache<'_> {
                 .filter(|_| result.simulator_failure.is_none())
                 .or_else(|| episode_note(&result, spec.start_phase())),
             thought_s: thought.as_secs_f64(),
-            keep_failed: self.keeps_failure(&result),
+            keep_failed: self.keeps_failure(&result, &attempts),
+            attempts,
             result,
         };
         if let Some(folder) = self.recording(spec).filter(|_| self.is_not_kept(&played)) {

@@ -16,7 +16,7 @@ use crate::results::{EPISODES, PlayedEpisode};
 use crate::{EpisodeError, fingerprint};
 use cache::EpisodeCache;
 
-pub use plan::{EvaluationPlan, KeptFiles, Shard, Starts};
+pub use plan::{EvaluationPlan, KeptFiles, SeedKey, Shard, Starts};
 pub use planned::PlannedEpisodes;
 pub use retry::{FailedEpisode, failed_episodes};
 pub use summary::{Evaluation, TaskSummary};

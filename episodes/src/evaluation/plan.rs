@@ -1,5 +1,6 @@
 //! What to play: which episodes there are, and which of them are this process's share.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use tandem_sim::{Sensing, render::RendererKind};
@@ -9,7 +10,7 @@ use super::retry::FailedEpisode;
 use crate::players::Policy;
 use crate::recording::Recorder;
 use crate::scoring::Phase;
-use crate::spec::{Controller, EpisodeSpec, MomentStart, PhaseStart, RobotFile, SceneFile, Start};
+use crate::spec::{Controller, EpisodeSpec, KeyedSeed, MomentStart, PhaseStart, RobotFile, SceneFile, Start};
 use crate::stress::Stress;
 use crate::tasks::Task;
 use crate::variation::Variation;
@@ -49,8 +50,26 @@ pub struct EvaluationPlan<'a> {
     pub record: bool,
     /// Which of these files stay.
     pub files: KeptFiles,
-    /// Count episodes in which the policy itself failed as failures, and keep them. They are played again otherwise.
-    pub keep_failed: bool,
+    /// How often an episode in which the policy itself failed is played again, by one run after another, before it counts as a failure.
+    pub retries: u32,
+    /// What draws worlds for seeds that are public, if anything does.
+    pub seed_key: Option<SeedKey>,
+}
+
+/// What an evaluator's key makes of the seeds of a plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SeedKey {
+    /// Names the key in results and tells nothing of it.
+    pub fingerprint: String,
+    /// What it draws for each seed.
+    pub drawn: BTreeMap<u32, u32>,
+}
+
+impl SeedKey {
+    fn of(&self, seed: u32) -> Option<KeyedSeed> {
+        let drawn = *self.drawn.get(&seed)?;
+        Some(KeyedSeed { key_fingerprint: self.fingerprint.clone(), drawn })
+    }
 }
 
 /// What is kept of episodes that are recorded; by default everything.
@@ -97,6 +116,9 @@ impl Shard {
 }
 
 impl EvaluationPlan<'_> {
+    /// How often an episode is played again by default.
+    pub const DEFAULT_RETRIES: u32 = 2;
+
     /// One of the episodes to play.
     pub fn spec(&self, task: &'static Task, seed: u32, start: Start) -> EpisodeSpec {
         EpisodeSpec {
@@ -114,6 +136,7 @@ impl EvaluationPlan<'_> {
             start,
             ..EpisodeSpec::new(task, seed, self.protocol)
         }
+        .keyed(self.seed_key.as_ref().and_then(|key| key.of(seed)))
     }
 
     /// One that begins again where a recorded one had not gone wrong yet: its world, under this plan's rules.
@@ -134,6 +157,7 @@ impl EvaluationPlan<'_> {
             stress: spec.stress,
             ..self.spec(spec.task, spec.seed, start)
         }
+        .keyed(spec.keyed_seed.clone())
     }
 
     /// What in its episodes is not as the benchmark has it: the same in all of them, but for the files of tasks and for what has been
@@ -141,7 +165,8 @@ impl EvaluationPlan<'_> {
     pub fn departures(&self) -> Vec<String> {
         let specs: Vec<EpisodeSpec> = match &self.starts {
             Starts::Task | Starts::Phases { .. } => {
-                self.tasks.iter().map(|task| self.spec(task, 0, Start::Task)).collect()
+                let seed = self.seeds.first().copied().unwrap_or_default();
+                self.tasks.iter().map(|task| self.spec(task, seed, Start::Task)).collect()
             }
             Starts::Moments { failed, before_s } => {
                 failed.iter().map(|failed| self.again(failed, *before_s)).collect()

@@ -1,6 +1,8 @@
 //! Which episodes are cached, what is noted, and how they are counted.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
 
 use tandem_sim::{Sensing, dynamics::Diverged, render::RendererKind};
 use tandem_tools_spec::{Assistance, Disclosure, EndReason, Hints, PhaseTimes, Protocol, ResultReply};
@@ -16,7 +18,7 @@ use crate::{players, scoring::Phase};
 fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultReply {
     ResultReply {
         task: task.into(),
-        seed,
+        seed: Some(seed),
         protocol: Protocol::Benchmark,
         phases: PhaseTimes(phases),
         ended: EndReason::Finished,
@@ -26,7 +28,7 @@ fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultRe
         thinking_s: 0.0,
         falls: 0,
         realtime_factor: 3.5,
-        state_hash: "00c0ffee00c0ffee".into(),
+        state_hash: Some("00c0ffee00c0ffee".into()),
         simulator_failure: None,
         assistance: Assistance::Full,
         extra_information: vec![],
@@ -48,6 +50,7 @@ fn played(cache: &EpisodeCache, spec: &EpisodeSpec) -> PlayedEpisode {
         thought_s: 1.5,
         note: None,
         keep_failed: false,
+        attempts: Vec::new(),
     }
 }
 
@@ -98,7 +101,8 @@ fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         jobs: 1,
         record: false,
         files: KeptFiles::default(),
-        keep_failed: false,
+        retries: EvaluationPlan::DEFAULT_RETRIES,
+        seed_key: None,
     }
 }
 
@@ -205,7 +209,7 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     type Change = fn(&mut PlayedEpisode);
     for (what, change) in [
         ("task", (|played| played.result.task = "handover".into()) as Change),
-        ("seed", |played| played.result.seed = 8),
+        ("seed", |played| played.result.seed = Some(8)),
         ("protocol", |played| played.spec.protocol = Protocol::Benchmark),
         ("assistance", |played| played.spec.assistance = Assistance::Paper),
         ("disclosure", |played| played.spec.disclosure = Disclosure::End),
@@ -247,6 +251,46 @@ impl Policy for Unplayable {
     fn play_episode(&self, _: &EpisodeSpec, _: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
         Err((self.0)())
     }
+}
+
+/// A policy that fails itself in every episode.
+#[derive(Debug, Default)]
+struct FailingPolicy(AtomicU32);
+
+impl Policy for FailingPolicy {
+    fn card(&self) -> PolicyCard {
+        "failing".into()
+    }
+
+    fn play_episode(&self, spec: &EpisodeSpec, _: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
+        let number = self.0.fetch_add(1, Ordering::Relaxed) + 1;
+        let phases = vec![("p1".into(), None), ("p2".into(), None), ("p3".into(), None)];
+        let result = ResultReply { ended: EndReason::PolicyFailed, ..result("handover", spec.seed, phases) };
+        let stopped = Some(format!("crash {number}"));
+        Ok(PlayOutcome { result, thought: Duration::from_secs(1), stopped })
+    }
+}
+
+/// Whoever fails itself when it is about to lose is played again as often as is asked for, and every attempt stays.
+#[test]
+fn a_policy_that_fails_itself_again_and_again_has_failed() {
+    let folder = tempfile::tempdir().unwrap();
+    let player = FailingPolicy::default();
+    let plan = EvaluationPlan { player: &player, ..plan(vec![tasks::find("handover").unwrap()], vec![1]) };
+    let run = |retries: u32| {
+        let evaluation =
+            evaluate(&EvaluationPlan { retries, ..plan.clone() }, folder.path(), &|_| {}).unwrap();
+        let (played, task) = (evaluation.episodes[0].clone(), evaluation.tasks["handover"].clone());
+        let notes: Vec<String> =
+            played.into_attempts().into_iter().filter_map(|attempt| attempt.note).collect();
+        (task.episodes, task.policy_failed, notes.join(", "))
+    };
+    assert_eq!(run(2), (0, 1, "crash 1".into()));
+    assert_eq!(run(2), (0, 1, "crash 1, crash 2".into()));
+    assert_eq!(run(2), (1, 0, "crash 1, crash 2, crash 3".into()), "it counts as a failure");
+    assert_eq!(run(2), (1, 0, "crash 1, crash 2, crash 3".into()), "and is kept");
+    assert_eq!(run(0), (1, 0, "crash 1, crash 2, crash 3".into()));
+    assert_eq!(run(3), (1, 0, "crash 1, crash 2, crash 3, crash 4".into()), "whoever asks for more has more");
 }
 
 #[test]
@@ -301,7 +345,7 @@ fn what_failed_itself_is_counted_apart_and_played_again() {
     let plan = plan(vec![handover], vec![1, 2, 3, 4, 5]);
     let build = fingerprint::build().unwrap();
     let cache = EpisodeCache { plan: &plan, folder: folder.path(), locomotion: "balance".into(), build };
-    let keeping_plan = EvaluationPlan { keep_failed: true, ..plan.clone() };
+    let keeping_plan = EvaluationPlan { retries: 0, ..plan.clone() };
     let keeping = EpisodeCache { plan: &keeping_plan, locomotion: "balance".into(), ..cache };
     let spec = |seed: u32| plan.spec(handover, seed, Start::Task);
     let outcomes = [

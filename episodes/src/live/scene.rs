@@ -37,9 +37,9 @@ struct Drawing {
 impl LiveScene {
     /// The scene of the episode `spec`, which is played in `world` by robots that `motions` move.
     pub(crate) fn of(spec: &EpisodeSpec, world: &World, motions: &[Motion]) -> LiveScene {
-        let scenery = stress::scenery(spec.stress, spec.seed, world);
+        let scenery = stress::scenery(spec.stress, spec.world_seed(), world);
         let Geometry { meshes, parts, numbers } = Geometry::of(&scenery);
-        let cameras = stress::cameras(spec.stress, spec.seed, world);
+        let cameras = stress::cameras(spec.stress, spec.world_seed(), world);
         let third_person = cameras.third_person();
         let robots = motions.iter().map(robot_head).collect::<Vec<_>>();
         let objects: Vec<&str> = world.object_models().map(|(name, _)| name).collect();

@@ -35,8 +35,8 @@ struct DrawnStep {
 impl Observer {
     /// Looks at the world of the episode `spec`.
     pub fn new(spec: &EpisodeSpec, world: &World) -> Observer {
-        let renderer = spec.renderer.renderer(stress::scenery(spec.stress, spec.seed, world));
-        Observer { renderer, cameras: stress::cameras(spec.stress, spec.seed, world), drawn: None }
+        let renderer = spec.renderer.renderer(stress::scenery(spec.stress, spec.world_seed(), world));
+        Observer { renderer, cameras: stress::cameras(spec.stress, spec.world_seed(), world), drawn: None }
     }
 
     /// The renderer, and on what device it draws.

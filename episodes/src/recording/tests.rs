@@ -140,7 +140,7 @@ fn record(folder: &Path) -> (World, PathBuf) {
 fn result() -> ResultReply {
     ResultReply {
         task: "handover".into(),
-        seed: 7,
+        seed: Some(7),
         protocol: Protocol::Agentic,
         phases: PhaseTimes(vec![("p1".into(), Some(0.2))]),
         ended: EndReason::Finished,
@@ -150,7 +150,7 @@ fn result() -> ResultReply {
         thinking_s: 0.0,
         falls: 0,
         realtime_factor: 4.0,
-        state_hash: "0123456789abcdef".into(),
+        state_hash: Some("0123456789abcdef".into()),
         simulator_failure: None,
         assistance: Assistance::Full,
         extra_information: vec![],

@@ -143,6 +143,10 @@ impl StateMismatch {
     }
 }
 
+fn text_of(hash: &Option<String>) -> String {
+    hash.clone().unwrap_or_default()
+}
+
 /// The recorded result against the one of the simulation, and against the phases scored from the recorded steps. Another build may
 /// not have named what this one does.
 fn compare_results(
@@ -157,7 +161,7 @@ fn compare_results(
     let text = |times_s: &[f64]| format!("{times_s:?}");
     let facts = |result: &ResultReply| (result.env_steps, result.tool_calls, result.falls);
     let mut pairs = vec![
-        ("state hash at the end", recorded.state_hash.clone(), again.state_hash.clone()),
+        ("state hash at the end", text_of(&recorded.state_hash), text_of(&again.state_hash)),
         ("times of phases", text(&times_s(recorded)), text(&times_s(&again))),
         ("times of phases scored from the steps", text(&times_s(recorded)), text(&scored_s)),
         ("steps, calls and falls", format!("{:?}", facts(recorded)), format!("{:?}", facts(&again))),

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use tandem_tools_spec::{Assistance, EndReason, ExtraInformation, ResultReply};
+use tandem_tools_spec::{Assistance, EndReason, ExtraInformation, PhaseTimes, ResultReply, Usage};
 
 pub use phase_level::{PhaseLevel, PhaseMeans, PhaseRate};
 
@@ -57,9 +57,26 @@ pub struct PlayedEpisode {
     pub thought_s: f64,
     /// Why the episode fell short: what stopped the policy, or the first phase that was missed.
     pub note: Option<String>,
-    /// Whether it counts as a failure of the policy that the policy itself failed, as whoever evaluated it wished.
+    /// Whether it counts as a failure of the policy that the policy itself failed: it has been played again as often as was asked for.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub keep_failed: bool,
+    /// The earlier attempts at this episode, which did not count; the oldest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub attempts: Vec<Attempt>,
+}
+
+/// An attempt at an episode that did not count, so that the episode was played again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Attempt {
+    pub ended: EndReason,
+    pub phases: PhaseTimes,
+    pub env_steps: u32,
+    pub tool_calls: u32,
+    pub thought_s: f64,
+    pub note: Option<String>,
+    /// What notes say that it took.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub usage: Option<Usage>,
 }
 
 /// Why an episode says nothing of how far its policy gets. It is listed apart from failures, and played again by the next run.
@@ -81,6 +98,14 @@ impl Exclusion {
 }
 
 impl PlayedEpisode {
+    /// Every attempt at the episode, the one that stands here as the last.
+    pub fn into_attempts(self) -> Vec<Attempt> {
+        let PlayedEpisode { result, thought_s, note, mut attempts, .. } = self;
+        let ResultReply { ended, phases, env_steps, tool_calls, usage, .. } = result;
+        attempts.push(Attempt { ended, phases, env_steps, tool_calls, thought_s, note, usage });
+        attempts
+    }
+
     /// Index of the phase that it began at and that alone counts; `None` where it began at the task's beginning.
     pub fn start_phase(&self) -> Option<usize> {
         self.spec.start_phase()
@@ -125,6 +150,11 @@ impl PlayedEpisode {
     pub fn counts(&self) -> bool {
         self.exclusion().is_none()
     }
+}
+
+/// How many of these attempts ended because the policy itself failed.
+pub fn failures_of_policy(attempts: &[Attempt]) -> usize {
+    attempts.iter().filter(|attempt| attempt.ended == EndReason::PolicyFailed).count()
 }
 
 /// What results say of a policy. Episodes of policies with different cards are never taken for each other.
@@ -187,14 +217,14 @@ mod tests {
     use std::fs;
 
     use serde_json::json;
-    use tandem_tools_spec::{EndReason, PhaseTimes, Protocol};
+    use tandem_tools_spec::{EndReason, Protocol};
 
     use super::*;
 
     fn result(p3_s: Option<f64>) -> ResultReply {
         ResultReply {
             task: "handover".into(),
-            seed: 3,
+            seed: Some(3),
             protocol: Protocol::Agentic,
             phases: PhaseTimes(vec![
                 ("p1".into(), Some(4.2)),
@@ -208,7 +238,7 @@ mod tests {
             thinking_s: 0.0,
             falls: 0,
             realtime_factor: 3.5,
-            state_hash: "00c0ffee00c0ffee".into(),
+            state_hash: Some("00c0ffee00c0ffee".into()),
             simulator_failure: None,
             assistance: Assistance::Full,
             extra_information: vec![],
@@ -254,6 +284,7 @@ mod tests {
                 thought_s: 0.0,
                 note: None,
                 keep_failed: false,
+                attempts: Vec::new(),
             };
             let text = serde_json::to_string(&played).unwrap();
             assert_eq!(serde_json::from_str::<PlayedEpisode>(&text).unwrap(), played);

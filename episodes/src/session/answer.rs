@@ -8,7 +8,7 @@ use tandem_tools_spec::{
 
 use super::Session;
 use crate::EpisodeError;
-use crate::commands::{self, Called, Command, RobotSheet, check_reach, report};
+use crate::commands::{self, Allowed, Called, Command, RobotSheet, check_reach, report};
 use crate::observation::{Detail, Proprioception, TeamObservation, check_formats, robot_state};
 use crate::recording::CallOutcome;
 
@@ -20,15 +20,11 @@ pub enum Answer {
 }
 
 impl Answer {
-    /// The reply that the caller gets, with views encoded as it asked for them.
-    pub fn reply(self, called: &Called) -> Result<ToolReply, EpisodeError> {
-        let formats = match called {
-            Called::One(call) => call.formats,
-            Called::Together(_) => Formats::default(),
-        };
+    /// The reply that the caller gets, with views encoded as it asked for them in `formats`.
+    pub fn reply(self, formats: &Formats) -> Result<ToolReply, EpisodeError> {
         match self {
             Answer::Reply(reply) => Ok(*reply),
-            Answer::Observation(seen) => Ok(ToolReply::Look(LookReply::Observe(seen.reply(&formats)?))),
+            Answer::Observation(seen) => Ok(ToolReply::Look(LookReply::Observe(seen.reply(formats)?))),
         }
     }
 }
@@ -49,8 +45,8 @@ impl<'a> From<&'a Answer> for CallOutcome<'a> {
 }
 
 impl Session {
-    pub(super) fn answer(&mut self, called: &Called) -> Result<Answer, EpisodeError> {
-        let call = match called {
+    pub(super) fn answer(&mut self, allowed: Allowed) -> Result<Answer, EpisodeError> {
+        let call = match allowed.called() {
             Called::One(call) => call,
             Called::Together(calls) => {
                 self.expect_underway()?;
@@ -59,8 +55,6 @@ impl Session {
                 return self.act(&command);
             }
         };
-        call.validate()?;
-        self.check_told(&call.tool)?;
         match &call.tool {
             ToolCall::Look(look) => self.look(look, &call.formats),
             ToolCall::Act(act) => {
@@ -130,11 +124,7 @@ impl Session {
     }
 
     /// What the robots that are looked through see and sense now.
-    pub(super) fn seen(
-        &mut self,
-        args: &Observe,
-        formats: &Formats,
-    ) -> Result<TeamObservation, EpisodeError> {
+    fn seen(&mut self, args: &Observe, formats: &Formats) -> Result<TeamObservation, EpisodeError> {
         let robots = self.looked_through(args, formats)?;
         let sheets: Vec<&RobotSheet> = self.motions.iter().map(|motion| &motion.robot).collect();
         let mut seen = self.observer.observe(&self.present, &robots, &sheets, Detail::of(args));
@@ -147,8 +137,9 @@ impl Session {
         Ok(seen)
     }
 
-    /// Whether an observation can be made as asked.
+    /// Whether an observation can be made as asked, and shows nothing that is withheld.
     pub(super) fn check_look(&self, look: &Look) -> Result<(), EpisodeError> {
+        self.check_told(&look.observe.clone().into())?;
         self.looked_through(&look.observe, &look.formats).map(drop)
     }
 
@@ -171,7 +162,7 @@ impl Session {
     }
 
     /// Executes a command, and reports on every robot that it has an order for.
-    pub(super) fn act(&mut self, command: &Command) -> Result<Answer, EpisodeError> {
+    fn act(&mut self, command: &Command) -> Result<Answer, EpisodeError> {
         let began: Vec<Pose> =
             self.present.robots.iter().map(|robot| robot.sensed.start_from_pelvis).collect();
         let (executed_steps, clamped) = self.run(command)?;

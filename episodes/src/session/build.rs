@@ -57,12 +57,12 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
     try_scene(spec, &world_spec, &model)?;
     let mut world = World::with_robot(&world_spec, model)?;
     if let Some(stress) = spec.stress {
-        stress.alter(&mut world, spec.task, spec.seed, spec.rules().initial_hold_steps);
+        stress.alter(&mut world, spec.task, spec.world_seed(), spec.rules().initial_hold_steps);
     }
     for robot in 0..world.robots().len() {
         world.set_locomotion(robot, locomotion.controller());
     }
-    world.set_sensing(spec.stressed_sensing(), spec.seed);
+    world.set_sensing(spec.stressed_sensing(), spec.world_seed());
     let body = Arc::new(UpperBody::new(&source, &world.rest_command(0))?);
     let present = world.present();
     let motion = |(index, robot): (usize, &Robot)| {
@@ -80,7 +80,7 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
 
 /// What the world of an episode is made of.
 fn world_spec(spec: &EpisodeSpec) -> Result<WorldSpec, EpisodeError> {
-    let own = own_spec(spec.task, spec.seed, spec.spread())?;
+    let own = own_spec(spec.task, spec.world_seed(), spec.spread())?;
     match &spec.scene {
         None => Ok(own),
         Some(file) => Ok(elsewhere(own, spec.task, &file.path, file.load()?)?),
@@ -96,7 +96,7 @@ fn add_distractors(
     let most = spec.stress.map_or(0, |stress| stress.distractors());
     if most > 0 {
         let world = World::with_robot(world_spec, model.clone())?;
-        world_spec.objects.extend(stress::distractors(most, spec.seed, spec.task, &world)?);
+        world_spec.objects.extend(stress::distractors(most, spec.world_seed(), spec.task, &world)?);
     }
     Ok(())
 }

@@ -1,20 +1,57 @@
-//! How calls reach an episode: what is refused before it counts, what is counted and recorded, and what the policy's clock does.
+//! The one way into an episode: a [`Request`] says who asks for what, and who reads the answer. What is refused before it counts, what is
+//! told, recorded and counted, and what the policy's clock does, is decided here and nowhere else.
 
 use tandem_sim::Step;
 use tandem_tools_spec::{
     Assistance, Call, EndReason, ExtraInformation, Formats, GetRobotState, Look, ManageReply, Observation,
-    Observe, TalkCall, ToolCall, ToolReply,
+    Observe, SpecError, TalkCall, Tool as _, ToolCall, ToolReply,
 };
 
 use super::Session;
 use super::answer::Answer;
 use super::told::shorten;
 use crate::EpisodeError;
-use crate::commands::{Called, Command, OperatorCall, OperatorCommand, RobotOrder};
+use crate::commands::{Called, OperatorCall, OperatorCommand};
 use crate::observation::TeamObservation;
 use crate::output::OutputError;
-use crate::recording::{CallOutcome, CallerRecord, ToolCallRecord};
+use crate::recording::{CallMoment, CallOutcome, CallerRecord, ToolCallRecord};
 use crate::reports::episode::SaidWords;
+
+/// A request to an episode.
+#[derive(Clone, Debug)]
+pub struct Request<'a> {
+    pub caller: Caller<'a>,
+    pub called: Called,
+    pub audience: Audience<'a>,
+}
+
+/// The one who makes a request.
+#[derive(Clone, Copy, Debug)]
+pub enum Caller<'a> {
+    /// The policy that directs all robots; also operators together.
+    Policy,
+    /// The operator of this robot.
+    Operator(&'a str),
+}
+
+/// The reader of an answer.
+#[derive(Clone, Copy, Debug)]
+pub enum Audience<'a> {
+    /// The caller, who is told what the episode's assistance grants.
+    Caller,
+    /// This process, which is told everything, for a policy that it asks itself. Of what the benchmark's own policies are not shown, the
+    /// policy is shown this; results name it.
+    Process(&'a [ExtraInformation]),
+}
+
+/// The answer to a request, as its audience may be told it; views are not encoded yet.
+#[derive(Clone)]
+pub struct Outcome {
+    answer: Answer,
+    formats: Formats,
+    /// For each caller of the request: whether its reply is a short one, and its look afterwards.
+    parts: Vec<(bool, Option<Observation>)>,
+}
 
 /// What a call comes to.
 #[derive(Clone, Debug)]
@@ -24,34 +61,81 @@ pub struct CallReply {
     pub observation: Option<Observation>,
 }
 
-impl Session {
-    /// Answers a tool call of the policy that directs all robots. An error changes nothing but the count of calls. The call that ends
-    /// the episode, and no later one, is counted and recorded, and closes the files.
-    pub fn call(&mut self, call: ToolCall) -> Result<ToolReply, EpisodeError> {
-        match &call {
-            ToolCall::Plan(plan) => self.plan(CallerRecord::Policy, plan).map(ToolReply::Plan),
-            _ => self.make(CallerRecord::Policy, &call.into()),
-        }
+impl<'a> Request<'a> {
+    /// A call of the policy that directs all robots.
+    pub fn of_policy(called: impl Into<Called>) -> Request<'a> {
+        Request { caller: Caller::Policy, called: called.into(), audience: Audience::Caller }
+    }
+}
+
+impl Outcome {
+    /// A reply for each caller of the request, with views encoded as it asked for them.
+    pub fn replies(self) -> Result<Vec<CallReply>, EpisodeError> {
+        let Outcome { answer, formats, parts } = self;
+        let reply = answer.reply(&formats)?;
+        let told = parts.into_iter().map(|(is_short, observation)| {
+            let mut reply = reply.clone();
+            if is_short {
+                // The recording has all of it.
+                shorten(&mut reply);
+            }
+            CallReply { reply, observation }
+        });
+        Ok(told.collect())
     }
 
-    /// As [`Session::call`], with all that may go with a call, by the operator of a robot or by the policy of all. A call that was
-    /// made for another step, or whose look afterwards could not be had, is refused before it counts.
-    pub fn ask(&mut self, operator: Option<&str>, mut call: Call) -> Result<CallReply, EpisodeError> {
-        self.admit(operator, &call)?;
-        call.expected_step = None;
-        let then = call.then.take();
-        let caller = operator.map_or(CallerRecord::Policy, CallerRecord::Operator);
-        let reply = match &call.tool {
-            ToolCall::Plan(plan) => {
-                let mut reply = ToolReply::Plan(self.plan(caller, plan)?);
-                if call.short {
-                    shorten(&mut reply);
-                }
-                reply
+    /// The reply to a request of one caller.
+    pub fn reply(self) -> Result<CallReply, EpisodeError> {
+        self.replies()?
+            .pop()
+            .ok_or_else(|| unanswered(Called::TOGETHER, "it has no command; give one at least"))
+    }
+
+    /// The observation that was asked for, with views as they were drawn.
+    pub fn seen(self) -> Result<TeamObservation, EpisodeError> {
+        match self.answer {
+            Answer::Observation(seen) => Ok(seen),
+            Answer::Reply(_) => Err(unanswered(Observe::NAME, "another tool was called")),
+        }
+    }
+}
+
+fn unanswered(tool: &'static str, reason: &str) -> EpisodeError {
+    SpecError::Invalid { tool, reason: reason.into() }.into()
+}
+
+impl Session {
+    /// Does what is asked and returns what its audience may be told. An error changes nothing but the count of calls. A request that was
+    /// made for another step, or whose look afterwards could not be had, is refused before it counts. The call that ends the episode,
+    /// and no later one, is counted and recorded, and closes the files.
+    pub fn perform(&mut self, request: Request) -> Result<Outcome, EpisodeError> {
+        let Request { caller, mut called, audience } = request;
+        self.admit(caller, &called)?;
+        let callers = called.take_surroundings();
+        let record = audience.record(caller);
+        let answer = match &called {
+            Called::One(Call { tool: ToolCall::Plan(plan), .. }) => {
+                ToolReply::Plan(self.plan(record, plan)?).into()
             }
-            _ => self.make(caller, &Called::One(call))?,
+            _ => self.make(record, &called)?,
         };
-        Ok(CallReply { reply, observation: self.look_after(caller, then)? })
+        let mut parts = Vec::with_capacity(callers.len());
+        for around in callers {
+            let caller = around.operator.as_deref().map_or(caller, Caller::Operator);
+            parts.push((around.short, self.look_after(audience.record(caller), around.then)?));
+        }
+        Ok(Outcome { answer, formats: called.formats(), parts })
+    }
+
+    /// Answers a tool call of the policy that directs all robots.
+    pub fn call(&mut self, call: ToolCall) -> Result<ToolReply, EpisodeError> {
+        Ok(self.perform(Request::of_policy(call))?.reply()?.reply)
+    }
+
+    /// As [`Session::call`], with all that may go with a call, by the operator of a robot or by the policy of all.
+    pub fn ask(&mut self, operator: Option<&str>, call: Call) -> Result<CallReply, EpisodeError> {
+        let caller = operator.map_or(Caller::Policy, Caller::Operator);
+        self.perform(Request { caller, ..Request::of_policy(call) })?.reply()
     }
 
     /// As [`Session::call`] of `observe`, for who asks a policy in this process: with views as they were drawn, and nothing
@@ -62,18 +146,43 @@ impl Session {
         shown: &[ExtraInformation],
     ) -> Result<TeamObservation, EpisodeError> {
         let look = Look { observe: observe.clone(), formats: Formats::default() };
-        let underway = self.ended.is_none();
-        let seen = self.look_once(CallerRecord::InProcess(shown), &look);
-        seen.iter().filter(|_| underway).for_each(|seen| self.shown.count_each(shown, seen));
-        self.let_think();
-        seen
+        let audience = Audience::Process(shown);
+        self.perform(Request { audience, ..Request::of_policy(Call::from(look)) })?.seen()
     }
 
     /// As [`Session::call`] of `observe`, for a policy in this process: what it is told, with views as they were drawn.
     pub fn observe_as_told(&mut self, look: &Look) -> Result<TeamObservation, EpisodeError> {
-        let seen = self.look_as_told(CallerRecord::Policy, look);
-        self.let_think();
-        seen
+        self.perform(Request::of_policy(Call::from(look.clone())))?.seen()
+    }
+
+    /// As [`Session::call`], for who carries out what a policy in this process decided: nothing is withheld from the reply, which the
+    /// policy itself is not shown.
+    pub fn carry_out(&mut self, call: ToolCall) -> Result<ToolReply, EpisodeError> {
+        let audience = Audience::Process(&[]);
+        Ok(self.perform(Request { audience, ..Request::of_policy(call) })?.reply()?.reply)
+    }
+
+    /// Executes the commands of several operators side by side, and looks for each what it wants to see then.
+    pub fn together(&mut self, commands: Vec<OperatorCommand>) -> Result<Vec<CallReply>, EpisodeError> {
+        let calls = commands.into_iter().map(|command| command.call).collect();
+        self.perform(Request::of_policy(Called::Together(calls)))?.replies()
+    }
+
+    /// Reads an operator's command, which [`Session::together`] executes when those of others are there, too. A refusal is counted and
+    /// recorded as that of any call.
+    pub fn read_command(&mut self, call: OperatorCall) -> Result<OperatorCommand, EpisodeError> {
+        let operator = call.robot().to_owned();
+        let caller = Caller::Operator(&operator);
+        let called = Called::Together(vec![call.clone()]);
+        self.admit(caller, &called)?;
+        let read = self.allow(&called).and_then(|_| self.expect_underway());
+        match read.and_then(|()| call.order(&self.rules, &self.motions)) {
+            Ok(order) => Ok(OperatorCommand { call: call.at_any_step(), steps: order.steps }),
+            Err(refusal) => {
+                self.refuse(CallerRecord::Operator(&operator), &called, &refusal);
+                Err(refusal)
+            }
+        }
     }
 
     /// As [`Session::call`] of `get_robot_state` for each robot, for a policy in this process that needs no text: what it is told of the
@@ -95,7 +204,7 @@ impl Session {
     /// A call of `get_robot_state` whose answer nobody needs as such.
     fn count_state_read(&mut self, robot: &str) {
         let counts = self.ended.is_none();
-        self.arrived();
+        self.arrived(CallerRecord::Policy, true);
         if counts && self.spec().assistance == Assistance::Full {
             self.shown.count_whole_state(robot);
         }
@@ -112,8 +221,9 @@ impl Session {
             ToolCall::Act(act) if self.files.is_none() && !self.shows_calls() => act,
             _ => return self.call(call.clone()).map(drop),
         };
-        self.arrived();
-        let acted = self.expect_underway().and_then(|()| self.carry_out_unreported(act));
+        self.arrived(CallerRecord::Policy, false);
+        let allowed = self.check_told(call).and_then(|()| self.expect_underway());
+        let acted = allowed.and_then(|()| self.carry_out_unreported(act));
         if self.ended.is_some() {
             self.settle();
         }
@@ -121,108 +231,45 @@ impl Session {
         acted
     }
 
-    /// As [`Session::call`], for who carries out what a policy in this process decided: nothing is withheld from the reply, which the
-    /// policy itself is not shown.
-    pub fn carry_out(&mut self, call: ToolCall) -> Result<ToolReply, EpisodeError> {
-        let called = Called::One(call.into());
-        let underway = self.arrived();
-        let answer = self.answer(&called);
-        let assistance = self.spec().assistance;
-        let told = answer.as_ref().map(|answer| answer.told(assistance));
-        self.came_out(underway, CallerRecord::InProcess(&[]), &called, CallOutcome::of(&told));
-        let reply = answer.and_then(|answer| answer.reply(&called));
-        self.let_think();
-        reply
-    }
-
-    /// Reads an operator's command, which [`Session::together`] executes when those of others are there, too. A refusal is counted and
-    /// recorded as that of any call.
-    pub fn read_command(&mut self, call: OperatorCall) -> Result<OperatorCommand, EpisodeError> {
-        self.admit(Some(call.robot()), call.call())?;
-        let order = self.expect_underway().and_then(|()| call.order(&self.rules, &self.motions));
-        let refusal = match order {
-            Ok(order) => return Ok(OperatorCommand { call, order }),
-            Err(refusal) => refusal,
-        };
-        let operator = call.robot().to_owned();
-        self.refuse(CallerRecord::Operator(&operator), &Called::Together(vec![call]), &refusal);
-        Err(refusal)
-    }
-
     /// Counts and records a call that has been refused.
     pub(super) fn refuse(&mut self, caller: CallerRecord, called: &Called, refusal: &EpisodeError) {
-        let underway = self.arrived();
+        let underway = self.arrived(caller, called.is_look());
         self.came_out(underway, caller, called, CallOutcome::refused(refusal));
         self.let_think();
     }
 
-    /// Executes the commands of several operators side by side, and looks for each what it wants to see then.
-    pub fn together(&mut self, commands: Vec<OperatorCommand>) -> Result<Vec<CallReply>, EpisodeError> {
-        let (mut calls, orders): (Vec<OperatorCall>, Vec<RobotOrder>) =
-            commands.into_iter().map(|command| (command.call, command.order)).unzip();
-        let after = |call: &mut OperatorCall| (call.robot().to_owned(), call.take_look(), call.call().short);
-        let looks: Vec<(String, Option<Look>, bool)> = calls.iter_mut().map(after).collect();
-        let called = Called::Together(calls);
-        let underway = self.arrived();
-        let mut answer = self.expect_underway().and_then(|()| self.act(&Command::together(orders)));
-        for answer in answer.iter_mut() {
-            answer.withhold(self.spec().assistance);
-            self.count(answer, &called, CallerRecord::Policy);
-        }
-        self.came_out(underway, CallerRecord::Policy, &called, CallOutcome::of(&answer));
-        self.let_think();
-        let reply = answer?.reply(&called)?;
-        let replies = looks.into_iter().map(|(robot, look, short)| {
-            let mut reply = reply.clone();
-            if short {
-                shorten(&mut reply);
-            }
-            Ok(CallReply { reply, observation: self.look_after(CallerRecord::Operator(&robot), look)? })
-        });
-        replies.collect()
-    }
-
-    /// Makes a call with nothing around it. The reply tells what the policy may be told, whoever calls.
-    pub(super) fn make(&mut self, caller: CallerRecord, called: &Called) -> Result<ToolReply, EpisodeError> {
+    /// Makes a call with nothing around it.
+    pub(super) fn make(&mut self, caller: CallerRecord, called: &Called) -> Result<Answer, EpisodeError> {
         let counts = self.ended.is_none();
-        let is_short = matches!(called, Called::One(Call { short: true, .. }));
-        let underway = self.arrived();
-        let mut answer = self.answer(called);
-        for answer in answer.iter_mut() {
-            answer.withhold(self.spec().assistance);
-            if counts {
-                let mut shown = answer.clone();
-                if let (true, Answer::Reply(reply)) = (is_short, &mut shown) {
-                    shorten(reply);
-                }
-                self.count(&shown, called, caller);
-            }
+        let underway = self.arrived(caller, called.is_look());
+        let whole = self.allow(called).and_then(|allowed| self.answer(allowed));
+        let assistance = self.spec().assistance;
+        let mut told = whole.as_ref().map(|answer| answer.told(assistance));
+        if let (true, Ok(told)) = (counts, &told) {
+            self.count(told, called, caller);
         }
-        self.came_out(underway, caller, called, CallOutcome::of(&answer));
-        if let Ok(Answer::Reply(reply)) = &mut answer
+        self.came_out(underway, caller, called, CallOutcome::of(&told));
+        if let Ok(Answer::Reply(reply)) = &mut told
             && let ToolReply::Manage(ManageReply::Finish(reply)) = &mut **reply
         {
             // Closing the files may have failed, which the reply has to say.
             *reply = self.result().disclosed(self.spec().disclosure);
         }
-        let mut reply = answer.and_then(|answer| answer.reply(called));
-        if is_short {
-            // The recording has all of it.
-            reply.iter_mut().for_each(shorten);
-        }
         self.let_think();
-        reply
+        let told = told.ok();
+        match (caller, told) {
+            (CallerRecord::Policy | CallerRecord::Operator(_), Some(told)) => Ok(told),
+            (CallerRecord::Policy | CallerRecord::Operator(_), None) | (CallerRecord::InProcess(_), _) => {
+                whole
+            }
+        }
     }
 
     /// Counts what an answer shows from which nothing is to be withheld any more.
     fn count(&mut self, answer: &Answer, called: &Called, caller: CallerRecord) {
-        let formats = match called {
-            Called::One(call) => call.formats,
-            Called::Together(_) => Formats::default(),
-        };
         match (caller, answer) {
             (CallerRecord::Policy | CallerRecord::Operator(_), answer) => {
-                self.shown.count_answer(answer, &formats, self.origin.spec.protocol);
+                self.shown.count_answer(answer, &called.formats(), self.origin.spec.protocol);
             }
             (CallerRecord::InProcess(shown), Answer::Observation(seen)) => self.shown.count_each(shown, seen),
             (CallerRecord::InProcess(_), Answer::Reply(_)) => {}
@@ -238,14 +285,16 @@ impl Session {
         call.then.as_ref().map_or(Ok(()), |look| self.check_look(look))
     }
 
-    /// As [`Session::check_around`]; a refusal is told.
-    fn admit(&mut self, operator: Option<&str>, call: &Call) -> Result<(), EpisodeError> {
-        let refused = self.check_around(call).err();
-        refused.map_or(Ok(()), |refusal| {
-            let arguments = serde_json::to_string(call).map_err(OutputError::from)?;
-            self.refused_before(operator, call.name(), &arguments, &refusal.to_string());
-            Err(refusal)
-        })
+    /// As [`Session::check_around`], of every call; a refusal is told.
+    fn admit(&mut self, caller: Caller, called: &Called) -> Result<(), EpisodeError> {
+        for call in called.calls() {
+            if let Err(refusal) = self.check_around(call) {
+                let arguments = serde_json::to_string(call).map_err(OutputError::from)?;
+                self.refused_before(caller.operator(), call.name(), &arguments, &refusal.to_string());
+                return Err(refusal);
+            }
+        }
+        Ok(())
     }
 
     /// Looks after a command, if that was asked for: a call of its own.
@@ -255,35 +304,23 @@ impl Session {
         look: Option<Look>,
     ) -> Result<Option<Observation>, EpisodeError> {
         let Some(look) = look else { return Ok(None) };
-        let observation = self.look_as_told(caller, &look).and_then(|seen| Ok(seen.reply(&look.formats)?));
-        self.let_think();
-        observation.map(Some)
+        let formats = look.formats;
+        match self.make(caller, &Called::One(Call::from(look)))? {
+            Answer::Observation(seen) => Ok(Some(seen.reply(&formats)?)),
+            Answer::Reply(_) => Err(unanswered(Observe::NAME, "another tool was called")),
+        }
     }
 
-    /// What a look shows, as the policy is told it, which is counted.
-    fn look_as_told(&mut self, caller: CallerRecord, look: &Look) -> Result<TeamObservation, EpisodeError> {
-        let underway = self.ended.is_none();
-        let seen = self.look_once(caller, look).map(|seen| seen.told(self.spec().assistance));
-        seen.iter().filter(|_| underway).for_each(|seen| self.shown.count_seen(seen, &look.formats));
-        seen
-    }
-
-    /// What a look shows, with nothing withheld; it is recorded as a policy is told it.
-    fn look_once(&mut self, caller: CallerRecord, look: &Look) -> Result<TeamObservation, EpisodeError> {
-        let underway = self.arrived();
-        let call = Call::from(look.clone());
-        let valid = call.validate().map_err(EpisodeError::from);
-        let seen = valid.and_then(|()| self.seen(&look.observe, &look.formats));
-        let told = seen.as_ref().map(|seen| seen.told(self.spec().assistance));
-        self.came_out(underway, caller, &Called::One(call), CallOutcome::of(&told));
-        seen
-    }
-
-    /// A call has arrived. Returns whether it is one of the episode's.
-    fn arrived(&mut self) -> bool {
+    /// A call has arrived. The clock stands while it is answered, but for a look of the policy's own, which costs the policy its time: who
+    /// looks again and again would otherwise think for nothing. Returns whether the call is one of the episode's.
+    fn arrived(&mut self, caller: CallerRecord, is_look: bool) -> bool {
         self.clock.pause();
         if self.ended.is_none() && self.clock.exhausted() {
             self.ended = Some(EndReason::WallClockExhausted);
+        }
+        match caller {
+            CallerRecord::Policy | CallerRecord::Operator(_) if is_look => self.let_think(),
+            CallerRecord::Policy | CallerRecord::Operator(_) | CallerRecord::InProcess(_) => {}
         }
         let underway = self.result.is_none();
         self.tool_calls += u32::from(underway);
@@ -311,7 +348,9 @@ impl Session {
                     files.keep_words(words);
                 }
             }
-            self.tell(ToolCallRecord::new(self.now(), caller, called, outcome));
+            // A replay asks the clock when the call arrives, not when it has been answered.
+            let moment = CallMoment { thought: self.clock.spent(), ..self.now() };
+            self.tell(ToolCallRecord::new(moment, caller, called, outcome));
         }
         // A plan that has ended the episode is told behind its last command.
         if self.ended.is_some() && !self.planning {
@@ -323,6 +362,26 @@ impl Session {
     pub(super) fn let_think(&mut self) {
         if self.ended.is_none() {
             self.clock.resume();
+        }
+    }
+}
+
+impl<'a> Caller<'a> {
+    fn operator(self) -> Option<&'a str> {
+        match self {
+            Caller::Policy => None,
+            Caller::Operator(robot) => Some(robot),
+        }
+    }
+}
+
+impl<'a> Audience<'a> {
+    /// The caller as recordings have it.
+    fn record(self, caller: Caller<'a>) -> CallerRecord<'a> {
+        match (self, caller) {
+            (Audience::Process(shown), _) => CallerRecord::InProcess(shown),
+            (Audience::Caller, Caller::Policy) => CallerRecord::Policy,
+            (Audience::Caller, Caller::Operator(robot)) => CallerRecord::Operator(robot),
         }
     }
 }

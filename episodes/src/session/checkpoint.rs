@@ -151,7 +151,7 @@ impl Checkpoint {
 impl Origin {
     /// What has to be the same for progress to fit, in words.
     fn episode(&self) -> String {
-        let (task, seed, protocol) = (self.spec.task.id, self.spec.seed, self.spec.protocol.name());
+        let (task, seed, protocol) = (self.spec.task.id, self.spec.world_seed(), self.spec.protocol.name());
         let (machine, told) = (self.machine(), self.told());
         format!("task {task} seed {seed} under the {protocol} protocol with {machine}, and {told}")
     }
@@ -165,7 +165,7 @@ impl Origin {
 
     /// As [`Origin::episode`], under whatever protocol and whatever its policy is told.
     fn world(&self) -> String {
-        format!("task {} seed {} with {}", self.spec.task.id, self.spec.seed, self.machine())
+        format!("task {} seed {} with {}", self.spec.task.id, self.spec.world_seed(), self.machine())
     }
 
     fn machine(&self) -> String {

@@ -15,12 +15,12 @@ mod status;
 mod told;
 
 pub(crate) use build::{Built, build};
-pub use calls::CallReply;
+pub use calls::{Audience, CallReply, Caller, Outcome, Request};
 pub use checkpoint::{Checkpoint, FailedStep};
 pub use clock::{Clock, monotonic};
 pub use failure::FAILED_STEP_FILE;
 use failure::Rewind;
-use onlookers::Audience;
+use onlookers::Spectators;
 pub(crate) use replay::Replay;
 use run_files::moment;
 pub use run_files::{RunFiles, RunFolder};
@@ -62,7 +62,7 @@ pub struct Session {
     clock: ThinkingClock,
     observer: Observer,
     files: Option<RunFiles>,
-    audience: Audience,
+    spectators: Spectators,
     /// Up to the end.
     tool_calls: u32,
     /// As many, with one for a plan; `None` where calls are made again that do not tell which of them were a plan's.
@@ -114,7 +114,7 @@ impl Session {
         let rules = spec.rules();
         let present = Arc::new(world.present());
         let rest = (0..motions.len()).map(|robot| world.rest_command(robot)).collect();
-        let disturbance = Disturbance::new(spec.variation.disturb, spec.seed, motions.len());
+        let disturbance = Disturbance::new(spec.variation.disturb, spec.world_seed(), motions.len());
         let begin_s = f64::from(rules.initial_hold_steps) / CONTROL_HZ;
         Ok(Session {
             origin: Origin { spec: spec.clone(), robot, locomotion },
@@ -123,7 +123,7 @@ impl Session {
             clock: ThinkingClock::new(rules.thinking, clock),
             observer: Observer::new(spec, &world),
             files: None,
-            audience: Audience::default(),
+            spectators: Spectators::default(),
             steps_before: 0,
             tool_calls: 0,
             requests: Some(0),
@@ -135,7 +135,7 @@ impl Session {
             simulator_failure: None,
             rewind: Rewind::default(),
             shown: ShownInformation::default(),
-            execution: Execution::of(spec.stress, disturbance, spec.seed, begin_s, rest),
+            execution: Execution::of(spec.stress, disturbance, spec.world_seed(), begin_s, rest),
             hashes: None,
             result: None,
             motions,

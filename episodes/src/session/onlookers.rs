@@ -16,7 +16,7 @@ const KEPT_ENTRIES: usize = 50;
 
 /// Who looks on, if anybody may, and what those are shown first who come later.
 #[derive(Default)]
-pub struct Audience {
+pub struct Spectators {
     onlookers: Option<Box<dyn Onlookers>>,
     /// The latest, the oldest first.
     entries: VecDeque<Arc<LiveEntry>>,
@@ -28,7 +28,7 @@ pub struct Audience {
     told_step: Option<u64>,
 }
 
-impl Audience {
+impl Spectators {
     fn tell(&self, event: impl FnOnce() -> LiveEvent) {
         if let Some(onlookers) = self.onlookers.as_deref().filter(|onlookers| onlookers.any()) {
             onlookers.tell(event());
@@ -39,28 +39,25 @@ impl Audience {
 impl Session {
     /// From now on, tells `onlookers` what happens.
     pub fn set_onlookers(&mut self, onlookers: Box<dyn Onlookers>) {
-        self.audience.onlookers = Some(onlookers);
+        self.spectators.onlookers = Some(onlookers);
     }
 
-    /// The episode as it stands, for who begins to look on. No call, and no time of the policy's.
+    /// The episode as it stands, for who begins to look on. No call.
     pub fn live_view(&mut self) -> LiveView {
-        self.clock.pause();
-        let scene = match &self.audience.scene {
+        let scene = match &self.spectators.scene {
             Some(scene) => scene.clone(),
             None => {
                 let made = Arc::new(LiveScene::of(self.spec(), &self.world, &self.motions));
-                self.audience.scene.insert(made).clone()
+                self.spectators.scene.insert(made).clone()
             }
         };
-        let view = LiveView {
+        LiveView {
             scene,
             now: Arc::new(self.live_step(self.budget())),
-            entries: self.audience.entries.iter().cloned().collect(),
+            entries: self.spectators.entries.iter().cloned().collect(),
             phases: self.reached(),
             result: self.result.clone(),
-        };
-        self.let_think();
-        view
+        }
     }
 
     /// As [`Session::live_view`], for the person who drives `robot`, who sees where everything is. It is a look whose picture nobody
@@ -74,42 +71,42 @@ impl Session {
     /// Shows the present step, where it is one that is shown.
     pub(super) fn show_step(&mut self, budget: Budget) {
         let step = self.present.control_step;
-        let onlookers = self.audience.onlookers.as_deref();
+        let onlookers = self.spectators.onlookers.as_deref();
         if onlookers.is_some_and(|onlookers| onlookers.any() && onlookers.wants_step(step)) {
             self.tell_step(budget);
         }
     }
 
     fn tell_step(&mut self, budget: Budget) {
-        self.audience.tell(|| LiveEvent::Step(Arc::new(self.live_step(budget))));
-        self.audience.told_step = Some(self.present.control_step);
+        self.spectators.tell(|| LiveEvent::Step(Arc::new(self.live_step(budget))));
+        self.spectators.told_step = Some(self.present.control_step);
     }
 
     pub(super) fn show_phase(&self, phase: &PhaseReached) {
-        self.audience.tell(|| LiveEvent::Phase(phase.clone()));
+        self.spectators.tell(|| LiveEvent::Phase(phase.clone()));
     }
 
     /// Shows the step in which the episode has ended, and what it came to.
     pub(super) fn show_end(&mut self) {
         self.tell_step(self.budget());
         if let Some(result) = &self.result {
-            self.audience.tell(|| LiveEvent::Ended(Arc::new(result.clone())));
+            self.spectators.tell(|| LiveEvent::Ended(Arc::new(result.clone())));
         }
     }
 
     /// Whether calls are shown or kept to be shown.
     pub(super) fn shows_calls(&self) -> bool {
-        self.audience.onlookers.is_some()
+        self.spectators.onlookers.is_some()
     }
 
     /// A call that has been answered, and the step to which it has come: what follows may be long in coming.
     pub(super) fn show_call(&mut self, record: &Result<ToolCallRecord, OutputError>) {
-        if self.audience.told_step != Some(self.present.control_step) {
+        if self.spectators.told_step != Some(self.present.control_step) {
             self.tell_step(self.budget());
         }
         let Ok(record) = record else { return };
-        self.audience.counted_calls += u32::from(record.message.counted);
-        let number = record.message.counted.then_some(self.audience.counted_calls);
+        self.spectators.counted_calls += u32::from(record.message.counted);
+        let number = record.message.counted.then_some(self.spectators.counted_calls);
         self.show_entry(|entry| LiveEntry::of_call(entry, number, record));
     }
 
@@ -122,13 +119,13 @@ impl Session {
         if !self.shows_calls() {
             return;
         }
-        self.audience.told_entries += 1;
-        let entry = Arc::new(made(self.audience.told_entries));
-        if self.audience.entries.len() == KEPT_ENTRIES {
-            self.audience.entries.pop_front();
+        self.spectators.told_entries += 1;
+        let entry = Arc::new(made(self.spectators.told_entries));
+        if self.spectators.entries.len() == KEPT_ENTRIES {
+            self.spectators.entries.pop_front();
         }
-        self.audience.entries.push_back(Arc::new(entry.without_pictures()));
-        self.audience.tell(|| LiveEvent::Entry(entry));
+        self.spectators.entries.push_back(Arc::new(entry.without_pictures()));
+        self.spectators.tell(|| LiveEvent::Entry(entry));
     }
 
     fn live_step(&self, budget: Budget) -> LiveStep {

@@ -79,7 +79,7 @@ impl Session {
         let EpisodeSpec { assistance, disclosure, .. } = *self.spec();
         StatusReply {
             task: self.spec().task.id.into(),
-            seed: self.spec().seed,
+            seed: self.spec().told_seed(),
             protocol: self.spec().protocol,
             time_s: self.present.time_s,
             env_steps: self.env_steps(),
@@ -89,7 +89,10 @@ impl Session {
             disclosure: Some(disclosure).filter(|told| *told != assistance.disclosure()),
             phases: self.phases(),
             budget: self.budget(),
-            state_hash: self.state_hash(),
+            state_hash: match assistance {
+                Assistance::Paper => None,
+                Assistance::Full => Some(self.state_hash()),
+            },
         }
     }
 
@@ -137,7 +140,7 @@ impl Session {
         let physics_s = self.physics.as_secs_f64();
         ResultReply {
             task: self.spec().task.id.into(),
-            seed: self.spec().seed,
+            seed: Some(self.spec().seed),
             protocol: self.spec().protocol,
             phases: PhaseTimes(phases.collect()),
             ended: self.ended.unwrap_or(EndReason::Finished),
@@ -147,7 +150,7 @@ impl Session {
             thinking_s: rounded(self.clock.spent().as_secs_f64()),
             falls: self.fallen().iter().filter(|robot| robot.fallen).count() as u32,
             realtime_factor: if physics_s > 0.0 { self.present.time_s / physics_s } else { 0.0 },
-            state_hash: self.state_hash(),
+            state_hash: Some(self.state_hash()),
             simulator_failure: self.simulator_failure.clone(),
             assistance: self.spec().assistance,
             extra_information: self.shown.names(),

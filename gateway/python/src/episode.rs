@@ -13,9 +13,9 @@ use pyo3::types::PyBytes;
 use serde_json::{Value, json};
 use tandem::hosting::{Answer, EpisodeMetrics, HostingError, PanicGuard};
 use tandem::settings::{Layer, Settings};
-use tandem_episodes::{Checkpoint, EpisodeError, RobotObservation, Session};
+use tandem_episodes::{Checkpoint, EpisodeError, EpisodeSpec, RobotObservation, Session};
 use tandem_tools_spec::{
-    ActCall, Call, CommandReply, DepthFormat, EndReason, Formats, ImageFormat, JointChunk, Look, Observe,
+    ActCall, Assistance, Call, CommandReply, DepthFormat, Disclosure, EndReason, Formats, ImageFormat, JointChunk, Look, Observe,
     ResultReply, SendJointChunk, Tool as _, ToolReply, parse_args,
 };
 
@@ -27,11 +27,40 @@ use crate::refusal::{failed, forked, refused};
 pub struct NativeEpisode {
     held: Mutex<Held>,
     robots: Vec<String>,
-    recorded: bool,
+    course: Course,
+    assistance: Assistance,
+    disclosure: Disclosure,
     /// The process that made it: one that is forked has neither the threads nor the files of its parent.
     process: u32,
     /// Whether somebody wants the policy to stop, who cannot reach its thread.
     interrupted: Arc<AtomicBool>,
+}
+
+/// Whether an episode may go back to an earlier moment.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Course {
+    /// It is the caller's own.
+    Free,
+    /// A recording is made of it.
+    Recorded,
+    /// An evaluation scores how it is played, at the first attempt.
+    Scored,
+}
+
+impl Course {
+    /// Why the episode goes forward only, if it does.
+    fn forward_only(self) -> Option<&'static str> {
+        match self {
+            Course::Free => None,
+            Course::Recorded => {
+                Some("a recorded episode goes forward only; start one without `record` to go back in it")
+            }
+            Course::Scored => Some(
+                "an evaluation scores this episode, which goes forward only and has no snapshots; an episode of your own, \
+                 tandem.Episode(task, seed), has them",
+            ),
+        }
+    }
 }
 
 /// What there is of an episode.
@@ -55,13 +84,16 @@ type Seen<'py> = (String, Vec<(Colours<'py>, Option<Depths<'py>>)>);
 
 impl NativeEpisode {
     /// An episode that has begun.
-    pub fn of(session: Session, recorded: bool) -> NativeEpisode {
+    pub fn of(session: Session, course: Course) -> NativeEpisode {
         let robots = session.spec().task.robots.iter().map(|robot| robot.name.to_owned()).collect();
+        let EpisodeSpec { assistance, disclosure, .. } = *session.spec();
         let guard = PanicGuard::new(session, EpisodeMetrics::new(Arc::default()));
         NativeEpisode {
             held: Mutex::new(Held::Open(guard.into())),
             robots,
-            recorded,
+            course,
+            assistance,
+            disclosure,
             process: process::id(),
             interrupted: Arc::default(),
         }
@@ -144,7 +176,8 @@ impl NativeEpisode {
         if let Some(reason) = session.recording_failed() {
             return Err(failed(py, &reason));
         }
-        Ok((NativeEpisode::of(session, record.is_some()), briefing))
+        let course = if record.is_some() { Course::Recorded } else { Course::Free };
+        Ok((NativeEpisode::of(session, course), briefing))
     }
 
     /// Names of the robots, in order.
@@ -229,13 +262,15 @@ impl NativeEpisode {
 
     /// Where the episode stands.
     fn snapshot(&self, py: Python) -> PyResult<Snapshot> {
+        if let (Course::Scored, Some(way)) = (self.course, self.course.forward_only()) {
+            return Err(failed(py, &way));
+        }
         self.work(py, |session| session.checkpoint()).map(|checkpoint| Snapshot { checkpoint })
     }
 
     /// Goes back, or on, to where a snapshot was taken.
     fn restore(&self, py: Python, snapshot: &Snapshot) -> PyResult<()> {
-        if self.recorded {
-            let way = "a recorded episode goes forward only; start one without `record` to go back in it";
+        if let Some(way) = self.course.forward_only() {
             return Err(failed(py, &way));
         }
         self.work(py, |session| session.resume(&snapshot.checkpoint))
@@ -243,6 +278,10 @@ impl NativeEpisode {
 
     /// Equal for equal physical states, 16 hexadecimal digits.
     fn state_hash(&self, py: Python) -> PyResult<String> {
+        if self.course == Course::Scored && self.assistance == Assistance::Paper {
+            let way = "an evaluation scores this episode and tells its policy no hash; results.json has that of its end";
+            return Err(failed(py, &way));
+        }
         self.work(py, |session| Ok(session.state_hash()))
     }
 
@@ -258,7 +297,9 @@ impl NativeEpisode {
     fn close(&self, py: Python) -> PyResult<String> {
         self.check_process(py)?;
         let result = py.detach(|| self.end(None)).map_err(|error| refused(py, &error))?;
-        Ok(json!(result).to_string())
+        // An episode of the caller's own has no secrets.
+        let told = if self.course == Course::Scored { result.disclosed(self.disclosure) } else { result };
+        Ok(json!(told).to_string())
     }
 }
 

@@ -70,7 +70,8 @@ pub fn evaluate(
         jobs,
         record,
         files: KeptFiles::default(),
-        keep_failed: false,
+        retries: EvaluationPlan::DEFAULT_RETRIES,
+        seed_key: None,
     };
     play_all(py, &plan, &out, progress.as_ref(), &player.interrupted)
 }

@@ -17,7 +17,7 @@ use tandem_episodes::results::{PlayedEpisode, PolicyCard};
 use tandem_episodes::{EpisodeSpec, Facts, RESULT_FILE, Session, build, create_private_folder, write_whole};
 use tandem_tools_spec::{EndReason, ToolCall, ToolReply};
 
-use crate::episode::NativeEpisode;
+use crate::episode::{Course, NativeEpisode};
 
 /// A policy, by what Python says of it.
 #[derive(Debug)]
@@ -101,7 +101,7 @@ impl PythonPolicy {
             return Err(PlayError::Lost(reason.into()));
         }
         let briefing = json!(session.briefing()).to_string();
-        let episode = NativeEpisode::of(session, output.record).until(self.interrupted.clone());
+        let episode = NativeEpisode::of(session, Course::Scored).until(self.interrupted.clone());
         let (episode, stopped) = Python::attach(|py| self.call(py, play, episode, briefing))
             .map_err(|error| PlayError::Absent(error.to_string()))?;
         if self.is_interrupted() {

@@ -95,8 +95,8 @@ class BaseEpisode(Tools):
     task: str
     """The task's id."""
 
-    seed: int
-    """Decides where the objects stand."""
+    seed: int | None
+    """Decides where the objects stand. None where an evaluation does not tell it, as under the assistance "paper"."""
 
     protocol: Protocol
     """The rules: "agentic" for agents that think between commands, "benchmark" for learned policies."""

@@ -93,7 +93,8 @@ class Episode(BaseEpisode):
         """The episode that somebody else has started."""
         told = Briefing.of(json.loads(briefing))
         status = told.status
-        episode = cls(status.task, status.seed, protocol=status.protocol, assistance=status.assistance)
+        episode = cls(status.task, protocol=status.protocol, assistance=status.assistance)
+        episode.seed = status.seed
         episode._native, episode._briefing, episode._is_given = native, told, True
         return episode
 
@@ -144,12 +145,12 @@ class Episode(BaseEpisode):
         return Stepped(steps, cast(StopReason, reason), time_s, tuple(phases), tuple(fallen), ended)
 
     def snapshot(self) -> Snapshot:
-        """Where the episode stands, with all that its policy has used of its budget."""
+        """Where the episode stands, with all that its policy has used of its budget. An episode that an evaluation scores has none."""
         return self._begun_native.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:
         """Takes the episode to where a snapshot was taken of it, or of another one of the same task, seed and settings. A
-        recorded episode goes forward only.
+        recorded episode goes forward only, and so does one that an evaluation scores.
         """
         self._begun_native.restore(snapshot)
 

@@ -86,6 +86,7 @@ def test_damage_is_said(recorded: tuple[Path, tandem.ResultReply], tmp_path: Pat
 
 
 def walk_a_little(episode: tandem.Episode) -> None:
+    assert episode.seed is not None
     if episode.seed == 2009:
         raise ValueError("no plan for this seed")
     for _ in range(1 + episode.seed % 2):
@@ -97,7 +98,14 @@ def test_a_callable_is_evaluated(tmp_path: Path) -> None:
 
     def run(jobs: int, out: Path | None) -> tandem.Evaluation:
         return tandem.evaluate(
-            walk_a_little, "handover", range(2007, 2010), jobs, protocol="benchmark", out=out, progress=told.append
+            walk_a_little,
+            "handover",
+            range(2007, 2010),
+            jobs,
+            protocol="benchmark",
+            assistance="full",
+            out=out,
+            progress=told.append,
         )
 
     kept = run(2, tmp_path)
@@ -119,6 +127,29 @@ def test_a_callable_is_evaluated(tmp_path: Path) -> None:
         tandem.report(tmp_path / "nothing")
     with pytest.raises(tandem.TandemError, match="have: handover"):
         tandem.evaluate(walk_a_little, "handove", 2007)
+
+
+def test_a_scored_episode_cannot_be_undone_or_known_again(tmp_path: Path) -> None:
+    snapshots: list[tandem.Snapshot] = []
+    with tandem.Episode("handover", 2011, protocol="benchmark", assistance="paper") as own:
+        snapshots.append(own.snapshot())
+
+    def cheat(episode: tandem.Episode) -> None:
+        with pytest.raises(tandem.TandemError, match="an evaluation scores this episode"):
+            episode.snapshot()
+        episode.wait(5)
+        with pytest.raises(tandem.TandemError, match="forward only"):
+            episode.restore(snapshots[0])
+        status = episode.get_status()
+        assert (episode.seed, status.seed, status.state_hash) == (None, None, None)
+        with pytest.raises(tandem.TandemError, match="no hash"):
+            assert episode.state_hash
+        told = episode.finish()
+        assert (told.seed, told.state_hash) == (None, None)
+
+    played = tandem.evaluate(cheat, "handover", 2011, protocol="benchmark", out=tmp_path)
+    assert [(result.ended, result.env_steps, result.seed) for result in played.results] == [("finished", 5, 2011)]
+    assert played.notes[0] == "p1 was not reached in 5 steps"
 
 
 def test_a_policy_that_raises_leaves_its_recordings_whole(tmp_path: Path) -> None:

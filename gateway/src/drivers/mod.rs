@@ -11,7 +11,7 @@ use std::{fs, io, path::Path};
 use tandem_episodes::players::PlayError;
 use tandem_tools_spec::ResultReply;
 
-use crate::hosting::HostingError;
+use crate::hosting::{EpisodeThread, HostingError};
 
 pub use http_episode::HttpEpisode;
 pub use people::People;
@@ -27,11 +27,11 @@ fn remove_old_result(path: &Path) -> Result<(), PlayError> {
     }
 }
 
-/// The result as the server has left it: a program may have ended its episode in any way.
-fn read_result(folder: &Path) -> Result<ResultReply, PlayError> {
-    let bytes =
-        fs::read(folder.join(tandem_episodes::RESULT_FILE)).map_err(|error| lost("no result", error))?;
-    serde_json::from_slice(&bytes).map_err(|error| lost("no result", error.into()))
+/// The result of an episode that has been closed, in whatever way a program has ended it. It is the server's own: what lies in the
+/// episode's folder a program may have written.
+fn own_result(episode: &EpisodeThread) -> Result<ResultReply, PlayError> {
+    let result = episode.result().cloned();
+    result.ok_or_else(|| PlayError::Lost("no result: the episode was not closed in time".into()))
 }
 
 fn lost(what: &str, error: io::Error) -> PlayError {

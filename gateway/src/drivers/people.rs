@@ -18,9 +18,9 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{Driving, Operators};
 
-use super::{lost, read_result, remove_old_result};
+use super::{lost, own_result, remove_old_result};
 use crate::{
-    hosting::{CollectedEpisode, Collection, HostingError},
+    hosting::{CollectedEpisode, Collection, HostingError, Purpose},
     http::{Guests, Server, operator_link},
     settings::Settings,
     token::Token,
@@ -64,7 +64,7 @@ impl People {
         let settings = Arc::new(Settings { token: Some(token), ..settings });
         let scheme = if settings.certificate.is_some() { "https" } else { "http" };
         let name = settings.allowed_hosts.first().cloned();
-        let guests = Guests { collection: Some(collection.clone()), ..Guests::default() };
+        let guests = Guests { purpose: Purpose::Collection(collection.clone()), ..Guests::default() };
         let server = Server::start_for(settings, guests);
         let server = server.map_err(|error| lost("no server", error))?;
         let base_url = base_url(scheme, server.address(), name.as_deref());
@@ -147,9 +147,8 @@ impl Policy for People {
             thread::sleep(POLL_INTERVAL);
         }
         let thought = episode.thought();
-        drop(episode);
         self.server.remove(&id)?;
-        let result = read_result(folder)?;
+        let result = own_result(&episode)?;
         match &*self.collection.wait_for_marks() {
             [] => {
                 fs::write(folder.join(GOOD_FILE), "").map_err(|error| lost("no mark", error))?;

@@ -110,6 +110,8 @@ struct SharedStatus {
     recording_failed: OnceLock<String>,
     /// How long the policy has thought, in nanoseconds.
     thought: AtomicU64,
+    /// What the episode came to, once it has been closed.
+    result: OnceLock<ResultReply>,
 }
 
 impl SharedStatus {
@@ -329,6 +331,11 @@ impl EpisodeThread {
         Duration::from_nanos(self.status.thought.load(Ordering::Relaxed))
     }
 
+    /// What the episode came to, with nothing withheld; from when it has been closed.
+    pub fn result(&self) -> Option<&ResultReply> {
+        self.status.result.get()
+    }
+
     /// Why the recording is not complete, if it is not.
     pub fn recording_failed(&self) -> Option<&str> {
         self.status.recording_failed.get().map(String::as_str)
@@ -457,12 +464,16 @@ fn serve(mut session: PanicGuard, mut inbox: mpsc::Receiver<Job>, status: &Share
                 let _ = session.run(|session| session.end(reason));
                 status.update(&session);
             }
-            Job::Close { reply } => return Closed(Some((reply, session.close()))),
+            Job::Close { reply } => return Closed(Some((reply, close(session, status)))),
         }
     }
     // Nobody is left who could be told.
-    let _ = session.close();
+    let _ = close(session, status);
     Closed(None)
+}
+
+fn close(session: PanicGuard, status: &SharedStatus) -> Result<ResultReply, HostingError> {
+    session.close().inspect(|result| drop(status.result.set(result.clone())))
 }
 
 fn answer(session: &mut Session, operator: Option<&str>, call: Call) -> Result<Answer, HostingError> {

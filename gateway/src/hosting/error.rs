@@ -89,6 +89,16 @@ pub enum HostingError {
         "an operator looks through its robot and commands it; this request is for who started the episode"
     )]
     HostsBusiness,
+    /// A client would start an episode where an evaluation in this process has the only one.
+    #[error(
+        "this server holds the one episode that an evaluation scores, and starts no other; play the one that your brief and the environment's TANDEM_EPISODE name"
+    )]
+    OneEpisode,
+    /// A program of this process would drive in a person's place.
+    #[error(
+        "in a collection people drive, and nobody else in their place; demonstrations of the expert are tandem collect's without --operators"
+    )]
+    PeopleDrive,
     /// Nobody here can drive a robot of this task.
     #[error("{0}")]
     NoExpert(#[source] PlayerError),
@@ -165,6 +175,8 @@ impl HostingError {
             }
             HostingError::NeedsOperator => Refusal::new("needs-operator", "Driven by operators", Forbidden),
             HostingError::HostsBusiness => Refusal::new("hosts-business", "Not for operators", Forbidden),
+            HostingError::OneEpisode => Refusal::new("one-episode", "No other episode", Forbidden),
+            HostingError::PeopleDrive => Refusal::new("people-drive", "People drive", Forbidden),
             HostingError::NoExpert(_) => Refusal::new("no-expert", "No expert", Invalid),
             HostingError::NoPolicy { .. } => Refusal::new("no-policy", "No policy", Conflict),
             HostingError::NoTalk => Refusal::new("no-talk", "Nobody hears", Conflict),
@@ -198,6 +210,8 @@ impl HostingError {
             | HostingError::EpisodePanicked
             | HostingError::NeedsOperator
             | HostingError::HostsBusiness
+            | HostingError::OneEpisode
+            | HostingError::PeopleDrive
             | HostingError::NoExpert(_)
             | HostingError::NoPolicy { .. }
             | HostingError::KeyUsed

@@ -118,13 +118,18 @@ impl HostedEpisode {
         })
     }
 
-    /// Its line in the list of episodes. Its thread is not asked, which may be at work.
+    /// Its line in the list of episodes, as far as its policies are told.
+    pub fn told_entry(&self) -> EpisodeEntry {
+        EpisodeEntry { seed: self.thread.spec().told_seed(), ..self.entry() }
+    }
+
+    /// The whole of it. Its thread is not asked, which may be at work.
     pub fn entry(&self) -> EpisodeEntry {
         let spec = self.thread.spec();
         EpisodeEntry {
             episode_id: self.id.clone(),
             task: spec.task.id.into(),
-            seed: spec.seed,
+            seed: Some(spec.seed),
             protocol: spec.protocol,
             operators: if self.team.is_some() { Operators::PerRobot } else { Operators::One },
             step: self.thread.env_steps(),

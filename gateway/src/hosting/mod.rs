@@ -25,8 +25,8 @@ pub use hosted_episode::{Caller, HostedEpisode};
 pub use idempotency_cache::IdempotentReply;
 pub use onlookers::LiveWatch;
 pub use panic_guard::{EpisodeMetrics, PanicGuard};
-pub use run_folder::{look_at_runs_folder, try_runs_folder};
-pub use table::EpisodeTable;
+pub use run_folder::{episode_name, look_at_runs_folder, try_runs_folder};
+pub use table::{EpisodeTable, Purpose};
 pub use team::{
     CollectedEpisode, Collection, CollectionProgress, CollectionStage, Driver, PartnerPolicy, Wish,
 };

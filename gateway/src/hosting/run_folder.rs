@@ -10,7 +10,9 @@ use std::{
     },
 };
 
-use tandem_episodes::{create_new_private_folder, create_private_folder};
+use tandem_episodes::{EpisodeSpec, create_new_private_folder, create_private_folder};
+
+use crate::token::{Token, TokenError};
 
 /// Makes the folder of all runs, where it is not there, and writes something into it, which is removed again; the folder stays. The
 /// error says what would have worked.
@@ -34,6 +36,18 @@ pub fn look_at_runs_folder(runs: &Path) -> Result<(), String> {
     tried
 }
 
+/// The name of an episode, which its callers know: task and seed, or where the assistance tells no seed a random text in its place.
+pub fn episode_name(spec: &EpisodeSpec) -> Result<String, TokenError> {
+    let task = spec.task.id;
+    Ok(match spec.told_seed() {
+        Some(seed) => format!("{task}-seed{seed}"),
+        None => format!("{task}-{}", &Token::random()?.1[..RANDOM_NAME_CHARS]),
+    })
+}
+
+/// How long the random part of a name is.
+const RANDOM_NAME_CHARS: usize = 10;
+
 /// Names and makes the folders of one server.
 #[derive(Debug, Default)]
 pub struct RunFolders {
@@ -44,11 +58,10 @@ pub struct RunFolders {
 }
 
 impl RunFolders {
-    /// Makes a new folder for an episode: `handover-seed0`, and where that is taken `handover-seed0-2`, `-3`, ... Where none can
-    /// be made, as on a full disk, the episode has a name all the same; its recording fails, and says why.
-    pub fn create(&self, runs: &Path, task: &str, seed: u32) -> (String, PathBuf) {
-        let base = format!("{task}-seed{seed}");
-        if let Ok(Some(made)) = create_private_folder(runs).and_then(|()| self.first_free(runs, &base)) {
+    /// Makes a new folder for an episode that is called `base`: `handover-seed0`, and where that is taken `handover-seed0-2`, `-3`, ... Where
+    /// none can be made, as on a full disk, the episode has a name all the same; its recording fails, and says why.
+    pub fn create(&self, runs: &Path, base: &str) -> (String, PathBuf) {
+        if let Ok(Some(made)) = create_private_folder(runs).and_then(|()| self.first_free(runs, base)) {
             return made;
         }
         loop {
@@ -90,7 +103,7 @@ mod tests {
     fn names_are_never_used_twice() {
         let runs = std::env::temp_dir().join(format!("tandem-runs-{}", std::process::id()));
         let folders = RunFolders::default();
-        let name = |seed| folders.create(&runs, "handover", seed).0;
+        let name = |seed| folders.create(&runs, &format!("handover-seed{seed}")).0;
         assert_eq!(
             [name(0), name(0), name(1), name(0)],
             ["handover-seed0", "handover-seed0-2", "handover-seed1", "handover-seed0-3"]
@@ -108,7 +121,7 @@ mod tests {
     fn an_episode_has_a_name_of_its_own_where_no_folder_can_be_made() {
         let file = tempfile::NamedTempFile::new().unwrap();
         let folders = RunFolders::default();
-        let names = [(); 2].map(|()| folders.create(&file.path().join("runs"), "handover", 0).0);
+        let names = [(); 2].map(|()| folders.create(&file.path().join("runs"), "handover-seed0").0);
         assert_eq!(names, ["handover-seed0-unrecorded-1", "handover-seed0-unrecorded-2"]);
     }
 
@@ -118,7 +131,7 @@ mod tests {
         use std::os::unix::fs::PermissionsExt;
         let parent = tempfile::tempdir().unwrap();
         let runs = parent.path().join("data/runs");
-        let (_, folder) = RunFolders::default().create(&runs, "handover", 0);
+        let (_, folder) = RunFolders::default().create(&runs, "handover-seed0");
         for path in [runs, folder] {
             let mode = std::fs::metadata(&path).unwrap().permissions().mode();
             assert_eq!(mode & 0o777, 0o700, "{}", path.display());

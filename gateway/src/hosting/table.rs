@@ -19,7 +19,7 @@ use tokio::{
 use super::{
     Caller, EpisodeThread, HostedEpisode, HostingError,
     idempotency_cache::{IdempotencyCache, IdempotentReply},
-    run_folder::RunFolders,
+    run_folder::{RunFolders, episode_name},
     team::{Collection, Team},
 };
 use crate::{metrics::Metrics, settings::Settings};
@@ -33,8 +33,19 @@ pub struct EpisodeTable {
     starts: IdempotencyCache<(StartEpisode, Driving), SharedStart>,
     metrics: Arc<Metrics>,
     folders: RunFolders,
-    /// Those who play one episode after another here, if there are such people.
-    collection: Option<Arc<Collection>>,
+    purpose: Purpose,
+}
+
+/// The purpose of a server. It decides who starts episodes, and who may drive their robots.
+#[derive(Debug, Clone, Default)]
+pub enum Purpose {
+    /// Clients start episodes and choose who drives.
+    #[default]
+    Clients,
+    /// An evaluation in this process has episodes scored. Clients play them, start none, and have nobody drive in their place.
+    Evaluation,
+    /// People play the episodes that a collection in this process starts.
+    Collection(Arc<Collection>),
 }
 
 /// What came of a start, for as many as want to know.
@@ -57,18 +68,43 @@ impl EpisodeTable {
             starts: IdempotencyCache::default(),
             metrics: Arc::default(),
             folders: RunFolders::default(),
-            collection: None,
+            purpose: Purpose::default(),
         }
     }
 
-    /// As [`EpisodeTable::new`], for the episodes of `collection`.
-    pub fn for_collection(settings: Arc<Settings>, collection: Option<Arc<Collection>>) -> EpisodeTable {
-        EpisodeTable { collection, ..EpisodeTable::new(settings) }
+    /// As [`EpisodeTable::new`], for this purpose.
+    pub fn for_purpose(settings: Arc<Settings>, purpose: Purpose) -> EpisodeTable {
+        EpisodeTable { purpose, ..EpisodeTable::new(settings) }
+    }
+
+    /// Whether an evaluation in this process has its episodes scored.
+    pub fn is_evaluation(&self) -> bool {
+        matches!(self.purpose, Purpose::Evaluation)
     }
 
     /// Those who play one episode after another here.
     pub fn collection(&self) -> Option<&Collection> {
-        self.collection.as_deref()
+        match &self.purpose {
+            Purpose::Collection(collection) => Some(collection),
+            Purpose::Clients | Purpose::Evaluation => None,
+        }
+    }
+
+    /// Refuses an episode that a client would start where it may not.
+    fn check_starts(&self) -> Result<(), HostingError> {
+        match self.purpose {
+            Purpose::Evaluation => Err(HostingError::OneEpisode),
+            Purpose::Clients | Purpose::Collection(_) => Ok(()),
+        }
+    }
+
+    /// Refuses a program that would drive a robot in the place of who has its seat.
+    fn check_stand_in(&self) -> Result<(), HostingError> {
+        match self.purpose {
+            Purpose::Evaluation => Err(HostingError::OneEpisode),
+            Purpose::Collection(_) => Err(HostingError::PeopleDrive),
+            Purpose::Clients => Ok(()),
+        }
     }
 
     /// What has been counted.
@@ -101,6 +137,7 @@ impl EpisodeTable {
         args: StartEpisode,
         driving: Driving,
     ) -> Result<StartReply, HostingError> {
+        self.check_starts()?;
         let reply = self.start_spec(self.settings.spec(&args)?, &driving).await?;
         let briefing = if args.short { reply.briefing.shortened() } else { reply.briefing };
         Ok(StartReply { briefing, ..reply })
@@ -108,8 +145,9 @@ impl EpisodeTable {
 
     /// As [`EpisodeTable::start_driven`], of an episode that is not as this server's are.
     pub async fn start_spec(&self, spec: EpisodeSpec, driving: &Driving) -> Result<StartReply, HostingError> {
+        self.check_starts()?;
         let place = self.take_place().await?;
-        let (id, path) = self.folders.create(&self.settings.runs, spec.task.id, spec.seed);
+        let (id, path) = self.folders.create(&self.settings.runs, &episode_name(&spec)?);
         let folder = RunFolder { path, visibility: self.settings.record, pages: true };
         self.begin(&id, spec, driving, folder, place).await
     }
@@ -135,7 +173,7 @@ impl EpisodeTable {
         place: OwnedSemaphorePermit,
     ) -> Result<StartReply, HostingError> {
         let robots = spec.task.robots.len();
-        let silence = spec.stress.and_then(|stress| stress.silence(spec.seed, robots));
+        let silence = spec.stress.and_then(|stress| stress.silence(spec.world_seed(), robots));
         let (team, operators) = match driving.is_per_robot() {
             true => Team::new(spec.task.robot_names(), driving, self.collection(), silence)
                 .map(|(team, tokens)| (Some(team), tokens))?,
@@ -192,6 +230,15 @@ impl EpisodeTable {
         Ok((hosted, team, robot))
     }
 
+    /// As [`EpisodeTable::own_robot`], for a program of this process that is to drive in the operator's place.
+    pub fn stand_in<'a>(
+        &self,
+        caller: &'a Caller,
+    ) -> Result<(HostedEpisode, Arc<Team>, &'a str), HostingError> {
+        self.check_stand_in()?;
+        self.own_robot(caller)
+    }
+
     /// What `who` has to know to play the episode `id`, in this server's words.
     pub async fn briefing(&self, id: &str, who: &Caller) -> Result<Briefing, HostingError> {
         let mut briefing = self.hosted(id)?.briefing(who).await?;
@@ -203,7 +250,12 @@ impl EpisodeTable {
     pub fn list(&self, who: &Caller) -> EpisodeList {
         let held = self.lock();
         let known = held.episodes.values().filter(|episode| episode.admit(who).is_ok());
-        EpisodeList { episodes: known.map(HostedEpisode::entry).collect() }
+        EpisodeList { episodes: known.map(HostedEpisode::told_entry).collect() }
+    }
+
+    /// All episodes, for those who watch.
+    pub fn watched(&self) -> EpisodeList {
+        EpisodeList { episodes: self.lock().episodes.values().map(HostedEpisode::entry).collect() }
     }
 
     /// Whether `who` is an operator who may talk to others.

@@ -22,8 +22,11 @@ use super::{
 
 /// The whole service.
 pub fn router(app: AppState, gate: Gate, limits: Limits) -> Router {
+    // Nobody drives the robots of an episode that is scored but its policy.
+    let operating = if app.table.is_evaluation() { Router::new() } else { pages::operate::router() };
     let routed = rest::router()
         .merge(pages::router())
+        .merge(operating)
         .nest_service("/mcp", mcp::router(app.clone()))
         .fallback(no_route)
         .method_not_allowed_fallback(no_method)
@@ -41,16 +44,17 @@ pub fn router(app: AppState, gate: Gate, limits: Limits) -> Router {
         .layer(middleware::from_fn_with_state(app, count_refusal))
 }
 
-async fn no_route(method: Method, uri: Uri) -> ApiError {
-    refused_route(method, uri, false)
+async fn no_route(State(app): State<AppState>, method: Method, uri: Uri) -> ApiError {
+    refused_route(&app, method, uri, false)
 }
 
-async fn no_method(method: Method, uri: Uri) -> ApiError {
-    refused_route(method, uri, true)
+async fn no_method(State(app): State<AppState>, method: Method, uri: Uri) -> ApiError {
+    refused_route(&app, method, uri, true)
 }
 
-fn refused_route(method: Method, uri: Uri, other_method: bool) -> ApiError {
-    let pages = [pages::WATCH, pages::operate::OPERATE].map(|page| format!("GET {page}"));
+fn refused_route(app: &AppState, method: Method, uri: Uri, other_method: bool) -> ApiError {
+    let operating = (!app.table.is_evaluation()).then_some(pages::operate::OPERATE);
+    let pages = [pages::WATCH].into_iter().chain(operating).map(|page| format!("GET {page}"));
     let have = rest::served().into_iter().chain(["POST /mcp".into()]).chain(pages).collect();
     ApiError::NoRoute { method: method.to_string(), path: uri.path().into(), have, other_method }
 }

@@ -14,7 +14,7 @@ use super::{
     watching::WatchKey,
 };
 use crate::{
-    hosting::{Collection, EpisodeTable, EpisodeThread, HostingError, PartnerPolicy},
+    hosting::{EpisodeTable, EpisodeThread, HostingError, PartnerPolicy, Purpose},
     settings::Settings,
 };
 
@@ -27,11 +27,11 @@ const REQUEST_GRACE: Duration = Duration::from_secs(5);
 /// How often the server looks for episodes whose policies make no more calls.
 const ABANDONED_CHECK_INTERVAL: Duration = Duration::from_secs(1);
 
-/// For whom a server is, besides those who start episodes.
+/// What a server is for, and who is there beside those who start episodes.
 #[derive(Debug, Default)]
 pub struct Guests {
-    /// People who play its episodes.
-    pub collection: Option<Arc<Collection>>,
+    /// Who starts episodes and drives their robots.
+    pub purpose: Purpose,
     /// A policy that people may have drive beside them.
     pub partner: Option<Arc<dyn PartnerPolicy>>,
 }
@@ -56,7 +56,7 @@ impl Server {
 
     /// As [`Server::start`], for `guests`.
     pub fn start_for(settings: Arc<Settings>, guests: Guests) -> io::Result<Server> {
-        let Guests { collection, partner } = guests;
+        let Guests { purpose, partner } = guests;
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(HTTP_THREADS)
             .thread_name("http")
@@ -69,7 +69,7 @@ impl Server {
             )
         })?;
         let address = listener.local_addr()?;
-        let table = Arc::new(EpisodeTable::for_collection(settings.clone(), collection));
+        let table = Arc::new(EpisodeTable::for_purpose(settings.clone(), purpose));
         let watch_key = WatchKey::random().map_err(io::Error::other)?;
         let scheme = if settings.certificate.is_some() { "https" } else { "http" };
         let watch_link = format!("{scheme}://{address}{WATCH}#{}", watch_key.text());

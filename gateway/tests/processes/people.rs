@@ -95,6 +95,11 @@ fn bad_episodes_are_put_aside_and_asked_for_again() {
     let (_, told) = run.ask(a, "/operate/collection", None);
     assert!(told.get("operators").is_none(), "a person gets nobody else's token: {told}");
     assert_eq!(run.ask("0123456789abcdef0123456789abcdef01234567", "/operate/collection", None).0, 401);
+    run.wait_for("playing");
+    for stand_in in ["/operate/expert", "/operate/policy"] {
+        let (status, told) = run.ask(a, stand_in, Some(json!({})));
+        assert_eq!((status, &told["title"]), (403, &json!("People drive")), "{told}");
+    }
     assert_eq!(run.play([true, true]), 2000);
     assert_eq!(run.play([true, false]), 2001);
     run.end();

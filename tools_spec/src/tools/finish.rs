@@ -51,8 +51,9 @@ pub enum EndReason {
 pub struct ResultReply {
     /// The task's id.
     pub task: String,
-    /// The seed.
-    pub seed: u32,
+    /// The seed; left out where it is told to a policy whose assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u32>,
     /// The rules that were in force.
     pub protocol: Protocol,
     /// When each phase was reached, in simulated seconds; null where it was not, or is not told.
@@ -74,8 +75,10 @@ pub struct ResultReply {
     pub falls: u32,
     /// Simulated seconds per second that the physics took.
     pub realtime_factor: f64,
-    /// Hash of the whole physical state at the end, 16 hexadecimal digits.
-    pub state_hash: String,
+    /// Hash of the whole physical state at the end, 16 hexadecimal digits; left out where it is told to a policy whose assistance is
+    /// "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state_hash: Option<String>,
     /// How the simulator failed: in which step, at which body, and what came out; left out where it did not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulator_failure: Option<String>,
@@ -100,8 +103,13 @@ pub struct ResultReply {
 }
 
 impl ResultReply {
-    /// The result as a policy hears it at the end.
+    /// The result as a policy hears it at the end. Under "paper" it is told neither seed nor hash, by which it could find the episode among
+    /// those that it has played before.
     pub fn disclosed(mut self, disclosure: Disclosure) -> ResultReply {
+        match self.assistance {
+            Assistance::Paper => (self.seed, self.state_hash) = (None, None),
+            Assistance::Full => {}
+        }
         if !disclosure.tells(true) {
             self.phases.0.iter_mut().for_each(|(_, time_s)| *time_s = None);
         }

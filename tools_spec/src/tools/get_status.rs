@@ -30,8 +30,9 @@ impl Tool for GetStatus {
 pub struct StatusReply {
     /// The task's id.
     pub task: String,
-    /// The seed.
-    pub seed: u32,
+    /// The seed; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u32>,
     /// The rules in force.
     pub protocol: Protocol,
     /// Simulated seconds since the episode began.
@@ -53,6 +54,7 @@ pub struct StatusReply {
     pub phases: Vec<PhaseReached>,
     /// What is left of the episode.
     pub budget: Budget,
-    /// Hash of the whole physical state, 16 hexadecimal digits. Equal hashes mean equal states.
-    pub state_hash: String,
+    /// Hash of the whole physical state, 16 hexadecimal digits. Equal hashes mean equal states. Left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state_hash: Option<String>,
 }

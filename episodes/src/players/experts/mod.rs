@@ -86,13 +86,13 @@ fn has_what_it_needs(task: &Task) -> bool {
 
 /// The task as robots that tell each other nothing take it to be: what the seed has chosen is guessed.
 pub fn guessed(spec: &EpisodeSpec) -> &'static Task {
-    spec.task.under(spec.seed ^ GUESSES)
+    spec.task.under(spec.world_seed() ^ GUESSES)
 }
 
 impl Expert {
     /// The expert of an episode, who demonstrates as its spec says.
     pub fn for_episode(spec: &EpisodeSpec) -> Result<Expert, PlayerError> {
-        let variety = Variety::new(spec.variation.variety, spec.seed);
+        let variety = Variety::new(spec.variation.variety, spec.world_seed());
         Ok(Expert { variety, ..Expert::of(spec.task)? })
     }
 

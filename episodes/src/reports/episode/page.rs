@@ -51,7 +51,8 @@ pub struct EpisodePage<'a> {
 impl EpisodePage<'_> {
     /// The page.
     pub fn html(&self) -> String {
-        let title = format!("{}, seed {}", self.task.id, self.result.seed);
+        let seed = self.result.seed.map(|seed| format!(", seed {seed}")).unwrap_or_default();
+        let title = format!("{}{seed}", self.task.id);
         let body = format!(
             r#"<h1>{}</h1>
 <p class="soft">{instruction}</p>
@@ -227,7 +228,7 @@ impl EpisodePage<'_> {
     }
 
     fn recording(&self) -> String {
-        let hash = escape(&self.result.state_hash);
+        let hash = escape(self.result.state_hash.as_deref().unwrap_or_default());
         format!(
             r#"<p><code>episode.mcap</code> beside this page holds every control step. To watch it, open it as a local file in
 <a href="https://app.foxglove.dev">Foxglove</a> or any other reader of MCAP.</p>

@@ -122,6 +122,7 @@ fn recorded(path: &Path, policy: &str) -> Result<PlayedEpisode, String> {
         note: episode_note(&result, None),
         thought_s: calls.last().map_or(0.0, |call| call.thought.as_secs_f64()),
         keep_failed: false,
+        attempts: Vec::new(),
         result,
     })
 }

@@ -22,6 +22,8 @@ pub struct PolicyGroup<'a> {
     pub episodes: Vec<&'a FoundEpisode>,
     /// Those that do not, and that have not been played again.
     pub excluded: Vec<&'a PlayedEpisode>,
+    /// Those that do not, and that have been played again elsewhere.
+    pub superseded: Vec<&'a PlayedEpisode>,
 }
 
 /// How far its episodes got, and at what cost.
@@ -50,6 +52,8 @@ pub struct PolicyReport {
     pub reasons: Vec<FailureReason>,
     /// Episodes that say nothing of how far the policy gets.
     pub excluded: Vec<ExcludedEpisodes>,
+    /// Episodes that were played more than once, because earlier attempts did not count.
+    pub played_again: Vec<RepeatedEpisode>,
 }
 
 /// One task.
@@ -129,6 +133,17 @@ pub struct ExcludedEpisodes {
     pub seeds: Vec<u32>,
 }
 
+/// An episode that was played more than once.
+#[derive(Debug, Serialize)]
+pub struct RepeatedEpisode {
+    pub task: &'static str,
+    pub seed: u32,
+    /// Why each earlier attempt failed, the oldest first.
+    pub earlier: Vec<String>,
+    /// What came of the last one.
+    pub last: String,
+}
+
 /// Policies in the order in which they were found, with names that tell them apart.
 pub fn groups<'a>(episodes: impl Iterator<Item = &'a FoundEpisode>) -> Vec<PolicyGroup<'a>> {
     let mut groups: Vec<(Vec<String>, Vec<&FoundEpisode>)> = Vec::new();
@@ -165,7 +180,8 @@ impl<'a> PolicyGroup<'a> {
         let key = |played: &PlayedEpisode| (played.spec.task.id, played.spec.seed, played.start_phase());
         let again: BTreeSet<_> = episodes.iter().map(|one| key(&one.played)).collect();
         let excluded = excluded.into_iter().map(|one| &one.played);
-        PolicyGroup { name, excluded: excluded.filter(|one| !again.contains(&key(one))).collect(), episodes }
+        let (superseded, excluded) = excluded.partition(|one| again.contains(&key(one)));
+        PolicyGroup { name, excluded, superseded, episodes }
     }
 }
 
@@ -229,6 +245,7 @@ impl PolicyReport {
             shown: shown(&played),
             reasons: reasons(&played),
             excluded: excluded(&group.excluded),
+            played_again: played_again(group),
             tasks,
         }
     }
@@ -379,6 +396,37 @@ fn excluded(episodes: &[&PlayedEpisode]) -> Vec<ExcludedEpisodes> {
     }
     listed.sort_by_key(|entry| (tasks::ALL.iter().position(|task| task.id == entry.task), entry.what));
     listed
+}
+
+/// Whoever fails itself when it is about to lose, and wins another time, is seen here.
+fn played_again(group: &PolicyGroup) -> Vec<RepeatedEpisode> {
+    let counted = group.episodes.iter().map(|found| &found.played);
+    let repeated = counted.chain(group.excluded.iter().copied()).filter_map(|played| {
+        let key = |played: &PlayedEpisode| (played.spec.task.id, played.spec.seed, played.start_phase());
+        let elsewhere = group.superseded.iter().filter(|other| key(other) == key(played));
+        let noted = |note: &Option<String>| note.clone().unwrap_or_else(|| "it failed".into());
+        let earlier: Vec<String> = elsewhere
+            .flat_map(|other| other.attempts.iter().map(|attempt| &attempt.note).chain([&other.note]))
+            .chain(played.attempts.iter().map(|attempt| &attempt.note))
+            .map(noted)
+            .collect();
+        let last = match (played.succeeded(), played.result.ended) {
+            (true, _) => "success",
+            (false, EndReason::PolicyFailed) => Exclusion::PolicyFailed.name(),
+            (false, EndReason::SimulatorFailed) => Exclusion::SimulatorFailed.name(),
+            (
+                false,
+                EndReason::TaskComplete
+                | EndReason::StepBudgetExhausted
+                | EndReason::WallClockExhausted
+                | EndReason::Finished
+                | EndReason::Abandoned,
+            ) => "failure",
+        };
+        let (task, seed) = (played.spec.task.id, played.spec.seed);
+        (!earlier.is_empty()).then(|| RepeatedEpisode { task, seed, earlier, last: last.into() })
+    });
+    repeated.collect()
 }
 
 /// Number of the first phase that counts and was not reached.

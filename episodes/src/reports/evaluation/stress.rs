@@ -156,7 +156,7 @@ impl StressReport {
 }
 
 fn kind_of(played: &PlayedEpisode) -> Option<&'static str> {
-    played.spec.stress?.kind(played.spec.seed)
+    played.spec.stress?.kind(played.spec.world_seed())
 }
 
 fn rate<'a>(episodes: impl Iterator<Item = &'a PlayedEpisode>) -> Option<Rate> {

@@ -25,6 +25,7 @@ pub fn all(report: &EvaluationReport) -> Vec<Table> {
     tables.push(reasons(policies));
     tables.push(went_wrong(&report.failure_moments, policies));
     tables.push(excluded(policies));
+    tables.push(played_again(policies));
     tables.extend(report.comparisons.iter().map(comparison));
     tables.push(published(&report.published));
     tables.push(published_together(report));
@@ -322,7 +323,7 @@ fn excluded(policies: &[PolicyReport]) -> Table {
     let mut table = Table::new(
         "Not counted",
         "Episodes in which the policy itself failed (its program or its server crashed or was gone), or the simulator. They are in \
-         no rate, and `evaluate` plays them again.",
+         no rate, and `evaluate` plays them again, those of the policy as often as `--retries` has it.",
         &["Policy", "Task", "What", "Why", "Episodes", "Seeds"],
         4,
     );
@@ -336,6 +337,29 @@ fn excluded(policies: &[PolicyReport]) -> Table {
                 entry.why.clone(),
                 seeds.len().to_string(),
                 seeds.join(", "),
+            ]);
+        }
+    }
+    table
+}
+
+fn played_again(policies: &[PolicyReport]) -> Table {
+    let mut table = Table::new(
+        "Played again",
+        "Episodes of which earlier attempts did not count. A policy that fails itself where it is about to lose, and wins another time, is \
+         found here.",
+        &["Policy", "Task", "Seed", "Earlier attempts", "Why they failed", "The last one"],
+        6,
+    );
+    for policy in policies {
+        for again in &policy.played_again {
+            table.rows.push(vec![
+                policy.name.clone(),
+                again.task.into(),
+                again.seed.to_string(),
+                again.earlier.len().to_string(),
+                again.earlier.join("; "),
+                again.last.clone(),
             ]);
         }
     }

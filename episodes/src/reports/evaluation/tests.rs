@@ -21,7 +21,7 @@ pub fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Pl
         build: "0.1.0+test".into(),
         result: ResultReply {
             task: task.id.into(),
-            seed,
+            seed: Some(seed),
             protocol: Protocol::Benchmark,
             phases: PhaseTimes(times.collect()),
             ended,
@@ -31,7 +31,7 @@ pub fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Pl
             thinking_s: 0.0,
             falls: u32::from(phases == 0),
             realtime_factor: 3.5,
-            state_hash: format!("{seed:016x}"),
+            state_hash: Some(format!("{seed:016x}")),
             simulator_failure: None,
             assistance: Assistance::Paper,
             extra_information: vec![],
@@ -43,6 +43,7 @@ pub fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Pl
         thought_s: f64::from(seed),
         note: None,
         keep_failed: false,
+        attempts: Vec::new(),
     }
 }
 
@@ -287,6 +288,30 @@ fn reports_quote_what_they_are_told() {
     let json: serde_json::Value =
         serde_json::from_str(&report.write(ReportFormat::Json, &ReportPictures::default()).unwrap()).unwrap();
     assert_eq!(json["policies"][0]["tasks"][0]["phases"][1]["cumulative"]["successes"], 6);
+}
+
+/// Who crashes when it is about to lose, and wins the next time, leaves a trace.
+#[test]
+fn an_episode_that_was_played_again_is_listed() {
+    let handover = tasks::find("handover").unwrap();
+    let failed = |seed: u32, why: &str| {
+        let mut played = played("one", handover, seed, 1);
+        (played.result.ended, played.note) = (EndReason::PolicyFailed, Some(why.into()));
+        played
+    };
+    let mut episodes = nine_six_three("one");
+    // One was played again in another folder, one in the same, and one as often as was asked for.
+    episodes[0].attempts = failed(0, "no plan").into_attempts();
+    episodes.push(failed(3, "crash"));
+    let attempts = failed(21, "no plan").into_attempts();
+    episodes.push(PlayedEpisode { keep_failed: true, attempts, ..failed(21, "crash") });
+    let report = EvaluationReport::of(&found(episodes));
+    let again = report.policies[0].played_again.iter();
+    let again: Vec<_> = again.map(|again| (again.seed, again.earlier.join(", "), &*again.last)).collect();
+    let expected = [(0, "no plan", "success"), (3, "crash", "failure"), (21, "no plan", "policy failed")];
+    assert_eq!(again, expected.map(|(seed, earlier, last)| (seed, earlier.to_owned(), last)));
+    let text = report.write(ReportFormat::Markdown, &ReportPictures::default()).unwrap();
+    assert!(text.contains("Played again"), "{text}");
 }
 
 #[test]

@@ -4,7 +4,7 @@ mod carry;
 mod walk_to;
 
 use tandem_tools_spec::{
-    ActCall, BaseState, Call, CommandReply, Expectation, HandReport, HandState, PlanCall, PlanReply,
+    ActCall, BaseState, CommandReply, Expectation, Formats, HandReport, HandState, PlanCall, PlanReply,
     PlanStep, RobotReport, SendPlan, SpecError, StopReason, Tool as _, ToolCall, ToolReply,
 };
 
@@ -29,13 +29,14 @@ impl Session {
     /// Carries out a plan, or refuses all of it.
     pub(super) fn plan(&mut self, caller: CallerRecord, plan: &PlanCall) -> Result<PlanReply, EpisodeError> {
         let call = ToolCall::Plan(plan.clone());
-        let allowed = call.validate().map_err(EpisodeError::from).and_then(|()| self.check_told(&call));
-        let checked = allowed.and_then(|()| self.expect_underway()).and_then(|()| match plan {
+        let called = Called::from(call.clone());
+        let allowed = self.allow(&called).and_then(|_| self.expect_underway());
+        let checked = allowed.and_then(|()| match plan {
             PlanCall::SendPlan(plan) => self.check_commands(plan),
             PlanCall::WalkTo(walk) => self.check_destinations(walk),
         });
         if let Err(refusal) = checked {
-            self.refuse(caller, &Called::One(Call::from(call)), &refusal);
+            self.refuse(caller, &called, &refusal);
             return Err(refusal);
         }
         self.count_request();
@@ -115,8 +116,8 @@ impl Session {
         call: ActCall,
         progress: &'a mut PlanProgress,
     ) -> Result<Result<&'a CommandReply, String>, EpisodeError> {
-        let made = self.make(caller, &Called::One(Call::from(ToolCall::Act(call))));
-        let reply = match made {
+        let made = self.make(caller, &Called::from(ToolCall::Act(call)));
+        let reply = match made.and_then(|answer| answer.reply(&Formats::default())) {
             Ok(ToolReply::Act(reply)) => reply,
             Ok(other) => return Ok(Err(format!("{other:?} is no reply to a command"))),
             Err(error) if progress.last.is_none() => return Err(error),

@@ -16,6 +16,7 @@ use tandem_tools_spec::{
 use super::Session;
 use super::answer::Answer;
 use crate::EpisodeError;
+use crate::commands::{Allowed, Called};
 use crate::observation::TeamObservation;
 
 /// How many replies showed what the benchmark's own policies are not shown.
@@ -68,7 +69,7 @@ impl ShownInformation {
     }
 
     /// As [`ShownInformation::count_answer`], of an observation.
-    pub fn count_seen(&mut self, seen: &TeamObservation, formats: &Formats) {
+    fn count_seen(&mut self, seen: &TeamObservation, formats: &Formats) {
         for robot in &seen.robots {
             self.count_state(&robot.state);
             if formats.depth.is_some() {
@@ -124,7 +125,7 @@ impl Answer {
     }
 
     /// Takes out what a policy of this assistance is not told.
-    pub fn withhold(&mut self, assistance: Assistance) {
+    fn withhold(&mut self, assistance: Assistance) {
         match (assistance, self) {
             (Assistance::Full, _) => {}
             (Assistance::Paper, Answer::Observation(seen)) => withhold_seen(seen),
@@ -138,18 +139,6 @@ impl Answer {
                 ToolReply::Look(LookReply::QueryDepth(_)) | ToolReply::Manage(_) | ToolReply::Talk(_) => {}
             },
         }
-    }
-}
-
-impl TeamObservation {
-    /// The observation as a policy of this assistance is told it.
-    pub fn told(&self, assistance: Assistance) -> TeamObservation {
-        let mut told = self.clone();
-        match assistance {
-            Assistance::Paper => withhold_seen(&mut told),
-            Assistance::Full => {}
-        }
-        told
     }
 }
 
@@ -235,6 +224,11 @@ fn withhold_hand(hand: &mut HandReport) {
 }
 
 impl Session {
+    /// Checks that no caller's call shows what the episode withholds.
+    pub(super) fn allow<'a>(&self, called: &'a Called) -> Result<Allowed<'a>, EpisodeError> {
+        called.allowed(|tool| self.check_told(tool))
+    }
+
     /// Refuses a call that would show what the policy is not told.
     pub(super) fn check_told(&self, call: &ToolCall) -> Result<(), EpisodeError> {
         let refused = |reason: &str| {

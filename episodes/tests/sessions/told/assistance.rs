@@ -41,13 +41,12 @@ const PAPER: &[(&str, &str)] = &[
     ),
     (
         "get_status",
-        "task seed protocol time_s env_steps ended assistance phases budget.steps_left budget.wall_clock_left_s \
-         budget.steps_per_command state_hash",
+        "task protocol time_s env_steps ended assistance phases budget.steps_left budget.wall_clock_left_s \
+         budget.steps_per_command",
     ),
     (
         "finish",
-        "task seed protocol assistance phases.p1 phases.p2 phases.p3 ended env_steps tool_calls requests thinking_s falls realtime_factor \
-         state_hash",
+        "task protocol assistance phases.p1 phases.p2 phases.p3 ended env_steps tool_calls requests thinking_s falls realtime_factor",
     ),
 ];
 
@@ -78,11 +77,11 @@ const FULL: &[(&str, &str)] = &[
         "states.joint_velocities_rad_s.* states.joint_torques_n_m.* states.gravity_in_pelvis \
          states.pelvis_in_start.position_m states.pelvis_in_start.quaternion_wxyz states.fallen",
     ),
-    ("get_status", "fallen.robot fallen.fallen phases.id phases.number phases.time_s"),
+    ("get_status", "seed state_hash fallen.robot fallen.fallen phases.id phases.number phases.time_s"),
     // That more was told is said, too.
     (
         "finish",
-        "departures extra_information extra_information_replies.joint_velocities.* \
+        "seed state_hash departures extra_information extra_information_replies.joint_velocities.* \
          extra_information_replies.joint_torques.* extra_information_replies.hand_forces.* \
          extra_information_replies.odometry.* extra_information_replies.gravity.*",
     ),

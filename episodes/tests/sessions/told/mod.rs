@@ -2,3 +2,4 @@
 
 mod assistance;
 mod endings;
+mod requests;

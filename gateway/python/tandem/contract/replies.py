@@ -188,8 +188,8 @@ class ResultReply:
     task: str
     """The task's id."""
 
-    seed: int
-    """The seed."""
+    seed: int | None
+    """The seed; left out where it is told to a policy whose assistance is "paper"."""
 
     protocol: Protocol
     """The rules that were in force."""
@@ -220,8 +220,10 @@ class ResultReply:
     realtime_factor: float
     """Simulated seconds per second that the physics took."""
 
-    state_hash: str
-    """Hash of the whole physical state at the end, 16 hexadecimal digits."""
+    state_hash: str | None
+    """Hash of the whole physical state at the end, 16 hexadecimal digits; left out where it is told to a policy
+    whose assistance is "paper".
+    """
 
     simulator_failure: str | None
     """How the simulator failed: in which step, at which body, and what came out; left out where it did not."""
@@ -251,7 +253,7 @@ class ResultReply:
         """Reads what JSON has."""
         return ResultReply(
             task=value["task"],
-            seed=value["seed"],
+            seed=value.get("seed"),
             protocol=value["protocol"],
             phases=value["phases"],
             ended=value["ended"],
@@ -261,7 +263,7 @@ class ResultReply:
             thinking_s=value.get("thinking_s"),
             falls=value["falls"],
             realtime_factor=value["realtime_factor"],
-            state_hash=value["state_hash"],
+            state_hash=value.get("state_hash"),
             simulator_failure=value.get("simulator_failure"),
             assistance=value.get("assistance"),
             extra_information=tuple(value.get("extra_information", ())),
@@ -347,8 +349,8 @@ class StatusReply:
     task: str
     """The task's id."""
 
-    seed: int
-    """The seed."""
+    seed: int | None
+    """The seed; left out where the assistance is "paper"."""
 
     protocol: Protocol
     """The rules in force."""
@@ -379,15 +381,17 @@ class StatusReply:
     budget: Budget
     """What is left of the episode."""
 
-    state_hash: str
-    """Hash of the whole physical state, 16 hexadecimal digits. Equal hashes mean equal states."""
+    state_hash: str | None
+    """Hash of the whole physical state, 16 hexadecimal digits. Equal hashes mean equal states. Left out where the
+    assistance is "paper".
+    """
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> StatusReply:
         """Reads what JSON has."""
         return StatusReply(
             task=value["task"],
-            seed=value["seed"],
+            seed=value.get("seed"),
             protocol=value["protocol"],
             time_s=value["time_s"],
             env_steps=value["env_steps"],
@@ -397,7 +401,7 @@ class StatusReply:
             disclosure=value.get("disclosure"),
             phases=tuple(PhaseReached.of(item) for item in value["phases"]),
             budget=Budget.of(value["budget"]),
-            state_hash=value["state_hash"],
+            state_hash=value.get("state_hash"),
         )
 
 

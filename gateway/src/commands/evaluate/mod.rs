@@ -55,9 +55,12 @@ pub struct EvaluateArgs {
     /// Record every episode in a folder of its own, for `replay` and for the pictures of a report.
     #[arg(long)]
     record: bool,
-    /// Count episodes in which the policy itself failed (its program or its server crashed or was gone) as failures, and keep them;
-    /// without it they are listed apart, and the next run plays them again.
-    #[arg(long)]
+    /// How often an episode in which the policy itself failed (its program or its server crashed or was gone) is played again, by one run
+    /// after another, before it counts as a failure. Until then it is listed apart. Results keep every attempt.
+    #[arg(long, value_name = "N", default_value_t = EvaluationPlan::DEFAULT_RETRIES)]
+    retries: u32,
+    /// The same as --retries 0.
+    #[arg(long, conflicts_with = "retries")]
     keep_failed: bool,
     /// Folder for `results.json` and one file per episode.
     #[arg(long, value_name = "DIR", default_value = "runs/evaluation")]
@@ -119,7 +122,7 @@ pub fn run(args: EvaluateArgs) -> CommandResult {
     let plan = EvaluationPlan {
         starts,
         shard,
-        keep_failed: args.keep_failed,
+        retries: if args.keep_failed { 0 } else { args.retries },
         ..args.episodes.plan(&*policy, args.record, Assistance::Paper)?
     };
     let mut counted = play_and_print(&plan, &args.out)?;

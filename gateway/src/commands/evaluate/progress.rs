@@ -105,7 +105,7 @@ impl Tally {
     fn count_outcome(&mut self, episode: &PlayedEpisode) {
         self.excluded += usize::from(!episode.counts());
         self.failed += usize::from(episode.counts() && !episode.succeeded());
-        self.last = format!("{} seed {}", episode.result.task, episode.result.seed);
+        self.last = format!("{} seed {}", episode.result.task, episode.spec.seed);
     }
 
     fn done(&self) -> usize {

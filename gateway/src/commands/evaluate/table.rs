@@ -19,10 +19,13 @@ pub fn print(evaluation: &Evaluation) {
     print_notes(counted.into_iter().filter_map(|episode| Some((episode, episode.note.clone()?))));
     if !excluded.is_empty() {
         println!(
-            "not counted, because the policy itself or the simulator failed; the next run plays them again:"
+            "not counted, because the policy itself or the simulator failed; the next run plays them again, those of the policy as often as \
+             --retries has it:"
         );
         print_notes(excluded.into_iter().map(|episode| (episode, exclusion_note(episode))));
     }
+    let again = evaluation.episodes.iter().filter(|episode| !episode.attempts.is_empty());
+    print_notes(again.map(|episode| (episode, attempts_note(episode))));
     evaluation.left_out.iter().for_each(|left_out| println!("  left out: {left_out}"));
 }
 
@@ -36,9 +39,16 @@ fn exclusion_note(episode: &PlayedEpisode) -> String {
     }
 }
 
+/// How often an episode was played before, and what came of it.
+fn attempts_note(episode: &PlayedEpisode) -> String {
+    let earlier = episode.attempts.iter().map(|attempt| attempt.note.as_deref().unwrap_or("it failed"));
+    let earlier: Vec<&str> = earlier.collect();
+    format!("attempt {}; before it: {}", episode.attempts.len() + 1, earlier.join("; "))
+}
+
 fn print_notes<'a>(notes: impl Iterator<Item = (&'a PlayedEpisode, String)>) {
     let lines: Vec<String> = notes
-        .map(|(episode, note)| format!("  {} seed {}: {note}", episode.result.task, episode.result.seed))
+        .map(|(episode, note)| format!("  {} seed {}: {note}", episode.result.task, episode.spec.seed))
         .collect();
     lines.iter().take(NOTES_SHOWN).for_each(|line| println!("{line}"));
     if lines.len() > NOTES_SHOWN {

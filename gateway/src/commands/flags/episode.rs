@@ -1,6 +1,6 @@
 //! The flags that say which episodes to play, and by robots of which kind.
 
-use std::{error::Error, ops::RangeInclusive, str::FromStr};
+use std::{error::Error, ops::RangeInclusive, path::PathBuf, str::FromStr};
 
 use clap::Args;
 use tandem_episodes::{
@@ -12,7 +12,7 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 
-use super::WorldFlags;
+use super::{WorldFlags, seed_key::read_seed_key};
 use crate::settings::one_of;
 
 /// Which episodes to play.
@@ -25,6 +25,10 @@ pub struct EpisodeFlags {
     /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
     #[arg(long, default_value = "0-9", value_name = "SEEDS")]
     seeds: Seeds,
+    /// A file with a key of yours, by which what the seeds mean is drawn: nobody without it can simulate an episode in advance. Results name
+    /// the key by its fingerprint. Without it, a seed means the same everywhere.
+    #[arg(long, value_name = "FILE")]
+    seed_key: Option<PathBuf>,
     /// The rules.
     #[arg(long, value_parser = one_of(Protocol::ALL, Protocol::name), default_value = Protocol::Agentic.name())]
     protocol: Protocol,
@@ -98,6 +102,8 @@ impl EpisodeFlags {
         let hints = self.hints.unwrap_or(assistance.hints());
         tracing::info!("{}", assistance.about(disclosure, hints));
         tracing::info!("{}", self.world.renderer().describe()?);
+        let seeds: Vec<u32> = self.seeds.0.collect();
+        let seed_key = self.seed_key.map(|file| read_seed_key(&file, &seeds)).transpose()?;
         Ok(EvaluationPlan {
             player,
             protocol: self.protocol,
@@ -113,13 +119,14 @@ impl EpisodeFlags {
             thinking_limit_s: self.thinking_limit,
             renderer: self.world.renderer(),
             tasks,
-            seeds: self.seeds.0.collect(),
+            seeds,
             starts: Starts::Task,
             shard: Shard::WHOLE,
             jobs: self.jobs,
             record,
             files: KeptFiles::default(),
-            keep_failed: false,
+            retries: EvaluationPlan::DEFAULT_RETRIES,
+            seed_key,
         })
     }
 }

@@ -3,6 +3,7 @@
 mod agent;
 mod episode;
 mod policy;
+mod seed_key;
 mod stress;
 mod world;
 

@@ -5,7 +5,7 @@ mod participant;
 mod process;
 
 use std::{
-    fs::File,
+    fs::{self, File},
     io::{self, Read, Seek, SeekFrom},
     path::Path,
     sync::Arc,
@@ -17,14 +17,14 @@ use serde_json::{Value, json};
 use tandem_episodes::{
     EpisodeError, EpisodeSpec, RunFolder, Visibility, create_private_folder,
     players::{EpisodeOutput, PlayError, PlayOutcome, Policy},
-    results::PolicyCard,
+    results::{PolicyCard, write_result},
 };
 use tandem_tools_spec::{Driving, EndReason, ResultReply, StartReply};
 
-use super::{lost, python::PythonModule, read_result, remove_old_result};
+use super::{lost, own_result, python::PythonModule, remove_old_result};
 use crate::{
-    hosting::{EpisodeThread, HostingError},
-    http::Server,
+    hosting::{EpisodeThread, HostingError, Purpose, episode_name},
+    http::{Guests, Server},
     settings::{Layer, Record, Settings, SettingsError},
     token::Token,
 };
@@ -88,15 +88,9 @@ impl Program {
     }
 
     /// The settings of a server for this episode alone.
-    fn settings_for(
-        &self,
-        spec: &EpisodeSpec,
-        token: Token,
-        folder: &Path,
-    ) -> Result<Arc<Settings>, PlayError> {
+    fn settings_for(&self, spec: &EpisodeSpec, token: Token) -> Result<Arc<Settings>, PlayError> {
         Ok(Arc::new(Settings {
             token: Some(token),
-            runs: folder.join("others"),
             assistance: spec.assistance,
             disclosure: spec.disclosure,
             hints: spec.hints,
@@ -126,7 +120,7 @@ impl Program {
         for participant in participants {
             let environment = participant.environment(start, &url);
             let group =
-                ProcessGroup::start(&self.processes, &self.command, &environment, &participant.folder);
+                ProcessGroup::start(&self.processes, &self.command, &environment, participant.folder.path());
             groups.push(group.map_err(|error| lost("the program cannot be started", error))?);
         }
         let exits = self.watch(&mut groups, episode).map_err(|error| lost("the program is lost", error))?;
@@ -217,7 +211,7 @@ impl Program {
                 (calls, [_]) => format!("after {calls} calls"),
                 (_, _) => format!("at control step {}", found.env_steps),
             };
-            let words = self.last_words(found, &so_far, &participant.folder)?;
+            let words = self.last_words(found, &so_far, participant.folder.path())?;
             Some(participant.robot.map_or(words.clone(), |robot| format!("{robot}: {words}")))
         });
         let mut reasons: Vec<String> = told.collect();
@@ -257,28 +251,44 @@ impl Policy for Program {
 
     fn play_episode(&self, spec: &EpisodeSpec, place: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
         let folder = place.folder;
-        create_private_folder(folder).map_err(|error| lost("no folder for the episode", error))?;
+        create_own_folder(folder).map_err(|error| lost("no folder for the episode", error))?;
         let absolute = folder.canonicalize().map_err(|error| lost("no folder for the episode", error))?;
         remove_old_result(&absolute.join(tandem_episodes::RESULT_FILE))?;
         let (token, text) = Token::random().map_err(HostingError::from)?;
-        let server = Server::start(self.settings_for(spec, token, &absolute)?);
+        let guests = Guests { purpose: Purpose::Evaluation, ..Guests::default() };
+        let server = Server::start_for(self.settings_for(spec, token)?, guests);
         let server = server.map_err(|error| lost("no server", error))?;
-        let id = format!("{}-seed{}", spec.task.id, spec.seed);
+        let id = episode_name(spec).map_err(HostingError::from)?;
         let files = RunFolder { path: absolute.clone(), visibility: Visibility::After, pages: true };
         let (episode, start) = server.host(&id, spec.clone(), &self.driving, files)?;
         if let Some(reason) = start.briefing.recording_failed {
             return Err(PlayError::Lost(reason));
         }
-        let participants = Participant::all(&start, &text, &absolute);
+        let participants = Participant::all(&start, &text)?;
         let ran = self.run(&server, &episode, &start, &participants);
         if ran.as_ref().is_ok_and(|ran| ran.iter().any(|found| found.exit.is_failure())) {
             episode.end_blocking(EndReason::PolicyFailed);
         }
         let thought = episode.thought();
-        drop(episode);
         server.stop();
-        self.outcome(read_result(&absolute)?, thought, &ran?, &participants)
+        for participant in &participants {
+            participant.keep_files(&absolute).map_err(|error| lost("a program's files are lost", error))?;
+        }
+        let result = own_result(&episode)?;
+        // A program that has found the folder may have written there.
+        write_result(&result, &absolute).map_err(EpisodeError::from)?;
+        self.outcome(result, thought, &ran?, &participants)
     }
+}
+
+/// Makes the folder of an episode. A link is refused: who has put it there would choose which files are written.
+fn create_own_folder(folder: &Path) -> io::Result<()> {
+    let is_link = fs::symlink_metadata(folder).is_ok_and(|found| found.is_symlink());
+    if is_link {
+        let why = format!("{} is a link; remove it, or give another --out", folder.display());
+        return Err(io::Error::new(io::ErrorKind::AlreadyExists, why));
+    }
+    create_private_folder(folder)
 }
 
 /// What was found of a program when the wait for it was over.
@@ -318,7 +328,10 @@ impl ProgramExit {
 /// room for.
 fn last_lines(folder: &Path) -> Option<String> {
     [STDERR_FILE, STDOUT_FILE].into_iter().find_map(|name| {
-        let mut file = File::open(folder.join(name)).ok()?;
+        let path = folder.join(name);
+        // A program may have put a link in its place.
+        fs::symlink_metadata(&path).ok().filter(|found| found.is_file())?;
+        let mut file = File::open(path).ok()?;
         let read_from = file.metadata().ok()?.len().saturating_sub(LAST_WORDS_BYTES);
         file.seek(SeekFrom::Start(read_from)).ok()?;
         let mut bytes = Vec::new();
@@ -342,8 +355,6 @@ fn last_lines(folder: &Path) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-
     use super::*;
 
     #[test]

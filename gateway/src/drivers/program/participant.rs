@@ -1,13 +1,14 @@
 //! What one of the programs of an episode is given: its folder, its environment, and its brief, which says the task and how to act
 //! in words that a language model can be given as they are.
 
-use std::path::{Path, PathBuf};
+use std::{fs, io, path::Path};
 
-use tandem_episodes::{EpisodeError, OutputError, create_private_folder, write_whole};
+use tandem_episodes::{EpisodeError, OutputError, create_private_folder, players::PlayError, write_whole};
 use tandem_tools_spec::{Driving, StartReply};
+use tempfile::TempDir;
 
-/// The file with the brief, which the program reads on its standard input, too.
-pub const BRIEF_FILE: &str = "brief.txt";
+use super::process::{BRIEF_FILE, STDERR_FILE, STDOUT_FILE};
+use crate::drivers::lost;
 
 /// The file with the server's reply to the start, for programs that read JSON.
 const START_FILE: &str = "start.json";
@@ -18,38 +19,51 @@ pub struct Participant<'a> {
     /// The robot that it directs, where it directs one alone.
     pub robot: Option<&'a str>,
     token: &'a str,
-    /// Where its brief and its output are kept.
-    pub folder: PathBuf,
+    /// The folder of its brief and its output while it runs. Its name says nothing, and no folder of another program or episode is beside it.
+    pub folder: TempDir,
 }
 
 impl<'a> Participant<'a> {
-    /// The programs of the episode `start`, whose files are in `folder`: one with the server's own `token`, or one for each operator.
-    pub fn all(start: &'a StartReply, token: &'a str, folder: &Path) -> Vec<Participant<'a>> {
-        if start.operators.is_empty() {
-            return vec![Participant { robot: None, token, folder: folder.into() }];
-        }
-        let participant = |robot: &'a str, token: &'a str| Participant {
-            robot: Some(robot),
-            token,
-            folder: folder.join(robot),
+    /// The programs of the episode `start`: one with the server's own `token`, or one for each operator.
+    pub fn all(start: &'a StartReply, token: &'a str) -> Result<Vec<Participant<'a>>, PlayError> {
+        let participant = |robot: Option<&'a str>, token: &'a str| {
+            let folder = private_folder().map_err(|error| lost("no folder for a program", error))?;
+            Ok(Participant { robot, token, folder })
         };
-        start.operators.iter().map(|operator| participant(&operator.robot, &operator.token)).collect()
+        if start.operators.is_empty() {
+            return Ok(vec![participant(None, token)?]);
+        }
+        start.operators.iter().map(|own| participant(Some(&own.robot), &own.token)).collect()
     }
 
     /// Writes what the program reads.
     pub fn write(&self, start: &StartReply, url: &str, driving: &Driving) -> Result<(), EpisodeError> {
-        if self.robot.is_some() {
-            create_private_folder(&self.folder)
-                .map_err(|source| OutputError::Io { path: self.folder.clone(), source })?;
-        }
         // A token is given to whom it belongs and is written to no file.
         let own = |robot: &str| start.briefing.clone().for_robot(robot);
         let briefing = self.robot.map_or_else(|| start.briefing.clone(), own);
         let shown = StartReply { operators: Vec::new(), briefing, ..start.clone() };
         let text = brief(&shown, url, self.robot, driving);
-        write_whole(&self.folder.join(BRIEF_FILE), text.as_bytes())?;
+        write_whole(&self.folder.path().join(BRIEF_FILE), text.as_bytes())?;
         let text = serde_json::to_string_pretty(&shown).map_err(OutputError::from)?;
-        Ok(write_whole(&self.folder.join(START_FILE), text.as_bytes())?)
+        Ok(write_whole(&self.folder.path().join(START_FILE), text.as_bytes())?)
+    }
+
+    /// Keeps in the folder of its episode what the program was given and what it has said, once it is gone. What it has put in the place of
+    /// one of these files, such as a link, is not followed.
+    pub fn keep_files(&self, episode: &Path) -> io::Result<()> {
+        let kept = self.robot.map_or_else(|| episode.to_owned(), |robot| episode.join(robot));
+        create_private_folder(&kept)?;
+        for name in [BRIEF_FILE, START_FILE, STDOUT_FILE, STDERR_FILE] {
+            let (from, to) = (self.folder.path().join(name), kept.join(name));
+            if !fs::symlink_metadata(&from).is_ok_and(|found| found.is_file()) {
+                continue;
+            }
+            match fs::remove_file(&to) {
+                Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+                _ => drop(fs::copy(&from, &to)?),
+            }
+        }
+        Ok(())
     }
 
     /// Variables that the program's environment has beside those of this process.
@@ -58,10 +72,19 @@ impl<'a> Participant<'a> {
             ("TANDEM_URL", url.into()),
             ("TANDEM_EPISODE", start.episode_id.clone()),
             ("TANDEM_TOKEN", self.token.into()),
-            ("TANDEM_START", self.folder.join(START_FILE).display().to_string()),
+            ("TANDEM_START", self.folder.path().join(START_FILE).display().to_string()),
         ];
         common.into_iter().chain(self.robot.map(|robot| ("TANDEM_ROBOT", robot.into()))).collect()
     }
+}
+
+/// A folder that no other user may enter, which goes when it is dropped.
+fn private_folder() -> io::Result<TempDir> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix("tandem-");
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700));
+    builder.tempdir()
 }
 
 /// The brief for the episode `start` on the server at `url`, whose reader directs all robots, or `robot` alone.

@@ -10,9 +10,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::participant::BRIEF_FILE;
+/// The file in a program's folder with the brief, which it reads on its standard input.
+pub const BRIEF_FILE: &str = "brief.txt";
 
-/// The files in a program's folder that its output is written to.
+/// The files there that its output is written to.
 pub const STDOUT_FILE: &str = "stdout.txt";
 pub const STDERR_FILE: &str = "stderr.txt";
 

@@ -14,7 +14,10 @@ mod trial;
 mod values;
 
 use std::{
-    sync::{Mutex, MutexGuard},
+    sync::{
+        Mutex, MutexGuard,
+        atomic::{AtomicU32, Ordering},
+    },
     time::Instant,
 };
 
@@ -48,12 +51,20 @@ pub struct RemotePolicy {
     map: PolicyMap,
     /// Since when each of the episodes that cannot begin yet has waited for the servers.
     waits: Mutex<Vec<Instant>>,
+    /// How many episodes it has played whose seeds it is not told.
+    untold: AtomicU32,
 }
 
 impl RemotePolicy {
     /// The policy at `urls`, asked as `map` says.
     pub fn new(protocol: PolicyProtocol, urls: Vec<String>, map: PolicyMap) -> RemotePolicy {
-        RemotePolicy { protocol, urls, map, waits: Mutex::default() }
+        RemotePolicy { protocol, urls, map, waits: Mutex::default(), untold: AtomicU32::default() }
+    }
+
+    /// The number by which the policy tells an episode from others: of its seed, or where it is told none, of how many it has played.
+    fn number_of(&self, spec: &EpisodeSpec) -> u32 {
+        let number = spec.told_seed().unwrap_or_else(|| self.untold.fetch_add(1, Ordering::Relaxed));
+        EpisodeMoment::number_of(spec.task, number)
     }
 
     fn waits(&self) -> MutexGuard<'_, Vec<Instant>> {
@@ -115,9 +126,7 @@ impl Policy for RemotePolicy {
     fn play_episode(&self, spec: &EpisodeSpec, place: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
         self.check(spec.task).map_err(PlayError::NotReady)?;
         let mut session = self.open(spec)?;
-        Ok(play_in_process(spec, place, |episode| {
-            session.play(episode, EpisodeMoment::number_of(spec.task, spec.seed))
-        })?)
+        Ok(play_in_process(spec, place, |episode| session.play(episode, self.number_of(spec)))?)
     }
 
     fn waiting(&self) -> Option<PolicyWait> {
@@ -140,7 +149,7 @@ impl PartnerPolicy for RemotePolicy {
         self.check(spec.task).map_err(PlayError::NotReady)?;
         let mut session = self.open(spec)?;
         connected();
-        Ok(session.play(episode, EpisodeMoment::number_of(spec.task, spec.seed)))
+        Ok(session.play(episode, self.number_of(spec)))
     }
 }
 

@@ -75,7 +75,7 @@ impl Target {
     }
 
     /// State hash and control steps of the episode, and whether it has ended.
-    fn state(&self) -> (String, u32, bool) {
+    fn state(&self) -> (Option<String>, u32, bool) {
         let episode = self.table.get(&self.id).unwrap();
         match self.runtime.block_on(episode.status()).unwrap().reply {
             ToolReply::Manage(ManageReply::GetStatus(status)) => {

@@ -22,7 +22,6 @@ use serde::Deserialize;
 use serde_json::json;
 
 use super::{app::AppState, problem::ApiError, watching::Watcher};
-use crate::hosting::Caller;
 
 const SHELL: &str = include_str!("../../../web/page.html");
 const STYLE: &str = include_str!("../../../web/style.css");
@@ -61,7 +60,7 @@ pub fn router() -> Router<AppState> {
         .route("/watch/file", get(finished::file))
         .route("/watch/take_over", post(taking_over::take_over))
         .layer(middleware::from_fn(only_watchers));
-    inside.route(WATCH, get(page).merge(post(enter))).merge(operate::router())
+    inside.route(WATCH, get(page).merge(post(enter)))
 }
 
 /// Lets nobody in who has not come by the link.
@@ -123,7 +122,7 @@ fn asset(kind: &'static str, text: &'static str) -> Response {
 
 /// Running and finished episodes, and evaluations.
 async fn episodes(State(app): State<AppState>) -> Result<Response, ApiError> {
-    let held = app.table.list(&Caller::Host);
+    let held = app.table.watched();
     let runs = app.settings.runs.clone();
     let go_on = held.episodes.iter().filter(|entry| entry.ended.is_none());
     let running: Vec<String> = go_on.map(|entry| entry.episode_id.clone()).collect();

@@ -57,7 +57,7 @@ async fn expert(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
 ) -> Result<StatusCode, ApiError> {
-    let (hosted, team, robot) = app.table.own_robot(&caller)?;
+    let (hosted, team, robot) = app.table.stand_in(&caller)?;
     team.take_expert(&hosted.thread, robot).await?;
     Ok(StatusCode::NO_CONTENT)
 }
@@ -78,7 +78,7 @@ async fn policy(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
 ) -> Result<StatusCode, ApiError> {
-    let (hosted, team, robot) = app.table.own_robot(&caller)?;
+    let (hosted, team, robot) = app.table.stand_in(&caller)?;
     let reason =
         "no policy may drive here; start the server with --partner, as act:http://127.0.0.1:8500/act";
     let policy = app.partner.ok_or_else(|| HostingError::NoPolicy { reason: reason.into() })?;

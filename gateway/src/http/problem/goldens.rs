@@ -80,6 +80,8 @@ fn hosting_refusals() -> Vec<HostingError> {
         HostingError::OperatorFinished { robot: robot() },
         HostingError::NeedsOperator,
         HostingError::HostsBusiness,
+        HostingError::OneEpisode,
+        HostingError::PeopleDrive,
         HostingError::NoExpert(PlayerError::NoExpert { task: "x".into(), have: vec!["handover"] }),
         HostingError::NoPolicy { reason: "nobody listens at http://127.0.0.1:1/act".into() },
         HostingError::NoTalk,

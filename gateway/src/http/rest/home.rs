@@ -63,9 +63,14 @@ fn row(entry: &EpisodeEntry) -> String {
     // First, where a telephone shows it. Who has not come by the link is asked for it there. Writing to a text cannot fail.
     let _ = write!(row, "<td><a href=\"/watch?episode={id}\">watch</a></td>");
     let _ = write!(row, "<td><a href=\"/v1/episodes/{id}\">{id}</a></td>");
-    for cell in
-        [task.clone(), seed.to_string(), protocol.to_string(), driven.into(), step.to_string(), stands]
-    {
+    for cell in [
+        task.clone(),
+        seed.map_or_else(|| "-".into(), |seed| seed.to_string()),
+        protocol.to_string(),
+        driven.into(),
+        step.to_string(),
+        stands,
+    ] {
         let _ = write!(row, "<td>{}</td>", escape(&cell));
     }
     row + "</tr>\n"
@@ -82,7 +87,7 @@ mod tests {
         let entry = |id: &str, ended: Option<EndReason>| EpisodeEntry {
             episode_id: id.into(),
             task: "handover".into(),
-            seed: 7,
+            seed: Some(7),
             protocol: Protocol::Agentic,
             operators: Operators::PerRobot,
             step: 325,

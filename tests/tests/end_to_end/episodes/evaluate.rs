@@ -36,7 +36,8 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         jobs,
         record: false,
         files: KeptFiles::default(),
-        keep_failed: false,
+        retries: EvaluationPlan::DEFAULT_RETRIES,
+        seed_key: None,
     }
 }
 
@@ -69,8 +70,8 @@ fn what_policies_are_told_is_recorded_and_not_mixed() {
 }
 
 /// State hashes without the times that a machine took.
-fn hashes(episodes: &[PlayedEpisode]) -> Vec<(u32, &str)> {
-    episodes.iter().map(|episode| (episode.result.seed, episode.result.state_hash.as_str())).collect()
+fn hashes(episodes: &[PlayedEpisode]) -> Vec<(u32, Option<&str>)> {
+    episodes.iter().map(|episode| (episode.spec.seed, episode.result.state_hash.as_deref())).collect()
 }
 
 #[test]
@@ -147,7 +148,7 @@ fn a_demonstration_is_replayed_without_a_look_on_other_seeds_alone() {
         ["handover seed 1: it is what open-loop replays, which is for other seeds"]
     );
     let [episode] = &evaluation.episodes[..] else { panic!("{:?}", evaluation.episodes) };
-    assert_eq!((episode.result.seed, episode.policy.name.as_str()), (2, "open-loop"));
+    assert_eq!((episode.spec.seed, episode.policy.name.as_str()), (2, "open-loop"));
     assert!(episode.reached(0), "what stands nearly where it stood is grasped blindly: {episode:?}");
     let report = EvaluationReport::of(&load(&[out]).expect("episodes"));
     let floor = report.floors.iter().find(|floor| floor.task == "handover").expect("its floor");

@@ -10,7 +10,7 @@ use tandem_tools_spec::{Assistance, PhaseTimes, Protocol};
 const SEEDS: [u32; 5] = [2000, 2001, 2002, 2003, 2004];
 
 /// Phases and the hash of the last state, for each seed, as the task's expert plays.
-fn played(task: &'static Task) -> Vec<(PhaseTimes, String)> {
+fn played(task: &'static Task) -> Vec<(PhaseTimes, Option<String>)> {
     let plan = EvaluationPlan {
         player: players::find("expert").expect("a player"),
         protocol: Protocol::Benchmark,
@@ -32,7 +32,8 @@ fn played(task: &'static Task) -> Vec<(PhaseTimes, String)> {
         jobs: 2,
         record: false,
         files: KeptFiles::default(),
-        keep_failed: false,
+        retries: EvaluationPlan::DEFAULT_RETRIES,
+        seed_key: None,
     };
     let folder = tempfile::tempdir().expect("a temporary folder");
     let episodes = evaluate(&plan, folder.path(), &|_| {}).expect("worlds can be built").episodes;

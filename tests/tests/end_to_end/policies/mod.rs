@@ -1,6 +1,7 @@
 //! Policies that live elsewhere: programs that are started for an episode, and learned policies at servers.
 
 pub mod act_server;
+mod cheats;
 mod kinds;
 mod openpi_server;
 pub mod plans;

@@ -33,7 +33,8 @@ pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> EvaluationPla
         jobs: 2,
         record,
         files: KeptFiles::default(),
-        keep_failed: false,
+        retries: EvaluationPlan::DEFAULT_RETRIES,
+        seed_key: None,
     }
 }
 

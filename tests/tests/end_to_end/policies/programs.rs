@@ -223,7 +223,7 @@ fn a_program_that_crashes_is_listed_apart_and_played_again() {
         assert!(fs::read_to_string(recorded).expect("a result").contains("\"policy_failed\""));
 
         // Whoever wants them counted gets what was played, and nothing is played again.
-        let kept = play(&EvaluationPlan { keep_failed: true, ..plan.clone() }, folder.path());
+        let kept = play(&EvaluationPlan { retries: 0, ..plan.clone() }, folder.path());
         assert_eq!((kept.tasks["handover"].episodes, kept.tasks["handover"].policy_failed), (2, 0));
         let hashes = |evaluation: &Evaluation| {
             let all = evaluation.episodes.iter();
@@ -237,6 +237,11 @@ fn a_program_that_crashes_is_listed_apart_and_played_again() {
         let again = play(&plan, folder.path());
         assert_eq!((again.tasks["handover"].episodes, again.tasks["handover"].policy_failed), (2, 0));
         assert!(again.episodes.iter().all(|played| played.result.ended == EndReason::Finished));
+        for played in &again.episodes {
+            let [earlier] = &played.attempts[..] else { panic!("{played:?}") };
+            assert_eq!(earlier.ended, EndReason::PolicyFailed, "a crash leaves a trace");
+            assert!(earlier.note.as_deref().is_some_and(|note| note.contains(says)), "{earlier:?}");
+        }
         fs::remove_file(&flag).expect("the file");
         fs::remove_dir_all(folder.path().join("episodes")).expect("a folder");
     }

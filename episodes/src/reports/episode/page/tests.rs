@@ -19,7 +19,7 @@ fn result(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> ResultReply {
     let phases = phase_times_s.into_iter().enumerate().map(|(index, time_s)| (Phase::number(index), time_s));
     ResultReply {
         task: "handover".into(),
-        seed: 4,
+        seed: Some(4),
         protocol,
         phases: PhaseTimes(phases.collect()),
         ended: EndReason::Finished,
@@ -29,7 +29,7 @@ fn result(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> ResultReply {
         thinking_s: 0.0,
         falls: 0,
         realtime_factor: 3.5,
-        state_hash: "<script>".into(),
+        state_hash: Some("<script>".into()),
         simulator_failure: None,
         assistance: Assistance::Full,
         extra_information: vec![],
