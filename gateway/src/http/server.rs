@@ -8,7 +8,11 @@ use tokio::{net::TcpListener, runtime::Runtime, sync::oneshot, task::JoinHandle,
 
 use super::{
     app::AppState,
-    gate::{Gate, connections, limits::Limits},
+    gate::{
+        Gate,
+        connections::{self, ConnectionLimits},
+        limits::Limits,
+    },
     pages::{WATCH, operate::OPERATE},
     router::router,
     watching::WatchKey,
@@ -84,7 +88,10 @@ impl Server {
             listener,
             certificate,
             router,
-            settings.request_timeout,
+            ConnectionLimits {
+                header: settings.request_timeout,
+                max_waiting_per_address: settings.max_requests,
+            },
             stopped,
         ));
         runtime.spawn(end_abandoned_episodes(table.clone()));

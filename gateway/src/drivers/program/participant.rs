@@ -1,7 +1,10 @@
 //! What one of the programs of an episode is given: its folder, its environment, and its brief, which says the task and how to act
 //! in words that a language model can be given as they are.
 
-use std::path::{Path, PathBuf};
+use std::{
+    env,
+    path::{Path, PathBuf},
+};
 
 use tandem_episodes::{EpisodeError, OutputError, create_private_folder, write_whole};
 use tandem_tools_spec::{Driving, StartReply};
@@ -60,8 +63,22 @@ impl<'a> Participant<'a> {
             ("TANDEM_TOKEN", self.token.into()),
             ("TANDEM_START", self.folder.join(START_FILE).display().to_string()),
         ];
-        common.into_iter().chain(self.robot.map(|robot| ("TANDEM_ROBOT", robot.into()))).collect()
+        let robot = self.robot.map(|robot| ("TANDEM_ROBOT", robot.into()));
+        common.into_iter().chain(robot).chain(off_proxies()).collect()
     }
+}
+
+/// Hosts that no proxy leads to.
+const LOOPBACK: [&str; 3] = ["127.0.0.1", "localhost", "::1"];
+
+/// Has programs reach the server directly, whatever proxy leads elsewhere: this machine behind what is excepted already.
+fn off_proxies() -> [(&'static str, String); 2] {
+    ["NO_PROXY", "no_proxy"].map(|name| {
+        let known = env::var(name).unwrap_or_default();
+        let mut hosts: Vec<&str> = known.split(',').map(str::trim).filter(|host| !host.is_empty()).collect();
+        hosts.extend(LOOPBACK);
+        (name, hosts.join(","))
+    })
 }
 
 /// The brief for the episode `start` on the server at `url`, whose reader directs all robots, or `robot` alone.

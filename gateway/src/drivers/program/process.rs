@@ -10,7 +10,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::participant::BRIEF_FILE;
+use super::{kept_output::KeptOutput, participant::BRIEF_FILE};
 
 /// The files in a program's folder that its output is written to.
 pub const STDOUT_FILE: &str = "stdout.txt";
@@ -35,6 +35,7 @@ impl ProcessGroups {
 pub struct ProcessGroup {
     child: Child,
     groups: Arc<ProcessGroups>,
+    outputs: Vec<KeptOutput>,
     /// How the program ended, once the group has been stopped.
     status: Option<ExitStatus>,
 }
@@ -54,15 +55,28 @@ impl ProcessGroup {
             .arg(command)
             .envs(environment.iter().map(|(name, value)| (name, value)))
             .stdin(Stdio::from(File::open(folder.join(BRIEF_FILE))?))
-            .stdout(output(STDOUT_FILE)?)
-            .stderr(output(STDERR_FILE)?);
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        let files = [output(STDOUT_FILE)?, output(STDERR_FILE)?];
         in_own_group(&mut shell);
         // A signal that comes between the start and the note of it would miss the program.
         let mut running = groups.lock();
         let child = shell.spawn()?;
         running.push(child.id());
         drop(running);
-        Ok(ProcessGroup { child, groups: groups.clone(), status: None })
+        let mut group = ProcessGroup { child, groups: groups.clone(), outputs: Vec::new(), status: None };
+        group.keep_outputs(files)?;
+        Ok(group)
+    }
+
+    fn keep_outputs(&mut self, [stdout, stderr]: [File; 2]) -> io::Result<()> {
+        if let Some(said) = self.child.stdout.take() {
+            self.outputs.push(KeptOutput::start(said, stdout)?);
+        }
+        if let Some(said) = self.child.stderr.take() {
+            self.outputs.push(KeptOutput::start(said, stderr)?);
+        }
+        Ok(())
     }
 
     /// Whether the program has ended well, whatever it has left running; `None` while it runs.
@@ -91,6 +105,7 @@ impl ProcessGroup {
         kill(&mut self.child);
         running.retain(|id| *id != self.child.id());
         let status = self.child.wait()?;
+        self.outputs.drain(..).for_each(KeptOutput::finish);
         self.status = Some(status);
         Ok(status)
     }
