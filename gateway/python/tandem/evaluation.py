@@ -8,6 +8,7 @@ import threading
 import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from itertools import islice
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -279,6 +280,8 @@ class Plan:
             return _evaluation(play(Path(folder)), None)
 
 
+MAX_SEEDS = 100_000
+
 MOST_ALIKE = 3
 """First episodes that fail alike, after which no further one is begun."""
 
@@ -339,7 +342,10 @@ def _task_ids(named: str | Iterable[str]) -> list[str]:
 def _seeds(given: int | Iterable[int]) -> list[int]:
     # An array of NumPy's has `__index__`, too.
     several = [given] if isinstance(given, int | np.integer) else given
-    return [integer(seed, "a seed") for seed in several]
+    seeds = [integer(seed, "a seed") for seed in islice(several, MAX_SEEDS + 1)]
+    if len(seeds) > MAX_SEEDS:
+        raise ValueError(f"there are more than {MAX_SEEDS} seeds; give at most so many to one evaluation")
+    return seeds
 
 
 def _evaluation(raw: dict[str, Any], folder: Path | None) -> Evaluation:

@@ -250,6 +250,13 @@ def test_a_filter_holds_a_reply_back(api: str, server: tandem.Server, runs: Path
     assert result(runs)["usage"]["endings"][0]["ending"] == "content_filter"
 
 
+def test_a_terminal_does_not_obey_a_model(server: tandem.Server, capsys: pytest.CaptureFixture[str]) -> None:
+    with ScriptedEndpoint(saying(Says(words="\x1b[2Jgone", calls=(("finish", {}),)))) as endpoint:
+        assert run(endpoint, server) == 0
+    printed = capsys.readouterr().out
+    assert "says: \ufffd[2Jgone" in printed and "\x1b" not in printed
+
+
 def test_what_the_episode_ends_by_is_how_the_model_ended(server: tandem.Server, runs: Path) -> None:
     with ScriptedEndpoint(saying(Says(words="Enough.", calls=(("finish", {}),)))) as endpoint:
         assert run(endpoint, server) == 0

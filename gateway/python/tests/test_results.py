@@ -159,6 +159,8 @@ def test_seeds_may_be_numbers_of_numpy() -> None:
     played = tandem.evaluate(policy, "handover", np.arange(2007, 2009))
     assert [result.seed for result in played.results] == [2007, 2008]
     assert tandem.Episode("handover", np.int64(2007)).seed == 2007  # pyright: ignore[reportArgumentType]
+    with pytest.raises(ValueError, match="more than 100000 seeds"):
+        tandem.evaluate(policy, "handover", range(2**32))
     with pytest.raises(TypeError, match="give a whole number"):
         tandem.Episode("handover", 1.5)  # pyright: ignore[reportArgumentType]
 

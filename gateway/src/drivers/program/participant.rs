@@ -139,3 +139,17 @@ fn partners(driving: &Driving) -> String {
         driving.patience_s()
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_proxy_leads_to_this_machine() {
+        for (name, hosts) in off_proxies() {
+            assert!(name.eq_ignore_ascii_case("no_proxy"), "{name}");
+            let hosts: Vec<&str> = hosts.split(',').collect();
+            assert!(LOOPBACK.iter().all(|host| hosts.contains(host)), "{hosts:?}");
+        }
+    }
+}
