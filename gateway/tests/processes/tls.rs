@@ -171,8 +171,7 @@ fn ask_policy(protocol: &str, scheme: &str, trusts: bool, serve: fn(Secured) -> 
         ])
         .args(["--policy-map", "map.toml", "--policy-key-file", "key.txt", "--policy"])
         .arg(format!("{protocol}:{scheme}://{address}/act"))
-        // Nobody is there: what is on this machine is reached without it.
-        .envs(["HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"].map(|name| (name, "http://127.0.0.1:1")))
+        .envs(["HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"].map(|name| (name, &proxy)))
         .current_dir(place.path());
     if trusts {
         program.env("SSL_CERT_FILE", "cert.pem");
