@@ -30,11 +30,11 @@ pub struct AgentFlags {
     #[arg(long, value_name = "WORD")]
     effort: Option<String>,
     /// Sampling temperature [default: the endpoint's].
-    #[arg(long, value_name = "T", value_parser = parse_amount)]
-    temperature: Option<f64>,
+    #[arg(long = "temperature", value_name = "T", value_parser = parse_amount)]
+    temperature_value: Option<f64>,
     /// Share of likely tokens to sample from [default: the endpoint's].
-    #[arg(long, value_name = "P", value_parser = parse_amount)]
-    top_p: Option<f64>,
+    #[arg(long = "top-p", value_name = "P", value_parser = parse_amount)]
+    top_share: Option<f64>,
     /// Seed of the sampling, for openai-chat [default: the endpoint's].
     #[arg(long, value_name = "N")]
     sampling_seed: Option<u32>,
@@ -146,8 +146,8 @@ impl AgentFlags {
             ("api", Some(self.api.clone())),
             ("base-url", self.base_url.clone()),
             ("effort", self.effort.clone()),
-            ("temperature", text(self.temperature)),
-            ("top-p", text(self.top_p)),
+            ("temperature", text(self.temperature_value)),
+            ("top-p", text(self.top_share)),
             ("sampling-seed", self.sampling_seed.map(|number| number.to_string())),
             ("extra-body", self.extra_body.clone()),
             ("context-tokens", self.context_tokens.map(|number| number.to_string())),
