@@ -25,6 +25,9 @@ use crate::{
 /// How many threads serve requests: these only parse, wait and answer, because the worlds have threads of their own.
 const HTTP_THREADS: usize = 2;
 
+/// Connections of one address that may always wait for a request, however few requests may be under way.
+const MIN_WAITING_PER_ADDRESS: usize = 64;
+
 /// How long requests that are still arriving at the end may take.
 const REQUEST_GRACE: Duration = Duration::from_secs(5);
 
@@ -90,7 +93,7 @@ impl Server {
             router,
             ConnectionLimits {
                 header: settings.request_timeout,
-                max_waiting_per_address: settings.max_requests,
+                max_waiting_per_address: settings.max_requests.max(MIN_WAITING_PER_ADDRESS),
             },
             stopped,
         ));
