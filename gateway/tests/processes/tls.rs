@@ -156,6 +156,9 @@ fn ask_policy(protocol: &str, scheme: &str, trusts: bool, serve: fn(Secured) -> 
             }
         }
     });
+    // It takes connections and answers nothing: what is on this machine is reached without it.
+    let silent = TcpListener::bind("127.0.0.1:0").unwrap();
+    let proxy = format!("http://{}", silent.local_addr().unwrap());
     let mut program = Command::new(env!("CARGO_BIN_EXE_tandem"));
     program
         .args([
