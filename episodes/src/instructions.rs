@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use tandem_sim::BaseLimits;
+use tandem_sim::{BaseLimits, MAX_TEXT_BYTES, read_text};
 use tandem_tools_spec::{Briefing, Instruction, TaskList};
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -47,7 +47,7 @@ pub enum InstructionsError {
 impl Instructions {
     /// Reads a file and checks that its tasks are among these, and its robots among theirs.
     pub fn read(path: &Path, tasks: &TaskSet) -> Result<Instructions, InstructionsError> {
-        let text = std::fs::read_to_string(path)
+        let text = read_text(path, MAX_TEXT_BYTES)
             .map_err(|source| InstructionsError::Read { path: path.into(), source })?;
         let instructions: Instructions = serde_json::from_str(&text)
             .map_err(|source| InstructionsError::Parse { path: path.into(), source })?;

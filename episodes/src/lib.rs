@@ -53,7 +53,9 @@ pub use error::{CheckpointError, EpisodeError, RobotError, SceneError};
 pub use fingerprint::{build, name_program};
 pub use instructions::{Instructions, InstructionsError};
 pub use observation::{Picture, RobotObservation, RobotView, TeamObservation};
-pub use output::{OutputError, create_new_private_folder, create_private_folder, write_whole};
+pub use output::{
+    OutputError, create_new_private_folder, create_private_folder, printable, shell_word, write_whole,
+};
 pub use protocol::{Rules, rules};
 pub use recording::{
     Damage, Fault, FilePart, LeftOut, NoteMessage, RecordedCall, RecordedCheckpoint, Recorder, Recording,
@@ -70,10 +72,10 @@ pub use spec::{
     Controller, EpisodeSpec, KeyedSeed, MomentStart, OwnRobot, PhaseStart, RobotFile, SceneFile, Start,
 };
 pub use tandem_sim::{
-    BaseLimits, CONTROL_HZ, LocomotionChoice, Sensing, SensorModel, SimError, StateSource,
+    BaseLimits, CONTROL_HZ, LocomotionChoice, MAX_TEXT_BYTES, Sensing, SensorModel, SimError, StateSource,
     assets::{DEFAULT_ROBOT, ROBOTS, robot as embedded_robot},
     body::BodyScale,
-    joint_names,
+    joint_names, read_bytes, read_text,
     render::RendererKind,
 };
 pub use task_check::{TaskCheck, TaskCheckError, check_task};

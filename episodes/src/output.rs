@@ -29,6 +29,25 @@ impl OutputError {
     }
 }
 
+/// A text as a terminal may show it: what others have written cannot move its cursor, change its colours or its title.
+pub fn printable(text: &str) -> String {
+    let shown = |character: char| match character {
+        '\n' | '\t' => character,
+        character if character.is_control() => char::REPLACEMENT_CHARACTER,
+        character => character,
+    };
+    text.chars().map(shown).collect()
+}
+
+/// A word as a shell reads it back.
+pub fn shell_word(text: &str) -> String {
+    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"_-./:=@%+,".contains(&byte);
+    match !text.is_empty() && text.bytes().all(plain) {
+        true => text.into(),
+        false => format!("'{}'", text.replace('\'', r"'\''")),
+    }
+}
+
 /// Writes a file under another name first and renames it when it is complete and on the disk: a reader sees the whole of it
 /// or nothing, even after a power cut. What cannot be written leaves nothing behind.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
@@ -111,6 +130,22 @@ pub mod webp {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_shell_reads_back_what_was_meant() {
+        assert_eq!(shell_word("runs/pi05-2"), "runs/pi05-2");
+        assert_eq!(shell_word("my runs"), "'my runs'");
+        assert_eq!(shell_word("it's $HOME"), r"'it'\''s $HOME'");
+        assert_eq!(shell_word(""), "''");
+    }
+
+    #[test]
+    fn a_terminal_obeys_nobody_elses_text() {
+        assert_eq!(
+            printable("a\u{1b}[2Jb\r\u{9b}31mc\n\td\u{7}é"),
+            "a\u{fffd}[2Jb\u{fffd}\u{fffd}31mc\n\td\u{fffd}é"
+        );
+    }
 
     #[test]
     fn what_cannot_be_put_in_place_leaves_nothing_behind() {

@@ -3,10 +3,12 @@
 use std::process::ExitCode;
 
 use tandem::cli::Cli;
+use tandem_episodes::printable;
 
 fn main() -> ExitCode {
     Cli::read().run().unwrap_or_else(|error| {
-        eprintln!("tandem: {error}");
+        // Errors quote files and servers of others.
+        eprintln!("tandem: {}", printable(&error.to_string()));
         ExitCode::FAILURE
     })
 }

@@ -16,8 +16,9 @@ use clap::{
 };
 use serde::Deserialize;
 use tandem_episodes::{
-    BaseLimits, Controller, EpisodeError, EpisodeSpec, Instructions, InstructionsError, RendererKind,
-    RobotFile, SceneFile, Sensing, SensorModel, SimError, StateSource, Visibility, check_task, read_task,
+    BaseLimits, Controller, EpisodeError, EpisodeSpec, Instructions, InstructionsError, MAX_TEXT_BYTES,
+    RendererKind, RobotFile, SceneFile, Sensing, SensorModel, SimError, StateSource, Visibility, check_task,
+    read_task, read_text,
     stress::{Stress, StressAxis, StressLevel},
     task_set,
     tasks::{Task, TaskSet},
@@ -435,8 +436,8 @@ pub fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
 }
 
 fn read_layer(path: &Path) -> Result<Layer, SettingsError> {
-    let text =
-        std::fs::read_to_string(path).map_err(|source| SettingsError::Read { path: path.into(), source })?;
+    let text = read_text(path, MAX_TEXT_BYTES)
+        .map_err(|source| SettingsError::Read { path: path.into(), source })?;
     toml::from_str(&text).map_err(|source| SettingsError::Parse { path: path.into(), source })
 }
 

@@ -9,9 +9,13 @@ use std::{
 };
 
 use subtle::{Choice, ConstantTimeEq};
+use tandem_episodes::read_text;
 
 /// The most bytes of a token.
 const MAX_LENGTH: usize = 256;
+
+/// The most bytes of a file with a token.
+const MAX_FILE_BYTES: u64 = 64 << 10;
 
 /// A shorter one could be guessed.
 const MIN_LENGTH: usize = 16;
@@ -74,8 +78,8 @@ impl Token {
 
     /// The token in a file, without the white space around it.
     pub fn read(path: &Path) -> Result<Token, TokenError> {
-        let text =
-            fs::read_to_string(path).map_err(|source| TokenError::Read { path: path.into(), source })?;
+        let text = read_text(path, MAX_FILE_BYTES)
+            .map_err(|source| TokenError::Read { path: path.into(), source })?;
         if readable_by_others(path) {
             tracing::warn!(file = %path.display(), "others on this machine can read the token; chmod 600 keeps it");
         }

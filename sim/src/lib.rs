@@ -64,6 +64,7 @@ pub mod render;
 pub mod robot;
 mod sides;
 mod units;
+mod user_file;
 pub mod world;
 
 pub use body::{
@@ -82,6 +83,7 @@ pub use robot::{
 };
 pub use sides::{Side, Sides};
 pub use units::{CONTROL_DT_S, CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL};
+pub use user_file::{MAX_TEXT_BYTES, read_bytes, read_text, with_own_separators};
 pub use world::{
     BodyTouch, HandContacts, ObjectFile, ObjectModel, ObjectPart, ObjectPlacement, ObjectState, ObjectStep,
     PlannedPush, RobotPress, RobotStep, SceneSource, Snapshot, Step, Touch, World, WorldSpec,

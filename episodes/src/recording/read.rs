@@ -16,6 +16,7 @@ use super::topics::notes::NoteMessage;
 use super::topics::steps::{StepDecoder, state_of};
 use super::{Recorder, checkpoint_name, metadata, topics};
 use crate::error::RobotError;
+use crate::output::{partial_path, shell_word};
 use crate::results::RESULT_FILE;
 use crate::scoring::{ScoreMemory, Scores, StepScore};
 use crate::spec::EpisodeSpec;
@@ -251,11 +252,14 @@ fn hint(path: &Path, damage: &Damage) -> String {
     match path.extension() {
         _ if damage.is_of_another_format() => "it is no MCAP file; give an episode.mcap".into(),
         Some(extension) if extension == "partial" => {
-            format!("`tandem recover {}` may make one of what comes before", path.display())
+            let partial = shell_word(&path.to_string_lossy());
+            format!("`tandem recover {partial}` may make one of what comes before")
         }
-        _ => format!(
-            "rename it to {0}.partial, and `tandem recover {0}.partial` may make one of what comes before",
-            path.display()
-        ),
+        _ => {
+            let partial = shell_word(&partial_path(path).to_string_lossy());
+            format!(
+                "rename it to {partial}, and `tandem recover {partial}` may make one of what comes before"
+            )
+        }
     }
 }

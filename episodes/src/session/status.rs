@@ -2,7 +2,7 @@
 
 use tandem_tools_spec::{
     Assistance, Briefing, Budget, EndReason, PhaseReached, PhaseTimes, ResultReply, RobotFallen, RobotInfo,
-    StatusReply,
+    StatusReply, Usage,
 };
 
 use super::Session;
@@ -134,6 +134,15 @@ impl Session {
         }
     }
 
+    /// What notes say that was used, and at the end how the play of models ended.
+    fn usage_so_far(&self) -> Usage {
+        let usage = self.usage.clone();
+        match self.ended {
+            Some(reason) => usage.ended_by(reason),
+            None => usage,
+        }
+    }
+
     fn result_so_far(&self) -> ResultReply {
         let mut times_s = self.scores.reached().map(|(_, time_s)| time_s);
         let phases = (0..self.spec().task.phases.len()).map(|index| (Phase::number(index), times_s.next()));
@@ -157,7 +166,7 @@ impl Session {
             extra_information_replies: self.shown.replies(),
             departures: self.spec().departures(),
             recording_failed: self.recording_failed().map(str::to_owned),
-            usage: (self.usage.notes > 0).then(|| self.usage.clone()),
+            usage: (self.usage.notes > 0).then(|| self.usage_so_far()),
         }
     }
 }

@@ -46,7 +46,7 @@ class TandemEnv(gym.Env[Observation, NDArray[np.float32]]):
         self._has_begun = False
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict[str, Any]]:
-        super().reset(seed=seed)
+        super().reset(seed=None if seed is None else int(seed))
         outcome = self._worlds.reset([seed])
         self._has_begun = True
         return self._worlds.of_world(0), self._info(outcome)

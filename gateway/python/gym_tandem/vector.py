@@ -11,6 +11,8 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 from typing_extensions import Unpack
 
+from tandem.base import integer
+
 from .worlds import Observation, Options, Outcome, Worlds
 
 Stepped = tuple[Observation, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]
@@ -81,9 +83,10 @@ class TandemVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]])
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        if seed is None or isinstance(seed, int):
-            super().reset(seed=seed)
-            seeds: list[int | None] = [None if seed is None else seed + world for world in range(self.num_envs)]
+        if seed is None or isinstance(seed, int | np.integer):
+            first = None if seed is None else integer(seed, "the seed")
+            super().reset(seed=first)
+            seeds: list[int | None] = [None if first is None else first + world for world in range(self.num_envs)]
         else:
             seeds = list(seed)
         if len(seeds) != self.num_envs:

@@ -15,7 +15,7 @@ from typing_extensions import TypedDict
 
 import tandem
 from tandem import _native
-from tandem.base import StressAxis, StressLevel
+from tandem.base import StressAxis, StressLevel, integer
 from tandem.contract.start import TaskInfo
 
 Observation = dict[str, Any]
@@ -25,6 +25,15 @@ STATE_COLUMNS = 47
 
 LARGEST_SEED = 2**32 - 1
 
+CHOICES: dict[str, tuple[str, ...]] = {
+    "obs_type": ("pixels_agent_pos", "pixels", "state"),
+    "action_type": ("joints", "wrists"),
+    "reward_type": ("sparse", "dense"),
+    "sensors": ("ideal", "g1"),
+    "renderer": ("auto", "cpu", "gpu"),
+}
+"""What options may be, the default first."""
+
 EPISODE_SETTINGS = ("renderer", "sensors", "stress", "level")
 """Options that mean what they mean to `tandem.Episode`, which has the same defaults."""
 
@@ -32,8 +41,8 @@ EPISODE_SETTINGS = ("renderer", "sensors", "stress", "level")
 class Options(TypedDict, total=False):
     """What every environment takes beside the task. Names are those of LeRobot's environments, where it has one."""
 
-    obs_type: Literal["state", "pixels_agent_pos"]
-    """What is observed: `agent_pos` alone, or `pixels`, too, which is the default."""
+    obs_type: Literal["state", "pixels", "pixels_agent_pos"]
+    """What is observed: `agent_pos` alone, `pixels` alone, or both, which is the default."""
 
     observation_width: int
     """Width of pictures; 320."""
@@ -104,16 +113,19 @@ class Worlds:
         unknown = options.keys() - Options.__annotations__.keys()
         if unknown:
             raise TypeError(f"no option {', '.join(sorted(unknown))}; have: {', '.join(Options.__annotations__)}")
+        self._check(options)
         rules = next(rules for rules in told.protocols if rules.protocol == "benchmark")
         self.count = count
         self.task = _reworded(told, options) if options.get("stress") == "words" else told
         self.max_episode_steps = rules.episode_steps - rules.initial_hold_steps
         self.robots = tuple(instruction.robot for instruction in told.robots)
-        self.size = options.get("observation_width", 320), options.get("observation_height", 240)
-        self.look_every = options.get("look_every", 1)
+        width, height = options.get("observation_width", 320), options.get("observation_height", 240)
+        self.size = integer(width, "observation_width"), integer(height, "observation_height")
+        self.look_every = integer(options.get("look_every", 1), "look_every")
         if min(self.size) < 1 or self.look_every < 1:
             raise ValueError(f"pictures of {self.size} at every step of {self.look_every}; give numbers from 1 on")
-        self.sees = options.get("obs_type", "pixels_agent_pos") == "pixels_agent_pos"
+        observed = options.get("obs_type", "pixels_agent_pos")
+        self.sees, self.senses = observed != "state", observed != "pixels"
         settings = {key: value for key, value in options.items() if key in EPISODE_SETTINGS}
         record = options.get("record")
         self._native = _native.Worlds(
@@ -132,6 +144,14 @@ class Worlds:
         self._seen = self._arrays()
         self._last = self._arrays() if keeps_last else None
 
+    @staticmethod
+    def _check(options: Options) -> None:
+        """Refuses what an option does not know."""
+        for name, known in CHOICES.items():
+            given = options.get(name, known[0])
+            if given not in known:
+                raise ValueError(f"no {name} {given!r}; have: {', '.join(known)}")
+
     def _arrays(self) -> tuple[NDArray[np.float32], NDArray[np.uint8] | None]:
         width, height = self.size
         states = np.zeros((self.count, len(self.robots), STATE_COLUMNS), np.float32)
@@ -147,8 +167,9 @@ class Worlds:
 
     def observation_dict(self, robots: tuple[str, ...]) -> gym.spaces.Dict:
         """What is seen of these robots."""
-        state = gym.spaces.Box(-np.inf, np.inf, (len(robots) * STATE_COLUMNS,), np.float32)
-        spaces: dict[str, gym.Space[Any]] = {"agent_pos": state}
+        spaces: dict[str, gym.Space[Any]] = {}
+        if self.senses:
+            spaces["agent_pos"] = gym.spaces.Box(-np.inf, np.inf, (len(robots) * STATE_COLUMNS,), np.float32)
         if self.sees:
             width, height = self.size
             picture = gym.spaces.Box(0, 255, (height, width, 3), np.uint8)
@@ -157,22 +178,26 @@ class Worlds:
 
     def reset(self, seeds: list[int | None], chosen: list[bool] | None = None) -> Outcome:
         """Begins an episode in each world, or in those that are chosen; without a seed, that of its next round."""
-        for seed in seeds:
-            if seed is not None and not 0 <= seed <= LARGEST_SEED:
+        begun = [-1 if seed is None else integer(seed, "a seed") for seed in seeds]
+        for seed, number in zip(seeds, begun, strict=True):
+            if seed is not None and not 0 <= number <= LARGEST_SEED:
                 raise ValueError(f"no seed {seed}; give one from 0 to {LARGEST_SEED}")
         if chosen is None:
             self._steps = 0
             chosen = [True] * self.count
-        return Outcome(*self._native.reset(chosen, [-1 if seed is None else int(seed) for seed in seeds], self._seen))
+        return Outcome(*self._native.reset(chosen, begun, self._seen))
 
     def step(self, actions: ArrayLike, autoreset: str) -> Outcome:
         """One control step of each world, or the beginning of its next episode."""
         rows: NDArray[np.float32] = np.ascontiguousarray(actions, np.float32)
-        shape = (self.count, len(self.robots), -1)
-        if rows.size % (self.count * len(self.robots)) != 0:
-            raise ValueError(
-                f"actions have the shape {rows.shape}; give rows of {self.count} worlds by {len(self.robots)} robots"
-            )
+        robots, width = len(self.robots), self._native.action_limits().shape[0]
+        shape = (self.count, robots, width)
+        shapes = [(self.count, robots * width), shape]
+        if self.count == 1:
+            shapes += [(robots * width,), (robots, width)]
+        # What has as many numbers in another order would be taken for what it is not.
+        if rows.shape not in shapes:
+            raise ValueError(f"actions have the shape {rows.shape}; give {' or '.join(map(str, shapes))}")
         self._steps += 1
         looks = self._steps % self.look_every == 0
         return Outcome(*self._native.step(np.reshape(rows, shape), autoreset, looks, self._seen, self._last))
@@ -180,7 +205,7 @@ class Worlds:
     def batch(self) -> Observation:
         """What is seen of all worlds. Arrays are those that the next step writes into."""
         states, pictures = self._seen
-        seen: Observation = {"agent_pos": np.reshape(states, (self.count, -1))}
+        seen: Observation = {"agent_pos": np.reshape(states, (self.count, -1))} if self.senses else {}
         if pictures is not None:
             seen["pixels"] = {robot: pictures[:, index] for index, robot in enumerate(self.robots)}
         return seen
@@ -188,7 +213,7 @@ class Worlds:
     def of_world(self, world: int, *, last: bool = False) -> Observation:
         """What is seen of one world, copied; of the episode before, where that has ended in the same step."""
         states, pictures = self._last if last and self._last is not None else self._seen
-        seen: Observation = {"agent_pos": states[world].ravel().copy()}
+        seen: Observation = {"agent_pos": states[world].ravel().copy()} if self.senses else {}
         if pictures is not None:
             seen["pixels"] = {robot: pictures[world, index].copy() for index, robot in enumerate(self.robots)}
         return seen
@@ -196,7 +221,7 @@ class Worlds:
     def of_robot(self, index: int) -> Observation:
         """What one robot of the first world sees and senses, copied."""
         states, pictures = self._seen
-        seen: Observation = {"agent_pos": states[0, index].copy()}
+        seen: Observation = {"agent_pos": states[0, index].copy()} if self.senses else {}
         if pictures is not None:
             seen["pixels"] = {self.robots[index]: pictures[0, index].copy()}
         return seen

@@ -42,9 +42,11 @@ class TandemEnvConfig(EnvConfig):
         robots = [robot.robot for robot in self.told.robots]
         width = 35 if self.action_type == "joints" else 32
         self.features[_ACTION] = PolicyFeature(type=FeatureType.ACTION, shape=(len(robots) * width,))
-        self.features["agent_pos"] = PolicyFeature(type=FeatureType.STATE, shape=(len(robots) * STATE_COLUMNS,))
-        self.features_map.update({_ACTION: _ACTION, "agent_pos": _STATE})
-        if self.obs_type == "pixels_agent_pos":
+        self.features_map[_ACTION] = _ACTION
+        if self.obs_type != "pixels":
+            self.features["agent_pos"] = PolicyFeature(type=FeatureType.STATE, shape=(len(robots) * STATE_COLUMNS,))
+            self.features_map["agent_pos"] = _STATE
+        if self.obs_type != "state":
             shape = (self.observation_height, self.observation_width, 3)
             for robot in robots:
                 self.features[f"pixels/{robot}"] = PolicyFeature(type=FeatureType.VISUAL, shape=shape)

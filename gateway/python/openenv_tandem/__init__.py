@@ -17,12 +17,15 @@ from openenv.core.client_types import StepResult
 from openenv.core.env_client import EnvClient
 from openenv.core.env_server.http_server import create_app
 from openenv.core.env_server.interfaces import Environment
-from openenv.core.env_server.types import Action, EnvironmentMetadata, Observation, State
+from openenv.core.env_server.types import Action, ConcurrencyConfig, EnvironmentMetadata, Observation, State
 from pydantic import Field
 
 import tandem
 
 _WORLDS = 16
+
+_IDLE_S = 3600.0
+"""A session without a call for so long ends, and its episode with it."""
 
 
 class TandemAction(Action):
@@ -78,10 +81,11 @@ class TandemEnvironment(Environment[TandemAction, TandemObservation, TandemState
     ) -> TandemObservation:
         if unknown:
             raise ValueError(f"no setting {', '.join(unknown)}; have: task, seed, protocol, assistance")
-        self.close()
         begun = self._next_seed if seed is None else seed
+        # What cannot be begun leaves the running episode as it is.
         episode = tandem.Episode(task, begun, protocol=protocol, assistance=assistance)
         briefing = episode.start()
+        self.close()
         self._episode, self._next_seed = episode, begun + 1
         self._state = TandemState(episode_id=episode_id or str(uuid4()), task=task, seed=begun)
         self._result = None
@@ -142,7 +146,12 @@ class TandemClient(EnvClient[TandemAction, TandemObservation, TandemState]):
 
 
 app = create_app(
-    TandemEnvironment, TandemAction, TandemObservation, "tandem", max_concurrent_envs=_WORLDS, state_cls=TandemState
+    TandemEnvironment,
+    TandemAction,
+    TandemObservation,
+    "tandem",
+    concurrency_config=ConcurrencyConfig(max_concurrent_envs=_WORLDS, session_timeout=_IDLE_S),
+    state_cls=TandemState,
 )
 """What a server of applications takes, as `uvicorn openenv_tandem:app`."""
 

@@ -6,9 +6,10 @@ import json
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import index
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal, TypeAlias, TypeVar
+from typing import Any, Literal, SupportsIndex, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -171,14 +172,25 @@ def begun(part: T | None) -> T:
     return part
 
 
+ROW_COLUMNS = 35
+"""Columns of a row for `step`."""
+
+
 def chunk_of(rows: ArrayLike, robots: int) -> NDArray[np.float32]:
     """Rows as robots by steps by columns."""
-    array = np.ascontiguousarray(rows, dtype=np.float32)
-    if array.ndim == 2:
-        array = array[:, np.newaxis, :]
-    if array.ndim != 3 or array.shape[0] != robots:
-        raise ValueError(f"rows have the shape {array.shape}; give {robots} robots by 35, or {robots} by steps by 35")
+    given = np.ascontiguousarray(rows, dtype=np.float32)
+    array = given[:, np.newaxis, :] if given.ndim == 2 else given
+    if array.ndim != 3 or array.shape[0] != robots or array.shape[2] != ROW_COLUMNS:
+        raise ValueError(f"rows have the shape {given.shape}; give {robots} robots by 35, or {robots} by steps by 35")
     return array
+
+
+def integer(value: SupportsIndex, what: str) -> int:
+    """A whole number, NumPy's included, as Python's own."""
+    try:
+        return index(value)
+    except TypeError as error:
+        raise TypeError(f"{what} is {value!r}; give a whole number") from error
 
 
 def settings_json(**settings: Any) -> str:

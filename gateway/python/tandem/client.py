@@ -5,15 +5,17 @@ from __future__ import annotations
 import base64
 import json
 import os
+import selectors
+import uuid
 from collections.abc import Mapping, Sequence
-from http.client import HTTPConnection, HTTPException, HTTPSConnection
+from http.client import HTTPConnection, HTTPException, HTTPResponse, HTTPSConnection
 from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .base import BaseEpisode, Observation, Stepped, begun, chunk_of
+from .base import BaseEpisode, Observation, Stepped, begun, chunk_of, integer
 from .contract.arguments import Json
 from .contract.replies import CameraCalibration, Protocol, ResultReply, RobotState
 from .contract.start import Briefing, TaskList
@@ -21,23 +23,30 @@ from .errors import TandemError, Unreachable, of_kind
 
 _KIND = "urn:tandem:problem:"
 
+DEFAULT_TIMEOUT_S = 720.0
+"""Longer than a call is held: an operator's waits up to 600 s for its partners."""
+
 
 class Client:
     """A server that `tandem serve` or `tandem.serve()` has started. A client is for one thread.
 
     url: Where it is, as "http://127.0.0.1:8700".
     token: What the server wants every request to send. None: that of the environment's TANDEM_TOKEN, if there is one.
-    timeout_s: The longest that an answer may take.
+    timeout_s: The longest that an answer may take; operators' calls are held for up to 600 s.
     """
 
-    def __init__(self, url: str, *, token: str | None = None, timeout_s: float = 120.0) -> None:
+    def __init__(self, url: str, *, token: str | None = None, timeout_s: float = DEFAULT_TIMEOUT_S) -> None:
         parts = urlsplit(url)
+        try:
+            port = parts.port
+        except ValueError as error:
+            raise TandemError(f"{url!r} is no address of a server ({error}); give one as http://127.0.0.1:8700") from error
         if parts.scheme not in ("http", "https") or parts.hostname is None:
             raise TandemError(f"{url!r} is no address of a server; give one as http://127.0.0.1:8700")
         kind = HTTPSConnection if parts.scheme == "https" else HTTPConnection
         self.url = url.rstrip("/")
         self._path = parts.path.rstrip("/")
-        self._connection = kind(parts.hostname, parts.port, timeout=timeout_s)
+        self._connection = kind(parts.hostname, port, timeout=timeout_s)
         self._token = token or os.environ.get("TANDEM_TOKEN")
 
     def tasks(self) -> TaskList:
@@ -58,14 +67,15 @@ class Client:
         headers = {"content-type": "application/json"}
         if self._token:
             headers["authorization"] = f"Bearer {self._token}"
+        if method == "POST" and _has_keys(path):
+            headers["idempotency-key"] = uuid.uuid4().hex
         text = None if body is None else json.dumps(body)
         try:
-            self._connection.request(method, self._path + path, text, headers)
-            response = self._connection.getresponse()
-            status, content, retry = response.status, response.read(), response.getheader("retry-after")
+            response, content = self._exchange(method, self._path + path, text, headers)
         except (OSError, HTTPException) as error:
             self._connection.close()
             raise Unreachable(f"{self.url} gives no answer: {error or type(error).__name__}") from error
+        status, retry = response.status, response.getheader("retry-after")
         if status == 204:
             return None
         try:
@@ -78,6 +88,43 @@ class Client:
         detail = str(answer.get("detail", content.decode(errors="replace")))
         raise of_kind(kind, str(answer.get("title", status)), detail, float(retry) if retry else None)
 
+    def _exchange(self, method: str, path: str, text: str | None, headers: dict[str, str]) -> tuple[HTTPResponse, bytes]:
+        """Sends a request over the kept connection, or over a new one where that is gone, and reads the answer. Where the
+        connection breaks under way, only a request is sent again that is carried out once.
+        """
+        is_kept = self._is_kept()
+        try:
+            return self._send(method, path, text, headers)
+        except TimeoutError:
+            raise
+        except (OSError, HTTPException):
+            if not is_kept or not (method == "GET" or "idempotency-key" in headers):
+                raise
+        self._connection.close()
+        return self._send(method, path, text, headers)
+
+    def _send(self, method: str, path: str, text: str | None, headers: dict[str, str]) -> tuple[HTTPResponse, bytes]:
+        self._connection.request(method, path, text, headers)
+        response = self._connection.getresponse()
+        return response, response.read()
+
+    def _is_kept(self) -> bool:
+        """Whether there is a connection still. A server that has closed it, while a model was thinking or because it was
+        started again, has left an end to read.
+        """
+        sock = self._connection.sock
+        if sock is None:
+            return False
+        try:
+            with selectors.DefaultSelector() as selector:
+                selector.register(sock, selectors.EVENT_READ)
+                has_ended = bool(selector.select(0))
+        except (OSError, ValueError):
+            has_ended = True
+        if has_ended:
+            self._connection.close()
+        return not has_ended
+
     def close(self) -> None:
         """Closes the connection; the next request opens another one."""
         self._connection.close()
@@ -88,7 +135,7 @@ class RemoteEpisode(BaseEpisode):
 
     def __init__(self, client: Client, task: str, seed: int, protocol: Protocol) -> None:
         self.task = task
-        self.seed = seed
+        self.seed = integer(seed, "the seed")
         self.protocol = protocol
         self._client = client
         self._id: str | None = None
@@ -158,6 +205,11 @@ class RemoteEpisode(BaseEpisode):
         if self._result is None:
             self._result = ResultReply.of(self._client.request("DELETE", f"/v1/episodes/{self.episode_id}"))
         return self._result
+
+
+def _has_keys(path: str) -> bool:
+    """Whether requests to a path may have a key, by which the server carries them out once."""
+    return path == "/v1/episodes" or "/tools/" in path
 
 
 def _row_of(state: RobotState) -> dict[str, float]:

@@ -24,6 +24,7 @@ from .base import (
     StressLevel,
     begun,
     chunk_of,
+    integer,
     settings_json,
 )
 from .contract.arguments import Json
@@ -70,7 +71,7 @@ class Episode(BaseEpisode):
         task_file: str | PathLike[str] | None = None,
     ) -> None:
         self.task = task
-        self.seed = seed
+        self.seed = integer(seed, "the seed")
         self.protocol = protocol
         self._record = None if record is None else Path(record)
         self._settings = settings_json(

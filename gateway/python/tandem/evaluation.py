@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import json
+import sys
+import threading
+import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from itertools import islice
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict
 
+import numpy as np
+
 from . import _native
-from .base import Renderer, Sensors, StateEstimate, StressAxis, StressLevel, settings_json
+from .base import Renderer, Sensors, StateEstimate, StressAxis, StressLevel, integer, settings_json
 from .contract.replies import Assistance, Protocol, ResultReply
 from .contract.start import TaskList
 from .episode import Episode
-from .errors import TandemError
+from .errors import EpisodeEnded, TandemError
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -141,7 +147,8 @@ def evaluate(
     """Plays every seed of every task, and counts what came of it, as `tandem evaluate` does.
 
     policy: Called with each episode, which has begun; it plays until it is done or the episode has ended. An exception of its
-        own ends this episode and no other, and the episode does not count; that the episode has ended is none. "expert" is
+        own ends this episode and no other, and the episode does not count; the first one is printed, and where the first three
+        episodes end by the same, the evaluation ends. That the episode has ended is no exception. "expert" is
         the task's scripted expert, which sees object poses; "idle" holds still.
     tasks: A task's id, or several; "all" for the benchmark's ten, "tandem+" for that suite.
     seeds: A seed, or several.
@@ -216,7 +223,7 @@ class Plan:
             ),
             protocol=settings.get("protocol", "agentic"),
             tasks=_task_ids(tasks),
-            seeds=[seeds] if isinstance(seeds, int) else list(seeds),
+            seeds=_seeds(seeds),
             record=settings.get("record", False),
             out=None if out is None else Path(out),
             progress=settings.get("progress"),
@@ -231,11 +238,13 @@ class Plan:
         policy = self.policy
         if isinstance(policy, str):
             return self._run(None, folder, jobs)
-
-        def play(native: _native.Episode, briefing: str) -> None:
-            policy(Episode._begun(native, briefing))
-
-        return self._run(play, folder, jobs)
+        watched = _WatchedPolicy(policy)
+        try:
+            return self._run(watched.play, folder, jobs)
+        except TandemError as error:
+            if watched.broken is None:
+                raise
+            raise TandemError(watched.broken) from error
 
     def play_elsewhere(self, ask: Elsewhere, folder: Path, jobs: int) -> dict[str, Any]:
         """As `play`, but `ask` has each of `jobs` episodes at once played by another process."""
@@ -271,6 +280,51 @@ class Plan:
             return _evaluation(play(Path(folder)), None)
 
 
+MAX_SEEDS = 100_000
+
+MOST_ALIKE = 3
+"""First episodes that fail alike, after which no further one is begun."""
+
+
+class _WatchedPolicy:
+    """A policy whose first failure is told at once, and which is not called any more where it cannot play at all."""
+
+    def __init__(self, policy: Callable[[Episode], object]) -> None:
+        self._policy = policy
+        self._lock = threading.Lock()
+        self._failures: list[str] = []
+        self._has_played = False
+        self.broken: str | None = None
+        """Why it is not called any more."""
+
+    def play(self, native: _native.Episode, briefing: str) -> None:
+        """Lets the policy play an episode."""
+        try:
+            self._policy(Episode._begun(native, briefing))
+        except EpisodeEnded:
+            self._has_played = True
+            raise
+        except Exception as error:
+            self._failed(error)
+            raise
+        self._has_played = True
+
+    def _failed(self, error: Exception) -> None:
+        with self._lock:
+            if not self._failures:
+                traceback.print_exception(error, file=sys.stderr)
+            self._failures.append(f"{type(error).__name__}: {error}")
+            is_broken = not self._has_played and len(self._failures) >= MOST_ALIKE and len(set(self._failures)) == 1
+            if is_broken:
+                self.broken = (
+                    f"the policy has failed alike in the first {MOST_ALIKE} episodes ({self._failures[0]}); mend it, and run "
+                    "the evaluation again: what was played is kept"
+                )
+        if is_broken:
+            # An evaluation ends by this, and no other episode is begun.
+            raise KeyboardInterrupt from error
+
+
 Played: TypeAlias = tuple[Literal[True], tuple[str, list[tuple[str, bytes]]]] | tuple[Literal[False], str]
 """An episode as JSON with the files of its recording, or why it was not played."""
 
@@ -283,6 +337,15 @@ def _task_ids(named: str | Iterable[str]) -> list[str]:
         return list(named)
     suite = None if named == "all" else named
     return [task.id for task in tasks().tasks if task.suite == suite] or [named]
+
+
+def _seeds(given: int | Iterable[int]) -> list[int]:
+    # An array of NumPy's has `__index__`, too.
+    several = [given] if isinstance(given, int | np.integer) else given
+    seeds = [integer(seed, "a seed") for seed in islice(several, MAX_SEEDS + 1)]
+    if len(seeds) > MAX_SEEDS:
+        raise ValueError(f"there are more than {MAX_SEEDS} seeds; give at most so many to one evaluation")
+    return seeds
 
 
 def _evaluation(raw: dict[str, Any], folder: Path | None) -> Evaluation:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import sys
 import threading
+import traceback
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -22,6 +24,9 @@ Infer: TypeAlias = Callable[[dict[str, Any], dict[str, Any]], Mapping[str, Any]]
 
 MOMENT = "moment"
 """Under this key, or one that begins so, a map sends `["episode", "step", "reset"]`."""
+
+MOST_PRINTED = 20
+"""Different tracebacks that are printed."""
 
 REMEMBERED = 256
 """So many episodes have a memory, those that were asked for last."""
@@ -88,6 +93,7 @@ class _Answering:
         self._memories: OrderedDict[tuple[str, int], dict[str, Any]] = OrderedDict()
         # A policy is one model, which answers one request after the other.
         self._one_by_one = threading.Lock()
+        self._printed: set[str] = set()
 
     def answer(self, path: str, body: bytes) -> bytes:
         infer = self._policies.get(path)
@@ -97,6 +103,13 @@ class _Answering:
         with self._one_by_one:
             reply = infer(observation, self._memory(path, observation))
         return json.dumps({key: np.asarray(value, np.float64).tolist() for key, value in reply.items()}).encode()
+
+    def print_once(self, error: Exception) -> None:
+        """Prints what a policy has raised, each thing once."""
+        told = f"{type(error).__name__}: {error}"
+        if told not in self._printed and len(self._printed) < MOST_PRINTED:
+            self._printed.add(told)
+            traceback.print_exception(error, file=sys.stderr)
 
     def _memory(self, path: str, observation: dict[str, Any]) -> dict[str, Any]:
         moment = next((value for key, value in observation.items() if key.startswith(MOMENT)), None)
@@ -135,7 +148,8 @@ def _handler(answering: _Answering) -> type[BaseHTTPRequestHandler]:
             except (json.JSONDecodeError, binascii.Error) as error:
                 status, answer = 400, f"no observation as json_numpy writes it: {error}".encode()
             except Exception as error:
-                # What a policy raises is told to who asked, who says it in the episode's result.
+                # What a policy raises is told to who asked, who says it in the episode's result, and here to who can mend it.
+                answering.print_once(error)
                 status, answer = 500, f"{type(error).__name__}: {error}".encode()
             self.send_response(status)
             self.send_header("content-type", "application/json" if status == 200 else "text/plain")

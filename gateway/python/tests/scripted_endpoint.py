@@ -41,6 +41,10 @@ class Says:
     calls: tuple[tuple[str, dict[str, Any] | str], ...] = ()
     thoughts: str = ""
     cut: bool = False
+    refusal: str = ""
+    """Words with which the model refuses."""
+    filtered: bool = False
+    """Whether a filter holds the reply back, where the format has such."""
 
 
 @dataclass(frozen=True)
@@ -241,7 +245,9 @@ class Chat:
             message["tool_calls"] = calls
         if said.thoughts:
             message["reasoning_content"] = said.thoughts
-        reason = "length" if said.cut else "tool_calls" if calls else "stop"
+        if said.refusal:
+            message["refusal"] = said.refusal
+        reason = "length" if said.cut else "content_filter" if said.filtered else "tool_calls" if calls else "stop"
         choice = {"index": 0, "message": message, "finish_reason": reason, "logprobs": None}
         usage = {
             "prompt_tokens": INPUT_TOKENS,
@@ -271,6 +277,9 @@ class Responses:
         if said.words:
             content: list[dict[str, Any]] = [{"type": "output_text", "text": said.words, "annotations": []}]
             output.append({"type": "message", "id": "msg", "role": "assistant", "status": "completed", "content": content})
+        if said.refusal:
+            refusal = [{"type": "refusal", "refusal": said.refusal}]
+            output.append({"type": "message", "id": "msg", "role": "assistant", "status": "completed", "content": refusal})
         for call_id, (name, arguments) in zip(ids, said.calls, strict=True):
             call = {"type": "function_call", "id": f"fc_{call_id}", "call_id": call_id, "name": name}
             output.append({**call, "arguments": _json(arguments), "status": "completed"})
@@ -281,8 +290,9 @@ class Responses:
             "output_tokens_details": {"reasoning_tokens": 0},
             "total_tokens": INPUT_TOKENS + OUTPUT_TOKENS,
         }
-        status = {"status": "incomplete" if said.cut else "completed"}
-        cut = {"incomplete_details": {"reason": "max_output_tokens"} if said.cut else None}
+        reason = "max_output_tokens" if said.cut else "content_filter" if said.filtered else None
+        status = {"status": "completed" if reason is None else "incomplete"}
+        cut = {"incomplete_details": None if reason is None else {"reason": reason}}
         return {
             "id": "r",
             "object": "response",
@@ -316,11 +326,11 @@ class Messages:
         content: list[dict[str, Any]] = []
         if said.thoughts:
             content.append({"type": "thinking", "thinking": said.thoughts, "signature": "signed"})
-        if said.words:
-            content.append({"type": "text", "text": said.words})
+        if said.words or said.refusal:
+            content.append({"type": "text", "text": said.words or said.refusal})
         for call_id, (name, arguments) in zip(ids, said.calls, strict=True):
             content.append({"type": "tool_use", "id": call_id, "name": name, "input": arguments})
-        reason = "max_tokens" if said.cut else "tool_use" if said.calls else "end_turn"
+        reason = "max_tokens" if said.cut else "refusal" if said.refusal else "tool_use" if said.calls else "end_turn"
         usage = {
             "input_tokens": INPUT_TOKENS - CACHED_TOKENS,
             "cache_read_input_tokens": CACHED_TOKENS,

@@ -220,8 +220,79 @@ def test_a_model_that_calls_nothing_is_asked_once_more(
     assert "You have called no tool" in told[1]
     assert "cut off" in told[3]
     assert len(told) == 4
-    assert result(runs)["ended"] == "finished"
+    came = result(runs)
+    assert came["ended"] == "finished"
+    assert came["usage"]["endings"] == [{"ending": "silent", "text": "I would rather not."}]
     assert "stopped: the model called no tool" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("api", APIS)
+def test_a_model_that_refuses_is_no_model_that_finished(
+    api: str, server: tandem.Server, runs: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wait, refuse = Says(calls=(("wait", {"steps": 5}),)), Says(refusal="I will not move robots.")
+    with ScriptedEndpoint(saying(wait, refuse)) as endpoint:
+        assert run(endpoint, server, api) == 0
+    assert "stopped: the model refused: I will not move robots." in capsys.readouterr().out
+    came = result(runs)
+    assert came["usage"]["endings"] == [{"ending": "refused", "text": "I will not move robots."}]
+    assert (came["ended"], len(endpoint.requests)) == ("finished", 2)
+
+
+@pytest.mark.parametrize("api", ["openai", "openai-chat"])
+def test_a_filter_holds_a_reply_back(api: str, server: tandem.Server, runs: Path) -> None:
+    with ScriptedEndpoint(saying(Says(filtered=True))) as endpoint:
+        assert run(endpoint, server, api) == 0
+    assert result(runs)["usage"]["endings"][0]["ending"] == "content_filter"
+    filtered = Refusal(400, "The response was filtered due to the prompt triggering the content management policy.")
+    with ScriptedEndpoint(saying(), refusals=[filtered]) as endpoint:
+        assert run(endpoint, server, api) == 0
+    assert result(runs)["usage"]["endings"][0]["ending"] == "content_filter"
+
+
+def test_a_terminal_does_not_obey_a_model(server: tandem.Server, capsys: pytest.CaptureFixture[str]) -> None:
+    with ScriptedEndpoint(saying(Says(words="\x1b[2Jgone", calls=(("finish", {}),)))) as endpoint:
+        assert run(endpoint, server) == 0
+    printed = capsys.readouterr().out
+    assert "says: \ufffd[2Jgone" in printed and "\x1b" not in printed
+
+
+def test_what_the_episode_ends_by_is_how_the_model_ended(server: tandem.Server, runs: Path) -> None:
+    with ScriptedEndpoint(saying(Says(words="Enough.", calls=(("finish", {}),)))) as endpoint:
+        assert run(endpoint, server) == 0
+    assert result(runs)["usage"]["endings"] == [{"ending": "finished", "text": ""}]
+
+
+BROKEN: dict[str, Any] = {
+    "an object": {"object": "chat.completion"},
+    "a choice without a message": {"choices": [{"index": 0, "finish_reason": "stop", "message": None}]},
+    "a list": [1, 2],
+}
+
+
+@pytest.mark.parametrize("what", BROKEN)
+def test_a_broken_endpoint_gives_a_line(
+    what: str, server: tandem.Server, runs: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with ScriptedEndpoint(saying()) as endpoint:
+        endpoint.answer = lambda path, body, headers: (200, BROKEN[what])
+        assert run(endpoint, server) == 1
+    printed = capsys.readouterr().err
+    assert printed.startswith("tandem agent: ") and printed.count("\n") == 1, printed
+    assert result(runs)["usage"]["endings"][0]["ending"] == "endpoint"
+
+
+def test_sampling_is_asked_for_and_kept(server: tandem.Server, runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    flags = ["--temperature", "0.2", "--top-p", "0.9", "--extra-body", '{"top_k": 40}']
+    with ScriptedEndpoint(saying(Says(calls=(("finish", {}),)))) as endpoint:
+        assert run(endpoint, server, "openai-chat", *flags, "--sampling-seed", "7") == 0
+    body = endpoint.requests[0].body
+    assert [body[name] for name in ("temperature", "top_p", "seed", "top_k")] == [0.2, 0.9, 7, 40]
+    for api in ("openai", "anthropic"):
+        assert main(["--model", "m", "--api", api, "--sampling-seed", "7"]) == 1
+        assert "takes no --sampling-seed" in capsys.readouterr().err
+    assert main(["--model", "m", "--extra-body", '{"api_key": "secret"}']) == 1
+    assert "secret" not in capsys.readouterr().err
 
 
 LIMITS = {
@@ -330,7 +401,7 @@ def test_wrong_flags_and_missing_packages_say_what_would_work(
         assert says in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "anthropic", None)
     assert main(["--model", "m", "--api", "anthropic"]) == 1
-    assert "pip install 'tandem-sim[agents]'" in capsys.readouterr().err
+    assert "pip install './gateway/python[agents]'" in capsys.readouterr().err
 
 
 def test_the_program_knows_the_flags_that_say_which_model_plays(capsys: pytest.CaptureFixture[str]) -> None:

@@ -25,7 +25,7 @@ TINY = TrainingSettings(steps=6, batch=4, hidden=32, keypoints=4, chunk_rows=4, 
 
 
 def torch() -> Any:
-    return pytest.importorskip("torch", reason="torch is not installed: pip install 'tandem-sim[baselines]'")
+    return pytest.importorskip("torch", reason="torch is not installed: pip install './gateway/python[baselines]'")
 
 
 @pytest.fixture(scope="module")

@@ -173,6 +173,14 @@ def test_refusals_say_what_would_work(server: tandem.Server) -> None:
         tandem.Client("127.0.0.1:8700")
 
 
+def test_rows_are_compared_as_shapes() -> None:
+    with tandem.Episode("handover", 2000, protocol="benchmark") as episode:
+        for shape in ((2,), (35, 2), (2, 35, 5), (2, 34), (1, 2, 35)):
+            with pytest.raises(ValueError, match="rows have the shape"):
+                episode.step(np.zeros(shape))
+        assert episode.step(np.tile([*np.zeros(34), 0.74], (2, 5, 1))).executed_steps == 5
+
+
 def test_tasks_are_listed_alike(server: tandem.Server) -> None:
     assert tandem.tasks() == tandem.Client(server.url).tasks()
     suites = [told.suite for told in tandem.tasks().tasks]

@@ -189,8 +189,21 @@ def test_what_is_not_there_is_refused_with_what_is() -> None:
         make("Handover", camera="A")
     with pytest.raises(Exception, match="have: sparse, dense"):
         make("Handover", reward_type="shaped")
+    with pytest.raises(ValueError, match="no obs_type 'pixel'; have: pixels_agent_pos, pixels, state"):
+        make("Handover", obs_type="pixel")
+    with pytest.raises(TypeError, match=r"look_every is 1\.5; give a whole number"):
+        make("Handover", look_every=1.5)
     env = make("Handover", obs_type="state")
     env.reset()
-    with pytest.raises(Exception, match="give"):
-        env.unwrapped.step(np.zeros(71, np.float32))
+    for shape in ((71,), (35, 2), (1, 35, 2), (2, 1, 35), (70, 1)):
+        with pytest.raises(ValueError, match="actions have the shape"):
+            env.unwrapped.step(np.zeros(shape, np.float32))
+    env.close()
+
+
+def test_pixels_are_pixels_alone() -> None:
+    env = make("Handover", obs_type="pixels", observation_width=np.int64(32), observation_height=24)
+    assert set(env.observation_space.spaces) == {"pixels"}
+    observation, _ = env.reset(seed=np.int64(2000))
+    assert set(observation) == {"pixels"} and observation["pixels"]["A"].shape == (24, 32, 3)
     env.close()

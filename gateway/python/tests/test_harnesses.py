@@ -116,6 +116,12 @@ def test_inspect_robots_evaluates_episodes_by_their_seeds(tmp_path: Path) -> Non
 def test_openenv_steps_by_tools() -> None:
     pytest.importorskip("openenv")
     module: Any = importlib.import_module("openenv_tandem")
+    running = module.TandemEnvironment()
+    begun = running.reset(seed=2000)
+    with pytest.raises(tandem.TandemError):
+        running.reset(task="handove")
+    assert begun.reply and running.step(module.TandemAction(tool="get_status")).problem is None, "it goes on"
+    running.close()
     env, action = module.TandemEnvironment(), module.TandemAction
     with pytest.raises(RuntimeError, match="call reset first"):
         env.step(action(tool="observe"))

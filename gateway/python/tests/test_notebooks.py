@@ -20,10 +20,10 @@ FURTHER = {"policy_trained_and_compared": (("av", "pyarrow", "torch"), "baseline
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebooks_run(path: Path, tmp_path: Path) -> None:
     for needed in ("ipykernel", "jupytext", "matplotlib", "nbclient"):
-        pytest.importorskip(needed, reason=f"{needed} is not installed: pip install 'tandem-sim[notebook]'")
+        pytest.importorskip(needed, reason=f"{needed} is not installed: pip install './gateway/python[notebook]'")
     further, extra = FURTHER.get(path.stem, ((), ""))
     for needed in further:
-        pytest.importorskip(needed, reason=f"{needed} is not installed: pip install 'tandem-sim[{extra}]'")
+        pytest.importorskip(needed, reason=f"{needed} is not installed: pip install './gateway/python[{extra}]'")
     jupytext: Any = import_module("jupytext")
     nbclient: Any = import_module("nbclient")
     notebook = jupytext.read(path)

@@ -83,14 +83,17 @@ def post(server: tandem.PolicyServer, path: str, body: bytes) -> tuple[int, str]
         return error.code, error.read().decode()
 
 
-def test_what_goes_wrong_is_told() -> None:
+def test_what_goes_wrong_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     def infer(observation: dict[str, Any], memory: dict[str, Any]) -> dict[str, Any]:
         return {"doubled": 2 * observation["x"]}
 
     array = {"__numpy__": base64.b64encode(np.array([1.5, -2], "<f4").tobytes()).decode(), "dtype": "<f4", "shape": [1, 2]}
     with tandem.serve_policy(infer) as server:
         assert post(server, "/act", json.dumps({"x": array}).encode()) == (200, '{"doubled": [[3.0, -4.0]]}')
-        assert post(server, "/act", b"{}") == (500, "KeyError: 'x'")
+        for _ in range(2):
+            assert post(server, "/act", b"{}") == (500, "KeyError: 'x'")
+        printed = capsys.readouterr().err
+        assert printed.count("Traceback") == 1 and "in infer" in printed
         assert post(server, "/A", b"{}") == (404, "no policy at /A; have: /act")
         status, said = post(server, "/act", b"?")
         assert status == 400 and "json_numpy" in said

@@ -16,7 +16,7 @@ from walkers import NotingWalker, fail, walk
 
 import tandem
 
-ray: Any = pytest.importorskip("ray", reason="Ray is not installed: pip install 'tandem-sim[ray]'")
+ray: Any = pytest.importorskip("ray", reason="Ray is not installed: pip install './gateway/python[ray]'")
 
 SEEDS = range(2020, 2026)
 EXAMPLE = Path(__file__).parents[2] / "examples/environments/rollouts.py"

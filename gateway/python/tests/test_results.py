@@ -169,6 +169,33 @@ def test_a_policy_that_raises_leaves_its_recordings_whole(tmp_path: Path) -> Non
     assert failed.tasks["handover"].policy_failed == 1
 
 
+def test_a_policy_that_cannot_play_is_told_of_once_and_stopped(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    begun: list[int] = []
+
+    def broken(episode: tandem.Episode) -> None:
+        begun.append(episode.seed)
+        raise AttributeError("no weights")
+
+    with pytest.raises(tandem.TandemError, match=r"failed alike in the first 3 episodes .AttributeError: no weights"):
+        tandem.evaluate(broken, "handover", range(2000, 2009), out=tmp_path)
+    assert begun == [2000, 2001, 2002]
+    printed = capsys.readouterr().err
+    assert printed.count("Traceback") == 1 and "in broken" in printed
+
+
+def test_seeds_may_be_numbers_of_numpy() -> None:
+    def policy(episode: tandem.Episode) -> None:
+        episode.wait(1)
+
+    played = tandem.evaluate(policy, "handover", np.arange(2007, 2009))
+    assert [result.seed for result in played.results] == [2007, 2008]
+    assert tandem.Episode("handover", np.int64(2007)).seed == 2007  # pyright: ignore[reportArgumentType]
+    with pytest.raises(ValueError, match="more than 100000 seeds"):
+        tandem.evaluate(policy, "handover", range(2**32))
+    with pytest.raises(TypeError, match="give a whole number"):
+        tandem.Episode("handover", 1.5)  # pyright: ignore[reportArgumentType]
+
+
 def test_players_are_named_and_collected(tmp_path: Path) -> None:
     shown = tandem.collect("handover", 2007, out=tmp_path, protocol="benchmark")
     played = tandem.evaluate("expert", "handover", 2007, protocol="benchmark", assistance="full")

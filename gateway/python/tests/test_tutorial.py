@@ -52,6 +52,6 @@ def test_the_commands_run(tmp_path: Path) -> None:
     page = (tmp_path / "runs/pouring/report.html").read_text()
     assert "open-loop" in page
     if not learns:
-        pytest.skip("torch is not installed: pip install 'tandem-sim[baselines]'; all but training and playing ran")
+        pytest.skip("torch is not installed: pip install './gateway/python[baselines]'; all but training and playing ran")
     assert "chunk" in page
     assert len((tmp_path / "runs/pouring/chunk/training.csv").read_text().splitlines()) == 3

@@ -12,7 +12,7 @@ use std::{
     thread,
 };
 
-use tandem_episodes::tasks;
+use tandem_episodes::{shell_word, tasks};
 use tandem_tools_spec::Assistance;
 use tracing_subscriber::filter::LevelFilter;
 
@@ -42,7 +42,7 @@ const NO_CHILD: u32 = 0;
 const INTERRUPTED: i32 = 130;
 
 /// Have a language model play a task, by any endpoint that speaks OpenAI's or Anthropic's formats. Python plays: pip install
-/// 'tandem-sim[agents]'. Keys are read from the environment: OPENAI_API_KEY, ANTHROPIC_API_KEY.
+/// './gateway/python[agents]' in a checkout of the repository. Keys are read from the environment: OPENAI_API_KEY, ANTHROPIC_API_KEY.
 #[allow(
     rustdoc::broken_intra_doc_links,
     reason = "the command line's help names an extra of the wheel, and no link"
@@ -114,7 +114,7 @@ pub fn run(args: AgentArgs) -> CommandResult {
     server.stop();
     println!(
         "to look at it in a browser: tandem serve --runs {}, and the link that it prints",
-        runs.display()
+        shell_word(&runs.to_string_lossy())
     );
     Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
 }

@@ -12,6 +12,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use tandem_episodes::{
     EpisodeSpec, Facts,
     players::{self, Episode, PlayerError, PrivilegedEpisode, experts},
+    shell_word,
     tasks::{self, Task},
 };
 use tandem_tools_spec::{CommandReply, Protocol, ResultReply, StartEpisode, ToolCall, ToolReply};
@@ -126,7 +127,7 @@ fn print_result(task: &Task, result: &ResultReply, folder: &Path) {
         Some(reason) => println!("  not everything was written: {reason}"),
         None => {
             println!("  {}: result.json, episode.mcap, strip.png, report.html", folder.display());
-            let runs = folder.parent().unwrap_or(folder).display();
+            let runs = shell_word(&folder.parent().unwrap_or(folder).to_string_lossy());
             println!(
                 "  to look at it step by step in a browser: tandem serve --runs {runs}, and the link that it prints"
             );

@@ -7,7 +7,8 @@ use clap::Subcommand;
 use super::CommandResult;
 use crate::drivers::{PythonModule, PythonPart};
 
-/// Make data sets of recordings, for those who train policies. Python writes them: pip install 'tandem-sim[lerobot]'.
+/// Make data sets of recordings, for those who train policies. Python writes them: pip install
+/// './gateway/python[lerobot]' in a checkout of the repository.
 #[allow(
     rustdoc::broken_intra_doc_links,
     reason = "the command line's help names an extra of the wheel, and no link"

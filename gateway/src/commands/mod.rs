@@ -23,15 +23,17 @@ use std::{
     process::ExitCode,
 };
 
+use tandem_episodes::printable;
+
 pub use flags::Seeds;
 
 /// What a subcommand ends with: an error is printed and is a failure, too.
 pub type CommandResult = Result<ExitCode, Box<dyn Error>>;
 
-/// Prints a text that other programs may read. One that has read enough and has gone is no error.
+/// Prints a text that other programs may read, without what a terminal would obey. One that has read enough and has gone is no error.
 fn print(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
-    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+    match out.write_all(printable(text).as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error),
         _ => Ok(()),
     }

@@ -11,7 +11,9 @@ use tandem_episodes::replay::{
     Difference, DrawnPictures, EpisodeCamera, PictureSize, PicturesPlan, Verdict, Verification, draw_all,
     film, verify,
 };
-use tandem_episodes::{Checkpoint, EpisodeSpec, FAILED_STEP_FILE, Recording, RendererKind, Session};
+use tandem_episodes::{
+    Checkpoint, EpisodeSpec, FAILED_STEP_FILE, Recording, RendererKind, Session, printable,
+};
 use tandem_tools_spec::ResultReply;
 
 use super::CommandResult;
@@ -137,7 +139,7 @@ fn failed_step(path: &Path, args: &ReplayArgs) -> Result<bool, Box<dyn std::erro
     let spec = checkpoint.spec();
     let (task, seed, protocol) = (spec.task.id, spec.seed, spec.protocol);
     println!("{}: {task} seed {seed}, {protocol}", path.display());
-    println!("  the simulator failed {}", failed.failure);
+    println!("  the simulator failed {}", printable(&failed.failure));
     if !args.verify {
         return Ok(true);
     }
@@ -151,8 +153,9 @@ fn failed_step(path: &Path, args: &ReplayArgs) -> Result<bool, Box<dyn std::erro
 fn describe(recording: &Recording) {
     let spec = &recording.spec;
     let (task, seed, protocol) = (spec.task.id, spec.seed, spec.protocol);
-    println!("{}: {task} seed {seed}, {protocol}, build {}", recording.path().display(), recording.build);
-    println!("  {}", told(spec, recording.result.as_ref()));
+    let (task, build) = (printable(task), printable(&recording.build));
+    println!("{}: {task} seed {seed}, {protocol}, build {build}", recording.path().display());
+    println!("  {}", printable(&told(spec, recording.result.as_ref())));
     match &recording.result {
         Some(result) => {
             let reached = result.phases.0.iter().filter(|(_, time_s)| time_s.is_some()).count();

@@ -8,7 +8,7 @@ use tandem_episodes::reports::{
     EvaluationReport, Film, FilmContent, FilmPlace, FilmedEpisode, ReportFormat, ReportPictures,
     failure_moments, film_places, gallery, load, pictured_failures,
 };
-use tandem_episodes::{Recording, write_whole};
+use tandem_episodes::{Recording, printable, write_whole};
 
 use super::CommandResult;
 use crate::settings::one_of;
@@ -59,7 +59,7 @@ pub fn run(args: ReportArgs) -> CommandResult {
     };
     let episodes = loaded.episodes.len();
     println!("{}: {episodes} episodes{excluded}{films}, {size_mb:.1} MB", path.display());
-    loaded.skipped.iter().for_each(|skipped| eprintln!("left out: {skipped}"));
+    loaded.skipped.iter().for_each(|skipped| eprintln!("left out: {}", printable(skipped)));
     Ok(ExitCode::SUCCESS)
 }
 

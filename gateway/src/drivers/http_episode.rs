@@ -1,6 +1,11 @@
 //! A client of one episode over HTTP, as a policy written in Rust would use it.
 
-use std::{net::SocketAddr, time::Duration};
+use std::{
+    fmt::Write,
+    io,
+    net::SocketAddr,
+    time::{Duration, SystemTime, UNIX_EPOCH},
+};
 
 use serde::Serialize;
 use serde_json::Value;
@@ -8,8 +13,11 @@ use tandem_episodes::players::{Episode, PlayerError};
 use tandem_tools_spec::{Driving, ProblemBody, ResultReply, StartEpisode, StartReply, ToolCall, ToolReply};
 use ureq::{Agent, http::Response};
 
-/// Longer than any call takes: the slowest, the start with its initial hold, takes a few seconds.
-const TIMEOUT: Duration = Duration::from_secs(120);
+/// Longer than any call is held: that of an operator waits up to 600 s for its partners.
+const TIMEOUT: Duration = Duration::from_secs(720);
+
+/// By this, a request that is sent again is carried out once.
+const KEY: &str = "idempotency-key";
 
 /// An episode on a server.
 #[derive(Debug)]
@@ -56,6 +64,8 @@ impl HttpEpisode {
     ) -> Result<(HttpEpisode, StartReply), HttpError> {
         let agent = Agent::config_builder()
             .http_status_as_error(false)
+            // The server is near, whatever proxy leads elsewhere.
+            .proxy(None)
             // A limit on the whole call would have ureq look up the address of each on a thread of its own.
             .timeout_recv_response(Some(TIMEOUT))
             .timeout_recv_body(Some(TIMEOUT))
@@ -85,8 +95,39 @@ impl Episode for HttpEpisode {
     }
 }
 
+/// Posts a request, and again where its connection breaks: its key has it carried out once.
 fn post(agent: &Agent, url: &str, body: &impl Serialize) -> Result<Value, HttpError> {
-    reply(agent.post(url).send_json(body)?)
+    let key = new_key();
+    let send = || agent.post(url).header(KEY, &key).send_json(body);
+    match send() {
+        Err(ureq::Error::Io(error)) if is_broken(&error) => reply(send()?),
+        sent => reply(sent?),
+    }
+}
+
+/// Whether a connection is gone that was there.
+fn is_broken(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::BrokenPipe
+            | io::ErrorKind::ConnectionAborted
+            | io::ErrorKind::ConnectionReset
+            | io::ErrorKind::UnexpectedEof
+    )
+}
+
+/// A key that no other request has.
+fn new_key() -> String {
+    let mut bytes = [0; 16];
+    if getrandom::fill(&mut bytes).is_err() {
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        return format!("{}", now.as_nanos());
+    }
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        // Writing to a text cannot fail.
+        let _ = write!(text, "{byte:02x}");
+        text
+    })
 }
 
 fn reply(mut response: Response<ureq::Body>) -> Result<Value, HttpError> {

@@ -17,7 +17,10 @@ pub use http_episode::HttpEpisode;
 pub use people::People;
 pub use program::Program;
 pub use python::{PythonError, PythonModule, PythonPart};
-pub use remote::{MapError, PRESETS, PolicyMap, PolicyProtocol, RemoteError, RemotePolicy, preset, try_map};
+pub use remote::{
+    MapError, PRESETS, PolicyKey, PolicyKeyError, PolicyMap, PolicyProtocol, RemoteError, RemotePolicy,
+    preset, try_map,
+};
 
 /// Removes the result that an interrupted run has left.
 fn remove_old_result(path: &Path) -> Result<(), PlayError> {

@@ -25,7 +25,7 @@ pub enum PythonError {
     /// There is no interpreter.
     #[error(
         "{} by Python, and {python} cannot be started ({source}); install Python 3.10 or later and \
-         pip install 'tandem-sim[{}]', or name an interpreter that has it by {PYTHON_VARIABLE}",
+         pip install './gateway/python[{}]' in a checkout of the repository, or name an interpreter that has it by {PYTHON_VARIABLE}",
         part.what(), part.extra()
     )]
     NoPython {
@@ -38,8 +38,8 @@ pub enum PythonError {
     },
     /// The interpreter has no such package.
     #[error(
-        "{} by Python's package, which {python} does not have; pip install 'tandem-sim[{}]', or name an \
-         interpreter that has it by {PYTHON_VARIABLE}",
+        "{} by Python's package, which {python} does not have; pip install './gateway/python[{}]' in a checkout of the \
+         repository, or name an interpreter that has it by {PYTHON_VARIABLE}",
         part.what(), part.extra()
     )]
     NoPackage {

@@ -27,7 +27,7 @@ use super::{
 use crate::metrics::Metrics;
 
 /// Calls that may wait for one episode. A policy has no use for more than one at a time; a few more are a burst.
-const WAITING_CALLS: usize = 16;
+pub const WAITING_CALLS: usize = 16;
 
 /// The contact solver keeps large temporaries on the stack.
 const STACK_BYTES: usize = 8 << 20;

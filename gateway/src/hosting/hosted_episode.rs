@@ -87,6 +87,8 @@ impl HostedEpisode {
     /// Keeps a note of who started the episode, or of an operator.
     pub async fn note(&self, who: &Caller, note: Note) -> Result<(), HostingError> {
         self.admit(who)?;
+        let own = self.team.as_ref().zip(who.robot());
+        let _place = own.map(|(team, robot)| team.take_place(robot)).transpose()?;
         self.thread.note(who.robot(), note).await
     }
 

@@ -32,6 +32,7 @@ pub fn router(app: AppState, gate: Gate, limits: Limits) -> Router {
         .method_not_allowed_fallback(no_method)
         // The gate has a limit of its own.
         .layer(DefaultBodyLimit::disable())
+        .layer(middleware::from_fn_with_state(limits.clone(), limits::take_place))
         .layer(middleware::from_fn_with_state(gate, gate::pass))
         .layer(middleware::from_fn_with_state(app.clone(), log_and_describe))
         .with_state(app.clone());
@@ -40,7 +41,7 @@ pub fn router(app: AppState, gate: Gate, limits: Limits) -> Router {
         .fallback_service(routed)
         .layer(middleware::from_fn_with_state(app.clone(), tokens::identify))
         // Before it, so that nobody tries tokens faster than requests are let in.
-        .layer(middleware::from_fn_with_state(limits, limits::pass))
+        .layer(middleware::from_fn_with_state(limits, limits::pass_rate))
         .layer(middleware::from_fn_with_state(app, count_refusal))
 }
 

@@ -8,7 +8,11 @@ use tokio::{net::TcpListener, runtime::Runtime, sync::oneshot, task::JoinHandle,
 
 use super::{
     app::AppState,
-    gate::{Gate, connections, limits::Limits},
+    gate::{
+        Gate,
+        connections::{self, ConnectionLimits},
+        limits::Limits,
+    },
     pages::{WATCH, operate::OPERATE},
     router::router,
     watching::WatchKey,
@@ -20,6 +24,9 @@ use crate::{
 
 /// How many threads serve requests: these only parse, wait and answer, because the worlds have threads of their own.
 const HTTP_THREADS: usize = 2;
+
+/// Connections of one address that may always wait for a request, however few requests may be under way.
+const MIN_WAITING_PER_ADDRESS: usize = 64;
 
 /// How long requests that are still arriving at the end may take.
 const REQUEST_GRACE: Duration = Duration::from_secs(5);
@@ -84,7 +91,10 @@ impl Server {
             listener,
             certificate,
             router,
-            settings.request_timeout,
+            ConnectionLimits {
+                header: settings.request_timeout,
+                max_waiting_per_address: settings.max_requests.max(MIN_WAITING_PER_ADDRESS),
+            },
             stopped,
         ));
         runtime.spawn(end_abandoned_episodes(table.clone()));

@@ -6,6 +6,7 @@ use std::{
     sync::Arc,
 };
 
+use tandem_episodes::{MAX_TEXT_BYTES, read_bytes};
 use tokio_rustls::rustls::{
     self, ServerConfig,
     crypto::ring,
@@ -73,13 +74,16 @@ impl Certificate {
     }
 
     fn read(certificate: &Path, key: &Path) -> Result<Certificate, TlsError> {
-        let chain = CertificateDer::pem_file_iter(certificate)
-            .and_then(Iterator::collect::<Result<Vec<_>, _>>)
+        let read = |path: &Path| read_bytes(path, MAX_TEXT_BYTES).map_err(pem::Error::Io);
+        let chain = read(certificate)
+            .and_then(|bytes| CertificateDer::pem_slice_iter(&bytes).collect::<Result<Vec<_>, _>>())
             .map_err(unreadable("the certificate", certificate))?;
         if chain.is_empty() {
             return Err(TlsError::NoCertificate { path: certificate.into() });
         }
-        let secret = PrivateKeyDer::from_pem_file(key).map_err(unreadable("the private key", key))?;
+        let secret = read(key)
+            .and_then(|bytes| PrivateKeyDer::from_pem_slice(&bytes))
+            .map_err(unreadable("the private key", key))?;
         ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
             .with_protocol_versions(&[&TLS13])
             .and_then(|builder| builder.with_no_client_auth().with_single_cert(chain, secret))

@@ -2,6 +2,7 @@
 
 use std::{
     fs,
+    net::TcpListener,
     process::{Command, Output, Stdio},
 };
 
@@ -119,4 +120,16 @@ fn readers_that_have_read_enough_are_no_failure() {
         let output = program.wait_with_output().expect("its end");
         assert!(output.status.success(), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
     }
+}
+
+#[test]
+fn the_demo_reaches_its_own_server_past_a_proxy_that_answers_nothing() {
+    let silent = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let proxy = format!("http://{}", silent.local_addr().expect("an address"));
+    let runs = tempfile::tempdir().expect("a temporary folder");
+    let runs = runs.path().to_str().expect("UTF-8");
+    let variables = ["HTTP_PROXY", "http_proxy", "ALL_PROXY"].map(|name| (name, proxy.as_str()));
+    let output = tandem(&["demo", "--seeds", "2000", "--runs", runs], &variables);
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("  p1 grasp_and_lift reached"), "{text}");
 }

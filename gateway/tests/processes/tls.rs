@@ -2,14 +2,21 @@
 
 use std::{
     io::{BufRead, BufReader, Read, Write},
-    net::TcpStream,
+    net::{TcpListener, TcpStream},
     path::Path,
     process::{Child, Command, Stdio},
-    sync::Arc,
+    sync::{Arc, mpsc},
+    thread,
 };
 
 use tokio_rustls::rustls::{
-    ClientConfig, ClientConnection, RootCertStore, StreamOwned, crypto::ring, pki_types::CertificateDer,
+    ClientConfig, ClientConnection, RootCertStore, ServerConfig, ServerConnection, StreamOwned,
+    crypto::ring,
+    pki_types::{CertificateDer, PrivateKeyDer},
+};
+use tungstenite::{
+    Message,
+    handshake::server::{Request, Response},
 };
 
 /// A server with a certificate.
@@ -110,4 +117,147 @@ fn files_that_are_no_certificate_and_its_key_are_refused_at_launch() {
     assert!(half.contains("give --tls-cert FILE"), "{half}");
     let missing = launched(&["--tls-key", "key.pem", "--tls-cert", "cert.pem"]);
     assert!(missing.contains("the certificate in cert.pem"), "{missing}");
+}
+
+/// What a policy's server sees of a client, and what `tandem evaluate` says when it is answered by an error.
+struct Asked {
+    authorization: String,
+    said: String,
+}
+
+/// A connection of a policy's server.
+type Secured = StreamOwned<ServerConnection, TcpStream>;
+
+/// Has a policy be asked at an encrypted server, which `serve` answers, by an evaluation that trusts it or does not.
+fn ask_policy(protocol: &str, scheme: &str, trusts: bool, serve: fn(Secured) -> String) -> Asked {
+    let place = tempfile::tempdir().unwrap();
+    let made = rcgen::generate_simple_self_signed(["127.0.0.1".to_owned()]).unwrap();
+    std::fs::write(place.path().join("cert.pem"), made.cert.pem()).unwrap();
+    std::fs::write(place.path().join("key.txt"), "secret-of-mine\n").unwrap();
+    let map = "preset = \"openpi\"\nconnect_s = 0.0\nreply_s = 20.0\n";
+    std::fs::write(place.path().join("map.toml"), map).unwrap();
+    let key = PrivateKeyDer::try_from(made.signing_key.serialize_der()).unwrap();
+    let config = ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
+        .with_safe_default_protocol_versions()
+        .unwrap()
+        .with_no_client_auth()
+        .with_single_cert(vec![made.cert.der().clone()], key)
+        .unwrap();
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    let (tell, told) = mpsc::channel();
+    thread::spawn(move || {
+        let config = Arc::new(config);
+        for stream in listener.incoming() {
+            let mut stream =
+                StreamOwned::new(ServerConnection::new(config.clone()).unwrap(), stream.unwrap());
+            if stream.conn.complete_io(&mut stream.sock).is_ok() {
+                let _ = tell.send(serve(stream));
+            }
+        }
+    });
+    // It takes connections and answers nothing: what is on this machine is reached without it.
+    let silent = TcpListener::bind("127.0.0.1:0").unwrap();
+    let proxy = format!("http://{}", silent.local_addr().unwrap());
+    let mut program = Command::new(env!("CARGO_BIN_EXE_tandem"));
+    program
+        .args([
+            "evaluate",
+            "--protocol",
+            "benchmark",
+            "--tasks",
+            "handover",
+            "--seeds",
+            "2000",
+            "--out",
+            "out",
+        ])
+        .args(["--policy-map", "map.toml", "--policy-key-file", "key.txt", "--policy"])
+        .arg(format!("{protocol}:{scheme}://{address}/act"))
+        .envs(["HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"].map(|name| (name, &proxy)))
+        .current_dir(place.path());
+    if trusts {
+        program.env("SSL_CERT_FILE", "cert.pem");
+    }
+    let output = program.output().unwrap();
+    let said =
+        [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+    Asked { authorization: told.try_recv().unwrap_or_default(), said }
+}
+
+/// openpi's server: who it is, then an error.
+fn serve_openpi(stream: Secured) -> String {
+    let mut authorization = String::new();
+    let keep = |request: &Request, response: Response| {
+        authorization = request.headers()["authorization"].to_str().unwrap().to_owned();
+        Ok(response)
+    };
+    let mut socket = tungstenite::accept_hdr(stream, keep).unwrap();
+    socket.send(Message::binary(b"\x80".to_vec())).unwrap();
+    while !socket.read().unwrap().is_binary() {}
+    socket.send(Message::text("no weights")).unwrap();
+    let _ = socket.read();
+    authorization
+}
+
+/// `/act`: an error.
+fn serve_act(stream: Secured) -> String {
+    let mut reader = BufReader::new(stream);
+    let (mut authorization, mut length) = (String::new(), 0);
+    loop {
+        let mut line = String::new();
+        reader.read_line(&mut line).unwrap();
+        match line.trim().split_once(": ") {
+            Some((name, value)) if name.eq_ignore_ascii_case("authorization") => authorization = value.into(),
+            Some((name, value)) if name.eq_ignore_ascii_case("content-length") => {
+                length = value.parse().unwrap()
+            }
+            Some(_) => {}
+            None if line.trim().is_empty() => break,
+            None => {}
+        }
+    }
+    reader.read_exact(&mut vec![0; length]).unwrap();
+    let answer = "HTTP/1.1 500 No\r\ncontent-length: 10\r\nconnection: close\r\n\r\nno weights";
+    reader.get_mut().write_all(answer.as_bytes()).unwrap();
+    authorization
+}
+
+#[test]
+fn policies_are_asked_encrypted_and_with_their_key() {
+    let openpi = ask_policy("openpi", "wss", true, serve_openpi);
+    assert!(openpi.said.contains("failed: no weights"), "{}", openpi.said);
+    assert_eq!(openpi.authorization, "Api-Key secret-of-mine");
+    let act = ask_policy("act", "https", true, serve_act);
+    assert!(act.said.contains("no weights"), "{}", act.said);
+    assert_eq!(act.authorization, "Bearer secret-of-mine");
+    for asked in
+        [ask_policy("openpi", "wss", false, serve_openpi), ask_policy("act", "https", false, serve_act)]
+    {
+        assert!(asked.said.contains("certificate"), "{}", asked.said);
+        assert_eq!(asked.authorization, "", "nobody who is not trusted sees the key");
+    }
+}
+
+#[test]
+fn a_key_is_sent_to_nobody_who_could_be_overheard() {
+    let place = tempfile::tempdir().unwrap();
+    let launched = |key: &str, policy: &str| {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_tandem"));
+        let flags =
+            ["evaluate", "--tasks", "handover", "--seeds", "2000", "--out", "out", "--policy-map", "openpi"];
+        let ended = program.args(flags).args(["--policy", policy]).env("TANDEM_POLICY_KEY", key);
+        let ended = ended.current_dir(place.path()).output().unwrap();
+        assert!(!ended.status.success());
+        String::from_utf8(ended.stderr).unwrap()
+    };
+    for (policy, says) in [
+        ("openpi:ws://a.example:1", "give openpi:wss://HOST"),
+        ("act:http://a.example/act", "give act:https://HOST"),
+    ] {
+        let said = launched("secret-of-mine", policy);
+        assert!(said.contains(says) && !said.contains("secret"), "{said}");
+    }
+    let said = launched("", "openpi:wss://a.example");
+    assert!(said.contains("TANDEM_POLICY_KEY has to be one line"), "{said}");
 }

@@ -1,6 +1,6 @@
 // The first page: a card for every episode that runs or has ended.
 
-import { ask, element, words } from "./dom.js";
+import { ask, element, endOf, words } from "./dom.js";
 
 const EVERY_MS = 1500;
 /** How wide a strip's cells are. */
@@ -76,7 +76,7 @@ function finishedCard({ run, result, ended_unix_s: endedS, recorded, strip }) {
   const inside = [
     strip ? element("div", { class: "strip" }, lastMoment(`/watch/file?run=${encodeURIComponent(run)}&file=strip.png`)) : null,
     element("div", { class: "line" }, element("strong", {}, words(result.task)), badge(`${reached} of ${phases.length} phases`, done ? "good" : "bad")),
-    element("div", { class: "soft" }, `seed ${result.seed}, ${result.protocol}, ${words(result.ended)}`),
+    element("div", { class: "soft" }, `seed ${result.seed}, ${result.protocol}, ${endOf(result)}`),
     element("div", {}, `${(result.env_steps / 50).toFixed(1)} s, ${result.tool_calls} calls, ${result.falls} falls`),
     element("div", { class: "soft id" }, `${run}, ${new Date(1000 * endedS).toLocaleString()}`),
   ];

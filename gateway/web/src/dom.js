@@ -21,6 +21,12 @@ export function say(node, text) {
 
 export const words = (name) => String(name).replaceAll("_", " ");
 
+/** How an episode ended: by the end of a model's play, where that says more, else by its own. */
+export function endOf(result) {
+  const own = (result.usage?.endings ?? []).filter(({ ending }) => ending !== "success" && ending !== "finished");
+  return own.map(({ robot, ending }) => (robot ? `${robot}: ` : "") + words(ending)).join(", ") || words(result.ended);
+}
+
 /** The colour that the style sheet calls `name`. */
 export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 

@@ -1,7 +1,7 @@
 // The page of one episode, running or finished.
 
 import { badge } from "./cards.js";
-import { ask, element, say, words } from "./dom.js";
+import { ask, element, endOf, say, words } from "./dom.js";
 import { Frame, readScene } from "./message.js";
 import { BudgetPlots, Plots } from "./plots.js";
 import { Pace, Stage } from "./stage.js";
@@ -326,7 +326,7 @@ class EpisodePage {
     if (!result && this.closed) return this.state.replaceChildren(badge("closed", ""));
     if (!result) return this.state.replaceChildren(badge(this.recorded ? "interrupted" : "live", this.recorded ? "bad" : "live"));
     const missing = this.head.phases.length - this.reached.size;
-    this.state.replaceChildren(badge(words(result.ended), missing ? "bad" : "good"));
+    this.state.replaceChildren(badge(endOf(result), missing ? "bad" : "good"));
     if (this.closed) {
       say(this.problem, "");
       this.state.append(" ", element("a", { href: `/watch?run=${encodeURIComponent(this.wanted.episode)}` }, "Look at it again"));

@@ -10,7 +10,10 @@ use image::ImageReader;
 use rapier3d::math::Vector;
 
 use super::{Document, vector};
-use crate::SimError;
+use crate::{
+    SimError,
+    user_file::{open_regular, with_own_separators},
+};
 
 /// Triangles as a file has them, in metres, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,7 +29,7 @@ impl Document {
         for asset in &self.model.assets.meshes {
             if let Some(path) = self.model.resolve_mesh_file(asset, &self.folder) {
                 let name = asset.name.clone().unwrap_or_default();
-                found.insert(name, Arc::new(self.read_mesh(asset, &path)?));
+                found.insert(name, Arc::new(self.read_mesh(asset, &with_own_separators(path))?));
             }
         }
         Ok(found)
@@ -37,7 +40,7 @@ impl Document {
         let mut found = BTreeMap::new();
         for asset in &self.model.assets.textures {
             if let Some(path) = self.model.resolve_texture_file(asset, &self.folder) {
-                found.insert(asset.name.clone().unwrap_or_default(), mean_rgb(&path)?);
+                found.insert(asset.name.clone().unwrap_or_default(), mean_rgb(&with_own_separators(path))?);
             }
         }
         Ok(found)
@@ -65,7 +68,7 @@ impl Document {
 /// Reads a file of the kind that its name says.
 fn read(path: &Path) -> Result<Mesh, SimError> {
     let kind = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    let open = || File::open(path).map(BufReader::new).map_err(|source| unreadable(path, source));
+    let open = || open_regular(path).map(BufReader::new).map_err(|source| unreadable(path, source));
     match kind.as_str() {
         "obj" => read_obj(path, open()?),
         "stl" => read_stl(path, open()?),
@@ -105,7 +108,9 @@ fn read_stl(path: &Path, mut file: BufReader<File>) -> Result<Mesh, SimError> {
 
 fn mean_rgb(path: &Path) -> Result<[f32; 3], SimError> {
     let name = || path.display().to_string();
-    let reader = ImageReader::open(path).map_err(|source| SimError::Read { path: name(), source })?;
+    let file = open_regular(path).map_err(|source| unreadable(path, source))?;
+    let reader = ImageReader::new(BufReader::new(file)).with_guessed_format();
+    let reader = reader.map_err(|source| unreadable(path, source))?;
     let picture = reader.decode().map_err(|source| SimError::Texture { path: name(), source })?.into_rgb8();
     let mut sum = [0.0f64; 3];
     for pixel in picture.pixels() {

@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 
 use roxmltree::Node;
 
-use crate::SimError;
+use crate::{
+    SimError,
+    user_file::{MAX_TEXT_BYTES, read_text, with_own_separators},
+};
 
 /// XML text without `<include>`.
 #[derive(Debug)]
@@ -115,10 +118,10 @@ impl MjcfText {
         if include.children().any(|child| child.is_element()) {
             return Err(refuse("<include> holds elements; put them behind it".into()));
         }
-        let beside = folder.join(name);
-        let path = if beside.exists() { beside } else { self.folder.join(name) };
+        let beside = with_own_separators(folder.join(name));
+        let path = if beside.exists() { beside } else { with_own_separators(self.folder.join(name)) };
         let shown = path.display().to_string();
-        let text = std::fs::read_to_string(&path)
+        let text = read_text(&path, MAX_TEXT_BYTES)
             .map_err(|source| SimError::Read { path: shown.clone(), source })?;
         let path = path.canonicalize().unwrap_or(path);
         if self.files.iter().any(|file| file.path.as_ref() == Some(&path)) {

@@ -163,6 +163,23 @@ fn who_watches_sees_steps_calls_and_pictures_until_the_end() {
 }
 
 #[test]
+fn who_asks_whether_anybody_is_there_is_answered() {
+    let server = TestServer::start();
+    let id = server.episode("benchmark");
+    let mut socket = watch(&server, &id);
+    for payload in ["there?", "", "still?"] {
+        socket.send(Message::Ping(payload.into())).expect("a ping");
+        let pong = std::iter::from_fn(|| Some(socket.read().expect("an open socket"))).find(Message::is_pong);
+        assert_eq!(pong, Some(Message::Pong(payload.into())));
+    }
+    server.tool(&id, "wait", &json!({ "steps": 5 })).ok();
+    assert!(socket.read().expect("an open socket").is_binary(), "a step is told as before");
+    socket.close(None).expect("a close");
+    let last = std::iter::from_fn(|| socket.read().ok()).last();
+    assert!(last.is_some_and(|message| message.is_close()), "a close is answered by another");
+}
+
+#[test]
 fn watching_changes_nothing() {
     let play = |watchers: usize| {
         let server = TestServer::start();

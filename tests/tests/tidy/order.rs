@@ -12,7 +12,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "sim",
         &[
-            &["units", "sides", "plane", "random", "dynamics", "owner"],
+            &["units", "sides", "plane", "random", "dynamics", "owner", "user_file"],
             &["error"],
             &["assets"],
             &["mjcf"],

@@ -17,6 +17,6 @@ pub use episode::{
     Assistance, Budget, Disclosure, ExtraInformation, Hints, PhaseReached, Protocol, RobotFallen, Wording,
 };
 pub use frames::PoseFrame;
-pub use note::{Note, NoteKind, TokenCount, Usage};
+pub use note::{AgentEnding, ModelEnding, Note, NoteKind, TokenCount, Usage};
 pub use pictures::{Bytes, CameraArrays, DepthFormat, Formats, ImageFormat, PixelRegion, Png};
 pub use quantities::{BASE_COLUMNS, BaseCommand, BaseLimits, JointValues, Pose, Range};

@@ -11,6 +11,8 @@ use crate::tool::read_as;
 
 /// The most characters of a note: more than a model says in one go.
 const MOST_CHARACTERS: usize = 50_000;
+/// The characters that results keep of how a model's play ended.
+const MOST_ENDING_CHARACTERS: usize = 500;
 /// The most characters of a model's name.
 const MOST_NAME_CHARACTERS: usize = 200;
 /// The most tokens, dollars and seconds of one note: what is more has been counted wrongly.
@@ -42,6 +44,60 @@ pub struct Note {
     /// How long the model took, in seconds. Null: not said.
     #[schemars(range(min = 0, max = MOST_SECONDS))]
     pub seconds: Option<f64>,
+    /// How the model's play ends with this note. Null: it goes on.
+    pub ending: Option<AgentEnding>,
+}
+
+/// How the play of a language model ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AgentEnding {
+    /// The task was completed.
+    Success,
+    /// The model called finish.
+    Finished,
+    /// The model refused to go on.
+    Refused,
+    /// A filter of the model's endpoint held back its reply.
+    ContentFilter,
+    /// The model called no tool, several times in turn.
+    Silent,
+    /// The tokens that it may use were used up.
+    TokenLimit,
+    /// The money that it may spend was spent.
+    PriceLimit,
+    /// The calls that it may make were made.
+    CallLimit,
+    /// The time that it may take was over.
+    TimeLimit,
+    /// The conversation became longer than the model can read.
+    Context,
+    /// The model's endpoint gave no reply.
+    Endpoint,
+}
+
+impl AgentEnding {
+    /// What happened, as reports have it.
+    pub fn words(self) -> &'static str {
+        match self {
+            AgentEnding::Success => "the task was completed",
+            AgentEnding::Finished => "the policy ended the episode",
+            AgentEnding::Refused => "the model refused",
+            AgentEnding::ContentFilter => "a content filter held back the model's reply",
+            AgentEnding::Silent => "the model called no tool",
+            AgentEnding::TokenLimit => "the tokens ran out",
+            AgentEnding::PriceLimit => "the money ran out",
+            AgentEnding::CallLimit => "the calls ran out",
+            AgentEnding::TimeLimit => "the agent's time ran out",
+            AgentEnding::Context => "the conversation became too long for the model",
+            AgentEnding::Endpoint => "the model's endpoint gave no reply",
+        }
+    }
+
+    /// Whether the end of the episode says as much.
+    pub fn is_of_the_episode(self) -> bool {
+        matches!(self, AgentEnding::Success | AgentEnding::Finished)
+    }
 }
 
 /// What the words of a note are.
@@ -94,6 +150,7 @@ impl Note {
             usd: Some(0.004),
             model: Some("a-model".into()),
             seconds: Some(2.5),
+            ending: None,
         }
     }
 
@@ -114,7 +171,8 @@ impl Note {
         };
         long("text", &self.text, MOST_CHARACTERS)?;
         long("model", self.model.as_deref().unwrap_or_default(), MOST_NAME_CHARACTERS)?;
-        if self.text.is_empty() && self.tokens.is_none() && self.usd.is_none() && self.seconds.is_none() {
+        let used = self.tokens.is_some() || self.usd.is_some() || self.seconds.is_some();
+        if self.text.is_empty() && !used && self.ending.is_none() {
             return Err("it says nothing; give a text, or the tokens, usd or seconds that were used".into());
         }
         let TokenCount { input, output, cached } = self.tokens.unwrap_or_default();
@@ -154,6 +212,29 @@ pub struct Usage {
     /// The models that notes name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<String>,
+    /// How the play of the models ended: one for all robots, or one for each that has said so.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub endings: Vec<ModelEnding>,
+}
+
+/// How a model's play ended, and its own words for it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ModelEnding {
+    /// The robot that it directed; left out where it directed all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub robot: Option<String>,
+    /// How it ended.
+    pub ending: AgentEnding,
+    /// The words of the model or of its endpoint, as of a refusal; empty where there are none.
+    pub text: String,
+}
+
+impl ModelEnding {
+    /// What happened, with the robot where the model directed one alone.
+    pub fn words(&self) -> String {
+        let words = self.ending.words();
+        self.robot.as_ref().map_or_else(|| words.into(), |robot| format!("{robot}: {words}"))
+    }
 }
 
 impl Usage {
@@ -173,6 +254,16 @@ impl Usage {
         if let Some(model) = note.model.as_ref().filter(|model| !self.models.contains(model)) {
             self.models.push(model.clone());
         }
+        if let Some(ending) = note.ending {
+            let text = note.text.chars().take(MOST_ENDING_CHARACTERS).collect();
+            self.endings.retain(|known| known.robot != note.robot);
+            self.endings.push(ModelEnding { robot: note.robot.clone(), ending, text });
+        }
+    }
+
+    /// How models' play ended where the end of the episode does not say it.
+    pub fn own_endings(&self) -> impl Iterator<Item = &ModelEnding> {
+        self.endings.iter().filter(|ended| !ended.ending.is_of_the_episode())
     }
 }
 
@@ -214,13 +305,31 @@ mod tests {
     }
 
     #[test]
+    fn the_end_of_a_models_play_is_kept_once_for_each_robot() {
+        let said = |robot: Option<&str>, ending: AgentEnding| Note {
+            text: "I cannot do that.".into(),
+            robot: robot.map(str::to_owned),
+            ending: Some(ending),
+            ..Note::default()
+        };
+        let mut usage = Usage::default();
+        usage.add(&said(Some("A"), AgentEnding::Silent));
+        usage.add(&said(Some("A"), AgentEnding::Refused));
+        usage.add(&said(Some("B"), AgentEnding::CallLimit));
+        let words: Vec<String> = usage.own_endings().map(ModelEnding::words).collect();
+        assert_eq!(words, ["A: the model refused", "B: the calls ran out"]);
+    }
+
+    #[test]
     fn what_was_used_adds_up() {
         let mut usage = Usage::default();
         usage.add(&Note { text: "Hm.".into(), ..Note::default() });
         assert_eq!((usage.usd, usage.model_s), (None, None));
         usage.add(&Note::example());
         usage.add(&Note::example());
-        let Usage { notes, input_tokens, output_tokens, cached_tokens, usd, model_s, models } = usage;
+        let Usage { notes, input_tokens, output_tokens, cached_tokens, usd, model_s, models, endings } =
+            usage;
+        assert_eq!(endings, []);
         assert_eq!((notes, input_tokens, output_tokens, cached_tokens), (3, 10420, 168, 9600));
         assert_eq!((usd, model_s, models), (Some(0.008), Some(5.0), vec!["a-model".to_owned()]));
     }

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::Error as _};
 use serde_json::{Map, Value};
 
-use crate::parts::{Assistance, Disclosure, Protocol, Usage};
+use crate::parts::{AgentEnding, Assistance, Disclosure, ModelEnding, Protocol, Usage};
 use crate::tool::Tool;
 
 /// End the episode and get its result. Call it when the task is done or cannot be done any more. After that no
@@ -117,6 +117,34 @@ impl ResultReply {
     }
 }
 
+impl ResultReply {
+    /// How the play of language models ended, in words, where the end of the episode does not say it.
+    pub fn model_endings(&self) -> Option<String> {
+        let endings = self.usage.iter().flat_map(Usage::own_endings);
+        let words: Vec<String> = endings.map(ModelEnding::words).collect();
+        (!words.is_empty()).then(|| words.join(", "))
+    }
+}
+
+impl Usage {
+    /// The same, with how a model's play ended where the episode's end says it and no note does.
+    pub fn ended_by(mut self, reason: EndReason) -> Usage {
+        let ending = match reason {
+            EndReason::TaskComplete => Some(AgentEnding::Success),
+            EndReason::Finished => Some(AgentEnding::Finished),
+            EndReason::StepBudgetExhausted
+            | EndReason::WallClockExhausted
+            | EndReason::Abandoned
+            | EndReason::PolicyFailed
+            | EndReason::SimulatorFailed => None,
+        };
+        if let Some(ending) = ending.filter(|_| !self.models.is_empty() && self.endings.is_empty()) {
+            self.endings.push(ModelEnding { robot: None, ending, text: String::new() });
+        }
+        self
+    }
+}
+
 /// Seconds by the number of the phase, in the task's order; JSON object from `p1`, `p2`, ... to seconds or null.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhaseTimes(pub Vec<(String, Option<f64>)>);
@@ -154,5 +182,26 @@ impl JsonSchema for PhaseTimes {
 
     fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
         schemars::json_schema!({ "type": "object", "additionalProperties": { "type": ["number", "null"] } })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_end_of_an_episode_says_how_a_models_play_ended_where_no_note_does() {
+        let ended = |models: &[&str], reason: EndReason| {
+            let models = models.iter().map(|model| (*model).to_owned()).collect();
+            let usage = Usage { models, ..Usage::default() }.ended_by(reason);
+            usage.endings.first().map(|ended| ended.ending)
+        };
+        assert_eq!(ended(&["m"], EndReason::TaskComplete), Some(AgentEnding::Success));
+        assert_eq!(ended(&["m"], EndReason::Finished), Some(AgentEnding::Finished));
+        assert_eq!(ended(&["m"], EndReason::StepBudgetExhausted), None);
+        assert_eq!(ended(&[], EndReason::Finished), None, "no model has played");
+        let silent = ModelEnding { robot: None, ending: AgentEnding::Silent, text: String::new() };
+        let usage = Usage { models: vec!["m".into()], endings: vec![silent.clone()], ..Usage::default() };
+        assert_eq!(usage.ended_by(EndReason::Finished).endings, [silent]);
     }
 }

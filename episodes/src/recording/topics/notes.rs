@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tandem_tools_spec::{Note, NoteKind, TokenCount};
+use tandem_tools_spec::{AgentEnding, Note, NoteKind, TokenCount};
 
 use super::messages::{CallMoment, JsonMessage};
 
@@ -46,6 +46,10 @@ pub struct NoteMessage {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "f64")]
     pub seconds: Option<f64>,
+    /// How the model's play ended with it; absent where it went on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "String")]
+    pub ending: Option<AgentEnding>,
 }
 
 impl JsonMessage for NoteMessage {
@@ -55,7 +59,7 @@ impl JsonMessage for NoteMessage {
 impl NoteMessage {
     /// The note `note` of this moment, when `/tool_calls` had so many messages.
     pub fn new(at: CallMoment, calls_before: u32, note: Note) -> NoteMessage {
-        let Note { text, kind, robot, tokens, usd, model, seconds } = note;
+        let Note { text, kind, robot, tokens, usd, model, seconds, ending } = note;
         let counted = |of: fn(&TokenCount) -> u32| tokens.as_ref().map(of);
         NoteMessage {
             text,
@@ -70,6 +74,7 @@ impl NoteMessage {
             cached_tokens: counted(|tokens| tokens.cached),
             usd,
             seconds,
+            ending,
         }
     }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use tandem_sim::CONTROL_HZ;
-use tandem_tools_spec::{Budget, EndReason, ResultReply};
+use tandem_tools_spec::{Budget, EndReason, ResultReply, Usage};
 
 use crate::html::{self, escape};
 use crate::protocol::Rules;
@@ -101,11 +101,23 @@ impl EpisodePage<'_> {
             EndReason::PolicyFailed => "The policy itself failed.",
             EndReason::SimulatorFailed => "The simulator failed.",
         };
-        let why = match &self.result.simulator_failure {
-            Some(failure) => format!("The simulator failed {}.", escape(failure)),
-            None => why.into(),
+        let why = match (&self.result.simulator_failure, self.model_endings()) {
+            (Some(failure), _) => format!("The simulator failed {}.", escape(failure)),
+            (None, Some(endings)) => endings,
+            (None, None) => why.into(),
         };
         format!(r#"<span class="{class}">{reached} of {phases} phases reached.</span> {why}"#)
+    }
+
+    /// How the play of models ended, with their own words, where the end of the episode does not say it.
+    fn model_endings(&self) -> Option<String> {
+        let endings = self.result.usage.iter().flat_map(Usage::own_endings);
+        let told = endings.map(|ended| match ended.text.is_empty() {
+            true => format!("{}.", escape(&ended.words())),
+            false => format!("{}: \u{201c}{}\u{201d}.", escape(&ended.words()), escape(&ended.text)),
+        });
+        let told: Vec<String> = told.collect();
+        (!told.is_empty()).then(|| told.join(" "))
     }
 
     fn facts(&self) -> String {

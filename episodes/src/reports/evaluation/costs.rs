@@ -1,9 +1,9 @@
 //! What episodes cost: steps, calls and thinking, and where notes say it, tokens, price and time of models.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
-use tandem_tools_spec::Usage;
+use tandem_tools_spec::{AgentEnding, Usage};
 
 use crate::results::PlayedEpisode;
 
@@ -65,6 +65,55 @@ impl ModelCosts {
     }
 }
 
+/// What was asked of models: for episodes that count, and for those that do not, which cost as much.
+#[derive(Debug, Serialize)]
+pub struct AskedCosts {
+    pub counted: CostSum,
+    pub not_counted: CostSum,
+    /// How the play of models ended, by episode and model, whether the episode counts or not.
+    pub endings: BTreeMap<AgentEnding, usize>,
+}
+
+/// What the notes of some episodes add up to.
+#[derive(Debug, Default, Serialize)]
+pub struct CostSum {
+    /// Episodes that have notes.
+    pub episodes: usize,
+    /// Tokens that were read, those from a cache included.
+    pub input_tokens: u64,
+    pub output_tokens: u64,
+    /// `None` where no note says it.
+    pub usd: Option<f64>,
+}
+
+impl AskedCosts {
+    /// `None` where no episode has notes.
+    pub fn of(counted: &[&PlayedEpisode], not_counted: &[&PlayedEpisode]) -> Option<AskedCosts> {
+        let mut endings = BTreeMap::new();
+        let usages = counted.iter().chain(not_counted).filter_map(|played| played.result.usage.as_ref());
+        for ended in usages.flat_map(|usage| &usage.endings) {
+            *endings.entry(ended.ending).or_default() += 1;
+        }
+        let costs =
+            AskedCosts { counted: CostSum::of(counted), not_counted: CostSum::of(not_counted), endings };
+        (costs.counted.episodes + costs.not_counted.episodes > 0).then_some(costs)
+    }
+}
+
+impl CostSum {
+    fn of(episodes: &[&PlayedEpisode]) -> CostSum {
+        episodes.iter().filter_map(|played| played.result.usage.as_ref()).fold(
+            CostSum::default(),
+            |sum, usage| CostSum {
+                episodes: sum.episodes + 1,
+                input_tokens: sum.input_tokens + usage.input_tokens,
+                output_tokens: sum.output_tokens + usage.output_tokens,
+                usd: usage.usd.map(|usd| sum.usd.unwrap_or_default() + usd).or(sum.usd),
+            },
+        )
+    }
+}
+
 impl EpisodeCosts {
     /// `None` of no episodes.
     pub fn of(episodes: &[&PlayedEpisode]) -> Option<EpisodeCosts> {
@@ -95,9 +144,33 @@ impl ValueRange {
 
 #[cfg(test)]
 mod tests {
+    use tandem_tools_spec::{EndReason, ModelEnding};
+
     use super::*;
     use crate::reports::evaluation::tests::{found, nine_six_three};
     use crate::reports::evaluation::{EvaluationReport, FailureMoment, ReportFormat, ReportPictures};
+
+    #[test]
+    fn what_does_not_count_was_asked_and_paid_all_the_same() {
+        let mut episodes = nine_six_three("agent");
+        for (played, ending) in episodes.iter_mut().zip([AgentEnding::Finished, AgentEnding::Endpoint]) {
+            let ended = ModelEnding { robot: None, ending, text: "I cannot.".into() };
+            let usage =
+                Usage { input_tokens: 10_000, usd: Some(0.06), endings: vec![ended], ..Usage::default() };
+            played.result.usage = Some(usage);
+        }
+        episodes[1].result.ended = EndReason::PolicyFailed;
+        episodes[1].result.phases.0.iter_mut().for_each(|(_, time_s)| *time_s = None);
+        let report = EvaluationReport::of(&found(episodes));
+        let text = report.write(ReportFormat::Markdown, &ReportPictures::default()).unwrap();
+        for line in [
+            "| agent | 1 | 10.0 | 0.0 | 0.060 | 1 | 10.0 | 0.0 | 0.060 | 0.120 |",
+            "| agent | the policy ended the episode | 1 |",
+            "| agent | the model's endpoint gave no reply | 1 |",
+        ] {
+            assert!(text.contains(line), "no {line}: {text}");
+        }
+    }
 
     /// An expert that says nothing of models, beside an agent of which half of the episodes have notes.
     #[test]
@@ -112,6 +185,7 @@ mod tests {
                 usd: Some(0.06),
                 model_s: Some(12.5),
                 models: vec!["a-model".into()],
+                endings: Vec::new(),
             });
         }
         let silent = EvaluationReport::of(&found(nine_six_three("agent")));

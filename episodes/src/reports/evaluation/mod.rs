@@ -20,7 +20,7 @@ mod went_wrong;
 use serde::Serialize;
 
 pub use compare::{Comparison, PairedRow};
-pub use costs::{EpisodeCosts, ModelCosts, ValueRange};
+pub use costs::{AskedCosts, CostSum, EpisodeCosts, ModelCosts, ValueRange};
 pub use floor::{FloorRate, TaskFloor};
 pub use load::{FoundEpisode, LoadError, LoadedEpisodes, load};
 pub use page::ReportPictures;

@@ -7,7 +7,7 @@ use serde_json::Value;
 use tandem_tools_spec::EndReason;
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::costs::{EpisodeCosts, ModelCosts};
+use super::costs::{AskedCosts, EpisodeCosts, ModelCosts};
 use super::load::{FoundEpisode, LoadedEpisodes};
 use super::rate::{MeanRate, Rate};
 use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, missed_phase_note, named, shown_in};
@@ -54,6 +54,8 @@ pub struct PolicyReport {
     pub excluded: Vec<ExcludedEpisodes>,
     /// Episodes that were played more than once, because earlier attempts did not count.
     pub played_again: Vec<RepeatedEpisode>,
+    /// What was asked of models in all, where notes say it.
+    pub asked: Option<AskedCosts>,
 }
 
 /// One task.
@@ -246,6 +248,7 @@ impl PolicyReport {
             reasons: reasons(&played),
             excluded: excluded(&group.excluded),
             played_again: played_again(group),
+            asked: AskedCosts::of(&played, &group.excluded),
             tasks,
         }
     }
@@ -451,7 +454,8 @@ pub fn failure_cause(played: &PlayedEpisode) -> String {
         .note
         .clone()
         .filter(|note| Some(note) != missed_phase_note(&played.result, played.start_phase()).as_ref());
-    let why = own.unwrap_or_else(|| ended.into());
+    // A model's own words differ from episode to episode.
+    let why = played.result.model_endings().or(own).unwrap_or_else(|| ended.into());
     match played.result.falls {
         0 => why,
         1 => format!("{why}; a robot fell"),

@@ -1,7 +1,7 @@
 //! The report's tables, made once for every way of writing them.
 
 use super::compare::{Comparison, PairedRow};
-use super::costs::{EpisodeCosts, ValueRange};
+use super::costs::{CostSum, EpisodeCosts, ValueRange};
 use super::floor::TaskFloor;
 use super::policy::{PolicyReport, TaskReport};
 use super::rate::{MeanRate, Rate, percent};
@@ -21,6 +21,8 @@ pub fn all(report: &EvaluationReport) -> Vec<Table> {
     tables.push(together(policies));
     tables.push(shown(policies));
     tables.push(agents(policies));
+    tables.push(asked(policies));
+    tables.push(endings(policies));
     tables.push(effort(policies));
     tables.push(reasons(policies));
     tables.push(went_wrong(&report.failure_moments, policies));
@@ -244,6 +246,56 @@ fn agents_row(policy: &PolicyReport, task: &TaskReport) -> Option<Vec<String>> {
         median(models.and_then(|models| models.usd.as_ref()), 1.0, 3),
         of_success.map_or(NONE.into(), |usd| format!("{:.3}", usd / success.successes as f64)),
     ])
+}
+
+fn asked(policies: &[PolicyReport]) -> Table {
+    let mut table = Table::new(
+        "All that models were asked",
+        "Sums of what notes say, in thousands of tokens and US dollars: of episodes that count, of those that do not, and together.",
+        &[
+            "Policy",
+            "Counted",
+            "Read (k)",
+            "Written (k)",
+            "Price ($)",
+            "Not counted",
+            "Read (k)",
+            "Written (k)",
+            "Price ($)",
+            "All ($)",
+        ],
+        1,
+    );
+    let usd_text = |usd: Option<f64>| usd.map_or(NONE.into(), |usd| format!("{usd:.3}"));
+    let sum = |sum: &CostSum| {
+        let thousands =
+            [sum.input_tokens, sum.output_tokens].map(|tokens| format!("{:.1}", tokens as f64 / 1e3));
+        let [read, written] = thousands;
+        [sum.episodes.to_string(), read, written, usd_text(sum.usd)]
+    };
+    for (policy, asked) in policies.iter().filter_map(|policy| Some((policy, policy.asked.as_ref()?))) {
+        let all: Vec<f64> =
+            [&asked.counted, &asked.not_counted].into_iter().filter_map(|sum| sum.usd).collect();
+        let all = usd_text((!all.is_empty()).then(|| all.iter().sum()));
+        let sums = [&asked.counted, &asked.not_counted].into_iter().flat_map(sum);
+        table.rows.push([policy.name.clone()].into_iter().chain(sums).chain([all]).collect());
+    }
+    table
+}
+
+fn endings(policies: &[PolicyReport]) -> Table {
+    let mut table = Table::new(
+        "How the play of models ended",
+        "Of all episodes that say so, whether they count or not; with a model for each robot, of each.",
+        &["Policy", "Ending", "Episodes"],
+        2,
+    );
+    for policy in policies {
+        for (ending, episodes) in policy.asked.iter().flat_map(|asked| &asked.endings) {
+            table.rows.push(vec![policy.name.clone(), ending.words().into(), episodes.to_string()]);
+        }
+    }
+    table
 }
 
 fn effort(policies: &[PolicyReport]) -> Table {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import signal
 import sys
@@ -10,18 +11,21 @@ import threading
 from collections.abc import Generator, Sequence
 from contextlib import ExitStack, contextmanager
 from types import FrameType
+from typing import Any, cast
 
 from ..client import Client
 from ..errors import TandemError
 from ..server import serve
 from .apis import open_model, without_keys
 from .episodes import Hosting, play_joined, play_own
-from .settings import APIS, AgentSettings, Limits, Prices
+from .settings import APIS, AgentSettings, Limits, Prices, Sampling
 
 DEFAULT_SECONDS = 3300.0
 """`tandem evaluate` stops a program after an hour; a model that is at it for so long finishes before."""
 
 DEFAULT_CALLS = 500
+
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 INTERRUPTED = 130
 """What shells report of a process that SIGINT has ended."""
@@ -53,6 +57,14 @@ def parser() -> argparse.ArgumentParser:
         default=100_000,
         metavar="N",
         help="longest conversation; the older half of a longer one becomes a list of calls [default: 100000]",
+    )
+    model.add_argument("--temperature", type=_amount, metavar="T", help="sampling temperature [default: the endpoint's]")
+    model.add_argument("--top-p", type=_share, metavar="P", help="share of likely tokens [default: the endpoint's]")
+    model.add_argument(
+        "--sampling-seed", type=int, metavar="N", help="seed of the sampling, for openai-chat [default: the endpoint's]"
+    )
+    model.add_argument(
+        "--extra-body", type=_object, metavar="JSON", help='further fields of requests, as {"top_k": 40} [default: none]'
     )
     limits = flags.add_argument_group("limits, after which the episode is finished")
     limits.add_argument("--max-tokens-total", type=_count, metavar="N", help="tokens read and written [default: any number]")
@@ -89,12 +101,14 @@ def settings_of(given: argparse.Namespace) -> AgentSettings:
     else:
         price = Prices(prices[0], prices[1], given.usd_per_million_cached)
     limits = Limits(given.max_tokens_total, given.max_usd, given.max_calls, given.max_seconds)
-    return AgentSettings(given.model, given.api, given.base_url, given.effort, given.context_tokens, limits, price)
+    sampling = Sampling(given.temperature, given.top_p, given.sampling_seed, given.extra_body)
+    return AgentSettings(given.model, given.api, given.base_url, given.effort, given.context_tokens, limits, price, sampling)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command and returns its exit code: 1 where the model or the server gave no answer."""
     given = parser().parse_args(arguments)
+    _keep_loopback_off_proxies()
     try:
         settings = settings_of(given)
         # What is missing is said before an episode begins.
@@ -124,6 +138,14 @@ def _run(given: argparse.Namespace, settings: AgentSettings) -> int:
     return 0
 
 
+def _keep_loopback_off_proxies() -> None:
+    """Has the SDKs reach endpoints on this machine directly, whatever proxy leads elsewhere."""
+    known = os.environ.get("no_proxy") or os.environ.get("NO_PROXY") or ""
+    hosts = [*filter(None, (host.strip() for host in known.split(","))), *LOOPBACK]
+    for name in ("NO_PROXY", "no_proxy"):
+        os.environ[name] = ",".join(dict.fromkeys(hosts))
+
+
 @contextmanager
 def _interruptible() -> Generator[None, None, None]:
     """Has the first SIGINT or SIGTERM end what is done, so that episodes are ended, and no other disturb that."""
@@ -150,6 +172,23 @@ def _count(text: str) -> int:
     if value < 1:
         raise argparse.ArgumentTypeError("give a whole number from 1 up")
     return value
+
+
+def _share(text: str) -> float:
+    value = float(text)
+    if not 0 <= value <= 1:
+        raise argparse.ArgumentTypeError("give a number from 0 to 1")
+    return value
+
+
+def _object(text: str) -> dict[str, Any]:
+    try:
+        value: Any = json.loads(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f'no JSON ({error}); give an object, as {{"top_k": 40}}') from error
+    if not isinstance(value, dict):
+        raise argparse.ArgumentTypeError('give a JSON object, as {"top_k": 40}')
+    return cast("dict[str, Any]", value)
 
 
 def _amount(text: str) -> float:

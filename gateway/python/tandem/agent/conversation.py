@@ -3,7 +3,47 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
+
+Ending: TypeAlias = Literal[
+    "success",
+    "finished",
+    "refused",
+    "content_filter",
+    "silent",
+    "token_limit",
+    "price_limit",
+    "call_limit",
+    "time_limit",
+    "context",
+    "endpoint",
+]
+"""How a model's play ends, as results have it."""
+
+
+@dataclass(frozen=True)
+class Stopped:
+    """Why a model plays no longer, where the episode's own end does not say it."""
+
+    ending: Ending
+    text: str
+    """The model's words, as of a refusal, or those of its endpoint, or which limit was reached."""
+
+    @property
+    def told(self) -> str:
+        """What whoever looks on is told."""
+        said = _SAID.get(self.ending)
+        return self.text if said is None else f"{said}: {self.text}" if self.text else said
+
+
+_SAID: dict[str, str] = {
+    "refused": "the model refused",
+    "content_filter": "a content filter held back the model's reply",
+    "silent": "the model called no tool, twice in turn",
+    "context": "the conversation became too long for the model",
+    "endpoint": "the model's endpoint gave no reply",
+}
+"""What the text of an ending does not say itself."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +119,12 @@ class Reply:
 
     cut: bool = False
     """Whether it was cut off at the most tokens that a reply may have."""
+
+    refusal: str | None = None
+    """The words of a model that refuses; None where it does not."""
+
+    filtered: bool = False
+    """Whether a filter of the endpoint held it back."""
 
 
 @dataclass(frozen=True)

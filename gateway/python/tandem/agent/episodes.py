@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from dataclasses import dataclass
 from typing import Any
+from unicodedata import category
 
 from ..client import Client
 from .apis import open_model
@@ -89,6 +90,11 @@ def _printer(robot: str | None) -> Printer:
     prefix = "" if robot is None else f"{robot}: "
 
     def show(text: str) -> None:
-        print(f"{prefix}{text}", flush=True)
+        print(f"{prefix}{printable(text)}", flush=True)
 
     return show
+
+
+def printable(text: str) -> str:
+    """A text as a terminal may show it: what a model writes cannot move its cursor or change its colours."""
+    return "".join(each if each in "\n\t" or category(each) != "Cc" else "\ufffd" for each in text)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from .conversation import Usage
+from .conversation import Stopped, Usage
 from .settings import Limits, Prices
 
 
@@ -39,17 +39,19 @@ class Ledger:
         """How long the agent has been at it."""
         return self._clock() - self._began_s
 
-    def reason_to_stop(self) -> str | None:
+    def reason_to_stop(self) -> Stopped | None:
         """Why no further request may be made. One more is taken to cost as much as the last: conversations grow."""
         limits, tokens = self.limits, self.input + self.output
         if limits.tokens is not None and tokens + self._last_tokens > limits.tokens:
-            return f"{tokens} tokens were used, and the next reply would pass --max-tokens-total {limits.tokens}"
+            text = f"{tokens} tokens were used, and the next reply would pass --max-tokens-total {limits.tokens}"
+            return Stopped("token_limit", text)
         if limits.usd is not None and self.usd + self._last_usd > limits.usd:
-            return f"{self.usd:.4f} US dollars were spent, and the next reply would pass --max-usd {limits.usd:g}"
+            text = f"{self.usd:.4f} US dollars were spent, and the next reply would pass --max-usd {limits.usd:g}"
+            return Stopped("price_limit", text)
         if limits.calls is not None and self.calls >= limits.calls:
-            return f"all of --max-calls {limits.calls} were made"
+            return Stopped("call_limit", f"all of --max-calls {limits.calls} were made")
         if limits.seconds is not None and self.seconds >= limits.seconds:
-            return f"--max-seconds {limits.seconds:g} are over"
+            return Stopped("time_limit", f"--max-seconds {limits.seconds:g} are over")
         return None
 
     def summary(self) -> str:

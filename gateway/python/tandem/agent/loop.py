@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
-from .apis import Model, TooLong
-from .conversation import Answer, Answers, Reply, Told, Usage
+from ..errors import TandemError
+from .apis import EndpointError, Filtered, Model, TooLong, without_keys
+from .conversation import Answer, Answers, Reply, Stopped, Told, Usage
 from .instructions import CUT_NUDGE, NUDGE, OPENING, instructions
 from .limits import Ledger
 from .memory import CHARACTERS_A_TOKEN, Memory, estimate
@@ -31,7 +33,7 @@ class Played:
     """How a model played."""
 
     ledger: Ledger
-    stopped: str | None
+    stopped: Stopped | None
     """Why we finished the episode in its place; None: it did so itself, or the episode ended."""
 
 
@@ -52,28 +54,50 @@ class Player:
 
     def play(self) -> Played:
         """Plays until the episode is over for this caller."""
+        if self._settings.sampling.told:
+            told = f"sampling: {json.dumps(self._settings.sampling.told)}"
+            self._seat.note(Note(told, "note", self._seat.robot, model=self._settings.model))
+        try:
+            stopped = self._play()
+        except EndpointError as error:
+            # That the endpoint is broken is no end of the model's, and is raised; whoever reads the episode is told.
+            with suppress(TandemError):
+                self._end(Stopped("context" if isinstance(error, TooLong) else "endpoint", without_keys(str(error))))
+            raise
+        if stopped is not None:
+            self._end(stopped)
+        self._seat.finish()
+        return Played(self._ledger, stopped)
+
+    def _play(self) -> Stopped | None:
         silent = 0
-        stopped: str | None = None
         while not self._seat.over:
             stopped = self._ledger.reason_to_stop()
             if stopped is not None:
-                break
-            reply = self._ask()
+                return stopped
+            try:
+                reply = self._ask()
+            except Filtered as filtered:
+                return Stopped("content_filter", str(filtered))
             self._memory.add(reply)
             if reply.calls:
                 silent = 0
                 self._memory.add(Answers(tuple(self._answer(reply))))
                 continue
+            if reply.refusal is not None:
+                return Stopped("refused", reply.refusal)
+            if reply.filtered:
+                return Stopped("content_filter", reply.words)
             silent += 1
             if silent >= MOST_SILENT:
-                stopped = "the model called no tool, twice in turn"
-                break
+                return Stopped("silent", reply.words)
             self._memory.add(Told(CUT_NUDGE if reply.cut else NUDGE))
-        if stopped is not None:
-            self._show(f"stopped: {stopped}")
-            self._seat.note(Note(f"stopped: {stopped}", "note", self._seat.robot, model=self._settings.model))
-        self._seat.finish()
-        return Played(self._ledger, stopped)
+        return None
+
+    def _end(self, stopped: Stopped) -> None:
+        """Says how the model's play ends, to whoever looks on and to the server."""
+        self._show(f"stopped: {stopped.told}")
+        self._seat.note(Note(stopped.text, "note", self._seat.robot, model=self._settings.model, ending=stopped.ending))
 
     def _ask(self) -> Reply:
         """Asks the model, with less of the conversation where it is too long for it, and counts what that took."""

@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from ..client import Client
 from ..errors import EpisodeEnded, Refused, SimulatorFailed
-from .conversation import Answer, Call, Picture, listed
+from .conversation import Answer, Call, Ending, Picture, listed
 from .tools import Tool, offered
 
 MOST_ANSWER_CHARACTERS = 60_000
@@ -39,6 +39,8 @@ class Note:
     usd: float | None = None
     model: str | None = None
     seconds: float | None = None
+    ending: Ending | None = None
+    """How the model's play ends with it; None: it goes on."""
 
 
 class Seat:
@@ -116,8 +118,10 @@ class Seat:
         if not self._keeps_notes:
             return
         try:
+            # An older server knows nothing of endings.
+            said = {name: value for name, value in asdict(note).items() if name != "ending" or value is not None}
             body = {
-                **asdict(note),
+                **said,
                 "text": note.text[:MOST_NOTE_CHARACTERS],
                 "model": (note.model or "")[:MOST_NAME_CHARACTERS],
             }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 from urllib.parse import urlsplit
 
 from ..errors import TandemError
@@ -50,6 +50,39 @@ class Limits:
     """Since the agent began."""
 
 
+KEPT_FIELDS = ("model", "messages", "input", "instructions", "system", "tools", "stream")
+SECRET_FIELDS = ("api_key", "authorization")
+"""Fields of a request that --extra-body may not have: they are the agent's, or would be written down."""
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How replies are sampled; None: as the endpoint does by itself."""
+
+    temperature: float | None = None
+    top_p: float | None = None
+    seed: int | None = None
+    extra_body: dict[str, Any] | None = None
+    """Further fields of each request, as the endpoint wants them."""
+
+    def __post_init__(self) -> None:
+        for name in self.extra_body or {}:
+            if name in KEPT_FIELDS or name.lower() in SECRET_FIELDS:
+                raise TandemError(f"--extra-body has {name!r}, which is the agent's own; leave it out")
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """What is set, as recordings have it."""
+        fields = {"temperature": self.temperature, "top_p": self.top_p, "seed": self.seed, "extra_body": self.extra_body}
+        return {name: value for name, value in fields.items() if value is not None}
+
+    def fields(self, api: Api) -> dict[str, Any]:
+        """What requests have of it, as the SDKs take it. A field that the endpoint does not know is refused, not left out."""
+        if self.seed is not None and api != "openai-chat":
+            raise TandemError(f"the API {api} takes no --sampling-seed; leave it out, or use --api openai-chat")
+        return self.told
+
+
 @dataclass(frozen=True)
 class AgentSettings:
     """An agent: a model behind an endpoint."""
@@ -67,12 +100,14 @@ class AgentSettings:
 
     limits: Limits = field(default_factory=Limits)
     prices: Prices | None = None
+    sampling: Sampling = field(default_factory=Sampling)
 
     def __post_init__(self) -> None:
         if self.limits.usd is not None and self.prices is None:
             raise TandemError("--max-usd needs prices: give --usd-per-million-input and --usd-per-million-output")
         if self.base_url is not None:
             check_base_url(self.base_url)
+        self.sampling.fields(self.api)
 
 
 def check_base_url(url: str) -> None:

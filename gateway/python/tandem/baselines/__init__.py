@@ -7,8 +7,8 @@
         print(server.url)
 
 Two kinds, both of which look at each robot's picture through an eye of their own, and tell a second of actions at once: `chunk`
-tells one, `flow` draws one of those that demonstrations had (flow matching). They need `pip install 'tandem-sim[baselines]'`:
-PyTorch, pyarrow and PyAV.
+tells one, `flow` draws one of those that demonstrations had (flow matching). They need PyTorch,
+pyarrow and PyAV: `pip install './gateway/python[baselines]'` in a checkout of the repository.
 """
 
 from __future__ import annotations

@@ -11,6 +11,21 @@ from typing import Any, Literal, TypeAlias
 
 from .commands import Budget, PhaseReached, Pose, PoseFrame, RobotFallen
 
+AgentEnding: TypeAlias = Literal[
+    "success",
+    "finished",
+    "refused",
+    "content_filter",
+    "silent",
+    "token_limit",
+    "price_limit",
+    "call_limit",
+    "time_limit",
+    "context",
+    "endpoint",
+]
+"""How the play of a language model ended."""
+
 Assistance: TypeAlias = Literal[
     "paper",
     "full",
@@ -139,6 +154,29 @@ class HandReach:
             reachable=value["reachable"],
             position_error_m=value["position_error_m"],
             orientation_error_rad=value["orientation_error_rad"],
+        )
+
+
+@dataclass(frozen=True)
+class ModelEnding:
+    """How a model's play ended, and its own words for it."""
+
+    robot: str | None
+    """The robot that it directed; left out where it directed all."""
+
+    ending: AgentEnding
+    """How it ended."""
+
+    text: str
+    """The words of the model or of its endpoint, as of a refusal; empty where there are none."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> ModelEnding:
+        """Reads what JSON has."""
+        return ModelEnding(
+            robot=value.get("robot"),
+            ending=value["ending"],
+            text=value["text"],
         )
 
 
@@ -430,6 +468,9 @@ class Usage:
     models: tuple[str, ...]
     """The models that notes name."""
 
+    endings: tuple[ModelEnding, ...]
+    """How the play of the models ended: one for all robots, or one for each that has said so."""
+
     @staticmethod
     def of(value: Mapping[str, Any]) -> Usage:
         """Reads what JSON has."""
@@ -441,4 +482,5 @@ class Usage:
             usd=value.get("usd"),
             model_s=value.get("model_s"),
             models=tuple(value.get("models", ())),
+            endings=tuple(ModelEnding.of(item) for item in value.get("endings", ())),
         )

@@ -4,7 +4,7 @@
 
     export_lerobot("runs/demonstrations", "data/handover", ExportSettings(rate_hz=10))
 
-It needs what `pip install 'tandem-sim[lerobot]'` adds: pyarrow, and PyAV with its encoders.
+It needs what `pip install './gateway/python[lerobot]'` adds: pyarrow, and PyAV with its encoders.
 """
 
 from __future__ import annotations

@@ -1,18 +1,23 @@
 //! What an evaluation came to, as text: rates, why episodes failed, and what does not count.
 
+use std::collections::BTreeMap;
+
 use tandem_episodes::{
     evaluation::Evaluation,
+    printable,
     results::{Exclusion, PhaseLevel, PlayedEpisode},
     statistics::{Count, clopper_pearson},
 };
+use tandem_tools_spec::{AgentEnding, Usage};
 
 /// How many notes of a kind are printed below the table.
 const NOTES_SHOWN: usize = 20;
 
 /// Prints the tables, then notes.
 pub fn print(evaluation: &Evaluation) {
-    println!("{}, {} protocol", evaluation.full_name(), evaluation.protocol);
+    println!("{}, {} protocol", printable(&evaluation.full_name()), evaluation.protocol);
     print_tasks(evaluation);
+    print_endings(evaluation);
     evaluation.phase_level.iter().for_each(print_phase_level);
     let (counted, excluded): (Vec<&PlayedEpisode>, Vec<&PlayedEpisode>) =
         evaluation.episodes.iter().partition(|episode| episode.counts());
@@ -26,7 +31,7 @@ pub fn print(evaluation: &Evaluation) {
     }
     let again = evaluation.episodes.iter().filter(|episode| !episode.attempts.is_empty());
     print_notes(again.map(|episode| (episode, attempts_note(episode))));
-    evaluation.left_out.iter().for_each(|left_out| println!("  left out: {left_out}"));
+    evaluation.left_out.iter().for_each(|left_out| println!("  left out: {}", printable(left_out)));
 }
 
 /// What failed, and how.
@@ -50,7 +55,7 @@ fn print_notes<'a>(notes: impl Iterator<Item = (&'a PlayedEpisode, String)>) {
     let lines: Vec<String> = notes
         .map(|(episode, note)| format!("  {} seed {}: {note}", episode.result.task, episode.spec.seed))
         .collect();
-    lines.iter().take(NOTES_SHOWN).for_each(|line| println!("{line}"));
+    lines.iter().take(NOTES_SHOWN).for_each(|line| println!("{}", printable(line)));
     if lines.len() > NOTES_SHOWN {
         println!("  and {} more notes in results.json", lines.len() - NOTES_SHOWN);
     }
@@ -91,6 +96,33 @@ fn print_tasks(evaluation: &Evaluation) {
         println!("{}", line.trim_end());
     }
     println!("rates in %, with exact 95 % intervals (Clopper-Pearson)");
+}
+
+/// Prints how the play of language models ended, and what all of it cost.
+fn print_endings(evaluation: &Evaluation) {
+    let usages: Vec<&Usage> =
+        evaluation.episodes.iter().filter_map(|played| played.result.usage.as_ref()).collect();
+    let mut endings: BTreeMap<AgentEnding, usize> = BTreeMap::new();
+    for ended in usages.iter().flat_map(|usage| &usage.endings) {
+        *endings.entry(ended.ending).or_default() += 1;
+    }
+    if endings.is_empty() {
+        return;
+    }
+    let counts: Vec<String> =
+        endings.iter().map(|(ending, episodes)| format!("{} ({episodes})", ending.words())).collect();
+    println!("models' play ended: {}", counts.join(", "));
+    let tokens = |of: fn(&Usage) -> u64| usages.iter().map(|usage| of(usage)).sum::<u64>();
+    let usd: Vec<f64> = usages.iter().filter_map(|usage| usage.usd).collect();
+    let price = match usd.is_empty() {
+        true => String::new(),
+        false => format!(", {:.2} US dollars", usd.iter().sum::<f64>()),
+    };
+    println!(
+        "all of it, counted or not: {} tokens read, {} written{price}",
+        tokens(|usage| usage.input_tokens),
+        tokens(|usage| usage.output_tokens)
+    );
 }
 
 /// Prints how often each phase was reached from its own start, and how much lower the rate of collaborative phases is.

@@ -29,6 +29,18 @@ pub struct AgentFlags {
     /// How much the model thinks, in its API's words, as low or high [default: its own].
     #[arg(long, value_name = "WORD")]
     effort: Option<String>,
+    /// Sampling temperature [default: the endpoint's].
+    #[arg(long = "temperature", value_name = "T", value_parser = parse_amount)]
+    temperature_value: Option<f64>,
+    /// Share of likely tokens to sample from [default: the endpoint's].
+    #[arg(long = "top-p", value_name = "P", value_parser = parse_amount)]
+    top_share: Option<f64>,
+    /// Seed of the sampling, for openai-chat [default: the endpoint's].
+    #[arg(long, value_name = "N")]
+    sampling_seed: Option<u32>,
+    /// Further fields of each request to the endpoint, as {"top_k": 40} [default: none].
+    #[arg(long, value_name = "JSON", value_parser = parse_object)]
+    extra_body: Option<String>,
     /// Longest conversation in tokens; the older half of a longer one becomes a list of calls [default: 100000].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     context_tokens: Option<u32>,
@@ -53,6 +65,19 @@ pub struct AgentFlags {
     /// Price of a million tokens that are read from a cache [default: as other tokens that are read].
     #[arg(long = "usd-per-million-cached", value_name = "USD")]
     million_cached_usd: Option<f64>,
+}
+
+fn parse_amount(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number: &f64| number.is_finite() && *number >= 0.0);
+    number.ok_or_else(|| "give a number from 0 up".into())
+}
+
+fn parse_object(text: &str) -> Result<String, String> {
+    match serde_json::from_str(text) {
+        Ok(Value::Object(_)) => Ok(text.into()),
+        Ok(_) => Err("give a JSON object, as {\"top_k\": 40}".into()),
+        Err(error) => Err(format!("no JSON ({error}); give an object, as {{\"top_k\": 40}}")),
+    }
 }
 
 /// The flags as they stand behind `agent:`.
@@ -114,13 +139,17 @@ impl AgentFlags {
     }
 
     /// Each flag with its value.
-    fn given(&self) -> [(&'static str, Option<String>); 12] {
+    fn given(&self) -> [(&'static str, Option<String>); 16] {
         let text = |number: Option<f64>| number.map(|number| number.to_string());
         [
             ("model", Some(self.model.clone())),
             ("api", Some(self.api.clone())),
             ("base-url", self.base_url.clone()),
             ("effort", self.effort.clone()),
+            ("temperature", text(self.temperature_value)),
+            ("top-p", text(self.top_share)),
+            ("sampling-seed", self.sampling_seed.map(|number| number.to_string())),
+            ("extra-body", self.extra_body.clone()),
             ("context-tokens", self.context_tokens.map(|number| number.to_string())),
             ("max-tokens-total", self.max_tokens_total.map(|number| number.to_string())),
             ("max-usd", text(self.max_usd)),
@@ -163,6 +192,25 @@ mod tests {
         assert_eq!(flags.limit_s(3600), 9300);
         let card = flags.card();
         assert_eq!((&card["base_url"], &card["max_usd"]), (&"http://127.0.0.1:11434/v1".into(), &0.5.into()));
+    }
+
+    #[test]
+    fn sampling_is_handed_on_and_recorded() {
+        let text = "m?temperature=0&top-p=0.9&sampling-seed=7&extra-body={\"top_k\":40}";
+        let flags = AgentFlags::parse_policy(text).unwrap();
+        let arguments = flags.arguments(3600);
+        for says in ["--temperature=0", "--top-p=0.9", "--sampling-seed=7", "--extra-body={\"top_k\":40}"] {
+            assert!(arguments.iter().any(|argument| argument == says), "{arguments:?}");
+        }
+        assert_eq!(flags.card()["extra_body"]["top_k"], 40);
+        for (text, says) in [
+            ("m?extra-body=[1]", "give a JSON object"),
+            ("m?temperature=-1", "from 0 up"),
+            ("m?top-p=nan", "from 0 up"),
+        ] {
+            let refused = AgentFlags::parse_policy(text).unwrap_err();
+            assert!(refused.contains(says), "{refused}");
+        }
     }
 
     #[test]

@@ -135,22 +135,33 @@ impl EpisodeFlags {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seeds(pub RangeInclusive<u32>);
 
-/// A text that names no seeds.
+/// The most seeds of one command.
+const MAX_SEEDS: u64 = 100_000;
+
+/// A text that names no seeds, or too many.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
-#[error("{0:?} names no seeds; give one, as 3, or a range with both ends included, as 0-9 or 0..9")]
-pub struct SeedsError(String);
+pub enum SeedsError {
+    #[error("{0:?} names no seeds; give one, as 3, or a range with both ends included, as 0-9 or 0..9")]
+    NoSeeds(String),
+    #[error("{text:?} names {seeds} seeds; give at most {MAX_SEEDS} in one command")]
+    TooMany { text: String, seeds: u64 },
+}
 
 impl FromStr for Seeds {
     type Err = SeedsError;
 
     fn from_str(text: &str) -> Result<Self, SeedsError> {
-        let number = |part: &str| part.parse::<u32>().map_err(|_| SeedsError(text.into()));
+        let number = |part: &str| part.parse::<u32>().map_err(|_| SeedsError::NoSeeds(text.into()));
         let range = match text.split_once("..").or_else(|| text.split_once('-')) {
             Some((first, last)) => number(first)?..=number(last)?,
             None => number(text)?..=number(text)?,
         };
         if range.is_empty() {
-            return Err(SeedsError(text.into()));
+            return Err(SeedsError::NoSeeds(text.into()));
+        }
+        let seeds = u64::from(*range.end()) - u64::from(*range.start()) + 1;
+        if seeds > MAX_SEEDS {
+            return Err(SeedsError::TooMany { text: text.into(), seeds });
         }
         Ok(Seeds(range))
     }
@@ -179,6 +190,11 @@ mod tests {
         check("ten", None);
         check("", None);
         check("4294967296", None);
+        check("0-99999", Some(0..=99_999));
+        check("4294967295", Some(u32::MAX..=u32::MAX));
+        check("0-4294967295", None);
+        let told = "0-4294967295".parse::<Seeds>().unwrap_err().to_string();
+        assert!(told.contains("4294967296 seeds; give at most 100000"), "{told}");
     }
 
     /// What a flag for seeds says of itself in each command that has one, under the command.

@@ -11,7 +11,9 @@ use tandem_tools_spec::{Driving, Operators};
 
 use super::agent::AgentFlags;
 use crate::{
-    drivers::{PRESETS, PolicyMap, PolicyProtocol, Program, PythonModule, PythonPart, RemotePolicy},
+    drivers::{
+        PRESETS, PolicyKey, PolicyMap, PolicyProtocol, Program, PythonModule, PythonPart, RemotePolicy,
+    },
     hosting::PartnerPolicy,
 };
 
@@ -36,6 +38,11 @@ pub struct PolicyFlags {
     /// openpi for openpi:, xpolicylab for xpolicylab:, none for act:].
     #[arg(long, value_name = "NAME|FILE")]
     policy_map: Option<String>,
+    /// File with the key that the policy's server wants, which is sent as `Authorization` (openpi, xpolicylab: `Api-Key KEY`; act:
+    /// `Bearer KEY`; a key that names its scheme, as `Basic ...`, as it is), over wss:// and https:// or to this machine; or give the
+    /// key itself in the environment, as TANDEM_POLICY_KEY [default: none].
+    #[arg(long, value_name = "FILE")]
+    policy_key_file: Option<PathBuf>,
     /// Longest that a program may run in one episode [default: 3600].
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
     policy_limit: Option<u32>,
@@ -105,13 +112,32 @@ fn parse_policy(text: &str) -> Result<PolicyChoice, String> {
 }
 
 fn parse_urls(protocol: PolicyProtocol, urls: &str) -> Result<Vec<String>, String> {
-    let check = |url: &str| match url.trim().strip_prefix(protocol.scheme()) {
-        Some(rest) if !rest.is_empty() => Ok(url.trim().to_owned()),
-        _ => {
-            Err(format!("{url:?} is no address of a server; give {protocol}:{}HOST:PORT", protocol.scheme()))
+    let schemes = protocol.schemes();
+    let [plain, encrypted] = schemes;
+    let check = |url: &str| {
+        let url = url.trim();
+        let behind = schemes.iter().find_map(|scheme| url.strip_prefix(scheme));
+        match behind.filter(|rest| !rest.is_empty() && !rest.starts_with(['/', ':'])) {
+            Some(rest) if rest.split('/').next().is_some_and(|authority| authority.contains('@')) => {
+                Err("an address takes no key; give it by --policy-key-file or TANDEM_POLICY_KEY".into())
+            }
+            // No policy's server listens where the web does.
+            Some(_) if plain == "ws://" && url.starts_with(plain) && port_of(url).is_none() => {
+                Err(format!("{url:?} names no port; give {protocol}:{plain}HOST:PORT"))
+            }
+            Some(_) => Ok(url.to_owned()),
+            None => Err(format!(
+                "{url:?} is no address of a server; give {protocol}:{plain}HOST:PORT, or {protocol}:{encrypted}HOST for an encrypted one"
+            )),
         }
     };
     urls.split(',').map(check).collect()
+}
+
+/// The port that an address names.
+fn port_of(url: &str) -> Option<u16> {
+    let authority = url.split_once("://")?.1.split('/').next()?;
+    authority.rsplit_once(']').map_or(authority, |(_, behind)| behind).rsplit_once(':')?.1.parse().ok()
 }
 
 impl PolicyFlags {
@@ -119,6 +145,10 @@ impl PolicyFlags {
     pub fn policy(self) -> Result<Box<dyn Policy>, Box<dyn Error>> {
         let misplaced = |flag: &str, who: &str| Err(format!("{flag} is for {who}").into());
         let driving = self.driving()?;
+        let key_file = self.policy_key_file;
+        if key_file.is_some() && !matches!(self.policy, PolicyChoice::Remote(..)) {
+            return misplaced("--policy-key-file", "policies at a server");
+        }
         let policy: Box<dyn Policy> = match (self.policy, self.policy_map, self.policy_limit) {
             (
                 PolicyChoice::Player(_)
@@ -159,9 +189,10 @@ impl PolicyFlags {
                     limit,
                 )?)
             }
-            (PolicyChoice::Remote(protocol, urls), map, None) => {
-                Box::new(remote_policy(protocol, urls, map, "--policy-map")?)
-            }
+            (PolicyChoice::Remote(protocol, urls), map, None) => Box::new(
+                remote_policy(protocol, urls, map, "--policy-map")?
+                    .with_key(PolicyKey::find(key_file.as_deref())?)?,
+            ),
         };
         Ok(match self.policy_name {
             Some(name) => Box::new(Renamed { name, policy }),
@@ -200,6 +231,10 @@ pub struct PartnerFlags {
     /// How that policy is asked and understood, as `evaluate --policy-map` takes it.
     #[arg(long, env = "TANDEM_PARTNER_MAP", value_name = "NAME|FILE", requires = "partner")]
     partner_map: Option<String>,
+    /// File with the key that its server wants, as `evaluate --policy-key-file` takes it; or give the key itself in the environment, as
+    /// TANDEM_POLICY_KEY.
+    #[arg(long, env = "TANDEM_PARTNER_KEY_FILE", value_name = "FILE", requires = "partner")]
+    partner_key_file: Option<PathBuf>,
 }
 
 #[derive(Clone, Debug)]
@@ -219,7 +254,8 @@ impl PartnerFlags {
     /// The policy, if there is one; what it needs is read, and no server is asked yet.
     pub fn policy(self) -> Result<Option<Arc<dyn PartnerPolicy>>, Box<dyn Error>> {
         let Some(PartnerAddress(protocol, urls)) = self.partner else { return Ok(None) };
-        Ok(Some(Arc::new(remote_policy(protocol, urls, self.partner_map, "--partner-map")?)))
+        let policy = remote_policy(protocol, urls, self.partner_map, "--partner-map")?;
+        Ok(Some(Arc::new(policy.with_key(PolicyKey::find(self.partner_key_file.as_deref())?)?)))
     }
 }
 
@@ -311,13 +347,29 @@ mod tests {
         check(&["--policy", "agent:m?api=grpc"], "openai, openai-chat, anthropic");
         check(&["--policy", "agent:m?max-calls=0"], "max-calls");
         check(&["--policy", "agent:m", "--policy-map", "openpi"], "--policy-map is for policies at a server");
-        check(&["--policy", "openpi:http://a"], "give openpi:ws://HOST:PORT");
+        check(
+            &["--policy", "openpi:http://a"],
+            "give openpi:ws://HOST:PORT, or openpi:wss://HOST for an encrypted one",
+        );
+        check(&["--policy", "openpi:ws://a"], "names no port; give openpi:ws://HOST:PORT");
+        check(&["--policy", "xpolicylab:ws://[::1]"], "names no port");
+        check(&["--policy", "act:https://:1/act"], "is no address of a server");
+        check(&["--policy", "openpi:wss://key@a"], "an address takes no key; give it by --policy-key-file");
+        check(&["--policy-key-file", "key"], "--policy-key-file is for policies at a server");
+        check(
+            &["--policy", "openpi:wss://a", "--policy-key-file", "nothing.txt"],
+            "cannot read the policy's key in nothing.txt",
+        );
+        check(
+            &["--policy", "openpi:ws://a.example:1", "--policy-key-file", "Cargo.toml"],
+            "has to be one line",
+        );
         check(
             &["--policy", "act:http://a/act"],
             "act: needs --policy-map, a file or one of openpi, xpolicylab, gr00t_n17_g1",
         );
         check(
-            &["--policy", "openpi:ws://a", "--policy-map", "nothing.toml"],
+            &["--policy", "openpi:ws://a:1", "--policy-map", "nothing.toml"],
             "no policy map \"nothing.toml\"",
         );
         check(&["--policy-map", "openpi"], "--policy-map is for policies at a server");

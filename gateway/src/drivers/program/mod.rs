@@ -1,6 +1,7 @@
 //! Agents as programs: a fresh process for each episode, or for each of its robots, which finds a server with that one episode at
 //! an address in its environment, and is stopped with all that it started when the episode or its time is over.
 
+mod kept_output;
 mod participant;
 mod process;
 
@@ -17,9 +18,10 @@ use serde_json::{Value, json};
 use tandem_episodes::{
     EpisodeError, EpisodeSpec, RunFolder, Visibility, create_private_folder,
     players::{EpisodeOutput, PlayError, PlayOutcome, Policy},
+    printable,
     results::{PolicyCard, write_result},
 };
-use tandem_tools_spec::{Driving, EndReason, ResultReply, StartReply};
+use tandem_tools_spec::{Driving, EndReason, ModelEnding, ResultReply, StartReply, Usage};
 
 use super::{lost, own_result, python::PythonModule, remove_old_result};
 use crate::{
@@ -215,6 +217,7 @@ impl Program {
             Some(participant.robot.map_or(words.clone(), |robot| format!("{robot}: {words}")))
         });
         let mut reasons: Vec<String> = told.collect();
+        reasons.extend(result.usage.iter().flat_map(Usage::own_endings).map(told_ending));
         match result.ended {
             EndReason::WallClockExhausted => reasons.push("the policy's wall clock ran out".into()),
             EndReason::Abandoned => reasons.push("the program made no call for too long".into()),
@@ -291,6 +294,15 @@ fn create_own_folder(folder: &Path) -> io::Result<()> {
     create_private_folder(folder)
 }
 
+/// How a model's play ended, and what it said.
+fn told_ending(ended: &ModelEnding) -> String {
+    let text: String = ended.text.chars().take(QUOTED_CHARS).collect();
+    match text.is_empty() {
+        true => ended.words(),
+        false => format!("{}: {text}", ended.words()),
+    }
+}
+
 /// What was found of a program when the wait for it was over.
 struct FoundProgram {
     exit: ProgramExit,
@@ -349,7 +361,7 @@ fn last_lines(folder: &Path) -> Option<String> {
             }
             quoted = longer;
         }
-        Some(quoted)
+        Some(printable(&quoted))
     })
 }
 

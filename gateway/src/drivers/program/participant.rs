@@ -1,7 +1,7 @@
 //! What one of the programs of an episode is given: its folder, its environment, and its brief, which says the task and how to act
 //! in words that a language model can be given as they are.
 
-use std::{fs, io, path::Path};
+use std::{env, fs, io, path::Path};
 
 use tandem_episodes::{EpisodeError, OutputError, create_private_folder, players::PlayError, write_whole};
 use tandem_tools_spec::{Driving, StartReply};
@@ -74,7 +74,8 @@ impl<'a> Participant<'a> {
             ("TANDEM_TOKEN", self.token.into()),
             ("TANDEM_START", self.folder.path().join(START_FILE).display().to_string()),
         ];
-        common.into_iter().chain(self.robot.map(|robot| ("TANDEM_ROBOT", robot.into()))).collect()
+        let robot = self.robot.map(|robot| ("TANDEM_ROBOT", robot.into()));
+        common.into_iter().chain(robot).chain(off_proxies()).collect()
     }
 }
 
@@ -85,6 +86,19 @@ fn private_folder() -> io::Result<TempDir> {
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700));
     builder.tempdir()
+}
+
+/// Hosts that no proxy leads to.
+const LOOPBACK: [&str; 3] = ["127.0.0.1", "localhost", "::1"];
+
+/// Has programs reach the server directly, whatever proxy leads elsewhere: this machine behind what is excepted already.
+fn off_proxies() -> [(&'static str, String); 2] {
+    ["NO_PROXY", "no_proxy"].map(|name| {
+        let known = env::var(name).unwrap_or_default();
+        let mut hosts: Vec<&str> = known.split(',').map(str::trim).filter(|host| !host.is_empty()).collect();
+        hosts.extend(LOOPBACK);
+        (name, hosts.join(","))
+    })
 }
 
 /// The brief for the episode `start` on the server at `url`, whose reader directs all robots, or `robot` alone.
@@ -144,4 +158,18 @@ fn partners(driving: &Driving) -> String {
          seconds holds still meanwhile.{talk}",
         driving.patience_s()
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_proxy_leads_to_this_machine() {
+        for (name, hosts) in off_proxies() {
+            assert!(name.eq_ignore_ascii_case("no_proxy"), "{name}");
+            let hosts: Vec<&str> = hosts.split(',').collect();
+            assert!(LOOPBACK.iter().all(|host| hosts.contains(host)), "{hosts:?}");
+        }
+    }
 }

@@ -10,6 +10,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use super::kept_output::KeptOutput;
+
 /// The file in a program's folder with the brief, which it reads on its standard input.
 pub const BRIEF_FILE: &str = "brief.txt";
 
@@ -36,6 +38,7 @@ impl ProcessGroups {
 pub struct ProcessGroup {
     child: Child,
     groups: Arc<ProcessGroups>,
+    outputs: Vec<KeptOutput>,
     /// How the program ended, once the group has been stopped.
     status: Option<ExitStatus>,
 }
@@ -55,15 +58,28 @@ impl ProcessGroup {
             .arg(command)
             .envs(environment.iter().map(|(name, value)| (name, value)))
             .stdin(Stdio::from(File::open(folder.join(BRIEF_FILE))?))
-            .stdout(output(STDOUT_FILE)?)
-            .stderr(output(STDERR_FILE)?);
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped());
+        let files = [output(STDOUT_FILE)?, output(STDERR_FILE)?];
         in_own_group(&mut shell);
         // A signal that comes between the start and the note of it would miss the program.
         let mut running = groups.lock();
         let child = shell.spawn()?;
         running.push(child.id());
         drop(running);
-        Ok(ProcessGroup { child, groups: groups.clone(), status: None })
+        let mut group = ProcessGroup { child, groups: groups.clone(), outputs: Vec::new(), status: None };
+        group.keep_outputs(files)?;
+        Ok(group)
+    }
+
+    fn keep_outputs(&mut self, [stdout, stderr]: [File; 2]) -> io::Result<()> {
+        if let Some(said) = self.child.stdout.take() {
+            self.outputs.push(KeptOutput::start(said, stdout)?);
+        }
+        if let Some(said) = self.child.stderr.take() {
+            self.outputs.push(KeptOutput::start(said, stderr)?);
+        }
+        Ok(())
     }
 
     /// Whether the program has ended well, whatever it has left running; `None` while it runs.
@@ -92,6 +108,7 @@ impl ProcessGroup {
         kill(&mut self.child);
         running.retain(|id| *id != self.child.id());
         let status = self.child.wait()?;
+        self.outputs.drain(..).for_each(KeptOutput::finish);
         self.status = Some(status);
         Ok(status)
     }

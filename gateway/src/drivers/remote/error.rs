@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use tandem_episodes::printable;
+
 /// What went wrong with a server.
 #[derive(Debug, thiserror::Error)]
 pub enum RemoteError {
@@ -54,7 +56,7 @@ pub fn gist(text: &str) -> String {
         (false, true) => Some(lines.collect::<Vec<_>>().join(" ")),
         (false, false) => lines.next().map(str::to_owned),
     };
-    line.as_deref().unwrap_or("no text").chars().take(LONGEST_GIST_CHARS).collect()
+    printable(&line.as_deref().unwrap_or("no text").chars().take(LONGEST_GIST_CHARS).collect::<String>())
 }
 
 const LONGEST_GIST_CHARS: usize = 300;

@@ -5,8 +5,8 @@ mod action;
 mod client;
 mod columns;
 mod error;
+mod kept_client;
 mod map;
-mod outstanding;
 mod policy_session;
 mod poses;
 mod request;
@@ -31,7 +31,8 @@ use tandem_episodes::{
     tasks::{Task, TaskWords},
 };
 
-pub use client::PolicyProtocol;
+use client::PolicyAddress;
+pub use client::{PolicyKey, PolicyKeyError, PolicyProtocol};
 pub use error::RemoteError;
 pub use map::{MapError, PRESETS, PolicyMap, preset};
 pub use trial::try_map;
@@ -47,7 +48,7 @@ use request::TaskInstructions;
 pub struct RemotePolicy {
     protocol: PolicyProtocol,
     /// One for all robots, or one for each in the task's order.
-    urls: Vec<String>,
+    servers: Vec<PolicyAddress>,
     map: PolicyMap,
     /// Since when each of the episodes that cannot begin yet has waited for the servers.
     waits: Mutex<Vec<Instant>>,
@@ -58,13 +59,27 @@ pub struct RemotePolicy {
 impl RemotePolicy {
     /// The policy at `urls`, asked as `map` says.
     pub fn new(protocol: PolicyProtocol, urls: Vec<String>, map: PolicyMap) -> RemotePolicy {
-        RemotePolicy { protocol, urls, map, waits: Mutex::default(), untold: AtomicU32::default() }
+        let servers = urls.into_iter().map(|url| PolicyAddress { url, key: None }).collect();
+        RemotePolicy { protocol, servers, map, waits: Mutex::default(), untold: AtomicU32::default() }
+    }
+
+    /// The same policy, whose servers want `key`. It is sent encrypted, and within this machine.
+    pub fn with_key(mut self, key: Option<PolicyKey>) -> Result<RemotePolicy, PolicyKeyError> {
+        for server in &mut self.servers {
+            server.key = key.clone();
+            self.protocol.check_key(server)?;
+        }
+        Ok(self)
     }
 
     /// The number by which the policy tells an episode from others: of its seed, or where it is told none, of how many it has played.
     fn number_of(&self, spec: &EpisodeSpec) -> u32 {
         let number = spec.told_seed().unwrap_or_else(|| self.untold.fetch_add(1, Ordering::Relaxed));
         EpisodeMoment::number_of(spec.task, number)
+    }
+
+    fn urls(&self) -> Vec<&str> {
+        self.servers.iter().map(|server| server.url.as_str()).collect()
     }
 
     fn waits(&self) -> MutexGuard<'_, Vec<Instant>> {
@@ -79,7 +94,7 @@ impl RemotePolicy {
         let session = {
             let (words, most_steps) =
                 (instructions(spec.task, spec.task_words()), spec.rules().steps_per_command);
-            PolicySession::open(self.protocol, &self.urls, &self.map, words, most_steps)
+            PolicySession::open(self.protocol, &self.servers, &self.map, words, most_steps)
         };
         let mut waits = self.waits();
         let own = waits.iter().position(|wait| *wait == began);
@@ -100,7 +115,7 @@ impl RemotePolicy {
 
     /// Whether there are as many servers as the task and the map want.
     fn check(&self, task: &Task) -> Result<(), String> {
-        let (servers, robots) = (self.urls.len(), task.robots.len());
+        let (servers, robots) = (self.servers.len(), task.robots.len());
         match (servers, self.map.answer) {
             (1, _) => Ok(()),
             (_, AnswerScope::All) => {
@@ -117,7 +132,7 @@ impl RemotePolicy {
 impl Policy for RemotePolicy {
     fn card(&self) -> PolicyCard {
         PolicyCard {
-            name: format!("{}:{}", self.protocol, self.urls.join(",")),
+            name: format!("{}:{}", self.protocol, self.urls().join(",")),
             settings: Some(json!(self.map)),
             extra_information: self.map.extra_information(),
         }
@@ -131,7 +146,7 @@ impl Policy for RemotePolicy {
 
     fn waiting(&self) -> Option<PolicyWait> {
         let lasted = self.waits().iter().min()?.elapsed();
-        Some(PolicyWait { target: self.urls.join(", "), lasted })
+        Some(PolicyWait { target: self.urls().join(", "), lasted })
     }
 }
 

@@ -10,10 +10,10 @@ use tandem_episodes::players::{LocalEpisode, PlayerError};
 
 use super::{
     action::{Executor, RobotRows, chunks, executed_rows},
-    client::{PolicyClient, PolicyProtocol},
+    client::{PolicyAddress, PolicyClient, PolicyProtocol},
     error::RemoteError,
+    kept_client::KeptClient,
     map::{AnswerScope, PolicyMap},
-    outstanding::Outstanding,
     request::{ObservationHistory, PolicyObservation, TaskInstructions, request},
 };
 
@@ -27,44 +27,40 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(500);
 pub struct PolicySession<'a> {
     plan: QueryPlan<'a>,
     /// One for all robots, or one for each.
-    clients: Vec<Box<dyn PolicyClient>>,
+    clients: Vec<KeptClient>,
     /// The most steps of one command.
     most_steps: usize,
 }
 
 impl<'a> PolicySession<'a> {
-    /// Connects to the servers at `urls` side by side, waiting for those that are not there yet, and tries each with black pictures
+    /// Connects to the servers at `addresses` side by side, waiting for those that are not there yet, and tries each with black pictures
     /// and zeros. Says of each that fails why.
     pub fn open(
         protocol: PolicyProtocol,
-        urls: &[String],
+        addresses: &[PolicyAddress],
         map: &'a PolicyMap,
         instructions: TaskInstructions,
         most_steps: u32,
     ) -> Result<PolicySession<'a>, Vec<RemoteError>> {
         let plan = QueryPlan { map, instructions };
         let deadline = Instant::now() + Duration::from_secs_f64(map.connect_s);
-        let outstanding = Outstanding::default();
-        let connect = |url: &str, robots: &[usize], busy| {
-            let mut client = retry_until(deadline, |left| {
-                let mut client = protocol.open(url, &plan.instructions.task, left, plan.within())?;
+        let connect = |address: &PolicyAddress, robots: &[usize]| {
+            let client = retry_until(deadline, |left| {
+                let mut client = protocol.open(address, &plan.instructions.task, left, plan.within())?;
                 plan.probe(&mut *client, robots)?;
                 client.begin_trial(plan.within())?;
                 Ok(client)
-            })?;
-            drop(busy);
-            outstanding.keep_alive(&mut *client);
-            Ok(client)
+            });
+            client.map(KeptClient::new)
         };
-        let opened: Vec<Result<Box<dyn PolicyClient>, RemoteError>> = thread::scope(|scope| {
+        let opened: Vec<Result<KeptClient, RemoteError>> = thread::scope(|scope| {
             let connect = &connect;
-            let connecting = urls.iter().zip(plan.queries()).zip(outstanding.more(urls.len()));
-            let connecting: Vec<_> = connecting
-                .map(|((url, robots), busy)| scope.spawn(move || connect(url, &robots, busy)))
-                .collect();
+            let connecting = addresses.iter().zip(plan.queries());
+            let connecting: Vec<_> =
+                connecting.map(|(address, robots)| scope.spawn(move || connect(address, &robots))).collect();
             connecting.into_iter().map(joined).collect()
         });
-        let (mut clients, mut failures) = (Vec::with_capacity(urls.len()), Vec::new());
+        let (mut clients, mut failures) = (Vec::with_capacity(addresses.len()), Vec::new());
         for client in opened {
             match client {
                 Ok(client) => clients.push(client),
@@ -115,30 +111,20 @@ impl<'a> PolicySession<'a> {
     ) -> Result<Vec<RobotRows>, RemoteError> {
         let PolicySession { plan, clients, .. } = self;
         let queries = plan.queries();
-        let ask = |client: &mut dyn PolicyClient, robots: &[usize]| {
-            plan.ask(client, shown, robots, held_rows, plan.within())
+        let ask = |client: &KeptClient, robots: &[usize]| {
+            client.with(|client| plan.ask(client, shown, robots, held_rows, plan.within()))
         };
-        let answers: Result<Vec<Vec<RobotRows>>, RemoteError> = match &mut clients[..] {
-            [shared] => queries.iter().map(|robots| ask(&mut **shared, robots)).collect(),
-            own => {
-                let outstanding = Outstanding::default();
-                thread::scope(|scope| {
-                    let (ask, outstanding) = (&ask, &outstanding);
-                    let busy = outstanding.more(own.len());
-                    let asking = own.iter_mut().zip(&queries).zip(busy);
-                    let asked: Vec<_> = asking
-                        .map(|((client, robots), busy)| {
-                            scope.spawn(move || {
-                                let answer = ask(&mut **client, robots);
-                                drop(busy);
-                                outstanding.keep_alive(&mut **client);
-                                answer
-                            })
-                        })
-                        .collect();
-                    asked.into_iter().map(joined).collect()
-                })
-            }
+        let answers: Result<Vec<Vec<RobotRows>>, RemoteError> = match &clients[..] {
+            [shared] => queries.iter().map(|robots| ask(shared, robots)).collect(),
+            own => thread::scope(|scope| {
+                let ask = &ask;
+                let asked: Vec<_> = own
+                    .iter()
+                    .zip(&queries)
+                    .map(|(client, robots)| scope.spawn(move || ask(client, robots)))
+                    .collect();
+                asked.into_iter().map(joined).collect()
+            }),
         };
         Ok(answers?.into_iter().flatten().collect())
     }

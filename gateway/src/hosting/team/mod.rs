@@ -21,9 +21,9 @@ use tandem_tools_spec::{
     Call, Driving, Finish, GetStatus, Heard, ManageCall, OperatorToken, Partner, PartnerDid, SpecError,
     TalkCall, ToolCall,
 };
-use tokio::sync::oneshot;
+use tokio::sync::{Semaphore, SemaphorePermit, oneshot};
 
-use super::{Answer, EpisodeThread, HostingError};
+use super::{Answer, EpisodeThread, HostingError, episode_thread::WAITING_CALLS};
 use crate::token::Token;
 pub use collection::{CollectedEpisode, Collection, CollectionProgress, CollectionStage};
 use driving::Wheel;
@@ -63,6 +63,13 @@ struct Wheels {
 struct Seat {
     robot: String,
     token: Token,
+    /// Places for calls that wait for the episode: a share of all, so that no operator takes those of another.
+    places: Semaphore,
+}
+
+/// Calls that may wait for each of `operators`.
+fn own_calls(operators: usize) -> usize {
+    (WAITING_CALLS / operators.max(1)).max(1)
 }
 
 impl Team {
@@ -74,11 +81,13 @@ impl Team {
         silence: Option<Silence>,
     ) -> Result<(Team, Vec<OperatorToken>), HostingError> {
         let (mut seats, mut tokens) = (Vec::new(), Vec::new());
-        for robot in robots {
+        let robots: Vec<&str> = robots.collect();
+        for robot in &robots {
             let kept = collection.and_then(|collection| collection.seat(robot));
             let (token, text) = kept.map_or_else(Token::random, Ok)?;
-            seats.push(Seat { robot: robot.into(), token });
-            tokens.push(OperatorToken { robot: robot.into(), token: text });
+            let places = Semaphore::new(own_calls(robots.len()));
+            seats.push(Seat { robot: (*robot).into(), token, places });
+            tokens.push(OperatorToken { robot: (*robot).into(), token: text });
         }
         let round = Mutex::new(Round::new(seats.iter().map(|seat| seat.robot.clone()).collect()));
         let patience = Duration::from_secs_f64(driving.patience_s());
@@ -97,6 +106,13 @@ impl Team {
             }
         }
         robot
+    }
+
+    /// Takes one of the places that the operator of `robot` has for calls that wait for the episode.
+    pub fn take_place(&self, robot: &str) -> Result<SemaphorePermit<'_>, HostingError> {
+        let seat = &self.seats[self.seat(robot)?];
+        let limit = own_calls(self.seats.len());
+        seat.places.try_acquire().map_err(|_| HostingError::TooManyWaiting { limit })
     }
 
     /// Whether operators may talk.
@@ -130,6 +146,7 @@ impl Team {
             }
             ToolCall::Manage(ManageCall::Finish(_)) => self.finish(episode, seat).await?,
             ToolCall::Look(_) | ToolCall::Manage(ManageCall::GetStatus(_)) => {
+                let _place = self.take_place(robot)?;
                 episode.ask(Some(robot), call.into_call()).await?
             }
         };
@@ -149,6 +166,7 @@ impl Team {
             return Err(HostingError::NoTalk);
         }
         self.round().check_unheard(seat)?;
+        let _place = self.take_place(&words.from)?;
         let answer = episode.ask(Some(&words.from), call.into_call()).await?;
         let mut round = self.round();
         let said = round.count_said(seat);
@@ -214,7 +232,9 @@ impl Team {
     ) -> Result<Answer, HostingError> {
         self.round().admit(seat)?;
         // What cannot be executed is refused before the others depend on it.
+        let place = self.take_place(call.robot())?;
         let command = episode.read_command(call).await?;
+        drop(place);
         let (reply, answer) = oneshot::channel();
         {
             let mut round = self.round();
@@ -342,5 +362,21 @@ impl Team {
     fn round(&self) -> MutexGuard<'_, Round> {
         // Nothing panics while it holds the lock.
         self.round.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_operator_takes_no_place_of_another() {
+        let (team, _) = Team::new(["A", "B"].into_iter(), &Driving::default(), None, None).unwrap();
+        let taken: Vec<_> = (0..WAITING_CALLS / 2).map(|_| team.take_place("A").unwrap()).collect();
+        let refused = team.take_place("A").unwrap_err();
+        assert!(matches!(refused, HostingError::TooManyWaiting { limit: 8 }), "{refused}");
+        drop(team.take_place("B").unwrap());
+        drop(taken);
+        drop(team.take_place("A").unwrap());
     }
 }

@@ -41,10 +41,17 @@ impl OneRobot {
         }
     }
 
-    /// What a call of the robot's operator is answered with.
+    /// What a call of the robot's operator is answered with. One that has kept the others waiting for too long is told so once; who plays
+    /// here has no use for that, and commands all the same.
     pub fn ask(&self, call: ToolCall) -> Result<ToolReply, HostingError> {
-        let asked = self.team.call(&self.episode, &self.robot, call.into());
-        Ok(self.runtime.block_on(asked)?.reply)
+        let ask = || -> Result<ToolReply, HostingError> {
+            let asked = self.team.call(&self.episode, &self.robot, call.clone().into());
+            Ok(self.runtime.block_on(asked)?.reply)
+        };
+        match ask() {
+            Err(HostingError::LateCommand { .. }) => ask(),
+            answer => answer,
+        }
     }
 
     fn check_company(&self) -> Result<(), PlayerError> {
@@ -101,7 +108,10 @@ impl LocalEpisode for OneRobot {
         shown: &[ExtraInformation],
     ) -> Result<TeamObservation, PlayerError> {
         self.check_company()?;
-        self.episode.look_blocking(observe, shown).map_err(|error| refused(Observe::NAME, error))
+        let seen =
+            self.episode.look_blocking(observe, shown).map_err(|error| refused(Observe::NAME, error))?;
+        self.team.round().has_looked(self.seat);
+        Ok(seen)
     }
 
     fn carry_out(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {

@@ -57,7 +57,7 @@ impl Team {
     }
 
     /// Has `policy` drive `robot` from now on, until the episode ends or everybody else has finished; returns when it is connected. It
-    /// is shown what its map says of all robots. Asking again changes nothing.
+    /// is shown what its map says of all robots. Asking again changes nothing while it drives; one that was lost is connected anew.
     pub async fn take_policy(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
@@ -65,6 +65,7 @@ impl Team {
         policy: Arc<dyn PartnerPolicy>,
     ) -> Result<(), HostingError> {
         let seat = self.seat(robot)?;
+        self.round().check_plays(seat)?;
         if std::mem::replace(&mut self.wheels().partners[seat], true) {
             return Ok(());
         }
@@ -80,6 +81,13 @@ impl Team {
                 Err(HostingError::NoPolicy { reason: error.to_string() })
             }
         }
+    }
+
+    /// Lets nobody wait for the robot on `seat`, whose policy is lost, until somebody drives it again.
+    fn lose_policy(self: &Arc<Self>, episode: &Arc<EpisodeThread>, seat: usize) {
+        self.round().fall_silent(seat);
+        self.wheels().partners[seat] = false;
+        self.go_on(episode);
     }
 
     fn one_robot(self: &Arc<Self>, episode: &Arc<EpisodeThread>, seat: usize, robot: &str) -> OneRobot {
@@ -109,7 +117,7 @@ fn play_expert(mut own: OneRobot, spec: &EpisodeSpec) {
     let _ = own.ask(Finish {}.into());
 }
 
-/// Plays until the episode is over or the policy fails, which is noted for who looks at the recording.
+/// Plays until the episode is over or the policy is lost, which is noted for who looks at the recording; it may be asked again then.
 fn play_policy(
     mut own: OneRobot,
     policy: &dyn PartnerPolicy,
@@ -123,7 +131,13 @@ fn play_policy(
         }
     };
     let spec = own.episode.spec().clone();
-    let failed = match policy.play(&spec, &mut own, &mut || answer(Ok(()))) {
+    let (team, seat) = (own.team.clone(), own.seat);
+    let mut connected = || {
+        // What has happened until now it sees when it looks.
+        team.round().has_looked(seat);
+        answer(Ok(()));
+    };
+    let failed = match policy.play(&spec, &mut own, &mut connected) {
         Err(error) => return answer(Err(error)),
         Ok(Ok(()) | Err(PlayerError::EpisodeOver)) => None,
         Ok(Err(error)) => Some(error),
@@ -134,6 +148,8 @@ fn play_policy(
         let note = own.episode.note(Some(&own.robot), Note { text, ..Note::default() });
         // Of an episode that has ended, nobody is left who could be told.
         let _ = own.runtime.block_on(note);
+        let _runtime = own.runtime.enter();
+        return own.team.lose_policy(&own.episode, own.seat);
     }
     let _ = own.ask(Finish {}.into());
 }

@@ -110,6 +110,26 @@ impl Round {
         }
     }
 
+    /// Refuses an operator that has finished.
+    pub fn check_plays(&self, seat: usize) -> Result<(), HostingError> {
+        let operator = &self.operators[seat];
+        match operator.state {
+            OperatorState::Finished => Err(HostingError::OperatorFinished { robot: operator.robot.clone() }),
+            OperatorState::Thinking
+            | OperatorState::Waiting(_)
+            | OperatorState::Acting
+            | OperatorState::Silent => Ok(()),
+        }
+    }
+
+    /// Nobody waits any longer for the operator on `seat`, until it calls again.
+    pub fn fall_silent(&mut self, seat: usize) {
+        let state = &mut self.operators[seat].state;
+        if let OperatorState::Thinking = state {
+            *state = OperatorState::Silent;
+        }
+    }
+
     /// The operator on `seat` leaves. Returns whether others play on.
     pub fn finish(&mut self, seat: usize) -> Result<bool, HostingError> {
         let waits_for = self.awaited();

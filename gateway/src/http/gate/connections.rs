@@ -1,7 +1,7 @@
-//! Accepts connections and serves each until the server stops, with a limit on how long a request's header may take. Where the server
-//! has a certificate, connections are encrypted.
+//! Accepts connections and serves each until the server stops, with limits on how long a request's header may take and on how long a
+//! connection may wait for a request. Where the server has a certificate, connections are encrypted.
 
-use std::{io, time::Duration};
+use std::{io, sync::Arc, time::Duration};
 
 use axum::Router;
 use hyper::{
@@ -10,10 +10,7 @@ use hyper::{
     server::conn::http1,
     service::{Service, service_fn},
 };
-use hyper_util::{
-    rt::{TokioIo, TokioTimer},
-    service::TowerToHyperService,
-};
+use hyper_util::{rt::TokioIo, service::TowerToHyperService};
 use tokio::{
     io::{AsyncRead, AsyncWrite},
     net::{TcpListener, TcpStream},
@@ -23,7 +20,10 @@ use tokio::{
 };
 use tokio_rustls::{TlsAcceptor, server::TlsStream};
 
-use super::limits::Peer;
+use super::{
+    limits::Peer,
+    waiting::{Connection, GoodCall, NotedStream, WaitTimer, WaitingConnections},
+};
 use crate::{http::problem::ApiError, settings::Certificate};
 
 /// How long to wait after the system refused a connection, as where all its file handles are taken.
@@ -40,27 +40,46 @@ struct Serving {
     stopping: watch::Receiver<bool>,
 }
 
+/// Limits on connections.
+#[derive(Debug, Clone, Copy)]
+pub struct ConnectionLimits {
+    /// How long a request's header may take.
+    pub header: Duration,
+    /// Connections of one address that may wait for a request.
+    pub max_waiting_per_address: usize,
+}
+
 /// Serves `router` until `stopped`, then lets the requests under way finish.
 pub async fn serve(
     listener: TcpListener,
     certificate: Option<Certificate>,
     router: Router,
-    header_limit: Duration,
+    limits: ConnectionLimits,
     stopped: impl Future<Output = ()>,
 ) {
     let (stop, stopping) = watch::channel(false);
-    let serving = Serving { router, header_limit, stopping };
+    let serving = Serving { router, header_limit: limits.header, stopping };
+    let waiting = Arc::new(WaitingConnections::new(limits.max_waiting_per_address));
     let tls = certificate.map(|Certificate(config)| TlsAcceptor::from(config));
     let mut connections = JoinSet::new();
     let accepting = async {
         loop {
             match listener.accept().await {
                 Ok((stream, peer)) => {
-                    let (serving, tls, peer) = (serving.clone(), tls.clone(), Peer(peer.ip()));
+                    let (serving, tls) = (serving.clone(), tls.clone());
+                    let connection = waiting.enter(peer.ip(), limits.header);
                     connections.spawn(async move {
-                        match tls {
-                            Some(tls) => serving.encrypted(stream, tls, peer).await,
-                            None => serving.connection(stream, peer).await,
+                        let served = async {
+                            match tls {
+                                Some(tls) => serving.encrypted(stream, tls, connection.clone()).await,
+                                None => serving.connection(stream, connection.clone()).await,
+                            }
+                        };
+                        tokio::select! {
+                            () = served => {}
+                            () = connection.crowded_out() => {
+                                tracing::info!("a connection was closed: too many of its address wait for a request");
+                            }
                         }
                     });
                     while connections.try_join_next().is_some() {}
@@ -83,32 +102,46 @@ pub async fn serve(
 
 impl Serving {
     /// Serves a connection that is to be encrypted. Who speaks HTTP on it is told so.
-    async fn encrypted(self, stream: TcpStream, tls: TlsAcceptor, peer: Peer) {
+    async fn encrypted(self, stream: TcpStream, tls: TlsAcceptor, connection: Arc<Connection>) {
         let mut stopping = self.stopping.clone();
         let begun = tokio::select! {
             begun = timeout(self.header_limit, begin(stream, tls)) => begun,
             _ = stopping.wait_for(|stopping| *stopping) => return,
         };
         match begun {
-            Ok(Ok(Begun::Encrypted(stream))) => self.connection(*stream, peer).await,
+            Ok(Ok(Begun::Encrypted(stream))) => self.connection(*stream, connection).await,
             Ok(Ok(Begun::Plain(stream))) => {
                 let router = Router::new().fallback(|| async { ApiError::NotEncrypted });
-                Serving { router, ..self }.connection(stream, peer).await;
+                Serving { router, ..self }.connection(stream, connection).await;
             }
             Ok(Err(error)) => tracing::info!(%error, "a connection was not encrypted"),
             Err(_) => tracing::info!("a connection was not encrypted in time"),
         }
     }
 
-    async fn connection(self, stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static, peer: Peer) {
+    async fn connection(
+        self,
+        stream: impl AsyncRead + AsyncWrite + Unpin + Send + 'static,
+        connection: Arc<Connection>,
+    ) {
         let Serving { router, header_limit, mut stopping } = self;
         let router = TowerToHyperService::new(router);
+        let answering = connection.clone();
         let with_peer = service_fn(move |mut request: Request<Incoming>| {
-            request.extensions_mut().insert(peer);
-            router.call(request)
+            request.extensions_mut().insert(Peer(answering.address()));
+            request.extensions_mut().insert(answering.clone());
+            let (answer, connection) = (router.call(request), answering.clone());
+            async move {
+                let answer = answer.await?;
+                if answer.extensions().get::<GoodCall>().is_some() {
+                    connection.trust();
+                }
+                Ok::<_, std::convert::Infallible>(answer)
+            }
         });
+        let stream = NotedStream { connection: connection.clone(), stream };
         let connection = http1::Builder::new()
-            .timer(TokioTimer::new())
+            .timer(WaitTimer(connection))
             .header_read_timeout(header_limit)
             .serve_connection(TokioIo::new(stream), with_peer)
             .with_upgrades();

@@ -14,8 +14,8 @@ use axum::{
 };
 use tokio::sync::Semaphore;
 
-use crate::http::problem::ApiError;
-use crate::settings::Settings;
+use super::waiting::Connection;
+use crate::{http::problem::ApiError, settings::Settings};
 
 /// How many addresses are remembered. Beyond, those are forgotten that may send at their full rate again.
 const MOST_ADDRESSES: usize = 1024;
@@ -53,13 +53,27 @@ impl Limits {
     }
 }
 
-/// Lets a request in within the limits, or answers when to send it again.
-pub async fn pass(State(limits): State<Limits>, request: Request, next: Next) -> Response {
-    let refusal = match (limits.check_rate(request.extensions().get()), limits.permits.try_acquire()) {
-        (Ok(()), Ok(_permit)) => return next.run(request).await,
-        (Err(refusal), _) => refusal,
-        (Ok(()), Err(_)) => ApiError::Busy { limit: limits.most_requests },
+/// Lets a request in within its address's rate, or answers when to send it again.
+pub async fn pass_rate(State(limits): State<Limits>, request: Request, next: Next) -> Response {
+    match limits.check_rate(request.extensions().get()) {
+        Ok(()) => next.run(request).await,
+        Err(refusal) => refused(refusal),
+    }
+}
+
+/// Gives a request one of the places, or answers when to send it again. It has arrived as a whole and its caller is known by then, so that
+/// nobody holds a place by being slow.
+pub async fn take_place(State(limits): State<Limits>, request: Request, next: Next) -> Response {
+    let Ok(_place) = limits.permits.try_acquire() else {
+        return refused(ApiError::Busy { limit: limits.most_requests });
     };
+    if let Some(connection) = request.extensions().get::<Arc<Connection>>() {
+        connection.is_served();
+    }
+    next.run(request).await
+}
+
+fn refused(refusal: ApiError) -> Response {
     tracing::info!(problem = refusal.kind(), "a request was not let in");
     refusal.into_response()
 }

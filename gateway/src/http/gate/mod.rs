@@ -5,6 +5,7 @@ pub mod connections;
 mod hosts;
 pub mod limits;
 pub mod tokens;
+mod waiting;
 
 use std::{net::IpAddr, sync::Arc};
 

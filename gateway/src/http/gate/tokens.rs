@@ -2,12 +2,14 @@
 //! lets through. A caller without a token learns that it needs one, and nothing else.
 
 use axum::{
+    body::Body,
     extract::{Request, State},
     http::{HeaderMap, StatusCode, header},
     middleware::Next,
     response::{IntoResponse, Response},
 };
 
+use super::waiting::GoodCall;
 use crate::{
     hosting::Caller,
     http::{
@@ -29,6 +31,9 @@ pub async fn identify(State(app): State<AppState>, mut request: Request, next: N
     if operate::is_open(request.uri().path()) {
         request.headers_mut().remove(header::COOKIE);
         request.headers_mut().remove(header::AUTHORIZATION);
+        // Nobody waits for a body that no page reads.
+        *request.body_mut() = Body::empty();
+        request.headers_mut().remove(header::CONTENT_TYPE);
         return next.run(request).await;
     }
     let driving = if path_is(&request, DRIVE) { drivers(&app, &request) } else { None };
@@ -55,7 +60,11 @@ pub async fn identify(State(app): State<AppState>, mut request: Request, next: N
     request.headers_mut().remove(header::COOKIE);
     request.headers_mut().remove(header::AUTHORIZATION);
     request.extensions_mut().insert(caller);
-    next.run(request).await
+    let mut answer = next.run(request).await;
+    if answer.status().is_success() {
+        answer.extensions_mut().insert(GoodCall);
+    }
+    answer
 }
 
 fn path_is(request: &Request, path: &str) -> bool {

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use axum::{
     Router, body, extract,
-    http::{Method, request::Parts},
+    http::{HeaderValue, Method, header, request::Parts},
     middleware::{self, Next},
     response::{IntoResponse, Response},
 };
@@ -37,6 +37,9 @@ use super::{
     problem::ApiError,
 };
 use crate::hosting::{Answer, Caller, HostingError, RefusedCall};
+
+/// What the library wants to be accepted; the answers are JSON.
+const ACCEPTED: &str = "application/json, text/event-stream";
 
 /// What a host tells its model about the server as a whole: only what `caller` can do.
 fn instructions(caller: &Caller) -> String {
@@ -284,6 +287,7 @@ struct DuplicateField(String);
 /// Refuses what is no message. A body that names a field twice is noted on the request, for the answer to its call.
 async fn check_body(request: extract::Request, next: Next) -> Response {
     let (mut parts, body) = request.into_parts();
+    accept_whatever_fits(&mut parts);
     // The gate has received it, within its limit.
     let bytes = body::to_bytes(body, usize::MAX).await.unwrap_or_default();
     if parts.method == Method::POST
@@ -295,6 +299,17 @@ async fn check_body(request: extract::Request, next: Next) -> Response {
         parts.extensions.insert(DuplicateField(reason));
     }
     next.run(extract::Request::from_parts(parts, bytes.into())).await
+}
+
+/// Spells out for the library behind this what a client takes that takes anything, or says nothing of it.
+fn accept_whatever_fits(parts: &mut Parts) {
+    let accepted = parts.headers.get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());
+    let ranges: Vec<&str> = accepted.flat_map(|value| value.split(',')).collect();
+    let media = |range: &str| range.split(';').next().unwrap_or_default().trim().to_ascii_lowercase();
+    let any = |range: &&str| matches!(&*media(range), "*/*" | "application/*" | "application/json");
+    if ranges.is_empty() || ranges.iter().any(any) {
+        parts.headers.insert(header::ACCEPT, HeaderValue::from_static(ACCEPTED));
+    }
 }
 
 fn duplicate_field(context: &RequestContext<RoleServer>) -> Option<&DuplicateField> {

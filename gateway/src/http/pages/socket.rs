@@ -2,6 +2,7 @@
 
 use std::{
     io::{self, Cursor},
+    sync::Arc,
     time::Duration,
 };
 
@@ -14,6 +15,7 @@ use hyper::upgrade::{OnUpgrade, Upgraded};
 use hyper_util::rt::TokioIo;
 use tokio::{
     io::{AsyncReadExt, AsyncWriteExt, ReadHalf, WriteHalf, split},
+    sync::Mutex,
     time::timeout,
 };
 use tungstenite::{
@@ -41,11 +43,14 @@ pub struct PageSocket {
 }
 
 /// Tells a page.
-pub struct PageSender(WriteHalf<TokioIo<Upgraded>>);
+#[derive(Clone)]
+pub struct PageSender(Arc<Mutex<WriteHalf<TokioIo<Upgraded>>>>);
 
-/// Hears a page.
+/// Hears a page, and answers its pings.
 pub struct PageReader {
     half: ReadHalf<TokioIo<Upgraded>>,
+    /// By which pings are answered.
+    sender: PageSender,
     /// What has come of the next frame.
     arrived: Vec<u8>,
 }
@@ -64,25 +69,25 @@ impl PageSender {
     /// Says that nothing more comes.
     pub async fn close(mut self) -> io::Result<()> {
         self.send(Frame::close(None)).await?;
-        self.0.shutdown().await
+        self.0.lock().await.shutdown().await
     }
 
     async fn send(&mut self, frame: Frame) -> io::Result<()> {
         let mut bytes = Vec::with_capacity(frame.len());
         frame.format(&mut bytes).map_err(io::Error::other)?;
         let sent = async {
-            self.0.write_all(&bytes).await?;
-            self.0.flush().await
+            let mut half = self.0.lock().await;
+            half.write_all(&bytes).await?;
+            half.flush().await
         };
         timeout(WRITE_LIMIT, sent).await.map_err(|_| io::Error::from(io::ErrorKind::TimedOut))?
     }
 }
 
 impl PageReader {
-    /// Returns when the page has gone. A page that has nothing to say is ended by what it sends, too: a close frame, as a rule.
+    /// Returns when the page has gone, whatever it has said until then.
     pub async fn gone(&mut self) {
-        let mut first = [0; 1];
-        let _ = self.half.read(&mut first).await;
+        while let Ok(Some(_)) = self.text().await {}
     }
 
     /// The next text of a page; `None` once it has gone. What is no whole text of a reasonable length ends it.
@@ -93,9 +98,16 @@ impl PageReader {
                     OpCode::Data(Data::Text) => {
                         return String::from_utf8(bytes).map(Some).map_err(io::Error::other);
                     }
-                    OpCode::Control(Control::Ping | Control::Pong) => continue,
+                    OpCode::Control(Control::Ping) => self.sender.send(Frame::pong(bytes)).await?,
+                    OpCode::Control(Control::Pong) => {}
+                    OpCode::Control(Control::Close) => {
+                        // Whoever closes first has gone when it has heard this.
+                        let _ = self.sender.send(Frame::close(None)).await;
+                        return Ok(None);
+                    }
                     OpCode::Data(_) | OpCode::Control(_) => return Ok(None),
                 }
+                continue;
             }
             if self.half.read_buf(&mut self.arrived).await? == 0 {
                 return Ok(None);
@@ -137,9 +149,10 @@ where
     tokio::spawn(async move {
         let Ok(upgraded) = upgrade.await else { return };
         let (half, sender) = split(TokioIo::new(upgraded));
-        let reader = PageReader { half, arrived: Vec::new() };
+        let sender = PageSender(Arc::new(Mutex::new(sender)));
+        let reader = PageReader { half, sender: sender.clone(), arrived: Vec::new() };
         // A page that has gone is no error.
-        let _ = serve(PageSocket { sender: PageSender(sender), reader }).await;
+        let _ = serve(PageSocket { sender, reader }).await;
     });
     let headers = [
         (header::CONNECTION, HeaderValue::from_static("upgrade")),

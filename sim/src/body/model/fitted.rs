@@ -15,6 +15,7 @@ use super::read::{PALM_IN_WRIST_M, assemble, corners_m, only_tree};
 use super::{BodyScale, JointModel, RobotModel, SiteModel};
 use crate::body::layout::{LEG_JOINTS, LEGS, joint_names};
 use crate::mjcf::{AxisJoint, BodyTree, Document, LinkJoint, MjcfCamera};
+use crate::user_file::with_own_separators;
 use crate::{Side, Sides, SimError, assets};
 
 /// Reads a description, and the MJCF that it names, in which joints, wrists and camera are then called as of every robot; with a number
@@ -22,7 +23,7 @@ use crate::{Side, Sides, SimError, assets};
 pub(super) fn read(path: &Path) -> Result<(RobotModel, Document, u64), SimError> {
     let (description, text) = RobotDescription::read(path)?;
     let folder = path.parent().unwrap_or(Path::new("."));
-    let mut document = Document::read(&folder.join(&description.model))?;
+    let mut document = Document::read(&with_own_separators(folder.join(&description.model)))?;
     let fingerprint = xxh3_64(format!("{:016x}{text}", document.fingerprint()).as_bytes());
     let fitting = Fitting {
         file: path.display().to_string(),

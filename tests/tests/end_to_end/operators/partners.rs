@@ -1,7 +1,10 @@
 //! Who else drives beside a person: the task's expert, a learned policy, and programs, whose commands go on over the steps of people.
 
 use std::{
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     time::{Duration, Instant},
 };
 
@@ -133,4 +136,50 @@ fn a_policy_that_is_not_there_is_told_of_and_may_be_asked_for_again() {
         assert_eq!(ask_for(&team, "/operate/policy", Some(&team.tokens[1])), 409);
     }
     assert!(act.requests.lock().expect("no panic").len() >= 2, "it is asked each time");
+}
+
+#[test]
+fn a_policy_that_was_lost_may_be_asked_for_again_and_nobody_waits_for_it() {
+    let (broken, failed) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+    let mut row = vec![0.0; 35];
+    row[34] = 0.76;
+    let (is_broken, has_failed) = (broken.clone(), failed.clone());
+    let act = ActServer::start(move |_| match is_broken.load(Ordering::SeqCst) {
+        true => {
+            has_failed.store(true, Ordering::SeqCst);
+            (500, json!({ "error": "out of memory" }))
+        }
+        false => (200, json!({ "actions": vec![row.clone(); 5] })),
+    });
+    let team =
+        Team::on(server_with_policy(&act.url()), 0, json!({ "patience_s": 600, "protocol": "agentic" }));
+    assert_eq!(ask_for(&team, "/operate/policy", Some(&team.tokens[1])), 204);
+    let mut page = DriversSocket::open(&team, 0);
+    let asked = || act.requests.lock().expect("no panic").len();
+    let mut drive_until = |done: &dyn Fn() -> bool| {
+        let began = Instant::now();
+        while !done() {
+            assert!(began.elapsed() < Duration::from_secs(120), "nothing happens");
+            page.say(json!({}), true);
+            page.read();
+        }
+    };
+    drive_until(&|| asked() >= 4);
+    broken.store(true, Ordering::SeqCst);
+    drive_until(&|| failed.load(Ordering::SeqCst));
+    broken.store(false, Ordering::SeqCst);
+    let before = asked();
+    // Asking is no more than a wish while the lost one says goodbye.
+    drive_until(&|| {
+        assert_eq!(ask_for(&team, "/operate/policy", Some(&team.tokens[1])), 204);
+        asked() >= before + 3
+    });
+    drop(page);
+    let (_, recording) = team.verified();
+    let notes = format!("{:?}", recording.transcript().expect("a transcript"));
+    assert!(
+        notes.contains("The policy of robot B has stopped") && notes.contains("out of memory"),
+        "{notes}"
+    );
+    assert_eq!(notes.matches("drives robot B.").count(), 2, "{notes}");
 }

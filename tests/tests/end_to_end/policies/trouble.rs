@@ -215,3 +215,16 @@ fn a_page_in_html_is_shown() {
         assert!(text.contains(&format!("{says}{page}")), "{text}");
     }
 }
+
+#[test]
+fn a_server_that_sends_elsewhere_is_not_followed() {
+    let server = ActServer::start(|_| (307, json!({})));
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let policy = RemotePolicy::new(PolicyProtocol::Act, vec![server.url()], map(folder.path(), FAST));
+    let evaluation = play(&plan(&policy, vec![1], false), folder.path());
+    let [left_out] = &evaluation.left_out[..] else { panic!("{evaluation:?}") };
+    assert!(
+        left_out.contains("it sends elsewhere") && left_out.contains("name that address in --policy"),
+        "{left_out}"
+    );
+}

@@ -1,13 +1,13 @@
 //! Programs of this machine are let in, and web pages are not.
 
 use std::{
-    io::{Read, Write},
+    io::{BufRead, BufReader, Read, Write},
     net::TcpStream,
     time::Duration,
 };
 
 use serde_json::{Value, json};
-use tandem::settings::Layer;
+use tandem::{settings::Layer, token::Token};
 use tandem_tests::TestServer;
 
 /// Sends bytes as they are and returns everything that comes back until the server closes the connection.
@@ -169,4 +169,108 @@ fn who_does_not_finish_a_request_is_cut_off() {
         let problem: Value = serde_json::from_str(body).expect("problem details");
         assert_eq!(problem["detail"], "the body did not arrive in 1 s; send it again, in one go");
     }
+}
+
+const TOKEN: &str = "correct-horse-battery-staple";
+
+fn with_token(flags: Layer) -> TestServer {
+    TestServer::with(Layer { token: Some(Token::parse(TOKEN, "a test").expect("a token")), ..flags })
+}
+
+/// A connection that stays open from request to request.
+struct Kept(TcpStream);
+
+impl Kept {
+    fn open(server: &TestServer) -> Kept {
+        let stream = TcpStream::connect(server.address).expect("a connection");
+        stream.set_read_timeout(Some(Duration::from_secs(60))).expect("a timeout");
+        Kept(stream)
+    }
+
+    /// The status of the answer to a request without a body; `None` where the server has closed the connection.
+    fn ask(&mut self, path: &str, token: &str) -> Option<u16> {
+        let request =
+            format!("GET {path} HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer {token}\r\n\r\n");
+        self.0.write_all(request.as_bytes()).ok()?;
+        let mut answer = String::new();
+        let mut reader = BufReader::new(&self.0);
+        reader.read_line(&mut answer).ok().filter(|read| *read > 0)?;
+        let mut length = 0;
+        loop {
+            let mut line = String::new();
+            reader.read_line(&mut line).expect("a header");
+            match line.split_once(": ") {
+                Some((name, value)) if name.eq_ignore_ascii_case("content-length") => {
+                    length = value.trim().parse().expect("a length");
+                }
+                Some(_) => {}
+                None => break,
+            }
+        }
+        reader.read_exact(&mut vec![0; length]).expect("a body");
+        status(&answer).parse().ok()
+    }
+
+    /// Waits until the server has closed the connection.
+    fn wait_for_the_end(&mut self) {
+        let mut rest = Vec::new();
+        // A connection that is cut with bytes under way is reset.
+        let _ = self.0.read_to_end(&mut rest);
+    }
+}
+
+#[test]
+fn a_connection_that_has_made_a_good_call_outlives_a_long_thought() {
+    let server = with_token(Layer { request_timeout: Some(1), ..Layer::default() });
+    let (mut known, mut unknown, mut idle) = (Kept::open(&server), Kept::open(&server), Kept::open(&server));
+    assert_eq!(known.ask("/healthz", TOKEN), Some(200));
+    assert_eq!(unknown.ask("/healthz", "another-token-of-somebody"), Some(401));
+    // Three times as long as the header of a request may take.
+    std::thread::sleep(Duration::from_secs(3));
+    unknown.wait_for_the_end();
+    idle.wait_for_the_end();
+    assert_eq!(known.ask("/healthz", TOKEN), Some(200));
+    let half = "GET /healthz HTTP/1.1\r\nhost: local";
+    known.0.write_all(half.as_bytes()).expect("half a request");
+    known.wait_for_the_end();
+}
+
+#[test]
+fn nobody_takes_a_place_by_being_slow() {
+    let server = with_token(Layer { max_requests: Some(4), ..Layer::default() });
+    let begin = |line: &str, headers: &str| {
+        let mut kept = Kept::open(&server);
+        let request = format!("{line} HTTP/1.1\r\nhost: localhost\r\n{headers}content-length: 9\r\n\r\n{{");
+        kept.0.write_all(request.as_bytes()).expect("half a request");
+        kept
+    };
+    let authorization = format!("authorization: Bearer {TOKEN}\r\n{JSON}\r\n");
+    let slow: Vec<Kept> = (0..8)
+        .flat_map(|_| [begin("GET /operate", ""), begin("POST /v1/episodes", &authorization)])
+        .collect();
+    for _ in 0..8 {
+        assert_eq!(Kept::open(&server).ask("/healthz", TOKEN), Some(200));
+    }
+    drop(slow);
+    // What no page reads, nobody waits for.
+    let page = raw(
+        &server,
+        "GET /operate HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\ncontent-length: 9\r\n\r\n{",
+    );
+    assert_eq!(status(&page), "200", "{page}");
+}
+
+#[test]
+fn an_address_keeps_so_many_connections_waiting_and_no_more() {
+    let server = with_token(Layer { max_requests: Some(4), ..Layer::default() });
+    let mut known = Kept::open(&server);
+    assert_eq!(known.ask("/healthz", TOKEN), Some(200));
+    // 64 may wait, of which one is known.
+    let mut waiting: Vec<Kept> = (0..67).map(|_| Kept::open(&server)).collect();
+    for kept in &mut waiting[..4] {
+        kept.wait_for_the_end();
+    }
+    let last = waiting.last_mut().expect("a connection");
+    assert_eq!(last.ask("/healthz", TOKEN), Some(200), "the latest may wait");
+    assert_eq!(known.ask("/healthz", TOKEN), Some(200), "who has made a good call goes last");
 }

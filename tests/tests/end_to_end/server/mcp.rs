@@ -167,3 +167,19 @@ fn instructions_say_what_the_caller_can_do() {
         "{operator}"
     );
 }
+
+#[test]
+fn a_client_that_takes_anything_is_answered() {
+    let server = TestServer::start();
+    let list = json!({ "jsonrpc": "2.0", "id": 1, "method": "tools/list", "params": {} }).to_string();
+    for accept in
+        ["*/*", "application/json", "application/*;q=0.8, text/html", "application/json, text/event-stream"]
+    {
+        let headers = [("content-type", "application/json"), ("accept", accept)];
+        let (status, _, bytes) = server.ask("POST", "/mcp", &headers, list.as_bytes());
+        let answer: Value = serde_json::from_slice(&bytes).unwrap_or_default();
+        assert!(status == 200 && answer["result"]["tools"].is_array(), "{accept}: {status} {answer}");
+    }
+    let headers = [("content-type", "application/json"), ("accept", "text/html")];
+    assert_eq!(server.ask("POST", "/mcp", &headers, list.as_bytes()).0, 406);
+}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .endpoint import EndpointError, MissingPackage, Model, TooLong, without_keys
+from .endpoint import EndpointError, Filtered, MissingPackage, Model, TooLong, without_keys
 from .models import open_model
 
-__all__ = ["EndpointError", "MissingPackage", "Model", "TooLong", "open_model", "without_keys"]
+__all__ = ["EndpointError", "Filtered", "MissingPackage", "Model", "TooLong", "open_model", "without_keys"]

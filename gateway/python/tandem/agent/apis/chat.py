@@ -9,7 +9,7 @@ from typing import Any
 from ..conversation import Answers, Call, Picture, Reply, Told, Turn, Usage, listed
 from ..settings import AgentSettings
 from ..tools import Tool, for_chat
-from .endpoint import EndpointError, OptionalFields, import_sdk, open_client, request
+from .endpoint import EndpointError, OptionalFields, import_sdk, open_client, request, understood
 
 RETURNED = ("reasoning_content", "reasoning_details")
 """Thoughts that some servers want back with the calls that they led to, by the names that they give them."""
@@ -25,6 +25,7 @@ class ChatModel:
         self._sdk = import_sdk("openai")
         self._settings = settings
         self._client = open_client(self._sdk, self._sdk.OpenAI, settings, ["OPENAI_API_KEY"])
+        self._sampling = settings.sampling.fields("openai-chat")
         self._optional = OptionalFields(RETURNED, prompt_cache_key=cache_key, reasoning_effort=settings.effort)
 
     def ask(self, instructions: str, tools: Sequence[Tool], turns: Sequence[Turn]) -> Reply:
@@ -34,13 +35,13 @@ class ChatModel:
             messages = [{"role": "system", "content": instructions}]
             messages += [message for turn in turns for message in _messages(turn, self._optional.returned)]
             return self._client.chat.completions.create(
-                model=self._settings.model, messages=messages, tools=for_chat(tools), **optional
+                model=self._settings.model, messages=messages, tools=for_chat(tools), **self._sampling, **optional
             )
 
         completion = request(self._sdk, self._settings, self._optional, send)
-        if not completion.choices:
-            raise EndpointError(f"{self._settings.model} answers without a choice: {completion.to_json()[:300]}")
-        return _reply(completion, len(turns))
+        if not getattr(completion, "choices", None):
+            raise EndpointError(f"{self._settings.model} answers without a choice: {str(completion)[:300]}")
+        return understood(self._settings, lambda: _reply(completion, len(turns)))
 
 
 def _messages(turn: Turn, returned: Collection[str]) -> list[dict[str, Any]]:
@@ -68,7 +69,7 @@ def _reply(completion: Any, turn: int) -> Reply:
     asked = [call for call in listed(message.tool_calls) if call.type == "function"]
     # Some servers leave the id empty.
     calls = tuple(
-        Call(call.id or f"call_{turn}_{index}", call.function.name, call.function.arguments or "{}")
+        Call(call.id or f"call_{turn}_{index}", call.function.name, _text(call.function.arguments))
         for index, call in enumerate(asked)
     )
     as_sent: dict[str, Any] = {"role": "assistant", "content": words or (None if calls else NOTHING)}
@@ -76,7 +77,14 @@ def _reply(completion: Any, turn: int) -> Reply:
     if calls:
         as_sent["tool_calls"] = [_sent(call, raw) for call, raw in zip(calls, asked, strict=True)]
     thoughts = getattr(message, "reasoning_content", None) or getattr(message, "reasoning", None) or ""
-    return Reply(words, str(thoughts), calls, _usage(completion.usage), as_sent, choice.finish_reason == "length")
+    refusal = getattr(message, "refusal", None) or None
+    cut, filtered = choice.finish_reason == "length", choice.finish_reason == "content_filter"
+    return Reply(words, str(thoughts), calls, _usage(completion.usage), as_sent, cut, refusal, filtered)
+
+
+def _text(arguments: Any) -> str:
+    """Arguments as JSON; some servers give the object itself."""
+    return arguments or "{}" if isinstance(arguments, str) else json.dumps(arguments or {})
 
 
 def _sent(call: Call, raw: Any) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from ..conversation import Reply, Turn
 from ..settings import AgentSettings
 from ..tools import Tool
 
-INSTALL = "pip install 'tandem-sim[agents]'"
+INSTALL = "pip install './gateway/python[agents]' in a checkout of the repository"
 
 RETRIES = 6
 """How often an SDK asks again, with its own growing waits: about half a minute of 429 and 500 is waited out."""
@@ -26,6 +26,7 @@ _REFUSED = (400, 422)
 _TOO_LONG = re.compile(
     r"context.{0,20}(length|window|size)|too long|too many tokens|maximum.{0,40}tokens|exceed.{0,40}(token|context)", re.I
 )
+_FILTERED = re.compile(r"content[ _-]?(filter|management policy)|ResponsibleAIPolicyViolation", re.I)
 _KEY = re.compile(r"\b(sk|pk|rk|key)-[\w*.…-]{6,}", re.I)
 
 
@@ -35,6 +36,10 @@ class EndpointError(TandemError):
 
 class TooLong(EndpointError):
     """The conversation is longer than the model can read."""
+
+
+class Filtered(EndpointError):
+    """A filter of the endpoint refused the conversation."""
 
 
 class MissingPackage(TandemError):
@@ -113,6 +118,21 @@ def request(sdk: Any, settings: AgentSettings, optional: OptionalFields, send: C
         except sdk.APIError as error:
             cause = f": {error.__cause__}" if error.__cause__ is not None else ""
             raise EndpointError(without_keys(f"{_where(settings)}: {error}{cause}")) from None
+        except EndpointError:
+            raise
+        except Exception as error:
+            # What is no JSON, or is cut off under way, some versions of the SDKs pass on as they find it.
+            text = f"{_where(settings)} answers nothing that the API {settings.api} knows: {type(error).__name__}: {error}"
+            raise EndpointError(without_keys(text[:_MOST_CHARACTERS])) from None
+
+
+def understood(settings: AgentSettings, read: Callable[[], Reply]) -> Reply:
+    """A reply as it is read from an answer, which may lack what the API promises."""
+    try:
+        return read()
+    except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+        text = f"{_where(settings)} answers what is no reply of the API {settings.api}: {type(error).__name__}: {error}"
+        raise EndpointError(without_keys(text[:_MOST_CHARACTERS])) from None
 
 
 def _status_error(settings: AgentSettings, status: int, message: str, told: str) -> EndpointError:
@@ -120,6 +140,8 @@ def _status_error(settings: AgentSettings, status: int, message: str, told: str)
     text = without_keys(f"{_where(settings)} answers {status}: {short}")
     if status in (*_REFUSED, 413) and _TOO_LONG.search(told):
         return TooLong(text)
+    if status in _REFUSED and _FILTERED.search(told):
+        return Filtered(text)
     return EndpointError(text)
 
 

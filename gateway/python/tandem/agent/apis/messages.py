@@ -10,7 +10,7 @@ from ..conversation import Answer, Answers, Call, Picture, Reply, Told, Turn, Us
 from ..settings import AgentSettings
 from ..tools import Tool, for_messages
 from .chat import NOTHING
-from .endpoint import OptionalFields, import_sdk, open_client, request
+from .endpoint import OptionalFields, import_sdk, open_client, request, understood
 
 REPLY_TOKENS = 16_000
 """The most that a reply may have, thoughts included, which this API wants to be told."""
@@ -29,6 +29,7 @@ class MessagesModel:
         self._sdk = import_sdk("anthropic")
         self._settings = settings
         self._client = open_client(self._sdk, self._sdk.Anthropic, settings, ["ANTHROPIC_API_KEY", "ANTHROPIC_AUTH_TOKEN"])
+        self._sampling = settings.sampling.fields("anthropic")
         thinking = settings.effort is not None
         self._optional = OptionalFields(
             output_config={"effort": settings.effort} if thinking else None,
@@ -50,10 +51,12 @@ class MessagesModel:
                 system=[{"type": "text", "text": instructions, **CACHED}],
                 messages=messages,
                 tools=offered,
+                **self._sampling,
                 **optional,
             )
 
-        return _reply(request(self._sdk, self._settings, self._optional, send))
+        message = request(self._sdk, self._settings, self._optional, send)
+        return understood(self._settings, lambda: _reply(message))
 
 
 def _message(turn: Turn) -> dict[str, Any]:
@@ -85,4 +88,5 @@ def _reply(message: Any) -> Reply:
     cached, written = usage.cache_read_input_tokens or 0, usage.cache_creation_input_tokens or 0
     counted = Usage(usage.input_tokens + cached + written, usage.output_tokens, cached, written)
     sent = as_sent or [{"type": "text", "text": NOTHING}]
-    return Reply(words, thoughts, calls, counted, sent, message.stop_reason == "max_tokens")
+    refusal = (words or NOTHING) if message.stop_reason == "refusal" else None
+    return Reply(words, thoughts, calls, counted, sent, message.stop_reason == "max_tokens", refusal)

@@ -9,7 +9,7 @@ from ..conversation import Answer, Answers, Call, Reply, Told, Turn, Usage, list
 from ..settings import AgentSettings
 from ..tools import Tool, for_responses
 from .chat import NOTHING
-from .endpoint import EndpointError, OptionalFields, import_sdk, open_client, request
+from .endpoint import EndpointError, OptionalFields, import_sdk, open_client, request, understood
 
 
 class ResponsesModel:
@@ -19,6 +19,7 @@ class ResponsesModel:
         self._sdk = import_sdk("openai")
         self._settings = settings
         self._client = open_client(self._sdk, self._sdk.OpenAI, settings, ["OPENAI_API_KEY"])
+        self._sampling = settings.sampling.fields("openai")
         self._optional = OptionalFields(
             prompt_cache_key=cache_key,
             store=False,
@@ -32,13 +33,18 @@ class ResponsesModel:
 
         def send(**optional: Any) -> Any:
             return self._client.responses.create(
-                model=self._settings.model, instructions=instructions, input=items, tools=for_responses(tools), **optional
+                model=self._settings.model,
+                instructions=instructions,
+                input=items,
+                tools=for_responses(tools),
+                **self._sampling,
+                **optional,
             )
 
         response = request(self._sdk, self._settings, self._optional, send)
-        if response.status == "failed":
+        if getattr(response, "status", None) == "failed":
             raise EndpointError(f"{self._settings.model} failed: {response.error}")
-        return _reply(response)
+        return understood(self._settings, lambda: _reply(response))
 
 
 def _items(turn: Turn) -> list[dict[str, Any]]:
@@ -77,9 +83,13 @@ def _reply(response: Any) -> Reply:
             if not item.encrypted_content:
                 continue
         as_sent.append(item.model_dump(exclude_none=True, mode="json"))
-    cut = response.incomplete_details is not None and response.incomplete_details.reason == "max_output_tokens"
+    incomplete = None if response.incomplete_details is None else response.incomplete_details.reason
+    cut, filtered = incomplete == "max_output_tokens", incomplete == "content_filter"
+    parts = [part for item in response.output if item.type == "message" for part in item.content]
+    refusals = [str(part.refusal) for part in parts if part.type == "refusal"]
+    refusal = "\n".join(refusals) if refusals else None
     sent = as_sent or [{"role": "assistant", "content": NOTHING}]
-    return Reply(response.output_text, "\n".join(thoughts), tuple(calls), _usage(response.usage), sent, cut)
+    return Reply(response.output_text, "\n".join(thoughts), tuple(calls), _usage(response.usage), sent, cut, refusal, filtered)
 
 
 def _usage(usage: Any) -> Usage | None:

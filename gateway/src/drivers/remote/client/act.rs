@@ -6,11 +6,17 @@ use base64::{Engine, prelude::BASE64_STANDARD};
 use serde_json::{Value, json};
 use ureq::{Agent, Timeout, http::Response};
 
-use super::PolicyClient;
+use super::{PolicyAddress, PolicyClient, PolicyKey, encryption::for_requests};
 use crate::drivers::remote::{
     error::{RemoteError, gist},
     values::{ReplyValue, RequestValue},
 };
+
+/// What addresses of such servers begin with: those of encrypted ones last.
+pub const SCHEMES: [&str; 2] = ["http://", "https://"];
+
+/// How the key is given.
+const KEY_SCHEME: &str = "Bearer";
 
 /// Answers beyond this are not read.
 const LARGEST_ANSWER_BYTES: u64 = 64 << 20;
@@ -18,21 +24,35 @@ const LARGEST_ANSWER_BYTES: u64 = 64 << 20;
 /// The policy at one address.
 pub struct Act {
     url: String,
+    key: Option<PolicyKey>,
     agent: Agent,
     /// How long it may take to find the server, until it has been found.
     connect_within: Option<Duration>,
 }
 
 impl Act {
-    pub fn new(url: &str, connect_within: Duration) -> Act {
-        let agent = Agent::config_builder().http_status_as_error(false).build().new_agent();
-        Act { url: url.into(), agent, connect_within: Some(connect_within) }
+    pub fn new(address: &PolicyAddress, connect_within: Duration) -> Act {
+        // Another address than the one that was named is asked by nobody.
+        let mut config = Agent::config_builder().http_status_as_error(false).max_redirects(0);
+        if address.is_encrypted() {
+            config = config.tls_config(for_requests());
+        }
+        if address.is_loopback() {
+            config = config.proxy(None);
+        }
+        let agent = config.build().new_agent();
+        let (url, key) = (address.url.clone(), address.key.clone());
+        Act { url, key, agent, connect_within: Some(connect_within) }
     }
 
     fn post(&self, body: String, within: Duration) -> Result<Response<ureq::Body>, ureq::Error> {
         let config = self.agent.post(&self.url).config().timeout_global(Some(within));
         let config = config.timeout_resolve(self.connect_within).timeout_connect(self.connect_within);
-        config.build().header("content-type", "application/json").send(body)
+        let mut request = config.build().header("content-type", "application/json");
+        if let Some(key) = &self.key {
+            request = request.header("authorization", key.authorization(KEY_SCHEME));
+        }
+        request.send(body)
     }
 
     fn failed(&self, error: ureq::Error, within: Duration) -> RemoteError {
@@ -65,6 +85,14 @@ impl PolicyClient for Act {
         let mut response = self.post(body, within).map_err(|error| self.failed(error, within))?;
         self.connect_within = None;
         let status = response.status();
+        if status.is_redirection() {
+            let place = response.headers().get("location").and_then(|place| place.to_str().ok());
+            let text = format!(
+                "{status}: it sends elsewhere, to {:?}, which is not followed; name that address in --policy",
+                gist(place.unwrap_or_default())
+            );
+            return Err(RemoteError::Failed { url: self.url.clone(), text });
+        }
         let read = response.body_mut().with_config().limit(LARGEST_ANSWER_BYTES).read_to_string();
         let text = read.map_err(|error| self.failed(error, within))?;
         if !status.is_success() {
@@ -151,7 +179,8 @@ mod tests {
     #[test]
     fn nobody_and_somebody_slow_are_told_apart() {
         let within = Duration::from_secs(1);
-        let failed = |error: ureq::Error| Act::new("http://there", within).failed(error, within);
+        let address = PolicyAddress { url: "http://there".into(), key: None };
+        let failed = |error: ureq::Error| Act::new(&address, within).failed(error, within);
         for kind in [
             io::ErrorKind::ConnectionRefused,
             io::ErrorKind::HostUnreachable,

@@ -6,17 +6,29 @@ use std::{
     time::{Duration, Instant},
 };
 
-use tungstenite::{Error, HandshakeError, Message, WebSocket, error::ProtocolError};
+use tokio_rustls::rustls::{ClientConnection, StreamOwned};
+use tungstenite::{
+    Error, HandshakeError, Message, WebSocket, client::IntoClientRequest, error::ProtocolError,
+    handshake::client::Request,
+};
 
+use super::{PolicyAddress, encryption::encrypted};
 use crate::drivers::remote::error::{RemoteError, gist};
 
-/// What addresses of such servers begin with.
-pub const SCHEME: &str = "ws://";
+/// What addresses of such servers begin with: those of encrypted ones last.
+pub const SCHEMES: [&str; 2] = ["ws://", "wss://"];
+
+/// How the key is given, as openpi's client gives it.
+const KEY_SCHEME: &str = "Api-Key";
+
+/// The ports of addresses that name none.
+const PORT: u16 = 80;
+const ENCRYPTED_PORT: u16 = 443;
 
 /// A connection to one server.
 pub struct PolicySocket {
     url: String,
-    socket: WebSocket<DeadlineStream>,
+    socket: WebSocket<PolicyStream>,
 }
 
 /// What a server sends of its own.
@@ -28,16 +40,18 @@ pub enum Frame {
 impl PolicySocket {
     /// Connects to a server that has to be found within `connect_within`, and may be busy with somebody else until `within`.
     pub fn connect(
-        url: &str,
+        address: &PolicyAddress,
         connect_within: Duration,
         within: Duration,
     ) -> Result<PolicySocket, RemoteError> {
+        let url = address.url.as_str();
         let unreachable = |reason: String| RemoteError::Unreachable { url: url.into(), reason };
+        let request = request(address).map_err(|error| unreachable(error.to_string()))?;
         let mut stream =
-            DeadlineStream::connect(url, connect_within).map_err(|error| unreachable(error.to_string()))?;
-        stream.deadline = Instant::now() + within;
-        let page = stream.stream.try_clone();
-        let (socket, _) = tungstenite::client(url, stream).map_err(|error| match error {
+            PolicyStream::connect(address, connect_within).map_err(|error| unreachable(error.to_string()))?;
+        stream.plain().deadline = Instant::now() + within;
+        let page = stream.page();
+        let (socket, _) = tungstenite::client(request, stream).map_err(|error| match error {
             // A proxy's page of an error, or another server than a policy's.
             HandshakeError::Failure(Error::Http(response)) => {
                 let status = response.status();
@@ -57,7 +71,7 @@ impl PolicySocket {
 
     /// Sends a binary message, after which the server has until `within` to answer.
     pub fn send(&mut self, bytes: Vec<u8>, within: Duration) -> Result<(), RemoteError> {
-        self.socket.get_mut().deadline = Instant::now() + within;
+        self.socket.get_mut().plain().deadline = Instant::now() + within;
         self.socket.send(Message::binary(bytes)).map_err(|error| self.failed(error, within))
     }
 
@@ -81,7 +95,7 @@ impl PolicySocket {
 
     /// Answers a server that asks whether anybody is there still. What else goes wrong shows with the next request.
     pub fn answer_pings(&mut self) {
-        self.socket.get_mut().deadline = Instant::now() + PING_WAIT;
+        self.socket.get_mut().plain().deadline = Instant::now() + PING_WAIT;
         let _ = self.hear(PING_WAIT);
     }
 
@@ -100,6 +114,15 @@ impl PolicySocket {
     pub fn unreadable(&self, reason: String) -> RemoteError {
         RemoteError::Unreadable { url: self.url.clone(), reason }
     }
+}
+
+/// The request for a socket, with the key that the server wants.
+fn request(address: &PolicyAddress) -> Result<Request, Error> {
+    let mut request = address.url.as_str().into_client_request()?;
+    if let Some(key) = &address.key {
+        request.headers_mut().insert("authorization", key.authorization(KEY_SCHEME));
+    }
+    Ok(request)
 }
 
 /// The server at `url` takes connections and says nothing.
@@ -134,6 +157,65 @@ fn is_late(error: &io::Error) -> bool {
     matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut)
 }
 
+/// A connection, encrypted or not.
+enum PolicyStream {
+    Plain(DeadlineStream),
+    Encrypted(Box<StreamOwned<ClientConnection, DeadlineStream>>),
+}
+
+impl PolicyStream {
+    fn connect(address: &PolicyAddress, within: Duration) -> io::Result<PolicyStream> {
+        Ok(match address.is_encrypted() {
+            true => {
+                let (connection, stream) =
+                    (encrypted(address.host())?, DeadlineStream::connect(address, within)?);
+                PolicyStream::Encrypted(Box::new(StreamOwned::new(connection, stream)))
+            }
+            false => PolicyStream::Plain(DeadlineStream::connect(address, within)?),
+        })
+    }
+
+    fn plain(&mut self) -> &mut DeadlineStream {
+        match self {
+            PolicyStream::Plain(stream) => stream,
+            PolicyStream::Encrypted(stream) => &mut stream.sock,
+        }
+    }
+
+    /// Where the rest of a page can be read; of an encrypted one, nowhere.
+    fn page(&self) -> io::Result<TcpStream> {
+        match self {
+            PolicyStream::Plain(stream) => stream.stream.try_clone(),
+            PolicyStream::Encrypted(_) => Err(io::ErrorKind::Unsupported.into()),
+        }
+    }
+}
+
+impl Read for PolicyStream {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self {
+            PolicyStream::Plain(stream) => stream.read(buffer),
+            PolicyStream::Encrypted(stream) => stream.read(buffer),
+        }
+    }
+}
+
+impl Write for PolicyStream {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            PolicyStream::Plain(stream) => stream.write(bytes),
+            PolicyStream::Encrypted(stream) => stream.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            PolicyStream::Plain(stream) => stream.flush(),
+            PolicyStream::Encrypted(stream) => stream.flush(),
+        }
+    }
+}
+
 /// A connection on which nothing takes longer than until a deadline, however small the pieces are in which it comes.
 struct DeadlineStream {
     stream: TcpStream,
@@ -141,12 +223,11 @@ struct DeadlineStream {
 }
 
 impl DeadlineStream {
-    fn connect(url: &str, within: Duration) -> io::Result<DeadlineStream> {
-        let address = url.strip_prefix(SCHEME).unwrap_or(url);
-        let address = address.split('/').next().unwrap_or_default();
+    fn connect(address: &PolicyAddress, within: Duration) -> io::Result<DeadlineStream> {
+        let port = address.port().unwrap_or(if address.is_encrypted() { ENCRYPTED_PORT } else { PORT });
         let mut failure = io::Error::other("no such host");
         let deadline = Instant::now() + within;
-        let mut addresses = address.to_socket_addrs()?;
+        let mut addresses = (address.host(), port).to_socket_addrs()?;
         while let Some(address) = addresses.next() {
             // Each has its share of what is left, which must not be nothing.
             let left = deadline.saturating_duration_since(Instant::now());

@@ -1,12 +1,16 @@
 //! Clients of policy servers: one file per protocol.
 
 mod act;
+mod address;
+mod encryption;
 mod link;
 mod msgpack;
 mod openpi;
 mod xpolicylab;
 
 use std::{fmt, time::Duration};
+
+pub use address::{PolicyAddress, PolicyKey, PolicyKeyError};
 
 use super::{
     error::RemoteError,
@@ -49,12 +53,21 @@ impl PolicyProtocol {
         }
     }
 
-    /// What its addresses begin with.
-    pub fn scheme(self) -> &'static str {
+    /// What its addresses begin with: those of encrypted servers last.
+    pub fn schemes(self) -> [&'static str; 2] {
         match self {
-            PolicyProtocol::Openpi | PolicyProtocol::XPolicyLab => link::SCHEME,
-            PolicyProtocol::Act => "http://",
+            PolicyProtocol::Openpi | PolicyProtocol::XPolicyLab => link::SCHEMES,
+            PolicyProtocol::Act => act::SCHEMES,
         }
+    }
+
+    /// Refuses to send a key where others could read it: to another machine, unencrypted.
+    pub fn check_key(self, address: &PolicyAddress) -> Result<(), PolicyKeyError> {
+        if address.key.is_none() || address.is_encrypted() || address.is_loopback() {
+            return Ok(());
+        }
+        let [_, encrypted] = self.schemes();
+        Err(PolicyKeyError::Unencrypted { url: address.url.clone(), protocol: self.name(), encrypted })
     }
 
     /// The preset that is meant where no map is given.
@@ -65,20 +78,22 @@ impl PolicyProtocol {
         }
     }
 
-    /// A client of the server at `url` for an episode of `task`. The server has to be found within `connect_within`; it may be busy
+    /// A client of the server at `address` for an episode of `task`. The server has to be found within `connect_within`; it may be busy
     /// then, and has `reply_within` to say who it is, or as long as to be found if that is longer.
     pub fn open(
         self,
-        url: &str,
+        address: &PolicyAddress,
         task: &str,
         connect_within: Duration,
         reply_within: Duration,
     ) -> Result<Box<dyn PolicyClient>, RemoteError> {
         Ok(match self {
-            PolicyProtocol::Openpi => Box::new(openpi::Openpi::connect(url, connect_within, reply_within)?),
-            PolicyProtocol::Act => Box::new(act::Act::new(url, connect_within)),
+            PolicyProtocol::Openpi => {
+                Box::new(openpi::Openpi::connect(address, connect_within, reply_within)?)
+            }
+            PolicyProtocol::Act => Box::new(act::Act::new(address, connect_within)),
             PolicyProtocol::XPolicyLab => {
-                Box::new(xpolicylab::XPolicyLab::connect(url, task, connect_within, reply_within)?)
+                Box::new(xpolicylab::XPolicyLab::connect(address, task, connect_within, reply_within)?)
             }
         })
     }

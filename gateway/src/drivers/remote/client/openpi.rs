@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::{
-    PolicyClient,
+    PolicyAddress, PolicyClient,
     link::{Frame, PolicySocket, silent},
     msgpack::{Dialect, read_reply, written},
 };
@@ -20,15 +20,15 @@ pub struct Openpi {
 impl Openpi {
     /// Connects, and hears who the server is.
     pub fn connect(
-        url: &str,
+        address: &PolicyAddress,
         connect_within: Duration,
         reply_within: Duration,
     ) -> Result<Openpi, RemoteError> {
         // A server that answers somebody else may shake no hands meanwhile.
         let within = connect_within.max(reply_within);
-        let mut link = Openpi { socket: PolicySocket::connect(url, connect_within, within)? };
+        let mut link = Openpi { socket: PolicySocket::connect(address, connect_within, within)? };
         let metadata = link.hear(within).map_err(|error| match error {
-            RemoteError::Slow { .. } => silent(url, within),
+            RemoteError::Slow { .. } => silent(&address.url, within),
             error => error,
         })?;
         match metadata {
@@ -78,7 +78,8 @@ mod tests {
         // The system takes connections; nobody hears them.
         let silent = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         let url = format!("ws://{}", silent.local_addr().unwrap());
-        let opened = Openpi::connect(&url, Duration::from_secs(1), Duration::from_millis(20));
+        let address = PolicyAddress { url, key: None };
+        let opened = Openpi::connect(&address, Duration::from_secs(1), Duration::from_millis(20));
         let error = opened.err().unwrap();
         assert!(matches!(error, RemoteError::Unreachable { .. }), "{error}");
         assert!(error.to_string().ends_with("it says nothing within 1 s of the connection"), "{error}");
@@ -96,7 +97,7 @@ mod tests {
             socket.read().unwrap()
         });
         let within = Duration::from_secs(5);
-        let mut link = Openpi::connect(&url, within, within).unwrap();
+        let mut link = Openpi::connect(&PolicyAddress { url, key: None }, within, within).unwrap();
         let since = Instant::now();
         while !server.is_finished() && since.elapsed() < within {
             link.keep_alive();

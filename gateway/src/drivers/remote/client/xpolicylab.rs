@@ -9,7 +9,7 @@ use std::{
 use rmpv::Value;
 
 use super::{
-    PolicyClient,
+    PolicyAddress, PolicyClient,
     link::{Frame, PolicySocket, silent},
     msgpack::{Dialect, bytes_of, entry, kind, read, reply_value, request_value, text},
 };
@@ -74,12 +74,12 @@ impl Request {
 impl XPolicyLab {
     /// Connects, says hello and for which task, and begins a trial.
     pub fn connect(
-        url: &str,
+        address: &PolicyAddress,
         task: &str,
         connect_within: Duration,
         reply_within: Duration,
     ) -> Result<XPolicyLab, RemoteError> {
-        let within = connect_within.max(reply_within);
+        let (url, within) = (address.url.as_str(), connect_within.max(reply_within));
         let mut name = [0; 8];
         getrandom::fill(&mut name)
             .map_err(|error| RemoteError::Unreachable { url: url.into(), reason: error.to_string() })?;
@@ -88,7 +88,7 @@ impl XPolicyLab {
             let _ = write!(text, "{byte:02x}");
             text
         });
-        let socket = PolicySocket::connect(url, connect_within, within)?;
+        let socket = PolicySocket::connect(address, connect_within, within)?;
         let case = task.to_owned();
         let mut link = XPolicyLab { socket, evaluation, case, messages: 0, trials: 0, trial: None };
         // Who does not know these words does not answer them.

@@ -4,12 +4,12 @@ mod check;
 
 use std::{
     collections::BTreeMap,
-    fs, io,
+    io,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
-use tandem_episodes::CONTROL_HZ;
+use tandem_episodes::{CONTROL_HZ, MAX_TEXT_BYTES, read_text};
 use tandem_tools_spec::{ACTION_ROW_LEN, ExtraInformation};
 
 use super::columns::{WRISTS, action_columns, extra_columns, state_columns};
@@ -246,9 +246,8 @@ impl PolicyMap {
         let path = Path::new(name);
         let text = match preset(name) {
             Some(text) => text.to_owned(),
-            None => {
-                fs::read_to_string(path).map_err(|source| MapError::Read { name: name.into(), source })?
-            }
+            None => read_text(path, MAX_TEXT_BYTES)
+                .map_err(|source| MapError::Read { name: name.into(), source })?,
         };
         let map = PolicyMap::parse(path, &text)?;
         map.check().map_err(|reason| MapError::Wrong { name: name.into(), reason })?;
@@ -339,7 +338,7 @@ mod tests {
     /// The map of a file that holds this.
     pub(super) fn read(text: &str) -> Result<PolicyMap, MapError> {
         let file = tempfile::NamedTempFile::new().unwrap();
-        fs::write(file.path(), text).unwrap();
+        std::fs::write(file.path(), text).unwrap();
         PolicyMap::find(&file.path().display().to_string())
     }
 

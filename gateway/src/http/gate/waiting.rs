@@ -1,0 +1,322 @@
+//! Connections that wait for a request: how long each may, and how many of one address do.
+//!
+//! A language model may think for minutes between two calls, so that a connection that has made a good call lives for an hour without
+//! one. All others have as long as a header may take.
+
+use std::{
+    collections::HashMap,
+    io,
+    net::IpAddr,
+    pin::Pin,
+    sync::{
+        Arc, Mutex, MutexGuard,
+        atomic::{AtomicBool, AtomicU64, Ordering},
+    },
+    task::{Context, Poll},
+    time::{Duration, Instant},
+};
+
+use hyper::rt::{Sleep, Timer};
+use tokio::{
+    io::{AsyncRead, AsyncWrite, ReadBuf},
+    sync::Notify,
+    time,
+};
+
+/// Longest wait for the next request on a connection that has made a good call.
+pub const MAX_TRUSTED_WAIT: Duration = Duration::from_secs(60 * 60);
+
+/// Marks the answer to a call of somebody who was known, and that was not refused.
+#[derive(Debug, Clone, Copy)]
+pub struct GoodCall;
+
+/// The connections that wait for a request, by address, the longest wait first.
+#[derive(Debug)]
+pub struct WaitingConnections {
+    max_per_address: usize,
+    entered: AtomicU64,
+    waiting: Mutex<HashMap<IpAddr, Vec<WaitingEntry>>>,
+}
+
+#[derive(Debug)]
+struct WaitingEntry {
+    number: u64,
+    is_trusted: bool,
+    close: Arc<Notify>,
+}
+
+impl WaitingConnections {
+    /// No connection yet; of one address at most `max_per_address` wait.
+    pub fn new(max_per_address: usize) -> WaitingConnections {
+        WaitingConnections {
+            max_per_address: max_per_address.max(1),
+            entered: AtomicU64::new(0),
+            waiting: Mutex::default(),
+        }
+    }
+
+    /// Enters a new connection from `address`, which waits for its first request.
+    pub fn enter(self: &Arc<Self>, address: IpAddr, header_limit: Duration) -> Arc<Connection> {
+        let connection = Connection {
+            all: self.clone(),
+            address,
+            number: self.entered.fetch_add(1, Ordering::Relaxed),
+            is_trusted: AtomicBool::new(false),
+            header_limit,
+            wait: Mutex::new(RequestWait { since: Instant::now(), header_since: None }),
+            close: Arc::default(),
+        };
+        connection.wait();
+        Arc::new(connection)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, HashMap<IpAddr, Vec<WaitingEntry>>> {
+        // Nothing panics while it holds the lock.
+        self.waiting.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+
+    fn remove(&self, connection: &Connection) {
+        let mut waiting = self.lock();
+        if let Some(entries) = waiting.get_mut(&connection.address) {
+            entries.retain(|entry| entry.number != connection.number);
+            if entries.is_empty() {
+                waiting.remove(&connection.address);
+            }
+        }
+    }
+
+    /// Adds a connection; where its address has too many, the one that has waited longest is closed, those without a good call first.
+    fn add(&self, connection: &Connection) {
+        let mut waiting = self.lock();
+        let entries = waiting.entry(connection.address).or_default();
+        entries.retain(|entry| entry.number != connection.number);
+        if entries.len() >= self.max_per_address {
+            let longest = entries.iter().position(|entry| !entry.is_trusted).unwrap_or(0);
+            entries.remove(longest).close.notify_one();
+        }
+        let (number, close) = (connection.number, connection.close.clone());
+        entries.push(WaitingEntry { number, is_trusted: connection.is_trusted(), close });
+    }
+}
+
+/// One connection, as it waits for requests and makes them.
+#[derive(Debug)]
+pub struct Connection {
+    all: Arc<WaitingConnections>,
+    address: IpAddr,
+    number: u64,
+    is_trusted: AtomicBool,
+    header_limit: Duration,
+    wait: Mutex<RequestWait>,
+    close: Arc<Notify>,
+}
+
+/// Since when the next request is waited for.
+#[derive(Debug, Clone, Copy)]
+struct RequestWait {
+    since: Instant,
+    /// Arrival of the first byte of its header.
+    header_since: Option<Instant>,
+}
+
+impl Connection {
+    /// The address at its other end.
+    pub fn address(&self) -> IpAddr {
+        self.address
+    }
+
+    /// Returns once too many connections of its address wait, and this one has to go.
+    pub async fn crowded_out(&self) {
+        self.close.notified().await;
+    }
+
+    /// Counts the connection as one that does not wait: its request has arrived and is let in.
+    pub fn is_served(&self) {
+        self.all.remove(self);
+    }
+
+    /// Lets the connection live for long between requests from now on.
+    pub fn trust(&self) {
+        self.is_trusted.store(true, Ordering::Relaxed);
+    }
+
+    fn is_trusted(&self) -> bool {
+        self.is_trusted.load(Ordering::Relaxed)
+    }
+
+    /// Begins the wait for the next request.
+    fn wait(&self) {
+        *self.lock() = RequestWait { since: Instant::now(), header_since: None };
+        self.all.add(self);
+    }
+
+    /// Bytes have arrived.
+    fn receive(&self) {
+        self.lock().header_since.get_or_insert_with(Instant::now);
+    }
+
+    /// The end of the wait. A connection without a good call has as long for wait and header together as another for a header.
+    fn deadline(&self) -> Instant {
+        let RequestWait { since, header_since } = *self.lock();
+        match (self.is_trusted(), header_since) {
+            (false, _) => since + self.header_limit,
+            (true, None) => since + MAX_TRUSTED_WAIT.max(self.header_limit),
+            (true, Some(begun)) => begun + self.header_limit,
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, RequestWait> {
+        // Nothing panics while it holds the lock.
+        self.wait.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+    }
+}
+
+impl Drop for Connection {
+    fn drop(&mut self) {
+        self.all.remove(self);
+    }
+}
+
+/// The timer by which hyper measures how long a header takes: it starts when the wait for a request begins, and ends by what the
+/// connection has done so far.
+#[derive(Debug, Clone)]
+pub struct WaitTimer(pub Arc<Connection>);
+
+impl Timer for WaitTimer {
+    fn sleep(&self, duration: Duration) -> Pin<Box<dyn Sleep>> {
+        self.sleep_until(Instant::now() + duration)
+    }
+
+    fn sleep_until(&self, _: Instant) -> Pin<Box<dyn Sleep>> {
+        self.0.wait();
+        let sleep = Box::pin(time::sleep_until(self.0.deadline().into()));
+        Box::pin(WaitSleep { connection: self.0.clone(), sleep })
+    }
+}
+
+/// Ends when the connection has waited for too long.
+struct WaitSleep {
+    connection: Arc<Connection>,
+    sleep: Pin<Box<time::Sleep>>,
+}
+
+impl Future for WaitSleep {
+    type Output = ();
+
+    fn poll(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<()> {
+        let deadline = self.connection.deadline().into();
+        if self.sleep.deadline() != deadline {
+            self.sleep.as_mut().reset(deadline);
+        }
+        self.sleep.as_mut().poll(context)
+    }
+}
+
+impl Sleep for WaitSleep {}
+
+/// A stream that notes on its connection when bytes arrive.
+pub struct NotedStream<S> {
+    pub connection: Arc<Connection>,
+    pub stream: S,
+}
+
+impl<S: AsyncRead + Unpin> AsyncRead for NotedStream<S> {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        let before = buffer.filled().len();
+        let read = Pin::new(&mut self.stream).poll_read(context, buffer);
+        if buffer.filled().len() > before {
+            self.connection.receive();
+        }
+        read
+    }
+}
+
+impl<S: AsyncWrite + Unpin> AsyncWrite for NotedStream<S> {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        Pin::new(&mut self.stream).poll_write(context, bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(context)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(context)
+    }
+
+    fn poll_write_vectored(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffers: &[io::IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        Pin::new(&mut self.stream).poll_write_vectored(context, buffers)
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        self.stream.is_write_vectored()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::Ipv4Addr;
+
+    use super::*;
+
+    const HEADER_LIMIT: Duration = Duration::from_secs(30);
+
+    fn enter(all: &Arc<WaitingConnections>, address: u32) -> Arc<Connection> {
+        all.enter(Ipv4Addr::from_bits(address).into(), HEADER_LIMIT)
+    }
+
+    async fn is_closed(connection: &Connection) -> bool {
+        tokio::select! {
+            biased;
+            () = connection.crowded_out() => true,
+            () = std::future::ready(()) => false,
+        }
+    }
+
+    #[test]
+    fn a_good_call_lets_a_connection_live_for_an_hour() {
+        let connection = enter(&Arc::new(WaitingConnections::new(4)), 1);
+        let since = connection.lock().since;
+        assert_eq!(connection.deadline(), since + HEADER_LIMIT);
+        connection.receive();
+        assert_eq!(connection.deadline(), since + HEADER_LIMIT, "a header in pieces wins no time");
+        connection.trust();
+        connection.wait();
+        let since = connection.lock().since;
+        assert_eq!(connection.deadline(), since + MAX_TRUSTED_WAIT);
+        connection.receive();
+        let begun = connection.lock().header_since.unwrap();
+        assert_eq!(connection.deadline(), begun + HEADER_LIMIT, "a header that has begun has to end");
+    }
+
+    #[tokio::test]
+    async fn the_longest_wait_makes_room_and_good_calls_come_last() {
+        let all = Arc::new(WaitingConnections::new(2));
+        let trusted = enter(&all, 1);
+        trusted.trust();
+        trusted.wait();
+        let (first, other) = (enter(&all, 1), enter(&all, 2));
+        let second = enter(&all, 1);
+        assert!(is_closed(&first).await, "it has made no good call");
+        assert!(!is_closed(&trusted).await && !is_closed(&other).await && !is_closed(&second).await);
+        second.is_served();
+        let third = enter(&all, 1);
+        assert!(!is_closed(&trusted).await && !is_closed(&second).await, "who is served does not wait");
+        drop(third);
+        assert_eq!(all.lock().len(), 2);
+        drop((trusted, first, second, other));
+        assert!(all.lock().is_empty());
+    }
+}
