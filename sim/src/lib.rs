@@ -54,6 +54,7 @@ pub mod body;
 pub mod dynamics;
 mod error;
 pub mod estimate;
+pub mod files;
 pub mod locomotion;
 mod mechanism;
 pub mod mjcf;

@@ -6,6 +6,7 @@ use tandem_sim::{Sensing, render::RendererKind};
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 
 use super::retry::FailedEpisode;
+use crate::instructions::Instructions;
 use crate::players::Policy;
 use crate::recording::Recorder;
 use crate::scoring::Phase;
@@ -33,6 +34,8 @@ pub struct EvaluationPlan<'a> {
     pub disclosure: Disclosure,
     /// Whether they are told how to grasp.
     pub hints: Hints,
+    /// Words in place of the tasks' own.
+    pub instructions: Instructions,
     /// In what episodes vary beyond the benchmark.
     pub variation: Variation,
     /// What goes wrong in them.
@@ -51,6 +54,20 @@ pub struct EvaluationPlan<'a> {
     pub files: KeptFiles,
     /// Count episodes in which the policy itself failed as failures, and keep them. They are played again otherwise.
     pub keep_failed: bool,
+    /// What becomes of a run that the folder holds already.
+    pub existing: ExistingRun,
+}
+
+/// What becomes of a run that a folder holds already. The same run goes on in any case.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ExistingRun {
+    /// Another run is left as it is, and the evaluation refused.
+    #[default]
+    Refuse,
+    /// The same run of another build goes on with this build; what it holds is kept.
+    ResumeWithNewBuild,
+    /// It is deleted.
+    Overwrite,
 }
 
 /// What is kept of episodes that are recorded; by default everything.
@@ -108,6 +125,7 @@ impl EvaluationPlan<'_> {
             assistance: self.assistance,
             disclosure: self.disclosure,
             hints: self.hints,
+            instructions: self.instructions.own_words(task.id),
             variation: self.variation,
             stress: self.stress,
             thinking_limit_s: self.thinking_limit_s,
@@ -136,9 +154,18 @@ impl EvaluationPlan<'_> {
         }
     }
 
-    /// What in its episodes is not as the benchmark has it: the same in all of them, but for the files of tasks and for what has been
-    /// begun again.
+    /// What in its episodes is not as the benchmark has it.
     pub fn departures(&self) -> Vec<String> {
+        self.named(EpisodeSpec::departures)
+    }
+
+    /// What in its episodes is not as Tandem usually has it.
+    pub fn peculiarities(&self) -> Vec<String> {
+        self.named(EpisodeSpec::peculiarities)
+    }
+
+    /// What is named of its episodes: the same in all of them, but for the files of tasks, for words, and for what has been begun again.
+    fn named(&self, of: fn(&EpisodeSpec) -> Vec<String>) -> Vec<String> {
         let specs: Vec<EpisodeSpec> = match &self.starts {
             Starts::Task | Starts::Phases { .. } => {
                 self.tasks.iter().map(|task| self.spec(task, 0, Start::Task)).collect()
@@ -148,9 +175,9 @@ impl EvaluationPlan<'_> {
             }
         };
         let mut found: Vec<String> = Vec::new();
-        for departure in specs.iter().flat_map(EpisodeSpec::departures) {
-            if !found.contains(&departure) {
-                found.push(departure);
+        for what in specs.iter().flat_map(of) {
+            if !found.contains(&what) {
+                found.push(what);
             }
         }
         found

@@ -25,6 +25,7 @@ pub(crate) use replay::Replay;
 use run_files::moment;
 pub use run_files::{RunFiles, RunFolder};
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -81,6 +82,8 @@ pub struct Session {
     rewind: Rewind,
     /// What the policy has been shown that the benchmark's own policies are not.
     shown: ShownInformation,
+    /// What it has asked for that the benchmark has not.
+    departures: BTreeSet<String>,
     /// What robots do in place of what they are told, where that is something else.
     execution: Option<Execution>,
     /// State hashes of the steps since they were last taken, where somebody wants them.
@@ -135,6 +138,7 @@ impl Session {
             simulator_failure: None,
             rewind: Rewind::default(),
             shown: ShownInformation::default(),
+            departures: BTreeSet::new(),
             execution: Execution::of(spec.stress, disturbance, spec.seed, begin_s, rest),
             hashes: None,
             result: None,
@@ -228,6 +232,7 @@ impl Session {
         let mut trajectories: Vec<Trajectory> = self.motions.iter().map(|_| Trajectory::Hold).collect();
         let mut clamped = Vec::with_capacity(command.orders.len());
         for order in &command.orders {
+            self.departures.extend(order.action.departures().map(str::to_owned));
             let motion = &mut self.motions[order.robot];
             let (trajectory, beyond) = Trajectory::begin(&order.action, order.steps.min(left), motion);
             trajectories[order.robot] = trajectory;

@@ -147,7 +147,7 @@ impl Session {
             assistance: self.spec().assistance,
             extra_information: self.shown.names(),
             extra_information_replies: self.shown.replies(),
-            departures: self.spec().departures(),
+            departures: self.spec().departures().into_iter().chain(self.departures.iter().cloned()).collect(),
             recording_failed: self.recording_failed().map(str::to_owned),
             usage: (self.usage.notes > 0).then(|| self.usage.clone()),
         }

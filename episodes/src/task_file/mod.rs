@@ -20,6 +20,7 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use tandem_sim::files::read_regular_text;
 use xxhash_rust::xxh3::xxh3_64;
 
 pub use error::TaskFileError;
@@ -33,7 +34,7 @@ static MADE: Mutex<Vec<&'static Task>> = Mutex::new(Vec::new());
 /// Reads a task's file, and the MJCF files that it names.
 pub fn read_task(path: &Path) -> Result<&'static Task, TaskFileError> {
     let read = |path: &Path| {
-        std::fs::read_to_string(path).map_err(|source| TaskFileError::Read { path: path.into(), source })
+        read_regular_text(path).map_err(|source| TaskFileError::Read { path: path.into(), source })
     };
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let mut source = TaskSource { name, text: read(path)?, beside: BTreeMap::new() };

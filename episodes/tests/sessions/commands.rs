@@ -297,3 +297,19 @@ fn episodes_go_the_same_way_whoever_draws() {
     let hashes = RendererKind::ALL.map(played);
     assert!(hashes.iter().all(|hash| *hash == hashes[0]), "{hashes:?}");
 }
+
+/// The benchmark's wrist commands neither take hands along nor have them give way: who asks for that is named.
+#[test]
+fn what_wrist_commands_ask_beyond_the_benchmark_is_named() {
+    let told = |entry: WristMove| {
+        let mut session = Session::start(&spec("handover", 3, Protocol::Benchmark), None).unwrap();
+        command(&mut session, MoveWrists { steps: 2, robots: vec![entry] }.into());
+        let named = session.close().departures;
+        named.into_iter().filter(|what| what.starts_with("wrist commands: ")).collect::<Vec<_>>()
+    };
+    assert_eq!(told(hand_up()), [""; 0]);
+    assert_eq!(told(WristMove { carried: Some(false), ..hand_up() }), [""; 0]);
+    assert_eq!(told(WristMove { carried: Some(true), ..hand_up() }), ["wrist commands: carried"]);
+    let compliance = WristMove { compliance_n_s_m: Some(250.0), ..hand_up() };
+    assert_eq!(told(compliance), ["wrist commands: compliance"]);
+}

@@ -28,11 +28,48 @@ pub use flags::Seeds;
 /// What a subcommand ends with: an error is printed and is a failure, too.
 pub type CommandResult = Result<ExitCode, Box<dyn Error>>;
 
+/// The command line of this process for a shell, without what starts the program.
+fn command_to_go_on() -> String {
+    let mut arguments =
+        std::env::args().skip_while(|word| word != "evaluate" && word != "collect").peekable();
+    if arguments.peek().is_none() {
+        return "run the same command again".into();
+    }
+    std::iter::once("tandem".into()).chain(arguments.map(|word| quoted(&word))).collect::<Vec<_>>().join(" ")
+}
+
+/// A word that a shell takes as it is.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./:=,+@%".contains(c);
+    match !word.is_empty() && word.chars().all(is_plain) {
+        true => word.into(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    }
+}
+
 /// Prints a text that other programs may read. One that has read enough and has gone is no error.
 fn print(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn a_shell_reads_what_was_given() {
+        for (word, expected) in [
+            ("runs/a-b_c.d", "runs/a-b_c.d"),
+            ("exec:python3 agent.py", "'exec:python3 agent.py'"),
+            ("it's", r"'it'\''s'"),
+            ("$HOME", "'$HOME'"),
+            ("", "''"),
+        ] {
+            assert_eq!(quoted(word), expected);
+        }
     }
 }

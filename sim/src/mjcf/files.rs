@@ -11,6 +11,10 @@ use rapier3d::math::Vector;
 
 use super::{Document, vector};
 use crate::SimError;
+use crate::files::open_regular;
+
+/// Largest file of a mesh.
+const MAX_MESH_BYTES: u64 = 1 << 30;
 
 /// Triangles as a file has them, in metres, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -65,7 +69,8 @@ impl Document {
 /// Reads a file of the kind that its name says.
 fn read(path: &Path) -> Result<Mesh, SimError> {
     let kind = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    let open = || File::open(path).map(BufReader::new).map_err(|source| unreadable(path, source));
+    let open =
+        || open_regular(path, MAX_MESH_BYTES).map(BufReader::new).map_err(|source| unreadable(path, source));
     match kind.as_str() {
         "obj" => read_obj(path, open()?),
         "stl" => read_stl(path, open()?),

@@ -32,6 +32,7 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::SimError;
+use crate::files::read_regular_text;
 use check::Checked;
 use joints::UnreadRanges;
 use source::MjcfText;
@@ -69,8 +70,7 @@ impl Document {
     /// Reads a file. What it includes, its meshes and its pictures are read from where they lie beside it.
     pub fn read(path: &Path) -> Result<Document, SimError> {
         let file = path.display().to_string();
-        let xml =
-            std::fs::read_to_string(path).map_err(|source| SimError::Read { path: file.clone(), source })?;
+        let xml = read_regular_text(path).map_err(|source| SimError::Read { path: file.clone(), source })?;
         Document::parse_in(&file, &xml, path.parent().unwrap_or(Path::new(".")))
     }
 

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use roxmltree::Node;
 
 use crate::SimError;
+use crate::files::read_regular_text;
 
 /// XML text without `<include>`.
 #[derive(Debug)]
@@ -118,8 +119,8 @@ impl MjcfText {
         let beside = folder.join(name);
         let path = if beside.exists() { beside } else { self.folder.join(name) };
         let shown = path.display().to_string();
-        let text = std::fs::read_to_string(&path)
-            .map_err(|source| SimError::Read { path: shown.clone(), source })?;
+        let text =
+            read_regular_text(&path).map_err(|source| SimError::Read { path: shown.clone(), source })?;
         let path = path.canonicalize().unwrap_or(path);
         if self.files.iter().any(|file| file.path.as_ref() == Some(&path)) {
             return Err(refuse(format!("`{shown}` is included already; a file can be included once")));

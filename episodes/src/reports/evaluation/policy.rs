@@ -153,7 +153,7 @@ pub fn groups<'a>(episodes: impl Iterator<Item = &'a FoundEpisode>) -> Vec<Polic
         let (policy, settings) = (&episodes[0].played.policy.name, &episodes[0].played.spec);
         let policy = split_address(policy).0;
         let shown = shown_in(episodes.iter().map(|found| &found.played));
-        let full_name = named(&named(policy, &shown), &settings.departures());
+        let full_name = named(&named(policy, &shown), &settings.peculiarities());
         PolicyGroup::new(full_name + &apart(&key), episodes)
     };
     groups.into_iter().map(group).collect()
@@ -176,7 +176,7 @@ pub fn rules_of(played: &PlayedEpisode) -> Vec<String> {
     let (name, address) = split_address(&played.policy.name);
     let card = PolicyCard { name: name.into(), ..played.policy.clone() };
     vec![
-        named(&card.full_name(), &spec.departures()),
+        named(&card.full_name(), &spec.peculiarities()),
         address.unwrap_or("in this process").into(),
         spec.protocol.name().into(),
         // Departures name files alone, whose content or folder may differ.

@@ -266,7 +266,8 @@ fn reports_quote_what_they_are_told() {
             "prefers-color-scheme: dark",
             "60 [26.2, 87.8] 6/10",
             "9/10</text>",
-            "another simulator",
+            "Published, on another scale",
+            "Method (another scale)",
         ],
         &["<script", "<link", "url(", "src=\"http", "href=", "a<b>"],
     );

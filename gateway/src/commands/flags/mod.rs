@@ -3,11 +3,13 @@
 mod agent;
 mod episode;
 mod policy;
+mod run;
 mod stress;
 mod world;
 
 pub use agent::AgentFlags;
 pub use episode::{EpisodeFlags, Seeds};
 pub use policy::{PartnerFlags, PolicyFlags};
+pub use run::RunFlags;
 pub use stress::{StressFlags, StressPlanFlags};
 pub use world::{LocomotionFlag, SensingFlags, WorldFlags};

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::SimError;
+use crate::files::read_regular_text;
 
 /// What the file says. Joints are called as published, but for those that are not.
 #[derive(Debug, Deserialize)]
@@ -65,8 +66,7 @@ impl RobotDescription {
     /// The file's content, and its text.
     pub fn read(path: &Path) -> Result<(RobotDescription, String), SimError> {
         let file = path.display().to_string();
-        let text =
-            std::fs::read_to_string(path).map_err(|source| SimError::Read { path: file.clone(), source })?;
+        let text = read_regular_text(path).map_err(|source| SimError::Read { path: file.clone(), source })?;
         let description = toml::from_str(&text)
             .map_err(|source| SimError::RobotDescription { file, source: Box::new(source) })?;
         Ok((description, text))

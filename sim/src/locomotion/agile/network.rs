@@ -17,6 +17,10 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use super::joints::{CONTROLLED_JOINTS, OBSERVED_JOINTS};
 use crate::SimError;
+use crate::files::read_regular;
+
+/// Largest file of a network.
+const MAX_NETWORK_BYTES: u64 = 1 << 30;
 
 const ORIENTATION: &str = "root_link_quat_w";
 const ANGULAR_VELOCITY: &str = "root_ang_vel_b";
@@ -93,7 +97,8 @@ impl Network {
     /// Reads a file, checks names and shapes, and runs it once.
     pub fn from_file(path: &Path) -> Result<Network, SimError> {
         let file = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|source| SimError::Read { path: file.clone(), source })?;
+        let bytes = read_regular(path, MAX_NETWORK_BYTES)
+            .map_err(|source| SimError::Read { path: file.clone(), source })?;
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         let name = format!("{name}+{:016x}", xxh3_64(&bytes));
         let model = load(&file, bytes)?;

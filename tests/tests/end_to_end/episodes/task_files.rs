@@ -1,9 +1,9 @@
 //! Tasks of files beside the same tasks in Rust, and what is kept of a file.
 
-use tandem_episodes::evaluation::{EvaluationPlan, KeptFiles, Shard, Starts, evaluate};
+use tandem_episodes::evaluation::{EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate};
 use tandem_episodes::players;
 use tandem_episodes::tasks::{self, Task};
-use tandem_episodes::{Controller, RendererKind, RobotFile, Sensing, Variation, read_task};
+use tandem_episodes::{Controller, Instructions, RendererKind, RobotFile, Sensing, Variation, read_task};
 use tandem_tools_spec::{Assistance, PhaseTimes, Protocol};
 
 /// As the book names them.
@@ -21,6 +21,7 @@ fn played(task: &'static Task) -> Vec<(PhaseTimes, String)> {
         assistance: Assistance::Paper,
         disclosure: Assistance::Paper.disclosure(),
         hints: Assistance::Paper.hints(),
+        instructions: Instructions::default(),
         variation: Variation::default(),
         stress: None,
         thinking_limit_s: None,
@@ -33,6 +34,7 @@ fn played(task: &'static Task) -> Vec<(PhaseTimes, String)> {
         record: false,
         files: KeptFiles::default(),
         keep_failed: false,
+        existing: ExistingRun::Refuse,
     };
     let folder = tempfile::tempdir().expect("a temporary folder");
     let episodes = evaluate(&plan, folder.path(), &|_| {}).expect("worlds can be built").episodes;
