@@ -16,7 +16,7 @@ mod walk;
 
 pub use called::{Called, OperatorCall, OperatorCommand};
 pub use check_reach::check_reach;
-pub use columns::{Clamped, action_row, base_row};
+pub use columns::{Clamped, TargetCounts, action_row, base_row};
 pub use motion::{Motion, MotionState, RobotSheet};
 pub use report::{report, wrist_state};
 pub use upper_body::{UpperBody, upper_body};

@@ -47,14 +47,22 @@ pub struct OtherRun {
     pub kept: usize,
     /// Whether nothing but the build differs.
     pub only_build: bool,
+    /// Whether nothing but tasks and seeds differs.
+    pub only_episodes: bool,
 }
 
 impl fmt::Display for OtherRun {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let OtherRun { folder, differences, kept, only_build } = self;
+        let OtherRun { folder, differences, kept, only_build, only_episodes } = self;
         let folder = folder.display();
         write!(f, "{folder} holds another run with {kept} episodes, which are left as they are: ")?;
         write!(f, "{}; give --out (in Python `out`) for another folder", differences.join("; "))?;
+        if *only_episodes {
+            write!(
+                f,
+                ", or all its tasks and seeds and further ones, which are added to it (--shard I/N divides a run among processes)"
+            )?;
+        }
         if *only_build {
             write!(
                 f,
@@ -152,6 +160,8 @@ fn settle(
     }
     let last = known.last().map_or(now.build(), RunIdentity::build);
     let only_build = differences.is_empty();
+    let is_of_episodes = |what: &String| what.starts_with("tasks are ") || what.starts_with("seeds are ");
+    let only_episodes = !only_build && last == now.build() && differences.iter().all(is_of_episodes);
     if last != now.build() && !(only_build && existing == ExistingRun::ResumeWithNewBuild) {
         differences.push(format!("the build is {}, and was {last}", now.build()));
     }
@@ -159,7 +169,9 @@ fn settle(
         // What holds no episode is nobody's.
         if !kept.is_empty() || !alone {
             let kept = kept.len();
-            return Err(OtherRun { folder: folder.into(), differences, kept, only_build }.into());
+            return Err(
+                OtherRun { folder: folder.into(), differences, kept, only_build, only_episodes }.into()
+            );
         }
         builds.clear();
     }

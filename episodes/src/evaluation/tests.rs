@@ -32,6 +32,7 @@ pub(super) fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) 
         assistance: Assistance::Full,
         extra_information: vec![],
         extra_information_replies: Default::default(),
+        joints_clamped_share: None,
         departures: vec![],
         recording_failed: None,
         usage: None,

@@ -27,6 +27,9 @@ pub fn play_all(
             let failure = &failure;
             scope.spawn(move || {
                 while let Some((number, wait)) = queue.next() {
+                    if lock(failure).is_some() {
+                        break;
+                    }
                     let outcome = match wait {
                         false => cache.load_or_play(&work[number]),
                         true => cache.wait_and_play(&work[number]),
@@ -35,8 +38,8 @@ pub fn play_all(
                         Ok(PlannedOutcome::Elsewhere) => queue.postpone(number),
                         Ok(outcome) => drop(done.send((number, outcome))),
                         Err(error) => {
-                            queue.stop();
                             lock(failure).get_or_insert(error);
+                            queue.stop();
                         }
                     }
                 }

@@ -14,7 +14,7 @@ use tandem_tools_spec::EndReason;
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::{Session, this_build, told::ShownInformation};
-use crate::commands::MotionState;
+use crate::commands::{MotionState, TargetCounts};
 use crate::error::{CheckpointError, EpisodeError};
 use crate::output::write_whole;
 use crate::recording::{Recording, RecordingError};
@@ -69,6 +69,7 @@ struct Progress {
     shown: ShownInformation,
     /// What it has asked for by then that the benchmark has not.
     departures: BTreeSet<String>,
+    targets: TargetCounts,
     /// What robots have been told that they do not do at once, if there is such a thing.
     execution: Option<ExecutionMemory>,
 }
@@ -213,6 +214,7 @@ impl Session {
             ended: self.ended,
             shown: self.shown.clone(),
             departures: self.departures.clone(),
+            targets: self.targets,
             execution: self.execution.as_ref().map(|execution| execution.memory().clone()),
         };
         Ok(Checkpoint { origin: self.origin.clone(), progress, failed: None })
@@ -235,6 +237,7 @@ impl Session {
         self.requests = self.requests.map(|_| 0);
         self.shown = ShownInformation::default();
         self.departures.clear();
+        self.targets = TargetCounts::default();
         self.clock.set_spent(Duration::ZERO);
         self.ended = None;
         Ok(())
@@ -256,6 +259,7 @@ impl Session {
         self.ended = progress.ended;
         self.shown = progress.shown.clone();
         self.departures.clone_from(&progress.departures);
+        self.targets = progress.targets;
         if let (Some(execution), Some(memory)) = (&mut self.execution, &progress.execution) {
             execution.set_memory(memory.clone());
         }

@@ -35,7 +35,7 @@ use tandem_sim::render::RenderRequest;
 use tandem_sim::{CONTROL_HZ, RobotCommand, Step, World};
 use tandem_tools_spec::{EndReason, ResultReply, Usage};
 
-use crate::commands::{Clamped, Command, Motion, MotionState, Trajectory};
+use crate::commands::{Clamped, Command, Motion, MotionState, TargetCounts, Trajectory};
 use crate::convert::isometry_from_sim;
 use crate::observation::{Observer, Picture};
 use crate::protocol::Rules;
@@ -84,6 +84,8 @@ pub struct Session {
     shown: ShownInformation,
     /// What it has asked for that the benchmark has not.
     departures: BTreeSet<String>,
+    /// Joint targets that it has asked for.
+    targets: TargetCounts,
     /// What robots do in place of what they are told, where that is something else.
     execution: Option<Execution>,
     /// State hashes of the steps since they were last taken, where somebody wants them.
@@ -139,6 +141,7 @@ impl Session {
             rewind: Rewind::default(),
             shown: ShownInformation::default(),
             departures: BTreeSet::new(),
+            targets: TargetCounts::default(),
             execution: Execution::of(spec.stress, disturbance, spec.seed, begin_s, rest),
             hashes: None,
             result: None,
@@ -178,6 +181,11 @@ impl Session {
             files.flush();
         }
         Ok(())
+    }
+
+    /// Share of the joint targets so far that lay beyond the joints' limits.
+    pub fn joints_clamped_share(&self) -> f64 {
+        self.targets.beyond_share()
     }
 
     /// All robots stand still for so many control steps.
@@ -236,6 +244,7 @@ impl Session {
             let motion = &mut self.motions[order.robot];
             let (trajectory, beyond) = Trajectory::begin(&order.action, order.steps.min(left), motion);
             trajectories[order.robot] = trajectory;
+            self.targets.add(beyond.targets);
             clamped.push(beyond);
         }
         let steps = command.steps.min(left);

@@ -16,6 +16,7 @@ Outcomes: TypeAlias = tuple[
     NDArray[np.int64],
     NDArray[np.int64],
     list[tuple[int, str]],
+    NDArray[np.float64],
 ]
 
 def action_columns() -> list[str]: ...
@@ -40,7 +41,6 @@ def evaluate(
     elsewhere: bool,
     existing_run: str,
 ) -> str: ...
-
 def demonstrations_folder(settings: str, protocol: str, tasks: list[str], seeds: list[int]) -> Path: ...
 
 class Snapshot:

@@ -63,6 +63,7 @@ fn another_run_is_refused_with_what_differs_and_left_as_it_is() {
     }
     let told = refused(EvaluationPlan { tasks: vec![pouring], ..own.clone() });
     assert!(told.contains("tasks are pouring, and were handover"), "{told}");
+    assert!(told.contains("further ones, which are added to it (--shard I/N"), "{told}");
     assert_eq!(std::fs::read(folder.path().join("episodes/handover-1.json")).unwrap(), before);
 
     // The same one goes on, and one with more of the same.

@@ -64,6 +64,9 @@ pub struct TaskReport {
     /// What models took, where notes say it.
     pub models: Option<ModelCosts>,
     pub falls: u32,
+    /// Mean share of the joint targets that lay beyond the joints' limits; nothing where none did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joints_clamped_share: Option<f64>,
 }
 
 /// One phase of a task.
@@ -261,8 +264,17 @@ impl TaskReport {
             effort: EpisodeCosts::of(&whole),
             models: ModelCosts::of(&whole),
             falls: of_task.iter().map(|one| one.result.falls).sum(),
+            joints_clamped_share: mean_clamped_share(&of_task),
         })
     }
+}
+
+/// Mean share of the joint targets of these episodes that lay beyond the joints' limits; `None` where none did.
+fn mean_clamped_share(episodes: &[&PlayedEpisode]) -> Option<f64> {
+    let shares: Vec<f64> =
+        episodes.iter().map(|one| one.result.joints_clamped_share.unwrap_or_default()).collect();
+    let mean = shares.iter().sum::<f64>() / shares.len().max(1) as f64;
+    (mean > 0.0).then_some(mean)
 }
 
 fn averages(tasks: &[TaskReport]) -> Vec<TaskAverage> {

@@ -22,6 +22,7 @@ pub fn all(report: &EvaluationReport) -> Vec<Table> {
     tables.push(shown(policies));
     tables.push(agents(policies));
     tables.push(effort(policies));
+    tables.push(clamped(policies));
     tables.push(reasons(policies));
     tables.push(went_wrong(&report.failure_moments, policies));
     tables.push(excluded(policies));
@@ -30,6 +31,23 @@ pub fn all(report: &EvaluationReport) -> Vec<Table> {
     tables.push(published_together(report));
     tables.retain(|table| !table.rows.is_empty());
     tables
+}
+
+/// What a policy asks of joints that they cannot do.
+fn clamped(policies: &[PolicyReport]) -> Table {
+    let mut table = Table::new(
+        "Joint targets beyond limits",
+        "Share of the joint targets that lay beyond the joints' limits and were moved there, percent. A large one may mean degrees \
+         in place of radians, or joints in another order.",
+        &["Policy", "Task", "Beyond"],
+        2,
+    );
+    for policy in policies {
+        let shares = policy.tasks.iter().filter_map(|task| Some((task.task, task.joints_clamped_share?)));
+        let row = |(task, share): (&str, f64)| vec![policy.name.clone(), task.into(), percent(share)];
+        table.rows.extend(shares.map(row));
+    }
+    table
 }
 
 pub fn rates(policy: &PolicyReport) -> Table {

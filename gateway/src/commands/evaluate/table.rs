@@ -1,10 +1,15 @@
 //! What an evaluation came to, as text: rates, why episodes failed, and what does not count.
 
+use std::collections::BTreeMap;
+
 use tandem_episodes::{
     evaluation::Evaluation,
     results::{Exclusion, PhaseLevel, PlayedEpisode},
     statistics::{Count, clopper_pearson},
 };
+
+/// A share of joint targets beyond limits from which on it is said.
+const CLAMPED_SHARE: f64 = 0.1;
 
 /// How many notes of a kind are printed below the table.
 const NOTES_SHOWN: usize = 20;
@@ -14,6 +19,10 @@ pub fn print(evaluation: &Evaluation) {
     println!("{}, {} protocol", evaluation.full_name(), evaluation.protocol);
     print_tasks(evaluation);
     evaluation.phase_level.iter().for_each(print_phase_level);
+    for (build, count) in &evaluation.other_builds {
+        println!("{count} of these episodes were played by another build, {build}");
+    }
+    print_clamped(evaluation);
     let (counted, excluded): (Vec<&PlayedEpisode>, Vec<&PlayedEpisode>) =
         evaluation.episodes.iter().partition(|episode| episode.counts());
     print_notes(counted.into_iter().filter_map(|episode| Some((episode, episode.note.clone()?))));
@@ -24,6 +33,24 @@ pub fn print(evaluation: &Evaluation) {
         print_notes(excluded.into_iter().map(|episode| (episode, exclusion_note(episode))));
     }
     evaluation.left_out.iter().for_each(|left_out| println!("  left out: {left_out}"));
+}
+
+/// Warns of tasks in whose episodes many joint targets lay beyond the joints' limits.
+fn print_clamped(evaluation: &Evaluation) {
+    let mut shares: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for PlayedEpisode { result, .. } in &evaluation.episodes {
+        shares.entry(&result.task).or_default().push(result.joints_clamped_share.unwrap_or_default());
+    }
+    for (task, shares) in shares {
+        let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+        if mean > CLAMPED_SHARE {
+            println!(
+                "warning: {:.0} % of the joint targets in {task} lay beyond the joints' limits and were moved there; they are radians, \
+                 in the order of the action row",
+                100.0 * mean
+            );
+        }
+    }
 }
 
 /// What failed, and how.

@@ -34,6 +34,7 @@ fn result(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> ResultReply {
         assistance: Assistance::Full,
         extra_information: vec![],
         extra_information_replies: Default::default(),
+        joints_clamped_share: None,
         departures: vec![],
         recording_failed: None,
         usage: None,
