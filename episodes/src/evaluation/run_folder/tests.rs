@@ -94,6 +94,12 @@ fn what_a_build_before_there_was_an_identity_has_played_is_not_replaced_by_anoth
     let empty = tempfile::tempdir().unwrap();
     drop(EvaluationRun::begin(&own, empty.path()).unwrap());
     assert_eq!(EvaluationRun::begin(&idle, empty.path()).unwrap().kept().to_play, 3);
+    drop(with_episodes(&idle, empty.path(), 1));
+    assert_eq!(
+        EvaluationRun::begin(&idle, empty.path()).unwrap().kept().kept,
+        1,
+        "it is the second one's now"
+    );
 }
 
 #[test]
