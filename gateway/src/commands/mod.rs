@@ -30,12 +30,18 @@ pub type CommandResult = Result<ExitCode, Box<dyn Error>>;
 
 /// The command line of this process for a shell, without what starts the program.
 fn command_to_go_on() -> String {
-    let mut arguments =
-        std::env::args().skip_while(|word| word != "evaluate" && word != "collect").peekable();
-    if arguments.peek().is_none() {
-        return "run the same command again".into();
+    let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
+    let words: Vec<String> = words.skip_while(|word| word != "evaluate" && word != "collect").collect();
+    match words.is_empty() {
+        true => "run the same command again".into(),
+        false => going_on(&words),
     }
-    std::iter::once("tandem".into()).chain(arguments.map(|word| quoted(&word))).collect::<Vec<_>>().join(" ")
+}
+
+/// The command that goes on with what this one has begun, of which nothing is to be deleted.
+fn going_on(words: &[String]) -> String {
+    let kept = words.iter().filter(|word| *word != "--overwrite").map(|word| quoted(word));
+    std::iter::once("tandem".into()).chain(kept).collect::<Vec<_>>().join(" ")
 }
 
 /// A word that a shell takes as it is.
@@ -58,7 +64,13 @@ fn print(text: &str) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::quoted;
+    use super::{going_on, quoted};
+
+    #[test]
+    fn what_was_begun_is_not_deleted_by_going_on() {
+        let words = ["collect", "--overwrite", "--out", "my runs"].map(String::from);
+        assert_eq!(going_on(&words), "tandem collect --out 'my runs'");
+    }
 
     #[test]
     fn a_shell_reads_what_was_given() {
