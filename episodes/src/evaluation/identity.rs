@@ -77,7 +77,7 @@ impl RunIdentity {
             starts,
             builds: vec![build.into()],
         }
-        .as_read_back()
+        .read_back()
     }
 
     /// The run of one episode, of which nothing else is known: builds before this one wrote no `run.json`.
@@ -92,11 +92,11 @@ impl RunIdentity {
             starts: None,
             builds: vec![played.build.clone()],
         }
-        .as_read_back()
+        .read_back()
     }
 
     /// Numbers may lose a bit on their way through text, so that only what was read is compared with what was read.
-    fn as_read_back(self) -> RunIdentity {
+    fn read_back(self) -> RunIdentity {
         let read = serde_json::to_string(&self).and_then(|text| serde_json::from_str(&text));
         read.unwrap_or(self)
     }
