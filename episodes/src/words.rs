@@ -21,18 +21,19 @@ pub struct OwnWords {
     pub robots: BTreeMap<String, String>,
 }
 
-/// Hashes of the benchmark's own words, joint and of each robot, which are published and which a file of instructions may hold.
-const BENCHMARK_WORDS: [(&str, &str); 10] = [
-    ("handover", "e6e83c5720b2bda4"),
-    ("pouring", "811edfc525362d72"),
-    ("frame_hang", "e0fb3a429bed504e"),
-    ("co_pouring", "a090d2464262cbad"),
-    ("trash_collection", "5d9af061e22a4c2f"),
-    ("cart_service", "4a433d04b8e9c6fd"),
-    ("co_carry", "a3ff536ba94812bd"),
-    ("table_align", "f0201d82a6b526e7"),
-    ("move_house", "ef96d1aef64a9a74"),
-    ("big_table", "6f4320604cdab543"),
+/// Hashes of the benchmark's own words, joint and of each robot, which are published and which a file of instructions may hold: one for
+/// each task, in the order of [`crate::tasks::ALL`].
+const BENCHMARK_WORDS: [&str; 10] = [
+    "e6e83c5720b2bda4",
+    "811edfc525362d72",
+    "e0fb3a429bed504e",
+    "a090d2464262cbad",
+    "5d9af061e22a4c2f",
+    "4a433d04b8e9c6fd",
+    "a3ff536ba94812bd",
+    "f0201d82a6b526e7",
+    "ef96d1aef64a9a74",
+    "6f4320604cdab543",
 ];
 
 /// What recordings have. Those of earlier builds hold the hash alone.
@@ -67,7 +68,7 @@ impl OwnWords {
 
     /// Whether they are those that the benchmark has for `task`.
     pub fn are_the_benchmarks(&self, task: &Task) -> bool {
-        task.file.is_none() && BENCHMARK_WORDS.contains(&(task.id, &self.xxh3))
+        task.file.is_none() && BENCHMARK_WORDS.contains(&self.xxh3.as_str())
     }
 
     /// The words of `task` with these in place of those that they replace.
@@ -89,8 +90,7 @@ mod tests {
 
     #[test]
     fn the_benchmarks_words_are_known_where_a_file_has_them() {
-        let ids: Vec<&str> = tasks::ALL.iter().map(|task| task.id).collect();
-        assert_eq!(BENCHMARK_WORDS.map(|(id, _)| id).to_vec(), ids);
+        assert_eq!(BENCHMARK_WORDS.len(), tasks::ALL.len());
         let handover = &tasks::ALL[0];
         let joint = "Pass the bottle directly from Robot A's right hand to Robot B's right hand, then place it on the target.";
         let of_a = "Pick up the bottle directly in front of you with your right hand and hand it to your partner's right hand.";

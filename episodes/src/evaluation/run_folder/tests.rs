@@ -35,11 +35,11 @@ fn another_run_is_refused_with_what_differs_and_left_as_it_is() {
         assert!(matches!(error, EvaluationError::OtherRun(_)), "{error}");
         error.to_string()
     };
-    type Change = fn(EvaluationPlan<'static>) -> EvaluationPlan<'static>;
+    type PlanChange = fn(EvaluationPlan<'static>) -> EvaluationPlan<'static>;
     for (says, change) in [
         (
             "policy is \"idle\", and was \"expert\"",
-            (|plan| EvaluationPlan { player: players::find("idle").unwrap(), ..plan }) as Change,
+            (|plan| EvaluationPlan { player: players::find("idle").unwrap(), ..plan }) as PlanChange,
         ),
         ("seeds are 2-4, and were 1-3", |plan| EvaluationPlan { seeds: vec![2, 3, 4], ..plan }),
         ("protocol is \"benchmark\", and was \"agentic\"", |plan| EvaluationPlan {
