@@ -205,6 +205,13 @@ pub enum CheckpointError {
     OtherWay { path: PathBuf, step: u64, made_by: String, this: &'static str },
     #[error("the checkpoint was made of {made_of}; it fits that episode, and this one is {wanted}")]
     OtherEpisode { made_of: String, wanted: String },
+    #[error("the checkpoint holds the progress of other robots or objects than it says; make it again")]
+    OtherContent,
+    #[error(
+        "{} begins elsewhere than at its task's beginning, and holds no checkpoint of where; recordings that this version of Tandem makes have it",
+        path.display()
+    )]
+    NoBeginning { path: PathBuf },
     #[error("the progress in a checkpoint cannot be read or written: {0}")]
     Progress(#[from] postcard::Error),
 }

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 use tandem_sim::{BaseLimits, MAX_TEXT_BYTES, read_text};
-use tandem_tools_spec::{Briefing, Instruction, TaskList};
-use xxhash_rust::xxh3::xxh3_64;
+use tandem_tools_spec::{Instruction, TaskList};
 
 use crate::describe::task_list;
 use crate::stress::Stress;
 use crate::tasks::TaskSet;
+use crate::words::OwnWords;
 
 /// Instructions by task id, as JSON:
 /// `{"handover": {"joint": "what all robots do", "robots": {"A": "what A does", "B": "what B does"}}}`.
@@ -81,10 +81,10 @@ impl Instructions {
         })
     }
 
-    /// Hash of what is said of `task` in place of its own words, if anything is.
-    pub fn fingerprint(&self, task: &str) -> Option<String> {
-        let TaskInstructions { joint, robots } = self.0.get(task)?;
-        Some(format!("{:016x}", xxh3_64(format!("{:?}", (joint, robots)).as_bytes())))
+    /// What is said of `task` in place of its own words, if anything is.
+    pub fn own_words(&self, task: &str) -> Option<OwnWords> {
+        let TaskInstructions { joint, robots } = self.0.get(task)?.clone();
+        Some(OwnWords::of(joint, robots))
     }
 
     /// Whether it says nothing of any task.
@@ -100,11 +100,6 @@ impl Instructions {
             self.rephrase(&task.id, &mut task.instruction, &mut task.robots);
         }
         list
-    }
-
-    /// Puts a briefing into these words.
-    pub fn rephrase_briefing(&self, briefing: &mut Briefing) {
-        self.rephrase(&briefing.status.task, &mut briefing.instruction, &mut briefing.instructions);
     }
 
     fn rephrase(&self, task: &str, joint: &mut String, robots: &mut [Instruction]) {
@@ -149,7 +144,7 @@ mod tests {
 
     #[test]
     fn hashes_tell_words_apart() {
-        let hash = |text: &str, task: &str| read(text).unwrap().fingerprint(task);
+        let hash = |text: &str, task: &str| read(text).unwrap().own_words(task).map(|words| words.xxh3);
         let (one, other) = (r#"{"handover": {"joint": "x"}}"#, r#"{"handover": {"joint": "y"}}"#);
         assert_eq!(hash(one, "handover"), hash(one, "handover"));
         assert_ne!(hash(one, "handover"), hash(other, "handover"));

@@ -28,6 +28,7 @@ mod fingerprint;
 pub mod html;
 mod instructions;
 pub mod live;
+mod locks;
 mod observation;
 mod output;
 pub mod players;
@@ -45,6 +46,7 @@ mod task_check;
 mod task_file;
 pub mod tasks;
 mod variation;
+mod words;
 
 pub use commands::{Called, OperatorCall, OperatorCommand};
 pub use conditions::{FUNCTIONS, Function};
@@ -81,3 +83,4 @@ pub use tandem_sim::{
 pub use task_check::{TaskCheck, TaskCheckError, check_task};
 pub use task_file::{TANDEM_PLUS, TaskFileError, read_task, tandem_plus, task_of, task_set};
 pub use variation::Variation;
+pub use words::OwnWords;

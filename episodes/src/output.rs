@@ -4,6 +4,8 @@ use std::{
     fs::{self, File},
     io::{self, Write},
     path::{Path, PathBuf},
+    process,
+    sync::atomic::{AtomicU32, Ordering},
 };
 
 /// Why a file of a run folder could not be written.
@@ -51,7 +53,7 @@ pub fn shell_word(text: &str) -> String {
 /// Writes a file under another name first and renames it when it is complete and on the disk: a reader sees the whole of it
 /// or nothing, even after a power cut. What cannot be written leaves nothing behind.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    write_whole_as(&partial_path(path), path, bytes)
+    write_whole_as(&own_partial_path(path), path, bytes)
 }
 
 /// As [`write_whole`], where the file's usual name on its way is another file's: it is called `under_way` instead.
@@ -64,6 +66,15 @@ pub fn write_whole_as(under_way: &Path, path: &Path, bytes: &[u8]) -> Result<(),
         let _ = fs::remove_file(under_way);
         OutputError::Io { path: path.into(), source }
     })
+}
+
+/// What a file is called until it is complete, where another process may write the same.
+fn own_partial_path(path: &Path) -> PathBuf {
+    static WRITTEN: AtomicU32 = AtomicU32::new(0);
+    let number = WRITTEN.fetch_add(1, Ordering::Relaxed);
+    let mut partial = path.to_path_buf().into_os_string();
+    partial.push(format!(".{}-{number}.partial", process::id()));
+    partial.into()
 }
 
 /// What a file is called until it is complete.
@@ -145,6 +156,14 @@ mod tests {
             printable("a\u{1b}[2Jb\r\u{9b}31mc\n\td\u{7}é"),
             "a\u{fffd}[2Jb\u{fffd}\u{fffd}31mc\n\td\u{fffd}é"
         );
+    }
+
+    #[test]
+    fn files_of_one_name_are_written_under_names_of_their_own() {
+        let path = Path::new("runs/results.json");
+        let [one, other] = [own_partial_path(path), own_partial_path(path)];
+        assert!(one != other && one.parent() == path.parent(), "{one:?} {other:?}");
+        assert_eq!(other.extension(), Some("partial".as_ref()));
     }
 
     #[test]

@@ -17,6 +17,14 @@ use crate::scoring::Phase;
 use crate::stress::{self, Stress};
 use crate::tasks::{Spread, Task, TaskWords};
 use crate::variation::Variation;
+use crate::words::OwnWords;
+
+/// What results say of a base controller and of instructions.
+const CONTROLLER: &str = "controller: ";
+const INSTRUCTIONS: &str = "instructions: ";
+/// What they say of Tandem's own, which the benchmark has not.
+pub const OWN_CONTROLLER: &str = "controller: Tandem's own";
+pub const OWN_WORDS: &str = "instructions: Tandem's own";
 
 /// Everything that makes an episode what it is. Equal values, played by equal calls on the same build, end in the same
 /// state, bit for bit.
@@ -46,9 +54,9 @@ pub struct EpisodeSpec {
     /// Whether it is told how to grasp; likewise.
     #[serde(default)]
     pub hints: Hints,
-    /// Hash of the instructions that the policy is given in place of the task's own; see [`crate::Instructions::fingerprint`].
+    /// The instructions that the policy is given in place of the task's own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub instructions: Option<String>,
+    pub instructions: Option<OwnWords>,
     /// In what it varies beyond the benchmark.
     #[serde(default, skip_serializing_if = "Variation::is_benchmarks")]
     pub variation: Variation,
@@ -208,9 +216,13 @@ impl EpisodeSpec {
         self.stress.map_or(self.sensing, |stress| stress.sensing(self.sensing))
     }
 
-    /// The words in which its policy is told the task, unless a file of instructions has others.
+    /// The words in which its policy is told the task.
     pub fn task_words(&self) -> TaskWords {
-        stress::task_words(self.stress, self.task)
+        let words = stress::task_words(self.stress, self.task);
+        match &self.instructions {
+            Some(own) => own.over(self.task, words),
+            None => words,
+        }
     }
 
     /// What its protocol allows for its task, with its own limit of thinking where it has one.
@@ -230,9 +242,26 @@ impl EpisodeSpec {
         Wording { assistance: self.assistance, hints: self.hints }
     }
 
-    /// What is neither as the benchmark nor as Tandem usually has it, each as results name it behind the policy's name. Whoever adds a setting decides here
-    /// whether it belongs to them.
+    /// What is not as the benchmark has it, each as results name it: Tandem's own base controller and its own wording of instructions first,
+    /// which every result has that asks for nothing else.
     pub fn departures(&self) -> Vec<String> {
+        let own_controller = (self.locomotion == Controller::Balance).then(|| OWN_CONTROLLER.to_owned());
+        let own_words =
+            (self.instructions.is_none() && self.task.file.is_none()).then(|| OWN_WORDS.to_owned());
+        let others = self.peculiarities().into_iter().filter(|what| !self.is_the_benchmarks(what));
+        own_controller.into_iter().chain(own_words).chain(others).collect()
+    }
+
+    /// Whether a peculiarity is what the benchmark has.
+    fn is_the_benchmarks(&self, what: &str) -> bool {
+        let words = self.instructions.as_ref().filter(|words| words.are_the_benchmarks(self.task));
+        let of_file = matches!(self.locomotion, Controller::File(_));
+        (of_file && what.starts_with(CONTROLLER)) || (words.is_some() && what.starts_with(INSTRUCTIONS))
+    }
+
+    /// What is not as Tandem usually has it, each as stands behind the policy's name. Whoever adds a setting decides here whether it
+    /// belongs to them.
+    pub fn peculiarities(&self) -> Vec<String> {
         // Without `..`, so that the compiler asks about a new field. What is named apart, or changes nothing that a policy could
         // tell, is left out.
         let EpisodeSpec {
@@ -255,7 +284,7 @@ impl EpisodeSpec {
             keyed_seed,
         } = self;
         let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let departures = [
+        let found = [
             task.file.as_ref().map(|file| match file.suite {
                 Some(suite) => format!("suite: {suite}"),
                 None => format!("task file: {} {}", file.source.name, file.xxh3),
@@ -267,15 +296,15 @@ impl EpisodeSpec {
             (*robot != RobotFile::default()).then(|| format!("robot: {}", robot.kind())),
             match locomotion {
                 Controller::Balance => None,
-                Controller::File(path) => Some(format!("controller: {}", file(path))),
+                Controller::File(path) => Some(format!("{CONTROLLER}{}", file(path))),
                 Controller::Looped(path) => {
-                    Some(format!("controller: {} in a loop over its place", file(path)))
+                    Some(format!("{CONTROLLER}{} in a loop over its place", file(path)))
                 }
             },
             (*state_estimate != StateSource::default())
                 .then(|| format!("state estimate: {}", state_estimate.name())),
             (*sensors != SensorModel::default()).then(|| format!("sensors: {}", sensors.name())),
-            instructions.as_ref().map(|xxh3| format!("instructions: {xxh3}")),
+            instructions.as_ref().map(|words| format!("{INSTRUCTIONS}{}", words.xxh3)),
             thinking_limit_s.map(|limit_s| format!("thinking limit: {limit_s} s")),
             keyed_seed.as_ref().map(|keyed| format!("seed key: {}", keyed.key_fingerprint)),
             stress.map(|stress| format!("stress: {stress}")),
@@ -289,7 +318,7 @@ impl EpisodeSpec {
                 Start::Task | Start::Checkpoint(_) | Start::Phase(_) => None,
             },
         ];
-        departures.into_iter().flatten().chain(variation.departures()).collect()
+        found.into_iter().flatten().chain(variation.departures()).collect()
     }
 
     /// Index of the phase that it begins at and that alone counts; `None` where it begins elsewhere, and all count.
@@ -448,21 +477,25 @@ mod tests {
         assert_eq!(asked(Some("looped:a/walk.onnx")), Controller::Looped("a/walk.onnx".into()));
 
         let own = EpisodeSpec::new(&tasks::ALL[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
-        let departures =
-            |file: Option<&str>| EpisodeSpec { locomotion: asked(file), ..own.clone() }.departures();
-        assert_eq!(departures(None), Vec::<String>::new());
-        assert_eq!(departures(Some("a/walk.onnx")), ["controller: walk.onnx"]);
-        assert_eq!(
-            departures(Some("looped:a/walk.onnx")),
-            ["controller: walk.onnx in a loop over its place"]
-        );
+        let named = |file: Option<&str>| {
+            let spec = EpisodeSpec { locomotion: asked(file), ..own.clone() };
+            (spec.peculiarities(), spec.departures())
+        };
+        let words = || OWN_WORDS.to_owned();
+        assert_eq!(named(None), (vec![], vec![OWN_CONTROLLER.into(), words()]));
+        // The benchmark's own kind of controller departs from Tandem's usual one, and not from the benchmark.
+        assert_eq!(named(Some("a/walk.onnx")), (vec!["controller: walk.onnx".into()], vec![words()]));
+        let looped = "controller: walk.onnx in a loop over its place".to_owned();
+        assert_eq!(named(Some("looped:a/walk.onnx")), (vec![looped.clone()], vec![words(), looped]));
     }
 
     #[test]
     fn other_words_are_named() {
         let own = EpisodeSpec::new(&tasks::ALL[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
-        let told = EpisodeSpec { instructions: Some("00ff".into()), ..own };
-        assert_eq!(told.departures(), ["instructions: 00ff"]);
+        let words = OwnWords { xxh3: "00ff".into(), ..OwnWords::default() };
+        let told = EpisodeSpec { instructions: Some(words), ..own };
+        assert_eq!(told.peculiarities(), ["instructions: 00ff"]);
+        assert_eq!(told.departures(), [OWN_CONTROLLER, "instructions: 00ff"]);
     }
 
     #[test]
@@ -471,7 +504,7 @@ mod tests {
         assert_eq!(serde_json::to_value(&own).unwrap().get("variation"), None);
         let variation = Variation { spread: Spread::Double, variety: 1, disturb: 0.8 };
         let wide = EpisodeSpec { variation, ..own };
-        assert_eq!(wide.departures(), ["spread: 2", "variety: 1", "disturbed: 0.8"]);
+        assert_eq!(wide.peculiarities(), ["spread: 2", "variety: 1", "disturbed: 0.8"]);
         let text = serde_json::to_string(&wide).unwrap();
         assert!(text.contains(r#""variation":{"spread":2,"variety":1,"disturb":0.8}"#), "{text}");
         assert_eq!(serde_json::from_str::<EpisodeSpec>(&text).unwrap(), wide);

@@ -367,7 +367,7 @@ impl Settings {
             assistance: self.assistance,
             disclosure: self.disclosure,
             hints: self.hints,
-            instructions: self.instructions.fingerprint(&start.task),
+            instructions: self.instructions.own_words(&start.task),
             thinking_limit_s: self.thinking_limit_s,
             ..EpisodeSpec::new(self.tasks.find(&start.task)?, start.seed, protocol)
         })

@@ -52,6 +52,8 @@ pub struct WorldStep {
     pub next_seed: Option<u32>,
     /// How the simulator failed, if it did.
     pub failure: Option<String>,
+    /// Share of the episode's joint targets that lay beyond the joints' limits.
+    pub joints_clamped_share: f64,
 }
 
 /// What is seen of a world; nothing of one that has panicked.
@@ -189,6 +191,7 @@ impl BatchWorld {
         let terminated = reached == session.spec().task.phases.len() || fallen.contains(&true);
         let truncated = !terminated && (failure.is_some() || session.ended().is_some());
         let env_steps = session.env_steps();
+        let joints_clamped_share = session.joints_clamped_share();
         let next_seed = None;
         WorldStep {
             reward,
@@ -200,6 +203,7 @@ impl BatchWorld {
             seed,
             next_seed,
             failure,
+            joints_clamped_share,
         }
     }
 

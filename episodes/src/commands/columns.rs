@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use serde::{Deserialize, Serialize};
 use tandem_sim::{
     ARM_COLUMNS, ARM_JOINTS, BaseCommand, BaseLimits, HAND_COLUMNS, HAND_JOINTS, RobotModel, Side, UPPER,
     UPPER_JOINTS, WAIST_COLUMN,
@@ -10,6 +11,29 @@ use tandem_sim::{
 /// Names of the last four columns, as every message with a base command has them.
 const BASE: [&str; 4] = ["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"];
 
+/// A joint target that is so much beyond a limit is counted: nearer ones come of rounding.
+const COUNTED_RAD: f64 = 0.01;
+
+/// How many joint targets were asked for, and how many of them lay beyond the joints' limits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TargetCounts {
+    asked: u64,
+    beyond: u64,
+}
+
+impl TargetCounts {
+    /// Adds those of another command.
+    pub fn add(&mut self, other: TargetCounts) {
+        self.asked += other.asked;
+        self.beyond += other.beyond;
+    }
+
+    /// The share of those beyond their limits; 0 of none.
+    pub fn beyond_share(self) -> f64 {
+        self.beyond as f64 / self.asked.max(1) as f64
+    }
+}
+
 /// What of a command lay beyond a limit and was moved there.
 #[derive(Clone, Debug, Default)]
 pub struct Clamped {
@@ -17,6 +41,8 @@ pub struct Clamped {
     pub columns: Vec<usize>,
     /// Fields of the base command.
     pub base: Vec<&'static str>,
+    /// Joint targets, clamped or not.
+    pub targets: TargetCounts,
 }
 
 impl Clamped {
@@ -24,6 +50,8 @@ impl Clamped {
     pub fn joint(&mut self, model: &RobotModel, column: usize, asked_rad: f64) -> f64 {
         let joint = &model.joints[UPPER[column]];
         let within_rad = asked_rad.clamp(joint.lower_rad.into(), joint.upper_rad.into());
+        self.targets.asked += 1;
+        self.targets.beyond += u64::from((asked_rad - within_rad).abs() > COUNTED_RAD);
         if within_rad != asked_rad && !self.columns.contains(&column) {
             self.columns.push(column);
         }

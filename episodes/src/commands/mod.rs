@@ -17,7 +17,7 @@ mod walk;
 pub(crate) use called::Allowed;
 pub use called::{Called, OperatorCall, OperatorCommand};
 pub use check_reach::check_reach;
-pub use columns::{Clamped, action_row, base_row};
+pub use columns::{Clamped, TargetCounts, action_row, base_row};
 pub use motion::{Motion, MotionState, RobotSheet};
 pub use report::{report, wrist_state};
 pub use upper_body::{UpperBody, upper_body};
@@ -48,6 +48,10 @@ pub struct RobotOrder {
     pub action: RobotAction,
 }
 
+/// What results say of wrist commands that take hands along with the pelvis, or have them give way.
+const CARRIED: &str = "wrist commands: carried";
+const COMPLIANCE: &str = "wrist commands: compliance";
+
 /// What is asked of one robot, as the arguments of a tool say it.
 #[derive(Clone, Debug)]
 pub enum RobotAction {
@@ -58,6 +62,21 @@ pub enum RobotAction {
 }
 
 impl RobotAction {
+    /// What of it the benchmark's wrist commands have not.
+    pub fn departures(&self) -> impl Iterator<Item = &'static str> {
+        let entry = match self {
+            RobotAction::MoveWrists(entry) => Some(entry),
+            RobotAction::Walk(_) | RobotAction::SendJointChunk(_) | RobotAction::Wait => None,
+        };
+        let gives_way = |entry: &WristMove| {
+            let compliances =
+                [entry.compliance_n_s_m, entry.side_compliance_n_s_m, entry.turn_compliance_n_m_s_rad];
+            compliances.iter().any(Option::is_some)
+        };
+        let carried = entry.filter(|entry| entry.carried == Some(true)).map(|_| CARRIED);
+        carried.into_iter().chain(entry.filter(|entry| gives_way(entry)).map(|_| COMPLIANCE))
+    }
+
     /// The frame that it gives wrist poses in.
     pub fn frame(&self) -> PoseFrame {
         match self {

@@ -1,13 +1,16 @@
 //! Single episodes: each is cached in a file of its own, and taken from there by the next run if it is the same.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use tandem_tools_spec::{EndReason, ResultReply};
 
 use super::retry::again_name;
 use super::{EvaluationError, EvaluationPlan, KeptFiles};
+use crate::locks::{FileLock, LockKind, Locking};
 use crate::output::write_whole;
 use crate::players::{EpisodeOutput, PlayError, PlayOutcome};
+use crate::recording::Recorder;
 use crate::results::{Attempt, PlayedEpisode, RESULT_FILE, episode_note, failures_of_policy};
 use crate::spec::{EpisodeSpec, Start};
 use crate::{CheckpointError, EpisodeError};
@@ -19,23 +22,66 @@ pub enum PlannedOutcome {
     Played(Box<PlayedEpisode>),
     /// It could not be begun, and why.
     LeftOut(String),
+    /// Another process plays it.
+    Elsewhere,
 }
 
 /// The folder of single episodes, and what has to agree for one of them to be taken instead of played.
+#[derive(Clone)]
 pub struct EpisodeCache<'a> {
     pub plan: &'a EvaluationPlan<'a>,
-    pub folder: &'a Path,
+    pub folder: PathBuf,
     pub locomotion: String,
     pub build: &'static str,
+    /// The builds whose results are taken.
+    pub builds: Vec<String>,
 }
 
 impl EpisodeCache<'_> {
+    /// The episode as it is kept, or played now, unless another process plays it.
     pub fn load_or_play(&self, spec: &EpisodeSpec) -> Result<PlannedOutcome, EvaluationError> {
-        if let Some(cached) = self.load(spec) {
-            return self.keep(spec, cached).map(|kept| PlannedOutcome::Kept(Box::new(kept)));
+        if let Some(kept) = self.load_kept(spec)? {
+            return Ok(kept);
+        }
+        let path = self.lock_path(spec);
+        let locking = FileLock::attempt(&path, LockKind::Exclusive);
+        let _lock = match locking.map_err(|source| EvaluationError::Io { path: path.clone(), source })? {
+            Locking::Locked(lock) => Some(lock.removing(&path)),
+            Locking::Held => return Ok(PlannedOutcome::Elsewhere),
+            Locking::Unsupported => None,
+        };
+        self.load_or_play_alone(spec)
+    }
+
+    /// As [`EpisodeCache::load_or_play`], once no other process plays it.
+    pub fn wait_and_play(&self, spec: &EpisodeSpec) -> Result<PlannedOutcome, EvaluationError> {
+        let path = self.lock_path(spec);
+        let lock = FileLock::wait(&path, || !self.plan.player.is_interrupted());
+        let _lock = lock.map_err(|source| EvaluationError::Io { path, source })?;
+        self.load_or_play_alone(spec)
+    }
+
+    /// The lock of whoever plays the episode.
+    fn lock_path(&self, spec: &EpisodeSpec) -> PathBuf {
+        self.folder.join(format!("{}.lock", name(spec)))
+    }
+
+    fn load_kept(&self, spec: &EpisodeSpec) -> Result<Option<PlannedOutcome>, EvaluationError> {
+        let kept = self.load(spec).map(|cached| self.keep(spec, cached)).transpose()?;
+        Ok(kept.map(|kept| PlannedOutcome::Kept(Box::new(kept))))
+    }
+
+    fn load_or_play_alone(&self, spec: &EpisodeSpec) -> Result<PlannedOutcome, EvaluationError> {
+        // Another process may have played it since it was looked for.
+        if let Some(kept) = self.load_kept(spec)? {
+            return Ok(kept);
         }
         let attempts = self.earlier(spec).map(PlayedEpisode::into_attempts).unwrap_or_default();
         let folder = self.folder.join(name(spec));
+        if self.plan.record {
+            // Until the recording is whole, no result says that it is.
+            forget_result(&folder)?;
+        }
         let KeptFiles { pages, .. } = self.plan.files;
         let output = EpisodeOutput { folder: &folder, record: self.plan.record, pages };
         match self.plan.player.play_episode(spec, output) {
@@ -62,20 +108,29 @@ impl EpisodeCache<'_> {
     pub fn load(&self, spec: &EpisodeSpec) -> Option<PlayedEpisode> {
         let cached = self.earlier(spec)?;
         let is_whole = self.is_not_kept(&cached)
-            || self.recording(spec).is_none_or(|folder| folder.join(RESULT_FILE).exists());
+            || self.recording(spec).is_none_or(|folder| is_recorded(&folder, &cached.result));
         (is_whole && cached.counts()).then_some(cached)
     }
 
     /// What an earlier run has left of this episode, whether it counts or is played again.
     fn earlier(&self, spec: &EpisodeSpec) -> Option<PlayedEpisode> {
-        let bytes = std::fs::read(self.folder.join(format!("{}.json", name(spec)))).ok()?;
-        let cached: PlayedEpisode = serde_json::from_slice(&bytes).ok()?;
-        let by = (&cached.policy, cached.locomotion.as_str(), cached.build.as_str());
-        let same = by == (&self.plan.player.card(), &self.locomotion, self.build)
+        let cached: PlayedEpisode = serde_json::from_slice(&self.read(spec)?).ok()?;
+        let by = (&cached.policy, cached.locomotion.as_str());
+        let same = by == (&self.plan.player.card(), &self.locomotion)
+            && self.builds.contains(&cached.build)
             && cached.spec == *spec
             && (cached.result.task.as_str(), cached.result.seed) == (spec.task.id, Some(spec.seed));
         let keep_failed = self.keeps_failure(&cached.result, &cached.attempts);
         same.then_some(PlayedEpisode { keep_failed, ..cached })
+    }
+
+    /// Whether there is a result of the episode that this build does not understand.
+    pub fn is_unreadable(&self, spec: &EpisodeSpec) -> bool {
+        self.read(spec).is_some_and(|bytes| serde_json::from_slice::<PlayedEpisode>(&bytes).is_err())
+    }
+
+    fn read(&self, spec: &EpisodeSpec) -> Option<Vec<u8>> {
+        std::fs::read(self.folder.join(format!("{}.json", name(spec)))).ok()
     }
 
     /// Whether a result is of a policy that failed itself, and has been played again as often as is asked for.
@@ -96,7 +151,7 @@ impl EpisodeCache<'_> {
         }
     }
 
-    /// Where the episode is recorded, if it is. Its `result.json` is written last.
+    /// Where the episode is recorded, if it is.
     fn recording(&self, spec: &EpisodeSpec) -> Option<PathBuf> {
         self.plan.record.then(|| self.folder.join(name(spec)))
     }
@@ -137,6 +192,28 @@ impl EpisodeCache<'_> {
         let text = serde_json::to_string_pretty(&played)?;
         write_whole(&self.folder.join(format!("{}.json", name(spec))), text.as_bytes())?;
         Ok(played)
+    }
+}
+
+/// Whether the recording in `folder` is whole, and of the episode that came to `result`. Its `result.json` is written last.
+fn is_recorded(folder: &Path, result: &ResultReply) -> bool {
+    let bytes = std::fs::read(folder.join(RESULT_FILE)).unwrap_or_default();
+    let recorded = serde_json::from_slice::<ResultReply>(&bytes);
+    folder.join(Recorder::FILE_NAME).exists()
+        && recorded.is_ok_and(|recorded| {
+            let of = |result: &ResultReply| (result.state_hash.clone(), result.env_steps, result.tool_calls);
+            of(&recorded) == of(result)
+        })
+}
+
+/// Removes the result of an earlier recording in `folder`.
+fn forget_result(folder: &Path) -> Result<(), EvaluationError> {
+    let path = folder.join(RESULT_FILE);
+    match std::fs::remove_file(&path) {
+        Err(source) if !matches!(source.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
+            Err(EvaluationError::Io { path, source })
+        }
+        _ => Ok(()),
     }
 }
 

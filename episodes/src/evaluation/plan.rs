@@ -7,6 +7,7 @@ use tandem_sim::{Sensing, render::RendererKind};
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 
 use super::retry::FailedEpisode;
+use crate::instructions::Instructions;
 use crate::players::Policy;
 use crate::recording::Recorder;
 use crate::scoring::Phase;
@@ -34,6 +35,8 @@ pub struct EvaluationPlan<'a> {
     pub disclosure: Disclosure,
     /// Whether they are told how to grasp.
     pub hints: Hints,
+    /// Words in place of the tasks' own.
+    pub instructions: Instructions,
     /// In what episodes vary beyond the benchmark.
     pub variation: Variation,
     /// What goes wrong in them.
@@ -54,6 +57,8 @@ pub struct EvaluationPlan<'a> {
     pub retries: u32,
     /// What draws worlds for seeds that are public, if anything does.
     pub seed_key: Option<SeedKey>,
+    /// What becomes of a run that the folder holds already.
+    pub existing: ExistingRun,
 }
 
 /// What an evaluator's key makes of the seeds of a plan.
@@ -70,6 +75,18 @@ impl SeedKey {
         let drawn = *self.drawn.get(&seed)?;
         Some(KeyedSeed { key_fingerprint: self.fingerprint.clone(), drawn })
     }
+}
+
+/// What becomes of a run that a folder holds already. The same run goes on in any case.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ExistingRun {
+    /// Another run is left as it is, and the evaluation refused.
+    #[default]
+    Refuse,
+    /// The same run of another build goes on with this build; what it holds is kept.
+    ResumeWithNewBuild,
+    /// It is deleted.
+    Overwrite,
 }
 
 /// What is kept of episodes that are recorded; by default everything.
@@ -130,6 +147,7 @@ impl EvaluationPlan<'_> {
             assistance: self.assistance,
             disclosure: self.disclosure,
             hints: self.hints,
+            instructions: self.instructions.own_words(task.id),
             variation: self.variation,
             stress: self.stress,
             thinking_limit_s: self.thinking_limit_s,
@@ -160,9 +178,18 @@ impl EvaluationPlan<'_> {
         .keyed(spec.keyed_seed.clone())
     }
 
-    /// What in its episodes is not as the benchmark has it: the same in all of them, but for the files of tasks and for what has been
-    /// begun again.
+    /// What in its episodes is not as the benchmark has it.
     pub fn departures(&self) -> Vec<String> {
+        self.named(EpisodeSpec::departures)
+    }
+
+    /// What in its episodes is not as Tandem usually has it.
+    pub fn peculiarities(&self) -> Vec<String> {
+        self.named(EpisodeSpec::peculiarities)
+    }
+
+    /// What is named of its episodes: the same in all of them, but for the files of tasks, for words, and for what has been begun again.
+    fn named(&self, of: fn(&EpisodeSpec) -> Vec<String>) -> Vec<String> {
         let specs: Vec<EpisodeSpec> = match &self.starts {
             Starts::Task | Starts::Phases { .. } => {
                 let seed = self.seeds.first().copied().unwrap_or_default();
@@ -173,9 +200,9 @@ impl EvaluationPlan<'_> {
             }
         };
         let mut found: Vec<String> = Vec::new();
-        for departure in specs.iter().flat_map(EpisodeSpec::departures) {
-            if !found.contains(&departure) {
-                found.push(departure);
+        for what in specs.iter().flat_map(of) {
+            if !found.contains(&what) {
+                found.push(what);
             }
         }
         found

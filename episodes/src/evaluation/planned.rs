@@ -1,4 +1,4 @@
-//! How many episodes an evaluation is to have, for whoever looks on while it is played.
+//! How many episodes an evaluation is to have, and how it goes on, for whoever looks on.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,10 +12,28 @@ use crate::output::write_whole;
 const WHOLE: &str = "planned.json";
 const SHARE: &str = "planned-";
 
-/// How many episodes a share of an evaluation has.
+/// How many episodes a share of an evaluation has, and how it goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlannedEpisodes {
     pub episodes: usize,
+    /// How many of them could not be begun; known at the end.
+    #[serde(default)]
+    pub left_out: usize,
+    /// Unknown of what earlier builds wrote.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state: Option<RunState>,
+}
+
+/// How an evaluation goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RunState {
+    /// It is played; or its process is gone, and nobody could say so.
+    Playing,
+    /// It has come to its end.
+    Complete,
+    /// An error has stopped it.
+    Stopped,
 }
 
 impl PlannedEpisodes {
@@ -28,17 +46,38 @@ impl PlannedEpisodes {
         Ok(write_whole(&folder.join(name), serde_json::to_string(&self)?.as_bytes())?)
     }
 
-    /// How many episodes all shares of an evaluation have that have begun; `None` where no share has said it.
-    pub fn read_all(folder: &Path) -> Option<usize> {
+    /// All shares of an evaluation that have begun as one; `None` where no share has said anything.
+    pub fn read_all(folder: &Path) -> Option<PlannedEpisodes> {
         let read = |path: PathBuf| serde_json::from_slice::<PlannedEpisodes>(&fs::read(path).ok()?).ok();
         if let Some(whole) = read(folder.join(WHOLE)) {
-            return Some(whole.episodes);
+            return Some(whole);
         }
         let files = fs::read_dir(folder).ok()?.flatten();
         let shares = files.filter(|file| file.file_name().to_string_lossy().starts_with(SHARE));
-        let counts: Vec<usize> = shares.filter_map(|file| Some(read(file.path())?.episodes)).collect();
-        (!counts.is_empty()).then(|| counts.iter().sum())
+        shares.filter_map(|file| read(file.path())).reduce(PlannedEpisodes::with)
     }
+
+    /// Two shares as one. It is played as long as one of them is.
+    fn with(self, other: PlannedEpisodes) -> PlannedEpisodes {
+        let state = match (self.state, other.state) {
+            (Some(RunState::Complete), Some(RunState::Complete)) => Some(RunState::Complete),
+            (Some(RunState::Playing), _) | (_, Some(RunState::Playing)) => Some(RunState::Playing),
+            (Some(RunState::Stopped), Some(_)) | (Some(_), Some(RunState::Stopped)) => {
+                Some(RunState::Stopped)
+            }
+            (None, _) | (_, None) => None,
+        };
+        PlannedEpisodes {
+            episodes: self.episodes + other.episodes,
+            left_out: self.left_out + other.left_out,
+            state,
+        }
+    }
+}
+
+/// Whether an evaluation has written the file of this name to say how many episodes it plans.
+pub(super) fn is_planned_file(name: &str) -> bool {
+    name == WHOLE || (name.starts_with(SHARE) && name.ends_with(".json"))
 }
 
 #[cfg(test)]
@@ -49,9 +88,19 @@ mod tests {
     fn shares_are_added_up() {
         let folder = tempfile::tempdir().unwrap();
         assert_eq!(PlannedEpisodes::read_all(folder.path()), None);
-        for (index, episodes) in [(0, 3), (1, 2)] {
-            PlannedEpisodes { episodes }.write(folder.path(), Shard { index, of: 2 }).unwrap();
+        for (index, episodes, state) in [(0, 3, RunState::Complete), (1, 2, RunState::Playing)] {
+            let share = PlannedEpisodes { episodes, left_out: 1, state: Some(state) };
+            share.write(folder.path(), Shard { index, of: 2 }).unwrap();
         }
-        assert_eq!(PlannedEpisodes::read_all(folder.path()), Some(5));
+        let all = PlannedEpisodes { episodes: 5, left_out: 2, state: Some(RunState::Playing) };
+        assert_eq!(PlannedEpisodes::read_all(folder.path()), Some(all));
+    }
+
+    #[test]
+    fn what_an_earlier_build_wrote_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join(WHOLE), r#"{"episodes": 4}"#).unwrap();
+        let read = PlannedEpisodes { episodes: 4, left_out: 0, state: None };
+        assert_eq!(PlannedEpisodes::read_all(folder.path()), Some(read));
     }
 }

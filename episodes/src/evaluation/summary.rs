@@ -39,6 +39,9 @@ pub struct Evaluation {
     /// What was not as the benchmark has it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub departures: Vec<String>,
+    /// What of it is not as Tandem usually has it, as stands behind the policy's name.
+    #[serde(skip)]
+    pub peculiarities: Vec<String>,
     /// What the policy was shown in any episode that the benchmark's own policies are not.
     #[serde(skip_serializing_if = "BTreeSet::is_empty")]
     pub extra_information: BTreeSet<String>,
@@ -50,6 +53,9 @@ pub struct Evaluation {
     /// Episodes that could not be begun, and why.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<String>,
+    /// How many of them other builds have played, by build.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub other_builds: BTreeMap<String, usize>,
     pub episodes: Vec<PlayedEpisode>,
 }
 
@@ -57,7 +63,7 @@ impl Evaluation {
     /// The policy's name with what has to be known beside it, as reports have it.
     pub fn full_name(&self) -> String {
         let shown = shown_in(self.episodes.iter());
-        named(&named(&self.policy.name, &shown), &self.departures)
+        named(&named(&self.policy.name, &shown), &self.peculiarities)
     }
 }
 
@@ -89,7 +95,8 @@ pub fn summarise(cache: &EpisodeCache, episodes: Vec<PlayedEpisode>, left_out: V
         locomotion: cache.locomotion.clone(),
         sensing: cache.plan.sensing,
         assistance: cache.plan.assistance,
-        departures: cache.plan.departures(),
+        departures: departures(cache, &episodes),
+        peculiarities: cache.plan.peculiarities(),
         extra_information: episodes
             .iter()
             .flat_map(|played| played.result.extra_information.clone())
@@ -97,6 +104,26 @@ pub fn summarise(cache: &EpisodeCache, episodes: Vec<PlayedEpisode>, left_out: V
         tasks,
         phase_level: PhaseLevel::of(episodes.iter()),
         left_out,
+        other_builds: other_builds(cache.build, &episodes),
         episodes,
     }
+}
+
+/// Those of all episodes, and those of what the policy asked for in any of them.
+fn departures(cache: &EpisodeCache, episodes: &[PlayedEpisode]) -> Vec<String> {
+    let mut found = cache.plan.departures();
+    for departure in episodes.iter().flat_map(|played| &played.result.departures) {
+        if !found.contains(departure) {
+            found.push(departure.clone());
+        }
+    }
+    found
+}
+
+fn other_builds(build: &str, episodes: &[PlayedEpisode]) -> BTreeMap<String, usize> {
+    let mut found = BTreeMap::new();
+    for other in episodes.iter().map(|played| &played.build).filter(|other| *other != build) {
+        *found.entry(other.clone()).or_default() += 1;
+    }
+    found
 }

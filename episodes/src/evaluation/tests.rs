@@ -8,6 +8,7 @@ use tandem_sim::{Sensing, dynamics::Diverged, render::RendererKind};
 use tandem_tools_spec::{Assistance, Disclosure, EndReason, Hints, PhaseTimes, Protocol, ResultReply};
 
 use super::*;
+use crate::instructions::Instructions;
 use crate::players::{EpisodeOutput, PlayError, PlayOutcome, Policy};
 use crate::results::{PhaseLevel, PolicyCard, episode_note, missed_phase_note, write_result};
 use crate::spec::{Controller, EpisodeSpec, PhaseStart, RobotFile, Start};
@@ -15,7 +16,7 @@ use crate::tasks::{self, Task};
 use crate::variation::Variation;
 use crate::{players, scoring::Phase};
 
-fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultReply {
+pub(super) fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultReply {
     ResultReply {
         task: task.into(),
         seed: Some(seed),
@@ -33,6 +34,7 @@ fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultRe
         assistance: Assistance::Full,
         extra_information: vec![],
         extra_information_replies: Default::default(),
+        joints_clamped_share: None,
         departures: vec![],
         recording_failed: None,
         usage: None,
@@ -40,7 +42,7 @@ fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultRe
 }
 
 /// An episode that was played under `cache`'s rules.
-fn played(cache: &EpisodeCache, spec: &EpisodeSpec) -> PlayedEpisode {
+pub(super) fn played(cache: &EpisodeCache, spec: &EpisodeSpec) -> PlayedEpisode {
     PlayedEpisode {
         policy: cache.plan.player.card(),
         spec: spec.clone(),
@@ -79,7 +81,7 @@ fn the_first_phase_that_was_missed_is_noted() {
     );
 }
 
-fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {
+pub(super) fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {
     EvaluationPlan {
         player: players::find("expert").unwrap(),
         protocol: Protocol::Agentic,
@@ -91,6 +93,7 @@ fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         assistance: Assistance::Full,
         disclosure: Disclosure::Live,
         hints: Hints::On,
+        instructions: Instructions::default(),
         variation: Variation::default(),
         stress: None,
         thinking_limit_s: None,
@@ -103,6 +106,7 @@ fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         files: KeptFiles::default(),
         retries: EvaluationPlan::DEFAULT_RETRIES,
         seed_key: None,
+        existing: ExistingRun::Refuse,
     }
 }
 
@@ -154,8 +158,13 @@ fn episodes_from_phases_need_demonstrations() {
 #[test]
 fn phases_on_their_own_are_averaged_by_who_works_on_them() {
     let plan = plan(Vec::new(), Vec::new());
-    let cache =
-        EpisodeCache { plan: &plan, folder: Path::new(""), locomotion: "balance".into(), build: "test" };
+    let cache = EpisodeCache {
+        plan: &plan,
+        folder: PathBuf::new(),
+        locomotion: "balance".into(),
+        build: "test",
+        builds: vec!["test".into()],
+    };
     let from = |id: &str, seed: u32, phase: usize, reached: bool| {
         let start = PhaseStart { recording: "demonstration".into(), phase: Phase::number(phase) };
         let spec = plan.spec(tasks::find(id).unwrap(), seed, Start::Phase(start));
@@ -196,7 +205,13 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     let plan = plan(vec![task], vec![7]);
     let spec = plan.spec(task, 7, Start::Task);
     let build = fingerprint::build().unwrap();
-    let cache = EpisodeCache { plan: &plan, folder: folder.path(), locomotion: "balance".into(), build };
+    let cache = EpisodeCache {
+        plan: &plan,
+        folder: folder.path().into(),
+        locomotion: "balance".into(),
+        build,
+        builds: vec![build.into()],
+    };
     let kept_after = |text: &str| {
         std::fs::write(folder.path().join("pouring-7.json"), text).unwrap();
         cache.load(&spec)
@@ -234,6 +249,12 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     std::fs::write(folder.path().join("pouring-7.json"), &text).unwrap();
     assert_eq!(collector.load(&spec), None, "no recording");
     std::fs::create_dir(folder.path().join("pouring-7")).unwrap();
+    write_result(&same.result, &folder.path().join("pouring-7")).unwrap();
+    assert_eq!(collector.load(&spec), None, "a result without its recording");
+    std::fs::write(folder.path().join("pouring-7/episode.mcap"), "").unwrap();
+    let other = ResultReply { state_hash: "0badc0ffee".into(), ..same.result.clone() };
+    write_result(&other, &folder.path().join("pouring-7")).unwrap();
+    assert_eq!(collector.load(&spec), None, "another episode's recording");
     write_result(&same.result, &folder.path().join("pouring-7")).unwrap();
     assert_eq!(collector.load(&spec), Some(same));
 }
@@ -303,7 +324,13 @@ fn what_was_played_before_is_kept_where_no_other_episode_can_be() {
             ..plan(vec![tasks::find("handover").unwrap()], vec![1, 2, 3, 4])
         };
         let build = fingerprint::build().unwrap();
-        let cache = EpisodeCache { plan: &plan, folder: folder.path(), locomotion: "balance".into(), build };
+        let cache = EpisodeCache {
+            plan: &plan,
+            folder: folder.path().into(),
+            locomotion: "balance".into(),
+            build,
+            builds: vec![build.into()],
+        };
         let (work, mut left_out) = plan.episodes();
         for spec in &work[1..3] {
             let path = folder.path().join(format!("handover-{}.json", spec.seed));
@@ -344,9 +371,15 @@ fn what_failed_itself_is_counted_apart_and_played_again() {
     let handover = tasks::find("handover").unwrap();
     let plan = plan(vec![handover], vec![1, 2, 3, 4, 5]);
     let build = fingerprint::build().unwrap();
-    let cache = EpisodeCache { plan: &plan, folder: folder.path(), locomotion: "balance".into(), build };
+    let cache = EpisodeCache {
+        plan: &plan,
+        folder: folder.path().into(),
+        locomotion: "balance".into(),
+        build,
+        builds: vec![build.into()],
+    };
     let keeping_plan = EvaluationPlan { retries: 0, ..plan.clone() };
-    let keeping = EpisodeCache { plan: &keeping_plan, locomotion: "balance".into(), ..cache };
+    let keeping = EpisodeCache { plan: &keeping_plan, ..cache.clone() };
     let spec = |seed: u32| plan.spec(handover, seed, Start::Task);
     let outcomes = [
         (EndReason::Finished, 2),

@@ -1,7 +1,7 @@
 //! Worlds side by side, each on a thread of its own; the first failure stops the others after their present episode.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, mpsc};
+use std::sync::{Mutex, MutexGuard, PoisonError, mpsc};
 
 use super::cache::{EpisodeCache, PlannedOutcome};
 use super::{EpisodeEvent, EvaluationError};
@@ -17,24 +17,29 @@ pub fn play_all(
 ) -> Result<Vec<PlayedEpisode>, EvaluationError> {
     let next = AtomicUsize::new(0);
     let failure = Mutex::new(None);
+    // What other processes play is come to last, when they have most likely finished it.
+    let elsewhere = Mutex::new(Vec::new());
     let (done, played) = mpsc::channel();
     let mut outcomes: Vec<(usize, PlannedOutcome)> = std::thread::scope(|scope| {
         for _ in 0..cache.plan.jobs.max(1) {
             let done = done.clone();
-            let (next, failure) = (&next, &failure);
+            let queue = Queue { next: &next, elsewhere: &elsewhere, episodes: work.len() };
+            let failure = &failure;
             scope.spawn(move || {
-                loop {
-                    let number = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(spec) = work.get(number) else { break };
-                    match cache.load_or_play(spec) {
+                while let Some((number, wait)) = queue.next() {
+                    if lock(failure).is_some() {
+                        break;
+                    }
+                    let outcome = match wait {
+                        false => cache.load_or_play(&work[number]),
+                        true => cache.wait_and_play(&work[number]),
+                    };
+                    match outcome {
+                        Ok(PlannedOutcome::Elsewhere) => queue.postpone(number),
                         Ok(outcome) => drop(done.send((number, outcome))),
                         Err(error) => {
-                            // Nobody else begins another episode.
-                            next.store(work.len(), Ordering::Relaxed);
-                            failure
-                                .lock()
-                                .unwrap_or_else(|poisoned| poisoned.into_inner())
-                                .get_or_insert(error);
+                            lock(failure).get_or_insert(error);
+                            queue.stop();
                         }
                     }
                 }
@@ -43,7 +48,7 @@ pub fn play_all(
         drop(done);
         played.iter().inspect(|(_, outcome)| progress(outcome.into())).collect()
     });
-    if let Some(error) = failure.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner()) {
+    if let Some(error) = lock(&failure).take() {
         // As the next run will find it: also what lies there from before, and was not come to.
         let kept = work.iter().filter(|spec| cache.load(spec).is_some()).count();
         return Err(error.after(kept, work.len()));
@@ -53,6 +58,8 @@ pub fn play_all(
     for (number, outcome) in outcomes {
         match outcome {
             PlannedOutcome::Kept(played) | PlannedOutcome::Played(played) => episodes.push(*played),
+            // Who waits for an episode plays it, or finds it played.
+            PlannedOutcome::Elsewhere => {}
             PlannedOutcome::LeftOut(reason) => {
                 let EpisodeSpec { task, seed, .. } = &work[number];
                 left_out.push(format!("{} seed {seed}: {reason}", task.id));
@@ -62,12 +69,46 @@ pub fn play_all(
     Ok(episodes)
 }
 
+/// The episodes that no thread has begun yet.
+#[derive(Clone, Copy)]
+struct Queue<'a> {
+    next: &'a AtomicUsize,
+    elsewhere: &'a Mutex<Vec<usize>>,
+    episodes: usize,
+}
+
+impl Queue<'_> {
+    /// Number of the next episode, and whether to wait for another process that plays it.
+    fn next(self) -> Option<(usize, bool)> {
+        let number = self.next.fetch_add(1, Ordering::Relaxed);
+        if number < self.episodes {
+            return Some((number, false));
+        }
+        lock(self.elsewhere).pop().map(|number| (number, true))
+    }
+
+    fn postpone(self, number: usize) {
+        lock(self.elsewhere).push(number);
+    }
+
+    /// Has nobody begin another episode.
+    fn stop(self) {
+        self.next.store(self.episodes, Ordering::Relaxed);
+        lock(self.elsewhere).clear();
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // Nothing panics while it holds one of these locks.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 impl<'a> From<&'a PlannedOutcome> for EpisodeEvent<'a> {
     fn from(outcome: &'a PlannedOutcome) -> EpisodeEvent<'a> {
         match outcome {
             PlannedOutcome::Kept(kept) => EpisodeEvent::Kept(kept),
             PlannedOutcome::Played(played) => EpisodeEvent::Played(played),
-            PlannedOutcome::LeftOut(_) => EpisodeEvent::LeftOut,
+            PlannedOutcome::LeftOut(_) | PlannedOutcome::Elsewhere => EpisodeEvent::LeftOut,
         }
     }
 }

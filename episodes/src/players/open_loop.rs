@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
+use tandem_sim::read_bytes;
 use tandem_tools_spec::{JointChunk, SendJointChunk};
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -13,7 +14,7 @@ use super::{
     Episode as _, EpisodeOutput, InProcess, PlayError, PlayOutcome, PlayerError, Policy, play_in_process,
 };
 use crate::protocol::rules;
-use crate::recording::{Recorder, Recording, RecordingError};
+use crate::recording::{MAX_RECORDING_BYTES, Recorder, Recording, RecordingError};
 use crate::results::{EPISODES, OPEN_LOOP, PolicyCard};
 use crate::scoring::Phase;
 use crate::spec::{EpisodeSpec, Start};
@@ -125,8 +126,8 @@ fn recordings(folder: &Path, task: &Task) -> Result<BTreeMap<u32, PathBuf>, Open
 impl RecordedRows {
     /// The rows of a recording, and whether its episode succeeded.
     fn read(path: &Path) -> Result<(RecordedRows, bool), OpenLoopError> {
-        let bytes =
-            std::fs::read(path).map_err(|source| RecordingError::Read { path: path.into(), source })?;
+        let bytes = read_bytes(path, MAX_RECORDING_BYTES)
+            .map_err(|source| RecordingError::Read { path: path.into(), source })?;
         let xxh3 = format!("{:016x}", xxh3_64(&bytes));
         let recording = Recording::from_bytes(path, bytes)?;
         let EpisodeSpec { task, seed, protocol, start, .. } = &recording.spec;

@@ -25,6 +25,11 @@ pub trait Policy: Debug + Send + Sync {
     fn waiting(&self) -> Option<PolicyWait> {
         None
     }
+
+    /// Whether its user wants it to end.
+    fn is_interrupted(&self) -> bool {
+        false
+    }
 }
 
 /// What a policy waits for, and how long it has.

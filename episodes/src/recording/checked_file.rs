@@ -21,6 +21,11 @@ const FOOTER_BYTES: usize = 2 * size_of::<u64>() + size_of::<u32>();
 /// Opcode and length, with which a footer begins.
 const FOOTER_RECORD: [u8; 9] = [op::FOOTER, FOOTER_BYTES as u8, 0, 0, 0, 0, 0, 0, 0];
 
+/// Most bytes of one topic's messages that are read. What policies were asked and answered in a long episode is a tenth of that.
+const MAX_TOPIC_BYTES: usize = 1 << 30;
+/// Most channels of a file. Ours have less than a hundred.
+const MAX_CHANNELS: usize = 4096;
+
 /// The texts of a metadata record.
 pub type Entries = BTreeMap<String, String>;
 
@@ -47,6 +52,10 @@ impl CheckedFile {
                     for record in records.iter() {
                         if let (_, Record::Channel(channel)) = record.map_err(|fault| place.damaged(fault))? {
                             channels.insert((channel.topic, channel.id));
+                            if channels.len() > MAX_CHANNELS {
+                                let (has, most) = (channels.len() as u64, MAX_CHANNELS as u64);
+                                return Err(place.damaged(Fault::TooMuch { has, most }));
+                            }
                         }
                     }
                     chunks.push(place);
@@ -85,6 +94,7 @@ impl CheckedFile {
     ) -> impl Iterator<Item = Result<T, Damage>> {
         let of_topic = self.channels.iter().filter(|(name, _)| name == topic);
         let channels: Vec<u16> = of_topic.map(|(_, channel)| *channel).collect();
+        let mut topic_bytes = 0;
         self.chunks.iter().flat_map(move |place| {
             let records = match place.open(&self.bytes) {
                 Ok(records) => records,
@@ -92,7 +102,16 @@ impl CheckedFile {
             };
             let messages = records.iter().filter_map(|record| match record {
                 Ok((_, Record::Message { header, data })) => {
-                    channels.contains(&header.channel_id).then(|| Ok(read(header.log_time, &data)))
+                    channels.contains(&header.channel_id).then(|| {
+                        topic_bytes += data.len();
+                        match topic_bytes > MAX_TOPIC_BYTES {
+                            true => {
+                                let (has, most) = (topic_bytes as u64, MAX_TOPIC_BYTES as u64);
+                                Err(place.damaged(Fault::TooMuch { has, most }))
+                            }
+                            false => Ok(read(header.log_time, &data)),
+                        }
+                    })
                 }
                 Ok(_) => None,
                 Err(fault) => Some(Err(place.damaged(fault))),

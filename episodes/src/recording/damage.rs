@@ -48,6 +48,8 @@ pub enum Fault {
     Length { said: u64, has: usize },
     #[error("it says that {compressed} bytes hold {uncompressed}, which is more than they can")]
     Expansion { compressed: usize, uncompressed: u64 },
+    #[error("it says that it holds {has} bytes, and {most} are the most that are read")]
+    TooMuch { has: u64, most: u64 },
     #[error("it is compressed as {0:?}; recordings are compressed as \"zstd\", and were as \"lz4\"")]
     Compression(String),
     #[error("it cannot be decompressed: {0}")]

@@ -19,6 +19,11 @@ const LZ4_MOST_EXPANSION: u64 = 255;
 /// Nor in Zstandard's: a block of at most 128 KiB takes three bytes and one that is repeated.
 const ZSTD_MOST_EXPANSION: u64 = (128 << 10) / 4;
 
+/// Most bytes that a chunk holds once it is decompressed. Ours have 256 KiB and one message more.
+const MAX_CHUNK_BYTES: u64 = 256 << 20;
+/// Most bytes that all chunks hold.
+const MAX_RECORDS_BYTES: u64 = 16 << 30;
+
 /// What every recording of ours says of who wrote it, with a version behind. These have all checksums.
 pub const LIBRARY: &str = "tandem ";
 
@@ -32,6 +37,8 @@ pub struct DataSection<'a> {
     /// Whether Tandem wrote it.
     own: bool,
     chunks: usize,
+    /// Bytes of all chunks so far, decompressed.
+    records_bytes: u64,
     /// The number that the next message of each channel has to have.
     sequences: HashMap<u16, u32>,
     /// What the message indexes behind the last chunk have to say: time and place of each message, by channel.
@@ -85,6 +92,7 @@ impl<'a> DataSection<'a> {
             position: MAGIC.len(),
             own: false,
             chunks: 0,
+            records_bytes: 0,
             sequences: HashMap::new(),
             indexes: BTreeMap::new(),
             saved_checksum: None,
@@ -187,6 +195,10 @@ impl<'a> DataSection<'a> {
         let (saved, records) = decompress(content)?;
         if !self.is_covered(saved, &records.bytes)? {
             self.without_checksum.chunks += 1;
+        }
+        self.records_bytes += records.bytes.len() as u64;
+        if self.records_bytes > MAX_RECORDS_BYTES {
+            return Err(Fault::TooMuch { has: self.records_bytes, most: MAX_RECORDS_BYTES });
         }
         self.indexes.clear();
         for record in records.iter() {
@@ -343,6 +355,9 @@ fn decompress(content: &[u8]) -> Result<(u32, ChunkRecords), Fault> {
         "zstd" if uncompressed > compressed as u64 * ZSTD_MOST_EXPANSION => {
             return Err(Fault::Expansion { compressed, uncompressed });
         }
+        "lz4" | "zstd" if uncompressed > MAX_CHUNK_BYTES => {
+            return Err(Fault::TooMuch { has: uncompressed, most: MAX_CHUNK_BYTES });
+        }
         "lz4" => read_all(lz4::Decoder::new(&*data), uncompressed)?,
         "zstd" => read_all(zstd::Decoder::new(&*data), uncompressed)?,
         other => return Err(Fault::Compression(other.into())),
@@ -392,5 +407,26 @@ impl<'a> Fields<'a> {
         let length = self.u32()?;
         let bytes = self.take(length.into())?;
         String::from_utf8(bytes.into()).map_err(|_| Fault::Unexpected)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chunk_is_not_decompressed_into_more_than_anybody_writes() {
+        let data = [0; 16 << 10];
+        let mut content = Vec::new();
+        for field in [0, 0, MAX_CHUNK_BYTES + 1] {
+            content.extend(u64::to_le_bytes(field));
+        }
+        content.extend(u32::to_le_bytes(0));
+        content.extend(u32::to_le_bytes(4));
+        content.extend(b"zstd");
+        content.extend(u64::to_le_bytes(data.len() as u64));
+        content.extend(data);
+        let refused = decompress(&content).map(drop).unwrap_err();
+        assert!(matches!(refused, Fault::TooMuch { most: MAX_CHUNK_BYTES, .. }), "{refused}");
     }
 }

@@ -7,6 +7,7 @@ use std::{
     io::{self, Seek, SeekFrom, Write},
     marker::PhantomData,
     path::{Path, PathBuf},
+    process,
 };
 
 use foxglove::Encode;
@@ -14,6 +15,7 @@ use mcap::Attachment;
 use mcap::records::MessageHeader;
 
 use super::{data_section::LIBRARY, metadata};
+use crate::locks::{FileLock, LockKind, Locking};
 use crate::output::{OutputError, partial_path, put_in_place, write_whole};
 
 /// A chunk is compressed as one, in buffers that every recording under way has.
@@ -171,12 +173,12 @@ enum Sink {
 }
 
 impl RecordingStore {
-    /// A store for what will be `path` when it is complete. A file of that partial name is overwritten.
+    /// A store for what will be `path` when it is complete. A file of that partial name is overwritten, unless it is being written.
     pub fn create(path: &Path, visibility: Visibility) -> io::Result<RecordingStore> {
         let sink = match visibility {
             Visibility::Live => {
-                let partial = partial_path(path);
-                Sink::File { file: File::create(&partial)?, partial }
+                let (file, partial) = open_partial(path)?;
+                Sink::File { file, partial }
             }
             Visibility::After => Sink::Memory,
         };
@@ -196,6 +198,31 @@ impl RecordingStore {
             Sink::File { file, partial } => put_in_place(file, partial, path).map_err(failed),
             Sink::Memory => write_whole(path, &self.pending),
             Sink::Failed => Err(failed(after_a_failure())),
+        }
+    }
+}
+
+/// The empty file that will be `path`, which nobody else writes, and its name until then.
+fn open_partial(path: &Path) -> io::Result<(File, PathBuf)> {
+    let partial = partial_path(path);
+    // Where a lock keeps others from reading, too, none is taken.
+    if !cfg!(unix) {
+        return Ok((File::create(&partial)?, partial));
+    }
+    match FileLock::attempt(&partial, LockKind::Exclusive)? {
+        Locking::Locked(lock) => {
+            // The lock is that of the opened file, which both handles are.
+            let file = lock.file().try_clone()?;
+            file.set_len(0)?;
+            Ok((file, partial))
+        }
+        Locking::Held => Err(io::Error::new(
+            io::ErrorKind::ResourceBusy,
+            format!("another episode is being recorded there, to {}", partial.display()),
+        )),
+        Locking::Unsupported => {
+            let own = partial_path(&path.with_extension(format!("{}.mcap", process::id())));
+            Ok((File::create(&own)?, own))
         }
     }
 }
@@ -253,5 +280,28 @@ impl Seek for RecordingStore {
 impl Drop for RecordingStore {
     fn drop(&mut self) {
         let _ = self.flush();
+    }
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recording_that_is_being_written_is_nobody_elses() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("episode.mcap");
+        fs::write(partial_path(&path), "left by a process that was killed").unwrap();
+        let mut store = RecordingStore::create(&path, Visibility::Live).unwrap();
+        let refused = RecordingStore::create(&path, Visibility::Live).map(drop).unwrap_err();
+        assert!(refused.to_string().contains("another episode is being recorded there"), "{refused}");
+        store.write_all(b"one").unwrap();
+        store.keep(&path).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"one");
+        let mut next = RecordingStore::create(&path, Visibility::Live).unwrap();
+        next.write_all(b"two").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"one", "it stays until the next one is whole");
+        next.keep(&path).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"two");
     }
 }

@@ -29,7 +29,7 @@ mod write;
 
 pub use damage::{Damage, Fault, FilePart};
 pub use mcap_file::Visibility;
-pub use read::{RecordedCall, RecordedCheckpoint, Recording, RecordingError};
+pub use read::{MAX_RECORDING_BYTES, RecordedCall, RecordedCheckpoint, Recording, RecordingError};
 pub use recover::{LeftOut, RecoverError, Recovered, recover};
 pub use thread::RecorderThread;
 pub use topics::messages::{

@@ -6,6 +6,7 @@ use std::time::Duration;
 use base64::{Engine, prelude::BASE64_STANDARD};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
+use tandem_sim::read_bytes;
 use tandem_sim::{SimError, Step};
 use tandem_tools_spec::{ExtraInformation, PhaseReached, ResultReply};
 
@@ -20,6 +21,9 @@ use crate::output::{partial_path, shell_word};
 use crate::results::RESULT_FILE;
 use crate::scoring::{ScoreMemory, Scores, StepScore};
 use crate::spec::EpisodeSpec;
+
+/// Largest recording that is read. Those with pictures of a long episode have some hundred megabytes.
+pub const MAX_RECORDING_BYTES: u64 = 4 << 30;
 
 /// A recording in memory.
 pub struct Recording {
@@ -75,6 +79,8 @@ pub enum RecordingError {
     Json { path: PathBuf, source: serde_json::Error },
     #[error("{}: {source}", path.display())]
     Step { path: PathBuf, source: StepError },
+    #[error("{}: {what} are not those of an episode of {task}", path.display())]
+    OtherTask { path: PathBuf, what: &'static str, task: &'static str },
     #[error("the objects of the episode cannot be read: {0}")]
     Sim(#[from] SimError),
     #[error(transparent)]
@@ -93,8 +99,8 @@ impl Recording {
     pub fn read(path: &Path) -> Result<Recording, RecordingError> {
         let inside = path.join(Recorder::FILE_NAME);
         let path = if inside.is_file() { &inside } else { path };
-        let bytes =
-            std::fs::read(path).map_err(|source| RecordingError::Read { path: path.into(), source })?;
+        let bytes = read_bytes(path, MAX_RECORDING_BYTES)
+            .map_err(|source| RecordingError::Read { path: path.into(), source })?;
         Recording::from_bytes(path, bytes)
     }
 
@@ -222,12 +228,38 @@ impl Recording {
         let mut steps = self.steps();
         let missing = || RecordingError::Missing { path: self.path.clone(), what: topics::STEPS.into() };
         let start = steps.next().ok_or_else(missing)??;
-        let mut scores = self.spec.task.scores(&self.spec.robot.model()?, &start)?;
-        scores.set_memory(self.scores.clone());
+        let model = self.spec.robot.model()?;
+        let links = model.links.len();
+        self.check_fit(&start, links)?;
+        let mut scores = self.spec.task.scores(&model, &start)?;
+        if !scores.set_memory(self.scores.clone()) {
+            return Err(self.of_another_task("the scores at its beginning"));
+        }
         for step in steps {
-            look(&scores.update(&step?));
+            let step = step?;
+            self.check_fit(&step, links)?;
+            if !scores.sees(&step) {
+                return Err(self.of_another_task("the objects of a step"));
+            }
+            look(&scores.update(&step));
         }
         Ok(scores)
+    }
+
+    /// Makes sure that a step has the robots of the task, each with so many links.
+    pub(crate) fn check_fit(&self, step: &Step, links: usize) -> Result<(), RecordingError> {
+        let task = self.spec.task;
+        let robots = &step.robots;
+        if robots.len() != task.robots.len()
+            || robots.iter().any(|robot| robot.truth.world_from_link.len() != links)
+        {
+            return Err(self.of_another_task("the robots of a step"));
+        }
+        Ok(())
+    }
+
+    fn of_another_task(&self, what: &'static str) -> RecordingError {
+        RecordingError::OtherTask { path: self.path.clone(), what, task: self.spec.task.id }
     }
 
     /// The JSON messages of a topic, with the simulated time of each.

@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use mcap::Attachment;
 use mcap::records::Record;
+use tandem_sim::read_bytes;
 
 use super::damage::Damage;
 use super::data_section::{AttachmentPlace, DataPart, DataSection};
 use super::mcap_file::{RecordingStore, Visibility, writer};
-use super::read::{Recording, RecordingError};
+use super::read::{MAX_RECORDING_BYTES, Recording, RecordingError};
 use crate::output::{OutputError, write_whole_as};
 
 /// What could be read, and where it is now.
@@ -70,8 +71,8 @@ pub fn recover(partial: &Path) -> Result<Recovered, RecoverError> {
     if path.exists() {
         return Err(RecoverError::Exists(path));
     }
-    let bytes =
-        std::fs::read(partial).map_err(|source| RecordingError::Read { path: partial.into(), source })?;
+    let bytes = read_bytes(partial, MAX_RECORDING_BYTES)
+        .map_err(|source| RecordingError::Read { path: partial.into(), source })?;
     let nothing = |reason: String| RecoverError::Nothing { path: partial.into(), reason };
     let mut data = DataSection::begin(&bytes).map_err(|damage| nothing(damage.to_string()))?;
     let mut copy = RecoveredFile::create(&path)?;

@@ -155,6 +155,7 @@ fn result() -> ResultReply {
         assistance: Assistance::Full,
         extra_information: vec![],
         extra_information_replies: Default::default(),
+        joints_clamped_share: None,
         departures: vec![],
         recording_failed: None,
         usage: None,

@@ -1,5 +1,6 @@
 //! Writes a recording while the episode runs.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use base64::{Engine, prelude::BASE64_STANDARD};
@@ -192,6 +193,8 @@ impl Recorder {
 /// The episode in one value for programs, and in single words for people.
 fn write_header(file: &mut McapFile, header: &RecordingHeader) -> Result<(), OutputError> {
     let names: Vec<&str> = header.robots.iter().map(|robot| robot.name.as_str()).collect();
+    let words = header.spec.task_words();
+    let instructions: BTreeMap<&str, &String> = header.spec.task.robot_names().zip(&words.robots).collect();
     let scores = postcard::to_stdvec(&header.scores).map_err(|source| OutputError::Encode(source.into()))?;
     let entries = [
         ("task", header.spec.task.id),
@@ -202,6 +205,8 @@ fn write_header(file: &mut McapFile, header: &RecordingHeader) -> Result<(), Out
         ("robots", &names.join(",")),
         ("tandem_version", env!("CARGO_PKG_VERSION")),
         (metadata::BUILD, header.build.as_str()),
+        ("instruction", &words.joint),
+        ("instructions", &serde_json::to_string(&instructions)?),
         (metadata::SPEC, &serde_json::to_string(&header.spec)?),
         (metadata::SCORES, &BASE64_STANDARD.encode(scores)),
     ];

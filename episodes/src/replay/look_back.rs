@@ -35,11 +35,13 @@ impl RecordedEpisode {
     pub fn read(path: &Path) -> Result<RecordedEpisode, ReplayError> {
         let recording = Recording::read(path)?;
         let built = build(&recording.spec)?;
+        let links = built.motions[0].robot.model.links.len();
         let transcript = recording.transcript()?;
         let looks: BTreeSet<u64> = transcript.iter().filter_map(looked_at).collect();
         let (mut steps, mut looked, mut last) = (Vec::new(), Vec::new(), None);
         for (index, step) in recording.steps().enumerate() {
             let step = step?;
+            recording.check_fit(&step, links)?;
             if looks.contains(&step.control_step) {
                 looked.push(step.clone());
             }

@@ -243,6 +243,7 @@ mod tests {
             assistance: Assistance::Full,
             extra_information: vec![],
             extra_information_replies: Default::default(),
+            joints_clamped_share: None,
             departures: vec![],
             recording_failed: None,
             usage: None,

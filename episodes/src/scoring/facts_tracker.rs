@@ -25,6 +25,13 @@ pub struct ObjectMemory {
     grasps: ObjectGrasps,
 }
 
+impl ObjectMemory {
+    /// The object's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+}
+
 impl FactsTracker {
     /// Begins to watch `objects`, given by name and file, and what moves on them, and robots of a model, with the state before the
     /// first control step.
@@ -86,6 +93,14 @@ impl FactsTracker {
 
     pub fn memory(&self) -> &[ObjectMemory] {
         &self.memory
+    }
+
+    /// Whether a memory is of the same objects and of as many robots.
+    pub fn fits(&self, memory: &[ObjectMemory]) -> bool {
+        let is_same = |(own, other): (&ObjectMemory, &ObjectMemory)| {
+            own.name == other.name && own.grasps.is_alike(&other.grasps)
+        };
+        self.memory.len() == memory.len() && self.memory.iter().zip(memory).all(is_same)
     }
 
     /// Goes back to an earlier [`FactsTracker::memory`] of the same objects.

@@ -29,7 +29,7 @@ impl GraspDetector {
     pub fn update(&mut self, contacts: &HandContacts) {
         let threshold_n = if self.holding { HOLD_ENDS_N } else { HOLD_BEGINS_N };
         let pressed = opposed_press_n(contacts) >= threshold_n;
-        self.steps_against = if pressed == self.holding { 0 } else { self.steps_against + 1 };
+        self.steps_against = if pressed == self.holding { 0 } else { self.steps_against.saturating_add(1) };
         if self.steps_against == STEPS_TO_CHANGE {
             self.holding = pressed;
             self.steps_against = 0;
@@ -76,6 +76,11 @@ impl ObjectGrasps {
         }
     }
 
+    /// Whether another memory is of the same object and of as many robots.
+    pub fn is_alike(&self, other: &ObjectGrasps) -> bool {
+        self.object == other.object && self.detectors.len() == other.detectors.len()
+    }
+
     /// Looks at the touches of one control step.
     pub fn update(&mut self, step: &Step) {
         for (robot, hands) in self.detectors.iter_mut().enumerate() {
@@ -86,7 +91,7 @@ impl ObjectGrasps {
         // A hand that lost touch for a moment holds on.
         let hands_off = self.grips().iter().all(|hands| *hands == Sides::both(Grip::Off));
         let off = hands_off && !step.is_touched(&self.object);
-        self.untouched_steps = if off { self.untouched_steps + 1 } else { 0 };
+        self.untouched_steps = if off { self.untouched_steps.saturating_add(1) } else { 0 };
     }
 
     pub fn grips(&self) -> Vec<Sides<Grip>> {

@@ -42,6 +42,11 @@ impl Scores {
         Ok(Scores { tracker: FactsTracker::new(objects, robot, start)?, phases: PhaseTracker::new(phases) })
     }
 
+    /// Whether a step has all objects that phases may ask for.
+    pub fn sees(&self, step: &Step) -> bool {
+        self.tracker.memory().iter().all(|object| step.object(object.name()).is_some())
+    }
+
     /// Looks at the control step that follows the last one.
     pub fn update(&mut self, step: &Step) -> StepScore {
         self.tracker.update(step);
@@ -79,9 +84,14 @@ impl Scores {
         ScoreMemory { objects: self.tracker.memory().to_vec(), phases: self.phases.memory().clone() }
     }
 
-    /// Goes back to an earlier [`Scores::memory`] of the same phases and objects.
-    pub fn set_memory(&mut self, memory: ScoreMemory) {
+    /// Goes back to an earlier [`Scores::memory`] of the same phases and objects. Returns false, and goes nowhere, where it is of others.
+    #[must_use]
+    pub fn set_memory(&mut self, memory: ScoreMemory) -> bool {
+        if !self.tracker.fits(&memory.objects) || !self.phases.fits(&memory.phases) {
+            return false;
+        }
         self.tracker.set_memory(memory.objects);
         self.phases.set_memory(memory.phases);
+        true
     }
 }

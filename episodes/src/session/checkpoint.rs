@@ -2,23 +2,28 @@
 //!
 //! The file is one line of JSON that says whose progress follows, so that `head -1` shows it, then the progress itself.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
+use tandem_sim::read_bytes;
 use tandem_sim::{RobotCommand, Snapshot};
 use tandem_tools_spec::EndReason;
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::{Session, this_build, told::ShownInformation};
-use crate::commands::MotionState;
+use crate::commands::{MotionState, TargetCounts};
 use crate::error::{CheckpointError, EpisodeError};
 use crate::output::write_whole;
 use crate::recording::{Recording, RecordingError};
 use crate::scoring::ScoreMemory;
 use crate::spec::{EpisodeSpec, PhaseStart};
 use crate::stress::ExecutionMemory;
+
+/// Largest file of a checkpoint. One has some hundred kilobytes.
+const MAX_CHECKPOINT_BYTES: u64 = 64 << 20;
 
 /// An episode at one instant. It fits episodes of the same task, seed, protocol, robot, controller and sensing, whose policies are
 /// told the same.
@@ -62,6 +67,9 @@ struct Progress {
     ended: Option<EndReason>,
     /// What the policy has been shown by then.
     shown: ShownInformation,
+    /// What it has asked for by then that the benchmark has not.
+    departures: BTreeSet<String>,
+    targets: TargetCounts,
     /// What robots have been told that they do not do at once, if there is such a thing.
     execution: Option<ExecutionMemory>,
 }
@@ -103,8 +111,8 @@ impl Checkpoint {
 
     /// Reads a file that this build has written.
     pub fn read(path: &Path) -> Result<Checkpoint, EpisodeError> {
-        let bytes =
-            std::fs::read(path).map_err(|source| CheckpointError::Read { path: path.into(), source })?;
+        let bytes = read_bytes(path, MAX_CHECKPOINT_BYTES)
+            .map_err(|source| CheckpointError::Read { path: path.into(), source })?;
         Checkpoint::from_bytes(&bytes, path)
     }
 
@@ -159,7 +167,7 @@ impl Origin {
     /// What its policy is told: who was told something once knows it.
     fn told(&self) -> String {
         let EpisodeSpec { assistance, disclosure, hints, instructions, .. } = &self.spec;
-        let words = instructions.as_deref().unwrap_or("of the task");
+        let words = instructions.as_ref().map_or("of the task", |words| &words.xxh3);
         format!("assistance {assistance}, phases told {disclosure}, hints {hints}, instructions {words}")
     }
 
@@ -205,6 +213,8 @@ impl Session {
             thought: self.clock.spent(),
             ended: self.ended,
             shown: self.shown.clone(),
+            departures: self.departures.clone(),
+            targets: self.targets,
             execution: self.execution.as_ref().map(|execution| execution.memory().clone()),
         };
         Ok(Checkpoint { origin: self.origin.clone(), progress, failed: None })
@@ -226,24 +236,30 @@ impl Session {
         self.tool_calls = 0;
         self.requests = self.requests.map(|_| 0);
         self.shown = ShownInformation::default();
+        self.departures.clear();
+        self.targets = TargetCounts::default();
         self.clock.set_spent(Duration::ZERO);
         self.ended = None;
         Ok(())
     }
 
     fn restore(&mut self, progress: &Progress) -> Result<(), EpisodeError> {
+        if progress.motions.len() != self.motions.len() || !self.scores.set_memory(progress.scores.clone()) {
+            return Err(CheckpointError::OtherContent.into());
+        }
         self.world.restore(&progress.world)?;
         self.present = Arc::new(self.world.present());
         self.steps_before = progress.steps_before;
         for (motion, state) in self.motions.iter_mut().zip(&progress.motions) {
             motion.set_state(state.clone());
         }
-        self.scores.set_memory(progress.scores.clone());
         self.tool_calls = progress.tool_calls;
         self.requests = self.requests.and(progress.requests);
         self.clock.set_spent(progress.thought);
         self.ended = progress.ended;
         self.shown = progress.shown.clone();
+        self.departures.clone_from(&progress.departures);
+        self.targets = progress.targets;
         if let (Some(execution), Some(memory)) = (&mut self.execution, &progress.execution) {
             execution.set_memory(memory.clone());
         }

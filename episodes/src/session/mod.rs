@@ -25,6 +25,7 @@ pub(crate) use replay::Replay;
 use run_files::moment;
 pub use run_files::{RunFiles, RunFolder};
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -34,7 +35,7 @@ use tandem_sim::render::RenderRequest;
 use tandem_sim::{CONTROL_HZ, RobotCommand, Step, World};
 use tandem_tools_spec::{EndReason, ResultReply, Usage};
 
-use crate::commands::{Clamped, Command, Motion, MotionState, Trajectory};
+use crate::commands::{Clamped, Command, Motion, MotionState, TargetCounts, Trajectory};
 use crate::convert::isometry_from_sim;
 use crate::observation::{Observer, Picture};
 use crate::protocol::Rules;
@@ -81,6 +82,10 @@ pub struct Session {
     rewind: Rewind,
     /// What the policy has been shown that the benchmark's own policies are not.
     shown: ShownInformation,
+    /// What it has asked for that the benchmark has not.
+    departures: BTreeSet<String>,
+    /// Joint targets that it has asked for.
+    targets: TargetCounts,
     /// What robots do in place of what they are told, where that is something else.
     execution: Option<Execution>,
     /// State hashes of the steps since they were last taken, where somebody wants them.
@@ -135,6 +140,8 @@ impl Session {
             simulator_failure: None,
             rewind: Rewind::default(),
             shown: ShownInformation::default(),
+            departures: BTreeSet::new(),
+            targets: TargetCounts::default(),
             execution: Execution::of(spec.stress, disturbance, spec.world_seed(), begin_s, rest),
             hashes: None,
             result: None,
@@ -174,6 +181,11 @@ impl Session {
             files.flush();
         }
         Ok(())
+    }
+
+    /// Share of the joint targets so far that lay beyond the joints' limits.
+    pub fn joints_clamped_share(&self) -> f64 {
+        self.targets.beyond_share()
     }
 
     /// All robots stand still for so many control steps.
@@ -228,9 +240,11 @@ impl Session {
         let mut trajectories: Vec<Trajectory> = self.motions.iter().map(|_| Trajectory::Hold).collect();
         let mut clamped = Vec::with_capacity(command.orders.len());
         for order in &command.orders {
+            self.departures.extend(order.action.departures().map(str::to_owned));
             let motion = &mut self.motions[order.robot];
             let (trajectory, beyond) = Trajectory::begin(&order.action, order.steps.min(left), motion);
             trajectories[order.robot] = trajectory;
+            self.targets.add(beyond.targets);
             clamped.push(beyond);
         }
         let steps = command.steps.min(left);

@@ -36,7 +36,8 @@ impl Replay {
         if let Some(begin) = begin {
             session.resume(&Checkpoint::from_bytes(&begin.bytes, path)?)?;
         } else if spec.start != Start::Task {
-            session.begin(None)?;
+            // What it names may be anything, and may begin elsewhere in its turn.
+            return Err(CheckpointError::NoBeginning { path: path.into() }.into());
         }
         session.requests = None;
         session.hashes = Some(vec![session.world.state_hash()]);

@@ -49,6 +49,8 @@ pub struct RunFiles {
     /// The first failure, unless it is the recorder's.
     failed: Option<String>,
     moments: Vec<KeyMoment>,
+    /// What robots are told together.
+    instruction: String,
     begin_s: f64,
     calls: CallCounts,
     said: Vec<SaidWords>,
@@ -67,6 +69,7 @@ impl RunFiles {
             recorder: begun.ok(),
             failed,
             moments: Vec::new(),
+            instruction: session.spec().task_words().joint,
             begin_s: session.steps_before as f64 / CONTROL_HZ,
             calls: CallCounts::default(),
             said: Vec::new(),
@@ -183,6 +186,7 @@ impl RunFiles {
         write_whole(&self.folder.join(STRIP_FILE), &strip::png(&self.moments)?)?;
         let page = EpisodePage {
             task,
+            instruction: &self.instruction,
             result,
             calls: &self.calls,
             said: &self.said,

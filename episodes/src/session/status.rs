@@ -164,7 +164,8 @@ impl Session {
             assistance: self.spec().assistance,
             extra_information: self.shown.names(),
             extra_information_replies: self.shown.replies(),
-            departures: self.spec().departures(),
+            joints_clamped_share: Some(rounded(self.joints_clamped_share())).filter(|share| *share > 0.0),
+            departures: self.spec().departures().into_iter().chain(self.departures.iter().cloned()).collect(),
             recording_failed: self.recording_failed().map(str::to_owned),
             usage: (self.usage.notes > 0).then(|| self.usage_so_far()),
         }

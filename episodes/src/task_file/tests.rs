@@ -187,6 +187,8 @@ fn a_file_says_that_hands_have_to_close() {
         FILE.replace("held = 'holds(\"A\", \"right\", \"box\")'", "held = '!hands_off(\"A\", \"box\")'");
     assert!(load(FILE).unwrap().needs_fingers());
     assert!(!load(&without).unwrap().needs_fingers());
+    let told = without.replace("held = ", "# Nobody holds(anything).\nheld = ");
+    assert!(!load(&told).unwrap().needs_fingers(), "a comment asks for nothing");
     let says = without.replace("scene = \"floor\"", "scene = \"floor\"\nneeds_fingers = true");
     assert!(load(&says).unwrap().needs_fingers());
     assert!(tandem_plus().iter().all(|task| task.needs_fingers()));
@@ -215,7 +217,7 @@ fn the_suite_is_whole() {
         assert_eq!(file.source.name, format!("{}.toml", task.id));
         assert_eq!((task.suite(), task_set(Vec::new()).find(task.id).ok()), (Some(TANDEM_PLUS), Some(*task)));
         assert!(crate::tasks::find(task.id).is_err(), "{} is none of the ten", task.id);
-        assert_eq!(EpisodeSpec::new(task, 0, Protocol::Benchmark).departures()[0], "suite: tandem+");
+        assert_eq!(EpisodeSpec::new(task, 0, Protocol::Benchmark).peculiarities()[0], "suite: tandem+");
         // What one robot alone may know stands in no instruction that all of them read.
         let shared = task.shared_instruction().unwrap_or(task.instruction);
         assert!(
@@ -235,7 +237,7 @@ fn a_spec_holds_the_whole_file() {
     let text = serde_json::to_string(&spec).unwrap();
     let read: EpisodeSpec = serde_json::from_str(&text).unwrap();
     assert_eq!(read, spec);
-    assert_eq!(read.departures()[0], format!("task file: lift.toml {}", task.file_xxh3().unwrap()));
+    assert_eq!(read.peculiarities()[0], format!("task file: lift.toml {}", task.file_xxh3().unwrap()));
     let changed = text.replace("high_m = '0.03'", "high_m = '0.30'");
     assert_ne!(changed, text);
     let error = serde_json::from_str::<EpisodeSpec>(&changed).unwrap_err().to_string();

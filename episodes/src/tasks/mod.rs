@@ -304,9 +304,22 @@ impl Task {
     /// Whether its robots have to hold something with a thumb and fingers: those of the benchmark do, and those of files whose conditions
     /// ask for it, or that say so.
     pub fn needs_fingers(&self) -> bool {
-        let asks = |text: &str| OF_FINGERS.iter().any(|name| text.contains(&format!("{name}(")));
-        self.file.as_ref().is_none_or(|file| file.needs_fingers || asks(&file.source.text))
+        self.file.as_ref().is_none_or(|file| file.needs_fingers || asks_for_fingers(&file.source.text))
     }
+}
+
+/// Whether an expression in a task's file asks for what only fingers do. Comments and instructions are none.
+fn asks_for_fingers(file: &str) -> bool {
+    fn asks(value: &toml::Value) -> bool {
+        match value {
+            toml::Value::String(text) => OF_FINGERS.iter().any(|name| text.contains(&format!("{name}("))),
+            toml::Value::Array(values) => values.iter().any(asks),
+            toml::Value::Table(values) => values.values().any(asks),
+            _ => false,
+        }
+    }
+    let table: toml::Table = file.parse().unwrap_or_default();
+    ["terms", "phases"].iter().filter_map(|part| table.get(*part)).any(asks)
 }
 
 /// The tasks of these, each once: the benchmark's in its order, then those of files as they come.

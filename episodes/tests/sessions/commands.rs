@@ -8,8 +8,8 @@ use crate::common::*;
 use tandem_episodes::{A, B, Clock, EpisodeError, EpisodeSpec, RendererKind, Session};
 use tandem_sim::Vector;
 use tandem_tools_spec::{
-    CheckReach, DepthRow, EndReason, Finish, LookReply, ManageReply, MoveWrists, Observe, Protocol,
-    QueryDepth, StopReason, ToolCall, ToolReply, Wait, Walk, WalkMove, WristMove,
+    CheckReach, DepthRow, EndReason, Finish, JointChunk, LookReply, ManageReply, MoveWrists, Observe,
+    Protocol, QueryDepth, SendJointChunk, StopReason, ToolCall, ToolReply, Wait, Walk, WalkMove, WristMove,
 };
 
 #[test]
@@ -296,4 +296,38 @@ fn episodes_go_the_same_way_whoever_draws() {
     };
     let hashes = RendererKind::ALL.map(played);
     assert!(hashes.iter().all(|hash| *hash == hashes[0]), "{hashes:?}");
+}
+
+/// The benchmark's wrist commands neither take hands along nor have them give way: who asks for that is named.
+#[test]
+fn what_wrist_commands_ask_beyond_the_benchmark_is_named() {
+    let told = |entry: WristMove| {
+        let mut session = Session::start(&spec("handover", 3, Protocol::Benchmark), None).unwrap();
+        command(&mut session, MoveWrists { steps: 2, robots: vec![entry] }.into());
+        let named = session.close().departures;
+        named.into_iter().filter(|what| what.starts_with("wrist commands: ")).collect::<Vec<_>>()
+    };
+    assert_eq!(told(hand_up()), [""; 0]);
+    assert_eq!(told(WristMove { carried: Some(false), ..hand_up() }), [""; 0]);
+    assert_eq!(told(WristMove { carried: Some(true), ..hand_up() }), ["wrist commands: carried"]);
+    let compliance = WristMove { compliance_n_s_m: Some(250.0), ..hand_up() };
+    assert_eq!(told(compliance), ["wrist commands: compliance"]);
+}
+
+/// Degrees for radians are the usual mistake.
+#[test]
+fn joint_targets_beyond_their_limits_are_counted() {
+    let told = |arm: f64| {
+        let mut session = Session::start(&spec("handover", 3, Protocol::Benchmark), None).unwrap();
+        let mut entry = row(&mut session, "A");
+        entry[..31].fill(0.0);
+        entry[..14].fill(arm);
+        let chunk = JointChunk { robot: "A".into(), rows: vec![entry; 4] };
+        command(&mut session, SendJointChunk { robots: vec![chunk] }.into());
+        session.close().joints_clamped_share
+    };
+    assert_eq!(told(0.1), None);
+    // The joints of the arms, of 31.
+    let share = told(0.1_f64.to_degrees()).expect("a share");
+    assert!((share - 14.0 / 31.0).abs() < 1e-3, "{share}");
 }

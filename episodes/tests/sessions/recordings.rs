@@ -1,6 +1,7 @@
 //! Recordings read back: every step as it was, and phases scored again from the steps alone.
 
 mod damage;
+mod forged;
 
 use crate::common::*;
 use std::path::{Path, PathBuf};

@@ -32,7 +32,7 @@ def raised(robot):
 
 def main():
     print(sys.stdin.read())  # the brief: what a language model would be told
-    with open(os.environ["TANDEM_START"]) as file:
+    with open(os.environ["TANDEM_START"], encoding="utf-8") as file:
         start = json.load(file)
     steps = start["status"]["budget"]["steps_per_command"]
     mine = os.environ.get("TANDEM_ROBOT")

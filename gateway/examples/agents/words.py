@@ -27,7 +27,7 @@ def call(tool, **arguments):
 
 def main():
     sys.stdin.read()  # the brief, which a language model would be told
-    with open(os.environ["TANDEM_START"]) as file:
+    with open(os.environ["TANDEM_START"], encoding="utf-8") as file:
         start = json.load(file)
     instruction = start["instructions"][0]["instruction"]
     secret = TOLD.search(instruction)

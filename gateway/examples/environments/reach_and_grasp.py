@@ -160,7 +160,7 @@ class Curve(BaseCallback):
             return
         returns, grasps = np.array(self.ended, float).T
         line = [self.num_timesteps, round(time.process_time() - self.begun_s), len(self.ended), returns.mean(), grasps.mean()]
-        with self.path.open("a") as file:
+        with self.path.open("a", encoding="utf-8") as file:
             csv.writer(file).writerow([*line[:3], *(f"{number:.3f}" for number in line[3:])])
         told = "{} decisions, {} s of processor time: {} episodes, mean return {:.3f}, lifted in {:.0%}"
         print(told.format(*line), flush=True)
@@ -188,7 +188,7 @@ def main() -> None:
     given = parser.parse_args()
     given.out.mkdir(parents=True, exist_ok=True)
     curve = given.out / "curve.csv"
-    curve.write_text("decisions,processor_s,episodes,mean_return,lifted_share\n")
+    curve.write_text("decisions,processor_s,episodes,mean_return,lifted_share\n", encoding="utf-8")
     envs = ReachAndGrasp(given.worlds, given.threads, FIRST_SEED)
     shape = {"net_arch": [64, 64], "log_std_init": -0.5}
     learner = PPO(

@@ -92,6 +92,8 @@ class Outcome:
     """Of the episode that has begun behind it, in the same step; -1 where none has."""
     failures: list[tuple[int, str]]
     """Worlds in which the simulator failed, and how."""
+    clamped: NDArray[np.float64]
+    """The share of the episode's joint targets that lay beyond the joints' limits, as degrees for radians do."""
 
 
 def _reworded(told: TaskInfo, options: Options) -> TaskInfo:
@@ -241,6 +243,7 @@ class Worlds:
             "phases": int(outcome.phases[world]),
             "fallen": outcome.fallen[world].copy(),
             "seed": int(outcome.seeds[world]),
+            "joints_clamped": float(outcome.clamped[world]),
         }
         for failed, how in outcome.failures:
             if failed == world:

@@ -355,9 +355,8 @@ fn begin(start: &str, settings: &str, folder: Option<&Path>) -> Result<(Session,
     let start = parse_args(read(start)).map_err(|error| refuse(error.into()))?;
     let spec = settings.spec(&start).map_err(refuse)?;
     let session = Session::start(&spec, folder).map_err(refuse)?;
-    let mut briefing = session.briefing();
-    settings.instructions.rephrase_briefing(&mut briefing);
-    Ok((session, json!(briefing).to_string()))
+    let briefing = json!(session.briefing()).to_string();
+    Ok((session, briefing))
 }
 
 /// What the package has written as JSON.

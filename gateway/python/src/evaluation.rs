@@ -10,7 +10,9 @@ use pyo3::prelude::*;
 use serde_json::{Value, json};
 use tandem::settings::{Layer, Settings};
 use tandem_episodes::Variation;
-use tandem_episodes::evaluation::{self, EpisodeEvent, EvaluationPlan, KeptFiles, Shard, Starts};
+use tandem_episodes::evaluation::{
+    self, EpisodeEvent, EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts,
+};
 use tandem_episodes::results::PlayedEpisode;
 use tandem_tools_spec::Protocol;
 
@@ -24,9 +26,9 @@ const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 /// it, the player that is called `name` plays; where `play` has episodes played `elsewhere`, it is called with task, seed and a function
 /// that says whether the user wants it to end, and returns whether it was played, and then the episode as JSON with the files of its
 /// recording, or else why not. What `out` holds already is not played again. `progress` is called with every episode's result as JSON,
-/// and whether it was played now.
+/// and whether it was played now. `existing_run` says what becomes of another run in `out`: `refuse`, `resume_with_new_build` or `overwrite`.
 #[pyfunction]
-#[pyo3(signature = (play, name, settings, protocol, tasks, seeds, jobs, record, out, progress, elsewhere))]
+#[pyo3(signature = (play, name, settings, protocol, tasks, seeds, jobs, record, out, progress, elsewhere, existing_run))]
 #[allow(clippy::too_many_arguments, reason = "the package calls it, by names")]
 pub fn evaluate(
     py: Python,
@@ -41,16 +43,48 @@ pub fn evaluate(
     out: PathBuf,
     progress: Option<Py<PyAny>>,
     elsewhere: bool,
+    existing_run: &str,
 ) -> PyResult<String> {
+    let by = PlayedBy::new(play, &name, elsewhere).map_err(|error| failed(py, &error))?;
+    let player = PythonPolicy { name, by, interrupted: Arc::default() };
+    let existing = existing(py, existing_run)?;
+    let plan = plan_of(py, &player, settings, protocol, &tasks, seeds)?;
+    let plan = EvaluationPlan { jobs, record, existing, ..plan };
+    play_all(py, &plan, &out, progress.as_ref(), &player.interrupted)
+}
+
+/// The folder that demonstrations have without another, in the folder `runs`.
+#[pyfunction]
+pub fn demonstrations_folder(
+    py: Python,
+    settings: &str,
+    protocol: &str,
+    tasks: Vec<String>,
+    seeds: Vec<u32>,
+) -> PyResult<PathBuf> {
+    let name = "expert".to_owned();
+    let by = PlayedBy::new(None, &name, false).map_err(|error| failed(py, &error))?;
+    let player = PythonPolicy { name, by, interrupted: Arc::default() };
+    let plan = plan_of(py, &player, settings, protocol, &tasks, seeds)?;
+    Ok(evaluation::default_folder(&plan, Some("demonstrations"), Path::new("runs")))
+}
+
+/// What is played, one episode after the other and without recordings.
+fn plan_of<'a>(
+    py: Python,
+    player: &'a PythonPolicy,
+    settings: &str,
+    protocol: &str,
+    tasks: &[String],
+    seeds: Vec<u32>,
+) -> PyResult<EvaluationPlan<'a>> {
     let layer: Layer = serde_json::from_str(settings).map_err(|error| failed(py, &error))?;
     let settings = Settings::resolve(layer, None).map_err(|error| failed(py, &error))?;
     let found: Result<Vec<_>, _> = tasks.iter().map(|task| settings.tasks.find(task)).collect();
     let protocol: Protocol =
         serde_json::from_value(Value::from(protocol)).map_err(|error| failed(py, &error))?;
-    let by = PlayedBy::new(play, &name, elsewhere).map_err(|error| failed(py, &error))?;
-    let player = PythonPolicy { name, by, interrupted: Arc::default() };
-    let plan = EvaluationPlan {
-        player: &player,
+    Ok(EvaluationPlan {
+        player,
         protocol,
         scene: settings.scene.clone(),
         robot: settings.robot.clone(),
@@ -60,6 +94,7 @@ pub fn evaluate(
         assistance: settings.assistance,
         disclosure: settings.disclosure,
         hints: settings.hints,
+        instructions: settings.instructions.clone(),
         variation: Variation::default(),
         stress: settings.stress,
         thinking_limit_s: settings.thinking_limit_s,
@@ -67,13 +102,22 @@ pub fn evaluate(
         seeds,
         starts: Starts::Task,
         shard: Shard::WHOLE,
-        jobs,
-        record,
+        jobs: 1,
+        record: false,
         files: KeptFiles::default(),
         retries: EvaluationPlan::DEFAULT_RETRIES,
         seed_key: None,
-    };
-    play_all(py, &plan, &out, progress.as_ref(), &player.interrupted)
+        existing: ExistingRun::Refuse,
+    })
+}
+
+fn existing(py: Python, name: &str) -> PyResult<ExistingRun> {
+    match name {
+        "refuse" => Ok(ExistingRun::Refuse),
+        "resume_with_new_build" => Ok(ExistingRun::ResumeWithNewBuild),
+        "overwrite" => Ok(ExistingRun::Overwrite),
+        other => Err(failed(py, &format!("nothing becomes of a run by {other:?}"))),
+    }
 }
 
 /// Plays on threads of their own, while this one hears signals: Python handles them on its main thread alone.

@@ -25,9 +25,9 @@ mod _native {
     #[pymodule_export]
     use crate::episode::{NativeEpisode, Snapshot};
     #[pymodule_export]
-    use crate::evaluation::evaluate;
+    use crate::evaluation::{demonstrations_folder, evaluate};
     #[pymodule_export]
-    use crate::program::{NativeServer, list_tasks, run_command_line, write_report};
+    use crate::program::{NativeServer, available_processors, list_tasks, run_command_line, write_report};
     #[pymodule_export]
     use crate::recording::NativeRecording;
     #[pymodule_export]

@@ -63,13 +63,13 @@ impl Policy for PythonPolicy {
             PlayedBy::Elsewhere(play) => self.play_elsewhere(play, spec, output),
         }
     }
-}
 
-impl PythonPolicy {
     fn is_interrupted(&self) -> bool {
         self.interrupted.load(Ordering::Relaxed)
     }
+}
 
+impl PythonPolicy {
     fn check_interrupt(&self) -> Result<(), PlayError> {
         match self.is_interrupted() {
             true => Err(PlayError::Absent("interrupted".into())),

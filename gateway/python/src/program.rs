@@ -46,6 +46,12 @@ pub fn write_report(py: Python, arguments: Vec<String>) -> PyResult<()> {
     py.detach(run).map_err(|text| failed(py, &text))
 }
 
+/// Number of processors that this process may use: a container's quota counts, and not its machine's cores.
+#[pyfunction]
+pub fn available_processors() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
 /// The tasks, as JSON.
 #[pyfunction]
 pub fn list_tasks(py: Python) -> PyResult<String> {

@@ -58,14 +58,15 @@ impl NativeRecording {
             })
         });
         let objects = self.steps.first().map_or(&[][..], |step| &step.objects[..]);
+        let words = spec.task_words();
         let about = json!({
             "spec": spec,
             "locomotion": locomotion,
             "build": build,
             "result": result,
             "phases": self.recording.phases().map_err(|error| failed(py, &error))?,
-            "instruction": spec.task.instruction,
-            "instructions": spec.task.robots.iter().map(|robot| (robot.name, robot.instruction)).collect::<BTreeMap<_, _>>(),
+            "instruction": words.joint,
+            "instructions": spec.task.robot_names().zip(&words.robots).collect::<BTreeMap<_, _>>(),
             "robots": spec.task.robots.iter().map(|robot| robot.name).collect::<Vec<_>>(),
             "objects": objects.iter().map(|object| &object.name).collect::<Vec<_>>(),
             "cameras": EpisodeCamera::all(spec.task).iter().map(|camera| camera.name(spec.task)).collect::<Vec<_>>(),

@@ -41,6 +41,7 @@ type Outcomes<'py> = (
     Bound<'py, PyArray1<i64>>,
     Bound<'py, PyArray1<i64>>,
     Vec<(usize, String)>,
+    Bound<'py, PyArray1<f64>>,
 );
 
 /// Where what is seen is written: worlds by robots by columns, and worlds by robots by height by width by red, green, blue.
@@ -223,6 +224,7 @@ impl NativeWorlds {
             array(py, &steps, |step| i64::from(step.seed)),
             array(py, &steps, |step| step.next_seed.map_or(-1, i64::from)),
             failures.collect(),
+            array(py, &steps, |step| step.joints_clamped_share),
         ))
     }
 }

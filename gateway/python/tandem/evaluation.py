@@ -98,10 +98,20 @@ class EvaluationSettings(TypedDict, total=False):
     assistance: Assistance
     """How much the policy is told; results say which behind its name. The default is "paper", for `collect` "full"."""
 
+    instructions: str | PathLike[str] | None
+    """JSON file with instructions in place of the tasks' own; results name them behind the policy's name."""
+
     out: str | PathLike[str] | None
-    """Folder for the results. What it holds of this policy's name, build and settings is not played again, so give another
-    name or folder where the policy has changed. Without it, nothing is kept.
+    """Folder for the results, of this run alone: what it holds of this policy's name, settings and build is not played again,
+    so give another name or folder where the policy has changed; another run there is left as it is, and an error. Without
+    it, nothing is kept.
     """
+
+    overwrite: bool
+    """Whether another run that lies there is deleted. It is left as it is otherwise, and an error says what differs."""
+
+    resume_with_new_build: bool
+    """Whether the same run of another build of Tandem goes on: what that has played is kept, and only the rest is played."""
 
     record: bool
     """Whether every episode is recorded there."""
@@ -154,8 +164,8 @@ def evaluate(
     seeds: A seed, or several.
     jobs: Episodes that run side by side, each on a thread of its own, on which the policy is called. Physics and drawing
         run at the same time; Python code of policies does not.
-    settings: `name`, `protocol`, `assistance`, `out`, `record`, `progress`, `renderer`, `state_estimate`, `sensors`, `stress`,
-        `level`, `scene`, `robot`, `task_file`: see `EvaluationSettings`.
+    settings: `name`, `protocol`, `assistance`, `instructions`, `out`, `overwrite`, `resume_with_new_build`, `record`,
+        `progress`, `renderer`, `state_estimate`, `sensors`, `stress`, `level`, `scene`, `robot`, `task_file`: see `EvaluationSettings`.
     """
     plan = Plan.of(policy, tasks, seeds, settings)
     return plan.evaluated(lambda folder: plan.play(folder, jobs))
@@ -168,14 +178,20 @@ def collect(
     **settings: Unpack[EvaluationSettings],
 ) -> Evaluation:
     """Records demonstrations of the experts, as `tandem collect` does: a folder for each episode, in the folder `episodes` of
-    `out`, which is runs/demonstrations where nothing else is given.
+    `out`, which where nothing else is given is one in runs/, with a name made of all that they are.
     """
-    return evaluate("expert", tasks, seeds, jobs, **demonstrations(settings))
+    # Both are gone through twice.
+    tasks, seeds = task_ids(tasks), seed_list(seeds)
+    return evaluate("expert", tasks, seeds, jobs, **demonstrations(tasks, seeds, settings))
 
 
-def demonstrations(settings: EvaluationSettings) -> EvaluationSettings:
+def demonstrations(tasks: list[str], seeds: list[int], settings: EvaluationSettings) -> EvaluationSettings:
     """The settings with which demonstrations are recorded."""
-    return {"assistance": "full", "out": "runs/demonstrations", **settings, "record": True}
+    whole: EvaluationSettings = {"assistance": "full", **settings, "record": True}
+    if whole.get("out") is None:
+        plan = Plan.of("expert", tasks, seeds, whole)
+        whole["out"] = _native.demonstrations_folder(plan.world, plan.protocol, plan.tasks, plan.seeds)
+    return whole
 
 
 @dataclass(frozen=True)
@@ -190,6 +206,8 @@ class Plan:
     tasks: list[str]
     seeds: list[int]
     record: bool
+    existing: Literal["refuse", "resume_with_new_build", "overwrite"] = "refuse"
+    """What becomes of another run in the folder."""
     out: Path | None = None
     progress: Callable[[ResultReply], object] | None = None
 
@@ -206,7 +224,7 @@ class Plan:
                 raise TandemError(f"results call the player {policy!r} by its own name; leave `name` out")
             name = policy
         out, scene, task_file = settings.get("out"), settings.get("scene"), settings.get("task_file")
-        robot = settings.get("robot")
+        robot, instructions = settings.get("robot"), settings.get("instructions")
         return Plan(
             policy=policy,
             name=name or str(getattr(policy, "__qualname__", type(policy).__qualname__)),
@@ -220,11 +238,13 @@ class Plan:
                 scene=None if scene is None else Path(scene),
                 robot=None if robot is None else Path(robot),
                 task_file=None if task_file is None else [str(Path(task_file))],
+                instructions=None if instructions is None else Path(instructions),
             ),
             protocol=settings.get("protocol", "agentic"),
-            tasks=_task_ids(tasks),
-            seeds=_seeds(seeds),
+            tasks=task_ids(tasks),
+            seeds=seed_list(seeds),
             record=settings.get("record", False),
+            existing=_existing(settings),
             out=None if out is None else Path(out),
             progress=settings.get("progress"),
         )
@@ -269,6 +289,7 @@ class Plan:
             folder,
             tell if progress else None,
             elsewhere,
+            self.existing,
         )
         return json.loads(answer)
 
@@ -332,14 +353,23 @@ Elsewhere: TypeAlias = Callable[[str, int, Callable[[], bool]], Played]
 """Has the episode of a task and a seed played; the last argument says whether the user wants all of it to end."""
 
 
-def _task_ids(named: str | Iterable[str]) -> list[str]:
+def _existing(settings: EvaluationSettings) -> Literal["refuse", "resume_with_new_build", "overwrite"]:
+    overwrite, resume = settings.get("overwrite", False), settings.get("resume_with_new_build", False)
+    if overwrite and resume:
+        raise TandemError("`overwrite` deletes what `resume_with_new_build` keeps; give one of them")
+    return "overwrite" if overwrite else "resume_with_new_build" if resume else "refuse"
+
+
+def task_ids(named: str | Iterable[str]) -> list[str]:
+    """The ids of tasks that are named one by one, or by their suite."""
     if not isinstance(named, str):
         return list(named)
     suite = None if named == "all" else named
     return [task.id for task in tasks().tasks if task.suite == suite] or [named]
 
 
-def _seeds(given: int | Iterable[int]) -> list[int]:
+def seed_list(given: int | Iterable[int]) -> list[int]:
+    """One seed, or several, as a list."""
     # An array of NumPy's has `__index__`, too.
     several = [given] if isinstance(given, int | np.integer) else given
     seeds = [integer(seed, "a seed") for seed in islice(several, MAX_SEEDS + 1)]

@@ -21,7 +21,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from .errors import TandemError
-from .evaluation import Evaluation, EvaluationSettings, Plan, Played, Policy, demonstrations
+from .evaluation import Evaluation, EvaluationSettings, Plan, Played, Policy, demonstrations, seed_list, task_ids
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -64,7 +64,7 @@ def evaluate(
     retries: How often an episode is played anew whose process or machine was lost. One that is lost more often is named in
         `left_out`, and played by the next evaluation into the same folder.
     task_options: What an episode's task is to Ray, as {"num_cpus": 2} or {"num_gpus": 0.25}; one processor otherwise.
-    settings: As there. A `scene`, `robot` or `task_file` has to lie at the same path on every machine.
+    settings: As there. A `scene`, `robot`, `task_file` or `instructions` has to lie at the same path on every machine.
     """
     plan = Plan.of(policy, tasks, seeds, settings)
     options: dict[str, Any] = {"num_cpus": 1, "max_retries": retries, **(task_options or {})}
@@ -101,7 +101,9 @@ def collect(
     **settings: Unpack[EvaluationSettings],
 ) -> Evaluation:
     """As `tandem.collect`, by the processes of a cluster; see `evaluate`."""
-    return evaluate("expert", tasks, seeds, jobs, retries=retries, task_options=task_options, **demonstrations(settings))
+    tasks, seeds = task_ids(tasks), seed_list(seeds)
+    whole = demonstrations(tasks, seeds, settings)
+    return evaluate("expert", tasks, seeds, jobs, retries=retries, task_options=task_options, **whole)
 
 
 def _player(plan: Plan) -> Callable[[str, int], Played]:

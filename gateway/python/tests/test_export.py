@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import re
 import subprocess
 import sys
 from io import BytesIO
@@ -258,6 +260,44 @@ def test_order_and_splits(tmp_path: Path) -> None:
     chosen = tmp_path / "chosen"
     chosen.mkdir()
     (chosen / "one").symlink_to(tmp_path / "task-9")
-    assert [path.parent.name for path in find(tmp_path)] == ["b-1", "one", "task-9", "task-10"]
+    (chosen / "other").symlink_to(tmp_path / "task-9")
+    assert [path.parent.name for path in find(chosen)] == ["one"]
+    # Links that lead back, or to what is there anyway, add nothing.
+    (tmp_path / "latest").symlink_to(".")
+    (chosen / "up").symlink_to(tmp_path)
+    assert [path.parent.name for path in find(tmp_path)] == ["b-1", "task-9", "task-10"]
     assert splits(70, 2) == {"train": "0:100", "val": "100:120", "rest": "120:140"}
     assert splits(50, 1) == {"train": "0:50"}
+
+
+def test_episodes_are_told_in_their_own_words(tmp_path: Path) -> None:
+    words = {"handover": {"joint": "Reicht die Flasche weiter: 传递瓶子。", "robots": {"B": "Nimm sie."}}}
+    (tmp_path / "words.json").write_text(json.dumps(words), encoding="utf-8")
+    for seed, instructions in ((2010, None), (2011, tmp_path / "words.json")):
+        tandem.evaluate(
+            "idle", "handover", seed, out=tmp_path / f"out-{seed}", record=True, protocol="benchmark", instructions=instructions
+        )
+    recording = tandem.Recording(tmp_path / "out-2011/episodes/handover-2011")
+    assert recording.instruction == words["handover"]["joint"] and recording.instructions["B"] == "Nimm sie."
+    # Files are UTF-8 whatever the locale's encoding is.
+    command = [sys.executable, "-m", "tandem.export", "lerobot", "--cameras=none", str(tmp_path), str(tmp_path / "set")]
+    ascii_only = {**os.environ, "LC_ALL": "POSIX", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    subprocess.run(command, check=True, env=ascii_only)
+    card = (tmp_path / "set/README.md").read_text(encoding="utf-8")
+    own = tandem.Recording(tmp_path / "out-2010/episodes/handover-2010").instructions
+    assert "B: Nimm sie." in card and own["B"] in card
+    about = json.loads((tmp_path / "set/meta/tandem.json").read_text(encoding="utf-8"))
+    assert about["instructions"] == [own, {**own, "B": "Nimm sie."}]
+    tasks = parquet.read_table(tmp_path / "set/meta/tasks.parquet")
+    assert words["handover"]["joint"] in str(tasks.to_pylist())
+
+
+def test_text_files_name_their_encoding() -> None:
+    package = Path(tandem.__file__).parent
+    calls = re.compile(r"(?:write_text|read_text|\bopen)\((?:[^()]|\([^()]*\)|\((?:[^()]|\([^()]*\))*\))*\)")
+    binary = re.compile(r"\"[rwa]?b\"|Image\.open|_av\.open|av\.open")
+    for path in package.rglob("*.py"):
+        source = path.read_text(encoding="utf-8")
+        for call in calls.finditer(source):
+            line = source[source.rfind("\n", 0, call.start()) + 1 : call.end()]
+            assert "encoding" in line or binary.search(line), f"{path}: {line}"

@@ -30,11 +30,60 @@ pub use flags::Seeds;
 /// What a subcommand ends with: an error is printed and is a failure, too.
 pub type CommandResult = Result<ExitCode, Box<dyn Error>>;
 
+/// The command line of this process for a shell, without what starts the program.
+fn command_to_go_on() -> String {
+    let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
+    let words: Vec<String> = words.skip_while(|word| word != "evaluate" && word != "collect").collect();
+    match words.is_empty() {
+        true => "run the same command again".into(),
+        false => going_on(&words),
+    }
+}
+
+/// The command that goes on with what this one has begun, of which nothing is to be deleted.
+fn going_on(words: &[String]) -> String {
+    let kept = words.iter().filter(|word| *word != "--overwrite").map(|word| quoted(word));
+    std::iter::once("tandem".into()).chain(kept).collect::<Vec<_>>().join(" ")
+}
+
+/// A word that a shell takes as it is.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./:=,+@%".contains(c);
+    match !word.is_empty() && word.chars().all(is_plain) {
+        true => word.into(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    }
+}
+
 /// Prints a text that other programs may read, without what a terminal would obey. One that has read enough and has gone is no error.
 fn print(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
     match out.write_all(printable(text).as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(error),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{going_on, quoted};
+
+    #[test]
+    fn what_was_begun_is_not_deleted_by_going_on() {
+        let words = ["collect", "--overwrite", "--out", "my runs"].map(String::from);
+        assert_eq!(going_on(&words), "tandem collect --out 'my runs'");
+    }
+
+    #[test]
+    fn a_shell_reads_what_was_given() {
+        for (word, expected) in [
+            ("runs/a-b_c.d", "runs/a-b_c.d"),
+            ("exec:python3 agent.py", "'exec:python3 agent.py'"),
+            ("it's", r"'it'\''s'"),
+            ("$HOME", "'$HOME'"),
+            ("", "''"),
+        ] {
+            assert_eq!(quoted(word), expected);
+        }
     }
 }

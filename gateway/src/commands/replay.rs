@@ -174,12 +174,12 @@ fn describe(recording: &Recording) {
     }
 }
 
-/// What its policy was told, and what is neither as the benchmark nor as Tandem usually has it.
+/// What its policy was told, and what is not as Tandem usually has it.
 fn told(spec: &EpisodeSpec, result: Option<&ResultReply>) -> String {
     let shown = result.map_or(&[][..], |result| &result.extra_information[..]);
     let assistance = format!("assistance: {}", spec.assistance);
-    let departures = spec.departures().into_iter().filter(|departure| *departure != assistance);
-    let besides = departures.chain(shown.iter().map(|what| format!("shown {what}")));
+    let peculiarities = spec.peculiarities().into_iter().filter(|what| *what != assistance);
+    let besides = peculiarities.chain(shown.iter().map(|what| format!("shown {what}")));
     [assistance.clone()].into_iter().chain(besides).collect::<Vec<_>>().join(", ")
 }
 

@@ -1,6 +1,7 @@
 //! Policies that are not in the episode's process: how they reach it, or it them.
 
 mod http_episode;
+mod interruption;
 mod people;
 mod program;
 mod python;
@@ -14,6 +15,7 @@ use tandem_tools_spec::ResultReply;
 use crate::hosting::{EpisodeThread, HostingError};
 
 pub use http_episode::HttpEpisode;
+pub use interruption::with_last_words;
 pub use people::People;
 pub use program::Program;
 pub use python::{PythonError, PythonModule, PythonPart};

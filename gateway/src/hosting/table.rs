@@ -179,9 +179,7 @@ impl EpisodeTable {
                 .map(|(team, tokens)| (Some(team), tokens))?,
             false => (None, Vec::new()),
         };
-        let (episode, mut briefing) =
-            EpisodeThread::start(id, spec, folder, place, self.metrics.clone()).await?;
-        self.settings.instructions.rephrase_briefing(&mut briefing);
+        let (episode, briefing) = EpisodeThread::start(id, spec, folder, place, self.metrics.clone()).await?;
         let episode = Arc::new(episode);
         if let Err(refused) = self.hold(HostedEpisode::new(id, episode.clone(), team)) {
             episode.close().await?;
@@ -241,9 +239,7 @@ impl EpisodeTable {
 
     /// What `who` has to know to play the episode `id`, in this server's words.
     pub async fn briefing(&self, id: &str, who: &Caller) -> Result<Briefing, HostingError> {
-        let mut briefing = self.hosted(id)?.briefing(who).await?;
-        self.settings.instructions.rephrase_briefing(&mut briefing);
-        Ok(briefing)
+        self.hosted(id)?.briefing(who).await
     }
 
     /// The episodes that `who` may know of, by id.

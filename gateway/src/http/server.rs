@@ -192,10 +192,34 @@ pub async fn shutdown_signal() {
             }
         }
     };
+    let hang_up = async {
+        // Whoever started the process by nohup wants it to outlive its terminal.
+        match is_hangup_ignored() {
+            false => match signal(SignalKind::hangup()) {
+                Ok(mut signals) => drop(signals.recv().await),
+                Err(_) => std::future::pending().await,
+            },
+            true => std::future::pending().await,
+        }
+    };
     tokio::select! {
         _ = tokio::signal::ctrl_c() => {}
         () = terminate => {}
+        () = hang_up => {}
     }
+}
+
+/// Whether the process was started with SIGHUP ignored, as it was before anybody listened for it.
+#[cfg(unix)]
+fn is_hangup_ignored() -> bool {
+    use std::sync::OnceLock;
+    static IGNORED: OnceLock<bool> = OnceLock::new();
+    *IGNORED.get_or_init(|| {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+        // SIGHUP is signal 1, the lowest bit.
+        mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & 1 == 1)
+    })
 }
 
 /// Waits until this process is asked to end.

@@ -3,6 +3,7 @@
 mod agents;
 mod command_line;
 mod evaluations;
+mod interrupted;
 mod logs;
 mod people;
 mod resumed;

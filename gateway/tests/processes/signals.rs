@@ -100,6 +100,18 @@ fn play_and_kill(runs: &Path, seed: u32, delay: Duration) -> u64 {
 }
 
 #[test]
+fn a_server_whose_terminal_is_gone_closes_its_recordings() {
+    let runs = tempfile::tempdir().expect("a temporary folder");
+    let mut server = Server::start(runs.path());
+    let start = json!({ "task": "handover", "seed": 0, "protocol": "agentic" });
+    let started = server.post("/v1/episodes", &start).expect("an episode");
+    server.tool(started["episode_id"].as_str().expect("an id"), "wait", &json!({ "steps": 5 }));
+    assert!(Command::new("kill").args(["-HUP", &server.id().to_string()]).status().expect("kill").success());
+    assert!(server.ended().success());
+    assert!(partials(runs.path()).is_empty());
+}
+
+#[test]
 fn a_server_that_is_stopped_while_an_episode_starts_ends() {
     let mut delays = Delays(1);
     for round in 0..20 {

@@ -1,10 +1,11 @@
 //! Those who watch: they come by the link alone, see what happens, and change nothing.
 
 use std::net::TcpStream;
+use std::sync::Mutex;
 
 use serde_json::{Value, json};
 use tandem::{settings::Layer, token::Token};
-use tandem_episodes::{Recorder, Recording, players, replay};
+use tandem_episodes::{Recorder, Recording, evaluation::evaluate, players, replay};
 use tandem_tests::TestServer;
 use tandem_tools_spec::Png;
 use tungstenite::{Message, WebSocket, client::IntoClientRequest};
@@ -318,8 +319,20 @@ fn evaluations_in_the_runs_folder_are_listed_as_they_fill() {
         "planned": 2, "runs": false, "last_unix_s": complete[0]["last_unix_s"],
     });
     assert_eq!(complete, json!([expected]));
+    // One that has come to its end is not taken for one that is played, whatever its folder lacks.
     std::fs::remove_file(folder.join("episodes/handover-2.json")).expect("a result");
-    assert_eq!((&list()[0]["played"], &list()[0]["runs"]), (&json!(1), &json!(true)));
+    assert_eq!((&list()[0]["played"], &list()[0]["runs"]), (&json!(1), &json!(false)));
+    let again = plan(players::find("idle").expect("a player"), vec![1, 2], false);
+    let seen = Mutex::new(Vec::new());
+    evaluate(&again, &folder, &|_| seen.lock().expect("a list").push(list()[0]["runs"].clone()))
+        .expect("it is played");
+    assert_eq!(*seen.lock().expect("a list"), [true, true]);
+    assert_eq!(list()[0]["runs"], json!(false));
+
+    // Nor is one whose process is gone.
+    let planned = folder.join("planned.json");
+    std::fs::write(&planned, r#"{"episodes": 2, "left_out": 0, "state": "playing"}"#).expect("a file");
+    assert_eq!(list()[0]["runs"], json!(false));
 }
 
 /// A page shows one step in five, and of a look what the policy was shown.

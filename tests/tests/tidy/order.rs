@@ -28,10 +28,10 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "episodes",
         &[
-            &["output", "html", "fingerprint", "scoring", "convert", "statistics"],
+            &["output", "locks", "html", "fingerprint", "scoring", "convert", "statistics"],
             &["error", "conditions"],
             &["tasks"],
-            &["variation", "task_file", "protocol"],
+            &["variation", "words", "task_file", "protocol"],
             &["stress"],
             &["spec"],
             &["commands", "results"],

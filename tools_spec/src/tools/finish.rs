@@ -91,6 +91,9 @@ pub struct ResultReply {
     /// How many replies showed it, by what it was, then by the robot that it was of; left out where it was nothing.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub extra_information_replies: BTreeMap<String, BTreeMap<String, u32>>,
+    /// Share of the joint targets that lay beyond the joints' limits by more than 0.01 rad, and were moved there; left out where none did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joints_clamped_share: Option<f64>,
     /// What was not as the benchmark has it, as "assistance: full"; left out where it was nothing.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub departures: Vec<String>,

@@ -35,6 +35,8 @@ pub struct SaidWords {
 /// What the page tells.
 pub struct EpisodePage<'a> {
     pub task: &'a Task,
+    /// What robots were told together.
+    pub instruction: &'a str,
     pub result: &'a ResultReply,
     pub calls: &'a CallCounts,
     /// In the order in which it was said.
@@ -70,7 +72,7 @@ impl EpisodePage<'_> {
 <h2>Recording</h2>
 {recording}"#,
             escape(&title),
-            instruction = escape(self.task.instruction),
+            instruction = escape(self.instruction),
             verdict = self.verdict(),
             facts = self.facts(),
             timeline = self.timeline(),

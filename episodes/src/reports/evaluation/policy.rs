@@ -70,6 +70,9 @@ pub struct TaskReport {
     /// What models took, where notes say it.
     pub models: Option<ModelCosts>,
     pub falls: u32,
+    /// Mean share of the joint targets that lay beyond the joints' limits; nothing where none did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joints_clamped_share: Option<f64>,
 }
 
 /// One phase of a task.
@@ -170,7 +173,7 @@ pub fn groups<'a>(episodes: impl Iterator<Item = &'a FoundEpisode>) -> Vec<Polic
         let (policy, settings) = (&episodes[0].played.policy.name, &episodes[0].played.spec);
         let policy = split_address(policy).0;
         let shown = shown_in(episodes.iter().map(|found| &found.played));
-        let full_name = named(&named(policy, &shown), &settings.departures());
+        let full_name = named(&named(policy, &shown), &settings.peculiarities());
         PolicyGroup::new(full_name + &apart(&key), episodes)
     };
     groups.into_iter().map(group).collect()
@@ -194,7 +197,7 @@ pub fn rules_of(played: &PlayedEpisode) -> Vec<String> {
     let (name, address) = split_address(&played.policy.name);
     let card = PolicyCard { name: name.into(), ..played.policy.clone() };
     vec![
-        named(&card.full_name(), &spec.departures()),
+        named(&card.full_name(), &spec.peculiarities()),
         address.unwrap_or("in this process").into(),
         spec.protocol.name().into(),
         // Departures name files alone, whose content or folder may differ.
@@ -281,8 +284,17 @@ impl TaskReport {
             effort: EpisodeCosts::of(&whole),
             models: ModelCosts::of(&whole),
             falls: of_task.iter().map(|one| one.result.falls).sum(),
+            joints_clamped_share: mean_clamped_share(&of_task),
         })
     }
+}
+
+/// Mean share of the joint targets of these episodes that lay beyond the joints' limits; `None` where none did.
+fn mean_clamped_share(episodes: &[&PlayedEpisode]) -> Option<f64> {
+    let shares: Vec<f64> =
+        episodes.iter().map(|one| one.result.joints_clamped_share.unwrap_or_default()).collect();
+    let mean = shares.iter().sum::<f64>() / shares.len().max(1) as f64;
+    (mean > 0.0).then_some(mean)
 }
 
 fn averages(tasks: &[TaskReport]) -> Vec<TaskAverage> {

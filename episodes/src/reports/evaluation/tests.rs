@@ -36,6 +36,7 @@ pub fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Pl
             assistance: Assistance::Paper,
             extra_information: vec![],
             extra_information_replies: Default::default(),
+            joints_clamped_share: None,
             departures: vec![],
             recording_failed: None,
             usage: None,
@@ -177,6 +178,18 @@ fn departures_stand_behind_the_name() {
     }
 }
 
+#[test]
+fn joint_targets_beyond_limits_are_told_where_there_were_some() {
+    let mut episodes = nine_six_three("agent");
+    let text = |episodes: &[PlayedEpisode]| {
+        let report = EvaluationReport::of(&found(episodes.to_vec()));
+        report.write(ReportFormat::Markdown, &ReportPictures::default()).unwrap()
+    };
+    assert!(!text(&episodes).contains("Joint targets beyond limits"));
+    episodes.iter_mut().for_each(|played| played.result.joints_clamped_share = Some(0.34));
+    assert!(text(&episodes).contains("| agent | handover | 34 |"), "{}", text(&episodes));
+}
+
 /// What a policy was shown in some of its episodes is named and counted, and makes no other policy of it.
 #[test]
 fn what_was_shown_beyond_the_benchmark_is_told() {
@@ -267,7 +280,8 @@ fn reports_quote_what_they_are_told() {
             "prefers-color-scheme: dark",
             "60 [26.2, 87.8] 6/10",
             "9/10</text>",
-            "another simulator",
+            "Published, on another scale",
+            "Method (another scale)",
         ],
         &["<script", "<link", "url(", "src=\"http", "href=", "a<b>"],
     );

@@ -100,6 +100,11 @@ impl PhaseTracker {
         &self.memory
     }
 
+    /// Whether a memory can be of these phases.
+    pub fn fits(&self, memory: &PhaseMemory) -> bool {
+        memory.reached_s.len() <= self.phases.len()
+    }
+
     /// Goes back to an earlier [`PhaseTracker::memory`] of the same phases.
     pub fn set_memory(&mut self, memory: PhaseMemory) {
         self.memory = memory;

@@ -46,7 +46,8 @@ const PAPER: &[(&str, &str)] = &[
     ),
     (
         "finish",
-        "task protocol assistance phases.p1 phases.p2 phases.p3 ended env_steps tool_calls requests thinking_s falls realtime_factor",
+        "task protocol assistance phases.p1 phases.p2 phases.p3 ended env_steps tool_calls requests thinking_s falls realtime_factor \
+         departures",
     ),
 ];
 
@@ -81,7 +82,7 @@ const FULL: &[(&str, &str)] = &[
     // That more was told is said, too.
     (
         "finish",
-        "seed state_hash departures extra_information extra_information_replies.joint_velocities.* \
+        "seed state_hash extra_information extra_information_replies.joint_velocities.* \
          extra_information_replies.joint_torques.* extra_information_replies.hand_forces.* \
          extra_information_replies.odometry.* extra_information_replies.gravity.*",
     ),

@@ -113,7 +113,7 @@ def task_of(data_set: Path) -> str:
 
 def _json(path: Path) -> dict[str, Any]:
     try:
-        return json.loads(path.read_text())
+        return json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise TandemError(f"there is no {path}; give the folder that tandem export lerobot wrote") from None
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shlex
 import subprocess
 import sys
@@ -11,6 +10,7 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
+from .. import _native
 from ..errors import TandemError
 from .maps import MAP_FILE
 from .settings import TrainingSettings
@@ -72,7 +72,7 @@ def run_recipe(
     from .training import train
 
     recipe, folder = recipe or Recipe(), Path(out)
-    jobs = recipe.jobs or len(os.sched_getaffinity(0))
+    jobs = recipe.jobs or _native.available_processors()
     name = f"{settings.kind}_{settings.scope}_{settings.sharing}_{settings.seed}"
     demonstrations, data, policy = (folder / part for part in ("demonstrations", "data", name))
     benchmark = ["--protocol", "benchmark", "--tasks", task]

@@ -12,6 +12,7 @@ from typing import Any
 
 import torch
 
+from .. import _native
 from ..errors import TandemError
 from .data import Demonstrations, read
 from .learner import Learner
@@ -44,13 +45,12 @@ def train(
     data_set: Folder that `tandem export lerobot` wrote, of version 3 and view joint.
     out: Folder of the policy.
     settings: Everything that the weights come of, beside data and threads.
-    threads: Of PyTorch. None: as many as it takes by itself.
+    threads: Of PyTorch. None: as many as there are processors for this process, a container's quota included.
     device: Where PyTorch computes.
     tell: Called with a line now and then.
     """
     settings, folder = settings or TrainingSettings(), Path(out)
-    if threads is not None:
-        torch.set_num_threads(threads)
+    torch.set_num_threads(threads or min(torch.get_num_threads(), _native.available_processors()))
     demonstrations = read(Path(data_set), settings.chunk_rows, settings.every)
     about = _about(demonstrations, settings)
     if (folder / POLICY_FILE).exists():
@@ -59,7 +59,7 @@ def train(
         tell(f"{folder} is trained already")
         return folder
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / MAP_FILE).write_text(map_text(settings, demonstrations.size, demonstrations.rate_hz))
+    (folder / MAP_FILE).write_text(map_text(settings, demonstrations.size, demonstrations.rate_hz), encoding="utf-8")
     learners = [
         Learner(demonstrations, of_network, settings, number, device)
         for number, of_network in enumerate(views(settings.scope, settings.sharing, len(demonstrations.robots)))
@@ -133,7 +133,7 @@ class _Run:
         else:
             line += ",,"
         self._curve.append(line)
-        (self._folder / CURVE_FILE).write_text("\n".join([CURVE_HEADER, *self._curve, ""]))
+        (self._folder / CURVE_FILE).write_text("\n".join([CURVE_HEADER, *self._curve, ""]), encoding="utf-8")
         self._tell(told)
         if self._step % VALIDATE_EVERY == 0:
             self._keep()

@@ -277,6 +277,11 @@ class ResultReply:
     extra_information_replies: dict[str, dict[str, int]]
     """How many replies showed it, by what it was, then by the robot that it was of; left out where it was nothing."""
 
+    joints_clamped_share: float | None
+    """Share of the joint targets that lay beyond the joints' limits by more than 0.01 rad, and were moved there;
+    left out where none did.
+    """
+
     departures: tuple[str, ...]
     """What was not as the benchmark has it, as "assistance: full"; left out where it was nothing."""
 
@@ -306,6 +311,7 @@ class ResultReply:
             assistance=value.get("assistance"),
             extra_information=tuple(value.get("extra_information", ())),
             extra_information_replies=value.get("extra_information_replies", {}),
+            joints_clamped_share=value.get("joints_clamped_share"),
             departures=tuple(value.get("departures", ())),
             recording_failed=value.get("recording_failed"),
             usage=None if (got := value.get("usage")) is None else Usage.of(got),

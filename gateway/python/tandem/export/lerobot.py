@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
@@ -16,6 +17,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from .. import _native
 from ..errors import TandemError
 from ..recording import Recording
 from .columns import is_successful
@@ -28,6 +30,9 @@ RECORDING_FILE = "episode.mcap"
 GOOD_FILE = "good"
 ABOUT_FILE = "meta/tandem.json"
 PLAN_FILE = "plan.json"
+
+_NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)
+"""What file systems say that have no locks."""
 
 TRAINED = 50
 VALIDATED = 10
@@ -88,7 +93,7 @@ def export_lerobot(
     settings = settings or ExportSettings()
     for name in ("pyarrow", "av"):
         library(name)
-    workers = jobs or len(os.sched_getaffinity(0))
+    workers = jobs or _native.available_processors()
     root, target = Path(runs), Path(out)
     found = find(root)
     if only_good:
@@ -124,12 +129,31 @@ def find(root: Path) -> list[Path]:
         words = re.split(r"(\d+)", path.relative_to(root).as_posix())
         return [(0, int(word), "") if word.isdigit() else (1, 0, word) for word in words if word]
 
-    # Links are followed: a folder of links is how one chooses recordings.
-    folders = [folder for folder, _, files in os.walk(root, followlinks=True) if RECORDING_FILE in files]
-    found = sorted((Path(folder) / RECORDING_FILE for folder in folders), key=order)
+    found = sorted(_below(root), key=order)
     if not found:
         raise TandemError(f"no {RECORDING_FILE} in {root}; give a folder of recordings, as of tandem collect")
     return found
+
+
+def _below(root: Path) -> list[Path]:
+    """Every recording once. Links are followed, because a folder of links is how one chooses recordings; no folder is entered
+    twice.
+    """
+    found: dict[str, Path] = {}
+    # What is there under its own name goes before links to it.
+    for follows in (False, True):
+        entered: set[str] = set()
+        for folder, inner, files in os.walk(root, followlinks=follows):
+            real = os.path.realpath(folder)
+            if real in entered:
+                inner.clear()
+                continue
+            entered.add(real)
+            inner.sort()
+            if RECORDING_FILE in files:
+                path = Path(folder) / RECORDING_FILE
+                found.setdefault(os.path.realpath(path), path)
+    return list(found.values())
 
 
 def _source(path: Path, root: Path) -> Source:
@@ -192,7 +216,7 @@ def _there(out: Path, plan: dict[str, Any]) -> dict[str, Any] | None:
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
         return None
     try:
-        about: dict[str, Any] = json.loads((out / ABOUT_FILE).read_text())
+        about: dict[str, Any] = json.loads((out / ABOUT_FILE).read_text(encoding="utf-8"))
         if about["plan"] == plan:
             return about
     except (OSError, ValueError, KeyError):
@@ -204,17 +228,21 @@ def _begin(work: Path, plan: dict[str, Any]) -> None:
     path = work / PLAN_FILE
     if not path.exists():
         write_whole(path, json.dumps(plan))
-    elif json.loads(path.read_text()) != plan:
+    elif json.loads(path.read_text(encoding="utf-8")) != plan:
         raise TandemError(f"{work} is what another export has left, of other recordings or settings; remove it")
 
 
 @contextmanager
 def _alone(work: Path) -> Generator[None, None, None]:
-    with (work / "lock").open("w") as lock:
+    with (work / "lock").open("w", encoding="utf-8") as lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
+        except BlockingIOError as error:
             raise TandemError(f"another export writes to {work} now; wait for it") from error
+        except OSError as error:
+            # Nobody can hold a lock where the file system has none.
+            if error.errno not in _NO_LOCKS:
+                raise
         yield
 
 
@@ -264,7 +292,10 @@ def _write_about(
     for source in sources:
         if source.spec not in specs:
             specs.append(source.spec)
-    instructions: dict[str, str] = parts[0].about["instructions"]
+    told: list[dict[str, str]] = []
+    for part in parts:
+        if part.about["instructions"] not in told:
+            told.append(part.about["instructions"])
     about = {
         "task": sources[0].task,
         "episodes": len(parts),
@@ -272,12 +303,12 @@ def _write_about(
         "successes": sum(source.success for source in sources),
         "builds": builds,
         "specs": specs,
-        "instructions": instructions,
+        "instructions": told,
         "splits": names,
         "recordings": recordings,
         "plan": plan,
     }
-    (whole / ABOUT_FILE).write_text(json.dumps(about, indent=2))
+    (whole / ABOUT_FILE).write_text(json.dumps(about, indent=2), encoding="utf-8")
     card = CARD.format(
         task=sources[0].task,
         rows=rows,
@@ -286,12 +317,12 @@ def _write_about(
         successes=about["successes"],
         seeds=", ".join(_ranges([source.seed for source in sources])),
         made="; ".join(_played(spec) for spec in specs),
-        told=" ".join(f"{robot}: {words}" for robot, words in instructions.items()),
+        told="\n\n".join(" ".join(f"{robot}: {words}" for robot, words in words_of.items()) for words_of in told),
         builds=", ".join(builds),
         settings=", ".join(f"{name} {value}" for name, value in plan["settings"].items()),
         splits=", ".join(f"{name} {span}" for name, span in names.items()),
     )
-    (whole / "README.md").write_text(card)
+    (whole / "README.md").write_text(card, encoding="utf-8")
 
 
 def _played(spec: dict[str, Any]) -> str:

@@ -74,7 +74,7 @@ def make_parts(path: Path, source: str, folder: Path, settings: ExportSettings, 
             recording = recording or Recording(path)
             own.mkdir(parents=True, exist_ok=True)
             _make(recording, views(recording, settings)[index], source, own, settings, stop)
-        parts.append(Part(own, json.loads((own / PART_FILE).read_text())))
+        parts.append(Part(own, json.loads((own / PART_FILE).read_text(encoding="utf-8"))))
     # Later runs need not read the recording to know how many there are.
     write_whole(folder / "parts.json", json.dumps(names))
     return parts
@@ -83,13 +83,13 @@ def make_parts(path: Path, source: str, folder: Path, settings: ExportSettings, 
 def part_names(folder: Path) -> list[str] | None:
     """The names of a recording's episodes, if all of them are there."""
     path = folder / "parts.json"
-    return json.loads(path.read_text()) if path.exists() else None
+    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
 
 
 def write_whole(path: Path, text: str) -> None:
     """Writes a file that is there as a whole, or not at all."""
     partial = path.with_name(path.name + ".partial")
-    partial.write_text(text)
+    partial.write_text(text, encoding="utf-8")
     partial.replace(path)
 
 

@@ -59,7 +59,7 @@ def write_v2(out: Path, parts: Sequence[Part], splits: dict[str, str], settings:
     _write_lines(meta / "tasks.jsonl", [{"task_index": number, "task": task} for number, task in enumerate(tasks)])
     _write_lines(meta / "episodes.jsonl", episodes)
     _write_lines(meta / "episodes_stats.jsonl", statistics)
-    (meta / "info.json").write_text(json.dumps(info, indent=4, ensure_ascii=False))
+    (meta / "info.json").write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
 
 
 def _made(out: Path, pattern: str, episode: int, key: str = "") -> Path:
@@ -71,4 +71,4 @@ def _made(out: Path, pattern: str, episode: int, key: str = "") -> Path:
 
 
 def _write_lines(path: Path, rows: Sequence[dict[str, Any]]) -> None:
-    path.write_text("".join(json.dumps(row, ensure_ascii=False) + "\n" for row in rows))
+    path.write_text("".join(json.dumps(row, ensure_ascii=False) + "\n" for row in rows), encoding="utf-8")

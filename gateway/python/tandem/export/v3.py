@@ -82,8 +82,8 @@ def write_v3(out: Path, parts: Sequence[Part], splits: dict[str, str], settings:
         "robot_type": ROBOT_TYPE,
         "splits": splits,
     }
-    (out / "meta/stats.json").write_text(json.dumps(_whole_statistics(out, parts, features), indent=4))
-    (out / "meta/info.json").write_text(json.dumps(info, indent=4, ensure_ascii=False))
+    (out / "meta/stats.json").write_text(json.dumps(_whole_statistics(out, parts, features), indent=4), encoding="utf-8")
+    (out / "meta/info.json").write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
 
 
 def films_of(features: dict[str, Any]) -> list[str]:

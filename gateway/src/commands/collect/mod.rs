@@ -2,7 +2,7 @@
 
 mod people;
 
-use std::{path::PathBuf, process::ExitCode};
+use std::process::ExitCode;
 
 use tandem_episodes::{
     Variation,
@@ -15,8 +15,8 @@ use people::PeopleFlags;
 
 use super::{
     CommandResult,
-    evaluate::play_and_print,
-    flags::{EpisodeFlags, StressFlags},
+    evaluate::{check_words, play_and_print},
+    flags::{EpisodeFlags, RunFlags, StressFlags},
     logging::log_evaluation,
 };
 
@@ -45,9 +45,8 @@ pub struct CollectArgs {
     /// Write no strip of pictures and no page of each episode, which take a quarter of the space.
     #[arg(long)]
     no_reports: bool,
-    /// Folder for the recordings.
-    #[arg(long, value_name = "DIR", default_value = "runs/demonstrations")]
-    out: PathBuf,
+    #[command(flatten)]
+    run: RunFlags,
 }
 
 /// How much to disturb.
@@ -64,12 +63,17 @@ pub fn run(args: CollectArgs) -> CommandResult {
     let plan = EvaluationPlan {
         variation,
         stress: args.stress.stress(),
+        existing: args.run.existing(),
         files: KeptFiles { pages: !args.no_reports, only_successful: args.only_successful },
         ..plan
     };
+    check_words(&plan, plan.stress)?;
     match args.people.operators() {
-        Some(_) => args.people.collect(plan, &args.out)?,
-        None => drop(play_and_print(&plan, &args.out)?),
+        Some(_) => {
+            let folder = args.run.folder(&plan, Some("people"));
+            args.people.collect(plan, &folder)?;
+        }
+        None => drop(play_and_print(&plan, &args.run.folder(&plan, Some("demonstrations")))?),
     }
     Ok(ExitCode::SUCCESS)
 }

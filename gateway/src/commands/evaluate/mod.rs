@@ -4,6 +4,7 @@ mod progress;
 mod table;
 
 use std::{
+    collections::BTreeSet,
     error::Error,
     path::{Path, PathBuf},
     process::ExitCode,
@@ -12,18 +13,20 @@ use std::{
 
 use tandem_episodes::{
     Phase,
-    evaluation::{self, EvaluationPlan, Shard, Starts, failed_episodes},
+    evaluation::{EvaluationPlan, EvaluationRun, KeptEpisodes, Shard, Starts, failed_episodes},
     results::STRESS,
-    tasks,
+    stress::{Stress, StressAxis},
+    tasks::Task,
 };
 
 use tandem_tools_spec::Assistance;
 
 use super::{
-    CommandResult,
-    flags::{EpisodeFlags, PolicyFlags, StressPlanFlags},
+    CommandResult, command_to_go_on,
+    flags::{EpisodeFlags, PolicyFlags, RunFlags, StressPlanFlags},
     logging::log_evaluation,
 };
+use crate::{drivers::with_last_words, settings::SettingsError};
 use progress::with_progress;
 
 /// Play tasks over seeds in parallel worlds and count the phases reached. Goes on where an interrupted run stopped.
@@ -62,9 +65,8 @@ pub struct EvaluateArgs {
     /// The same as --retries 0.
     #[arg(long, conflicts_with = "retries")]
     keep_failed: bool,
-    /// Folder for `results.json` and one file per episode.
-    #[arg(long, value_name = "DIR", default_value = "runs/evaluation")]
-    out: PathBuf,
+    #[command(flatten)]
+    run: RunFlags,
 }
 
 /// Phases named on the command line.
@@ -73,20 +75,28 @@ struct PhaseList(Vec<String>);
 
 /// The phases that `text` names: `all`, or numbers and ids separated by commas.
 fn parse_phases(text: &str) -> Result<PhaseList, String> {
-    let most = tasks::ALL.iter().map(|task| task.phases.len()).max().unwrap_or_default();
-    let numbers: Vec<String> = (0..most).map(Phase::number).collect();
-    if text == "all" {
-        return Ok(PhaseList(numbers));
+    let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
+    match names.iter().any(String::is_empty) {
+        true => Err("no phase; give p1, the id of a phase, or all".into()),
+        false => Ok(PhaseList(names)),
     }
-    let is_id = |text: &str| tasks::ALL.iter().flat_map(|task| task.phases).any(|phase| phase.id == text);
-    let known = |phase: &str| match numbers.iter().any(|number| number == phase) || is_id(phase) {
-        true => Ok(phase.to_owned()),
-        false => Err(format!(
-            "no phase {phase:?}; have: {}, the id of a phase, as `tandem tasks` lists them, or all",
-            numbers.join(", ")
-        )),
-    };
-    text.split(',').map(|phase| known(phase.trim())).collect::<Result<_, _>>().map(PhaseList)
+}
+
+/// The phases that are named, of which each task that is played may have some.
+fn phases_of(PhaseList(names): PhaseList, tasks: &[&'static Task]) -> Result<Vec<String>, String> {
+    let most = tasks.iter().map(|task| task.phases.len()).max().unwrap_or_default();
+    let numbers: Vec<String> = (0..most).map(Phase::number).collect();
+    if names == ["all"] {
+        return Ok(numbers);
+    }
+    let ids: BTreeSet<&str> = tasks.iter().flat_map(|task| task.phases).map(|phase| phase.id).collect();
+    match names.iter().find(|name| !numbers.contains(name) && !ids.contains(name.as_str())) {
+        None => Ok(names),
+        Some(unknown) => {
+            let have: Vec<&str> = numbers.iter().map(String::as_str).chain(ids).collect();
+            Err(format!("no phase {unknown:?} in what is played; have: {}, or all", have.join(", ")))
+        }
+    }
 }
 
 /// A share on the command line.
@@ -109,32 +119,47 @@ impl FromStr for ShardFlag {
 /// Plays and counts. The program fails if there are episodes to play and none of them counts.
 pub fn run(args: EvaluateArgs) -> CommandResult {
     log_evaluation();
-    let starts = match (args.demos, args.from) {
-        (Some(demonstrations), Some(PhaseList(phases))) => Starts::Phases { demonstrations, phases },
-        _ => Starts::Task,
-    };
-    let starts = match &args.retry_from {
-        Some(folder) => begin_again(folder, args.before)?,
-        None => starts,
-    };
     let ShardFlag(shard) = args.shard;
     let policy = args.policy.policy()?;
+    let plan = args.episodes.plan(&*policy, args.record, Assistance::Paper)?;
+    let starts = match (&args.retry_from, args.demos, args.from) {
+        (Some(folder), ..) => begin_again(folder, args.before)?,
+        (None, Some(demonstrations), Some(phases)) => {
+            Starts::Phases { demonstrations, phases: phases_of(phases, &plan.tasks)? }
+        }
+        _ => Starts::Task,
+    };
     let plan = EvaluationPlan {
         starts,
         shard,
         retries: if args.keep_failed { 0 } else { args.retries },
-        ..args.episodes.plan(&*policy, args.record, Assistance::Paper)?
+        existing: args.run.existing(),
+        ..plan
     };
-    let mut counted = play_and_print(&plan, &args.out)?;
+    check_words(&plan, args.stress.stresses())?;
+    let folder = args.run.folder(&plan, None);
+    let mut counted = play_and_print(&plan, &folder)?;
     for stress in args.stress.stresses() {
         println!("\nunder stress: {stress}");
         let plan = EvaluationPlan { stress: Some(stress), ..plan.clone() };
-        counted += play_and_print(&plan, &args.out.join(STRESS).join(stress.to_string()))?;
+        counted += play_and_print(&plan, &folder.join(STRESS).join(stress.to_string()))?;
     }
     Ok(match counted {
         0 if !plan.episodes().0.is_empty() => ExitCode::FAILURE,
         _ => ExitCode::SUCCESS,
     })
+}
+
+/// Refuses to tell tasks in two other wordings at once.
+pub fn check_words(
+    plan: &EvaluationPlan,
+    stresses: impl IntoIterator<Item = Stress>,
+) -> Result<(), SettingsError> {
+    let is_other_words = |stress: Stress| stress.axis == StressAxis::Words;
+    match !plan.instructions.is_empty() && stresses.into_iter().any(is_other_words) {
+        true => Err(SettingsError::TwoWordings),
+        false => Ok(()),
+    }
 }
 
 /// What has failed in `folder`, to begin again so many seconds before; what cannot be begun again is logged.
@@ -152,8 +177,63 @@ fn begin_again(folder: &Path, before_s: u32) -> Result<Starts, Box<dyn Error>> {
 
 /// Plays `plan` into `folder`, says how it goes on, prints a table, and returns how many of the episodes count.
 pub fn play_and_print(plan: &EvaluationPlan, folder: &Path) -> Result<usize, Box<dyn Error>> {
-    let evaluation = with_progress(plan, |progress| evaluation::evaluate(plan, folder, progress))?;
+    let run = EvaluationRun::begin(plan, folder)?;
+    println!("{}, in {}", in_words(run.kept()), folder.display());
+    if run.is_without_locks() {
+        let folder = folder.display();
+        tracing::warn!(
+            "the file system of {folder} has no locks: see to it that no other process plays in that folder"
+        );
+    }
+    let say = || print_interrupted(&run);
+    let evaluation = with_last_words(say, || with_progress(plan, |progress| run.play(progress)))?;
     table::print(&evaluation);
     println!("  results in {}", folder.display());
     Ok(evaluation.episodes.iter().filter(|episode| episode.counts()).count())
+}
+
+/// What a run has when it begins, as `5 kept, 25 to play`.
+fn in_words(kept: KeptEpisodes) -> String {
+    let KeptEpisodes { kept, of_other_builds, to_play, unreadable } = kept;
+    let mut words = match (kept, of_other_builds) {
+        (0, _) => format!("{to_play} to play"),
+        (_, 0) => format!("{kept} kept, {to_play} to play"),
+        (_, _) => format!("{kept} kept ({of_other_builds} of them of another build), {to_play} to play"),
+    };
+    if unreadable > 0 {
+        words += &format!(" ({unreadable} of them again, since this build cannot read their results)");
+    }
+    words
+}
+
+/// What is said of a run that a signal ends: what it has come to by now, and how to go on.
+fn print_interrupted(run: &EvaluationRun) {
+    let KeptEpisodes { kept, to_play, .. } = run.kept();
+    println!("\ninterrupted; {kept} episodes are kept, {to_play} are left");
+    if kept > 0 {
+        table::print(&run.so_far());
+    }
+    println!("to go on: {}", command_to_go_on());
+}
+
+#[cfg(test)]
+mod tests {
+    use tandem_episodes::{tandem_plus, tasks};
+
+    use super::*;
+
+    #[test]
+    fn phases_are_those_of_the_tasks_that_are_played() {
+        let found =
+            |text: &str, tasks: &[&'static Task]| parse_phases(text).and_then(|list| phases_of(list, tasks));
+        let handover = [tasks::find("handover").unwrap()];
+        assert_eq!(found("p2, transfer", &handover).unwrap(), ["p2", "transfer"]);
+        assert_eq!(found("all", &handover).unwrap(), ["p1", "p2", "p3"]);
+        let plus: Vec<&'static Task> = tandem_plus().to_vec();
+        let own = plus[0].phases[0].id;
+        assert_eq!(found(own, &plus).unwrap(), [own]);
+        let refused = found("p9", &handover).unwrap_err();
+        assert!(refused.contains("no phase \"p9\"") && refused.contains("p3, grasp_and_lift"), "{refused}");
+        assert!(found("", &handover).is_err());
+    }
 }

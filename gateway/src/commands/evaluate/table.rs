@@ -10,6 +10,9 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{AgentEnding, Usage};
 
+/// A share of joint targets beyond limits from which on it is said.
+const CLAMPED_SHARE: f64 = 0.1;
+
 /// How many notes of a kind are printed below the table.
 const NOTES_SHOWN: usize = 20;
 
@@ -19,6 +22,10 @@ pub fn print(evaluation: &Evaluation) {
     print_tasks(evaluation);
     print_endings(evaluation);
     evaluation.phase_level.iter().for_each(print_phase_level);
+    for (build, count) in &evaluation.other_builds {
+        println!("{count} of these episodes were played by another build, {build}");
+    }
+    print_clamped(evaluation);
     let (counted, excluded): (Vec<&PlayedEpisode>, Vec<&PlayedEpisode>) =
         evaluation.episodes.iter().partition(|episode| episode.counts());
     print_notes(counted.into_iter().filter_map(|episode| Some((episode, episode.note.clone()?))));
@@ -32,6 +39,24 @@ pub fn print(evaluation: &Evaluation) {
     let again = evaluation.episodes.iter().filter(|episode| !episode.attempts.is_empty());
     print_notes(again.map(|episode| (episode, attempts_note(episode))));
     evaluation.left_out.iter().for_each(|left_out| println!("  left out: {}", printable(left_out)));
+}
+
+/// Warns of tasks in whose episodes many joint targets lay beyond the joints' limits.
+fn print_clamped(evaluation: &Evaluation) {
+    let mut shares: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for PlayedEpisode { result, .. } in &evaluation.episodes {
+        shares.entry(&result.task).or_default().push(result.joints_clamped_share.unwrap_or_default());
+    }
+    for (task, shares) in shares {
+        let mean = shares.iter().sum::<f64>() / shares.len() as f64;
+        if mean > CLAMPED_SHARE {
+            println!(
+                "warning: {:.0} % of the joint targets in {task} lay beyond the joints' limits and were moved there; they are radians, \
+                 in the order of the action row",
+                100.0 * mean
+            );
+        }
+    }
 }
 
 /// What failed, and how.

@@ -4,8 +4,8 @@ use std::{error::Error, ops::RangeInclusive, path::PathBuf, str::FromStr};
 
 use clap::Args;
 use tandem_episodes::{
-    EpisodeError, TANDEM_PLUS, Variation,
-    evaluation::{EvaluationPlan, KeptFiles, Shard, Starts},
+    EpisodeError, Instructions, TANDEM_PLUS, Variation,
+    evaluation::{EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts},
     players::Policy,
     tandem_plus, task_set,
     tasks::{self, Spread, Task},
@@ -41,6 +41,9 @@ pub struct EpisodeFlags {
     /// For experiments: whether texts say how to grasp, whatever the assistance has.
     #[arg(long, hide = true, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = one_of(Hints::ALL, Hints::name))]
     hints: Option<Hints>,
+    /// JSON file with instructions in place of the tasks' own, as for `serve`; results name them.
+    #[arg(long, env = "TANDEM_INSTRUCTIONS", value_name = "FILE")]
+    instructions: Option<PathBuf>,
     /// How far the seed moves things, as a multiple of the benchmark's randomisation; above 1 it turns them, too.
     #[arg(long, value_name = "TIMES", value_parser = one_of(Spread::ALL, Spread::name), default_value = Spread::default().name())]
     spread: Spread,
@@ -93,7 +96,10 @@ impl EpisodeFlags {
         record: bool,
         assistance: Assistance,
     ) -> Result<EvaluationPlan<'_>, Box<dyn Error>> {
-        let tasks = played(self.tasks, self.world.read_task_files()?);
+        let of_files = self.world.read_task_files()?;
+        let known = task_set(of_files.clone());
+        let instructions = self.instructions.as_deref().map(|path| Instructions::read(path, &known));
+        let tasks = played(self.tasks, of_files);
         let robot = self.world.read_robot()?;
         let model = robot.model()?;
         tasks.iter().try_for_each(|task| robot.check_task(&model, task))?;
@@ -114,6 +120,7 @@ impl EpisodeFlags {
             assistance,
             disclosure,
             hints,
+            instructions: instructions.transpose()?.unwrap_or_default(),
             variation: Variation { spread: self.spread, ..Variation::default() },
             stress: None,
             thinking_limit_s: self.thinking_limit,
@@ -127,6 +134,7 @@ impl EpisodeFlags {
             files: KeptFiles::default(),
             retries: EvaluationPlan::DEFAULT_RETRIES,
             seed_key,
+            existing: ExistingRun::Refuse,
         })
     }
 }

@@ -3,6 +3,7 @@
 mod agent;
 mod episode;
 mod policy;
+mod run;
 mod seed_key;
 mod stress;
 mod world;
@@ -10,5 +11,6 @@ mod world;
 pub use agent::AgentFlags;
 pub use episode::{EpisodeFlags, Seeds};
 pub use policy::{PartnerFlags, PolicyFlags};
+pub use run::RunFlags;
 pub use stress::{StressFlags, StressPlanFlags};
 pub use world::{LocomotionFlag, SensingFlags, WorldFlags};

@@ -292,6 +292,10 @@ impl Policy for Renamed {
     fn waiting(&self) -> Option<PolicyWait> {
         self.policy.waiting()
     }
+
+    fn is_interrupted(&self) -> bool {
+        self.policy.is_interrupted()
+    }
 }
 
 #[cfg(test)]

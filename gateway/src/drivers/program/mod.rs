@@ -31,6 +31,7 @@ use crate::{
     token::Token,
 };
 use participant::Participant;
+pub use process::end_all_programs;
 use process::{ProcessGroup, ProcessGroups, STDERR_FILE, STDOUT_FILE};
 
 /// How long a program may go on when its episode has ended.
@@ -72,7 +73,7 @@ impl Program {
             ..Layer::default()
         };
         let processes = Arc::new(ProcessGroups::default());
-        process::stop_on_shutdown(&processes);
+        process::end_with_all(&processes);
         let (name, card) = (format!("exec:{command}"), json!({ "command": command }));
         let settings = Settings::resolve(flags, None)?;
         Ok(Program { command, name, card, driving, limit, settings, processes })

@@ -2,10 +2,10 @@
 
 use std::{
     fs::File,
-    io,
+    io::{self, Write},
     path::Path,
     process::{Child, Command, ExitStatus, Stdio},
-    sync::{Arc, Mutex, MutexGuard},
+    sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
     thread,
     time::{Duration, Instant},
 };
@@ -37,6 +37,8 @@ impl ProcessGroups {
 /// A program and all that it has started. Dropping it stops them.
 pub struct ProcessGroup {
     child: Child,
+    /// Ends the group once this process is gone, however that came. `None` where it could not be started.
+    guard: Option<Child>,
     groups: Arc<ProcessGroups>,
     outputs: Vec<KeptOutput>,
     /// How the program ended, once the group has been stopped.
@@ -67,7 +69,13 @@ impl ProcessGroup {
         let child = shell.spawn()?;
         running.push(child.id());
         drop(running);
-        let mut group = ProcessGroup { child, groups: groups.clone(), outputs: Vec::new(), status: None };
+        let guard = guard(child.id());
+        if let Err(error) = &guard {
+            tracing::warn!(%error, "nobody ends the program if this process is killed");
+        }
+        let guard = guard.ok().flatten();
+        let mut group =
+            ProcessGroup { child, guard, groups: groups.clone(), outputs: Vec::new(), status: None };
         group.keep_outputs(files)?;
         Ok(group)
     }
@@ -109,6 +117,9 @@ impl ProcessGroup {
         running.retain(|id| *id != self.child.id());
         let status = self.child.wait()?;
         self.outputs.drain(..).for_each(KeptOutput::finish);
+        if let Some(guard) = self.guard.take() {
+            dismiss(guard);
+        }
         self.status = Some(status);
         Ok(status)
     }
@@ -121,29 +132,44 @@ impl Drop for ProcessGroup {
     }
 }
 
-/// Has a signal that ends this process end every group first, from now on.
-pub fn stop_on_shutdown(groups: &Arc<ProcessGroups>) {
-    let groups = Arc::downgrade(groups);
-    thread::spawn(move || {
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
-        let Ok(runtime) = runtime else { return };
-        runtime.block_on(crate::http::shutdown_signal());
-        if let Some(groups) = groups.upgrade() {
-            // Held to the end, so that no further group starts.
-            let running = groups.lock();
-            running.iter().for_each(|id| kill_group(*id));
-            std::process::exit(INTERRUPTED);
-        }
-        std::process::exit(INTERRUPTED);
-    });
+/// The groups of all policies of this process.
+static ALL: Mutex<Vec<Weak<ProcessGroups>>> = Mutex::new(Vec::new());
+
+/// Has [`end_all_programs`] end these groups, too.
+pub fn end_with_all(groups: &Arc<ProcessGroups>) {
+    let mut all = ALL.lock().unwrap_or_else(PoisonError::into_inner);
+    all.retain(|known| known.strong_count() > 0);
+    all.push(Arc::downgrade(groups));
 }
 
-/// What shells report of a process that SIGINT has ended.
-const INTERRUPTED: i32 = 130;
+/// Ends every program that this process has started, and lets it start no other: it is about to end itself.
+pub fn end_all_programs() {
+    let all = ALL.lock().unwrap_or_else(PoisonError::into_inner);
+    for groups in all.iter().filter_map(Weak::upgrade) {
+        let running = groups.lock();
+        running.iter().for_each(|id| kill_group(*id));
+        // Held to the end, so that no further group starts.
+        std::mem::forget(running);
+        std::mem::forget(groups.clone());
+    }
+}
+
+/// Lets a guard go, whose group has ended.
+fn dismiss(mut guard: Child) {
+    if let Some(mut stdin) = guard.stdin.take() {
+        // It may have been killed.
+        let _ = stdin.write_all(b"ended\n");
+    }
+    let _ = guard.wait();
+}
 
 #[cfg(unix)]
 mod system {
-    use std::{io, os::unix::process::CommandExt, process::Child, process::Command};
+    use std::{
+        io,
+        os::unix::process::CommandExt,
+        process::{Child, Command, Stdio},
+    };
 
     use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 
@@ -152,6 +178,18 @@ mod system {
     /// Has the command start in a process group of its own.
     pub fn in_own_group(command: &mut Command) {
         command.process_group(0);
+    }
+
+    /// Waits for a line, or for the end of whoever would write it. The kernel closes the pipe of a process that is gone.
+    const GUARD: &str = r#"trap '' HUP INT TERM; read -r line || kill -s KILL -- "-$1""#;
+
+    /// Starts what ends the group once this process is gone.
+    pub fn guard(id: u32) -> io::Result<Option<Child>> {
+        let mut shell = Command::new(SHELL[0]);
+        shell.args([SHELL[1], GUARD, "tandem-guard", &id.to_string()]);
+        shell.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
+        in_own_group(&mut shell);
+        shell.spawn().map(Some)
     }
 
     /// Whether the child has ended with status 0; `None` while it runs. It is not waited for, so that no other process gets its number.
@@ -193,6 +231,10 @@ mod system {
 
     pub fn in_own_group(_: &mut Command) {}
 
+    pub fn guard(_: u32) -> io::Result<Option<Child>> {
+        Ok(None)
+    }
+
     pub fn ended_well(child: &mut Child) -> io::Result<Option<bool>> {
         Ok(child.try_wait()?.map(|status| status.success()))
     }
@@ -206,4 +248,4 @@ mod system {
     pub fn kill_group(_: u32) {}
 }
 
-use system::{SHELL, ended_well, in_own_group, kill, kill_group, terminate};
+use system::{SHELL, ended_well, guard, in_own_group, kill, kill_group, terminate};

@@ -10,14 +10,14 @@ use std::{
 
 use serde::Serialize;
 use tandem_episodes::{
-    evaluation::PlannedEpisodes,
+    evaluation::{PlannedEpisodes, RunState, is_being_played},
     results::{EPISODES, PlayedEpisode},
 };
 
 /// How deep below the runs folder they lie.
 const DEPTH: usize = 3;
 
-/// One that is not complete and in which nothing has happened for so long has been stopped.
+/// Where nobody says whether an evaluation is played, one in which nothing has happened for so long has been stopped.
 const STOPPED_AFTER: Duration = Duration::from_secs(600);
 
 /// What was read of them last.
@@ -96,10 +96,23 @@ fn entry(
 ) -> Option<EvaluationEntry> {
     let name = folder.strip_prefix(runs).ok()?.to_str()?.replace('\\', "/");
     let planned = PlannedEpisodes::read_all(folder);
-    let lately = changed.elapsed().map_or(true, |since| since < STOPPED_AFTER);
     let last_unix_s = changed.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
-    let runs = lately && planned.is_some_and(|planned| counts.played < planned);
+    let runs = planned.is_some_and(|planned| is_played(folder, planned, counts.played, changed));
+    let planned = planned.map(|planned| planned.episodes);
     Some(EvaluationEntry { folder: name, counts, planned, last_unix_s, runs })
+}
+
+/// Whether episodes are being played in an evaluation, in which something `changed` last then.
+fn is_played(folder: &Path, planned: PlannedEpisodes, played: usize, changed: SystemTime) -> bool {
+    match (planned.state, is_being_played(folder)) {
+        (Some(RunState::Complete | RunState::Stopped), _) => false,
+        // The process may be gone without having been able to say so.
+        (_, Some(is_played)) => is_played,
+        (_, None) => {
+            let lately = changed.elapsed().map_or(true, |since| since < STOPPED_AFTER);
+            lately && played + planned.left_out < planned.episodes
+        }
+    }
 }
 
 impl EvaluationCounts {

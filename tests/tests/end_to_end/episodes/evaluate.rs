@@ -3,15 +3,19 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use serde_json::json;
-use tandem_episodes::evaluation::{EpisodeEvent, EvaluationPlan, KeptFiles, Shard, Starts, evaluate};
+use tandem_episodes::evaluation::{
+    EpisodeEvent, EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate,
+};
 use tandem_episodes::players::OpenLoop;
 use tandem_episodes::replay::{Verdict, verify};
 use tandem_episodes::reports::{EvaluationReport, load};
 use tandem_episodes::results::PlayedEpisode;
 use tandem_episodes::{
-    Controller, EpisodeSpec, Recording, RendererKind, RobotFile, Sensing, Variation, players, tasks,
+    Controller, EpisodeSpec, Instructions, Recording, RendererKind, RobotFile, Sensing, Variation, players,
+    tasks,
 };
 use tandem_tools_spec::{Assistance, Disclosure, EndReason, Hints, Protocol};
+use tempfile::TempDir;
 
 fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
     let handover = tasks::find("handover").expect("a task");
@@ -25,6 +29,7 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         assistance: Assistance::Full,
         disclosure: Disclosure::Live,
         hints: Hints::On,
+        instructions: Instructions::default(),
         variation: Variation::default(),
         stress: None,
         thinking_limit_s: None,
@@ -38,13 +43,19 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         files: KeptFiles::default(),
         retries: EvaluationPlan::DEFAULT_RETRIES,
         seed_key: None,
+        existing: ExistingRun::Refuse,
     }
 }
 
 #[test]
 fn what_policies_are_told_is_recorded_and_not_mixed() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let play = |assistance: Assistance, disclosure: Disclosure, hints: Hints, name: &str| {
+    let folders = [(); 3].map(|()| tempfile::tempdir().expect("a temporary folder"));
+    let [one, two, three] = folders.each_ref();
+    let play = |folder: &TempDir,
+                assistance: Assistance,
+                disclosure: Disclosure,
+                hints: Hints,
+                name: &str| {
         let plan = EvaluationPlan { assistance, disclosure, hints, ..plan(1, vec![1]) };
         let mut evaluation = evaluate(&plan, folder.path(), &|_| {}).expect("it is played");
         assert_eq!(evaluation.full_name(), name);
@@ -54,19 +65,24 @@ fn what_policies_are_told_is_recorded_and_not_mixed() {
         assert_eq!(results["assistance"], json!(assistance));
         let EpisodeSpec { assistance: of_spec, disclosure: of_phases, hints: of_texts, .. } = told.spec;
         assert_eq!((of_spec, of_phases, of_texts), (assistance, disclosure, hints));
-        assert_eq!((told.result.assistance, &told.result.departures), (assistance, &told.spec.departures()));
+        assert_eq!(told.result.assistance, assistance);
+        assert!(told.result.departures.starts_with(&told.spec.departures()), "{:?}", told.result.departures);
         told
     };
     let (full, paper) = (Assistance::Full, Assistance::Paper);
-    let live = play(full, Disclosure::Live, Hints::On, "expert + assistance: full");
+    let live = play(one, full, Disclosure::Live, Hints::On, "expert + assistance: full");
     assert_eq!((live.result.ended, live.note), (EndReason::TaskComplete, None));
-    let told = play(paper, Disclosure::End, Hints::Off, "expert");
+    let told = play(two, paper, Disclosure::End, Hints::Off, "expert");
     assert_eq!((told.result.ended, told.note), (EndReason::Finished, None), "it is played anew");
     assert_eq!(told.result.phases, live.result.phases, "an expert needs nothing of what only `full` tells");
     assert_eq!(told.result.extra_information, [""; 0]);
     let name = "expert + phases told: never + hints: on";
-    let never = play(paper, Disclosure::Never, Hints::On, name);
+    let never = play(three, paper, Disclosure::Never, Hints::On, name);
     assert_eq!(never.result.phases, live.result.phases, "results have every phase");
+    // Who is told otherwise plays another run, which has a folder of its own.
+    let mixed = evaluate(&EvaluationPlan { assistance: paper, ..plan(1, vec![1]) }, one.path(), &|_| {});
+    let refused = mixed.expect_err("another run is there").to_string();
+    assert!(refused.contains("assistance is \"paper\", and was \"full\""), "{refused}");
 }
 
 /// State hashes without the times that a machine took.

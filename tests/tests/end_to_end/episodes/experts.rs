@@ -4,14 +4,14 @@
 use std::ops::RangeInclusive;
 use std::thread::available_parallelism;
 
-use tandem_episodes::evaluation::{EvaluationPlan, KeptFiles, Shard, Starts, evaluate};
+use tandem_episodes::evaluation::{EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate};
 use tandem_episodes::players::{
     self, Episode, EpisodeOutput, InProcess, PlayerError, Policy, PrivilegedEpisode, experts,
 };
 use tandem_episodes::tasks::{self, Task};
 use tandem_episodes::{
-    A, B, C, Controller, EpisodeSpec, Facts, RendererKind, RobotFile, Sensing, Session, Variation,
-    tandem_plus,
+    A, B, C, Controller, EpisodeSpec, Facts, Instructions, RendererKind, RobotFile, Sensing, Session,
+    Variation, tandem_plus,
 };
 use tandem_sim::{SensorModel, Side};
 use tandem_tools_spec::{ActCall, Assistance, Protocol, ToolCall, ToolReply};
@@ -40,6 +40,7 @@ fn solve(tasks: Vec<&'static Task>, may_fail: usize) {
         assistance: Assistance::Paper,
         disclosure: Assistance::Paper.disclosure(),
         hints: Assistance::Paper.hints(),
+        instructions: Instructions::default(),
         variation: Variation::default(),
         stress: None,
         thinking_limit_s: None,
@@ -53,6 +54,7 @@ fn solve(tasks: Vec<&'static Task>, may_fail: usize) {
         files: KeptFiles::default(),
         retries: EvaluationPlan::DEFAULT_RETRIES,
         seed_key: None,
+        existing: ExistingRun::Refuse,
     };
     let folder = tempfile::tempdir().expect("a temporary folder");
     let played = evaluate(&plan, folder.path(), &|_| {}).expect("worlds can be built").episodes;

@@ -1,9 +1,9 @@
 //! Tasks of files beside the same tasks in Rust, and what is kept of a file.
 
-use tandem_episodes::evaluation::{EvaluationPlan, KeptFiles, Shard, Starts, evaluate};
+use tandem_episodes::evaluation::{EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate};
 use tandem_episodes::players;
 use tandem_episodes::tasks::{self, Task};
-use tandem_episodes::{Controller, RendererKind, RobotFile, Sensing, Variation, read_task};
+use tandem_episodes::{Controller, Instructions, RendererKind, RobotFile, Sensing, Variation, read_task};
 use tandem_tools_spec::{Assistance, PhaseTimes, Protocol};
 
 /// As the book names them.
@@ -21,6 +21,7 @@ fn played(task: &'static Task) -> Vec<(PhaseTimes, Option<String>)> {
         assistance: Assistance::Paper,
         disclosure: Assistance::Paper.disclosure(),
         hints: Assistance::Paper.hints(),
+        instructions: Instructions::default(),
         variation: Variation::default(),
         stress: None,
         thinking_limit_s: None,
@@ -34,6 +35,7 @@ fn played(task: &'static Task) -> Vec<(PhaseTimes, Option<String>)> {
         files: KeptFiles::default(),
         retries: EvaluationPlan::DEFAULT_RETRIES,
         seed_key: None,
+        existing: ExistingRun::Refuse,
     };
     let folder = tempfile::tempdir().expect("a temporary folder");
     let episodes = evaluate(&plan, folder.path(), &|_| {}).expect("worlds can be built").episodes;

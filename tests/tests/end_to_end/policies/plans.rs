@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use tandem_episodes::{
-    Controller, Recorder, Recording, RendererKind, RobotFile, Sensing, Variation,
-    evaluation::{Evaluation, EvaluationPlan, KeptFiles, Shard, Starts, evaluate},
+    Controller, Instructions, Recorder, Recording, RendererKind, RobotFile, Sensing, Variation,
+    evaluation::{Evaluation, EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate},
     players::Policy,
     tasks,
 };
@@ -22,6 +22,7 @@ pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> EvaluationPla
         assistance: Assistance::Paper,
         disclosure: Assistance::Paper.disclosure(),
         hints: Assistance::Paper.hints(),
+        instructions: Instructions::default(),
         variation: Variation::default(),
         stress: None,
         thinking_limit_s: None,
@@ -35,6 +36,7 @@ pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> EvaluationPla
         files: KeptFiles::default(),
         retries: EvaluationPlan::DEFAULT_RETRIES,
         seed_key: None,
+        existing: ExistingRun::Refuse,
     }
 }
 

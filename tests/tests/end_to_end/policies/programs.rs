@@ -5,7 +5,7 @@ use std::{env, fs, io::Read, path::Path, time::Duration};
 use serde_json::{Value, json};
 use tandem::drivers::Program;
 use tandem_episodes::{
-    evaluation::{Evaluation, EvaluationPlan},
+    evaluation::{Evaluation, EvaluationPlan, evaluate},
     reports::{EvaluationReport, ReportFormat, ReportPictures, load},
     results::{Exclusion, PlayedEpisode},
 };
@@ -128,11 +128,9 @@ fn a_program_plays_and_its_words_are_kept() {
     let again = play(&plan, folder.path());
     assert_eq!(again.episodes, evaluation.episodes, "what was played is kept");
     let longer = program(&agent_command("finish"), LONG * 2);
-    let other = play(&super::plans::plan(&longer, vec![1], true), folder.path());
-    assert_ne!(
-        other.episodes[0].thought_s, evaluation.episodes[0].thought_s,
-        "another limit is another policy"
-    );
+    let other = evaluate(&super::plans::plan(&longer, vec![1, 2], true), folder.path(), &|_| {});
+    let refused = other.expect_err("another limit is another policy").to_string();
+    assert!(refused.contains("policy_settings.limit_s is 200"), "{refused}");
 }
 
 #[test]

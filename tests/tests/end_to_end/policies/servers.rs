@@ -117,7 +117,8 @@ fn each_robot_may_have_a_policy_of_its_own() {
     assert!(servers.iter().all(|server| server.requests.lock().expect("no panic").len() == 51));
 
     let three = RemotePolicy::new(PolicyProtocol::Openpi, vec![servers[0].url(); 3], first_twenty);
-    let evaluation = play(&plan(&three, vec![2], false), folder.path());
+    let elsewhere = tempfile::tempdir().expect("a temporary folder");
+    let evaluation = play(&plan(&three, vec![2], false), elsewhere.path());
     assert_eq!(
         evaluation.left_out,
         ["handover seed 2: 3 servers for 2 robots; give one for all, or one for each"]

@@ -50,7 +50,8 @@ fn a_server_that_fails_ends_its_episode_and_no_other() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let policy = RemotePolicy::new(PolicyProtocol::Openpi, vec![server.url()], map(folder.path(), FAST));
     let one_by_one = |seed: u32| {
-        let evaluation = play(&plan(&policy, vec![seed], false), folder.path());
+        let out = folder.path().join(seed.to_string());
+        let evaluation = play(&plan(&policy, vec![seed], false), &out);
         let [played] = &evaluation.episodes[..] else { panic!("{evaluation:?}") };
         (played.result.ended, played.result.env_steps, played.note.clone().unwrap_or_default())
     };
@@ -96,11 +97,11 @@ fn a_policy_that_is_not_ready_is_left_out_and_played_the_next_time() {
     play(&plan(&policy, vec![1], false), folder.path());
     assert_eq!(asked(), before, "it is kept");
     let longer = PolicyMap { reply_s: 6.0, ..fast() };
-    play(
-        &plan(&RemotePolicy::new(PolicyProtocol::Openpi, vec![sound.url()], longer), vec![1], false),
-        folder.path(),
-    );
-    assert!(asked() > before, "another map is another policy");
+    let longer = RemotePolicy::new(PolicyProtocol::Openpi, vec![sound.url()], longer);
+    let other = evaluate(&plan(&longer, vec![1], false), folder.path(), &|_| {});
+    let refused = other.expect_err("another map is another policy").to_string();
+    assert!(refused.contains("policy_settings.reply_s is 6"), "{refused}");
+    assert_eq!(asked(), before, "nobody is asked");
 }
 
 /// An address at which nobody listens.

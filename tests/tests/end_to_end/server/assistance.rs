@@ -167,10 +167,11 @@ fn starts_and_results_say_what_is_told() {
         server.tool(&id, "wait", &json!({ "steps": 1 })).ok();
         let result = server.delete(&format!("/v1/episodes/{id}")).ok();
         assert_eq!(result["assistance"], json!(assistance));
+        let own = ["controller: Tandem's own", "instructions: Tandem's own"];
         let (departures, shown) = match assistance {
-            Assistance::Paper => (Value::Null, Value::Null),
+            Assistance::Paper => (json!(own), Value::Null),
             Assistance::Full => (
-                json!(["assistance: full"]),
+                json!([own[0], own[1], "assistance: full"]),
                 json!({
                     "joint_torques": { "A": 1, "B": 1 },
                     "hand_forces": { "A": 1, "B": 1 },

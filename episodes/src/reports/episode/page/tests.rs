@@ -34,6 +34,7 @@ fn result(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> ResultReply {
         assistance: Assistance::Full,
         extra_information: vec![],
         extra_information_replies: Default::default(),
+        joints_clamped_share: None,
         departures: vec![],
         recording_failed: None,
         usage: None,
@@ -51,8 +52,19 @@ fn page_of(begin_s: f64, result: &ResultReply) -> String {
     let moments = [KeyMoment { caption: ["p1 <grasp>".into(), "4.0 s".into()], views }];
     let rules = rules(protocol, task);
     let said = [SaidWords { time_s: 1.5, robot: "A".into(), text: "the <red> one".into() }];
-    EpisodePage { task, result, calls: &calls, said: &said, begin_s, rules, budget_left, moments: &moments }
-        .html()
+    let instruction = task.instruction;
+    EpisodePage {
+        task,
+        instruction,
+        result,
+        calls: &calls,
+        said: &said,
+        begin_s,
+        rules,
+        budget_left,
+        moments: &moments,
+    }
+    .html()
 }
 
 #[test]

@@ -85,7 +85,7 @@ pub fn floors(groups: &[PolicyGroup], policies: &[PolicyReport]) -> Vec<TaskFloo
 /// In which task and what circumstances an episode was played. What its policy is told moves nobody who hears nothing.
 fn place(played: &PlayedEpisode) -> FloorKey {
     let spec = EpisodeSpec { instructions: None, ..played.spec.clone() }.assisted(Assistance::Paper);
-    (spec.task.id, spec.departures())
+    (spec.task.id, spec.peculiarities())
 }
 
 fn plays_as(group: &PolicyGroup, player: &str) -> bool {
@@ -137,7 +137,7 @@ fn shipped_row(line: &str) -> Option<(FloorKey, FloorRate)> {
         measured: format!("earlier: seeds {first_seed}-{last_seed}, build {build}"),
         phases: reached.iter().map(rate).collect::<Option<_>>()?,
     };
-    Some(((task.id, spec.departures()), rate))
+    Some(((task.id, spec.peculiarities()), rate))
 }
 
 #[cfg(test)]

@@ -32,6 +32,13 @@ impl PolicyMap {
         for names in self.state.values() {
             state_columns(names)?;
         }
+        for (table, keys) in [("state", &self.state), ("action", &self.action)] {
+            if let Some((key, _)) = keys.iter().find(|(_, names)| names.is_empty()) {
+                return Err(format!(
+                    "[{table}] has no column under {key:?}; name some, or leave the key out"
+                ));
+            }
+        }
         let told = self.check_action()?;
         self.check_wrists(&told)?;
         self.check_delta(&told)?;
@@ -243,6 +250,8 @@ mod tests {
             "\"waist_yaw_joint\" is told twice",
         );
         check("[action]", "tells no column");
+        check("[action]\n\"a\" = [\"row\"]\n\"b\" = []", "[action] has no column under \"b\"");
+        check("[state]\n\"s\" = []", "[state] has no column under \"s\"");
         check("[chunk]\nrows = 0", "rows is 0");
         check(
             "[chunk]\nrows = 50\nexecute = 60",

@@ -315,9 +315,13 @@ impl PolicyMap {
         shown
     }
 
-    /// As [`PolicyMap::shown`], by name.
+    /// As [`PolicyMap::shown`], by name, and what else a policy is told of its episode that the benchmark's are not.
     pub fn extra_information(&self) -> Vec<String> {
-        self.shown().into_iter().map(|what| what.name().into()).collect()
+        let of_moment = [("episode", "episode number"), ("step", "clock")];
+        let is_named = |column: &str| self.state.values().flatten().any(|name| name == column);
+        let of_moment = of_moment.into_iter().filter(|(column, _)| is_named(column));
+        let shown = self.shown().into_iter().map(|what| what.name().to_owned());
+        shown.chain(of_moment.map(|(_, what)| what.to_owned())).collect()
     }
 
     /// Whether the camera that sees all robots is shown.
@@ -340,6 +344,17 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
         PolicyMap::find(&file.path().display().to_string())
+    }
+
+    #[test]
+    fn a_clock_and_the_number_of_an_episode_are_named() {
+        let map =
+            read("preset = \"openpi\"\n[state]\n\"s\" = [\"left_arm\", \"step\", \"episode\", \"reset\"]\n")
+                .unwrap();
+        assert_eq!(
+            (map.extra_information(), map.shown()),
+            (vec!["episode number".into(), "clock".into()], vec![])
+        );
     }
 
     #[test]

@@ -1,0 +1,291 @@
+//! The identity of a run: who plays which episodes by which rules on which build, as `run.json` has it. One folder holds one run.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use xxhash_rust::xxh3::xxh3_64;
+
+use super::{EvaluationPlan, Starts};
+use crate::results::{PlayedEpisode, PolicyCard};
+use crate::spec::{EpisodeSpec, Start};
+use crate::tasks::Task;
+
+/// Largest number of differences that an error names.
+const MAX_DIFFERENCES: usize = 6;
+
+/// Longest part of a folder's name that is the policy's, in characters.
+const MAX_NAME_CHARS: usize = 40;
+
+/// Fields of a spec that differ between the episodes of a run.
+const OF_SINGLE_EPISODES: [&str; 4] = ["task", "seed", "start", "instructions"];
+
+/// The content of `run.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunIdentity {
+    #[serde(flatten)]
+    pub policy: PolicyCard,
+    /// Name of the base controller, which tells files of different content apart.
+    pub controller: String,
+    /// The spec that all its episodes share.
+    pub rules: Value,
+    /// Its tasks by id, each with the file or the words in place of the built-in ones.
+    pub tasks: BTreeMap<String, String>,
+    pub seeds: SeedList,
+    /// Where its episodes begin, if not at their tasks' own beginnings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub starts: Option<Value>,
+    /// The builds that have played it, the last one last.
+    pub builds: Vec<String>,
+}
+
+/// Seeds, written as `0-9,12`.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub struct SeedList(pub BTreeSet<u32>);
+
+impl RunIdentity {
+    /// The run that plays `plan` on `build`, whose base controller has this name.
+    pub fn of_plan(plan: &EvaluationPlan, controller: &str, build: &str) -> RunIdentity {
+        let seed = plan.seeds.first().copied().unwrap_or_default();
+        let planned = |task: &'static Task| plan.spec(task, seed, Start::Task);
+        let specs: Vec<EpisodeSpec> = match &plan.starts {
+            Starts::Task | Starts::Phases { .. } => plan.tasks.iter().map(|task| planned(task)).collect(),
+            Starts::Moments { failed, .. } => failed.iter().map(|failed| failed.spec.clone()).collect(),
+        };
+        let seeds = match &plan.starts {
+            Starts::Task | Starts::Phases { .. } => plan.seeds.iter().copied().collect(),
+            Starts::Moments { failed, .. } => failed.iter().map(|failed| failed.spec.seed).collect(),
+        };
+        let starts = match &plan.starts {
+            Starts::Task => None,
+            Starts::Phases { demonstrations, phases } => {
+                let demonstrations = std::path::absolute(demonstrations).unwrap_or(demonstrations.clone());
+                Some(json!({ "phases": phases, "demonstrations": demonstrations }))
+            }
+            Starts::Moments { failed, before_s } => {
+                let failed: Vec<_> = failed.iter().map(|failed| &failed.recording).collect();
+                Some(json!({ "again": failed, "before_s": before_s }))
+            }
+        };
+        RunIdentity {
+            policy: plan.player.card(),
+            controller: controller.into(),
+            rules: specs.first().map(rules).unwrap_or_default(),
+            tasks: specs.iter().map(|spec| (spec.task.id.into(), words(spec))).collect(),
+            seeds: SeedList(seeds),
+            starts,
+            builds: vec![build.into()],
+        }
+        .read_back()
+    }
+
+    /// The run of one episode, of which nothing else is known: builds before this one wrote no `run.json`.
+    pub fn of_episode(played: &PlayedEpisode) -> RunIdentity {
+        let spec = &played.spec;
+        RunIdentity {
+            policy: played.policy.clone(),
+            controller: played.locomotion.clone(),
+            rules: rules(spec),
+            tasks: BTreeMap::from([(spec.task.id.into(), words(spec))]),
+            seeds: SeedList(BTreeSet::from([spec.seed])),
+            starts: None,
+            builds: vec![played.build.clone()],
+        }
+        .read_back()
+    }
+
+    /// Numbers may lose a bit on their way through text, so that only what was read is compared with what was read.
+    fn read_back(self) -> RunIdentity {
+        let read = serde_json::to_string(&self).and_then(|text| serde_json::from_str(&text));
+        read.unwrap_or(self)
+    }
+
+    /// The build that played it last.
+    pub fn build(&self) -> &str {
+        self.builds.last().map_or("", String::as_str)
+    }
+
+    /// Where the run `now` is another than this one, a line each. The build is left out; tasks and seeds may have been added.
+    pub fn differences(&self, now: &RunIdentity) -> Vec<String> {
+        let (was, is) = (self.leaves(), now.leaves());
+        let names: BTreeSet<&String> = was.keys().chain(is.keys()).collect();
+        let missing = "nothing".to_owned();
+        let differing = names.into_iter().filter(|name| was.get(*name) != is.get(*name)).map(|name| {
+            let of = |leaves: &BTreeMap<String, String>| leaves.get(name).unwrap_or(&missing).clone();
+            difference(name, &of(&is), &of(&was))
+        });
+        let mut found: Vec<String> = differing.collect();
+        if self.tasks.iter().any(|(id, words)| now.tasks.get(id) != Some(words)) {
+            found.push(format!("tasks are {}, and were {}", now.task_names(), self.task_names()));
+        }
+        if !self.seeds.0.is_subset(&now.seeds.0) {
+            let [is, was] = [now, self].map(|run| String::from(run.seeds.clone()));
+            found.push(format!("seeds are {is}, and were {was}"));
+        }
+        if found.len() > MAX_DIFFERENCES {
+            let more = found.len() - MAX_DIFFERENCES;
+            found.truncate(MAX_DIFFERENCES);
+            found.push(format!("and {more} more"));
+        }
+        found
+    }
+
+    /// Whether the run `now` has the same episodes, and more.
+    pub fn grows_to(&self, now: &RunIdentity) -> bool {
+        self.tasks.len() < now.tasks.len() || self.seeds.0.len() < now.seeds.0.len()
+    }
+
+    fn task_names(&self) -> String {
+        let name = |(id, words): (&String, &String)| match words.as_str() {
+            BUILT_IN => id.clone(),
+            words => format!("{id} ({words})"),
+        };
+        self.tasks.iter().map(name).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Every value of it by its path, but for tasks, seeds and builds.
+    fn leaves(&self) -> BTreeMap<String, String> {
+        let RunIdentity { policy, controller, rules, tasks: _, seeds: _, starts, builds: _ } = self;
+        let mut found = BTreeMap::new();
+        collect("", &json!(policy), &mut found);
+        collect("controller", &json!(controller), &mut found);
+        collect("", rules, &mut found);
+        collect("starts", &json!(starts), &mut found);
+        found
+    }
+
+    /// Name of a folder for this run, on whichever build: `expert-benchmark-0123abcd`.
+    pub fn folder_name(&self) -> String {
+        let all = format!("{:?}", (self.leaves(), &self.tasks, &self.seeds));
+        let protocol = self.rules["protocol"].as_str().unwrap_or("run");
+        format!("{}-{protocol}-{:08x}", plain(&self.policy.name), xxh3_64(all.as_bytes()) >> 32)
+    }
+}
+
+/// Default folder of the run that plays `plan` as the policy called `name`, in the folder `runs`.
+pub fn default_folder(plan: &EvaluationPlan, name: Option<&str>, runs: &Path) -> std::path::PathBuf {
+    // Two files with one name would share a default, and the second would be refused there.
+    let controller = json!(plan.locomotion).to_string();
+    let mut identity = RunIdentity::of_plan(plan, &controller, "");
+    if let Some(name) = name {
+        identity.policy = name.into();
+    }
+    runs.join(identity.folder_name())
+}
+
+/// What a task is told and made of, where nothing else takes its place.
+const BUILT_IN: &str = "built in";
+
+fn words(spec: &EpisodeSpec) -> String {
+    let file = spec.task.file.as_ref().map(|file| format!("{} {}", file.source.name, file.xxh3));
+    let instructions = spec.instructions.as_ref().map(|words| format!("instructions {}", words.xxh3));
+    let own: Vec<String> = file.into_iter().chain(instructions).collect();
+    if own.is_empty() { BUILT_IN.into() } else { own.join(", ") }
+}
+
+fn rules(spec: &EpisodeSpec) -> Value {
+    let mut rules = json!(spec);
+    if let Value::Object(fields) = &mut rules {
+        fields.retain(|name, _| !OF_SINGLE_EPISODES.contains(&name.as_str()));
+        if let Some(Value::Object(keyed)) = fields.get_mut("keyed_seed") {
+            // What the key draws is of single episodes, too.
+            keyed.retain(|name, _| name != "drawn");
+        }
+    }
+    rules
+}
+
+fn difference(name: &str, is: &str, was: &str) -> String {
+    format!("{name} is {is}, and was {was}")
+}
+
+fn collect(path: &str, value: &Value, found: &mut BTreeMap<String, String>) {
+    match value {
+        Value::Object(fields) => {
+            for (name, value) in fields {
+                let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+                collect(&path, value, found);
+            }
+        }
+        Value::Null => {}
+        Value::String(text) => drop(found.insert(path.into(), format!("{text:?}"))),
+        value => drop(found.insert(path.into(), value.to_string())),
+    }
+}
+
+/// A policy's name as a part of a folder's name.
+fn plain(name: &str) -> String {
+    let mut plain = String::new();
+    for letter in name.chars() {
+        match letter {
+            letter if letter.is_ascii_alphanumeric() || "._".contains(letter) => plain.push(letter),
+            _ if plain.ends_with('-') || plain.is_empty() => {}
+            _ => plain.push('-'),
+        }
+        if plain.len() == MAX_NAME_CHARS {
+            break;
+        }
+    }
+    let plain = plain.trim_matches(['-', '.']);
+    if plain.is_empty() { "policy".into() } else { plain.into() }
+}
+
+impl From<SeedList> for String {
+    fn from(SeedList(seeds): SeedList) -> String {
+        let mut ranges: Vec<(u32, u32)> = Vec::new();
+        for seed in seeds {
+            match ranges.last_mut() {
+                Some((_, last)) if last.checked_add(1) == Some(seed) => *last = seed,
+                _ => ranges.push((seed, seed)),
+            }
+        }
+        let range =
+            |(first, last)| if first == last { format!("{first}") } else { format!("{first}-{last}") };
+        ranges.into_iter().map(range).collect::<Vec<_>>().join(",")
+    }
+}
+
+impl TryFrom<String> for SeedList {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<SeedList, String> {
+        let number = |text: &str| text.parse::<u32>().map_err(|_| format!("{text:?} is no seed"));
+        let mut seeds = BTreeSet::new();
+        for range in text.split(',').filter(|range| !range.is_empty()) {
+            let (first, last) = range.split_once('-').unwrap_or((range, range));
+            seeds.extend(number(first)?..=number(last)?);
+        }
+        Ok(SeedList(seeds))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seeds_are_written_as_ranges() {
+        for (seeds, text) in [(vec![], ""), (vec![7], "7"), (vec![3, 0, 1, 2, 9, 11, 12], "0-3,9,11-12")] {
+            let list = SeedList(seeds.into_iter().collect());
+            assert_eq!(String::from(list.clone()), text);
+            assert_eq!(SeedList::try_from(text.to_owned()), Ok(list));
+        }
+        assert!(SeedList::try_from("0-x".to_owned()).is_err());
+    }
+
+    #[test]
+    fn a_folder_is_named_by_a_policy_whatever_that_is_called() {
+        for (name, expected) in [
+            ("expert", "expert"),
+            ("exec:python3 ../agent.py --model 'x'", "exec-python3-..-agent.py-model-x"),
+            ("..", "policy"),
+            ("代理", "policy"),
+            ("openpi:ws://127.0.0.1:8000", "openpi-ws-127.0.0.1-8000"),
+        ] {
+            assert_eq!(plain(name), expected);
+        }
+        assert!(plain(&"long ".repeat(50)).len() <= MAX_NAME_CHARS);
+    }
+}

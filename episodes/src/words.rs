@@ -1,0 +1,114 @@
+//! Words of a file of instructions, as an episode is told them in place of its task's own.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use xxhash_rust::xxh3::xxh3_64;
+
+use crate::tasks::{Task, TaskWords};
+
+/// What a file of instructions says of one task. What it leaves out keeps the task's own words.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "RecordedWords")]
+pub struct OwnWords {
+    /// Hash of the texts, by which results tell words apart.
+    pub xxh3: String,
+    /// For a policy that directs all robots.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
+    /// By robot, for policies that direct one each.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub robots: BTreeMap<String, String>,
+}
+
+/// Hashes of the benchmark's own words, joint and of each robot, which are published and which a file of instructions may hold: one for
+/// each task, in the order of [`crate::tasks::ALL`].
+const BENCHMARK_WORDS: [&str; 10] = [
+    "e6e83c5720b2bda4",
+    "811edfc525362d72",
+    "e0fb3a429bed504e",
+    "a090d2464262cbad",
+    "5d9af061e22a4c2f",
+    "4a433d04b8e9c6fd",
+    "a3ff536ba94812bd",
+    "f0201d82a6b526e7",
+    "ef96d1aef64a9a74",
+    "6f4320604cdab543",
+];
+
+/// What recordings have. Those of earlier builds hold the hash alone.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum RecordedWords {
+    Hash(String),
+    Texts {
+        xxh3: String,
+        #[serde(default)]
+        joint: Option<String>,
+        #[serde(default)]
+        robots: BTreeMap<String, String>,
+    },
+}
+
+impl From<RecordedWords> for OwnWords {
+    fn from(recorded: RecordedWords) -> OwnWords {
+        match recorded {
+            RecordedWords::Hash(xxh3) => OwnWords { xxh3, ..OwnWords::default() },
+            RecordedWords::Texts { xxh3, joint, robots } => OwnWords { xxh3, joint, robots },
+        }
+    }
+}
+
+impl OwnWords {
+    /// The words of these texts.
+    pub fn of(joint: Option<String>, robots: BTreeMap<String, String>) -> OwnWords {
+        let xxh3 = format!("{:016x}", xxh3_64(format!("{:?}", (&joint, &robots)).as_bytes()));
+        OwnWords { xxh3, joint, robots }
+    }
+
+    /// Whether they are those that the benchmark has for `task`.
+    pub fn are_the_benchmarks(&self, task: &Task) -> bool {
+        task.file.is_none() && BENCHMARK_WORDS.contains(&self.xxh3.as_str())
+    }
+
+    /// The words of `task` with these in place of those that they replace.
+    pub fn over(&self, task: &Task, words: TaskWords) -> TaskWords {
+        let TaskWords { joint, shared, robots } = words;
+        let own = |(name, text): (&str, String)| self.robots.get(name).cloned().unwrap_or(text);
+        TaskWords {
+            joint: self.joint.clone().unwrap_or(joint),
+            shared,
+            robots: task.robot_names().zip(robots).map(own).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tasks;
+
+    #[test]
+    fn the_benchmarks_words_are_known_where_a_file_has_them() {
+        assert_eq!(BENCHMARK_WORDS.len(), tasks::ALL.len());
+        let handover = &tasks::ALL[0];
+        let joint = "Pass the bottle directly from Robot A's right hand to Robot B's right hand, then place it on the target.";
+        let of_a = "Pick up the bottle directly in front of you with your right hand and hand it to your partner's right hand.";
+        let of_b = "Receive the bottle with your right hand, place it on the target directly in front of you, and release it.";
+        let robots = |of_b: &str| {
+            BTreeMap::from([("A", of_a), ("B", of_b)].map(|(name, text)| (name.to_owned(), text.to_owned())))
+        };
+        assert!(OwnWords::of(Some(joint.into()), robots(of_b)).are_the_benchmarks(handover));
+        assert!(!OwnWords::of(Some(joint.into()), robots("Take it.")).are_the_benchmarks(handover));
+        assert!(!OwnWords::of(None, robots(of_b)).are_the_benchmarks(handover));
+    }
+
+    #[test]
+    fn words_of_earlier_recordings_are_known_by_their_hash() {
+        let read = |text: &str| serde_json::from_str::<OwnWords>(text).unwrap();
+        let hash = OwnWords { xxh3: "00ff".into(), ..OwnWords::default() };
+        assert_eq!(read("\"00ff\""), hash);
+        let words = OwnWords { joint: Some("Pass it on.".into()), ..hash };
+        assert_eq!(read(&serde_json::to_string(&words).unwrap()), words);
+    }
+}

@@ -1,0 +1,40 @@
+//! The flags that say where a run lies, and what becomes of one that is there already.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use tandem_episodes::evaluation::{EvaluationPlan, ExistingRun, default_folder};
+
+/// Folder of the folders of runs.
+const RUNS: &str = "runs";
+
+/// The folder of a run.
+#[derive(Debug, Args)]
+pub struct RunFlags {
+    /// Folder of the run, for `results.json` and one file per episode [default: in the folder runs, a name made of policy, protocol and
+    /// everything else that makes the run what it is].
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Go on with the same run of another build of the program: what that has played is kept and marked, and only the rest is played.
+    #[arg(long)]
+    resume_with_new_build: bool,
+    /// Delete the run that the folder holds, and begin anew.
+    #[arg(long, conflicts_with = "resume_with_new_build")]
+    overwrite: bool,
+}
+
+impl RunFlags {
+    /// What becomes of a run that the folder holds already.
+    pub fn existing(&self) -> ExistingRun {
+        match (self.overwrite, self.resume_with_new_build) {
+            (true, _) => ExistingRun::Overwrite,
+            (false, true) => ExistingRun::ResumeWithNewBuild,
+            (false, false) => ExistingRun::Refuse,
+        }
+    }
+
+    /// The folder for `plan`, which without a flag is called as the policy is, or as `name` says.
+    pub fn folder(&self, plan: &EvaluationPlan, name: Option<&str>) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| default_folder(plan, name, Path::new(RUNS)))
+    }
+}
