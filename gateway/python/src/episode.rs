@@ -15,8 +15,8 @@ use tandem::hosting::{Answer, EpisodeMetrics, HostingError, PanicGuard};
 use tandem::settings::{Layer, Settings};
 use tandem_episodes::{Checkpoint, EpisodeError, EpisodeSpec, RobotObservation, Session};
 use tandem_tools_spec::{
-    ActCall, Assistance, Call, CommandReply, DepthFormat, Disclosure, EndReason, Formats, ImageFormat, JointChunk, Look, Observe,
-    ResultReply, SendJointChunk, Tool as _, ToolReply, parse_args,
+    ActCall, Assistance, Call, CommandReply, DepthFormat, Disclosure, EndReason, Formats, ImageFormat,
+    JointChunk, Look, Observe, ResultReply, SendJointChunk, Tool as _, ToolReply, parse_args,
 };
 
 use crate::arrays::{Colours, Depths, shaped, state_names, state_row};

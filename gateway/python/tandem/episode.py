@@ -146,7 +146,7 @@ class Episode(BaseEpisode):
         return Stepped(steps, cast(StopReason, reason), time_s, tuple(phases), tuple(fallen), ended)
 
     def snapshot(self) -> Snapshot:
-        """Where the episode stands, with all that its policy has used of its budget. An episode that an evaluation scores has none."""
+        """Returns the state of the episode, with what its policy has used of its budget. A scored episode has none."""
         return self._begun_native.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:

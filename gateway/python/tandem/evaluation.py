@@ -165,7 +165,8 @@ def evaluate(
     jobs: Episodes that run side by side, each on a thread of its own, on which the policy is called. Physics and drawing
         run at the same time; Python code of policies does not.
     settings: `name`, `protocol`, `assistance`, `instructions`, `out`, `overwrite`, `resume_with_new_build`, `record`,
-        `progress`, `renderer`, `state_estimate`, `sensors`, `stress`, `level`, `scene`, `robot`, `task_file`: see `EvaluationSettings`.
+        `progress`, `renderer`, `state_estimate`, `sensors`, `stress`, `level`, `scene`, `robot`, `task_file`: see
+        `EvaluationSettings`.
     """
     plan = Plan.of(policy, tasks, seeds, settings)
     return plan.evaluated(lambda folder: plan.play(folder, jobs))
