@@ -252,7 +252,7 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     write_result(&same.result, &folder.path().join("pouring-7")).unwrap();
     assert_eq!(collector.load(&spec), None, "a result without its recording");
     std::fs::write(folder.path().join("pouring-7/episode.mcap"), "").unwrap();
-    let other = ResultReply { state_hash: "0badc0ffee".into(), ..same.result.clone() };
+    let other = ResultReply { state_hash: Some("0badc0ffee".into()), ..same.result.clone() };
     write_result(&other, &folder.path().join("pouring-7")).unwrap();
     assert_eq!(collector.load(&spec), None, "another episode's recording");
     write_result(&same.result, &folder.path().join("pouring-7")).unwrap();
