@@ -14,4 +14,4 @@ mod skipped;
 mod tls;
 mod without_space;
 
-pub use server::{Delays, Server, partials};
+pub use server::{Delays, Server, hangups_are_ignored, partials};

@@ -102,3 +102,10 @@ impl Delays {
         Duration::from_millis((self.0 >> 33) % most_ms)
     }
 }
+
+/// Whether this process, and with it what it starts, ignores hangups, for example under `nohup`.
+pub fn hangups_are_ignored() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    ignored.and_then(|set| u64::from_str_radix(set.trim(), 16).ok()).is_some_and(|set| set & 1 == 1)
+}

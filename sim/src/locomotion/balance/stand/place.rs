@@ -22,7 +22,9 @@ const COASTS_S: f32 = 0.2;
 /// corrects the command by what he sees.
 const FORGETS_S: f32 = 4.0;
 const MOVED_LEASH_M: f32 = 0.25;
-/// A robot that was told to stop steps on until its feet are this near to where commands took it, or for this long.
+/// A robot that was told to move for no longer than this steps on until its feet are near to where commands took it, or for a while. One
+/// that has walked far stops as soon as it can.
+const MOVED_SHORT_S: f32 = 2.5;
 const MOVED_NEAR_M: f32 = 0.02;
 const MOVED_LONGEST_S: f32 = 0.6;
 const MOVED_RETURN_1_S: f32 = 2.0;
@@ -43,7 +45,8 @@ pub(in crate::locomotion::balance) struct StandingPlace {
 struct MovedPlace {
     /// Pelvis over the middle of the soles as the robot last stood, heading frame.
     rest_m: Vector,
-    /// Time since the commands ended.
+    /// Time for which commands have moved it, and time since they ended.
+    told_s: f32,
     ended_s: f32,
 }
 
@@ -58,7 +61,11 @@ impl StandingPlace {
         let feet_m = middle_m(&body.world_from_soles());
         let away_m = flat(body.world_from_pelvis().translation - feet_m);
         let rest_m = Rotation::from_rotation_z(-heading_rad) * away_m;
-        StandingPlace { middle_m: feet_m, heading_rad, moved: Some(MovedPlace { rest_m, ended_s: 0.0 }) }
+        StandingPlace {
+            middle_m: feet_m,
+            heading_rad,
+            moved: Some(MovedPlace { rest_m, told_s: 0.0, ended_s: 0.0 }),
+        }
     }
 
     /// Whether commands took the robot here.
@@ -83,6 +90,7 @@ impl StandingPlace {
         self.middle_m = robot_m + away_m.clamp_length_max(scale.length_m(MOVED_LEASH_M));
         self.heading_rad = heading_rad;
         if let Some(moved) = &mut self.moved {
+            moved.told_s += dt_s;
             moved.ended_s = 0.0;
         }
     }
@@ -107,7 +115,7 @@ impl StandingPlace {
         };
         moved.ended_s += dt_s;
         let there = landed && flat(self.middle_m - feet_m).length() < scale.length_m(MOVED_NEAR_M);
-        if there {
+        if there || moved.told_s > scale.time_s(MOVED_SHORT_S) {
             moved.ended_s = f32::INFINITY;
         }
         let goes_on = moved.ended_s < scale.time_s(MOVED_LONGEST_S);
@@ -180,6 +188,8 @@ mod tests {
         let (body, mut place) = moved(&command, 0.05);
         assert_eq!(place.velocity_m_s(&body, &load, 0.0, true, DT_S), None, "feet are within a centimetre");
         assert_eq!(place.velocity_m_s(&body, &load, 0.0, false, DT_S), None);
+        let (body, mut place) = moved(&command, MOVED_SHORT_S + 0.1);
+        assert_eq!(place.velocity_m_s(&body, &load, 0.0, false, DT_S), None, "it has walked far");
     }
 
     #[test]
