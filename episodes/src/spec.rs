@@ -1,5 +1,7 @@
 //! What makes an episode what it is, in one value: from a request or flags to the session, the recording and the results.
 
+mod keyed_seed;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -18,6 +20,8 @@ use crate::stress::{self, Stress};
 use crate::tasks::{Spread, Task, TaskWords};
 use crate::variation::Variation;
 use crate::words::OwnWords;
+
+pub use keyed_seed::KeyedSeed;
 
 /// What results say of a base controller and of instructions.
 const CONTROLLER: &str = "controller: ";
@@ -69,15 +73,6 @@ pub struct EpisodeSpec {
     /// What an evaluator's key makes of the seed, where there is a key.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub keyed_seed: Option<KeyedSeed>,
-}
-
-/// The seed that an evaluator's key draws for a public one.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct KeyedSeed {
-    /// Names the key and tells nothing of it.
-    pub key_fingerprint: String,
-    /// The seed in whose place it stands.
-    pub drawn: u32,
 }
 
 /// Which file describes the robots.
@@ -184,25 +179,6 @@ impl EpisodeSpec {
     /// The same with another seed, and what that chooses.
     pub fn seeded(&self, seed: u32) -> EpisodeSpec {
         EpisodeSpec { task: self.task.under(seed), seed, keyed_seed: None, ..self.clone() }
-    }
-
-    /// The same with what an evaluator's key makes of the seed.
-    pub fn keyed(self, keyed_seed: Option<KeyedSeed>) -> EpisodeSpec {
-        let drawn = keyed_seed.as_ref().map_or(self.seed, |keyed| keyed.drawn);
-        EpisodeSpec { task: self.task.under(drawn), keyed_seed, ..self }
-    }
-
-    /// The seed that decides what happens: the evaluator's, where a key has drawn one.
-    pub fn world_seed(&self) -> u32 {
-        self.keyed_seed.as_ref().map_or(self.seed, |keyed| keyed.drawn)
-    }
-
-    /// The seed, as far as the policy is told.
-    pub fn told_seed(&self) -> Option<u32> {
-        match self.assistance {
-            Assistance::Paper => None,
-            Assistance::Full => Some(self.seed),
-        }
     }
 
     /// How far the seed moves things.

@@ -10,7 +10,7 @@ use tandem_sim::{CONTROL_HZ, RobotCommand, Side, SplitMix64};
 /// What is added to the targets of arms, waist and fingers; nothing corrects it, because no robot knows where the load or the
 /// others are.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Disturbance {
+pub(super) enum ArmDisturbance {
     None,
     /// To both shoulders' pitch of every robot within a second, rad: below zero hands press towards what is before them.
     Shoulders(f32),
@@ -28,13 +28,13 @@ const NOISE_STEPS: u32 = 10;
 
 /// One disturbance under way.
 pub(super) struct Disturber {
-    disturbance: Disturbance,
+    disturbance: ArmDisturbance,
     random: SplitMix64,
     noise_rad: Vec<[f32; UPPER_JOINTS]>,
 }
 
 impl Disturber {
-    pub(super) fn new(disturbance: Disturbance, seed: u32, team_size: usize) -> Disturber {
+    pub(super) fn new(disturbance: ArmDisturbance, seed: u32, team_size: usize) -> Disturber {
         let noise_rad = vec![[0.0; UPPER_JOINTS]; team_size];
         Disturber { disturbance, random: SplitMix64(seed.into()), noise_rad }
     }
@@ -45,13 +45,13 @@ impl Disturber {
         for (place, robot) in team.iter().enumerate() {
             let upper_rad = &mut commands[*robot].upper_rad;
             match self.disturbance {
-                Disturbance::None => {}
-                Disturbance::Shoulders(by_rad) => pitch_shoulders(upper_rad, by_rad * share),
-                Disturbance::OneWay(by_rad) => {
+                ArmDisturbance::None => {}
+                ArmDisturbance::Shoulders(by_rad) => pitch_shoulders(upper_rad, by_rad * share),
+                ArmDisturbance::OneWay(by_rad) => {
                     let sign = if place % 2 == 0 { 1.0 } else { -1.0 };
                     pitch_shoulders(upper_rad, by_rad * share * sign);
                 }
-                Disturbance::Noise(deviation_rad) => {
+                ArmDisturbance::Noise(deviation_rad) => {
                     if control_step % NOISE_STEPS == 0 {
                         self.noise_rad[place] = noise(deviation_rad, &mut self.random);
                     }
@@ -60,12 +60,12 @@ impl Disturber {
                         .zip(self.noise_rad[place])
                         .for_each(|(target, noise)| *target += noise);
                 }
-                Disturbance::LastOpens if place + 1 == team.len() => {
+                ArmDisturbance::LastOpens if place + 1 == team.len() => {
                     for first in HAND_COLUMNS.iter() {
                         upper_rad[*first..*first + HAND_JOINTS].iter_mut().for_each(|q| *q *= 1.0 - share);
                     }
                 }
-                Disturbance::LastOpens => {}
+                ArmDisturbance::LastOpens => {}
             }
         }
     }

@@ -4,7 +4,6 @@ use std::f32::consts::PI;
 
 use tandem_sim::{Pose, Vector};
 
-use crate::EpisodeError;
 use crate::bench::carrying;
 use crate::players::experts::skills::{
     CarryTeam, Commander, FREE, HandGrasp, Hold, ObjectPath, grasp_compliantly, grasp_reached,
@@ -16,7 +15,6 @@ use crate::tasks::{self, Task};
 /// Something that a team holds, and the task from whose start the team takes it.
 pub(super) struct SharedLoad {
     pub name: &'static str,
-    task: LoadTask,
     pub object: &'static str,
     /// Robot, its two places on the object, and which way it faces in the object's frame.
     holders: &'static [(usize, [&'static str; 2], f32)],
@@ -30,17 +28,10 @@ pub(super) struct SharedLoad {
     way_m: [f32; 2],
 }
 
-enum LoadTask {
-    /// One of the tasks, by its id.
-    Of(&'static str),
-    Bar,
-}
-
 const TWO_THIRDS_RAD: f32 = 2.0 * PI / 3.0;
 
 pub(super) const TABLE: SharedLoad = SharedLoad {
     name: "shared_table",
-    task: LoadTask::Of("table_align"),
     object: "office_table",
     holders: &[(A, ["a_left", "a_right"], 0.0), (B, ["b_left", "b_right"], PI)],
     hold: &Hold::EDGE,
@@ -52,7 +43,6 @@ pub(super) const TABLE: SharedLoad = SharedLoad {
 
 pub(super) const ROUND_TABLE: SharedLoad = SharedLoad {
     name: "shared_round_table",
-    task: LoadTask::Of("big_table"),
     object: "round_table",
     holders: &[
         (A, ["a_left", "a_right"], 0.0),
@@ -68,7 +58,6 @@ pub(super) const ROUND_TABLE: SharedLoad = SharedLoad {
 
 pub(super) const LEGS: SharedLoad = SharedLoad {
     name: "shared_legs",
-    task: LoadTask::Of("move_house"),
     object: "console_table",
     holders: &[(B, ["b_left", "b_right"], PI), (C, ["c_left", "c_right"], 0.0)],
     hold: &Hold::LEG,
@@ -80,7 +69,6 @@ pub(super) const LEGS: SharedLoad = SharedLoad {
 
 pub(super) const BASKET: SharedLoad = SharedLoad {
     name: "shared_basket",
-    task: LoadTask::Of("co_carry"),
     object: "basket",
     holders: &[(A, ["a_left", "a_right"], 0.0), (B, ["b_left", "b_right"], PI)],
     hold: &Hold::RIM,
@@ -92,7 +80,6 @@ pub(super) const BASKET: SharedLoad = SharedLoad {
 
 pub(super) const BAR: SharedLoad = SharedLoad {
     name: "shared_bar",
-    task: LoadTask::Bar,
     object: "bar",
     holders: &[(A, ["a_left", "a_right"], 0.0), (B, ["b_left", "b_right"], 0.0)],
     hold: &Hold::BAR,
@@ -105,11 +92,10 @@ pub(super) const BAR: SharedLoad = SharedLoad {
 const PACE_M_S: f32 = 0.2;
 
 impl SharedLoad {
-    pub(super) fn task(&self) -> Result<&'static Task, EpisodeError> {
-        match self.task {
-            LoadTask::Of(id) => tasks::find(id),
-            LoadTask::Bar => Ok(&carrying::TASK),
-        }
+    /// Returns the task in which the object is carried.
+    pub(super) fn task(&self) -> &'static Task {
+        let has_it = |task: &&'static Task| task.objects.iter().any(|spot| spot.name == self.object);
+        tasks::ALL.iter().find(has_it).unwrap_or(&carrying::TASK)
     }
 
     /// Number of robots that hold it.
@@ -144,8 +130,7 @@ impl SharedLoad {
         episode: &mut InProcess,
         then: impl FnOnce(&mut Commander, &mut CarryTeam) -> Result<(), PlayerError>,
     ) -> Result<(), PlayerError> {
-        let task = self.task().map_err(|error| PlayerError::GaveUp(error.to_string()))?;
-        let commander = &mut Commander::new(task, episode)?;
+        let commander = &mut Commander::new(self.task(), episode)?;
         let grasps: Vec<HandGrasp> = self
             .holders
             .iter()

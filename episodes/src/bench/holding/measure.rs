@@ -6,7 +6,7 @@ use tandem_sim::{CONTROL_HZ, Step, Vector};
 
 /// What came of a team of which nobody fell.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Held {
+pub(super) struct HoldResult {
     /// The farthest that a pelvis ever was from where it was when the team was told to stand, or to set down; horizontal.
     pub drift_m: f32,
     /// The same from where it was [`RESTS_AFTER_S`] later.
@@ -26,7 +26,7 @@ const RESTS_AFTER_S: f32 = 1.5;
 const MEAN_STEPS: usize = CONTROL_HZ as usize;
 
 /// Adds up what happens, control step by control step.
-pub(super) struct Measure<'a> {
+pub(super) struct HoldMeasure<'a> {
     object: &'a str,
     team: &'a [usize],
     steps: u32,
@@ -37,10 +37,10 @@ pub(super) struct Measure<'a> {
     load_m: VecDeque<Vector>,
     load_rested_m: Option<Vector>,
     fell: bool,
-    held: Held,
+    held: HoldResult,
 }
 
-impl<'a> Measure<'a> {
+impl<'a> HoldMeasure<'a> {
     /// From the step at which the team is told to stand; `began_m` are the places of pelvises to measure drift from, if they are
     /// others.
     pub(super) fn new(
@@ -48,8 +48,8 @@ impl<'a> Measure<'a> {
         object: &'a str,
         team: &'a [usize],
         began_m: Option<&[Vector]>,
-    ) -> Measure<'a> {
-        Measure {
+    ) -> HoldMeasure<'a> {
+        HoldMeasure {
             object,
             team,
             steps: 0,
@@ -59,7 +59,7 @@ impl<'a> Measure<'a> {
             load_m: VecDeque::new(),
             load_rested_m: None,
             fell: false,
-            held: Held::default(),
+            held: HoldResult::default(),
         }
     }
 
@@ -101,9 +101,9 @@ impl<'a> Measure<'a> {
     }
 
     /// What came of it; `None` if a robot fell.
-    pub(super) fn held(self) -> Option<Held> {
+    pub(super) fn held(self) -> Option<HoldResult> {
         let power_w = self.held.power_w / self.steps.max(1) as f32;
-        (!self.fell).then_some(Held { power_w, ..self.held })
+        (!self.fell).then_some(HoldResult { power_w, ..self.held })
     }
 }
 

@@ -19,9 +19,9 @@ use crate::Session;
 use crate::players::experts::skills::HandMove;
 use crate::players::{InProcess, PlayerError};
 use crate::spec::{Controller, EpisodeSpec, RobotFile};
-use disturbance::{Disturbance, Disturber};
+use disturbance::{ArmDisturbance, Disturber};
 use loads::{BAR, BASKET, LEGS, ROUND_TABLE, SharedLoad, TABLE};
-use measure::{Held, Measure};
+use measure::{HoldMeasure, HoldResult};
 
 /// What a team does before it is told to stand.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,18 +41,18 @@ struct Setup {
     load: &'static SharedLoad,
     before: Before,
     /// `None`: as heavy as its file has it.
-    kg_per_robot: Option<f32>,
+    robot_share_kg: Option<f32>,
 }
 
 const HOLDS_S: f32 = 6.0;
 const LOWERING_S: f32 = 1.0;
 
 /// Setups and what is tried in each: a name's end, and what happens. One team's episode up to the moment serves all of them.
-fn setups() -> Vec<(Setup, Vec<(&'static str, Disturbance)>)> {
-    use Disturbance::{LastOpens, Noise, None as Undisturbed, OneWay, Shoulders};
+fn setups() -> Vec<(Setup, Vec<(&'static str, ArmDisturbance)>)> {
+    use ArmDisturbance::{LastOpens, Noise, None as Undisturbed, OneWay, Shoulders};
     let mut setups = Vec::new();
     for load in [&TABLE, &ROUND_TABLE, &LEGS, &BASKET, &BAR] {
-        let setup = Setup { load, before: Before::Lifts, kg_per_robot: None };
+        let setup = Setup { load, before: Before::Lifts, robot_share_kg: None };
         let all = vec![
             ("", Undisturbed),
             ("_press_0.05", Shoulders(-0.05)),
@@ -74,11 +74,11 @@ fn setups() -> Vec<(Setup, Vec<(&'static str, Disturbance)>)> {
             (5.0, ["_5kg", "_5kg_press_0.10"]),
         ] {
             let heavy = vec![(names[0], Undisturbed), (names[1], Shoulders(-0.10))];
-            setups.push((Setup { kg_per_robot: Some(kg), ..setup }, heavy));
+            setups.push((Setup { robot_share_kg: Some(kg), ..setup }, heavy));
         }
     }
     for load in [&TABLE, &ROUND_TABLE, &LEGS, &BASKET] {
-        let setup = Setup { load, before: Before::SetsDown(0.02), kg_per_robot: None };
+        let setup = Setup { load, before: Before::SetsDown(0.02), robot_share_kg: None };
         setups.push((setup, vec![("_set_down", Undisturbed)]));
     }
     setups
@@ -98,22 +98,22 @@ pub fn run(
         if cases.is_empty() {
             continue;
         }
-        let tried: Vec<Disturbance> = cases.iter().map(|(_, disturbance)| *disturbance).collect();
+        let tried: Vec<ArmDisturbance> = cases.iter().map(|(_, disturbance)| *disturbance).collect();
         let trials = over_seeds(seeds, |seed| {
             let spec = setup.spec(robot, controller, sensing, seed)?;
             setup.trials(&spec, &tried)
         });
         let trials = trials.into_iter().collect::<Result<Vec<_>, BenchError>>()?;
         for (place, (end, _)) in cases.iter().enumerate() {
-            let held: Vec<&Held> = trials.iter().filter_map(|trial| trial[place].as_ref()).collect();
+            let held: Vec<&HoldResult> = trials.iter().filter_map(|trial| trial[place].as_ref()).collect();
             done(report(&format!("{}{end}", setup.load.name), trials.len(), &held));
         }
     }
     Ok(())
 }
 
-fn report(name: &str, seeds: usize, held: &[&Held]) -> CaseReport {
-    let worst = |value: fn(&Held) -> f32| held.iter().map(|held| value(held)).reduce(f32::max);
+fn report(name: &str, seeds: usize, held: &[&HoldResult]) -> CaseReport {
+    let worst = |value: fn(&HoldResult) -> f32| held.iter().map(|held| value(held)).reduce(f32::max);
     CaseReport {
         survived: held.len(),
         final_drift_m: worst(|held| held.drift_m),
@@ -139,16 +139,20 @@ impl Setup {
             locomotion: controller.clone(),
             sensing,
             renderer: RendererKind::Cpu,
-            ..EpisodeSpec::new(self.load.task().map_err(Box::new)?, seed, Protocol::Benchmark)
+            ..EpisodeSpec::new(self.load.task(), seed, Protocol::Benchmark)
         })
     }
 
     /// What came of each disturbance, all from the same moment; `None` for a team that fell, or did not come to hold the
     /// object.
-    fn trials(&self, spec: &EpisodeSpec, tried: &[Disturbance]) -> Result<Vec<Option<Held>>, BenchError> {
+    fn trials(
+        &self,
+        spec: &EpisodeSpec,
+        tried: &[ArmDisturbance],
+    ) -> Result<Vec<Option<HoldResult>>, BenchError> {
         let mut session = Session::start(spec, None).map_err(Box::new)?;
-        if let Some(kg_per_robot) = self.kg_per_robot {
-            let mass_kg = kg_per_robot * self.load.team_size() as f32;
+        if let Some(robot_share_kg) = self.robot_share_kg {
+            let mass_kg = robot_share_kg * self.load.team_size() as f32;
             session.world_mut().set_mass(self.load.object, mass_kg.into());
         }
         let mut episode = InProcess::new(session);
@@ -165,7 +169,7 @@ impl Setup {
         for disturbance in tried {
             world.restore(&moment)?;
             let mut disturber = Disturber::new(*disturbance, spec.seed, team.len());
-            let mut measure = Measure::new(&world.present(), self.load.object, &team, began_m.as_deref());
+            let mut measure = HoldMeasure::new(&world.present(), self.load.object, &team, began_m.as_deref());
             let steps = (HOLDS_S * CONTROL_HZ as f32) as u32;
             for step in 0..steps {
                 let mut commands = commands.clone();

@@ -45,7 +45,7 @@ pub(super) struct Load {
     /// How much the robot leans ahead of pulls, 0 to 1: see [`super::stand::Ahead`].
     pub ahead: f32,
     /// How much the robot gives way to what pulls its hands, 0 to 1: see [`super::stand::Partner`].
-    pub gives_way: f32,
+    pub yield_share: f32,
 }
 
 /// Pushes and pulls are taken to act this high over the centre of mass: at the chest and the hands.
@@ -67,7 +67,7 @@ impl Load {
         push: impl Into<SplitPush>,
         ahead: f32,
     ) -> Load {
-        let SplitPush { rest: push, hands_m_s2, hands_lever_m, gives_way } = push.into();
+        let SplitPush { rest: push, hands_m_s2, hands_lever_m, yield_share } = push.into();
         let scale = &body.model.scale;
         let push_lever_m = scale.length_m(PUSH_LEVER_M);
         let height_m = body.com_m.z - ground_m;
@@ -108,7 +108,7 @@ impl Load {
             balance_point_m_s,
             velocity_m_s: laden.velocity_m_s,
             ahead,
-            gives_way,
+            yield_share,
         }
     }
 }

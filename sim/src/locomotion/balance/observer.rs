@@ -41,13 +41,13 @@ pub(super) struct SplitPush {
     /// Height of the palms over the centre of mass.
     pub hands_lever_m: f32,
     /// Share of the hands' part to which the robot gives way, 0 to 1.
-    pub gives_way: f32,
+    pub yield_share: f32,
 }
 
 impl From<ObservedPush> for SplitPush {
     /// The push on a robot whose hands hold nothing.
     fn from(rest: ObservedPush) -> SplitPush {
-        SplitPush { rest, hands_m_s2: Vector::ZERO, hands_lever_m: 0.0, gives_way: 0.0 }
+        SplitPush { rest, hands_m_s2: Vector::ZERO, hands_lever_m: 0.0, yield_share: 0.0 }
     }
 }
 

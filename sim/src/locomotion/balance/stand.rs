@@ -240,7 +240,7 @@ impl Stand {
     fn giving_way_m(&self, body: &BodyEstimate, load: &Load, weights_m: Vector, dt_s: f32) -> Vector {
         let scale = &body.model.scale;
         let pull_n = flat(body.hand_reaction_n.left + body.hand_reaction_n.right);
-        let rate_m_s_n = scale.speed_m_s(GIVING_WAY_M_S_N) / scale.force_n(1.0) * load.gives_way;
+        let rate_m_s_n = scale.speed_m_s(GIVING_WAY_M_S_N) / scale.force_n(1.0) * load.yield_share;
         let pull_n = pull_n - pull_n.clamp_length_max(scale.force_n(PULLED_N));
         let way_m = Rotation::from_rotation_z(-self.heading_rad) * pull_n * (rate_m_s_n * dt_s);
         let most_m = scale.length_m(GIVING_WAY_ZONE_M);
@@ -287,7 +287,7 @@ impl Stand {
 
 /// Returns how far the centre of mass may be from the middle of the feet under a load, on a G1.
 fn com_zone_m(load: &Load) -> f32 {
-    COM_ZONE_M + (HELD_ZONE_M - COM_ZONE_M) * load.gives_way
+    COM_ZONE_M + (HELD_ZONE_M - COM_ZONE_M) * load.yield_share
 }
 
 /// Shift that brings a point back into a zone round the middle of the feet.

@@ -262,7 +262,10 @@ fn a_key_of_the_evaluators_draws_other_worlds() {
     };
     assert_ne!(hash(&keyed), hash(&public));
     assert_eq!((hash(&keyed), keyed.episodes[0].result.seed), (hash(&drawn), Some(1)));
-    assert_eq!(keyed.departures, ["seed key: 00112233"]);
+    assert_eq!(
+        keyed.departures,
+        ["controller: Tandem's own", "instructions: Tandem's own", "seed key: 00112233"]
+    );
     let again = play(&private, &folder.path().join("keyed"));
     assert_eq!(again.episodes, keyed.episodes, "what was played is kept");
     let recording = folder.path().join("keyed/episodes/handover-1/episode.mcap");

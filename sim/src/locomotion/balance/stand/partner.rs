@@ -39,12 +39,12 @@ const UNEXPLAINED_M_S2: f32 = 0.5;
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub(in crate::locomotion::balance) struct Partner {
     /// Whether fingers press on something, 0 to 1.
-    holds: f32,
+    hold_share: f32,
     /// Time for which the pull has been strong.
     strong_s: f32,
     strong: bool,
     /// Whether the pull is the world's, 0 to 1.
-    world: f32,
+    world_share: f32,
 }
 
 impl Partner {
@@ -57,29 +57,29 @@ impl Partner {
         dt_s: f32,
     ) -> SplitPush {
         let felt_m_s2 = flat(body.hand_reaction_n.left + body.hand_reaction_n.right) / mass_kg;
-        let hands_m_s2 = explained_m_s2(push.acceleration_m_s2, felt_m_s2) * self.holds;
+        let hands_m_s2 = explained_m_s2(push.acceleration_m_s2, felt_m_s2) * self.hold_share;
         self.update(body, hands_m_s2.length(), dt_s);
-        let gives_way = self.holds * (1.0 - self.world);
+        let yield_share = self.hold_share * (1.0 - self.world_share);
         let rest_m_s2 = push.acceleration_m_s2 - hands_m_s2;
-        let rest_m_s2 = rest_m_s2 - rest_m_s2.clamp_length_max(UNEXPLAINED_M_S2 * gives_way);
+        let rest_m_s2 = rest_m_s2 - rest_m_s2.clamp_length_max(UNEXPLAINED_M_S2 * yield_share);
         let palms_m = body.palms_m();
         SplitPush {
             rest: ObservedPush { acceleration_m_s2: rest_m_s2, ..push },
-            hands_m_s2: hands_m_s2 * (1.0 - gives_way),
+            hands_m_s2: hands_m_s2 * (1.0 - yield_share),
             hands_lever_m: (palms_m.left.z + palms_m.right.z) * 0.5 - body.com_m.z,
-            gives_way,
+            yield_share,
         }
     }
 
     fn update(&mut self, body: &BodyEstimate, pull_m_s2: f32, dt_s: f32) {
         let presses = body.hand_presses.left || body.hand_presses.right;
         let change_1_s = if presses { BEGINS_1_S } else { -ENDS_1_S };
-        self.holds = (self.holds + change_1_s * dt_s).clamp(0.0, 1.0);
+        self.hold_share = (self.hold_share + change_1_s * dt_s).clamp(0.0, 1.0);
         self.strong_s = if pull_m_s2 > STRONG_M_S2 { self.strong_s + dt_s } else { 0.0 };
         self.strong = self.strong_s > body.model.scale.time_s(STRONG_S)
             || self.strong && pull_m_s2 > STRONG_M_S2 * STILL_STRONG;
         let change_1_s = if self.strong { WITHSTANDS_1_S } else { -GIVES_WAY_1_S };
-        self.world = (self.world + change_1_s * dt_s).clamp(0.0, 1.0);
+        self.world_share = (self.world_share + change_1_s * dt_s).clamp(0.0, 1.0);
     }
 }
 
@@ -120,11 +120,11 @@ mod tests {
     fn a_robot_that_holds_something_gives_way_to_what_its_hands_feel() {
         let mut partner = Partner::default();
         let push = split(&mut partner, false, 0.9, 0.9, 2.0);
-        assert_eq!((push.rest.acceleration_m_s2.x, push.hands_m_s2.x, push.gives_way), (0.9, 0.0, 0.0));
+        assert_eq!((push.rest.acceleration_m_s2.x, push.hands_m_s2.x, push.yield_share), (0.9, 0.0, 0.0));
         let push = split(&mut partner, true, 0.9, 0.8, 1.0);
-        assert_eq!((push.rest.acceleration_m_s2.x, push.hands_m_s2.x, push.gives_way), (0.0, 0.0, 1.0));
+        assert_eq!((push.rest.acceleration_m_s2.x, push.hands_m_s2.x, push.yield_share), (0.0, 0.0, 1.0));
         let push = split(&mut partner, false, 0.9, 0.8, 0.2);
-        assert!(push.gives_way > 0.7, "a finger has slipped: {}", push.gives_way);
+        assert!(push.yield_share > 0.7, "a finger has slipped: {}", push.yield_share);
     }
 
     #[test]
@@ -139,10 +139,10 @@ mod tests {
     #[test]
     fn a_pull_that_feet_cannot_hold_is_the_worlds_until_it_is_half() {
         let mut partner = Partner::default();
-        assert_eq!(split(&mut partner, true, 1.3, 1.2, 1.0).gives_way, 0.0);
+        assert_eq!(split(&mut partner, true, 1.3, 1.2, 1.0).yield_share, 0.0);
         let push = split(&mut partner, true, 1.3, 1.2, 0.1);
         assert!((push.hands_m_s2.x - 1.3).abs() < 1e-5, "{}", push.hands_m_s2.x);
-        assert_eq!(split(&mut partner, true, 0.7, 0.7, 2.0).gives_way, 0.0, "it has not ended yet");
-        assert_eq!(split(&mut partner, true, 0.4, 0.4, 1.1).gives_way, 1.0);
+        assert_eq!(split(&mut partner, true, 0.7, 0.7, 2.0).yield_share, 0.0, "it has not ended yet");
+        assert_eq!(split(&mut partner, true, 0.4, 0.4, 1.1).yield_share, 1.0);
     }
 }
