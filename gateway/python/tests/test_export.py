@@ -285,6 +285,7 @@ def test_episodes_are_told_in_their_own_words(tmp_path: Path) -> None:
     subprocess.run(command, check=True, env=ascii_only)
     card = (tmp_path / "set/README.md").read_text(encoding="utf-8")
     own = tandem.Recording(tmp_path / "out-2010/episodes/handover-2010").instructions
+    assert isinstance(own, dict)
     assert "B: Nimm sie." in card and own["B"] in card
     about = json.loads((tmp_path / "set/meta/tandem.json").read_text(encoding="utf-8"))
     assert about["instructions"] == [own, {**own, "B": "Nimm sie."}]

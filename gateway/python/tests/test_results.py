@@ -170,14 +170,14 @@ def test_a_policy_that_raises_leaves_its_recordings_whole(tmp_path: Path) -> Non
 
 
 def test_a_policy_that_cannot_play_is_told_of_once_and_stopped(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    begun: list[int] = []
+    begun: list[int | None] = []
 
     def broken(episode: tandem.Episode) -> None:
         begun.append(episode.seed)
         raise AttributeError("no weights")
 
     with pytest.raises(tandem.TandemError, match=r"failed alike in the first 3 episodes .AttributeError: no weights"):
-        tandem.evaluate(broken, "handover", range(2000, 2009), out=tmp_path)
+        tandem.evaluate(broken, "handover", range(2000, 2009), out=tmp_path, assistance="full")
     assert begun == [2000, 2001, 2002]
     printed = capsys.readouterr().err
     assert printed.count("Traceback") == 1 and "in broken" in printed

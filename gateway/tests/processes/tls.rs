@@ -186,6 +186,7 @@ fn ask_policy(protocol: &str, scheme: &str, trusts: bool, serve: fn(Secured) -> 
 }
 
 /// openpi's server: who it is, then an error.
+#[expect(clippy::result_large_err, reason = "tungstenite's callback has this type")]
 fn serve_openpi(stream: Secured) -> String {
     let mut authorization = String::new();
     let keep = |request: &Request, response: Response| {

@@ -55,7 +55,11 @@ pub(super) fn run(
         }
         let heading_rad =
             unwrap(heading_rad(&robot.truth.world_from_pelvis()), log.last().map_or(0.0, |s| s.heading_rad));
-        let base = base_command(case, seed, &world, &robot.truth, heading_rad, &legs, time_s, rest.base);
+        let base = if let Plan::Pulse(axis) = &case.plan {
+            pulse_command(pulse(*axis, seed, &model.scale), time_s, rest.base)
+        } else {
+            base_command(case, &world, &robot.truth, heading_rad, &legs, time_s, rest.base)
+        };
         disturb(case, &mut world, seed, direction, &legs, time_s);
         let upper_rad = arms.at(&rest.upper_rad, time_s);
         work_j += robot.sensed.power_w() * DT_S;
@@ -74,9 +78,15 @@ pub(super) fn run(
     Ok(trial)
 }
 
+/// The command of a pulse that begins once the arms are held out.
+fn pulse_command((velocity, pulse_s): (BaseVelocity, f32), time_s: f32, rest: BaseCommand) -> BaseCommand {
+    let told = (SETTLE_S..SETTLE_S + pulse_s - 0.5 * DT_S).contains(&time_s);
+    let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } = if told { velocity } else { BaseVelocity::STILL };
+    BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, ..rest }
+}
+
 fn base_command(
     case: &Case,
-    seed: u32,
     world: &World,
     truth: &RobotTruth,
     heading_rad: f32,
@@ -85,19 +95,12 @@ fn base_command(
     rest: BaseCommand,
 ) -> BaseCommand {
     match &case.plan {
-        Plan::Hold => rest,
+        Plan::Hold | Plan::Pulse(_) => rest,
         Plan::Move(velocity) if time_s > SETTLE_S && time_s < case.duration_s - STOP_S => {
             let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } = *velocity;
             BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m: rest.pelvis_height_m }
         }
         Plan::Move(_) => rest,
-        Plan::Pulse(axis) => {
-            let (velocity, pulse_s) = pulse(*axis, seed, &world.robots()[0].model.scale);
-            let told = (SETTLE_S..SETTLE_S + pulse_s - 0.5 * DT_S).contains(&time_s);
-            let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } =
-                if told { velocity } else { BaseVelocity::STILL };
-            BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m: rest.pelvis_height_m }
-        }
         Plan::Squat { high_m, low_m } => {
             let middle = (case.duration_s / 3.0..case.duration_s * 2.0 / 3.0).contains(&time_s);
             BaseCommand { pelvis_height_m: if middle { *low_m } else { *high_m }, ..rest }

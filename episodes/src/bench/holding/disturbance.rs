@@ -48,11 +48,11 @@ impl Disturber {
                 ArmDisturbance::None => {}
                 ArmDisturbance::Shoulders(by_rad) => pitch_shoulders(upper_rad, by_rad * share),
                 ArmDisturbance::OneWay(by_rad) => {
-                    let sign = if place % 2 == 0 { 1.0 } else { -1.0 };
+                    let sign = if place.is_multiple_of(2) { 1.0 } else { -1.0 };
                     pitch_shoulders(upper_rad, by_rad * share * sign);
                 }
                 ArmDisturbance::Noise(deviation_rad) => {
-                    if control_step % NOISE_STEPS == 0 {
+                    if control_step.is_multiple_of(NOISE_STEPS) {
                         self.noise_rad[place] = noise(deviation_rad, &mut self.random);
                     }
                     upper_rad
