@@ -161,7 +161,7 @@ def test_refusals_say_what_would_work(server: tandem.Server) -> None:
             texts.append(f"{refused.value.kind}: {refused.value}")
             with pytest.raises(ValueError, match="give 2 robots by 35"):
                 episode.step(np.zeros((3, 35)))
-            with pytest.raises(tandem.Refused, match="34 numbers"):
+            with pytest.raises(ValueError, match="give 2 robots by 35"):
                 episode.step(np.zeros((2, 34)))
             with pytest.raises(tandem.Refused):
                 episode.step(np.full((2, 35), np.nan))

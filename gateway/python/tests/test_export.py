@@ -282,7 +282,7 @@ def test_episodes_are_told_in_their_own_words(tmp_path: Path) -> None:
     # Files are UTF-8 whatever the locale's encoding is.
     command = [sys.executable, "-m", "tandem.export", "lerobot", "--cameras=none", str(tmp_path), str(tmp_path / "set")]
     ascii_only = {**os.environ, "LC_ALL": "POSIX", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
-    subprocess.run(command, check=True, env=ascii_only)
+    subprocess.run(command, cwd=tmp_path, check=True, env=ascii_only)
     card = (tmp_path / "set/README.md").read_text(encoding="utf-8")
     own = tandem.Recording(tmp_path / "out-2010/episodes/handover-2010").instructions
     assert isinstance(own, dict)

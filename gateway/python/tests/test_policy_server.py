@@ -38,7 +38,8 @@ rate_hz = 10.0
 def evaluate(folder: Path, server: tandem.PolicyServer, seeds: str) -> dict[str, Any]:
     (folder / "map.toml").write_text(MAP)
     flags = ["--policy", server.url, "--policy-map", "map.toml", "--protocol", "benchmark", "--tasks", "handover"]
-    flags += ["--seeds", seeds, "--jobs", "2", "--out", "out"]
+    # Policies read the seed, which is withheld under "paper".
+    flags += ["--seeds", seeds, "--jobs", "2", "--out", "out", "--assistance", "full"]
     command = [sys.executable, "-m", "tandem", "evaluate", *flags]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
