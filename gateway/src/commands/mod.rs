@@ -23,7 +23,7 @@ use std::{
     process::ExitCode,
 };
 
-use tandem_episodes::printable;
+use tandem_episodes::{printable, shell_word};
 
 pub use flags::Seeds;
 
@@ -42,17 +42,8 @@ fn command_to_go_on() -> String {
 
 /// The command that goes on with what this one has begun, of which nothing is to be deleted.
 fn going_on(words: &[String]) -> String {
-    let kept = words.iter().filter(|word| *word != "--overwrite").map(|word| quoted(word));
+    let kept = words.iter().filter(|word| *word != "--overwrite").map(|word| shell_word(word));
     std::iter::once("tandem".into()).chain(kept).collect::<Vec<_>>().join(" ")
-}
-
-/// A word that a shell takes as it is.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./:=,+@%".contains(c);
-    match !word.is_empty() && word.chars().all(is_plain) {
-        true => word.into(),
-        false => format!("'{}'", word.replace('\'', r"'\''")),
-    }
 }
 
 /// Prints a text that other programs may read, without what a terminal would obey. One that has read enough and has gone is no error.
@@ -83,7 +74,7 @@ mod tests {
             ("$HOME", "'$HOME'"),
             ("", "''"),
         ] {
-            assert_eq!(quoted(word), expected);
+            assert_eq!(shell_word(word), expected);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! What happens to a team that holds something and is told to stand.
+//! Disturbances of a team that holds something and is told to stand.
 
 use std::f32::consts::PI;
 
@@ -7,8 +7,7 @@ use tandem_sim::body::{
 };
 use tandem_sim::{CONTROL_HZ, RobotCommand, Side, SplitMix64};
 
-/// What is added to the targets of arms, waist and fingers; nothing corrects it, because no robot knows where the load or the
-/// others are.
+/// Offset of the targets of arms, waist and fingers. Nothing corrects it, because no robot knows where the load or the others are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum ArmDisturbance {
     None,

@@ -1,4 +1,4 @@
-//! What teams of the bench hold between them, and how they come to hold it.
+//! Shared loads of the bench, and how teams take them.
 
 use std::f32::consts::PI;
 
@@ -19,12 +19,12 @@ pub(super) struct SharedLoad {
     /// Robot, its two places on the object, and which way it faces in the object's frame.
     holders: &'static [(usize, [&'static str; 2], f32)],
     hold: &'static Hold,
-    /// Whether hands reach out while their robots walk to the object: legs of a table are taken so.
+    /// True where hands reach out while their robots walk to the object, for example to the legs of a table.
     reaching: bool,
     /// Pelvis over the floor while the object is taken and while it is held; `None` leaves it as it is.
     pelvis_m: Option<[f32; 2]>,
     lift_m: f32,
-    /// Where the team goes with it: ahead and to the left, world frame.
+    /// Displacement of the object when it is carried: x and y in the world frame.
     way_m: [f32; 2],
 }
 

@@ -1,10 +1,10 @@
-//! How far a team that was told to stand, and what it holds, went from there.
+//! Drift of a team that was told to stand, and of its load.
 
 use std::collections::VecDeque;
 
 use tandem_sim::{CONTROL_HZ, Step, Vector};
 
-/// What came of a team of which nobody fell.
+/// Figures of a team of which nobody fell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct HoldResult {
     /// The farthest that a pelvis ever was from where it was when the team was told to stand, or to set down; horizontal.
@@ -100,7 +100,7 @@ impl<'a> HoldMeasure<'a> {
         }
     }
 
-    /// What came of it; `None` if a robot fell.
+    /// Returns the figures; `None` if a robot fell.
     pub(super) fn held(self) -> Option<HoldResult> {
         let power_w = self.held.power_w / self.steps.max(1) as f32;
         (!self.fell).then_some(HoldResult { power_w, ..self.held })
