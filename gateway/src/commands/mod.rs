@@ -57,24 +57,11 @@ fn print(text: &str) -> io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::{going_on, quoted};
+    use super::going_on;
 
     #[test]
     fn what_was_begun_is_not_deleted_by_going_on() {
         let words = ["collect", "--overwrite", "--out", "my runs"].map(String::from);
         assert_eq!(going_on(&words), "tandem collect --out 'my runs'");
-    }
-
-    #[test]
-    fn a_shell_reads_what_was_given() {
-        for (word, expected) in [
-            ("runs/a-b_c.d", "runs/a-b_c.d"),
-            ("exec:python3 agent.py", "'exec:python3 agent.py'"),
-            ("it's", r"'it'\''s'"),
-            ("$HOME", "'$HOME'"),
-            ("", "''"),
-        ] {
-            assert_eq!(shell_word(word), expected);
-        }
     }
 }
