@@ -67,8 +67,8 @@ pub use recording::{
 pub use results::RESULT_FILE;
 pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, RobotFacts, Scores, StepScore};
 pub use session::{
-    Audience, CallReply, Caller, Checkpoint, Clock, FAILED_STEP_FILE, FailedStep, Outcome, Request, RunFiles,
-    RunFolder, Session, monotonic,
+    Audience, BringBack, CallReply, Caller, Checkpoint, Clock, FAILED_STEP_FILE, FailedStep, JournalEntry,
+    Outcome, Request, RunFiles, RunFolder, Session, monotonic,
 };
 pub use spec::{
     Controller, EpisodeSpec, KeyedSeed, MomentStart, OwnRobot, PhaseStart, RobotFile, SceneFile, Start,

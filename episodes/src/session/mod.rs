@@ -21,7 +21,9 @@ pub use clock::{Clock, monotonic};
 pub use failure::FAILED_STEP_FILE;
 use failure::Rewind;
 use onlookers::Spectators;
+use replay::{Asked, Journal};
 pub(crate) use replay::Replay;
+pub use replay::{BringBack, JournalEntry};
 use run_files::moment;
 pub use run_files::{RunFiles, RunFolder};
 
@@ -90,6 +92,8 @@ pub struct Session {
     execution: Option<Execution>,
     /// State hashes of the steps since they were last taken, where somebody wants them.
     hashes: Option<Vec<u64>>,
+    /// What it has been asked, where that is written down.
+    journal: Option<Journal>,
     /// What it came to, from when the files were closed: the one truth that everybody is told.
     result: Option<ResultReply>,
 }
@@ -144,6 +148,7 @@ impl Session {
             targets: TargetCounts::default(),
             execution: Execution::of(spec.stress, disturbance, spec.world_seed(), begin_s, rest),
             hashes: None,
+            journal: None,
             result: None,
             motions,
             present,
@@ -210,8 +215,10 @@ impl Session {
 
     /// Ends the episode for a reason that lies outside it, unless it has ended before, and closes its files.
     pub fn end(&mut self, reason: EndReason) {
+        let arrival = self.arrival(|| Asked::end(reason));
         self.ended.get_or_insert(reason);
         self.settle();
+        self.write_down(arrival);
     }
 
     /// Closes the files, once; from here on the result stays as it is.
