@@ -54,6 +54,7 @@ pub use describe::{brief, task_list};
 pub use error::{CheckpointError, EpisodeError, RobotError, SceneError};
 pub use fingerprint::{build, name_program};
 pub use instructions::{Instructions, InstructionsError};
+pub use locks::{FileLock, LockKind, Locking};
 pub use observation::{Picture, RobotObservation, RobotView, TeamObservation};
 pub use output::{
     OutputError, create_new_private_folder, create_private_folder, printable, shell_word, write_whole,

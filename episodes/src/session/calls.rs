@@ -9,7 +9,7 @@ use tandem_tools_spec::{
 
 use super::Session;
 use super::answer::Answer;
-use super::replay::Asked;
+use super::journal::Asked;
 use super::told::shorten;
 use crate::EpisodeError;
 use crate::commands::{Called, OperatorCall, OperatorCommand};
@@ -67,6 +67,15 @@ impl<'a> Request<'a> {
     pub fn of_policy(called: impl Into<Called>) -> Request<'a> {
         Request { caller: Caller::Policy, called: called.into(), audience: Audience::Caller }
     }
+
+    /// The request as a journal has it.
+    fn asked(&self) -> Result<Asked, serde_json::Error> {
+        let shown = match self.audience {
+            Audience::Caller => None,
+            Audience::Process(shown) => Some(shown),
+        };
+        Asked::call(self.caller.operator(), shown, &self.called)
+    }
 }
 
 impl Outcome {
@@ -110,7 +119,7 @@ impl Session {
     /// made for another step, or whose look afterwards could not be had, is refused before it counts. The call that ends the episode,
     /// and no later one, is counted and recorded, and closes the files.
     pub fn perform(&mut self, request: Request) -> Result<Outcome, EpisodeError> {
-        let arrival = self.arrival(|| Asked::request(&request));
+        let arrival = self.arrival(|| request.asked());
         let outcome = self.do_what_is_asked(request);
         self.write_down(arrival);
         outcome
@@ -385,7 +394,7 @@ impl Session {
 }
 
 impl<'a> Caller<'a> {
-    pub(super) fn operator(self) -> Option<&'a str> {
+    fn operator(self) -> Option<&'a str> {
         match self {
             Caller::Policy => None,
             Caller::Operator(robot) => Some(robot),

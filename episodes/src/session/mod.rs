@@ -6,6 +6,7 @@ mod calls;
 mod checkpoint;
 mod clock;
 mod failure;
+mod journal;
 mod notes;
 mod onlookers;
 mod plan;
@@ -20,10 +21,11 @@ pub use checkpoint::{Checkpoint, FailedStep};
 pub use clock::{Clock, monotonic};
 pub use failure::FAILED_STEP_FILE;
 use failure::Rewind;
+pub use journal::JournalEntry;
+use journal::{Asked, Journal};
 use onlookers::Spectators;
-use replay::{Asked, Journal};
+pub use replay::BringBack;
 pub(crate) use replay::Replay;
-pub use replay::{BringBack, JournalEntry};
 use run_files::moment;
 pub use run_files::{RunFiles, RunFolder};
 
@@ -414,6 +416,11 @@ impl Session {
     /// How long the policy has thought, up to its last call.
     pub fn thought(&self) -> Duration {
         self.clock.spent()
+    }
+
+    /// How long it has been thinking since it was last answered.
+    pub fn thinking(&self) -> Duration {
+        self.clock.thinking()
     }
 
     /// Why the episode has ended, if it has.

@@ -4,7 +4,7 @@
 use tandem_tools_spec::{Note, SpecError};
 
 use super::Session;
-use super::replay::Asked;
+use super::journal::Asked;
 use crate::EpisodeError;
 use crate::commands;
 use crate::output::OutputError;

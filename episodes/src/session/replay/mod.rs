@@ -1,6 +1,6 @@
 //! A recorded episode played again: call by call, with the policy's clock as it was charged.
 
-mod journal;
+mod bring_back;
 mod set_clock;
 
 use std::path::Path;
@@ -15,8 +15,7 @@ use crate::commands::Called;
 use crate::error::{CheckpointError, EpisodeError};
 use crate::recording::{BEGIN, CallerRecord, RecordedCheckpoint, Recording, state_hash_text};
 use crate::spec::{EpisodeSpec, MomentStart, Start};
-pub(super) use journal::{Asked, Journal};
-pub use journal::{BringBack, JournalEntry};
+pub use bring_back::BringBack;
 use set_clock::SetHands;
 
 /// An episode under way for the second time.

@@ -7,23 +7,19 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tandem_tools_spec::{EndReason, ExtraInformation, Note};
 
-use super::set_clock::SetHands;
+use super::Session;
 use crate::commands::{Called, OperatorCall};
-use crate::error::{CheckpointError, EpisodeError};
-use crate::live::Onlookers;
 use crate::recording::state_hash_text;
-use crate::session::{Audience, Caller, Clock, Request, RunFolder, Session, this_build};
-use crate::spec::EpisodeSpec;
 
 /// One request, when it came, and where it led.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JournalEntry {
     /// How long the policy had thought by then, in nanoseconds.
     thought_ns: u64,
-    asked: Asked,
+    pub(super) asked: Asked,
     /// The world afterwards, where it has moved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    state: Option<StateMark>,
+    pub(super) state: Option<StateMark>,
     /// Why the episode had ended by then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ended: Option<EndReason>,
@@ -31,8 +27,8 @@ pub struct JournalEntry {
 
 /// A state of the world, to tell whether another is the same.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct StateMark {
-    control_step: u64,
+pub struct StateMark {
+    pub(super) control_step: u64,
     state_hash: String,
 }
 
@@ -71,20 +67,7 @@ pub struct Journal {
 }
 
 /// What came, and when; nothing where no journal is kept.
-pub(in crate::session) type Arrival = Option<(Duration, Result<Asked, serde_json::Error>)>;
-
-/// An episode that another process has played, or this one before it put the episode aside.
-pub struct BringBack {
-    pub spec: EpisodeSpec,
-    /// Where it is recorded from its beginning on.
-    pub folder: Option<RunFolder>,
-    pub entries: Vec<JournalEntry>,
-    /// The policy's wall clock from the last entry on.
-    pub clock: Clock,
-    /// How long the policy has been thinking since then.
-    pub thinking: Duration,
-    pub onlookers: Box<dyn Onlookers>,
-}
+pub(super) type Arrival = Option<(Duration, Result<Asked, serde_json::Error>)>;
 
 impl JournalEntry {
     /// The control step that the world had come to, where it has moved.
@@ -113,41 +96,13 @@ impl Session {
         }
     }
 
-    /// Plays an episode again up to the last entry of its journal, and goes on from there. An error says where it went another way.
-    pub fn bring_back(back: BringBack) -> Result<Session, EpisodeError> {
-        let BringBack { spec, folder, entries, clock, thinking, onlookers } = back;
-        let hands = SetHands::default();
-        let path = folder.as_ref().map(|folder| folder.path.clone()).unwrap_or_default();
-        let mut session = Session::start_with_clock(&spec, folder, hands.clock(clock))?;
-        session.set_onlookers(onlookers);
-        for entry in entries {
-            let shown = session.clock.spent() + session.clock.thinking();
-            hands.pass(entry.thought().saturating_sub(shown));
-            entry.asked.ask(&mut session)?;
-            let Some(state) = entry.state else { continue };
-            if session.state_mark() != state {
-                let (step, this) = (state.control_step, this_build()?);
-                return Err(CheckpointError::OtherWay { path, step, made_by: this.into(), this }.into());
-            }
-        }
-        hands.pass(thinking);
-        hands.go();
-        // The clock goes from this look on.
-        session.clock.thinking();
-        session.keep_journal();
-        Ok(session)
-    }
-
     /// What has come, if a journal is kept.
-    pub(in crate::session) fn arrival(
-        &self,
-        asked: impl FnOnce() -> Result<Asked, serde_json::Error>,
-    ) -> Arrival {
+    pub(super) fn arrival(&self, asked: impl FnOnce() -> Result<Asked, serde_json::Error>) -> Arrival {
         self.journal.as_ref().map(|_| (self.clock.spent() + self.clock.thinking(), asked()))
     }
 
     /// Writes down what had come, and where it has led.
-    pub(in crate::session) fn write_down(&mut self, arrival: Arrival) {
+    pub(super) fn write_down(&mut self, arrival: Arrival) {
         let Some((thought, asked)) = arrival else { return };
         let (step, ended) = (self.present.control_step, self.ended);
         let has_moved = self.journal.as_ref().is_some_and(|journal| journal.marked_step != step);
@@ -165,7 +120,7 @@ impl Session {
         }
     }
 
-    fn state_mark(&self) -> StateMark {
+    pub(super) fn state_mark(&self) -> StateMark {
         StateMark {
             control_step: self.present.control_step,
             state_hash: state_hash_text(self.world.state_hash()),
@@ -174,29 +129,29 @@ impl Session {
 }
 
 impl Asked {
-    pub(in crate::session) fn request(request: &Request) -> Result<Asked, serde_json::Error> {
-        let Request { caller, called, audience } = request;
+    pub(super) fn call(
+        operator: Option<&str>,
+        shown: Option<&[ExtraInformation]>,
+        called: &Called,
+    ) -> Result<Asked, serde_json::Error> {
         Ok(Asked::Call {
-            operator: caller.operator().map(str::to_owned),
-            shown: match audience {
-                Audience::Caller => None,
-                Audience::Process(shown) => Some(shown.to_vec()),
-            },
+            operator: operator.map(str::to_owned),
+            shown: shown.map(<[_]>::to_vec),
             tool: called.name().into(),
             arguments: serde_json::from_str(&called.arguments()?)?,
         })
     }
 
-    pub(in crate::session) fn command(call: &OperatorCall) -> Result<Asked, serde_json::Error> {
+    pub(super) fn command(call: &OperatorCall) -> Result<Asked, serde_json::Error> {
         let (robot, call) = (call.robot().into(), call.call());
         Ok(Asked::Command { robot, tool: call.name().into(), arguments: serde_json::to_value(call)? })
     }
 
-    pub(in crate::session) fn note(operator: Option<&str>, note: &Note) -> Result<Asked, serde_json::Error> {
+    pub(super) fn note(operator: Option<&str>, note: &Note) -> Result<Asked, serde_json::Error> {
         Ok(Asked::Note { operator: operator.map(str::to_owned), note: note.clone() })
     }
 
-    pub(in crate::session) fn refused(
+    pub(super) fn refused(
         operator: Option<&str>,
         [tool, arguments, problem]: [&str; 3],
     ) -> Result<Asked, serde_json::Error> {
@@ -204,31 +159,7 @@ impl Asked {
         Ok(Asked::Refused { operator: operator.map(str::to_owned), tool, arguments, problem })
     }
 
-    pub(in crate::session) fn end(reason: EndReason) -> Result<Asked, serde_json::Error> {
+    pub(super) fn end(reason: EndReason) -> Result<Asked, serde_json::Error> {
         Ok(Asked::End { reason })
-    }
-
-    /// Asks it again. What was refused is refused again, so that a refusal is no error.
-    fn ask(self, session: &mut Session) -> Result<(), EpisodeError> {
-        match self {
-            Asked::Call { operator, shown, tool, arguments } => {
-                let caller = operator.as_deref().map_or(Caller::Policy, Caller::Operator);
-                let audience = shown.as_deref().map_or(Audience::Caller, Audience::Process);
-                let called = Called::parse(&tool, arguments)?;
-                let _ = session.perform(Request { caller, called, audience });
-            }
-            Asked::Command { robot, tool, arguments } => {
-                let call = tandem_tools_spec::Call::parse(&tool, arguments)?;
-                let _ = session.read_command(OperatorCall::new(&robot, call)?);
-            }
-            Asked::Note { operator, note } => {
-                let _ = session.note(operator.as_deref(), note);
-            }
-            Asked::Refused { operator, tool, arguments, problem } => {
-                session.refused_before(operator.as_deref(), &tool, &arguments, &problem);
-            }
-            Asked::End { reason } => session.end(reason),
-        }
-        Ok(())
     }
 }
