@@ -195,6 +195,10 @@ impl EpisodeTable {
             let spec = episode.spec().clone();
             let heading = Heading::new(build, spec, self.settings.record, driving, start.clone(), key);
             episode.begin_journal(heading).await?;
+            if self.settings.advertised_url.is_some() {
+                // Whichever server is asked for it first plays it.
+                episode.put_aside();
+            }
         }
         Ok(start)
     }

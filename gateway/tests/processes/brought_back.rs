@@ -15,8 +15,8 @@ use tandem_episodes::{Recorder, Recording, tasks};
 
 use crate::{Delays, Server};
 
-/// Kills of a test; ten tasks in turn.
-const KILLS: usize = 10;
+/// Kills of a test, of tasks in turn.
+const KILLS: usize = 5;
 /// The longest that the first call after a start may take.
 const WAKES_WITHIN: Duration = Duration::from_secs(5);
 /// A kill comes at most so long after the first call.
