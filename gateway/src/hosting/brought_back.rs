@@ -109,7 +109,11 @@ impl EpisodeTable {
         let folder =
             RunFolder { path: self.settings.runs.join(id), visibility: heading.visibility, pages: true };
         if heading.build != build().map_err(EpisodeError::Build)? {
-            tracing::warn!(episode = id, made_by = heading.build, "begun by another build, and not played here");
+            tracing::warn!(
+                episode = id,
+                made_by = heading.build,
+                "begun by another build, and not played here"
+            );
             make_whole(&path, &folder, &journals.url);
         }
         let limit = self.settings.max_episodes;

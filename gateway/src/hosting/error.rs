@@ -170,7 +170,9 @@ pub enum HostingError {
 impl HostingError {
     /// What this error is to its caller.
     pub fn refusal(&self) -> Refusal {
-        use RefusalClass::{Conflict, Elsewhere, Failed, Forbidden, Gone, Invalid, NotFound, TooMany, Unavailable};
+        use RefusalClass::{
+            Conflict, Elsewhere, Failed, Forbidden, Gone, Invalid, NotFound, TooMany, Unavailable,
+        };
         match self {
             HostingError::Episode(error) => error.refusal(),
             HostingError::UnknownEpisode { .. } => {
@@ -191,7 +193,9 @@ impl HostingError {
             HostingError::HeldElsewhere { .. } => {
                 Refusal::new("held-elsewhere", "Played elsewhere", Elsewhere)
             }
-            HostingError::OtherBuild { .. } => Refusal::new("other-build", "Begun by another build", Conflict),
+            HostingError::OtherBuild { .. } => {
+                Refusal::new("other-build", "Begun by another build", Conflict)
+            }
             HostingError::EpisodeStopped => {
                 Refusal::new("episode-stopped", "Episode stopped", Gone).hint(START_ANOTHER)
             }

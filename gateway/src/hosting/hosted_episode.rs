@@ -132,8 +132,7 @@ impl HostedEpisode {
         let work =
             async move { episode.answer(robot, asked, Some(keyed)).await.map(Arc::new).map_err(Arc::new) };
         let lasting = |made: &SharedAnswer| made.as_ref().map_or_else(|error| error.is_final(), |_| true);
-        let IdempotentReply { reply, replayed } =
-            self.beside.replies.once(&key, call, work, lasting).await?;
+        let IdempotentReply { reply, replayed } = self.beside.replies.once(&key, call, work, lasting).await?;
         Ok(IdempotentReply { reply: reply.map_err(HostingError::Shared)?, replayed })
     }
 

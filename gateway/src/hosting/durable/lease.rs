@@ -108,8 +108,12 @@ mod tests {
     fn one_server_plays_an_episode_and_others_know_where() {
         let folder = tempfile::tempdir().unwrap();
         let journal = folder.path().join("handover-seed0.jsonl");
-        let Leasing::Taken(lease) = Lease::take(&journal, "http://a:1").unwrap() else { panic!("it is free") };
-        let Leasing::Held { url } = Lease::take(&journal, "http://b:1").unwrap() else { panic!("it is held") };
+        let Leasing::Taken(lease) = Lease::take(&journal, "http://a:1").unwrap() else {
+            panic!("it is free")
+        };
+        let Leasing::Held { url } = Lease::take(&journal, "http://b:1").unwrap() else {
+            panic!("it is held")
+        };
         assert_eq!(url, "http://a:1");
         assert_eq!(Lease::held_elsewhere(&journal, "http://b:1").as_deref(), Some("http://a:1"));
         drop(lease);

@@ -25,10 +25,10 @@ use super::{
     durable::{Heading, Keyed, LiveFolder},
 };
 use crate::metrics::Metrics;
-use job::{Job, ReplySender};
 pub use job::Tell;
-pub use onlookers::LiveWatch;
+use job::{Job, ReplySender};
 use onlookers::EveryStep;
+pub use onlookers::LiveWatch;
 pub use panic_guard::{EpisodeMetrics, PanicGuard};
 use status::SharedStatus;
 pub use work::HostMemory;

@@ -337,7 +337,8 @@ impl Desk<'_> {
             .flatten()
             .and_then(|asked| {
                 let kept = answers.into_iter().map(|(keyed, answer)| KeptAnswer::new(keyed, answer));
-                let kept: Vec<KeptAnswer> = kept.collect::<Result<_, _>>().map_err(|error| error.to_string())?;
+                let kept: Vec<KeptAnswer> =
+                    kept.collect::<Result<_, _>>().map_err(|error| error.to_string())?;
                 let now = self.stage.memory.memory();
                 let memory = (now != log.memory).then(|| now.clone());
                 log.memory = now;
@@ -364,7 +365,9 @@ impl Desk<'_> {
                 let file = JournalFile::create(&path, heading, journals.durability)?;
                 Ok(Log { file, lease, memory: self.stage.memory.memory() })
             }
-            Leasing::Held { url } => Err(std::io::Error::other(format!("{url} plays an episode of this name"))),
+            Leasing::Held { url } => {
+                Err(std::io::Error::other(format!("{url} plays an episode of this name")))
+            }
         });
         match begun {
             Ok(log) => {
@@ -373,7 +376,9 @@ impl Desk<'_> {
                 self.log = Some(log);
                 self.stage.status.durable.store(true, std::sync::atomic::Ordering::Relaxed);
             }
-            Err(error) => tracing::warn!(%error, "no journal; a server that is started again does not bring it back"),
+            Err(error) => {
+                tracing::warn!(%error, "no journal; a server that is started again does not bring it back")
+            }
         }
     }
 
