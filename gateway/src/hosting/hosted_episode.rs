@@ -47,15 +47,25 @@ pub struct HostedEpisode {
     /// The operators, where each robot has one.
     pub team: Option<Arc<Team>>,
     replies: Arc<IdempotencyCache<Call, SharedAnswer>>,
+    notes: Arc<IdempotencyCache<Note, SharedNote>>,
 }
 
 /// What came of a call, for as many as want to know.
 type SharedAnswer = Result<Arc<Answer>, Arc<HostingError>>;
 
+/// What came of a note, for as many as want to know.
+type SharedNote = Result<(), Arc<HostingError>>;
+
 impl HostedEpisode {
     /// The episode `id`, whose replies may be asked for again from now on.
     pub fn new(id: &str, thread: Arc<EpisodeThread>, team: Option<Team>) -> HostedEpisode {
-        HostedEpisode { id: id.into(), thread, team: team.map(Arc::new), replies: Arc::default() }
+        HostedEpisode {
+            id: id.into(),
+            thread,
+            team: team.map(Arc::new),
+            replies: Arc::default(),
+            notes: Arc::default(),
+        }
     }
 
     /// What the episode is called.
@@ -75,8 +85,7 @@ impl HostedEpisode {
             let reply = Arc::new(self.clone().answer(robot, call).await?);
             return Ok(IdempotentReply { reply, replayed: false });
         };
-        // Keys of different operators have nothing to do with each other.
-        let key = format!("{}:{key}", robot.as_deref().unwrap_or_default());
+        let key = own_key(robot.as_deref(), key);
         let (episode, asked) = (self.clone(), call.clone());
         let work = async move { episode.answer(robot, asked).await.map(Arc::new).map_err(Arc::new) };
         let lasting = |made: &SharedAnswer| made.as_ref().map_or_else(|error| error.is_final(), |_| true);
@@ -84,8 +93,17 @@ impl HostedEpisode {
         Ok(IdempotentReply { reply: reply.map_err(HostingError::Shared)?, replayed })
     }
 
-    /// Keeps a note of who started the episode, or of an operator.
-    pub async fn note(&self, who: &Caller, note: Note) -> Result<(), HostingError> {
+    /// Keeps a note of who started the episode, or of an operator; with a key, once for this key and caller.
+    pub async fn note(&self, who: &Caller, note: Note, key: Option<&str>) -> Result<(), HostingError> {
+        let Some(key) = key else { return self.keep_note(who, note).await };
+        let (episode, caller, told) = (self.clone(), who.clone(), note.clone());
+        let work = async move { episode.keep_note(&caller, told).await.map_err(Arc::new) };
+        let lasting = |made: &SharedNote| made.as_ref().map_or_else(|error| error.is_final(), |()| true);
+        let kept = self.notes.once(&own_key(who.robot(), key), note, work, lasting).await?;
+        kept.reply.map_err(HostingError::Shared)
+    }
+
+    async fn keep_note(&self, who: &Caller, note: Note) -> Result<(), HostingError> {
         self.admit(who)?;
         let own = self.team.as_ref().zip(who.robot());
         let _place = own.map(|(team, robot)| team.take_place(robot)).transpose()?;
@@ -206,4 +224,9 @@ impl HostedEpisode {
             }
         }
     }
+}
+
+/// The key of a request of the operator of `robot`: keys of different operators have nothing to do with each other.
+fn own_key(robot: Option<&str>, key: &str) -> String {
+    format!("{}:{key}", robot.unwrap_or_default())
 }
