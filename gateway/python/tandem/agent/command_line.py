@@ -149,6 +149,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _keep_loopback_off_proxies()
     try:
         episode = None if given.resume is None else _resumed(given)
+        result = None if episode is None else read_result(Path(given.resume))
+        if result is not None:
+            if not given.check:
+                print("the episode has ended already")
+                print_result(result)
+            return 0
         flags = _flags(given) if episode is None else {**episode.flags, **_given(given)}
         settings = settings_of(argparse.Namespace(**flags))
         # What is missing is said before an episode begins.
@@ -185,13 +191,17 @@ def _resumed(given: argparse.Namespace) -> EpisodeFile:
     if given.runs is not None:
         told["runs"] = str(Path(given.runs).resolve())
     differing = [
-        f"--{name.replace('_', '-')} {value} (it was {'not given' if kept.get(name) in (None, False) else kept[name]})"
+        f"--{name.replace('_', '-')} {value} (it was {_or_not_given(kept.get(name))})"
         for name, value in told.items()
         if name not in MAY_CHANGE and value != kept.get(name)
     ]
     if differing:
         raise TandemError(f"{given.resume} was played otherwise: {', '.join(differing)}; leave out what differs")
     return episode
+
+
+def _or_not_given(value: Any) -> str:
+    return "not given" if value is None or value is False else str(value)
 
 
 def _run(given: argparse.Namespace, flags: dict[str, Any], settings: AgentSettings) -> int:
@@ -214,11 +224,6 @@ def _run(given: argparse.Namespace, flags: dict[str, Any], settings: AgentSettin
 
 def _resume(given: argparse.Namespace, episode: EpisodeFile, settings: AgentSettings) -> int:
     folder = given.resume.resolve()
-    result = read_result(folder)
-    if result is not None:
-        print("the episode has ended already")
-        print_result(result)
-        return 0
     with ExitStack() as stack:
         url = given.url
         if url is None:

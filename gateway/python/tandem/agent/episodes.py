@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -60,30 +60,39 @@ def play_own(url: str, hosting: Hosting, settings: AgentSettings, keeping: Keepi
     episode_id = str(start["episode_id"])
     operators = tuple(listed(start.get("operators")))
     episode = EpisodeFile(episode_id, keeping.flags, keeping.server_flags, operators)
-    journals = _new_journals(keeping.runs, episode)
-    print(f"{hosting.task}, seed {hosting.seed}: {episode_id} at {url}", flush=True)
-    return _play_through(host, episode, settings, journals)
+    with ExitStack() as stack:
+        journals = _open_new(keeping.runs, episode, stack)
+        print(f"{hosting.task}, seed {hosting.seed}: {episode_id} at {url}", flush=True)
+        return _play_through(host, episode, settings, journals)
 
 
 def resume(url: str, folder: Path, episode: EpisodeFile, settings: AgentSettings) -> dict[str, Any]:
     """Goes on with an episode that an agent has left, where the server still holds it, and returns its result."""
     host = Client(url)
-    episode_id = episode.episode_id
-    # Those of another process are refused before anything is done.
-    journals = [Journal(LineFile(conversation_path(folder, robot))) for robot in _robots(episode)]
+    with ExitStack() as stack:
+        # Those of another process are refused before anything is done.
+        journals = _open(folder, episode, stack)
+        has_ended = _has_ended(host, folder, episode)
+        print(f"{episode.flags['task']}, seed {episode.flags['seed']}: {episode.episode_id} at {url}", flush=True)
+        if has_ended:
+            result = host.request("DELETE", f"/v1/episodes/{episode.episode_id}")
+            print_result(result)
+            return result
+        return _play_through(host, episode, settings, journals)
+
+
+def _has_ended(host: Client, folder: Path, episode: EpisodeFile) -> bool:
+    """Asks the server whether an episode has ended."""
     try:
-        status = host.request("GET", f"/v1/episodes/{episode_id}")
+        status = host.request("GET", f"/v1/episodes/{episode.episode_id}")
     except Refused as refused:
+        if refused.kind != "unknown-episode":
+            raise
         raise TandemError(
-            f"the server does not hold {episode_id} any more, so that it cannot go on ({refused.detail}); "
+            f"the server does not hold {episode.episode_id} any more, so that it cannot go on ({refused.detail}); "
             f"what was recorded is in {folder}; play the task anew, without --resume"
         ) from refused
-    print(f"{episode.flags['task']}, seed {episode.flags['seed']}: {episode_id} at {url}", flush=True)
-    if status["ended"] is not None:
-        result = host.request("DELETE", f"/v1/episodes/{episode_id}")
-        print_result(result)
-        return result
-    return _play_through(host, episode, settings, journals)
+    return status["ended"] is not None
 
 
 def print_result(result: dict[str, Any]) -> None:
@@ -100,33 +109,34 @@ def _robots(episode: EpisodeFile) -> list[str | None]:
     return [each["robot"] for each in episode.operators] or [None]
 
 
-def _new_journals(runs: Path | None, episode: EpisodeFile) -> list[Journal]:
+def _open_new(runs: Path | None, episode: EpisodeFile, stack: ExitStack) -> list[Journal]:
     """Writes down what an episode is resumed by, and begins a journal for each model. Where that fails, nothing is kept."""
-    robots = _robots(episode)
     if runs is not None:
         folder = runs / episode.episode_id
         try:
-            journals = [Journal(LineFile(conversation_path(folder, robot))) for robot in robots]
+            journals = _open(folder, episode, stack)
             episode.write(folder)
             return journals
         except (OSError, TandemError) as error:
             print(f"tandem agent: {error}; the play goes on, and --resume cannot take it up", file=sys.stderr)
-    return [Journal() for _ in robots]
+    return [Journal() for _ in _robots(episode)]
+
+
+def _open(folder: Path, episode: EpisodeFile, stack: ExitStack) -> list[Journal]:
+    """Opens the journal of each model."""
+    return [Journal(stack.enter_context(closing(LineFile(conversation_path(folder, robot))))) for robot in _robots(episode)]
 
 
 def _play_through(host: Client, episode: EpisodeFile, settings: AgentSettings, journals: Sequence[Journal]) -> dict[str, Any]:
     """Plays an episode to its end, ends it, and returns its result."""
-    with ExitStack() as stack:
-        for journal in journals:
-            stack.callback(journal.close)
-        try:
-            if episode.operators:
-                _play_each(host.url, episode, settings, journals)
-            else:
-                seat = _take_seat(host, episode.episode_id, None, journals[0])
-                _play(seat, str(episode.flags["task"]), settings, journals[0])
-        finally:
-            result = host.request("DELETE", f"/v1/episodes/{episode.episode_id}")
+    try:
+        if episode.operators:
+            _play_each(host.url, episode, settings, journals)
+        else:
+            seat = _take_seat(host, episode.episode_id, None, journals[0])
+            _play(seat, str(episode.flags["task"]), settings, journals[0])
+    finally:
+        result = host.request("DELETE", f"/v1/episodes/{episode.episode_id}")
     print_result(result)
     return result
 

@@ -41,12 +41,6 @@ class Journal:
             self._lines = None
             EpisodeFile.remove(path.parent)
 
-    def close(self) -> None:
-        """Gives the file up to others."""
-        if self._lines is not None:
-            self._lines.close()
-            self._lines = None
-
 
 def _read(lines: LineFile) -> list[Event]:
     try:
