@@ -332,7 +332,7 @@ def test_what_cannot_be_resumed_says_what_could(
     missing = refusal(capsys, "--resume", str(runs / "handover-seed9"))
     assert "there is no folder" in missing and f"have: {broken_off}" in missing
     (runs / "empty").mkdir(exist_ok=True)
-    assert "no agent has left a conversation there; have: " in refusal(capsys, "--resume", str(runs / "empty"))
+    assert "it is no folder of an agent's episode; have: " in refusal(capsys, "--resume", str(runs / "empty"))
     resume = ("--resume", str(broken_off), "--url", server.url)
     told = refusal(capsys, *resume, "--model", "other", "--seed", "3", "--per-robot", "--top-p", "0.9")
     for says in ("--model other (it was scripted)", "--seed 3 (it was 2000)", "--per-robot True (it was not given)", "--top-p"):
@@ -389,3 +389,23 @@ def test_limits_may_change_and_an_episode_that_has_ended_gives_its_result(
     assert main(resume) == 0
     printed = capsys.readouterr().out
     assert printed.startswith("the episode has ended already\nfinished: p1 not reached")
+
+
+def test_a_play_that_cannot_be_kept_goes_on(
+    server: tandem.Server, runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(file: LineFile, value: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    episode = ["--model", "scripted", "--api", "openai-chat", "--task", "handover", "--seed", str(SEED), "--url", server.url]
+    with ScriptedEndpoint(script) as endpoint:
+        where = ["--base-url", endpoint.base_url("openai-chat")]
+        assert main([*episode, *where, "--runs", str(tmp_path)]) == 0
+        assert "--resume cannot take it up" in capsys.readouterr().err
+        endpoint.restart()
+        monkeypatch.setattr(LineFile, "append", full)
+        assert main([*episode, *where, "--runs", str(runs)]) == 0
+    printed = capsys.readouterr().err
+    assert printed.count("No space left on device; the play goes on, and --resume cannot take it up") == 1
+    folder = max(runs.glob("handover-*/result.json"), key=lambda path: path.stat().st_mtime_ns).parent
+    assert not (folder / "agent.json").exists()

@@ -149,7 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _keep_loopback_off_proxies()
     try:
         episode = None if given.resume is None else _resumed(given)
-        result = None if episode is None else read_result(Path(given.resume))
+        result = None if given.resume is None else read_result(given.resume)
         if result is not None:
             if not given.check:
                 print("the episode has ended already")

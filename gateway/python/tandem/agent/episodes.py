@@ -90,7 +90,7 @@ def _has_ended(host: Client, folder: Path, episode: EpisodeFile) -> bool:
             raise
         raise TandemError(
             f"the server does not hold {episode.episode_id} any more, so that it cannot go on ({refused.detail}); "
-            f"what was recorded is in {folder}; play the task anew, without --resume"
+            f"its recording is in {folder} (tandem recover makes it whole); play the task anew, without --resume"
         ) from refused
     return status["ended"] is not None
 

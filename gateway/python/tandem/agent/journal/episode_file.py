@@ -64,9 +64,8 @@ class EpisodeFile:
             kept = {name: fields[name] for name in ("episode_id", "flags", "server_flags")}
             episode = EpisodeFile(**kept, operators=tuple(fields["operators"]))
         except FileNotFoundError:
-            raise TandemError(
-                f"{folder} has no {FILE}: no agent has left a conversation there{_others(folder.parent)}"
-            ) from None
+            others = _others(folder.parent)
+            raise TandemError(f"{folder} has no {FILE}: it is no folder of an agent's episode{others}") from None
         except (OSError, KeyError, TypeError, ValueError) as error:
             raise TandemError(f"{path} cannot be read ({error}); play the task anew, without --resume") from error
         if folder.resolve().name != episode.episode_id:
@@ -90,4 +89,4 @@ def read_result(folder: Path) -> dict[str, Any] | None:
 def _others(runs: Path) -> str:
     """Names the folders beside in which a play can be resumed."""
     folders = sorted(str(path.parent) for path in runs.glob(f"*/{FILE}") if not (path.parent / RESULT_FILE).exists())
-    return f"; have: {', '.join(folders)}" if folders else ""
+    return f"; have: {', '.join(folders)}" if folders else ", as runs/handover-seed0"
