@@ -180,24 +180,32 @@ fn play_each(
     let runs = settings.runs.clone();
     let server = Server::start(settings)?;
     let url = format!("http://{}", server.address());
-    let mut failed = false;
+    let mut ended = None;
     let child = Arc::new(AtomicU32::new(NO_CHILD));
     hand_on_signals(child.clone());
     for play in plays {
         let further: Vec<&str> = ["--url", &url].into_iter().chain(play.iter().map(String::as_str)).collect();
         let mut playing = agent.command(&further).env("TANDEM_TOKEN", token).spawn()?;
         child.store(playing.id(), Ordering::SeqCst);
-        if !playing.wait()?.success() {
-            failed = true;
+        let status = playing.wait()?;
+        ended = Some(status);
+        if !status.success() {
             break;
         }
     }
-    server.stop();
-    println!(
-        "to look at it in a browser: tandem serve --runs {}, and the link that it prints",
-        shell_word(&runs.to_string_lossy())
-    );
-    Ok(exit_code(!failed))
+    // A process without an exit code was killed, and has not ended its episode.
+    let was_killed = ended.is_some_and(|status| status.code().is_none());
+    let shown = shell_word(&runs.to_string_lossy());
+    if was_killed {
+        server.stop_keeping();
+        eprintln!(
+            "the agent was killed; tandem agent --resume, with the folder of its episode in {shown}, goes on"
+        );
+    } else {
+        server.stop();
+    }
+    println!("to look at it in a browser: tandem serve --runs {shown}, and the link that it prints");
+    Ok(exit_code(ended.is_none_or(|status| status.success())))
 }
 
 fn exit_code(is_success: bool) -> ExitCode {

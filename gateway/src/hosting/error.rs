@@ -1,6 +1,6 @@
 //! Why the host of episodes refuses.
 
-use std::{io, sync::Arc};
+use std::{io, path::PathBuf, sync::Arc};
 
 use tandem_episodes::{EpisodeError, players::PlayerError};
 use tandem_tools_spec::{Refusal, RefusalClass};
@@ -39,6 +39,34 @@ pub enum HostingError {
     HeldAlready {
         /// The id of both.
         id: String,
+    },
+    /// Another server on the same folder of runs plays the episode.
+    #[error("episode {id:?} is played by {url:?}; ask there")]
+    HeldElsewhere {
+        /// What was asked for.
+        id: String,
+        /// Where it is played.
+        url: String,
+    },
+    /// The episode was begun by another build, which alone brings it to the same state.
+    #[error(
+        "this episode was begun by build {made_by} of the server and this is {this}, which would not bring it to the same state; start that build on the same runs folder to go on, or DELETE the episode; what was recorded is in {}", .folder.display()
+    )]
+    OtherBuild {
+        /// The build that began it.
+        made_by: String,
+        /// This one.
+        this: &'static str,
+        /// Where it is recorded.
+        folder: PathBuf,
+    },
+    /// The journal from which the episode is to be brought back cannot be read or written.
+    #[error("the journal {}: {source}", .path.display())]
+    Journal {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
     },
     /// The episode was closed meanwhile.
     #[error("the episode has stopped")]
@@ -142,7 +170,9 @@ pub enum HostingError {
 impl HostingError {
     /// What this error is to its caller.
     pub fn refusal(&self) -> Refusal {
-        use RefusalClass::{Conflict, Failed, Forbidden, Gone, Invalid, NotFound, TooMany, Unavailable};
+        use RefusalClass::{
+            Conflict, Elsewhere, Failed, Forbidden, Gone, Invalid, NotFound, TooMany, Unavailable,
+        };
         match self {
             HostingError::Episode(error) => error.refusal(),
             HostingError::UnknownEpisode { .. } => {
@@ -159,6 +189,12 @@ impl HostingError {
             }
             HostingError::ShuttingDown => {
                 Refusal::new("shutting-down", "Shutting down", Unavailable).retry_after_s(60)
+            }
+            HostingError::HeldElsewhere { .. } => {
+                Refusal::new("held-elsewhere", "Played elsewhere", Elsewhere)
+            }
+            HostingError::OtherBuild { .. } => {
+                Refusal::new("other-build", "Begun by another build", Conflict)
             }
             HostingError::EpisodeStopped => {
                 Refusal::new("episode-stopped", "Episode stopped", Gone).hint(START_ANOTHER)
@@ -185,9 +221,10 @@ impl HostingError {
             }
             HostingError::KeyUsed => Refusal::new("key-used", "Key used", Invalid),
             HostingError::Shared(error) => error.refusal(),
-            HostingError::HeldAlready { .. } | HostingError::Token(_) | HostingError::Thread(_) => {
-                Refusal::INTERNAL
-            }
+            HostingError::HeldAlready { .. }
+            | HostingError::Journal { .. }
+            | HostingError::Token(_)
+            | HostingError::Thread(_) => Refusal::INTERNAL,
         }
     }
 
@@ -206,6 +243,9 @@ impl HostingError {
             | HostingError::TooManyWaiting { .. }
             | HostingError::ShuttingDown
             | HostingError::HeldAlready { .. }
+            | HostingError::HeldElsewhere { .. }
+            | HostingError::OtherBuild { .. }
+            | HostingError::Journal { .. }
             | HostingError::EpisodeStopped
             | HostingError::EpisodePanicked
             | HostingError::NeedsOperator
@@ -218,6 +258,33 @@ impl HostingError {
             | HostingError::Token(_)
             | HostingError::Shared(_)
             | HostingError::Thread(_) => false,
+        }
+    }
+
+    /// Whether the episode is another server's, or nobody's any more.
+    pub fn is_elsewhere(&self) -> bool {
+        match self {
+            HostingError::HeldElsewhere { .. } | HostingError::UnknownEpisode { .. } => true,
+            HostingError::Shared(error) => error.is_elsewhere(),
+            _ => false,
+        }
+    }
+
+    /// Whether another build alone can go on with the episode.
+    pub fn is_of_other_build(&self) -> bool {
+        match self {
+            HostingError::OtherBuild { .. } => true,
+            HostingError::Shared(error) => error.is_of_other_build(),
+            _ => false,
+        }
+    }
+
+    /// Where the episode is played, if another server plays it.
+    pub fn elsewhere(&self) -> Option<&str> {
+        match self {
+            HostingError::HeldElsewhere { url, .. } => Some(url),
+            HostingError::Shared(error) => error.elsewhere(),
+            _ => None,
         }
     }
 

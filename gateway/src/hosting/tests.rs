@@ -10,22 +10,27 @@ use std::{
     time::Duration,
 };
 
-use tandem_episodes::{Clock, EpisodeSpec, Recorder, Recording, RunFolder, tasks};
+use tandem_episodes::{Clock, EpisodeSpec, Recorder, Recording, tasks};
 use tandem_tools_spec::{Briefing, EndReason, ManageReply, Protocol, StatusReply, ToolCall, ToolReply, Wait};
-use tokio::sync::Semaphore;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use super::*;
+use super::{episode::Surroundings, hosted_episode::Beside, *};
 use crate::settings::{Layer, Settings};
 
 const IDLE: Duration = Duration::from_secs(900);
+
+/// An episode that is recorded in `folder`, of which nothing else is known.
+pub fn alone(folder: &Path, place: OwnedSemaphorePermit) -> Surroundings {
+    let memory = Arc::new(Beside::default());
+    Surroundings { folder: folder.into(), place, metrics: Arc::default(), memory, journals: None }
+}
 
 async fn start(id: &str, folder: &Path, clock: Clock) -> (Arc<EpisodeThread>, Arc<Semaphore>, Briefing) {
     let spec = EpisodeSpec::new(tasks::find("handover").unwrap(), 0, Protocol::Benchmark);
     let places = Arc::new(Semaphore::new(1));
     let permit = places.clone().try_acquire_owned().unwrap();
-    let folder = RunFolder::from(folder);
     let (episode, briefing) =
-        EpisodeThread::start_with_clock(id, spec, folder, permit, Arc::default(), clock).await.unwrap();
+        EpisodeThread::start_with_clock(id, spec, alone(folder, permit), clock).await.unwrap();
     (Arc::new(episode), places, briefing)
 }
 
@@ -144,7 +149,7 @@ async fn closing_ends_in_time_and_says_what_it_left() {
     hangs.store(true, Relaxed);
     let call = tokio::spawn(async move { episode.call(wait()).await });
     tokio::task::yield_now().await;
-    let left = table.close_all(Duration::from_millis(50)).await;
+    let left = table.close_all(Duration::from_millis(50), false).await;
     assert_eq!(left, [format!("stuck in {}", runs.path().display())]);
     drop(go_on);
     assert!(call.await.unwrap().is_ok(), "the call still finishes");

@@ -1,6 +1,7 @@
 //! The program in a process of its own: stopped, killed, resumed, on a full disk, what it logs, and what it says of itself.
 
 mod agents;
+mod brought_back;
 mod command_line;
 mod evaluations;
 mod interrupted;
