@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import random
 import re
 import signal
@@ -310,6 +311,39 @@ def test_a_model_for_each_robot_is_taken_up_again(moment: Moment, server: tandem
     assert sorted({tool for tool, _ in set(relay.keys)} - {"notes"}) == ["finish", "say", "wait"]
     assert len({key for tool, key in relay.keys if tool == "wait"}) == 4
     assert sum("I am A." in text for text in heard) == sum("I am B." in text for text in heard) == 1
+
+
+@pytest.mark.parametrize(("program", "killed"), [("tandem", "both"), ("tandem", "agent"), ("tandem.agent", "both")])
+def test_an_agent_whose_server_is_killed_with_it_goes_on(program: str, killed: str, tmp_path: Path, unbroken: Unbroken) -> None:
+    requests, came, _ = unbroken("openai-chat")
+    command = [sys.executable, "-m", *(["tandem", "agent"] if program == "tandem" else [program])]
+    model = ["--model", "scripted", "--api", "openai-chat"]
+    episode = [*model, "--task", "handover", "--seed", str(SEED), "--runs", str(tmp_path)]
+    with ScriptedEndpoint(script) as endpoint:
+        reply, asked = endpoint.answer, iter(range(1000))
+
+        def answer(path: str, body: dict[str, Any], headers: dict[str, str]) -> tuple[int, dict[str, Any]]:
+            replied = reply(path, body, headers)
+            if next(asked) == 2:
+                if killed == "both":
+                    os.killpg(first.pid, signal.SIGKILL)
+                else:
+                    events = (latest(tmp_path) / "agent.jsonl").read_text().splitlines()
+                    os.kill(json.loads(events[0])["pid"], signal.SIGKILL)
+            return replied
+
+        endpoint.answer = answer
+        where = ["--base-url", endpoint.base_url("openai-chat")]
+        first = subprocess.Popen(
+            [*command, *episode, *where], cwd=AWAY, start_new_session=True, stderr=subprocess.PIPE, text=True
+        )
+        _, errors = first.communicate(timeout=120)
+        assert ("the agent was killed; tandem agent --resume" in errors) == (killed == "agent")
+        folder = latest(tmp_path)
+        resume = [*command, "--resume", str(folder), *where]
+        assert subprocess.run(resume, cwd=AWAY, timeout=120, check=False).returncode == 0
+    assert told(endpoint) == requests
+    assert summary(folder) == came
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ use std::{
 
 use serde::Deserialize;
 use serde_json::{Map, Value};
-use tandem_episodes::{RESULT_FILE, shell_word, tasks};
+use tandem_episodes::{shell_word, tasks};
 use tandem_tools_spec::Assistance;
 use tracing_subscriber::filter::LevelFilter;
 
@@ -135,9 +135,6 @@ fn play(args: AgentArgs) -> CommandResult {
 /// fit, before there is a server.
 fn resume(folder: &Path, given: &GivenFlags) -> CommandResult {
     let agent = PythonModule::new(PythonPart::Agent, resumed_arguments(given))?;
-    if folder.join(RESULT_FILE).exists() {
-        return Ok(exit_code(agent.command(&[]).status()?.success()));
-    }
     let folder = folder.canonicalize()?;
     let kept: AgentFile = serde_json::from_slice(&fs::read(folder.join(AGENT_FILE))?)?;
     let (token, text) = Token::random()?;

@@ -134,9 +134,4 @@ fn who_resumes_an_episode_hands_on_what_is_given_and_no_defaults() {
     assert!(printed.contains(&arguments), "no {arguments} in {printed}");
     let (_, printed) = tandem(&python, &["agent", "--seed", "3"]);
     assert!(printed.contains("--model <NAME>|--resume <FOLDER>"), "{printed}");
-    // Nothing goes on, and nothing is served.
-    fs::write(folder.join("result.json"), "{}").expect("a file");
-    let (output, printed) = tandem(&python, &resume);
-    assert!(output.status.success(), "{printed}");
-    assert_eq!(printed.lines().next(), Some(format!("-m tandem.agent {arguments}").as_str()));
 }

@@ -18,8 +18,8 @@ from ..client import Client
 from ..errors import TandemError
 from ..server import serve
 from .apis import open_model, without_keys
-from .episodes import Hosting, Keeping, play_joined, play_own, print_result, resume
-from .journal import EpisodeFile, read_result
+from .episodes import Hosting, Keeping, play_joined, play_own, resume
+from .journal import EpisodeFile
 from .settings import APIS, AgentSettings, Limits, Prices, Sampling
 
 DEFAULTS: dict[str, Any] = {
@@ -149,12 +149,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _keep_loopback_off_proxies()
     try:
         episode = None if given.resume is None else _resumed(given)
-        result = None if given.resume is None else read_result(given.resume)
-        if result is not None:
-            if not given.check:
-                print("the episode has ended already")
-                print_result(result)
-            return 0
         flags = _flags(given) if episode is None else {**episode.flags, **_given(given)}
         settings = settings_of(argparse.Namespace(**flags))
         # What is missing is said before an episode begins.

@@ -17,7 +17,7 @@ from ..errors import Refused, TandemError
 from .apis import open_model
 from .conversation import listed
 from .instructions import instructions
-from .journal import Begun, EpisodeFile, Journal, LineFile, conversation_path
+from .journal import Begun, EpisodeFile, Journal, LineFile, conversation_path, read_result
 from .loop import Played, Player, Printer
 from .seat import Seat
 from .settings import AgentSettings
@@ -67,35 +67,39 @@ def play_own(url: str, hosting: Hosting, settings: AgentSettings, keeping: Keepi
 
 
 def resume(url: str, folder: Path, episode: EpisodeFile, settings: AgentSettings) -> dict[str, Any]:
-    """Goes on with an episode that an agent has left, where the server still holds it, and returns its result."""
+    """Goes on with an episode that an agent has left, and returns its result. Of one that has ended it only prints that."""
     host = Client(url)
     with ExitStack() as stack:
         # Those of another process are refused before anything is done.
         journals = _open(folder, episode, stack)
-        has_ended = _has_ended(host, folder, episode)
-        print(f"{episode.flags['task']}, seed {episode.flags['seed']}: {episode.episode_id} at {url}", flush=True)
-        if has_ended:
-            result = host.request("DELETE", f"/v1/episodes/{episode.episode_id}")
-            print_result(result)
-            return result
-        return _play_through(host, episode, settings, journals)
+        result = _ended(host, folder, episode)
+        if result is None:
+            print(f"{episode.flags['task']}, seed {episode.flags['seed']}: {episode.episode_id} at {url}", flush=True)
+            return _play_through(host, episode, settings, journals)
+    print("the episode has ended already")
+    _print_result(result)
+    return result
 
 
-def _has_ended(host: Client, folder: Path, episode: EpisodeFile) -> bool:
-    """Asks the server whether an episode has ended."""
+def _ended(host: Client, folder: Path, episode: EpisodeFile) -> dict[str, Any] | None:
+    """The result of an episode that has ended; None: it goes on."""
+    path = f"/v1/episodes/{episode.episode_id}"
     try:
-        status = host.request("GET", f"/v1/episodes/{episode.episode_id}")
+        goes_on = host.request("GET", path)["ended"] is None
+        return None if goes_on else host.request("DELETE", path)
     except Refused as refused:
         if refused.kind != "unknown-episode":
             raise
-        raise TandemError(
-            f"the server does not hold {episode.episode_id} any more, so that it cannot go on ({refused.detail}); "
-            f"its recording is in {folder} (tandem recover makes it whole); play the task anew, without --resume"
-        ) from refused
-    return status["ended"] is not None
+        result = read_result(folder)
+        if result is None:
+            raise TandemError(
+                f"the server does not hold {episode.episode_id} any more, so that it cannot go on ({refused.detail}); "
+                f"its recording is in {folder} (tandem recover makes it whole); play the task anew, without --resume"
+            ) from refused
+        return result
 
 
-def print_result(result: dict[str, Any]) -> None:
+def _print_result(result: dict[str, Any]) -> None:
     """Prints how an episode ended, in a line."""
     phases = ", ".join(f"{number} {_when(time_s)}" for number, time_s in result["phases"].items())
     print(
@@ -137,7 +141,7 @@ def _play_through(host: Client, episode: EpisodeFile, settings: AgentSettings, j
             _play(seat, str(episode.flags["task"]), settings, journals[0])
     finally:
         result = host.request("DELETE", f"/v1/episodes/{episode.episode_id}")
-    print_result(result)
+    _print_result(result)
     return result
 
 
