@@ -51,7 +51,7 @@ def server(runs: Path) -> Iterator[tandem.Server]:
 
 
 class Relay:
-    """Stands between an agent and the server of episodes, and keeps the Idempotency-Key of each request that has one.
+    """Stands between an agent and its server, and keeps the Idempotency-Key of each request that has one.
 
     kill: Is asked about every request whether the agent is killed with it, before the server gets it ("before") or when the
         server has answered ("after"), and not ("").
@@ -148,7 +148,7 @@ def result(folder: Path) -> dict[str, Any]:
 
 
 def script(_: str) -> Script:
-    """Looks, waits and talks to itself, and ends: replies with thoughts, pictures, several calls, a mistake and none."""
+    """Looks, waits and ends: replies with thoughts, pictures, several calls, a mistake, and without a call."""
     yield Says(thoughts="Where am I?", words="I look.", calls=(("observe", {"robots": ["A"]}), ("get_status", {})))
     yield Says(words="I wait.", calls=(("wait", {"steps": 5}), ("wait", {"steps": 99}), ("wait", {"steps": 7})))
     yield Says(words="Well.")

@@ -78,8 +78,8 @@ pub struct AgentArgs {
     /// Folder that recordings are written to, one folder per episode.
     #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
     runs: PathBuf,
-    /// In place of a new episode: go on with that of this folder, as runs/handover-seed0, whose agent was killed. Limits, prices and
-    /// --base-url may be given anew; everything else is as it was.
+    /// In place of a new episode: go on with that of this folder, as runs/handover-seed0, whose agent was killed.
+    /// Limits, prices and --base-url may be given anew; everything else is as it was.
     #[arg(long, value_name = "FOLDER")]
     resume: Option<PathBuf>,
     #[command(flatten)]
@@ -89,12 +89,12 @@ pub struct AgentArgs {
 /// What is read here of [`AGENT_FILE`].
 #[derive(Debug, Deserialize)]
 struct AgentFile {
-    flags: KeptFlags,
+    flags: ServerFlags,
 }
 
 /// The flags of an episode that concern its server.
 #[derive(Debug, Deserialize)]
-struct KeptFlags {
+struct ServerFlags {
     assistance: Assistance,
 }
 
@@ -131,8 +131,8 @@ fn play(args: AgentArgs) -> CommandResult {
     play_each(&agent, settings, &text, plays.collect())
 }
 
-/// Goes on with the episode of `folder` on a server over the folder of all runs, which brings the episode back. Python says what does not
-/// fit, before there is a server.
+/// Goes on with the episode of `folder`, which a server over the folder of all runs brings back. Python refuses flags
+/// that do not fit, before there is a server.
 fn resume(folder: &Path, given: &GivenFlags) -> CommandResult {
     let agent = PythonModule::new(PythonPart::Agent, resumed_arguments(given))?;
     let folder = folder.canonicalize()?;
@@ -154,7 +154,8 @@ fn world_flags(given: &GivenFlags) -> Value {
     flags.map(|(flag, value)| (flag.replace('-', "_"), Value::from(value))).collect::<Map<_, _>>().into()
 }
 
-/// The arguments for Python of who resumes an episode: what is given, and no defaults, which may be others than those of the episode.
+/// The arguments for Python where an episode is resumed: the flags that are given, without defaults, which may differ
+/// from the episode's.
 fn resumed_arguments(given: &GivenFlags) -> Vec<String> {
     let world = given.of::<WorldFlags>();
     let own = given.of::<AgentArgs>().into_iter().filter(|flag| !world.contains(flag));

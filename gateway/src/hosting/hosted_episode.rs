@@ -282,7 +282,7 @@ impl HostedEpisode {
     }
 }
 
-/// The key of a request of the operator of `robot`: keys of different operators have nothing to do with each other.
+/// The key under which an operator's request is kept: keys of different operators have nothing to do with each other.
 fn own_key(robot: Option<&str>, key: &str) -> String {
     format!("{}:{key}", robot.unwrap_or_default())
 }

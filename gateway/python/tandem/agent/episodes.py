@@ -67,7 +67,7 @@ def play_own(url: str, hosting: Hosting, settings: AgentSettings, keeping: Keepi
 
 
 def resume(url: str, folder: Path, episode: EpisodeFile, settings: AgentSettings) -> dict[str, Any]:
-    """Goes on with an episode that an agent has left, and returns its result. Of one that has ended it only prints that."""
+    """Goes on with an episode that an agent has left, unless it has ended, and returns its result."""
     host = Client(url)
     with ExitStack() as stack:
         # Those of another process are refused before anything is done.
@@ -114,7 +114,7 @@ def _robots(episode: EpisodeFile) -> list[str | None]:
 
 
 def _open_new(runs: Path | None, episode: EpisodeFile, stack: ExitStack) -> list[Journal]:
-    """Writes down what an episode is resumed by, and begins a journal for each model. Where that fails, nothing is kept."""
+    """Writes down what an episode is resumed by, and begins a journal for each model. On failure nothing is kept."""
     if runs is not None:
         folder = runs / episode.episode_id
         try:

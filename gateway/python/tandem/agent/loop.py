@@ -111,7 +111,7 @@ class Player:
         return stopped
 
     def _heed(self, replied: Replied) -> Stopped | None:
-        """Does what a reply asks for, unless it is done already. Returns why the model plays no longer, where it does not."""
+        """Does what a reply asks for, unless it is done already. Returns why the model stops, if it does."""
         if not self._progress.noted:
             self._tell(replied)
             self._record(Noted())
@@ -206,7 +206,7 @@ class Player:
         self._progress.apply(event)
 
     def _key(self, what: str) -> str:
-        """Returns the Idempotency-Key of what this conversation asks of the server, which is the same in every process."""
+        """Returns the Idempotency-Key of a request of this conversation, which is the same in every process."""
         return f"{self._begun.conversation}-{what}"
 
 

@@ -68,7 +68,7 @@ class Seat:
         return self.client.request("GET", f"/v1/episodes/{self.episode_id}/briefing")
 
     def call(self, call: Call, key: str) -> Answer:
-        """Calls a tool as the model wants it. What cannot be done is an answer, too, which says what would have worked.
+        """Calls a tool as the model wants it. A refusal is an answer, too, which says what would have worked.
 
         key: The call's Idempotency-Key.
         """

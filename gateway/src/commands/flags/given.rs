@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use clap::{ArgAction, ArgMatches, Args, Command, FromArgMatches, parser::ValueSource};
 
-/// The flags of a subcommand that the command line or the environment gives, by id, with their texts. It has to be the first field
-/// of the subcommand's flags: those that are read before are gone from the matches.
+/// The flags of a subcommand that the command line or the environment gives, by id, with their texts. It has to be the
+/// first field of the subcommand's flags: those that are read before are gone from the matches.
 #[derive(Debug)]
 pub struct GivenFlags(BTreeMap<String, Vec<String>>);
 

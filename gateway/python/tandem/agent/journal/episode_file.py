@@ -1,4 +1,4 @@
-"""What is kept of an episode that an agent has begun: by which flags, under which name, with which operators."""
+"""The file of an episode that an agent has begun: its flags, its id and its operators."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MODE = 0o600
 
 @dataclass(frozen=True)
 class EpisodeFile:
-    """An episode, as `agent.json` in its folder has it. It holds the tokens of operators, and is its owner's alone."""
+    """The contents of `agent.json` in an episode's folder. Only its owner may read it: it has operators' tokens."""
 
     episode_id: str
     flags: dict[str, Any]

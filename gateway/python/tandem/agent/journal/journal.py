@@ -28,8 +28,8 @@ class Journal:
         return first if isinstance(first, Begun) else None
 
     def write(self, event: Event) -> None:
-        """Writes an event down. Where that fails, the model plays on, and the play cannot be resumed any more: a conversation
-        with a gap would be another one.
+        """Writes an event down. Where that fails, the model plays on, and nobody can resume the play: a
+        conversation with a gap would be another one.
         """
         if self._lines is None:
             return

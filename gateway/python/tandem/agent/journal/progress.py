@@ -10,7 +10,7 @@ from .events import Answered, Begun, Ended, Event, Halved, Noted, Replied, Resum
 
 
 class Progress:
-    """What the model remembers and has used up, and what remains to be done about its latest reply. All of it changes by events
+    """Memory and usage of a model, and what remains to be done about its latest reply. All of it changes by events
     alone, so that those of a file lead where they led before.
     """
 
