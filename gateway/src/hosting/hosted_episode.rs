@@ -57,15 +57,19 @@ pub struct Beside {
     team: Option<Arc<Team>>,
     /// Replies that may be asked for again.
     replies: Arc<IdempotencyCache<Call, SharedAnswer>>,
+    notes: IdempotencyCache<Note, SharedNote>,
 }
 
 /// What came of a call, for as many as want to know.
 type SharedAnswer = Result<Arc<Answer>, Arc<HostingError>>;
 
+/// What came of a note, for as many as want to know.
+type SharedNote = Result<(), Arc<HostingError>>;
+
 impl Beside {
     /// What is known of an episode that `team` drives, or else one policy.
     pub fn new(team: Option<Team>) -> Beside {
-        Beside { team: team.map(Arc::new), replies: Arc::default() }
+        Beside { team: team.map(Arc::new), ..Beside::default() }
     }
 }
 
@@ -125,8 +129,7 @@ impl HostedEpisode {
             let reply = Arc::new(self.clone().answer(robot, call, None).await?);
             return Ok(IdempotentReply { reply, replayed: false });
         };
-        // Keys of different operators have nothing to do with each other.
-        let key = format!("{}:{key}", robot.as_deref().unwrap_or_default());
+        let key = own_key(robot.as_deref(), key);
         let (episode, asked) = (self.clone(), call.clone());
         let keyed = Keyed { key: key.clone(), request: call.clone() };
         let work =
@@ -136,8 +139,17 @@ impl HostedEpisode {
         Ok(IdempotentReply { reply: reply.map_err(HostingError::Shared)?, replayed })
     }
 
-    /// Keeps a note of who started the episode, or of an operator.
-    pub async fn note(&self, who: &Caller, note: Note) -> Result<(), HostingError> {
+    /// Keeps a note of who started the episode, or of an operator; with a key, once for this key and caller.
+    pub async fn note(&self, who: &Caller, note: Note, key: Option<&str>) -> Result<(), HostingError> {
+        let Some(key) = key else { return self.keep_note(who, note).await };
+        let (episode, caller, told) = (self.clone(), who.clone(), note.clone());
+        let work = async move { episode.keep_note(&caller, told).await.map_err(Arc::new) };
+        let lasting = |made: &SharedNote| made.as_ref().map_or_else(|error| error.is_final(), |()| true);
+        let kept = self.beside.notes.once(&own_key(who.robot(), key), note, work, lasting).await?;
+        kept.reply.map_err(HostingError::Shared)
+    }
+
+    async fn keep_note(&self, who: &Caller, note: Note) -> Result<(), HostingError> {
         self.admit(who)?;
         let own = self.team().zip(who.robot());
         let _place = own.map(|(team, robot)| team.take_place(robot)).transpose()?;
@@ -268,4 +280,9 @@ impl HostedEpisode {
             }
         }
     }
+}
+
+/// The key under which an operator's request is kept: keys of different operators have nothing to do with each other.
+fn own_key(robot: Option<&str>, key: &str) -> String {
+    format!("{}:{key}", robot.unwrap_or_default())
 }

@@ -167,6 +167,11 @@ impl Server {
         self.stop_for(false)
     }
 
+    /// As [`Server::stop`]; episodes under way go on when the next server on the same runs brings them back.
+    pub fn stop_keeping(self) -> Vec<String> {
+        self.stop_for(true)
+    }
+
     fn stop_for(self, keep: bool) -> Vec<String> {
         let Server { runtime, table, stop, served, settings, .. } = self;
         let _ = stop.send(());

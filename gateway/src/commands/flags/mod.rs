@@ -2,6 +2,7 @@
 
 mod agent;
 mod episode;
+mod given;
 mod policy;
 mod run;
 mod seed_key;
@@ -10,6 +11,7 @@ mod world;
 
 pub use agent::AgentFlags;
 pub use episode::{EpisodeFlags, Seeds};
+pub use given::GivenFlags;
 pub use policy::{PartnerFlags, PolicyFlags};
 pub use run::RunFlags;
 pub use stress::{StressFlags, StressPlanFlags};

@@ -245,13 +245,14 @@ async fn note(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
     encoding: Encoding,
+    IdempotencyKey(key): IdempotencyKey,
     Path(id): Path<String>,
     body: Bytes,
 ) -> Result<StatusCode, ApiError> {
     let episode = app.table.awake(&id).await?;
     episode.admit(&caller)?;
     let note = Note::parse(encoding.read(&body)?)?;
-    let kept = episode.note(&caller, note).await;
+    let kept = episode.note(&caller, note, key.as_deref()).await;
     kept.map_err(|refusal| ApiError::from(refusal).in_episode(&episode.thread))?;
     Ok(StatusCode::NO_CONTENT)
 }
