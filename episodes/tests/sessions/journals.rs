@@ -98,7 +98,7 @@ fn bring_back(spec: &EpisodeSpec, entries: &[JournalEntry], hands: &Hands, think
 fn said(session: &mut Session) -> serde_json::Value {
     let mut told = json!([session.status(), session.result(), session.thought().as_millis()]);
     let result = told[1].as_object_mut().unwrap();
-    result.retain(|name, _| !name.contains("real_time"));
+    result.retain(|name, _| name != "realtime_factor");
     told
 }
 

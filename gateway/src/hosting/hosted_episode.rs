@@ -96,6 +96,11 @@ impl HostMemory for Beside {
         }
     }
 
+    fn let_go(&self) {
+        // What is left of them would keep all memory around it in use.
+        self.replies.clear();
+    }
+
     fn is_busy(&self) -> bool {
         self.team.as_ref().is_some_and(|team| team.is_busy())
     }

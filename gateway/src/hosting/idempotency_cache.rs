@@ -99,6 +99,13 @@ impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> IdempotencyCache<Q,
         }
     }
 
+    /// Forgets every reply that has been made.
+    pub fn clear(&self) {
+        let mut entries = self.lock();
+        entries.retain(|entry| entry.reply.borrow().is_none());
+        entries.shrink_to_fit();
+    }
+
     fn forget(&self, key: &str) {
         self.lock().retain(|entry| entry.key != key);
     }

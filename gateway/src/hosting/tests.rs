@@ -15,7 +15,7 @@ use tandem_tools_spec::{Briefing, EndReason, ManageReply, Protocol, StatusReply,
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use super::{episode::Surroundings, hosted_episode::Beside, *};
-use crate::settings::{Layer, Settings};
+use crate::settings::{Durability, Layer, Settings};
 
 const IDLE: Duration = Duration::from_secs(900);
 
@@ -157,4 +157,39 @@ async fn closing_ends_in_time_and_says_what_it_left() {
     let refused = table.insert("late", late.clone());
     assert!(matches!(refused, Err(HostingError::ShuttingDown)), "nothing is added after closing");
     late.close().await.unwrap();
+}
+
+/// Who asks a sleeping episode for something notices nothing but the time that it takes.
+#[tokio::test]
+async fn an_episode_that_was_put_aside_is_as_it_was() {
+    let runs = tempfile::tempdir().unwrap();
+    let flags = Layer { runs: Some(runs.path().into()), max_episodes: Some(2), ..Layer::default() };
+    let table = Arc::new(EpisodeTable::new(Settings::resolve(flags, None).unwrap()));
+    let journals = LiveFolder::beside(runs.path(), "http://127.0.0.1:1".into(), Durability::Disk);
+    table.keep_journals(journals.clone());
+    let start = || serde_json::from_value(serde_json::json!({ "task": "handover", "seed": 2110 })).unwrap();
+    let mut steps = Vec::new();
+    for sleeps in [true, false] {
+        let id = table.start(start()).await.unwrap().episode_id;
+        let hosted = table.awake(&id).await.unwrap();
+        hosted.call(&Caller::Host, wait().into(), Some("first")).await.unwrap();
+        let first = hosted.call(&Caller::Host, wait().into(), Some("second")).await.unwrap();
+        if sleeps {
+            hosted.thread.put_aside();
+            while !hosted.thread.sleeps() {
+                tokio::time::sleep(Duration::from_millis(1)).await;
+            }
+            assert!(!hosted.thread.ended());
+        }
+        let again = table.awake(&id).await.unwrap();
+        let again = again.call(&Caller::Host, wait().into(), Some("second")).await.unwrap();
+        assert!(again.replayed && again.reply.step == first.reply.step);
+        hosted.call(&Caller::Host, wait().into(), Some("third")).await.unwrap();
+        let result = table.remove(&id).await.unwrap();
+        assert_eq!((result.recording_failed.as_deref(), result.tool_calls), (None, 3));
+        let recording = Recording::read(&runs.path().join(&id).join(Recorder::FILE_NAME)).unwrap();
+        steps.push(recording.state_hashes().map(Result::unwrap).collect::<Vec<_>>());
+    }
+    assert_eq!(steps[0], steps[1]);
+    assert!(journals.ids().is_empty());
 }

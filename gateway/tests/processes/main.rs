@@ -1,15 +1,12 @@
 //! The program in a process of its own: stopped, killed, resumed, on a full disk, what it logs, and what it says of itself.
 
 mod agents;
-mod brought_back;
 mod command_line;
 mod evaluations;
-mod interrupted;
+mod killed;
 mod logs;
 mod people;
-mod resumed;
 mod server;
-mod signals;
 #[path = "../../../tests/src/skipped.rs"]
 mod skipped;
 mod tls;

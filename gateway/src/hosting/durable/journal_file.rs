@@ -138,8 +138,14 @@ impl JournalFile {
     pub fn create(path: &Path, heading: &Heading, durability: Durability) -> io::Result<JournalFile> {
         let file = private_file(path)?;
         let mut journal = JournalFile { path: path.into(), file, durability };
-        journal.append(heading)?;
-        Ok(journal)
+        match journal.append(heading) {
+            Ok(()) => Ok(journal),
+            Err(error) => {
+                // Half a heading says nothing.
+                let _ = journal.remove();
+                Err(error)
+            }
+        }
     }
 
     /// Goes on with a journal that has been read to its end.

@@ -42,6 +42,9 @@ pub trait HostMemory: std::fmt::Debug + Send + Sync {
     /// Takes over what was remembered elsewhere, and the answers that may be asked for again.
     fn restore(&self, memory: Option<Value>, answers: Vec<KeptAnswer>);
 
+    /// Lets go of what [`HostMemory::restore`] brings again: the episode is put aside.
+    fn let_go(&self);
+
     /// Whether somebody in this process plays, who would be missed.
     fn is_busy(&self) -> bool;
 }
@@ -252,6 +255,7 @@ impl Desk<'_> {
             }
         }
         if asleep {
+            self.stage.memory.let_go();
             return Left::Asleep;
         }
         // Nobody is left who could be told.
@@ -289,10 +293,7 @@ impl Desk<'_> {
                 let _ = reply.send(kept.flatten());
             }
             Job::Refused { operator, call, reply } => {
-                let RefusedCall { tool, arguments, problem } = *call;
-                let kept = self.session.run(|session| {
-                    session.refused_before(operator.as_deref(), &tool, &arguments, &problem);
-                });
+                let kept = self.session.run(|session| refused(session, operator.as_deref(), *call));
                 self.commit(None);
                 let _ = reply.send(kept);
             }
@@ -316,7 +317,6 @@ impl Desk<'_> {
                 }
             }
             Job::End { reason } => {
-                // The log has the reason of a refusal.
                 let _ = self.session.run(|session| session.end(reason));
                 self.commit(None);
             }
@@ -412,6 +412,11 @@ fn together(
 ) -> Result<Vec<Answer>, HostingError> {
     let replies = session.together(commands)?;
     Ok(replies.into_iter().map(|reply| Answer::new(reply, session)).collect())
+}
+
+fn refused(session: &mut Session, operator: Option<&str>, call: RefusedCall) {
+    let RefusedCall { tool, arguments, problem } = call;
+    session.refused_before(operator, &tool, &arguments, &problem);
 }
 
 fn view(session: &mut Session, operator: Option<&str>) -> Result<LiveView, HostingError> {
