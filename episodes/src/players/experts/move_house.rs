@@ -1,6 +1,5 @@
-//! MoveHouse: A walks to the door, presses its lever, pushes the door open along its swing and stands aside in the
-//! other room. Meanwhile B and C lift the table; they follow A through the doorway in step and set it down on the
-//! marks.
+//! MoveHouse: A presses the lever, pushes the door open along its swing and stands aside in the other room. Meanwhile B and
+//! C lift the table; they follow A through the doorway in step and set it down on the marks.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -49,11 +48,9 @@ const OPENED_S: f32 = 0.4;
 /// B stays so far behind A, until A is beside the way.
 const APART_M: f32 = 0.75;
 const BESIDE_Y_M: f32 = -0.75;
-/// Where A stands to press the lever, and where it stands aside, in the door's frame.
-const BEFORE_M: Vector = Vector::new(-0.50, -0.15, 0.0);
+/// Where A stands aside, in the door's frame.
 const ASIDE_M: Vector = Vector::new(0.75, -1.05, 0.0);
 const WALK_M_S: f32 = 0.3;
-const APPROACH_M_S: f32 = 0.4;
 
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     let door = ParallelScript { robots: &[A], script: Box::new(clear_the_way) };
@@ -61,12 +58,10 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     in_parallel(commander, vec![door, table])
 }
 
-/// A walks to the door, opens it and stands aside.
+/// A opens the door and stands aside.
 fn clear_the_way(commander: &mut Commander) -> Result<(), PlayerError> {
-    let door = commander.facts()?.object("lever_door").pose_in_world;
-    let before = WalkGoal { robot: A, to: place(door * BEFORE_M, 0.0), pace_m_s: APPROACH_M_S };
-    walk_to(commander, &[before])?;
     open_door(commander)?;
+    let door = commander.facts()?.object("lever_door").pose_in_world;
     walk_to(commander, &[WalkGoal { robot: A, to: place(door * ASIDE_M, FRAC_PI_2), pace_m_s: WALK_M_S }])
 }
 
@@ -90,7 +85,7 @@ fn carry_table(commander: &mut Commander) -> Result<(), PlayerError> {
     let marks = facts.object("foot_marks").pose_in_world;
     let b_x_m = facts.robots[B].pelvis_in_world.translation.x;
     let free_m = |facts: &Facts| match facts.robots[A].pelvis_in_world.translation {
-        a_m if a_m.x > 0.0 && a_m.y < BESIDE_Y_M => f32::INFINITY,
+        a_m if a_m.y < BESIDE_Y_M => f32::INFINITY,
         a_m => a_m.x - APART_M - b_x_m,
     };
     team.carry_where_free(commander, &marks, PACE_M_S, &free_m)?;
@@ -108,7 +103,7 @@ fn set_heights(commander: &mut Commander, height_m: f32) {
     }
 }
 
-/// Has A, within reach of the lever, press it with its right fist and follow the leaf on its swing.
+/// A, which begins within reach of the lever, lays its right fist on it, presses it down and follows the leaf on its swing.
 fn open_door(commander: &mut Commander) -> Result<(), PlayerError> {
     let leaf = commander.facts()?.object("lever_door leaf").pose_in_world;
     let pressed_m = press_lever(commander)?;
