@@ -117,6 +117,11 @@ pub enum HostingError {
         "an operator looks through its robot and commands it; this request is for who started the episode"
     )]
     HostsBusiness,
+    /// Somebody else is to drive one robot of an episode whose robots one policy directs.
+    #[error(
+        "one policy directs all robots of this episode; start one and add \"operators\": \"per_robot\" for somebody else to drive one of them"
+    )]
+    OnePolicy,
     /// A client would start an episode where an evaluation in this process has the only one.
     #[error(
         "this server holds the one episode that an evaluation scores, and starts no other; play the one that your brief and the environment's TANDEM_EPISODE name"
@@ -213,6 +218,7 @@ impl HostingError {
             HostingError::HostsBusiness => Refusal::new("hosts-business", "Not for operators", Forbidden),
             HostingError::OneEpisode => Refusal::new("one-episode", "No other episode", Forbidden),
             HostingError::PeopleDrive => Refusal::new("people-drive", "People drive", Forbidden),
+            HostingError::OnePolicy => Refusal::new("one-policy", "One policy directs all", Conflict),
             HostingError::NoExpert(_) => Refusal::new("no-expert", "No expert", Invalid),
             HostingError::NoPolicy { .. } => Refusal::new("no-policy", "No policy", Conflict),
             HostingError::NoTalk => Refusal::new("no-talk", "Nobody hears", Conflict),
@@ -252,6 +258,7 @@ impl HostingError {
             | HostingError::HostsBusiness
             | HostingError::OneEpisode
             | HostingError::PeopleDrive
+            | HostingError::OnePolicy
             | HostingError::NoExpert(_)
             | HostingError::NoPolicy { .. }
             | HostingError::KeyUsed

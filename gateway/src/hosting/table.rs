@@ -114,14 +114,6 @@ impl EpisodeTable {
     }
 
     /// Refuses a program that would drive a robot in the place of who has its seat.
-    fn check_stand_in(&self) -> Result<(), HostingError> {
-        match self.purpose {
-            Purpose::Evaluation => Err(HostingError::OneEpisode),
-            Purpose::Collection(_) => Err(HostingError::PeopleDrive),
-            Purpose::Clients => Ok(()),
-        }
-    }
-
     /// What has been counted.
     pub fn metrics(&self) -> &Arc<Metrics> {
         &self.metrics
@@ -291,13 +283,21 @@ impl EpisodeTable {
         Ok((hosted, team, robot))
     }
 
-    /// As [`EpisodeTable::own_robot`], for a program of this process that is to drive in the operator's place.
-    pub fn stand_in<'a>(
-        &self,
-        caller: &'a Caller,
-    ) -> Result<(HostedEpisode, Arc<Team>, &'a str), HostingError> {
-        self.check_stand_in()?;
-        self.own_robot(caller)
+    /// Checks that `who` may replace operators by the expert or a policy of this process. The episode's starter may.
+    pub fn check_stand_in(&self, who: &Caller) -> Result<(), HostingError> {
+        match (&self.purpose, who) {
+            (Purpose::Evaluation, _) => Err(HostingError::OneEpisode),
+            (Purpose::Collection(_), _) => Err(HostingError::PeopleDrive),
+            (Purpose::Clients, Caller::Operator { .. }) => Err(HostingError::HostsBusiness),
+            (Purpose::Clients, Caller::Host) => Ok(()),
+        }
+    }
+
+    /// The episode `id` and its operators.
+    pub fn team(&self, id: &str) -> Result<(HostedEpisode, Arc<Team>), HostingError> {
+        let hosted = self.hosted(id)?;
+        let team = hosted.team.clone().ok_or(HostingError::OnePolicy)?;
+        Ok((hosted, team))
     }
 
     /// What `who` has to know to play the episode `id`, in this server's words.

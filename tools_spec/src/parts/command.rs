@@ -143,6 +143,9 @@ pub struct HandReport {
     /// What the fingers feel between them, by their own torques; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grip: Option<Grip>,
+    /// What of the hand presses, by the torques of the fingers' own drives; left out where nothing does, and where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub presses: Vec<HandPart>,
     /// What stops the hand, as far as it can feel that; left out where it feels nothing, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub touches: Option<Touch>,
@@ -195,8 +198,23 @@ pub enum Grip {
     Touching,
     /// Thumb or fingers press on something and the others do not press against it: close those further.
     OneSided,
-    /// The thumb presses on one side and the fingers on the other.
-    Holding,
+    /// The thumb presses, and fingers or palm do. That is a hold, as phases ask for, where they press on opposite sides, which a hand cannot
+    /// feel: on a round thing that lies at the fingertips, or only hangs in a bent hand, they press on neighbouring ones.
+    TwoSided,
+}
+
+/// A part of a hand that presses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum HandPart {
+    /// The thumb.
+    Thumb,
+    /// The middle finger.
+    Middle,
+    /// The index finger.
+    Index,
+    /// The palm, on which the thumb presses something: the arm feels nothing of that force.
+    Palm,
 }
 
 /// What a hand touches, as far as it can feel that.

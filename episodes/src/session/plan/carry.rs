@@ -323,7 +323,7 @@ impl Carrier {
             };
             let empty = &mut self.empty[*side];
             *empty = match (grip, *empty) {
-                (Some(Grip::Holding), _) => Some(0),
+                (Some(Grip::TwoSided), _) => Some(0),
                 (Some(Grip::None), Some(commands)) => Some(commands + 1),
                 (_, before) => before,
             };

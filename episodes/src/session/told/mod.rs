@@ -204,6 +204,7 @@ fn withhold_hand(hand: &mut HandReport) {
     let HandReport {
         state,
         grip,
+        presses,
         touches,
         target: _,
         measured: _,
@@ -218,6 +219,7 @@ fn withhold_hand(hand: &mut HandReport) {
     } = hand;
     (*state, *grip, *touches, *compliance_offset_m) = (None, None, None, None);
     (*largest_effort, *force_n) = (None, None);
+    presses.clear();
     if let Some(FingerReport { state, target_rad: _, measured_rad: _ }) = fingers {
         *state = None;
     }

@@ -21,11 +21,19 @@ Grip: TypeAlias = Literal[
     "none",
     "touching",
     "one_sided",
-    "holding",
+    "two_sided",
 ]
 """What the fingers of a hand feel between them: the torques of their drives while they are stopped short of their
 targets.
 """
+
+HandPart: TypeAlias = Literal[
+    "thumb",
+    "middle",
+    "index",
+    "palm",
+]
+"""A part of a hand that presses."""
 
 HandState: TypeAlias = Literal[
     "arrived",
@@ -248,6 +256,11 @@ class HandReport:
     grip: Grip | None
     """What the fingers feel between them, by their own torques; left out where the assistance is "paper"."""
 
+    presses: tuple[HandPart, ...]
+    """What of the hand presses, by the torques of the fingers' own drives; left out where nothing does, and where
+    the assistance is "paper".
+    """
+
     touches: Touch | None
     """What stops the hand, as far as it can feel that; left out where it feels nothing, and where the assistance
     is "paper".
@@ -308,6 +321,7 @@ class HandReport:
         return HandReport(
             state=value.get("state"),
             grip=value.get("grip"),
+            presses=tuple(value.get("presses", ())),
             touches=value.get("touches"),
             target=None if (got := value.get("target")) is None else Pose.of(got),
             measured=None if (got := value.get("measured")) is None else Pose.of(got),

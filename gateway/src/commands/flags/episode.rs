@@ -12,7 +12,7 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 
-use super::{WorldFlags, seed_key::read_seed_key};
+use super::{WorldFlags, read_seed_key};
 use crate::settings::one_of;
 
 /// Which episodes to play.

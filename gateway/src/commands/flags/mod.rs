@@ -14,5 +14,6 @@ pub use episode::{EpisodeFlags, Seeds};
 pub use given::GivenFlags;
 pub use policy::{PartnerFlags, PolicyFlags};
 pub use run::RunFlags;
+pub use seed_key::read_seed_key;
 pub use stress::{StressFlags, StressPlanFlags};
 pub use world::{LocomotionFlag, SensingFlags, WorldFlags};

@@ -418,19 +418,21 @@ impl Team {
 
     /// Refuses a call that names a robot which nobody drives.
     fn check_robots(&self, call: &Call) -> Result<(), EpisodeError> {
-        let names = || self.seats.iter().map(|seat| seat.robot.as_str());
-        match call.robots().into_iter().find(|robot| !names().any(|name| name == *robot)) {
-            Some(robot) => Err(EpisodeError::UnknownRobot {
-                name: robot.into(),
-                have: names().map(str::to_owned).collect(),
-            }),
-            None => Ok(()),
-        }
+        let is_known = |robot: &str| self.seats.iter().any(|seat| seat.robot == robot);
+        call.robots()
+            .into_iter()
+            .find(|robot| !is_known(robot))
+            .map_or(Ok(()), |robot| Err(self.unknown(robot)))
+    }
+
+    fn unknown(&self, robot: &str) -> EpisodeError {
+        let have = self.seats.iter().map(|seat| seat.robot.clone()).collect();
+        EpisodeError::UnknownRobot { name: robot.into(), have }
     }
 
     fn seat(&self, robot: &str) -> Result<usize, HostingError> {
         let found = self.seats.iter().position(|seat| seat.robot == robot);
-        found.ok_or(HostingError::NeedsOperator)
+        found.ok_or_else(|| self.unknown(robot).into())
     }
 
     fn wheels(&self) -> MutexGuard<'_, Wheels> {
