@@ -296,7 +296,7 @@ impl EpisodeTable {
     /// The episode `id` and its operators.
     pub fn team(&self, id: &str) -> Result<(HostedEpisode, Arc<Team>), HostingError> {
         let hosted = self.hosted(id)?;
-        let team = hosted.team.clone().ok_or(HostingError::OnePolicy)?;
+        let team = hosted.team().cloned().ok_or(HostingError::OnePolicy)?;
         Ok((hosted, team))
     }
 
