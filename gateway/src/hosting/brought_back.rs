@@ -38,11 +38,20 @@ impl EpisodeTable {
             return;
         }
         for id in ids {
+            if self.is_elsewhere(&id) {
+                continue;
+            }
             match self.adopt(&id) {
                 Ok(_) => tracing::info!(episode = id, "held, and brought back when it is asked for"),
                 Err(error) => tracing::warn!(episode = id, %error, "not held"),
             }
         }
+    }
+
+    /// Whether another server plays the episode `id`.
+    fn is_elsewhere(&self, id: &str) -> bool {
+        let Some(journals) = self.journals.get() else { return false };
+        journals.journal(id).is_some_and(|path| Lease::is_elsewhere(&path, &journals.url))
     }
 
     /// The episode `id`, played by this server, wherever it has been before.
@@ -96,9 +105,6 @@ impl EpisodeTable {
     fn adopt(&self, id: &str) -> Result<HostedEpisode, HostingError> {
         let journals = self.journals.get().ok_or_else(|| unknown(id))?;
         let path = journals.journal(id).filter(|path| path.exists()).ok_or_else(|| unknown(id))?;
-        if let Some(url) = Lease::held_elsewhere(&path, &journals.url) {
-            return Err(HostingError::HeldElsewhere { id: id.into(), url });
-        }
         let failed = |source| HostingError::Journal { path: path.clone(), source };
         let mut reader = JournalReader::open(&path).map_err(failed)?;
         let mut entries = Vec::new();
@@ -161,8 +167,8 @@ impl EpisodeTable {
         let Some(journals) = self.journals.get() else { return };
         for episode in self.all() {
             if episode.thread.sleeps()
-                && let Some(path) = journals.journal(episode.id())
-                && (!path.exists() || Lease::held_elsewhere(&path, &journals.url).is_some())
+                && (self.is_elsewhere(episode.id())
+                    || journals.journal(episode.id()).is_none_or(|path| !path.exists()))
             {
                 self.forget(episode.id());
             }

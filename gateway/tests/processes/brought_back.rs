@@ -249,3 +249,63 @@ fn an_interrupt_ends_episodes_and_a_termination_does_not() {
         }
     }
 }
+
+/// The answer to a call at `server`, with its status and where it sends the caller; nothing is followed.
+fn ask(server: &Server, method: &str, path: &str, body: &Value) -> (u16, String, Value) {
+    let config = ureq::Agent::config_builder().http_status_as_error(false).max_redirects(0);
+    let agent: ureq::Agent = config.max_redirects_will_error(false).build().into();
+    let url = format!("{}{path}", server.url);
+    let mut answer = match method {
+        "DELETE" => agent.delete(url).call().expect("an answer"),
+        _ => agent.post(url).send_json(body).expect("an answer"),
+    };
+    let location = answer.headers().get("location").map(|url| url.to_str().expect("a URL").to_owned());
+    (answer.status().as_u16(), location.unwrap_or_default(), answer.body_mut().read_json().expect("JSON"))
+}
+
+#[test]
+fn an_episode_of_another_build_is_named_and_refused_and_its_recording_is_whole() {
+    let runs = tempfile::tempdir().expect("a temporary folder");
+    let server = Server::start(runs.path());
+    let start = json!({ "task": "handover", "seed": 3500, "protocol": "agentic" });
+    let id = server.post("/v1/episodes", &start).expect("an episode")["episode_id"].clone();
+    let id = id.as_str().expect("an id");
+    server.tool(id, "wait", &json!({ "steps": 25 }));
+    drop(server);
+    let journal = runs.path().join(".live").join(format!("{id}.jsonl"));
+    let written = std::fs::read_to_string(&journal).expect("a journal");
+    let (_, build) = written.split_once(r#""build":""#).expect("a build");
+    let (build, _) = build.split_once('"').expect("its end");
+    std::fs::write(&journal, written.replacen(build, "0.0.1+old", 1)).expect("another build");
+
+    let server = Server::start(runs.path());
+    let path = format!("/v1/episodes/{id}");
+    let (status, _, refusal) = ask(&server, "POST", &format!("{path}/tools/wait"), &json!({ "steps": 1 }));
+    let says = refusal["detail"].as_str().expect("words");
+    assert_eq!((status, &refusal["type"]), (409, &json!("urn:tandem:problem:other-build")), "{refusal}");
+    assert!(says.contains("0.0.1+old") && says.contains("start that build"), "{says}");
+    let recording = Recording::read(&runs.path().join(id).join(Recorder::FILE_NAME)).expect("a whole one");
+    assert!(recording.steps().count() > 300);
+    let (status, ..) = ask(&server, "DELETE", &path, &json!({}));
+    assert_eq!((status, journal.exists()), (410, false));
+}
+
+#[test]
+fn an_episode_is_played_by_one_server_and_by_the_next_when_that_has_gone() {
+    let runs = tempfile::tempdir().expect("a temporary folder");
+    let [first, second] = [(); 2].map(|()| Server::start(runs.path()));
+    let start = json!({ "task": "handover", "seed": 3600, "operators": "per_robot" });
+    let started = first.post("/v1/episodes", &start).expect("an episode");
+    let id = started["episode_id"].as_str().expect("an id");
+    let path = format!("/v1/episodes/{id}/tools/get_status?x=1");
+    let (status, location, refusal) = ask(&second, "POST", &path, &json!({}));
+    assert_eq!((status, location), (307, format!("{}{path}", first.url)), "{refusal}");
+    drop(first);
+    let token = started["operators"][1]["token"].as_str().expect("a token");
+    let agent = ureq::Agent::new_with_defaults();
+    let request = agent.post(format!("{}{path}", second.url));
+    let mut answer =
+        request.header("authorization", format!("Bearer {token}")).send_json(json!({})).expect("200");
+    let status: Value = answer.body_mut().read_json().expect("JSON");
+    assert_eq!(status["env_steps"], started["status"]["env_steps"], "{status}");
+}

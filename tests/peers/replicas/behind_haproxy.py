@@ -84,7 +84,7 @@ def agent(port: int, seed: int, calls: int, think_s: float, told: dict) -> None:
         if number > 0:
             looks_s.append(took_s)
     status, result, _ = caller.post(tools + "finish", {})
-    assert status == 200 and result["env_steps"] == step and result["tool_calls"] == 2 * calls, result
+    assert status == 200 and result["env_steps"] == step and result["tool_calls"] == 2 * calls + 1, result
     told[seed] = (looks_s, caller.repeated, caller.redirected)
 
 

@@ -5,6 +5,7 @@ use std::{
     fs::{self, File},
     io::{self, Read, Seek, Write},
     path::{Path, PathBuf},
+    thread,
     time::{Duration, SystemTime},
 };
 
@@ -14,6 +15,12 @@ use super::age;
 
 /// Without locks, the owner of a lease that is older than this is gone.
 const STALE: Duration = Duration::from_secs(30);
+
+/// How often a lease is asked for that somebody has. One who looks at it has it for microseconds.
+const ATTEMPTS: u32 = 40;
+const ATTEMPT_INTERVAL: Duration = Duration::from_millis(1);
+/// Attempts that are left when a lease that says whose it is counts as held.
+const SURE_AFTER: u32 = ATTEMPTS - 3;
 
 /// The right to play an episode, until it is dropped.
 #[derive(Debug)]
@@ -43,15 +50,20 @@ impl Lease {
     /// Takes the lease of the episode with this journal for the server at `url`, unless another has it.
     pub fn take(journal: &Path, url: &str) -> io::Result<Leasing> {
         let path = Lease::path(journal);
-        let lock = match FileLock::attempt(&path, LockKind::Exclusive)? {
-            Locking::Locked(lock) => Some(lock.removing(&path)),
-            Locking::Held => return Ok(Leasing::Held { url: owner(&path) }),
-            Locking::Unsupported => {
-                let other = owner(&path);
-                if !other.is_empty() && other != url && age(&path)? < STALE {
-                    return Ok(Leasing::Held { url: other });
+        let mut attempts = ATTEMPTS;
+        let lock = loop {
+            attempts -= 1;
+            match FileLock::attempt(&path, LockKind::Exclusive)? {
+                Locking::Locked(lock) => break Some(lock.removing(&path)),
+                // It may be looked at, and one that has just been taken may not be written yet.
+                Locking::Held if attempts > 0 && (attempts > SURE_AFTER || owner(&path).is_empty()) => {
+                    thread::sleep(ATTEMPT_INTERVAL);
                 }
-                None
+                Locking::Held => return Ok(Leasing::Held { url: owner(&path) }),
+                Locking::Unsupported => match fresh_owner(&path).filter(|other| other != url) {
+                    Some(url) => return Ok(Leasing::Held { url }),
+                    None => break None,
+                },
             }
         };
         match &lock {
@@ -61,11 +73,16 @@ impl Lease {
         Ok(Leasing::Taken(Lease { path, lock }))
     }
 
-    /// Who has the lease of the episode with this journal, if that is another than the server at `url`.
-    pub fn held_elsewhere(journal: &Path, url: &str) -> Option<String> {
-        match Lease::take(journal, url) {
-            Ok(Leasing::Held { url: other }) if other != url => Some(other),
-            Ok(Leasing::Held { .. } | Leasing::Taken(_)) | Err(_) => None,
+    /// Whether another server than the one at `url` has the lease of the episode with this journal.
+    pub fn is_elsewhere(journal: &Path, url: &str) -> bool {
+        let path = Lease::path(journal);
+        if !path.exists() {
+            return false;
+        }
+        match FileLock::attempt(&path, LockKind::Shared) {
+            Ok(Locking::Held) => owner(&path) != url,
+            Ok(Locking::Unsupported) => fresh_owner(&path).is_some_and(|other| other != url),
+            Ok(Locking::Locked(_)) | Err(_) => false,
         }
     }
 
@@ -85,6 +102,11 @@ impl Drop for Lease {
             let _ = fs::remove_file(&self.path);
         }
     }
+}
+
+/// The owner of a lease without locks, who has shown lately that it is there.
+fn fresh_owner(path: &Path) -> Option<String> {
+    Some(owner(path)).filter(|owner| !owner.is_empty() && age(path).is_ok_and(|age| age < STALE))
 }
 
 fn owner(path: &Path) -> String {
@@ -115,9 +137,9 @@ mod tests {
             panic!("it is held")
         };
         assert_eq!(url, "http://a:1");
-        assert_eq!(Lease::held_elsewhere(&journal, "http://b:1").as_deref(), Some("http://a:1"));
+        assert!(Lease::is_elsewhere(&journal, "http://b:1") && !Lease::is_elsewhere(&journal, "http://a:1"));
         drop(lease);
-        assert_eq!(Lease::held_elsewhere(&journal, "http://b:1"), None);
+        assert!(!Lease::is_elsewhere(&journal, "http://b:1"));
         assert!(matches!(Lease::take(&journal, "http://b:1").unwrap(), Leasing::Taken(_)));
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "nothing is left of it");
     }
