@@ -74,13 +74,13 @@ class Client:
     def request(self, method: str, path: str, body: Mapping[str, Json] | None = None, *, key: str | None = None) -> Any:
         """Sends a request and returns its answer as JSON has it; None where there is none.
 
-        key: The request's Idempotency-Key, by which the server carries it out once, however often it is sent. None: a new
-            one for a start or a call, and none for others.
+        key: The request's Idempotency-Key, by which the server carries it out once, however often it is sent. None: a new one,
+            for those that may have one.
         """
         headers = {"content-type": "application/json"}
         if self._token:
             headers["authorization"] = f"Bearer {self._token}"
-        if key is not None or (method == "POST" and _has_keys(path)):
+        if method == "POST" and _has_keys(path):
             headers["idempotency-key"] = key or uuid.uuid4().hex
         text = None if body is None else json.dumps(body)
         try:
@@ -248,8 +248,8 @@ class RemoteEpisode(BaseEpisode):
 
 
 def _has_keys(path: str) -> bool:
-    """Whether requests to a path have a key, by which the server carries them out once."""
-    return path == "/v1/episodes" or "/tools/" in path
+    """Whether requests to a path may have a key, by which the server carries them out once."""
+    return path == "/v1/episodes" or "/tools/" in path or path.endswith("/notes")
 
 
 def _row_of(state: RobotState) -> dict[str, float]:
