@@ -287,63 +287,85 @@ def test_kills_at_any_moment_leave_the_play_as_it_was(server: tandem.Server, run
     assert [tool for tool, _ in keys] == called
 
 
-@pytest.mark.parametrize("moment", [(1, "/tools/wait", "after"), (2, "/tools/say", "after"), (1, "/tools/finish", "after")])
-def test_a_model_for_each_robot_is_taken_up_again(moment: Moment, server: tandem.Server, runs: Path) -> None:
-    heard: list[str] = []
+class Pair:
+    """A script for each robot, which tells the other who it is; keeps what they heard."""
 
-    def pair(system: str) -> Script:
+    def __init__(self) -> None:
+        self.heard: list[str] = []
+
+    def script(self, system: str) -> Script:
         robot = "A" if "the humanoid robot A" in system else "B"
         answers = yield Says(calls=(("say", {"text": f"I am {robot}."}), ("wait", {"steps": 5})))
-        heard.extend(answer.text for answer in answers)
+        self.heard.extend(answer.text for answer in answers)
         yield Says(calls=(("wait", {"steps": 5}),))
         yield Says(calls=(("finish", {}),))
 
-    with ScriptedEndpoint(pair) as endpoint, Relay(server.url, at(moment)) as relay:
+    def check(self, folder: Path, endpoint: ScriptedEndpoint) -> None:
+        """Checks that all was done and heard once."""
+        came = result(folder)
+        assert (came["ended"], came["env_steps"], len(endpoint.requests)) == ("finished", 310, 6)
+        said = ["I am A.", "I am B."]
+        assert [sum(words in text for text in self.heard) for words in said] == [1, 1]
+
+
+@pytest.mark.parametrize("moment", [(1, "/tools/wait", "after"), (2, "/tools/say", "after"), (1, "/tools/finish", "after")])
+def test_a_model_for_each_robot_is_taken_up_again(moment: Moment, server: tandem.Server, runs: Path) -> None:
+    pair = Pair()
+    with ScriptedEndpoint(pair.script) as endpoint, Relay(server.url, at(moment)) as relay:
         relay.agent = begin(endpoint, relay.url, "openai-chat", runs, "--per-robot", "--talk")
         relay.agent.communicate(timeout=120)
         folder = latest(runs)
         relay.agent = start(endpoint, relay.url, "openai-chat", "--resume", str(folder))
         printed, errors = relay.agent.communicate(timeout=120)
     assert relay.agent.returncode == 0, errors
-    came = result(folder)
-    assert (came["ended"], came["env_steps"], len(endpoint.requests)) == ("finished", 310, 6)
+    pair.check(folder, endpoint)
     assert "A: taken up again after" in printed or "B: taken up again after" in printed
     assert sorted({tool for tool, _ in set(relay.keys)} - {"notes"}) == ["finish", "say", "wait"]
     assert len({key for tool, key in relay.keys if tool == "wait"}) == 4
-    assert sum("I am A." in text for text in heard) == sum("I am B." in text for text in heard) == 1
+
+
+def break_off(command: list[str], endpoint: ScriptedEndpoint, runs: Path, killed: str) -> str:
+    """Starts an agent with a server of its own, kills the agent or both with the third reply, and returns their last words."""
+    reply, asked = endpoint.answer, iter(range(1000))
+
+    def answer(path: str, body: dict[str, Any], headers: dict[str, str]) -> tuple[int, dict[str, Any]]:
+        replied = reply(path, body, headers)
+        if next(asked) == 2:
+            if killed == "both":
+                os.killpg(agent.pid, signal.SIGKILL)
+            else:
+                events = (latest(runs) / "agent.jsonl").read_text().splitlines()
+                os.kill(json.loads(events[0])["pid"], signal.SIGKILL)
+        return replied
+
+    endpoint.answer = answer
+    episode = ["--model", "scripted", "--api", "openai-chat", "--task", "handover", "--seed", str(SEED), "--runs", str(runs)]
+    agent = subprocess.Popen([*command, *episode], cwd=AWAY, start_new_session=True, stderr=subprocess.PIPE, text=True)
+    return agent.communicate(timeout=120)[1]
 
 
 @pytest.mark.parametrize(("program", "killed"), [("tandem", "both"), ("tandem", "agent"), ("tandem.agent", "both")])
 def test_an_agent_whose_server_is_killed_with_it_goes_on(program: str, killed: str, tmp_path: Path, unbroken: Unbroken) -> None:
     requests, came, _ = unbroken("openai-chat")
-    command = [sys.executable, "-m", *(["tandem", "agent"] if program == "tandem" else [program])]
-    model = ["--model", "scripted", "--api", "openai-chat"]
-    episode = [*model, "--task", "handover", "--seed", str(SEED), "--runs", str(tmp_path)]
+    program_and_flags = ["tandem", "agent"] if program == "tandem" else [program]
     with ScriptedEndpoint(script) as endpoint:
-        reply, asked = endpoint.answer, iter(range(1000))
-
-        def answer(path: str, body: dict[str, Any], headers: dict[str, str]) -> tuple[int, dict[str, Any]]:
-            replied = reply(path, body, headers)
-            if next(asked) == 2:
-                if killed == "both":
-                    os.killpg(first.pid, signal.SIGKILL)
-                else:
-                    events = (latest(tmp_path) / "agent.jsonl").read_text().splitlines()
-                    os.kill(json.loads(events[0])["pid"], signal.SIGKILL)
-            return replied
-
-        endpoint.answer = answer
-        where = ["--base-url", endpoint.base_url("openai-chat")]
-        first = subprocess.Popen(
-            [*command, *episode, *where], cwd=AWAY, start_new_session=True, stderr=subprocess.PIPE, text=True
-        )
-        _, errors = first.communicate(timeout=120)
+        command = [sys.executable, "-m", *program_and_flags, "--base-url", endpoint.base_url("openai-chat")]
+        errors = break_off(command, endpoint, tmp_path, killed)
         assert ("the agent was killed; tandem agent --resume" in errors) == (killed == "agent")
         folder = latest(tmp_path)
-        resume = [*command, "--resume", str(folder), *where]
-        assert subprocess.run(resume, cwd=AWAY, timeout=120, check=False).returncode == 0
+        assert subprocess.run([*command, "--resume", str(folder)], cwd=AWAY, timeout=120, check=False).returncode == 0
     assert told(endpoint) == requests
     assert summary(folder) == came
+
+
+def test_a_model_for_each_robot_goes_on_on_another_server(tmp_path: Path) -> None:
+    pair = Pair()
+    with ScriptedEndpoint(pair.script) as endpoint:
+        command = [sys.executable, "-m", "tandem", "agent", "--base-url", endpoint.base_url("openai-chat")]
+        break_off([*command, "--per-robot", "--talk"], endpoint, tmp_path, "both")
+        folder = latest(tmp_path)
+        assert subprocess.run([*command, "--resume", str(folder)], cwd=AWAY, timeout=120, check=False).returncode == 0
+    pair.check(folder, endpoint)
 
 
 @pytest.fixture(scope="module")
