@@ -9,7 +9,7 @@ use tandem_tools_spec::{
 
 use super::Session;
 use super::answer::Answer;
-use super::journal::Asked;
+use super::journal::KeptRequest;
 use super::told::shorten;
 use crate::EpisodeError;
 use crate::commands::{Called, OperatorCall, OperatorCommand};
@@ -69,12 +69,12 @@ impl<'a> Request<'a> {
     }
 
     /// The request as a journal has it.
-    fn asked(&self) -> Result<Asked, serde_json::Error> {
+    fn asked(&self) -> Result<KeptRequest, serde_json::Error> {
         let shown = match self.audience {
             Audience::Caller => None,
             Audience::Process(shown) => Some(shown),
         };
-        Asked::call(self.caller.operator(), shown, &self.called)
+        KeptRequest::call(self.caller.operator(), shown, &self.called)
     }
 }
 
@@ -188,7 +188,7 @@ impl Session {
     /// Reads an operator's command, which [`Session::together`] executes when those of others are there, too. A refusal is counted and
     /// recorded as that of any call.
     pub fn read_command(&mut self, call: OperatorCall) -> Result<OperatorCommand, EpisodeError> {
-        let arrival = self.arrival(|| Asked::command(&call));
+        let arrival = self.arrival(|| KeptRequest::command(&call));
         let read = self.read_or_refuse(call);
         if read.is_err() {
             self.write_down(arrival);

@@ -16,7 +16,7 @@ use crate::recording::state_hash_text;
 pub struct JournalEntry {
     /// How long the policy had thought by then, in nanoseconds.
     thought_ns: u64,
-    pub(super) asked: Asked,
+    pub(super) asked: KeptRequest,
     /// The world afterwards, where it has moved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) state: Option<StateMark>,
@@ -35,7 +35,7 @@ pub struct StateMark {
 /// What an episode may be asked.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Asked {
+pub enum KeptRequest {
     /// [`Session::perform`].
     Call {
         #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -67,7 +67,7 @@ pub struct Journal {
 }
 
 /// What came, and when; nothing where no journal is kept.
-pub(super) type Arrival = Option<(Duration, Result<Asked, serde_json::Error>)>;
+pub(super) type Arrival = Option<(Duration, Result<KeptRequest, serde_json::Error>)>;
 
 impl JournalEntry {
     /// The control step that the world had come to, where it has moved.
@@ -97,7 +97,7 @@ impl Session {
     }
 
     /// What has come, if a journal is kept.
-    pub(super) fn arrival(&self, asked: impl FnOnce() -> Result<Asked, serde_json::Error>) -> Arrival {
+    pub(super) fn arrival(&self, asked: impl FnOnce() -> Result<KeptRequest, serde_json::Error>) -> Arrival {
         self.journal.as_ref().map(|_| (self.clock.spent() + self.clock.thinking(), asked()))
     }
 
@@ -128,13 +128,13 @@ impl Session {
     }
 }
 
-impl Asked {
+impl KeptRequest {
     pub(super) fn call(
         operator: Option<&str>,
         shown: Option<&[ExtraInformation]>,
         called: &Called,
-    ) -> Result<Asked, serde_json::Error> {
-        Ok(Asked::Call {
+    ) -> Result<KeptRequest, serde_json::Error> {
+        Ok(KeptRequest::Call {
             operator: operator.map(str::to_owned),
             shown: shown.map(<[_]>::to_vec),
             tool: called.name().into(),
@@ -142,24 +142,24 @@ impl Asked {
         })
     }
 
-    pub(super) fn command(call: &OperatorCall) -> Result<Asked, serde_json::Error> {
+    pub(super) fn command(call: &OperatorCall) -> Result<KeptRequest, serde_json::Error> {
         let (robot, call) = (call.robot().into(), call.call());
-        Ok(Asked::Command { robot, tool: call.name().into(), arguments: serde_json::to_value(call)? })
+        Ok(KeptRequest::Command { robot, tool: call.name().into(), arguments: serde_json::to_value(call)? })
     }
 
-    pub(super) fn note(operator: Option<&str>, note: &Note) -> Result<Asked, serde_json::Error> {
-        Ok(Asked::Note { operator: operator.map(str::to_owned), note: note.clone() })
+    pub(super) fn note(operator: Option<&str>, note: &Note) -> Result<KeptRequest, serde_json::Error> {
+        Ok(KeptRequest::Note { operator: operator.map(str::to_owned), note: note.clone() })
     }
 
     pub(super) fn refused(
         operator: Option<&str>,
         [tool, arguments, problem]: [&str; 3],
-    ) -> Result<Asked, serde_json::Error> {
+    ) -> Result<KeptRequest, serde_json::Error> {
         let [tool, arguments, problem] = [tool, arguments, problem].map(str::to_owned);
-        Ok(Asked::Refused { operator: operator.map(str::to_owned), tool, arguments, problem })
+        Ok(KeptRequest::Refused { operator: operator.map(str::to_owned), tool, arguments, problem })
     }
 
-    pub(super) fn end(reason: EndReason) -> Result<Asked, serde_json::Error> {
-        Ok(Asked::End { reason })
+    pub(super) fn end(reason: EndReason) -> Result<KeptRequest, serde_json::Error> {
+        Ok(KeptRequest::End { reason })
     }
 }

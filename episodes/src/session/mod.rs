@@ -22,7 +22,7 @@ pub use clock::{Clock, monotonic};
 pub use failure::FAILED_STEP_FILE;
 use failure::Rewind;
 pub use journal::JournalEntry;
-use journal::{Asked, Journal};
+use journal::{Journal, KeptRequest};
 use onlookers::Spectators;
 pub use replay::BringBack;
 pub(crate) use replay::Replay;
@@ -217,7 +217,7 @@ impl Session {
 
     /// Ends the episode for a reason that lies outside it, unless it has ended before, and closes its files.
     pub fn end(&mut self, reason: EndReason) {
-        let arrival = self.arrival(|| Asked::end(reason));
+        let arrival = self.arrival(|| KeptRequest::end(reason));
         self.ended.get_or_insert(reason);
         self.settle();
         self.write_down(arrival);

@@ -4,7 +4,7 @@
 use tandem_tools_spec::{Note, SpecError};
 
 use super::Session;
-use super::journal::Asked;
+use super::journal::KeptRequest;
 use crate::EpisodeError;
 use crate::commands;
 use crate::output::OutputError;
@@ -13,7 +13,7 @@ use crate::recording::{CallMoment, CallerRecord, NoteMessage, ToolCallRecord};
 impl Session {
     /// Keeps a note of the policy that directs all robots, or of the operator of one.
     pub fn note(&mut self, operator: Option<&str>, note: Note) -> Result<(), EpisodeError> {
-        let arrival = self.arrival(|| Asked::note(operator, &note));
+        let arrival = self.arrival(|| KeptRequest::note(operator, &note));
         let kept = self.keep_note(operator, note);
         self.write_down(arrival);
         kept
@@ -43,7 +43,7 @@ impl Session {
 
     /// Keeps a call that was refused before it reached the episode: `arguments` as they came.
     pub fn refused_before(&mut self, operator: Option<&str>, tool: &str, arguments: &str, problem: &str) {
-        let arrival = self.arrival(|| Asked::refused(operator, [tool, arguments, problem]));
+        let arrival = self.arrival(|| KeptRequest::refused(operator, [tool, arguments, problem]));
         self.tell_beside(operator, tool, arguments, Err(problem));
         self.write_down(arrival);
     }

@@ -99,13 +99,18 @@ pub(super) fn measure(
         }
     }
     if let Plan::Squat { .. } = &case.plan {
-        let ends = [case.duration_s / 3.0, case.duration_s * 2.0 / 3.0, case.duration_s];
-        let error_m = |end_s: &f32| {
-            let sample = &log[at(end_s - 2.0 * DT_S)];
-            (sample.pelvis_m.z - sample.command.pelvis_height_m).abs()
-        };
-        trial.height_error_m = ends.iter().map(error_m).reduce(f32::max);
+        trial.height_error_m = squat_error_m(case, |time_s| &log[at(time_s)]);
     }
+}
+
+/// The most that a pelvis was off the height that it was told, at the ends of a squat's thirds.
+fn squat_error_m<'a>(case: &Case, at: impl Fn(f32) -> &'a Sample) -> Option<f32> {
+    let ends = [case.duration_s / 3.0, case.duration_s * 2.0 / 3.0, case.duration_s];
+    let error_m = |end_s: &f32| {
+        let sample = at(end_s - 2.0 * DT_S);
+        (sample.pelvis_m.z - sample.command.pelvis_height_m).abs()
+    };
+    ends.iter().map(error_m).reduce(f32::max)
 }
 
 /// How far a robot came to rest from where a pulse should have taken it, and how far it is turned from there.

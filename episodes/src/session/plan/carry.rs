@@ -14,8 +14,8 @@ use tandem_tools_spec::{
 };
 
 use super::PlanProgress;
-use super::walk_to::{ATTEMPTS, CALM_COMMANDS, THERE_M, THERE_RAD, WALK_STEPS, WELL_M, WELL_RAD, all_stand};
-use super::way::{Corrections, Missing, Stand, Way, wrapped};
+use super::walk_to::{ATTEMPTS, CALM_COMMANDS, THERE_M, THERE_RAD, WELL_M, WELL_RAD, all_stand};
+use super::way::{Corrections, Missing, Stand, WALK_STEPS, Way, wrapped};
 use crate::EpisodeError;
 use crate::commands;
 use crate::convert::isometry_from_sim;

@@ -9,15 +9,12 @@ use tandem_tools_spec::{
 };
 
 use super::PlanProgress;
-use super::way::{Corrections, Missing, Stand};
+use super::way::{Corrections, Missing, Stand, WALK_STEPS};
 use crate::EpisodeError;
 use crate::commands;
 use crate::recording::CallerRecord;
 use crate::session::Session;
 
-/// Control steps of one walk: about half a cycle of the gait. The pelvis sways from side to side once a cycle,
-/// so that the mean of two moments that are half a cycle apart knows nothing of it.
-pub const WALK_STEPS: u32 = 13;
 /// Speed by what is missing, and the most of it: ahead, back, to the sides; turning.
 const GAIN_1_S: f64 = 0.7;
 const AHEAD_M_S: f64 = 0.3;

@@ -4,9 +4,11 @@ use nalgebra::{Isometry3, Rotation2, Translation3, UnitQuaternion, Vector2, Vect
 use tandem_sim::{CONTROL_HZ, Pose};
 use tandem_tools_spec::Destination;
 
-use super::walk_to::WALK_STEPS;
 use crate::convert::isometry_from_sim;
 
+/// Control steps of one walk: about half a cycle of the gait. The pelvis sways from side to side once a cycle,
+/// so that the mean of two moments that are half a cycle apart knows nothing of it.
+pub const WALK_STEPS: u32 = 13;
 /// A radian of a way is as long as so many metres.
 const M_PER_RAD: f64 = 0.5;
 /// Short walks make up for no more than this of what others have missed.

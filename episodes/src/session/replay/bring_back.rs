@@ -8,7 +8,7 @@ use super::set_clock::SetHands;
 use crate::commands::{Called, OperatorCall};
 use crate::error::{CheckpointError, EpisodeError};
 use crate::live::Onlookers;
-use crate::session::journal::{Asked, JournalEntry};
+use crate::session::journal::{JournalEntry, KeptRequest};
 use crate::session::{Audience, Caller, Clock, Request, RunFolder, Session, this_build};
 use crate::spec::EpisodeSpec;
 
@@ -52,27 +52,27 @@ impl Session {
     }
 }
 
-impl Asked {
+impl KeptRequest {
     /// Asks it again. What was refused is refused again, so that a refusal is no error.
     fn ask(self, session: &mut Session) -> Result<(), EpisodeError> {
         match self {
-            Asked::Call { operator, shown, tool, arguments } => {
+            KeptRequest::Call { operator, shown, tool, arguments } => {
                 let caller = operator.as_deref().map_or(Caller::Policy, Caller::Operator);
                 let audience = shown.as_deref().map_or(Audience::Caller, Audience::Process);
                 let called = Called::parse(&tool, arguments)?;
                 let _ = session.perform(Request { caller, called, audience });
             }
-            Asked::Command { robot, tool, arguments } => {
+            KeptRequest::Command { robot, tool, arguments } => {
                 let call = Call::parse(&tool, arguments)?;
                 let _ = session.read_command(OperatorCall::new(&robot, call)?);
             }
-            Asked::Note { operator, note } => {
+            KeptRequest::Note { operator, note } => {
                 let _ = session.note(operator.as_deref(), note);
             }
-            Asked::Refused { operator, tool, arguments, problem } => {
+            KeptRequest::Refused { operator, tool, arguments, problem } => {
                 session.refused_before(operator.as_deref(), &tool, &arguments, &problem);
             }
-            Asked::End { reason } => session.end(reason),
+            KeptRequest::End { reason } => session.end(reason),
         }
         Ok(())
     }

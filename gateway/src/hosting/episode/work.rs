@@ -263,7 +263,8 @@ impl Desk<'_> {
         Left::Closed(None)
     }
 
-    /// A reply that cannot be sent means that the caller has gone. What was done stays done.
+    /// A reply that cannot be sent means that the caller has gone. What was done stays done. The log has the reason of what is refused and
+    /// told to nobody.
     fn do_job(&mut self, job: Job) {
         match job {
             Job::Call { operator, call, keyed, told, reply } => {
@@ -309,7 +310,6 @@ impl Desk<'_> {
                 self.commit(None);
             }
             Job::EndIfAbandoned { idle } => {
-                // The log has the reason of a refusal.
                 let _ = self.session.run(|session| session.end_if_abandoned(idle));
                 self.commit(None);
                 if self.session.ended().is_some() {
