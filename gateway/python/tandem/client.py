@@ -102,8 +102,8 @@ class Client:
         raise of_kind(kind, str(answer.get("title", status)), detail, float(retry) if retry else None)
 
     def _exchange(self, method: str, path: str, text: str | None, headers: dict[str, str]) -> tuple[HTTPResponse, bytes]:
-        """Sends a request over the kept connection, or over a new one where that is gone, and reads the answer. A server that has
-        answered before may be away for a while; then only a request is sent again that is carried out once.
+        """Sends a request over the kept connection, or over a new one where that is gone, and reads the answer. A server
+        that has answered before may be away for a while; then only a request is sent again that is carried out once.
         """
         may_repeat = method == "GET" or "idempotency-key" in headers
         deadline_s = time.monotonic() + (RESTART_S if self._has_answered and may_repeat else 0.0)

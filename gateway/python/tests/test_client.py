@@ -27,8 +27,8 @@ OK = b"HTTP/1.1 200 OK\r\ncontent-type: application/json\r\ncontent-length: 2\r\
 class Flaky:
     """A server that closes connections when it likes.
 
-    answers: For each request of a connection, in turn, what it is answered with, or whether; behind the last one the connection is
-        closed.
+    answers: For each request of a connection, in turn, what it is answered with, or whether; behind the last one the
+        connection is closed.
     """
 
     def __init__(self, *connections: Sequence[bool | bytes]) -> None:
