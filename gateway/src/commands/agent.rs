@@ -123,7 +123,7 @@ fn play(args: AgentArgs) -> CommandResult {
         format!("--server-flags={}", world_flags(&args.given)),
     ];
     let switches = [(args.per_robot, "--per-robot"), (args.talk, "--talk")];
-    let plays = args.seeds.0.into_iter().map(|seed| {
+    let plays = args.seeds.0.map(|seed| {
         let episode = ["--task".into(), task.id.into(), "--seed".into(), seed.to_string()];
         let switches = switches.iter().filter(|(given, _)| *given).map(|(_, flag)| (*flag).into());
         kept.iter().cloned().chain(episode).chain(switches).collect()

@@ -88,7 +88,8 @@ impl EpisodeTable {
         let (table, text) = (self.clone(), text.to_owned());
         let found = spawn_blocking(move || {
             let others = journals.ids().into_iter().filter(|id| table.hosted(id).is_err());
-            others.filter_map(|id| table.operator_of(&journals, &id, &text)).last()
+            // Every token is compared.
+            others.fold(None, |found, id| table.operator_of(&journals, &id, &text).or(found))
         });
         found.await.ok()?
     }

@@ -118,9 +118,10 @@ impl EpisodeThread {
 
     /// Returns once the episode is there, wherever it has been.
     pub async fn awake(&self) -> Result<(), HostingError> {
-        match self.stage.status.sleep() {
-            None => Ok(()),
-            Some(_) => self.do_job_in_turn(|reply| Job::Awake { reply }).await,
+        // It is not enough that somebody has woken it up: what is answered already has to be known first.
+        match self.stage.status.is_there() {
+            true => Ok(()),
+            false => self.do_job_in_turn(|reply| Job::Awake { reply }).await,
         }
     }
 
@@ -277,7 +278,9 @@ impl EpisodeThread {
     /// threads that run futures: it waits for a place among the jobs.
     pub fn end_blocking(&self, reason: EndReason) {
         // An episode that has stopped meanwhile has ended.
-        let _ = self.sender().map(|jobs| jobs.blocking_send(Job::End { reason }));
+        if let Ok(jobs) = self.sender() {
+            let _ = jobs.blocking_send(Job::End { reason });
+        }
     }
 
     /// Ends the episode after the calls already waiting, closes its recording and returns the result.

@@ -3,7 +3,10 @@
 use std::{
     sync::{
         Mutex, MutexGuard, OnceLock,
-        atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering::Relaxed},
+        atomic::{
+            AtomicBool, AtomicU32, AtomicU64,
+            Ordering::{Acquire, Relaxed, Release},
+        },
     },
     time::{Duration, Instant},
 };
@@ -27,6 +30,8 @@ pub struct SharedStatus {
     /// Whether it can be brought back, and so put aside.
     pub durable: AtomicBool,
     sleep: Mutex<Option<Sleep>>,
+    /// Whether all is there that it had before it was put aside. It is woken up before that.
+    there: AtomicBool,
     /// When it was asked for something last.
     used: Mutex<Instant>,
 }
@@ -49,6 +54,7 @@ impl Default for SharedStatus {
             result: OnceLock::new(),
             durable: AtomicBool::new(false),
             sleep: Mutex::default(),
+            there: AtomicBool::new(true),
             used: Mutex::new(Instant::now()),
         }
     }
@@ -115,6 +121,7 @@ impl SharedStatus {
 
     /// It is put aside, its policy having thought for so long since it was last answered.
     pub fn fall_asleep(&self, thinking: Duration) {
+        self.there.store(false, Release);
         *lock(&self.sleep) = Some(Sleep { since: Instant::now(), thinking });
     }
 
@@ -125,6 +132,15 @@ impl SharedStatus {
 
     pub fn sleep(&self) -> Option<Sleep> {
         *lock(&self.sleep)
+    }
+
+    /// All is there that it had before it was put aside.
+    pub fn is_back(&self) {
+        self.there.store(true, Release);
+    }
+
+    pub fn is_there(&self) -> bool {
+        self.there.load(Acquire)
     }
 
     pub fn wake_up(&self) -> Option<Sleep> {

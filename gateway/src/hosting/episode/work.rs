@@ -90,10 +90,13 @@ struct Log {
     memory: Value,
 }
 
+/// What an episode came to, or why that is not known.
+type Outcome = Result<ResultReply, HostingError>;
+
 /// How it ended.
 enum Left {
     /// Who asked for the end, and what they are to be told once the place is free.
-    Closed(Option<(ReplySender<ResultReply>, Result<ResultReply, HostingError>)>),
+    Closed(Option<(ReplySender<ResultReply>, Box<Outcome>)>),
     Asleep,
 }
 
@@ -140,7 +143,7 @@ fn play(stage: &Stage, opening: Opening, mut inbox: mpsc::Receiver<Job>) {
     // The place is free before the caller hears of the end, so that it can start the next episode.
     stage.place.lock().unwrap_or_else(PoisonError::into_inner).take();
     if let Some((reply, result)) = told {
-        let _ = reply.send(result);
+        let _ = reply.send(*result);
     }
 }
 
@@ -232,6 +235,7 @@ impl Stage {
         let metrics = EpisodeMetrics::again(self.metrics.clone(), &session);
         let session = PanicGuard::again(session, metrics);
         self.status.update(&session);
+        self.status.is_back();
         Ok(Desk { stage: self, session, log: Some(log) })
     }
 }
@@ -250,7 +254,7 @@ impl Desk<'_> {
                     inbox.close();
                     asleep = true;
                 }
-                Job::Close { keep, reply } => return Left::Closed(Some((reply, self.close(keep)))),
+                Job::Close { keep, reply } => return Left::Closed(Some((reply, Box::new(self.close(keep))))),
                 job => self.do_job(job),
             }
         }
@@ -320,7 +324,7 @@ impl Desk<'_> {
                 let _ = self.session.run(|session| session.end(reason));
                 self.commit(None);
             }
-            Job::BeginJournal { heading, reply } => drop(reply.send(Ok(self.begin_journal(&heading)))),
+            Job::BeginJournal { heading, reply } => drop(reply.send(self.begin_journal(&heading))),
             Job::Awake { reply } => drop(reply.send(Ok(()))),
             Job::Sleep | Job::Close { .. } => {}
         }
@@ -357,9 +361,9 @@ impl Desk<'_> {
         }
     }
 
-    fn begin_journal(&mut self, heading: &Heading) {
-        let Some(journals) = &self.stage.journals else { return };
-        let Some(path) = journals.journal(&self.stage.id) else { return };
+    fn begin_journal(&mut self, heading: &Heading) -> Result<(), HostingError> {
+        let Some(journals) = &self.stage.journals else { return Ok(()) };
+        let Some(path) = journals.journal(&self.stage.id) else { return Ok(()) };
         let begun = journals.create().and_then(|()| match Lease::take(&path, &journals.url)? {
             Leasing::Taken(lease) => {
                 let file = JournalFile::create(&path, heading, journals.durability)?;
@@ -380,6 +384,7 @@ impl Desk<'_> {
                 tracing::warn!(%error, "no journal; a server that is started again does not bring it back")
             }
         }
+        Ok(())
     }
 
     /// Removes the journal.

@@ -7,7 +7,7 @@ use std::{
     process::Command,
     sync::{Mutex, atomic::AtomicBool, atomic::Ordering::Relaxed},
     thread,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use serde_json::{Value, json};
@@ -17,8 +17,6 @@ use crate::{Delays, Server};
 
 /// Kills of a test, of tasks in turn.
 const KILLS: usize = 5;
-/// The longest that the first call after a start may take.
-const WAKES_WITHIN: Duration = Duration::from_secs(5);
 /// A kill comes at most so long after the first call.
 const LATEST_KILL_MS: u64 = 500;
 
@@ -52,16 +50,12 @@ impl<'a> Restarted<'a> {
             if let Some(token) = token {
                 request = request.header("authorization", format!("Bearer {token}"));
             }
-            let began = Instant::now();
             let answered = request.send_json(body).and_then(|mut answer| {
                 let status = answer.status().as_u16();
                 Ok((status, answer.body_mut().read_json::<Value>()?))
             });
             match answered {
-                Ok(answer) => {
-                    assert!(number == 0 || began.elapsed() < WAKES_WITHIN, "{:?}", began.elapsed());
-                    return answer;
-                }
+                Ok(answer) => return answer,
                 Err(_) => {
                     let mut server = self.server.lock().expect("a server");
                     if server.1 == number {
