@@ -54,6 +54,7 @@ pub use describe::{brief, task_list};
 pub use error::{CheckpointError, EpisodeError, RobotError, SceneError};
 pub use fingerprint::{build, name_program};
 pub use instructions::{Instructions, InstructionsError};
+pub use locks::{FileLock, LockKind, Locking};
 pub use observation::{Picture, RobotObservation, RobotView, TeamObservation};
 pub use output::{
     OutputError, create_new_private_folder, create_private_folder, printable, shell_word, write_whole,
@@ -67,8 +68,8 @@ pub use recording::{
 pub use results::RESULT_FILE;
 pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, RobotFacts, Scores, StepScore};
 pub use session::{
-    Audience, CallReply, Caller, Checkpoint, Clock, FAILED_STEP_FILE, FailedStep, Outcome, Request, RunFiles,
-    RunFolder, Session, monotonic,
+    Audience, BringBack, CallReply, Caller, Checkpoint, Clock, FAILED_STEP_FILE, FailedStep, JournalEntry,
+    Outcome, Request, RunFiles, RunFolder, Session, monotonic,
 };
 pub use spec::{
     Controller, EpisodeSpec, KeyedSeed, MomentStart, OwnRobot, PhaseStart, RobotFile, SceneFile, Start,

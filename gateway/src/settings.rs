@@ -1,5 +1,6 @@
 //! Settings: flags first, then environment (`TANDEM_*`), then a TOML file, then defaults.
 
+mod durability;
 mod error;
 mod tls;
 
@@ -26,6 +27,7 @@ use tandem_episodes::{
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, StartEpisode, Wording};
 
 use crate::token::{Token, TokenError};
+pub use durability::Durability;
 pub use error::SettingsError;
 pub use tls::{Certificate, TlsError};
 
@@ -129,6 +131,12 @@ pub struct Layer {
     /// Longest that closing the episodes may take when the server stops [default: 30].
     #[arg(long, env = "TANDEM_STOP_TIMEOUT", value_name = "SECONDS")]
     pub stop_timeout: Option<u32>,
+    /// How safe a call is before it is answered: "system" outlives the process, "disk" a power cut, too [default: system].
+    #[arg(long, env = "TANDEM_DURABLE", value_name = "HOW")]
+    pub durable: Option<Durability>,
+    /// Where other servers on the same folder of runs, and clients that they send here, find this one [default: the address].
+    #[arg(long, env = "TANDEM_ADVERTISE", value_name = "URL")]
+    pub advertise: Option<String>,
 }
 
 /// When recordings can be read.
@@ -176,6 +184,8 @@ impl Layer {
             rate_limit: self.rate_limit.or(next.rate_limit),
             idle_timeout: self.idle_timeout.or(next.idle_timeout),
             stop_timeout: self.stop_timeout.or(next.stop_timeout),
+            durable: self.durable.or(next.durable),
+            advertise: self.advertise.or(next.advertise),
         }
     }
 
@@ -346,6 +356,10 @@ pub struct Settings {
     pub idle_timeout: Duration,
     /// Longest that closing the episodes may take at the end.
     pub stop_timeout: Duration,
+    /// How safe a call is before it is answered.
+    pub durability: Durability,
+    /// Where others find the server, if not at its address.
+    pub advertised_url: Option<String>,
 }
 
 impl Settings {
@@ -421,6 +435,8 @@ impl Settings {
             rate_limit: layer.rate_limit,
             idle_timeout: seconds(layer.idle_timeout, 15 * 60),
             stop_timeout: seconds(layer.stop_timeout, 30),
+            durability: layer.durable.unwrap_or_default(),
+            advertised_url: layer.advertise,
         }))
     }
 }

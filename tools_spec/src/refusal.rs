@@ -32,6 +32,8 @@ pub enum RefusalClass {
     Forbidden,
     /// What the request names has existed and exists no longer.
     Gone,
+    /// Another server has what the request names.
+    Elsewhere,
     /// The caller asks for more than there is room for.
     TooMany,
     /// The server takes no requests of this kind at present.

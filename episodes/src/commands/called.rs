@@ -253,13 +253,13 @@ impl OperatorCall {
         Ok(OperatorArguments {
             robot: self.robot.clone(),
             tool: self.call.name().into(),
-            arguments: serde_json::to_value(&self.call.tool)?,
+            arguments: serde_json::to_value(&self.call)?,
         })
     }
 
     fn parse(arguments: OperatorArguments) -> Result<OperatorCall, EpisodeError> {
         let OperatorArguments { robot, tool, arguments } = arguments;
-        let call = OperatorCall::new(&robot, ToolCall::parse(&tool, arguments)?.into())?;
+        let call = OperatorCall::new(&robot, Call::parse(&tool, arguments)?)?;
         call.command()?;
         Ok(call)
     }

@@ -32,9 +32,11 @@ const HANDS: &str = "A wrist's x axis points along its fingers, and its z axis a
 
 /// What only they are told who are told what hands feel.
 const GRIP: &str = "A hand holds something, as phases ask for, while its thumb presses on one side of it and fingers or palm press \
-    on the opposite one, each with 1.5 N or more, for 60 ms. grip is what the fingers' own drives feel of that: it says \"holding\" where \
-    both press, though a thing that only hangs in a bent hand is pressed on neighbouring sides, and not held; close farther then. Where it says \"one_sided\", close by 0.2 rad more what \
-    does not press yet, mostly the thumb; where it says \"touching\" or \"none\" though the hand is closed, bring the palm nearer first. ";
+    on the opposite one, within 60 degrees, each with 1.5 N or more, for 60 ms. grip is what the fingers' own drives feel of that: it says \
+    \"two_sided\" where both press, and presses says what does. Whether on opposite sides is not felt: a thing that only hangs in a bent \
+    hand, or a round one at the fingertips, is pressed on neighbouring sides, and not held. If it slips, or a phase is not reached, open, \
+    bring the palm nearer, so that the thumb comes round, and close farther. Where it says \"one_sided\", close by 0.2 rad more what \
+    presses does not name, mostly the thumb; where it says \"touching\" or \"none\" though the hand is closed, bring the palm nearer first. ";
 
 const GRASPING: &str = "Fingers that are stopped short of their targets press: ask them for 0.3 rad more than a thing leaves them. `grips` has \
     grips that work, of right hands (left ones negate all angles but the first), for a robot that faces the thing squarely. Put the wrist where the place lies at place_m in its frame: \

@@ -60,9 +60,13 @@ impl RunIdentity {
         };
         let starts = match &plan.starts {
             Starts::Task => None,
-            Starts::Phases { demonstrations, phases } => {
+            Starts::Phases { demonstrations, phases, training } => {
                 let demonstrations = std::path::absolute(demonstrations).unwrap_or(demonstrations.clone());
-                Some(json!({ "phases": phases, "demonstrations": demonstrations }))
+                let mut starts = json!({ "phases": phases, "demonstrations": demonstrations });
+                if *training {
+                    starts["training"] = true.into();
+                }
+                Some(starts)
             }
             Starts::Moments { failed, before_s } => {
                 let failed: Vec<_> = failed.iter().map(|failed| &failed.recording).collect();

@@ -21,7 +21,7 @@ use cache::EpisodeCache;
 use run_folder::EvaluationFolder;
 
 pub use identity::{RunIdentity, SeedList, default_folder};
-pub use plan::{EvaluationPlan, ExistingRun, KeptFiles, SeedKey, Shard, Starts};
+pub use plan::{EvaluationPlan, ExistingRun, KeptFiles, SeedKey, Shard, Starts, training_seeds};
 pub use planned::{PlannedEpisodes, RunState};
 pub use retry::{FailedEpisode, failed_episodes};
 pub use run_folder::{OtherRun, is_being_played};

@@ -1,6 +1,7 @@
 //! What to play: which episodes there are, and which of them are this process's share.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use tandem_sim::{Sensing, render::RendererKind};
@@ -115,6 +116,8 @@ pub enum Starts {
         demonstrations: PathBuf,
         /// Numbers or ids, as `p2` or `transfer`; a task without such a phase has no episode of it.
         phases: Vec<String>,
+        /// Begins in the training demonstrations, whose seeds replace the plan's.
+        training: bool,
     },
     /// Each begins some seconds before the moment at which one of these went wrong, in its world; tasks and seeds are theirs.
     Moments { failed: Vec<FailedEpisode>, before_s: u32 },
@@ -216,10 +219,10 @@ impl EvaluationPlan<'_> {
             let own = failed.iter().enumerate().filter(|(number, _)| is_own(number));
             return (own.map(|(_, failed)| self.again(failed, *before_s)).collect(), left_out);
         }
-        let everything =
-            self.tasks.iter().flat_map(|task| self.seeds.iter().map(|seed| (*task, *seed))).flat_map(
-                |(task, seed)| self.starts_of(task).into_iter().map(move |phase| (task, seed, phase)),
-            );
+        let of_tasks =
+            self.tasks.iter().flat_map(|task| self.seeds_of(task).into_iter().map(|seed| (*task, seed)));
+        let everything = of_tasks
+            .flat_map(|(task, seed)| self.starts_of(task).into_iter().map(move |phase| (task, seed, phase)));
         let own = everything.enumerate().filter(|(number, _)| is_own(number));
         for (_, (task, seed, phase)) in own {
             let start = match (&self.starts, phase) {
@@ -239,6 +242,14 @@ impl EvaluationPlan<'_> {
         (found, left_out)
     }
 
+    /// The seeds that are played of `task`.
+    fn seeds_of(&self, task: &Task) -> Vec<u32> {
+        match &self.starts {
+            Starts::Phases { demonstrations, training: true, .. } => training_seeds(demonstrations, task),
+            Starts::Task | Starts::Phases { .. } | Starts::Moments { .. } => self.seeds.clone(),
+        }
+    }
+
     /// Numbers of the phases that episodes of `task` begin at; `None` for its own beginning.
     fn starts_of(&self, task: &Task) -> Vec<Option<String>> {
         match &self.starts {
@@ -255,10 +266,38 @@ impl EvaluationPlan<'_> {
     }
 }
 
-/// The recording of a task and seed, in a folder as `collect` or as `serve` writes them.
-fn demonstration(folder: &Path, task: &Task, seed: u32) -> Option<PathBuf> {
+/// Number of training demonstrations of a task: the benchmark's, and that of the split by `tandem export`.
+const MAX_TRAINING_DEMONSTRATIONS: usize = 50;
+
+/// Folders of a task's demonstrations, each with the prefix of their names before the seed.
+///
+/// `collect` and `serve` write them so.
+fn demonstration_folders(folder: &Path, task: &Task) -> [(PathBuf, String); 3] {
     let id = task.id;
-    let names = [format!("episodes/{id}-{seed}"), format!("{id}-{seed}"), format!("{id}-seed{seed}")];
-    let recordings = names.iter().map(|name| folder.join(name).join(Recorder::FILE_NAME));
+    let (collected, served) = (format!("{id}-"), format!("{id}-seed"));
+    [(folder.join("episodes"), collected.clone()), (folder.into(), collected), (folder.into(), served)]
+}
+
+/// The recording of a task and seed.
+fn demonstration(folder: &Path, task: &Task, seed: u32) -> Option<PathBuf> {
+    let recordings = demonstration_folders(folder, task)
+        .map(|(folder, begins)| folder.join(format!("{begins}{seed}")).join(Recorder::FILE_NAME));
     recordings.into_iter().find(|recording| recording.exists())
+}
+
+/// Returns the seeds of a task's training demonstrations in a folder: the lowest ones.
+pub fn training_seeds(folder: &Path, task: &Task) -> Vec<u32> {
+    let mut seeds = BTreeSet::new();
+    for (folder, begins) in demonstration_folders(folder, task) {
+        let names = fs::read_dir(folder)
+            .into_iter()
+            .flatten()
+            .filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+        seeds.extend(names.filter_map(|name| name.strip_prefix(&begins)?.parse::<u32>().ok()));
+    }
+    seeds
+        .into_iter()
+        .filter(|seed| demonstration(folder, task, *seed).is_some())
+        .take(MAX_TRAINING_DEMONSTRATIONS)
+        .collect()
 }

@@ -138,8 +138,11 @@ fn episodes_from_phases_need_demonstrations() {
         std::fs::create_dir_all(recording).unwrap();
         std::fs::write(recording.join("episode.mcap"), "").unwrap();
     }
-    let starts =
-        Starts::Phases { demonstrations: folder.path().into(), phases: vec!["p3".into(), "p1".into()] };
+    let starts = Starts::Phases {
+        demonstrations: folder.path().into(),
+        phases: vec!["p3".into(), "p1".into()],
+        training: false,
+    };
     let plan = EvaluationPlan { starts, ..plan(vec![tasks::find("pouring").unwrap()], vec![1, 2, 3, 4]) };
     let (episodes, left_out) = plan.episodes();
     let begun = |spec: &EpisodeSpec| match &spec.start {
@@ -153,6 +156,36 @@ fn episodes_from_phases_need_demonstrations() {
     let all = (0..3).flat_map(|index| [expected(index, "p1"), expected(index, "p3")]).collect::<Vec<_>>();
     assert_eq!(episodes.iter().map(begun).collect::<Vec<_>>(), all);
     assert_eq!(left_out, ["p1", "p3"].map(|phase| format!("pouring seed 4 {phase}: no demonstration")));
+}
+
+/// The benchmark begins each phase once in each of 50 demonstrations, and in none of the validation split.
+#[test]
+fn phases_begin_in_the_demonstrations_for_training() {
+    let folder = tempfile::tempdir().unwrap();
+    let demonstrate = |name: String| {
+        let recording = folder.path().join("episodes").join(name);
+        std::fs::create_dir_all(&recording).unwrap();
+        std::fs::write(recording.join("episode.mcap"), "").unwrap();
+    };
+    // One of Pouring's has failed, and was not kept; Handover has two.
+    (2000..2061).filter(|seed| *seed != 2003).for_each(|seed| demonstrate(format!("pouring-{seed}")));
+    ["handover-7", "handover-11", "pouring-x"].into_iter().for_each(|name| demonstrate(name.into()));
+    std::fs::create_dir_all(folder.path().join("episodes/handover-3")).unwrap();
+    let starts =
+        Starts::Phases { demonstrations: folder.path().into(), phases: vec!["p2".into()], training: true };
+    let tasks = ["pouring", "handover", "co_carry"].map(|id| tasks::find(id).unwrap());
+    let plan = EvaluationPlan { starts, ..plan(tasks.into(), vec![1]) };
+    let (episodes, left_out) = plan.episodes();
+    let seeds = |id: &str| {
+        episodes.iter().filter(|spec| spec.task.id == id).map(|spec| spec.seed).collect::<Vec<_>>()
+    };
+    assert_eq!(seeds("pouring"), (2000..2051).filter(|seed| *seed != 2003).collect::<Vec<_>>());
+    assert_eq!((seeds("handover"), seeds("co_carry"), left_out.len()), (vec![7, 11], vec![], 0));
+    assert!(
+        episodes
+            .iter()
+            .all(|spec| matches!(&spec.start, Start::Phase(PhaseStart { phase, .. }) if phase == "p2"))
+    );
 }
 
 #[test]

@@ -13,6 +13,7 @@ use std::{
 use foxglove::Encode;
 use mcap::Attachment;
 use mcap::records::MessageHeader;
+use serde::{Deserialize, Serialize};
 
 use super::{data_section::LIBRARY, metadata};
 use crate::locks::{FileLock, LockKind, Locking};
@@ -144,7 +145,8 @@ fn string_map(entries: &[(&str, &str)]) -> BTreeMap<String, String> {
 }
 
 /// When a recording can be read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Visibility {
     /// It can be read under way, as `episode.mcap.partial`.
     #[default]

@@ -9,6 +9,7 @@ use tandem_tools_spec::{
 
 use super::Session;
 use super::answer::Answer;
+use super::journal::KeptRequest;
 use super::told::shorten;
 use crate::EpisodeError;
 use crate::commands::{Called, OperatorCall, OperatorCommand};
@@ -66,6 +67,15 @@ impl<'a> Request<'a> {
     pub fn of_policy(called: impl Into<Called>) -> Request<'a> {
         Request { caller: Caller::Policy, called: called.into(), audience: Audience::Caller }
     }
+
+    /// The request as a journal has it.
+    fn asked(&self) -> Result<KeptRequest, serde_json::Error> {
+        let shown = match self.audience {
+            Audience::Caller => None,
+            Audience::Process(shown) => Some(shown),
+        };
+        KeptRequest::call(self.caller.operator(), shown, &self.called)
+    }
 }
 
 impl Outcome {
@@ -109,6 +119,13 @@ impl Session {
     /// made for another step, or whose look afterwards could not be had, is refused before it counts. The call that ends the episode,
     /// and no later one, is counted and recorded, and closes the files.
     pub fn perform(&mut self, request: Request) -> Result<Outcome, EpisodeError> {
+        let arrival = self.arrival(|| request.asked());
+        let outcome = self.do_what_is_asked(request);
+        self.write_down(arrival);
+        outcome
+    }
+
+    fn do_what_is_asked(&mut self, request: Request) -> Result<Outcome, EpisodeError> {
         let Request { caller, mut called, audience } = request;
         self.admit(caller, &called)?;
         let callers = called.take_surroundings();
@@ -171,6 +188,15 @@ impl Session {
     /// Reads an operator's command, which [`Session::together`] executes when those of others are there, too. A refusal is counted and
     /// recorded as that of any call.
     pub fn read_command(&mut self, call: OperatorCall) -> Result<OperatorCommand, EpisodeError> {
+        let arrival = self.arrival(|| KeptRequest::command(&call));
+        let read = self.read_or_refuse(call);
+        if read.is_err() {
+            self.write_down(arrival);
+        }
+        read
+    }
+
+    fn read_or_refuse(&mut self, call: OperatorCall) -> Result<OperatorCommand, EpisodeError> {
         let operator = call.robot().to_owned();
         let caller = Caller::Operator(&operator);
         let called = Called::Together(vec![call.clone()]);
@@ -290,7 +316,8 @@ impl Session {
         for call in called.calls() {
             if let Err(refusal) = self.check_around(call) {
                 let arguments = serde_json::to_string(call).map_err(OutputError::from)?;
-                self.refused_before(caller.operator(), call.name(), &arguments, &refusal.to_string());
+                let problem = refusal.to_string();
+                self.tell_beside(caller.operator(), call.name(), &arguments, Err(&problem));
                 return Err(refusal);
             }
         }

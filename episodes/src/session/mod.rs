@@ -6,6 +6,7 @@ mod calls;
 mod checkpoint;
 mod clock;
 mod failure;
+mod journal;
 mod notes;
 mod onlookers;
 mod plan;
@@ -20,7 +21,10 @@ pub use checkpoint::{Checkpoint, FailedStep};
 pub use clock::{Clock, monotonic};
 pub use failure::FAILED_STEP_FILE;
 use failure::Rewind;
+pub use journal::JournalEntry;
+use journal::{Journal, KeptRequest};
 use onlookers::Spectators;
+pub use replay::BringBack;
 pub(crate) use replay::Replay;
 use run_files::moment;
 pub use run_files::{RunFiles, RunFolder};
@@ -90,6 +94,8 @@ pub struct Session {
     execution: Option<Execution>,
     /// State hashes of the steps since they were last taken, where somebody wants them.
     hashes: Option<Vec<u64>>,
+    /// What it has been asked, where that is written down.
+    journal: Option<Journal>,
     /// What it came to, from when the files were closed: the one truth that everybody is told.
     result: Option<ResultReply>,
 }
@@ -144,6 +150,7 @@ impl Session {
             targets: TargetCounts::default(),
             execution: Execution::of(spec.stress, disturbance, spec.world_seed(), begin_s, rest),
             hashes: None,
+            journal: None,
             result: None,
             motions,
             present,
@@ -210,8 +217,10 @@ impl Session {
 
     /// Ends the episode for a reason that lies outside it, unless it has ended before, and closes its files.
     pub fn end(&mut self, reason: EndReason) {
+        let arrival = self.arrival(|| KeptRequest::end(reason));
         self.ended.get_or_insert(reason);
         self.settle();
+        self.write_down(arrival);
     }
 
     /// Closes the files, once; from here on the result stays as it is.
@@ -407,6 +416,11 @@ impl Session {
     /// How long the policy has thought, up to its last call.
     pub fn thought(&self) -> Duration {
         self.clock.spent()
+    }
+
+    /// How long it has been thinking since it was last answered.
+    pub fn thinking(&self) -> Duration {
+        self.clock.thinking()
     }
 
     /// Why the episode has ended, if it has.

@@ -4,6 +4,7 @@
 use tandem_tools_spec::{Note, SpecError};
 
 use super::Session;
+use super::journal::KeptRequest;
 use crate::EpisodeError;
 use crate::commands;
 use crate::output::OutputError;
@@ -11,7 +12,14 @@ use crate::recording::{CallMoment, CallerRecord, NoteMessage, ToolCallRecord};
 
 impl Session {
     /// Keeps a note of the policy that directs all robots, or of the operator of one.
-    pub fn note(&mut self, operator: Option<&str>, mut note: Note) -> Result<(), EpisodeError> {
+    pub fn note(&mut self, operator: Option<&str>, note: Note) -> Result<(), EpisodeError> {
+        let arrival = self.arrival(|| KeptRequest::note(operator, &note));
+        let kept = self.keep_note(operator, note);
+        self.write_down(arrival);
+        kept
+    }
+
+    fn keep_note(&mut self, operator: Option<&str>, mut note: Note) -> Result<(), EpisodeError> {
         note.validate().map_err(|reason| SpecError::Invalid { tool: Note::NAME, reason })?;
         self.expect_underway()?;
         if let Some(own) = operator {
@@ -35,7 +43,9 @@ impl Session {
 
     /// Keeps a call that was refused before it reached the episode: `arguments` as they came.
     pub fn refused_before(&mut self, operator: Option<&str>, tool: &str, arguments: &str, problem: &str) {
+        let arrival = self.arrival(|| KeptRequest::refused(operator, [tool, arguments, problem]));
         self.tell_beside(operator, tool, arguments, Err(problem));
+        self.write_down(arrival);
     }
 
     /// Keeps what was asked and answered and is no call of the episode.

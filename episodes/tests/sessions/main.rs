@@ -7,6 +7,7 @@ mod common;
 mod felt;
 mod files;
 mod films;
+mod journals;
 mod operators;
 mod plans;
 mod recordings;

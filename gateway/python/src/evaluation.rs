@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 use serde_json::{Value, json};
+use tandem::commands::read_seed_key;
 use tandem::settings::{Layer, Settings};
 use tandem_episodes::Variation;
 use tandem_episodes::evaluation::{
@@ -27,8 +28,9 @@ const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 /// that says whether the user wants it to end, and returns whether it was played, and then the episode as JSON with the files of its
 /// recording, or else why not. What `out` holds already is not played again. `progress` is called with every episode's result as JSON,
 /// and whether it was played now. `existing_run` says what becomes of another run in `out`: `refuse`, `resume_with_new_build` or `overwrite`.
+/// `seed_key` is the file with an evaluator's key.
 #[pyfunction]
-#[pyo3(signature = (play, name, settings, protocol, tasks, seeds, jobs, record, out, progress, elsewhere, existing_run))]
+#[pyo3(signature = (play, name, settings, protocol, tasks, seeds, jobs, record, out, progress, elsewhere, existing_run, seed_key))]
 #[allow(clippy::too_many_arguments, reason = "the package calls it, by names")]
 pub fn evaluate(
     py: Python,
@@ -44,11 +46,12 @@ pub fn evaluate(
     progress: Option<Py<PyAny>>,
     elsewhere: bool,
     existing_run: &str,
+    seed_key: Option<PathBuf>,
 ) -> PyResult<String> {
     let by = PlayedBy::new(play, &name, elsewhere).map_err(|error| failed(py, &error))?;
     let player = PythonPolicy { name, by, interrupted: Arc::default() };
     let existing = existing(py, existing_run)?;
-    let plan = plan_of(py, &player, settings, protocol, &tasks, seeds)?;
+    let plan = plan_of(py, &player, settings, protocol, &tasks, seeds, seed_key)?;
     let plan = EvaluationPlan { jobs, record, existing, ..plan };
     play_all(py, &plan, &out, progress.as_ref(), &player.interrupted)
 }
@@ -61,11 +64,12 @@ pub fn demonstrations_folder(
     protocol: &str,
     tasks: Vec<String>,
     seeds: Vec<u32>,
+    seed_key: Option<PathBuf>,
 ) -> PyResult<PathBuf> {
     let name = "expert".to_owned();
     let by = PlayedBy::new(None, &name, false).map_err(|error| failed(py, &error))?;
     let player = PythonPolicy { name, by, interrupted: Arc::default() };
-    let plan = plan_of(py, &player, settings, protocol, &tasks, seeds)?;
+    let plan = plan_of(py, &player, settings, protocol, &tasks, seeds, seed_key)?;
     Ok(evaluation::default_folder(&plan, Some("demonstrations"), Path::new("runs")))
 }
 
@@ -77,12 +81,14 @@ fn plan_of<'a>(
     protocol: &str,
     tasks: &[String],
     seeds: Vec<u32>,
+    seed_key: Option<PathBuf>,
 ) -> PyResult<EvaluationPlan<'a>> {
     let layer: Layer = serde_json::from_str(settings).map_err(|error| failed(py, &error))?;
     let settings = Settings::resolve(layer, None).map_err(|error| failed(py, &error))?;
     let found: Result<Vec<_>, _> = tasks.iter().map(|task| settings.tasks.find(task)).collect();
     let protocol: Protocol =
         serde_json::from_value(Value::from(protocol)).map_err(|error| failed(py, &error))?;
+    let key = seed_key.map(|file| read_seed_key(&file, &seeds)).transpose();
     Ok(EvaluationPlan {
         player,
         protocol,
@@ -106,7 +112,7 @@ fn plan_of<'a>(
         record: false,
         files: KeptFiles::default(),
         retries: EvaluationPlan::DEFAULT_RETRIES,
-        seed_key: None,
+        seed_key: key.map_err(|error| failed(py, &error))?,
         existing: ExistingRun::Refuse,
     })
 }

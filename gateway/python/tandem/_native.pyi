@@ -40,8 +40,9 @@ def evaluate(
     progress: Callable[[str, bool], None] | None,
     elsewhere: bool,
     existing_run: str,
+    seed_key: Path | None,
 ) -> str: ...
-def demonstrations_folder(settings: str, protocol: str, tasks: list[str], seeds: list[int]) -> Path: ...
+def demonstrations_folder(settings: str, protocol: str, tasks: list[str], seeds: list[int], seed_key: Path | None) -> Path: ...
 
 class Snapshot:
     """Where an episode stands, to go back to: in this process, or as bytes that the same build reads again."""

@@ -6,6 +6,7 @@ import base64
 import json
 import os
 import selectors
+import time
 import uuid
 from collections.abc import Mapping, Sequence
 from http.client import HTTPConnection, HTTPException, HTTPResponse, HTTPSConnection
@@ -25,6 +26,12 @@ _KIND = "urn:tandem:problem:"
 
 DEFAULT_TIMEOUT_S = 720.0
 """Longer than a call is held: an operator's waits up to 600 s for its partners."""
+
+RESTART_S = 10.0
+"""For so long a server may be away that has answered before: it is started again, or another takes its place."""
+
+_BETWEEN = (502, 503, 504)
+"""What load balancers answer while a server is away."""
 
 
 class Client:
@@ -47,6 +54,8 @@ class Client:
         self.url = url.rstrip("/")
         self._path = parts.path.rstrip("/")
         self._connection = kind(parts.hostname, port, timeout=timeout_s)
+        self._elsewhere: dict[str, HTTPConnection] = {}
+        self._has_answered = False
         self._token = token or os.environ.get("TANDEM_TOKEN")
 
     def tasks(self) -> TaskList:
@@ -62,13 +71,17 @@ class Client:
         """
         return RemoteEpisode(self, task, seed, protocol)
 
-    def request(self, method: str, path: str, body: Mapping[str, Json] | None = None) -> Any:
-        """Sends a request and returns its answer as JSON has it; None where there is none."""
+    def request(self, method: str, path: str, body: Mapping[str, Json] | None = None, *, key: str | None = None) -> Any:
+        """Sends a request and returns its answer as JSON has it; None where there is none.
+
+        key: The request's Idempotency-Key, by which the server carries it out once, however often it is sent. None: a new one,
+            for those that may have one.
+        """
         headers = {"content-type": "application/json"}
         if self._token:
             headers["authorization"] = f"Bearer {self._token}"
         if method == "POST" and _has_keys(path):
-            headers["idempotency-key"] = uuid.uuid4().hex
+            headers["idempotency-key"] = key or uuid.uuid4().hex
         text = None if body is None else json.dumps(body)
         try:
             response, content = self._exchange(method, self._path + path, text, headers)
@@ -89,23 +102,49 @@ class Client:
         raise of_kind(kind, str(answer.get("title", status)), detail, float(retry) if retry else None)
 
     def _exchange(self, method: str, path: str, text: str | None, headers: dict[str, str]) -> tuple[HTTPResponse, bytes]:
-        """Sends a request over the kept connection, or over a new one where that is gone, and reads the answer. Where the
-        connection breaks under way, only a request is sent again that is carried out once.
+        """Sends a request over the kept connection, or over a new one where that is gone, and reads the answer. A server
+        that has answered before may be away for a while; then only a request is sent again that is carried out once.
         """
-        is_kept = self._is_kept()
-        try:
-            return self._send(method, path, text, headers)
-        except TimeoutError:
-            raise
-        except (OSError, HTTPException):
-            if not is_kept or not (method == "GET" or "idempotency-key" in headers):
+        may_repeat = method == "GET" or "idempotency-key" in headers
+        deadline_s = time.monotonic() + (RESTART_S if self._has_answered and may_repeat else 0.0)
+        pause_s = 0.0
+        self._is_kept()
+        while True:
+            is_last = time.monotonic() >= deadline_s
+            try:
+                response, content = self._follow(method, path, text, headers)
+                if is_last or response.status not in _BETWEEN or b"urn:tandem" in content:
+                    self._has_answered = True
+                    return response, content
+            except TimeoutError:
                 raise
-        self._connection.close()
-        return self._send(method, path, text, headers)
+            except (OSError, HTTPException):
+                self.close()
+                if is_last:
+                    raise
+            time.sleep(pause_s)
+            pause_s = min(2 * pause_s + 0.05, 1.0)
 
-    def _send(self, method: str, path: str, text: str | None, headers: dict[str, str]) -> tuple[HTTPResponse, bytes]:
-        self._connection.request(method, path, text, headers)
-        response = self._connection.getresponse()
+    def _follow(self, method: str, path: str, text: str | None, headers: dict[str, str]) -> tuple[HTTPResponse, bytes]:
+        """Sends a request, and where another server plays the episode, to that one."""
+        response, content = self._send(self._connection, method, path, text, headers)
+        location = urlsplit(response.getheader("location") or "")
+        if response.status != 307 or location.hostname is None:
+            return response, content
+        connection = self._elsewhere.get(location.netloc)
+        if connection is None:
+            kind = HTTPSConnection if location.scheme == "https" else HTTPConnection
+            connection = kind(location.hostname, location.port, timeout=self._connection.timeout)
+            self._elsewhere[location.netloc] = connection
+        path = f"{location.path}?{location.query}" if location.query else location.path
+        return self._send(connection, method, path, text, headers)
+
+    @staticmethod
+    def _send(
+        connection: HTTPConnection, method: str, path: str, text: str | None, headers: dict[str, str]
+    ) -> tuple[HTTPResponse, bytes]:
+        connection.request(method, path, text, headers)
+        response = connection.getresponse()
         return response, response.read()
 
     def _is_kept(self) -> bool:
@@ -126,8 +165,9 @@ class Client:
         return not has_ended
 
     def close(self) -> None:
-        """Closes the connection; the next request opens another one."""
-        self._connection.close()
+        """Closes the connections; the next request opens another one."""
+        for connection in (self._connection, *self._elsewhere.values()):
+            connection.close()
 
 
 class RemoteEpisode(BaseEpisode):
@@ -209,7 +249,7 @@ class RemoteEpisode(BaseEpisode):
 
 def _has_keys(path: str) -> bool:
     """Whether requests to a path may have a key, by which the server carries them out once."""
-    return path == "/v1/episodes" or "/tools/" in path
+    return path == "/v1/episodes" or "/tools/" in path or path.endswith("/notes")
 
 
 def _row_of(state: RobotState) -> dict[str, float]:

@@ -142,6 +142,11 @@ class EvaluationSettings(TypedDict, total=False):
     task_file: str | PathLike[str] | None
     """TOML file with a task of your own, which `tasks` may name."""
 
+    seed_key: str | PathLike[str] | None
+    """File with a key of yours, by which what the seeds mean is drawn, as `--seed-key` has it: nobody without it can simulate
+    an episode in advance. Results name the key by its fingerprint. Without it, a seed means the same everywhere.
+    """
+
 
 Policy: TypeAlias = Callable[[Episode], object] | Literal["expert", "idle"]
 """Who plays: a callable, which is given each episode as it begins, or a player that Tandem has, by name."""
@@ -165,8 +170,8 @@ def evaluate(
     jobs: Episodes that run side by side, each on a thread of its own, on which the policy is called. Physics and drawing
         run at the same time; Python code of policies does not.
     settings: `name`, `protocol`, `assistance`, `instructions`, `out`, `overwrite`, `resume_with_new_build`, `record`,
-        `progress`, `renderer`, `state_estimate`, `sensors`, `stress`, `level`, `scene`, `robot`, `task_file`: see
-        `EvaluationSettings`.
+        `progress`, `renderer`, `state_estimate`, `sensors`, `stress`, `level`, `scene`, `robot`, `task_file`,
+        `seed_key`: see `EvaluationSettings`.
     """
     plan = Plan.of(policy, tasks, seeds, settings)
     return plan.evaluated(lambda folder: plan.play(folder, jobs))
@@ -191,7 +196,7 @@ def demonstrations(tasks: list[str], seeds: list[int], settings: EvaluationSetti
     whole: EvaluationSettings = {"assistance": "full", **settings, "record": True}
     if whole.get("out") is None:
         plan = Plan.of("expert", tasks, seeds, whole)
-        whole["out"] = _native.demonstrations_folder(plan.world, plan.protocol, plan.tasks, plan.seeds)
+        whole["out"] = _native.demonstrations_folder(plan.world, plan.protocol, plan.tasks, plan.seeds, plan.seed_key)
     return whole
 
 
@@ -209,6 +214,8 @@ class Plan:
     record: bool
     existing: Literal["refuse", "resume_with_new_build", "overwrite"] = "refuse"
     """What becomes of another run in the folder."""
+    seed_key: Path | None = None
+    """File with the key that draws what the seeds mean."""
     out: Path | None = None
     progress: Callable[[ResultReply], object] | None = None
 
@@ -226,6 +233,7 @@ class Plan:
             name = policy
         out, scene, task_file = settings.get("out"), settings.get("scene"), settings.get("task_file")
         robot, instructions = settings.get("robot"), settings.get("instructions")
+        seed_key = settings.get("seed_key")
         return Plan(
             policy=policy,
             name=name or str(getattr(policy, "__qualname__", type(policy).__qualname__)),
@@ -246,6 +254,7 @@ class Plan:
             seeds=seed_list(seeds),
             record=settings.get("record", False),
             existing=_existing(settings),
+            seed_key=None if seed_key is None else Path(seed_key),
             out=None if out is None else Path(out),
             progress=settings.get("progress"),
         )
@@ -291,6 +300,7 @@ class Plan:
             tell if progress else None,
             elsewhere,
             self.existing,
+            self.seed_key,
         )
         return json.loads(answer)
 

@@ -64,7 +64,8 @@ def evaluate(
     retries: How often an episode is played anew whose process or machine was lost. One that is lost more often is named in
         `left_out`, and played by the next evaluation into the same folder.
     task_options: What an episode's task is to Ray, as {"num_cpus": 2} or {"num_gpus": 0.25}; one processor otherwise.
-    settings: As there. A `scene`, `robot`, `task_file` or `instructions` has to lie at the same path on every machine.
+    settings: As there. A `scene`, `robot`, `task_file`, `instructions` or `seed_key` has to lie at the same path on every
+        machine.
     """
     plan = Plan.of(policy, tasks, seeds, settings)
     options: dict[str, Any] = {"num_cpus": 1, "max_retries": retries, **(task_options or {})}

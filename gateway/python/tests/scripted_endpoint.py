@@ -88,6 +88,8 @@ class Conversation:
     script: Script
     began: bool = False
     sent_ids: list[str] = field(default_factory=list[str])
+    latest: tuple[dict[str, Any], dict[str, Any]] | None = None
+    """The latest request and its reply, which is given again to who asks the same again."""
 
 
 class ScriptedEndpoint:
@@ -137,8 +139,10 @@ class ScriptedEndpoint:
             check_all(BODIES[path].validate_python(body))
             wire = WIRES[path]
             system = wire.system(body)
-            self.requests.append(Request(path, body, system, _count_pictures(body), headers))
             conversation = self._conversations.setdefault(system, Conversation(self._script(system)))
+            if conversation.latest is not None and conversation.latest[0] == body:
+                return 200, conversation.latest[1]
+            self.requests.append(Request(path, body, system, _count_pictures(body), headers))
             heard = wire.heard(body)
             answered = [each.call_id for each in heard]
             assert answered == conversation.sent_ids, f"calls {conversation.sent_ids} were answered as {answered}"
@@ -147,6 +151,7 @@ class ScriptedEndpoint:
             ids = [f"call_{len(self.requests)}_{index}" for index in range(len(said.calls))]
             reply = wire.reply(said, ids)
             conversation.sent_ids = ids
+            conversation.latest = (body, reply)
             return 200, reply
 
     def _handler(self) -> type[BaseHTTPRequestHandler]:

@@ -8,7 +8,7 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -27,24 +27,35 @@ OK = b"HTTP/1.1 200 OK\r\ncontent-type: application/json\r\ncontent-length: 2\r\
 class Flaky:
     """A server that closes connections when it likes.
 
-    answers: For each request of a connection, in turn, whether it is answered; behind the last one the connection is closed.
+    answers: For each request of a connection, in turn, what it is answered with, or whether; behind the last one the
+        connection is closed.
     """
 
-    def __init__(self, *connections: list[bool]) -> None:
+    def __init__(self, *connections: Sequence[bool | bytes]) -> None:
         self.requests: list[tuple[str, str | None]] = []
         self._connections = connections
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.url = f"http://127.0.0.1:{self._listener.getsockname()[1]}"
-        threading.Thread(target=self._serve, daemon=True).start()
+        self._port = 0
+        self.open()
+        self.url = f"http://127.0.0.1:{self._port}"
 
-    def _serve(self) -> None:
+    def open(self) -> None:
+        """Listens, where it has listened before."""
+        self._listener = socket.create_server(("127.0.0.1", self._port))
+        self._port = self._listener.getsockname()[1]
+        threading.Thread(target=self._serve, args=(self._listener,), daemon=True).start()
+
+    def close(self) -> None:
+        """Listens no more."""
+        self._listener.close()
+
+    def _serve(self, listener: socket.socket) -> None:
         for answers in self._connections:
-            connection, _ = self._listener.accept()
+            connection, _ = listener.accept()
             with connection, connection.makefile("rb") as lines:
-                for is_answered in answers:
+                for answer in answers:
                     self.requests.append(_read(lines))
-                    if is_answered:
-                        connection.sendall(OK)
+                    if answer is not False:
+                        connection.sendall(OK if answer is True else answer)
 
 
 def _read(lines: Any) -> tuple[str, str | None]:
@@ -77,13 +88,12 @@ def test_only_what_is_carried_out_once_is_sent_again() -> None:
     client.request("POST", call, {"steps": 1})
     (_, _), (first, key), (again, same) = server.requests
     assert first == again == f"POST {call}" and key == same and key is not None
-    for method, path in (("DELETE", "/v1/episodes/x"), ("POST", "/v1/episodes/x/notes")):
-        server = Flaky([True, False], [True])
-        client = tandem.Client(server.url)
-        client.request("GET", "/v1/tasks")
-        with pytest.raises(tandem.Unreachable):
-            client.request(method, path)
-        assert [line for line, _ in server.requests] == ["GET /v1/tasks", f"{method} {path}"]
+    server = Flaky([True, False], [True])
+    client = tandem.Client(server.url)
+    client.request("GET", "/v1/tasks")
+    with pytest.raises(tandem.Unreachable):
+        client.request("DELETE", "/v1/episodes/x")
+    assert [line for line, _ in server.requests] == ["GET /v1/tasks", "DELETE /v1/episodes/x"]
 
 
 def test_every_call_has_a_key_of_its_own() -> None:
@@ -91,8 +101,39 @@ def test_every_call_has_a_key_of_its_own() -> None:
     client = tandem.Client(server.url)
     for path in ("/v1/episodes", "/v1/episodes/x/tools/wait", "/v1/episodes/x/notes"):
         client.request("POST", path)
-    start, call, note = (key for _, key in server.requests)
-    assert start and call and start != call and note is None
+    keys = [key for _, key in server.requests]
+    assert all(keys) and len(set(keys)) == 3
+
+
+def test_a_server_that_is_started_again_is_waited_for() -> None:
+    """And one that has never answered is not."""
+    server = Flaky([True])
+    client = tandem.Client(server.url)
+    client.request("GET", "/v1/tasks")
+    server.close()
+
+    def start_again() -> None:
+        time.sleep(1.0)
+        server.open()
+
+    threading.Thread(target=start_again, daemon=True).start()
+    client.request("POST", "/v1/episodes/x/tools/wait", {"steps": 1})
+    assert [line for line, _ in server.requests] == ["GET /v1/tasks", "POST /v1/episodes/x/tools/wait"]
+    server.close()
+    began_s = time.monotonic()
+    with pytest.raises(tandem.Unreachable):
+        tandem.Client(server.url).request("GET", "/v1/tasks")
+    assert time.monotonic() - began_s < 1.0
+
+
+def test_an_episode_is_followed_to_the_server_that_plays_it() -> None:
+    player = Flaky([True, True])
+    sends = f"HTTP/1.1 307 Elsewhere\r\nlocation: {player.url}/v1/episodes/x/tools/wait\r\ncontent-length: 0\r\n\r\n".encode()
+    asked = Flaky([sends, sends])
+    client = tandem.Client(asked.url)
+    for _ in range(2):
+        client.request("POST", "/v1/episodes/x/tools/wait", {"steps": 1})
+    assert player.requests == asked.requests
 
 
 def test_an_address_that_is_none_is_refused_at_once() -> None:

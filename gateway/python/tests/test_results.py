@@ -152,6 +152,32 @@ def test_a_scored_episode_cannot_be_undone_or_known_again(tmp_path: Path) -> Non
     assert played.notes[0] == "p1 was not reached in 5 steps"
 
 
+def test_a_key_draws_what_seeds_mean(tmp_path: Path) -> None:
+    def played(key: str | None, seeds: range = range(1, 3)) -> tandem.Evaluation:
+        file = tmp_path / "key.txt"
+        if key is not None:
+            file.write_text(key)
+        return tandem.evaluate("idle", "handover", seeds, protocol="benchmark", seed_key=file if key is not None else None)
+
+    public, keyed, again, other = (
+        played(None),
+        played("0123456789abcdef\n"),
+        played("0123456789abcdef"),
+        played("0123456789abcdeg"),
+    )
+    hashes = [[result.state_hash for result in run.results] for run in (public, keyed, again, other)]
+    assert [result.seed for result in keyed.results] == [1, 2]
+    assert hashes[1] == hashes[2]
+    assert len({*hashes[0], *hashes[1], *hashes[3]}) == 6
+    named = [[what for what in run.raw["departures"] if what.startswith("seed key: ")] for run in (public, keyed, again, other)]
+    assert [len(names) for names in named] == [0, 1, 1, 1]
+    assert named[1] == named[2] != named[3]
+    with pytest.raises(tandem.TandemError, match="has 4 bytes; give 16 or more"):
+        played("0123")
+    with pytest.raises(tandem.TandemError, match="cannot read the seed key"):
+        tandem.evaluate("idle", "handover", 1, seed_key=tmp_path / "nothing")
+
+
 def test_a_policy_that_raises_leaves_its_recordings_whole(tmp_path: Path) -> None:
     def policy(episode: tandem.Episode) -> None:
         episode.wait(5)

@@ -1,9 +1,9 @@
 //! `tandem agent`: a language model plays episodes on a server in this process, and what it says and does is printed.
 
 use std::{
-    io,
+    fs, io,
     net::Ipv4Addr,
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::ExitCode,
     sync::{
         Arc,
@@ -12,13 +12,15 @@ use std::{
     thread,
 };
 
+use serde::Deserialize;
+use serde_json::{Map, Value};
 use tandem_episodes::{shell_word, tasks};
 use tandem_tools_spec::Assistance;
 use tracing_subscriber::filter::LevelFilter;
 
 use super::{
     CommandResult, Seeds, demo,
-    flags::{AgentFlags, WorldFlags},
+    flags::{AgentFlags, GivenFlags, WorldFlags},
     logging::log_to_stderr,
 };
 use crate::{
@@ -41,6 +43,9 @@ const NO_CHILD: u32 = 0;
 /// What shells report of a process that SIGINT has ended.
 const INTERRUPTED: i32 = 130;
 
+/// The file in an episode's folder in which Python keeps by which flags it was begun.
+const AGENT_FILE: &str = "agent.json";
+
 /// Have a language model play a task, by any endpoint that speaks OpenAI's or Anthropic's formats. Python plays: pip install
 /// './gateway/python[agents]' in a checkout of the repository. Keys are read from the environment: OPENAI_API_KEY, ANTHROPIC_API_KEY.
 #[allow(
@@ -48,7 +53,10 @@ const INTERRUPTED: i32 = 130;
     reason = "the command line's help names an extra of the wheel, and no link"
 )]
 #[derive(Debug, clap::Args)]
+#[command(group = clap::ArgGroup::new("player").required(true).multiple(true).args(["model", "resume"]))]
 pub struct AgentArgs {
+    #[command(flatten)]
+    given: GivenFlags,
     #[command(flatten)]
     agent: AgentFlags,
     /// The id of the task [default: that of --task-file, or else handover].
@@ -70,53 +78,139 @@ pub struct AgentArgs {
     /// Folder that recordings are written to, one folder per episode.
     #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
     runs: PathBuf,
+    /// In place of a new episode: go on with that of this folder, as runs/handover-seed0, whose agent was killed.
+    /// Limits, prices and --base-url may be given anew; everything else is as it was.
+    #[arg(long, value_name = "FOLDER")]
+    resume: Option<PathBuf>,
     #[command(flatten)]
     world: WorldFlags,
 }
 
-/// Plays every seed. The program fails where the model's endpoint gives no answer.
+/// What is read here of [`AGENT_FILE`].
+#[derive(Debug, Deserialize)]
+struct AgentFile {
+    flags: ServerFlags,
+}
+
+/// The flags of an episode that concern its server.
+#[derive(Debug, Deserialize)]
+struct ServerFlags {
+    assistance: Assistance,
+}
+
+/// Plays every seed, or goes on with an episode. The program fails where the model's endpoint gives no answer.
 pub fn run(args: AgentArgs) -> CommandResult {
     log_to_stderr(LevelFilter::WARN);
+    match &args.resume {
+        Some(folder) => resume(folder, &args.given),
+        None => play(args),
+    }
+}
+
+fn play(args: AgentArgs) -> CommandResult {
     let agent = PythonModule::new(PythonPart::Agent, args.agent.arguments(args.agent.limit_s(LIMIT_S)))?;
     let (token, text) = Token::random()?;
-    let flags = Layer {
-        listen: Some((Ipv4Addr::LOCALHOST, FREE_PORT).into()),
-        token: Some(token),
-        runs: Some(args.runs),
-        assistance: Some(args.assistance),
-        ..args.world.layer()
-    };
-    let settings = Settings::resolve(flags, None)?;
-    try_runs_folder(&settings.runs)?;
+    let world = args.world.layer();
+    let layer = Layer { runs: Some(args.runs), assistance: Some(args.assistance), ..world };
+    let settings = Settings::resolve(on_this_machine(layer, token), None)?;
     let task = match &args.task {
         Some(id) => settings.tasks.find(id)?,
         None => settings.tasks.first_of_files().map_or_else(|| tasks::find(demo::TASK), Ok)?,
     };
+    let kept = [
+        format!("--runs={}", settings.runs.display()),
+        format!("--assistance={}", args.assistance.name()),
+        format!("--server-flags={}", world_flags(&args.given)),
+    ];
+    let switches = [(args.per_robot, "--per-robot"), (args.talk, "--talk")];
+    let plays = args.seeds.0.map(|seed| {
+        let episode = ["--task".into(), task.id.into(), "--seed".into(), seed.to_string()];
+        let switches = switches.iter().filter(|(given, _)| *given).map(|(_, flag)| (*flag).into());
+        kept.iter().cloned().chain(episode).chain(switches).collect()
+    });
+    play_each(&agent, settings, &text, plays.collect())
+}
+
+/// Goes on with the episode of `folder`, which a server over the folder of all runs brings back. Python refuses flags
+/// that do not fit, before there is a server.
+fn resume(folder: &Path, given: &GivenFlags) -> CommandResult {
+    let agent = PythonModule::new(PythonPart::Agent, resumed_arguments(given))?;
+    let folder = folder.canonicalize()?;
+    let kept: AgentFile = serde_json::from_slice(&fs::read(folder.join(AGENT_FILE))?)?;
+    let (token, text) = Token::random()?;
+    let runs = folder.parent().map(Path::to_owned);
+    let layer = Layer { runs, assistance: Some(kept.flags.assistance), ..Layer::default() };
+    play_each(&agent, Settings::resolve(on_this_machine(layer, token), None)?, &text, vec![Vec::new()])
+}
+
+/// Settings of a server that nobody else reaches.
+fn on_this_machine(layer: Layer, token: Token) -> Layer {
+    Layer { listen: Some((Ipv4Addr::LOCALHOST, FREE_PORT).into()), token: Some(token), ..layer }
+}
+
+/// The flags of the world that are given, as Python keeps them.
+fn world_flags(given: &GivenFlags) -> Value {
+    let flags = given.of::<WorldFlags>().into_iter();
+    flags.map(|(flag, value)| (flag.replace('-', "_"), Value::from(value))).collect::<Map<_, _>>().into()
+}
+
+/// The arguments for Python where an episode is resumed: the flags that are given, without defaults, which may differ
+/// from the episode's.
+fn resumed_arguments(given: &GivenFlags) -> Vec<String> {
+    let world = given.of::<WorldFlags>();
+    let own = given.of::<AgentArgs>().into_iter().filter(|flag| !world.contains(flag));
+    let own = own.map(|(flag, value)| match (flag.as_str(), value) {
+        ("seeds", Some(seed)) => format!("--seed={seed}"),
+        (_, Some(value)) => format!("--{flag}={value}"),
+        (_, None) => format!("--{flag}"),
+    });
+    own.chain([format!("--server-flags={}", world_flags(given))]).collect()
+}
+
+/// Has Python play one episode after another on a server in this process, each with its own arguments.
+fn play_each(
+    agent: &PythonModule,
+    settings: Arc<Settings>,
+    token: &str,
+    plays: Vec<Vec<String>>,
+) -> CommandResult {
+    try_runs_folder(&settings.runs)?;
     let runs = settings.runs.clone();
     let server = Server::start(settings)?;
     let url = format!("http://{}", server.address());
-    let switches = [(args.per_robot, "--per-robot"), (args.talk, "--talk")];
-    let mut failed = false;
+    let mut ended = None;
     let child = Arc::new(AtomicU32::new(NO_CHILD));
     hand_on_signals(child.clone());
-    for seed in args.seeds.0 {
-        let seed = seed.to_string();
-        let mut further = vec!["--url", &url, "--task", task.id, "--seed", &seed];
-        further.extend(switches.iter().filter(|(given, _)| *given).map(|(_, flag)| *flag));
-        let mut command = agent.command(&further);
-        let mut playing = command.env("TANDEM_TOKEN", &text).spawn()?;
+    for play in plays {
+        let further: Vec<&str> = ["--url", &url].into_iter().chain(play.iter().map(String::as_str)).collect();
+        let mut playing = agent.command(&further).env("TANDEM_TOKEN", token).spawn()?;
         child.store(playing.id(), Ordering::SeqCst);
-        if !playing.wait()?.success() {
-            failed = true;
+        let status = playing.wait()?;
+        ended = Some(status);
+        if !status.success() {
             break;
         }
     }
-    server.stop();
-    println!(
-        "to look at it in a browser: tandem serve --runs {}, and the link that it prints",
-        shell_word(&runs.to_string_lossy())
-    );
-    Ok(if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS })
+    // A process without an exit code was killed, and has not ended its episode.
+    let was_killed = ended.is_some_and(|status| status.code().is_none());
+    let shown = shell_word(&runs.to_string_lossy());
+    if was_killed {
+        server.stop_keeping();
+        eprintln!(
+            "the agent was killed; tandem agent --resume, with the folder of its episode in {shown}, goes on"
+        );
+    } else {
+        server.stop();
+    }
+    println!("to look at it in a browser: tandem serve --runs {shown}, and the link that it prints");
+    Ok(exit_code(ended.is_none_or(|status| status.success())))
+}
+
+fn exit_code(is_success: bool) -> ExitCode {
+    match is_success {
+        true => ExitCode::SUCCESS,
+        false => ExitCode::FAILURE,
+    }
 }
 
 /// Has the first signal that would end this process ask the child that runs then to end its episode; a second one does not wait

@@ -25,7 +25,7 @@ use std::{
 
 use tandem_episodes::{printable, shell_word};
 
-pub use flags::Seeds;
+pub use flags::{Seeds, read_seed_key};
 
 /// What a subcommand ends with: an error is printed and is a failure, too.
 pub type CommandResult = Result<ExitCode, Box<dyn Error>>;

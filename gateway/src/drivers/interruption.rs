@@ -20,7 +20,7 @@ pub fn with_last_words<T>(say: impl Fn() + Sync, work: impl FnOnce() -> T) -> T 
             };
             let is_asked_to_end = runtime.block_on(async {
                 tokio::select! {
-                    () = shutdown_signal() => true,
+                    _ = shutdown_signal() => true,
                     _ = done => false,
                 }
             });

@@ -1,6 +1,6 @@
 //! Why the host of episodes refuses.
 
-use std::{io, sync::Arc};
+use std::{io, path::PathBuf, sync::Arc};
 
 use tandem_episodes::{EpisodeError, players::PlayerError};
 use tandem_tools_spec::{Refusal, RefusalClass};
@@ -39,6 +39,34 @@ pub enum HostingError {
     HeldAlready {
         /// The id of both.
         id: String,
+    },
+    /// Another server on the same folder of runs plays the episode.
+    #[error("episode {id:?} is played by {url:?}; ask there")]
+    HeldElsewhere {
+        /// What was asked for.
+        id: String,
+        /// Where it is played.
+        url: String,
+    },
+    /// The episode was begun by another build, which alone brings it to the same state.
+    #[error(
+        "this episode was begun by build {made_by} of the server and this is {this}, which would not bring it to the same state; start that build on the same runs folder to go on, or DELETE the episode; what was recorded is in {}", .folder.display()
+    )]
+    OtherBuild {
+        /// The build that began it.
+        made_by: String,
+        /// This one.
+        this: &'static str,
+        /// Where it is recorded.
+        folder: PathBuf,
+    },
+    /// The journal from which the episode is to be brought back cannot be read or written.
+    #[error("the journal {}: {source}", .path.display())]
+    Journal {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
     },
     /// The episode was closed meanwhile.
     #[error("the episode has stopped")]
@@ -89,6 +117,11 @@ pub enum HostingError {
         "an operator looks through its robot and commands it; this request is for who started the episode"
     )]
     HostsBusiness,
+    /// Somebody else is to drive one robot of an episode whose robots one policy directs.
+    #[error(
+        "one policy directs all robots of this episode; start one and add \"operators\": \"per_robot\" for somebody else to drive one of them"
+    )]
+    OnePolicy,
     /// A client would start an episode where an evaluation in this process has the only one.
     #[error(
         "this server holds the one episode that an evaluation scores, and starts no other; play the one that your brief and the environment's TANDEM_EPISODE name"
@@ -142,7 +175,9 @@ pub enum HostingError {
 impl HostingError {
     /// What this error is to its caller.
     pub fn refusal(&self) -> Refusal {
-        use RefusalClass::{Conflict, Failed, Forbidden, Gone, Invalid, NotFound, TooMany, Unavailable};
+        use RefusalClass::{
+            Conflict, Elsewhere, Failed, Forbidden, Gone, Invalid, NotFound, TooMany, Unavailable,
+        };
         match self {
             HostingError::Episode(error) => error.refusal(),
             HostingError::UnknownEpisode { .. } => {
@@ -159,6 +194,12 @@ impl HostingError {
             }
             HostingError::ShuttingDown => {
                 Refusal::new("shutting-down", "Shutting down", Unavailable).retry_after_s(60)
+            }
+            HostingError::HeldElsewhere { .. } => {
+                Refusal::new("held-elsewhere", "Played elsewhere", Elsewhere)
+            }
+            HostingError::OtherBuild { .. } => {
+                Refusal::new("other-build", "Begun by another build", Conflict)
             }
             HostingError::EpisodeStopped => {
                 Refusal::new("episode-stopped", "Episode stopped", Gone).hint(START_ANOTHER)
@@ -177,6 +218,7 @@ impl HostingError {
             HostingError::HostsBusiness => Refusal::new("hosts-business", "Not for operators", Forbidden),
             HostingError::OneEpisode => Refusal::new("one-episode", "No other episode", Forbidden),
             HostingError::PeopleDrive => Refusal::new("people-drive", "People drive", Forbidden),
+            HostingError::OnePolicy => Refusal::new("one-policy", "One policy directs all", Conflict),
             HostingError::NoExpert(_) => Refusal::new("no-expert", "No expert", Invalid),
             HostingError::NoPolicy { .. } => Refusal::new("no-policy", "No policy", Conflict),
             HostingError::NoTalk => Refusal::new("no-talk", "Nobody hears", Conflict),
@@ -185,9 +227,10 @@ impl HostingError {
             }
             HostingError::KeyUsed => Refusal::new("key-used", "Key used", Invalid),
             HostingError::Shared(error) => error.refusal(),
-            HostingError::HeldAlready { .. } | HostingError::Token(_) | HostingError::Thread(_) => {
-                Refusal::INTERNAL
-            }
+            HostingError::HeldAlready { .. }
+            | HostingError::Journal { .. }
+            | HostingError::Token(_)
+            | HostingError::Thread(_) => Refusal::INTERNAL,
         }
     }
 
@@ -206,18 +249,49 @@ impl HostingError {
             | HostingError::TooManyWaiting { .. }
             | HostingError::ShuttingDown
             | HostingError::HeldAlready { .. }
+            | HostingError::HeldElsewhere { .. }
+            | HostingError::OtherBuild { .. }
+            | HostingError::Journal { .. }
             | HostingError::EpisodeStopped
             | HostingError::EpisodePanicked
             | HostingError::NeedsOperator
             | HostingError::HostsBusiness
             | HostingError::OneEpisode
             | HostingError::PeopleDrive
+            | HostingError::OnePolicy
             | HostingError::NoExpert(_)
             | HostingError::NoPolicy { .. }
             | HostingError::KeyUsed
             | HostingError::Token(_)
             | HostingError::Shared(_)
             | HostingError::Thread(_) => false,
+        }
+    }
+
+    /// Whether the episode is another server's, or nobody's any more.
+    pub fn is_elsewhere(&self) -> bool {
+        match self {
+            HostingError::HeldElsewhere { .. } | HostingError::UnknownEpisode { .. } => true,
+            HostingError::Shared(error) => error.is_elsewhere(),
+            _ => false,
+        }
+    }
+
+    /// Whether another build alone can go on with the episode.
+    pub fn is_of_other_build(&self) -> bool {
+        match self {
+            HostingError::OtherBuild { .. } => true,
+            HostingError::Shared(error) => error.is_of_other_build(),
+            _ => false,
+        }
+    }
+
+    /// Where the episode is played, if another server plays it.
+    pub fn elsewhere(&self) -> Option<&str> {
+        match self {
+            HostingError::HeldElsewhere { url, .. } => Some(url),
+            HostingError::Shared(error) => error.elsewhere(),
+            _ => None,
         }
     }
 

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use serde_json::Value;
 use tandem_episodes::EpisodeError;
 use tandem_tools_spec::{
     Briefing, Call, EPISODE_TOOLS, EpisodeEntry, ManageReply, Note, Operators, ResultReply, SpecError,
@@ -10,6 +11,8 @@ use tandem_tools_spec::{
 
 use super::{
     Answer, EpisodeThread, HostingError, RefusedCall,
+    durable::{KeptAnswer, Keyed},
+    episode::HostMemory,
     idempotency_cache::{IdempotencyCache, IdempotentReply},
     team::Team,
 };
@@ -44,18 +47,74 @@ pub struct HostedEpisode {
     id: String,
     /// The thread that owns its world.
     pub thread: Arc<EpisodeThread>,
+    beside: Arc<Beside>,
+}
+
+/// What a server knows of an episode beside its world.
+#[derive(Debug, Default)]
+pub struct Beside {
     /// The operators, where each robot has one.
-    pub team: Option<Arc<Team>>,
+    team: Option<Arc<Team>>,
+    /// Replies that may be asked for again.
     replies: Arc<IdempotencyCache<Call, SharedAnswer>>,
+    notes: IdempotencyCache<Note, SharedNote>,
 }
 
 /// What came of a call, for as many as want to know.
 type SharedAnswer = Result<Arc<Answer>, Arc<HostingError>>;
 
+/// What came of a note, for as many as want to know.
+type SharedNote = Result<(), Arc<HostingError>>;
+
+impl Beside {
+    /// What is known of an episode that `team` drives, or else one policy.
+    pub fn new(team: Option<Team>) -> Beside {
+        Beside { team: team.map(Arc::new), ..Beside::default() }
+    }
+}
+
+impl HostMemory for Beside {
+    fn memory(&self) -> Value {
+        let operators = self.team.as_ref().map(|team| team.memory());
+        // Texts and numbers can always be written.
+        serde_json::to_value(operators).unwrap_or_default()
+    }
+
+    fn restore(&self, memory: Option<Value>, answers: Vec<KeptAnswer>) {
+        if let (Some(team), Some(memory)) = (&self.team, memory) {
+            match serde_json::from_value(memory) {
+                Ok(memory) => team.restore(memory),
+                Err(error) => tracing::error!(%error, "what operators had not heard yet is lost"),
+            }
+        }
+        for answer in answers {
+            let key = answer.key.clone();
+            match answer.read() {
+                Ok((request, answer)) => self.replies.keep(key, request, Ok(Arc::new(answer))),
+                Err(error) => tracing::error!(error, key, "an answer is lost"),
+            }
+        }
+    }
+
+    fn let_go(&self) {
+        // What is left of them would keep all memory around it in use.
+        self.replies.clear();
+    }
+
+    fn is_busy(&self) -> bool {
+        self.team.as_ref().is_some_and(|team| team.is_busy())
+    }
+}
+
 impl HostedEpisode {
-    /// The episode `id`, whose replies may be asked for again from now on.
-    pub fn new(id: &str, thread: Arc<EpisodeThread>, team: Option<Team>) -> HostedEpisode {
-        HostedEpisode { id: id.into(), thread, team: team.map(Arc::new), replies: Arc::default() }
+    /// The episode `id`, of which the server knows `beside`.
+    pub fn new(id: &str, thread: Arc<EpisodeThread>, beside: Arc<Beside>) -> HostedEpisode {
+        HostedEpisode { id: id.into(), thread, beside }
+    }
+
+    /// The operators, where each robot has one.
+    pub fn team(&self) -> Option<&Arc<Team>> {
+        self.beside.team.as_ref()
     }
 
     /// What the episode is called.
@@ -72,22 +131,32 @@ impl HostedEpisode {
     ) -> Result<IdempotentReply<Arc<Answer>>, HostingError> {
         let robot = self.robot_of(who)?;
         let Some(key) = key else {
-            let reply = Arc::new(self.clone().answer(robot, call).await?);
+            let reply = Arc::new(self.clone().answer(robot, call, None).await?);
             return Ok(IdempotentReply { reply, replayed: false });
         };
-        // Keys of different operators have nothing to do with each other.
-        let key = format!("{}:{key}", robot.as_deref().unwrap_or_default());
+        let key = own_key(robot.as_deref(), key);
         let (episode, asked) = (self.clone(), call.clone());
-        let work = async move { episode.answer(robot, asked).await.map(Arc::new).map_err(Arc::new) };
+        let keyed = Keyed { key: key.clone(), request: call.clone() };
+        let work =
+            async move { episode.answer(robot, asked, Some(keyed)).await.map(Arc::new).map_err(Arc::new) };
         let lasting = |made: &SharedAnswer| made.as_ref().map_or_else(|error| error.is_final(), |_| true);
-        let IdempotentReply { reply, replayed } = self.replies.once(&key, call, work, lasting).await?;
+        let IdempotentReply { reply, replayed } = self.beside.replies.once(&key, call, work, lasting).await?;
         Ok(IdempotentReply { reply: reply.map_err(HostingError::Shared)?, replayed })
     }
 
-    /// Keeps a note of who started the episode, or of an operator.
-    pub async fn note(&self, who: &Caller, note: Note) -> Result<(), HostingError> {
+    /// Keeps a note of who started the episode, or of an operator; with a key, once for this key and caller.
+    pub async fn note(&self, who: &Caller, note: Note, key: Option<&str>) -> Result<(), HostingError> {
+        let Some(key) = key else { return self.keep_note(who, note).await };
+        let (episode, caller, told) = (self.clone(), who.clone(), note.clone());
+        let work = async move { episode.keep_note(&caller, told).await.map_err(Arc::new) };
+        let lasting = |made: &SharedNote| made.as_ref().map_or_else(|error| error.is_final(), |()| true);
+        let kept = self.beside.notes.once(&own_key(who.robot(), key), note, work, lasting).await?;
+        kept.reply.map_err(HostingError::Shared)
+    }
+
+    async fn keep_note(&self, who: &Caller, note: Note) -> Result<(), HostingError> {
         self.admit(who)?;
-        let own = self.team.as_ref().zip(who.robot());
+        let own = self.team().zip(who.robot());
         let _place = own.map(|(team, robot)| team.take_place(robot)).transpose()?;
         self.thread.note(who.robot(), note).await
     }
@@ -133,7 +202,7 @@ impl HostedEpisode {
             task: spec.task.id.into(),
             seed: Some(spec.seed),
             protocol: spec.protocol,
-            operators: if self.team.is_some() { Operators::PerRobot } else { Operators::One },
+            operators: if self.team().is_some() { Operators::PerRobot } else { Operators::One },
             step: self.thread.env_steps(),
             ended: self.thread.end_reason(),
         }
@@ -141,7 +210,7 @@ impl HostedEpisode {
 
     /// Whether operators may talk.
     pub fn may_talk(&self) -> bool {
-        self.team.as_ref().is_some_and(|team| team.may_talk())
+        self.team().is_some_and(|team| team.may_talk())
     }
 
     /// Refuses a tool that `who` is not offered, whatever its arguments are.
@@ -161,8 +230,13 @@ impl HostedEpisode {
 
     /// Ends the episode, as [`EpisodeThread::close`] does; operators who wait for each other are told.
     pub async fn close(&self) -> Result<ResultReply, HostingError> {
-        let result = self.thread.close().await;
-        if let Some(team) = &self.team {
+        self.close_for(false).await
+    }
+
+    /// As [`HostedEpisode::close`], where it is to go on when it is brought back if `keep` says so.
+    pub async fn close_for(&self, keep: bool) -> Result<ResultReply, HostingError> {
+        let result = if keep { self.thread.leave().await } else { self.thread.close().await };
+        if let Some(team) = self.team() {
             team.stop();
         }
         result
@@ -181,18 +255,23 @@ impl HostedEpisode {
     /// The robot that `who` drives; `None` where one policy directs all.
     fn robot_of(&self, who: &Caller) -> Result<Option<String>, HostingError> {
         self.admit(who)?;
-        match (who, &self.team) {
+        match (who, self.team()) {
             (Caller::Host, None) => Ok(None),
             (Caller::Host, Some(_)) => Err(HostingError::NeedsOperator),
             (Caller::Operator { robot, .. }, _) => Ok(Some(robot.clone())),
         }
     }
 
-    async fn answer(self, robot: Option<String>, call: Call) -> Result<Answer, HostingError> {
-        match (self.team, robot, &call.tool) {
+    async fn answer(
+        self,
+        robot: Option<String>,
+        call: Call,
+        keyed: Option<Keyed>,
+    ) -> Result<Answer, HostingError> {
+        match (self.team(), robot, &call.tool) {
             (Some(team), Some(robot), _) => {
                 let asked = RefusedCall::of(&call);
-                let answer = team.call(&self.thread, &robot, call).await;
+                let answer = team.call(&self.thread, &robot, call, keyed).await;
                 if let Err(refusal) = &answer
                     && refusal.is_of_the_team()
                 {
@@ -202,8 +281,13 @@ impl HostedEpisode {
             }
             (_, _, ToolCall::Talk(_)) => Err(HostingError::NoTalk),
             (_, _, ToolCall::Look(_) | ToolCall::Act(_) | ToolCall::Plan(_) | ToolCall::Manage(_)) => {
-                self.thread.ask(None, call).await
+                self.thread.ask(None, call, keyed, Box::new(|answer| answer)).await
             }
         }
     }
+}
+
+/// The key under which an operator's request is kept: keys of different operators have nothing to do with each other.
+fn own_key(robot: Option<&str>, key: &str) -> String {
+    format!("{}:{key}", robot.unwrap_or_default())
 }

@@ -88,6 +88,24 @@ impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> IdempotencyCache<Q,
         Ok((reply, false))
     }
 
+    /// Keeps a reply that has been made elsewhere.
+    pub fn keep(&self, key: String, request: Q, reply: R) {
+        let (_, reply) = watch::channel(Some(reply));
+        let mut entries = self.lock();
+        entries.retain(|entry| entry.key != key);
+        entries.push_back(Entry { key, request, reply });
+        if entries.len() > CAPACITY {
+            entries.pop_front();
+        }
+    }
+
+    /// Forgets every reply that has been made.
+    pub fn clear(&self) {
+        let mut entries = self.lock();
+        entries.retain(|entry| entry.reply.borrow().is_none());
+        entries.shrink_to_fit();
+    }
+
     fn forget(&self, key: &str) {
         self.lock().retain(|entry| entry.key != key);
     }

@@ -4,27 +4,26 @@
 #[cfg(test)]
 mod absurd_robot;
 mod answer;
-mod episode_thread;
+mod brought_back;
+mod durable;
+mod episode;
 mod error;
 mod hosted_episode;
 mod idempotency_cache;
-mod onlookers;
-mod panic_guard;
 mod run_folder;
 mod table;
 mod team;
 #[cfg(test)]
-mod tests;
+pub mod tests;
 
 #[cfg(test)]
 pub use absurd_robot::write_absurd_robot;
 pub use answer::{Answer, RefusedCall};
-pub use episode_thread::EpisodeThread;
+pub use durable::LiveFolder;
+pub use episode::{EpisodeMetrics, EpisodeThread, LiveWatch, PanicGuard};
 pub use error::HostingError;
 pub use hosted_episode::{Caller, HostedEpisode};
 pub use idempotency_cache::IdempotentReply;
-pub use onlookers::LiveWatch;
-pub use panic_guard::{EpisodeMetrics, PanicGuard};
 pub use run_folder::{episode_name, look_at_runs_folder, try_runs_folder};
 pub use table::{EpisodeTable, Purpose};
 pub use team::{

@@ -2,11 +2,12 @@
 
 use std::{
     collections::{BTreeMap, btree_map::Entry},
-    sync::{Arc, Mutex, MutexGuard},
+    fs,
+    sync::{Arc, Mutex, MutexGuard, OnceLock},
     time::Duration,
 };
 
-use tandem_episodes::{EpisodeSpec, RunFolder};
+use tandem_episodes::{EpisodeError, EpisodeSpec, RunFolder, build, stress::Silence};
 use tandem_tools_spec::{
     Assistance, Briefing, Driving, EpisodeList, ResultReply, StartEpisode, StartReply, TaskList,
 };
@@ -18,6 +19,9 @@ use tokio::{
 
 use super::{
     Caller, EpisodeThread, HostedEpisode, HostingError,
+    durable::{Heading, LiveFolder, StartKey},
+    episode::Surroundings,
+    hosted_episode::Beside,
     idempotency_cache::{IdempotencyCache, IdempotentReply},
     run_folder::{RunFolders, episode_name},
     team::{Collection, Team},
@@ -28,12 +32,16 @@ use crate::{metrics::Metrics, settings::Settings};
 #[derive(Debug)]
 pub struct EpisodeTable {
     held: Mutex<HeldEpisodes>,
-    places: Arc<Semaphore>,
-    settings: Arc<Settings>,
-    starts: IdempotencyCache<(StartEpisode, Driving), SharedStart>,
-    metrics: Arc<Metrics>,
+    pub(super) places: Arc<Semaphore>,
+    pub(super) settings: Arc<Settings>,
+    pub(super) starts: IdempotencyCache<(StartEpisode, Driving), SharedStart>,
+    pub(super) metrics: Arc<Metrics>,
     folders: RunFolders,
     purpose: Purpose,
+    /// Where the journals are of episodes that outlive the server, if any do.
+    pub(super) journals: OnceLock<LiveFolder>,
+    /// When it was looked for episodes of other servers last.
+    pub(super) looked_around: Mutex<Option<Instant>>,
 }
 
 /// The purpose of a server. It decides who starts episodes, and who may drive their robots.
@@ -69,6 +77,8 @@ impl EpisodeTable {
             metrics: Arc::default(),
             folders: RunFolders::default(),
             purpose: Purpose::default(),
+            journals: OnceLock::new(),
+            looked_around: Mutex::default(),
         }
     }
 
@@ -80,6 +90,11 @@ impl EpisodeTable {
     /// Whether an evaluation in this process has its episodes scored.
     pub fn is_evaluation(&self) -> bool {
         matches!(self.purpose, Purpose::Evaluation)
+    }
+
+    /// Whether clients start episodes here, who may come back to them.
+    pub fn serves_clients(&self) -> bool {
+        matches!(self.purpose, Purpose::Clients)
     }
 
     /// Those who play one episode after another here.
@@ -99,14 +114,6 @@ impl EpisodeTable {
     }
 
     /// Refuses a program that would drive a robot in the place of who has its seat.
-    fn check_stand_in(&self) -> Result<(), HostingError> {
-        match self.purpose {
-            Purpose::Evaluation => Err(HostingError::OneEpisode),
-            Purpose::Collection(_) => Err(HostingError::PeopleDrive),
-            Purpose::Clients => Ok(()),
-        }
-    }
-
     /// What has been counted.
     pub fn metrics(&self) -> &Arc<Metrics> {
         &self.metrics
@@ -120,7 +127,8 @@ impl EpisodeTable {
         key: &str,
     ) -> Result<IdempotentReply<StartReply>, HostingError> {
         let (table, request) = (self.clone(), (args.clone(), driving));
-        let work = async move { table.start_driven(args, driving).await.map_err(Arc::new) };
+        let kept = StartKey { key: key.into(), args };
+        let work = async move { table.start_asked(driving, kept).await.map_err(Arc::new) };
         let lasting = |made: &SharedStart| made.as_ref().map_or_else(|error| error.is_final(), |_| true);
         let IdempotentReply { reply, replayed } = self.starts.once(key, request, work, lasting).await?;
         Ok(IdempotentReply { reply: reply.map_err(HostingError::Shared)?, replayed })
@@ -137,8 +145,22 @@ impl EpisodeTable {
         args: StartEpisode,
         driving: Driving,
     ) -> Result<StartReply, HostingError> {
+        self.start_args(&args, driving, None).await
+    }
+
+    async fn start_asked(&self, driving: Driving, asked: StartKey) -> Result<StartReply, HostingError> {
+        let args = asked.args.clone();
+        self.start_args(&args, driving, Some(asked)).await
+    }
+
+    async fn start_args(
+        &self,
+        args: &StartEpisode,
+        driving: Driving,
+        key: Option<StartKey>,
+    ) -> Result<StartReply, HostingError> {
         self.check_starts()?;
-        let reply = self.start_spec(self.settings.spec(&args)?, &driving).await?;
+        let reply = self.start_kept(self.settings.spec(args)?, &driving, key).await?;
         let briefing = if args.short { reply.briefing.shortened() } else { reply.briefing };
         Ok(StartReply { briefing, ..reply })
     }
@@ -146,10 +168,31 @@ impl EpisodeTable {
     /// As [`EpisodeTable::start_driven`], of an episode that is not as this server's are.
     pub async fn start_spec(&self, spec: EpisodeSpec, driving: &Driving) -> Result<StartReply, HostingError> {
         self.check_starts()?;
+        self.start_kept(spec, driving, None).await
+    }
+
+    /// Starts an episode that a server which is started again brings back; `key` is that of the start.
+    async fn start_kept(
+        &self,
+        spec: EpisodeSpec,
+        driving: &Driving,
+        key: Option<StartKey>,
+    ) -> Result<StartReply, HostingError> {
         let place = self.take_place().await?;
         let (id, path) = self.folders.create(&self.settings.runs, &episode_name(&spec)?);
         let folder = RunFolder { path, visibility: self.settings.record, pages: true };
-        self.begin(&id, spec, driving, folder, place).await
+        let (episode, start) = self.begin(&id, spec, driving, folder, place).await?;
+        if self.journals.get().is_some() {
+            let build = build().map_err(EpisodeError::Build)?;
+            let spec = episode.spec().clone();
+            let heading = Heading::new(build, spec, self.settings.record, driving, start.clone(), key);
+            episode.begin_journal(heading).await?;
+            if self.settings.advertised_url.is_some() {
+                // Whichever server is asked for it first plays it.
+                episode.put_aside();
+            }
+        }
+        Ok(start)
     }
 
     /// Starts `spec` under the name `id` with its files in `folder`, for an evaluation in this process.
@@ -161,7 +204,7 @@ impl EpisodeTable {
         folder: RunFolder,
     ) -> Result<StartReply, HostingError> {
         let place = self.take_place().await?;
-        self.begin(id, spec, driving, folder, place).await
+        Ok(self.begin(id, spec, driving, folder, place).await?.1)
     }
 
     async fn begin(
@@ -171,23 +214,35 @@ impl EpisodeTable {
         driving: &Driving,
         folder: RunFolder,
         place: OwnedSemaphorePermit,
-    ) -> Result<StartReply, HostingError> {
-        let robots = spec.task.robots.len();
-        let silence = spec.stress.and_then(|stress| stress.silence(spec.world_seed(), robots));
+    ) -> Result<(Arc<EpisodeThread>, StartReply), HostingError> {
+        let silence = silence(&spec);
         let (team, operators) = match driving.is_per_robot() {
             true => Team::new(spec.task.robot_names(), driving, self.collection(), silence)
                 .map(|(team, tokens)| (Some(team), tokens))?,
             false => (None, Vec::new()),
         };
-        let (episode, briefing) = EpisodeThread::start(id, spec, folder, place, self.metrics.clone()).await?;
+        let beside = Arc::new(Beside::new(team));
+        let surroundings = self.surroundings(folder, place, beside.clone());
+        let (episode, briefing) = EpisodeThread::start(id, spec, surroundings).await?;
         let episode = Arc::new(episode);
-        if let Err(refused) = self.hold(HostedEpisode::new(id, episode.clone(), team)) {
+        if let Err(refused) = self.hold(HostedEpisode::new(id, episode.clone(), beside)) {
             episode.close().await?;
             return Err(refused);
         }
         tracing::info!(episode = id, "started");
         let idle_limit_s = self.settings.idle_timeout.as_secs();
-        Ok(StartReply { episode_id: id.into(), idle_limit_s, operators, briefing })
+        Ok((episode, StartReply { episode_id: id.into(), idle_limit_s, operators, briefing }))
+    }
+
+    /// What an episode is played in here.
+    pub(super) fn surroundings(
+        &self,
+        folder: RunFolder,
+        place: OwnedSemaphorePermit,
+        memory: Arc<Beside>,
+    ) -> Surroundings {
+        let journals = self.journals.get().cloned();
+        Surroundings { folder, place, metrics: self.metrics.clone(), memory, journals }
     }
 
     /// The reply to `list_tasks`, with this server's limit of thinking where it has one, and without what its policies are
@@ -224,17 +279,25 @@ impl EpisodeTable {
     ) -> Result<(HostedEpisode, Arc<Team>, &'a str), HostingError> {
         let Caller::Operator { episode, robot } = caller else { return Err(HostingError::NeedsOperator) };
         let hosted = self.hosted(episode)?;
-        let team = hosted.team.clone().ok_or(HostingError::NeedsOperator)?;
+        let team = hosted.team().cloned().ok_or(HostingError::NeedsOperator)?;
         Ok((hosted, team, robot))
     }
 
-    /// As [`EpisodeTable::own_robot`], for a program of this process that is to drive in the operator's place.
-    pub fn stand_in<'a>(
-        &self,
-        caller: &'a Caller,
-    ) -> Result<(HostedEpisode, Arc<Team>, &'a str), HostingError> {
-        self.check_stand_in()?;
-        self.own_robot(caller)
+    /// Checks that `who` may replace operators by the expert or a policy of this process. The episode's starter may.
+    pub fn check_stand_in(&self, who: &Caller) -> Result<(), HostingError> {
+        match (&self.purpose, who) {
+            (Purpose::Evaluation, _) => Err(HostingError::OneEpisode),
+            (Purpose::Collection(_), _) => Err(HostingError::PeopleDrive),
+            (Purpose::Clients, Caller::Operator { .. }) => Err(HostingError::HostsBusiness),
+            (Purpose::Clients, Caller::Host) => Ok(()),
+        }
+    }
+
+    /// The episode `id` and its operators.
+    pub fn team(&self, id: &str) -> Result<(HostedEpisode, Arc<Team>), HostingError> {
+        let hosted = self.hosted(id)?;
+        let team = hosted.team().cloned().ok_or(HostingError::OnePolicy)?;
+        Ok((hosted, team))
     }
 
     /// What `who` has to know to play the episode `id`, in this server's words.
@@ -269,7 +332,7 @@ impl EpisodeTable {
         let seat = seat.map(|robot| Caller::Operator { episode: String::new(), robot: robot.into() });
         let held = self.lock();
         held.episodes.iter().fold(seat, |found, (id, hosted)| {
-            let robot = hosted.team.as_ref().and_then(|team| team.robot_of(text));
+            let robot = hosted.team().and_then(|team| team.robot_of(text));
             robot.map(|robot| Caller::Operator { episode: id.clone(), robot: robot.into() }).or(found)
         })
     }
@@ -277,9 +340,29 @@ impl EpisodeTable {
     /// Ends the episode `id`, forgets it and returns its result.
     pub async fn remove(&self, id: &str) -> Result<ResultReply, HostingError> {
         let episode = self.lock().episodes.remove(id).ok_or_else(|| unknown(id))?;
-        let result = episode.close().await?;
+        let result = match episode.close().await {
+            // It cannot be played to its end here; its recording is what there is of it.
+            Err(error) if error.is_of_other_build() => {
+                let journal = self.journals.get().and_then(|journals| journals.journal(id));
+                if let Some(Err(error)) = journal.map(fs::remove_file) {
+                    tracing::error!(episode = id, %error, "the journal stays");
+                }
+                return Err(HostingError::EpisodeStopped);
+            }
+            result => result?,
+        };
         tracing::info!(episode = id, "closed");
         Ok(result.disclosed(self.settings.disclosure))
+    }
+
+    /// Forgets the episode `id`, which is somebody else's now.
+    pub(super) fn forget(&self, id: &str) {
+        self.lock().episodes.remove(id);
+    }
+
+    /// All that are held.
+    pub(super) fn all(&self) -> Vec<HostedEpisode> {
+        self.lock().episodes.values().cloned().collect()
     }
 
     /// How many episodes are held.
@@ -297,16 +380,10 @@ impl EpisodeTable {
         self.lock().episodes.values().filter(|episode| !episode.thread.ended()).count()
     }
 
-    /// Ends the episodes that nobody plays any more. To be called every now and then.
-    pub fn end_abandoned(&self) {
-        for episode in self.lock().episodes.values().filter(|episode| !episode.thread.ended()) {
-            episode.thread.end_if_abandoned(self.settings.idle_timeout);
-        }
-    }
-
     /// Takes no more episodes, ends those that are held after the calls already waiting, and returns when every file is
-    /// closed, or after `limit`. What was not closed by then is returned by name.
-    pub async fn close_all(&self, limit: Duration) -> Vec<String> {
+    /// closed, or after `limit`. What was not closed by then is returned by name. Those that `keep` says, and those that sleep, go on where
+    /// they are brought back.
+    pub async fn close_all(&self, limit: Duration, keep: bool) -> Vec<String> {
         let deadline = Instant::now() + limit;
         let episodes = {
             let mut held = self.lock();
@@ -314,9 +391,9 @@ impl EpisodeTable {
             std::mem::take(&mut held.episodes)
         };
         let mut closings = JoinSet::new();
-        for (id, episode) in episodes {
+        for (id, episode) in episodes.into_iter().filter(|(_, episode)| !episode.thread.sleeps()) {
             closings.spawn(async move {
-                match timeout_at(deadline, episode.close()).await {
+                match timeout_at(deadline, episode.close_for(keep)).await {
                     Ok(Ok(_)) => tracing::info!(episode = id, "closed"),
                     Ok(Err(error)) => tracing::error!(episode = id, %error, "not closed"),
                     Err(_) => return Some(format!("{id} in {}", episode.thread.folder().display())),
@@ -337,11 +414,11 @@ impl EpisodeTable {
     /// Holds an episode that one policy directs.
     #[cfg(test)]
     pub(crate) fn insert(&self, id: &str, episode: Arc<EpisodeThread>) -> Result<(), HostingError> {
-        self.hold(HostedEpisode::new(id, episode, None))
+        self.hold(HostedEpisode::new(id, episode, Arc::default()))
     }
 
     /// Holds an episode, unless the table is closing or holds one of that id, which stays.
-    fn hold(&self, episode: HostedEpisode) -> Result<(), HostingError> {
+    pub(super) fn hold(&self, episode: HostedEpisode) -> Result<(), HostingError> {
         let mut held = self.lock();
         if held.closing {
             return Err(HostingError::ShuttingDown);
@@ -362,7 +439,7 @@ impl EpisodeTable {
         }
         if let Some(ended) = self.remove_one_that_has_ended() {
             // Its own result is not this caller's business.
-            let _ = ended.close().await;
+            let _ = ended.end_for_good().await;
         }
         let limit = self.settings.max_episodes;
         self.places.clone().try_acquire_owned().map_err(|_| HostingError::TooManyEpisodes { limit })
@@ -381,6 +458,11 @@ impl EpisodeTable {
     }
 }
 
-fn unknown(id: &str) -> HostingError {
+pub(super) fn unknown(id: &str) -> HostingError {
     HostingError::UnknownEpisode { id: id.into() }
+}
+
+/// Whose words do not reach the others in an episode of `spec`.
+pub(super) fn silence(spec: &EpisodeSpec) -> Option<Silence> {
+    spec.stress.and_then(|stress| stress.silence(spec.world_seed(), spec.task.robots.len()))
 }

@@ -10,22 +10,27 @@ use std::{
     time::Duration,
 };
 
-use tandem_episodes::{Clock, EpisodeSpec, Recorder, Recording, RunFolder, tasks};
+use tandem_episodes::{Clock, EpisodeSpec, Recorder, Recording, tasks};
 use tandem_tools_spec::{Briefing, EndReason, ManageReply, Protocol, StatusReply, ToolCall, ToolReply, Wait};
-use tokio::sync::Semaphore;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
-use super::*;
-use crate::settings::{Layer, Settings};
+use super::{episode::Surroundings, hosted_episode::Beside, *};
+use crate::settings::{Durability, Layer, Settings};
 
 const IDLE: Duration = Duration::from_secs(900);
+
+/// An episode that is recorded in `folder`, of which nothing else is known.
+pub fn alone(folder: &Path, place: OwnedSemaphorePermit) -> Surroundings {
+    let memory = Arc::new(Beside::default());
+    Surroundings { folder: folder.into(), place, metrics: Arc::default(), memory, journals: None }
+}
 
 async fn start(id: &str, folder: &Path, clock: Clock) -> (Arc<EpisodeThread>, Arc<Semaphore>, Briefing) {
     let spec = EpisodeSpec::new(tasks::find("handover").unwrap(), 0, Protocol::Benchmark);
     let places = Arc::new(Semaphore::new(1));
     let permit = places.clone().try_acquire_owned().unwrap();
-    let folder = RunFolder::from(folder);
     let (episode, briefing) =
-        EpisodeThread::start_with_clock(id, spec, folder, permit, Arc::default(), clock).await.unwrap();
+        EpisodeThread::start_with_clock(id, spec, alone(folder, permit), clock).await.unwrap();
     (Arc::new(episode), places, briefing)
 }
 
@@ -144,7 +149,7 @@ async fn closing_ends_in_time_and_says_what_it_left() {
     hangs.store(true, Relaxed);
     let call = tokio::spawn(async move { episode.call(wait()).await });
     tokio::task::yield_now().await;
-    let left = table.close_all(Duration::from_millis(50)).await;
+    let left = table.close_all(Duration::from_millis(50), false).await;
     assert_eq!(left, [format!("stuck in {}", runs.path().display())]);
     drop(go_on);
     assert!(call.await.unwrap().is_ok(), "the call still finishes");
@@ -152,4 +157,39 @@ async fn closing_ends_in_time_and_says_what_it_left() {
     let refused = table.insert("late", late.clone());
     assert!(matches!(refused, Err(HostingError::ShuttingDown)), "nothing is added after closing");
     late.close().await.unwrap();
+}
+
+/// Who asks a sleeping episode for something notices nothing but the time that it takes.
+#[tokio::test]
+async fn an_episode_that_was_put_aside_is_as_it_was() {
+    let runs = tempfile::tempdir().unwrap();
+    let flags = Layer { runs: Some(runs.path().into()), max_episodes: Some(2), ..Layer::default() };
+    let table = Arc::new(EpisodeTable::new(Settings::resolve(flags, None).unwrap()));
+    let journals = LiveFolder::beside(runs.path(), "http://127.0.0.1:1".into(), Durability::Disk);
+    table.keep_journals(journals.clone());
+    let start = || serde_json::from_value(serde_json::json!({ "task": "handover", "seed": 2110 })).unwrap();
+    let mut steps = Vec::new();
+    for sleeps in [true, false] {
+        let id = table.start(start()).await.unwrap().episode_id;
+        let hosted = table.awake(&id).await.unwrap();
+        hosted.call(&Caller::Host, wait().into(), Some("first")).await.unwrap();
+        let first = hosted.call(&Caller::Host, wait().into(), Some("second")).await.unwrap();
+        if sleeps {
+            hosted.thread.put_aside();
+            while !hosted.thread.sleeps() {
+                tokio::time::sleep(Duration::from_millis(1)).await;
+            }
+            assert!(!hosted.thread.ended());
+        }
+        let again = table.awake(&id).await.unwrap();
+        let again = again.call(&Caller::Host, wait().into(), Some("second")).await.unwrap();
+        assert!(again.replayed && again.reply.step == first.reply.step);
+        hosted.call(&Caller::Host, wait().into(), Some("third")).await.unwrap();
+        let result = table.remove(&id).await.unwrap();
+        assert_eq!((result.recording_failed.as_deref(), result.tool_calls), (None, 3));
+        let recording = Recording::read(&runs.path().join(&id).join(Recorder::FILE_NAME)).unwrap();
+        steps.push(recording.state_hashes().map(Result::unwrap).collect::<Vec<_>>());
+    }
+    assert_eq!(steps[0], steps[1]);
+    assert!(journals.ids().is_empty());
 }

@@ -3,7 +3,7 @@
 use axum::{
     Router,
     extract::{DefaultBodyLimit, MatchedPath, Request, State},
-    http::{HeaderMap, Method, Uri, header},
+    http::{HeaderMap, HeaderValue, Method, Uri, header},
     middleware::{self, Next},
     response::{IntoResponse, Response},
 };
@@ -16,7 +16,7 @@ use super::{
         tokens,
     },
     mcp, pages,
-    problem::{ApiError, RefusalKind},
+    problem::{ApiError, Elsewhere, RefusalKind},
     rest,
 };
 
@@ -75,8 +75,14 @@ async fn log_and_describe(State(app): State<AppState>, request: Request, next: N
     let method = request.method().clone();
     let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str).to_owned();
     let episode = episode_of(request.uri().path()).filter(|id| app.table.get(id).is_ok()).map(str::to_owned);
+    let asked = request.uri().path_and_query().map(|path| path.as_str().to_owned()).unwrap_or_default();
     let began = std::time::Instant::now();
     let mut response = next.run(request).await;
+    if let Some(Elsewhere(url)) = response.extensions().get()
+        && let Ok(location) = HeaderValue::try_from(format!("{url}{asked}"))
+    {
+        response.headers_mut().insert(header::LOCATION, location);
+    }
     let status = response.status();
     if status.is_client_error() && !is_json(response.headers()) {
         let allow = response.headers().get(header::ALLOW).cloned();

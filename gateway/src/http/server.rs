@@ -18,7 +18,7 @@ use super::{
     watching::WatchKey,
 };
 use crate::{
-    hosting::{EpisodeTable, EpisodeThread, HostingError, PartnerPolicy, Purpose},
+    hosting::{EpisodeTable, EpisodeThread, HostingError, LiveFolder, PartnerPolicy, Purpose},
     settings::Settings,
 };
 
@@ -32,7 +32,10 @@ const MIN_WAITING_PER_ADDRESS: usize = 64;
 const REQUEST_GRACE: Duration = Duration::from_secs(5);
 
 /// How often the server looks for episodes whose policies make no more calls.
-const ABANDONED_CHECK_INTERVAL: Duration = Duration::from_secs(1);
+const TIDY_INTERVAL: Duration = Duration::from_secs(1);
+
+/// Of so many of these times, in one it looks for what other servers do on the same runs.
+const TICKS_PER_LOOK: u64 = 10;
 
 /// What a server is for, and who is there beside those who start episodes.
 #[derive(Debug, Default)]
@@ -80,6 +83,11 @@ impl Server {
         let watch_key = WatchKey::random().map_err(io::Error::other)?;
         let scheme = if settings.certificate.is_some() { "https" } else { "http" };
         let watch_link = format!("{scheme}://{address}{WATCH}#{}", watch_key.text());
+        if table.serves_clients() {
+            let url = settings.advertised_url.clone().unwrap_or_else(|| format!("{scheme}://{address}"));
+            let url = url.trim_end_matches('/').to_owned();
+            table.keep_journals(LiveFolder::beside(&settings.runs, url, settings.durability));
+        }
         let app = AppState { partner, ..AppState::new(table.clone(), settings.clone(), watch_key) };
         let router = router(app, Gate::new(settings.clone(), address.ip()), Limits::new(&settings));
         let (stop, stopped) = oneshot::channel::<()>();
@@ -97,7 +105,7 @@ impl Server {
             },
             stopped,
         ));
-        runtime.spawn(end_abandoned_episodes(table.clone()));
+        runtime.spawn(look_after(table.clone()));
         tracing::info!("{}", settings.assistance.about(settings.disclosure, settings.hints));
         tracing::info!("serving on {scheme}://{address}");
         Ok(Server { runtime, address, watch_link, table, stop, served, settings })
@@ -141,24 +149,34 @@ impl Server {
         &self.table
     }
 
-    /// Serves until SIGINT or SIGTERM, then stops as [`Server::stop`] does.
+    /// Serves until it is asked to end, then stops as [`Server::stop`] does. Episodes under way go on when the next server on the same
+    /// runs brings them back, unless somebody has ended this one from a keyboard.
     pub fn run_until_signal(self) -> Vec<String> {
-        self.runtime.block_on(shutdown_signal());
+        let keep = self.runtime.block_on(shutdown_signal()) == ShutdownSignal::Terminate;
         tracing::info!("shutting down; calls under way finish first, a second signal ends at once");
         self.runtime.spawn(async {
             shutdown_signal().await;
             std::process::exit(1);
         });
-        self.stop()
+        self.stop_for(keep)
     }
 
     /// Takes no more requests, finishes the calls under way, and returns when every recording is closed, or after the time
     /// that the settings allow; what was not closed by then is logged, and returned.
     pub fn stop(self) -> Vec<String> {
+        self.stop_for(false)
+    }
+
+    /// As [`Server::stop`]; episodes under way go on when the next server on the same runs brings them back.
+    pub fn stop_keeping(self) -> Vec<String> {
+        self.stop_for(true)
+    }
+
+    fn stop_for(self, keep: bool) -> Vec<String> {
         let Server { runtime, table, stop, served, settings, .. } = self;
         let _ = stop.send(());
         runtime.block_on(async {
-            let left = table.close_all(settings.stop_timeout).await;
+            let left = table.close_all(settings.stop_timeout, keep).await;
             if !left.is_empty() {
                 tracing::error!(left = left.join(", "), "ending without these, which did not end in time");
             }
@@ -171,17 +189,29 @@ impl Server {
     }
 }
 
-async fn end_abandoned_episodes(table: Arc<EpisodeTable>) {
-    let mut ticks = interval(ABANDONED_CHECK_INTERVAL);
-    loop {
+async fn look_after(table: Arc<EpisodeTable>) {
+    let mut ticks = interval(TIDY_INTERVAL);
+    for tick in 0u64.. {
         ticks.tick().await;
-        table.end_abandoned();
+        table.tidy_up();
+        if tick.is_multiple_of(TICKS_PER_LOOK) {
+            table.look_around();
+        }
     }
+}
+
+/// Who has asked this process to end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ShutdownSignal {
+    /// Somebody at the keyboard, by SIGINT.
+    Interrupt,
+    /// Whoever looks after the process, by SIGTERM, or the terminal that is closed, by SIGHUP.
+    Terminate,
 }
 
 /// Waits until this process is asked to end.
 #[cfg(unix)]
-pub async fn shutdown_signal() {
+pub async fn shutdown_signal() -> ShutdownSignal {
     use tokio::signal::unix::{SignalKind, signal};
     let terminate = async {
         match signal(SignalKind::terminate()) {
@@ -203,9 +233,9 @@ pub async fn shutdown_signal() {
         }
     };
     tokio::select! {
-        _ = tokio::signal::ctrl_c() => {}
-        () = terminate => {}
-        () = hang_up => {}
+        _ = tokio::signal::ctrl_c() => ShutdownSignal::Interrupt,
+        () = terminate => ShutdownSignal::Terminate,
+        () = hang_up => ShutdownSignal::Terminate,
     }
 }
 
@@ -224,6 +254,7 @@ fn is_hangup_ignored() -> bool {
 
 /// Waits until this process is asked to end.
 #[cfg(not(unix))]
-pub async fn shutdown_signal() {
+pub async fn shutdown_signal() -> ShutdownSignal {
     let _ = tokio::signal::ctrl_c().await;
+    ShutdownSignal::Interrupt
 }

@@ -4,14 +4,14 @@ use std::{path::Path, sync::Arc};
 
 use serde_json::{Value, json};
 use tandem_episodes::{
-    Checkpoint, EpisodeSpec, FAILED_STEP_FILE, Recorder, Recording, RobotFile, RunFolder, Session, tasks,
+    Checkpoint, EpisodeSpec, FAILED_STEP_FILE, Recorder, Recording, RobotFile, Session, tasks,
 };
 use tandem_tools_spec::{EndReason, Protocol};
 use tokio::sync::Semaphore;
 
 use super::Server;
 use crate::{
-    hosting::{EpisodeThread, write_absurd_robot},
+    hosting::{EpisodeThread, tests::alone, write_absurd_robot},
     settings::{Layer, Settings},
 };
 
@@ -23,7 +23,7 @@ fn hold(server: &Server, id: &str, robot: &Path, folder: &Path) {
         ..EpisodeSpec::new(handover, 0, Protocol::Benchmark)
     };
     let permit = Arc::new(Semaphore::new(1)).try_acquire_owned().unwrap();
-    let started = EpisodeThread::start(id, spec, RunFolder::from(folder), permit, Arc::default());
+    let started = EpisodeThread::start(id, spec, alone(folder, permit));
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
     let (episode, _) = runtime.block_on(started).unwrap();
     server.table().insert(id, Arc::new(episode)).unwrap();

@@ -109,3 +109,29 @@ fn the_command_gives_a_model_its_server() {
     let (output, printed) = tandem(&failing, &[&agent[..], &[runs.to_str().expect("UTF-8")]].concat());
     assert!(!output.status.success(), "{printed}");
 }
+
+#[cfg(unix)]
+#[test]
+fn who_resumes_an_episode_hands_on_what_is_given_and_no_defaults() {
+    let runs = tempfile::tempdir().expect("a temporary folder");
+    let python = interpreter(runs.path(), "exit 0", "echo \"$@ token $TANDEM_TOKEN\"");
+    let folder = runs.path().join("handover-seed3");
+    fs::create_dir(&folder).expect("a folder");
+    fs::write(
+        folder.join("agent.json"),
+        r#"{"format": 1, "flags": {"assistance": "paper", "task": "handover"}}"#,
+    )
+    .expect("a file");
+    let folder_text = folder.to_str().expect("UTF-8");
+    let given = ["--seed", "3", "--per-robot", "--scene", "room.xml", "--max-usd", "2"];
+    let resume = [&["agent", "--resume", folder_text][..], &given].concat();
+    let arguments = format!(
+        "--max-usd=2 --seed=3 --per-robot --resume={folder_text} --server-flags={{\"scene\":\"room.xml\"}} token "
+    );
+    let (output, printed) = tandem(&python, &resume);
+    assert!(output.status.success(), "{printed}");
+    assert!(printed.starts_with("-m tandem.agent --url http://127.0.0.1:"), "{printed}");
+    assert!(printed.contains(&arguments), "no {arguments} in {printed}");
+    let (_, printed) = tandem(&python, &["agent", "--seed", "3"]);
+    assert!(printed.contains("--model <NAME>|--resume <FOLDER>"), "{printed}");
+}

@@ -3,12 +3,10 @@
 mod agents;
 mod command_line;
 mod evaluations;
-mod interrupted;
+mod killed;
 mod logs;
 mod people;
-mod resumed;
 mod server;
-mod signals;
 #[path = "../../../tests/src/skipped.rs"]
 mod skipped;
 mod tls;

@@ -113,7 +113,7 @@ const robotCount = (task) => task?.robots?.length ?? 2;
 async function linksOf({ episode_id: episode, operators, instructions }, chosen, hostToken) {
   const by = (player) => operators.filter(({ robot }) => chosen.get(robot) === player);
   const [people, still] = [by("person"), by("still")];
-  for (const player of ["expert", "policy"]) await Promise.all(by(player).map(({ token }) => call(`/operate/${player}`, token, {})));
+  for (const player of ["expert", "policy"]) await Promise.all(by(player).map(({ robot }) => call(`/operate/${player}`, hostToken, { episode, robot })));
   const part = (robot) => instructions.find((entry) => entry.robot === robot)?.instruction ?? "";
   const rows = people.map(({ robot, token }, index) => {
     const seat = new URLSearchParams({ episode, robot, token });

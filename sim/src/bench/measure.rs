@@ -29,15 +29,12 @@ pub(super) struct Trial {
     pub standing_after_s: Option<f32>,
     pub still_after_s: Option<f32>,
     pub steps: Option<u32>,
-    pub pelvis_tilt_deg: Option<f32>,
     pub power_w: f32,
 }
 
 /// One control step of the log.
 pub(super) struct Sample {
     pub pelvis_m: Vector,
-    /// Angle between its vertical axis and the world's.
-    pub pelvis_tilt_rad: f32,
     /// Ankle roll links.
     pub feet_m: Sides<Vector>,
     /// Unwrapped.
@@ -70,14 +67,11 @@ pub(super) fn measure(
         }
         Plan::Move(velocity) => {
             let stop = at(case.duration_s - STOP_S);
-            let walk = &log[at(SETTLE_S + RAMP_S)..stop];
-            trial.velocity_error_share = Some(velocity_error(walk, *velocity));
+            trial.velocity_error_share = Some(velocity_error(&log[at(SETTLE_S + RAMP_S)..stop], *velocity));
             let turned_rad = velocity.yaw_rate_rad_s * (stop - start) as f32 * DT_S;
             trial.heading_error_deg =
                 Some((log[end].heading_rad - log[start].heading_rad - turned_rad).abs().to_degrees());
-            trial.height_error_m = Some(walking_height_error_m(walk));
-            trial.pelvis_tilt_deg =
-                walk.iter().map(|sample| sample.pelvis_tilt_rad.to_degrees()).reduce(f32::max);
+            trial.height_error_m = Some(walking_height_error_m(&log[at(SETTLE_S + RAMP_S)..stop]));
             trial.standing_after_s = Some(slower_after_s(&log[stop..], 0.1));
             trial.still_after_s = Some(slower_after_s(&log[stop..], 0.02));
         }

@@ -22,7 +22,7 @@ const passed = (ms) => new Promise((done) => setTimeout(done, ms));
 
 // The experts play it, each its own robot, until the table is lifted.
 const theirs = await begin();
-for (const { token } of theirs.operators) await post(base, "/operate/expert", {}, token);
+for (const { robot } of theirs.operators) await post(base, "/operate/expert", { episode: theirs.episode_id, robot });
 while (!(await stands(theirs.episode_id)).phases?.length) await passed(200);
 const shown = await remove(theirs.episode_id);
 console.log(`the experts lift it after ${shown.phases.p1} s`);

@@ -49,6 +49,23 @@ fn a_note_is_kept_and_changes_nothing() {
 }
 
 #[test]
+fn a_note_with_a_key_is_kept_once() {
+    let server = TestServer::start();
+    let id = server.episode("agentic");
+    let path = format!("/v1/episodes/{id}/notes");
+    let keyed = |key: &str, body: &Value| {
+        let headers = [("content-type", "application/json"), ("idempotency-key", key)];
+        server.ask("POST", &path, &headers, body.to_string().as_bytes()).0
+    };
+    for key in ["a", "a", "b"] {
+        assert_eq!(keyed(key, &thought()), 204, "{key}");
+    }
+    assert_eq!(keyed("a", &json!({ "text": "Other words." })), 422);
+    let result = server.delete(&format!("/v1/episodes/{id}")).ok();
+    assert_eq!((&result["usage"]["notes"], &result["usage"]["usd"]), (&json!(2), &json!(0.5)));
+}
+
+#[test]
 fn what_is_no_note_is_refused_and_so_is_one_after_the_end() {
     let server = TestServer::start();
     let id = server.episode("benchmark");

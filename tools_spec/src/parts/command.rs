@@ -143,11 +143,14 @@ pub struct HandReport {
     /// What the fingers feel between them, by their own torques; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grip: Option<Grip>,
+    /// What of the hand presses, by the torques of the fingers' own drives; left out where nothing does, and where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub presses: Vec<HandPart>,
     /// What stops the hand, as far as it can feel that; left out where it feels nothing, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub touches: Option<Touch>,
-    /// The wrist pose that was asked for, in the pelvis frame as it is now, and not where the hand has given way to since; of an arm
-    /// without a wrist target, the pose that its joint targets stand for. Left out of a short reply.
+    /// The wrist pose that was asked for, in the pelvis frame as it is now; of an arm without a wrist target, the pose that
+    /// its joint targets stand for. Left out of a short reply.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<Pose>,
     /// The wrist pose that was measured, in the pelvis frame as it is now, its quaternion with the sign that is nearer to the target's.
@@ -160,10 +163,10 @@ pub struct HandReport {
     /// Angle from target to measured, in radians; left out as the distance is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation_error_rad: Option<f64>,
-    /// How far the hand has given way to what pulls it, by the command's compliance: it is to be so far from `target`, [x, y, z] in metres
-    /// in the pelvis frame, and its state is told against that. Left out where it has not, and where the assistance is "paper".
+    /// How far the hand has given way to what pulls it, by the command's compliance: its target is moved so far, [x, y, z] in metres in
+    /// the pelvis frame. Left out where it has not, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub given_way_m: Option<[f64; 3]>,
+    pub compliance_offset_m: Option<[f64; 3]>,
     /// Its fingers; left out of a short reply where they have arrived.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fingers: Option<FingerReport>,
@@ -195,8 +198,23 @@ pub enum Grip {
     Touching,
     /// Thumb or fingers press on something and the others do not press against it: close those further.
     OneSided,
-    /// The thumb presses on one side and the fingers on the other.
-    Holding,
+    /// The thumb presses, and fingers or palm do. That is a hold, as phases ask for, where they press on opposite sides, which a hand cannot
+    /// feel: on a round thing that lies at the fingertips, or only hangs in a bent hand, they press on neighbouring ones.
+    TwoSided,
+}
+
+/// A part of a hand that presses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum HandPart {
+    /// The thumb.
+    Thumb,
+    /// The middle finger.
+    Middle,
+    /// The index finger.
+    Index,
+    /// The palm, on which the thumb presses something: the arm feels nothing of that force.
+    Palm,
 }
 
 /// What a hand touches, as far as it can feel that.

@@ -9,8 +9,8 @@ mod pictures;
 mod quantities;
 
 pub use command::{
-    BaseMotion, BaseReport, BaseState, CommandReply, Effort, FingerReport, Grip, HandReport, HandState,
-    RobotReport, StopReason, Touch,
+    BaseMotion, BaseReport, BaseState, CommandReply, Effort, FingerReport, Grip, HandPart, HandReport,
+    HandState, RobotReport, StopReason, Touch,
 };
 pub use driving::{Driving, Heard, OperatorToken, Operators, Partner, PartnerDid};
 pub use episode::{

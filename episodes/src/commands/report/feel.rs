@@ -1,9 +1,11 @@
 //! What a hand feels of what it touches: by the torques of its own drives, and by where its joints have thumb, fingers and palm. Nothing
 //! here is of the simulator's contacts.
 
+use std::ops::Range;
+
 use tandem_sim::mjcf::{Geom, Primitive};
 use tandem_sim::{HAND_JOINTS, Pose, RobotModel, RobotSensed, Side, UPPER, Vector};
-use tandem_tools_spec::{Grip, Touch};
+use tandem_tools_spec::{Grip, HandPart, Touch};
 
 use crate::commands::columns;
 
@@ -17,37 +19,59 @@ const WITHIN_PART: f32 = 0.5;
 const MOVES_RAD_S: f32 = 0.5;
 /// Shapes as near as this touch each other.
 const NEAR_M: f32 = 0.004;
-/// Joints of the thumb come first, as in `move_wrists`.
-const THUMB_JOINTS: usize = 3;
+/// Joints in the order of `move_wrists`.
+const THUMB: Range<usize> = 0..3;
+const PARTS: [(HandPart, Range<usize>); 3] =
+    [(HandPart::Thumb, THUMB), (HandPart::Middle, 3..5), (HandPart::Index, 5..7)];
 /// thumb_0 swings the thumb to the side, and neither opens nor closes it.
 const SWINGING: usize = 0;
 /// Points along a capsule at which its distance from another shape is taken.
 const POINTS: usize = 9;
 
-/// What the fingers of a hand feel between them, and what that is.
-pub fn grip(side: Side, sensed: &RobotSensed, model: &RobotModel) -> (Grip, Option<Touch>) {
+/// What a hand feels.
+pub struct Felt {
+    pub grip: Grip,
+    /// What of the hand presses.
+    pub presses: Vec<HandPart>,
+    pub touch: Option<Touch>,
+}
+
+/// Finds what a hand feels between its fingers. A scored hold asks for opposite presses. Torques do not tell their
+/// directions: a press on the tip and one of twice the force halfway along the finger have the same torque.
+pub fn felt(side: Side, sensed: &RobotSensed, model: &RobotModel) -> Felt {
     let closing: [f32; HAND_JOINTS] = std::array::from_fn(|finger| closing_n_m(side, finger, sensed));
-    let (thumb, fingers) = closing.split_at(THUMB_JOINTS);
-    let most = |torques_n_m: &[f32]| torques_n_m.iter().copied().fold(0.0, f32::max);
-    let presses = |torques_n_m: &[f32]| most(torques_n_m) >= PRESSES_N_M;
-    let of_itself = most(thumb) >= TOUCHES_N_M && thumb_touches_own_hand(side, sensed, model);
+    let most = |joints: Range<usize>| closing[joints].iter().copied().fold(0.0, f32::max);
+    let pressing =
+        |(part, joints): &(HandPart, Range<usize>)| (most(joints.clone()) >= PRESSES_N_M).then_some(*part);
+    let thumb_n_m = most(THUMB);
+    let [thumb, fingers] =
+        [&PARTS[..1], &PARTS[1..]].map(|parts| parts.iter().filter_map(pressing).collect::<Vec<HandPart>>());
+    let of_itself = thumb_n_m >= TOUCHES_N_M && thumb_touches_own_hand(side, sensed, model);
     // What the palm presses back is within the hand, and does not reach the arm.
-    let within_n = WITHIN_PART * most(thumb) / THUMB_LEVER_M;
+    let within_n = WITHIN_PART * thumb_n_m / THUMB_LEVER_M;
     let palm_presses = sensed.hand_force_in_pelvis_n[side].length() < within_n;
-    let grip = match (presses(thumb), presses(fingers)) {
-        (true, false) if of_itself => Grip::None,
-        (true, true) => Grip::Holding,
-        (true, false) if palm_presses => Grip::Holding,
-        (true, false) | (false, true) => Grip::OneSided,
-        (false, false) if of_itself => Grip::None,
-        (false, false) if closing.iter().any(|torque_n_m| torque_n_m.abs() >= TOUCHES_N_M) => Grip::Touching,
-        (false, false) => Grip::None,
+    let (grip, palm) = match (thumb.is_empty(), fingers.is_empty()) {
+        (false, true) if of_itself => (Grip::None, false),
+        (false, false) => (Grip::TwoSided, false),
+        (false, true) if palm_presses => (Grip::TwoSided, true),
+        (false, true) | (true, false) => (Grip::OneSided, false),
+        (true, true) if of_itself => (Grip::None, false),
+        (true, true) if closing.iter().any(|torque_n_m| torque_n_m.abs() >= TOUCHES_N_M) => {
+            (Grip::Touching, false)
+        }
+        (true, true) => (Grip::None, false),
     };
     let touch = match grip {
         Grip::None => of_itself.then_some(Touch::Itself),
-        Grip::Touching | Grip::OneSided | Grip::Holding => Some(Touch::Something),
+        Grip::Touching | Grip::OneSided | Grip::TwoSided => Some(Touch::Something),
     };
-    (grip, touch)
+    let presses = match grip {
+        Grip::None | Grip::Touching => Vec::new(),
+        Grip::OneSided | Grip::TwoSided => {
+            thumb.into_iter().chain(fingers).chain(palm.then_some(HandPart::Palm)).collect()
+        }
+    };
+    Felt { grip, presses, touch }
 }
 
 /// The torque with which a finger joint's drive closes it; 0 of joints that turn, and of the one that neither opens nor closes.
@@ -57,7 +81,7 @@ fn closing_n_m(side: Side, finger: usize, sensed: &RobotSensed) -> f32 {
         return 0.0;
     }
     // Left thumbs and right fingers close in the positive sense.
-    let sign = if finger < THUMB_JOINTS { side.sign() } else { -side.sign() };
+    let sign = if THUMB.contains(&finger) { side.sign() } else { -side.sign() };
     sign * sensed.joints.torque_n_m[joint]
 }
 

@@ -9,6 +9,8 @@ use tandem_tools_spec::{
     BaseMotion, Effort, FingerReport, Grip, HandReport, HandState, PoseFrame, RobotReport, Touch,
 };
 
+use feel::Felt;
+
 use super::columns::{self, Clamped};
 use super::motion::{Aim, Motion, RobotSheet};
 use crate::convert::{coarse, coarse_pose, isometry_from_sim, rounded_to};
@@ -21,7 +23,7 @@ const FINGER_MOVES_RAD_S: f32 = 0.2;
 /// An arm without a wrist target that is farther from what its joints stand for has been pushed.
 const PUSHED_AWAY_M: f64 = 0.03;
 const PUSHED_AWAY_RAD: f64 = 0.15;
-/// A hand that holds something has arrived within so many times the tolerance of others.
+/// A hand that presses on something from two sides has arrived within so many times the tolerance of others.
 const HOLDING_FACTOR: f64 = 3.0;
 /// A hand that is blocked and feels this much touches something.
 const TOUCHED_N: f32 = 3.0;
@@ -81,19 +83,17 @@ fn hand_report(
     frame: PoseFrame,
 ) -> HandReport {
     let (arm, hand) = (columns::arm(side), columns::hand(side));
-    // Where the hand has given way to since is told beside it, or a target that is sent again would go on from there.
-    let asked = motion.state().aims[side].in_pelvis(motion.world_from_pelvis());
-    let asked = asked.unwrap_or_else(|| motion.commanded_wrists()[side]);
+    let target = motion.targets()[side];
     let measured = isometry_from_sim(&sensed.pelvis_from_wrist[side]);
-    let missing = measured.inverse() * asked;
+    let missing = measured.inverse() * target;
     let robot = &motion.robot;
     let force_n = sensed.hand_force_in_pelvis_n[side];
-    let state = wrist_state(side, &motion.targets()[side], &measured, sensed, motion);
-    let (grip, touch) = feel::grip(side, sensed, &robot.model);
-    let presses = state == HandState::Blocked && force_n.length() > TOUCHED_N;
+    let state = wrist_state(side, &target, &measured, sensed, motion);
+    let Felt { grip, presses, touch } = feel::felt(side, sensed, &robot.model);
+    let is_pushed = state == HandState::Blocked && force_n.length() > TOUCHED_N;
     let frame_from_pelvis = motion.pelvis_from(frame).inverse();
     let [target_told, mut measured_told] =
-        [asked, measured].map(|wrist| coarse_pose(&(frame_from_pelvis * wrist)));
+        [target, measured].map(|wrist| coarse_pose(&(frame_from_pelvis * wrist)));
     let signs = target_told.quaternion_wxyz.iter().zip(&measured_told.quaternion_wxyz);
     if signs.map(|(one, other)| one * other).sum::<f64>() < 0.0 {
         measured_told.quaternion_wxyz = measured_told.quaternion_wxyz.map(|part| 0.0 - part);
@@ -101,12 +101,13 @@ fn hand_report(
     HandReport {
         state: Some(state),
         grip: Some(grip),
-        touches: touch.or(presses.then_some(Touch::Something)),
+        presses,
+        touches: touch.or(is_pushed.then_some(Touch::Something)),
         target: Some(target_told),
         measured: Some(measured_told),
         position_error_m: Some(coarse(missing.translation.vector.norm())),
         orientation_error_rad: Some(coarse(missing.rotation.angle())),
-        given_way_m: motion
+        compliance_offset_m: motion
             .given_way_m(side)
             .map(|offset_m| [offset_m.x, offset_m.y, offset_m.z].map(coarse)),
         fingers: Some(fingers(side, sensed, motion)),
@@ -144,7 +145,8 @@ pub fn wrist_state(
     let tolerance = motion.tolerance(side);
     let near = |factor: f64| is_near(measured, target, &tolerance, factor);
     // Under its load an arm sags.
-    if near(1.0) || (near(HOLDING_FACTOR) && feel::grip(side, sensed, &motion.robot.model).0 == Grip::Holding)
+    if near(1.0)
+        || (near(HOLDING_FACTOR) && feel::felt(side, sensed, &motion.robot.model).grip == Grip::TwoSided)
     {
         HandState::Arrived
     } else if motion.comes_nearer(side).unwrap_or_else(turns) {

@@ -1,5 +1,6 @@
 //! Which phases have been reached, and when. A phase is looked at only once its predecessors have been reached.
 
+use std::any::type_name;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -7,7 +8,20 @@ use serde::{Deserialize, Serialize};
 use super::Facts;
 
 /// Something that holds at a control step, or does not: a function of a task in Rust, or what a task's file says.
-pub type Condition = &'static (dyn Fn(&Facts) -> bool + Sync);
+pub type Condition = &'static dyn Predicate;
+
+/// A function of a control step.
+pub trait Predicate: Fn(&Facts) -> bool + Sync {
+    /// Its name in the source, as `grasped_and_lifted`.
+    fn name(&self) -> &'static str;
+}
+
+impl<F: Fn(&Facts) -> bool + Sync> Predicate for F {
+    fn name(&self) -> &'static str {
+        let path = type_name::<F>();
+        path.rsplit("::").next().unwrap_or(path)
+    }
+}
 
 /// How far something has come, from 0 to 1.
 pub type Nearness = &'static (dyn Fn(&Facts) -> f32 + Sync);

@@ -199,8 +199,8 @@ fn each_phase_has_the_time_of_its_step() {
 
 #[test]
 fn a_spoiled_phase_stays_out_of_reach_and_spoils_no_other() {
-    static LIFTED: Done = Done::When(&|facts| facts.lift_m("bottle") > 0.05);
-    let spoiled: Condition = &|facts| facts.holds(B, Right, "bottle");
+    static LIFTED: Done = Done::When(&|facts: &Facts| facts.lift_m("bottle") > 0.05);
+    let spoiled: Condition = &|facts: &Facts| facts.holds(B, Right, "bottle");
     let phase = |done: Done| Phase {
         id: "lift",
         description: "It is lifted.",
@@ -219,6 +219,6 @@ fn a_spoiled_phase_stays_out_of_reach_and_spoils_no_other() {
     assert_eq!(reached(vec![guarded()], &[Rests, Aloft(&[A])]), 1);
     assert_eq!(reached(vec![guarded()], &[Rests, Aloft(&[B]), Rests, Aloft(&[A])]), 0);
     // What was done before the phase was next does not count against it.
-    let rests: Condition = &|facts| facts.lift_m("bottle") < 0.01;
+    let rests: Condition = &|facts: &Facts| facts.lift_m("bottle") < 0.01;
     assert_eq!(reached(vec![phase(Done::When(rests)), guarded()], &[Aloft(&[B]), Rests, Aloft(&[A])]), 2);
 }

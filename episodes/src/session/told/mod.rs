@@ -204,20 +204,22 @@ fn withhold_hand(hand: &mut HandReport) {
     let HandReport {
         state,
         grip,
+        presses,
         touches,
         target: _,
         measured: _,
         position_error_m: _,
         orientation_error_rad: _,
-        given_way_m,
+        compliance_offset_m,
         fingers,
         largest_effort,
         force_n,
         joints_clamped: _,
         joints_at_limit: _,
     } = hand;
-    (*state, *grip, *touches, *given_way_m) = (None, None, None, None);
+    (*state, *grip, *touches, *compliance_offset_m) = (None, None, None, None);
     (*largest_effort, *force_n) = (None, None);
+    presses.clear();
     if let Some(FingerReport { state, target_rad: _, measured_rad: _ }) = fingers {
         *state = None;
     }

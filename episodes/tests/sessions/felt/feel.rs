@@ -26,7 +26,7 @@ impl Episode for Gripping {
             let robot = ["A", "B", "C"].iter().position(|name| *name == report.robot).expect("a robot");
             for (side, hand) in [(Side::Left, &report.left), (Side::Right, &report.right)] {
                 let holds = facts.objects.iter().any(|object| object.hands[robot][side] == Truth::Holding);
-                let told = hand.grip == Some(Grip::Holding);
+                let told = hand.grip == Some(Grip::TwoSided);
                 let case = match (holds, told) {
                     (true, true) => 0,
                     (true, false) => 1,

@@ -180,7 +180,7 @@ impl Trial {
             })
             .collect();
         assert!(self.holds(&session), "{}: {report:#?}", self.thing);
-        assert!(says.iter().all(|grip| *grip == Some(Grip::Holding)), "{}: {report:#?}", self.thing);
+        assert!(says.iter().all(|grip| *grip == Some(Grip::TwoSided)), "{}: {report:#?}", self.thing);
         self.move_hands(&mut session, grip, None, &grip.open_rad, 2);
         for stop_m in grip.stops_m.iter().rev() {
             self.move_hands(&mut session, grip, Some(*stop_m), &grip.open_rad, 3);

@@ -149,7 +149,7 @@ fn a_hand_that_lifts_the_bottle_feels_its_weight() {
         assert!((right.force_n.unwrap()[2] + f64::from(BOTTLE_N)).abs() < 0.75, "{right:?}");
         let fingers = right.fingers.and_then(|fingers| fingers.state);
         assert_eq!(fingers, Some(HandState::Blocked), "the bottle is between them: {right:?}");
-        assert_eq!(right.grip, Some(Grip::Holding), "{right:?}");
+        assert_eq!(right.grip, Some(Grip::TwoSided), "{right:?}");
     }
     // Later B moves its arms, and their inertia shows.
     for force_n in lifting.felt_n[0][B] {

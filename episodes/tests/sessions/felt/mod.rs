@@ -4,4 +4,5 @@ mod carries;
 mod feel;
 mod grips;
 mod hands;
+mod pinches;
 mod surfaces;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use tandem_episodes::replay::{Closest, PhaseTrace};
-use tandem_episodes::tasks::{PhaseSetting, Task};
+use tandem_episodes::tasks::{self, PhaseSetting, Task};
 use tandem_episodes::{EpisodeSpec, Recording, Session, read_task, task_of};
 use tandem_tools_spec::Protocol;
 
@@ -74,4 +74,24 @@ fn a_hand_that_comes_nearer_is_a_share() {
     let trace = stood_still(with("done = 'holds(\"A\", \"right\", \"parcel\")'"));
     let nearest = trace.conditions[0].parts[0].nearest.map(|nearest| nearest.best);
     assert!(matches!(nearest, Some(Closest::Share(share)) if share > 0.2 && share < 0.5), "{nearest:?}");
+}
+
+/// The conditions of a task in Rust are named by their functions.
+#[test]
+fn conditions_in_rust_say_when_they_held() {
+    let settings = |task: &str| {
+        let trace = stood_still(tasks::find(task).expect("a task"));
+        assert!(!trace.description.is_empty() && trace.nearest.best < 1.0, "{trace:?}");
+        trace.conditions
+    };
+    let [lifted, open] = &settings("move_house")[..] else { panic!("two milestones") };
+    assert_eq!([lifted.function, open.function], [Some("lifted"), Some("open")]);
+    assert_eq!((open.setting, open.for_s, lifted.for_s), (PhaseSetting::Milestone, 0.5, 0.0));
+    assert_eq!((open.held.of, open.held.steps, lifted.held.first_s), (50, 0, None));
+    for task in tasks::ALL {
+        let conditions = settings(task.id);
+        let named =
+            conditions.iter().all(|condition| condition.function.is_some_and(|name| !name.contains('{')));
+        assert!(named && !conditions.is_empty(), "{}: {conditions:?}", task.id);
+    }
 }

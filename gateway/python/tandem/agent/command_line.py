@@ -10,6 +10,7 @@ import sys
 import threading
 from collections.abc import Generator, Sequence
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from types import FrameType
 from typing import Any, cast
 
@@ -17,13 +18,38 @@ from ..client import Client
 from ..errors import TandemError
 from ..server import serve
 from .apis import open_model, without_keys
-from .episodes import Hosting, play_joined, play_own
+from .episodes import Hosting, Keeping, play_joined, play_own, resume
+from .journal import EpisodeFile
 from .settings import APIS, AgentSettings, Limits, Prices, Sampling
 
-DEFAULT_SECONDS = 3300.0
-"""`tandem evaluate` stops a program after an hour; a model that is at it for so long finishes before."""
+DEFAULTS: dict[str, Any] = {
+    "api": "openai",
+    "context_tokens": 100_000,
+    "max_calls": 500,
+    # `tandem evaluate` stops a program after an hour; a model that is at it for so long finishes before.
+    "max_seconds": 3300.0,
+    "seed": 0,
+    "assistance": "full",
+    "per_robot": False,
+    "talk": False,
+}
+"""Flags that have a value where neither the command line nor what is resumed says one."""
 
-DEFAULT_CALLS = 500
+MAY_CHANGE = (
+    "base_url",
+    "context_tokens",
+    "max_tokens_total",
+    "max_usd",
+    "max_calls",
+    "max_seconds",
+    "usd_per_million_input",
+    "usd_per_million_output",
+    "usd_per_million_cached",
+)
+"""Flags that --resume takes anew: where the endpoint is, and what the model may use up."""
+
+NOT_KEPT = ("resume", "runs", "url", "server_flags", "check")
+"""Flags that say nothing of the play."""
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
@@ -39,11 +65,10 @@ def parser() -> argparse.ArgumentParser:
         "a new one. Keys are read from the environment: OPENAI_API_KEY, ANTHROPIC_API_KEY.",
     )
     model = flags.add_argument_group("the model")
-    model.add_argument("--model", required=True, metavar="NAME", help="the model's name at its endpoint")
+    model.add_argument("--model", metavar="NAME", help="the model's name at its endpoint")
     model.add_argument(
         "--api",
         choices=APIS,
-        default="openai",
         help="what the endpoint speaks: OpenAI's Responses, its Chat Completions (Ollama, vLLM and most others), or "
         "Anthropic's Messages [default: openai]",
     )
@@ -54,7 +79,6 @@ def parser() -> argparse.ArgumentParser:
     model.add_argument(
         "--context-tokens",
         type=_count,
-        default=100_000,
         metavar="N",
         help="longest conversation; the older half of a longer one becomes a list of calls [default: 100000]",
     )
@@ -69,24 +93,38 @@ def parser() -> argparse.ArgumentParser:
     limits = flags.add_argument_group("limits, after which the episode is finished")
     limits.add_argument("--max-tokens-total", type=_count, metavar="N", help="tokens read and written [default: any number]")
     limits.add_argument("--max-usd", type=_amount, metavar="USD", help="US dollars, by the prices below [default: any amount]")
-    limits.add_argument("--max-calls", type=_count, default=DEFAULT_CALLS, metavar="N", help="calls of tools [default: 500]")
-    limits.add_argument("--max-seconds", type=_amount, default=DEFAULT_SECONDS, metavar="SECONDS", help="time [default: 3300]")
+    limits.add_argument("--max-calls", type=_count, metavar="N", help="calls of tools [default: 500]")
+    limits.add_argument("--max-seconds", type=_amount, metavar="SECONDS", help="time [default: 3300]")
     for name, what in (("input", "read"), ("output", "written"), ("cached", "read from a cache")):
         limits.add_argument(
             f"--usd-per-million-{name}", type=_amount, metavar="USD", help=f"price of a million tokens that are {what}"
         )
     episode = flags.add_argument_group("a new episode")
     episode.add_argument("--task", metavar="TASK", help="what to play, as handover")
-    episode.add_argument("--seed", type=int, default=0, metavar="N", help="decides where the objects stand [default: 0]")
+    episode.add_argument("--seed", type=int, metavar="N", help="decides where the objects stand [default: 0]")
     episode.add_argument("--url", metavar="URL", help="server that holds it [default: one in this process]")
-    episode.add_argument("--runs", default="runs", metavar="DIR", help="folder of recordings, without --url [default: runs]")
+    episode.add_argument("--runs", metavar="DIR", help="the server's folder of recordings [default: runs, without --url]")
     episode.add_argument(
-        "--assistance", choices=("full", "paper"), default="full", help="what the model is told, without --url [default: full]"
+        "--assistance", choices=("full", "paper"), help="what the model is told, without --url [default: full]"
     )
     episode.add_argument(
-        "--per-robot", action="store_true", help="a model for each robot, which sees and commands that robot alone"
+        "--per-robot",
+        action="store_true",
+        default=None,
+        help="a model for each robot, which sees and commands that robot alone",
     )
-    episode.add_argument("--talk", action="store_true", help="with --per-robot: let them talk to each other by the tool say")
+    episode.add_argument(
+        "--talk", action="store_true", default=None, help="with --per-robot: let them talk to each other by the tool say"
+    )
+    flags.add_argument(
+        "--resume",
+        type=Path,
+        metavar="FOLDER",
+        help="in place of a new episode: go on with that of this folder, where its agent was killed; of the flags, limits, "
+        "prices and the endpoint's address may be given anew, and all others are as before",
+    )
+    # What `tandem agent` was told of its server.
+    flags.add_argument("--server-flags", type=_object, default={}, help=argparse.SUPPRESS)
     flags.add_argument("--check", action="store_true", help=argparse.SUPPRESS)
     return flags
 
@@ -110,13 +148,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser().parse_args(arguments)
     _keep_loopback_off_proxies()
     try:
-        settings = settings_of(given)
+        episode = None if given.resume is None else _resumed(given)
+        flags = _flags(given) if episode is None else {**episode.flags, **_given(given)}
+        settings = settings_of(argparse.Namespace(**flags))
         # What is missing is said before an episode begins.
         open_model(settings, "")
         if given.check:
             return 0
         with _interruptible():
-            return _run(given, settings)
+            return _run(given, flags, settings) if episode is None else _resume(given, episode, settings)
     except TandemError as error:
         print(f"tandem agent: {without_keys(str(error))}", file=sys.stderr)
         return 1
@@ -125,7 +165,40 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
-def _run(given: argparse.Namespace, settings: AgentSettings) -> int:
+def _given(given: argparse.Namespace) -> dict[str, Any]:
+    """The flags that are given, of those that say something of the play."""
+    return {name: value for name, value in vars(given).items() if value is not None and name not in NOT_KEPT}
+
+
+def _flags(given: argparse.Namespace) -> dict[str, Any]:
+    """The flags of a new play, each with its value."""
+    if given.model is None:
+        raise TandemError("no model; give --model NAME, or --resume FOLDER to go on with an episode")
+    return {**{name: value for name, value in vars(given).items() if name not in NOT_KEPT}, **DEFAULTS, **_given(given)}
+
+
+def _resumed(given: argparse.Namespace) -> EpisodeFile:
+    """The episode that is to be resumed. Refuses flags by which it would be another one."""
+    episode = EpisodeFile.read(given.resume)
+    kept = {**episode.flags, **episode.server_flags, "runs": str(given.resume.resolve().parent)}
+    told = {**_given(given), **given.server_flags}
+    if given.runs is not None:
+        told["runs"] = str(Path(given.runs).resolve())
+    differing = [
+        f"--{name.replace('_', '-')} {value} (it was {_or_not_given(kept.get(name))})"
+        for name, value in told.items()
+        if name not in MAY_CHANGE and value != kept.get(name)
+    ]
+    if differing:
+        raise TandemError(f"{given.resume} was played otherwise: {', '.join(differing)}; leave out what differs")
+    return episode
+
+
+def _or_not_given(value: Any) -> str:
+    return "not given" if value is None or value is False else str(value)
+
+
+def _run(given: argparse.Namespace, flags: dict[str, Any], settings: AgentSettings) -> int:
     if given.task is None:
         url, episode = os.environ.get("TANDEM_URL"), os.environ.get("TANDEM_EPISODE")
         if not url or not episode:
@@ -133,8 +206,23 @@ def _run(given: argparse.Namespace, settings: AgentSettings) -> int:
         play_joined(Client(url), episode, os.environ.get("TANDEM_ROBOT"), settings)
         return 0
     with ExitStack() as stack:
-        url = given.url or stack.enter_context(serve(runs=given.runs, assistance=given.assistance)).url
-        play_own(url, Hosting(given.task, given.seed, given.per_robot, given.talk), settings)
+        url, runs = given.url, given.runs
+        if url is None:
+            runs = runs or "runs"
+            url = stack.enter_context(serve(runs=runs, assistance=flags["assistance"])).url
+        hosting = Hosting(flags["task"], flags["seed"], flags["per_robot"], flags["talk"])
+        keeping = Keeping(None if runs is None else Path(runs), flags, given.server_flags)
+        play_own(url, hosting, settings, keeping)
+    return 0
+
+
+def _resume(given: argparse.Namespace, episode: EpisodeFile, settings: AgentSettings) -> int:
+    folder = given.resume.resolve()
+    with ExitStack() as stack:
+        url = given.url
+        if url is None:
+            url = stack.enter_context(serve(runs=folder.parent, assistance=episode.flags["assistance"])).url
+        resume(url, folder, episode, settings)
     return 0
 
 

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import sys
 import threading
+from collections.abc import Sequence
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 from unicodedata import category
+from uuid import uuid4
 
 from ..client import Client
+from ..errors import Refused, TandemError
 from .apis import open_model
 from .conversation import listed
+from .instructions import instructions
+from .journal import Begun, EpisodeFile, Journal, LineFile, conversation_path, read_result
 from .loop import Played, Player, Printer
 from .seat import Seat
 from .settings import AgentSettings
@@ -25,12 +33,24 @@ class Hosting:
     talk: bool = False
 
 
+@dataclass(frozen=True)
+class Keeping:
+    """By which flags a play is begun, and where that is kept, so that it can be resumed."""
+
+    runs: Path | None
+    """The server's folder of recordings. None: it is not known, and nothing is kept."""
+
+    flags: dict[str, Any]
+    server_flags: dict[str, str]
+
+
 def play_joined(client: Client, episode_id: str, robot: str | None, settings: AgentSettings) -> Played:
     """Plays an episode that somebody else has begun and ends."""
-    return _play(Seat(client, episode_id, robot), settings, _printer(robot))
+    seat = Seat(client, episode_id, robot)
+    return _play(seat, str(seat.briefing["status"]["task"]), settings, Journal())
 
 
-def play_own(url: str, hosting: Hosting, settings: AgentSettings) -> dict[str, Any]:
+def play_own(url: str, hosting: Hosting, settings: AgentSettings, keeping: Keeping) -> dict[str, Any]:
     """Begins an episode on a server, plays it, ends it, and returns its result."""
     host = Client(url)
     body: dict[str, Any] = {"task": hosting.task, "seed": hosting.seed}
@@ -38,42 +58,125 @@ def play_own(url: str, hosting: Hosting, settings: AgentSettings) -> dict[str, A
         body |= {"operators": "per_robot", "talk": hosting.talk}
     start = host.request("POST", "/v1/episodes", body)
     episode_id = str(start["episode_id"])
-    print(f"{hosting.task}, seed {hosting.seed}: {episode_id} at {url}", flush=True)
+    operators = tuple(listed(start.get("operators")))
+    episode = EpisodeFile(episode_id, keeping.flags, keeping.server_flags, operators)
+    with ExitStack() as stack:
+        journals = _open_new(keeping.runs, episode, stack)
+        print(f"{hosting.task}, seed {hosting.seed}: {episode_id} at {url}", flush=True)
+        return _play_through(host, episode, settings, journals)
+
+
+def resume(url: str, folder: Path, episode: EpisodeFile, settings: AgentSettings) -> dict[str, Any]:
+    """Goes on with an episode that an agent has left, unless it has ended, and returns its result."""
+    host = Client(url)
+    with ExitStack() as stack:
+        # Those of another process are refused before anything is done.
+        journals = _open(folder, episode, stack)
+        result = _ended(host, folder, episode)
+        if result is None:
+            print(f"{episode.flags['task']}, seed {episode.flags['seed']}: {episode.episode_id} at {url}", flush=True)
+            return _play_through(host, episode, settings, journals)
+    print("the episode has ended already")
+    _print_result(result)
+    return result
+
+
+def _ended(host: Client, folder: Path, episode: EpisodeFile) -> dict[str, Any] | None:
+    """The result of an episode that has ended; None: it goes on."""
+    path = f"/v1/episodes/{episode.episode_id}"
     try:
-        operators = listed(start.get("operators"))
-        if operators:
-            _play_each(url, episode_id, operators, settings)
-        else:
-            _play(Seat(host, episode_id), settings, _printer(None))
-    finally:
-        result = host.request("DELETE", f"/v1/episodes/{episode_id}")
+        goes_on = host.request("GET", path)["ended"] is None
+        return None if goes_on else host.request("DELETE", path)
+    except Refused as refused:
+        if refused.kind != "unknown-episode":
+            raise
+        result = read_result(folder)
+        if result is None:
+            raise TandemError(
+                f"the server does not hold {episode.episode_id} any more, so that it cannot go on ({refused.detail}); "
+                f"its recording is in {folder} (tandem recover makes it whole); play the task anew, without --resume"
+            ) from refused
+        return result
+
+
+def _print_result(result: dict[str, Any]) -> None:
+    """Prints how an episode ended, in a line."""
     phases = ", ".join(f"{number} {_when(time_s)}" for number, time_s in result["phases"].items())
     print(
         f"{result['ended']}: {phases}; {result['env_steps']} steps, {result['tool_calls']} calls, {result['falls']} falls",
         flush=True,
     )
+
+
+def _robots(episode: EpisodeFile) -> list[str | None]:
+    """The robot that each model directs; None: it directs all."""
+    return [each["robot"] for each in episode.operators] or [None]
+
+
+def _open_new(runs: Path | None, episode: EpisodeFile, stack: ExitStack) -> list[Journal]:
+    """Writes down what an episode is resumed by, and begins a journal for each model. On failure nothing is kept."""
+    if runs is not None:
+        folder = runs / episode.episode_id
+        try:
+            journals = _open(folder, episode, stack)
+            episode.write(folder)
+            return journals
+        except (OSError, TandemError) as error:
+            print(f"tandem agent: {error}; the play goes on, and --resume cannot take it up", file=sys.stderr)
+    return [Journal() for _ in _robots(episode)]
+
+
+def _open(folder: Path, episode: EpisodeFile, stack: ExitStack) -> list[Journal]:
+    """Opens the journal of each model."""
+    return [Journal(stack.enter_context(closing(LineFile(conversation_path(folder, robot))))) for robot in _robots(episode)]
+
+
+def _play_through(host: Client, episode: EpisodeFile, settings: AgentSettings, journals: Sequence[Journal]) -> dict[str, Any]:
+    """Plays an episode to its end, ends it, and returns its result."""
+    try:
+        if episode.operators:
+            _play_each(host.url, episode, settings, journals)
+        else:
+            seat = _take_seat(host, episode.episode_id, None, journals[0])
+            _play(seat, str(episode.flags["task"]), settings, journals[0])
+    finally:
+        result = host.request("DELETE", f"/v1/episodes/{episode.episode_id}")
+    _print_result(result)
     return result
 
 
-def _play(seat: Seat, settings: AgentSettings, show: Printer) -> Played:
+def _take_seat(client: Client, episode_id: str, robot: str | None, journal: Journal) -> Seat:
+    return Seat(client, episode_id, robot, None if journal.begun is None else journal.begun.tools)
+
+
+def _play(seat: Seat, task: str, settings: AgentSettings, journal: Journal) -> Played:
+    show = _printer(seat.robot)
     # Episodes of one task begin alike.
-    model = open_model(settings, f"tandem-{seat.briefing['status']['task']}")
-    played = Player(seat, model, settings, show).play()
+    model = open_model(settings, f"tandem-{task}")
+    begun = journal.begun
+    if begun is None:
+        begun = Begun(uuid4().hex, instructions(seat), seat.tools)
+        journal.write(begun)
+    played = Player(seat, model, settings, show, begun, journal).play()
     show(played.ledger.summary())
     return played
 
 
-def _play_each(url: str, episode_id: str, operators: list[dict[str, str]], settings: AgentSettings) -> None:
+def _play_each(url: str, episode: EpisodeFile, settings: AgentSettings, journals: Sequence[Journal]) -> None:
     """One model for each robot, side by side. Where one fails the others play on, and the failure is raised at the end."""
     failures: list[BaseException] = []
 
-    def operate(robot: str, token: str) -> None:
+    def operate(robot: str, token: str, journal: Journal) -> None:
         try:
-            _play(Seat(Client(url, token=token), episode_id, robot), settings, _printer(robot))
+            seat = _take_seat(Client(url, token=token), episode.episode_id, robot, journal)
+            _play(seat, str(episode.flags["task"]), settings, journal)
         except BaseException as failure:
             failures.append(failure)
 
-    threads = [threading.Thread(target=operate, args=(each["robot"], each["token"]), daemon=True) for each in operators]
+    threads = [
+        threading.Thread(target=operate, args=(each["robot"], each["token"], journal), daemon=True)
+        for each, journal in zip(episode.operators, journals, strict=True)
+    ]
     for thread in threads:
         thread.start()
     for thread in threads:

@@ -22,9 +22,12 @@ class Ledger:
         self._clock = clock
         self._began_s = clock()
 
-    def add(self, usage: Usage) -> float | None:
-        """Counts a request and returns its price in US dollars, where prices are given."""
-        usd = None if self.prices is None else self.prices.usd(usage)
+    def price(self, usage: Usage) -> float | None:
+        """Returns the price of a request in US dollars, where prices are given."""
+        return None if self.prices is None else self.prices.usd(usage)
+
+    def add(self, usage: Usage, usd: float | None) -> None:
+        """Counts a request and its price."""
         self.requests += 1
         self.input += usage.input
         self.output += usage.output
@@ -32,12 +35,15 @@ class Ledger:
         self.usd += usd or 0.0
         self._last_tokens = usage.input + usage.output
         self._last_usd = usd or 0.0
-        return usd
 
     @property
     def seconds(self) -> float:
         """How long the agent has been at it."""
         return self._clock() - self._began_s
+
+    def take_up(self, seconds: float) -> None:
+        """Goes on after so many seconds; the time since then is not counted."""
+        self._began_s = self._clock() - seconds
 
     def reason_to_stop(self) -> Stopped | None:
         """Why no further request may be made. One more is taken to cost as much as the last: conversations grow."""

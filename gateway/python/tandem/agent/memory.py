@@ -22,9 +22,8 @@ LISTED_CHARACTERS = 160
 class Memory:
     """What the model remembers: our first words, and the latest turns."""
 
-    def __init__(self, opening: str, context_tokens: int, most_pictures: int = MOST_PICTURES) -> None:
+    def __init__(self, opening: str, most_pictures: int = MOST_PICTURES) -> None:
         self._opening = opening
-        self._context_tokens = context_tokens
         self._most_pictures = most_pictures
         self._listed: list[str] = []
         self._turns: list[Turn] = []
@@ -43,12 +42,6 @@ class Memory:
         self._turns.append(turn)
         if _count_pictures(self._turns) > self._most_pictures:
             self._turns = _forget_pictures(self._turns, self._most_pictures // 2)
-
-    def trim(self, input_tokens: int) -> bool:
-        """Where the last request has read more tokens than a conversation may have, cuts it to half of that. Returns whether it
-        was cut.
-        """
-        return input_tokens > self._context_tokens and self.halve()
 
     def halve(self) -> bool:
         """Forgets the older half of the turns but for a list of their calls. False: there is nothing to forget."""

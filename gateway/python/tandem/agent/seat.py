@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any, cast
 
 from ..client import Client
@@ -47,21 +49,29 @@ class Seat:
     """One episode on a server, for whoever directs all robots, or one of them.
 
     robot: The robot that is directed, where it is one alone; the client's token is then its operator's.
+    tools: The tools that it is offered. None: the server is asked.
     """
 
-    def __init__(self, client: Client, episode_id: str, robot: str | None = None) -> None:
+    def __init__(self, client: Client, episode_id: str, robot: str | None = None, tools: Sequence[Tool] | None = None) -> None:
         self.client = client
         self.episode_id = episode_id
         self.robot = robot
-        self.briefing: dict[str, Any] = client.request("GET", f"/v1/episodes/{episode_id}/briefing")
-        self.tools: tuple[Tool, ...] = offered(client, episode_id)
+        self.tools: tuple[Tool, ...] = offered(client, episode_id) if tools is None else tuple(tools)
         self.over = False
         self.phases: tuple[str, ...] = ()
         """Those reached so far, as the latest reply that tells them has them."""
         self._keeps_notes = True
 
-    def call(self, call: Call) -> Answer:
-        """Calls a tool as the model wants it. What cannot be done is an answer, too, which says what would have worked."""
+    @cached_property
+    def briefing(self) -> dict[str, Any]:
+        """What there is to know of the episode."""
+        return self.client.request("GET", f"/v1/episodes/{self.episode_id}/briefing")
+
+    def call(self, call: Call, key: str) -> Answer:
+        """Calls a tool as the model wants it. A refusal is an answer, too, which says what would have worked.
+
+        key: The call's Idempotency-Key.
+        """
         tool = next((tool for tool in self.tools if tool.name == call.tool), None)
         if tool is None:
             names = ", ".join(tool.name for tool in self.tools)
@@ -78,7 +88,7 @@ class Seat:
         if tool.takes("short") and arguments.get("short") is None:
             arguments["short"] = True
         try:
-            reply = self._post(tool.name, arguments)
+            reply = self._post(tool.name, arguments, key)
         except EpisodeEnded as ended:
             self.over = True
             return Answer(call, ended.detail, refused=True)
@@ -98,23 +108,24 @@ class Seat:
             text = f"{text[:MOST_ANSWER_CHARACTERS]} ... ({len(text)} characters; the rest is not shown: ask for less)"
         return Answer(call, text, pictures)
 
-    def _post(self, tool: str, arguments: dict[str, Any]) -> dict[str, Any]:
+    def _post(self, tool: str, arguments: dict[str, Any], key: str) -> dict[str, Any]:
+        path = f"/v1/episodes/{self.episode_id}/tools/{tool}"
         for _ in range(BUSY_TRIES):
             try:
-                return self.client.request("POST", f"/v1/episodes/{self.episode_id}/tools/{tool}", arguments)
+                return self.client.request("POST", path, arguments, key=key)
             except Refused as refused:
                 if refused.retry_after_s is None:
                     raise
                 time.sleep(min(refused.retry_after_s, LONGEST_WAIT_S))
-        return self.client.request("POST", f"/v1/episodes/{self.episode_id}/tools/{tool}", arguments)
+        return self.client.request("POST", path, arguments, key=key)
 
-    def finish(self) -> None:
+    def finish(self, key: str) -> None:
         """Finishes the episode for this caller, unless it is over."""
         if not self.over:
-            self.call(Call("", "finish", "{}"))
+            self.call(Call("", "finish", "{}"), key)
 
-    def note(self, note: Note) -> None:
-        """Hands the model's words to the server, where it keeps them."""
+    def note(self, note: Note, key: str) -> None:
+        """Hands the model's words to the server, which keeps them once for a key."""
         if not self._keeps_notes:
             return
         try:
@@ -125,7 +136,7 @@ class Seat:
                 "text": note.text[:MOST_NOTE_CHARACTERS],
                 "model": (note.model or "")[:MOST_NAME_CHARACTERS],
             }
-            self.client.request("POST", f"/v1/episodes/{self.episode_id}/notes", body)
+            self.client.request("POST", f"/v1/episodes/{self.episode_id}/notes", body, key=key)
         except Refused as refused:
             # Words are not worth an episode: an older server keeps none, and one that has ended keeps no more.
             self._keeps_notes = refused.kind not in ("no-route", "ended")

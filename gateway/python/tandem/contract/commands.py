@@ -21,11 +21,19 @@ Grip: TypeAlias = Literal[
     "none",
     "touching",
     "one_sided",
-    "holding",
+    "two_sided",
 ]
 """What the fingers of a hand feel between them: the torques of their drives while they are stopped short of their
 targets.
 """
+
+HandPart: TypeAlias = Literal[
+    "thumb",
+    "middle",
+    "index",
+    "palm",
+]
+"""A part of a hand that presses."""
 
 HandState: TypeAlias = Literal[
     "arrived",
@@ -248,15 +256,19 @@ class HandReport:
     grip: Grip | None
     """What the fingers feel between them, by their own torques; left out where the assistance is "paper"."""
 
+    presses: tuple[HandPart, ...]
+    """What of the hand presses, by the torques of the fingers' own drives; left out where nothing does, and where
+    the assistance is "paper".
+    """
+
     touches: Touch | None
     """What stops the hand, as far as it can feel that; left out where it feels nothing, and where the assistance
     is "paper".
     """
 
     target: Pose | None
-    """The wrist pose that was asked for, in the pelvis frame as it is now, and not where the hand has given way to
-    since; of an arm without a wrist target, the pose that its joint targets stand for. Left out of a short
-    reply.
+    """The wrist pose that was asked for, in the pelvis frame as it is now; of an arm without a wrist target, the
+    pose that its joint targets stand for. Left out of a short reply.
     """
 
     measured: Pose | None
@@ -272,10 +284,9 @@ class HandReport:
     orientation_error_rad: float | None
     """Angle from target to measured, in radians; left out as the distance is."""
 
-    given_way_m: tuple[float, float, float] | None
-    """How far the hand has given way to what pulls it, by the command's compliance: it is to be so far from
-    `target`, [x, y, z] in metres in the pelvis frame, and its state is told against that. Left out where it has
-    not, and where the assistance is "paper".
+    compliance_offset_m: tuple[float, float, float] | None
+    """How far the hand has given way to what pulls it, by the command's compliance: its target is moved so far,
+    [x, y, z] in metres in the pelvis frame. Left out where it has not, and where the assistance is "paper".
     """
 
     fingers: FingerReport | None
@@ -310,12 +321,13 @@ class HandReport:
         return HandReport(
             state=value.get("state"),
             grip=value.get("grip"),
+            presses=tuple(value.get("presses", ())),
             touches=value.get("touches"),
             target=None if (got := value.get("target")) is None else Pose.of(got),
             measured=None if (got := value.get("measured")) is None else Pose.of(got),
             position_error_m=value.get("position_error_m"),
             orientation_error_rad=value.get("orientation_error_rad"),
-            given_way_m=None if (got := value.get("given_way_m")) is None else tuple(got),
+            compliance_offset_m=None if (got := value.get("compliance_offset_m")) is None else tuple(got),
             fingers=None if (got := value.get("fingers")) is None else FingerReport.of(got),
             largest_effort=None if (got := value.get("largest_effort")) is None else Effort.of(got),
             force_n=None if (got := value.get("force_n")) is None else tuple(got),

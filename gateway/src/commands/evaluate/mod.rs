@@ -13,7 +13,9 @@ use std::{
 
 use tandem_episodes::{
     Phase,
-    evaluation::{EvaluationPlan, EvaluationRun, KeptEpisodes, Shard, Starts, failed_episodes},
+    evaluation::{
+        EvaluationPlan, EvaluationRun, KeptEpisodes, Shard, Starts, failed_episodes, training_seeds,
+    },
     results::STRESS,
     stress::{Stress, StressAxis},
     tasks::Task,
@@ -52,6 +54,10 @@ pub struct EvaluateArgs {
     /// Folder of demonstrations, as `collect` or `serve` writes them; this build has to have recorded them.
     #[arg(long, value_name = "DIR", requires = "from")]
     demos: Option<PathBuf>,
+    /// Begin in the training demonstrations instead of those of --seeds: the first 50 of each task by seed, as the benchmark does and as
+    /// `export` splits data sets.
+    #[arg(long, requires = "from", conflicts_with = "seeds")]
+    training_demos: bool,
     /// Play share I of N, counted from 0, as 0/10; shares may write to one folder, and `report` joins folders.
     #[arg(long, value_name = "I/N", default_value = "0/1")]
     shard: ShardFlag,
@@ -125,11 +131,14 @@ pub fn run(args: EvaluateArgs) -> CommandResult {
     let starts = match (&args.retry_from, args.demos, args.from) {
         (Some(folder), ..) => begin_again(folder, args.before)?,
         (None, Some(demonstrations), Some(phases)) => {
-            Starts::Phases { demonstrations, phases: phases_of(phases, &plan.tasks)? }
+            let phases = phases_of(phases, &plan.tasks)?;
+            Starts::Phases { demonstrations, phases, training: args.training_demos }
         }
         _ => Starts::Task,
     };
+    let seeds = seeds(&plan, &starts)?;
     let plan = EvaluationPlan {
+        seeds,
         starts,
         shard,
         retries: if args.keep_failed { 0 } else { args.retries },
@@ -148,6 +157,21 @@ pub fn run(args: EvaluateArgs) -> CommandResult {
         0 if !plan.episodes().0.is_empty() => ExitCode::FAILURE,
         _ => ExitCode::SUCCESS,
     })
+}
+
+/// Returns the seeds that are played: the plan's, or those of the training demonstrations.
+fn seeds(plan: &EvaluationPlan, starts: &Starts) -> Result<Vec<u32>, String> {
+    let Starts::Phases { demonstrations, training: true, .. } = starts else { return Ok(plan.seeds.clone()) };
+    let mut seeds = BTreeSet::new();
+    for task in &plan.tasks {
+        let of_task = training_seeds(demonstrations, task);
+        tracing::info!("phases of {} begin in {} demonstrations", task.id, of_task.len());
+        seeds.extend(of_task);
+    }
+    match seeds.is_empty() {
+        true => Err(format!("{} has no demonstration of what is played", demonstrations.display())),
+        false => Ok(seeds.into_iter().collect()),
+    }
 }
 
 /// Refuses to tell tasks in two other wordings at once.

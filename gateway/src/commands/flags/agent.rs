@@ -19,7 +19,7 @@ const GRACE_S: u32 = 300;
 pub struct AgentFlags {
     /// The model's name at its endpoint.
     #[arg(long, value_name = "NAME")]
-    model: String,
+    model: Option<String>,
     /// What the endpoint speaks: OpenAI's Responses, its Chat Completions (Ollama, vLLM and most others), or Anthropic's Messages.
     #[arg(long, value_name = "API", default_value = "openai", value_parser = ["openai", "openai-chat", "anthropic"])]
     api: String,
@@ -108,9 +108,9 @@ impl AgentFlags {
         AgentOptions::try_parse_from(arguments).map(|options| options.flags).map_err(refused)
     }
 
-    /// The model's name.
+    /// The model's name; empty where none is given, as by who resumes an episode.
     pub fn model(&self) -> &str {
-        &self.model
+        self.model.as_deref().unwrap_or_default()
     }
 
     /// How long a program may take that is given `usual_s` where nobody says otherwise.
@@ -142,7 +142,7 @@ impl AgentFlags {
     fn given(&self) -> [(&'static str, Option<String>); 16] {
         let text = |number: Option<f64>| number.map(|number| number.to_string());
         [
-            ("model", Some(self.model.clone())),
+            ("model", self.model.clone()),
             ("api", Some(self.api.clone())),
             ("base-url", self.base_url.clone()),
             ("effort", self.effort.clone()),

@@ -12,7 +12,7 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 
-use super::{WorldFlags, seed_key::read_seed_key};
+use super::{WorldFlags, read_seed_key};
 use crate::settings::one_of;
 
 /// Which episodes to play.
@@ -214,7 +214,11 @@ mod tests {
                 let name = flag.get_long().unwrap_or_default();
                 let help = flag.get_help().map(ToString::to_string).unwrap_or_default();
                 // With what else has to be given, behind a flag or in its place.
-                let required = of.get_arguments().filter(|flag| flag.is_required_set());
+                let groups = of.get_groups().filter(|group| group.is_required_set());
+                let of_groups: Vec<_> = groups.filter_map(|group| group.get_args().next()).collect();
+                let is_required =
+                    |flag: &&clap::Arg| flag.is_required_set() || of_groups.contains(&flag.get_id());
+                let required = of.get_arguments().filter(is_required);
                 let line: String = required
                     .map(|flag| flag.get_long().map_or(" x".into(), |name| format!(" --{name} x")))
                     .fold(path.clone(), |line, flag| line + &flag);

@@ -2,6 +2,7 @@
 
 mod agent;
 mod episode;
+mod given;
 mod policy;
 mod run;
 mod seed_key;
@@ -10,7 +11,9 @@ mod world;
 
 pub use agent::AgentFlags;
 pub use episode::{EpisodeFlags, Seeds};
+pub use given::GivenFlags;
 pub use policy::{PartnerFlags, PolicyFlags};
 pub use run::RunFlags;
+pub use seed_key::read_seed_key;
 pub use stress::{StressFlags, StressPlanFlags};
 pub use world::{LocomotionFlag, SensingFlags, WorldFlags};

@@ -8,32 +8,34 @@ use tandem_episodes::replay::{Closest, ConditionTrace, Held, Moment, PartTrace, 
 /// Lines about what the next phase asks for, each part of its conditions by its place in the task's file.
 pub fn told(recording: &Recording) -> Result<String, Box<dyn std::error::Error>> {
     let Some(trace) = PhaseTrace::of(recording)? else { return Ok("  all phases were reached\n".into()) };
-    let PhaseTrace { number, id, from_s, to_s, nearest, conditions } = trace;
+    let PhaseTrace { number, id, from_s, to_s, nearest, description, conditions } = trace;
     let Moment { best, time_s } = nearest;
     let mut told = format!(
         "  {number} {id} was next from {from_s:.2} s to {to_s:.2} s and not reached; it came to {best:.2} of 1, at {time_s:.2} s\n"
     );
     match &recording.spec.task.file {
-        None => told += "  its conditions are in Rust; of tasks in files each part is told\n",
-        Some(file) => {
-            writeln!(told, "  {} asks for:", file.source.name)?;
-            let rows: Vec<[String; 4]> = conditions.iter().flat_map(rows).collect();
-            let widths: [usize; 3] =
-                std::array::from_fn(|column| rows.iter().map(|row| row[column].len()).max().unwrap_or(0));
-            for [place, setting, held, text] in &rows {
-                let [place_chars, setting_chars, held_chars] = widths;
-                let row =
-                    format!("    {place:place_chars$}  {setting:setting_chars$}  {held:held_chars$}  {text}");
-                writeln!(told, "{}", row.trim_end())?;
-            }
-        }
+        None => writeln!(told, "  {description}\n  its functions:")?,
+        Some(file) => writeln!(told, "  {} asks for:", file.source.name)?,
+    }
+    let rows: Vec<[String; 4]> = conditions.iter().flat_map(rows).collect();
+    let widths: [usize; 3] =
+        std::array::from_fn(|column| rows.iter().map(|row| row[column].len()).max().unwrap_or(0));
+    for [place, setting, held, text] in &rows {
+        let [place_chars, setting_chars, held_chars] = widths;
+        let row = format!("    {place:place_chars$}  {setting:setting_chars$}  {held:held_chars$}  {text}");
+        writeln!(told, "{}", row.trim_end())?;
     }
     Ok(told)
 }
 
-/// Place, setting, when it held, and as it is written, of each part of a condition; and how it was of all of them at once.
+/// Returns a row for each part of a condition, and one for all of them at once: place, setting, when it held, text. A
+/// condition in Rust has one row, which begins with its function's name.
 fn rows(condition: &ConditionTrace) -> Vec<[String; 4]> {
-    let ConditionTrace { setting, for_s, held, parts, most_at_once } = condition;
+    let ConditionTrace { setting, function, for_s, held, parts, most_at_once } = condition;
+    if let Some(name) = function {
+        let told = held_told(held, "") + &without_break(held, *for_s);
+        return vec![[(*name).into(), setting.name().into(), told, String::new()]];
+    }
     let part = |(index, part): (usize, &PartTrace)| {
         let [line, column] = part.place;
         let setting = if index == 0 { setting.name() } else { "" };
@@ -47,14 +49,19 @@ fn rows(condition: &ConditionTrace) -> Vec<[String; 4]> {
             1 => String::new(),
             all => format!("; {best} of {all} at {time_s:.2} s"),
         };
-        let mut at_once = held_told(held, &most);
-        if *for_s > 0.0 {
-            let _ = write!(at_once, "; without a break {:.2} s of {for_s}", held.longest_s());
-        }
+        let at_once = held_told(held, &most) + &without_break(held, *for_s);
         let what = if parts.len() > 1 { "all at once" } else { "" };
         rows.push(["".into(), "".into(), at_once, what.into()]);
     }
     rows
+}
+
+/// How much of the time for which it has to hold it held without a break.
+fn without_break(held: &Held, for_s: f64) -> String {
+    match for_s > 0.0 {
+        true => format!("; without a break {:.2} s of {for_s}", held.longest_s()),
+        false => String::new(),
+    }
 }
 
 /// When something held; `nearest` is said of what never did.

@@ -146,7 +146,7 @@ async fn turn(team: Arc<Team>, episode: Arc<EpisodeThread>) {
                 let robot = wrist_move.robot.clone();
                 let command = ToolCall::from(MoveWrists { steps: 1, robots: vec![wrist_move] });
                 let call = Call { short: true, ..command.into() };
-                let answer = team.call(&episode, &robot, call).await;
+                let answer = team.call(&episode, &robot, call, None).await;
                 let mut wheels = team.wheels();
                 wheels.under_way[seat] = None;
                 if let Some(wheel) = &wheels.seats[seat] {

@@ -12,23 +12,27 @@ mod partner;
 mod round;
 
 use std::{
-    sync::{Arc, Mutex, MutexGuard},
+    sync::{
+        Arc, Mutex, MutexGuard,
+        atomic::{AtomicBool, Ordering::Relaxed},
+    },
     time::{Duration, Instant},
 };
 
-use tandem_episodes::{EpisodeError, OperatorCall, OperatorCommand, stress::Silence};
+use tandem_episodes::{EpisodeError, OperatorCall, stress::Silence};
 use tandem_tools_spec::{
     Call, Driving, Finish, GetStatus, Heard, ManageCall, OperatorToken, Partner, PartnerDid, SpecError,
     TalkCall, ToolCall,
 };
 use tokio::sync::{Semaphore, SemaphorePermit, oneshot};
 
-use super::{Answer, EpisodeThread, HostingError, episode_thread::WAITING_CALLS};
+use super::{Answer, EpisodeThread, HostingError, durable::Keyed, episode::WAITING_CALLS};
 use crate::token::Token;
 pub use collection::{CollectedEpisode, Collection, CollectionProgress, CollectionStage};
 use driving::Wheel;
 pub use driving::{Driver, Wish};
 pub use partner::PartnerPolicy;
+pub use round::OperatorMemory;
 use round::{Pending, Round};
 
 /// The operators of one episode.
@@ -80,21 +84,32 @@ impl Team {
         collection: Option<&Collection>,
         silence: Option<Silence>,
     ) -> Result<(Team, Vec<OperatorToken>), HostingError> {
-        let (mut seats, mut tokens) = (Vec::new(), Vec::new());
-        let robots: Vec<&str> = robots.collect();
-        for robot in &robots {
+        let mut tokens = Vec::new();
+        for robot in robots {
             let kept = collection.and_then(|collection| collection.seat(robot));
-            let (token, text) = kept.map_or_else(Token::random, Ok)?;
-            let places = Semaphore::new(own_calls(robots.len()));
-            seats.push(Seat { robot: (*robot).into(), token, places });
-            tokens.push(OperatorToken { robot: (*robot).into(), token: text });
+            let (_, token) = kept.map_or_else(Token::random, Ok)?;
+            tokens.push(OperatorToken { robot: robot.into(), token });
+        }
+        Ok((Team::of(&tokens, driving, silence)?, tokens))
+    }
+
+    /// The operators who have these tokens.
+    pub fn of(
+        tokens: &[OperatorToken],
+        driving: &Driving,
+        silence: Option<Silence>,
+    ) -> Result<Team, HostingError> {
+        let mut seats = Vec::new();
+        for OperatorToken { robot, token } in tokens {
+            let token = Token::parse(token, "an operator")?;
+            seats.push(Seat { robot: robot.clone(), token, places: Semaphore::new(own_calls(tokens.len())) });
         }
         let round = Mutex::new(Round::new(seats.iter().map(|seat| seat.robot.clone()).collect()));
         let patience = Duration::from_secs_f64(driving.patience_s());
         let (none, under_way) = (seats.iter().map(|_| None).collect(), vec![None; seats.len()]);
         let partners = vec![false; seats.len()];
         let wheels = Mutex::new(Wheels { seats: none, under_way, partners, ..Wheels::default() });
-        Ok((Team { seats, patience, talk: driving.talk == Some(true), silence, round, wheels }, tokens))
+        Ok(Team { seats, patience, talk: driving.talk == Some(true), silence, round, wheels })
     }
 
     /// The robot whose operator has the token `text`; every token is compared.
@@ -115,6 +130,23 @@ impl Team {
         seat.places.try_acquire().map_err(|_| HostingError::TooManyWaiting { limit })
     }
 
+    /// What of the operators is to be remembered.
+    pub fn memory(&self) -> Vec<OperatorMemory> {
+        self.round().memory()
+    }
+
+    /// Takes over what was remembered.
+    pub fn restore(&self, memory: Vec<OperatorMemory>) {
+        self.round().restore(memory);
+    }
+
+    /// Whether somebody in this process drives, or waits for others.
+    pub fn is_busy(&self) -> bool {
+        let wheels = self.wheels();
+        let drives = wheels.partners.contains(&true) || wheels.seats.iter().any(Option::is_some);
+        drives || self.round().may_begin()
+    }
+
     /// Whether operators may talk.
     pub fn may_talk(&self) -> bool {
         self.talk
@@ -126,55 +158,77 @@ impl Team {
         episode: &Arc<EpisodeThread>,
         robot: &str,
         call: Call,
+        keyed: Option<Keyed>,
     ) -> Result<Answer, HostingError> {
         let seat = self.seat(robot)?;
         self.check_robots(&call)?;
         let call = OperatorCall::new(robot, call)?;
-        let answer = match &call.call().tool {
-            ToolCall::Act(_) => return self.act(episode, seat, call).await,
+        match &call.call().tool {
+            ToolCall::Act(_) => self.act(episode, seat, call, keyed).await,
             ToolCall::Talk(TalkCall::Say(say)) => {
                 let words = Heard { from: robot.into(), text: say.text.clone() };
-                return self.say(episode, seat, call, words).await;
+                self.say(episode, seat, call, words, keyed).await
             }
-            ToolCall::Plan(_) => {
-                return Err(EpisodeError::from(SpecError::Invalid {
+            ToolCall::Plan(_) => Err(EpisodeError::from(SpecError::Invalid {
                     tool: call.call().name(),
                     reason: "every robot of this episode has its operator, and a plan of one would hold up the others; command one by one"
                         .into(),
                 })
-                .into());
-            }
-            ToolCall::Manage(ManageCall::Finish(_)) => self.finish(episode, seat).await?,
+                .into()),
+            ToolCall::Manage(ManageCall::Finish(_)) => self.finish(episode, seat, keyed).await,
             ToolCall::Look(_) | ToolCall::Manage(ManageCall::GetStatus(_)) => {
                 let _place = self.take_place(robot)?;
-                episode.ask(Some(robot), call.into_call()).await?
+                self.ask(episode, seat, call.into_call(), keyed, move |team, answer| {
+                    team.round().has_looked(seat);
+                    answer
+                })
+                .await
             }
+        }
+    }
+
+    /// Has the episode answer a call of the operator on `seat`; `then` makes of the answer what this one is told.
+    async fn ask(
+        self: &Arc<Self>,
+        episode: &Arc<EpisodeThread>,
+        seat: usize,
+        call: Call,
+        keyed: Option<Keyed>,
+        then: impl FnOnce(&Team, Answer) -> Answer + Send + 'static,
+    ) -> Result<Answer, HostingError> {
+        let team = self.clone();
+        let told = move |answer: Result<Answer, HostingError>| {
+            answer.map(|answer| {
+                let answer = then(&team, answer);
+                team.for_seat(answer, seat)
+            })
         };
-        self.round().has_looked(seat);
-        Ok(self.for_seat(answer, seat))
+        episode.ask(Some(&self.seats[seat].robot), call, keyed, Box::new(told)).await
     }
 
     /// Lets the others hear what the operator on `seat` says.
     async fn say(
-        &self,
+        self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
         seat: usize,
         call: OperatorCall,
         words: Heard,
+        keyed: Option<Keyed>,
     ) -> Result<Answer, HostingError> {
         if !self.talk {
             return Err(HostingError::NoTalk);
         }
         self.round().check_unheard(seat)?;
         let _place = self.take_place(&words.from)?;
-        let answer = episode.ask(Some(&words.from), call.into_call()).await?;
-        let mut round = self.round();
-        let said = round.count_said(seat);
-        if self.silence.is_none_or(|silence| silence.lets_hear(seat, said)) {
-            round.spread(seat, &words);
-        }
-        drop(round);
-        Ok(self.for_seat(answer, seat))
+        self.ask(episode, seat, call.into_call(), keyed, move |team, answer| {
+            let mut round = team.round();
+            let said = round.count_said(seat);
+            if team.silence.is_none_or(|silence| silence.lets_hear(seat, said)) {
+                round.spread(seat, &words);
+            }
+            answer
+        })
+        .await
     }
 
     /// Takes a command, and answers when it has been executed. Beside people who drive in real time, whose commands are of one step
@@ -184,13 +238,20 @@ impl Team {
         episode: &Arc<EpisodeThread>,
         seat: usize,
         call: OperatorCall,
+        keyed: Option<Keyed>,
     ) -> Result<Answer, HostingError> {
         if call.call().steps() <= 1 || !self.goes_on(seat) {
-            return self.act_once(episode, seat, call).await;
+            return self.act_once(episode, seat, call, keyed).await;
         }
         let (team, episode) = (self.clone(), episode.clone());
         // What has begun is finished, whether its caller is still there or not.
-        let going_on = tokio::spawn(async move { team.act_on(&episode, seat, call).await });
+        let going_on = tokio::spawn(async move {
+            let answer = team.act_on(&episode, seat, call).await?;
+            match keyed {
+                Some(keyed) => episode.keep_answer(keyed, answer).await,
+                None => Ok(answer),
+            }
+        });
         going_on.await.map_err(|_| HostingError::EpisodeStopped)?
     }
 
@@ -204,7 +265,7 @@ impl Team {
         loop {
             let is_cut_off = left.call().steps() > 1 && self.goes_on(seat);
             let part = if is_cut_off { left.clone().unseen() } else { left.clone() };
-            let mut answer = self.act_once(episode, seat, part).await?;
+            let mut answer = self.act_once(episode, seat, part, None).await?;
             let rest = answer.cut_off_steps().and_then(|steps| Some((steps, left.rest(steps)?)));
             match rest.filter(|_| self.goes_on(seat)) {
                 Some((steps, rest)) => {
@@ -229,6 +290,7 @@ impl Team {
         episode: &Arc<EpisodeThread>,
         seat: usize,
         call: OperatorCall,
+        keyed: Option<Keyed>,
     ) -> Result<Answer, HostingError> {
         self.round().admit(seat)?;
         // What cannot be executed is refused before the others depend on it.
@@ -239,7 +301,7 @@ impl Team {
         {
             let mut round = self.round();
             round.admit(seat)?;
-            round.command(seat, Pending { command, reply });
+            round.command(seat, Pending { command, keyed, reply });
         }
         self.go_on(episode);
         answer.await.map_err(|_| HostingError::EpisodeStopped)?
@@ -251,15 +313,21 @@ impl Team {
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
         seat: usize,
+        keyed: Option<Keyed>,
     ) -> Result<Answer, HostingError> {
-        let robot = Some(self.seats[seat].robot.as_str());
         let others_play_on = !episode.ended() && self.round().finish(seat)?;
-        if !others_play_on {
-            return episode.ask(robot, ToolCall::from(Finish {}).into()).await;
+        let call: ToolCall = match others_play_on {
+            true => GetStatus {}.into(),
+            false => Finish {}.into(),
+        };
+        if others_play_on {
+            self.go_on(episode);
         }
-        self.go_on(episode);
-        let status = episode.ask(robot, ToolCall::from(GetStatus {}).into()).await?;
-        Ok(Answer { others_play_on, ..status })
+        let then = move |team: &Team, answer| {
+            team.round().has_looked(seat);
+            Answer { others_play_on, ..answer }
+        };
+        self.ask(episode, seat, call.into(), keyed, then).await
     }
 
     /// Nothing is executed any more: whoever waits is told so.
@@ -298,26 +366,37 @@ impl Team {
 
     /// Makes the step, whoever of its operators is still there, and tells each what became of it.
     async fn execute(self: Arc<Self>, episode: &Arc<EpisodeThread>, pending: Vec<(usize, Pending)>) {
-        let (replies, commands): (Vec<_>, Vec<OperatorCommand>) =
-            pending.into_iter().map(|(seat, Pending { command, reply })| ((seat, reply), command)).unzip();
-        let asked_steps: Vec<u32> = commands.iter().map(OperatorCommand::steps).collect();
-        let outcome = episode.together(commands).await;
-        let did = self.round().end(outcome.as_ref().ok().and_then(|answers| answers.first()));
+        let (mut replies, mut commands, mut asked) = (Vec::new(), Vec::new(), Vec::new());
+        for (seat, Pending { command, keyed, reply }) in pending {
+            asked.push((seat, command.steps()));
+            commands.push((command, keyed));
+            replies.push(reply);
+        }
+        let (team, is_over) = (self.clone(), Arc::new(AtomicBool::new(false)));
+        let over = is_over.clone();
+        let told = move |outcome: Result<Vec<Answer>, HostingError>| {
+            over.store(true, Relaxed);
+            let did = team.round().end(outcome.as_ref().ok().and_then(|answers| answers.first()));
+            let tell = |((seat, asked_steps), answer)| {
+                let partners = team.partners(seat, &did);
+                Answer { partners, ..team.for_seat(answer, seat) }.cut_off_after(asked_steps)
+            };
+            outcome.map(|answers| asked.into_iter().zip(answers).map(tell).collect())
+        };
+        let outcome = episode.together(commands, Box::new(told)).await;
+        if !is_over.load(Relaxed) {
+            self.round().end(None);
+        }
         match outcome {
             Ok(answers) => {
-                for (((seat, reply), answer), asked_steps) in
-                    replies.into_iter().zip(answers).zip(asked_steps)
-                {
-                    let partners = self.partners(seat, &did);
-                    let answer =
-                        Answer { partners, ..self.for_seat(answer, seat) }.cut_off_after(asked_steps);
+                for (reply, answer) in replies.into_iter().zip(answers) {
                     // A caller that has gone has its robot's step recorded all the same.
                     let _ = reply.send(Ok(answer));
                 }
             }
             Err(error) => {
                 let error = Arc::new(error);
-                for (_, reply) in replies {
+                for reply in replies {
                     let _ = reply.send(Err(HostingError::Shared(error.clone())));
                 }
             }
@@ -339,19 +418,21 @@ impl Team {
 
     /// Refuses a call that names a robot which nobody drives.
     fn check_robots(&self, call: &Call) -> Result<(), EpisodeError> {
-        let names = || self.seats.iter().map(|seat| seat.robot.as_str());
-        match call.robots().into_iter().find(|robot| !names().any(|name| name == *robot)) {
-            Some(robot) => Err(EpisodeError::UnknownRobot {
-                name: robot.into(),
-                have: names().map(str::to_owned).collect(),
-            }),
-            None => Ok(()),
-        }
+        let is_known = |robot: &str| self.seats.iter().any(|seat| seat.robot == robot);
+        call.robots()
+            .into_iter()
+            .find(|robot| !is_known(robot))
+            .map_or(Ok(()), |robot| Err(self.unknown(robot)))
+    }
+
+    fn unknown(&self, robot: &str) -> EpisodeError {
+        let have = self.seats.iter().map(|seat| seat.robot.clone()).collect();
+        EpisodeError::UnknownRobot { name: robot.into(), have }
     }
 
     fn seat(&self, robot: &str) -> Result<usize, HostingError> {
         let found = self.seats.iter().position(|seat| seat.robot == robot);
-        found.ok_or(HostingError::NeedsOperator)
+        found.ok_or_else(|| self.unknown(robot).into())
     }
 
     fn wheels(&self) -> MutexGuard<'_, Wheels> {

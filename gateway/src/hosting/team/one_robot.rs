@@ -45,7 +45,7 @@ impl OneRobot {
     /// here has no use for that, and commands all the same.
     pub fn ask(&self, call: ToolCall) -> Result<ToolReply, HostingError> {
         let ask = || -> Result<ToolReply, HostingError> {
-            let asked = self.team.call(&self.episode, &self.robot, call.clone().into());
+            let asked = self.team.call(&self.episode, &self.robot, call.clone().into(), None);
             Ok(self.runtime.block_on(asked)?.reply)
         };
         match ask() {

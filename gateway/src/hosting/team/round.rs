@@ -1,10 +1,11 @@
 //! Who has commanded what for the step that is made next.
 
+use serde::{Deserialize, Serialize};
 use tandem_episodes::OperatorCommand;
 use tandem_tools_spec::{Heard, PartnerDid, ToolReply};
 use tokio::{sync::oneshot, task::AbortHandle};
 
-use crate::hosting::{Answer, HostingError};
+use crate::hosting::{Answer, HostingError, durable::Keyed};
 
 /// The most that waits for one operator to hear it.
 const MOST_UNHEARD: usize = 32;
@@ -27,6 +28,16 @@ struct Operator {
     missed: Option<[u32; 2]>,
     heard: Vec<Heard>,
     /// How often it has spoken.
+    said: u32,
+}
+
+/// What of an operator outlives the server, which commands do not that have not been executed.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+pub struct OperatorMemory {
+    silent: bool,
+    finished: bool,
+    missed: Option<[u32; 2]>,
+    heard: Vec<Heard>,
     said: u32,
 }
 
@@ -58,6 +69,7 @@ enum OperatorState {
 #[derive(Debug)]
 pub struct Pending {
     pub command: OperatorCommand,
+    pub keyed: Option<Keyed>,
     pub reply: oneshot::Sender<Result<Answer, HostingError>>,
 }
 
@@ -72,6 +84,33 @@ impl Round {
             said: 0,
         };
         Round { operators: robots.into_iter().map(operator).collect(), number: 0, patience: None }
+    }
+
+    /// What is to be remembered, by seat.
+    pub fn memory(&self) -> Vec<OperatorMemory> {
+        let memory = |operator: &Operator| OperatorMemory {
+            silent: matches!(operator.state, OperatorState::Silent),
+            finished: matches!(operator.state, OperatorState::Finished),
+            missed: operator.missed,
+            heard: operator.heard.clone(),
+            said: operator.said,
+        };
+        self.operators.iter().map(memory).collect()
+    }
+
+    /// Takes over what was remembered.
+    pub fn restore(&mut self, memory: Vec<OperatorMemory>) {
+        for (operator, memory) in self.operators.iter_mut().zip(memory) {
+            let OperatorMemory { silent, finished, missed, heard, said } = memory;
+            (operator.missed, operator.heard, operator.said) = (missed, heard, said);
+            match operator.state {
+                // It has asked again already.
+                OperatorState::Waiting(_) | OperatorState::Acting => {}
+                _ if finished => operator.state = OperatorState::Finished,
+                _ if silent => operator.state = OperatorState::Silent,
+                _ => operator.state = OperatorState::Thinking,
+            }
+        }
     }
 
     pub fn number(&self) -> u64 {

@@ -41,7 +41,10 @@ pub async fn identify(State(app): State<AppState>, mut request: Request, next: N
         request.extensions_mut().insert(robots.clone());
     }
     let driver = driving.map(|(caller, _)| caller);
-    let by_token = driver.or_else(|| caller(&app, request.headers()));
+    let by_token = match driver {
+        Some(driver) => Some(driver),
+        None => caller(&app, request.headers()).await,
+    };
     if by_token == Some(Caller::Host) {
         request.extensions_mut().insert(Host);
     }
@@ -85,11 +88,15 @@ fn refused(headers: &HeaderMap) -> Response {
     }
 }
 
-fn caller(app: &AppState, headers: &HeaderMap) -> Option<Caller> {
+async fn caller(app: &AppState, headers: &HeaderMap) -> Option<Caller> {
     let token = bearer(headers);
-    let operator = token.and_then(|token| app.table.operator(token));
+    let is_hosts = |token| app.settings.token.as_ref().is_some_and(|expected| expected.matches(token));
+    let operator = match token {
+        Some(token) if !is_hosts(token) => app.table.operator_anywhere(token).await,
+        _ => None,
+    };
     match (&app.settings.token, token) {
-        (Some(expected), Some(token)) => operator.or_else(|| expected.matches(token).then_some(Caller::Host)),
+        (Some(_), Some(token)) => operator.or_else(|| is_hosts(token).then_some(Caller::Host)),
         (Some(_), None) => None,
         // Where the server has no token, a token that is no operator's is ignored.
         (None, _) => operator.or(Some(Caller::Host)),

@@ -214,7 +214,7 @@ impl McpServer {
                 return Err(ApiError::NoEpisodeNamed { tool: name.into() });
             }
         };
-        let episode = self.app.table.hosted(&id);
+        let episode = self.app.table.awake(&id).await;
         let call = match &episode {
             Ok(episode) => {
                 episode.admit(caller)?;

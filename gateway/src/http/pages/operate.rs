@@ -3,12 +3,14 @@
 
 use axum::{
     Extension, Json, Router,
+    body::Bytes,
     extract::State,
     http::{StatusCode, header},
     response::{Html, IntoResponse, Response},
     routing::{get, post},
 };
 
+use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::{
@@ -52,13 +54,29 @@ pub fn is_open(path: &str) -> bool {
     path.strip_prefix(OPERATE).is_some_and(|rest| matches!(rest, "" | "/page.css" | "/page.js"))
 }
 
-/// The task's expert drives the caller's robot from now on.
+/// The robot whose operator is replaced.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StandIn {
+    episode: String,
+    robot: String,
+}
+
+/// Reads which operator is to be replaced, for the episode's starter.
+fn stand_in(app: &AppState, who: &Caller, body: &[u8]) -> Result<StandIn, ApiError> {
+    app.table.check_stand_in(who)?;
+    serde_json::from_slice(body).map_err(|error| ApiError::MalformedJson(error.to_string()))
+}
+
+/// Has the task's expert drive a robot from now on.
 async fn expert(
     State(app): State<AppState>,
-    Extension(caller): Extension<Caller>,
+    Extension(who): Extension<Caller>,
+    body: Bytes,
 ) -> Result<StatusCode, ApiError> {
-    let (hosted, team, robot) = app.table.stand_in(&caller)?;
-    team.take_expert(&hosted.thread, robot).await?;
+    let StandIn { episode, robot } = stand_in(&app, &who, &body)?;
+    let (hosted, team) = app.table.team(&episode)?;
+    team.take_expert(&hosted.thread, &robot).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -73,16 +91,18 @@ async fn known_policy(
     }
 }
 
-/// The policy that this server was started with drives the caller's robot from now on.
+/// Has the policy that this server was started with drive a robot from now on.
 async fn policy(
     State(app): State<AppState>,
-    Extension(caller): Extension<Caller>,
+    Extension(who): Extension<Caller>,
+    body: Bytes,
 ) -> Result<StatusCode, ApiError> {
-    let (hosted, team, robot) = app.table.stand_in(&caller)?;
+    let StandIn { episode, robot } = stand_in(&app, &who, &body)?;
+    let (hosted, team) = app.table.team(&episode)?;
     let reason =
         "no policy may drive here; start the server with --partner, as act:http://127.0.0.1:8500/act";
     let policy = app.partner.ok_or_else(|| HostingError::NoPolicy { reason: reason.into() })?;
-    team.take_policy(&hosted.thread, robot, policy).await?;
+    team.take_policy(&hosted.thread, &robot, policy).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -82,6 +82,7 @@ fn hosting_refusals() -> Vec<HostingError> {
         HostingError::HostsBusiness,
         HostingError::OneEpisode,
         HostingError::PeopleDrive,
+        HostingError::OnePolicy,
         HostingError::NoExpert(PlayerError::NoExpert { task: "x".into(), have: vec!["handover"] }),
         HostingError::NoPolicy { reason: "nobody listens at http://127.0.0.1:1/act".into() },
         HostingError::NoTalk,

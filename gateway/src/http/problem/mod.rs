@@ -212,6 +212,7 @@ fn status(class: RefusalClass) -> StatusCode {
         RefusalClass::Conflict => StatusCode::CONFLICT,
         RefusalClass::Forbidden => StatusCode::FORBIDDEN,
         RefusalClass::Gone => StatusCode::GONE,
+        RefusalClass::Elsewhere => StatusCode::TEMPORARY_REDIRECT,
         RefusalClass::TooMany => StatusCode::TOO_MANY_REQUESTS,
         RefusalClass::Unavailable => StatusCode::SERVICE_UNAVAILABLE,
         RefusalClass::Failed | RefusalClass::Internal => StatusCode::INTERNAL_SERVER_ERROR,
@@ -313,6 +314,15 @@ impl ApiError {
         }
     }
 
+    /// The server that plays the episode, if another does.
+    fn elsewhere(&self) -> Option<&str> {
+        match self {
+            ApiError::Hosting(error) => error.elsewhere(),
+            ApiError::RecordingFailed { error, .. } => error.elsewhere(),
+            _ => None,
+        }
+    }
+
     /// Why the recording of the episode that it concerns is not complete, if that has to be said.
     pub fn recording_failed(&self) -> Option<&str> {
         let ApiError::RecordingFailed { recording_failed, .. } = self else { return None };
@@ -330,6 +340,10 @@ impl ApiError {
     }
 }
 
+/// An extension of a response that refuses: the server that plays the episode.
+#[derive(Debug, Clone)]
+pub struct Elsewhere(pub String);
+
 /// An extension of a response that refuses: the name of the problem's kind.
 #[derive(Debug, Clone, Copy)]
 pub struct RefusalKind(pub &'static str);
@@ -340,6 +354,9 @@ impl IntoResponse for ApiError {
         let text = serde_json::json!(self.body()).to_string();
         let mut response = (status, [(header::CONTENT_TYPE, PROBLEM_JSON)], text).into_response();
         response.extensions_mut().insert(RefusalKind(kind));
+        if let Some(url) = self.elsewhere() {
+            response.extensions_mut().insert(Elsewhere(url.into()));
+        }
         let headers = response.headers_mut();
         if let Some(seconds) = retry_after_s {
             headers.insert(header::RETRY_AFTER, seconds.into());

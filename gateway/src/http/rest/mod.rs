@@ -99,7 +99,7 @@ async fn episode_tools(
     Extension(caller): Extension<Caller>,
     Path(id): Path<String>,
 ) -> Result<Json<Vec<EpisodeToolSpec>>, ApiError> {
-    let episode = app.table.hosted(&id)?;
+    let episode = app.table.awake(&id).await?;
     episode.admit(&caller)?;
     let (wording, talk) = (app.settings.wording(), app.table.may_talk(&caller));
     let thread = &episode.thread;
@@ -189,7 +189,7 @@ async fn status(
     encoding: Encoding,
     Path(id): Path<String>,
 ) -> Result<Response, ApiError> {
-    encoding.write(StatusCode::OK, &app.table.hosted(&id)?.status(&caller).await?)
+    encoding.write(StatusCode::OK, &app.table.awake(&id).await?.status(&caller).await?)
 }
 
 async fn briefing(
@@ -210,7 +210,7 @@ async fn call(
     body: Bytes,
 ) -> Result<Response, ApiError> {
     counted(&app, &name, async {
-        let episode = app.table.hosted(&id)?;
+        let episode = app.table.awake(&id).await?;
         episode.admit(&caller)?;
         let read = || {
             episode.check_offered(&caller, &name)?;
@@ -245,13 +245,14 @@ async fn note(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
     encoding: Encoding,
+    IdempotencyKey(key): IdempotencyKey,
     Path(id): Path<String>,
     body: Bytes,
 ) -> Result<StatusCode, ApiError> {
-    let episode = app.table.hosted(&id)?;
+    let episode = app.table.awake(&id).await?;
     episode.admit(&caller)?;
     let note = Note::parse(encoding.read(&body)?)?;
-    let kept = episode.note(&caller, note).await;
+    let kept = episode.note(&caller, note, key.as_deref()).await;
     kept.map_err(|refusal| ApiError::from(refusal).in_episode(&episode.thread))?;
     Ok(StatusCode::NO_CONTENT)
 }
@@ -261,7 +262,11 @@ async fn remove(
     Extension(caller): Extension<Caller>,
     Path(id): Path<String>,
 ) -> Result<Json<ResultReply>, ApiError> {
-    app.table.hosted(&id)?.admit(&caller)?;
+    match app.table.awake(&id).await {
+        // What cannot be played here can be given up all the same.
+        Err(error) if error.is_of_other_build() => app.table.hosted(&id)?.admit(&caller)?,
+        hosted => hosted?.admit(&caller)?,
+    }
     require_host(&caller)?;
     Ok(Json(app.table.remove(&id).await?))
 }

@@ -122,7 +122,7 @@ fn phases_are_played_on_their_own_by_shares_and_joined_by_a_report() {
     let [demos, out] = ["demos", "out"].map(|name| folder.path().join(name));
     evaluate(&EvaluationPlan { record: true, ..plan(1, vec![1]) }, &demos, &|_| {}).expect("it is played");
     let phases = ["p1", "p2", "p3"].map(String::from).to_vec();
-    let starts = Starts::Phases { demonstrations: demos, phases };
+    let starts = Starts::Phases { demonstrations: demos, phases, training: false };
     let mut left_out = 0;
     for index in 0..2 {
         let plan = EvaluationPlan {

@@ -18,16 +18,25 @@ use tandem_tests::TestServer;
 use super::{driving::DriversSocket, team::Team};
 use crate::policies::act_server::ActServer;
 
-/// The status of a request for a partner at `path` by who has `token`.
-fn ask_for(team: &Team, path: &str, token: Option<&str>) -> u16 {
+const EXPERT: &str = "/operate/expert";
+const POLICY: &str = "/operate/policy";
+
+/// The answer to who has `token`, or to who started the episode, and asks for a partner at `path` for robot B.
+fn asked_for(team: &Team, path: &str, token: Option<&str>) -> (u16, Value) {
+    answer_to(team, path, token, json!({ "episode": team.id, "robot": "B" }))
+}
+
+fn answer_to(team: &Team, path: &str, token: Option<&str>, body: Value) -> (u16, Value) {
     let bearer = token.map(|token| format!("Bearer {token}"));
     let mut headers = vec![("content-type", "application/json")];
     headers.extend(bearer.iter().map(|bearer| ("authorization", bearer.as_str())));
-    team.server.ask("POST", path, &headers, b"{}").0
+    let answer = team.server.ask("POST", path, &headers, body.to_string().as_bytes());
+    (answer.0, serde_json::from_slice(&answer.2).unwrap_or_default())
 }
 
-fn ask_for_expert(team: &Team, token: Option<&str>) -> u16 {
-    ask_for(team, "/operate/expert", token)
+/// The status where who started the episode asks.
+fn ask_for(team: &Team, path: &str) -> u16 {
+    asked_for(team, path, None).0
 }
 
 /// A server whose people may have the policy at `url` beside them.
@@ -43,9 +52,9 @@ fn server_with_policy(url: &str) -> TestServer {
 #[test]
 fn an_expert_for_each_robot_plays_the_task_to_its_end() {
     let team = Team::start(json!({ "patience_s": 600, "protocol": "agentic" }));
-    assert_eq!(ask_for_expert(&team, None), 403, "it is for who has a robot");
-    for token in [&team.tokens[0], &team.tokens[1], &team.tokens[1]] {
-        assert_eq!(ask_for_expert(&team, Some(token)), 204);
+    for robot in ["A", "B", "B"] {
+        let asked = json!({ "episode": team.id, "robot": robot });
+        assert_eq!(answer_to(&team, EXPERT, None, asked).0, 204);
     }
     let began = Instant::now();
     while team.server.get(&format!("/v1/episodes/{}", team.id)).ok()["ended"].is_null() {
@@ -59,6 +68,39 @@ fn an_expert_for_each_robot_plays_the_task_to_its_end() {
     );
     let notes = recording.transcript().expect("a transcript");
     assert!(format!("{notes:?}").contains("The task's expert drives robot B."));
+}
+
+/// An operator's token has neither its own robot nor a partner's driven by the expert or a policy.
+#[test]
+fn who_started_the_episode_decides_who_drives_beside_operators() {
+    let act = ActServer::start(|_| (200, json!({ "actions": [] })));
+    let team = Team::on(server_with_policy(&act.url()), 0, json!({ "patience_s": 0.05 }));
+    for token in &team.tokens {
+        for path in [EXPERT, POLICY] {
+            for body in [json!({ "episode": team.id, "robot": "B" }), json!({ "robot": "A" }), json!({})] {
+                let (status, told) = answer_to(&team, path, Some(token), body);
+                assert_eq!((status, &told["title"]), (403, &json!("Not for operators")), "{told}");
+            }
+        }
+    }
+    let one = team
+        .server
+        .post("/v1/episodes", &json!({ "task": "handover", "seed": 0, "protocol": "benchmark" }))
+        .ok();
+    for (body, status, says) in [
+        (json!({ "episode": team.id, "robot": "C" }), 422, "no robot \"C\""),
+        (json!({ "episode": "x", "robot": "A" }), 404, "no episode \"x\""),
+        (json!({ "episode": one["episode_id"], "robot": "A" }), 409, "add \"operators\": \"per_robot\""),
+        (json!({ "robot": "A" }), 400, "missing field `episode`"),
+    ] {
+        let (answered, told) = answer_to(&team, EXPERT, None, body);
+        assert!(answered == status && told.to_string().contains(&says.replace('"', "\\\"")), "{told}");
+    }
+    assert_eq!(act.requests.lock().expect("no panic").len(), 0, "no policy was asked");
+    team.ask(0, "wait", json!({ "steps": 1 })).ok();
+    let (result, recording) = team.verified();
+    assert!(!result["extra_information"].to_string().contains("third_person"), "{result}");
+    assert!(!format!("{:?}", recording.transcript().expect("a transcript")).contains("drives robot"));
 }
 
 #[test]
@@ -95,9 +137,8 @@ fn a_learned_policy_drives_its_own_robot_beside_a_person() {
     let server = server_with_policy(&act.url());
     assert_eq!(server.get("/operate/policy").ok()["policy"], json!(format!("act:{}", act.url())));
     let team = Team::on(server, 0, json!({ "patience_s": 600, "protocol": "agentic" }));
-    assert_eq!(ask_for(&team, "/operate/policy", None), 403, "it is for who has a robot");
     for _ in 0..2 {
-        assert_eq!(ask_for(&team, "/operate/policy", Some(&team.tokens[1])), 204);
+        assert_eq!(ask_for(&team, POLICY), 204);
     }
     let mut page = DriversSocket::open(&team, 0);
     let began = Instant::now();
@@ -122,7 +163,7 @@ fn a_learned_policy_drives_its_own_robot_beside_a_person() {
 fn no_page_names_an_address_of_its_own() {
     let team = Team::start(json!({ "patience_s": 600 }));
     assert_eq!(team.server.get("/operate/policy").ok()["policy"], Value::Null);
-    assert_eq!(ask_for(&team, "/operate/policy", Some(&team.tokens[1])), 409);
+    assert_eq!(ask_for(&team, POLICY), 409);
     let bearer = format!("Bearer {}", team.tokens[1]);
     let asked = team.server.ask("GET", "/operate/policy", &[("authorization", &bearer)], b"");
     assert_eq!(asked.0, 403, "it is for who starts episodes");
@@ -133,7 +174,7 @@ fn a_policy_that_is_not_there_is_told_of_and_may_be_asked_for_again() {
     let act = ActServer::start(|_| (500, json!({ "error": "no weights" })));
     let team = Team::on(server_with_policy(&act.url()), 0, json!({ "patience_s": 600 }));
     for _ in 0..2 {
-        assert_eq!(ask_for(&team, "/operate/policy", Some(&team.tokens[1])), 409);
+        assert_eq!(ask_for(&team, POLICY), 409);
     }
     assert!(act.requests.lock().expect("no panic").len() >= 2, "it is asked each time");
 }
@@ -153,7 +194,7 @@ fn a_policy_that_was_lost_may_be_asked_for_again_and_nobody_waits_for_it() {
     });
     let team =
         Team::on(server_with_policy(&act.url()), 0, json!({ "patience_s": 600, "protocol": "agentic" }));
-    assert_eq!(ask_for(&team, "/operate/policy", Some(&team.tokens[1])), 204);
+    assert_eq!(ask_for(&team, POLICY), 204);
     let mut page = DriversSocket::open(&team, 0);
     let asked = || act.requests.lock().expect("no panic").len();
     let mut drive_until = |done: &dyn Fn() -> bool| {
@@ -171,7 +212,7 @@ fn a_policy_that_was_lost_may_be_asked_for_again_and_nobody_waits_for_it() {
     let before = asked();
     // Asking is no more than a wish while the lost one says goodbye.
     drive_until(&|| {
-        assert_eq!(ask_for(&team, "/operate/policy", Some(&team.tokens[1])), 204);
+        assert_eq!(ask_for(&team, POLICY), 204);
         asked() >= before + 3
     });
     drop(page);

@@ -1,25 +1,28 @@
 //! A recorded episode played again: call by call, with the policy's clock as it was charged.
 
+mod bring_back;
+mod set_clock;
+
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 use tandem_sim::CONTROL_HZ;
 use tandem_tools_spec::{ExtraInformation, ResultReply};
 
 use super::checkpoint::unreadable;
-use super::{Checkpoint, Session, this_build};
+use super::{Checkpoint, Session, monotonic, this_build};
 use crate::commands::Called;
 use crate::error::{CheckpointError, EpisodeError};
 use crate::recording::{BEGIN, CallerRecord, RecordedCheckpoint, Recording, state_hash_text};
 use crate::spec::{EpisodeSpec, MomentStart, Start};
+pub use bring_back::BringBack;
+use set_clock::SetHands;
 
 /// An episode under way for the second time.
 pub struct Replay {
     session: Session,
-    /// What the policy's clock shows, in nanoseconds.
-    policy_clock_ns: Arc<AtomicU64>,
+    /// The policy's clock.
+    hands: SetHands,
 }
 
 impl Replay {
@@ -30,9 +33,8 @@ impl Replay {
         begin: Option<&RecordedCheckpoint>,
         path: &Path,
     ) -> Result<Replay, EpisodeError> {
-        let policy_clock_ns = Arc::new(AtomicU64::new(0));
-        let read = policy_clock_ns.clone();
-        let mut session = Session::build(spec, Box::new(move || Duration::from_nanos(read.load(Relaxed))))?;
+        let hands = SetHands::default();
+        let mut session = Session::build(spec, hands.clock(monotonic()))?;
         if let Some(begin) = begin {
             session.resume(&Checkpoint::from_bytes(&begin.bytes, path)?)?;
         } else if spec.start != Start::Task {
@@ -45,7 +47,7 @@ impl Replay {
             session.hold(spec.rules().initial_hold_steps)?;
         }
         session.clock.resume();
-        Ok(Replay { session, policy_clock_ns })
+        Ok(Replay { session, hands })
     }
 
     /// Makes a call that was made when the policy had thought for as long as `thought`; `shown` as [`crate::RecordedCall`] has it.
@@ -55,8 +57,7 @@ impl Replay {
         thought: Duration,
         shown: Option<&[ExtraInformation]>,
     ) -> Result<(), EpisodeError> {
-        let passed = thought.saturating_sub(self.session.clock.spent());
-        self.policy_clock_ns.fetch_add(u64::try_from(passed.as_nanos()).unwrap_or(u64::MAX), Relaxed);
+        self.hands.pass(thought.saturating_sub(self.session.clock.spent()));
         let caller = shown.map_or(CallerRecord::Policy, CallerRecord::InProcess);
         self.session.make(caller, called).map(drop)
     }

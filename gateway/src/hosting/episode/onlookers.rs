@@ -56,13 +56,23 @@ struct Pace {
 }
 
 impl LiveFeed {
-    /// A feed, and its end for the episode's session.
-    pub fn new() -> (LiveFeed, FeedEnd) {
-        let (events, _) = broadcast::channel(KEPT_EVENTS);
-        let drivers: Arc<AtomicUsize> = Arc::default();
-        let feed = LiveFeed { events: Mutex::new(Some(events.clone())), drivers: drivers.clone() };
+    /// A feed to which nobody listens yet.
+    pub fn new() -> LiveFeed {
+        LiveFeed { events: Mutex::new(Some(broadcast::channel(KEPT_EVENTS).0)), drivers: Arc::default() }
+    }
+
+    /// The end for the episode's session, unless nothing happens any more.
+    pub fn end(&self) -> Option<FeedEnd> {
+        let events = self.events.lock().unwrap_or_else(PoisonError::into_inner).clone()?;
         let pace = Pace { even_at: Cell::new(Instant::now()) };
-        (feed, FeedEnd { events, drivers, pace })
+        Some(FeedEnd { events, drivers: self.drivers.clone(), pace })
+    }
+
+    /// Whether anybody listens or drives.
+    pub fn is_watched(&self) -> bool {
+        let events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
+        self.drivers.load(Ordering::Relaxed) > 0
+            || events.as_ref().is_some_and(|events| events.receiver_count() > 0)
     }
 
     /// Tells every step for as long as the return value is held.

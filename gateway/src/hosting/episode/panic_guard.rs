@@ -8,7 +8,7 @@ use std::time::Duration;
 use tandem_episodes::Session;
 use tandem_tools_spec::{EndReason, ResultReply};
 
-use super::HostingError;
+use crate::hosting::HostingError;
 use crate::metrics::Metrics;
 
 /// A session, until it has panicked.
@@ -27,6 +27,11 @@ impl PanicGuard {
     /// A session whose work is counted by `metrics`.
     pub fn new(session: Session, mut metrics: EpisodeMetrics) -> PanicGuard {
         metrics.begin(&session);
+        PanicGuard { state: GuardState::Sound(Box::new(session)), metrics }
+    }
+
+    /// A session that has begun before, and been counted as far as it has come.
+    pub fn again(session: Session, metrics: EpisodeMetrics) -> PanicGuard {
         PanicGuard { state: GuardState::Sound(Box::new(session)), metrics }
     }
 
@@ -122,6 +127,16 @@ impl EpisodeMetrics {
     /// An episode that has not begun.
     pub fn new(metrics: Arc<Metrics>) -> EpisodeMetrics {
         EpisodeMetrics { metrics, control_steps: 0, physics: Duration::ZERO, ended: false }
+    }
+
+    /// An episode that has been counted as far as `session` has come.
+    pub fn again(metrics: Arc<Metrics>, session: &Session) -> EpisodeMetrics {
+        EpisodeMetrics {
+            metrics,
+            control_steps: session.present().control_step,
+            physics: session.physics(),
+            ended: session.ended().is_some(),
+        }
     }
 
     /// The episode has begun, and may have held still for a while.

@@ -1,0 +1,79 @@
+//! An episode that another process has played, or this one before it put the episode aside, brought to where it stood.
+
+use std::time::Duration;
+
+use tandem_tools_spec::Call;
+
+use super::set_clock::SetHands;
+use crate::commands::{Called, OperatorCall};
+use crate::error::{CheckpointError, EpisodeError};
+use crate::live::Onlookers;
+use crate::session::journal::{JournalEntry, KeptRequest};
+use crate::session::{Audience, Caller, Clock, Request, RunFolder, Session, this_build};
+use crate::spec::EpisodeSpec;
+
+/// What an episode is brought back from.
+pub struct BringBack {
+    pub spec: EpisodeSpec,
+    /// Where it is recorded from its beginning on.
+    pub folder: Option<RunFolder>,
+    pub entries: Vec<JournalEntry>,
+    /// The policy's wall clock from the last entry on.
+    pub clock: Clock,
+    /// How long the policy has been thinking since then.
+    pub thinking: Duration,
+    pub onlookers: Box<dyn Onlookers>,
+}
+
+impl Session {
+    /// Plays an episode again up to the last entry of its journal, and goes on from there. An error says where it went another way.
+    pub fn bring_back(back: BringBack) -> Result<Session, EpisodeError> {
+        let BringBack { spec, folder, entries, clock, thinking, onlookers } = back;
+        let hands = SetHands::default();
+        let path = folder.as_ref().map(|folder| folder.path.clone()).unwrap_or_default();
+        let mut session = Session::start_with_clock(&spec, folder, hands.clock(clock))?;
+        session.set_onlookers(onlookers);
+        for entry in entries {
+            let shown = session.clock.spent() + session.clock.thinking();
+            hands.pass(entry.thought().saturating_sub(shown));
+            entry.asked.ask(&mut session)?;
+            let Some(state) = entry.state else { continue };
+            if session.state_mark() != state {
+                let (step, this) = (state.control_step, this_build()?);
+                return Err(CheckpointError::OtherWay { path, step, made_by: this.into(), this }.into());
+            }
+        }
+        hands.pass(thinking);
+        hands.go();
+        // The clock goes from this look on.
+        session.clock.thinking();
+        session.keep_journal();
+        Ok(session)
+    }
+}
+
+impl KeptRequest {
+    /// Asks it again. What was refused is refused again, so that a refusal is no error.
+    fn ask(self, session: &mut Session) -> Result<(), EpisodeError> {
+        match self {
+            KeptRequest::Call { operator, shown, tool, arguments } => {
+                let caller = operator.as_deref().map_or(Caller::Policy, Caller::Operator);
+                let audience = shown.as_deref().map_or(Audience::Caller, Audience::Process);
+                let called = Called::parse(&tool, arguments)?;
+                let _ = session.perform(Request { caller, called, audience });
+            }
+            KeptRequest::Command { robot, tool, arguments } => {
+                let call = Call::parse(&tool, arguments)?;
+                let _ = session.read_command(OperatorCall::new(&robot, call)?);
+            }
+            KeptRequest::Note { operator, note } => {
+                let _ = session.note(operator.as_deref(), note);
+            }
+            KeptRequest::Refused { operator, tool, arguments, problem } => {
+                session.refused_before(operator.as_deref(), &tool, &arguments, &problem);
+            }
+            KeptRequest::End { reason } => session.end(reason),
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,178 @@
+//! Episodes brought back from what they were asked: the same states, counts, clocks and results as without an interruption.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::time::Duration;
+
+use crate::common::*;
+use serde_json::json;
+use tandem_episodes::live::{LiveEvent, Onlookers};
+use tandem_episodes::{BringBack, Clock, EpisodeSpec, JournalEntry, OperatorCall, Session};
+use tandem_tools_spec::{
+    Call, EndReason, ExtraInformation, JointChunk, Note, Observe, Protocol, Say, SendJointChunk, ToolCall,
+    Wait,
+};
+
+/// Nobody looks on.
+struct Nobody;
+
+impl Onlookers for Nobody {
+    fn any(&self) -> bool {
+        false
+    }
+
+    fn wants_step(&self, _: u64) -> bool {
+        false
+    }
+
+    fn tell(&self, _: LiveEvent) {}
+}
+
+/// A clock whose hands the test turns.
+#[derive(Clone, Default)]
+struct Hands(Arc<AtomicU64>);
+
+impl Hands {
+    fn clock(&self) -> Clock {
+        let hands = self.0.clone();
+        Box::new(move || Duration::from_millis(hands.load(Relaxed)))
+    }
+
+    fn pass(&self, ms: u64) {
+        self.0.fetch_add(ms, Relaxed);
+    }
+}
+
+fn call(tool: &str, arguments: serde_json::Value) -> Call {
+    Call::parse(tool, arguments).unwrap()
+}
+
+/// Asks for something of every kind, some of which is refused.
+fn ask_everything(session: &mut Session, hands: &Hands) {
+    hands.pass(700);
+    command(session, raise_hand(25));
+    let rows = vec![row(session, "B"); 5];
+    command(session, SendJointChunk { robots: vec![JointChunk { robot: "B".into(), rows }] }.into());
+    hands.pass(40);
+    let look = Observe { robots: Some(vec!["A".into()]), short: None, frame: None };
+    session.call(look.clone().into()).unwrap();
+    session.observe(&look, &[ExtraInformation::ThirdPerson]).unwrap();
+    hands.pass(5_000);
+    let walk = json!({ "robot": "A", "vx_m_s": 0.1, "vy_m_s": 0.0, "yaw_rate_rad_s": 0.1 });
+    let plan = json!({ "commands": [
+        { "tool": "walk", "arguments": { "steps": 20, "robots": [walk] } }, { "tool": "wait", "arguments": { "steps": 5 } },
+    ] });
+    session.ask(None, call("send_plan", plan)).unwrap();
+    session.ask(None, call("wait", json!({ "steps": 3, "observe": { "robots": ["B"] } }))).unwrap();
+    session.ask(None, call("wait", json!({ "steps": 3, "expected_step": 1 }))).unwrap_err();
+    session.call(Wait { steps: 500 }.into()).unwrap_err();
+    session.note(None, Note { text: "I have looked.".into(), ..Note::default() }).unwrap();
+    session.refused_before(None, "wiat", "{}", "no such tool");
+    let operator =
+        |robot: &str, steps| OperatorCall::new(robot, ToolCall::from(Wait { steps }).into()).unwrap();
+    session.read_command(operator("A", 500)).unwrap_err();
+    let commands =
+        [("A", 4), ("B", 7)].map(|(robot, steps)| session.read_command(operator(robot, steps)).unwrap());
+    session.together(commands.into()).unwrap();
+    session.ask(Some("B"), ToolCall::from(Say { text: "Ready.".into() }).into()).unwrap();
+}
+
+/// As another process reads it.
+fn copied(entries: &[JournalEntry]) -> Vec<JournalEntry> {
+    serde_json::from_str(&serde_json::to_string(entries).unwrap()).unwrap()
+}
+
+fn bring_back(spec: &EpisodeSpec, entries: &[JournalEntry], hands: &Hands, thinking_ms: u64) -> Session {
+    let back = BringBack {
+        spec: spec.clone(),
+        folder: None,
+        entries: copied(entries),
+        clock: hands.clock(),
+        thinking: Duration::from_millis(thinking_ms),
+        onlookers: Box::new(Nobody),
+    };
+    Session::bring_back(back).unwrap()
+}
+
+/// What a session says of itself, but for how long physics took.
+fn said(session: &mut Session) -> serde_json::Value {
+    let mut told = json!([session.status(), session.result(), session.thought().as_millis()]);
+    let result = told[1].as_object_mut().unwrap();
+    result.retain(|name, _| name != "realtime_factor");
+    told
+}
+
+#[test]
+fn an_episode_is_brought_back_as_it_stood() {
+    let hands = Hands::default();
+    let spec = spec("handover", 2100, Protocol::Agentic);
+    let mut session = Session::start_with_clock(&spec, None, hands.clock()).unwrap();
+    session.keep_journal();
+    ask_everything(&mut session, &hands);
+    let mut entries = session.take_journal().unwrap();
+    assert!(session.take_journal().unwrap().is_empty());
+    assert_eq!(entries.last().unwrap().control_step(), None, "nobody has moved since");
+
+    let mut again = bring_back(&spec, &entries, &hands, 0);
+    assert_eq!(said(&mut again), said(&mut session));
+    assert_eq!(again.state_hash(), session.state_hash());
+    // Both go on, and are brought back once more.
+    hands.pass(900);
+    for session in [&mut session, &mut again] {
+        command(session, raise_hand(25));
+    }
+    entries.extend(again.take_journal().unwrap());
+    let mut once_more = bring_back(&spec, &entries, &hands, 0);
+    assert_eq!(said(&mut once_more), said(&mut session));
+    assert_eq!(once_more.state_hash(), session.state_hash());
+}
+
+#[test]
+fn the_clock_goes_on_from_what_was_thought_and_what_ended_stays_ended() {
+    let hands = Hands::default();
+    let spec = spec("handover", 2101, Protocol::Agentic);
+    let mut session = Session::start_with_clock(&spec, None, hands.clock()).unwrap();
+    session.keep_journal();
+    hands.pass(1_000_000);
+    wait(&mut session, 2);
+    let mut entries = session.take_journal().unwrap();
+
+    // A server was away for a day, which costs nothing; before it, the policy had been thinking for 100 s.
+    hands.pass(86_400_000);
+    let mut again = bring_back(&spec, &entries, &hands, 100_000);
+    hands.pass(699_000);
+    wait(&mut again, 2);
+    assert_eq!(again.thought(), Duration::from_secs(1_799));
+    hands.pass(1_000);
+    again.call(Wait { steps: 2 }.into()).unwrap_err();
+    assert_eq!(again.ended(), Some(EndReason::WallClockExhausted));
+    entries.extend(again.take_journal().unwrap());
+    assert_eq!(entries.last().unwrap().ended, Some(EndReason::WallClockExhausted));
+    assert_eq!(bring_back(&spec, &entries, &hands, 0).ended(), Some(EndReason::WallClockExhausted));
+
+    session.end(EndReason::Abandoned);
+    entries.truncate(1);
+    entries.extend(session.take_journal().unwrap());
+    assert_eq!(bring_back(&spec, &entries, &hands, 0).ended(), Some(EndReason::Abandoned));
+}
+
+#[test]
+fn another_state_is_found_out() {
+    let hands = Hands::default();
+    let spec = spec("handover", 2102, Protocol::Agentic);
+    let mut session = Session::start_with_clock(&spec, None, hands.clock()).unwrap();
+    session.keep_journal();
+    command(&mut session, raise_hand(25));
+    let entries = session.take_journal().unwrap();
+    let other = EpisodeSpec { seed: 2103, ..spec };
+    let back = BringBack {
+        spec: other,
+        folder: None,
+        entries,
+        clock: hands.clock(),
+        thinking: Duration::ZERO,
+        onlookers: Box::new(Nobody),
+    };
+    let error = Session::bring_back(back).err().expect("it is not the same");
+    assert!(error.to_string().contains("325"), "{error}");
+}

@@ -1,0 +1,26 @@
+"""What an agent writes down as it plays, so that a play that broke off can be taken up again."""
+
+from __future__ import annotations
+
+from .episode_file import EpisodeFile, conversation_path, read_result
+from .events import Answered, Begun, Ended, Event, Halved, Noted, Replied, Resumed
+from .journal import Journal
+from .line_file import LineFile
+from .progress import Progress
+
+__all__ = [
+    "Answered",
+    "Begun",
+    "Ended",
+    "EpisodeFile",
+    "Event",
+    "Halved",
+    "Journal",
+    "LineFile",
+    "Noted",
+    "Progress",
+    "Replied",
+    "Resumed",
+    "conversation_path",
+    "read_result",
+]

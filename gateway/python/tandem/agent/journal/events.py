@@ -1,0 +1,138 @@
+"""Events of a conversation, each a line of JSON. Playing them again gives the same conversation."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import asdict, dataclass, field
+from datetime import datetime, timezone
+from typing import Any, TypeAlias
+
+from ..conversation import Answer, Call, Picture, Reply, Told, Usage
+from ..tools import Tool
+
+
+@dataclass(frozen=True)
+class Begun:
+    """The conversation begins."""
+
+    conversation: str
+    """Its random name, which Idempotency-Keys are made of."""
+
+    instructions: str
+    tools: tuple[Tool, ...]
+    pid: int = field(default_factory=os.getpid)
+    """The process that plays."""
+
+
+@dataclass(frozen=True)
+class Replied:
+    """The model replied. The reply is written down before anything is done about it."""
+
+    reply: Reply
+    usage: Usage
+    """As the endpoint counts, or else an estimate."""
+
+    usd: float | None
+    model_s: float
+    """How long the model took."""
+
+    halves: bool
+    """Whether the conversation had become too long, so that its older half is left out before this reply."""
+
+    seconds: float
+    """The agent's time so far, without that between two processes."""
+
+
+@dataclass(frozen=True)
+class Noted:
+    """The server has the notes on the latest reply."""
+
+
+@dataclass(frozen=True)
+class Answered:
+    """A call of the latest reply was answered."""
+
+    answer: Answer
+    called: bool
+    """False: the call was not made, as after the last that may be."""
+
+    over: bool
+    """Whether the episode is over for this model."""
+
+    phases: tuple[str, ...]
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Halved:
+    """The endpoint found the conversation too long, and its older half was left out."""
+
+
+@dataclass(frozen=True)
+class Resumed:
+    """Another process takes the conversation up."""
+
+    at: str = field(default_factory=lambda: datetime.now(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"))
+    pid: int = field(default_factory=os.getpid)
+
+
+@dataclass(frozen=True)
+class Ended:
+    """The model plays no longer."""
+
+
+Event: TypeAlias = Begun | Replied | Noted | Answered | Told | Halved | Resumed | Ended
+
+_NAMES: dict[type[Event], str] = {
+    Begun: "begun",
+    Replied: "replied",
+    Noted: "noted",
+    Answered: "answered",
+    Told: "told",
+    Halved: "halved",
+    Resumed: "resumed",
+    Ended: "ended",
+}
+
+
+def written(event: Event) -> dict[str, Any]:
+    """Returns an event as JSON has it."""
+    return {"event": _NAMES[type(event)], **asdict(event)}
+
+
+def read(line: dict[str, Any]) -> Event:
+    """Reads an event. Raises KeyError, TypeError or ValueError where a line is none."""
+    fields = {name: value for name, value in line.items() if name != "event"}
+    match line["event"]:
+        case "begun":
+            fields["tools"] = tuple(Tool(**tool) for tool in fields["tools"])
+            return Begun(**fields)
+        case "replied":
+            fields["reply"], fields["usage"] = _reply(fields["reply"]), Usage(**fields["usage"])
+            return Replied(**fields)
+        case "noted":
+            return Noted()
+        case "answered":
+            fields["answer"], fields["phases"] = _answer(fields["answer"]), tuple(fields["phases"])
+            return Answered(**fields)
+        case "told":
+            return Told(**fields)
+        case "halved":
+            return Halved()
+        case "resumed":
+            return Resumed(**fields)
+        case "ended":
+            return Ended()
+        case other:
+            raise ValueError(f"there is no event {other!r}")
+
+
+def _reply(fields: dict[str, Any]) -> Reply:
+    fields["calls"] = tuple(Call(**call) for call in fields["calls"])
+    fields["usage"] = None if fields["usage"] is None else Usage(**fields["usage"])
+    return Reply(**fields)
+
+
+def _answer(fields: dict[str, Any]) -> Answer:
+    fields["call"], fields["pictures"] = Call(**fields["call"]), tuple(Picture(**each) for each in fields["pictures"])
+    return Answer(**fields)

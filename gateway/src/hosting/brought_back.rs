@@ -1,0 +1,190 @@
+//! Episodes of a server that has gone, or of others on the same folder of runs: found by their journals, and held asleep until they are
+//! asked for something. Those that nobody asks for long are put to sleep here, too.
+
+use std::{
+    fs,
+    sync::{Arc, PoisonError},
+    time::Duration,
+};
+
+use tandem_episodes::{EpisodeError, RunFolder, build, recover};
+use tokio::{task::spawn_blocking, time::Instant};
+
+use super::{
+    Caller, EpisodeTable, EpisodeThread, HostedEpisode, HostingError,
+    durable::{JournalReader, Lease, Leasing, LiveFolder, StartKey},
+    hosted_episode::Beside,
+    table::{silence, unknown},
+    team::Team,
+};
+
+/// So many episodes stay awake, however long nobody asks them for anything: each has some megabytes.
+const MOST_AWAKE: usize = 256;
+
+/// An episode may be put aside after a second for so many control steps, which is ten times what bringing it back takes.
+const STEPS_PER_IDLE_S: u32 = 300;
+
+/// How often it is looked for episodes of other servers.
+const LOOK_INTERVAL: Duration = Duration::from_secs(1);
+
+/// The name of a recording under way.
+const PARTIAL_RECORDING: &str = "episode.mcap.partial";
+
+impl EpisodeTable {
+    /// From now on keeps journals in `journals`, and holds the episodes of a server that has gone.
+    pub fn keep_journals(&self, journals: LiveFolder) {
+        let ids = journals.ids();
+        if self.journals.set(journals).is_err() {
+            return;
+        }
+        for id in ids {
+            if self.is_elsewhere(&id) {
+                continue;
+            }
+            match self.adopt(&id) {
+                Ok(_) => tracing::info!(episode = id, "held, and brought back when it is asked for"),
+                Err(error) => tracing::warn!(episode = id, %error, "not held"),
+            }
+        }
+    }
+
+    /// Whether another server plays the episode `id`.
+    fn is_elsewhere(&self, id: &str) -> bool {
+        let Some(journals) = self.journals.get() else { return false };
+        journals.journal(id).is_some_and(|path| Lease::is_elsewhere(&path, &journals.url))
+    }
+
+    /// The episode `id`, played by this server, wherever it has been before.
+    pub async fn awake(self: &Arc<Self>, id: &str) -> Result<HostedEpisode, HostingError> {
+        let hosted = match self.hosted(id) {
+            Ok(hosted) => hosted,
+            Err(unknown) if self.journals.get().is_none() => return Err(unknown),
+            Err(_) => {
+                let (table, id) = (self.clone(), id.to_owned());
+                let adopted = spawn_blocking(move || table.adopt(&id));
+                adopted.await.map_err(|_| HostingError::EpisodeStopped)??
+            }
+        };
+        let there = hosted.thread.awake().await;
+        if there.as_ref().is_err_and(HostingError::is_elsewhere) {
+            self.forget(id);
+        }
+        there.map(|()| hosted)
+    }
+
+    /// As [`EpisodeTable::operator`], of every server on the folder of runs.
+    pub async fn operator_anywhere(self: &Arc<Self>, text: &str) -> Option<Caller> {
+        if let Some(found) = self.operator(text) {
+            return Some(found);
+        }
+        let journals = self.journals.get()?.clone();
+        {
+            let mut looked = self.looked_around.lock().unwrap_or_else(PoisonError::into_inner);
+            if looked.is_some_and(|looked| looked.elapsed() < LOOK_INTERVAL) {
+                return None;
+            }
+            *looked = Some(Instant::now());
+        }
+        let (table, text) = (self.clone(), text.to_owned());
+        let found = spawn_blocking(move || {
+            let others = journals.ids().into_iter().filter(|id| table.hosted(id).is_err());
+            // Every token is compared.
+            others.fold(None, |found, id| table.operator_of(&journals, &id, &text).or(found))
+        });
+        found.await.ok()?
+    }
+
+    /// The operator with this token of an episode that is not held here.
+    fn operator_of(&self, journals: &LiveFolder, id: &str, text: &str) -> Option<Caller> {
+        let heading = JournalReader::open(&journals.journal(id)?).ok()?.heading;
+        let team = Team::of(&heading.start.operators, &heading.driving, None).ok()?;
+        let robot = team.robot_of(text)?.to_owned();
+        Some(Caller::Operator { episode: id.into(), robot })
+    }
+
+    /// Holds the episode `id`, which has a journal, unless another server plays it.
+    fn adopt(&self, id: &str) -> Result<HostedEpisode, HostingError> {
+        let journals = self.journals.get().ok_or_else(|| unknown(id))?;
+        let path = journals.journal(id).filter(|path| path.exists()).ok_or_else(|| unknown(id))?;
+        let failed = |source| HostingError::Journal { path: path.clone(), source };
+        let mut reader = JournalReader::open(&path).map_err(failed)?;
+        let mut entries = Vec::new();
+        while let Some(mut commit) = reader.next_commit().map_err(failed)? {
+            entries.append(&mut commit.asked);
+        }
+        let heading = reader.heading;
+        let folder =
+            RunFolder { path: self.settings.runs.join(id), visibility: heading.visibility, pages: true };
+        if heading.build != build().map_err(EpisodeError::Build)? {
+            tracing::warn!(
+                episode = id,
+                made_by = heading.build,
+                "begun by another build, and not played here"
+            );
+            make_whole(&path, &folder, &journals.url);
+        }
+        let limit = self.settings.max_episodes;
+        let place = self.places.clone().try_acquire_owned();
+        let place = place.map_err(|_| HostingError::TooManyEpisodes { limit })?;
+        let team = match heading.driving.is_per_robot() {
+            true => Some(Team::of(&heading.start.operators, &heading.driving, silence(&heading.spec))?),
+            false => None,
+        };
+        let beside = Arc::new(Beside::new(team));
+        let surroundings = self.surroundings(folder, place, beside.clone());
+        let briefing = &heading.start.briefing;
+        let thread = EpisodeThread::asleep(id, heading.spec, surroundings, briefing, entries.iter());
+        let hosted = HostedEpisode::new(id, Arc::new(thread), beside);
+        if let Some(StartKey { key, args }) = heading.key {
+            self.starts.keep(key, (args, heading.driving), Ok(heading.start));
+        }
+        match self.hold(hosted.clone()) {
+            // Somebody else has been quicker.
+            Err(HostingError::HeldAlready { .. }) => self.hosted(id),
+            held => held.map(|()| hosted),
+        }
+    }
+
+    /// Ends the episodes that nobody plays any more, and puts aside those that nobody misses. To be called every now and then.
+    pub fn tidy_up(&self) {
+        let episodes = self.all();
+        for episode in episodes.iter().filter(|episode| !episode.thread.ended()) {
+            episode.thread.end_if_abandoned(self.settings.idle_timeout);
+        }
+        let mut awake: Vec<_> = episodes.iter().filter(|episode| episode.thread.may_sleep()).collect();
+        let Some(too_many) = awake.len().checked_sub(MOST_AWAKE).filter(|count| *count > 0) else { return };
+        awake.sort_by_key(|episode| std::cmp::Reverse(episode.thread.idle()));
+        for episode in awake.into_iter().take(too_many) {
+            let quiet_s = (episode.thread.env_steps() / STEPS_PER_IDLE_S).max(1);
+            if episode.thread.idle() >= Duration::from_secs(quiet_s.into()) {
+                episode.thread.put_aside();
+            }
+        }
+    }
+
+    /// Shows other servers that this one still plays its episodes, and forgets those that they have taken or ended. To be called every few
+    /// seconds.
+    pub fn look_around(&self) {
+        let Some(journals) = self.journals.get() else { return };
+        for episode in self.all() {
+            if episode.thread.sleeps()
+                && (self.is_elsewhere(episode.id())
+                    || journals.journal(episode.id()).is_none_or(|path| !path.exists()))
+            {
+                self.forget(episode.id());
+            }
+        }
+    }
+}
+
+/// Makes a recording that can be read of one that was left under way.
+fn make_whole(journal: &std::path::Path, folder: &RunFolder, url: &str) {
+    let partial = folder.path.join(PARTIAL_RECORDING);
+    // Nobody else is to do the same.
+    let Ok(Leasing::Taken(_lease)) = Lease::take(journal, url) else { return };
+    if fs::exists(&partial).unwrap_or(false)
+        && let Err(error) = recover(&partial)
+    {
+        tracing::warn!(%error, "its recording is not whole");
+    }
+}

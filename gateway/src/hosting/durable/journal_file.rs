@@ -1,0 +1,215 @@
+//! The journal of an episode as a file: a line that says what the episode is, then a line for everything that was answered at once. A line
+//! is written whole or counts for nothing, so that what was done and what was answered are never one without the other.
+
+use std::{
+    fs::{self, File, OpenOptions},
+    io::{self, BufRead, BufReader, Write},
+    path::{Path, PathBuf},
+};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use tandem_episodes::{EpisodeSpec, JournalEntry, Visibility};
+use tandem_tools_spec::{Call, Driving, Heard, Observation, Partner, StartEpisode, StartReply};
+
+use crate::{hosting::Answer, settings::Durability};
+
+/// What the lines say has changed whenever this has.
+const FORMAT: u32 = 1;
+
+/// What an episode is, and how it was started.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Heading {
+    format: u32,
+    /// The build that plays it.
+    pub build: String,
+    pub spec: EpisodeSpec,
+    pub visibility: Visibility,
+    pub driving: Driving,
+    /// What the caller was told, tokens included.
+    pub start: StartReply,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub key: Option<StartKey>,
+}
+
+/// The idempotency key of a start, and what came with it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StartKey {
+    pub key: String,
+    pub args: StartEpisode,
+}
+
+/// A call with a key, whose answer is kept for who asks again.
+#[derive(Debug, Clone)]
+pub struct Keyed {
+    pub key: String,
+    pub request: Call,
+}
+
+/// What was answered at once: what was asked, what those were told who gave a key, and what the host has to remember then.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub struct Commit {
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub asked: Vec<JournalEntry>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub answers: Vec<KeptAnswer>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub memory: Option<Value>,
+}
+
+/// An answer, and the request that it answers.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct KeptAnswer {
+    pub key: String,
+    tool: String,
+    arguments: Value,
+    reply: Value,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    step: Option<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    observation: Option<Observation>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    partners: Vec<Partner>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    heard: Vec<Heard>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    recording_failed: Option<String>,
+    #[serde(default)]
+    others_play_on: bool,
+}
+
+/// A journal that is written.
+#[derive(Debug)]
+pub struct JournalFile {
+    path: PathBuf,
+    file: File,
+    durability: Durability,
+}
+
+/// A journal that is read, line by line.
+pub struct JournalReader {
+    pub heading: Heading,
+    lines: BufReader<File>,
+    /// How much of the file is whole lines.
+    whole_bytes: u64,
+}
+
+impl Heading {
+    pub fn new(
+        build: &str,
+        spec: EpisodeSpec,
+        visibility: Visibility,
+        driving: &Driving,
+        start: StartReply,
+        key: Option<StartKey>,
+    ) -> Heading {
+        Heading { format: FORMAT, build: build.into(), spec, visibility, driving: *driving, start, key }
+    }
+}
+
+impl KeptAnswer {
+    /// The answer to `keyed`, kept as it was told.
+    pub fn new(keyed: &Keyed, answer: &Answer) -> Result<KeptAnswer, serde_json::Error> {
+        Ok(KeptAnswer {
+            key: keyed.key.clone(),
+            tool: keyed.request.name().into(),
+            arguments: serde_json::to_value(&keyed.request)?,
+            reply: serde_json::to_value(&answer.reply)?,
+            step: answer.step,
+            observation: answer.observation.clone(),
+            partners: answer.partners.clone(),
+            heard: answer.heard.clone(),
+            recording_failed: answer.recording_failed.clone(),
+            others_play_on: answer.others_play_on,
+        })
+    }
+
+    /// The request, and the answer as it was told.
+    pub fn read(self) -> Result<(Call, Answer), String> {
+        let request = Call::parse(&self.tool, self.arguments).map_err(|error| error.to_string())?;
+        let reply = request.tool.parse_reply(self.reply).map_err(|error| error.to_string())?;
+        let KeptAnswer { step, observation, partners, heard, recording_failed, others_play_on, .. } = self;
+        Ok((request, Answer { reply, step, observation, partners, heard, recording_failed, others_play_on }))
+    }
+}
+
+impl JournalFile {
+    /// Begins the journal at `path`.
+    pub fn create(path: &Path, heading: &Heading, durability: Durability) -> io::Result<JournalFile> {
+        let file = private_file(path)?;
+        let mut journal = JournalFile { path: path.into(), file, durability };
+        match journal.append(heading) {
+            Ok(()) => Ok(journal),
+            Err(error) => {
+                // Half a heading says nothing.
+                let _ = journal.remove();
+                Err(error)
+            }
+        }
+    }
+
+    /// Goes on with a journal that has been read to its end.
+    pub fn go_on(path: &Path, read: JournalReader, durability: Durability) -> io::Result<JournalFile> {
+        let file = OpenOptions::new().append(true).open(path)?;
+        file.set_len(read.whole_bytes)?;
+        Ok(JournalFile { path: path.into(), file, durability })
+    }
+
+    /// Writes a line more. After an error the journal is not to be used any more.
+    pub fn append(&mut self, line: &impl Serialize) -> io::Result<()> {
+        let mut bytes = serde_json::to_vec(line)?;
+        bytes.push(b'\n');
+        self.file.write_all(&bytes)?;
+        match self.durability {
+            Durability::System => Ok(()),
+            Durability::Disk => self.file.sync_data(),
+        }
+    }
+
+    /// Removes it: the episode is not to be brought back.
+    pub fn remove(self) -> io::Result<()> {
+        fs::remove_file(&self.path)
+    }
+}
+
+impl JournalReader {
+    /// Reads what the episode at `path` is.
+    pub fn open(path: &Path) -> io::Result<JournalReader> {
+        let mut lines = BufReader::new(File::open(path)?);
+        let (heading, bytes) = read_line::<Heading>(&mut lines)?
+            .ok_or_else(|| io::Error::other("the first line of the journal is missing"))?;
+        if heading.format != FORMAT {
+            let found = heading.format;
+            return Err(io::Error::other(format!("the journal is of format {found}, and this is {FORMAT}")));
+        }
+        Ok(JournalReader { heading, lines, whole_bytes: bytes })
+    }
+
+    /// What was answered next; none after the last line that is whole.
+    pub fn next_commit(&mut self) -> io::Result<Option<Commit>> {
+        let read = read_line(&mut self.lines)?;
+        Ok(read.map(|(commit, bytes)| {
+            self.whole_bytes += bytes;
+            commit
+        }))
+    }
+}
+
+/// A new file that nobody but its owner may read: it holds tokens.
+fn private_file(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.write(true).create(true).truncate(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    options.open(path)
+}
+
+/// A line that is whole, and its length.
+fn read_line<T: for<'a> Deserialize<'a>>(lines: &mut impl BufRead) -> io::Result<Option<(T, u64)>> {
+    let mut line = Vec::new();
+    lines.read_until(b'\n', &mut line)?;
+    match line.last() {
+        Some(b'\n') => Ok(Some((serde_json::from_slice(&line)?, line.len() as u64))),
+        _ => Ok(None),
+    }
+}

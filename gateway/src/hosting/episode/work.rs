@@ -1,0 +1,437 @@
+//! The thread of an episode at work: job after job, each written into the episode's journal before it is answered.
+
+use std::{
+    sync::{Arc, Mutex, PoisonError},
+    thread,
+    time::Duration,
+};
+
+use serde_json::Value;
+use tandem_episodes::{
+    BringBack, CallReply, Clock, EpisodeError, EpisodeSpec, RESULT_FILE, RunFolder, Session, build,
+    live::LiveView, monotonic,
+};
+use tandem_tools_spec::{Briefing, Call, ManageReply, ResultReply, ToolReply};
+use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
+
+use super::{
+    Surroundings,
+    job::{Job, ReplySender},
+    onlookers::{FeedEnd, LiveFeed},
+    panic_guard::{EpisodeMetrics, PanicGuard},
+    status::SharedStatus,
+};
+use crate::{
+    hosting::{
+        Answer, HostingError, RefusedCall,
+        durable::{
+            Commit, Heading, JournalFile, JournalReader, KeptAnswer, Keyed, Lease, Leasing, LiveFolder,
+        },
+    },
+    metrics::Metrics,
+};
+
+/// The contact solver keeps large temporaries on the stack.
+const STACK_BYTES: usize = 8 << 20;
+
+/// What a host knows of an episode beside its world.
+pub trait HostMemory: std::fmt::Debug + Send + Sync {
+    /// What of it decides what is told later.
+    fn memory(&self) -> Value;
+
+    /// Takes over what was remembered elsewhere, and the answers that may be asked for again.
+    fn restore(&self, memory: Option<Value>, answers: Vec<KeptAnswer>);
+
+    /// Lets go of what [`HostMemory::restore`] brings again: the episode is put aside.
+    fn let_go(&self);
+
+    /// Whether somebody in this process plays, who would be missed.
+    fn is_busy(&self) -> bool;
+}
+
+/// All that a thread needs to play an episode, whichever thread it is.
+#[derive(Debug)]
+pub struct Stage {
+    pub id: String,
+    pub spec: EpisodeSpec,
+    pub folder: RunFolder,
+    pub metrics: Arc<Metrics>,
+    pub status: SharedStatus,
+    pub feed: LiveFeed,
+    /// The place that it takes among the episodes.
+    pub place: Mutex<Option<OwnedSemaphorePermit>>,
+    pub memory: Arc<dyn HostMemory>,
+    /// Where its journal is, if it has one.
+    pub journals: Option<LiveFolder>,
+    /// One thread plays at a time.
+    pub turn: Mutex<()>,
+}
+
+/// How a thread comes by the session.
+pub enum Opening {
+    /// It begins.
+    New { clock: Clock, started: oneshot::Sender<Result<Briefing, EpisodeError>> },
+    /// It is brought back, its policy having thought for so long since it was last answered.
+    Again { thinking: Duration },
+}
+
+/// A session, and the journal that it is written into.
+struct Desk<'a> {
+    stage: &'a Stage,
+    session: PanicGuard,
+    log: Option<Log>,
+}
+
+/// The journal of an episode that this process plays.
+struct Log {
+    file: JournalFile,
+    lease: Lease,
+    /// What was remembered last.
+    memory: Value,
+}
+
+/// What an episode came to, or why that is not known.
+type Outcome = Result<ResultReply, HostingError>;
+
+/// How it ended.
+enum Left {
+    /// Who asked for the end, and what they are to be told once the place is free.
+    Closed(Option<(ReplySender<ResultReply>, Box<Outcome>)>),
+    Asleep,
+}
+
+/// Starts a thread that plays the episode.
+pub fn spawn(stage: Arc<Stage>, opening: Opening, inbox: mpsc::Receiver<Job>) -> Result<(), HostingError> {
+    let name = stage.id.clone();
+    let thread = move || {
+        // Every line that is logged on this thread names the episode.
+        let _named = tracing::info_span!("thread", episode = stage.id).entered();
+        play(&stage, opening, inbox);
+    };
+    let builder = thread::Builder::new().name(name).stack_size(STACK_BYTES);
+    builder.spawn(thread).map(drop).map_err(HostingError::Thread)
+}
+
+fn play(stage: &Stage, opening: Opening, mut inbox: mpsc::Receiver<Job>) {
+    let turn = stage.turn.lock().unwrap_or_else(PoisonError::into_inner);
+    let desk = match opening {
+        Opening::New { clock, started } => match stage.begin(clock) {
+            Ok((session, briefing)) => {
+                // A caller that went away during the start has dropped the inbox's other end, and work returns.
+                let _ = started.send(Ok(briefing));
+                Desk { stage, session, log: None }
+            }
+            Err(error) => return drop(started.send(Err(error))),
+        },
+        Opening::Again { thinking } => match stage.bring_back(thinking) {
+            Ok(desk) => desk,
+            Err(why) => {
+                tracing::warn!(%why, "not brought back");
+                stage.status.fall_asleep(Duration::ZERO);
+                drop(turn);
+                inbox.close();
+                let why = Arc::new(why);
+                while let Some(job) = inbox.blocking_recv() {
+                    job.refuse(&why);
+                }
+                return;
+            }
+        },
+    };
+    let Left::Closed(told) = desk.work(inbox) else { return };
+    stage.feed.close();
+    // The place is free before the caller hears of the end, so that it can start the next episode.
+    stage.place.lock().unwrap_or_else(PoisonError::into_inner).take();
+    if let Some((reply, result)) = told {
+        let _ = reply.send(*result);
+    }
+}
+
+impl Stage {
+    pub fn new(id: &str, spec: EpisodeSpec, surroundings: Surroundings, status: SharedStatus) -> Stage {
+        let Surroundings { folder, place, metrics, memory, journals } = surroundings;
+        Stage {
+            id: id.into(),
+            spec,
+            folder,
+            metrics,
+            status,
+            feed: LiveFeed::new(),
+            place: Mutex::new(Some(place)),
+            memory,
+            journals,
+            turn: Mutex::default(),
+        }
+    }
+
+    /// Removes the journal of an episode that sleeps, which is not to be brought back.
+    pub fn forget_journal(&self) -> Result<(), HostingError> {
+        let Some(path) = self.journals.as_ref().and_then(|journals| journals.journal(&self.id)) else {
+            return Ok(());
+        };
+        match std::fs::remove_file(&path) {
+            Err(source) if source.kind() != std::io::ErrorKind::NotFound => {
+                Err(HostingError::Journal { path, source })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn guarded(&self, session: Session) -> PanicGuard {
+        PanicGuard::new(session, EpisodeMetrics::new(self.metrics.clone()))
+    }
+
+    fn onlookers(&self) -> Result<Box<FeedEnd>, HostingError> {
+        self.feed.end().map(Box::new).ok_or(HostingError::EpisodeStopped)
+    }
+
+    fn begin(&self, clock: Clock) -> Result<(PanicGuard, Briefing), EpisodeError> {
+        let mut session = Session::start_with_clock(&self.spec, Some(self.folder.clone()), clock)?;
+        if let Some(feed) = self.feed.end() {
+            session.set_onlookers(Box::new(feed));
+        }
+        let briefing = session.briefing();
+        Ok((self.guarded(session), briefing))
+    }
+
+    /// Takes the lease, and plays the journal again.
+    fn bring_back(&self, thinking: Duration) -> Result<Desk<'_>, HostingError> {
+        let unknown = || HostingError::UnknownEpisode { id: self.id.clone() };
+        let journals = self.journals.as_ref().ok_or_else(unknown)?;
+        let path = journals.journal(&self.id).filter(|path| path.exists()).ok_or_else(unknown)?;
+        let failed = |source| HostingError::Journal { path: path.clone(), source };
+        let lease = match Lease::take(&path, &journals.url).map_err(failed)? {
+            Leasing::Taken(lease) => lease,
+            Leasing::Held { url } => return Err(HostingError::HeldElsewhere { id: self.id.clone(), url }),
+        };
+        let mut reader = JournalReader::open(&path).map_err(failed)?;
+        let this = build().map_err(EpisodeError::Build)?;
+        if reader.heading.build != this {
+            let folder = self.folder.path.clone();
+            return Err(HostingError::OtherBuild { made_by: reader.heading.build, this, folder });
+        }
+        let (mut entries, mut answers, mut memory) = (Vec::new(), Vec::new(), None);
+        while let Some(commit) = reader.next_commit().map_err(failed)? {
+            let Commit { mut asked, answers: mut told, memory: remembered } = commit;
+            entries.append(&mut asked);
+            answers.append(&mut told);
+            memory = remembered.or(memory);
+        }
+        // What has ended and is written is not written again.
+        let is_written = entries.last().is_some_and(|entry| entry.ended.is_some())
+            && self.folder.path.join(RESULT_FILE).exists();
+        let session = Session::bring_back(BringBack {
+            spec: self.spec.clone(),
+            folder: (!is_written).then(|| self.folder.clone()),
+            entries,
+            clock: monotonic(),
+            thinking,
+            onlookers: self.onlookers()?,
+        })?;
+        let file = JournalFile::go_on(&path, reader, journals.durability).map_err(failed)?;
+        let log = Log { file, lease, memory: memory.clone().unwrap_or_default() };
+        self.memory.restore(memory, answers);
+        tracing::info!("brought back");
+        let metrics = EpisodeMetrics::again(self.metrics.clone(), &session);
+        let session = PanicGuard::again(session, metrics);
+        self.status.update(&session);
+        self.status.is_back();
+        Ok(Desk { stage: self, session, log: Some(log) })
+    }
+}
+
+impl Desk<'_> {
+    /// Does jobs until one asks for the end or for sleep, or nobody is left who could send one.
+    fn work(mut self, mut inbox: mpsc::Receiver<Job>) -> Left {
+        self.stage.status.update(&self.session);
+        let mut asleep = false;
+        while let Some(job) = inbox.blocking_recv() {
+            match job {
+                Job::Sleep if self.log.is_some() => {
+                    let thinking = self.session.run(|session| session.thinking()).unwrap_or_default();
+                    self.stage.status.fall_asleep(thinking);
+                    // What has come by now is done all the same; what comes later wakes it up.
+                    inbox.close();
+                    asleep = true;
+                }
+                Job::Close { keep, reply } => return Left::Closed(Some((reply, Box::new(self.close(keep))))),
+                job => self.do_job(job),
+            }
+        }
+        if asleep {
+            self.stage.memory.let_go();
+            return Left::Asleep;
+        }
+        // Nobody is left who could be told.
+        let _ = self.close(true);
+        Left::Closed(None)
+    }
+
+    /// A reply that cannot be sent means that the caller has gone. What was done stays done. The log has the reason of what is refused and
+    /// told to nobody.
+    fn do_job(&mut self, job: Job) {
+        match job {
+            Job::Call { operator, call, keyed, told, reply } => {
+                let answer = self.session.run(|session| answer(session, operator.as_deref(), *call));
+                let answer = told(answer.flatten());
+                self.commit(keyed.as_ref().zip(answer.as_ref().ok()));
+                let _ = reply.send(answer);
+            }
+            Job::ReadCommand { call, reply } => {
+                let command = self.session.run(|session| Ok(session.read_command(*call)?)).flatten();
+                self.commit(None);
+                let _ = reply.send(command);
+            }
+            Job::Together { commands, keyed, told, reply } => {
+                let answers = told(self.session.run(|session| together(session, commands)).flatten());
+                let told = answers.as_deref().unwrap_or_default();
+                self.commit(keyed.iter().zip(told).filter_map(|(keyed, told)| Some((keyed.as_ref()?, told))));
+                let _ = reply.send(answers);
+            }
+            Job::KeepAnswer { keyed, answer, reply } => {
+                self.commit([(&keyed, &*answer)]);
+                let _ = reply.send(Ok(*answer));
+            }
+            Job::Note { operator, note, reply } => {
+                let kept = self.session.run(|session| Ok(session.note(operator.as_deref(), *note)?));
+                self.commit(None);
+                let _ = reply.send(kept.flatten());
+            }
+            Job::Refused { operator, call, reply } => {
+                let kept = self.session.run(|session| refused(session, operator.as_deref(), *call));
+                self.commit(None);
+                let _ = reply.send(kept);
+            }
+            Job::Status { reply } => drop(reply.send(self.session.run(|session| standing(session)))),
+            Job::Briefing { reply } => drop(reply.send(self.session.run(|session| session.briefing()))),
+            Job::Watch { operator, reply } => {
+                let view = self.session.run(|session| view(session, operator.as_deref()));
+                self.commit(None);
+                let _ = reply.send(view.flatten());
+            }
+            Job::Work(work) => {
+                work(Ok((&mut self.session, &self.stage.status)));
+                self.commit(None);
+            }
+            Job::EndIfAbandoned { idle } => {
+                let _ = self.session.run(|session| session.end_if_abandoned(idle));
+                self.commit(None);
+                if self.session.ended().is_some() {
+                    tracing::info!("abandoned, and ended");
+                }
+            }
+            Job::End { reason } => {
+                let _ = self.session.run(|session| session.end(reason));
+                self.commit(None);
+            }
+            Job::BeginJournal { heading, reply } => drop(reply.send(self.begin_journal(&heading))),
+            Job::Awake { reply } => drop(reply.send(Ok(()))),
+            Job::Sleep | Job::Close { .. } => {}
+        }
+    }
+
+    /// Writes down what has been done, and what of it is answered to those who gave a key.
+    fn commit<'a>(&mut self, answers: impl IntoIterator<Item = (&'a Keyed, &'a Answer)>) {
+        self.stage.status.update(&self.session);
+        let Some(log) = &mut self.log else { return };
+        let written = self
+            .session
+            .run(|session| session.take_journal())
+            .map_err(|panicked| panicked.to_string())
+            .flatten()
+            .and_then(|asked| {
+                let kept = answers.into_iter().map(|(keyed, answer)| KeptAnswer::new(keyed, answer));
+                let kept: Vec<KeptAnswer> =
+                    kept.collect::<Result<_, _>>().map_err(|error| error.to_string())?;
+                let now = self.stage.memory.memory();
+                let memory = (now != log.memory).then(|| now.clone());
+                log.memory = now;
+                log.lease.renew();
+                match asked.is_empty() && kept.is_empty() && memory.is_none() {
+                    true => Ok(()),
+                    false => {
+                        let commit = Commit { asked, answers: kept, memory };
+                        log.file.append(&commit).map_err(|error| error.to_string())
+                    }
+                }
+            });
+        if let Err(why) = written {
+            tracing::error!(why, "the journal ends here; the episode goes on, and is not brought back");
+            self.forget();
+        }
+    }
+
+    fn begin_journal(&mut self, heading: &Heading) -> Result<(), HostingError> {
+        let Some(journals) = &self.stage.journals else { return Ok(()) };
+        let Some(path) = journals.journal(&self.stage.id) else { return Ok(()) };
+        let begun = journals.create().and_then(|()| match Lease::take(&path, &journals.url)? {
+            Leasing::Taken(lease) => {
+                let file = JournalFile::create(&path, heading, journals.durability)?;
+                Ok(Log { file, lease, memory: self.stage.memory.memory() })
+            }
+            Leasing::Held { url } => {
+                Err(std::io::Error::other(format!("{url} plays an episode of this name")))
+            }
+        });
+        match begun {
+            Ok(log) => {
+                // After a panic there is nothing to keep.
+                let _ = self.session.run(Session::keep_journal);
+                self.log = Some(log);
+                self.stage.status.durable.store(true, std::sync::atomic::Ordering::Relaxed);
+            }
+            Err(error) => {
+                tracing::warn!(%error, "no journal; a server that is started again does not bring it back")
+            }
+        }
+        Ok(())
+    }
+
+    /// Removes the journal.
+    fn forget(&mut self) {
+        self.stage.status.durable.store(false, std::sync::atomic::Ordering::Relaxed);
+        if let Some(Log { file, .. }) = self.log.take()
+            && let Err(error) = file.remove()
+        {
+            tracing::error!(%error, "the journal stays");
+        }
+    }
+
+    fn close(mut self, keep: bool) -> Result<ResultReply, HostingError> {
+        if !keep {
+            self.forget();
+        }
+        let result = self.session.close();
+        result.inspect(|result| drop(self.stage.status.result.set(result.clone())))
+    }
+}
+
+fn answer(session: &mut Session, operator: Option<&str>, call: Call) -> Result<Answer, HostingError> {
+    let reply = session.ask(operator, call)?;
+    Ok(Answer::new(reply, session))
+}
+
+fn together(
+    session: &mut Session,
+    commands: Vec<tandem_episodes::OperatorCommand>,
+) -> Result<Vec<Answer>, HostingError> {
+    let replies = session.together(commands)?;
+    Ok(replies.into_iter().map(|reply| Answer::new(reply, session)).collect())
+}
+
+fn refused(session: &mut Session, operator: Option<&str>, call: RefusedCall) {
+    let RefusedCall { tool, arguments, problem } = call;
+    session.refused_before(operator, &tool, &arguments, &problem);
+}
+
+fn view(session: &mut Session, operator: Option<&str>) -> Result<LiveView, HostingError> {
+    match operator {
+        Some(robot) => Ok(session.drivers_view(robot)?),
+        None => Ok(session.live_view()),
+    }
+}
+
+fn standing(session: &Session) -> Answer {
+    let reply = ToolReply::Manage(ManageReply::GetStatus(session.status()));
+    Answer::new(CallReply { reply, observation: None }, session)
+}
