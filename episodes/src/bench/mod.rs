@@ -4,6 +4,7 @@ mod carrying;
 mod env;
 mod falls;
 mod holding;
+mod placing;
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -77,6 +78,10 @@ pub fn locomotion(
     holding::run(robot, controller, sensing, filter, seeds, &mut |held| {
         done(&held);
         report.cases.push(held);
+    })?;
+    placing::run(robot, controller, sensing, filter, seeds, &mut |placed| {
+        done(&placed);
+        report.cases.push(placed);
     })?;
     Ok(report)
 }

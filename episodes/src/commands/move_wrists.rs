@@ -102,13 +102,14 @@ fn aims(entry: &WristMove, motion: &Motion) -> Sides<Aim> {
 /// Position and orientation of a wrist, each of which may be left out.
 type Halves = (Option<[f64; 3]>, Option<[f64; 4]>);
 
-/// Targets of the wrists in the pelvis frame that are given in `frame`.
+/// Targets of the wrists in the pelvis frame that are given in `frame`. A half that is left out stays as it was asked for: were it to stay
+/// where the hand has given way to, each command would let it give way anew.
 pub fn wrist_targets(
     halves: Sides<Halves>,
     frame: PoseFrame,
     motion: &Motion,
 ) -> Sides<Option<Isometry3<f64>>> {
-    let present = motion.targets();
+    let present = motion.told_wrists();
     if frame == PoseFrame::Pelvis {
         // Through another frame and back, what is left out would not stay to the last bit.
         return Sides::from_fn(|side| wrist_target(halves[side].0, halves[side].1, &present[side]));

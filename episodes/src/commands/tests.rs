@@ -142,6 +142,23 @@ fn hands_give_way_as_they_were_told_to_and_come_back() {
     assert!(off_m(&motion).norm() < 1e-3, "{}", off_m(&motion));
 }
 
+/// A hand that is told again how to be turned, and not where to be, is to stay where it was asked to be: pulled on and on, it gives way by
+/// no more than the most of one command.
+#[test]
+fn targets_that_are_left_out_do_not_go_on_from_where_hands_have_given_way_to() {
+    let mut motion = arrived();
+    let there_m = wrist_in_world_m(&motion);
+    for command in 0..6 {
+        let position_m = right_hand(false).right_position_m.filter(|_| command == 0);
+        let entry =
+            WristMove { right_position_m: position_m, compliance_n_s_m: Some(250.0), ..right_hand(false) };
+        let goal = action(entry, &motion);
+        play_pulled(goal, Vector3::zeros(), Vector3::new(30.0, 0.0, 0.0), &mut motion);
+        let off_m = (wrist_in_world_m(&motion) - there_m).norm();
+        assert!((0.05..0.061).contains(&off_m), "{off_m} m after command {command}");
+    }
+}
+
 /// Both hands before the chest of a robot that faces left, and what they ask for; they may give way as `soft` has it.
 fn both_hands(soft: WristMove) -> (Motion, RobotAction) {
     let mut motion = standing();

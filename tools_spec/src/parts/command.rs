@@ -149,8 +149,8 @@ pub struct HandReport {
     /// What stops the hand, as far as it can feel that; left out where it feels nothing, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub touches: Option<Touch>,
-    /// The wrist pose that was asked for, in the pelvis frame as it is now; of an arm without a wrist target, the pose that
-    /// its joint targets stand for. Left out of a short reply.
+    /// The wrist pose that was asked for, in the pelvis frame as it is now, and not where the hand has given way to since; of an arm
+    /// without a wrist target, the pose that its joint targets stand for. Left out of a short reply.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<Pose>,
     /// The wrist pose that was measured, in the pelvis frame as it is now, its quaternion with the sign that is nearer to the target's.
@@ -163,10 +163,10 @@ pub struct HandReport {
     /// Angle from target to measured, in radians; left out as the distance is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation_error_rad: Option<f64>,
-    /// How far the hand has given way to what pulls it, by the command's compliance: its target is moved so far, [x, y, z] in metres in
-    /// the pelvis frame. Left out where it has not, and where the assistance is "paper".
+    /// How far the hand has given way to what pulls it, by the command's compliance: it is to be so far from `target`, [x, y, z] in metres
+    /// in the pelvis frame, and its state is told against that. Left out where it has not, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub compliance_offset_m: Option<[f64; 3]>,
+    pub given_way_m: Option<[f64; 3]>,
     /// Its fingers; left out of a short reply where they have arrived.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fingers: Option<FingerReport>,

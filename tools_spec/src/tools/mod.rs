@@ -35,4 +35,4 @@ pub use start_episode::{
 };
 pub use wait::Wait;
 pub use walk::{Walk, WalkMove};
-pub use walk_to::{Destination, WalkTo};
+pub use walk_to::{Destination, WalkTo, Waypoint};

@@ -155,6 +155,23 @@ fn what_may_be_left_out_has_its_default() {
     }
 }
 
+/// A team that carries goes by its waypoints together.
+#[test]
+fn robots_that_carry_have_as_many_waypoints_as_each_other() {
+    let call = |carry: bool, counts: [usize; 2]| {
+        let entry = |(robot, count): (&str, usize)| {
+            let waypoints = vec![json!({ "at_m": [0.1, 0.2] }); count];
+            json!({ "robot": robot, "to_m": [0.0, 0.5], "waypoints": waypoints, "carry": carry })
+        };
+        let robots: Vec<Value> = ["A", "B"].into_iter().zip(counts).map(entry).collect();
+        let call = tandem_tools_spec::Call::parse("walk_to", json!({ "steps": 500, "robots": robots }));
+        call.err().map(|refusal| refusal.to_string())
+    };
+    assert_eq!((call(true, [2, 2]), call(false, [1, 2])), (None, None));
+    assert!(call(true, [1, 2]).is_some_and(|refusal| refusal.contains("each as many")));
+    assert!(call(false, [11, 0]).is_some_and(|refusal| refusal.contains("10 at most")));
+}
+
 /// Arguments that are shown to a caller are such as its schema has them: with the episode where it is named there, and without null.
 #[test]
 fn examples_fit_the_schemas() {

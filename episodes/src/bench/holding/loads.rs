@@ -13,7 +13,7 @@ use crate::scoring::{A, B, C};
 use crate::tasks::{self, Task};
 
 /// Something that a team holds, and the task from whose start the team takes it.
-pub(super) struct SharedLoad {
+pub(in crate::bench) struct SharedLoad {
     pub name: &'static str,
     pub object: &'static str,
     /// Robot, its two places on the object, and which way it faces in the object's frame.
@@ -30,7 +30,7 @@ pub(super) struct SharedLoad {
 
 const TWO_THIRDS_RAD: f32 = 2.0 * PI / 3.0;
 
-pub(super) const TABLE: SharedLoad = SharedLoad {
+pub(in crate::bench) const TABLE: SharedLoad = SharedLoad {
     name: "shared_table",
     object: "office_table",
     holders: &[(A, ["a_left", "a_right"], 0.0), (B, ["b_left", "b_right"], PI)],
@@ -41,7 +41,7 @@ pub(super) const TABLE: SharedLoad = SharedLoad {
     way_m: [0.0, -0.3],
 };
 
-pub(super) const ROUND_TABLE: SharedLoad = SharedLoad {
+pub(in crate::bench) const ROUND_TABLE: SharedLoad = SharedLoad {
     name: "shared_round_table",
     object: "round_table",
     holders: &[
@@ -56,7 +56,7 @@ pub(super) const ROUND_TABLE: SharedLoad = SharedLoad {
     way_m: [0.3, 0.0],
 };
 
-pub(super) const LEGS: SharedLoad = SharedLoad {
+pub(in crate::bench) const LEGS: SharedLoad = SharedLoad {
     name: "shared_legs",
     object: "console_table",
     holders: &[(B, ["b_left", "b_right"], PI), (C, ["c_left", "c_right"], 0.0)],
@@ -67,7 +67,7 @@ pub(super) const LEGS: SharedLoad = SharedLoad {
     way_m: [0.3, 0.0],
 };
 
-pub(super) const BASKET: SharedLoad = SharedLoad {
+pub(in crate::bench) const BASKET: SharedLoad = SharedLoad {
     name: "shared_basket",
     object: "basket",
     holders: &[(A, ["a_left", "a_right"], 0.0), (B, ["b_left", "b_right"], PI)],
@@ -78,7 +78,7 @@ pub(super) const BASKET: SharedLoad = SharedLoad {
     way_m: [0.0, -0.3],
 };
 
-pub(super) const BAR: SharedLoad = SharedLoad {
+pub(in crate::bench) const BAR: SharedLoad = SharedLoad {
     name: "shared_bar",
     object: "bar",
     holders: &[(A, ["a_left", "a_right"], 0.0), (B, ["b_left", "b_right"], 0.0)],
@@ -93,23 +93,23 @@ const PACE_M_S: f32 = 0.2;
 
 impl SharedLoad {
     /// Returns the task in which the object is carried.
-    pub(super) fn task(&self) -> &'static Task {
+    pub(in crate::bench) fn task(&self) -> &'static Task {
         let has_it = |task: &&'static Task| task.objects.iter().any(|spot| spot.name == self.object);
         tasks::ALL.iter().find(has_it).unwrap_or(&carrying::TASK)
     }
 
     /// Number of robots that hold it.
-    pub(super) fn team_size(&self) -> usize {
+    pub(in crate::bench) fn team_size(&self) -> usize {
         self.holders.len()
     }
 
     /// The robots that hold it.
-    pub(super) fn team(&self) -> impl Iterator<Item = usize> {
+    pub(in crate::bench) fn team(&self) -> impl Iterator<Item = usize> {
         self.holders.iter().map(|(robot, ..)| *robot)
     }
 
     /// Takes the object and lifts it; if `carried`, goes a little way with it.
-    pub(super) fn take(&self, episode: &mut InProcess, carried: bool) -> Result<(), PlayerError> {
+    pub(in crate::bench) fn take(&self, episode: &mut InProcess, carried: bool) -> Result<(), PlayerError> {
         self.with_team(episode, |commander, team| {
             if !carried {
                 return Ok(());
@@ -125,7 +125,7 @@ impl SharedLoad {
     }
 
     /// Takes the object, lifts it, and goes on as `then` says.
-    pub(super) fn with_team(
+    pub(in crate::bench) fn with_team(
         &self,
         episode: &mut InProcess,
         then: impl FnOnce(&mut Commander, &mut CarryTeam) -> Result<(), PlayerError>,

@@ -4,7 +4,7 @@
 //! and all arms to stay as they are, but for what the case adds.
 
 mod disturbance;
-mod loads;
+pub(super) mod loads;
 mod measure;
 
 use std::ops::RangeInclusive;

@@ -83,17 +83,19 @@ fn hand_report(
     frame: PoseFrame,
 ) -> HandReport {
     let (arm, hand) = (columns::arm(side), columns::hand(side));
-    let target = motion.targets()[side];
+    // Where the hand has given way to since is told beside it, or a target that is sent again would go on from there.
+    let asked = motion.state().aims[side].in_pelvis(motion.world_from_pelvis());
+    let asked = asked.unwrap_or_else(|| motion.commanded_wrists()[side]);
     let measured = isometry_from_sim(&sensed.pelvis_from_wrist[side]);
-    let missing = measured.inverse() * target;
+    let missing = measured.inverse() * asked;
     let robot = &motion.robot;
     let force_n = sensed.hand_force_in_pelvis_n[side];
-    let state = wrist_state(side, &target, &measured, sensed, motion);
+    let state = wrist_state(side, &motion.targets()[side], &measured, sensed, motion);
     let Felt { grip, presses, touch } = feel::felt(side, sensed, &robot.model);
     let is_pushed = state == HandState::Blocked && force_n.length() > TOUCHED_N;
     let frame_from_pelvis = motion.pelvis_from(frame).inverse();
     let [target_told, mut measured_told] =
-        [target, measured].map(|wrist| coarse_pose(&(frame_from_pelvis * wrist)));
+        [asked, measured].map(|wrist| coarse_pose(&(frame_from_pelvis * wrist)));
     let signs = target_told.quaternion_wxyz.iter().zip(&measured_told.quaternion_wxyz);
     if signs.map(|(one, other)| one * other).sum::<f64>() < 0.0 {
         measured_told.quaternion_wxyz = measured_told.quaternion_wxyz.map(|part| 0.0 - part);
@@ -107,7 +109,7 @@ fn hand_report(
         measured: Some(measured_told),
         position_error_m: Some(coarse(missing.translation.vector.norm())),
         orientation_error_rad: Some(coarse(missing.rotation.angle())),
-        compliance_offset_m: motion
+        given_way_m: motion
             .given_way_m(side)
             .map(|offset_m| [offset_m.x, offset_m.y, offset_m.z].map(coarse)),
         fingers: Some(fingers(side, sensed, motion)),

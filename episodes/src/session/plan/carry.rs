@@ -1,33 +1,40 @@
-//! `walk_to` of robots that push or carry: bases and hands go along one path, from rest to rest, each robot's in its own start frame.
+//! `walk_to` of robots that push or carry: bases and hands go along one path, from rest to rest, each robot's
+//! in its own start frame.
 //!
-//! A path is a turn and a shift at a constant rate, as of one rigid body. Robots that hold one load, and whose places fit it, so go as if
-//! they were one body with it all along the way, though none of them knows where the others are.
+//! A path is a row of ways, each a turn and a shift at a constant rate, as of one rigid body. Robots that hold
+//! one load, and whose places fit it, so go as if they were one body with it all along, though none of them
+//! knows where the others are. All along, wrists are to be where they were to their robot at the first step:
+//! where a base stays off its place, the next way does not begin from there.
 
-use nalgebra::{Isometry3, Rotation2, Translation3, UnitQuaternion, Vector2, Vector3};
+use nalgebra::{Isometry3, Rotation2, Vector2};
 use tandem_sim::{CONTROL_HZ, Side, Sides};
 use tandem_tools_spec::{
-    ActCall, BaseState, CommandReply, Destination, Grip, MoveWrists, PlanReply, RobotReport, WalkTo,
+    ActCall, CommandReply, Destination, Grip, HandState, MoveWrists, PlanReply, RobotReport, WalkTo,
     WristMove,
 };
 
 use super::PlanProgress;
-use super::walk_to::{WALK_STEPS, heading_rad, wrapped};
+use super::walk_to::{ATTEMPTS, CALM_COMMANDS, THERE_M, THERE_RAD, WELL_M, WELL_RAD, all_stand};
+use super::way::{Corrections, Missing, Stand, WALK_STEPS, Way, wrapped};
 use crate::EpisodeError;
 use crate::commands;
 use crate::convert::isometry_from_sim;
 use crate::recording::CallerRecord;
 use crate::session::Session;
 
-/// How fast a path is gone, and how soon that is so. A radian is as long as so many metres.
+/// How fast a path is gone, and how soon that is so.
 const PACE_M_S: f64 = 0.2;
 const ACCELERATION_M_S2: f64 = 0.2;
 const CREEP_M_S: f64 = 0.02;
-const M_PER_RAD: f64 = 0.5;
-/// A path waits for a robot that lags by more, and is given up after so many commands of that.
-const LEAD_M: f64 = 0.2;
-const PATIENCE_COMMANDS: u32 = 16;
-/// Velocity for what a robot is off its path, and the most of it with the path's own; turning. Twice the gain makes robots that walk half
-/// a second behind their commands swing from side to side, more and more.
+/// A path slows down for a robot that lags by the first and waits for one that lags by the second, and is given
+/// up after so many commands of that. The same for one that is turned away from its path.
+const LAG_M: [f64; 2] = [0.13, 0.18];
+const LAGS_COMMANDS: u32 = 16;
+const TURNED_RAD: [f64; 2] = [0.12, 0.2];
+/// A path is given up after so many commands with a robot turned away, or a wrist out of reach.
+const STRAYS_COMMANDS: u32 = 3;
+/// Velocity for what a robot is off its path, and the most of it with the path's own; turning. Twice the gain
+/// makes robots that walk half a second behind their commands swing from side to side, more and more.
 const GAIN_1_S: f64 = 0.5;
 const MOST_M_S: f64 = 0.3;
 const TURN_RAD_S: f64 = 0.4;
@@ -36,42 +43,53 @@ const COMPLIANCE_N_S_M: f64 = 250.0;
 /// At its end robots correct their places in so many commands, and then come to rest within so many.
 const CORRECTING_COMMANDS: u32 = 4;
 const RESTING_COMMANDS: u32 = 12;
-/// One that stands this near has arrived.
-const THERE_M: f64 = 0.15;
-const THERE_RAD: f64 = 0.1;
 /// A hand that held and holds nothing for so many commands has lost it.
 const LOST_COMMANDS: u32 = 4;
-
-/// A place and a heading on the floor, in a start frame.
-#[derive(Clone, Copy, Debug)]
-struct Stand {
-    at_m: Vector2<f64>,
-    heading_rad: f64,
-}
-
-/// The way from one place to another, as a rigid body goes that turns and shifts at constant rates:
-///   p(s) = p_0 + R_0 V(s w) s v,   V(a) = [sin a, -(1 - cos a); 1 - cos a, sin a] / a,   s in 0..=1.
-/// v is chosen so that p(1) is the other place. Each point of that body goes along such a way with the same w.
-#[derive(Clone, Copy, Debug)]
-struct Way {
-    from: Stand,
-    /// v and w, for the whole way.
-    shift_m: Vector2<f64>,
-    turn_rad: f64,
-}
 
 /// One robot on its way.
 struct Carrier {
     name: String,
     robot: usize,
     carries: bool,
-    way: Way,
+    ways: Vec<Way>,
     /// Where its wrists stay, in the frame of the place where it stands.
     stand_from_wrist: Sides<Isometry3<f64>>,
     /// What it was off its path half a cycle of its gait ago.
     before_m: Option<Vector2<f64>>,
     /// For how many commands each hand that held has held nothing; `None` before it holds.
     empty: Sides<Option<u32>>,
+    /// The hand that cannot come to where it is to be.
+    out_of_reach: Option<Side>,
+    corrections: Corrections,
+}
+
+/// What a team does next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum CarryStage {
+    OnWay,
+    /// At the end of its path, for so many commands.
+    Correcting(u32),
+    /// Told to stand for so many commands; for the last of them, all have stood.
+    Resting {
+        commands: u32,
+        calm: u32,
+    },
+    /// Robots make up by one short walk for what is missing where they stand.
+    Pulse,
+}
+
+/// Robots that go along one path.
+struct CarryPlan {
+    carriers: Vec<Carrier>,
+    /// Length of each way, the longest of the robots'.
+    ways_m: Vec<f64>,
+    pace: PathPace,
+    stage: CarryStage,
+    attempts: u32,
+    /// Commands in a row in which a robot was turned away or a wrist out of reach.
+    strays: u32,
+    /// Why the robots go no further.
+    stopped: Option<String>,
 }
 
 /// How far a path has been gone, and how fast.
@@ -82,61 +100,65 @@ struct PathPace {
     waited: u32,
 }
 
-impl Stand {
-    fn of(start_from_pelvis: &tandem_sim::Pose) -> Stand {
-        let at = isometry_from_sim(start_from_pelvis).translation.vector;
-        Stand { at_m: at.xy(), heading_rad: heading_rad(start_from_pelvis) }
-    }
-
-    fn start_from_stand(&self) -> Isometry3<f64> {
-        let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.heading_rad);
-        Isometry3::from_parts(Translation3::new(self.at_m.x, self.at_m.y, 0.0), turned)
-    }
-}
-
-impl Way {
-    fn new(from: Stand, to: Stand) -> Way {
-        let turn_rad = wrapped(to.heading_rad - from.heading_rad);
-        let [x, y]: [f64; 2] = (Rotation2::new(-from.heading_rad) * (to.at_m - from.at_m)).into();
-        // V^-1 = [c, w/2; -w/2, c], c = w/2 / tan(w/2)
-        let half = 0.5 * turn_rad;
-        let c = if half.abs() < 1e-6 { 1.0 } else { half / half.tan() };
-        Way { from, shift_m: Vector2::new(c * x + half * y, c * y - half * x), turn_rad }
-    }
-
-    fn length_m(&self) -> f64 {
-        self.shift_m.norm().max(M_PER_RAD * self.turn_rad.abs())
-    }
-
-    fn at(&self, share: f64) -> Stand {
-        let angle = share * self.turn_rad;
-        let (sine, versine) = if angle.abs() < 1e-6 {
-            (1.0, 0.5 * angle)
-        } else {
-            (angle.sin() / angle, (1.0 - angle.cos()) / angle)
-        };
-        let [x, y]: [f64; 2] = (share * self.shift_m).into();
-        let moved_m = Vector2::new(sine * x - versine * y, versine * x + sine * y);
-        Stand {
-            at_m: self.from.at_m + Rotation2::new(self.from.heading_rad) * moved_m,
-            heading_rad: self.from.heading_rad + angle,
-        }
-    }
-}
-
 impl PathPace {
-    /// Goes on for `time_s` along a path of `length_m`, on which somebody lags by `lag_m`.
-    fn go(&mut self, length_m: f64, lag_m: f64, time_s: f64) {
+    /// Goes on for `time_s` along a path of `length_m`, at a share of its pace.
+    fn go(&mut self, length_m: f64, share: f64, time_s: f64) {
         let left_m = length_m - self.gone_m;
-        if lag_m > LEAD_M {
-            (self.pace_m_s, self.waited) = (0.5 * self.pace_m_s, self.waited + 1);
-        } else {
+        if share > 0.0 {
             let can_stop_m_s = (2.0 * ACCELERATION_M_S2 * left_m).sqrt().max(CREEP_M_S);
-            self.pace_m_s = (self.pace_m_s + ACCELERATION_M_S2 * time_s).min(can_stop_m_s).min(PACE_M_S);
+            let most_m_s = (PACE_M_S * share).max(CREEP_M_S);
+            self.pace_m_s = (self.pace_m_s + ACCELERATION_M_S2 * time_s).min(can_stop_m_s).min(most_m_s);
             self.waited = 0;
+        } else {
+            (self.pace_m_s, self.waited) = (0.5 * self.pace_m_s, self.waited + 1);
         }
         self.pace_m_s = self.pace_m_s.min(left_m / time_s);
         self.gone_m += self.pace_m_s * time_s;
+    }
+}
+
+impl CarryPlan {
+    fn new(carriers: Vec<Carrier>) -> CarryPlan {
+        let ways = carriers.iter().map(|carrier| carrier.ways.len()).min().unwrap_or(0);
+        let longest =
+            |leg: usize| carriers.iter().map(|carrier| carrier.ways[leg].length_m()).fold(0.0, f64::max);
+        CarryPlan {
+            ways_m: (0..ways).map(longest).collect(),
+            carriers,
+            pace: PathPace::default(),
+            stage: CarryStage::OnWay,
+            attempts: 0,
+            strays: 0,
+            stopped: None,
+        }
+    }
+
+    fn length_m(&self) -> f64 {
+        self.ways_m.iter().sum()
+    }
+
+    /// The way that is gone now, and the share of it that has been.
+    fn leg(&self) -> (usize, f64) {
+        let mut left_m = self.pace.gone_m;
+        for (leg, way_m) in self.ways_m.iter().enumerate() {
+            if left_m < *way_m {
+                return (leg, left_m / way_m);
+            }
+            left_m -= way_m;
+        }
+        (self.ways_m.len() - 1, 1.0)
+    }
+
+    fn is_at_end(&self) -> bool {
+        self.length_m() - self.pace.gone_m < 1e-6
+    }
+
+    /// Gives up, and comes to rest.
+    fn stop(&mut self, why: String) {
+        self.stopped.get_or_insert(why);
+        if !matches!(self.stage, CarryStage::Resting { .. }) {
+            self.stage = CarryStage::Resting { commands: 0, calm: 0 };
+        }
     }
 }
 
@@ -148,49 +170,28 @@ impl Session {
         walk: &WalkTo,
     ) -> Result<PlanReply, EpisodeError> {
         let carriers = walk.robots.iter().map(|entry| self.carrier(entry));
-        let mut carriers: Vec<Carrier> = carriers.collect::<Result<_, _>>()?;
-        let length_m = carriers.iter().map(|carrier| carrier.way.length_m()).fold(0.0, f64::max);
+        let mut plan = CarryPlan::new(carriers.collect::<Result<_, _>>()?);
         let mut progress = PlanProgress::default();
-        let mut pace = PathPace::default();
-        let mut at_end = 0;
         loop {
             let left = walk.steps.saturating_sub(progress.executed_steps());
             if left == 0 {
-                let why = format!("the steps are used up; {}", self.how_far_off(&carriers));
+                let used_up = || format!("the steps are used up; {}", self.how_far_off(&plan));
+                let why = plan.stopped.clone().unwrap_or_else(used_up);
                 return self.plan_reply(progress, Some(why));
             }
-            let steps = left.min(WALK_STEPS);
-            let is_there = length_m - pace.gone_m < 1e-6;
-            let part = |gone_m: f64| if length_m > 0.0 { (gone_m / length_m).min(1.0) } else { 1.0 };
-            let off_m = self.off_path(&mut carriers, part(pace.gone_m));
-            if is_there {
-                (pace.pace_m_s, at_end) = (0.0, at_end + 1);
-            } else {
-                let lag_m = off_m.iter().map(Vector2::norm).fold(0.0, f64::max);
-                pace.go(length_m, lag_m, f64::from(steps) / CONTROL_HZ);
-            }
-            let rests = at_end > CORRECTING_COMMANDS;
-            let rate_1_s = if length_m > 0.0 { pace.pace_m_s / length_m } else { 0.0 };
-            let several = carriers.iter().filter(|carrier| carrier.carries).count() > 1;
-            let robots = carriers.iter().zip(&off_m).map(|(carrier, off_m)| {
-                let base =
-                    if rests { [0.0; 3] } else { self.velocity(carrier, part(pace.gone_m), rate_1_s, off_m) };
-                carrier.wrist_move(&carrier.way.at(part(pace.gone_m)), base, several)
-            });
-            let call = ActCall::MoveWrists(MoveWrists { steps, robots: robots.collect() });
+            let call = self.next_moves(&mut plan, left.min(WALK_STEPS));
             let reply = match self.make_planned(caller, call, &mut progress)? {
                 Err(why) => return self.plan_reply(progress, Some(why)),
+                Ok(reply) if reply.fallen.iter().any(|robot| robot.fallen) => {
+                    return self.plan_reply(progress, Some("a robot has fallen".into()));
+                }
                 Ok(reply) => reply,
             };
-            let stands = rests && stand(reply);
-            if let Some(why) = self.why_not_on(reply, &mut carriers, pace.waited) {
-                return self.plan_reply(progress, Some(why));
+            if let Some(why) = self.why_not_on(reply, &mut plan) {
+                plan.stop(why);
             }
-            if stands || at_end > CORRECTING_COMMANDS + RESTING_COMMANDS {
-                let off = carriers.iter().any(|carrier| !self.has_arrived(carrier));
-                let why =
-                    off.then(|| format!("it came no nearer than this; {}", self.how_far_off(&carriers)));
-                return self.plan_reply(progress, why);
+            if self.is_done(all_stand(reply), &mut plan) {
+                return self.plan_reply(progress, plan.stopped);
             }
         }
     }
@@ -198,40 +199,89 @@ impl Session {
     fn carrier(&self, entry: &Destination) -> Result<Carrier, EpisodeError> {
         let robot = commands::find(&entry.robot, &self.motions)?;
         let start_from_pelvis = &self.present.robots[robot].sensed.start_from_pelvis;
-        let from = Stand::of(start_from_pelvis);
-        let to =
-            Stand { at_m: entry.to_m.into(), heading_rad: entry.heading_rad.unwrap_or(from.heading_rad) };
+        let mut from = Stand::of(start_from_pelvis);
         let stand_from_pelvis = from.start_from_stand().inverse() * isometry_from_sim(start_from_pelvis);
+        let way = |to: Stand| Way::new(std::mem::replace(&mut from, to), to);
         Ok(Carrier {
             name: entry.robot.clone(),
             robot,
             carries: entry.carry == Some(true),
-            way: Way::new(from, to),
+            ways: self.stands_at(robot).places(entry).into_iter().map(way).collect(),
             stand_from_wrist: self.motions[robot].told_wrists().map(|wrist| stand_from_pelvis * wrist),
             before_m: None,
             empty: Sides::both(None),
+            out_of_reach: None,
+            corrections: Corrections::default(),
         })
     }
 
-    fn stands_at(&self, carrier: &Carrier) -> Stand {
-        Stand::of(&self.present.robots[carrier.robot].sensed.start_from_pelvis)
+    /// The next command, of so many steps.
+    fn next_moves(&self, plan: &mut CarryPlan, steps: u32) -> ActCall {
+        let leg = plan.leg();
+        let off_m: Vec<_> = plan.carriers.iter_mut().map(|carrier| self.off_path_m(carrier, leg)).collect();
+        if plan.stage == CarryStage::OnWay {
+            let share = self.share_of_pace(plan, &off_m);
+            plan.pace.go(plan.length_m(), share, f64::from(steps) / CONTROL_HZ);
+        } else {
+            plan.pace.pace_m_s = 0.0;
+        }
+        let leg = plan.leg();
+        let several = plan.carriers.iter().filter(|carrier| carrier.carries).count() > 1;
+        let robots = plan.carriers.iter_mut().zip(&off_m).map(|(carrier, off_m)| {
+            let base = match plan.stage {
+                CarryStage::OnWay | CarryStage::Correcting(_) => {
+                    let rate_1_s = plan.pace.pace_m_s / plan.ways_m[leg.0].max(1e-9);
+                    self.velocity(carrier, leg, rate_1_s, off_m)
+                }
+                CarryStage::Pulse => {
+                    let missing = self.missing_to_end(carrier);
+                    match missing.is_within(WELL_M, WELL_RAD) {
+                        true => [0.0; 3],
+                        false => carrier.corrections.pulse(&missing),
+                    }
+                }
+                CarryStage::Resting { .. } => [0.0; 3],
+            };
+            carrier.wrist_move(&carrier.at(leg), base, several)
+        });
+        ActCall::MoveWrists(MoveWrists { steps, robots: robots.collect() })
     }
 
-    /// How far each robot is from where it is to be after this part of its way, start frame: the mean of now and half a cycle ago, which
+    /// How far a robot is from where it is to be now, start frame: the mean of now and half a cycle ago, which
     /// knows nothing of the pelvis' sway.
-    fn off_path(&self, carriers: &mut [Carrier], share: f64) -> Vec<Vector2<f64>> {
-        let off = |carrier: &mut Carrier| {
-            let now_m = carrier.way.at(share).at_m - self.stands_at(carrier).at_m;
-            0.5 * (now_m + carrier.before_m.replace(now_m).unwrap_or(now_m))
-        };
-        carriers.iter_mut().map(off).collect()
+    fn off_path_m(&self, carrier: &mut Carrier, leg: (usize, f64)) -> Vector2<f64> {
+        let now_m = carrier.at(leg).at_m - self.stands_at(carrier.robot).at_m;
+        0.5 * (now_m + carrier.before_m.replace(now_m).unwrap_or(now_m))
     }
 
-    /// The base command of a robot that is `off_m` its path, on which it goes on by so much of it a second: ahead, left, turning.
-    fn velocity(&self, carrier: &Carrier, share: f64, rate_1_s: f64, off_m: &Vector2<f64>) -> [f64; 3] {
-        let Way { shift_m, turn_rad, .. } = carrier.way;
-        let to_be = carrier.way.at(share);
-        let heading_rad = self.stands_at(carrier).heading_rad;
+    /// The share of its pace at which a team goes on of which robots are `off_m` their path: 0 where one lags
+    /// too far, is turned away or does not reach what it holds.
+    fn share_of_pace(&self, plan: &CarryPlan, off_m: &[Vector2<f64>]) -> f64 {
+        let share = |off: f64, [slows, stops]: [f64; 2]| ((stops - off) / (stops - slows)).clamp(0.0, 1.0);
+        plan.carriers.iter().zip(off_m).fold(1.0, |least, (carrier, off_m)| {
+            let reaches = if carrier.out_of_reach.is_some() { 0.0 } else { 1.0 };
+            let turned_rad = self.turned_rad(carrier, plan.leg());
+            least.min(share(off_m.norm(), LAG_M)).min(share(turned_rad, TURNED_RAD)).min(reaches)
+        })
+    }
+
+    /// How far a robot is turned away from its path.
+    fn turned_rad(&self, carrier: &Carrier, leg: (usize, f64)) -> f64 {
+        wrapped(carrier.at(leg).heading_rad - self.stands_at(carrier.robot).heading_rad).abs()
+    }
+
+    /// The base command of a robot that is `off_m` its path, on which it goes on by so much of its way a
+    /// second: ahead, left, turning.
+    fn velocity(
+        &self,
+        carrier: &Carrier,
+        leg: (usize, f64),
+        rate_1_s: f64,
+        off_m: &Vector2<f64>,
+    ) -> [f64; 3] {
+        let Way { shift_m, turn_rad, .. } = carrier.ways[leg.0];
+        let to_be = carrier.at(leg);
+        let heading_rad = self.stands_at(carrier.robot).heading_rad;
         let in_start_m_s = Rotation2::new(to_be.heading_rad) * shift_m * rate_1_s + GAIN_1_S * off_m;
         let own_m_s = (Rotation2::new(-heading_rad) * in_start_m_s).cap_magnitude(MOST_M_S);
         let turning = turn_rad * rate_1_s + GAIN_1_S * wrapped(to_be.heading_rad - heading_rad);
@@ -239,47 +289,101 @@ impl Session {
     }
 
     /// Why the robots go no further, if they do not.
-    fn why_not_on(&self, reply: &CommandReply, carriers: &mut [Carrier], waited: u32) -> Option<String> {
-        if reply.fallen.iter().any(|robot| robot.fallen) {
-            return Some("a robot has fallen".into());
-        }
-        for (carrier, report) in carriers.iter_mut().zip(&reply.robots).filter(|(carrier, _)| carrier.carries)
-        {
+    fn why_not_on(&self, reply: &CommandReply, plan: &mut CarryPlan) -> Option<String> {
+        let leg = plan.leg();
+        let carrying = plan.carriers.iter_mut().zip(&reply.robots).filter(|(carrier, _)| carrier.carries);
+        for (carrier, report) in carrying {
             if let Some(side) = carrier.lost(report) {
                 return Some(format!("{}'s {} hand has lost what it held", carrier.name, side.name()));
             }
+            carrier.out_of_reach =
+                Side::BOTH.into_iter().find(|side| hand_state(report, *side) == Some(HandState::OutOfReach));
         }
-        (waited > PATIENCE_COMMANDS).then(|| {
-            format!(
+        if plan.stage != CarryStage::OnWay {
+            return None;
+        }
+        let stray = plan.carriers.iter().find_map(|carrier| {
+            let turned_rad = self.turned_rad(carrier, leg);
+            let turned = || format!("{} is turned away from its way by {turned_rad:.2} rad", carrier.name);
+            let out = |side: Side| format!("{}'s {} wrist is out of reach", carrier.name, side.name());
+            carrier.out_of_reach.map(out).or_else(|| (turned_rad > TURNED_RAD[1]).then(turned))
+        });
+        plan.strays = if stray.is_some() { plan.strays + 1 } else { 0 };
+        if plan.pace.waited > LAGS_COMMANDS {
+            return Some(format!(
                 "it goes no further: something is in the way or too heavy; {}",
-                self.how_far_off(carriers)
-            )
-        })
+                self.how_far_off(plan)
+            ));
+        }
+        stray
+            .filter(|_| plan.strays >= STRAYS_COMMANDS)
+            .map(|why| format!("they stopped with what they hold: {why}; {}", self.how_far_off(plan)))
     }
 
-    fn has_arrived(&self, carrier: &Carrier) -> bool {
-        let (is, to_be) = (self.stands_at(carrier), carrier.way.at(1.0));
-        (to_be.at_m - is.at_m).norm() <= THERE_M
-            && wrapped(to_be.heading_rad - is.heading_rad).abs() <= THERE_RAD
-    }
-
-    fn how_far_off(&self, carriers: &[Carrier]) -> String {
-        let far = |carrier: &Carrier| {
-            let (is, to_be) = (self.stands_at(carrier), carrier.way.at(1.0));
-            let (off_m, off_rad) =
-                ((to_be.at_m - is.at_m).norm(), wrapped(to_be.heading_rad - is.heading_rad).abs());
-            format!("{} is {off_m:.2} m and {off_rad:.2} rad off its place", carrier.name)
+    /// Goes on to what comes after a command after which all `stand` or do not; whether nothing does.
+    fn is_done(&self, stand: bool, plan: &mut CarryPlan) -> bool {
+        plan.stage = match plan.stage {
+            CarryStage::OnWay if plan.is_at_end() => CarryStage::Correcting(0),
+            CarryStage::OnWay => CarryStage::OnWay,
+            CarryStage::Correcting(commands) if commands + 1 < CORRECTING_COMMANDS => {
+                CarryStage::Correcting(commands + 1)
+            }
+            CarryStage::Correcting(_) | CarryStage::Pulse => CarryStage::Resting { commands: 0, calm: 0 },
+            CarryStage::Resting { commands, calm } => {
+                let calm = if stand { calm + 1 } else { 0 };
+                if calm >= CALM_COMMANDS || commands >= RESTING_COMMANDS {
+                    return self.is_there(plan);
+                }
+                CarryStage::Resting { commands: commands + 1, calm }
+            }
         };
-        carriers.iter().map(far).collect::<Vec<_>>().join(", ")
+        false
+    }
+
+    /// Whether a team that rests is to rest: at its places, or no nearer than it comes. Is sent once more
+    /// otherwise.
+    fn is_there(&self, plan: &mut CarryPlan) -> bool {
+        let all_within = |most_m: f64, most_rad: f64| {
+            plan.carriers.iter().all(|carrier| self.missing_to_end(carrier).is_within(most_m, most_rad))
+        };
+        if plan.stopped.is_some() || all_within(WELL_M, WELL_RAD) {
+            return true;
+        }
+        if plan.attempts == ATTEMPTS {
+            if !all_within(THERE_M, THERE_RAD) {
+                plan.stopped = Some(format!("it came no nearer than this; {}", self.how_far_off(plan)));
+            }
+            return true;
+        }
+        plan.attempts += 1;
+        plan.stage = CarryStage::Pulse;
+        false
+    }
+
+    fn missing_to_end(&self, carrier: &Carrier) -> Missing {
+        let now = self.stands_at(carrier.robot);
+        now.missing_to(&carrier.ways.last().map_or(now, |way| way.at(1.0)))
+    }
+
+    fn how_far_off(&self, plan: &CarryPlan) -> String {
+        let far = |carrier: &Carrier| self.missing_to_end(carrier).told(&carrier.name);
+        plan.carriers.iter().map(far).collect::<Vec<_>>().join(", ")
     }
 }
 
-fn stand(reply: &CommandReply) -> bool {
-    let states = reply.robots.iter().map(|robot| robot.base.and_then(|base| base.state));
-    states.flatten().all(|state| state == BaseState::Standing)
+fn hand_state(report: &RobotReport, side: Side) -> Option<HandState> {
+    match side {
+        Side::Left => report.left.state,
+        Side::Right => report.right.state,
+    }
 }
 
 impl Carrier {
+    /// Where it is to be after a share of one of its ways.
+    fn at(&self, (leg, share): (usize, f64)) -> Stand {
+        self.ways[leg].at(share)
+    }
+
     /// Goes on with this base command while its wrists go to where they are of one that stands at `stand`.
     fn wrist_move(
         &self,
@@ -334,55 +438,24 @@ impl Carrier {
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::PI;
-
     use super::*;
-
-    fn stand(x_m: f64, y_m: f64, heading_rad: f64) -> Stand {
-        Stand { at_m: Vector2::new(x_m, y_m), heading_rad }
-    }
-
-    /// Two robots that face each other across a load, each with a start frame of its own: all along their ways they are where they were to
-    /// each other.
-    #[test]
-    fn robots_whose_places_fit_go_as_one_body() {
-        // The start frame of B in that of A, and where B stands as A stands.
-        let a_from_b = stand(1.3, 0.1, 2.9).start_from_stand();
-        let stand_from_partner = stand(1.2, 0.05, PI).start_from_stand();
-        let b_of = |a: &Stand| {
-            let there = a_from_b.inverse() * a.start_from_stand() * stand_from_partner;
-            let ahead = there.rotation * Vector3::x();
-            stand(there.translation.x, there.translation.y, ahead.y.atan2(ahead.x))
-        };
-        let (from, to) = (stand(0.1, -0.2, 0.3), stand(-0.6, 0.9, 1.5));
-        let ways = [Way::new(from, to), Way::new(b_of(&from), b_of(&to))];
-        for part in [0.0, 0.3, 0.5, 0.8, 1.0] {
-            let [a, b] = ways.map(|way| way.at(part));
-            let fits = b_of(&a);
-            assert!((fits.at_m - b.at_m).norm() < 1e-9, "{part}: {fits:?} and {b:?}");
-            assert!(wrapped(fits.heading_rad - b.heading_rad).abs() < 1e-9, "{part}");
-        }
-        for (part, end) in [(0.0, from), (1.0, to)] {
-            let at = ways[0].at(part);
-            assert!((at.at_m - end.at_m).norm() < 1e-9 && (at.heading_rad - end.heading_rad).abs() < 1e-9);
-        }
-        let straight = Way::new(stand(0.0, 0.0, 0.5), stand(1.0, 2.0, 0.5));
-        assert!((straight.at(0.5).at_m - Vector2::new(0.5, 1.0)).norm() < 1e-9, "{straight:?}");
-    }
 
     #[test]
     fn a_path_is_gone_from_rest_to_rest_and_waits() {
         let mut pace = PathPace::default();
         let mut paces = Vec::new();
         while 1.0 - pace.gone_m > 1e-9 {
-            pace.go(1.0, 0.05, 0.26);
+            pace.go(1.0, 1.0, 0.26);
             paces.push(pace.pace_m_s);
         }
         assert!((pace.gone_m - 1.0).abs() < 1e-9 && paces.len() < 40, "{paces:?}");
         assert!(paces[0] < 0.06 && paces.iter().all(|pace| *pace <= PACE_M_S), "{paces:?}");
+        let mut slowed = PathPace { gone_m: 0.3, pace_m_s: 0.2, waited: 0 };
+        slowed.go(1.0, 0.4, 0.26);
+        assert!((slowed.pace_m_s - 0.4 * PACE_M_S).abs() < 1e-9, "{}", slowed.pace_m_s);
         let mut held_up = PathPace { gone_m: 0.5, pace_m_s: 0.2, waited: 0 };
         for _ in 0..10 {
-            held_up.go(1.0, LEAD_M + 0.01, 0.26);
+            held_up.go(1.0, 0.0, 0.26);
         }
         assert!(held_up.waited == 10 && held_up.gone_m < 0.56, "{}", held_up.gone_m);
     }

@@ -2,6 +2,7 @@
 
 mod carry;
 mod walk_to;
+mod way;
 
 use tandem_tools_spec::{
     ActCall, BaseState, CommandReply, Expectation, Formats, HandReport, HandState, PlanCall, PlanReply,

@@ -1,56 +1,67 @@
-//! `walk_to`: a row of short walks, each told anew from where the robot's own odometry has it.
+//! `walk_to`: a row of short walks, each told anew from where the robot's own odometry has it, and short ones
+//! for what is missing once it stands.
 
-use std::f64::consts::PI;
+use std::collections::VecDeque;
 
-use nalgebra::{Vector2, Vector3};
-use tandem_sim::Pose;
-use tandem_tools_spec::{ActCall, BaseState, Destination, PlanReply, Wait, Walk, WalkMove, WalkTo};
+use nalgebra::Vector2;
+use tandem_tools_spec::{
+    ActCall, BaseState, CommandReply, Destination, PlanReply, Wait, Walk, WalkMove, WalkTo,
+};
 
 use super::PlanProgress;
+use super::way::{Corrections, Missing, Stand, WALK_STEPS};
 use crate::EpisodeError;
 use crate::commands;
-use crate::convert::isometry_from_sim;
 use crate::recording::CallerRecord;
 use crate::session::Session;
 
-/// Control steps of one walk: about half a cycle of the gait. The pelvis sways from side to side once a cycle, so that the mean of two
-/// moments that are half a cycle apart knows nothing of it.
-pub const WALK_STEPS: u32 = 13;
 /// Speed by what is missing, and the most of it: ahead, back, to the sides; turning.
 const GAIN_1_S: f64 = 0.7;
 const AHEAD_M_S: f64 = 0.3;
 const ASIDE_M_S: f64 = 0.2;
 const TURN_RAD_S: f64 = 0.4;
-/// A robot this near to its place is let come to rest; it coasts a little.
+/// A robot this near to its place is let come to rest; it coasts a little. A waypoint is passed from farther
+/// off.
 const NEAR_M: f64 = 0.03;
 const NEAR_RAD: f64 = 0.04;
-/// One that stands this near has arrived.
-const THERE_M: f64 = 0.04;
-const THERE_RAD: f64 = 0.05;
+const PASSED_M: f64 = 0.1;
+/// One that stands this near has arrived, and is sent once more until it is a little nearer.
+pub const THERE_M: f64 = 0.015;
+pub const THERE_RAD: f64 = 0.026;
+pub const WELL_M: f64 = 0.011;
+pub const WELL_RAD: f64 = 0.02;
+/// How often a robot that has come to rest is sent once more, by a pulse where it is this near.
+pub const ATTEMPTS: u32 = 5;
+const PULSE_M: f64 = 0.1;
+const PULSE_RAD: f64 = 0.15;
+/// Commands for which all have stood: by then nothing sways any more.
+pub const CALM_COMMANDS: u32 = 2;
 /// A robot that has not come nearer by this much in so many walks is held up.
 const NEARER_M: f64 = 0.03;
 const PATIENCE_WALKS: u32 = 12;
-/// How often a robot that has come to rest is sent once more.
-const ATTEMPTS: u32 = 3;
+
+/// How a robot is to move next.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum WalkerStage {
+    Walks,
+    /// It is to make up by one short walk for what is missing where it stands.
+    Corrects,
+    Rests,
+}
 
 /// One robot on its way.
 struct Walker {
     name: String,
     robot: usize,
-    to_m: Vector2<f64>,
-    heading_rad: f64,
+    /// Where it is to go by and, at last, to come to rest.
+    places: VecDeque<Stand>,
+    stage: WalkerStage,
     /// Where it was half a cycle ago, if it walked then.
     before_m: Option<Vector2<f64>>,
     /// The nearest that it has been, and walks since then.
     nearest_m: f64,
     walks: u32,
-    rests: bool,
-}
-
-/// What is missing to a place: [ahead, left] as the robot faces, and the angle.
-struct Missing {
-    way_m: Vector2<f64>,
-    turn_rad: f64,
+    corrections: Corrections,
 }
 
 impl Session {
@@ -66,7 +77,7 @@ impl Session {
         let walkers = walk.robots.iter().map(|entry| self.walker(entry));
         let mut walkers: Vec<Walker> = walkers.collect::<Result<_, _>>()?;
         let mut progress = PlanProgress::default();
-        let mut attempts = 0;
+        let (mut attempts, mut calm) = (0, 0);
         loop {
             let left = walk.steps.saturating_sub(progress.executed_steps());
             if left == 0 {
@@ -87,9 +98,7 @@ impl Session {
                 Ok(reply) if reply.fallen.iter().any(|robot| robot.fallen) => {
                     return self.plan_reply(progress, Some("a robot has fallen".into()));
                 }
-                Ok(reply) => reply.robots.iter().all(|robot| {
-                    robot.base.and_then(|base| base.state).is_none_or(|state| state == BaseState::Standing)
-                }),
+                Ok(reply) => all_stand(reply),
             };
             if let Some(walker) = walkers.iter().find(|walker| walker.walks > PATIENCE_WALKS) {
                 let name = walker.name.clone();
@@ -99,22 +108,22 @@ impl Session {
                 );
                 return self.plan_reply(progress, Some(why));
             }
-            if walks || !stands {
+            calm = if walks || !stands { 0 } else { calm + 1 };
+            if calm < CALM_COMMANDS {
                 continue;
             }
-            let off: Vec<bool> = walkers.iter().map(|walker| !self.is_there(walker)).collect();
-            if !off.contains(&true) {
+            let off: Vec<Missing> = walkers.iter().map(|walker| self.missing_of(walker)).collect();
+            let all_within = |most_m, most_rad| off.iter().all(|off| off.is_within(most_m, most_rad));
+            if all_within(WELL_M, WELL_RAD) {
                 return self.plan_reply(progress, None);
             }
-            attempts += 1;
             if attempts == ATTEMPTS {
-                let why = format!("it came no nearer than this; {}", self.how_far(&walkers));
-                return self.plan_reply(progress, Some(why));
+                let why = (!all_within(THERE_M, THERE_RAD))
+                    .then(|| format!("it came no nearer than this; {}", self.how_far(&walkers)));
+                return self.plan_reply(progress, why);
             }
-            for (walker, off) in walkers.iter_mut().zip(off) {
-                (walker.rests, walker.before_m, walker.walks) = (!off, None, 0);
-                walker.nearest_m = f64::INFINITY;
-            }
+            attempts += 1;
+            walkers.iter_mut().zip(&off).for_each(|(walker, off)| walker.try_again(off));
         }
     }
 
@@ -123,84 +132,97 @@ impl Session {
         Ok(Walker {
             name: entry.robot.clone(),
             robot,
-            to_m: entry.to_m.into(),
-            heading_rad: entry.heading_rad.unwrap_or_else(|| heading_rad(&self.odometry(robot))),
+            places: self.stands_at(robot).places(entry).into(),
+            stage: WalkerStage::Walks,
             before_m: None,
             nearest_m: f64::INFINITY,
             walks: 0,
-            rests: false,
+            corrections: Corrections::default(),
         })
     }
 
-    fn odometry(&self, robot: usize) -> Pose {
-        self.present.robots[robot].sensed.start_from_pelvis
+    /// Where a robot's odometry has it.
+    pub(super) fn stands_at(&self, robot: usize) -> Stand {
+        Stand::of(&self.present.robots[robot].sensed.start_from_pelvis)
     }
 
-    fn missing(&self, walker: &Walker, at_m: Vector2<f64>) -> Missing {
-        let heading_rad = heading_rad(&self.odometry(walker.robot));
-        let (sine, cosine) = heading_rad.sin_cos();
-        let way_m = walker.to_m - at_m;
-        Missing {
-            way_m: Vector2::new(cosine * way_m.x + sine * way_m.y, cosine * way_m.y - sine * way_m.x),
-            turn_rad: wrapped(walker.heading_rad - heading_rad),
-        }
-    }
-
-    fn now_m(&self, walker: &Walker) -> Vector2<f64> {
-        isometry_from_sim(&self.odometry(walker.robot)).translation.vector.xy()
-    }
-
-    fn is_there(&self, walker: &Walker) -> bool {
-        let Missing { way_m, turn_rad } = self.missing(walker, self.now_m(walker));
-        way_m.norm() <= THERE_M && turn_rad.abs() <= THERE_RAD
+    fn missing_of(&self, walker: &Walker) -> Missing {
+        let now = self.stands_at(walker.robot);
+        now.missing_to(walker.places.back().unwrap_or(&now))
     }
 
     /// How a robot is to walk next; `None` where it is to come to rest.
     fn next_walk(&self, walker: &mut Walker) -> Option<WalkMove> {
-        let now_m = self.now_m(walker);
-        let mean_m = walker.before_m.map_or(now_m, |before_m| 0.5 * (before_m + now_m));
-        walker.before_m = Some(now_m);
-        let Missing { way_m, turn_rad } = self.missing(walker, mean_m);
-        walker.rests |= way_m.norm() <= NEAR_M && turn_rad.abs() <= NEAR_RAD;
-        if walker.rests {
+        let now = self.stands_at(walker.robot);
+        match walker.stage {
+            WalkerStage::Rests => return None,
+            WalkerStage::Corrects => {
+                walker.stage = WalkerStage::Rests;
+                let missing = self.missing_of(walker);
+                let pulse = walker.corrections.pulse(&missing);
+                return Some(walker.walk(pulse));
+            }
+            WalkerStage::Walks => {}
+        }
+        let mean_m = walker.before_m.map_or(now.at_m, |before_m| 0.5 * (before_m + now.at_m));
+        walker.before_m = Some(now.at_m);
+        let mean = Stand { at_m: mean_m, ..now };
+        while walker.places.len() > 1 && mean.missing_to(&walker.places[0]).way_m.norm() < PASSED_M {
+            walker.places.pop_front();
+            (walker.nearest_m, walker.walks) = (f64::INFINITY, 0);
+        }
+        let off = mean.missing_to(walker.places.front()?);
+        if walker.places.len() == 1 && off.is_within(NEAR_M, NEAR_RAD) {
+            walker.stage = WalkerStage::Rests;
             return None;
         }
-        let missing = way_m.norm() + 0.3 * turn_rad.abs();
-        if missing < walker.nearest_m - NEARER_M {
-            (walker.nearest_m, walker.walks) = (missing, 0);
+        let missing_m = off.way_m.norm() + 0.3 * off.turn_rad.abs();
+        if missing_m < walker.nearest_m - NEARER_M {
+            (walker.nearest_m, walker.walks) = (missing_m, 0);
         } else {
             walker.walks += 1;
         }
-        let wanted_m_s = GAIN_1_S * way_m;
+        let wanted_m_s = GAIN_1_S * off.way_m;
         // The same part of every speed, so that the way stays straight.
         let most = (wanted_m_s.x.abs() / AHEAD_M_S).max(wanted_m_s.y.abs() / ASIDE_M_S).max(1.0);
-        let robot = walker.name.clone();
-        Some(WalkMove {
-            robot,
-            vx_m_s: wanted_m_s.x / most,
-            vy_m_s: wanted_m_s.y / most,
-            yaw_rate_rad_s: (GAIN_1_S * turn_rad).clamp(-TURN_RAD_S, TURN_RAD_S),
-            pelvis_height_m: None,
-            waist_yaw_rad: None,
-            look_at_m: None,
-        })
+        let turning_rad_s = (GAIN_1_S * off.turn_rad).clamp(-TURN_RAD_S, TURN_RAD_S);
+        Some(walker.walk([wanted_m_s.x / most, wanted_m_s.y / most, turning_rad_s]))
     }
 
     fn how_far(&self, walkers: &[Walker]) -> String {
-        let far = |walker: &Walker| {
-            let Missing { way_m, turn_rad } = self.missing(walker, self.now_m(walker));
-            format!("{} is {:.2} m and {:.2} rad off its place", walker.name, way_m.norm(), turn_rad.abs())
-        };
+        let far = |walker: &Walker| self.missing_of(walker).told(&walker.name);
         walkers.iter().map(far).collect::<Vec<_>>().join(", ")
     }
 }
 
-pub fn heading_rad(start_from_pelvis: &Pose) -> f64 {
-    let ahead = isometry_from_sim(start_from_pelvis).rotation * Vector3::x();
-    ahead.y.atan2(ahead.x)
+/// Whether no robot of the reply steps, as far as that is told.
+pub fn all_stand(reply: &CommandReply) -> bool {
+    let states = reply.robots.iter().map(|robot| robot.base.and_then(|base| base.state));
+    states.flatten().all(|state| state == BaseState::Standing)
 }
 
-/// The same angle from -pi to pi.
-pub fn wrapped(angle_rad: f64) -> f64 {
-    (angle_rad + PI).rem_euclid(2.0 * PI) - PI
+impl Walker {
+    /// Is sent once more from where it stands, if it is `off` its place.
+    fn try_again(&mut self, off: &Missing) {
+        (self.before_m, self.walks, self.nearest_m) = (None, 0, f64::INFINITY);
+        self.stage = if off.is_within(WELL_M, WELL_RAD) {
+            WalkerStage::Rests
+        } else if off.is_within(PULSE_M, PULSE_RAD) {
+            WalkerStage::Corrects
+        } else {
+            WalkerStage::Walks
+        };
+    }
+
+    fn walk(&self, [vx_m_s, vy_m_s, yaw_rate_rad_s]: [f64; 3]) -> WalkMove {
+        WalkMove {
+            robot: self.name.clone(),
+            vx_m_s,
+            vy_m_s,
+            yaw_rate_rad_s,
+            pelvis_height_m: None,
+            waist_yaw_rad: None,
+            look_at_m: None,
+        }
+    }
 }

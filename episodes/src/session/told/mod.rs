@@ -210,14 +210,14 @@ fn withhold_hand(hand: &mut HandReport) {
         measured: _,
         position_error_m: _,
         orientation_error_rad: _,
-        compliance_offset_m,
+        given_way_m,
         fingers,
         largest_effort,
         force_n,
         joints_clamped: _,
         joints_at_limit: _,
     } = hand;
-    (*state, *grip, *touches, *compliance_offset_m) = (None, None, None, None);
+    (*state, *grip, *touches, *given_way_m) = (None, None, None, None);
     (*largest_effort, *force_n) = (None, None);
     presses.clear();
     if let Some(FingerReport { state, target_rad: _, measured_rad: _ }) = fingers {

@@ -92,7 +92,7 @@ const FULL: &[(&str, &str)] = &[
 const FULL_AT_TIMES: &[(&str, &str)] = &[
     (
         "command",
-        "robots.frame robots.SIDE.presses robots.SIDE.touches robots.SIDE.compliance_offset_m robots.base.commanded_height_m \
+        "robots.frame robots.SIDE.presses robots.SIDE.touches robots.SIDE.given_way_m robots.base.commanded_height_m \
          robots.base.comes_to_rest_m robots.base.displaced_m robots.base.stepped",
     ),
     ("check_reach", "needs_a_step"),

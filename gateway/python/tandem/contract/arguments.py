@@ -58,13 +58,21 @@ class Destination:
     """[x, y] in metres in the robot's own start frame, as pelvis_in_start has it."""
 
     heading_rad: float | None = None
-    """Which way it is to face, in radians counter-clockwise from how it faced at the start. None: as it faces now."""
+    """Which way it is to face, in radians counter-clockwise from how it faced at the start. None: as it faces now,
+    or at the last waypoint.
+    """
+
+    waypoints: Sequence[Waypoint] | None = None
+    """Places to go by on the way, in order, without a stop. Robots of one call that carry have as many waypoints
+    as each other, and go by them together. None: none.
+    """
 
     carry: bool | None = None
     """True: it pushes or carries what its hands hold. Wrists stay where they are to it and as high over the floor
-    though its pelvis sinks as it walks, and lead it by what it lags, up to 20 cm. Robots of one call that carry
-    go at one pace of 0.2 m/s and give way to each other (compliance_n_s_m 250), so that several carry one load:
-    give each its place in its own start frame. None: false.
+    though its pelvis sinks as it walks, and lead it by what it lags. Robots of one call that carry go at one
+    pace of 0.2 m/s and give way to each other (compliance_n_s_m 250), so that several carry one load: give each
+    its place in its own start frame. All slow down and stop where one lags by 18 cm, is turned away by 0.2 rad,
+    or a wrist is out of reach. None: false.
     """
 
 
@@ -179,6 +187,17 @@ class WalkMove:
     """A point to turn the head to by the waist, [x, y, z] in the pelvis frame, in place of waist_yaw_rad. None:
     none.
     """
+
+
+@dataclass(frozen=True)
+class Waypoint:
+    """A place that a robot's pelvis is to go by, within 10 cm or so."""
+
+    at_m: Numbers
+    """[x, y] in metres in the robot's own start frame."""
+
+    heading_rad: float | None = None
+    """Which way it is to face there, as the place's. None: as before."""
 
 
 @dataclass(frozen=True)

@@ -267,8 +267,9 @@ class HandReport:
     """
 
     target: Pose | None
-    """The wrist pose that was asked for, in the pelvis frame as it is now; of an arm without a wrist target, the
-    pose that its joint targets stand for. Left out of a short reply.
+    """The wrist pose that was asked for, in the pelvis frame as it is now, and not where the hand has given way to
+    since; of an arm without a wrist target, the pose that its joint targets stand for. Left out of a short
+    reply.
     """
 
     measured: Pose | None
@@ -284,9 +285,10 @@ class HandReport:
     orientation_error_rad: float | None
     """Angle from target to measured, in radians; left out as the distance is."""
 
-    compliance_offset_m: tuple[float, float, float] | None
-    """How far the hand has given way to what pulls it, by the command's compliance: its target is moved so far,
-    [x, y, z] in metres in the pelvis frame. Left out where it has not, and where the assistance is "paper".
+    given_way_m: tuple[float, float, float] | None
+    """How far the hand has given way to what pulls it, by the command's compliance: it is to be so far from
+    `target`, [x, y, z] in metres in the pelvis frame, and its state is told against that. Left out where it has
+    not, and where the assistance is "paper".
     """
 
     fingers: FingerReport | None
@@ -327,7 +329,7 @@ class HandReport:
             measured=None if (got := value.get("measured")) is None else Pose.of(got),
             position_error_m=value.get("position_error_m"),
             orientation_error_rad=value.get("orientation_error_rad"),
-            compliance_offset_m=None if (got := value.get("compliance_offset_m")) is None else tuple(got),
+            given_way_m=None if (got := value.get("given_way_m")) is None else tuple(got),
             fingers=None if (got := value.get("fingers")) is None else FingerReport.of(got),
             largest_effort=None if (got := value.get("largest_effort")) is None else Effort.of(got),
             force_n=None if (got := value.get("force_n")) is None else tuple(got),

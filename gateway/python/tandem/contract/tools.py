@@ -208,9 +208,9 @@ class Tools(ABC):
     ) -> PlanReply:
         """Walk to places in the start frame, looking at odometry on the way: arms keep their joints and go along,
         or push and carry with `carry`. It is carried out as short commands, each recorded and counted as a tool
-        call, until every robot stands within 4 cm and 0.05 rad of its place (15 cm and 0.1 rad where it
-        carries, its hands nearer), one gets no nearer, or the steps are used up. It walks straight and looks at
-        nothing: go round what stands in the way by places in between.
+        call, until every robot stands within 1.5 cm and 1.5 degrees of its place, one gets no nearer, or the
+        steps are used up. It walks straight and looks at nothing: go round what stands in the way by
+        `waypoints`.
 
         steps: The most control steps of 20 ms to take, up to 1500. A way takes about 120, and 250 a metre and 150 a
             quarter turn; where robots carry, 450 a metre.

@@ -25,7 +25,7 @@ const MOVED_LEASH_M: f32 = 0.25;
 /// A robot that was told to move for no longer than this steps on until its feet are near to where commands took it, or for a while. One
 /// that has walked far stops as soon as it can.
 const MOVED_SHORT_S: f32 = 2.5;
-const MOVED_NEAR_M: f32 = 0.02;
+const MOVED_NEAR_M: f32 = 0.012;
 const MOVED_LONGEST_S: f32 = 0.6;
 const MOVED_RETURN_1_S: f32 = 2.0;
 const MOVED_RETURN_M_S: f32 = 0.2;

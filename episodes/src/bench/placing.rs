@@ -1,0 +1,230 @@
+//! Robots that are sent to places by `walk_to`, with empty hands or as a team with a load: cases of the bench
+//! of base controllers.
+
+use std::f32::consts::{FRAC_PI_2, TAU};
+use std::ops::RangeInclusive;
+
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use tandem_sim::bench::{CaseReport, is_asked, over_seeds};
+use tandem_sim::render::RendererKind;
+use tandem_sim::{CONTROL_HZ, Sensing, Side, Sides, SplitMix64};
+use tandem_tools_spec::{Assistance, Destination, Protocol, ToolCall, WalkTo};
+
+use super::BenchError;
+use super::holding::loads::{BASKET, LEGS, ROUND_TABLE, SharedLoad, TABLE};
+use crate::Session;
+use crate::convert::isometry_from_sim;
+use crate::players::{InProcess, PlayerError};
+use crate::scoring::{Done, Phase};
+use crate::spec::{Controller, EpisodeSpec, RobotFile};
+use crate::tasks::{RobotSpot, Task};
+
+/// A robot alone on a floor.
+const TASK: Task = Task {
+    id: "place",
+    scene: "floor",
+    robots: &[RobotSpot { name: "A", position_m: [0.0; 2], yaw_rad: 0.0, instruction: "" }],
+    objects: &[],
+    randomize: &[],
+    instruction: "",
+    benchmark_steps: 60 * CONTROL_HZ as u32,
+    phases: &[Phase {
+        id: "none",
+        description: "A bench has no success that would end it early.",
+        collaborative: false,
+        done: Done::When(&|_| false),
+        nearness: &|_| 0.0,
+    }],
+    file: None,
+};
+
+/// One after another, each from where the last ended.
+const PLACES: usize = 3;
+/// How far places are from one another, and how far a robot or a team turns between them.
+const AWAY_M: [f32; 2] = [0.05, 0.6];
+const TURN_RAD: f32 = FRAC_PI_2;
+const CARRIED_TURN_RAD: f32 = 0.3;
+const MOST_STEPS: u32 = 1500;
+
+/// What came of a robot's or a team's calls: the worst of all.
+#[derive(Clone, Debug, Default)]
+struct PlaceResult {
+    /// How far a pelvis came to rest from its place, and how far it is turned from there.
+    off_m: f64,
+    off_rad: f64,
+    /// How far wrists were, after a call, from where they were to their pelvis before the first; horizontally.
+    squeezed_m: f64,
+}
+
+/// Plays the cases whose names `filter` asks for on these seeds.
+pub fn run(
+    robot: &RobotFile,
+    controller: &Controller,
+    sensing: Sensing,
+    filter: &str,
+    seeds: &RangeInclusive<u32>,
+    done: &mut dyn FnMut(CaseReport),
+) -> Result<(), BenchError> {
+    let loads = [&TABLE, &ROUND_TABLE, &LEGS, &BASKET].map(Some);
+    for load in std::iter::once(None).chain(loads) {
+        let name = load.map_or("place_walk".into(), |load| format!("place_{}", load.name));
+        if !is_asked(filter, &name) {
+            continue;
+        }
+        let trials = over_seeds(seeds, |seed| {
+            let spec = EpisodeSpec {
+                robot: robot.clone(),
+                locomotion: controller.clone(),
+                sensing,
+                renderer: RendererKind::Cpu,
+                ..EpisodeSpec::new(load.map_or(&TASK, |load| load.task()), seed, Protocol::Agentic)
+            };
+            trial(&spec.assisted(Assistance::Full), load)
+        });
+        let trials = trials.into_iter().collect::<Result<Vec<_>, BenchError>>()?;
+        let placed: Vec<&PlaceResult> = trials.iter().flatten().collect();
+        let worst = |value: fn(&PlaceResult) -> f64| {
+            placed.iter().map(|placed| value(placed) as f32).reduce(f32::max)
+        };
+        done(CaseReport {
+            survived: placed.len(),
+            heading_error_deg: worst(|placed| placed.off_rad.to_degrees()),
+            final_drift_m: worst(|placed| placed.off_m),
+            load_drift_m: load.and(worst(|placed| placed.squeezed_m)),
+            ..CaseReport::of(&name, trials.len())
+        });
+    }
+    Ok(())
+}
+
+/// One seed; `None` if a robot fell, or the team did not come to hold its load.
+fn trial(spec: &EpisodeSpec, load: Option<&SharedLoad>) -> Result<Option<PlaceResult>, BenchError> {
+    let session = Session::start(spec, None).map_err(Box::new)?;
+    let mut episode = InProcess::new(session);
+    let team: Vec<usize> = load.map_or(vec![0], |load| load.team().collect());
+    match load.map_or(Ok(()), |load| load.take(&mut episode, false)) {
+        Ok(()) => {}
+        Err(PlayerError::GaveUp(_) | PlayerError::EpisodeOver) => return Ok(None),
+        Err(error) => return Err(error.into()),
+    }
+    let session = &mut episode.session;
+    let mut random = SplitMix64(spec.seed.into());
+    let wrists = pelvis_from_wrists(session, &team);
+    let mut result = PlaceResult::default();
+    for _ in 0..PLACES {
+        let turn_rad = if load.is_some() { CARRIED_TURN_RAD } else { TURN_RAD };
+        let (away_m, angle_rad) = (random.uniform(AWAY_M), random.uniform([0.0, TAU]));
+        let turn_rad = f64::from(random.uniform([-turn_rad, turn_rad]));
+        let (sine, cosine) = f64::from(angle_rad).sin_cos();
+        let by_m = f64::from(away_m) * Vector3::new(cosine, sine, 0.0);
+        let goals = goals(session, &team, by_m, turn_rad);
+        send(session, &team, &goals, load.is_some())?;
+        for (robot, goal) in team.iter().zip(&goals) {
+            let at = upright(&pelvis(session, *robot));
+            let off = goal.inv_mul(&at);
+            let off_rad = heading(&off);
+            result.off_m = result.off_m.max(off.translation.vector.xy().norm());
+            result.off_rad = result.off_rad.max(off_rad.abs());
+        }
+        for (before, now) in wrists.iter().zip(pelvis_from_wrists(session, &team)) {
+            for side in Side::BOTH {
+                result.squeezed_m = result.squeezed_m.max((now[side] - before[side]).xy().norm());
+            }
+        }
+        if session.present().robots.iter().any(|robot| robot.truth.fallen) {
+            return Ok(None);
+        }
+    }
+    Ok(Some(result))
+}
+
+/// Where pelves are to be once everything is moved by this, turned about the middle of the team.
+fn goals(session: &Session, team: &[usize], by_m: Vector3<f64>, turn_rad: f64) -> Vec<Isometry3<f64>> {
+    let at: Vec<Isometry3<f64>> = team.iter().map(|robot| upright(&pelvis(session, *robot))).collect();
+    let middle_m = at.iter().map(|at| at.translation.vector).sum::<Vector3<f64>>() / at.len() as f64;
+    let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn_rad);
+    let moved = Translation3::from(by_m) * Isometry3::rotation_wrt_point(turned, middle_m.into());
+    at.iter().map(|at| moved * at).collect()
+}
+
+/// Sends each robot to its place, told in its own start frame as its odometry has it.
+fn send(
+    session: &mut Session,
+    team: &[usize],
+    goals: &[Isometry3<f64>],
+    carries: bool,
+) -> Result<(), BenchError> {
+    let destination = |(robot, goal): (&usize, &Isometry3<f64>)| {
+        let sensed = isometry_from_sim(&session.present().robots[*robot].sensed.start_from_pelvis);
+        let to = upright(&sensed) * upright(&pelvis(session, *robot)).inv_mul(goal);
+        Destination {
+            robot: session.spec().task.robots[*robot].name.into(),
+            to_m: [to.translation.x, to.translation.y],
+            heading_rad: Some(heading(&to)),
+            waypoints: None,
+            carry: Some(carries),
+        }
+    };
+    let robots = team.iter().zip(goals).map(destination).collect();
+    let call = ToolCall::from(WalkTo { steps: MOST_STEPS, robots });
+    session.call(call).map_err(Box::new)?;
+    Ok(())
+}
+
+fn pelvis(session: &Session, robot: usize) -> Isometry3<f64> {
+    isometry_from_sim(&session.present().robots[robot].truth.world_from_pelvis())
+}
+
+fn pelvis_from_wrists(session: &Session, team: &[usize]) -> Vec<Sides<Vector3<f64>>> {
+    let wrists = |robot: &usize| {
+        let into_pelvis = upright(&pelvis(session, *robot)).inverse();
+        let truth = &session.present().robots[*robot].truth;
+        Sides::from_fn(|side| {
+            (into_pelvis * isometry_from_sim(&truth.world_from_wrist[side])).translation.vector
+        })
+    };
+    team.iter().map(wrists).collect()
+}
+
+fn heading(pose: &Isometry3<f64>) -> f64 {
+    let ahead = pose.rotation * Vector3::x();
+    ahead.y.atan2(ahead.x)
+}
+
+fn upright(pose: &Isometry3<f64>) -> Isometry3<f64> {
+    Isometry3::from_parts(
+        pose.translation,
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading(pose)),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Plays a case on three seeds: nobody falls, and every pelvis comes to rest within `off_m` and 1.5 degrees
+    /// of its place.
+    fn comes_to_its_place(filter: &str, off_m: f32, squeezed_m: f32) {
+        let mut played = 0;
+        let mut check = |report: CaseReport| {
+            played += 1;
+            assert_eq!(report.survived, report.seeds, "{report}");
+            assert!(report.final_drift_m.is_some_and(|drift_m| drift_m <= off_m), "{report}");
+            assert!(report.heading_error_deg.is_some_and(|off_deg| off_deg <= 1.5), "{report}");
+            assert!(report.load_drift_m.is_none_or(|drift_m| drift_m <= squeezed_m), "{report}");
+        };
+        let (robot, controller) = (RobotFile::default(), Controller::default());
+        run(&robot, &controller, Sensing::default(), filter, &(3000..=3002), &mut check).unwrap();
+        assert_eq!(played, 1, "{filter}");
+    }
+
+    #[test]
+    fn robots_come_to_their_places() {
+        comes_to_its_place("place_walk", 0.017, 0.0);
+    }
+
+    #[test]
+    fn teams_come_to_their_places_with_what_they_hold() {
+        comes_to_its_place("place_shared_table", 0.02, 0.04);
+    }
+}
