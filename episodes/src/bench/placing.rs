@@ -225,6 +225,6 @@ mod tests {
 
     #[test]
     fn teams_come_to_their_places_with_what_they_hold() {
-        comes_to_its_place("place_shared_table", 0.02, 0.04);
+        comes_to_its_place("place_shared_table", 0.02, 0.06);
     }
 }

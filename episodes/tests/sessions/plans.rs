@@ -165,11 +165,14 @@ fn a_robot_walks_to_a_place() {
 fn a_robot_that_does_not_reach_what_it_carries_stops() {
     let mut session = agentic();
     let far = json!({ "robot": "A", "right_position_m": [0.9, -0.2, 0.2] });
-    let call = Call::parse("move_wrists", json!({ "steps": 50, "robots": [far] })).unwrap();
-    session.call(call.tool).unwrap();
+    for _ in 0..3 {
+        let call = Call::parse("move_wrists", json!({ "steps": 25, "robots": [far] })).unwrap();
+        session.call(call.tool).unwrap();
+    }
     let to = json!({ "steps": 1200, "robots": [{ "robot": "A", "to_m": [-1.0, 0.0], "carry": true }] });
     let reply = plan(&mut session, "walk_to", to).unwrap();
-    assert!(reply.stopped.is_some_and(|why| why.contains("A's right wrist is out of reach")));
+    let why = reply.stopped.unwrap_or_default();
+    assert!(why.contains("wrist is out of reach"), "{why}");
     let told = &reply.last.robots[A];
     assert_eq!(told.base.and_then(|base| base.state), Some(BaseState::Standing), "{told:?}");
     assert!(reply.executed_steps < 300, "{}", reply.executed_steps);

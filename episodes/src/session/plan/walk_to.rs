@@ -28,8 +28,8 @@ const PASSED_M: f64 = 0.1;
 /// One that stands this near has arrived, and is sent once more until it is a little nearer.
 pub const THERE_M: f64 = 0.015;
 pub const THERE_RAD: f64 = 0.026;
-pub const WELL_M: f64 = 0.011;
-pub const WELL_RAD: f64 = 0.02;
+pub const WELL_M: f64 = 0.013;
+pub const WELL_RAD: f64 = 0.023;
 /// How often a robot that has come to rest is sent once more, by a pulse where it is this near.
 pub const ATTEMPTS: u32 = 5;
 const PULSE_M: f64 = 0.1;
