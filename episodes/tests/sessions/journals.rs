@@ -1,4 +1,5 @@
-//! Episodes brought back from what they were asked: the same states, counts, clocks and results as without an interruption.
+//! Episodes brought back from what they were asked: the same states, counts, clocks and results as without an
+//! interruption.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};

@@ -91,7 +91,7 @@ impl HostMemory for Beside {
             let key = answer.key.clone();
             match answer.read() {
                 Ok((request, answer)) => self.replies.keep(key, request, Ok(Arc::new(answer))),
-                Err(error) => tracing::error!(error, key, "an answer is lost"),
+                Err(error) => tracing::error!(%error, key, "an answer is lost"),
             }
         }
     }
@@ -287,7 +287,8 @@ impl HostedEpisode {
     }
 }
 
-/// The key under which an operator's request is kept: keys of different operators have nothing to do with each other.
+/// The key under which an operator's request is kept: keys of different operators have nothing to do with each
+/// other.
 fn own_key(robot: Option<&str>, key: &str) -> String {
     format!("{}:{key}", robot.unwrap_or_default())
 }

@@ -40,8 +40,8 @@ pub struct EpisodeTable {
     purpose: Purpose,
     /// Where the journals are of episodes that outlive the server, if any do.
     pub(super) journals: OnceLock<LiveFolder>,
-    /// When it was looked for episodes of other servers last.
-    pub(super) looked_around: Mutex<Option<Instant>>,
+    /// The operators of episodes that other servers play, by episode.
+    pub(super) others: Mutex<BTreeMap<String, Team>>,
 }
 
 /// The purpose of a server. It decides who starts episodes, and who may drive their robots.
@@ -78,7 +78,7 @@ impl EpisodeTable {
             folders: RunFolders::default(),
             purpose: Purpose::default(),
             journals: OnceLock::new(),
-            looked_around: Mutex::default(),
+            others: Mutex::default(),
         }
     }
 
@@ -127,8 +127,8 @@ impl EpisodeTable {
         key: &str,
     ) -> Result<IdempotentReply<StartReply>, HostingError> {
         let (table, request) = (self.clone(), (args.clone(), driving));
-        let kept = StartKey { key: key.into(), args };
-        let work = async move { table.start_asked(driving, kept).await.map_err(Arc::new) };
+        let own_key = Some(key.to_owned());
+        let work = async move { table.start_with_key(args, driving, own_key).await.map_err(Arc::new) };
         let lasting = |made: &SharedStart| made.as_ref().map_or_else(|error| error.is_final(), |_| true);
         let IdempotentReply { reply, replayed } = self.starts.once(key, request, work, lasting).await?;
         Ok(IdempotentReply { reply: reply.map_err(HostingError::Shared)?, replayed })
@@ -145,23 +145,20 @@ impl EpisodeTable {
         args: StartEpisode,
         driving: Driving,
     ) -> Result<StartReply, HostingError> {
-        self.start_args(&args, driving, None).await
+        self.start_with_key(args, driving, None).await
     }
 
-    async fn start_asked(&self, driving: Driving, asked: StartKey) -> Result<StartReply, HostingError> {
-        let args = asked.args.clone();
-        self.start_args(&args, driving, Some(asked)).await
-    }
-
-    async fn start_args(
+    async fn start_with_key(
         &self,
-        args: &StartEpisode,
+        args: StartEpisode,
         driving: Driving,
-        key: Option<StartKey>,
+        key: Option<String>,
     ) -> Result<StartReply, HostingError> {
         self.check_starts()?;
-        let reply = self.start_kept(self.settings.spec(args)?, &driving, key).await?;
-        let briefing = if args.short { reply.briefing.shortened() } else { reply.briefing };
+        let (spec, is_short) = (self.settings.spec(&args)?, args.short);
+        let key = key.map(|key| StartKey { key, args });
+        let reply = self.start_kept(spec, &driving, key).await?;
+        let briefing = if is_short { reply.briefing.shortened() } else { reply.briefing };
         Ok(StartReply { briefing, ..reply })
     }
 
@@ -283,7 +280,8 @@ impl EpisodeTable {
         Ok((hosted, team, robot))
     }
 
-    /// Checks that `who` may replace operators by the expert or a policy of this process. The episode's starter may.
+    /// Checks that `who` may replace operators by the expert or a policy of this process. The episode's starter
+    /// may.
     pub fn check_stand_in(&self, who: &Caller) -> Result<(), HostingError> {
         match (&self.purpose, who) {
             (Purpose::Evaluation, _) => Err(HostingError::OneEpisode),
@@ -380,9 +378,9 @@ impl EpisodeTable {
         self.lock().episodes.values().filter(|episode| !episode.thread.ended()).count()
     }
 
-    /// Takes no more episodes, ends those that are held after the calls already waiting, and returns when every file is
-    /// closed, or after `limit`. What was not closed by then is returned by name. Those that `keep` says, and those that sleep, go on where
-    /// they are brought back.
+    /// Takes no more episodes, ends those that are held after the calls already waiting, and returns when every
+    /// file is closed, or after `limit`. What was not closed by then is returned by name. Those that `keep`
+    /// says, and those that sleep, go on where they are brought back.
     pub async fn close_all(&self, limit: Duration, keep: bool) -> Vec<String> {
         let deadline = Instant::now() + limit;
         let episodes = {

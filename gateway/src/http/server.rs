@@ -149,8 +149,8 @@ impl Server {
         &self.table
     }
 
-    /// Serves until it is asked to end, then stops as [`Server::stop`] does. Episodes under way go on when the next server on the same
-    /// runs brings them back, unless somebody has ended this one from a keyboard.
+    /// Serves until it is asked to end, then stops as [`Server::stop`] does. Episodes under way go on when the
+    /// next server on the same runs brings them back, unless somebody has ended this one from a keyboard.
     pub fn run_until_signal(self) -> Vec<String> {
         let keep = self.runtime.block_on(shutdown_signal()) == ShutdownSignal::Terminate;
         tracing::info!("shutting down; calls under way finish first, a second signal ends at once");

@@ -1,13 +1,16 @@
-//! An episode that another process has played, or this one before it put the episode aside, brought to where it stood.
+//! An episode that another process has played, or this one before it put the episode aside, brought to where it
+//! stood.
 
 use std::time::Duration;
 
+use serde_json::Value;
 use tandem_tools_spec::Call;
 
 use super::set_clock::SetHands;
 use crate::commands::{Called, OperatorCall};
 use crate::error::{CheckpointError, EpisodeError};
 use crate::live::Onlookers;
+use crate::output::OutputError;
 use crate::session::journal::{JournalEntry, KeptRequest};
 use crate::session::{Audience, Caller, Clock, Request, RunFolder, Session, this_build};
 use crate::spec::EpisodeSpec;
@@ -26,7 +29,8 @@ pub struct BringBack {
 }
 
 impl Session {
-    /// Plays an episode again up to the last entry of its journal, and goes on from there. An error says where it went another way.
+    /// Plays an episode again up to the last entry of its journal, and goes on from there. An error says where
+    /// it went another way.
     pub fn bring_back(back: BringBack) -> Result<Session, EpisodeError> {
         let BringBack { spec, folder, entries, clock, thinking, onlookers } = back;
         let hands = SetHands::default();
@@ -59,11 +63,11 @@ impl KeptRequest {
             KeptRequest::Call { operator, shown, tool, arguments } => {
                 let caller = operator.as_deref().map_or(Caller::Policy, Caller::Operator);
                 let audience = shown.as_deref().map_or(Audience::Caller, Audience::Process);
-                let called = Called::parse(&tool, arguments)?;
+                let called = Called::parse(&tool, read(&arguments)?)?;
                 let _ = session.perform(Request { caller, called, audience });
             }
             KeptRequest::Command { robot, tool, arguments } => {
-                let call = Call::parse(&tool, arguments)?;
+                let call = Call::parse(&tool, read(&arguments)?)?;
                 let _ = session.read_command(OperatorCall::new(&robot, call)?);
             }
             KeptRequest::Note { operator, note } => {
@@ -76,4 +80,9 @@ impl KeptRequest {
         }
         Ok(())
     }
+}
+
+/// Reads the arguments of a request.
+fn read(arguments: &str) -> Result<Value, EpisodeError> {
+    Ok(serde_json::from_str(arguments).map_err(OutputError::from)?)
 }

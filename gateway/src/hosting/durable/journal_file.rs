@@ -1,7 +1,9 @@
-//! The journal of an episode as a file: a line that says what the episode is, then a line for everything that was answered at once. A line
-//! is written whole or counts for nothing, so that what was done and what was answered are never one without the other.
+//! The journal of an episode as a file: a line that says what the episode is, then a line for everything that
+//! was answered at once. A line is written whole or counts for nothing, so that what was done and what was
+//! answered are never one without the other.
 
 use std::{
+    error::Error,
     fs::{self, File, OpenOptions},
     io::{self, BufRead, BufReader, Write},
     path::{Path, PathBuf},
@@ -46,7 +48,8 @@ pub struct Keyed {
     pub request: Call,
 }
 
-/// What was answered at once: what was asked, what those were told who gave a key, and what the host has to remember then.
+/// What was answered at once: what was asked, what those were told who gave a key, and what the host has to
+/// remember then.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Commit {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -62,8 +65,9 @@ pub struct Commit {
 pub struct KeptAnswer {
     pub key: String,
     tool: String,
-    arguments: Value,
-    reply: Value,
+    /// JSON, as the reply is.
+    arguments: String,
+    reply: String,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     step: Option<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -113,8 +117,8 @@ impl KeptAnswer {
         Ok(KeptAnswer {
             key: keyed.key.clone(),
             tool: keyed.request.name().into(),
-            arguments: serde_json::to_value(&keyed.request)?,
-            reply: serde_json::to_value(&answer.reply)?,
+            arguments: serde_json::to_string(&keyed.request)?,
+            reply: serde_json::to_string(&answer.reply)?,
             step: answer.step,
             observation: answer.observation.clone(),
             partners: answer.partners.clone(),
@@ -125,9 +129,9 @@ impl KeptAnswer {
     }
 
     /// The request, and the answer as it was told.
-    pub fn read(self) -> Result<(Call, Answer), String> {
-        let request = Call::parse(&self.tool, self.arguments).map_err(|error| error.to_string())?;
-        let reply = request.tool.parse_reply(self.reply).map_err(|error| error.to_string())?;
+    pub fn read(self) -> Result<(Call, Answer), Box<dyn Error>> {
+        let request = Call::parse(&self.tool, serde_json::from_str(&self.arguments)?)?;
+        let reply = request.tool.parse_reply(serde_json::from_str(&self.reply)?)?;
         let KeptAnswer { step, observation, partners, heard, recording_failed, others_play_on, .. } = self;
         Ok((request, Answer { reply, step, observation, partners, heard, recording_failed, others_play_on }))
     }

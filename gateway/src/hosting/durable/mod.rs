@@ -1,5 +1,6 @@
-//! Episodes that outlive the process which holds them: each has a journal beside the runs, in which every call is written before its
-//! answer leaves, and a lease that says which server plays it. Whoever takes the lease plays the journal again.
+//! Episodes that outlive the process which holds them: each has a journal beside the runs, in which every call
+//! is written before its answer leaves, and a lease that says which server plays it. Whoever takes the lease
+//! plays the journal again.
 
 mod journal_file;
 mod lease;

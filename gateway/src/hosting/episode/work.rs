@@ -1,4 +1,5 @@
-//! The thread of an episode at work: job after job, each written into the episode's journal before it is answered.
+//! The thread of an episode at work: job after job, each written into the episode's journal before it is
+//! answered.
 
 use std::{
     sync::{Arc, Mutex, PoisonError},
@@ -267,8 +268,8 @@ impl Desk<'_> {
         Left::Closed(None)
     }
 
-    /// A reply that cannot be sent means that the caller has gone. What was done stays done. The log has the reason of what is refused and
-    /// told to nobody.
+    /// A reply that cannot be sent means that the caller has gone. What was done stays done. The log has the
+    /// reason of what is refused and told to nobody.
     fn do_job(&mut self, job: Job) {
         match job {
             Job::Call { operator, call, keyed, told, reply } => {

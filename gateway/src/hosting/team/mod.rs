@@ -187,7 +187,8 @@ impl Team {
         }
     }
 
-    /// Has the episode answer a call of the operator on `seat`; `then` makes of the answer what this one is told.
+    /// Has the episode answer a call of the operator on `seat`; `then` makes of the answer what this one is
+    /// told.
     async fn ask(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
