@@ -1,7 +1,7 @@
 //! Looks at the world of an episode: draws what its cameras see, and measures depth at pixels.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{Isometry3, Point3};
 use tandem_sim::render::{Camera, Cameras, Frame, RenderRequest, Renderer};
@@ -22,6 +22,8 @@ pub struct Observer {
     renderer: Box<dyn Renderer>,
     pub cameras: Cameras,
     drawn: Option<DrawnStep>,
+    /// What draws while nobody sees what [`Observer::observe`] returns but the recording.
+    for_recording: Option<Arc<Mutex<Box<dyn Renderer>>>>,
 }
 
 /// The views that have been drawn of the latest step that somebody looked at.
@@ -36,7 +38,19 @@ impl Observer {
     /// Looks at the world of the episode `spec`.
     pub fn new(spec: &EpisodeSpec, world: &World) -> Observer {
         let renderer = spec.renderer.renderer(stress::scenery(spec.stress, spec.world_seed(), world));
-        Observer { renderer, cameras: stress::cameras(spec.stress, spec.world_seed(), world), drawn: None }
+        let cameras = stress::cameras(spec.stress, spec.world_seed(), world);
+        Observer { renderer, cameras, drawn: None, for_recording: None }
+    }
+
+    /// From now on nobody but the recording needs what is observed: pictures are drawn on its thread, and depth is not.
+    pub fn draw_for_recording(&mut self, spec: &EpisodeSpec, world: &World) {
+        let renderer = spec.renderer.renderer(stress::scenery(spec.stress, spec.world_seed(), world));
+        self.for_recording = Some(Arc::new(Mutex::new(renderer)));
+    }
+
+    /// From now on what is observed is drawn at once.
+    pub fn draw_at_once(&mut self) {
+        self.for_recording = None;
     }
 
     /// The renderer, and on what device it draws.
@@ -96,6 +110,21 @@ impl Observer {
         robots.iter().filter_map(|robot| views[*robot].clone()).collect()
     }
 
+    fn view_for_recording(
+        &self,
+        renderer: &Arc<Mutex<Box<dyn Renderer>>>,
+        step: &Arc<Step>,
+        robot: usize,
+    ) -> Arc<RobotView> {
+        let camera = self.cameras.egocentric(step, robot);
+        let (intrinsics, size_px) = (camera.intrinsics(), [camera.width, camera.height]);
+        let (renderer, step) = (renderer.clone(), step.clone());
+        let picture = Picture::drawn_later(size_px, move || {
+            renderer.lock().unwrap_or_else(PoisonError::into_inner).render_colours(&step, &camera)
+        });
+        Arc::new(RobotView { intrinsics, picture: picture.into(), depth_m: Vec::new() })
+    }
+
     /// What the robots numbered `robots` see and sense after `step`; `sheets` describe all robots.
     pub fn observe(
         &mut self,
@@ -104,7 +133,12 @@ impl Observer {
         sheets: &[&RobotSheet],
         detail: Detail,
     ) -> TeamObservation {
-        let views = self.views(step, robots);
+        let views = match &self.for_recording {
+            Some(renderer) => {
+                robots.iter().map(|robot| self.view_for_recording(renderer, step, *robot)).collect()
+            }
+            None => self.views(step, robots),
+        };
         let observe = |(&robot, view): (&usize, Arc<RobotView>)| {
             let own = Proprioception::of(step, robot);
             RobotObservation {

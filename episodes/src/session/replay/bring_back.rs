@@ -37,6 +37,7 @@ impl Session {
         let path = folder.as_ref().map(|folder| folder.path.clone()).unwrap_or_default();
         let mut session = Session::start_with_clock(&spec, folder, hands.clock(clock))?;
         session.set_onlookers(onlookers);
+        session.observer.draw_for_recording(&spec, &session.world);
         for entry in entries {
             let shown = session.clock.spent() + session.clock.thinking();
             hands.pass(entry.thought().saturating_sub(shown));
@@ -47,6 +48,7 @@ impl Session {
                 return Err(CheckpointError::OtherWay { path, step, made_by: this.into(), this }.into());
             }
         }
+        session.observer.draw_at_once();
         hands.pass(thinking);
         hands.go();
         // The clock goes from this look on.
