@@ -51,6 +51,8 @@ pub struct RecorderThread {
     /// Steps that the system does not have yet.
     unwritten_steps: Arc<AtomicUsize>,
     hurry: Arc<AtomicBool>,
+    /// Whether the episode is played again, so that it is no loss if what it leaves behind is written late.
+    catches_up: bool,
 }
 
 impl RecorderThread {
@@ -75,7 +77,13 @@ impl RecorderThread {
             waiting_pictures: Arc::default(),
             unwritten_steps,
             hurry,
+            catches_up: false,
         })
+    }
+
+    /// Whether the episode is played again from now on: it does not wait then until the system has its steps and pictures.
+    pub fn catch_up(&mut self, catches_up: bool) {
+        self.catches_up = catches_up;
     }
 
     /// Appends after everything that was appended before, some time soon.
@@ -93,6 +101,7 @@ impl RecorderThread {
         match count {
             ..GATHERED_STEPS => {}
             GATHERED_STEPS..UNWRITTEN_STEPS => self.wake(),
+            UNWRITTEN_STEPS.. if self.catches_up => self.wake(),
             UNWRITTEN_STEPS.. => self.flush(),
         }
     }
@@ -131,6 +140,7 @@ impl RecorderThread {
         match count {
             ..GATHERED_PICTURES => {}
             GATHERED_PICTURES..WAITING_PICTURES => self.wake(),
+            WAITING_PICTURES.. if self.catches_up => self.wake(),
             WAITING_PICTURES.. => self.flush(),
         }
     }

@@ -1,5 +1,5 @@
-//! MoveHouse: A presses the lever, pushes the door open along its swing and stands aside in the other room. Meanwhile B and
-//! C lift the table; they follow A through the doorway in step and set it down on the marks.
+//! MoveHouse: A walks to the door, presses its lever, pushes the door open along its swing and stands aside in the other
+//! room. Meanwhile B and C lift the table; they follow A through the doorway in step and set it down on the marks.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -7,7 +7,7 @@ use tandem_sim::{Pose, Rotation, Side, Sides, Vector};
 
 use super::skills::{
     CarryTeam, Commander, FREE, HandGrasp, HandMove, Hold, ParallelScript, Posture, PosturePath, WalkGoal,
-    closed_rad, follow, grasp_reached, in_parallel, let_go, place, walk_to,
+    closed_rad, follow, grasp_reached, in_parallel, let_go, place, walk_reaching, walk_to,
 };
 use crate::players::PlayerError;
 use crate::scoring::{A, B, C, Facts};
@@ -48,8 +48,10 @@ const OPENED_S: f32 = 0.4;
 /// B stays so far behind A, until A is beside the way.
 const APART_M: f32 = 0.75;
 const BESIDE_Y_M: f32 = -0.75;
-/// Where A stands aside, in the door's frame.
+/// Where A stands to press the lever, and where it stands aside, in the door's frame.
+const BEFORE_M: Vector = Vector::new(-0.50, -0.15, 0.0);
 const ASIDE_M: Vector = Vector::new(0.75, -1.05, 0.0);
+const APPROACH_M_S: f32 = 0.4;
 const WALK_M_S: f32 = 0.3;
 
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
@@ -103,7 +105,7 @@ fn set_heights(commander: &mut Commander, height_m: f32) {
     }
 }
 
-/// A, which begins within reach of the lever, lays its right fist on it, presses it down and follows the leaf on its swing.
+/// A walks up to the lever, lays its right fist on it, presses it down and follows the leaf on its swing.
 fn open_door(commander: &mut Commander) -> Result<(), PlayerError> {
     let leaf = commander.facts()?.object("lever_door leaf").pose_in_world;
     let pressed_m = press_lever(commander)?;
@@ -128,7 +130,15 @@ fn press_lever(commander: &mut Commander) -> Result<f32, PlayerError> {
         let wrist_m = end_m + Vector::new(-PRESSING_M - back_m, 0.0, above_m);
         HandMove::reach(A, Side::Right, Pose::from_parts(wrist_m, Rotation::from_rotation_x(-FRAC_PI_2)))
     };
-    commander.perform(1.2, &[reach(BACK_M, ABOVE_LEVER_M).shaped(closed_rad(Side::Right))])?;
+    let before = place(facts.object("lever_door").pose_in_world * BEFORE_M, 0.0);
+    let robot = &facts.robots[A];
+    let pelvis_m = before.translation.with_z(robot.pelvis_in_world.translation.z);
+    let pelvis = Pose::from_parts(pelvis_m, before.rotation);
+    let hands = Sides {
+        left: HandMove::reach(A, Side::Left, pelvis * robot.wrist_in_pelvis.left),
+        right: reach(BACK_M, ABOVE_LEVER_M).shaped(closed_rad(Side::Right)),
+    };
+    walk_reaching(commander, &[WalkGoal { robot: A, to: before, pace_m_s: APPROACH_M_S }], &[hands])?;
     commander.perform(0.6, &[reach(0.0, ABOVE_LEVER_M)])?;
     for down_m in DOWN_M {
         commander.perform(0.6, &[reach(0.0, down_m)])?;

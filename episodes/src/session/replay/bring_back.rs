@@ -37,7 +37,7 @@ impl Session {
         let path = folder.as_ref().map(|folder| folder.path.clone()).unwrap_or_default();
         let mut session = Session::start_with_clock(&spec, folder, hands.clock(clock))?;
         session.set_onlookers(onlookers);
-        session.observer.draw_for_recording(&spec, &session.world);
+        session.catch_up(&spec);
         for entry in entries {
             let shown = session.clock.spent() + session.clock.thinking();
             hands.pass(entry.thought().saturating_sub(shown));
@@ -48,13 +48,28 @@ impl Session {
                 return Err(CheckpointError::OtherWay { path, step, made_by: this.into(), this }.into());
             }
         }
-        session.observer.draw_at_once();
+        session.caught_up();
         hands.pass(thinking);
         hands.go();
         // The clock goes from this look on.
         session.clock.thinking();
         session.keep_journal();
         Ok(session)
+    }
+
+    /// Leaves pictures and files to the recorder: nobody waits for an answer.
+    fn catch_up(&mut self, spec: &EpisodeSpec) {
+        self.observer.draw_for_recording(spec, &self.world);
+        if let Some(files) = &mut self.files {
+            files.catch_up(true);
+        }
+    }
+
+    fn caught_up(&mut self) {
+        self.observer.draw_at_once();
+        if let Some(files) = &mut self.files {
+            files.catch_up(false);
+        }
     }
 }
 
