@@ -139,8 +139,8 @@ impl RunFiles {
         recorder.append_pictures(pictures, move |recorder| recorder.tool_call(record?));
     }
 
-    /// Whether the episode is played again from now on, see [`RecorderThread::catch_up`].
-    pub fn catch_up(&mut self, catches_up: bool) {
+    /// Whether the episode is played again from now on: it does not wait then for what is recorded.
+    pub(super) fn catch_up(&mut self, catches_up: bool) {
         if let Some(recorder) = &mut self.recorder {
             recorder.catch_up(catches_up);
         }
