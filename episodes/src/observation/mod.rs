@@ -37,8 +37,8 @@ pub struct RobotView {
     pub intrinsics: Intrinsics,
     /// The recording may still need it when the rest of the view is gone.
     pub picture: Arc<Picture>,
-    /// As [`Frame::depth_m`]. Not every protocol gives it to policies at every pixel, so they get it by calls alone. Empty in a view that
-    /// only the recording needs.
+    /// [`Frame::depth_m`]. Not every protocol gives it to policies at every pixel, so they get it by calls
+    /// alone. Empty in a view that only the recording needs.
     pub(crate) depth_m: Vec<f32>,
 }
 
@@ -51,7 +51,7 @@ pub struct Picture {
     png: Mutex<Option<Arc<[u8]>>>,
 }
 
-/// What draws a picture, where somebody asks for its colours.
+/// Function that draws a picture at the first use of its colours.
 type Draw = Box<dyn FnOnce() -> Vec<u8> + Send>;
 
 impl Picture {
@@ -59,12 +59,12 @@ impl Picture {
         Picture::drawn_later([width, height], || rgb)
     }
 
-    /// A picture that is drawn by who first asks for its colours, on a thread of theirs.
+    /// Returns a picture that is drawn at the first use of its colours, on the thread that uses them.
     fn drawn_later([width, height]: [u32; 2], draw: impl FnOnce() -> Vec<u8> + Send + 'static) -> Picture {
         Picture { width, height, rgb: LazyLock::new(Box::new(draw)), png: Mutex::default() }
     }
 
-    /// Three bytes a pixel, sRGB.
+    /// Returns the colours, three bytes a pixel, sRGB.
     pub fn rgb(&self) -> &[u8] {
         &self.rgb
     }

@@ -22,7 +22,7 @@ pub struct Observer {
     renderer: Box<dyn Renderer>,
     pub cameras: Cameras,
     drawn: Option<DrawnStep>,
-    /// What draws while nobody sees what [`Observer::observe`] returns but the recording.
+    /// Renderer of views that only the recording needs; `None` while callers need them.
     for_recording: Option<Arc<Mutex<Box<dyn Renderer>>>>,
 }
 
@@ -34,21 +34,25 @@ struct DrawnStep {
     views: Vec<Option<Arc<RobotView>>>,
 }
 
+/// Returns the renderer of the episode `spec`.
+fn renderer(spec: &EpisodeSpec, world: &World) -> Box<dyn Renderer> {
+    spec.renderer.renderer(stress::scenery(spec.stress, spec.world_seed(), world))
+}
+
 impl Observer {
     /// Looks at the world of the episode `spec`.
     pub fn new(spec: &EpisodeSpec, world: &World) -> Observer {
-        let renderer = spec.renderer.renderer(stress::scenery(spec.stress, spec.world_seed(), world));
+        let renderer = renderer(spec, world);
         let cameras = stress::cameras(spec.stress, spec.world_seed(), world);
         Observer { renderer, cameras, drawn: None, for_recording: None }
     }
 
-    /// From now on nobody but the recording needs what is observed: pictures are drawn on its thread, and depth is not.
+    /// Observes for the recording alone from now on: its thread draws the pictures, and depth is not drawn.
     pub fn draw_for_recording(&mut self, spec: &EpisodeSpec, world: &World) {
-        let renderer = spec.renderer.renderer(stress::scenery(spec.stress, spec.world_seed(), world));
-        self.for_recording = Some(Arc::new(Mutex::new(renderer)));
+        self.for_recording = Some(Arc::new(Mutex::new(renderer(spec, world))));
     }
 
-    /// From now on what is observed is drawn at once.
+    /// Draws observations at once from now on.
     pub fn draw_at_once(&mut self) {
         self.for_recording = None;
     }
@@ -110,6 +114,7 @@ impl Observer {
         robots.iter().filter_map(|robot| views[*robot].clone()).collect()
     }
 
+    /// Returns a view whose picture is drawn by the recorder.
     fn view_for_recording(
         &self,
         renderer: &Arc<Mutex<Box<dyn Renderer>>>,

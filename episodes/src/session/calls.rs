@@ -54,7 +54,7 @@ pub struct Outcome {
     parts: Vec<(bool, Option<SeenAfter>)>,
 }
 
-/// What was seen after a command, and how its caller wants the pictures.
+/// An observation after a command, and the formats of its pictures.
 #[derive(Clone)]
 struct SeenAfter {
     seen: TeamObservation,

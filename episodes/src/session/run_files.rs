@@ -139,7 +139,7 @@ impl RunFiles {
         recorder.append_pictures(pictures, move |recorder| recorder.tool_call(record?));
     }
 
-    /// Whether the episode is played again from now on: it does not wait then for what is recorded.
+    /// Lets the episode run ahead of the recorder, or makes it wait again as usual.
     pub(super) fn catch_up(&mut self, catches_up: bool) {
         if let Some(recorder) = &mut self.recorder {
             recorder.catch_up(catches_up);

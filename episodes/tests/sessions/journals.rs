@@ -141,7 +141,7 @@ fn an_episode_is_brought_back_as_it_stood() {
     assert_eq!(once_more.state_hash(), session.state_hash());
 }
 
-/// What was written where at which moment, pictures among it.
+/// Returns topic, time in ns and content of every message of a recording.
 fn recorded(folder: &Path) -> Vec<(String, u64, Vec<u8>)> {
     let bytes = std::fs::read(folder.join(Recorder::FILE_NAME)).unwrap();
     let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);

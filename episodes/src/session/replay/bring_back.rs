@@ -37,7 +37,7 @@ impl Session {
         let path = folder.as_ref().map(|folder| folder.path.clone()).unwrap_or_default();
         let mut session = Session::start_with_clock(&spec, folder, hands.clock(clock))?;
         session.set_onlookers(onlookers);
-        session.catch_up(&spec);
+        session.catch_up();
         for entry in entries {
             let shown = session.clock.spent() + session.clock.thinking();
             hands.pass(entry.thought().saturating_sub(shown));
@@ -57,14 +57,15 @@ impl Session {
         Ok(session)
     }
 
-    /// Leaves pictures and files to the recorder: nobody waits for an answer.
-    fn catch_up(&mut self, spec: &EpisodeSpec) {
-        self.observer.draw_for_recording(spec, &self.world);
+    /// Leaves pictures and files to the recorder, since nobody waits for an answer.
+    fn catch_up(&mut self) {
+        self.observer.draw_for_recording(&self.origin.spec, &self.world);
         if let Some(files) = &mut self.files {
             files.catch_up(true);
         }
     }
 
+    /// Ends [`Session::catch_up`].
     fn caught_up(&mut self) {
         self.observer.draw_at_once();
         if let Some(files) = &mut self.files {
