@@ -19,8 +19,9 @@ use super::{
     team::Team,
 };
 
-/// So many episodes stay awake, however long nobody asks them for anything: each has some megabytes.
-const MOST_AWAKE: usize = 256;
+/// So many episodes stay awake, however long nobody asks them for anything. Each has some megabytes in heaps
+/// that all share, and calls take longer the more there are.
+const MOST_AWAKE: usize = 96;
 
 /// An episode may be put aside after a second for so many control steps, which is ten times what bringing it
 /// back takes.
@@ -142,10 +143,16 @@ impl EpisodeTable {
         }
     }
 
-    /// Ends the episodes that nobody plays any more, and puts aside those that nobody misses. To be called
-    /// every now and then.
+    /// Ends the episodes that nobody plays any more, and puts aside those that nobody misses. Seats again who
+    /// drove from the server that has gone. To be called every now and then, where futures run.
     pub fn tidy_up(&self) {
         let episodes = self.all();
+        for episode in &episodes {
+            if let Some(team) = episode.team().filter(|team| team.misses_partners()).cloned() {
+                let (thread, partner) = (episode.thread.clone(), self.partner());
+                tokio::spawn(async move { team.seat_again(&thread, partner).await });
+            }
+        }
         for episode in episodes.iter().filter(|episode| !episode.thread.ended()) {
             episode.thread.end_if_abandoned(self.settings.idle_timeout);
         }

@@ -24,7 +24,7 @@ use super::{
     hosted_episode::Beside,
     idempotency_cache::{IdempotencyCache, IdempotentReply},
     run_folder::{RunFolders, episode_name},
-    team::{Collection, Team},
+    team::{Collection, PartnerPolicy, Team},
 };
 use crate::{metrics::Metrics, settings::Settings};
 
@@ -42,6 +42,16 @@ pub struct EpisodeTable {
     pub(super) journals: OnceLock<LiveFolder>,
     /// The operators of episodes that other servers play, by episode.
     pub(super) others: Mutex<BTreeMap<String, Team>>,
+    partner: Option<Arc<dyn PartnerPolicy>>,
+}
+
+/// What a server is for, and who is there beside those who start episodes.
+#[derive(Debug, Default)]
+pub struct Guests {
+    /// Who starts episodes and drives their robots.
+    pub purpose: Purpose,
+    /// A policy that people may have drive beside them: no page can name another.
+    pub partner: Option<Arc<dyn PartnerPolicy>>,
 }
 
 /// The purpose of a server. It decides who starts episodes, and who may drive their robots.
@@ -79,12 +89,21 @@ impl EpisodeTable {
             purpose: Purpose::default(),
             journals: OnceLock::new(),
             others: Mutex::default(),
+            partner: None,
         }
     }
 
-    /// As [`EpisodeTable::new`], for this purpose.
-    pub fn for_purpose(settings: Arc<Settings>, purpose: Purpose) -> EpisodeTable {
-        EpisodeTable { purpose, ..EpisodeTable::new(settings) }
+    /// As [`EpisodeTable::new`], for `guests`.
+    pub fn for_guests(settings: Arc<Settings>, guests: Guests) -> EpisodeTable {
+        let Guests { purpose, partner } = guests;
+        EpisodeTable { purpose, partner, ..EpisodeTable::new(settings) }
+    }
+
+    /// The policy that people may have drive beside them.
+    pub fn partner(&self) -> Result<Arc<dyn PartnerPolicy>, HostingError> {
+        let reason =
+            "no policy may drive here; start the server with --partner, as act:http://127.0.0.1:8500/act";
+        self.partner.clone().ok_or_else(|| HostingError::NoPolicy { reason: reason.into() })
     }
 
     /// Whether an evaluation in this process has its episodes scored.
@@ -113,7 +132,6 @@ impl EpisodeTable {
         }
     }
 
-    /// Refuses a program that would drive a robot in the place of who has its seat.
     /// What has been counted.
     pub fn metrics(&self) -> &Arc<Metrics> {
         &self.metrics
@@ -269,13 +287,13 @@ impl EpisodeTable {
         self.lock().episodes.get(id).cloned().ok_or_else(|| unknown(id))
     }
 
-    /// An operator's episode, its team, and the operator's robot.
-    pub fn own_robot<'a>(
-        &self,
+    /// An operator's episode, wherever it has been before, its team, and the operator's robot.
+    pub async fn own_robot<'a>(
+        self: &Arc<Self>,
         caller: &'a Caller,
     ) -> Result<(HostedEpisode, Arc<Team>, &'a str), HostingError> {
         let Caller::Operator { episode, robot } = caller else { return Err(HostingError::NeedsOperator) };
-        let hosted = self.hosted(episode)?;
+        let hosted = self.awake(episode).await?;
         let team = hosted.team().cloned().ok_or(HostingError::NeedsOperator)?;
         Ok((hosted, team, robot))
     }
@@ -291,9 +309,9 @@ impl EpisodeTable {
         }
     }
 
-    /// The episode `id` and its operators.
-    pub fn team(&self, id: &str) -> Result<(HostedEpisode, Arc<Team>), HostingError> {
-        let hosted = self.hosted(id)?;
+    /// The episode `id`, wherever it has been before, and its operators.
+    pub async fn team(self: &Arc<Self>, id: &str) -> Result<(HostedEpisode, Arc<Team>), HostingError> {
+        let hosted = self.awake(id).await?;
         let team = hosted.team().cloned().ok_or(HostingError::OnePolicy)?;
         Ok((hosted, team))
     }

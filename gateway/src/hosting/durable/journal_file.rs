@@ -10,14 +10,20 @@ use std::{
 };
 
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{
+    Value,
+    value::{RawValue, to_raw_value},
+};
 use tandem_episodes::{EpisodeSpec, JournalEntry, Visibility};
-use tandem_tools_spec::{Call, Driving, Heard, Observation, Partner, StartEpisode, StartReply};
+use tandem_tools_spec::{Call, Driving, Heard, Note, Observation, Partner, StartEpisode, StartReply};
 
 use crate::{hosting::Answer, settings::Durability};
 
-/// What the lines say has changed whenever this has.
+/// Another number means lines that older builds' readers cannot read, or theirs that this one cannot.
 const FORMAT: u32 = 1;
+
+/// Most lines are no longer: a state of a robot and what goes with it.
+const USUAL_LINE_BYTES: usize = 8 << 10;
 
 /// What an episode is, and how it was started.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -48,7 +54,7 @@ pub struct Keyed {
     pub request: Call,
 }
 
-/// What was answered at once: what was asked, what those were told who gave a key, and what the host has to
+/// What was answered at once: what was asked, what came with a key, answers among it, and what the host has to
 /// remember then.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Commit {
@@ -56,8 +62,17 @@ pub struct Commit {
     pub asked: Vec<JournalEntry>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub answers: Vec<KeptAnswer>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<KeyedNote>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub memory: Option<Value>,
+}
+
+/// A note that came with a key, and is kept once.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct KeyedNote {
+    pub key: String,
+    pub note: Note,
 }
 
 /// An answer, and the request that it answers.
@@ -65,9 +80,8 @@ pub struct Commit {
 pub struct KeptAnswer {
     pub key: String,
     tool: String,
-    /// JSON, as the reply is.
-    arguments: String,
-    reply: String,
+    arguments: Box<RawValue>,
+    reply: Box<RawValue>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     step: Option<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -111,14 +125,21 @@ impl Heading {
     }
 }
 
+impl Commit {
+    pub fn is_empty(&self) -> bool {
+        let Commit { asked, answers, notes, memory } = self;
+        asked.is_empty() && answers.is_empty() && notes.is_empty() && memory.is_none()
+    }
+}
+
 impl KeptAnswer {
     /// The answer to `keyed`, kept as it was told.
     pub fn new(keyed: &Keyed, answer: &Answer) -> Result<KeptAnswer, serde_json::Error> {
         Ok(KeptAnswer {
             key: keyed.key.clone(),
             tool: keyed.request.name().into(),
-            arguments: serde_json::to_string(&keyed.request)?,
-            reply: serde_json::to_string(&answer.reply)?,
+            arguments: to_raw_value(&keyed.request)?,
+            reply: to_raw_value(&answer.reply)?,
             step: answer.step,
             observation: answer.observation.clone(),
             partners: answer.partners.clone(),
@@ -130,8 +151,8 @@ impl KeptAnswer {
 
     /// The request, and the answer as it was told.
     pub fn read(self) -> Result<(Call, Answer), Box<dyn Error>> {
-        let request = Call::parse(&self.tool, serde_json::from_str(&self.arguments)?)?;
-        let reply = request.tool.parse_reply(serde_json::from_str(&self.reply)?)?;
+        let request = Call::parse(&self.tool, serde_json::from_str(self.arguments.get())?)?;
+        let reply = request.tool.parse_reply(serde_json::from_str(self.reply.get())?)?;
         let KeptAnswer { step, observation, partners, heard, recording_failed, others_play_on, .. } = self;
         Ok((request, Answer { reply, step, observation, partners, heard, recording_failed, others_play_on }))
     }
@@ -161,7 +182,8 @@ impl JournalFile {
 
     /// Writes a line more. After an error the journal is not to be used any more.
     pub fn append(&mut self, line: &impl Serialize) -> io::Result<()> {
-        let mut bytes = serde_json::to_vec(line)?;
+        let mut bytes = Vec::with_capacity(USUAL_LINE_BYTES);
+        serde_json::to_writer(&mut bytes, line)?;
         bytes.push(b'\n');
         self.file.write_all(&bytes)?;
         match self.durability {

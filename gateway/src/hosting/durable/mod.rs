@@ -5,7 +5,7 @@
 mod journal_file;
 mod lease;
 
-pub use journal_file::{Commit, Heading, JournalFile, JournalReader, KeptAnswer, Keyed, StartKey};
+pub use journal_file::{Commit, Heading, JournalFile, JournalReader, KeptAnswer, Keyed, KeyedNote, StartKey};
 pub use lease::{Lease, Leasing};
 
 use std::{

@@ -199,9 +199,14 @@ impl EpisodeThread {
     }
 
     /// Keeps a note of the policy that directs all robots, or of the operator of one.
-    pub async fn note(&self, operator: Option<&str>, note: Note) -> Result<(), HostingError> {
+    pub async fn note(
+        &self,
+        operator: Option<&str>,
+        note: Note,
+        key: Option<String>,
+    ) -> Result<(), HostingError> {
         let (operator, note) = (operator.map(str::to_owned), Box::new(note));
-        self.do_job(|reply| Job::Note { operator, note, reply }).await
+        self.do_job(|reply| Job::Note { operator, note, key, reply }).await
     }
 
     /// Keeps a call that was refused before it came here, after those that its caller made before. Nobody is
