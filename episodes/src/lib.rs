@@ -57,7 +57,8 @@ pub use instructions::{Instructions, InstructionsError};
 pub use locks::{FileLock, LockKind, Locking};
 pub use observation::{Picture, RobotObservation, RobotView, TeamObservation};
 pub use output::{
-    OutputError, create_new_private_folder, create_private_folder, printable, shell_word, write_whole,
+    OutputError, create_new_private_folder, create_private_folder, partial_path, printable, shell_word,
+    write_whole,
 };
 pub use protocol::{Rules, rules};
 pub use recording::{

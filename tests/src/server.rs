@@ -1,10 +1,11 @@
 //! The server under test, and the HTTP client that tests call it with.
 
-use std::{net::SocketAddr, path::PathBuf, time::Duration};
+use std::{net::SocketAddr, path::PathBuf, sync::Arc, time::Duration};
 
 use serde_json::{Value, json};
 use tandem::{
-    http::{Guests, Server},
+    hosting::Guests,
+    http::Server,
     settings::{Layer, Settings},
 };
 use ureq::{Agent, SendBody, http};
@@ -49,6 +50,7 @@ impl Answer {
 /// A server that records into a temporary folder, with room for two episodes.
 pub struct TestServer {
     server: Option<Server>,
+    settings: Arc<Settings>,
     pub address: SocketAddr,
     pub runs: tempfile::TempDir,
     agent: Agent,
@@ -74,11 +76,11 @@ impl TestServer {
             ..flags
         };
         let settings = Settings::resolve(flags, None).expect("settings without a file");
-        let server = Server::start_for(settings, guests).expect("a free port");
+        let server = Server::start_for(settings.clone(), guests).expect("a free port");
         let timeout = Some(Duration::from_secs(60));
         let agent =
             Agent::config_builder().http_status_as_error(false).timeout_global(timeout).build().new_agent();
-        TestServer { address: server.address(), server: Some(server), runs, agent }
+        TestServer { address: server.address(), server: Some(server), settings, runs, agent }
     }
 
     /// What the link for watching has after its `#`.
@@ -91,6 +93,15 @@ impl TestServer {
     pub fn stop(&mut self) {
         let left = self.server.take().expect("a running server").stop();
         assert!(left.is_empty(), "{left:?} did not end");
+    }
+
+    /// Stops the server as SIGTERM does, and starts one on the same folder of runs.
+    pub fn restart(&mut self, guests: Guests) {
+        let left = self.server.take().expect("a running server").stop_keeping();
+        assert!(left.is_empty(), "{left:?} did not stop");
+        let server = Server::start_for(self.settings.clone(), guests).expect("a free port");
+        self.address = server.address();
+        self.server = Some(server);
     }
 
     /// Starts an episode of Handover and returns its id.

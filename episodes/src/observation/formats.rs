@@ -21,7 +21,7 @@ pub fn arrays(
     formats: &Formats,
 ) -> Result<Option<CameraArrays>, PictureError> {
     let RobotView { picture, depth_m, .. } = view;
-    let rgb = (formats.images == Some(ImageFormat::Rgb)).then(|| Bytes(picture.rgb.clone()));
+    let rgb = (formats.images == Some(ImageFormat::Rgb)).then(|| Bytes(picture.rgb().to_vec()));
     let (mut depth_float16, mut depth_png16) = (None, None);
     match formats.depth {
         Some(DepthFormat::Float16) => {

@@ -7,7 +7,7 @@ mod proprioception;
 mod scaling;
 mod surface;
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 use tandem_sim::render::{Frame, Intrinsics, PictureError, encode_png};
 use tandem_tools_spec::{CameraCalibration, CameraImage, Formats, ImageFormat, Observation, Png, RobotState};
@@ -37,7 +37,8 @@ pub struct RobotView {
     pub intrinsics: Intrinsics,
     /// The recording may still need it when the rest of the view is gone.
     pub picture: Arc<Picture>,
-    /// As [`Frame::depth_m`]. Not every protocol gives it to policies at every pixel, so they get it by calls alone.
+    /// [`Frame::depth_m`]. Not every protocol gives it to policies at every pixel, so they get it by calls
+    /// alone. Empty in a view that only the recording needs.
     pub(crate) depth_m: Vec<f32>,
 }
 
@@ -46,14 +47,26 @@ pub struct RobotView {
 pub struct Picture {
     pub width: u32,
     pub height: u32,
-    /// Three bytes a pixel, sRGB.
-    pub rgb: Vec<u8>,
+    rgb: LazyLock<Vec<u8>, Draw>,
     png: Mutex<Option<Arc<[u8]>>>,
 }
 
+/// Function that draws a picture at the first use of its colours.
+type Draw = Box<dyn FnOnce() -> Vec<u8> + Send>;
+
 impl Picture {
     pub fn new(width: u32, height: u32, rgb: Vec<u8>) -> Picture {
-        Picture { width, height, rgb, png: Mutex::default() }
+        Picture::drawn_later([width, height], || rgb)
+    }
+
+    /// Returns a picture that is drawn at the first use of its colours, on the thread that uses them.
+    fn drawn_later([width, height]: [u32; 2], draw: impl FnOnce() -> Vec<u8> + Send + 'static) -> Picture {
+        Picture { width, height, rgb: LazyLock::new(Box::new(draw)), png: Mutex::default() }
+    }
+
+    /// Returns the colours, three bytes a pixel, sRGB.
+    pub fn rgb(&self) -> &[u8] {
+        &self.rgb
     }
 
     /// The picture as a PNG file, encoded the first time only: whoever asks meanwhile waits for it.

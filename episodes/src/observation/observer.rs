@@ -1,7 +1,7 @@
 //! Looks at the world of an episode: draws what its cameras see, and measures depth at pixels.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{Isometry3, Point3};
 use tandem_sim::render::{Camera, Cameras, Frame, RenderRequest, Renderer};
@@ -22,6 +22,8 @@ pub struct Observer {
     renderer: Box<dyn Renderer>,
     pub cameras: Cameras,
     drawn: Option<DrawnStep>,
+    /// Renderer of views that only the recording needs; `None` while callers need them.
+    for_recording: Option<Arc<Mutex<Box<dyn Renderer>>>>,
 }
 
 /// The views that have been drawn of the latest step that somebody looked at.
@@ -32,11 +34,27 @@ struct DrawnStep {
     views: Vec<Option<Arc<RobotView>>>,
 }
 
+/// Returns the renderer of the episode `spec`.
+fn renderer(spec: &EpisodeSpec, world: &World) -> Box<dyn Renderer> {
+    spec.renderer.renderer(stress::scenery(spec.stress, spec.world_seed(), world))
+}
+
 impl Observer {
     /// Looks at the world of the episode `spec`.
     pub fn new(spec: &EpisodeSpec, world: &World) -> Observer {
-        let renderer = spec.renderer.renderer(stress::scenery(spec.stress, spec.world_seed(), world));
-        Observer { renderer, cameras: stress::cameras(spec.stress, spec.world_seed(), world), drawn: None }
+        let renderer = renderer(spec, world);
+        let cameras = stress::cameras(spec.stress, spec.world_seed(), world);
+        Observer { renderer, cameras, drawn: None, for_recording: None }
+    }
+
+    /// Observes for the recording alone from now on: its thread draws the pictures, and depth is not drawn.
+    pub fn draw_for_recording(&mut self, spec: &EpisodeSpec, world: &World) {
+        self.for_recording = Some(Arc::new(Mutex::new(renderer(spec, world))));
+    }
+
+    /// Draws observations at once from now on.
+    pub fn draw_at_once(&mut self) {
+        self.for_recording = None;
     }
 
     /// The renderer, and on what device it draws.
@@ -96,6 +114,22 @@ impl Observer {
         robots.iter().filter_map(|robot| views[*robot].clone()).collect()
     }
 
+    /// Returns a view whose picture is drawn by the recorder.
+    fn view_for_recording(
+        &self,
+        renderer: &Arc<Mutex<Box<dyn Renderer>>>,
+        step: &Arc<Step>,
+        robot: usize,
+    ) -> Arc<RobotView> {
+        let camera = self.cameras.egocentric(step, robot);
+        let (intrinsics, size_px) = (camera.intrinsics(), [camera.width, camera.height]);
+        let (renderer, step) = (renderer.clone(), step.clone());
+        let picture = Picture::drawn_later(size_px, move || {
+            renderer.lock().unwrap_or_else(PoisonError::into_inner).render_colours(&step, &camera)
+        });
+        Arc::new(RobotView { intrinsics, picture: picture.into(), depth_m: Vec::new() })
+    }
+
     /// What the robots numbered `robots` see and sense after `step`; `sheets` describe all robots.
     pub fn observe(
         &mut self,
@@ -104,7 +138,12 @@ impl Observer {
         sheets: &[&RobotSheet],
         detail: Detail,
     ) -> TeamObservation {
-        let views = self.views(step, robots);
+        let views = match &self.for_recording {
+            Some(renderer) => {
+                robots.iter().map(|robot| self.view_for_recording(renderer, step, *robot)).collect()
+            }
+            None => self.views(step, robots),
+        };
         let observe = |(&robot, view): (&usize, Arc<RobotView>)| {
             let own = Proprioception::of(step, robot);
             RobotObservation {

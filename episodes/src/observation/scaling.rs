@@ -11,14 +11,14 @@ pub type Pixels<'a> = ImageBuffer<Rgb<u8>, &'a [u8]>;
 impl Picture {
     /// The pixels as they are.
     pub fn pixels(&self) -> Pixels<'_> {
-        ImageBuffer::from_raw(self.width, self.height, &self.rgb[..]).expect("three bytes a pixel")
+        ImageBuffer::from_raw(self.width, self.height, self.rgb()).expect("three bytes a pixel")
     }
 
     /// The whole picture, stretched to another width and height: smooth in both directions, within 1 of 255 of what Pillow's
     /// bilinear filter gives.
     pub fn scaled(&self, [width, height]: [u32; 2]) -> RgbImage {
         let own =
-            ImageRef::new(self.width, self.height, &self.rgb, PixelType::U8x3).expect("three bytes a pixel");
+            ImageRef::new(self.width, self.height, self.rgb(), PixelType::U8x3).expect("three bytes a pixel");
         let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Bilinear));
         let mut scaled = RgbImage::new(width, height);
         Resizer::new().resize(&own, &mut scaled, &options).expect("both have three bytes a pixel");

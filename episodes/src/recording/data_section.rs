@@ -1,10 +1,10 @@
 //! Goes over the data of a recording, record by record, and checks each before anything is made of it: no length is believed
 //! that the file does not have, nothing is decompressed into more than it can hold, and what has a checksum is held to it.
 //!
-//! The library that writes recordings can read them, too: its `sans_io::LinearReader` limits the length of records and
-//! checks checksums. It takes a checksum of 0 for none, even where Tandem always writes one. It says neither where damage
-//! is nor where the bytes of chunks and attachments are, which are opened later. Here it could replace `frame` and
-//! `take_record` alone, at the price of another copy of the file.
+//! The library that writes recordings can read them, too: its `sans_io::LinearReader` limits the length of
+//! records and checks checksums. It takes a checksum of 0 for none, even where Tandem always writes one. It
+//! says neither where damage is nor where the bytes of chunks and attachments are, which are opened later. Here
+//! it could replace `frame` and `take_record` alone, at the price of another copy of the file.
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::{self, Read};

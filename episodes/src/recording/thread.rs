@@ -51,6 +51,8 @@ pub struct RecorderThread {
     /// Steps that the system does not have yet.
     unwritten_steps: Arc<AtomicUsize>,
     hurry: Arc<AtomicBool>,
+    /// True while the episode is brought back: a journal has its calls, so that steps may be written late.
+    catches_up: bool,
 }
 
 impl RecorderThread {
@@ -75,7 +77,13 @@ impl RecorderThread {
             waiting_pictures: Arc::default(),
             unwritten_steps,
             hurry,
+            catches_up: false,
         })
+    }
+
+    /// Lets the episode run ahead of the recorder, or makes it wait again as usual.
+    pub fn catch_up(&mut self, catches_up: bool) {
+        self.catches_up = catches_up;
     }
 
     /// Appends after everything that was appended before, some time soon.
@@ -90,10 +98,15 @@ impl RecorderThread {
     ) {
         let count = self.unwritten_steps.fetch_add(1, Ordering::Relaxed) + 1;
         self.send(Append::Step(Box::new(append)));
-        match count {
-            ..GATHERED_STEPS => {}
-            GATHERED_STEPS..UNWRITTEN_STEPS => self.wake(),
-            UNWRITTEN_STEPS.. => self.flush(),
+        self.keep_up(count, GATHERED_STEPS, UNWRITTEN_STEPS);
+    }
+
+    /// Wakes the recorder from `gathered` on, and lets the episode wait for it from `waiting` on.
+    fn keep_up(&self, count: usize, gathered: usize, waiting: usize) {
+        if count >= waiting && !self.catches_up {
+            self.flush();
+        } else if count >= gathered {
+            self.wake();
         }
     }
 
@@ -128,11 +141,7 @@ impl RecorderThread {
             waiting.fetch_sub(pictures, Ordering::Relaxed);
             outcome
         });
-        match count {
-            ..GATHERED_PICTURES => {}
-            GATHERED_PICTURES..WAITING_PICTURES => self.wake(),
-            WAITING_PICTURES.. => self.flush(),
-        }
+        self.keep_up(count, GATHERED_PICTURES, WAITING_PICTURES);
     }
 
     /// Waits until the system has everything that was appended so far, or one of it has failed.

@@ -51,7 +51,14 @@ pub struct Outcome {
     answer: Answer,
     formats: Formats,
     /// For each caller of the request: whether its reply is a short one, and its look afterwards.
-    parts: Vec<(bool, Option<Observation>)>,
+    parts: Vec<(bool, Option<SeenAfter>)>,
+}
+
+/// An observation after a command, and the formats of its pictures.
+#[derive(Clone)]
+struct SeenAfter {
+    seen: TeamObservation,
+    formats: Formats,
 }
 
 /// What a call comes to.
@@ -83,15 +90,16 @@ impl Outcome {
     pub fn replies(self) -> Result<Vec<CallReply>, EpisodeError> {
         let Outcome { answer, formats, parts } = self;
         let reply = answer.reply(&formats)?;
-        let told = parts.into_iter().map(|(is_short, observation)| {
+        let told = parts.into_iter().map(|(is_short, after)| {
             let mut reply = reply.clone();
             if is_short {
                 // The recording has all of it.
                 shorten(&mut reply);
             }
-            CallReply { reply, observation }
+            let observation = after.map(|SeenAfter { seen, formats }| seen.reply(&formats)).transpose()?;
+            Ok(CallReply { reply, observation })
         });
-        Ok(told.collect())
+        told.collect()
     }
 
     /// The reply to a request of one caller.
@@ -329,11 +337,11 @@ impl Session {
         &mut self,
         caller: CallerRecord,
         look: Option<Look>,
-    ) -> Result<Option<Observation>, EpisodeError> {
+    ) -> Result<Option<SeenAfter>, EpisodeError> {
         let Some(look) = look else { return Ok(None) };
         let formats = look.formats;
         match self.make(caller, &Called::One(Call::from(look)))? {
-            Answer::Observation(seen) => Ok(Some(seen.reply(&formats)?)),
+            Answer::Observation(seen) => Ok(Some(SeenAfter { seen, formats })),
             Answer::Reply(_) => Err(unanswered(Observe::NAME, "another tool was called")),
         }
     }

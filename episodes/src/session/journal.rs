@@ -1,10 +1,10 @@
-//! The journal of an episode: what it has been asked, so that another process can bring it to where it stands by asking the same again.
-//! Looks are in it as well, since they count, cost time and are recorded. What has been answered is not: it comes to the same.
+//! The journal of an episode: what it has been asked, so that another process can bring it to where it stands
+//! by asking the same again. Looks are in it as well, since they count, cost time and are recorded. What has
+//! been answered is not: it comes to the same.
 
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use tandem_tools_spec::{EndReason, ExtraInformation, Note};
 
 use super::Session;
@@ -14,7 +14,7 @@ use crate::recording::state_hash_text;
 /// One request, when it came, and where it led.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JournalEntry {
-    /// How long the policy had thought by then, in nanoseconds.
+    /// The policy's thinking time when the request came, in nanoseconds.
     thought_ns: u64,
     pub(super) asked: KeptRequest,
     /// The world afterwards, where it has moved.
@@ -32,7 +32,7 @@ pub struct StateMark {
     state_hash: String,
 }
 
-/// What an episode may be asked.
+/// A request to an episode, in the form that a journal keeps. Arguments are JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum KeptRequest {
@@ -40,14 +40,15 @@ pub enum KeptRequest {
     Call {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         operator: Option<String>,
-        /// What a policy in this process is shown, where it asks and not its caller.
+        /// The extra information that a policy in this process is shown; `None` where the caller itself reads
+        /// the answer.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         shown: Option<Vec<ExtraInformation>>,
         tool: String,
-        arguments: Value,
+        arguments: String,
     },
     /// [`Session::read_command`], where that has refused.
-    Command { robot: String, tool: String, arguments: Value },
+    Command { robot: String, tool: String, arguments: String },
     /// [`Session::note`].
     Note { operator: Option<String>, note: Note },
     /// [`Session::refused_before`].
@@ -56,26 +57,26 @@ pub enum KeptRequest {
     End { reason: EndReason },
 }
 
-/// What a session writes down until somebody takes it.
+/// Entries that a session has written down and nobody has taken yet.
 #[derive(Default)]
 pub struct Journal {
     entries: Vec<JournalEntry>,
     /// The step of the last mark.
     marked_step: u64,
-    /// Why something could not be written down.
+    /// The reason why an entry is missing.
     failed: Option<String>,
 }
 
-/// What came, and when; nothing where no journal is kept.
+/// A request and the policy's thinking time when it came; `None` where no journal is kept.
 pub(super) type Arrival = Option<(Duration, Result<KeptRequest, serde_json::Error>)>;
 
 impl JournalEntry {
-    /// The control step that the world had come to, where it has moved.
+    /// Returns the control step that the world had come to, where it had moved.
     pub fn control_step(&self) -> Option<u64> {
         self.state.as_ref().map(|state| state.control_step)
     }
 
-    /// How long the policy had thought when the request came.
+    /// Returns the policy's thinking time when the request came.
     pub fn thought(&self) -> Duration {
         Duration::from_nanos(self.thought_ns)
     }
@@ -87,7 +88,8 @@ impl Session {
         self.journal = Some(Journal { marked_step: self.present.control_step, ..Journal::default() });
     }
 
-    /// What has been asked since this was last called. An error says that something is missing, and the journal with it worthless.
+    /// Takes the entries written since the last call. An error means that an entry is missing: the journal is
+    /// then worthless.
     pub fn take_journal(&mut self) -> Result<Vec<JournalEntry>, String> {
         let Some(journal) = &mut self.journal else { return Ok(Vec::new()) };
         match journal.failed.take() {
@@ -138,13 +140,13 @@ impl KeptRequest {
             operator: operator.map(str::to_owned),
             shown: shown.map(<[_]>::to_vec),
             tool: called.name().into(),
-            arguments: serde_json::from_str(&called.arguments()?)?,
+            arguments: called.arguments()?,
         })
     }
 
     pub(super) fn command(call: &OperatorCall) -> Result<KeptRequest, serde_json::Error> {
         let (robot, call) = (call.robot().into(), call.call());
-        Ok(KeptRequest::Command { robot, tool: call.name().into(), arguments: serde_json::to_value(call)? })
+        Ok(KeptRequest::Command { robot, tool: call.name().into(), arguments: serde_json::to_string(call)? })
     }
 
     pub(super) fn note(operator: Option<&str>, note: &Note) -> Result<KeptRequest, serde_json::Error> {

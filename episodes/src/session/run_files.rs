@@ -139,6 +139,13 @@ impl RunFiles {
         recorder.append_pictures(pictures, move |recorder| recorder.tool_call(record?));
     }
 
+    /// Lets the episode run ahead of the recorder, or makes it wait again as usual.
+    pub(super) fn catch_up(&mut self, catches_up: bool) {
+        if let Some(recorder) = &mut self.recorder {
+            recorder.catch_up(catches_up);
+        }
+    }
+
     /// Waits until everything recorded is on its way to the disk, or has failed.
     pub(super) fn flush(&mut self) {
         if let Some(recorder) = &self.recorder {

@@ -33,10 +33,10 @@ pub const TASK: Task = Task {
     robots: &[
         RobotSpot {
             name: "A",
-            position_m: [-0.50, -0.15],
+            position_m: [-0.55, -0.60],
             yaw_rad: 0.0,
-            instruction: "Press the lever of the door before you down, push the door wide open, and stand aside, so that your \
-                          partners can pass with their table.",
+            instruction: "Walk to the door, press its lever down, push the door wide open, and stand aside, so \
+                          that your partners can pass with their table.",
         },
         RobotSpot {
             name: "B",

@@ -132,9 +132,9 @@ fn small_pictures_are_the_cameras_own_scaled() {
     let own = scene.colours(view, &step, None);
     let colours = scene.colours(view, &step, Some(small));
     assert_eq!((own.width, own.height, colours.width, colours.height), (320, 240, 160, 120));
-    assert_eq!(colours.rgb, own.scaled([160, 120]).into_raw());
+    assert_eq!(colours.rgb(), own.scaled([160, 120]).into_raw());
     let camera = scene.camera(view, &step, Some(small));
-    assert_ne!(scene.draw(&step, &camera).rgb, colours.rgb);
+    assert_ne!(scene.draw(&step, &camera).rgb, colours.rgb());
 
     // The one camera that is asked for, without depth.
     let out = folder.path().join("lean");
@@ -147,7 +147,7 @@ fn small_pictures_are_the_cameras_own_scaled() {
     };
     let drawn = draw_all(&recording, &plan("A"), &out, &|| {}).unwrap();
     assert_eq!((drawn.moments, drawn.cameras, files(&out).len()), (3, 1, 3 + 2));
-    assert_eq!(image::open(out.join("A/rgb/000005.png")).unwrap().into_rgb8().into_raw(), colours.rgb);
+    assert_eq!(image::open(out.join("A/rgb/000005.png")).unwrap().into_rgb8().into_raw(), colours.rgb());
     let text = draw_all(&recording, &plan("C"), &out, &|| {}).unwrap_err().to_string();
     assert!(text.contains("no camera \"C\"") && text.contains("third_person, A, B"), "{text}");
 }

@@ -1,5 +1,7 @@
-//! Episodes brought back from what they were asked: the same states, counts, clocks and results as without an interruption.
+//! Episodes brought back from what they were asked: the same states, counts, clocks and results as without an
+//! interruption.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
@@ -7,7 +9,9 @@ use std::time::Duration;
 use crate::common::*;
 use serde_json::json;
 use tandem_episodes::live::{LiveEvent, Onlookers};
-use tandem_episodes::{BringBack, Clock, EpisodeSpec, JournalEntry, OperatorCall, Session};
+use tandem_episodes::{
+    BringBack, Clock, EpisodeSpec, JournalEntry, OperatorCall, Recorder, RunFolder, Session,
+};
 use tandem_tools_spec::{
     Call, EndReason, ExtraInformation, JointChunk, Note, Observe, Protocol, Say, SendJointChunk, ToolCall,
     Wait,
@@ -83,9 +87,19 @@ fn copied(entries: &[JournalEntry]) -> Vec<JournalEntry> {
 }
 
 fn bring_back(spec: &EpisodeSpec, entries: &[JournalEntry], hands: &Hands, thinking_ms: u64) -> Session {
+    bring_back_into(None, spec, entries, hands, thinking_ms)
+}
+
+fn bring_back_into(
+    folder: Option<RunFolder>,
+    spec: &EpisodeSpec,
+    entries: &[JournalEntry],
+    hands: &Hands,
+    thinking_ms: u64,
+) -> Session {
     let back = BringBack {
         spec: spec.clone(),
-        folder: None,
+        folder,
         entries: copied(entries),
         clock: hands.clock(),
         thinking: Duration::from_millis(thinking_ms),
@@ -125,6 +139,46 @@ fn an_episode_is_brought_back_as_it_stood() {
     let mut once_more = bring_back(&spec, &entries, &hands, 0);
     assert_eq!(said(&mut once_more), said(&mut session));
     assert_eq!(once_more.state_hash(), session.state_hash());
+}
+
+/// Returns topic, time in ns and content of every message of a recording.
+fn recorded(folder: &Path) -> Vec<(String, u64, Vec<u8>)> {
+    let bytes = std::fs::read(folder.join(Recorder::FILE_NAME)).unwrap();
+    let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    messages
+        .map(|message| (message.channel.topic.clone(), message.log_time, message.data.into_owned()))
+        .collect()
+}
+
+/// Pictures that only the recording needs are drawn later, and are the same.
+#[test]
+fn the_recording_is_made_again_with_its_pictures() {
+    let hands = Hands::default();
+    let spec = spec("handover", 2104, Protocol::Agentic);
+    let folder = tempfile::tempdir().unwrap();
+    let [first, second] = ["first", "second"].map(|name| folder.path().join(name));
+    let mut session =
+        Session::start_with_clock(&spec, Some(RunFolder::from(&*first)), hands.clock()).unwrap();
+    session.keep_journal();
+    ask_everything(&mut session, &hands);
+    let entries = session.take_journal().unwrap();
+    let mut again = bring_back_into(Some(RunFolder::from(&*second)), &spec, &entries, &hands, 0);
+    // A look at the same moment as one of before, which is answered now.
+    let look = Observe { robots: None, short: None, frame: None };
+    let [seen, seen_again] = [&mut session, &mut again].map(|session| {
+        let seen = session.observe(&look, &[]).unwrap();
+        seen.robots.into_iter().map(|robot| robot.view.depth_m().to_vec()).collect::<Vec<_>>()
+    });
+    assert!(seen == seen_again && !seen[0].is_empty());
+    session.close();
+    again.close();
+    let (before, after) = (recorded(&first), recorded(&second));
+    let pictures = before.iter().filter(|(topic, ..)| topic.ends_with("/egocentric")).count();
+    assert!(pictures > 2, "{pictures}");
+    for (one, other) in before.iter().zip(&after) {
+        assert!(one == other, "{} at {}, {} at {}", one.0, one.1, other.0, other.1);
+    }
+    assert_eq!(before.len(), after.len());
 }
 
 #[test]

@@ -205,7 +205,7 @@ impl NativeEpisode {
         })?;
         let views = seen.robots.iter().map(|RobotObservation { view, .. }| {
             let (height, width) = (view.picture.height as usize, view.picture.width as usize);
-            let colours = shaped(py, &view.picture.rgb, [height, width, 3])?;
+            let colours = shaped(py, view.picture.rgb(), [height, width, 3])?;
             let depth = depth.then(|| shaped(py, view.depth_m(), [height, width])).transpose()?;
             Ok((colours, depth))
         });

@@ -123,7 +123,7 @@ impl NativeRecording {
         let picture = self.drawn(py, camera, step, size, |renderer, camera, step, size| {
             renderer.colours(camera, step, size)
         })?;
-        shaped(py, &picture.rgb, [picture.height as usize, picture.width as usize, 3])
+        shaped(py, picture.rgb(), [picture.height as usize, picture.width as usize, 3])
     }
 }
 

@@ -294,8 +294,8 @@ def test_episodes_are_told_in_their_own_words(tmp_path: Path) -> None:
 
 def test_text_files_name_their_encoding() -> None:
     package = Path(tandem.__file__).parent
-    calls = re.compile(r"(?:write_text|read_text|\bopen)\((?:[^()]|\([^()]*\)|\((?:[^()]|\([^()]*\))*\))*\)")
-    binary = re.compile(r"\"[rwa]?b\"|Image\.open|_av\.open|av\.open")
+    calls = re.compile(r"(?:write_text|read_text|\b(?:fd)?open)\((?:[^()]|\([^()]*\)|\((?:[^()]|\([^()]*\))*\))*\)")
+    binary = re.compile(r"\"[rwa]?b\"|\bos\.open|Image\.open|_av\.open|av\.open")
     for path in package.rglob("*.py"):
         source = path.read_text(encoding="utf-8")
         for call in calls.finditer(source):

@@ -319,7 +319,9 @@ def test_a_model_for_each_robot_is_taken_up_again(moment: Moment, server: tandem
         printed, errors = relay.agent.communicate(timeout=120)
     assert relay.agent.returncode == 0, errors
     pair.check(folder, endpoint)
-    assert "A: taken up again after" in printed or "B: taken up again after" in printed
+    # If both robots had finished before the kill, the episode has ended.
+    goes_on = "A: taken up again after" in printed or "B: taken up again after" in printed
+    assert goes_on or (moment[1] == "/tools/finish" and "the episode has ended already" in printed)
     assert sorted({tool for tool, _ in set(relay.keys)} - {"notes"}) == ["finish", "say", "wait"]
     assert len({key for tool, key in relay.keys if tool == "wait"}) == 4
 

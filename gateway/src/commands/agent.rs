@@ -78,7 +78,7 @@ pub struct AgentArgs {
     /// Folder that recordings are written to, one folder per episode.
     #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
     runs: PathBuf,
-    /// In place of a new episode: go on with that of this folder, as runs/handover-seed0, whose agent was killed.
+    /// Resume the episode of this folder, for example runs/handover-seed0, whose agent was killed, instead of a new one.
     /// Limits, prices and --base-url may be given anew; everything else is as it was.
     #[arg(long, value_name = "FOLDER")]
     resume: Option<PathBuf>,

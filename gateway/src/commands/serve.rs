@@ -11,8 +11,8 @@ use super::{
     print,
 };
 use crate::{
-    hosting::try_runs_folder,
-    http::{Guests, Server},
+    hosting::{Guests, try_runs_folder},
+    http::Server,
     settings::{Layer, Settings},
     token::Token,
 };

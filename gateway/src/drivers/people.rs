@@ -20,8 +20,8 @@ use tandem_tools_spec::{Driving, Operators};
 
 use super::{lost, own_result, remove_old_result};
 use crate::{
-    hosting::{CollectedEpisode, Collection, HostingError, Purpose},
-    http::{Guests, Server, operator_link},
+    hosting::{CollectedEpisode, Collection, Guests, HostingError, Purpose},
+    http::{Server, operator_link},
     settings::Settings,
     token::Token,
 };

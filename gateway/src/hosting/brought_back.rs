@@ -1,14 +1,15 @@
-//! Episodes of a server that has gone, or of others on the same folder of runs: found by their journals, and held asleep until they are
-//! asked for something. Those that nobody asks for long are put to sleep here, too.
+//! Episodes of a server that has gone, or of others on the same folder of runs: found by their journals, and
+//! held asleep until they are asked for something. Those that nobody asks for long are put to sleep here, too.
 
 use std::{
     fs,
+    path::Path,
     sync::{Arc, PoisonError},
     time::Duration,
 };
 
-use tandem_episodes::{EpisodeError, RunFolder, build, recover};
-use tokio::{task::spawn_blocking, time::Instant};
+use tandem_episodes::{EpisodeError, Recorder, RunFolder, build, partial_path, recover};
+use tokio::task::spawn_blocking;
 
 use super::{
     Caller, EpisodeTable, EpisodeThread, HostedEpisode, HostingError,
@@ -18,17 +19,13 @@ use super::{
     team::Team,
 };
 
-/// So many episodes stay awake, however long nobody asks them for anything: each has some megabytes.
-const MOST_AWAKE: usize = 256;
+/// So many episodes stay awake, however long nobody asks them for anything. Each has some megabytes in heaps
+/// that all share, and calls take longer the more there are.
+const MOST_AWAKE: usize = 96;
 
-/// An episode may be put aside after a second for so many control steps, which is ten times what bringing it back takes.
+/// An episode may be put aside after a second for so many control steps, which is ten times what bringing it
+/// back takes.
 const STEPS_PER_IDLE_S: u32 = 300;
-
-/// How often it is looked for episodes of other servers.
-const LOOK_INTERVAL: Duration = Duration::from_secs(1);
-
-/// The name of a recording under way.
-const PARTIAL_RECORDING: &str = "episode.mcap.partial";
 
 impl EpisodeTable {
     /// From now on keeps journals in `journals`, and holds the episodes of a server that has gone.
@@ -77,29 +74,30 @@ impl EpisodeTable {
         if let Some(found) = self.operator(text) {
             return Some(found);
         }
-        let journals = self.journals.get()?.clone();
-        {
-            let mut looked = self.looked_around.lock().unwrap_or_else(PoisonError::into_inner);
-            if looked.is_some_and(|looked| looked.elapsed() < LOOK_INTERVAL) {
-                return None;
-            }
-            *looked = Some(Instant::now());
-        }
+        self.journals.get()?;
         let (table, text) = (self.clone(), text.to_owned());
-        let found = spawn_blocking(move || {
-            let others = journals.ids().into_iter().filter(|id| table.hosted(id).is_err());
-            // Every token is compared.
-            others.fold(None, |found, id| table.operator_of(&journals, &id, &text).or(found))
-        });
-        found.await.ok()?
+        spawn_blocking(move || table.operator_elsewhere(&text)).await.ok()?
     }
 
-    /// The operator with this token of an episode that is not held here.
-    fn operator_of(&self, journals: &LiveFolder, id: &str, text: &str) -> Option<Caller> {
-        let heading = JournalReader::open(&journals.journal(id)?).ok()?.heading;
-        let team = Team::of(&heading.start.operators, &heading.driving, None).ok()?;
-        let robot = team.robot_of(text)?.to_owned();
-        Some(Caller::Operator { episode: id.into(), robot })
+    /// Finds the operator with this token of an episode that is not held here. Each journal's heading is read
+    /// once, however many tokens are tried, and every token is compared.
+    fn operator_elsewhere(&self, text: &str) -> Option<Caller> {
+        let journals = self.journals.get()?;
+        let ids = journals.ids();
+        let mut others = self.others.lock().unwrap_or_else(PoisonError::into_inner);
+        others.retain(|id, _| ids.contains(id));
+        for id in ids {
+            if !others.contains_key(&id)
+                && self.hosted(&id).is_err()
+                && let Some(team) = team_of(journals, &id)
+            {
+                others.insert(id, team);
+            }
+        }
+        others.iter().fold(None, |found, (id, team)| {
+            let robot = team.robot_of(text);
+            robot.map(|robot| Caller::Operator { episode: id.clone(), robot: robot.into() }).or(found)
+        })
     }
 
     /// Holds the episode `id`, which has a journal, unless another server plays it.
@@ -145,9 +143,16 @@ impl EpisodeTable {
         }
     }
 
-    /// Ends the episodes that nobody plays any more, and puts aside those that nobody misses. To be called every now and then.
+    /// Ends the episodes that nobody plays any more, and puts aside those that nobody misses. Seats again who
+    /// drove from the server that has gone. To be called every now and then, where futures run.
     pub fn tidy_up(&self) {
         let episodes = self.all();
+        for episode in &episodes {
+            if let Some(team) = episode.team().filter(|team| team.misses_partners()).cloned() {
+                let (thread, partner) = (episode.thread.clone(), self.partner());
+                tokio::spawn(async move { team.seat_again(&thread, partner).await });
+            }
+        }
         for episode in episodes.iter().filter(|episode| !episode.thread.ended()) {
             episode.thread.end_if_abandoned(self.settings.idle_timeout);
         }
@@ -162,8 +167,8 @@ impl EpisodeTable {
         }
     }
 
-    /// Shows other servers that this one still plays its episodes, and forgets those that they have taken or ended. To be called every few
-    /// seconds.
+    /// Shows other servers that this one still plays its episodes, and forgets those that they have taken or
+    /// ended. To be called every few seconds.
     pub fn look_around(&self) {
         let Some(journals) = self.journals.get() else { return };
         for episode in self.all() {
@@ -177,9 +182,15 @@ impl EpisodeTable {
     }
 }
 
+/// The operators of the episode `id`, as its journal has them.
+fn team_of(journals: &LiveFolder, id: &str) -> Option<Team> {
+    let heading = JournalReader::open(&journals.journal(id)?).ok()?.heading;
+    Team::of(&heading.start.operators, &heading.driving, None).ok()
+}
+
 /// Makes a recording that can be read of one that was left under way.
-fn make_whole(journal: &std::path::Path, folder: &RunFolder, url: &str) {
-    let partial = folder.path.join(PARTIAL_RECORDING);
+fn make_whole(journal: &Path, folder: &RunFolder, url: &str) {
+    let partial = partial_path(&folder.path.join(Recorder::FILE_NAME));
     // Nobody else is to do the same.
     let Ok(Leasing::Taken(_lease)) = Lease::take(journal, url) else { return };
     if fs::exists(&partial).unwrap_or(false)

@@ -11,7 +11,7 @@ use tandem_tools_spec::{
 
 use super::{
     Answer, EpisodeThread, HostingError, RefusedCall,
-    durable::{KeptAnswer, Keyed},
+    durable::{KeptAnswer, Keyed, KeyedNote},
     episode::HostMemory,
     idempotency_cache::{IdempotencyCache, IdempotentReply},
     team::Team,
@@ -80,7 +80,7 @@ impl HostMemory for Beside {
         serde_json::to_value(operators).unwrap_or_default()
     }
 
-    fn restore(&self, memory: Option<Value>, answers: Vec<KeptAnswer>) {
+    fn restore(&self, memory: Option<Value>, answers: Vec<KeptAnswer>, notes: Vec<KeyedNote>) {
         if let (Some(team), Some(memory)) = (&self.team, memory) {
             match serde_json::from_value(memory) {
                 Ok(memory) => team.restore(memory),
@@ -91,14 +91,18 @@ impl HostMemory for Beside {
             let key = answer.key.clone();
             match answer.read() {
                 Ok((request, answer)) => self.replies.keep(key, request, Ok(Arc::new(answer))),
-                Err(error) => tracing::error!(error, key, "an answer is lost"),
+                Err(error) => tracing::error!(%error, key, "an answer is lost"),
             }
+        }
+        for KeyedNote { key, note } in notes {
+            self.notes.keep(key, note, Ok(()));
         }
     }
 
     fn let_go(&self) {
         // What is left of them would keep all memory around it in use.
         self.replies.clear();
+        self.notes.clear();
     }
 
     fn is_busy(&self) -> bool {
@@ -131,14 +135,16 @@ impl HostedEpisode {
     ) -> Result<IdempotentReply<Arc<Answer>>, HostingError> {
         let robot = self.robot_of(who)?;
         let Some(key) = key else {
-            let reply = Arc::new(self.clone().answer(robot, call, None).await?);
+            let reply = Arc::new(Box::pin(self.clone().answer(robot, call, None)).await?);
             return Ok(IdempotentReply { reply, replayed: false });
         };
         let key = own_key(robot.as_deref(), key);
         let (episode, asked) = (self.clone(), call.clone());
         let keyed = Keyed { key: key.clone(), request: call.clone() };
-        let work =
-            async move { episode.answer(robot, asked, Some(keyed)).await.map(Arc::new).map_err(Arc::new) };
+        // On the heap: it is handed on several times, and has kilobytes.
+        let work = Box::pin(async move {
+            episode.answer(robot, asked, Some(keyed)).await.map(Arc::new).map_err(Arc::new)
+        });
         let lasting = |made: &SharedAnswer| made.as_ref().map_or_else(|error| error.is_final(), |_| true);
         let IdempotentReply { reply, replayed } = self.beside.replies.once(&key, call, work, lasting).await?;
         Ok(IdempotentReply { reply: reply.map_err(HostingError::Shared)?, replayed })
@@ -146,19 +152,21 @@ impl HostedEpisode {
 
     /// Keeps a note of who started the episode, or of an operator; with a key, once for this key and caller.
     pub async fn note(&self, who: &Caller, note: Note, key: Option<&str>) -> Result<(), HostingError> {
-        let Some(key) = key else { return self.keep_note(who, note).await };
-        let (episode, caller, told) = (self.clone(), who.clone(), note.clone());
-        let work = async move { episode.keep_note(&caller, told).await.map_err(Arc::new) };
+        let Some(key) = key.map(|key| own_key(who.robot(), key)) else {
+            return self.keep_note(who, note, None).await;
+        };
+        let (episode, caller, told, own) = (self.clone(), who.clone(), note.clone(), key.clone());
+        let work = async move { episode.keep_note(&caller, told, Some(own)).await.map_err(Arc::new) };
         let lasting = |made: &SharedNote| made.as_ref().map_or_else(|error| error.is_final(), |()| true);
-        let kept = self.beside.notes.once(&own_key(who.robot(), key), note, work, lasting).await?;
+        let kept = self.beside.notes.once(&key, note, work, lasting).await?;
         kept.reply.map_err(HostingError::Shared)
     }
 
-    async fn keep_note(&self, who: &Caller, note: Note) -> Result<(), HostingError> {
+    async fn keep_note(&self, who: &Caller, note: Note, key: Option<String>) -> Result<(), HostingError> {
         self.admit(who)?;
         let own = self.team().zip(who.robot());
         let _place = own.map(|(team, robot)| team.take_place(robot)).transpose()?;
-        self.thread.note(who.robot(), note).await
+        self.thread.note(who.robot(), note, key).await
     }
 
     /// Keeps a call of `who` that was refused before it reached the episode.
@@ -287,7 +295,8 @@ impl HostedEpisode {
     }
 }
 
-/// The key under which an operator's request is kept: keys of different operators have nothing to do with each other.
+/// The key under which an operator's request is kept: keys of different operators have nothing to do with each
+/// other.
 fn own_key(robot: Option<&str>, key: &str) -> String {
     format!("{}:{key}", robot.unwrap_or_default())
 }

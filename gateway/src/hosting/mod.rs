@@ -25,7 +25,7 @@ pub use error::HostingError;
 pub use hosted_episode::{Caller, HostedEpisode};
 pub use idempotency_cache::IdempotentReply;
 pub use run_folder::{episode_name, look_at_runs_folder, try_runs_folder};
-pub use table::{EpisodeTable, Purpose};
+pub use table::{EpisodeTable, Guests, Purpose};
 pub use team::{
     CollectedEpisode, Collection, CollectionProgress, CollectionStage, Driver, PartnerPolicy, Wish,
 };

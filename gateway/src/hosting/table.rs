@@ -24,7 +24,7 @@ use super::{
     hosted_episode::Beside,
     idempotency_cache::{IdempotencyCache, IdempotentReply},
     run_folder::{RunFolders, episode_name},
-    team::{Collection, Team},
+    team::{Collection, PartnerPolicy, Team},
 };
 use crate::{metrics::Metrics, settings::Settings};
 
@@ -40,8 +40,18 @@ pub struct EpisodeTable {
     purpose: Purpose,
     /// Where the journals are of episodes that outlive the server, if any do.
     pub(super) journals: OnceLock<LiveFolder>,
-    /// When it was looked for episodes of other servers last.
-    pub(super) looked_around: Mutex<Option<Instant>>,
+    /// The operators of episodes that other servers play, by episode.
+    pub(super) others: Mutex<BTreeMap<String, Team>>,
+    partner: Option<Arc<dyn PartnerPolicy>>,
+}
+
+/// What a server is for, and who is there beside those who start episodes.
+#[derive(Debug, Default)]
+pub struct Guests {
+    /// Who starts episodes and drives their robots.
+    pub purpose: Purpose,
+    /// A policy that people may have drive beside them: no page can name another.
+    pub partner: Option<Arc<dyn PartnerPolicy>>,
 }
 
 /// The purpose of a server. It decides who starts episodes, and who may drive their robots.
@@ -78,13 +88,22 @@ impl EpisodeTable {
             folders: RunFolders::default(),
             purpose: Purpose::default(),
             journals: OnceLock::new(),
-            looked_around: Mutex::default(),
+            others: Mutex::default(),
+            partner: None,
         }
     }
 
-    /// As [`EpisodeTable::new`], for this purpose.
-    pub fn for_purpose(settings: Arc<Settings>, purpose: Purpose) -> EpisodeTable {
-        EpisodeTable { purpose, ..EpisodeTable::new(settings) }
+    /// As [`EpisodeTable::new`], for `guests`.
+    pub fn for_guests(settings: Arc<Settings>, guests: Guests) -> EpisodeTable {
+        let Guests { purpose, partner } = guests;
+        EpisodeTable { purpose, partner, ..EpisodeTable::new(settings) }
+    }
+
+    /// The policy that people may have drive beside them.
+    pub fn partner(&self) -> Result<Arc<dyn PartnerPolicy>, HostingError> {
+        let reason =
+            "no policy may drive here; start the server with --partner, as act:http://127.0.0.1:8500/act";
+        self.partner.clone().ok_or_else(|| HostingError::NoPolicy { reason: reason.into() })
     }
 
     /// Whether an evaluation in this process has its episodes scored.
@@ -113,7 +132,6 @@ impl EpisodeTable {
         }
     }
 
-    /// Refuses a program that would drive a robot in the place of who has its seat.
     /// What has been counted.
     pub fn metrics(&self) -> &Arc<Metrics> {
         &self.metrics
@@ -127,8 +145,8 @@ impl EpisodeTable {
         key: &str,
     ) -> Result<IdempotentReply<StartReply>, HostingError> {
         let (table, request) = (self.clone(), (args.clone(), driving));
-        let kept = StartKey { key: key.into(), args };
-        let work = async move { table.start_asked(driving, kept).await.map_err(Arc::new) };
+        let own_key = Some(key.to_owned());
+        let work = async move { table.start_with_key(args, driving, own_key).await.map_err(Arc::new) };
         let lasting = |made: &SharedStart| made.as_ref().map_or_else(|error| error.is_final(), |_| true);
         let IdempotentReply { reply, replayed } = self.starts.once(key, request, work, lasting).await?;
         Ok(IdempotentReply { reply: reply.map_err(HostingError::Shared)?, replayed })
@@ -145,23 +163,20 @@ impl EpisodeTable {
         args: StartEpisode,
         driving: Driving,
     ) -> Result<StartReply, HostingError> {
-        self.start_args(&args, driving, None).await
+        self.start_with_key(args, driving, None).await
     }
 
-    async fn start_asked(&self, driving: Driving, asked: StartKey) -> Result<StartReply, HostingError> {
-        let args = asked.args.clone();
-        self.start_args(&args, driving, Some(asked)).await
-    }
-
-    async fn start_args(
+    async fn start_with_key(
         &self,
-        args: &StartEpisode,
+        args: StartEpisode,
         driving: Driving,
-        key: Option<StartKey>,
+        key: Option<String>,
     ) -> Result<StartReply, HostingError> {
         self.check_starts()?;
-        let reply = self.start_kept(self.settings.spec(args)?, &driving, key).await?;
-        let briefing = if args.short { reply.briefing.shortened() } else { reply.briefing };
+        let (spec, is_short) = (self.settings.spec(&args)?, args.short);
+        let key = key.map(|key| StartKey { key, args });
+        let reply = self.start_kept(spec, &driving, key).await?;
+        let briefing = if is_short { reply.briefing.shortened() } else { reply.briefing };
         Ok(StartReply { briefing, ..reply })
     }
 
@@ -272,18 +287,19 @@ impl EpisodeTable {
         self.lock().episodes.get(id).cloned().ok_or_else(|| unknown(id))
     }
 
-    /// An operator's episode, its team, and the operator's robot.
-    pub fn own_robot<'a>(
-        &self,
+    /// An operator's episode, wherever it has been before, its team, and the operator's robot.
+    pub async fn own_robot<'a>(
+        self: &Arc<Self>,
         caller: &'a Caller,
     ) -> Result<(HostedEpisode, Arc<Team>, &'a str), HostingError> {
         let Caller::Operator { episode, robot } = caller else { return Err(HostingError::NeedsOperator) };
-        let hosted = self.hosted(episode)?;
+        let hosted = self.awake(episode).await?;
         let team = hosted.team().cloned().ok_or(HostingError::NeedsOperator)?;
         Ok((hosted, team, robot))
     }
 
-    /// Checks that `who` may replace operators by the expert or a policy of this process. The episode's starter may.
+    /// Checks that `who` may replace operators by the expert or a policy of this process. The episode's starter
+    /// may.
     pub fn check_stand_in(&self, who: &Caller) -> Result<(), HostingError> {
         match (&self.purpose, who) {
             (Purpose::Evaluation, _) => Err(HostingError::OneEpisode),
@@ -293,9 +309,9 @@ impl EpisodeTable {
         }
     }
 
-    /// The episode `id` and its operators.
-    pub fn team(&self, id: &str) -> Result<(HostedEpisode, Arc<Team>), HostingError> {
-        let hosted = self.hosted(id)?;
+    /// The episode `id`, wherever it has been before, and its operators.
+    pub async fn team(self: &Arc<Self>, id: &str) -> Result<(HostedEpisode, Arc<Team>), HostingError> {
+        let hosted = self.awake(id).await?;
         let team = hosted.team().cloned().ok_or(HostingError::OnePolicy)?;
         Ok((hosted, team))
     }
@@ -380,9 +396,9 @@ impl EpisodeTable {
         self.lock().episodes.values().filter(|episode| !episode.thread.ended()).count()
     }
 
-    /// Takes no more episodes, ends those that are held after the calls already waiting, and returns when every file is
-    /// closed, or after `limit`. What was not closed by then is returned by name. Those that `keep` says, and those that sleep, go on where
-    /// they are brought back.
+    /// Takes no more episodes, ends those that are held after the calls already waiting, and returns when every
+    /// file is closed, or after `limit`. What was not closed by then is returned by name. Those that `keep`
+    /// says, and those that sleep, go on where they are brought back.
     pub async fn close_all(&self, limit: Duration, keep: bool) -> Vec<String> {
         let deadline = Instant::now() + limit;
         let episodes = {

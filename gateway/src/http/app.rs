@@ -14,7 +14,7 @@ use super::{
     watching::{KnownEvaluations, MOST_WATCHERS, RecordingReader, WatchKey},
 };
 use crate::{
-    hosting::{Caller, EpisodeTable, PartnerPolicy},
+    hosting::{Caller, EpisodeTable},
     settings::Settings,
 };
 
@@ -38,8 +38,6 @@ pub struct AppState {
     pub films: RecordingReader,
     /// The evaluations in the runs folder, as they were when they were listed last.
     pub evaluations: KnownEvaluations,
-    /// The policy that people may have drive beside them: no page can name another.
-    pub partner: Option<Arc<dyn PartnerPolicy>>,
 }
 
 impl AppState {
@@ -48,7 +46,7 @@ impl AppState {
         let watchers = Arc::new(Semaphore::new(MOST_WATCHERS));
         let (recordings, films) = (RecordingReader::start(), RecordingReader::start());
         let evaluations = KnownEvaluations::default();
-        AppState { table, settings, watch_key, watchers, recordings, films, evaluations, partner: None }
+        AppState { table, settings, watch_key, watchers, recordings, films, evaluations }
     }
 
     /// The tools that `caller` may be offered: talking is for operators who may.

@@ -17,4 +17,4 @@ mod tests;
 mod watching;
 
 pub use pages::{operate::operator_link, qr::qr_text};
-pub use server::{Guests, Server, shutdown_signal};
+pub use server::{Server, shutdown_signal};

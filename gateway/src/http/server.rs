@@ -18,7 +18,7 @@ use super::{
     watching::WatchKey,
 };
 use crate::{
-    hosting::{EpisodeTable, EpisodeThread, HostingError, LiveFolder, PartnerPolicy, Purpose},
+    hosting::{EpisodeTable, EpisodeThread, Guests, HostingError, LiveFolder},
     settings::Settings,
 };
 
@@ -36,15 +36,6 @@ const TIDY_INTERVAL: Duration = Duration::from_secs(1);
 
 /// Of so many of these times, in one it looks for what other servers do on the same runs.
 const TICKS_PER_LOOK: u64 = 10;
-
-/// What a server is for, and who is there beside those who start episodes.
-#[derive(Debug, Default)]
-pub struct Guests {
-    /// Who starts episodes and drives their robots.
-    pub purpose: Purpose,
-    /// A policy that people may have drive beside them.
-    pub partner: Option<Arc<dyn PartnerPolicy>>,
-}
 
 /// A running server. Dropping it stops it at once; [`Server::stop`] lets calls under way finish.
 #[derive(Debug)]
@@ -66,7 +57,6 @@ impl Server {
 
     /// As [`Server::start`], for `guests`.
     pub fn start_for(settings: Arc<Settings>, guests: Guests) -> io::Result<Server> {
-        let Guests { purpose, partner } = guests;
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(HTTP_THREADS)
             .thread_name("http")
@@ -79,7 +69,7 @@ impl Server {
             )
         })?;
         let address = listener.local_addr()?;
-        let table = Arc::new(EpisodeTable::for_purpose(settings.clone(), purpose));
+        let table = Arc::new(EpisodeTable::for_guests(settings.clone(), guests));
         let watch_key = WatchKey::random().map_err(io::Error::other)?;
         let scheme = if settings.certificate.is_some() { "https" } else { "http" };
         let watch_link = format!("{scheme}://{address}{WATCH}#{}", watch_key.text());
@@ -88,7 +78,7 @@ impl Server {
             let url = url.trim_end_matches('/').to_owned();
             table.keep_journals(LiveFolder::beside(&settings.runs, url, settings.durability));
         }
-        let app = AppState { partner, ..AppState::new(table.clone(), settings.clone(), watch_key) };
+        let app = AppState::new(table.clone(), settings.clone(), watch_key);
         let router = router(app, Gate::new(settings.clone(), address.ip()), Limits::new(&settings));
         let (stop, stopped) = oneshot::channel::<()>();
         let certificate = settings.certificate.clone();
@@ -149,8 +139,8 @@ impl Server {
         &self.table
     }
 
-    /// Serves until it is asked to end, then stops as [`Server::stop`] does. Episodes under way go on when the next server on the same
-    /// runs brings them back, unless somebody has ended this one from a keyboard.
+    /// Serves until it is asked to end, then stops as [`Server::stop`] does. Episodes under way go on when the
+    /// next server on the same runs brings them back, unless somebody has ended this one from a keyboard.
     pub fn run_until_signal(self) -> Vec<String> {
         let keep = self.runtime.block_on(shutdown_signal()) == ShutdownSignal::Terminate;
         tracing::info!("shutting down; calls under way finish first, a second signal ends at once");

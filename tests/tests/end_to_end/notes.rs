@@ -1,6 +1,7 @@
 //! Notes over HTTP: who may send them, and that they change nothing of an episode; and calls that are refused before they reach one.
 
 use serde_json::{Value, json};
+use tandem::hosting::Guests;
 use tandem_episodes::{Recorder, Recording, TranscriptEntry};
 use tandem_tests::{Answer, TestServer};
 
@@ -50,17 +51,20 @@ fn a_note_is_kept_and_changes_nothing() {
 
 #[test]
 fn a_note_with_a_key_is_kept_once() {
-    let server = TestServer::start();
+    let mut server = TestServer::start();
     let id = server.episode("agentic");
     let path = format!("/v1/episodes/{id}/notes");
-    let keyed = |key: &str, body: &Value| {
+    let keyed = |server: &TestServer, key: &str, body: &Value| {
         let headers = [("content-type", "application/json"), ("idempotency-key", key)];
         server.ask("POST", &path, &headers, body.to_string().as_bytes()).0
     };
     for key in ["a", "a", "b"] {
-        assert_eq!(keyed(key, &thought()), 204, "{key}");
+        assert_eq!(keyed(&server, key, &thought()), 204, "{key}");
     }
-    assert_eq!(keyed("a", &json!({ "text": "Other words." })), 422);
+    assert_eq!(keyed(&server, "a", &json!({ "text": "Other words." })), 422);
+    server.restart(Guests::default());
+    assert_eq!(keyed(&server, "b", &thought()), 204);
+    assert_eq!(keyed(&server, "a", &json!({ "text": "Other words." })), 422);
     let result = server.delete(&format!("/v1/episodes/{id}")).ok();
     assert_eq!((&result["usage"]["notes"], &result["usage"]["usd"]), (&json!(2), &json!(0.5)));
 }

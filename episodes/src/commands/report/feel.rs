@@ -28,16 +28,17 @@ const SWINGING: usize = 0;
 /// Points along a capsule at which its distance from another shape is taken.
 const POINTS: usize = 9;
 
-/// What a hand feels.
+/// The contacts that a hand feels by the torques of its own drives.
 pub struct Felt {
     pub grip: Grip,
-    /// What of the hand presses.
+    /// The parts of the hand that press.
     pub presses: Vec<HandPart>,
     pub touch: Option<Touch>,
 }
 
-/// Finds what a hand feels between its fingers. A scored hold asks for opposite presses. Torques do not tell their
-/// directions: a press on the tip and one of twice the force halfway along the finger have the same torque.
+/// Finds what a hand feels between its fingers. A scored hold asks for opposite presses. Torques do not tell
+/// their directions: a press on the tip and one of twice the force halfway along the finger have the same
+/// torque.
 pub fn felt(side: Side, sensed: &RobotSensed, model: &RobotModel) -> Felt {
     let closing: [f32; HAND_JOINTS] = std::array::from_fn(|finger| closing_n_m(side, finger, sensed));
     let most = |joints: Range<usize>| closing[joints].iter().copied().fold(0.0, f32::max);

@@ -23,7 +23,7 @@ const FINGER_MOVES_RAD_S: f32 = 0.2;
 /// An arm without a wrist target that is farther from what its joints stand for has been pushed.
 const PUSHED_AWAY_M: f64 = 0.03;
 const PUSHED_AWAY_RAD: f64 = 0.15;
-/// A hand that presses on something from two sides has arrived within so many times the tolerance of others.
+/// Factor on the tolerance of arrival of a hand that presses on something from two sides.
 const HOLDING_FACTOR: f64 = 3.0;
 /// A hand that is blocked and feels this much touches something.
 const TOUCHED_N: f32 = 3.0;

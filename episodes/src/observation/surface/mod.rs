@@ -150,7 +150,7 @@ fn grow(
 }
 
 fn rgb(view: &RobotView, pixel: usize) -> [f32; 3] {
-    std::array::from_fn(|i| f32::from(view.picture.rgb[3 * pixel + i]) / 255.0)
+    std::array::from_fn(|i| f32::from(view.picture.rgb()[3 * pixel + i]) / 255.0)
 }
 
 /// Whether two colours are those of one material in more and in less light.
@@ -376,7 +376,7 @@ mod tests {
         assert_eq!(told(&view), [221, 36]);
         // A red carpet before the robot, nearer than all and over a quarter of the picture, and a line where two colours mix.
         let is_carpet = |u: usize, v: usize| v > 30 || (v > 26 && u < 20);
-        let mut rgb = view.picture.rgb.clone();
+        let mut rgb = view.picture.rgb().to_vec();
         for pixel in 0..WIDTH * HEIGHT {
             let (u, v) = (pixel % WIDTH, pixel / WIDTH);
             if is_carpet(u, v) || v == 0 {

@@ -1,5 +1,6 @@
-//! MoveHouse: A presses the lever, pushes the door open along its swing and stands aside in the other room. Meanwhile B and
-//! C lift the table; they follow A through the doorway in step and set it down on the marks.
+//! MoveHouse: A walks to the door, presses its lever, pushes the door open along its swing and stands aside in
+//! the other room. Meanwhile B and C lift the table; they follow A through the doorway in step and set it down on
+//! the marks.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -7,7 +8,7 @@ use tandem_sim::{Pose, Rotation, Side, Sides, Vector};
 
 use super::skills::{
     CarryTeam, Commander, FREE, HandGrasp, HandMove, Hold, ParallelScript, Posture, PosturePath, WalkGoal,
-    closed_rad, follow, grasp_reached, in_parallel, let_go, place, walk_to,
+    at_height, closed_rad, follow, grasp_reached, in_parallel, let_go, place, walk_reaching, walk_to,
 };
 use crate::players::PlayerError;
 use crate::scoring::{A, B, C, Facts};
@@ -48,8 +49,12 @@ const OPENED_S: f32 = 0.4;
 /// B stays so far behind A, until A is beside the way.
 const APART_M: f32 = 0.75;
 const BESIDE_Y_M: f32 = -0.75;
-/// Where A stands aside, in the door's frame.
+/// Position of A while it presses the lever, door frame.
+const BEFORE_M: Vector = Vector::new(-0.50, -0.15, 0.0);
+/// Position of A beside its partners' way, door frame.
 const ASIDE_M: Vector = Vector::new(0.75, -1.05, 0.0);
+/// Largest speed of A on its way to the lever, and to its place aside.
+const APPROACH_M_S: f32 = 0.4;
 const WALK_M_S: f32 = 0.3;
 
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
@@ -103,7 +108,7 @@ fn set_heights(commander: &mut Commander, height_m: f32) {
     }
 }
 
-/// A, which begins within reach of the lever, lays its right fist on it, presses it down and follows the leaf on its swing.
+/// Opens the door: A walks up to the lever, presses it with its right fist and follows the leaf on its swing.
 fn open_door(commander: &mut Commander) -> Result<(), PlayerError> {
     let leaf = commander.facts()?.object("lever_door leaf").pose_in_world;
     let pressed_m = press_lever(commander)?;
@@ -111,32 +116,46 @@ fn open_door(commander: &mut Commander) -> Result<(), PlayerError> {
     let (left_in_pelvis, pelvis_m) = (robot.wrist_in_pelvis.left, robot.pelvis_in_world.translation.z);
     let at = |gone_m: f32| {
         let (stand, wrist) = push(&leaf, gone_m / FIRST_RADIUS_M, pressed_m);
-        let pelvis = Pose::from_parts(stand.translation.with_z(pelvis_m), stand.rotation);
+        let pelvis = at_height(&stand, pelvis_m);
         vec![Posture { robot: A, stand, wrists: Sides { left: pelvis * left_in_pelvis, right: wrist } }]
     };
     let length_m = OPEN_RAD * FIRST_RADIUS_M;
     follow(commander, &PosturePath { at: &at, length_m, pace_m_s: PUSH_M_S, hold_s: OPENED_S, free_m: &FREE })
 }
 
-/// Presses the lever down until the bolt is drawn, and says how high the wrist is then.
+/// Walks up to the lever, presses it until the bolt is drawn, and returns the height of the wrist then.
 fn press_lever(commander: &mut Commander) -> Result<f32, PlayerError> {
     let facts = commander.facts()?;
     let end_m = facts.site_m("lever_door lever", "end");
     let bolt_m = |facts: &Facts| facts.seen_from_m("lever_door leaf", "lever_door bolt").y;
     let shut_m = bolt_m(&facts);
-    let reach = |back_m: f32, above_m: f32| {
-        let wrist_m = end_m + Vector::new(-PRESSING_M - back_m, 0.0, above_m);
-        HandMove::reach(A, Side::Right, Pose::from_parts(wrist_m, Rotation::from_rotation_x(-FRAC_PI_2)))
-    };
-    commander.perform(1.2, &[reach(BACK_M, ABOVE_LEVER_M).shaped(closed_rad(Side::Right))])?;
-    commander.perform(0.6, &[reach(0.0, ABOVE_LEVER_M)])?;
+    walk_to_lever(commander, &facts, end_m)?;
+    commander.perform(0.6, &[fist_at(end_m, 0.0, ABOVE_LEVER_M)])?;
     for down_m in DOWN_M {
-        commander.perform(0.6, &[reach(0.0, down_m)])?;
+        commander.perform(0.6, &[fist_at(end_m, 0.0, down_m)])?;
         if bolt_m(&commander.facts()?) - shut_m >= DRAWN_M {
             return Ok(end_m.z + down_m);
         }
     }
     Err(PlayerError::GaveUp("the lever could not be pressed down".into()))
+}
+
+/// Walks up to the lever; meanwhile the right hand makes a fist behind the lever's end.
+fn walk_to_lever(commander: &mut Commander, facts: &Facts, end_m: Vector) -> Result<(), PlayerError> {
+    let to = place(facts.object("lever_door").pose_in_world * BEFORE_M, 0.0);
+    let robot = &facts.robots[A];
+    let pelvis = at_height(&to, robot.pelvis_in_world.translation.z);
+    let hands = Sides {
+        left: HandMove::reach(A, Side::Left, pelvis * robot.wrist_in_pelvis.left),
+        right: fist_at(end_m, BACK_M, ABOVE_LEVER_M).shaped(closed_rad(Side::Right)),
+    };
+    walk_reaching(commander, &[WalkGoal { robot: A, to, pace_m_s: APPROACH_M_S }], &[hands])
+}
+
+/// Returns the move of the right fist, palm down, to a place behind and above the lever's end.
+fn fist_at(end_m: Vector, back_m: f32, above_m: f32) -> HandMove {
+    let wrist_m = end_m + Vector::new(-PRESSING_M - back_m, 0.0, above_m);
+    HandMove::reach(A, Side::Right, Pose::from_parts(wrist_m, Rotation::from_rotation_x(-FRAC_PI_2)))
 }
 
 /// Where A stands, and its right wrist at a height, to push the leaf that was shut at `shut` to an angle.

@@ -12,7 +12,7 @@ pub type Condition = &'static dyn Predicate;
 
 /// A function of a control step.
 pub trait Predicate: Fn(&Facts) -> bool + Sync {
-    /// Its name in the source, as `grasped_and_lifted`.
+    /// Returns the function's name in the source, for example `grasped_and_lifted`.
     fn name(&self) -> &'static str;
 }
 

@@ -1,13 +1,16 @@
-//! An episode that another process has played, or this one before it put the episode aside, brought to where it stood.
+//! An episode that another process has played, or this one before it put the episode aside, brought to where it
+//! stood.
 
 use std::time::Duration;
 
+use serde_json::Value;
 use tandem_tools_spec::Call;
 
 use super::set_clock::SetHands;
 use crate::commands::{Called, OperatorCall};
 use crate::error::{CheckpointError, EpisodeError};
 use crate::live::Onlookers;
+use crate::output::OutputError;
 use crate::session::journal::{JournalEntry, KeptRequest};
 use crate::session::{Audience, Caller, Clock, Request, RunFolder, Session, this_build};
 use crate::spec::EpisodeSpec;
@@ -26,13 +29,15 @@ pub struct BringBack {
 }
 
 impl Session {
-    /// Plays an episode again up to the last entry of its journal, and goes on from there. An error says where it went another way.
+    /// Plays an episode again up to the last entry of its journal, and goes on from there. An error says where
+    /// it went another way.
     pub fn bring_back(back: BringBack) -> Result<Session, EpisodeError> {
         let BringBack { spec, folder, entries, clock, thinking, onlookers } = back;
         let hands = SetHands::default();
         let path = folder.as_ref().map(|folder| folder.path.clone()).unwrap_or_default();
         let mut session = Session::start_with_clock(&spec, folder, hands.clock(clock))?;
         session.set_onlookers(onlookers);
+        session.catch_up();
         for entry in entries {
             let shown = session.clock.spent() + session.clock.thinking();
             hands.pass(entry.thought().saturating_sub(shown));
@@ -43,12 +48,29 @@ impl Session {
                 return Err(CheckpointError::OtherWay { path, step, made_by: this.into(), this }.into());
             }
         }
+        session.caught_up();
         hands.pass(thinking);
         hands.go();
         // The clock goes from this look on.
         session.clock.thinking();
         session.keep_journal();
         Ok(session)
+    }
+
+    /// Leaves pictures and files to the recorder, since nobody waits for an answer.
+    fn catch_up(&mut self) {
+        self.observer.draw_for_recording(&self.origin.spec, &self.world);
+        if let Some(files) = &mut self.files {
+            files.catch_up(true);
+        }
+    }
+
+    /// Ends [`Session::catch_up`].
+    fn caught_up(&mut self) {
+        self.observer.draw_at_once();
+        if let Some(files) = &mut self.files {
+            files.catch_up(false);
+        }
     }
 }
 
@@ -59,11 +81,11 @@ impl KeptRequest {
             KeptRequest::Call { operator, shown, tool, arguments } => {
                 let caller = operator.as_deref().map_or(Caller::Policy, Caller::Operator);
                 let audience = shown.as_deref().map_or(Audience::Caller, Audience::Process);
-                let called = Called::parse(&tool, arguments)?;
+                let called = Called::parse(&tool, read(&arguments)?)?;
                 let _ = session.perform(Request { caller, called, audience });
             }
             KeptRequest::Command { robot, tool, arguments } => {
-                let call = Call::parse(&tool, arguments)?;
+                let call = Call::parse(&tool, read(&arguments)?)?;
                 let _ = session.read_command(OperatorCall::new(&robot, call)?);
             }
             KeptRequest::Note { operator, note } => {
@@ -76,4 +98,9 @@ impl KeptRequest {
         }
         Ok(())
     }
+}
+
+/// Reads the arguments of a request.
+fn read(arguments: &str) -> Result<Value, EpisodeError> {
+    Ok(serde_json::from_str(arguments).map_err(OutputError::from)?)
 }

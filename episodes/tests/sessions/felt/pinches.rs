@@ -59,7 +59,8 @@ fn approach(session: &mut Session, beside_m: f64, fingers_rad: [f64; 7]) {
     move_hand(session, entry);
 }
 
-/// For three seconds thumb and fingers press and nothing is held: replies say what presses, and nothing of a hold.
+/// For three seconds thumb and fingers press and nothing is held: replies say what presses, and nothing of a
+/// hold.
 #[test]
 fn a_pinch_that_is_not_scored_is_told_as_no_hold() {
     let mut session =

@@ -48,7 +48,7 @@ fn every_axis_is_recorded_verified_and_the_same_again() {
 fn pictures(stress: Option<(StressAxis, StressLevel)>) -> [Vec<u8>; 2] {
     let mut session = Session::start(&under("handover", SEED, stress), None).unwrap();
     let room = session.third_person();
-    [session.eye(0, [320, 240]), room.rgb]
+    [session.eye(0, [320, 240]), room.rgb().to_vec()]
 }
 
 fn mean_difference(one: &[u8], other: &[u8]) -> f64 {

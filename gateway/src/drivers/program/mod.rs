@@ -25,8 +25,8 @@ use tandem_tools_spec::{Driving, EndReason, ModelEnding, ResultReply, StartReply
 
 use super::{lost, own_result, python::PythonModule, remove_old_result};
 use crate::{
-    hosting::{EpisodeThread, HostingError, Purpose, episode_name},
-    http::{Guests, Server},
+    hosting::{EpisodeThread, Guests, HostingError, Purpose, episode_name},
+    http::Server,
     settings::{Layer, Record, Settings, SettingsError},
     token::Token,
 };

@@ -1,21 +1,29 @@
-//! The journal of an episode as a file: a line that says what the episode is, then a line for everything that was answered at once. A line
-//! is written whole or counts for nothing, so that what was done and what was answered are never one without the other.
+//! The journal of an episode as a file: a line that says what the episode is, then a line for everything that
+//! was answered at once. A line is written whole or counts for nothing, so that what was done and what was
+//! answered are never one without the other.
 
 use std::{
+    error::Error,
     fs::{self, File, OpenOptions},
     io::{self, BufRead, BufReader, Write},
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{
+    Value,
+    value::{RawValue, to_raw_value},
+};
 use tandem_episodes::{EpisodeSpec, JournalEntry, Visibility};
-use tandem_tools_spec::{Call, Driving, Heard, Observation, Partner, StartEpisode, StartReply};
+use tandem_tools_spec::{Call, Driving, Heard, Note, Observation, Partner, StartEpisode, StartReply};
 
 use crate::{hosting::Answer, settings::Durability};
 
-/// What the lines say has changed whenever this has.
+/// Another number means lines that older builds' readers cannot read, or theirs that this one cannot.
 const FORMAT: u32 = 1;
+
+/// Most lines are no longer: a state of a robot and what goes with it.
+const USUAL_LINE_BYTES: usize = 8 << 10;
 
 /// What an episode is, and how it was started.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -46,15 +54,25 @@ pub struct Keyed {
     pub request: Call,
 }
 
-/// What was answered at once: what was asked, what those were told who gave a key, and what the host has to remember then.
+/// What was answered at once: what was asked, what came with a key, answers among it, and what the host has to
+/// remember then.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Commit {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub asked: Vec<JournalEntry>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub answers: Vec<KeptAnswer>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<KeyedNote>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub memory: Option<Value>,
+}
+
+/// A note that came with a key, and is kept once.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct KeyedNote {
+    pub key: String,
+    pub note: Note,
 }
 
 /// An answer, and the request that it answers.
@@ -62,8 +80,8 @@ pub struct Commit {
 pub struct KeptAnswer {
     pub key: String,
     tool: String,
-    arguments: Value,
-    reply: Value,
+    arguments: Box<RawValue>,
+    reply: Box<RawValue>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     step: Option<u32>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -107,14 +125,21 @@ impl Heading {
     }
 }
 
+impl Commit {
+    pub fn is_empty(&self) -> bool {
+        let Commit { asked, answers, notes, memory } = self;
+        asked.is_empty() && answers.is_empty() && notes.is_empty() && memory.is_none()
+    }
+}
+
 impl KeptAnswer {
     /// The answer to `keyed`, kept as it was told.
     pub fn new(keyed: &Keyed, answer: &Answer) -> Result<KeptAnswer, serde_json::Error> {
         Ok(KeptAnswer {
             key: keyed.key.clone(),
             tool: keyed.request.name().into(),
-            arguments: serde_json::to_value(&keyed.request)?,
-            reply: serde_json::to_value(&answer.reply)?,
+            arguments: to_raw_value(&keyed.request)?,
+            reply: to_raw_value(&answer.reply)?,
             step: answer.step,
             observation: answer.observation.clone(),
             partners: answer.partners.clone(),
@@ -125,9 +150,9 @@ impl KeptAnswer {
     }
 
     /// The request, and the answer as it was told.
-    pub fn read(self) -> Result<(Call, Answer), String> {
-        let request = Call::parse(&self.tool, self.arguments).map_err(|error| error.to_string())?;
-        let reply = request.tool.parse_reply(self.reply).map_err(|error| error.to_string())?;
+    pub fn read(self) -> Result<(Call, Answer), Box<dyn Error>> {
+        let request = Call::parse(&self.tool, serde_json::from_str(self.arguments.get())?)?;
+        let reply = request.tool.parse_reply(serde_json::from_str(self.reply.get())?)?;
         let KeptAnswer { step, observation, partners, heard, recording_failed, others_play_on, .. } = self;
         Ok((request, Answer { reply, step, observation, partners, heard, recording_failed, others_play_on }))
     }
@@ -157,7 +182,8 @@ impl JournalFile {
 
     /// Writes a line more. After an error the journal is not to be used any more.
     pub fn append(&mut self, line: &impl Serialize) -> io::Result<()> {
-        let mut bytes = serde_json::to_vec(line)?;
+        let mut bytes = Vec::with_capacity(USUAL_LINE_BYTES);
+        serde_json::to_writer(&mut bytes, line)?;
         bytes.push(b'\n');
         self.file.write_all(&bytes)?;
         match self.durability {

@@ -1,5 +1,5 @@
-//! Which server plays an episode: the one that has locked the episode's lease. Where the file system has no locks, a lease is held for as
-//! long as its owner writes it anew.
+//! Which server plays an episode: the one that has locked the episode's lease. Where the file system has no
+//! locks, a lease is held for as long as its owner writes it anew.
 
 use std::{
     fs::{self, File},

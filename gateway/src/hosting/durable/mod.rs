@@ -1,10 +1,11 @@
-//! Episodes that outlive the process which holds them: each has a journal beside the runs, in which every call is written before its
-//! answer leaves, and a lease that says which server plays it. Whoever takes the lease plays the journal again.
+//! Episodes that outlive the process which holds them: each has a journal beside the runs, in which every call
+//! is written before its answer leaves, and a lease that says which server plays it. Whoever takes the lease
+//! plays the journal again.
 
 mod journal_file;
 mod lease;
 
-pub use journal_file::{Commit, Heading, JournalFile, JournalReader, KeptAnswer, Keyed, StartKey};
+pub use journal_file::{Commit, Heading, JournalFile, JournalReader, KeptAnswer, Keyed, KeyedNote, StartKey};
 pub use lease::{Lease, Leasing};
 
 use std::{

@@ -42,6 +42,7 @@ pub enum Job {
     Note {
         operator: Option<String>,
         note: Box<Note>,
+        key: Option<String>,
         reply: ReplySender<()>,
     },
     /// Keeps a call that was refused on its way here.

@@ -1,5 +1,5 @@
-//! The thread that owns one episode's world. Calls reach it through a bounded channel, each with its own reply, and a call
-//! whose caller has gone still finishes, is recorded and charged.
+//! The thread that owns one episode's world. Calls reach it through a bounded channel, each with its own reply,
+//! and a call whose caller has gone still finishes, is recorded and charged.
 
 mod job;
 mod onlookers;
@@ -34,10 +34,12 @@ use status::SharedStatus;
 pub use work::HostMemory;
 use work::{Opening, Stage};
 
-/// Calls that may wait for one episode. A policy has no use for more than one at a time; a few more are a burst.
+/// Calls that may wait for one episode. A policy has no use for more than one at a time; a few more are a
+/// burst.
 pub const WAITING_CALLS: usize = 16;
 
-/// An episode. Its thread ends while it sleeps, and whatever is asked of it wakes it up. Dropping the last handle closes its recording.
+/// An episode. Its thread ends while it sleeps, and whatever is asked of it wakes it up. Dropping the last
+/// handle closes its recording.
 #[derive(Debug)]
 pub struct EpisodeThread {
     jobs: Mutex<mpsc::Sender<Job>>,
@@ -160,8 +162,8 @@ impl EpisodeThread {
         self.ask(None, tool.into(), None, Box::new(|answer| answer)).await
     }
 
-    /// As [`EpisodeThread::call`], with all that may go with a call, and for the operator of a robot where each has one. What `told` makes
-    /// of the answer is told, and kept for a call with a key.
+    /// As [`EpisodeThread::call`], with all that may go with a call, and for the operator of a robot where each
+    /// has one. What `told` makes of the answer is told, and kept for a call with a key.
     pub async fn ask(
         &self,
         operator: Option<&str>,
@@ -184,7 +186,8 @@ impl EpisodeThread {
         self.do_job(|reply| Job::ReadCommand { call: call.into(), reply }).await
     }
 
-    /// Executes commands of several operators side by side. Returns an answer for each, with what each looks at then, as `told` has it.
+    /// Executes commands of several operators side by side. Returns an answer for each, with what each looks at
+    /// then, as `told` has it.
     pub async fn together(
         &self,
         commands: Vec<(OperatorCommand, Option<Keyed>)>,
@@ -196,13 +199,18 @@ impl EpisodeThread {
     }
 
     /// Keeps a note of the policy that directs all robots, or of the operator of one.
-    pub async fn note(&self, operator: Option<&str>, note: Note) -> Result<(), HostingError> {
+    pub async fn note(
+        &self,
+        operator: Option<&str>,
+        note: Note,
+        key: Option<String>,
+    ) -> Result<(), HostingError> {
         let (operator, note) = (operator.map(str::to_owned), Box::new(note));
-        self.do_job(|reply| Job::Note { operator, note, reply }).await
+        self.do_job(|reply| Job::Note { operator, note, key, reply }).await
     }
 
-    /// Keeps a call that was refused before it came here, after those that its caller made before. Nobody is told where it cannot be
-    /// kept.
+    /// Keeps a call that was refused before it came here, after those that its caller made before. Nobody is
+    /// told where it cannot be kept.
     pub async fn refused(&self, operator: Option<&str>, call: RefusedCall) {
         let (operator, call) = (operator.map(str::to_owned), Box::new(call));
         let _ = self.do_job_in_turn(|reply| Job::Refused { operator, call, reply }).await;
@@ -223,8 +231,8 @@ impl EpisodeThread {
         self.watch_as(None).await
     }
 
-    /// As [`EpisodeThread::watch`], for the person who drives `robot` and is told every step. It sees what no policy may know; that is
-    /// recorded, and results name it.
+    /// As [`EpisodeThread::watch`], for the person who drives `robot` and is told every step. It sees what no
+    /// policy may know; that is recorded, and results name it.
     pub async fn watch_driving(&self, robot: &str) -> Result<(LiveWatch, EveryStep), HostingError> {
         Ok((self.watch_as(Some(robot.into())).await?, self.stage.feed.every_step()))
     }
@@ -242,8 +250,8 @@ impl EpisodeThread {
         self.work_blocking(|session| Ok(session.facts()))
     }
 
-    /// A look through the robots, as it was drawn, for a policy that is asked from this process and `shown` this of what policies are
-    /// not shown as a rule; results name it.
+    /// A look through the robots, as it was drawn, for a policy that is asked from this process and `shown`
+    /// this of what policies are not shown as a rule; results name it.
     pub fn look_blocking(
         &self,
         observe: &Observe,
@@ -274,8 +282,8 @@ impl EpisodeThread {
         }
     }
 
-    /// Ends the episode for a reason that lies outside it, after the calls already waiting, unless it has ended by then. Not for
-    /// threads that run futures: it waits for a place among the jobs.
+    /// Ends the episode for a reason that lies outside it, after the calls already waiting, unless it has ended
+    /// by then. Not for threads that run futures: it waits for a place among the jobs.
     pub fn end_blocking(&self, reason: EndReason) {
         // An episode that has stopped meanwhile has ended.
         if let Ok(jobs) = self.sender() {

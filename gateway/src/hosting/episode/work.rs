@@ -1,4 +1,5 @@
-//! The thread of an episode at work: job after job, each written into the episode's journal before it is answered.
+//! The thread of an episode at work: job after job, each written into the episode's journal before it is
+//! answered.
 
 use std::{
     sync::{Arc, Mutex, PoisonError},
@@ -25,7 +26,8 @@ use crate::{
     hosting::{
         Answer, HostingError, RefusedCall,
         durable::{
-            Commit, Heading, JournalFile, JournalReader, KeptAnswer, Keyed, Lease, Leasing, LiveFolder,
+            Commit, Heading, JournalFile, JournalReader, KeptAnswer, Keyed, KeyedNote, Lease, Leasing,
+            LiveFolder,
         },
     },
     metrics::Metrics,
@@ -39,8 +41,9 @@ pub trait HostMemory: std::fmt::Debug + Send + Sync {
     /// What of it decides what is told later.
     fn memory(&self) -> Value;
 
-    /// Takes over what was remembered elsewhere, and the answers that may be asked for again.
-    fn restore(&self, memory: Option<Value>, answers: Vec<KeptAnswer>);
+    /// Takes over what was remembered elsewhere, the answers that may be asked for again, and the notes that may
+    /// come again.
+    fn restore(&self, memory: Option<Value>, answers: Vec<KeptAnswer>, notes: Vec<KeyedNote>);
 
     /// Lets go of what [`HostMemory::restore`] brings again: the episode is put aside.
     fn let_go(&self);
@@ -210,11 +213,12 @@ impl Stage {
             let folder = self.folder.path.clone();
             return Err(HostingError::OtherBuild { made_by: reader.heading.build, this, folder });
         }
-        let (mut entries, mut answers, mut memory) = (Vec::new(), Vec::new(), None);
+        let (mut entries, mut answers, mut notes, mut memory) = (Vec::new(), Vec::new(), Vec::new(), None);
         while let Some(commit) = reader.next_commit().map_err(failed)? {
-            let Commit { mut asked, answers: mut told, memory: remembered } = commit;
+            let Commit { mut asked, answers: mut told, notes: mut noted, memory: remembered } = commit;
             entries.append(&mut asked);
             answers.append(&mut told);
+            notes.append(&mut noted);
             memory = remembered.or(memory);
         }
         // What has ended and is written is not written again.
@@ -230,7 +234,7 @@ impl Stage {
         })?;
         let file = JournalFile::go_on(&path, reader, journals.durability).map_err(failed)?;
         let log = Log { file, lease, memory: memory.clone().unwrap_or_default() };
-        self.memory.restore(memory, answers);
+        self.memory.restore(memory, answers, notes);
         tracing::info!("brought back");
         let metrics = EpisodeMetrics::again(self.metrics.clone(), &session);
         let session = PanicGuard::again(session, metrics);
@@ -267,8 +271,8 @@ impl Desk<'_> {
         Left::Closed(None)
     }
 
-    /// A reply that cannot be sent means that the caller has gone. What was done stays done. The log has the reason of what is refused and
-    /// told to nobody.
+    /// A reply that cannot be sent means that the caller has gone. What was done stays done. The log has the
+    /// reason of what is refused and told to nobody.
     fn do_job(&mut self, job: Job) {
         match job {
             Job::Call { operator, call, keyed, told, reply } => {
@@ -292,10 +296,12 @@ impl Desk<'_> {
                 self.commit([(&keyed, &*answer)]);
                 let _ = reply.send(Ok(*answer));
             }
-            Job::Note { operator, note, reply } => {
-                let kept = self.session.run(|session| Ok(session.note(operator.as_deref(), *note)?));
-                self.commit(None);
-                let _ = reply.send(kept.flatten());
+            Job::Note { operator, note, key, reply } => {
+                let keyed = key.map(|key| KeyedNote { key, note: (*note).clone() });
+                let kept =
+                    self.session.run(|session| Ok(session.note(operator.as_deref(), *note)?)).flatten();
+                self.commit_noted(None, keyed.filter(|_| kept.is_ok()));
+                let _ = reply.send(kept);
             }
             Job::Refused { operator, call, reply } => {
                 let kept = self.session.run(|session| refused(session, operator.as_deref(), *call));
@@ -332,6 +338,15 @@ impl Desk<'_> {
 
     /// Writes down what has been done, and what of it is answered to those who gave a key.
     fn commit<'a>(&mut self, answers: impl IntoIterator<Item = (&'a Keyed, &'a Answer)>) {
+        self.commit_noted(answers, None);
+    }
+
+    /// As [`Desk::commit`], with a note that has been kept and came with a key.
+    fn commit_noted<'a>(
+        &mut self,
+        answers: impl IntoIterator<Item = (&'a Keyed, &'a Answer)>,
+        noted: Option<KeyedNote>,
+    ) {
         self.stage.status.update(&self.session);
         let Some(log) = &mut self.log else { return };
         let written = self
@@ -347,12 +362,10 @@ impl Desk<'_> {
                 let memory = (now != log.memory).then(|| now.clone());
                 log.memory = now;
                 log.lease.renew();
-                match asked.is_empty() && kept.is_empty() && memory.is_none() {
+                let commit = Commit { asked, answers: kept, notes: noted.into_iter().collect(), memory };
+                match commit.is_empty() {
                     true => Ok(()),
-                    false => {
-                        let commit = Commit { asked, answers: kept, memory };
-                        log.file.append(&commit).map_err(|error| error.to_string())
-                    }
+                    false => log.file.append(&commit).map_err(|error| error.to_string()),
                 }
             });
         if let Err(why) = written {

@@ -31,7 +31,7 @@ use crate::token::Token;
 pub use collection::{CollectedEpisode, Collection, CollectionProgress, CollectionStage};
 use driving::Wheel;
 pub use driving::{Driver, Wish};
-pub use partner::PartnerPolicy;
+pub use partner::{PartnerKind, PartnerPolicy};
 pub use round::OperatorMemory;
 use round::{Pending, Round};
 
@@ -59,7 +59,9 @@ struct Wheels {
     /// Whether commands are made of what they say.
     turning: bool,
     /// By seat: whether the task's expert or a policy drives.
-    partners: Vec<bool>,
+    partners: Vec<Option<PartnerKind>>,
+    /// By seat: who drove when the server before this one ended, and has not been seated again yet.
+    left: Vec<Option<PartnerKind>>,
 }
 
 /// Who drives which robot.
@@ -107,8 +109,8 @@ impl Team {
         let round = Mutex::new(Round::new(seats.iter().map(|seat| seat.robot.clone()).collect()));
         let patience = Duration::from_secs_f64(driving.patience_s());
         let (none, under_way) = (seats.iter().map(|_| None).collect(), vec![None; seats.len()]);
-        let partners = vec![false; seats.len()];
-        let wheels = Mutex::new(Wheels { seats: none, under_way, partners, ..Wheels::default() });
+        let (partners, left) = (vec![None; seats.len()], vec![None; seats.len()]);
+        let wheels = Mutex::new(Wheels { seats: none, under_way, partners, left, ..Wheels::default() });
         Ok(Team { seats, patience, talk: driving.talk == Some(true), silence, round, wheels })
     }
 
@@ -132,18 +134,25 @@ impl Team {
 
     /// What of the operators is to be remembered.
     pub fn memory(&self) -> Vec<OperatorMemory> {
-        self.round().memory()
+        let mut memory = self.round().memory();
+        let wheels = self.wheels();
+        for (memory, (now, left)) in memory.iter_mut().zip(wheels.partners.iter().zip(&wheels.left)) {
+            memory.partner = now.or(*left);
+        }
+        memory
     }
 
     /// Takes over what was remembered.
     pub fn restore(&self, memory: Vec<OperatorMemory>) {
+        self.wheels().left = memory.iter().map(OperatorMemory::left).collect();
         self.round().restore(memory);
     }
 
     /// Whether somebody in this process drives, or waits for others.
     pub fn is_busy(&self) -> bool {
         let wheels = self.wheels();
-        let drives = wheels.partners.contains(&true) || wheels.seats.iter().any(Option::is_some);
+        let partners = wheels.partners.iter().chain(&wheels.left);
+        let drives = partners.flatten().next().is_some() || wheels.seats.iter().any(Option::is_some);
         drives || self.round().may_begin()
     }
 
@@ -187,7 +196,8 @@ impl Team {
         }
     }
 
-    /// Has the episode answer a call of the operator on `seat`; `then` makes of the answer what this one is told.
+    /// Has the episode answer a call of the operator on `seat`; `then` makes of the answer what this one is
+    /// told.
     async fn ask(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
@@ -281,7 +291,7 @@ impl Team {
     /// Whether a command by who has `seat` goes on where that of a partner was shorter.
     fn goes_on(&self, seat: usize) -> bool {
         let wheels = self.wheels();
-        wheels.partners[seat] || wheels.seats.iter().any(Option::is_some)
+        wheels.partners[seat].is_some() || wheels.seats.iter().any(Option::is_some)
     }
 
     /// Takes a command, and answers when the step has been made.

@@ -5,6 +5,7 @@
 
 use std::{fmt, sync::Arc, thread};
 
+use serde::{Deserialize, Serialize};
 use tandem_episodes::{
     EpisodeSpec,
     players::{Episode, LocalEpisode, PlayError, PlayerError, PrivilegedPlayer, experts::Expert},
@@ -17,6 +18,14 @@ use crate::hosting::{EpisodeThread, HostingError};
 
 /// Control steps for which the robot stands before the expert's script begins again.
 const PAUSE_STEPS: u32 = 25;
+
+/// Who of this process drives a robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PartnerKind {
+    Expert,
+    Policy,
+}
 
 /// A policy elsewhere that can drive one robot of an episode: it plays all of them, and its own does its part.
 pub trait PartnerPolicy: fmt::Debug + Send + Sync {
@@ -44,12 +53,12 @@ impl Team {
         let seat = self.seat(robot)?;
         let spec = episode.spec().clone();
         Expert::for_episode(&spec).map_err(HostingError::NoExpert)?;
-        if std::mem::replace(&mut self.wheels().partners[seat], true) {
+        if self.wheels().partners[seat].replace(PartnerKind::Expert).is_some() {
             return Ok(());
         }
         drop(episode.watch_driving(robot).await?);
         let text = format!("The task's expert drives robot {robot}.");
-        episode.note(Some(robot), Note { text, ..Note::default() }).await?;
+        episode.note(Some(robot), Note { text, ..Note::default() }, None).await?;
         let own = self.one_robot(episode, seat, robot);
         let thread = thread::Builder::new().name(format!("expert of {robot}"));
         thread.spawn(move || play_expert(own, &spec)).map_err(HostingError::Thread)?;
@@ -66,7 +75,7 @@ impl Team {
     ) -> Result<(), HostingError> {
         let seat = self.seat(robot)?;
         self.round().check_plays(seat)?;
-        if std::mem::replace(&mut self.wheels().partners[seat], true) {
+        if self.wheels().partners[seat].replace(PartnerKind::Policy).is_some() {
             return Ok(());
         }
         let text = format!("The policy {} drives robot {robot}.", policy.name());
@@ -75,18 +84,49 @@ impl Team {
         let thread = thread::Builder::new().name(format!("policy of {robot}"));
         thread.spawn(move || play_policy(own, &*policy, connected)).map_err(HostingError::Thread)?;
         match connection.await.map_err(|_| HostingError::EpisodeStopped)? {
-            Ok(()) => episode.note(Some(robot), Note { text, ..Note::default() }).await,
+            Ok(()) => episode.note(Some(robot), Note { text, ..Note::default() }, None).await,
             Err(error) => {
-                self.wheels().partners[seat] = false;
+                self.wheels().partners[seat] = None;
                 Err(HostingError::NoPolicy { reason: error.to_string() })
             }
         }
     }
 
-    /// Lets nobody wait for the robot on `seat`, whose policy is lost, until somebody drives it again.
-    fn lose_policy(self: &Arc<Self>, episode: &Arc<EpisodeThread>, seat: usize) {
+    /// Seats again who drove when the server before this one ended; `policy` is the one that may drive here.
+    pub async fn seat_again(
+        self: &Arc<Self>,
+        episode: &Arc<EpisodeThread>,
+        policy: Result<Arc<dyn PartnerPolicy>, HostingError>,
+    ) {
+        let policy = policy.map_err(Arc::new);
+        let left = self.wheels().left.clone();
+        for (seat, kind) in left.into_iter().enumerate() {
+            let robot = &self.seats[seat].robot;
+            let seated = match kind {
+                None => continue,
+                Some(PartnerKind::Expert) => self.take_expert(episode, robot).await,
+                Some(PartnerKind::Policy) => match policy.clone() {
+                    Ok(policy) => self.take_policy(episode, robot, policy).await,
+                    Err(none) => Err(HostingError::Shared(none)),
+                },
+            };
+            self.wheels().left[seat] = None;
+            if let Err(error) = seated {
+                tracing::warn!(%error, robot, "nobody drives a robot again that was driven from here");
+                self.lose_partner(episode, seat);
+            }
+        }
+    }
+
+    /// Whether somebody is to be seated again.
+    pub fn misses_partners(&self) -> bool {
+        self.wheels().left.iter().any(Option::is_some)
+    }
+
+    /// Lets nobody wait for the robot on `seat`, whose partner is lost, until somebody drives it again.
+    fn lose_partner(self: &Arc<Self>, episode: &Arc<EpisodeThread>, seat: usize) {
         self.round().fall_silent(seat);
-        self.wheels().partners[seat] = false;
+        self.wheels().partners[seat] = None;
         self.go_on(episode);
     }
 
@@ -145,11 +185,11 @@ fn play_policy(
     if let Some(error) = failed {
         tracing::warn!(%error, robot = own.robot, "the policy of a robot has stopped");
         let text = format!("The policy of robot {} has stopped: {error}", own.robot);
-        let note = own.episode.note(Some(&own.robot), Note { text, ..Note::default() });
+        let note = own.episode.note(Some(&own.robot), Note { text, ..Note::default() }, None);
         // Of an episode that has ended, nobody is left who could be told.
         let _ = own.runtime.block_on(note);
         let _runtime = own.runtime.enter();
-        return own.team.lose_policy(&own.episode, own.seat);
+        return own.team.lose_partner(&own.episode, own.seat);
     }
     let _ = own.ask(Finish {}.into());
 }

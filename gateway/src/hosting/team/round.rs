@@ -5,6 +5,7 @@ use tandem_episodes::OperatorCommand;
 use tandem_tools_spec::{Heard, PartnerDid, ToolReply};
 use tokio::{sync::oneshot, task::AbortHandle};
 
+use super::partner::PartnerKind;
 use crate::hosting::{Answer, HostingError, durable::Keyed};
 
 /// The most that waits for one operator to hear it.
@@ -39,6 +40,16 @@ pub struct OperatorMemory {
     missed: Option<[u32; 2]>,
     heard: Vec<Heard>,
     said: u32,
+    /// Who of the process drove in its place.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub partner: Option<PartnerKind>,
+}
+
+impl OperatorMemory {
+    /// Who of the process drove, and has not finished.
+    pub fn left(&self) -> Option<PartnerKind> {
+        self.partner.filter(|_| !self.finished)
+    }
 }
 
 /// How the others stand to one operator.
@@ -94,6 +105,7 @@ impl Round {
             missed: operator.missed,
             heard: operator.heard.clone(),
             said: operator.said,
+            partner: None,
         };
         self.operators.iter().map(memory).collect()
     }
@@ -101,7 +113,7 @@ impl Round {
     /// Takes over what was remembered.
     pub fn restore(&mut self, memory: Vec<OperatorMemory>) {
         for (operator, memory) in self.operators.iter_mut().zip(memory) {
-            let OperatorMemory { silent, finished, missed, heard, said } = memory;
+            let OperatorMemory { silent, finished, missed, heard, said, partner: _ } = memory;
             (operator.missed, operator.heard, operator.said) = (missed, heard, said);
             match operator.state {
                 // It has asked again already.

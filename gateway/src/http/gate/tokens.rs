@@ -36,7 +36,10 @@ pub async fn identify(State(app): State<AppState>, mut request: Request, next: N
         request.headers_mut().remove(header::CONTENT_TYPE);
         return next.run(request).await;
     }
-    let driving = if path_is(&request, DRIVE) { drivers(&app, &request) } else { None };
+    let driving = match request.uri().query().filter(|_| path_is(&request, DRIVE)) {
+        Some(query) => drivers(&app, query, request.headers()).await,
+        None => None,
+    };
     if let Some((_, robots)) = &driving {
         request.extensions_mut().insert(robots.clone());
     }

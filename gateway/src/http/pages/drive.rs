@@ -5,7 +5,7 @@ use std::{io, sync::Arc, time::Duration};
 use axum::{
     Extension,
     extract::{Request, State},
-    http::{HeaderValue, StatusCode, header},
+    http::{HeaderMap, HeaderValue, StatusCode, header},
     response::{IntoResponse, Response},
 };
 use serde::Deserialize;
@@ -77,19 +77,17 @@ pub async fn enter(
     Ok((StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie)]).into_response())
 }
 
-/// The operators of `robots=A,C` in the query of a request for the socket whose cookies name their tokens: whom it comes from, and all
-/// robots that it may drive. They are of one episode.
-pub fn drivers(app: &AppState, request: &Request) -> Option<(Caller, DrivenRobots)> {
-    let wanted = request.uri().query()?.strip_prefix("robots=")?;
-    let lines = request.headers().get_all(header::COOKIE).into_iter().filter_map(|line| line.to_str().ok());
+/// The operators of `robots=A,C` in the query of a request for the socket, of whose headers cookies name their tokens: whom it comes
+/// from, and all robots that it may drive. They are of one episode.
+pub async fn drivers(app: &AppState, query: &str, headers: &HeaderMap) -> Option<(Caller, DrivenRobots)> {
+    let wanted = query.strip_prefix("robots=")?;
+    let lines = headers.get_all(header::COOKIE).into_iter().filter_map(|line| line.to_str().ok());
     let cookies: Vec<(&str, &str)> =
         lines.flat_map(|line| line.split(';')).filter_map(|pair| pair.trim().split_once('=')).collect();
-    let operator = |robot: &str| {
-        let named = cookies.iter().filter(|(name, _)| name.strip_prefix(COOKIE) == Some(robot));
-        let mut operators = named.filter_map(|(_, token)| app.table.operator(token));
-        operators.find(|caller| caller.robot() == Some(robot))
-    };
-    let callers = wanted.split(',').map(operator).collect::<Option<Vec<Caller>>>()?;
+    let mut callers = Vec::new();
+    for robot in wanted.split(',') {
+        callers.push(driver_of(app, robot, &cookies).await?);
+    }
     let first = callers.first()?.clone();
     let same = |caller: &Caller| match (caller, &first) {
         (Caller::Operator { episode, .. }, Caller::Operator { episode: other, .. }) => episode == other,
@@ -101,6 +99,19 @@ pub fn drivers(app: &AppState, request: &Request) -> Option<(Caller, DrivenRobot
         .then(|| (first.clone(), DrivenRobots(wanted.split(',').map(str::to_owned).collect())))
 }
 
+/// The operator of `robot` whose token a cookie has.
+async fn driver_of(app: &AppState, robot: &str, cookies: &[(&str, &str)]) -> Option<Caller> {
+    for (name, token) in cookies {
+        if name.strip_prefix(COOKIE) == Some(robot)
+            && let Some(caller) = app.table.operator_anywhere(token).await
+            && caller.robot() == Some(robot)
+        {
+            return Some(caller);
+        }
+    }
+    None
+}
+
 /// The socket.
 pub async fn drive(
     State(app): State<AppState>,
@@ -109,7 +120,7 @@ pub async fn drive(
     request: Request,
 ) -> Result<Response, ApiError> {
     let Extension(DrivenRobots(robots)) = robots.ok_or(HostingError::NeedsOperator)?;
-    let (hosted, team, robot) = app.table.own_robot(&caller)?;
+    let (hosted, team, robot) = app.table.own_robot(&caller).await?;
     let (watch, every_step) = hosted.thread.watch_driving(robot).await?;
     let (driver, answers) = Driver::take(&team, &hosted.thread, &robots)?;
     let (robot, disclosure) = (robot.to_owned(), app.settings.disclosure);

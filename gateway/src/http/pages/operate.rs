@@ -75,7 +75,7 @@ async fn expert(
     body: Bytes,
 ) -> Result<StatusCode, ApiError> {
     let StandIn { episode, robot } = stand_in(&app, &who, &body)?;
-    let (hosted, team) = app.table.team(&episode)?;
+    let (hosted, team) = app.table.team(&episode).await?;
     team.take_expert(&hosted.thread, &robot).await?;
     Ok(StatusCode::NO_CONTENT)
 }
@@ -86,7 +86,7 @@ async fn known_policy(
     Extension(caller): Extension<Caller>,
 ) -> Result<Json<Value>, ApiError> {
     match caller {
-        Caller::Host => Ok(Json(json!({ "policy": app.partner.map(|policy| policy.name()) }))),
+        Caller::Host => Ok(Json(json!({ "policy": app.table.partner().ok().map(|policy| policy.name()) }))),
         Caller::Operator { .. } => Err(HostingError::HostsBusiness.into()),
     }
 }
@@ -98,11 +98,8 @@ async fn policy(
     body: Bytes,
 ) -> Result<StatusCode, ApiError> {
     let StandIn { episode, robot } = stand_in(&app, &who, &body)?;
-    let (hosted, team) = app.table.team(&episode)?;
-    let reason =
-        "no policy may drive here; start the server with --partner, as act:http://127.0.0.1:8500/act";
-    let policy = app.partner.ok_or_else(|| HostingError::NoPolicy { reason: reason.into() })?;
-    team.take_policy(&hosted.thread, &robot, policy).await?;
+    let (hosted, team) = app.table.team(&episode).await?;
+    team.take_policy(&hosted.thread, &robot, app.table.partner()?).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

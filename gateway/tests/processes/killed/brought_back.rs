@@ -1,5 +1,5 @@
-//! SIGKILL at random moments of episodes: the server that is started again on the same runs goes on where they stood. No answer that was
-//! seen is lost, nothing is done twice, and every state is what it would have been.
+//! SIGKILL at random moments of episodes: the server that is started again on the same runs goes on where they
+//! stood. No answer that was seen is lost, nothing is done twice, and every state is what it would have been.
 
 use std::{
     collections::BTreeMap,
@@ -88,7 +88,8 @@ fn script(robot: &str, seed: u64) -> Vec<(&'static str, Value)> {
     (0..16).map(|_| pool[choose.next(pool.len() as u64).as_millis() as usize].clone()).collect()
 }
 
-/// Plays a script, during which the server is killed `kill_after` the first call. Returns the answers, and the hash of every state.
+/// Plays a script, during which the server is killed `kill_after` the first call. Returns the answers, and the
+/// hash of every state.
 fn play(task: &str, seed: u64, kill_after: Option<Duration>) -> (Vec<Value>, Vec<(u64, String)>) {
     let runs = tempfile::tempdir().expect("a temporary folder");
     let server = Restarted::new(runs.path());

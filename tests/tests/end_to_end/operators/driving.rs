@@ -99,7 +99,7 @@ impl DriversSocket {
         }
     }
 
-    fn step(&self) -> f32 {
+    pub fn step(&self) -> f32 {
         self.row.get(1).copied().unwrap_or_default()
     }
 

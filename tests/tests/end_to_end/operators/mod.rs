@@ -4,5 +4,6 @@ mod driving;
 mod page;
 mod partners;
 mod processes;
+mod restarts;
 mod rounds;
 mod team;

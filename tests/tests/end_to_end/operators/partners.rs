@@ -11,15 +11,15 @@ use std::{
 use serde_json::{Value, json};
 use tandem::{
     drivers::{PolicyMap, PolicyProtocol, RemotePolicy},
-    http::Guests,
+    hosting::Guests,
 };
 use tandem_tests::TestServer;
 
 use super::{driving::DriversSocket, team::Team};
 use crate::policies::act_server::ActServer;
 
-const EXPERT: &str = "/operate/expert";
-const POLICY: &str = "/operate/policy";
+pub const EXPERT: &str = "/operate/expert";
+pub const POLICY: &str = "/operate/policy";
 
 /// The answer to who has `token`, or to who started the episode, and asks for a partner at `path` for robot B.
 fn asked_for(team: &Team, path: &str, token: Option<&str>) -> (u16, Value) {
@@ -35,18 +35,19 @@ fn answer_to(team: &Team, path: &str, token: Option<&str>, body: Value) -> (u16,
 }
 
 /// The status where who started the episode asks.
-fn ask_for(team: &Team, path: &str) -> u16 {
+pub fn ask_for(team: &Team, path: &str) -> u16 {
     asked_for(team, path, None).0
 }
 
 /// A server whose people may have the policy at `url` beside them.
 fn server_with_policy(url: &str) -> TestServer {
+    TestServer::with_guests(Default::default(), guests_with_policy(url))
+}
+
+pub fn guests_with_policy(url: &str) -> Guests {
     let map = PolicyMap::find("openpi").expect("a preset");
     let policy = RemotePolicy::new(PolicyProtocol::Act, vec![url.into()], map);
-    TestServer::with_guests(
-        Default::default(),
-        Guests { partner: Some(Arc::new(policy)), ..Guests::default() },
-    )
+    Guests { partner: Some(Arc::new(policy)), ..Guests::default() }
 }
 
 #[test]

@@ -6,7 +6,7 @@ use tandem_sim::{Pose, Rotation, Sides, Vector, heading_rad, wrapped_rad};
 use super::commander::{Commander, HandMove};
 use super::grasps::{HandGrasp, grasp_compliantly, move_together};
 use super::posture_path::{FREE, PathProgress, Posture, PosturePath, follow_while};
-use super::walk::{Tolerance, WalkGoal, approach, upright, walk_reaching};
+use super::walk::{Tolerance, WalkGoal, approach, at_height, upright, walk_reaching};
 use super::walked_way::WalkedWay;
 use crate::players::PlayerError;
 use crate::scoring::{Facts, Grip};
@@ -198,7 +198,7 @@ impl<'a> CarryTeam<'a> {
         free_m: &dyn Fn(&Facts) -> f32,
     ) -> Result<(), PlayerError> {
         let from = upright(&self.object(commander)?);
-        let over = Pose::from_parts(place.translation.with_z(from.translation.z), place.rotation);
+        let over = at_height(place, from.translation.z);
         let length_m = (over.translation - from.translation).length();
         let at = |gone_m: f32| from.lerp(&over, gone_m / length_m);
         self.carry(commander, &ObjectPath { at: &at, length_m, pace_m_s, free_m })
@@ -229,14 +229,14 @@ impl<'a> CarryTeam<'a> {
         self.give_way(commander, false);
         let mut object = self.object(commander)?;
         for _ in 0..MOST_MOVES_OVER {
-            let over = Pose::from_parts(place.translation.with_z(object.translation.z), place.rotation);
+            let over = at_height(place, object.translation.z);
             move_together(commander, self.grasps, &|share| object.lerp(&over, share), 4, 0.15)?;
             object = self.object(commander)?;
             if is_over(&object, place) {
                 break;
             }
         }
-        let over = Pose::from_parts(place.translation.with_z(object.translation.z), place.rotation);
+        let over = at_height(place, object.translation.z);
         let down = Pose::from_parts(place.translation - Vector::Z * PRESS_M, place.rotation);
         move_together(commander, self.grasps, &|share| over.lerp(&down, share), 5, 0.22)?;
         self.give_way(commander, true);

@@ -18,4 +18,4 @@ pub use grasps::{
 pub use parallel::{ParallelScript, in_parallel};
 pub use posture_path::{FREE, Posture, PosturePath, follow};
 pub use variety::Variety;
-pub use walk::{Tolerance, WalkGoal, approach, at_hand, place, upright, walk_to};
+pub use walk::{Tolerance, WalkGoal, approach, at_hand, at_height, place, upright, walk_reaching, walk_to};

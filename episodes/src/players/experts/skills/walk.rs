@@ -247,6 +247,11 @@ pub fn place(position_m: Vector, heading_rad: f32) -> Pose {
     Pose::from_parts(position_m, Rotation::from_rotation_z(heading_rad))
 }
 
+/// Returns the place at another height.
+pub fn at_height(place: &Pose, height_m: f32) -> Pose {
+    Pose::from_parts(place.translation.with_z(height_m), place.rotation)
+}
+
 /// Where a robot stands to have `point_m` before its right hand.
 pub fn at_hand(point_m: Vector, heading_rad: f32) -> Pose {
     let facing = place(Vector::ZERO, heading_rad);

@@ -10,9 +10,8 @@ use crate::drivers::remote::{
 
 /// The picture in the size that is wanted, as an array of bytes.
 pub fn array(picture: &Picture, size_px: [u32; 2], fit: Fit, layout: Layout) -> Array {
-    let Picture { width, height, ref rgb, .. } = *picture;
-    if [width, height] == size_px {
-        return arranged(rgb.clone(), size_px, layout);
+    if [picture.width, picture.height] == size_px {
+        return arranged(picture.rgb().to_vec(), size_px, layout);
     }
     arranged(fitted(picture, size_px, fit).into_raw(), size_px, layout)
 }
