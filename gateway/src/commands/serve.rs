@@ -50,8 +50,8 @@ pub fn run(args: ServeArgs) -> CommandResult {
     Ok(if left.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Has threads share as many heaps as there are processors. The C library gives them eight times as many, and in each one stays in use what
-/// lies between the leftovers of episodes that have ended or sleep: gigabytes with thousands of them.
+/// Has threads that use the C library's heaps, as in the wheel, share as many as there are processors. It gives them eight times as many, and
+/// in each one stays in use what lies between the leftovers of episodes that have ended or sleep: gigabytes with thousands of them.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 fn share_heaps() {
     let heaps = std::thread::available_parallelism()
