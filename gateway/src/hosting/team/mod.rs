@@ -31,9 +31,9 @@ use crate::token::Token;
 pub use collection::{CollectedEpisode, Collection, CollectionProgress, CollectionStage};
 use driving::Wheel;
 pub use driving::{Driver, Wish};
-pub use partner::{PartnerKind, PartnerPolicy};
+pub use partner::PartnerPolicy;
 pub use round::OperatorMemory;
-use round::{Pending, Round};
+use round::{PartnerKind, Pending, Round};
 
 /// The operators of one episode.
 #[derive(Debug)]

@@ -5,7 +5,6 @@
 
 use std::{fmt, sync::Arc, thread};
 
-use serde::{Deserialize, Serialize};
 use tandem_episodes::{
     EpisodeSpec,
     players::{Episode, LocalEpisode, PlayError, PlayerError, PrivilegedPlayer, experts::Expert},
@@ -13,19 +12,11 @@ use tandem_episodes::{
 use tandem_tools_spec::{Finish, Note, Wait};
 use tokio::{runtime::Handle, sync::oneshot};
 
-use super::{Team, one_robot::OneRobot};
+use super::{Team, one_robot::OneRobot, round::PartnerKind};
 use crate::hosting::{EpisodeThread, HostingError};
 
 /// Control steps for which the robot stands before the expert's script begins again.
 const PAUSE_STEPS: u32 = 25;
-
-/// Who of this process drives a robot.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PartnerKind {
-    Expert,
-    Policy,
-}
 
 /// A policy elsewhere that can drive one robot of an episode: it plays all of them, and its own does its part.
 pub trait PartnerPolicy: fmt::Debug + Send + Sync {

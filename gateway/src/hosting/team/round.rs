@@ -5,7 +5,6 @@ use tandem_episodes::OperatorCommand;
 use tandem_tools_spec::{Heard, PartnerDid, ToolReply};
 use tokio::{sync::oneshot, task::AbortHandle};
 
-use super::partner::PartnerKind;
 use crate::hosting::{Answer, HostingError, durable::Keyed};
 
 /// The most that waits for one operator to hear it.
@@ -30,6 +29,14 @@ struct Operator {
     heard: Vec<Heard>,
     /// How often it has spoken.
     said: u32,
+}
+
+/// Who of this process drives a robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PartnerKind {
+    Expert,
+    Policy,
 }
 
 /// What of an operator outlives the server, which commands do not that have not been executed.
