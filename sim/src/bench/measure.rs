@@ -29,12 +29,15 @@ pub(super) struct Trial {
     pub standing_after_s: Option<f32>,
     pub still_after_s: Option<f32>,
     pub steps: Option<u32>,
+    pub pelvis_tilt_deg: Option<f32>,
     pub power_w: f32,
 }
 
 /// One control step of the log.
 pub(super) struct Sample {
     pub pelvis_m: Vector,
+    /// Angle between its vertical axis and the world's.
+    pub pelvis_tilt_rad: f32,
     /// Ankle roll links.
     pub feet_m: Sides<Vector>,
     /// Unwrapped.
@@ -67,11 +70,14 @@ pub(super) fn measure(
         }
         Plan::Move(velocity) => {
             let stop = at(case.duration_s - STOP_S);
-            trial.velocity_error_share = Some(velocity_error(&log[at(SETTLE_S + RAMP_S)..stop], *velocity));
+            let walk = &log[at(SETTLE_S + RAMP_S)..stop];
+            trial.velocity_error_share = Some(velocity_error(walk, *velocity));
             let turned_rad = velocity.yaw_rate_rad_s * (stop - start) as f32 * DT_S;
             trial.heading_error_deg =
                 Some((log[end].heading_rad - log[start].heading_rad - turned_rad).abs().to_degrees());
-            trial.height_error_m = Some(walking_height_error_m(&log[at(SETTLE_S + RAMP_S)..stop]));
+            trial.height_error_m = Some(walking_height_error_m(walk));
+            trial.pelvis_tilt_deg =
+                walk.iter().map(|sample| sample.pelvis_tilt_rad.to_degrees()).reduce(f32::max);
             trial.standing_after_s = Some(slower_after_s(&log[stop..], 0.1));
             trial.still_after_s = Some(slower_after_s(&log[stop..], 0.02));
         }
@@ -93,13 +99,18 @@ pub(super) fn measure(
         }
     }
     if let Plan::Squat { .. } = &case.plan {
-        let ends = [case.duration_s / 3.0, case.duration_s * 2.0 / 3.0, case.duration_s];
-        let error_m = |end_s: &f32| {
-            let sample = &log[at(end_s - 2.0 * DT_S)];
-            (sample.pelvis_m.z - sample.command.pelvis_height_m).abs()
-        };
-        trial.height_error_m = ends.iter().map(error_m).reduce(f32::max);
+        trial.height_error_m = squat_error_m(case, |time_s| &log[at(time_s)]);
     }
+}
+
+/// The most that a pelvis was off the height that it was told, at the ends of a squat's thirds.
+fn squat_error_m<'a>(case: &Case, at: impl Fn(f32) -> &'a Sample) -> Option<f32> {
+    let ends = [case.duration_s / 3.0, case.duration_s * 2.0 / 3.0, case.duration_s];
+    let error_m = |end_s: &f32| {
+        let sample = at(end_s - 2.0 * DT_S);
+        (sample.pelvis_m.z - sample.command.pelvis_height_m).abs()
+    };
+    ends.iter().map(error_m).reduce(f32::max)
 }
 
 /// How far a robot came to rest from where a pulse should have taken it, and how far it is turned from there.

@@ -61,6 +61,8 @@ pub struct CaseReport {
     pub still_after_s: Option<f32>,
     /// How often a foot left the ground while the robot was to stand.
     pub steps: Option<u32>,
+    /// The most that the pelvis of a robot that walks was out of level.
+    pub pelvis_tilt_deg: Option<f32>,
     /// The most that what robots carried between them was ever tilted.
     pub load_tilt_deg: Option<f32>,
     /// How far what robots held went after they had come to rest: the mean of each second, horizontally.
@@ -172,6 +174,7 @@ fn summarise(case: &Case, trials: &[Trial]) -> CaseReport {
         standing_after_s: worst(|trial| trial.standing_after_s),
         still_after_s: worst(|trial| trial.still_after_s),
         steps: standing.iter().filter_map(|trial| trial.steps).max(),
+        pelvis_tilt_deg: worst(|trial| trial.pelvis_tilt_deg),
         power_w: mean(|trial| Some(trial.power_w)).unwrap_or(0.0),
         ..CaseReport::of(case.name, trials.len())
     }
@@ -179,7 +182,7 @@ fn summarise(case: &Case, trials: &[Trial]) -> CaseReport {
 
 impl CaseReport {
     /// Column heads of [`CaseReport`]'s lines.
-    pub const HEAD: &str = "case                        alive  v err  heading    drift     sway   height  stands  still  steps   tilt     load  power";
+    pub const HEAD: &str = "case                        alive  v err  heading    drift     sway   height  stands  still  steps  pelvis   tilt     load  power";
 
     /// The report of a case in which nothing has been measured yet.
     pub fn of(case: &str, seeds: usize) -> CaseReport {
@@ -195,6 +198,7 @@ impl CaseReport {
             standing_after_s: None,
             still_after_s: None,
             steps: None,
+            pelvis_tilt_deg: None,
             load_tilt_deg: None,
             load_drift_m: None,
             power_w: 0.0,
@@ -209,7 +213,7 @@ impl fmt::Display for CaseReport {
         };
         write!(
             f,
-            "{:26} {:>2}/{:<2}  {:>5}  {:>7}  {:>7}  {:>7}  {:>7}  {:>6}  {:>5}  {:>5}  {:>5}  {:>7}  {:>5}",
+            "{:26} {:>2}/{:<2}  {:>5}  {:>7}  {:>7}  {:>7}  {:>7}  {:>6}  {:>5}  {:>5}  {:>6}  {:>5}  {:>7}  {:>5}",
             self.case,
             self.survived,
             self.seeds,
@@ -221,6 +225,7 @@ impl fmt::Display for CaseReport {
             show(self.standing_after_s, 1.0, "s"),
             show(self.still_after_s, 1.0, "s"),
             self.steps.map_or("-".into(), |steps| steps.to_string()),
+            show(self.pelvis_tilt_deg, 1.0, "°"),
             show(self.load_tilt_deg, 1.0, "°"),
             show(self.load_drift_m, 100.0, "cm"),
             show(Some(self.power_w), 1.0, "W"),

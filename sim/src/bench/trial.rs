@@ -66,6 +66,7 @@ pub(super) fn run(
         log.push(Sample {
             feet_m: feet.map(|link| robot.truth.world_from_link[link].translation),
             pelvis_m: robot.truth.world_from_pelvis().translation,
+            pelvis_tilt_rad: (robot.truth.world_from_pelvis().rotation * Vector::Z).z.min(1.0).acos(),
             heading_rad,
             command: base,
         });
