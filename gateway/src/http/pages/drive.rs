@@ -99,17 +99,10 @@ pub async fn drivers(app: &AppState, query: &str, headers: &HeaderMap) -> Option
         .then(|| (first.clone(), DrivenRobots(wanted.split(',').map(str::to_owned).collect())))
 }
 
-/// The operator of `robot` whose token a cookie has.
+/// The operator of `robot` whose token its cookie has. Browsers send one for each, and no second is looked up.
 async fn driver_of(app: &AppState, robot: &str, cookies: &[(&str, &str)]) -> Option<Caller> {
-    for (name, token) in cookies {
-        if name.strip_prefix(COOKIE) == Some(robot)
-            && let Some(caller) = app.table.operator_anywhere(token).await
-            && caller.robot() == Some(robot)
-        {
-            return Some(caller);
-        }
-    }
-    None
+    let (_, token) = cookies.iter().find(|(name, _)| name.strip_prefix(COOKIE) == Some(robot))?;
+    app.table.operator_anywhere(token).await.filter(|caller| caller.robot() == Some(robot))
 }
 
 /// The socket.
