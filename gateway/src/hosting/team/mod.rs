@@ -60,7 +60,7 @@ struct Wheels {
     turning: bool,
     /// By seat: whether the task's expert or a policy drives.
     partners: Vec<Option<PartnerKind>>,
-    /// By seat: who drove when the server before this one ended, and has not been seated again yet.
+    /// By seat: the partner that drove when the server before this one ended, until it is seated again.
     left: Vec<Option<PartnerKind>>,
 }
 

@@ -83,7 +83,8 @@ impl Team {
         }
     }
 
-    /// Seats again who drove when the server before this one ended; `policy` is the one that may drive here.
+    /// Seats the partners again that drove when the server before this one ended; `policy` is the one that may
+    /// drive here.
     pub async fn seat_again(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
@@ -109,7 +110,7 @@ impl Team {
         }
     }
 
-    /// Whether somebody is to be seated again.
+    /// Returns true while a partner is still to be seated again.
     pub fn misses_partners(&self) -> bool {
         self.wheels().left.iter().any(Option::is_some)
     }

@@ -31,7 +31,7 @@ struct Operator {
     said: u32,
 }
 
-/// Who of this process drives a robot.
+/// Driver of a robot that runs in this process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PartnerKind {
@@ -47,13 +47,13 @@ pub struct OperatorMemory {
     missed: Option<[u32; 2]>,
     heard: Vec<Heard>,
     said: u32,
-    /// Who of the process drove in its place.
+    /// Partner that drove in its place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partner: Option<PartnerKind>,
 }
 
 impl OperatorMemory {
-    /// Who of the process drove, and has not finished.
+    /// Returns the partner that drove and has not finished.
     pub fn left(&self) -> Option<PartnerKind> {
         self.partner.filter(|_| !self.finished)
     }
