@@ -51,8 +51,8 @@ pub fn run(args: ServeArgs) -> CommandResult {
 }
 
 /// Limits the C library's heaps to the number of processors; the wheel's threads use them, the binary's do not.
-/// By itself the library has eight times as many, and in each one stays in use what lies between the leftovers of
-/// episodes that have ended or sleep: gigabytes with thousands of them.
+/// By itself the library has eight times as many, and in each one stays in use what lies between the leftovers
+/// of episodes that have ended or sleep: gigabytes with thousands of them.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 fn share_heaps() {
     let heaps = std::thread::available_parallelism()

@@ -54,8 +54,8 @@ pub struct Keyed {
     pub request: Call,
 }
 
-/// Line of a journal: requests that were answered at once, the answers and notes among them that have a key, and
-/// the host's memory where it has changed.
+/// Line of a journal: requests that were answered at once, the answers and notes among them that have a key,
+/// and the host's memory where it has changed.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Commit {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
