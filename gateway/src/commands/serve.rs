@@ -50,8 +50,9 @@ pub fn run(args: ServeArgs) -> CommandResult {
     Ok(if left.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Has threads share as many heaps as there are processors. The C library gives them eight times as many, and in each one stays in use what
-/// lies between the leftovers of episodes that have ended or sleep: gigabytes with thousands of them.
+/// Limits the C library's heaps to the number of processors; the wheel's threads use them, the binary's do not.
+/// By itself the library has eight times as many, and in each one stays in use what lies between the leftovers
+/// of episodes that have ended or sleep: gigabytes with thousands of them.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 fn share_heaps() {
     let heaps = std::thread::available_parallelism()

@@ -19,8 +19,7 @@ use super::{
     team::Team,
 };
 
-/// So many episodes stay awake, however long nobody asks them for anything. Each has some megabytes in heaps
-/// that all share, and calls take longer the more there are.
+/// Number of episodes that stay awake, however long nobody asks them for anything. Each has some megabytes.
 const MOST_AWAKE: usize = 96;
 
 /// An episode may be put aside after a second for so many control steps, which is ten times what bringing it
@@ -143,8 +142,8 @@ impl EpisodeTable {
         }
     }
 
-    /// Ends the episodes that nobody plays any more, and puts aside those that nobody misses. Seats again who
-    /// drove from the server that has gone. To be called every now and then, where futures run.
+    /// Ends the episodes that nobody plays any more, and puts aside those that nobody misses. Seats
+    /// the partners again that drove on the server before. To be called every now and then, where futures run.
     pub fn tidy_up(&self) {
         let episodes = self.all();
         for episode in &episodes {

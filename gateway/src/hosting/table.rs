@@ -45,12 +45,12 @@ pub struct EpisodeTable {
     partner: Option<Arc<dyn PartnerPolicy>>,
 }
 
-/// What a server is for, and who is there beside those who start episodes.
+/// Purpose of a server, and the policy that people may have drive beside them.
 #[derive(Debug, Default)]
 pub struct Guests {
-    /// Who starts episodes and drives their robots.
+    /// Decides who starts episodes and drives their robots.
     pub purpose: Purpose,
-    /// A policy that people may have drive beside them: no page can name another.
+    /// Policy that drives a robot when people ask for one; no page can name another.
     pub partner: Option<Arc<dyn PartnerPolicy>>,
 }
 
@@ -99,7 +99,7 @@ impl EpisodeTable {
         EpisodeTable { purpose, partner, ..EpisodeTable::new(settings) }
     }
 
-    /// The policy that people may have drive beside them.
+    /// Returns the policy that people may have drive beside them.
     pub fn partner(&self) -> Result<Arc<dyn PartnerPolicy>, HostingError> {
         let reason =
             "no policy may drive here; start the server with --partner, as act:http://127.0.0.1:8500/act";

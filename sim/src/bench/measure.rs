@@ -103,7 +103,7 @@ pub(super) fn measure(
     }
 }
 
-/// The most that a pelvis was off the height that it was told, at the ends of a squat's thirds.
+/// Returns the largest distance of a pelvis from its commanded height at the ends of a squat's thirds.
 fn squat_error_m<'a>(case: &Case, at: impl Fn(f32) -> &'a Sample) -> Option<f32> {
     let ends = [case.duration_s / 3.0, case.duration_s * 2.0 / 3.0, case.duration_s];
     let error_m = |end_s: &f32| {

@@ -61,7 +61,7 @@ pub struct CaseReport {
     pub still_after_s: Option<f32>,
     /// How often a foot left the ground while the robot was to stand.
     pub steps: Option<u32>,
-    /// The most that the pelvis of a robot that walks was out of level.
+    /// Largest angle between the pelvis of a robot that walks and level.
     pub pelvis_tilt_deg: Option<f32>,
     /// The most that what robots carried between them was ever tilted.
     pub load_tilt_deg: Option<f32>,
@@ -182,7 +182,8 @@ fn summarise(case: &Case, trials: &[Trial]) -> CaseReport {
 
 impl CaseReport {
     /// Column heads of [`CaseReport`]'s lines.
-    pub const HEAD: &str = "case                        alive  v err  heading    drift     sway   height  stands  still  steps  pelvis   tilt     load  power";
+    pub const HEAD: &str = "case                        alive  v err  heading    drift     sway   height  \
+                            stands  still  steps  pelvis   tilt     load  power";
 
     /// The report of a case in which nothing has been measured yet.
     pub fn of(case: &str, seeds: usize) -> CaseReport {
@@ -213,7 +214,8 @@ impl fmt::Display for CaseReport {
         };
         write!(
             f,
-            "{:26} {:>2}/{:<2}  {:>5}  {:>7}  {:>7}  {:>7}  {:>7}  {:>6}  {:>5}  {:>5}  {:>6}  {:>5}  {:>7}  {:>5}",
+            "{:26} {:>2}/{:<2}  {:>5}  {:>7}  {:>7}  {:>7}  {:>7}  \
+             {:>6}  {:>5}  {:>5}  {:>6}  {:>5}  {:>7}  {:>5}",
             self.case,
             self.survived,
             self.seeds,

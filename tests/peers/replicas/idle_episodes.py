@@ -1,9 +1,11 @@
-"""Two thousand episodes at one server, of which fifty are played: what they take, and what the fifty notice.
+"""Two thousand episodes at one server, of which fifty are played: what they take, and what the fifty notice. The
+fifty are alone before and after: whatever grows slower with their age is no matter of the others.
 
     python3 tests/peers/replicas/idle_episodes.py target/release/tandem
 """
 
 import argparse
+import http.client
 import pathlib
 import statistics
 import subprocess
@@ -30,6 +32,15 @@ def start(count: int, first_seed: int) -> list[str]:
         ids.append(started["episode_id"])
         caller.post(f"/v1/episodes/{ids[-1]}/tools/wait", {"steps": 5})
     return ids
+
+
+def end(ids: list[str]) -> None:
+    connection = http.client.HTTPConnection("127.0.0.1", PORT)
+    for episode in ids:
+        connection.request("DELETE", f"/v1/episodes/{episode}")
+        with connection.getresponse() as response:
+            response.read()
+            assert response.status == 200, response.status
 
 
 def play(ids: list[str], calls: int, think_s: float) -> dict[str, float]:
@@ -76,17 +87,24 @@ def main() -> None:
         try:
             time.sleep(1)
             active = start(given.active, 4000)
-            print(f"{given.active} alone:", play(active, given.calls, given.think_s), memory_mb(process))
+            before = play(active, given.calls, given.think_s)
+            print(f"{given.active} alone:", before, memory_mb(process))
             began = time.monotonic()
             rest = start(given.held - given.active, 10_000)
             print(f"{len(rest)} more in {time.monotonic() - began:.0f} s:", memory_mb(process))
-            print(f"{given.active} of {given.held}:", play(active, given.calls, given.think_s), memory_mb(process))
+            beside = play(active, given.calls, given.think_s)
+            print(f"{given.active} of {given.held}:", beside, memory_mb(process))
             woken = []
             for episode in rest[:50]:
                 status, _, took_s = Caller(PORT).post(f"/v1/episodes/{episode}/tools/get_robot_state", {"robot": "A"})
                 assert status == 200
                 woken.append(1000 * took_s)
             print(f"a call that wakes one of them: {statistics.median(woken):.0f} ms", memory_mb(process))
+            end(rest)
+            after = play(active, given.calls, given.think_s)
+            print(f"{given.active} alone again:", after, memory_mb(process))
+            for name, beside_ms in beside.items():
+                print(f"{name}: {beside_ms / (0.5 * (before[name] + after[name])):.2f} times as long beside the others")
         finally:
             process.kill()
             process.wait()

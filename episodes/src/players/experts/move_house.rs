@@ -1,6 +1,6 @@
 //! MoveHouse: A walks to the door, presses its lever, pushes the door open along its swing and stands aside in
-//! the other room. Meanwhile B and C lift the table; they follow A through the doorway in step and set it down on
-//! the marks.
+//! the other room. Meanwhile B and C lift the table; they follow A through the doorway in step and set it down
+//! on the marks.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 

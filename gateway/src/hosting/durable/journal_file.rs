@@ -19,10 +19,10 @@ use tandem_tools_spec::{Call, Driving, Heard, Note, Observation, Partner, StartE
 
 use crate::{hosting::Answer, settings::Durability};
 
-/// Another number means lines that older builds' readers cannot read, or theirs that this one cannot.
+/// Number of the format; another one means that builds cannot read each other's lines.
 const FORMAT: u32 = 1;
 
-/// Most lines are no longer: a state of a robot and what goes with it.
+/// Room for most lines: a robot's state and what goes with it.
 const USUAL_LINE_BYTES: usize = 8 << 10;
 
 /// What an episode is, and how it was started.
@@ -54,8 +54,8 @@ pub struct Keyed {
     pub request: Call,
 }
 
-/// What was answered at once: what was asked, what came with a key, answers among it, and what the host has to
-/// remember then.
+/// Line of a journal: requests that were answered at once, the answers and notes among them that have a key,
+/// and the host's memory where it has changed.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Commit {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -12,7 +12,7 @@ use tandem_episodes::{
     BringBack, CallReply, Clock, EpisodeError, EpisodeSpec, RESULT_FILE, RunFolder, Session, build,
     live::LiveView, monotonic,
 };
-use tandem_tools_spec::{Briefing, Call, ManageReply, ResultReply, ToolReply};
+use tandem_tools_spec::{Briefing, Call, ManageReply, Note, ResultReply, ToolReply};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot};
 
 use super::{
@@ -41,8 +41,7 @@ pub trait HostMemory: std::fmt::Debug + Send + Sync {
     /// What of it decides what is told later.
     fn memory(&self) -> Value;
 
-    /// Takes over what was remembered elsewhere, the answers that may be asked for again, and the notes that may
-    /// come again.
+    /// Takes over what was remembered elsewhere, and the answers and notes that may be asked for again.
     fn restore(&self, memory: Option<Value>, answers: Vec<KeptAnswer>, notes: Vec<KeyedNote>);
 
     /// Lets go of what [`HostMemory::restore`] brings again: the episode is put aside.
@@ -297,11 +296,7 @@ impl Desk<'_> {
                 let _ = reply.send(Ok(*answer));
             }
             Job::Note { operator, note, key, reply } => {
-                let keyed = key.map(|key| KeyedNote { key, note: (*note).clone() });
-                let kept =
-                    self.session.run(|session| Ok(session.note(operator.as_deref(), *note)?)).flatten();
-                self.commit_noted(None, keyed.filter(|_| kept.is_ok()));
-                let _ = reply.send(kept);
+                let _ = reply.send(self.note(operator.as_deref(), *note, key));
             }
             Job::Refused { operator, call, reply } => {
                 let kept = self.session.run(|session| refused(session, operator.as_deref(), *call));
@@ -334,6 +329,13 @@ impl Desk<'_> {
             Job::Awake { reply } => drop(reply.send(Ok(()))),
             Job::Sleep | Job::Close { .. } => {}
         }
+    }
+
+    fn note(&mut self, operator: Option<&str>, note: Note, key: Option<String>) -> Result<(), HostingError> {
+        let keyed = key.map(|key| KeyedNote { key, note: note.clone() });
+        let kept = self.session.run(|session| Ok(session.note(operator, note)?)).flatten();
+        self.commit_noted(None, keyed.filter(|_| kept.is_ok()));
+        kept
     }
 
     /// Writes down what has been done, and what of it is answered to those who gave a key.

@@ -31,9 +31,9 @@ use crate::token::Token;
 pub use collection::{CollectedEpisode, Collection, CollectionProgress, CollectionStage};
 use driving::Wheel;
 pub use driving::{Driver, Wish};
-pub use partner::{PartnerKind, PartnerPolicy};
+pub use partner::PartnerPolicy;
 pub use round::OperatorMemory;
-use round::{Pending, Round};
+use round::{PartnerKind, Pending, Round};
 
 /// The operators of one episode.
 #[derive(Debug)]
@@ -60,7 +60,7 @@ struct Wheels {
     turning: bool,
     /// By seat: whether the task's expert or a policy drives.
     partners: Vec<Option<PartnerKind>>,
-    /// By seat: who drove when the server before this one ended, and has not been seated again yet.
+    /// By seat: the partner that drove when the server before this one ended, until it is seated again.
     left: Vec<Option<PartnerKind>>,
 }
 

@@ -5,7 +5,6 @@
 
 use std::{fmt, sync::Arc, thread};
 
-use serde::{Deserialize, Serialize};
 use tandem_episodes::{
     EpisodeSpec,
     players::{Episode, LocalEpisode, PlayError, PlayerError, PrivilegedPlayer, experts::Expert},
@@ -13,19 +12,11 @@ use tandem_episodes::{
 use tandem_tools_spec::{Finish, Note, Wait};
 use tokio::{runtime::Handle, sync::oneshot};
 
-use super::{Team, one_robot::OneRobot};
+use super::{Team, one_robot::OneRobot, round::PartnerKind};
 use crate::hosting::{EpisodeThread, HostingError};
 
 /// Control steps for which the robot stands before the expert's script begins again.
 const PAUSE_STEPS: u32 = 25;
-
-/// Who of this process drives a robot.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PartnerKind {
-    Expert,
-    Policy,
-}
 
 /// A policy elsewhere that can drive one robot of an episode: it plays all of them, and its own does its part.
 pub trait PartnerPolicy: fmt::Debug + Send + Sync {
@@ -92,7 +83,8 @@ impl Team {
         }
     }
 
-    /// Seats again who drove when the server before this one ended; `policy` is the one that may drive here.
+    /// Seats the partners again that drove when the server before this one ended; `policy` is the one that may
+    /// drive here.
     pub async fn seat_again(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
@@ -118,7 +110,7 @@ impl Team {
         }
     }
 
-    /// Whether somebody is to be seated again.
+    /// Returns true while a partner is still to be seated again.
     pub fn misses_partners(&self) -> bool {
         self.wheels().left.iter().any(Option::is_some)
     }

@@ -5,7 +5,6 @@ use tandem_episodes::OperatorCommand;
 use tandem_tools_spec::{Heard, PartnerDid, ToolReply};
 use tokio::{sync::oneshot, task::AbortHandle};
 
-use super::partner::PartnerKind;
 use crate::hosting::{Answer, HostingError, durable::Keyed};
 
 /// The most that waits for one operator to hear it.
@@ -32,6 +31,14 @@ struct Operator {
     said: u32,
 }
 
+/// Driver of a robot that runs in this process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PartnerKind {
+    Expert,
+    Policy,
+}
+
 /// What of an operator outlives the server, which commands do not that have not been executed.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct OperatorMemory {
@@ -40,13 +47,13 @@ pub struct OperatorMemory {
     missed: Option<[u32; 2]>,
     heard: Vec<Heard>,
     said: u32,
-    /// Who of the process drove in its place.
+    /// Partner that drove in its place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partner: Option<PartnerKind>,
 }
 
 impl OperatorMemory {
-    /// Who of the process drove, and has not finished.
+    /// Returns the partner that drove and has not finished.
     pub fn left(&self) -> Option<PartnerKind> {
         self.partner.filter(|_| !self.finished)
     }

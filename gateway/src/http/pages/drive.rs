@@ -77,8 +77,8 @@ pub async fn enter(
     Ok((StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie)]).into_response())
 }
 
-/// The operators of `robots=A,C` in the query of a request for the socket, of whose headers cookies name their tokens: whom it comes
-/// from, and all robots that it may drive. They are of one episode.
+/// Returns the caller of a request for the socket, and all robots that it may drive: the operators of
+/// `robots=A,C` in its query whose tokens are in its cookies. They are of one episode.
 pub async fn drivers(app: &AppState, query: &str, headers: &HeaderMap) -> Option<(Caller, DrivenRobots)> {
     let wanted = query.strip_prefix("robots=")?;
     let lines = headers.get_all(header::COOKIE).into_iter().filter_map(|line| line.to_str().ok());
@@ -99,17 +99,11 @@ pub async fn drivers(app: &AppState, query: &str, headers: &HeaderMap) -> Option
         .then(|| (first.clone(), DrivenRobots(wanted.split(',').map(str::to_owned).collect())))
 }
 
-/// The operator of `robot` whose token a cookie has.
+/// Returns the operator of `robot` whose token its cookie has. Browsers send one for each; a second is not
+/// looked up.
 async fn driver_of(app: &AppState, robot: &str, cookies: &[(&str, &str)]) -> Option<Caller> {
-    for (name, token) in cookies {
-        if name.strip_prefix(COOKIE) == Some(robot)
-            && let Some(caller) = app.table.operator_anywhere(token).await
-            && caller.robot() == Some(robot)
-        {
-            return Some(caller);
-        }
-    }
-    None
+    let (_, token) = cookies.iter().find(|(name, _)| name.strip_prefix(COOKIE) == Some(robot))?;
+    app.table.operator_anywhere(token).await.filter(|caller| caller.robot() == Some(robot))
 }
 
 /// The socket.

@@ -1,4 +1,4 @@
-//! Who drives beside a person is there again when the server is: the person's page, the expert, and a policy.
+//! Restarts under people who drive: their pages, the expert and a policy drive on.
 
 use std::time::{Duration, Instant};
 
@@ -12,7 +12,7 @@ use super::{
 };
 use crate::policies::act_server::ActServer;
 
-/// Drives until the world has come so many steps further, which takes both robots.
+/// Drives robot A for so many control steps and returns the last; each step takes a command of both robots.
 fn drive(team: &Team, steps: f32) -> f32 {
     let mut page = DriversSocket::open(team, 0);
     let (began, mut first) = (Instant::now(), None);
