@@ -113,13 +113,19 @@ fn squat_error_m<'a>(case: &Case, at: impl Fn(f32) -> &'a Sample) -> Option<f32>
     ends.iter().map(error_m).reduce(f32::max)
 }
 
-/// How far a robot came to rest from where a pulse should have taken it, and how far it is turned from there.
+/// Share of a pulse's way by which a robot may be off without being counted.
+const PULSE_SHARE: f32 = 0.1;
+
+/// Returns how far a robot came to rest from where a pulse should have taken it, and how far it is turned from there: what is beyond
+/// [`PULSE_SHARE`] of the way and of the turn.
 fn off_pulse(from: &Sample, to: &Sample, velocity: BaseVelocity, pulse_s: f32) -> [f32; 2] {
     let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } = velocity;
     let way_m = Vector::new(vx_m_s, vy_m_s, 0.0) * pulse_s;
     let way_m = Rotation::from_rotation_z(from.heading_rad) * way_m;
-    let turned_rad = to.heading_rad - from.heading_rad - yaw_rate_rad_s * pulse_s;
-    [flat(to.pelvis_m - from.pelvis_m - way_m).length(), turned_rad.abs()]
+    let turn_rad = yaw_rate_rad_s * pulse_s;
+    let off_m = flat(to.pelvis_m - from.pelvis_m - way_m).length() - PULSE_SHARE * way_m.length();
+    let off_rad = (to.heading_rad - from.heading_rad - turn_rad).abs() - PULSE_SHARE * turn_rad.abs();
+    [off_m, off_rad].map(|off| off.max(0.0))
 }
 
 /// How often a foot left the ground.

@@ -8,20 +8,25 @@ use tandem_sim::{
     bench,
 };
 
-fn report(case: &str, seeds: usize) -> bench::CaseReport {
+/// The cases whose names contain this word.
+fn reports(word: &str, seeds: usize) -> Vec<bench::CaseReport> {
     let robot = RobotSource::embedded(DEFAULT_ROBOT).unwrap();
     let report = bench::run(
         DEFAULT_ROBOT,
         &Arc::new(robot.model),
         &LocomotionChoice::Balance,
         Sensing::default(),
-        case,
+        word,
         &(0..=seeds as u32 - 1),
         |_| {},
-    )
-    .unwrap();
-    assert_eq!(report.cases.len(), 1, "`{case}` names one case");
-    report.cases.into_iter().next().unwrap()
+    );
+    report.unwrap().cases
+}
+
+fn report(case: &str, seeds: usize) -> bench::CaseReport {
+    let mut reports = reports(case, seeds);
+    assert_eq!(reports.len(), 1, "`{case}` names one case");
+    reports.remove(0)
 }
 
 #[test]
@@ -36,6 +41,18 @@ fn walks_as_commanded_and_stops() {
         assert!(report.standing_after_s.unwrap() < 1.0 && report.still_after_s.unwrap() < 1.7, "{report:?}");
         let upright_deg = if case.ends_with("2kg") { 5.0 } else { 3.0 };
         assert!(report.pelvis_tilt_deg.unwrap() < upright_deg, "{report:?}");
+    }
+}
+
+/// Speeds of 0.03 to 0.1 m/s, or rad/s, for 0.5 to 2 s.
+#[test]
+fn short_commands_move_the_base_by_speed_times_time() {
+    let reports = reports("pulse_", 3);
+    assert_eq!(reports.len(), 6, "three axes, with empty hands and with 2 kg");
+    for report in reports {
+        assert_eq!(report.survived, report.seeds, "{report:?}");
+        assert!(report.final_drift_m.is_some_and(|off_m| off_m <= 0.015), "{report:?}");
+        assert!(report.heading_error_deg.is_some_and(|off_deg| off_deg <= 0.5), "{report:?}");
     }
 }
 

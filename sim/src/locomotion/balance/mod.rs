@@ -187,7 +187,7 @@ impl BalanceState {
             let mut place = self
                 .place
                 .filter(StandingPlace::is_moved)
-                .unwrap_or_else(|| StandingPlace::of_mover(body, heading_rad));
+                .unwrap_or_else(|| StandingPlace::of_mover(body, load, heading_rad));
             place.advance(scale, load, &command, heading_rad, dt_s);
             self.place = Some(place);
             return command;

@@ -139,10 +139,16 @@ impl Stand {
         if let Some(Resting { load, keeps, .. }) = moving {
             let scale = &body.model.scale;
             let zone_m = if keeps { com_zone_m(load) } else { RESTING_ZONE_M };
-            stand.home_m += heading * back_into_m(zone_m, scale, stand.weights_m(body, load));
+            let shift_m = heading * back_into_m(zone_m, scale, stand.weights_m(body, load));
+            stand.home_m += shift_m;
             stand.lean_m = stand.against_push_m(scale, stand.weights_m(body, load), load);
             stand.lean_goal_m = stand.lean_m;
             stand.offset_m = flat(pelvis.translation - stand.home_m) - heading * stand.lean_m;
+            if keeps {
+                // The centre of mass of a robot that has stepped is farther ahead of its pelvis than once it is upright: it is
+                // shifted as it stands up.
+                stand.home_m -= shift_m;
+            }
             stand.offset_rate_m_s = flat(body.com_velocity_m_s);
         }
         stand

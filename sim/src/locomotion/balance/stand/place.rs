@@ -18,21 +18,20 @@ const RETURN_M_S: f32 = 0.15;
 
 /// A robot that stops coasts for this long at the speed that it has.
 const COASTS_S: f32 = 0.2;
-/// What a robot stays behind its command, or is ahead of it, is forgotten in this time, and beyond the leash at once: who walks far
-/// corrects the command by what he sees.
+/// A robot that was told to move for no longer than this steps on until its feet are near to where commands took it, or for a while.
+/// One that walks farther corrects its commands by what it sees: it stops as soon as it can.
+const MOVED_SHORT_S: f32 = 3.5;
+/// From then on what a robot stays behind its command, or is ahead of it, is forgotten in this time; beyond the leash it is at once.
 const FORGETS_S: f32 = 4.0;
 const MOVED_LEASH_M: f32 = 0.25;
-/// A robot that was told to move for no longer than this steps on until its feet are near to where commands took it, or for a while. One
-/// that has walked far stops as soon as it can.
-const MOVED_SHORT_S: f32 = 2.5;
 const MOVED_NEAR_M: f32 = 0.012;
-const MOVED_LONGEST_S: f32 = 0.6;
+const MOVED_LONGEST_S: f32 = 0.4;
 const MOVED_RETURN_1_S: f32 = 2.0;
 const MOVED_RETURN_M_S: f32 = 0.2;
-/// The pelvis of a robot that has stopped makes up for as much of what its feet are off.
-const MOVED_SHIFT_M: f32 = 0.015;
+/// The pelvis of a robot that has stopped so makes up for as much of what its feet are off.
+const MOVED_SHIFT_M: f32 = 0.04;
 
-/// Middle of the soles and heading of a robot that stands.
+/// Middle of the soles and heading of a robot that stands, or of one that stops where commands have taken it.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(in crate::locomotion::balance) struct StandingPlace {
     pub middle_m: Vector,
@@ -43,7 +42,7 @@ pub(in crate::locomotion::balance) struct StandingPlace {
 /// What is known of a place that commands move.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct MovedPlace {
-    /// Pelvis over the middle of the soles as the robot last stood, heading frame.
+    /// Pelvis over the robot's centre of mass, with what it carries, as it last stood, heading frame.
     rest_m: Vector,
     /// Time for which commands have moved it, and time since they ended.
     told_s: f32,
@@ -56,16 +55,17 @@ impl StandingPlace {
         StandingPlace { middle_m, heading_rad, moved: None }
     }
 
-    /// The place from which commands take a robot with its feet and its pelvis here.
-    pub(in crate::locomotion::balance) fn of_mover(body: &BodyEstimate, heading_rad: f32) -> StandingPlace {
-        let feet_m = middle_m(&body.world_from_soles());
-        let away_m = flat(body.world_from_pelvis().translation - feet_m);
+    /// The place from which commands take a robot: its feet come under where its centre of mass is now, so that the pelvis need not
+    /// leave its own place.
+    pub(in crate::locomotion::balance) fn of_mover(
+        body: &BodyEstimate,
+        load: &Load,
+        heading_rad: f32,
+    ) -> StandingPlace {
+        let middle_m = flat(load.weights_point_m);
+        let away_m = flat(body.world_from_pelvis().translation - middle_m);
         let rest_m = Rotation::from_rotation_z(-heading_rad) * away_m;
-        StandingPlace {
-            middle_m: feet_m,
-            heading_rad,
-            moved: Some(MovedPlace { rest_m, told_s: 0.0, ended_s: 0.0 }),
-        }
+        StandingPlace { middle_m, heading_rad, moved: Some(MovedPlace { rest_m, told_s: 0.0, ended_s: 0.0 }) }
     }
 
     /// Whether commands took the robot here.
@@ -83,10 +83,15 @@ impl StandingPlace {
         dt_s: f32,
     ) {
         let way_m = Vector::new(command.vx_m_s, command.vy_m_s, 0.0) * dt_s;
-        let coming_m = flat(load.velocity_m_s) * scale.time_s(COASTS_S);
+        // The robot turns about its pelvis.
+        let [old, turned] = [self.heading_rad, heading_rad].map(Rotation::from_rotation_z);
+        let rest_m = self.moved.map_or(Vector::ZERO, |moved| moved.rest_m);
         let robot_m = flat(load.weights_point_m);
-        let away_m = flat(self.middle_m) + Rotation::from_rotation_z(heading_rad) * way_m - robot_m;
-        let away_m = away_m + (coming_m - away_m) * (dt_s / scale.time_s(FORGETS_S));
+        let mut away_m = flat(self.middle_m) + old * rest_m + turned * (way_m - rest_m) - robot_m;
+        if self.moved.is_some_and(|moved| moved.told_s > scale.time_s(MOVED_SHORT_S)) {
+            let coming_m = flat(load.velocity_m_s) * scale.time_s(COASTS_S);
+            away_m += (coming_m - away_m) * (dt_s / scale.time_s(FORGETS_S));
+        }
         self.middle_m = robot_m + away_m.clamp_length_max(scale.length_m(MOVED_LEASH_M));
         self.heading_rad = heading_rad;
         if let Some(moved) = &mut self.moved {
@@ -130,10 +135,14 @@ impl StandingPlace {
         body: &BodyEstimate,
         heading_rad: f32,
     ) -> Option<Vector> {
+        let moved = self.moved?;
+        let scale = &body.model.scale;
+        if moved.told_s > scale.time_s(MOVED_SHORT_S) {
+            return Some(moved.rest_m);
+        }
         let off_m = flat(self.middle_m - middle_m(&body.world_from_soles()));
-        let shift_m = Rotation::from_rotation_z(-heading_rad) * off_m;
-        let most_m = body.model.scale.length_m(MOVED_SHIFT_M);
-        self.moved.map(|moved| moved.rest_m + shift_m.clamp_length_max(most_m))
+        let off_m = off_m.clamp_length_max(scale.length_m(MOVED_SHIFT_M));
+        Some(moved.rest_m + Rotation::from_rotation_z(-heading_rad) * off_m)
     }
 }
 
@@ -155,25 +164,44 @@ mod tests {
         Load::of(body, &LadenRobot::of(body), 0.0, ObservedPush::default(), 0.0)
     }
 
-    /// Where commands of some seconds take the place of a robot that has not moved, from its feet.
+    /// Where commands of some seconds take the place of a robot that has not moved.
     fn moved(command: &BaseVelocity, seconds: f32) -> (BodyEstimate, StandingPlace) {
         let body = Posed::standing().body();
-        let mut place = StandingPlace::of_mover(&body, 0.0);
+        let mut place = StandingPlace::of_mover(&body, &load(&body), 0.0);
+        let mut heading_rad = 0.0;
         for _ in 0..(seconds / DT_S) as usize {
-            place.advance(&body.model.scale, &load(&body), command, 0.0, DT_S);
+            heading_rad += command.yaw_rate_rad_s * DT_S;
+            place.advance(&body.model.scale, &load(&body), command, heading_rad, DT_S);
         }
         (body, place)
+    }
+
+    /// How far a place is from where the robot's centre of mass is.
+    fn way_m(body: &BodyEstimate, place: &StandingPlace) -> Vector {
+        flat(place.middle_m - load(body).weights_point_m)
     }
 
     #[test]
     fn a_short_command_moves_the_place_by_its_velocity_times_its_duration() {
         let command = BaseVelocity { vx_m_s: 0.2, ..BaseVelocity::STILL };
-        let (body, place) = moved(&command, 0.5);
-        let way_m = flat(place.middle_m - middle_m(&body.world_from_soles()));
-        assert!((way_m.x - 0.1).abs() < 0.01 && way_m.y.abs() < 1e-3, "{way_m}");
-        let (body, place) = moved(&command, 10.0);
-        let away_m = flat(place.middle_m - load(&body).weights_point_m).length();
-        assert!(away_m < MOVED_LEASH_M + 1e-4, "a robot that is held back is not owed {away_m} m");
+        let (body, place) = moved(&command, 3.0);
+        let way_m = way_m(&body, &place);
+        assert!((way_m.x - MOVED_LEASH_M).abs() < 1e-4, "a robot that is held back is not owed {way_m}");
+        for seconds in [0.5, 1.0] {
+            let (body, place) = moved(&command, seconds);
+            let way_m = self::way_m(&body, &place);
+            assert!((way_m - Vector::X * (0.2 * seconds)).length() < 2e-3, "{way_m} in {seconds} s");
+        }
+    }
+
+    #[test]
+    fn a_robot_that_turns_in_place_keeps_its_pelvis_there() {
+        let (body, place) = moved(&BaseVelocity { yaw_rate_rad_s: 0.5, ..BaseVelocity::STILL }, 3.0);
+        let rest_m = place.moved.expect("commands moved it").rest_m;
+        assert!(rest_m.length() > 0.02, "the centre of mass of a robot is ahead of its pelvis: {rest_m}");
+        let pelvis_m = place.middle_m + Rotation::from_rotation_z(place.heading_rad) * rest_m;
+        let off_m = flat(pelvis_m - body.world_from_pelvis().translation);
+        assert!(off_m.length() < 1e-3 && way_m(&body, &place).length() > 0.02, "{off_m}");
     }
 
     #[test]
@@ -185,7 +213,8 @@ mod tests {
         assert!(to_m_s(true).expect("it is 10 cm away").x > 0.1);
         let steps = (0..1000).take_while(|_| to_m_s(false).is_some()).count();
         assert!((steps as f32 * DT_S - MOVED_LONGEST_S).abs() < 0.02, "{steps} steps");
-        let (body, mut place) = moved(&command, 0.05);
+        let feet_m = middle_m(&body.world_from_soles());
+        let mut place = StandingPlace { middle_m: feet_m + Vector::X * 0.01, ..place };
         assert_eq!(place.velocity_m_s(&body, &load, 0.0, true, DT_S), None, "feet are within a centimetre");
         assert_eq!(place.velocity_m_s(&body, &load, 0.0, false, DT_S), None);
         let (body, mut place) = moved(&command, MOVED_SHORT_S + 0.1);
@@ -194,11 +223,12 @@ mod tests {
 
     #[test]
     fn the_pelvis_makes_up_for_a_little_of_what_the_feet_are_off() {
-        let (body, place) = moved(&BaseVelocity { vy_m_s: 0.1, ..BaseVelocity::STILL }, 0.5);
-        let (_, start) = moved(&BaseVelocity::STILL, 0.0);
-        let rest_m = |place: &StandingPlace| place.rest_m(&body, 0.0).expect("commands moved it");
-        let shift_m = rest_m(&place) - rest_m(&start);
-        assert!((shift_m.length() - MOVED_SHIFT_M).abs() < 1e-4 && shift_m.y > 0.0, "{shift_m}");
+        let (body, place) = moved(&BaseVelocity { vy_m_s: 0.1, ..BaseVelocity::STILL }, 2.0);
+        let stood_m = place.moved.expect("commands moved it").rest_m;
+        let shift_m = place.rest_m(&body, 0.0).expect("commands moved it") - stood_m;
+        assert!((shift_m.length() - MOVED_SHIFT_M).abs() < 1e-4 && shift_m.y > 0.03, "{shift_m}");
+        let (body, far) = moved(&BaseVelocity { vy_m_s: 0.1, ..BaseVelocity::STILL }, MOVED_SHORT_S + 0.1);
+        assert_eq!(far.rest_m(&body, 0.0), Some(stood_m), "it has walked far");
         assert_eq!(StandingPlace::new(Vector::ZERO, 0.0).rest_m(&body, 0.0), None);
     }
 }
