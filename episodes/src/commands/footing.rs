@@ -1,7 +1,7 @@
 //! What is told of a robot's base: whether it stands or steps and why, and where it is against where it was told to be. All of it by its
 //! own controller and odometry.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 use tandem_sim::{BaseCommand, BaseVelocity, RobotSensed};
 use tandem_tools_spec::{BaseReport, BaseState};
@@ -11,7 +11,11 @@ use crate::convert::{coarse, isometry_from_sim};
 /// A robot that was told to stop has stopped after so many control steps, as measured from 0.05 to 0.4 m/s in every direction; one that
 /// steps later than that was pushed.
 const SETTLES_STEPS: u32 = 75;
-/// A base that was told to stop goes on for a while at its speed, the longer the faster it went:
+/// A base that was told to move for at most so many control steps comes to rest where speed times time takes it, as far as it has not
+/// been held back by more than the leash.
+const SHORT_STEPS: u32 = 175;
+const LEASH_M: f64 = 0.25;
+/// After longer walks it goes on for a while at its speed, the longer the faster it went:
 ///   d = v (0.25 s + 0.6 s^2/m |v|),
 /// fitted to walks of 3 s ahead, back and to the side: 3 cm from 0.1 m/s, 8 from 0.2, 12 from 0.3 and 21 from 0.4.
 const COASTS_S: f64 = 0.25;
@@ -35,6 +39,8 @@ pub struct Footing {
     /// Control steps since it was last told to move, and how it was to.
     still_steps: u32,
     told_m_s: [f64; 2],
+    /// Where the commands since it last stood take it.
+    walk: Option<ToldWalk>,
     /// Where it came to rest after that, in the frame of its estimate.
     rests_at: Option<Isometry3<f64>>,
     /// Control steps since its feet last moved, and how high its pelvis is and how fast it has risen lately.
@@ -43,6 +49,13 @@ pub struct Footing {
     rises_m_s: f64,
     /// Whether it has stepped since its last command began, though it was told to stand.
     stepped: bool,
+}
+
+/// A place to which commands take a base from where it stood, start frame.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct ToldWalk {
+    to_m: Vector3<f64>,
+    control_steps: u32,
 }
 
 impl Footing {
@@ -54,6 +67,7 @@ impl Footing {
             is_stepping: None,
             still_steps: SETTLES_STEPS,
             told_m_s: [0.0; 2],
+            walk: None,
             rests_at: None,
             planted_steps: PLANTED_STEPS,
             height_m,
@@ -81,11 +95,36 @@ impl Footing {
             self.still_steps = 0;
             self.told_m_s = [base.vx_m_s.into(), base.vy_m_s.into()];
             self.rests_at = None;
+            self.walk_on();
         }
         if self.still_steps >= SETTLES_STEPS || (self.still_steps > 0 && sensed.is_stepping == Some(false)) {
             self.rests_at.get_or_insert(*world_from_pelvis);
+            self.walk = None;
         }
         self.stepped |= self.still_steps >= SETTLES_STEPS && sensed.is_stepping == Some(true);
+    }
+
+    /// Goes on to where the command takes the base in one more control step.
+    fn walk_on(&mut self) {
+        let start_from_pelvis = self.pelvis_from_start.inverse();
+        let pelvis_m = start_from_pelvis.translation.vector;
+        let walk = self.walk.get_or_insert(ToldWalk { to_m: pelvis_m, control_steps: 0 });
+        let ahead = start_from_pelvis.rotation * Vector3::x();
+        let level = Rotation3::from_axis_angle(&Vector3::z_axis(), ahead.y.atan2(ahead.x));
+        walk.to_m += level * Vector3::new(self.told_m_s[0], self.told_m_s[1], 0.0) * CONTROL_S;
+        walk.to_m = pelvis_m + (walk.to_m - pelvis_m).cap_magnitude(LEASH_M);
+        walk.control_steps += 1;
+    }
+
+    /// Where the base comes to rest if no further step is commanded, start frame.
+    fn rests_m(&self) -> Vector3<f64> {
+        if let Some(walk) = self.walk.as_ref().filter(|walk| walk.control_steps <= SHORT_STEPS) {
+            return walk.to_m;
+        }
+        let start_from_pelvis = self.pelvis_from_start.inverse();
+        let told_m_s = Vector3::new(self.told_m_s[0], self.told_m_s[1], 0.0);
+        let coasts_s = COASTS_S + COASTS_S2_M * told_m_s.norm() - f64::from(self.still_steps) * CONTROL_S;
+        start_from_pelvis.translation.vector + start_from_pelvis.rotation * told_m_s * coasts_s.max(0.0)
     }
 
     fn state(&self, base: &BaseCommand) -> Option<BaseState> {
@@ -102,15 +141,11 @@ impl Footing {
 
     /// What is told of a base under the command `base`, with the pelvis at `world_from_pelvis`.
     pub fn report(&self, base: &BaseCommand, world_from_pelvis: &Isometry3<f64>) -> BaseReport {
-        let start_from_pelvis = self.pelvis_from_start.inverse();
-        let pelvis_height_m = start_from_pelvis.translation.z;
+        let pelvis_height_m = self.pelvis_from_start.inverse().translation.z;
         let commanded_m = f64::from(base.pelvis_height_m);
         let state = self.state(base);
         let moves = matches!(state, Some(BaseState::Stepping | BaseState::Settling));
-        let told_m_s = Vector3::new(self.told_m_s[0], self.told_m_s[1], 0.0);
-        let coasts_s = COASTS_S + COASTS_S2_M * told_m_s.norm() - f64::from(self.still_steps) * CONTROL_S;
-        let coasts_m = told_m_s * coasts_s.max(0.0);
-        let rests_m = start_from_pelvis.translation.vector + start_from_pelvis.rotation * coasts_m;
+        let rests_m = self.rests_m();
         let displaced_m = self.rests_at.map(|rests| {
             rests.inverse_transform_vector(&(world_from_pelvis.translation.vector - rests.translation.vector))
         });

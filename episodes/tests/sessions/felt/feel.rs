@@ -145,7 +145,7 @@ fn a_base_says_what_it_does_and_where_it_will_rest() {
     for told in [walking, settling] {
         let [x_m, y_m] = told.comes_to_rest_m.unwrap();
         let off_m = (x_m - rests_m[0]).hypot(y_m - rests_m[1]);
-        assert!(off_m < 0.05, "{off_m} m off: {told:?}, and it rests at {rests_m:?}");
+        assert!(off_m < 0.03, "{off_m} m off: {told:?}, and it rests at {rests_m:?}");
     }
     assert_eq!(session.facts().robots.len(), 2);
 }

@@ -248,7 +248,7 @@ impl BalanceState {
                 let back = self.place.is_none_or(|place| place.is_moved()) || step.to_turn_rad() < BACK_RAD;
                 let landed = step.just_landed() && step.steps() >= LEAST_STEPS;
                 if !moving && back && landed && captured && feet_together {
-                    let kept_m = self.place.and_then(|place| place.rest_m(body, self.heading_rad));
+                    let kept_m = self.place.and_then(|place| place.rest_m(body, load, self.heading_rad));
                     let rest_m = kept_m.unwrap_or(self.pelvis_from_middle_m);
                     let resting = Resting { rest_m, keeps: kept_m.is_some(), load };
                     let stand = Stand::plant(body, self.heading_rad, Some(resting));

@@ -30,6 +30,8 @@ const MOVED_RETURN_1_S: f32 = 2.0;
 const MOVED_RETURN_M_S: f32 = 0.2;
 /// The pelvis of a robot that has stopped so makes up for as much of what its feet are off.
 const MOVED_SHIFT_M: f32 = 0.04;
+/// That of one that holds something with partners makes up for less.
+const HELD_SHIFT_M: f32 = 0.02;
 
 /// Middle of the soles and heading of a robot that stands, or of one that stops where commands have taken it.
 #[derive(Clone, Copy, Serialize, Deserialize)]
@@ -133,6 +135,7 @@ impl StandingPlace {
     pub(in crate::locomotion::balance) fn rest_m(
         &self,
         body: &BodyEstimate,
+        load: &Load,
         heading_rad: f32,
     ) -> Option<Vector> {
         let moved = self.moved?;
@@ -141,7 +144,8 @@ impl StandingPlace {
             return Some(moved.rest_m);
         }
         let off_m = flat(self.middle_m - middle_m(&body.world_from_soles()));
-        let off_m = off_m.clamp_length_max(scale.length_m(MOVED_SHIFT_M));
+        let most_m = MOVED_SHIFT_M + (HELD_SHIFT_M - MOVED_SHIFT_M) * load.yield_share;
+        let off_m = off_m.clamp_length_max(scale.length_m(most_m));
         Some(moved.rest_m + Rotation::from_rotation_z(-heading_rad) * off_m)
     }
 }
@@ -225,10 +229,10 @@ mod tests {
     fn the_pelvis_makes_up_for_a_little_of_what_the_feet_are_off() {
         let (body, place) = moved(&BaseVelocity { vy_m_s: 0.1, ..BaseVelocity::STILL }, 2.0);
         let stood_m = place.moved.expect("commands moved it").rest_m;
-        let shift_m = place.rest_m(&body, 0.0).expect("commands moved it") - stood_m;
+        let shift_m = place.rest_m(&body, &load(&body), 0.0).expect("commands moved it") - stood_m;
         assert!((shift_m.length() - MOVED_SHIFT_M).abs() < 1e-4 && shift_m.y > 0.03, "{shift_m}");
         let (body, far) = moved(&BaseVelocity { vy_m_s: 0.1, ..BaseVelocity::STILL }, MOVED_SHORT_S + 0.1);
-        assert_eq!(far.rest_m(&body, 0.0), Some(stood_m), "it has walked far");
-        assert_eq!(StandingPlace::new(Vector::ZERO, 0.0).rest_m(&body, 0.0), None);
+        assert_eq!(far.rest_m(&body, &load(&body), 0.0), Some(stood_m), "it has walked far");
+        assert_eq!(StandingPlace::new(Vector::ZERO, 0.0).rest_m(&body, &load(&body), 0.0), None);
     }
 }
