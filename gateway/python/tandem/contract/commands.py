@@ -106,8 +106,8 @@ class BaseReport:
     """The height that it was last told, where it is more than 2 cm off that; left out otherwise."""
 
     comes_to_rest_m: tuple[float, float] | None
-    """Where the pelvis will come to rest if no further step is commanded: [x, y] in the start frame, to within 5
-    cm. Only of a base that steps or settles.
+    """Where the pelvis will come to rest if no further step is commanded: [x, y] in the start frame, to within 3
+    cm after a walk of up to 3.5 s, and to within 5 cm after a longer one. Only of a base that steps or settles.
     """
 
     displaced_m: tuple[float, float] | None
