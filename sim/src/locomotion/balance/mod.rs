@@ -188,7 +188,7 @@ impl BalanceState {
                 .place
                 .filter(StandingPlace::is_moved)
                 .unwrap_or_else(|| StandingPlace::of_mover(body, load, heading_rad));
-            place.advance(scale, load, &command, heading_rad, dt_s);
+            place.advance(body, load, &command, heading_rad, dt_s);
             self.place = Some(place);
             return command;
         }

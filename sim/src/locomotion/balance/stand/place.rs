@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::ground::middle_m;
 use super::super::load::Load;
-use crate::body::{BodyEstimate, BodyScale};
+use crate::body::{BodyEstimate, BodyScale, LEG_JOINTS, LEGS};
 use crate::locomotion::BaseVelocity;
 use crate::plane::flat;
 
@@ -44,8 +44,10 @@ pub(in crate::locomotion::balance) struct StandingPlace {
 /// What is known of a place that commands move.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct MovedPlace {
-    /// Pelvis over the robot's centre of mass, with what it carries, as it last stood, heading frame.
+    /// Pelvis over the centre of mass of the robot, with what it carries, once it stands with its arms as they are; heading frame.
     rest_m: Vector,
+    /// What its legs added to the way from the pelvis to the centre of mass as it last stood, heading frame.
+    standing_legs_m: Vector,
     /// Time for which commands have moved it, and time since they ended.
     told_s: f32,
     ended_s: f32,
@@ -67,7 +69,22 @@ impl StandingPlace {
         let middle_m = flat(load.weights_point_m);
         let away_m = flat(body.world_from_pelvis().translation - middle_m);
         let rest_m = Rotation::from_rotation_z(-heading_rad) * away_m;
-        StandingPlace { middle_m, heading_rad, moved: Some(MovedPlace { rest_m, told_s: 0.0, ended_s: 0.0 }) }
+        let standing_legs_m = legs_m(body, heading_rad);
+        StandingPlace {
+            middle_m,
+            heading_rad,
+            moved: Some(MovedPlace { rest_m, standing_legs_m, told_s: 0.0, ended_s: 0.0 }),
+        }
+    }
+
+    /// Moves the point under the centre of mass as arms and loads have moved that from the pelvis, whose place stays.
+    fn follow_arms(&mut self, body: &BodyEstimate, load: &Load, heading_rad: f32) {
+        let Some(moved) = &mut self.moved else { return };
+        let away_m = flat(body.world_from_pelvis().translation - load.weights_point_m);
+        let legs_m = moved.standing_legs_m - legs_m(body, heading_rad);
+        let rest_m = Rotation::from_rotation_z(-heading_rad) * away_m - legs_m;
+        self.middle_m += Rotation::from_rotation_z(self.heading_rad) * (moved.rest_m - rest_m);
+        moved.rest_m = rest_m;
     }
 
     /// Whether commands took the robot here.
@@ -78,12 +95,14 @@ impl StandingPlace {
     /// Goes on with the robot as a command has it for one physics step.
     pub(in crate::locomotion::balance) fn advance(
         &mut self,
-        scale: &BodyScale,
+        body: &BodyEstimate,
         load: &Load,
         command: &BaseVelocity,
         heading_rad: f32,
         dt_s: f32,
     ) {
+        let scale = &body.model.scale;
+        self.follow_arms(body, load, heading_rad);
         let way_m = Vector::new(command.vx_m_s, command.vy_m_s, 0.0) * dt_s;
         // The robot turns about its pelvis.
         let [old, turned] = [self.heading_rad, heading_rad].map(Rotation::from_rotation_z);
@@ -112,6 +131,7 @@ impl StandingPlace {
         landed: bool,
         dt_s: f32,
     ) -> Option<Vector> {
+        self.follow_arms(body, load, heading_rad);
         let scale = &body.model.scale;
         let feet_m = middle_m(&body.world_from_soles());
         let Some(moved) = &mut self.moved else {
@@ -150,6 +170,19 @@ impl StandingPlace {
     }
 }
 
+/// Returns what the legs add to the way from the pelvis to the centre of mass; horizontal, heading frame.
+fn legs_m(body: &BodyEstimate, heading_rad: f32) -> Vector {
+    let pelvis_m = body.world_from_pelvis().translation;
+    let links = LEGS.into_iter().flat_map(|first| &body.model.joints[first..first + LEG_JOINTS]);
+    let moment_kg_m: Vector = links
+        .map(|joint| {
+            let mass = &body.model.links[joint.link].mass;
+            (body.world_from_link[joint.link] * mass.local_com - pelvis_m) * mass.mass()
+        })
+        .sum();
+    Rotation::from_rotation_z(-heading_rad) * flat(moment_kg_m / body.model.mass_kg)
+}
+
 fn towards_m_s(scale: &BodyScale, away_m: Vector, heading_rad: f32, rate_1_s: f32, most_m_s: f32) -> Vector {
     let away_m = Rotation::from_rotation_z(-heading_rad) * away_m;
     (away_m * scale.rate_1_s(rate_1_s)).clamp_length_max(scale.speed_m_s(most_m_s))
@@ -175,7 +208,7 @@ mod tests {
         let mut heading_rad = 0.0;
         for _ in 0..(seconds / DT_S) as usize {
             heading_rad += command.yaw_rate_rad_s * DT_S;
-            place.advance(&body.model.scale, &load(&body), command, heading_rad, DT_S);
+            place.advance(&body, &load(&body), command, heading_rad, DT_S);
         }
         (body, place)
     }
