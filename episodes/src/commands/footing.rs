@@ -13,7 +13,7 @@ use crate::convert::{coarse, isometry_from_sim};
 const SETTLES_STEPS: u32 = 75;
 /// A base that was told to move for at most so many control steps comes to rest where speed times time takes it, as far as it has not
 /// been held back by more than the leash.
-const SHORT_STEPS: u32 = 175;
+const SHORT_STEPS: u32 = 125;
 const LEASH_M: f64 = 0.25;
 /// After longer walks it goes on for a while at its speed, the longer the faster it went:
 ///   d = v (0.25 s + 0.6 s^2/m |v|),

@@ -66,7 +66,7 @@ const NAMED_FRAMES: &str = " Tools that take `frame` know \"pelvis\"; \"level\",
     rotation.";
 
 /// How our own controller walks.
-const WALKING: &str = "A robot that is told to walk gains way after 0.3 to 0.5 s. Told to stop within 3.5 s, it goes \
+const WALKING: &str = "A robot that is told to walk gains way after 0.3 to 0.5 s. Told to stop within 2.5 s, it goes \
     on to where speed times time takes it, to within 2 cm and a tenth of the way. After longer walks it coasts: by 3 cm from 0.1 m/s, 8 cm from 0.2, 12 from 0.3 and 20 from \
     0.4, and by 0.09 rad from turning at 0.5 rad/s; it stands after about a second. While it steps the pelvis \
     sways by up to 4 cm to each side, twice a second: mean over half a second what you steer by, or have walk_to do it. base.state says \

@@ -90,7 +90,7 @@ pub struct BaseReport {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub commanded_height_m: Option<f64>,
     /// Where the pelvis will come to rest if no further step is commanded: [x, y] in the start frame, to within 3 cm after a walk of up to
-    /// 3.5 s, and to within 5 cm after a longer one. Only of a base that steps or settles.
+    /// 2.5 s, and to within 5 cm after a longer one. Only of a base that steps or settles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub comes_to_rest_m: Option<[f64; 2]>,
     /// How far a base that was told to stand is from where it came to rest, [forward, left] in metres as it faced there; left out where

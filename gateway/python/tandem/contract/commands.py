@@ -107,7 +107,7 @@ class BaseReport:
 
     comes_to_rest_m: tuple[float, float] | None
     """Where the pelvis will come to rest if no further step is commanded: [x, y] in the start frame, to within 3
-    cm after a walk of up to 3.5 s, and to within 5 cm after a longer one. Only of a base that steps or settles.
+    cm after a walk of up to 2.5 s, and to within 5 cm after a longer one. Only of a base that steps or settles.
     """
 
     displaced_m: tuple[float, float] | None

@@ -20,7 +20,7 @@ const RETURN_M_S: f32 = 0.15;
 const COASTS_S: f32 = 0.2;
 /// A robot that was told to move for no longer than this steps on until its feet are near to where commands took it, or for a while.
 /// One that walks farther corrects its commands by what it sees: it stops as soon as it can.
-const MOVED_SHORT_S: f32 = 3.5;
+const MOVED_SHORT_S: f32 = 2.5;
 /// From then on what a robot stays behind its command, or is ahead of it, is forgotten in this time; beyond the leash it is at once.
 const FORGETS_S: f32 = 4.0;
 const MOVED_LEASH_M: f32 = 0.25;
@@ -193,6 +193,7 @@ mod tests {
     use super::super::super::load::LadenRobot;
     use super::super::super::observer::ObservedPush;
     use super::*;
+    use crate::body::ARMS;
     use crate::body::posed::Posed;
 
     const DT_S: f32 = 1.0 / 200.0;
@@ -239,6 +240,28 @@ mod tests {
         let pelvis_m = place.middle_m + Rotation::from_rotation_z(place.heading_rad) * rest_m;
         let off_m = flat(pelvis_m - body.world_from_pelvis().translation);
         assert!(off_m.length() < 1e-3 && way_m(&body, &place).length() > 0.02, "{off_m}");
+    }
+
+    #[test]
+    fn feet_go_under_what_arms_reach_out_and_legs_that_bend_change_nothing() {
+        let standing = Posed::standing();
+        let place = StandingPlace::of_mover(&standing.body(), &load(&standing.body()), 0.0);
+        let after = |by_rad: &[(usize, f32)]| {
+            let mut posed = standing.clone();
+            for (joint, by_rad) in by_rad {
+                posed.q_rad[*joint] += by_rad;
+            }
+            let body = posed.body();
+            let mut place = place;
+            place.follow_arms(&body, &load(&body), 0.0);
+            let rest_m = place.moved.expect("commands moved it").rest_m;
+            (place.middle_m, flat(place.middle_m + rest_m - body.world_from_pelvis().translation))
+        };
+        let (reaching_m, pelvis_off_m) = after(&[(ARMS.left, -1.0), (ARMS.right, -1.0)]);
+        assert!((reaching_m - place.middle_m).x > 0.01 && pelvis_off_m.length() < 1e-5, "{reaching_m}");
+        let bent = LEGS.into_iter().flat_map(|first| [(first, -0.4), (first + 3, 0.8), (first + 4, -0.4)]);
+        let (bent_m, pelvis_off_m) = after(&bent.collect::<Vec<_>>());
+        assert!((bent_m - place.middle_m).length() < 1e-5 && pelvis_off_m.length() < 1e-5, "{bent_m}");
     }
 
     #[test]
