@@ -43,7 +43,6 @@ mod spec;
 pub mod statistics;
 pub mod stress;
 mod task_check;
-mod task_file;
 pub mod tasks;
 mod variation;
 mod words;
@@ -67,7 +66,9 @@ pub use recording::{
     recover,
 };
 pub use results::RESULT_FILE;
-pub use scoring::{A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, RobotFacts, Scores, StepScore};
+pub use scoring::{
+    A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, Predicate, RobotFacts, Scores, StepScore,
+};
 pub use session::{
     Audience, BringBack, CallReply, Caller, Checkpoint, Clock, FAILED_STEP_FILE, FailedStep, JournalEntry,
     Outcome, Request, RunFiles, RunFolder, Session, monotonic,
@@ -83,6 +84,6 @@ pub use tandem_sim::{
     render::RendererKind,
 };
 pub use task_check::{TaskCheck, TaskCheckError, check_task};
-pub use task_file::{TANDEM_PLUS, TaskFileError, read_task, tandem_plus, task_of, task_set};
+pub use tasks::{TANDEM_PLUS, TaskFileError, read_task, tandem_plus, task_of};
 pub use variation::Variation;
 pub use words::OwnWords;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use tandem_tools_spec::Protocol;
 
 use crate::EpisodeError;
-use crate::tasks::{AGENTIC_STEPS, THINKING_S, Task};
+use crate::tasks::Task;
 
 /// What a protocol allows for one task.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,17 +39,13 @@ impl Rules {
 
 /// What `protocol` allows for `task`.
 pub fn rules(protocol: Protocol, task: &Task) -> Rules {
-    let (agentic_steps, thinking_s) = match &task.file {
-        None => (AGENTIC_STEPS, THINKING_S),
-        Some(file) => (file.agentic_steps, file.thinking_s),
-    };
     match protocol {
         Protocol::Agentic => Rules {
             protocol,
             steps_per_command: 25,
-            episode_steps: agentic_steps,
+            episode_steps: task.agentic_steps,
             initial_hold_steps: 300,
-            thinking: Some(Duration::from_secs(thinking_s.into())),
+            thinking: Some(Duration::from_secs(task.thinking_s.into())),
             seeds: (0, 9),
         },
         Protocol::Benchmark => Rules {

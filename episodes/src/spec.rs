@@ -17,7 +17,7 @@ use crate::error::{RobotError, SceneError};
 use crate::protocol::{Rules, rules};
 use crate::scoring::Phase;
 use crate::stress::{self, Stress};
-use crate::tasks::{Spread, Task, TaskWords};
+use crate::tasks::{Spread, Task, TaskOrigin, TaskWords};
 use crate::variation::Variation;
 use crate::words::OwnWords;
 
@@ -34,7 +34,7 @@ pub const OWN_WORDS: &str = "instructions: Tandem's own";
 /// state, bit for bit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeSpec {
-    #[serde(with = "crate::task_file::by_id_or_file")]
+    #[serde(with = "crate::tasks::by_id_or_file")]
     pub task: &'static Task,
     pub seed: u32,
     pub protocol: Protocol,
@@ -223,7 +223,7 @@ impl EpisodeSpec {
     pub fn departures(&self) -> Vec<String> {
         let own_controller = (self.locomotion == Controller::Balance).then(|| OWN_CONTROLLER.to_owned());
         let own_words =
-            (self.instructions.is_none() && self.task.file.is_none()).then(|| OWN_WORDS.to_owned());
+            (self.instructions.is_none() && self.task.is_benchmark()).then(|| OWN_WORDS.to_owned());
         let others = self.peculiarities().into_iter().filter(|what| !self.is_the_benchmarks(what));
         own_controller.into_iter().chain(own_words).chain(others).collect()
     }
@@ -261,10 +261,11 @@ impl EpisodeSpec {
         } = self;
         let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let found = [
-            task.file.as_ref().map(|file| match file.suite {
-                Some(suite) => format!("suite: {suite}"),
-                None => format!("task file: {} {}", file.source.name, file.xxh3),
-            }),
+            match task.origin {
+                TaskOrigin::Benchmark => None,
+                TaskOrigin::Suite(suite) => Some(format!("suite: {suite}")),
+                TaskOrigin::File => Some(format!("task file: {} {}", task.source.name, task.xxh3)),
+            },
             (*assistance != Assistance::Paper).then(|| format!("assistance: {assistance}")),
             (*disclosure != assistance.disclosure()).then(|| format!("phases told: {disclosure}")),
             (*hints != assistance.hints()).then(|| format!("hints: {hints}")),
@@ -452,7 +453,7 @@ mod tests {
         assert_eq!(asked(Some("a/walk.onnx")), Controller::File("a/walk.onnx".into()));
         assert_eq!(asked(Some("looped:a/walk.onnx")), Controller::Looped("a/walk.onnx".into()));
 
-        let own = EpisodeSpec::new(&tasks::ALL[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
+        let own = EpisodeSpec::new(tasks::cohub()[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
         let named = |file: Option<&str>| {
             let spec = EpisodeSpec { locomotion: asked(file), ..own.clone() };
             (spec.peculiarities(), spec.departures())
@@ -467,7 +468,7 @@ mod tests {
 
     #[test]
     fn other_words_are_named() {
-        let own = EpisodeSpec::new(&tasks::ALL[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
+        let own = EpisodeSpec::new(tasks::cohub()[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
         let words = OwnWords { xxh3: "00ff".into(), ..OwnWords::default() };
         let told = EpisodeSpec { instructions: Some(words), ..own };
         assert_eq!(told.peculiarities(), ["instructions: 00ff"]);
@@ -476,7 +477,7 @@ mod tests {
 
     #[test]
     fn what_varies_as_in_the_benchmark_leaves_no_trace_and_what_does_not_is_named() {
-        let own = EpisodeSpec::new(&tasks::ALL[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
+        let own = EpisodeSpec::new(tasks::cohub()[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
         assert_eq!(serde_json::to_value(&own).unwrap().get("variation"), None);
         let variation = Variation { spread: Spread::Double, variety: 1, disturb: 0.8 };
         let wide = EpisodeSpec { variation, ..own };

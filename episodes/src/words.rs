@@ -22,7 +22,7 @@ pub struct OwnWords {
 }
 
 /// Hashes of the benchmark's own words, joint and of each robot, which are published and which a file of instructions may hold: one for
-/// each task, in the order of [`crate::tasks::ALL`].
+/// each task, in the order of [`crate::tasks::cohub`].
 const BENCHMARK_WORDS: [&str; 10] = [
     "e6e83c5720b2bda4",
     "811edfc525362d72",
@@ -68,7 +68,7 @@ impl OwnWords {
 
     /// Whether they are those that the benchmark has for `task`.
     pub fn are_the_benchmarks(&self, task: &Task) -> bool {
-        task.file.is_none() && BENCHMARK_WORDS.contains(&self.xxh3.as_str())
+        task.is_benchmark() && BENCHMARK_WORDS.contains(&self.xxh3.as_str())
     }
 
     /// The words of `task` with these in place of those that they replace.
@@ -90,8 +90,8 @@ mod tests {
 
     #[test]
     fn the_benchmarks_words_are_known_where_a_file_has_them() {
-        assert_eq!(BENCHMARK_WORDS.len(), tasks::ALL.len());
-        let handover = &tasks::ALL[0];
+        assert_eq!(BENCHMARK_WORDS.len(), tasks::cohub().len());
+        let handover = tasks::cohub()[0];
         let joint = "Pass the bottle directly from Robot A's right hand to Robot B's right hand, then place it on the target.";
         let of_a = "Pick up the bottle directly in front of you with your right hand and hand it to your partner's right hand.";
         let of_b = "Receive the bottle with your right hand, place it on the target directly in front of you, and release it.";

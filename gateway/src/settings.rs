@@ -21,7 +21,6 @@ use tandem_episodes::{
     RendererKind, RobotFile, SceneFile, Sensing, SensorModel, SimError, StateSource, Visibility, check_task,
     read_task, read_text,
     stress::{Stress, StressAxis, StressLevel},
-    task_set,
     tasks::{Task, TaskSet},
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, StartEpisode, Wording};
@@ -255,7 +254,7 @@ impl Layer {
     /// The benchmark's tasks, and those of files.
     pub fn read_tasks(&self) -> Result<TaskSet, SettingsError> {
         let files = self.task_file.iter().flatten();
-        Ok(task_set(files.map(|path| read_task_file(path)).collect::<Result<_, _>>()?))
+        Ok(TaskSet::with_files(files.map(|path| read_task_file(path)).collect::<Result<_, _>>()?))
     }
 
     /// The instructions of the file, which may name these tasks, or the tasks' own.

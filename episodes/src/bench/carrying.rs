@@ -6,10 +6,11 @@
 use std::cell::Cell;
 use std::f32::consts::FRAC_PI_2;
 use std::ops::RangeInclusive;
+use std::sync::LazyLock;
 
 use tandem_sim::bench::{CaseReport, over_seeds};
 use tandem_sim::render::RendererKind;
-use tandem_sim::{CONTROL_HZ, Pose, Rotation, Sensing, Sides, Vector, heading_rad, wrapped_rad};
+use tandem_sim::{Pose, Rotation, Sensing, Sides, Vector, heading_rad, wrapped_rad};
 use tandem_tools_spec::{Protocol, ToolCall, ToolReply};
 
 use super::BenchError;
@@ -18,9 +19,9 @@ use crate::players::experts::skills::{
     CarryTeam, Commander, FREE, HandGrasp, Hold, ObjectPath, grasp_compliantly,
 };
 use crate::players::{Episode, InProcess, PlayerError, PrivilegedEpisode};
-use crate::scoring::{A, B, Done, Facts, Grip, Phase};
+use crate::scoring::{A, B, Facts, Grip};
 use crate::spec::{Controller, EpisodeSpec, RobotFile};
-use crate::tasks::{RobotSpot, Task, spot, uniform_xy};
+use crate::tasks::Task;
 
 /// A way of the bar.
 pub struct CarryingCase {
@@ -49,33 +50,14 @@ const fn straight(ahead_m: f32, left_m: f32) -> PathLeg {
 
 /// Robots stand so far to the left and right of the bar's middle.
 const APART_M: f32 = 0.65;
-const BAR_M: [f32; 3] = [0.29, 0.0, 0.85];
 const LIFT_M: f32 = 0.1;
 const PACE_M_S: f32 = 0.2;
 /// A way is looked at in so many points a leg.
 const WAY_POINTS: usize = 200;
 
-pub(super) const TASK: Task = Task {
-    id: "carry_bar",
-    scene: "floor",
-    robots: &[beside("A", APART_M), beside("B", -APART_M)],
-    objects: &[spot("bar", BAR_M), spot("bar_stand", BAR_M)],
-    randomize: &[uniform_xy(&["bar", "bar_stand"], 0.03, 0.03)],
-    instruction: "",
-    benchmark_steps: 60 * CONTROL_HZ as u32,
-    phases: &[Phase {
-        id: "none",
-        description: "A bench has no success that would end it early.",
-        collaborative: true,
-        done: Done::When(&|_: &Facts| false),
-        nearness: &|_| 0.0,
-    }],
-    file: None,
-};
-
-const fn beside(name: &'static str, left_m: f32) -> RobotSpot {
-    RobotSpot { name, position_m: [0.0, left_m], yaw_rad: 0.0, instruction: "" }
-}
+/// Two robots and a bar.
+pub(super) static TASK: LazyLock<&'static Task> =
+    LazyLock::new(|| super::task("carry_bar.toml", include_str!("tasks/carry_bar.toml")));
 
 /// Plays one case on these seeds.
 pub fn run(
@@ -126,7 +108,7 @@ fn trial(
         locomotion: controller.clone(),
         sensing,
         renderer: RendererKind::Cpu,
-        ..EpisodeSpec::new(&TASK, seed, Protocol::Benchmark)
+        ..EpisodeSpec::new(*TASK, seed, Protocol::Benchmark)
     };
     let aloft = Cell::new(None);
     let session = Session::start(&spec, None).map_err(Box::new)?;
@@ -147,7 +129,7 @@ fn carry(
     episode: &mut dyn PrivilegedEpisode,
     aloft: &Cell<Option<Pose>>,
 ) -> Result<(), PlayerError> {
-    let commander = &mut Commander::new(&TASK, episode)?;
+    let commander = &mut Commander::new(*TASK, episode)?;
     let [a_left, a_right] = HandGrasp::with_both_hands(A, "bar", ["a_left", "a_right"], 0.0, &Hold::BAR);
     let [b_left, b_right] = HandGrasp::with_both_hands(B, "bar", ["b_left", "b_right"], 0.0, &Hold::BAR);
     let grasps = [a_left, a_right, b_left, b_right];

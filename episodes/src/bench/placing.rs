@@ -3,11 +3,12 @@
 
 use std::f32::consts::{FRAC_PI_2, TAU};
 use std::ops::RangeInclusive;
+use std::sync::LazyLock;
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use tandem_sim::bench::{CaseReport, is_asked, over_seeds};
 use tandem_sim::render::RendererKind;
-use tandem_sim::{CONTROL_HZ, Sensing, Side, Sides, SplitMix64};
+use tandem_sim::{Sensing, Side, Sides, SplitMix64};
 use tandem_tools_spec::{Assistance, Destination, Protocol, ToolCall, WalkTo};
 
 use super::BenchError;
@@ -15,28 +16,12 @@ use super::holding::loads::{BASKET, LEGS, ROUND_TABLE, SharedLoad, TABLE};
 use crate::Session;
 use crate::convert::isometry_from_sim;
 use crate::players::{InProcess, PlayerError};
-use crate::scoring::{Done, Phase};
 use crate::spec::{Controller, EpisodeSpec, RobotFile};
-use crate::tasks::{RobotSpot, Task};
+use crate::tasks::Task;
 
 /// A robot alone on a floor.
-const TASK: Task = Task {
-    id: "place",
-    scene: "floor",
-    robots: &[RobotSpot { name: "A", position_m: [0.0; 2], yaw_rad: 0.0, instruction: "" }],
-    objects: &[],
-    randomize: &[],
-    instruction: "",
-    benchmark_steps: 60 * CONTROL_HZ as u32,
-    phases: &[Phase {
-        id: "none",
-        description: "A bench has no success that would end it early.",
-        collaborative: false,
-        done: Done::When(&|_| false),
-        nearness: &|_| 0.0,
-    }],
-    file: None,
-};
+static TASK: LazyLock<&'static Task> =
+    LazyLock::new(|| super::task("place.toml", include_str!("tasks/place.toml")));
 
 /// One after another, each from where the last ended.
 const PLACES: usize = 3;
@@ -77,7 +62,7 @@ pub fn run(
                 locomotion: controller.clone(),
                 sensing,
                 renderer: RendererKind::Cpu,
-                ..EpisodeSpec::new(load.map_or(&TASK, |load| load.task()), seed, Protocol::Agentic)
+                ..EpisodeSpec::new(load.map_or(*TASK, |load| load.task()), seed, Protocol::Agentic)
             };
             trial(&spec.assisted(Assistance::Full), load)
         });

@@ -1,10 +1,10 @@
 //! The facts that an expression may ask for, one row each: its name, what stands in its brackets, what it is, and what the
 //! book says of it. To add one: its row here, and its line in the book's table, which a test holds against this one.
 
-use tandem_sim::Side;
+use tandem_sim::{Side, Vector};
 
 use super::meaning::{Argument, Fact, Measure, Statement};
-use crate::scoring::{nearness, placement};
+use crate::scoring::{Predicate, nearness, placement};
 
 /// A fact that expressions ask for by name.
 #[derive(Debug)]
@@ -135,6 +135,20 @@ pub static FUNCTIONS: &[Function] = &[
         f.facts.turned_rad(f.object(0), f.object(1)).to_degrees().into()
     })
     .help("how far the second object is turned about the vertical against the first, from -180 to 180, positive to the left"),
+    number("ahead_m", TWO_OBJECTS, ANY, |f| f.facts.seen_from_m(f.object(0), f.object(1)).x.into())
+        .help("how far the second object's origin is ahead of the first's, along the first's own x axis"),
+    number("aside_m", TWO_OBJECTS, ANY, |f| f.facts.seen_from_m(f.object(0), f.object(1)).y.into())
+        .help("how far it is to the left, along the first's own y axis"),
+    number("beyond_m", &[Parameter::Object, Parameter::Object, Parameter::Site { of: 1 }], ANY, |f| {
+        let (back, plane_m) = behind(f, 1);
+        (plane_m - f.facts.reach_m(f.object(0), back)).into()
+    })
+    .help("how far all of the first object is beyond a site of the second, along the second's own x axis"),
+    number("robot_beyond_m", &[Parameter::Robot, Parameter::Object, Parameter::Site { of: 1 }], ANY, |f| {
+        let (back, plane_m) = behind(f, 1);
+        (plane_m - f.facts.robot_reach_m(f.robot(0), back)).into()
+    })
+    .help("how far all of the robot is beyond a site of the object, along the object's own x axis"),
     number("sites_apart_m", TWO_SITES, NOT_NEGATIVE, |f| {
         (f.facts.site_m(f.object(0), f.site(1)) - f.facts.site_m(f.object(2), f.site(3))).length().into()
     })
@@ -299,6 +313,13 @@ impl Fact<'_> {
             other => panic!("{other:?} is no list of numbers"),
         }
     }
+}
+
+/// Returns the way back along the x axis of the object at `place`, and how far that way the site named behind it is.
+fn behind(f: &Fact, place: usize) -> (Vector, f32) {
+    let object = f.object(place);
+    let back = f.facts.object(object).pose_in_world.rotation * Vector::NEG_X;
+    (back, f.facts.site_m(object, f.site(place + 1)).dot(back))
 }
 
 fn come(value: f64, from_value: f64, to_value: f64) -> f64 {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tandem_sim::Side;
 
 use super::syntax::{Arithmetic, Relation};
-use crate::scoring::{Facts, nearness};
+use crate::scoring::{Facts, Predicate, nearness};
 
 /// An expression of either kind.
 #[derive(Clone, Debug)]
@@ -78,8 +78,8 @@ pub enum Argument {
     Truth(Arc<Truth>),
 }
 
-impl Truth {
-    pub fn holds(&self, facts: &Facts) -> bool {
+impl Predicate for Truth {
+    fn holds(&self, facts: &Facts) -> bool {
         match self {
             Truth::Always(holds) => *holds,
             Truth::Not(inner) => !inner.holds(facts),
@@ -93,7 +93,9 @@ impl Truth {
             Truth::Fact { statement, arguments } => (statement.holds)(&Fact { facts, arguments }),
         }
     }
+}
 
+impl Truth {
     /// How near it is to holding, from 0 to 1: the mean of its parts, where hands that come to an object count as they come.
     pub fn nearness(&self, facts: &Facts) -> f32 {
         match self {

@@ -1,7 +1,7 @@
 //! Conditions as somebody writes them, right and wrong.
 
 use super::*;
-use crate::scoring::{A, Facts, Grip};
+use crate::scoring::{A, Facts, Grip, Predicate};
 use crate::tasks;
 
 /// The objects of Handover, which two robots stand at.

@@ -183,7 +183,7 @@ pub fn default_folder(plan: &EvaluationPlan, name: Option<&str>, runs: &Path) ->
 const BUILT_IN: &str = "built in";
 
 fn words(spec: &EpisodeSpec) -> String {
-    let file = spec.task.file.as_ref().map(|file| format!("{} {}", file.source.name, file.xxh3));
+    let file = spec.task.file_xxh3().map(|xxh3| format!("{} {xxh3}", spec.task.source.name));
     let instructions = spec.instructions.as_ref().map(|words| format!("instructions {}", words.xxh3));
     let own: Vec<String> = file.into_iter().chain(instructions).collect();
     if own.is_empty() { BUILT_IN.into() } else { own.join(", ") }

@@ -164,7 +164,7 @@ mod tests {
     fn every_player_can_be_made_for_every_task_or_says_for_which() {
         for entry in ALL {
             assert_eq!(find(entry.name).unwrap().name, entry.name);
-            for task in tasks::ALL {
+            for &task in tasks::cohub() {
                 let spec = EpisodeSpec::new(task, 0, Protocol::Agentic);
                 let solved = experts::solved().any(|solved| solved == task);
                 match entry.check(&spec) {

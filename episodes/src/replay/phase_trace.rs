@@ -4,7 +4,7 @@ use tandem_sim::CONTROL_HZ;
 
 use crate::conditions::ConditionPart;
 use crate::recording::{Recording, RecordingError};
-use crate::scoring::{Condition, Done, Facts, Milestone, Phase, StepScore};
+use crate::scoring::{Facts, Phase, Predicate, StepScore};
 use crate::tasks::{PhaseCondition, PhaseSetting};
 
 /// The first phase that an episode did not reach, over the steps in which it was next.
@@ -32,8 +32,6 @@ pub struct Moment<T> {
 #[derive(Debug)]
 pub struct ConditionTrace {
     pub setting: PhaseSetting,
-    /// Name of its function, of a task in Rust; such a condition has no parts.
-    pub function: Option<&'static str>,
     /// How long it has to hold without a break.
     pub for_s: f64,
     /// All of its parts at once.
@@ -106,10 +104,7 @@ impl PhaseTrace {
         let reached = recording.phases()?;
         let Some(phase) = task.phases.get(reached.len()) else { return Ok(None) };
         let since_s = reached.last().map_or(f64::NEG_INFINITY, |last| last.time_s);
-        let asked: Vec<Asked> = match &task.file {
-            Some(file) => file.conditions[reached.len()].iter().map(Asked::InFile).collect(),
-            None => functions(&phase.done),
-        };
+        let asked = &task.conditions[reached.len()];
         let mut trace = PhaseTrace {
             number: Phase::number(reached.len()),
             id: phase.id,
@@ -121,13 +116,13 @@ impl PhaseTrace {
         };
         recording.score_with(|StepScore { facts, .. }| {
             if facts.time_s >= since_s {
-                trace.look(phase, &asked, facts);
+                trace.look(phase, asked, facts);
             }
         })?;
         Ok(Some(trace))
     }
 
-    fn look(&mut self, phase: &Phase, asked: &[Asked], facts: &Facts) {
+    fn look(&mut self, phase: &Phase, asked: &[PhaseCondition], facts: &Facts) {
         let time_s = facts.time_s;
         (self.from_s, self.to_s) = (self.from_s.min(time_s), time_s);
         let best = (phase.nearness)(facts);
@@ -138,62 +133,25 @@ impl PhaseTrace {
     }
 }
 
-/// A condition of the phase.
-enum Asked<'a> {
-    InFile(&'a PhaseCondition),
-    InRust { setting: PhaseSetting, condition: Condition, for_s: f64 },
-}
-
-/// The conditions of a phase in Rust.
-fn functions<'a>(done: &Done) -> Vec<Asked<'a>> {
-    let lasting = |setting, condition, for_s| Asked::InRust { setting, condition, for_s };
-    let now = |setting, condition| lasting(setting, condition, 0.0);
-    match *done {
-        Done::When(condition) => vec![now(PhaseSetting::Done, condition)],
-        Done::Sequence { first, then, broken } => vec![
-            now(PhaseSetting::First, first),
-            now(PhaseSetting::Then, then),
-            now(PhaseSetting::Broken, broken),
-        ],
-        Done::Lasting { condition, for_s, at_end } => {
-            vec![lasting(PhaseSetting::Lasting, condition, for_s), now(PhaseSetting::AtEnd, at_end)]
-        }
-        Done::Milestones(milestones) => {
-            let milestone = |one: &Milestone| lasting(PhaseSetting::Milestone, one.condition, one.for_s);
-            milestones.iter().map(milestone).collect()
-        }
-        Done::Unless { spoiled, done } => {
-            std::iter::once(now(PhaseSetting::Spoiled, spoiled)).chain(functions(done)).collect()
-        }
-    }
-}
-
 impl ConditionTrace {
-    fn begin(asked: &Asked) -> ConditionTrace {
+    fn begin(asked: &PhaseCondition) -> ConditionTrace {
         let part = |(place, part): &([usize; 2], ConditionPart)| PartTrace {
             place: *place,
             text: part.text.clone(),
             held: Held::default(),
             nearest: None,
         };
-        let (setting, function, for_s, parts) = match asked {
-            Asked::InFile(asked) => {
-                (asked.setting, None, asked.for_s, asked.parts.iter().map(part).collect())
-            }
-            Asked::InRust { setting, condition, for_s } => {
-                (*setting, Some(condition.name()), *for_s, Vec::new())
-            }
-        };
-        let most_at_once = Moment { best: 0, time_s: 0.0 };
-        ConditionTrace { setting, function, for_s, held: Held::default(), parts, most_at_once }
+        ConditionTrace {
+            setting: asked.setting,
+            for_s: asked.for_s,
+            held: Held::default(),
+            parts: asked.parts.iter().map(part).collect(),
+            most_at_once: Moment { best: 0, time_s: 0.0 },
+        }
     }
 
-    fn look(&mut self, asked: &Asked, facts: &Facts) {
+    fn look(&mut self, asked: &PhaseCondition, facts: &Facts) {
         let time_s = facts.time_s;
-        let asked = match asked {
-            Asked::InFile(asked) => asked,
-            Asked::InRust { condition, .. } => return self.held.take(condition(facts), time_s),
-        };
         self.held.take(asked.truth.holds(facts), time_s);
         let mut best = 0;
         for (trace, (_, part)) in self.parts.iter_mut().zip(&asked.parts) {

@@ -46,18 +46,6 @@ pub fn grips(f: &Facts, robots: &[usize], object: &str) -> f32 {
     all(&robots.iter().map(nearer).collect::<Vec<_>>())
 }
 
-/// The mean of how far hands have come to holding an object and of what they then do with it, which counts in hands that hold it
-/// alone: a knock lifts and tilts objects, too.
-pub fn in_hands(held_share: f32, values: &[f32]) -> f32 {
-    let counted = is(held_share >= 1.0);
-    (held_share + counted * values.iter().sum::<f32>()) / (1 + values.len()) as f32
-}
-
-/// How far `object` has come, from `from_m` away, to being within `within_m` of `target` on the floor's plane.
-pub fn beside(f: &Facts, object: &str, target: &str, [from_m, within_m]: [f32; 2]) -> f32 {
-    come(f.apart_m(object, target), from_m, within_m)
-}
-
 /// How far `object` has come to standing upright and still with every robot off it.
 pub fn standing(f: &Facts, object: &str) -> f32 {
     let is_still = f.speed_m_s(object) <= STILL_M_S && f.turn_rate_rad_s(object) <= STILL_RAD_S;
@@ -112,8 +100,6 @@ mod tests {
 
     #[test]
     fn what_is_lifted_counts_in_hands_that_hold_it() {
-        assert_eq!([0.0, TOUCHING, 1.0].map(|held| in_hands(held, &[1.0])), [0.0, 0.5 * TOUCHING, 1.0]);
-        assert_eq!(in_hands(1.0, &[0.5, 0.0]), 0.5);
         let handover = tasks::find("handover").unwrap();
         let nearness = |f: &Facts| (handover.phases[0].nearness)(f);
         let touched = Facts::at_rest(handover).grip(A, Right, "bottle", Grip::Touching);
@@ -136,7 +122,7 @@ mod tests {
 
     #[test]
     fn every_phase_says_how_near_it_is() {
-        for task in tasks::ALL {
+        for &task in tasks::cohub() {
             let rest = Facts::at_rest(task);
             for phase in task.phases {
                 let nearness = (phase.nearness)(&rest);

@@ -127,8 +127,7 @@ fn own_spec(task: &Task, seed: u32, spread: Spread) -> Result<WorldSpec, SimErro
 
 /// The scene that a task's file brings, if it does.
 fn scene_of_file(task: &Task) -> Option<Result<Document, SimError>> {
-    let mjcf = task.file.as_ref()?.scene_mjcf?;
-    Some(Document::parse_alone(task.scene, mjcf))
+    task.scene_mjcf.map(|mjcf| Document::parse_alone(task.scene, mjcf))
 }
 
 /// Puts a task into another scene. The scene is moved, so that its site `task` is at the origin; tasks and experts keep their numbers.

@@ -7,8 +7,7 @@ use std::sync::OnceLock;
 use serde::Deserialize;
 
 use super::StressLevel;
-use crate::task_file::tandem_plus;
-use crate::tasks::{Task, TaskWords};
+use crate::tasks::{Task, TaskWords, tandem_plus};
 
 /// The re-wordings of one task, by level.
 #[derive(Deserialize)]
@@ -31,8 +30,8 @@ pub fn reworded_tasks() -> impl Iterator<Item = &'static str> {
 
 /// A task in other words: those of its file, or those that are kept of the benchmark's; `None` where nobody has worded it in others.
 pub fn reworded(task: &Task, level: StressLevel) -> Option<TaskWords> {
-    if let Some(file) = &task.file {
-        return file.rewordings.as_ref().map(|levels| level.of(levels.each_ref()).clone());
+    if !task.is_benchmark() {
+        return task.rewordings.as_ref().map(|levels| level.of(levels.each_ref()).clone());
     }
     let Rewording { joint, robots } = rewordings().get(task.id)?;
     let of = |texts: &[String; 3]| level.of(texts.each_ref()).clone();
@@ -64,7 +63,7 @@ mod tests {
 
     #[test]
     fn every_role_of_every_task_has_words_that_are_ever_less_its_own() {
-        for task in tasks::ALL.iter().chain(tandem_plus().iter().copied()) {
+        for task in tasks::built_in() {
             let own = TaskWords::of(task);
             let levels = StressLevel::ALL.map(|level| reworded(task, level).expect(task.id));
             let texts = |words: &TaskWords| [vec![words.joint.clone()], words.robots.clone()].concat();

@@ -188,7 +188,7 @@ impl TaskCheck {
 
     /// Notes what a robot's operator reads of what the seed chooses though its own instruction holds that back.
     fn note_secrets(&mut self, task: &Task) {
-        let Some(ways) = task.file.as_ref().and_then(|file| file.variants.get()) else { return };
+        let Some(ways) = task.variants.get() else { return };
         let chosen =
             |text: &dyn Fn(&'static Task) -> &'static str| ways.iter().any(|way| text(way) != text(ways[0]));
         let (told, kept): (Vec<usize>, Vec<usize>) =
@@ -198,7 +198,7 @@ impl TaskCheck {
         }
         let names: Vec<&str> = kept.iter().map(|robot| task.robots[*robot].name).collect();
         let who = names.join(" and ");
-        if chosen(&|way| way.shared_instruction().unwrap_or(way.instruction)) {
+        if chosen(&|way| way.shared_instruction.unwrap_or(way.instruction)) {
             self.notes.push(format!(
                 "what the seed chooses is not in the own instruction of {who}, but an operator of that robot alone reads it in the \
                  joint one; give shared_instruction without it"
@@ -219,7 +219,7 @@ impl TaskCheck {
 
     /// Notes re-wordings that tell other robots than the task's own words what the seed chooses.
     fn note_rewordings(&mut self, ways: &[&'static Task], [told, kept]: [&[usize]; 2]) {
-        let words = |way: &'static Task| way.file.as_ref().and_then(|file| file.rewordings.as_ref());
+        let words = |way: &'static Task| way.rewordings.as_ref();
         let levels = words(ways[0]).map_or(0, |levels| levels.len());
         for level in 0..levels {
             let chosen = |text: &dyn Fn(&'static TaskWords) -> &'static str| {
@@ -271,11 +271,13 @@ impl TaskCheck {
 /// Whether a phase would be reached at once, were it next.
 fn holds(done: &Done, facts: &Facts) -> bool {
     match done {
-        Done::When(condition) => condition(facts),
-        Done::Sequence { first, then, .. } => first(facts) && then(facts),
-        Done::Lasting { condition, at_end, .. } => condition(facts) && at_end(facts),
-        Done::Milestones(milestones) => milestones.iter().all(|milestone| (milestone.condition)(facts)),
-        Done::Unless { spoiled, done } => !spoiled(facts) && holds(done, facts),
+        Done::When(condition) => condition.holds(facts),
+        Done::Sequence { first, then, .. } => first.holds(facts) && then.holds(facts),
+        Done::Lasting { condition, at_end, .. } => {
+            condition.holds(facts) && at_end.as_ref().is_none_or(|at_end| at_end.holds(facts))
+        }
+        Done::Milestones(milestones) => milestones.iter().all(|milestone| milestone.condition.holds(facts)),
+        Done::Unless { spoiled, done } => !spoiled.holds(facts) && holds(done, facts),
     }
 }
 

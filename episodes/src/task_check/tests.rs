@@ -1,8 +1,8 @@
 //! Tasks that stand, fall, and are done by nobody.
 
 use super::*;
-use crate::task_file::task_of;
 use crate::tasks::TaskSource;
+use crate::tasks::task_of;
 
 /// A box on the floor, one robot, and phases of these conditions.
 fn task(z_m: f32, conditions: [&str; 2]) -> &'static Task {
@@ -62,7 +62,7 @@ fn what_falls_is_named() {
 fn what_is_in_a_robots_way_is_named() {
     let table = r#"<mujoco><worldbody><geom type="plane" size="5 5 1"/>
         <geom type="box" size="0.3 0.3 0.02" pos="0.25 0 0.7"/></worldbody></mujoco>"#;
-    let mut source = task(0.05, [LIFTED, LIFTED]).file.as_ref().unwrap().source.clone();
+    let mut source = task(0.05, [LIFTED, LIFTED]).source.clone();
     source.text = source.text.replace("scene = \"floor\"", &format!("scene_mjcf = '''{table}'''"));
     let check = check_task(task_of(source).unwrap(), &[0], None).unwrap();
     let told = check.falls.iter().find(|line| line.contains("robot A")).expect("it stands in a table");

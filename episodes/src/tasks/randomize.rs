@@ -97,19 +97,6 @@ impl Offset {
     }
 }
 
-/// An offset of up to `x_m` and `y_m` either way along world x and y, independently.
-pub const fn uniform_xy(objects: &'static [&'static str], x_m: f32, y_m: f32) -> Offset {
-    Offset {
-        objects,
-        x_m: -x_m..=x_m,
-        y_m: -y_m..=y_m,
-        z_m: 0.0..=0.0,
-        yaw_rad: 0.0..=0.0,
-        wider_yaw_rad: 0.0,
-        on_wall: false,
-    }
-}
-
 impl Task {
     /// Where every object starts under `seed`, in the order of [`Task::objects`]: world position in metres, and yaw.
     pub fn start_poses(&self, seed: u32, spread: Spread) -> Vec<StartPose> {
@@ -157,11 +144,11 @@ pub struct StartPose {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tasks::ALL;
+    use crate::tasks::cohub;
 
     #[test]
     fn offsets_fill_their_ranges_and_stay_inside() {
-        for task in ALL {
+        for task in cohub() {
             let start_poses: Vec<_> = (0..400).map(|seed| task.start_poses(seed, Spread::Single)).collect();
             for (index, spot) in task.objects.iter().enumerate() {
                 let own: Vec<_> =
@@ -196,7 +183,7 @@ mod tests {
 
     #[test]
     fn a_seed_always_means_the_same_start_and_seeds_differ() {
-        for task in ALL {
+        for task in cohub() {
             for spread in Spread::ALL {
                 assert_eq!(task.start_poses(7, spread), task.start_poses(7, spread));
                 assert_ne!(task.start_poses(7, spread), task.start_poses(8, spread));
@@ -207,7 +194,7 @@ mod tests {
     /// What a place of the list of tasks was before there was a spread: the four numbers of each offset drawn and added.
     #[test]
     fn a_spread_of_one_is_what_the_benchmark_has_bit_for_bit() {
-        for task in ALL {
+        for task in cohub() {
             for seed in [0, 7, 2000, u32::MAX] {
                 let mut random = SplitMix64(seed.into());
                 let mut expected: Vec<[f32; 4]> = task
@@ -236,7 +223,7 @@ mod tests {
 
     #[test]
     fn a_wider_spread_fills_wider_ranges_and_turns_what_goes_together_as_one() {
-        for task in ALL {
+        for task in cohub() {
             let farthest = |spread: Spread| {
                 let places = (0..400).flat_map(|seed| task.start_poses(seed, spread));
                 let moved = places.zip(task.objects.iter().cycle()).map(|(start, spot)| {

@@ -6,7 +6,7 @@ use tandem_tools_spec::Protocol;
 
 #[test]
 fn scenes_settle_within_a_second_and_start_again_bit_for_bit() {
-    for task in tasks::ALL {
+    for &task in tasks::cohub() {
         // This protocol has no initial hold.
         let [mut session, mut again] = [(); 2].map(|()| start(task.id, 1, Protocol::Benchmark));
         assert_eq!(session.state_hash(), again.state_hash(), "{}", task.id);
@@ -22,7 +22,7 @@ fn scenes_settle_within_a_second_and_start_again_bit_for_bit() {
 
 /// Does nothing in every task: objects move less than `drift_m`, nobody falls, no phase is reached.
 fn idle(wait_s: u32, drift_m: f32) {
-    for task in tasks::ALL {
+    for &task in tasks::cohub() {
         let mut session = start(task.id, 1, Protocol::Agentic);
         let before = session.facts();
         (0..2 * wait_s).for_each(|_| drop(wait(&mut session, 25)));

@@ -35,7 +35,7 @@ fn demonstration(task: &str, folder: &Path) -> Option<PathBuf> {
 
 #[test]
 fn every_task_is_verified_and_goes_on_where_each_phase_begins() {
-    for task in tasks::ALL {
+    for &task in tasks::cohub() {
         let folder = tempfile::tempdir().unwrap();
         let Some(recording) = demonstration(task.id, folder.path()) else { continue };
         let found = verified(&recording);

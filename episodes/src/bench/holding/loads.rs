@@ -95,7 +95,7 @@ impl SharedLoad {
     /// Returns the task in which the object is carried.
     pub(in crate::bench) fn task(&self) -> &'static Task {
         let has_it = |task: &&'static Task| task.objects.iter().any(|spot| spot.name == self.object);
-        tasks::ALL.iter().find(has_it).unwrap_or(&carrying::TASK)
+        tasks::cohub().iter().copied().find(has_it).unwrap_or(*carrying::TASK)
     }
 
     /// Number of robots that hold it.

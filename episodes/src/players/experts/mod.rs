@@ -20,8 +20,7 @@ mod trash_collection;
 
 use super::{PlayerError, PrivilegedEpisode, PrivilegedPlayer};
 use crate::spec::EpisodeSpec;
-use crate::task_file::task_set;
-use crate::tasks::{self, ObjectSpot, Task};
+use crate::tasks::{self, ObjectSpot, Task, TaskSet};
 use skills::{Commander, Variety};
 
 /// What tells the seed of guesses from the episode's own.
@@ -45,7 +44,7 @@ const ALL: &[(&str, ExpertScript)] = &[
 
 /// The tasks of the benchmark that have an expert, in their order.
 pub fn solved() -> impl Iterator<Item = &'static Task> {
-    tasks::ALL.iter().filter(|task| Expert::of(task).is_ok())
+    tasks::cohub().iter().copied().filter(|task| Expert::of(task).is_ok())
 }
 
 /// The script of one task.
@@ -76,7 +75,7 @@ pub fn solves(task: &'static Task) -> bool {
 
 /// Whether the robots and objects that an expert asks for by name are those of the program's own task.
 fn has_what_it_needs(task: &Task) -> bool {
-    let Ok(own) = task_set(Vec::new()).find(task.id) else { return false };
+    let Ok(own) = TaskSet::default().find(task.id) else { return false };
     let has = |spot: &ObjectSpot| {
         let same = |other: &ObjectSpot| other.name == spot.name && other.source() == spot.source();
         task.objects.iter().any(same)

@@ -363,7 +363,8 @@ fn reasons(episodes: &[&PlayedEpisode]) -> Vec<FailureReason> {
             }),
         }
     }
-    let rank = |reason: &FailureReason| tasks::ALL.iter().position(|task| task.id == reason.task);
+    let rank =
+        |reason: &FailureReason| tasks::cohub().iter().copied().position(|task| task.id == reason.task);
     reasons.sort_by_key(|reason| (rank(reason), reason.phase.clone()));
     reasons
 }
@@ -409,7 +410,9 @@ fn excluded(episodes: &[&PlayedEpisode]) -> Vec<ExcludedEpisodes> {
             None => listed.push(ExcludedEpisodes { task, what, why, seeds: vec![seed] }),
         }
     }
-    listed.sort_by_key(|entry| (tasks::ALL.iter().position(|task| task.id == entry.task), entry.what));
+    listed.sort_by_key(|entry| {
+        (tasks::cohub().iter().copied().position(|task| task.id == entry.task), entry.what)
+    });
     listed
 }
 

@@ -303,7 +303,7 @@ fn task_table(report: &StressReport) -> Table {
 /// A line for each rate of each task, as the CSV's other lines are.
 pub fn csv_lines(report: &StressReport, quoted: &dyn Fn(&str) -> String) -> Vec<String> {
     let line = |row: &StressRow| {
-        let task = tasks::ALL.iter().find(|task| Some(task.id) == row.task)?;
+        let task = tasks::cohub().iter().copied().find(|task| Some(task.id) == row.task)?;
         let last = task.phases.len() - 1;
         let Rate { successes, trials, share, interval_share: [low_share, high_share] } = row.rate;
         let of = format!("{},{},{},{}", quoted(&report.policy), report.protocol, task.id, task.robots.len());

@@ -1,33 +1,32 @@
 //! Which phases have been reached, and when. A phase is looked at only once its predecessors have been reached.
 
-use std::any::type_name;
 use std::fmt;
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
 use super::Facts;
 
-/// Something that holds at a control step, or does not: a function of a task in Rust, or what a task's file says.
-pub type Condition = &'static dyn Predicate;
+/// Something that holds at a control step, or does not.
+pub type Condition = Arc<dyn Predicate>;
 
-/// A function of a control step.
-pub trait Predicate: Fn(&Facts) -> bool + Sync {
-    /// Returns the function's name in the source, for example `grasped_and_lifted`.
-    fn name(&self) -> &'static str;
+/// An expression over the facts of a control step.
+pub trait Predicate: Send + Sync {
+    /// Returns whether it holds at this control step.
+    fn holds(&self, facts: &Facts) -> bool;
 }
 
-impl<F: Fn(&Facts) -> bool + Sync> Predicate for F {
-    fn name(&self) -> &'static str {
-        let path = type_name::<F>();
-        path.rsplit("::").next().unwrap_or(path)
+impl<F: Fn(&Facts) -> bool + Send + Sync> Predicate for F {
+    fn holds(&self, facts: &Facts) -> bool {
+        self(facts)
     }
 }
 
-/// How far something has come, from 0 to 1.
-pub type Nearness = &'static (dyn Fn(&Facts) -> f32 + Sync);
+/// Returns how far something has come, from 0 to 1.
+pub type Nearness = Arc<dyn Fn(&Facts) -> f32 + Send + Sync>;
 
 /// One scored phase.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct Phase {
     pub id: &'static str,
     /// When the phase counts as reached, for people and policies.
@@ -41,21 +40,22 @@ pub struct Phase {
 }
 
 /// When a phase is reached. Conditions see one control step at a time; what has to happen in sequence says so here.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub enum Done {
     /// It is reached as soon as the condition holds.
     When(Condition),
     /// It is reached when `then` holds after `first` held; a step at which `broken` holds in between asks for `first` again.
-    Sequence { first: Condition, then: Condition, broken: Condition },
+    Sequence { first: Condition, then: Condition, broken: Option<Condition> },
     /// It is reached when `condition` has held without a break for `for_s`, and `at_end` holds then too.
-    Lasting { condition: Condition, for_s: f64, at_end: Condition },
+    Lasting { condition: Condition, for_s: f64, at_end: Option<Condition> },
     /// It is reached when every one of these has been passed, in any order.
-    Milestones(&'static [Milestone]),
+    Milestones(Vec<Milestone>),
     /// It is reached as `done` says, unless `spoiled` has held at any step since the phase before was reached.
-    Unless { spoiled: Condition, done: &'static Done },
+    Unless { spoiled: Condition, done: Box<Done> },
 }
 
 /// One of several things that have to happen once.
+#[derive(Clone)]
 pub struct Milestone {
     pub condition: Condition,
     /// How long it has to hold without a break.
@@ -167,23 +167,26 @@ impl PhaseTracker {
 impl PhaseMemory {
     fn is_done(&mut self, done: &Done, facts: &Facts) -> bool {
         match done {
-            Done::When(condition) => condition(facts),
+            Done::When(condition) => condition.holds(facts),
             Done::Sequence { first, then, broken } => {
-                self.underway = (self.underway && !broken(facts)) || first(facts);
-                self.underway && then(facts)
+                let breaks = broken.as_ref().is_some_and(|broken| broken.holds(facts));
+                self.underway = (self.underway && !breaks) || first.holds(facts);
+                self.underway && then.holds(facts)
             }
             Done::Lasting { condition, for_s, at_end } => {
-                lasted(&mut self.since_s, *condition, *for_s, facts) && at_end(facts)
+                lasted(&mut self.since_s, condition, *for_s, facts)
+                    && at_end.as_ref().is_none_or(|at_end| at_end.holds(facts))
             }
             Done::Milestones(milestones) => {
                 self.milestones.resize(milestones.len(), MilestoneMemory::default());
                 for (milestone, memory) in milestones.iter().zip(&mut self.milestones) {
-                    memory.passed |= lasted(&mut memory.since_s, milestone.condition, milestone.for_s, facts);
+                    memory.passed |=
+                        lasted(&mut memory.since_s, &milestone.condition, milestone.for_s, facts);
                 }
                 self.milestones.iter().all(|memory| memory.passed)
             }
             Done::Unless { spoiled, done } => {
-                self.spoiled |= spoiled(facts);
+                self.spoiled |= spoiled.holds(facts);
                 !self.spoiled && self.is_done(done, facts)
             }
         }
@@ -191,8 +194,8 @@ impl PhaseMemory {
 }
 
 /// Whether `condition` has held without a break for `for_s`; `since_s` remembers since when.
-fn lasted(since_s: &mut Option<f64>, condition: Condition, for_s: f64, facts: &Facts) -> bool {
-    *since_s = condition(facts).then(|| since_s.unwrap_or(facts.time_s));
+fn lasted(since_s: &mut Option<f64>, condition: &Condition, for_s: f64, facts: &Facts) -> bool {
+    *since_s = condition.holds(facts).then(|| since_s.unwrap_or(facts.time_s));
     // Times are sums of control steps; half of one keeps rounding out.
     since_s.is_some_and(|since_s| facts.time_s - since_s >= for_s - HALF_STEP_S)
 }

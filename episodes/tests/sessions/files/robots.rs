@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use tandem_episodes::{
-    EpisodeError, EpisodeSpec, RobotError, RobotFile, Session, read_task, tandem_plus,
+    EpisodeError, EpisodeSpec, RobotError, RobotFile, Session, read_task,
     tasks::{self, Task},
 };
 use tandem_tools_spec::{CheckReach, LookReply, MoveWrists, Protocol, ToolReply, WristMove};
@@ -62,7 +62,7 @@ fn a_described_robot_reaches_and_results_name_it() {
 
 #[test]
 fn tasks_that_need_fingers_are_refused_with_one_that_does_not() {
-    for task in tasks::ALL.iter().chain(tandem_plus().iter().copied()) {
+    for task in tasks::built_in() {
         let error = Session::start(&spec(task), None).map(|_| ()).expect_err("no fingers");
         assert!(matches!(error, EpisodeError::Robot(_)), "{error:?}");
         let text = error.to_string();

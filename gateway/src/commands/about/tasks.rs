@@ -6,7 +6,8 @@ use std::{
     process::ExitCode,
 };
 
-use tandem_episodes::{BodyScale, LocomotionChoice, check_task, create_private_folder, read_task, task_set};
+use tandem_episodes::tasks::TaskSet;
+use tandem_episodes::{BodyScale, LocomotionChoice, check_task, create_private_folder, read_task};
 use tandem_tools_spec::TaskList;
 
 use crate::commands::{CommandResult, Seeds, print};
@@ -48,7 +49,7 @@ pub fn run(args: TasksArgs) -> CommandResult {
         return check(args);
     }
     let limits = LocomotionChoice::default().limits(&BodyScale::G1);
-    let list = tandem_episodes::task_list(&task_set(Vec::new()), None, &limits);
+    let list = tandem_episodes::task_list(&TaskSet::default(), None, &limits);
     let text = match args.json {
         true => serde_json::to_string_pretty(&list)? + "\n",
         false => told(&list),
@@ -61,7 +62,7 @@ pub fn run(args: TasksArgs) -> CommandResult {
 fn check(args: CheckArgs) -> CommandResult {
     let task = read_task(&args.file)?;
     let own = tandem_episodes::task_list(
-        &task_set(vec![task]),
+        &TaskSet::with_files(vec![task]),
         None,
         &LocomotionChoice::default().limits(&BodyScale::G1),
     );

@@ -7,8 +7,8 @@ use tandem_episodes::{
     EpisodeError, Instructions, TANDEM_PLUS, Variation,
     evaluation::{EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts},
     players::Policy,
-    tandem_plus, task_set,
-    tasks::{self, Spread, Task},
+    tandem_plus,
+    tasks::{self, Spread, Task, TaskSet},
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 
@@ -64,10 +64,10 @@ struct TaskList(Vec<&'static Task>);
 /// The built-in tasks that `text` names: `all` of the benchmark's, those of a suite, or ids separated by commas.
 fn parse_tasks(text: &str) -> Result<TaskList, String> {
     let found: Result<_, _> = match text {
-        "all" => Ok(tasks::ALL.iter().collect()),
+        "all" => Ok(tasks::cohub().to_vec()),
         TANDEM_PLUS => Ok(tandem_plus().to_vec()),
         ids => {
-            let known = task_set(Vec::new());
+            let known = TaskSet::default();
             ids.split(',').map(|id| known.find(id.trim())).collect()
         }
     };
@@ -80,7 +80,7 @@ fn parse_tasks(text: &str) -> Result<TaskList, String> {
 fn played(named: Option<TaskList>, of_files: Vec<&'static Task>) -> Vec<&'static Task> {
     let named = match named {
         Some(TaskList(named)) => named,
-        None if of_files.is_empty() => tasks::ALL.iter().collect(),
+        None if of_files.is_empty() => tasks::cohub().to_vec(),
         None => Vec::new(),
     };
     let replaced = |task: &&'static Task| of_files.iter().any(|other| other.id == task.id);
@@ -97,7 +97,7 @@ impl EpisodeFlags {
         assistance: Assistance,
     ) -> Result<EvaluationPlan<'_>, Box<dyn Error>> {
         let of_files = self.world.read_task_files()?;
-        let known = task_set(of_files.clone());
+        let known = TaskSet::with_files(of_files.clone());
         let instructions = self.instructions.as_deref().map(|path| Instructions::read(path, &known));
         let tasks = played(self.tasks, of_files);
         let robot = self.world.read_robot()?;

@@ -13,10 +13,7 @@ pub fn told(recording: &Recording) -> Result<String, Box<dyn std::error::Error>>
     let mut told = format!(
         "  {number} {id} was next from {from_s:.2} s to {to_s:.2} s and not reached; it came to {best:.2} of 1, at {time_s:.2} s\n"
     );
-    match &recording.spec.task.file {
-        None => writeln!(told, "  {description}\n  its functions:")?,
-        Some(file) => writeln!(told, "  {} asks for:", file.source.name)?,
-    }
+    writeln!(told, "  {description}\n  {} asks for:", recording.spec.task.source.name)?;
     let rows: Vec<[String; 4]> = conditions.iter().flat_map(rows).collect();
     let widths: [usize; 3] =
         std::array::from_fn(|column| rows.iter().map(|row| row[column].len()).max().unwrap_or(0));
@@ -28,14 +25,9 @@ pub fn told(recording: &Recording) -> Result<String, Box<dyn std::error::Error>>
     Ok(told)
 }
 
-/// Returns a row for each part of a condition, and one for all of them at once: place, setting, when it held, text. A
-/// condition in Rust has one row, which begins with its function's name.
+/// Returns a row for each part of a condition, and one for all of them at once: place, setting, when it held, text.
 fn rows(condition: &ConditionTrace) -> Vec<[String; 4]> {
-    let ConditionTrace { setting, function, for_s, held, parts, most_at_once } = condition;
-    if let Some(name) = function {
-        let told = held_told(held, "") + &without_break(held, *for_s);
-        return vec![[(*name).into(), setting.name().into(), told, String::new()]];
-    }
+    let ConditionTrace { setting, for_s, held, parts, most_at_once } = condition;
     let part = |(index, part): (usize, &PartTrace)| {
         let [line, column] = part.place;
         let setting = if index == 0 { setting.name() } else { "" };

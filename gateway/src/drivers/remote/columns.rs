@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use tandem_episodes::{
-    joint_names, tandem_plus,
+    joint_names,
     tasks::{self, Task},
 };
 use tandem_tools_spec::{ACTION_ROW_LEN, BASE_COLUMNS, ExtraInformation, Pose, RobotState};
@@ -101,8 +101,7 @@ impl EpisodeMoment {
         const SEEDS: u32 = 1_000_000;
         /// The first number that a float does not tell from the next one.
         const END: u32 = 1 << 24;
-        let built_in: Vec<&str> =
-            tasks::ALL.iter().chain(tandem_plus().iter().copied()).map(|known| known.id).collect();
+        let built_in: Vec<&str> = tasks::built_in().map(|known| known.id).collect();
         let own_file = task.file_xxh3().filter(|_| task.suite().is_none());
         match (own_file, built_in.iter().position(|id| *id == task.id)) {
             (None, Some(index)) => (index as u32 + 1) * SEEDS + seed % SEEDS,
@@ -297,14 +296,14 @@ mod tests {
             std::fs::write(&path, text).unwrap();
             read_task(&path).unwrap()
         });
-        let built_in = tasks::ALL.iter().chain(tandem_plus().iter().copied());
+        let built_in = tasks::built_in();
         for task in built_in.chain(own) {
             for seed in [0, 1, 2000, 999_999] {
                 let own = number(task, seed);
                 assert!(own > 0 && (own as f32) as u32 == own && numbers.insert(own), "{own}");
             }
         }
-        assert_eq!(number(&tasks::ALL[1], 42), 2_000_042);
+        assert_eq!(number(tasks::cohub()[1], 42), 2_000_042);
         let columns = state_columns(&names("episode step reset")).unwrap();
         assert_eq!(columns, [STATE_MOMENT, STATE_MOMENT + 1, STATE_MOMENT + 2]);
         assert_eq!(extra_columns(&columns), [], "no sensor of the robot's tells it");

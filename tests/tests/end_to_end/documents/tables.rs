@@ -2,7 +2,6 @@
 
 use clap::{Arg, Command, CommandFactory};
 use tandem::cli::Cli;
-use tandem_episodes::tandem_plus;
 use tandem_episodes::tasks::{self, Task};
 use tandem_tests::TestServer;
 
@@ -13,7 +12,7 @@ const EVERYWHERE: [&str; 2] = ["help", "version"];
 
 #[test]
 fn pages_of_tasks_say_what_tasks_are() {
-    for task in tasks::ALL.iter().chain(tandem_plus().iter().copied()) {
+    for task in tasks::built_in() {
         let folder = if task.suite().is_some() { "tasks/plus" } else { "tasks" };
         let text = page(&format!("{BOOK}/{folder}/{}.md", task.id)).text;
         let expected = expected_of(task);
@@ -31,7 +30,7 @@ fn expected_of(task: &Task) -> Vec<String> {
     });
     let objects = task.objects.iter().filter(|object| object.name == object.file);
     let objects = objects.map(|object| format!("`{}`", object.name));
-    let agentic_steps = task.file.as_ref().map_or(tasks::AGENTIC_STEPS, |file| file.agentic_steps);
+    let agentic_steps = task.agentic_steps;
     let whole = [
         format!("| all robots | {} |", task.instruction),
         format!("{agentic_steps}, of which 300 are the initial hold | {} |", task.benchmark_steps),

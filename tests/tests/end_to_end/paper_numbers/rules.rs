@@ -10,7 +10,7 @@ use super::table::{self, Moves, TASKS};
 
 #[test]
 fn tasks_are_set_as_published() {
-    let ids: Vec<&str> = tasks::ALL.iter().map(|task| task.id).collect();
+    let ids: Vec<&str> = tasks::cohub().iter().copied().map(|task| task.id).collect();
     assert_eq!(ids, TASKS.each_ref().map(|published| published.id));
     for published in &TASKS {
         let task = tasks::find(published.id).unwrap();

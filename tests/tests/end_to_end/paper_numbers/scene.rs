@@ -28,10 +28,14 @@ impl Scene {
         let mut facts = self.start.clone();
         change(&mut facts);
         match &self.task.phases[p - 1].done {
-            Done::When(condition) => condition(&facts),
-            Done::Sequence { then, .. } => then(&facts),
-            Done::Lasting { condition, at_end, .. } => condition(&facts) && at_end(&facts),
-            Done::Milestones(milestones) => milestones.iter().all(|milestone| (milestone.condition)(&facts)),
+            Done::When(condition) => condition.holds(&facts),
+            Done::Sequence { then, .. } => then.holds(&facts),
+            Done::Lasting { condition, at_end, .. } => {
+                condition.holds(&facts) && at_end.as_ref().is_none_or(|at_end| at_end.holds(&facts))
+            }
+            Done::Milestones(milestones) => {
+                milestones.iter().all(|milestone| milestone.condition.holds(&facts))
+            }
             Done::Unless { .. } => panic!("none of the benchmark's phases can be spoiled"),
         }
     }
@@ -43,8 +47,9 @@ impl Scene {
         let Done::Sequence { first, broken, .. } = &self.task.phases[p - 1].done else {
             panic!("p{p} of {} is no sequence", self.task.id)
         };
-        assert_ne!(first(&facts), broken(&facts), "{} p{p}", self.task.id);
-        first(&facts)
+        let is_broken = broken.as_ref().is_some_and(|broken| broken.holds(&facts));
+        assert_ne!(first.holds(&facts), is_broken, "{} p{p}", self.task.id);
+        first.holds(&facts)
     }
 
     /// Checks as [`Scene::threshold`] does, for the beginning of a sequence.

@@ -49,8 +49,8 @@ fn pouring() {
         let in_glass_m = facts.point_m("glass", Vector::new(0.0, 0.0, 0.02));
         changed(facts, "marble").pose_in_world.translation = in_glass_m;
     });
-    let Done::Lasting { for_s, .. } = scene.task.phases[2].done else { panic!("the marble has to stay") };
-    assert_eq!(for_s, table::POURING_INSIDE_S);
+    let Done::Lasting { for_s, .. } = &scene.task.phases[2].done else { panic!("the marble has to stay") };
+    assert_eq!(*for_s, table::POURING_INSIDE_S);
 }
 
 #[test]

@@ -165,7 +165,7 @@ fn move_house() {
         open(facts, angle_rad);
         lift(facts, 0.05);
     });
-    let Done::Milestones(milestones) = scene.task.phases[0].done else { panic!("in either order") };
+    let Done::Milestones(milestones) = &scene.task.phases[0].done else { panic!("in either order") };
     assert_eq!(milestones.iter().map(|milestone| milestone.for_s).fold(0.0, f64::max), table::DOOR_OPEN_S);
     let place = |facts: &mut Facts, beside_m: Vector| put(facts, "console_table", "foot_marks", beside_m);
     for axis in SIDEWAYS {

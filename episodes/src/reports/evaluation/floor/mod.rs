@@ -78,7 +78,7 @@ pub fn floors(groups: &[PolicyGroup], policies: &[PolicyReport]) -> Vec<TaskFloo
         (!players.is_empty()).then_some(TaskFloor { task, departures, players, is_high })
     };
     let mut floors: Vec<TaskFloor> = places.into_iter().filter_map(of_place).collect();
-    floors.sort_by_key(|floor| tasks::ALL.iter().position(|task| task.id == floor.task));
+    floors.sort_by_key(|floor| tasks::cohub().iter().copied().position(|task| task.id == floor.task));
     floors
 }
 

@@ -1,0 +1,394 @@
+//! From a task's table to the task: everything is looked up, and all mistakes are found, not only the first.
+
+use std::ops::RangeInclusive;
+use std::sync::{Arc, OnceLock};
+
+use tandem_sim::mjcf::Document;
+use tandem_sim::{ObjectModel, assets};
+use toml::Spanned;
+
+use super::choices::{ways, with_options};
+use super::error::{Mistakes, TaskFileError};
+use super::phases;
+use super::reading::{Reading, lasting, place_in_file};
+use super::rewordings::in_words;
+use super::table::{Extent, ObjectTable, OffsetTable, RobotTable, TaskTable};
+use crate::conditions::Names;
+use crate::scoring::Phase;
+use crate::tasks::embedded::origin_of;
+use crate::tasks::{ChosenOption, ObjectSpot, Offset, RobotSpot, Task, TaskOrigin, TaskSource};
+
+const ROBOTS: [&str; 3] = ["A", "B", "C"];
+const MOST_OBJECTS: usize = 64;
+const MOST_PHASES: usize = 12;
+/// Robots that begin nearer to each other touch.
+const ROBOTS_APART_M: f64 = 0.35;
+/// Nothing is farther away than this.
+const FARTHEST_M: f64 = 100.0;
+const DEFAULT_BENCHMARK_STEPS: u32 = 1000;
+/// The agentic protocol's of the benchmark.
+const DEFAULT_AGENTIC_STEPS: u32 = 6000;
+const DEFAULT_THINKING_S: u32 = 1800;
+/// Before a policy's first call robots stand still for 300 steps.
+const AGENTIC_STEPS_ALLOWED: RangeInclusive<u32> = 400..=200_000;
+const BENCHMARK_STEPS_ALLOWED: RangeInclusive<u32> = 50..=200_000;
+const THINKING_S_ALLOWED: RangeInclusive<u32> = 1..=1_000_000;
+
+/// The MJCF files that a task's file names.
+pub(super) fn files_beside(source: &TaskSource) -> Result<Vec<String>, TaskFileError> {
+    let table = parse(source)?;
+    let named = table.scene.into_iter().chain(table.objects.into_iter().filter_map(|object| object.file));
+    Ok(named.map(Spanned::into_inner).filter(|name| is_file(name)).collect())
+}
+
+fn parse(source: &TaskSource) -> Result<TaskTable, TaskFileError> {
+    toml::from_str(&source.text).map_err(|error| {
+        let at = error.span().unwrap_or(0..0);
+        let mistakes = vec![(at, error.message().to_owned())];
+        TaskFileError::Mistakes(Mistakes::new(&source.name, &source.text, mistakes))
+    })
+}
+
+fn is_file(name: &str) -> bool {
+    name.ends_with(".xml")
+}
+
+/// The task that a source says: before anything is chosen, where it has choices, with the others as its variants.
+pub(super) fn task(source: &TaskSource, xxh3: &str) -> Result<&'static Task, TaskFileError> {
+    let table = parse(source)?;
+    let mut reading = Reading::new(source, &[]);
+    let choices = reading.choices(table.choices);
+    reading.checked()?;
+    let variants = Arc::new(OnceLock::new());
+    let made: Vec<Task> = ways(&choices)
+        .into_iter()
+        .map(|way| one_way(source, xxh3, way, &variants))
+        .collect::<Result<_, _>>()?;
+    let mut made: Vec<&'static Task> = made.into_iter().map(leaked).collect();
+    if choices.is_empty() {
+        return Ok(made.swap_remove(0));
+    }
+    let with_all = |text: &Spanned<String>| lasting(&with_options(text.as_ref(), &choices));
+    let robots = made[0].robots.iter().zip(table.robots.as_ref());
+    let robots: Vec<RobotSpot> = robots
+        .map(|(spot, table)| RobotSpot { instruction: with_all(&table.instruction), ..*spot })
+        .collect();
+    let phases = made[0].phases.iter().zip(table.phases.as_ref());
+    let phases: Vec<Phase> = phases
+        .map(|(phase, table)| Phase { description: with_all(&table.description), ..phase.clone() })
+        .collect();
+    let undecided = Task {
+        instruction: with_all(&table.instruction),
+        shared_instruction: table.shared_instruction.as_ref().map(with_all),
+        rewordings: table.rewordings.as_ref().and_then(|rewordings| {
+            in_words(rewordings.as_ref(), |text| with_options(text.as_ref(), &choices))
+        }),
+        robots: Vec::leak(robots),
+        phases: Vec::leak(phases),
+        chosen: Vec::new(),
+        ..one_way(source, xxh3, ways(&choices).swap_remove(0), &variants)?
+    };
+    // Nobody else has seen it yet.
+    let _ = variants.set(made);
+    Ok(leaked(undecided))
+}
+
+/// The task where this has been chosen.
+fn one_way(
+    source: &TaskSource,
+    xxh3: &str,
+    chosen: Vec<ChosenOption>,
+    variants: &Arc<OnceLock<Vec<&'static Task>>>,
+) -> Result<Task, TaskFileError> {
+    let mut reading = Reading::new(source, &chosen);
+    let table = parse(&reading.source)?;
+    let read = reading.task(table);
+    reading.checked()?;
+    let Some(task) = read else { return Err(reading.mistakes()) };
+    let (source, variants) = (source.clone(), variants.clone());
+    Ok(Task { origin: origin_of(&source), source, xxh3: xxh3.into(), chosen, variants, ..task })
+}
+
+fn leaked(task: Task) -> &'static Task {
+    Box::leak(Box::new(task))
+}
+
+impl Reading<'_> {
+    /// Returns the task without its source. `None` where it cannot be made.
+    fn task(&mut self, table: TaskTable) -> Option<Task> {
+        self.id(&table.id, "the task");
+        self.words(&table.instruction);
+        table.shared_instruction.iter().for_each(|text| self.words(text));
+        let benchmark_steps =
+            self.within(&table.budget.benchmark_steps, &BENCHMARK_STEPS_ALLOWED, DEFAULT_BENCHMARK_STEPS);
+        let agentic_steps =
+            self.within(&table.budget.agentic_steps, &AGENTIC_STEPS_ALLOWED, DEFAULT_AGENTIC_STEPS);
+        let thinking_s = self.within(&table.budget.thinking_s, &THINKING_S_ALLOWED, DEFAULT_THINKING_S);
+        let scene = self.scene(&table);
+        let robots = self.robots(&table.robots);
+        let mut names =
+            Names { robots: robots.iter().map(|robot| robot.name.to_owned()).collect(), ..Names::default() };
+        let objects = self.objects(&table.objects, &mut names);
+        let randomize = self.offsets(&table.randomize, &objects, &names);
+        if table.phases.as_ref().is_empty() || table.phases.as_ref().len() > MOST_PHASES {
+            self.wrong(table.phases.span(), format!("a task has 1 to {MOST_PHASES} [[phases]]"));
+        }
+        let phases = phases::phases(self, table.terms, table.phases.into_inner(), &mut names);
+        let rewordings = self.rewordings(&table.rewordings, &table.shared_instruction, &robots);
+        let (phases, conditions): (Vec<_>, Vec<_>) = phases.into_iter().unzip();
+        let (scene, scene_mjcf) = scene?;
+        Some(Task {
+            id: lasting(table.id.as_ref()),
+            scene,
+            scene_mjcf,
+            robots: Vec::leak(robots),
+            objects: Vec::leak(objects),
+            randomize: Vec::leak(randomize),
+            instruction: lasting(table.instruction.as_ref()),
+            shared_instruction: table.shared_instruction.as_ref().map(|text| lasting(text.as_ref())),
+            rewordings,
+            benchmark_steps,
+            agentic_steps,
+            thinking_s,
+            phases: Vec::leak(phases),
+            conditions,
+            says_needs_fingers: table.needs_fingers,
+            origin: TaskOrigin::File,
+            source: TaskSource::default(),
+            xxh3: String::new(),
+            chosen: Vec::new(),
+            variants: Arc::default(),
+        })
+    }
+
+    fn within(&mut self, given: &Option<Spanned<u32>>, range: &RangeInclusive<u32>, default: u32) -> u32 {
+        let Some(given) = given else { return default };
+        if !range.contains(given.as_ref()) {
+            let what = format!("this may be {} to {}, as {default}", range.start(), range.end());
+            self.wrong(given.span(), what);
+        }
+        *given.as_ref()
+    }
+
+    /// Numbers that a place or an angle can have.
+    fn finite<T>(&mut self, given: &Spanned<T>, values: &[f64], most_value: f64) {
+        if values.iter().any(|value| !value.is_finite() || value.abs() > most_value) {
+            self.wrong(given.span(), format!("a number here is at most {most_value} either way"));
+        }
+    }
+
+    /// What messages call the scene, and its text if it is not one that the binary carries.
+    fn scene(&mut self, table: &TaskTable) -> Option<(&'static str, Option<&'static str>)> {
+        let (at, (name, mjcf)) = match (&table.scene, &table.scene_mjcf) {
+            (Some(name), None) => (name.span(), self.named(name, assets::scene)?),
+            (None, Some(text)) => (text.span(), self.inline(text)),
+            (Some(_), Some(both)) => {
+                self.wrong(both.span(), "the scene is given twice; give scene or scene_mjcf");
+                return None;
+            }
+            (None, None) => {
+                let have = assets::scene("").err().map(|error| error.to_string()).unwrap_or_default();
+                let have = have.split_once("have: ").map_or("", |(_, have)| have);
+                let what = format!(
+                    "no scene; give scene = \"floor\" above the first [...], or scene = \"my_room.xml\", or scene_mjcf; \
+                     rooms that there are: {have}"
+                );
+                self.wrong(0..0, what);
+                return None;
+            }
+        };
+        if let Some(mjcf) = mjcf
+            && let Err(error) = Document::parse_alone(name, mjcf)
+        {
+            self.wrong_mjcf(at, error.to_string());
+        }
+        Some((name, mjcf))
+    }
+
+    /// What a name of a scene or an object stands for: a file beside the task's, or one that the binary carries.
+    fn named(
+        &mut self,
+        name: &Spanned<String>,
+        embedded: impl Fn(&str) -> Result<&'static str, tandem_sim::SimError>,
+    ) -> Option<(&'static str, Option<&'static str>)> {
+        let text = name.as_ref().as_str();
+        if is_file(text) {
+            return match self.source.beside.get(text) {
+                Some(mjcf) => Some((lasting(text), Some(lasting(mjcf)))),
+                None => {
+                    self.wrong(name.span(), format!("there is no {text} beside the task's file"));
+                    None
+                }
+            };
+        }
+        match embedded(text) {
+            Ok(_) => Some((lasting(text), None)),
+            Err(error) => {
+                let what = format!("{error}; or a file beside this one, whose name ends in .xml");
+                self.wrong(name.span(), what);
+                None
+            }
+        }
+    }
+
+    /// MJCF that stands in the task's file itself. Lines are put before it, so that its mistakes are told by the lines of that.
+    fn inline(&self, text: &Spanned<String>) -> (&'static str, Option<&'static str>) {
+        let mjcf = text.as_ref();
+        let at = place_in_file(&self.source.text, text);
+        let lines = self.source.text[..at].matches('\n').count();
+        let padding = if mjcf.starts_with("<?xml") { 0 } else { lines };
+        (lasting(&self.source.name), Some(String::leak("\n".repeat(padding) + mjcf)))
+    }
+
+    fn robots(&mut self, tables: &Spanned<Vec<RobotTable>>) -> Vec<RobotSpot> {
+        let (span, tables) = (tables.span(), tables.as_ref());
+        let names: Vec<&str> = tables.iter().map(|robot| robot.name.as_ref().as_str()).collect();
+        if tables.is_empty() || tables.len() > ROBOTS.len() || names != ROBOTS[..tables.len()] {
+            let other = tables.iter().zip(ROBOTS).find(|(robot, name)| robot.name.as_ref() != name);
+            let other = other.map(|(robot, _)| robot).or(tables.get(ROBOTS.len()));
+            let at = other.map_or(span, |robot| robot.name.span());
+            let what = format!(
+                "there are 1 to 3 [[robots]], called \"A\", \"B\" and \"C\" in this order; here: {names:?}"
+            );
+            self.wrong(at, what);
+        }
+        for (index, robot) in tables.iter().enumerate() {
+            self.words(&robot.instruction);
+            let [x_m, y_m] = *robot.position_m.as_ref();
+            self.finite(&robot.position_m, &[x_m, y_m], FARTHEST_M);
+            for other in &tables[..index] {
+                let [other_x_m, other_y_m] = *other.position_m.as_ref();
+                if f64::hypot(x_m - other_x_m, y_m - other_y_m) < ROBOTS_APART_M {
+                    let what = format!(
+                        "robots stand at least {ROBOTS_APART_M} m apart; {} is here, too",
+                        other.name.as_ref()
+                    );
+                    self.wrong(robot.position_m.span(), what);
+                }
+            }
+        }
+        // What follows knows robots by the names that they ought to have.
+        let spot = |(robot, name): (&RobotTable, &'static str)| RobotSpot {
+            name,
+            position_m: robot.position_m.as_ref().map(|value| value as f32),
+            yaw_rad: angle_rad(robot.yaw_deg.as_ref()),
+            instruction: lasting(robot.instruction.as_ref()),
+        };
+        tables.iter().zip(ROBOTS).map(spot).collect()
+    }
+
+    fn objects(&mut self, tables: &[ObjectTable], names: &mut Names) -> Vec<ObjectSpot> {
+        let mut found: Vec<ObjectSpot> = Vec::new();
+        if let Some(beyond) = tables.get(MOST_OBJECTS) {
+            self.wrong(beyond.name.span(), format!("a task has at most {MOST_OBJECTS} objects"));
+        }
+        for table in tables.iter().take(MOST_OBJECTS) {
+            self.id(&table.name, "an object");
+            self.finite(&table.position_m, table.position_m.as_ref(), FARTHEST_M);
+            let name = table.name.as_ref().as_str();
+            if found.iter().any(|spot| spot.name == name) {
+                self.wrong(
+                    table.name.span(),
+                    format!("there is an object {name:?} already; give each its own name"),
+                );
+                continue;
+            }
+            let given = match (&table.file, &table.mjcf) {
+                (Some(_), Some(both)) => {
+                    self.wrong(both.span(), "the object is given twice; give file or mjcf");
+                    None
+                }
+                (None, Some(text)) => Some((text.span(), self.inline(text))),
+                (file, None) => {
+                    let file = file.as_ref().unwrap_or(&table.name);
+                    self.named(file, assets::object).map(|named| (file.span(), named))
+                }
+            };
+            let Some((at, (file, mjcf))) = given else {
+                names.mistaken_objects.insert(name.to_owned());
+                continue;
+            };
+            let spot = ObjectSpot {
+                name: lasting(name),
+                file,
+                position_m: table.position_m.as_ref().map(|value| value as f32),
+                yaw_rad: angle_rad(table.yaw_deg.as_ref()),
+                mjcf,
+            };
+            match ObjectModel::parts(&spot.source(), name) {
+                Ok(parts) => {
+                    names.objects.extend(parts.into_iter().map(|part| (part.name, Arc::new(part.model))));
+                }
+                Err(error) => {
+                    self.wrong_mjcf(at, error.to_string());
+                    names.mistaken_objects.insert(name.to_owned());
+                }
+            }
+            found.push(spot);
+        }
+        found
+    }
+
+    fn offsets(&mut self, tables: &[OffsetTable], objects: &[ObjectSpot], names: &Names) -> Vec<Offset> {
+        tables.iter().map(|table| self.offset(table, objects, names)).collect()
+    }
+
+    fn offset(&mut self, table: &OffsetTable, objects: &[ObjectSpot], names: &Names) -> Offset {
+        let mut moved: Vec<&'static str> = Vec::new();
+        for name in table.objects.as_ref() {
+            match objects.iter().find(|spot| spot.name == name.as_ref()) {
+                Some(spot) => moved.push(spot.name),
+                None if names.mistaken_objects.contains(name.as_ref()) => {}
+                None => {
+                    let have: Vec<&str> = objects.iter().map(|spot| spot.name).collect();
+                    let what = format!("no object {:?} to move; have: {}", name.as_ref(), have.join(", "));
+                    self.wrong(name.span(), what);
+                }
+            }
+        }
+        if table.objects.as_ref().is_empty() {
+            self.wrong(table.objects.span(), "this moves nothing; name objects, as [\"bottle\"]");
+        }
+        let mut range = |given: &Option<Spanned<Extent>>, most_value: f64| {
+            let Some(given) = given else { return 0.0..=0.0 };
+            let [from, to] = match *given.as_ref() {
+                Extent::EitherWay(value) => [-value, value],
+                Extent::FromTo(values) => values,
+            };
+            self.finite(given, &[from, to], most_value);
+            if from > to {
+                let what = format!(
+                    "this ends before it begins; give [{to}, {from}], or one number for so much either way"
+                );
+                self.wrong(given.span(), what);
+            }
+            from..=to
+        };
+        let metres = |range: RangeInclusive<f64>| *range.start() as f32..=*range.end() as f32;
+        let [x_m, y_m, z_m] =
+            [&table.x_m, &table.y_m, &table.z_m].map(|given| metres(range(given, FARTHEST_M)));
+        let yaw_deg = range(&table.yaw_deg, 360.0);
+        let wider_deg = table.wider_yaw_deg.as_ref();
+        if let Some(given) = wider_deg {
+            self.finite(given, &[*given.as_ref()], 360.0);
+        }
+        Offset {
+            objects: Vec::leak(moved),
+            x_m,
+            y_m,
+            z_m,
+            yaw_rad: rad(*yaw_deg.start())..=rad(*yaw_deg.end()),
+            wider_yaw_rad: angle_rad(wider_deg),
+            on_wall: table.on_wall,
+        }
+    }
+}
+
+fn angle_rad(given: Option<&Spanned<f64>>) -> f32 {
+    given.map_or(0.0, |given| rad(*given.as_ref()))
+}
+
+/// Degrees, as they are written, in radians.
+fn rad(angle_deg: f64) -> f32 {
+    angle_deg.to_radians() as f32
+}

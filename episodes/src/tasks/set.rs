@@ -1,0 +1,125 @@
+//! The tasks that there are to play: the benchmark's, those of our own suite, and those of files.
+
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
+use super::embedded::{COHUB_FILES, Embedded, TANDEM_PLUS_FILES};
+use super::file::task_of;
+use super::{Task, TaskSource};
+use crate::EpisodeError;
+
+static COHUB: LazyLock<Vec<&'static Task>> = LazyLock::new(|| read(COHUB_FILES));
+static TANDEM_PLUS_TASKS: LazyLock<Vec<&'static Task>> = LazyLock::new(|| read(TANDEM_PLUS_FILES));
+
+fn read(files: &[Embedded]) -> Vec<&'static Task> {
+    let task = |(name, text): &Embedded| {
+        let source = TaskSource { name: (*name).into(), text: (*text).into(), beside: BTreeMap::new() };
+        task_of(source).unwrap_or_else(|error| panic!("a task of the program: {error}"))
+    };
+    files.iter().map(task).collect()
+}
+
+/// Returns the benchmark's ten tasks, in its order.
+pub fn cohub() -> &'static [&'static Task] {
+    &COHUB
+}
+
+/// Returns the tasks of the suite [`TANDEM_PLUS`](super::TANDEM_PLUS).
+pub fn tandem_plus() -> &'static [&'static Task] {
+    &TANDEM_PLUS_TASKS
+}
+
+/// Returns every task that the program carries: the benchmark's, then those of our own suite.
+pub fn built_in() -> impl Iterator<Item = &'static Task> + Clone {
+    cohub().iter().chain(tandem_plus()).copied()
+}
+
+/// The tasks that there are to play: those that the program carries, and those of files.
+#[derive(Clone, Debug, Default)]
+pub struct TaskSet {
+    of_files: Vec<&'static Task>,
+}
+
+impl TaskSet {
+    /// Returns the built-in tasks and those of files. One of a file that has the id of another takes its place.
+    pub fn with_files(of_files: Vec<&'static Task>) -> TaskSet {
+        TaskSet { of_files }
+    }
+
+    /// Returns the first task that a file brings.
+    pub fn first_of_files(&self) -> Option<&'static Task> {
+        self.of_files.first().copied()
+    }
+
+    /// Returns the benchmark's tasks, then those of suites, then those of files.
+    pub fn all(&self) -> impl Iterator<Item = &'static Task> + Clone {
+        let replaced = |task: &&'static Task| self.of_files.iter().all(|other| other.id != task.id);
+        built_in().filter(replaced).chain(self.of_files.iter().copied())
+    }
+
+    /// Returns the task called `id`.
+    ///
+    /// # Errors
+    ///
+    /// [`EpisodeError::UnknownTask`], which lists those that there are.
+    pub fn find(&self, id: &str) -> Result<&'static Task, EpisodeError> {
+        find_in(self.all(), id)
+    }
+}
+
+/// Returns the benchmark's task called `id`.
+///
+/// # Errors
+///
+/// [`EpisodeError::UnknownTask`], which lists those that there are.
+pub fn find(id: &str) -> Result<&'static Task, EpisodeError> {
+    find_in(cohub().iter().copied(), id)
+}
+
+fn find_in(
+    mut tasks: impl Iterator<Item = &'static Task> + Clone,
+    id: &str,
+) -> Result<&'static Task, EpisodeError> {
+    let have = tasks.clone();
+    tasks.find(|task| task.id == id).ok_or_else(|| {
+        let have = have.map(|task| task.id).collect();
+        EpisodeError::UnknownTask { id: id.into(), have }
+    })
+}
+
+/// Returns the tasks of these, each once: the benchmark's in its order, then those of files as they come.
+pub fn in_order(played: impl Iterator<Item = &'static Task> + Clone) -> Vec<&'static Task> {
+    let mut found: Vec<&'static Task> =
+        cohub().iter().copied().filter(|task| played.clone().any(|one| one == *task)).collect();
+    for task in played {
+        if !found.contains(&task) {
+            found.push(task);
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::embedded::TANDEM_PLUS;
+    use super::*;
+
+    #[test]
+    fn every_task_is_complete() {
+        for task in cohub() {
+            assert!(find(task.id).is_ok_and(|found| found.id == task.id));
+            let names: Vec<&str> = task.robots.iter().map(|robot| robot.name).collect();
+            assert_eq!(names, &["A", "B", "C"][..names.len()], "{}", task.id);
+            assert_eq!(task.phases.len(), 3, "{}", task.id);
+            assert!(task.is_benchmark() && task.needs_fingers(), "{}", task.id);
+        }
+        let plus = built_in().skip(cohub().len());
+        assert!(plus.into_iter().all(|task| task.suite() == Some(TANDEM_PLUS) && find(task.id).is_err()));
+    }
+
+    #[test]
+    fn an_unknown_task_lists_those_there_are() {
+        let text = find("handove").unwrap_err().to_string();
+        assert!(text.starts_with("no task \"handove\"; have: handover"), "{text}");
+    }
+}
