@@ -9,7 +9,7 @@
 //! let spec = EpisodeSpec::new(tasks::find("handover")?, 0, Protocol::Benchmark);
 //! let mut session = Session::start(&spec, None)?;
 //! session.call(Wait { steps: 10 }.into())?;
-//! session.call(GetStatus {}.into())?;
+//! session.call(GetStatus::default().into())?;
 //! let result = session.close();
 //! assert_eq!((result.env_steps, result.tool_calls), (10, 2));
 //! assert_eq!(result.phases.reached_s("p1"), None);

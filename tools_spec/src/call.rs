@@ -173,7 +173,7 @@ impl SendPlan {
         let call = |(index, command): (usize, &PlannedCommand)| {
             let refused = |reason: String| SpecError::Invalid {
                 tool: SendPlan::NAME,
-                reason: format!("commands[{index}]: {reason}"),
+                reason: format!("{}: {reason}", self.place(index)),
             };
             let mut args = Value::Object(command.arguments.clone());
             let with_all = beside::<WithAll>(SendPlan::NAME, &mut args, &WithAll::FIELDS)
@@ -305,7 +305,7 @@ mod tests {
         for call in examples.chain([whole, Call::from(looking(&["B"]))]) {
             assert_eq!(Call::parse(call.name(), json!(call)), Ok(call));
         }
-        assert_eq!(json!(Call::from(ToolCall::from(GetStatus {}))), json!({}));
+        assert_eq!(json!(Call::from(ToolCall::from(GetStatus::default()))), json!({}));
     }
 
     /// A short reply is asked of every tool alike, and what is written of that is read back.

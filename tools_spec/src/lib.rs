@@ -31,9 +31,9 @@ pub use parts::{
     AgentEnding, Assistance, BASE_COLUMNS, BaseCommand, BaseLimits, BaseMotion, BaseReport, BaseState,
     Budget, Bytes, CameraArrays, CommandReply, DepthFormat, Disclosure, Driving, Effort, ExtraInformation,
     FingerReport, Formats, Grip, HandPart, HandReport, HandState, Heard, Hints, ImageFormat, JointValues,
-    ModelEnding, Note, NoteKind, OperatorToken, Operators, Partner, PartnerDid, PhaseReached, PixelRegion,
-    Png, Pose, PoseFrame, Protocol, Range, RobotFallen, RobotReport, StopReason, TokenCount, Touch, Usage,
-    Wording,
+    ModelEnding, NextPhase, Note, NoteKind, OperatorToken, Operators, Partner, PartnerDid, PhaseReached,
+    PixelRegion, Png, Pose, PoseFrame, Protocol, Range, RobotFallen, RobotReport, StopReason, TokenCount,
+    Touch, Usage, Wording,
 };
 pub use refusal::{ProblemBody, Refusal, RefusalClass};
 pub use schema::{EpisodeToolSpec, Format, ToolSpec, TypedTool, TypedTools};

@@ -13,7 +13,7 @@ pub const SMALLEST_COMPONENT: f64 = 1e-6;
 pub const MOST_STEPS: u32 = 50;
 
 /// The most pixels that one call may ask for.
-pub const MOST_PIXELS: usize = 256;
+pub const MOST_PIXELS: usize = 4096;
 
 /// Names of robots, of which an episode has the first two or three.
 pub const ROBOT_NAMES: [&str; 3] = ["A", "B", "C"];

@@ -316,7 +316,7 @@ mod tests {
             assert_eq!(call.rest(5).unwrap().call().steps(), call.call().steps() - 5);
             assert_eq!(call.rest(25), None);
         }
-        assert_eq!(operator("A", GetStatus {}).rest(0), None);
+        assert_eq!(operator("A", GetStatus::default()).rest(0), None);
     }
 
     #[test]
@@ -346,7 +346,7 @@ mod tests {
                 }
             }
         }
-        let status = operator("B", GetStatus {});
+        let status = operator("B", GetStatus::default());
         assert_eq!((status.robot(), status.call().robots().len()), ("B", 0));
         let all = operator("B", Observe { robots: None, short: None, frame: None }).into_call();
         assert_eq!(all.tool, Observe { robots: Some(vec!["B".into()]), short: None, frame: None }.into());

@@ -3,6 +3,7 @@
 
 use tandem_sim::{Side, Vector};
 
+use super::lacks;
 use super::meaning::{Argument, Fact, Measure, Statement};
 use crate::scoring::{Predicate, nearness, placement};
 
@@ -65,6 +66,7 @@ pub static FUNCTIONS: &[Function] = &[
         |f| f.facts.holds(f.robot(0), f.side(1), f.object(2)),
         |f| nearness::grip(f.facts, f.robot(0), f.side(1), f.object(2)),
     )
+    .lacks(|f| lacks::grip(f.facts, f.robot(0), &[f.side(1)], f.object(2)))
     .help("this hand of the robot holds the object"),
     coming(
         "holds_any",
@@ -72,6 +74,7 @@ pub static FUNCTIONS: &[Function] = &[
         |f| f.facts.holds_any(f.robot(0), f.object(1)),
         |f| nearness::grips(f.facts, &[f.robot(0)], f.object(1)),
     )
+    .lacks(|f| lacks::grip(f.facts, f.robot(0), &Side::BOTH, f.object(1)))
     .help("a hand of the robot holds the object"),
     coming(
         "held_by_all",
@@ -79,8 +82,13 @@ pub static FUNCTIONS: &[Function] = &[
         |f| f.facts.held_by_all(f.robots(0), f.object(1)),
         |f| nearness::grips(f.facts, f.robots(0), f.object(1)),
     )
+    .lacks(|f| {
+        let of_robot = |robot: &usize| lacks::grip(f.facts, *robot, &Side::BOTH, f.object(1));
+        f.robots(0).iter().flat_map(of_robot).collect()
+    })
     .help("each of these robots holds the object with a hand"),
     truth("hands_off", &[Parameter::Robot, Parameter::Object], |f| f.facts.hands_off(f.robot(0), f.object(1)))
+        .lacks(|f| lacks::hands_off(f.facts, f.robot(0), f.object(1)))
         .help("neither hand of the robot touches the object"),
     truth("fallen", &[Parameter::Robot], |f| f.facts.robots[f.robot(0)].fallen).help("the robot has fallen"),
     // Where things are.
@@ -91,8 +99,10 @@ pub static FUNCTIONS: &[Function] = &[
     })
     .help("the first object's origin is inside a site of the second that is a box"),
     truth("within_box", WITHIN, |f| placement::within_box(f.facts, f.object(0), f.object(1), f.number_f32(2)))
+        .lacks(|f| lacks::apart(f.facts, f.object(0), f.object(1), f.number_f32(2), true))
         .help("the objects' origins are so near on each of x, y and z"),
     truth("above_box", WITHIN, |f| placement::above_box(f.facts, f.object(0), f.object(1), f.number_f32(2)))
+        .lacks(|f| lacks::apart(f.facts, f.object(0), f.object(1), f.number_f32(2), false))
         .help("the objects' origins are so near on x and y, at any height"),
     truth("within_mark", TWO_SITES, |f| {
         f.facts.within_mark(f.object(0), f.site(1), f.object(2), f.site(3))
@@ -104,10 +114,12 @@ pub static FUNCTIONS: &[Function] = &[
     .help("a rod of the first object, from site to site, passes through a ring of the second: a site with its axis along y"),
     // How things stand.
     truth("stands_released", OBJECT, |f| placement::stands_released(f.facts, f.object(0)))
+        .lacks(|f| lacks::stands_released(f.facts, f.object(0)))
         .help("upright within 15 degrees, slower than 0.05 m/s and 0.15 rad/s, and untouched by robots for 0.2 s"),
     truth("stands_as_high", &[Parameter::Object, Parameter::Number("within_m")], |f| {
         placement::stands_as_high(f.facts, f.object(0), f.number_f32(1))
     })
+    .lacks(|f| lacks::stands_as_high(f.facts, f.object(0), f.number_f32(1)))
     .help("the object's origin is as high as when the episode began, to so much"),
     number("lift_m", OBJECT, ANY, |f| f.facts.lift_m(f.object(0)).into())
         .help("how far the object's origin is above where it began"),
@@ -200,7 +212,7 @@ const THREADS: [Parameter; 5] = [
 const COMING: [Parameter; 3] = [Parameter::Number("x"), Parameter::Number("from"), Parameter::Number("to")];
 
 const fn truth(name: &'static str, parameters: &'static [Parameter], holds: fn(&Fact) -> bool) -> Function {
-    Function { name, parameters, gives: Gives::Truth(Statement { holds, near: None }), help: "" }
+    Function { name, parameters, gives: Gives::Truth(Statement { holds, near: None, lacks: None }), help: "" }
 }
 
 const fn coming(
@@ -209,7 +221,12 @@ const fn coming(
     holds: fn(&Fact) -> bool,
     near: fn(&Fact) -> f32,
 ) -> Function {
-    Function { name, parameters, gives: Gives::Truth(Statement { holds, near: Some(near) }), help: "" }
+    Function {
+        name,
+        parameters,
+        gives: Gives::Truth(Statement { holds, near: Some(near), lacks: None }),
+        help: "",
+    }
 }
 
 const fn number(
@@ -224,6 +241,18 @@ const fn number(
 impl Function {
     const fn help(self, help: &'static str) -> Function {
         let Function { name, parameters, gives, .. } = self;
+        Function { name, parameters, gives, help }
+    }
+
+    /// Adds what it says of a fact that does not hold.
+    const fn lacks(self, lacks: fn(&Fact) -> Vec<String>) -> Function {
+        let Function { name, parameters, gives, help } = self;
+        let gives = match gives {
+            Gives::Truth(Statement { holds, near, .. }) => {
+                Gives::Truth(Statement { holds, near, lacks: Some(lacks) })
+            }
+            Gives::Number(measure) => Gives::Number(measure),
+        };
         Function { name, parameters, gives, help }
     }
 

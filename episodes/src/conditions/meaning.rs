@@ -50,6 +50,8 @@ pub struct Statement {
     pub holds: fn(&Fact) -> bool,
     /// How near it is to that, from 0 to 1, where that grows on the way.
     pub near: Option<fn(&Fact) -> f32>,
+    /// What it lacks, one sentence each, where its text alone does not say it.
+    pub lacks: Option<fn(&Fact) -> Vec<String>>,
 }
 
 #[derive(Debug)]

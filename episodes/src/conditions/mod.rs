@@ -4,6 +4,7 @@
 
 mod check;
 mod functions;
+mod lacks;
 mod meaning;
 mod syntax;
 
@@ -13,8 +14,11 @@ use std::sync::Arc;
 
 use tandem_sim::ObjectModel;
 
+use crate::scoring::{Facts, Predicate};
+
 pub use check::nearest;
 pub use functions::{FUNCTIONS, Function, OF_FINGERS};
+use meaning::{Fact, Statement};
 pub use meaning::{Meaning, Number, Truth};
 
 /// What an expression of a task may name.
@@ -41,6 +45,36 @@ pub struct ConditionPart {
     /// As it is written.
     pub text: String,
     pub truth: Arc<Truth>,
+}
+
+impl ConditionPart {
+    /// Whether another part asks for the same, also in the terms that it names.
+    pub fn asks_the_same(&self, other: &ConditionPart) -> bool {
+        let meaning = |part: &ConditionPart| format!("{:?}", part.truth);
+        self.text == other.text && meaning(self) == meaning(other)
+    }
+
+    /// Returns what it lacks to hold, one sentence each. Empty where it holds.
+    pub fn lacks(&self, facts: &Facts) -> Vec<String> {
+        let Self { text, truth, .. } = self;
+        if truth.holds(facts) {
+            return Vec::new();
+        }
+        let now = |value: f64| (value * 1e3).round() / 1e3;
+        match &**truth {
+            Truth::Compared { sides, .. } => {
+                let [left, right] = sides.each_ref().map(|side| now(side.value(facts)));
+                match &*sides[1] {
+                    Number::Value(_) => vec![format!("{text}: it is {left}")],
+                    _ => vec![format!("{text}: it is {left} and {right}")],
+                }
+            }
+            Truth::Fact { statement: Statement { lacks: Some(lacks), .. }, arguments } => {
+                lacks(&Fact { facts, arguments })
+            }
+            _ => vec![format!("{text} does not hold")],
+        }
+    }
 }
 
 /// What is wrong with an expression, and what would be right.

@@ -9,5 +9,5 @@ pub mod placement;
 mod scores;
 
 pub use facts::{A, B, C, Facts, Grip, ObjectFacts, RobotFacts};
-pub use phases::{Condition, Done, Milestone, Nearness, Phase, Predicate};
+pub use phases::{Condition, Done, Milestone, Nearness, Phase, PhaseMemory, Predicate};
 pub use scores::{ScoreMemory, Scores, StepScore};

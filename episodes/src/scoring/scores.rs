@@ -70,9 +70,9 @@ impl Scores {
         self.phases.progress(&self.facts(step))
     }
 
-    /// Whether the present phase is a sequence that has begun.
-    pub fn underway(&self) -> bool {
-        self.phases.underway()
+    /// What is remembered of the phase that is next.
+    pub fn next_phase(&self) -> &PhaseMemory {
+        self.phases.memory()
     }
 
     /// Whether the last phase has been reached.

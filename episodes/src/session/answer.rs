@@ -3,7 +3,7 @@
 use tandem_sim::Pose;
 use tandem_tools_spec::{
     ActCall, CommandReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall, ManageReply, Observe,
-    PoseFrame, RobotReport, SpecError, StopReason, TalkCall, TalkReply, ToolCall, ToolReply,
+    PoseFrame, RobotReport, SpecError, StatusReply, StopReason, TalkCall, TalkReply, ToolCall, ToolReply,
 };
 
 use super::Session;
@@ -153,7 +153,10 @@ impl Session {
 
     fn manage(&mut self, call: &ManageCall) -> ManageReply {
         match call {
-            ManageCall::GetStatus(_) => ManageReply::GetStatus(self.status()),
+            ManageCall::GetStatus(asked) => {
+                let next_phase = if asked.explain == Some(true) { self.next_phase() } else { None };
+                ManageReply::GetStatus(StatusReply { next_phase, ..self.status() })
+            }
             ManageCall::Finish(_) => {
                 self.ended.get_or_insert(EndReason::Finished);
                 ManageReply::Finish(self.result().disclosed(self.spec().disclosure))

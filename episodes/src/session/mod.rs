@@ -301,7 +301,8 @@ impl Session {
             motion.sense(isometry_from_sim(&robot.estimate.world_from_pelvis), hands_n);
             motion.feel(&robot.sensed);
         }
-        let (was_underway, reached_before) = (self.scores.underway(), self.scores.reached().count());
+        let (was_underway, reached_before) =
+            (self.scores.next_phase().underway(), self.scores.reached().count());
         let scored = self.scores.update(&self.present);
         let budget = self.budget();
         if let Some(hashes) = &mut self.hashes {
@@ -313,7 +314,7 @@ impl Session {
         self.show_step(budget);
         if scored.reached {
             self.phases_reached(reached_before);
-        } else if self.scores.underway() && !was_underway {
+        } else if self.scores.next_phase().underway() && !was_underway {
             self.keep_picture("together");
         }
         Ok(())

@@ -1,5 +1,7 @@
 //! How the episode stands: budget, phases, falls, result.
 
+mod next_phase;
+
 use tandem_tools_spec::{
     Assistance, Briefing, Budget, EndReason, PhaseReached, PhaseTimes, ResultReply, RobotFallen, RobotInfo,
     StatusReply, Usage,
@@ -88,6 +90,7 @@ impl Session {
             assistance,
             disclosure: Some(disclosure).filter(|told| *told != assistance.disclosure()),
             phases: self.phases(),
+            next_phase: None,
             budget: self.budget(),
             state_hash: match assistance {
                 Assistance::Paper => None,

@@ -30,7 +30,7 @@ pub fn wait(session: &mut Session, steps: u32) -> CommandReply {
 }
 
 pub fn status(session: &mut Session) -> StatusReply {
-    match session.call(GetStatus {}.into()).unwrap() {
+    match session.call(GetStatus::default().into()).unwrap() {
         ToolReply::Manage(ManageReply::GetStatus(status)) => status,
         other => panic!("{other:?} is no status"),
     }

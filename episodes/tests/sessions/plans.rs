@@ -50,7 +50,7 @@ fn a_plan_stops_where_something_is_not_as_it_expects() {
     assert_eq!((reply.commands, reply.executed_steps), (3, 9));
     let why = reply.stopped.unwrap();
     assert!(
-        why.contains("commands[2]") && why.contains("arrived is false, not true (A's right wrist"),
+        why.contains("command 3 of ") && why.contains("arrived is false, not true (A's right wrist"),
         "{why}"
     );
     let hash = session.state_hash();
@@ -74,9 +74,9 @@ fn a_plan_that_cannot_be_carried_out_moves_nothing() {
     for (command, says) in [
         (
             json!({ "tool": "finish", "arguments": {} }),
-            "commands[1]: \"finish\" is no command; have: move_wrists",
+            "command 2 of 2: \"finish\" is no command; have: move_wrists",
         ),
-        (json!({ "tool": "wait", "arguments": { "steps": 0 } }), "commands[1]: wait: steps is 0"),
+        (json!({ "tool": "wait", "arguments": { "steps": 0 } }), "command 2 of 2: wait: steps is 0"),
         (json!({ "tool": "wait", "arguments": { "steps": 26 } }), "allows 1 to 25"),
         (
             json!({ "tool": "walk", "arguments": { "steps": 5, "robots": [{ "robot": "C", "vx_m_s": 0, "vy_m_s": 0, "yaw_rate_rad_s": 0 }] } }),
@@ -114,7 +114,7 @@ fn commands_of_a_plan_may_ask_for_short_replies() {
     assert_eq!((full.commands, full.tool_calls, short.tool_calls), (2, 2, 4));
     assert_eq!(session.result().tool_calls, 4);
     let refused = plan(&mut session, "send_plan", json!({ "commands": [wait(json!("yes"))] })).unwrap_err();
-    assert!(refused.contains("commands[0]") && refused.contains("short"), "{refused}");
+    assert!(refused.contains("command 1 of ") && refused.contains("short"), "{refused}");
 }
 
 /// Two robots stand; one of them has nothing to say.

@@ -127,7 +127,7 @@ fn agentic(folder: &Path, thinking_s: u64) -> PathBuf {
     wait(&mut session, 3);
     policy_clock_ns.fetch_add(thinking_s * 1_000_000_000, Relaxed);
     let _ = session.call(Wait { steps: 25 }.into());
-    session.call(GetStatus {}.into()).unwrap();
+    session.call(GetStatus::default().into()).unwrap();
     session.call(Finish {}.into()).unwrap();
     folder.join(Recorder::FILE_NAME)
 }

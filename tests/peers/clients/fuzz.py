@@ -7,7 +7,7 @@
 The first run calls every operation but DELETE, each on a live episode of its own, and says how far the episode has come. The second
 run calls all operations together, DELETE among them, on episodes that they share. The protocol is the benchmark's.
 
-Two things the description of all episodes cannot say, and they are left out here. A region names at most 256 pixels. An episode of
+Two things the description of all episodes cannot say, and they are left out here. A region names at most 4096 pixels. An episode of
 two robots has no C, which is then refused with 422 though the description allows it; the list of an episode's own tools does not.
 So the task has three robots, and the server has to be one that holds no other episodes, since the list leads to them.
 """

@@ -31,9 +31,9 @@ struct Step {
 const STEPS: &[Step] = &[
     Step {
         what: "task",
-        folder: "episodes/src/tasks",
-        extension: "rs",
-        says: "pub const TASK: Task",
+        folder: "episodes/tasks",
+        extension: "toml",
+        says: "[[phases]]",
         // An expert plays one task; the demo and the contract's example are Handover.
         may: &[
             "episodes/src/tasks/",

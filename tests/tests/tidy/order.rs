@@ -31,7 +31,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
             &["output", "locks", "html", "fingerprint", "scoring", "convert", "statistics"],
             &["error", "conditions"],
             &["tasks"],
-            &["variation", "words", "task_file", "protocol"],
+            &["variation", "words", "protocol"],
             &["stress"],
             &["spec"],
             &["commands", "results"],

@@ -142,11 +142,13 @@ pub enum ExtraInformation {
     Odometry,
     /// Which way is down.
     Gravity,
+    /// What the next phase lacks, as the simulator measures it.
+    PhaseConditions,
 }
 
 impl ExtraInformation {
     /// Every kind.
-    pub const ALL: [ExtraInformation; 8] = [
+    pub const ALL: [ExtraInformation; 9] = [
         ExtraInformation::DepthImages,
         ExtraInformation::PixelDepth,
         ExtraInformation::ThirdPerson,
@@ -155,6 +157,7 @@ impl ExtraInformation {
         ExtraInformation::HandForces,
         ExtraInformation::Odometry,
         ExtraInformation::Gravity,
+        ExtraInformation::PhaseConditions,
     ];
 
     /// As results and reports call it.
@@ -168,15 +171,17 @@ impl ExtraInformation {
             ExtraInformation::HandForces => "hand_forces",
             ExtraInformation::Odometry => "odometry",
             ExtraInformation::Gravity => "gravity",
+            ExtraInformation::PhaseConditions => "phase_conditions",
         }
     }
 
     /// Whether `full` assistance tells it unasked, so that who names the assistance has named it.
     pub fn is_of_full_assistance(self) -> bool {
         match self {
-            ExtraInformation::DepthImages | ExtraInformation::PixelDepth | ExtraInformation::ThirdPerson => {
-                false
-            }
+            ExtraInformation::DepthImages
+            | ExtraInformation::PixelDepth
+            | ExtraInformation::ThirdPerson
+            | ExtraInformation::PhaseConditions => false,
             ExtraInformation::JointVelocities
             | ExtraInformation::JointTorques
             | ExtraInformation::HandForces
@@ -284,6 +289,17 @@ pub struct PhaseReached {
     pub number: String,
     /// Simulated seconds since the episode began.
     pub time_s: f64,
+}
+
+/// The phase to reach next.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NextPhase {
+    /// What the phase is called, for example `place`.
+    pub id: String,
+    /// `p1`, `p2`, ... in the order they have to be reached.
+    pub number: String,
+    /// What does not hold yet, one sentence each. Empty where the next control step reaches the phase.
+    pub lacks: Vec<String>,
 }
 
 /// Whether a robot has fallen.

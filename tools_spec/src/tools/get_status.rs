@@ -4,16 +4,21 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::finish::EndReason;
-use crate::parts::{Assistance, Budget, Disclosure, PhaseReached, Protocol, RobotFallen};
+use crate::parts::{Assistance, Budget, Disclosure, NextPhase, PhaseReached, Protocol, RobotFallen};
 use crate::tool::Tool;
 
 /// Ask where the episode stands: time, phases reached, who has fallen, and the budget left. Costs no steps; physics stands
 /// still. Also answers after the episode has ended.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(extend("paper" = "Ask where the episode stands: time, the budget left, and once it has ended the phases that were reached. \
     Costs no steps; physics stands still. Also answers after the episode has ended."))]
 #[serde(deny_unknown_fields)]
-pub struct GetStatus {}
+pub struct GetStatus {
+    /// True: also what the next phase still lacks, part by part, as it is measured. Null: false.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("full_only" = true, "default" = false))]
+    pub explain: Option<bool>,
+}
 
 impl Tool for GetStatus {
     type Reply = StatusReply;
@@ -21,7 +26,7 @@ impl Tool for GetStatus {
     const READ_ONLY: bool = true;
 
     fn example() -> Self {
-        GetStatus {}
+        GetStatus::default()
     }
 }
 
@@ -52,6 +57,9 @@ pub struct StatusReply {
     pub disclosure: Option<Disclosure>,
     /// Every phase reached so far, where the assistance tells it.
     pub phases: Vec<PhaseReached>,
+    /// The phase to reach next, and what it lacks; left out where the call did not ask for it, and where phases are not told.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub next_phase: Option<NextPhase>,
     /// What is left of the episode.
     pub budget: Budget,
     /// Hash of the whole physical state, 16 hexadecimal digits. Equal hashes mean equal states. Left out where the assistance is "paper".

@@ -9,7 +9,7 @@ use crate::limits;
 use crate::parts::{PixelRegion, PoseFrame};
 use crate::tool::Tool;
 
-/// Measure where what a robot's head camera sees is, at pixels named one by one or as a region: at most 256 of them either way. Returns
+/// Measure where what a robot's head camera sees is, at pixels named one by one or as a region: at most 4096 of them either way. Returns
 /// a row [u, v, x, y, z] for each pixel: the 3-D point in the robot's pelvis frame, the frame that wrist targets are given in. A pixel
 /// sees a surface, so the middle of an object lies a little behind the point. Costs no steps; physics stands still.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -19,11 +19,11 @@ pub struct QueryDepth {
     /// The robot whose camera measures, as "A".
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
-    /// Pixels as [u, v]: column 0 to 319 from the left, row 0 to 239 from the top, at most 256 of them.
+    /// Pixels as [u, v]: column 0 to 319 from the left, row 0 to 239 from the top, at most 4096 of them.
     /// Example: [[160, 120], [170, 120]]. Null: those of `region`.
     #[schemars(length(min = 1, max = limits::MOST_PIXELS), extend("items" = limits::pixel()))]
     pub pixels: Option<Vec<[i64; 2]>>,
-    /// Pixels of a rectangle, row by row, at most 256 of them. Null: those of `pixels`.
+    /// Pixels of a rectangle, row by row, at most 4096 of them. Null: those of `pixels`.
     pub region: Option<PixelRegion>,
     /// A surface to find, whose middle, size, corners and, where it is upright and round, axis are told in place of points: give pixel,
     /// [u, v] of a place on it, for the patch of its colour and the whole thing, or color, as "red", for the nearest three of that colour.

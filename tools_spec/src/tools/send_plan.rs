@@ -64,6 +64,11 @@ pub struct Expectation {
 impl SendPlan {
     /// The tools that a plan may name: every one that commands.
     pub const COMMANDS: [&str; 4] = [MoveWrists::NAME, Walk::NAME, SendJointChunk::NAME, Wait::NAME];
+
+    /// Returns what messages call the command at `index`.
+    pub fn place(&self, index: usize) -> String {
+        format!("command {} of {}", index + 1, self.commands.len())
+    }
 }
 
 impl Tool for SendPlan {
@@ -102,13 +107,14 @@ impl Tool for SendPlan {
         for (index, command) in self.commands.iter().enumerate() {
             let Some(Expectation { force_above_n, force_below_n, .. }) = &command.expects else { continue };
             for (name, force_n) in [("force_above_n", force_above_n), ("force_below_n", force_below_n)] {
-                checks::finite(&format!("commands[{index}].expects.{name}"), force_n.as_slice())?;
+                checks::finite(&format!("{}: expects.{name}", self.place(index)), force_n.as_slice())?;
             }
         }
         let names = self.commands.iter().map(|command| command.tool.as_str()).enumerate();
         match names.into_iter().find(|(_, name)| !SendPlan::COMMANDS.contains(name)) {
             Some((index, name)) => Err(format!(
-                "commands[{index}]: {name:?} is no command; have: {}",
+                "{}: {name:?} is no command; have: {}",
+                self.place(index),
                 SendPlan::COMMANDS.join(", ")
             )),
             None => Ok(()),

@@ -134,7 +134,7 @@ fn refusals_say_what_would_work() {
     refused("wait", json!({ "steps": 0 }), &["steps is 0", "at least 1"]);
     let expects = json!({ "force_below_n": 2e6 });
     let heavy = json!({ "commands": [{ "tool": "wait", "arguments": { "steps": 1 }, "expects": expects }] });
-    refused("send_plan", heavy, &["commands[0].expects.force_below_n holds 2000000"]);
+    refused("send_plan", heavy, &["command 1 of 1: expects.force_below_n holds 2000000"]);
     refused("wait", json!({ "steps": -1 }), &["wait: steps: ", "-1", "{\"steps\":25}"]);
     refused("wait", json!({ "steps": 2.5 }), &["2.5", "{\"steps\":25}"]);
     refused("wait", json!({ "step": 25 }), &["unknown field `step`", "`steps`"]);
@@ -155,8 +155,8 @@ fn refusals_say_what_would_work() {
     );
     refused("check_reach", json!({ "robot": "A" }), &["no pose", "right_position_m"]);
     let pixels = |count: usize| json!({ "robot": "A", "pixels": vec![[160, 120]; count] });
-    assert!(ToolCall::parse("query_depth", pixels(256)).is_ok());
-    refused("query_depth", pixels(257), &["257", "at most 256"]);
+    assert!(ToolCall::parse("query_depth", pixels(4096)).is_ok());
+    refused("query_depth", pixels(4097), &["4097", "at most 4096"]);
     refused("query_depth", json!({ "robot": "A" }), &["either pixels", "or region"]);
     let both =
         json!({ "robot": "A", "pixels": [[0, 0]], "region": { "from": [0, 0], "to": [1, 1], "stride": 1 } });
@@ -255,14 +255,14 @@ fn a_region_names_every_so_many_pixels_row_by_row() {
     );
     assert_eq!(named(region([5, 7], [5, 7], 1)), [[5, 7]]);
     assert_eq!(named(region([3, 9], [1, 9], 2)), [[1, 9], [3, 9]], "either corner may come first");
-    assert_eq!(named(region([0, 0], [15, 15], 1)).len(), 256);
+    assert_eq!(named(region([0, 0], [63, 63], 1)).len(), 4096);
     refused(
         "query_depth",
-        region([0, 0], [16, 15], 1),
-        &["names 272", "at most 256", "with stride 2 it fits"],
+        region([0, 0], [64, 63], 1),
+        &["names 4160", "at most 4096", "with stride 2 it fits"],
     );
-    refused("query_depth", region([0, 0], [319, 239], 4), &["names 4800", "with stride 18 it fits"]);
-    refused("query_depth", region([i64::MIN, i64::MIN], [i64::MAX, i64::MAX], 1), &["at most 256"]);
+    refused("query_depth", region([0, 0], [319, 239], 4), &["names 4800", "with stride 5 it fits"]);
+    refused("query_depth", region([i64::MIN, i64::MIN], [i64::MAX, i64::MAX], 1), &["at most 4096"]);
     refused("query_depth", region([0, 0], [3, 3], 0), &["stride is 0", "at least 1"]);
     refused("query_depth", region([0, 0], [3, 3], -1), &["region.stride"]);
 }

@@ -153,11 +153,6 @@ impl PhaseTracker {
         reached as f64 + f64::from(next)
     }
 
-    /// Whether the present phase is a sequence whose `first` has held, unbroken.
-    pub fn underway(&self) -> bool {
-        self.memory.underway
-    }
-
     /// Whether the last phase has been reached.
     pub fn complete(&self) -> bool {
         self.memory.reached_s.len() == self.phases.len()
@@ -165,6 +160,26 @@ impl PhaseTracker {
 }
 
 impl PhaseMemory {
+    /// Whether the next phase is a sequence whose `first` has held, unbroken.
+    pub fn underway(&self) -> bool {
+        self.underway
+    }
+
+    /// Whether the next phase has been spoiled.
+    pub fn spoiled(&self) -> bool {
+        self.spoiled
+    }
+
+    /// Since when the next phase's lasting condition has held, in simulated seconds.
+    pub fn since_s(&self) -> Option<f64> {
+        self.since_s
+    }
+
+    /// Since when the condition of milestone `index` of the next phase has held, in simulated seconds, and whether it is passed.
+    pub fn milestone(&self, index: usize) -> (Option<f64>, bool) {
+        self.milestones.get(index).map_or((None, false), |memory| (memory.since_s, memory.passed))
+    }
+
     fn is_done(&mut self, done: &Done, facts: &Facts) -> bool {
         match done {
             Done::When(condition) => condition.holds(facts),

@@ -15,6 +15,7 @@ use crate::EpisodeError;
 use crate::commands::{Called, Command};
 use crate::output::OutputError;
 use crate::recording::CallerRecord;
+use crate::scoring::Phase;
 
 /// What has been carried out of a plan.
 #[derive(Default)]
@@ -72,9 +73,20 @@ impl Session {
     }
 
     fn check_commands(&self, plan: &SendPlan) -> Result<(), EpisodeError> {
-        plan.calls()?
-            .iter()
-            .try_for_each(|step| Command::read(&step.call, &self.rules, &self.motions).map(drop))
+        for (index, PlanStep { call, expects, .. }) in plan.calls()?.iter().enumerate() {
+            Command::read(call, &self.rules, &self.motions)?;
+            let phases = self.spec().task.phases.iter().enumerate();
+            let numbered = phases.map(|(number, phase)| (Phase::number(number), phase.id));
+            let is_known = |name: &String| numbered.clone().any(|(number, id)| *name == number || name == id);
+            if let Some(name) = expects.phase_reached.as_ref().filter(|name| !is_known(name)) {
+                let have: Vec<String> =
+                    numbered.clone().map(|(number, id)| format!("{number} ({id})")).collect();
+                let reason =
+                    format!("{}: there is no phase {name:?}; have: {}", plan.place(index), have.join(", "));
+                return Err(SpecError::Invalid { tool: SendPlan::NAME, reason }.into());
+            }
+        }
+        Ok(())
     }
 
     fn carry_out_commands(
@@ -90,7 +102,7 @@ impl Session {
                 Err(why) => Some(why),
             };
             if let Some(why) = why {
-                return self.plan_reply(progress, Some(format!("after commands[{index}]: {why}")));
+                return self.plan_reply(progress, Some(format!("after {}: {why}", plan.place(index))));
             }
         }
         self.plan_reply(progress, None)
@@ -188,7 +200,8 @@ fn unexpected(expected: &Expectation, reply: &CommandReply) -> Option<String> {
             let phase = phase_reached.as_ref()?;
             let is_reached =
                 reply.phases.iter().any(|reached| reached.number == *phase || reached.id == *phase);
-            (!is_reached).then(|| format!("{phase} has not been reached"))
+            (!is_reached)
+                .then(|| format!("{phase} has not been reached; get_status with explain says what it lacks"))
         })
 }
 

@@ -10,7 +10,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use tandem_tools_spec::{
     ActCall, Assistance, CommandReply, ExtraInformation, FingerReport, Formats, HandReport, LookCall,
-    LookReply, PoseFrame, Protocol, RobotReport, RobotState, SpecError, ToolCall, ToolReply,
+    LookReply, ManageCall, ManageReply, PoseFrame, Protocol, RobotReport, RobotState, SpecError, ToolCall,
+    ToolReply,
 };
 
 use super::Session;
@@ -58,6 +59,13 @@ impl ShownInformation {
                 // Agents of the benchmark have it, its learned policies have not.
                 ToolReply::Look(LookReply::QueryDepth(depth)) if protocol == Protocol::Benchmark => {
                     self.count(ExtraInformation::PixelDepth, &depth.robot);
+                }
+                // Of no robot alone.
+                ToolReply::Manage(ManageReply::GetStatus(status)) if status.next_phase.is_some() => {
+                    status
+                        .fallen
+                        .iter()
+                        .for_each(|of| self.count(ExtraInformation::PhaseConditions, &of.robot));
                 }
                 ToolReply::Look(
                     LookReply::QueryDepth(_) | LookReply::CheckReach(_) | LookReply::Observe(_),
@@ -247,6 +255,11 @@ impl Session {
                 if args.surface.is_some() && self.spec().assistance == Assistance::Paper =>
             {
                 return Err(refused("this episode measures at pixels alone; give pixels or region"));
+            }
+            ToolCall::Manage(ManageCall::GetStatus(args))
+                if args.explain == Some(true) && self.spec().assistance == Assistance::Paper =>
+            {
+                return Err(refused("this episode does not tell what phases lack; leave explain out"));
             }
             ToolCall::Look(LookCall::QueryDepth(args)) => vec![args.frame],
             ToolCall::Look(LookCall::CheckReach(args)) => vec![args.frame],

@@ -170,7 +170,7 @@ impl Episode for Listening {
                 Observe { robots: None, short: None, frame: None }.into(),
                 QueryDepth::example().into(),
                 CheckReach::example().into(),
-                GetStatus {}.into(),
+                GetStatus::default().into(),
             ];
             for look in looks {
                 self.ask(look)?;
@@ -192,7 +192,7 @@ fn listen(assistance: Assistance) -> (Vec<Option<f64>>, EndReason, Told) {
     let session = Session::start(&spec, None).unwrap();
     let mut episode = Listening { session, told: Told::new(), commands: 0 };
     players::find("expert").unwrap().play(&spec, &mut episode).unwrap();
-    episode.ask(GetStatus {}.into()).unwrap();
+    episode.ask(GetStatus::default().into()).unwrap();
     if assistance == Assistance::Paper {
         let before = status(&mut episode.session);
         assert_eq!((before.ended, before.phases.len()), (None, 0), "success is told at the end");

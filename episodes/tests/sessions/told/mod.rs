@@ -2,4 +2,5 @@
 
 mod assistance;
 mod endings;
+mod explained;
 mod requests;

@@ -327,7 +327,7 @@ impl Team {
     ) -> Result<Answer, HostingError> {
         let others_play_on = !episode.ended() && self.round().finish(seat)?;
         let call: ToolCall = match others_play_on {
-            true => GetStatus {}.into(),
+            true => GetStatus::default().into(),
             false => Finish {}.into(),
         };
         if others_play_on {

@@ -18,9 +18,9 @@ fn documents_weigh_objects_as_their_files_do() {
         let mut masses_kg: Vec<f32> = all.iter().map(|part| part.model.mass_kg).collect();
         masses_kg.extend(task.objects.iter().map(whole_kg));
         let page = page(&format!("{BOOK}/tasks/{}.md", task.id)).text;
-        let source = fs::read_to_string(root().join(format!("episodes/src/tasks/{}.rs", task.id)));
+        let source = fs::read_to_string(root().join(format!("episodes/tasks/cohub/{}.toml", task.id)));
         let source = source.expect("the file of a task");
-        let header: String = source.lines().map_while(|line| line.strip_prefix("//!")).collect();
+        let header: String = source.lines().map_while(|line| line.strip_prefix("#")).collect();
         for stated in stated_kg(&header) {
             let known = masses_kg.iter().any(|mass_kg| stated.is(*mass_kg));
             assert!(known, "the file of {} says {} kg; objects have {masses_kg:?}", task.id, stated.text);

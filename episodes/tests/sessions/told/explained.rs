@@ -1,0 +1,39 @@
+//! What `get_status` with `explain` says of the phase that is next.
+
+use tandem_episodes::Session;
+use tandem_tools_spec::{Assistance, Disclosure, GetStatus, ManageReply, NextPhase, Protocol, ToolReply};
+
+use crate::common::*;
+
+fn explained(session: &mut Session) -> Result<Option<NextPhase>, String> {
+    match session.call(GetStatus { explain: Some(true) }.into()) {
+        Ok(ToolReply::Manage(ManageReply::GetStatus(status))) => Ok(status.next_phase),
+        Ok(other) => panic!("{other:?} is no status"),
+        Err(error) => Err(error.to_string()),
+    }
+}
+
+#[test]
+fn the_next_phase_is_explained_to_who_asks_and_results_say_so() {
+    let own = spec("handover", 2000, Protocol::Agentic).assisted(Assistance::Full);
+    let mut session = Session::start(&own, None).unwrap();
+    assert_eq!(status(&mut session).next_phase, None);
+    assert!(!session.result().extra_information.contains(&"phase_conditions".to_owned()));
+    let hash = session.state_hash();
+    let next = explained(&mut session).unwrap().unwrap();
+    assert_eq!((next.id.as_str(), next.number.as_str()), ("grasp_and_lift", "p1"));
+    assert_eq!(next.lacks[0], "A's right hand does not hold bottle: the right one is off it");
+    assert!(next.lacks[1].starts_with("lift_m(\"bottle\") >= 0.03: it is "), "{next:?}");
+    assert_eq!(session.state_hash(), hash);
+    assert_eq!(session.result().extra_information_replies["phase_conditions"]["B"], 1);
+}
+
+#[test]
+fn what_is_not_told_is_not_explained() {
+    let paper = spec("handover", 2000, Protocol::Agentic).assisted(Assistance::Paper);
+    let refused = explained(&mut Session::start(&paper, None).unwrap()).unwrap_err();
+    assert!(refused.contains("leave explain out"), "{refused}");
+    let mut late = spec("handover", 2000, Protocol::Agentic).assisted(Assistance::Full);
+    late.disclosure = Disclosure::End;
+    assert_eq!(explained(&mut Session::start(&late, None).unwrap()), Ok(None));
+}
