@@ -1,6 +1,7 @@
 //! What the robots of an episode see and sense at one moment. A view is drawn once for a step and a robot, and encoded only where it
 //! leaves the process: in a reply or in the recording.
 
+mod fit;
 mod formats;
 mod observer;
 mod proprioception;

@@ -6,8 +6,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use nalgebra::{Isometry3, Point3};
 use tandem_sim::render::{Camera, Cameras, Frame, RenderRequest, Renderer};
 use tandem_sim::{Step, World};
-use tandem_tools_spec::{Color, DepthReply, DepthRow, PoseFrame, SurfaceQuery};
+use tandem_tools_spec::{
+    Color, DepthReply, DepthRow, PixelRegion, PoseFrame, QueryDepth, RegionFit, SpecError, SurfaceQuery,
+    Tool as _,
+};
 
+use super::fit;
 use super::proprioception::{Detail, Proprioception, calibration, robot_state};
 use super::surface::{self, CameraPoses};
 use super::{Picture, RobotObservation, RobotView, TeamObservation};
@@ -179,8 +183,31 @@ impl Observer {
             robot: name.into(),
             frame: Some(frame).filter(|frame| *frame != PoseFrame::Pelvis),
             surfaces: Vec::new(),
+            fit: None,
             columns: DepthReply::COLUMNS.map(String::from),
             points: points.collect(),
+        })
+    }
+
+    /// Fits the plane in a region of what robot number `robot` sees.
+    ///
+    /// # Errors
+    ///
+    /// [`SpecError::Invalid`] if no plane fills enough of the region, or the region reaches out of the picture.
+    pub fn fit(
+        &mut self,
+        step: &Arc<Step>,
+        robot: usize,
+        region: &PixelRegion,
+        pelvis_from_frame: Isometry3<f64>,
+    ) -> Result<RegionFit, EpisodeError> {
+        self.check_pixels(step, robot, &[region.from, region.to])?;
+        let view = self.views(step, &[robot]).swap_remove(0);
+        let pelvis_from_camera = isometry_from_sim(&step.robots[robot].sensed.pelvis_from_camera);
+        let frame_from_camera = pelvis_from_frame.inverse() * pelvis_from_camera;
+        fit::fit(&view, [region.from, region.to], &frame_from_camera).ok_or_else(|| {
+            let reason = "no plane fills a fifth of the region; name a smaller one on a flat surface".into();
+            SpecError::Invalid { tool: QueryDepth::NAME, reason }.into()
         })
     }
 
@@ -212,6 +239,7 @@ impl Observer {
             robot: name.into(),
             frame: Some(frame).filter(|frame| *frame != PoseFrame::Pelvis),
             surfaces,
+            fit: None,
             columns: DepthReply::COLUMNS.map(String::from),
             points: Vec::new(),
         })

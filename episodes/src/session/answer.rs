@@ -2,8 +2,9 @@
 
 use tandem_sim::Pose;
 use tandem_tools_spec::{
-    ActCall, CommandReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall, ManageReply, Observe,
-    PoseFrame, RobotReport, SpecError, StatusReply, StopReason, TalkCall, TalkReply, ToolCall, ToolReply,
+    ActCall, CommandReply, DepthReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall,
+    ManageReply, Observe, PoseFrame, RobotReport, SpecError, StatusReply, StopReason, TalkCall, TalkReply,
+    ToolCall, ToolReply,
 };
 
 use super::Session;
@@ -112,7 +113,16 @@ impl Session {
                         let level = motion.pelvis_from(PoseFrame::Level);
                         self.observer.surface(&self.present, robot, name, query, frame, &level)?
                     }
-                    None => self.observer.depth(&self.present, robot, name, &args.named(), frame)?,
+                    None => {
+                        let fit = match (args.fit, &args.region) {
+                            (Some(true), Some(region)) => {
+                                Some(self.observer.fit(&self.present, robot, region, frame.1)?)
+                            }
+                            _ => None,
+                        };
+                        let depth = self.observer.depth(&self.present, robot, name, &args.named(), frame)?;
+                        DepthReply { fit, ..depth }
+                    }
                 })
             }
             LookCall::CheckReach(args) => {

@@ -123,6 +123,13 @@ class BaseEpisode(Tools):
         """Names of the 35 columns of a row for `step`: joint targets in radians, then the base command."""
         return tuple(self.briefing.action_row)
 
+    def explain(self) -> tuple[str, ...]:
+        """Says what the next phase still lacks, one sentence each, as the simulator measures it. Empty where phases are not told, and
+        after the last. Refused where the assistance is "paper"; results name it as `phase_conditions`.
+        """
+        following = self.get_status(explain=True).next_phase
+        return () if following is None else tuple(following.lacks)
+
     @property
     @abstractmethod
     def state_columns(self) -> tuple[str, ...]:

@@ -96,6 +96,13 @@ def test_paper_tells_less() -> None:
         assert episode.finish().extra_information == ()
 
 
+def test_the_next_phase_is_explained() -> None:
+    with tandem.Episode("handover", seed=2000, assistance="full") as episode:
+        assert episode.explain()[0] == "A's right hand does not hold bottle: the right one is off it"
+    with tandem.Episode("handover", seed=2000, assistance="paper") as episode, pytest.raises(tandem.TandemError):
+        episode.explain()
+
+
 def test_a_state_that_is_read_is_a_call_recorded_or_not(tmp_path: Path) -> None:
     results: list[tandem.ResultReply] = []
     for record in (None, tmp_path):

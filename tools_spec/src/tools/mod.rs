@@ -24,7 +24,8 @@ pub use list_tasks::{ListTasks, ProtocolInfo, TaskInfo, TaskList};
 pub use move_wrists::{MoveWrists, WristMove};
 pub use observe::{CameraCalibration, CameraImage, Observation, Observe};
 pub use query_depth::{
-    Color, DepthReply, DepthRow, JoinedBy, QueryDepth, Surface, SurfaceQuery, UprightAxis,
+    Color, DepthReply, DepthRow, EdgeFit, JoinedBy, PlaneFit, QueryDepth, RegionFit, Surface, SurfaceQuery,
+    UprightAxis,
 };
 pub use say::Say;
 pub use send_joint_chunk::{ACTION_ROW_LEN, JointChunk, SendJointChunk, action_row_layout};

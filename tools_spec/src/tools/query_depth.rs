@@ -25,6 +25,11 @@ pub struct QueryDepth {
     pub pixels: Option<Vec<[i64; 2]>>,
     /// Pixels of a rectangle, row by row, at most 4096 of them. Null: those of `pixels`.
     pub region: Option<PixelRegion>,
+    /// True: also the plane in `region`, the straight edges at which it ends there, and the corners where they meet, fitted to every pixel
+    /// of it. Null: false.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("full_only" = true, "default" = false))]
+    pub fit: Option<bool>,
     /// A surface to find, whose middle, size, corners and, where it is upright and round, axis are told in place of points: give pixel,
     /// [u, v] of a place on it, for the patch of its colour and the whole thing, or color, as "red", for the nearest three of that colour.
     #[schemars(extend("full_only" = true))]
@@ -52,6 +57,7 @@ impl Tool for QueryDepth {
             robot: "A".into(),
             pixels: Some(vec![[160, 120], [170, 120]]),
             region: None,
+            fit: None,
             surface: None,
             frame: None,
         }
@@ -62,6 +68,9 @@ impl Tool for QueryDepth {
     }
 
     fn validate(&self) -> Result<(), String> {
+        if self.fit == Some(true) && self.region.is_none() {
+            return Err("fit is of a region; give region, as {\"from\": [100, 80], \"to\": [220, 170], \"stride\": 10}".into());
+        }
         match (&self.pixels, &self.region, &self.surface) {
             (Some(pixels), None, None) => checks::pixels(pixels),
             (None, Some(region), None) => checks::region(region),
@@ -180,6 +189,45 @@ pub struct Surface {
     pub cut_off: bool,
 }
 
+/// The largest plane in a region of a picture.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PlaneFit {
+    /// The middle of its points, in metres in the frame of the reply.
+    pub point_m: [f64; 3],
+    /// Unit vector at right angles to it, towards the camera, in that frame.
+    pub normal: [f64; 3],
+    /// Root mean square of how far its points are off it, in metres.
+    pub rms_m: f64,
+    /// How many pixels of the region see it.
+    pub pixels: u32,
+    /// Their share of those that see anything.
+    pub share: f64,
+}
+
+/// A straight edge at which the plane ends within the region.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EdgeFit {
+    /// One end of what is seen of it, in metres in the frame of the reply.
+    pub from_m: [f64; 3],
+    /// The other end.
+    pub to_m: [f64; 3],
+    /// Root mean square of how far its points are off it, in metres.
+    pub rms_m: f64,
+    /// How many points it was fitted to.
+    pub points: u32,
+}
+
+/// What `fit` found in a region.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RegionFit {
+    /// The largest plane.
+    pub plane: PlaneFit,
+    /// Its straight edges, the longest first, up to four. An edge may be where something hides the plane.
+    pub edges: Vec<EdgeFit>,
+    /// Where two of them meet, in metres in the frame of the reply.
+    pub corners_m: Vec<[f64; 3]>,
+}
+
 /// The reply to `query_depth`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct DepthReply {
@@ -192,6 +240,9 @@ pub struct DepthReply {
     /// the nearest first and what is of the room last. Left out where none was asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub surfaces: Vec<Surface>,
+    /// What was fitted to the region; left out where that was not asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fit: Option<RegionFit>,
     /// What each column of `points` is: "u", "v", "x_m", "y_m", "z_m".
     pub columns: [String; 5],
     /// One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where nothing is seen. Of a surface

@@ -261,6 +261,11 @@ impl Session {
             {
                 return Err(refused("this episode does not tell what phases lack; leave explain out"));
             }
+            ToolCall::Look(LookCall::QueryDepth(args))
+                if args.fit == Some(true) && self.spec().assistance == Assistance::Paper =>
+            {
+                return Err(refused("this episode measures at pixels alone; leave fit out"));
+            }
             ToolCall::Look(LookCall::QueryDepth(args)) => vec![args.frame],
             ToolCall::Look(LookCall::CheckReach(args)) => vec![args.frame],
             ToolCall::Act(ActCall::MoveWrists(args))
