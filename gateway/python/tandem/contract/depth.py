@@ -33,6 +33,9 @@ class DepthReply:
     of a colour up to three, the nearest first and what is of the room last. Left out where none was asked for.
     """
 
+    fit: RegionFit | None
+    """What was fitted to the region; left out where that was not asked for."""
+
     columns: tuple[str, str, str, str, str]
     """What each column of `points` is: "u", "v", "x_m", "y_m", "z_m"."""
 
@@ -48,8 +51,90 @@ class DepthReply:
             robot=value["robot"],
             frame=value.get("frame"),
             surfaces=tuple(Surface.of(item) for item in value.get("surfaces", ())),
+            fit=None if (got := value.get("fit")) is None else RegionFit.of(got),
             columns=tuple(value["columns"]),
             points=tuple(tuple(item) for item in value["points"]),
+        )
+
+
+@dataclass(frozen=True)
+class EdgeFit:
+    """A straight edge at which the plane ends within the region."""
+
+    from_m: tuple[float, float, float]
+    """One end of what is seen of it, in metres in the frame of the reply."""
+
+    to_m: tuple[float, float, float]
+    """The other end."""
+
+    rms_m: float
+    """Root mean square of how far its points are off it, in metres."""
+
+    points: int
+    """How many points it was fitted to."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> EdgeFit:
+        """Reads what JSON has."""
+        return EdgeFit(
+            from_m=tuple(value["from_m"]),
+            to_m=tuple(value["to_m"]),
+            rms_m=value["rms_m"],
+            points=value["points"],
+        )
+
+
+@dataclass(frozen=True)
+class PlaneFit:
+    """The largest plane in a region of a picture."""
+
+    point_m: tuple[float, float, float]
+    """The middle of its points, in metres in the frame of the reply."""
+
+    normal: tuple[float, float, float]
+    """Unit vector at right angles to it, towards the camera, in that frame."""
+
+    rms_m: float
+    """Root mean square of how far its points are off it, in metres."""
+
+    pixels: int
+    """How many pixels of the region see it."""
+
+    share: float
+    """Their share of those that see anything."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> PlaneFit:
+        """Reads what JSON has."""
+        return PlaneFit(
+            point_m=tuple(value["point_m"]),
+            normal=tuple(value["normal"]),
+            rms_m=value["rms_m"],
+            pixels=value["pixels"],
+            share=value["share"],
+        )
+
+
+@dataclass(frozen=True)
+class RegionFit:
+    """What `fit` found in a region."""
+
+    plane: PlaneFit
+    """The largest plane."""
+
+    edges: tuple[EdgeFit, ...]
+    """Its straight edges, the longest first, up to four. An edge may be where something hides the plane."""
+
+    corners_m: tuple[tuple[float, float, float], ...]
+    """Where two of them meet, in metres in the frame of the reply."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> RegionFit:
+        """Reads what JSON has."""
+        return RegionFit(
+            plane=PlaneFit.of(value["plane"]),
+            edges=tuple(EdgeFit.of(item) for item in value["edges"]),
+            corners_m=tuple(tuple(item) for item in value["corners_m"]),
         )
 
 

@@ -181,6 +181,29 @@ class ModelEnding:
 
 
 @dataclass(frozen=True)
+class NextPhase:
+    """The phase to reach next."""
+
+    id: str
+    """What the phase is called, for example `place`."""
+
+    number: str
+    """`p1`, `p2`, ... in the order they have to be reached."""
+
+    lacks: tuple[str, ...]
+    """What does not hold yet, one sentence each. Empty where the next control step reaches the phase."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> NextPhase:
+        """Reads what JSON has."""
+        return NextPhase(
+            id=value["id"],
+            number=value["number"],
+            lacks=tuple(value["lacks"]),
+        )
+
+
+@dataclass(frozen=True)
 class ReachReply:
     """The reply to `check_reach`."""
 
@@ -422,6 +445,11 @@ class StatusReply:
     phases: tuple[PhaseReached, ...]
     """Every phase reached so far, where the assistance tells it."""
 
+    next_phase: NextPhase | None
+    """The phase to reach next, and what it lacks; left out where the call did not ask for it, and where phases are
+    not told.
+    """
+
     budget: Budget
     """What is left of the episode."""
 
@@ -444,6 +472,7 @@ class StatusReply:
             assistance=value["assistance"],
             disclosure=value.get("disclosure"),
             phases=tuple(PhaseReached.of(item) for item in value["phases"]),
+            next_phase=None if (got := value.get("next_phase")) is None else NextPhase.of(got),
             budget=Budget.of(value["budget"]),
             state_hash=value.get("state_hash"),
         )

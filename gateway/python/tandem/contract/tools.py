@@ -54,18 +54,21 @@ class Tools(ABC):
         *,
         pixels: Numbers | None = None,
         region: PixelRegion | None = None,
+        fit: bool | None = None,
         surface: SurfaceQuery | None = None,
         frame: PoseFrame | None = None,
     ) -> DepthReply:
-        """Measure where what a robot's head camera sees is, at pixels named one by one or as a region: at most 256
-        of them either way. Returns a row [u, v, x, y, z] for each pixel: the 3-D point in the robot's pelvis
-        frame, the frame that wrist targets are given in. A pixel sees a surface, so the middle of an object
-        lies a little behind the point. Costs no steps; physics stands still.
+        """Measure where what a robot's head camera sees is, at pixels named one by one or as a region: at most
+        4096 of them either way. Returns a row [u, v, x, y, z] for each pixel: the 3-D point in the robot's
+        pelvis frame, the frame that wrist targets are given in. A pixel sees a surface, so the middle of an
+        object lies a little behind the point. Costs no steps; physics stands still.
 
         robot: The robot whose camera measures, as "A".
-        pixels: Pixels as [u, v]: column 0 to 319 from the left, row 0 to 239 from the top, at most 256 of them.
+        pixels: Pixels as [u, v]: column 0 to 319 from the left, row 0 to 239 from the top, at most 4096 of them.
             Example: [[160, 120], [170, 120]]. None: those of `region`.
-        region: Pixels of a rectangle, row by row, at most 256 of them. None: those of `pixels`.
+        region: Pixels of a rectangle, row by row, at most 4096 of them. None: those of `pixels`.
+        fit: True: also the plane in `region`, the straight edges at which it ends there, and the corners where they
+            meet, fitted to every pixel of it. None: false.
         surface: A surface to find, whose middle, size, corners and, where it is upright and round, axis are told in
             place of points: give pixel, [u, v] of a place on it, for the patch of its colour and the whole thing, or
             color, as "red", for the nearest three of that colour.
@@ -75,6 +78,7 @@ class Tools(ABC):
             "robot": robot,
             "pixels": pixels,
             "region": region,
+            "fit": fit,
             "surface": surface,
             "frame": frame,
         }
@@ -224,11 +228,18 @@ class Tools(ABC):
 
     def get_status(
         self,
+        *,
+        explain: bool | None = None,
     ) -> StatusReply:
         """Ask where the episode stands: time, phases reached, who has fallen, and the budget left. Costs no steps;
         physics stands still. Also answers after the episode has ended.
+
+        explain: True: also what the next phase still lacks, part by part, as it is measured. None: false.
         """
-        return StatusReply.of(self.call("get_status", {}))
+        arguments: dict[str, Any] = {
+            "explain": explain,
+        }
+        return StatusReply.of(self.call("get_status", plain(arguments)))
 
     def finish(
         self,
