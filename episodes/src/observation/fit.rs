@@ -281,7 +281,7 @@ mod tests {
     /// What a camera sees of a table of 0.6 x 0.4 m, turned by 0.3 rad about the way that the camera looks, 1 m off and leaning by
     /// `lean_rad`, and of a wall 2 m off.
     fn view(lean_rad: f64) -> RobotView {
-        let plane = Isometry3::new(Vector3::new(0.0, 0.0, 1.0), Vector3::new(lean_rad, 0.0, 0.0))
+        let plane = Isometry3::new(Vector3::new(0.0, 0.0, -1.0), Vector3::new(lean_rad, 0.0, 0.0))
             * Isometry3::rotation(Vector3::z() * 0.3);
         let intrinsics = Intrinsics {
             width: WIDTH as u32,
@@ -315,15 +315,15 @@ mod tests {
             let found = fit(&view(lean_rad), [[5, 5], [155, 115]], &Isometry3::identity()).unwrap();
             let PlaneFit { point_m, normal, rms_m, share, .. } = found.plane;
             let turned = Isometry3::rotation(Vector3::new(lean_rad, 0.0, 0.0));
-            let expected = turned * -Vector3::z();
+            let expected = turned * Vector3::z();
             assert!(Vector3::from(normal).angle(&expected) < 0.01, "{normal:?}");
             assert!(
-                distance_m(point_m, [0.0, 0.0, 1.0]) < 0.05 && rms_m <= 0.001 && share > 0.2,
+                distance_m(point_m, [0.0, 0.0, -1.0]) < 0.05 && rms_m <= 0.001 && share > 0.2,
                 "{point_m:?}"
             );
             assert_eq!((found.edges.len(), found.corners_m.len()), (4, 4), "{lean_rad}: {found:?}");
             let table =
-                Isometry3::translation(0.0, 0.0, 1.0) * turned * Isometry3::rotation(Vector3::z() * 0.3);
+                Isometry3::translation(0.0, 0.0, -1.0) * turned * Isometry3::rotation(Vector3::z() * 0.3);
             for [x_m, y_m] in [[0.3, 0.2], [-0.3, 0.2], [0.3, -0.2], [-0.3, -0.2]] {
                 let corner_m: [f64; 3] = (table * Point3::new(x_m, y_m, 0.0)).coords.into();
                 let off_m =
@@ -339,7 +339,7 @@ mod tests {
         let corner = fit(&view, [[5, 5], [80, 60]], &Isometry3::identity()).unwrap();
         assert!(corner.edges.len() >= 2 && !corner.corners_m.is_empty(), "{corner:?}");
         let wall = fit(&view, [[0, 0], [12, 12]], &Isometry3::identity()).unwrap();
-        assert!(wall.edges.is_empty() && (wall.plane.point_m[2] - 2.0).abs() < 1e-3, "{wall:?}");
+        assert!(wall.edges.is_empty() && (wall.plane.point_m[2] + 2.0).abs() < 1e-3, "{wall:?}");
         assert_eq!(fit(&view, [[80, 60], [83, 63]], &Isometry3::identity()), None, "16 pixels are too few");
     }
 }
