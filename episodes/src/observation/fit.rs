@@ -45,6 +45,16 @@ struct Line {
     along: Vector2<f64>,
 }
 
+/// A straight stretch of a boundary.
+struct Edge {
+    line: Line,
+    /// Where it begins and ends along the line.
+    ends_m: [f64; 2],
+    /// Root mean square of how far its points are off the line.
+    rms_m: f64,
+    points: usize,
+}
+
 /// Fits the region between two corners of the picture, and tells the result in the frame in which the camera has this pose.
 pub fn fit(
     view: &RobotView,
@@ -69,7 +79,7 @@ pub fn fit(
     let axes = plane.axes();
     let on_plane = |at_m: Vector2<f64>| plane.point_m + axes[0] * at_m.x + axes[1] * at_m.y;
     let edges = edges(region.boundary(&plane, &axes));
-    let told = |(line, [start_m, end_m], rms_m, points): &(Line, [f64; 2], f64, usize)| EdgeFit {
+    let told = |Edge { line, ends_m: [start_m, end_m], rms_m, points }: &Edge| EdgeFit {
         from_m: tell(on_plane(line.at(*start_m))),
         to_m: tell(on_plane(line.at(*end_m))),
         rms_m: coarse(*rms_m),
@@ -204,9 +214,8 @@ impl Line {
     }
 }
 
-/// Returns the straight edges in the points of a boundary, the longest first: the line, where it begins and ends along itself, how far
-/// its points are off it (root mean square), and how many they are.
-fn edges(mut points: Vec<Vector2<f64>>) -> Vec<(Line, [f64; 2], f64, usize)> {
+/// Returns the straight edges in the points of a boundary, the longest first.
+fn edges(mut points: Vec<Vector2<f64>>) -> Vec<Edge> {
     let mut found = Vec::new();
     let mut random = SplitMix64(points.len() as u64);
     while found.len() < MAX_EDGES && points.len() >= MIN_EDGE_POINTS {
@@ -239,28 +248,29 @@ fn edges(mut points: Vec<Vector2<f64>>) -> Vec<(Line, [f64; 2], f64, usize)> {
         let rms_m = (own.iter().map(|at| line.off_m(at).powi(2)).sum::<f64>() / own.len() as f64).sqrt();
         points.retain(|at| line.off_m(at).abs() >= EDGE_OFF_M);
         if ends_m[1] - ends_m[0] >= MIN_EDGE_M {
-            found.push((line, ends_m, rms_m, own.len()));
+            found.push(Edge { line, ends_m, rms_m, points: own.len() });
         }
     }
-    found.sort_by(|(_, one, ..), (_, other, ..)| (other[1] - other[0]).total_cmp(&(one[1] - one[0])));
+    let length_m = |edge: &Edge| edge.ends_m[1] - edge.ends_m[0];
+    found.sort_by(|one, other| length_m(other).total_cmp(&length_m(one)));
     found
 }
 
 /// Returns where two edges meet that reach so far.
-fn corners_of(edges: &[(Line, [f64; 2], f64, usize)]) -> Vec<Vector2<f64>> {
+fn corners_of(edges: &[Edge]) -> Vec<Vector2<f64>> {
     let mut found = Vec::new();
-    for (index, (one, one_ends_m, ..)) in edges.iter().enumerate() {
-        for (other, other_ends_m, ..) in &edges[index + 1..] {
-            let turn = one.along.perp(&other.along);
+    for (index, Edge { line: one, .. }) in edges.iter().enumerate() {
+        for other in &edges[index + 1..] {
+            let turn = one.along.perp(&other.line.along);
             if turn.abs() < MIN_CORNER_RAD.sin() {
                 continue;
             }
-            let corner_m = one.at((other.point_m - one.point_m).perp(&other.along) / turn);
-            let reaches = |line: &Line, [start_m, end_m]: [f64; 2]| {
+            let corner_m = one.at((other.line.point_m - one.point_m).perp(&other.line.along) / turn);
+            let reaches = |Edge { line, ends_m: [start_m, end_m], .. }: &Edge| {
                 let along_m = line.along_m(&corner_m);
                 along_m > start_m - MAX_CORNER_GAP_M && along_m < end_m + MAX_CORNER_GAP_M
             };
-            if reaches(one, *one_ends_m) && reaches(other, *other_ends_m) {
+            if reaches(&edges[index]) && reaches(other) {
                 found.push(corner_m);
             }
         }
