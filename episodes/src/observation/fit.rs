@@ -65,9 +65,9 @@ pub fn fit(
         std::array::from_fn(|axis| pick(corners[0][axis], corners[1][axis]) as usize)
     });
     let region = Region { view, from, to };
-    let points: Vec<Vector3<f64>> = region.pixels().filter_map(|at| region.point_m(at)).collect();
-    let (plane, rms_m, count) = fit_plane(&points)?;
-    let share = count as f64 / points.len() as f64;
+    let points_m: Vec<Vector3<f64>> = region.pixels().filter_map(|at| region.point_m(at)).collect();
+    let (plane, rms_m, count) = fit_plane(&points_m)?;
+    let share = count as f64 / points_m.len() as f64;
     if count < MIN_PLANE_POINTS || share < MIN_PLANE_SHARE {
         return None;
     }
@@ -78,7 +78,7 @@ pub fn fit(
     let normal = frame_from_camera * plane.normal;
     let axes = plane.axes();
     let on_plane = |at_m: Vector2<f64>| plane.point_m + axes[0] * at_m.x + axes[1] * at_m.y;
-    let edges = edges(region.boundary(&plane, &axes));
+    let edges = edges(region.boundary(&plane));
     let told = |Edge { line, ends_m: [start_m, end_m], rms_m, points }: &Edge| EdgeFit {
         from_m: tell(on_plane(line.at(*start_m))),
         to_m: tell(on_plane(line.at(*end_m))),
@@ -111,7 +111,8 @@ impl Region<'_> {
     }
 
     /// Returns where the plane ends in the region, in its own coordinates: between each of its pixels and a neighbour that is not of it.
-    fn boundary(&self, plane: &Plane, axes: &[Vector3<f64>; 2]) -> Vec<Vector2<f64>> {
+    fn boundary(&self, plane: &Plane) -> Vec<Vector2<f64>> {
+        let axes = plane.axes();
         let is_of_it = |at| self.point_m(at).is_some_and(|point_m| plane.has(&point_m));
         let mut found = Vec::new();
         for [u, v] in self.pixels().filter(|at| is_of_it(*at)) {
@@ -163,19 +164,19 @@ impl Plane {
 }
 
 /// Returns the plane with the most of these points, how far they are off it (root mean square), and how many they are.
-fn fit_plane(points: &[Vector3<f64>]) -> Option<(Plane, f64, usize)> {
-    if points.len() < MIN_PLANE_POINTS {
+fn fit_plane(points_m: &[Vector3<f64>]) -> Option<(Plane, f64, usize)> {
+    if points_m.len() < MIN_PLANE_POINTS {
         return None;
     }
-    let mut random = SplitMix64(points.len() as u64);
-    let mut draw = || points[random.uniform([0.0, points.len() as f32]) as usize % points.len()];
+    let mut random = SplitMix64(points_m.len() as u64);
+    let mut draw = || points_m[random.uniform([0.0, points_m.len() as f32]) as usize % points_m.len()];
     let mut best: Option<(Plane, usize)> = None;
     for _ in 0..TRIALS {
         let [a, b, c] = [draw(), draw(), draw()];
         let across = (b - a).cross(&(c - a));
         if across.norm() > 1e-9 {
             let plane = Plane { normal: across.normalize(), point_m: a };
-            let count = points.iter().filter(|point_m| plane.has(point_m)).count();
+            let count = points_m.iter().filter(|point_m| plane.has(point_m)).count();
             if best.is_none_or(|(_, most)| count > most) {
                 best = Some((plane, count));
             }
@@ -184,10 +185,10 @@ fn fit_plane(points: &[Vector3<f64>]) -> Option<(Plane, f64, usize)> {
     let mut plane = best?.0;
     for _ in 0..3 {
         plane = Plane::nearest(
-            points.iter().filter(|point_m| plane.has(point_m)).collect::<Vec<_>>().into_iter(),
+            points_m.iter().filter(|point_m| plane.has(point_m)).collect::<Vec<_>>().into_iter(),
         );
     }
-    let own = points.iter().filter(|point_m| plane.has(point_m));
+    let own = points_m.iter().filter(|point_m| plane.has(point_m));
     let (sum_m2, count) = own.fold((0.0, 0), |(sum, count), at| (sum + plane.off_m(at).powi(2), count + 1));
     (count > 0).then(|| (plane, (sum_m2 / count as f64).sqrt(), count))
 }
