@@ -3,11 +3,9 @@
 use tandem_sim::Side;
 
 use crate::scoring::placement::{RELEASE_S, STILL_M_S, STILL_RAD_S, UPRIGHT_RAD};
-use crate::scoring::{Facts, Grip};
+use crate::scoring::{Facts, Grip, ROBOT_NAMES};
 
-const ROBOTS: [&str; 3] = ["A", "B", "C"];
-
-/// Of a robot none of whose hands on these sides holds `object`.
+/// Returns what a robot lacks to hold `object` with a hand on one of these sides.
 pub fn grip(f: &Facts, robot: usize, sides: &[Side], object: &str) -> Vec<String> {
     let hands = f.object(object).hands[robot];
     if sides.iter().any(|side| hands[*side] == Grip::Holding) {
@@ -17,21 +15,21 @@ pub fn grip(f: &Facts, robot: usize, sides: &[Side], object: &str) -> Vec<String
         Grip::Off => format!("the {} one is off it", side.name()),
         Grip::Touching | Grip::Holding => format!("the {} one touches it from one side alone", side.name()),
     };
-    let (robot, does) = (ROBOTS[robot], sides.iter().map(does).collect::<Vec<_>>().join(", "));
+    let (robot, does) = (ROBOT_NAMES[robot], sides.iter().map(does).collect::<Vec<_>>().join(", "));
     match sides {
         [side] => vec![format!("{robot}'s {} hand does not hold {object}: {does}", side.name())],
         _ => vec![format!("no hand of {robot} holds {object}: {does}")],
     }
 }
 
-/// Of a robot with a hand on `object`.
+/// Returns which hands of a robot are on `object`.
 pub fn hands_off(f: &Facts, robot: usize, object: &str) -> Vec<String> {
     let hands = f.object(object).hands[robot];
     let on = Side::BOTH.into_iter().filter(|side| hands[*side] != Grip::Off);
-    on.map(|side| format!("{}'s {} hand is on {object}", ROBOTS[robot], side.name())).collect()
+    on.map(|side| format!("{}'s {} hand is on {object}", ROBOT_NAMES[robot], side.name())).collect()
 }
 
-/// Of an object that does not stand upright, still and released.
+/// Returns what an object lacks to stand upright, still and released.
 pub fn stands_released(f: &Facts, object: &str) -> Vec<String> {
     let mut found: Vec<String> = (0..f.robots.len()).flat_map(|robot| hands_off(f, robot, object)).collect();
     let untouched_s = f.untouched_s(object);
@@ -49,14 +47,14 @@ pub fn stands_released(f: &Facts, object: &str) -> Vec<String> {
     found
 }
 
-/// Of an object that is higher or lower than at the start by more than `within_m`.
+/// Returns how much higher or lower an object is than at the start.
 pub fn stands_as_high(f: &Facts, object: &str, within_m: f32) -> Vec<String> {
     let lift_m = f.lift_m(object);
     let (by_m, way) = (lift_m.abs(), if lift_m > 0.0 { "higher" } else { "lower" });
     vec![format!("{object} is {by_m:.3} m {way} than at the start, at most {within_m}")]
 }
 
-/// Of an object that is farther than `half_m` from another on an axis of the room.
+/// Returns how far an object is from another along the axes on which that is more than `half_m`.
 pub fn apart(f: &Facts, object: &str, target: &str, half_m: f32, also_high: bool) -> Vec<String> {
     let apart_m = f.position_m(object) - f.position_m(target);
     let axes = [("x", apart_m.x), ("y", apart_m.y), ("z", if also_high { apart_m.z } else { 0.0 })];

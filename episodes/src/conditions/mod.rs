@@ -60,7 +60,8 @@ impl ConditionPart {
         if truth.holds(facts) {
             return Vec::new();
         }
-        let now = |value: f64| (value * 1e3).round() / 1e3;
+        // Without the sign of a zero.
+        let now = |value: f64| (value * 1e3).round() / 1e3 + 0.0;
         match &**truth {
             Truth::Compared { sides, .. } => {
                 let [left, right] = sides.each_ref().map(|side| now(side.value(facts)));

@@ -45,6 +45,16 @@ struct Line {
     along: Vector2<f64>,
 }
 
+/// A straight stretch of a boundary.
+struct Edge {
+    line: Line,
+    /// Where it begins and ends along the line.
+    ends_m: [f64; 2],
+    /// Root mean square of how far its points are off the line.
+    rms_m: f64,
+    points: usize,
+}
+
 /// Fits the region between two corners of the picture, and tells the result in the frame in which the camera has this pose.
 pub fn fit(
     view: &RobotView,
@@ -55,9 +65,9 @@ pub fn fit(
         std::array::from_fn(|axis| pick(corners[0][axis], corners[1][axis]) as usize)
     });
     let region = Region { view, from, to };
-    let points: Vec<Vector3<f64>> = region.pixels().filter_map(|at| region.point_m(at)).collect();
-    let (plane, rms_m, count) = fit_plane(&points)?;
-    let share = count as f64 / points.len() as f64;
+    let points_m: Vec<Vector3<f64>> = region.pixels().filter_map(|at| region.point_m(at)).collect();
+    let (plane, rms_m, count) = fit_plane(&points_m)?;
+    let share = count as f64 / points_m.len() as f64;
     if count < MIN_PLANE_POINTS || share < MIN_PLANE_SHARE {
         return None;
     }
@@ -68,8 +78,8 @@ pub fn fit(
     let normal = frame_from_camera * plane.normal;
     let axes = plane.axes();
     let on_plane = |at_m: Vector2<f64>| plane.point_m + axes[0] * at_m.x + axes[1] * at_m.y;
-    let edges = edges(region.boundary(&plane, &axes));
-    let told = |(line, [start_m, end_m], rms_m, points): &(Line, [f64; 2], f64, usize)| EdgeFit {
+    let edges = edges(region.boundary(&plane));
+    let told = |Edge { line, ends_m: [start_m, end_m], rms_m, points }: &Edge| EdgeFit {
         from_m: tell(on_plane(line.at(*start_m))),
         to_m: tell(on_plane(line.at(*end_m))),
         rms_m: coarse(*rms_m),
@@ -101,7 +111,8 @@ impl Region<'_> {
     }
 
     /// Returns where the plane ends in the region, in its own coordinates: between each of its pixels and a neighbour that is not of it.
-    fn boundary(&self, plane: &Plane, axes: &[Vector3<f64>; 2]) -> Vec<Vector2<f64>> {
+    fn boundary(&self, plane: &Plane) -> Vec<Vector2<f64>> {
+        let axes = plane.axes();
         let is_of_it = |at| self.point_m(at).is_some_and(|point_m| plane.has(&point_m));
         let mut found = Vec::new();
         for [u, v] in self.pixels().filter(|at| is_of_it(*at)) {
@@ -153,19 +164,19 @@ impl Plane {
 }
 
 /// Returns the plane with the most of these points, how far they are off it (root mean square), and how many they are.
-fn fit_plane(points: &[Vector3<f64>]) -> Option<(Plane, f64, usize)> {
-    if points.len() < MIN_PLANE_POINTS {
+fn fit_plane(points_m: &[Vector3<f64>]) -> Option<(Plane, f64, usize)> {
+    if points_m.len() < MIN_PLANE_POINTS {
         return None;
     }
-    let mut random = SplitMix64(points.len() as u64);
-    let mut draw = || points[random.uniform([0.0, points.len() as f32]) as usize % points.len()];
+    let mut random = SplitMix64(points_m.len() as u64);
+    let mut draw = || points_m[random.uniform([0.0, points_m.len() as f32]) as usize % points_m.len()];
     let mut best: Option<(Plane, usize)> = None;
     for _ in 0..TRIALS {
         let [a, b, c] = [draw(), draw(), draw()];
         let across = (b - a).cross(&(c - a));
         if across.norm() > 1e-9 {
             let plane = Plane { normal: across.normalize(), point_m: a };
-            let count = points.iter().filter(|point_m| plane.has(point_m)).count();
+            let count = points_m.iter().filter(|point_m| plane.has(point_m)).count();
             if best.is_none_or(|(_, most)| count > most) {
                 best = Some((plane, count));
             }
@@ -174,10 +185,10 @@ fn fit_plane(points: &[Vector3<f64>]) -> Option<(Plane, f64, usize)> {
     let mut plane = best?.0;
     for _ in 0..3 {
         plane = Plane::nearest(
-            points.iter().filter(|point_m| plane.has(point_m)).collect::<Vec<_>>().into_iter(),
+            points_m.iter().filter(|point_m| plane.has(point_m)).collect::<Vec<_>>().into_iter(),
         );
     }
-    let own = points.iter().filter(|point_m| plane.has(point_m));
+    let own = points_m.iter().filter(|point_m| plane.has(point_m));
     let (sum_m2, count) = own.fold((0.0, 0), |(sum, count), at| (sum + plane.off_m(at).powi(2), count + 1));
     (count > 0).then(|| (plane, (sum_m2 / count as f64).sqrt(), count))
 }
@@ -204,9 +215,8 @@ impl Line {
     }
 }
 
-/// Returns the straight edges in the points of a boundary, the longest first: the line, where it begins and ends along itself, how far
-/// its points are off it (root mean square), and how many they are.
-fn edges(mut points: Vec<Vector2<f64>>) -> Vec<(Line, [f64; 2], f64, usize)> {
+/// Returns the straight edges in the points of a boundary, the longest first.
+fn edges(mut points: Vec<Vector2<f64>>) -> Vec<Edge> {
     let mut found = Vec::new();
     let mut random = SplitMix64(points.len() as u64);
     while found.len() < MAX_EDGES && points.len() >= MIN_EDGE_POINTS {
@@ -239,28 +249,29 @@ fn edges(mut points: Vec<Vector2<f64>>) -> Vec<(Line, [f64; 2], f64, usize)> {
         let rms_m = (own.iter().map(|at| line.off_m(at).powi(2)).sum::<f64>() / own.len() as f64).sqrt();
         points.retain(|at| line.off_m(at).abs() >= EDGE_OFF_M);
         if ends_m[1] - ends_m[0] >= MIN_EDGE_M {
-            found.push((line, ends_m, rms_m, own.len()));
+            found.push(Edge { line, ends_m, rms_m, points: own.len() });
         }
     }
-    found.sort_by(|(_, one, ..), (_, other, ..)| (other[1] - other[0]).total_cmp(&(one[1] - one[0])));
+    let length_m = |edge: &Edge| edge.ends_m[1] - edge.ends_m[0];
+    found.sort_by(|one, other| length_m(other).total_cmp(&length_m(one)));
     found
 }
 
 /// Returns where two edges meet that reach so far.
-fn corners_of(edges: &[(Line, [f64; 2], f64, usize)]) -> Vec<Vector2<f64>> {
+fn corners_of(edges: &[Edge]) -> Vec<Vector2<f64>> {
     let mut found = Vec::new();
-    for (index, (one, one_ends_m, ..)) in edges.iter().enumerate() {
-        for (other, other_ends_m, ..) in &edges[index + 1..] {
-            let turn = one.along.perp(&other.along);
+    for (index, Edge { line: one, .. }) in edges.iter().enumerate() {
+        for other in &edges[index + 1..] {
+            let turn = one.along.perp(&other.line.along);
             if turn.abs() < MIN_CORNER_RAD.sin() {
                 continue;
             }
-            let corner_m = one.at((other.point_m - one.point_m).perp(&other.along) / turn);
-            let reaches = |line: &Line, [start_m, end_m]: [f64; 2]| {
+            let corner_m = one.at((other.line.point_m - one.point_m).perp(&other.line.along) / turn);
+            let reaches = |Edge { line, ends_m: [start_m, end_m], .. }: &Edge| {
                 let along_m = line.along_m(&corner_m);
                 along_m > start_m - MAX_CORNER_GAP_M && along_m < end_m + MAX_CORNER_GAP_M
             };
-            if reaches(one, *one_ends_m) && reaches(other, *other_ends_m) {
+            if reaches(&edges[index]) && reaches(other) {
                 found.push(corner_m);
             }
         }
@@ -281,7 +292,7 @@ mod tests {
     /// What a camera sees of a table of 0.6 x 0.4 m, turned by 0.3 rad about the way that the camera looks, 1 m off and leaning by
     /// `lean_rad`, and of a wall 2 m off.
     fn view(lean_rad: f64) -> RobotView {
-        let plane = Isometry3::new(Vector3::new(0.0, 0.0, 1.0), Vector3::new(lean_rad, 0.0, 0.0))
+        let plane = Isometry3::new(Vector3::new(0.0, 0.0, -1.0), Vector3::new(lean_rad, 0.0, 0.0))
             * Isometry3::rotation(Vector3::z() * 0.3);
         let intrinsics = Intrinsics {
             width: WIDTH as u32,
@@ -315,15 +326,15 @@ mod tests {
             let found = fit(&view(lean_rad), [[5, 5], [155, 115]], &Isometry3::identity()).unwrap();
             let PlaneFit { point_m, normal, rms_m, share, .. } = found.plane;
             let turned = Isometry3::rotation(Vector3::new(lean_rad, 0.0, 0.0));
-            let expected = turned * -Vector3::z();
+            let expected = turned * Vector3::z();
             assert!(Vector3::from(normal).angle(&expected) < 0.01, "{normal:?}");
             assert!(
-                distance_m(point_m, [0.0, 0.0, 1.0]) < 0.05 && rms_m <= 0.001 && share > 0.2,
+                distance_m(point_m, [0.0, 0.0, -1.0]) < 0.05 && rms_m <= 0.001 && share > 0.2,
                 "{point_m:?}"
             );
             assert_eq!((found.edges.len(), found.corners_m.len()), (4, 4), "{lean_rad}: {found:?}");
             let table =
-                Isometry3::translation(0.0, 0.0, 1.0) * turned * Isometry3::rotation(Vector3::z() * 0.3);
+                Isometry3::translation(0.0, 0.0, -1.0) * turned * Isometry3::rotation(Vector3::z() * 0.3);
             for [x_m, y_m] in [[0.3, 0.2], [-0.3, 0.2], [0.3, -0.2], [-0.3, -0.2]] {
                 let corner_m: [f64; 3] = (table * Point3::new(x_m, y_m, 0.0)).coords.into();
                 let off_m =
@@ -339,7 +350,7 @@ mod tests {
         let corner = fit(&view, [[5, 5], [80, 60]], &Isometry3::identity()).unwrap();
         assert!(corner.edges.len() >= 2 && !corner.corners_m.is_empty(), "{corner:?}");
         let wall = fit(&view, [[0, 0], [12, 12]], &Isometry3::identity()).unwrap();
-        assert!(wall.edges.is_empty() && (wall.plane.point_m[2] - 2.0).abs() < 1e-3, "{wall:?}");
+        assert!(wall.edges.is_empty() && (wall.plane.point_m[2] + 2.0).abs() < 1e-3, "{wall:?}");
         assert_eq!(fit(&view, [[80, 60], [83, 63]], &Isometry3::identity()), None, "16 pixels are too few");
     }
 }

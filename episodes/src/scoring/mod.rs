@@ -8,6 +8,6 @@ mod phases;
 pub mod placement;
 mod scores;
 
-pub use facts::{A, B, C, Facts, Grip, ObjectFacts, RobotFacts};
+pub use facts::{A, B, C, Facts, Grip, ObjectFacts, ROBOT_NAMES, RobotFacts};
 pub use phases::{Condition, Done, Milestone, Nearness, Phase, PhaseMemory, Predicate};
 pub use scores::{ScoreMemory, Scores, StepScore};

@@ -115,7 +115,7 @@ impl Session {
                     }
                     None => {
                         let fit = match (args.fit, &args.region) {
-                            (Some(true), Some(region)) => {
+                            (true, Some(region)) => {
                                 Some(self.observer.fit(&self.present, robot, region, frame.1)?)
                             }
                             _ => None,
@@ -164,7 +164,7 @@ impl Session {
     fn manage(&mut self, call: &ManageCall) -> ManageReply {
         match call {
             ManageCall::GetStatus(asked) => {
-                let next_phase = if asked.explain == Some(true) { self.next_phase() } else { None };
+                let next_phase = if asked.explain { self.next_phase() } else { None };
                 ManageReply::GetStatus(StatusReply { next_phase, ..self.status() })
             }
             ManageCall::Finish(_) => {

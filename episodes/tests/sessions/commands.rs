@@ -175,7 +175,7 @@ fn depth_finds_the_bottle_where_it_is() {
         robot: "A".into(),
         pixels: Some(vec![[u.round() as i64, v.round() as i64]]),
         region: None,
-        fit: None,
+        fit: false,
         surface: None,
         frame: None,
     };

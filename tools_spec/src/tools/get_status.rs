@@ -14,10 +14,10 @@ use crate::tool::Tool;
     Costs no steps; physics stands still. Also answers after the episode has ended."))]
 #[serde(deny_unknown_fields)]
 pub struct GetStatus {
-    /// True: also what the next phase still lacks, part by part, as it is measured. Null: false.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("full_only" = true, "default" = false))]
-    pub explain: Option<bool>,
+    /// True: also what the next phase still lacks, part by part, as it is measured.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[schemars(extend("full_only" = true))]
+    pub explain: bool,
 }
 
 impl Tool for GetStatus {

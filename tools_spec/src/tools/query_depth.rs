@@ -26,10 +26,10 @@ pub struct QueryDepth {
     /// Pixels of a rectangle, row by row, at most 4096 of them. Null: those of `pixels`.
     pub region: Option<PixelRegion>,
     /// True: also the plane in `region`, the straight edges at which it ends there, and the corners where they meet, fitted to every pixel
-    /// of it. Null: false.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("full_only" = true, "default" = false))]
-    pub fit: Option<bool>,
+    /// of it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[schemars(extend("full_only" = true))]
+    pub fit: bool,
     /// A surface to find, whose middle, size, corners and, where it is upright and round, axis are told in place of points: give pixel,
     /// [u, v] of a place on it, for the patch of its colour and the whole thing, or color, as "red", for the nearest three of that colour.
     #[schemars(extend("full_only" = true))]
@@ -57,7 +57,7 @@ impl Tool for QueryDepth {
             robot: "A".into(),
             pixels: Some(vec![[160, 120], [170, 120]]),
             region: None,
-            fit: None,
+            fit: false,
             surface: None,
             frame: None,
         }
@@ -68,7 +68,7 @@ impl Tool for QueryDepth {
     }
 
     fn validate(&self) -> Result<(), String> {
-        if self.fit == Some(true) && self.region.is_none() {
+        if self.fit && self.region.is_none() {
             return Err("fit is of a region; give region, as {\"from\": [100, 80], \"to\": [220, 170], \"stride\": 10}".into());
         }
         match (&self.pixels, &self.region, &self.surface) {

@@ -305,7 +305,7 @@ fn openapi_says_what_is_refused() {
     };
     assert_eq!(whole("query_depth")["oneOf"][1]["required"], json!(["region"]));
     assert_eq!(whole("check_reach")["allOf"][0]["anyOf"].as_array().map(Vec::len), Some(4));
-    assert_eq!(field("query_depth", "/pixels/maxItems"), 256);
+    assert_eq!(field("query_depth", "/pixels/maxItems"), 4096);
     assert_eq!(field("send_joint_chunk", "/robots/anyOf").as_array().map(Vec::len), Some(50));
     assert_eq!(field("observe", "/robots/uniqueItems"), true);
     let both = field("walk", "/robots/items/not/allOf");

@@ -10,6 +10,8 @@ pub const A: usize = 0;
 pub const B: usize = 1;
 /// Index of robot C.
 pub const C: usize = 2;
+/// Names of robots, by index.
+pub const ROBOT_NAMES: [&str; 3] = ["A", "B", "C"];
 
 /// The world at one control step.
 #[derive(Clone, Debug)]

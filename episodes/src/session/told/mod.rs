@@ -257,12 +257,12 @@ impl Session {
                 return Err(refused("this episode measures at pixels alone; give pixels or region"));
             }
             ToolCall::Manage(ManageCall::GetStatus(args))
-                if args.explain == Some(true) && self.spec().assistance == Assistance::Paper =>
+                if args.explain && self.spec().assistance == Assistance::Paper =>
             {
                 return Err(refused("this episode does not tell what phases lack; leave explain out"));
             }
             ToolCall::Look(LookCall::QueryDepth(args))
-                if args.fit == Some(true) && self.spec().assistance == Assistance::Paper =>
+                if args.fit && self.spec().assistance == Assistance::Paper =>
             {
                 return Err(refused("this episode measures at pixels alone; leave fit out"));
             }

@@ -14,15 +14,14 @@ use super::reading::{Reading, lasting, place_in_file};
 use super::rewordings::in_words;
 use super::table::{Extent, ObjectTable, OffsetTable, RobotTable, TaskTable};
 use crate::conditions::Names;
-use crate::scoring::Phase;
+use crate::scoring::{Phase, ROBOT_NAMES};
 use crate::tasks::embedded::origin_of;
 use crate::tasks::{ChosenOption, ObjectSpot, Offset, RobotSpot, Task, TaskOrigin, TaskSource};
 
-const ROBOTS: [&str; 3] = ["A", "B", "C"];
 const MOST_OBJECTS: usize = 64;
 const MOST_PHASES: usize = 12;
 /// Robots that begin nearer to each other touch.
-const ROBOTS_APART_M: f64 = 0.35;
+const ROBOT_NAMES_APART_M: f64 = 0.35;
 /// Nothing is farther away than this.
 const FARTHEST_M: f64 = 100.0;
 const DEFAULT_BENCHMARK_STEPS: u32 = 1000;
@@ -243,9 +242,9 @@ impl Reading<'_> {
     fn robots(&mut self, tables: &Spanned<Vec<RobotTable>>) -> Vec<RobotSpot> {
         let (span, tables) = (tables.span(), tables.as_ref());
         let names: Vec<&str> = tables.iter().map(|robot| robot.name.as_ref().as_str()).collect();
-        if tables.is_empty() || tables.len() > ROBOTS.len() || names != ROBOTS[..tables.len()] {
-            let other = tables.iter().zip(ROBOTS).find(|(robot, name)| robot.name.as_ref() != name);
-            let other = other.map(|(robot, _)| robot).or(tables.get(ROBOTS.len()));
+        if tables.is_empty() || tables.len() > ROBOT_NAMES.len() || names != ROBOT_NAMES[..tables.len()] {
+            let other = tables.iter().zip(ROBOT_NAMES).find(|(robot, name)| robot.name.as_ref() != name);
+            let other = other.map(|(robot, _)| robot).or(tables.get(ROBOT_NAMES.len()));
             let at = other.map_or(span, |robot| robot.name.span());
             let what = format!(
                 "there are 1 to 3 [[robots]], called \"A\", \"B\" and \"C\" in this order; here: {names:?}"
@@ -258,9 +257,9 @@ impl Reading<'_> {
             self.finite(&robot.position_m, &[x_m, y_m], FARTHEST_M);
             for other in &tables[..index] {
                 let [other_x_m, other_y_m] = *other.position_m.as_ref();
-                if f64::hypot(x_m - other_x_m, y_m - other_y_m) < ROBOTS_APART_M {
+                if f64::hypot(x_m - other_x_m, y_m - other_y_m) < ROBOT_NAMES_APART_M {
                     let what = format!(
-                        "robots stand at least {ROBOTS_APART_M} m apart; {} is here, too",
+                        "robots stand at least {ROBOT_NAMES_APART_M} m apart; {} is here, too",
                         other.name.as_ref()
                     );
                     self.wrong(robot.position_m.span(), what);
@@ -274,7 +273,7 @@ impl Reading<'_> {
             yaw_rad: angle_rad(robot.yaw_deg.as_ref()),
             instruction: lasting(robot.instruction.as_ref()),
         };
-        tables.iter().zip(ROBOTS).map(spot).collect()
+        tables.iter().zip(ROBOT_NAMES).map(spot).collect()
     }
 
     fn objects(&mut self, tables: &[ObjectTable], names: &mut Names) -> Vec<ObjectSpot> {

@@ -6,7 +6,7 @@ use tandem_tools_spec::{Assistance, Disclosure, GetStatus, ManageReply, NextPhas
 use crate::common::*;
 
 fn explained(session: &mut Session) -> Result<Option<NextPhase>, String> {
-    match session.call(GetStatus { explain: Some(true) }.into()) {
+    match session.call(GetStatus { explain: true }.into()) {
         Ok(ToolReply::Manage(ManageReply::GetStatus(status))) => Ok(status.next_phase),
         Ok(other) => panic!("{other:?} is no status"),
         Err(error) => Err(error.to_string()),
