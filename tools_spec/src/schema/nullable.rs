@@ -44,6 +44,8 @@ fn leave_out_own(object: &mut Map<String, Value>) {
         if let Some(choice) = the_choice_beside_null(property) {
             *property = choice;
             optional.push(name.clone());
+        } else if property.get("default").is_some() {
+            optional.push(name.clone());
         }
     }
     if let Some(Value::Array(required)) = object.get_mut("required") {

@@ -16,7 +16,7 @@ use crate::tool::Tool;
 pub struct GetStatus {
     /// True: also what the next phase still lacks, part by part, as it is measured.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    #[schemars(extend("full_only" = true))]
+    #[schemars(extend("full_only" = true, "default" = false))]
     pub explain: bool,
 }
 

@@ -28,7 +28,7 @@ pub struct QueryDepth {
     /// True: also the plane in `region`, the straight edges at which it ends there, and the corners where they meet, fitted to every pixel
     /// of it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    #[schemars(extend("full_only" = true))]
+    #[schemars(extend("full_only" = true, "default" = false))]
     pub fit: bool,
     /// A surface to find, whose middle, size, corners and, where it is upright and round, axis are told in place of points: give pixel,
     /// [u, v] of a place on it, for the patch of its colour and the whole thing, or color, as "red", for the nearest three of that colour.

@@ -68,7 +68,7 @@ class Tools(ABC):
             Example: [[160, 120], [170, 120]]. None: those of `region`.
         region: Pixels of a rectangle, row by row, at most 4096 of them. None: those of `pixels`.
         fit: True: also the plane in `region`, the straight edges at which it ends there, and the corners where they
-            meet, fitted to every pixel of it. None: false.
+            meet, fitted to every pixel of it.
         surface: A surface to find, whose middle, size, corners and, where it is upright and round, axis are told in
             place of points: give pixel, [u, v] of a place on it, for the patch of its colour and the whole thing, or
             color, as "red", for the nearest three of that colour.
@@ -234,7 +234,7 @@ class Tools(ABC):
         """Ask where the episode stands: time, phases reached, who has fallen, and the budget left. Costs no steps;
         physics stands still. Also answers after the episode has ended.
 
-        explain: True: also what the next phase still lacks, part by part, as it is measured. None: false.
+        explain: True: also what the next phase still lacks, part by part, as it is measured.
         """
         arguments: dict[str, Any] = {
             "explain": explain,

@@ -20,6 +20,8 @@ pub fn parameters(schema: &Value) -> Vec<Parameter> {
     let properties = schema["properties"].as_object().into_iter().flatten();
     let parameter = |(wire, of): (&String, &Value)| {
         let (kind, may_be_null) = argument_type(of);
+        // None is left out, and what is left out has its default.
+        let may_be_null = may_be_null || !of["default"].is_null();
         Parameter {
             wire: wire.clone(),
             name: python_name(wire),
