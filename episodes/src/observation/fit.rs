@@ -290,8 +290,8 @@ mod tests {
     const FOCAL_PX: f32 = 130.0;
 
     /// What a camera sees of a table of 0.6 x 0.4 m, turned by 0.3 rad about the way that the camera looks, 1 m off and leaning by
-    /// `lean_rad`, and of a wall 2 m off.
-    fn view(lean_rad: f64) -> RobotView {
+    /// `lean_rad`, and of a wall behind it.
+    fn view(lean_rad: f64, wall_m: f32) -> RobotView {
         let plane = Isometry3::new(Vector3::new(0.0, 0.0, -1.0), Vector3::new(lean_rad, 0.0, 0.0))
             * Isometry3::rotation(Vector3::z() * 0.3);
         let intrinsics = Intrinsics {
@@ -307,7 +307,7 @@ mod tests {
             let normal = plane.rotation * Vector3::z();
             let depth_m = normal.dot(&plane.translation.vector) / normal.dot(&ray);
             let own_m = plane.inverse() * Point3::from(ray * depth_m);
-            if own_m.x.abs() <= 0.3 && own_m.y.abs() <= 0.2 { depth_m as f32 } else { 2.0 }
+            if own_m.x.abs() <= 0.3 && own_m.y.abs() <= 0.2 { depth_m as f32 } else { wall_m }
         });
         let (width, height) = (WIDTH as u32, HEIGHT as u32);
         let depth_m = depth_m.collect();
@@ -323,7 +323,8 @@ mod tests {
     #[test]
     fn a_table_has_its_plane_four_edges_and_four_corners() {
         for lean_rad in [0.0, 0.5, -0.8] {
-            let found = fit(&view(lean_rad), [[5, 5], [155, 115]], &Isometry3::identity()).unwrap();
+            let found =
+                fit(&view(lean_rad, f32::INFINITY), [[5, 5], [155, 115]], &Isometry3::identity()).unwrap();
             let PlaneFit { point_m, normal, rms_m, share, .. } = found.plane;
             let turned = Isometry3::rotation(Vector3::new(lean_rad, 0.0, 0.0));
             let expected = turned * Vector3::z();
@@ -346,7 +347,7 @@ mod tests {
 
     #[test]
     fn a_corner_alone_and_no_plane_at_all() {
-        let view = view(0.0);
+        let view = view(0.0, 2.0);
         let corner = fit(&view, [[5, 5], [80, 60]], &Isometry3::identity()).unwrap();
         assert!(corner.edges.len() >= 2 && !corner.corners_m.is_empty(), "{corner:?}");
         let wall = fit(&view, [[0, 0], [12, 12]], &Isometry3::identity()).unwrap();

@@ -20,7 +20,8 @@ from .client import Client, RemoteEpisode
 from .contract.arguments import JointChunk, PixelRegion, SurfaceQuery, WalkMove, WristMove
 from .contract.commands import CommandReply
 from .contract.depth import DepthReply
-from .contract.replies import ReachReply, ResultReply, RobotState, StatusReply
+from .contract.replies import ReachReply, RobotState, StatusReply
+from .contract.result import ResultReply
 from .contract.start import Briefing, TaskList
 from .episode import Episode
 from .errors import EpisodeEnded, Refused, SimulatorFailed, TandemError, Unreachable

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .contract.commands import StopReason
-from .contract.replies import CameraCalibration, EndReason, Protocol, ResultReply, RobotState
+from .contract.replies import CameraCalibration, EndReason, Protocol, RobotState
+from .contract.result import ResultReply
 from .contract.start import Briefing
 from .contract.tools import Tools
 from .errors import TandemError

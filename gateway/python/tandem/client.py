@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from .base import BaseEpisode, Observation, Stepped, begun, chunk_of, integer
 from .contract.arguments import Json
-from .contract.replies import CameraCalibration, Protocol, ResultReply, RobotState
+from .contract.replies import CameraCalibration, Protocol, RobotState
+from .contract.result import ResultReply
 from .contract.start import Briefing, TaskList
 from .errors import TandemError, Unreachable, of_kind
 

@@ -29,7 +29,8 @@ from .base import (
 )
 from .contract.arguments import Json
 from .contract.commands import StopReason
-from .contract.replies import Assistance, CameraCalibration, EndReason, Protocol, ResultReply, RobotState
+from .contract.replies import Assistance, CameraCalibration, EndReason, Protocol, RobotState
+from .contract.result import ResultReply
 from .contract.start import Briefing
 from .errors import TandemError
 

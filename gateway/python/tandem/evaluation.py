@@ -18,7 +18,8 @@ import numpy as np
 
 from . import _native
 from .base import Renderer, Sensors, StateEstimate, StressAxis, StressLevel, integer, settings_json
-from .contract.replies import Assistance, Protocol, ResultReply
+from .contract.replies import Assistance, Protocol
+from .contract.result import ResultReply
 from .contract.start import TaskList
 from .episode import Episode
 from .errors import EpisodeEnded, TandemError

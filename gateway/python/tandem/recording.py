@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from . import _native
 from .contract.commands import PhaseReached
-from .contract.replies import ResultReply
+from .contract.result import ResultReply
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,8 @@ from .arguments import (
 )
 from .commands import CommandReply, PlanReply, PoseFrame
 from .depth import DepthReply
-from .replies import ReachReply, ResultReply, RobotState, StatusReply
+from .replies import ReachReply, RobotState, StatusReply
+from .result import ResultReply
 
 
 class Tools(ABC):

@@ -7,7 +7,7 @@ use tandem_tools_spec::TypedTool;
 
 use super::text::{Lines, docstring};
 use super::types::{Parameter, parameters, python_name, reading, reference, reply_type, without_null};
-use super::{OF_DEPTH, OF_OBSERVE, OF_START, described, is_method};
+use super::{OF_DEPTH, OF_OBSERVE, OF_RESULT, OF_START, described, is_method};
 
 /// The types of the contract, by what they are part of.
 pub struct Contract<'a> {
@@ -19,6 +19,8 @@ pub struct Contract<'a> {
     depth: BTreeSet<String>,
     /// What else tools of an episode are answered with.
     replies: BTreeSet<String>,
+    /// What an episode came to.
+    result: BTreeSet<String>,
     /// What only starts and lists of tasks are answered with.
     start: BTreeSet<String>,
 }
@@ -31,6 +33,7 @@ impl<'a> Contract<'a> {
             commands: BTreeSet::new(),
             depth: BTreeSet::new(),
             replies: BTreeSet::new(),
+            result: BTreeSet::new(),
             start: BTreeSet::new(),
         };
         let on_episode = || tools.iter().filter(|tool| is_method(tool));
@@ -45,9 +48,11 @@ impl<'a> Contract<'a> {
             on_episode().map(|tool| tool.reply.as_str()).partition(|reply| is_common(reply));
         let commands = all_of(common, &[]);
         let depth = all_of(OF_DEPTH.to_vec(), &[&commands]);
-        let replies = all_of(own.into_iter().chain(OF_OBSERVE).collect(), &[&commands, &depth]);
-        let start = all_of(OF_START.to_vec(), &[&commands, &depth, &replies]);
-        Contract { arguments, commands, depth, replies, start, ..contract }
+        let own = own.into_iter().filter(|reply| *reply != OF_RESULT);
+        let replies = all_of(own.chain(OF_OBSERVE).collect(), &[&commands, &depth]);
+        let result = all_of(vec![OF_RESULT], &[&commands, &depth, &replies]);
+        let start = all_of(OF_START.to_vec(), &[&commands, &depth, &replies, &result]);
+        Contract { arguments, commands, depth, replies, result, start, ..contract }
     }
 
     /// Classes and names for choices that a schema refers to itself.
@@ -81,7 +86,9 @@ impl<'a> Contract<'a> {
     /// Whether it is one of several texts that stands in replies, too, whose modules have it.
     pub fn is_replied(&self, name: &str) -> bool {
         !self.is_class(name)
-            && [&self.commands, &self.depth, &self.replies].iter().any(|names| names.contains(name))
+            && [&self.commands, &self.depth, &self.replies, &self.result]
+                .iter()
+                .any(|names| names.contains(name))
     }
 
     /// The type of a name that has no class and is no choice, as that of numbers by joint.
@@ -144,6 +151,11 @@ impl<'a> Contract<'a> {
         self.reply_module("What tools reply that are no commands.", &self.replies)
     }
 
+    /// The module of what an episode came to.
+    pub fn result(&self) -> String {
+        self.reply_module("What an episode came to.", &self.result)
+    }
+
     /// The module of what a start and a list of tasks reply.
     pub fn start(&self) -> String {
         self.reply_module("What a start replies, and what tasks there are.", &self.start)
@@ -171,9 +183,12 @@ impl<'a> Contract<'a> {
 
     /// Imports types of replies from where they are.
     pub fn import(&self, lines: &mut Lines, names: Vec<String>) {
-        for (module, own) in
-            [("commands", &self.commands), ("depth", &self.depth), ("replies", &self.replies)]
-        {
+        for (module, own) in [
+            ("commands", &self.commands),
+            ("depth", &self.depth),
+            ("replies", &self.replies),
+            ("result", &self.result),
+        ] {
             lines.import(module, names.iter().filter(|name| own.contains(*name)).cloned());
         }
     }

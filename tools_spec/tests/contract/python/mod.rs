@@ -21,6 +21,8 @@ const OBSERVE: &str = "observe";
 const OF_OBSERVE: [&str; 2] = ["RobotState", "CameraCalibration"];
 /// What is told of points and surfaces.
 const OF_DEPTH: [&str; 1] = ["DepthReply"];
+/// What an episode came to.
+const OF_RESULT: &str = "ResultReply";
 /// What a list of tasks is, and what a start says wherever the episode runs.
 const OF_START: [&str; 2] = ["Briefing", "TaskList"];
 
@@ -33,6 +35,7 @@ fn the_python_package_has_every_tool() {
         ("commands", contract.commands()),
         ("depth", contract.depth()),
         ("replies", contract.replies()),
+        ("result", contract.result()),
         ("start", contract.start()),
         ("tools", methods(&contract, &tools)),
     ];
