@@ -112,7 +112,7 @@ pub(super) fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan
 
 #[test]
 fn shares_are_fair_and_together_the_whole() {
-    let whole = plan(tasks::cohub().iter().copied().collect(), (0..10).collect());
+    let whole = plan(tasks::cohub().to_vec(), (0..10).collect());
     let (all, _) = whole.episodes();
     assert_eq!(all.len(), 10 * tasks::cohub().len());
     let mut joined = Vec::new();
