@@ -26,8 +26,6 @@ const LEG_S: f32 = 0.3;
 /// A frame that missed the peg, or leans by more than this on it, is taken off and hung anew.
 const TRIES: u32 = 3;
 const ASKEW_RAD: f32 = 0.2;
-/// A loop that is not so far past the peg's tip slides off it.
-const LEAST_DEPTH_M: f32 = 0.005;
 /// Fingers open as far as the wall behind the frame lets them, then the hands go outwards and back.
 const LOOSE: f32 = 0.35;
 const OUTWARDS_M: f32 = 0.13;
@@ -71,8 +69,7 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
         if is_straight_on_peg(&commander.facts()?) {
             give_way(commander, true);
             go(commander, past, resting, 4)?;
-            let facts = commander.facts()?;
-            if is_straight_on_peg(&facts) && depth_m(&facts) > LEAST_DEPTH_M {
+            if is_straight_on_peg(&commander.facts()?) {
                 return let_go(commander, &grasps);
             }
             give_way(commander, false);
@@ -93,11 +90,6 @@ fn give_way(commander: &mut Commander, give_way: bool) {
     for robot in [A, B] {
         commander.set_compliance(robot, give_way.then_some(COMPLIANCE_N_S_M));
     }
-}
-
-/// How far the loop is past the peg's tip.
-fn depth_m(facts: &Facts) -> f32 {
-    facts.site_m("frame", "loop").y - facts.site_m("wall_peg", "tip").y
 }
 
 /// Once let go of, a frame that hangs askew stays so: no hand has room behind it to take it again.
