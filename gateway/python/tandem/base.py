@@ -125,8 +125,8 @@ class BaseEpisode(Tools):
         return tuple(self.briefing.action_row)
 
     def explain(self) -> tuple[str, ...]:
-        """Says what the next phase still lacks, one sentence each, as the simulator measures it. Empty where phases are not told, and
-        after the last. Refused where the assistance is "paper"; results name it as `phase_conditions`.
+        """Says what the next phase still lacks, one sentence each, as the simulator measures it. Empty where phases are not
+        told, and after the last. Refused where the assistance is "paper"; results name it as `phase_conditions`.
         """
         following = self.get_status(explain=True).next_phase
         return () if following is None else tuple(following.lacks)
