@@ -1,6 +1,6 @@
 //! Conditions that somebody writes into a task's file: expressions over [`crate::Facts`], in a small typed part of the
-//! Common Expression Language. `syntax` reads them, `check` finds out what they mean, `functions` lists the facts, and
-//! `meaning` is what is left to evaluate at every control step.
+//! Common Expression Language. `syntax` reads them, `check` finds out what they mean, `functions` lists the facts,
+//! `meaning` is what is left to evaluate at every control step, and `lacks` says in sentences why a fact does not hold.
 
 mod check;
 mod functions;
