@@ -21,7 +21,7 @@ use crate::players::experts::skills::{
 use crate::players::{Episode, InProcess, PlayerError, PrivilegedEpisode};
 use crate::scoring::{A, B, Facts, Grip};
 use crate::spec::{Controller, EpisodeSpec, RobotFile};
-use crate::tasks::Task;
+use crate::tasks::{Task, embedded_task};
 
 /// A way of the bar.
 pub struct CarryingCase {
@@ -57,7 +57,7 @@ const WAY_POINTS: usize = 200;
 
 /// Two robots and a bar.
 pub(super) static TASK: LazyLock<&'static Task> =
-    LazyLock::new(|| super::task("carry_bar.toml", include_str!("tasks/carry_bar.toml")));
+    LazyLock::new(|| embedded_task("carry_bar.toml", include_str!("tasks/carry_bar.toml")));
 
 /// Plays one case on these seeds.
 pub fn run(

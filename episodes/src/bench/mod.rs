@@ -6,7 +6,6 @@ mod falls;
 mod holding;
 mod placing;
 
-use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -28,7 +27,6 @@ use crate::batch::BatchError;
 use crate::commands;
 use crate::players::PlayerError;
 use crate::spec::{Controller, RobotFile};
-use crate::tasks::{Task, TaskSource, task_of};
 
 /// Targets drawn where no file gives any.
 const SAMPLED_TARGETS: usize = 200;
@@ -54,12 +52,6 @@ pub enum BenchError {
     NoCase { asked: String, have: String },
     #[error("0 episodes measure nothing; use at least 1")]
     NoEpisodes,
-}
-
-/// Returns a task of the benches.
-fn task(name: &str, text: &str) -> &'static Task {
-    let source = TaskSource { name: name.into(), text: text.into(), beside: BTreeMap::new() };
-    task_of(source).unwrap_or_else(|error| panic!("a task of the program: {error}"))
 }
 
 /// Plays the cases whose names contain one of the words of `filter`, separated by commas, on these seeds, robots on their own first, then

@@ -17,11 +17,11 @@ use crate::Session;
 use crate::convert::isometry_from_sim;
 use crate::players::{InProcess, PlayerError};
 use crate::spec::{Controller, EpisodeSpec, RobotFile};
-use crate::tasks::Task;
+use crate::tasks::{Task, embedded_task};
 
 /// A robot alone on a floor.
 static TASK: LazyLock<&'static Task> =
-    LazyLock::new(|| super::task("place.toml", include_str!("tasks/place.toml")));
+    LazyLock::new(|| embedded_task("place.toml", include_str!("tasks/place.toml")));
 
 /// One after another, each from where the last ended.
 const PLACES: usize = 3;

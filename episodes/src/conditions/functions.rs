@@ -344,7 +344,8 @@ impl Fact<'_> {
     }
 }
 
-/// Returns the way back along the x axis of the object at `place`, and how far that way the site named behind it is.
+/// Returns the way back along the x axis of the object at `place`, and how far that way the site named
+/// behind it is.
 fn behind(f: &Fact, place: usize) -> (Vector, f32) {
     let object = f.object(place);
     let back = f.facts.object(object).pose_in_world.rotation * Vector::NEG_X;

@@ -50,7 +50,7 @@ pub struct Statement {
     pub holds: fn(&Fact) -> bool,
     /// How near it is to that, from 0 to 1, where that grows on the way.
     pub near: Option<fn(&Fact) -> f32>,
-    /// What it lacks, one sentence each, where its text alone does not say it.
+    /// Says what it lacks, one sentence each. `None` where its text alone says it.
     pub lacks: Option<fn(&Fact) -> Vec<String>>,
 }
 

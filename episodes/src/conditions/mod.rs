@@ -48,7 +48,7 @@ pub struct ConditionPart {
 }
 
 impl ConditionPart {
-    /// Whether another part asks for the same, also in the terms that it names.
+    /// Returns whether another part asks for the same, also in the terms that it names.
     pub fn asks_the_same(&self, other: &ConditionPart) -> bool {
         let meaning = |part: &ConditionPart| format!("{:?}", part.truth);
         self.text == other.text && meaning(self) == meaning(other)

@@ -1,5 +1,5 @@
-//! Fits the largest plane in a region of a picture, the straight edges at which it ends there, and the corners where these meet. From the
-//! depth that the policy may measure itself.
+//! Fits the largest plane in a region of a picture, the straight edges at which it ends there, and the
+//! corners where these meet. From the depth that the policy may measure itself.
 
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, SymmetricEigen, Vector2, Vector3};
 use tandem_sim::SplitMix64;
@@ -14,7 +14,7 @@ const PLANE_OFF_SHARE: f64 = 0.003;
 /// Points are of an edge that are off it by less than this.
 const EDGE_OFF_M: f64 = 0.004;
 const TRIALS: usize = 200;
-/// A plane has at least so many points, and this share of those in the region.
+/// Smallest number of points of a plane, and their smallest share of those in the region.
 const MIN_PLANE_POINTS: usize = 30;
 const MIN_PLANE_SHARE: f64 = 0.2;
 const MIN_EDGE_POINTS: usize = 12;
@@ -48,14 +48,15 @@ struct Line {
 /// A straight stretch of a boundary.
 struct Edge {
     line: Line,
-    /// Where it begins and ends along the line.
+    /// Its start and end along the line.
     ends_m: [f64; 2],
     /// Root mean square of how far its points are off the line.
     rms_m: f64,
     points: usize,
 }
 
-/// Fits the region between two corners of the picture, and tells the result in the frame in which the camera has this pose.
+/// Fits the region between two corners of the picture, and tells the result in the frame in which the
+/// camera has this pose.
 pub fn fit(
     view: &RobotView,
     corners: [[i64; 2]; 2],
@@ -110,7 +111,8 @@ impl Region<'_> {
         depth_m.is_finite().then(|| Vector3::from(seen_m.to_array().map(f64::from)))
     }
 
-    /// Returns where the plane ends in the region, in its own coordinates: between each of its pixels and a neighbour that is not of it.
+    /// Returns where the plane ends in the region, in its own coordinates: between each of its pixels and a
+    /// neighbour that is not of it.
     fn boundary(&self, plane: &Plane) -> Vec<Vector2<f64>> {
         let axes = plane.axes();
         let is_of_it = |at| self.point_m(at).is_some_and(|point_m| plane.has(&point_m));
@@ -163,7 +165,8 @@ impl Plane {
     }
 }
 
-/// Returns the plane with the most of these points, how far they are off it (root mean square), and how many they are.
+/// Returns the plane with the most of these points, how far they are off it (root mean square), and how
+/// many they are.
 fn fit_plane(points_m: &[Vector3<f64>]) -> Option<(Plane, f64, usize)> {
     if points_m.len() < MIN_PLANE_POINTS {
         return None;
@@ -289,7 +292,7 @@ mod tests {
     const HEIGHT: usize = 120;
     const FOCAL_PX: f32 = 130.0;
 
-    /// What a camera sees of a table of 0.6 x 0.4 m, turned by 0.3 rad about the way that the camera looks, 1 m off and leaning by
+    /// Returns the view of a table of 0.6 x 0.4 m, turned by 0.3 rad about the way that the camera looks, 1 m off and leaning by
     /// `lean_rad`, and of a wall behind it.
     fn view(lean_rad: f64, wall_m: f32) -> RobotView {
         let plane = Isometry3::new(Vector3::new(0.0, 0.0, -1.0), Vector3::new(lean_rad, 0.0, 0.0))

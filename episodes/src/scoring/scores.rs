@@ -70,7 +70,7 @@ impl Scores {
         self.phases.progress(&self.facts(step))
     }
 
-    /// What is remembered of the phase that is next.
+    /// Returns the memory of the next phase.
     pub fn next_phase(&self) -> &PhaseMemory {
         self.phases.memory()
     }

@@ -1,5 +1,6 @@
-//! Tasks as data: where robots and objects are, what varies with the seed, what is asked, and the phases that score it. Every task is a
-//! TOML file: the benchmark's in `episodes/tasks/cohub`, our own in `episodes/tasks/tandem_plus`, and those of users.
+//! Tasks as data: where robots and objects are, what varies with the seed, what is asked, and the phases
+//! that score it. Every task is a TOML file: the benchmark's in `episodes/tasks/cohub`, our own in
+//! `episodes/tasks/tandem_plus`, and those of users.
 //!
 //! To add a task to a suite: one file there and its line in `set`.
 
@@ -13,6 +14,7 @@ mod tests;
 pub use embedded::TANDEM_PLUS;
 pub use file::{TaskFileError, by_id_or_file, read_task, task_of};
 pub use randomize::{Offset, Spread, StartPose};
+pub(crate) use set::embedded_task;
 pub use set::{TaskSet, built_in, cohub, find, in_order, tandem_plus};
 
 use std::collections::BTreeMap;
@@ -41,7 +43,8 @@ pub struct Task {
     pub randomize: &'static [Offset],
     /// What has to be done, for a policy that directs all robots.
     pub instruction: &'static str,
-    /// What operators of one robot each read in place of the joint instruction, where that tells what not all of them may know.
+    /// Instruction for operators of one robot each, in place of the joint one, where that tells what not
+    /// all of them may know.
     pub shared_instruction: Option<&'static str>,
     /// The task in other words, for each level of stress. `None` where the file has none.
     pub rewordings: Option<[TaskWords; 3]>,
@@ -231,7 +234,8 @@ impl Task {
         }
     }
 
-    /// Whether its robots have to hold something with a thumb and fingers: its conditions ask for it, or its file says so.
+    /// Whether its robots have to hold something with a thumb and fingers: its conditions ask for it, or
+    /// its file says so.
     pub fn needs_fingers(&self) -> bool {
         self.says_needs_fingers || asks_for_fingers(&self.source.text)
     }

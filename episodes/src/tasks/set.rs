@@ -12,11 +12,17 @@ static COHUB: LazyLock<Vec<&'static Task>> = LazyLock::new(|| read(COHUB_FILES))
 static TANDEM_PLUS_TASKS: LazyLock<Vec<&'static Task>> = LazyLock::new(|| read(TANDEM_PLUS_FILES));
 
 fn read(files: &[Embedded]) -> Vec<&'static Task> {
-    let task = |(name, text): &Embedded| {
-        let source = TaskSource { name: (*name).into(), text: (*text).into(), beside: BTreeMap::new() };
-        task_of(source).unwrap_or_else(|error| panic!("a task of the program: {error}"))
-    };
-    files.iter().map(task).collect()
+    files.iter().map(|(name, text)| embedded_task(name, text)).collect()
+}
+
+/// Returns the task of a file that the binary carries.
+///
+/// # Panics
+///
+/// If the file has a mistake.
+pub(crate) fn embedded_task(name: &str, text: &str) -> &'static Task {
+    let source = TaskSource { name: name.into(), text: text.into(), beside: BTreeMap::new() };
+    task_of(source).unwrap_or_else(|error| panic!("a task of the program: {error}"))
 }
 
 /// Returns the benchmark's ten tasks, in its order.

@@ -160,22 +160,23 @@ impl PhaseTracker {
 }
 
 impl PhaseMemory {
-    /// Whether the next phase is a sequence whose `first` has held, unbroken.
+    /// Returns whether the next phase is a sequence whose `first` has held, unbroken.
     pub fn underway(&self) -> bool {
         self.underway
     }
 
-    /// Whether the next phase has been spoiled.
+    /// Returns whether the next phase has been spoiled.
     pub fn spoiled(&self) -> bool {
         self.spoiled
     }
 
-    /// Since when the next phase's lasting condition has held, in simulated seconds.
+    /// Returns since when the next phase's lasting condition has held, in simulated seconds.
     pub fn since_s(&self) -> Option<f64> {
         self.since_s
     }
 
-    /// Since when the condition of milestone `index` of the next phase has held, in simulated seconds, and whether it is passed.
+    /// Returns since when the condition of milestone `index` of the next phase has held, in simulated
+    /// seconds, and whether it is passed.
     pub fn milestone(&self, index: usize) -> (Option<f64>, bool) {
         self.milestones.get(index).map_or((None, false), |memory| (memory.since_s, memory.passed))
     }

@@ -1,4 +1,4 @@
-//! What the next phase still lacks, part by part.
+//! Explains the next phase: says part by part what it still lacks.
 
 use tandem_tools_spec::NextPhase;
 
@@ -10,7 +10,8 @@ use crate::tasks::{PhaseCondition, PhaseSetting, Task};
 const KEPT_BACK: &str = "what else it asks for depends on what the seed has chosen, and is not told";
 
 impl Session {
-    /// Returns the phase that is to be reached next, and what it lacks. `None` where phases are not told, and after the last.
+    /// Returns the phase that is to be reached next, and what it lacks. `None` where phases are not told,
+    /// and after the last.
     pub(in crate::session) fn next_phase(&self) -> Option<NextPhase> {
         if !self.spec().disclosure.tells(self.ended.is_some()) {
             return None;
@@ -27,18 +28,24 @@ fn lacks(task: &'static Task, index: usize, memory: &PhaseMemory, facts: &Facts)
     let conditions = &task.conditions[index];
     let told = |number: usize| told_parts(task, index, number);
     let missing = |number: usize| told(number).flat_map(|part| part.lacks(facts)).collect::<Vec<_>>();
+    let keeps_back = |number: usize| told(number).count() < conditions[number].parts.len();
+    // How long a condition holds says whether those parts of it hold that are kept back.
+    let lasts = |number: usize, since_s: Option<f64>| {
+        let PhaseCondition { for_s, truth, .. } = &conditions[number];
+        let told = (!keeps_back(number)).then(|| lasting(*for_s, since_s, truth.holds(facts), facts));
+        told.flatten()
+    };
     let mut found = Vec::new();
     let mut milestones = 0;
     for (number, condition) in conditions.iter().enumerate() {
-        let PhaseCondition { setting, for_s, truth, .. } = condition;
-        match setting {
+        match condition.setting {
             PhaseSetting::Done => found.extend(missing(number)),
             PhaseSetting::First if memory.underway() => {}
             PhaseSetting::First => found.extend(after("first", missing(number))),
             PhaseSetting::Then => found.extend(after("then", missing(number))),
             PhaseSetting::Lasting => {
                 found.extend(missing(number));
-                found.extend(lasting(*for_s, memory.since_s(), truth.holds(facts), facts));
+                found.extend(lasts(number, memory.since_s()));
             }
             PhaseSetting::AtEnd => found.extend(after("at the end of that", missing(number))),
             PhaseSetting::Milestone => {
@@ -46,7 +53,7 @@ fn lacks(task: &'static Task, index: usize, memory: &PhaseMemory, facts: &Facts)
                 milestones += 1;
                 if !passed {
                     found.extend(missing(number));
-                    found.extend(lasting(*for_s, since_s, truth.holds(facts), facts));
+                    found.extend(lasts(number, since_s));
                 }
             }
             PhaseSetting::Spoiled if memory.spoiled() => {
@@ -55,14 +62,14 @@ fn lacks(task: &'static Task, index: usize, memory: &PhaseMemory, facts: &Facts)
             PhaseSetting::Broken | PhaseSetting::Spoiled => {}
         }
     }
-    let keeps_back = |number: usize| told(number).count() < conditions[number].parts.len();
     if (0..conditions.len()).any(keeps_back) {
         found.push(KEPT_BACK.into());
     }
     found
 }
 
-/// Returns the parts of a condition that are the same whatever the seed chooses. No other may be read by a robot's operator.
+/// Returns the parts of a condition that are the same whatever the seed chooses. No other may be read by a
+/// robot's operator.
 fn told_parts(
     task: &'static Task,
     phase: usize,

@@ -1,5 +1,5 @@
-//! A task's file: TOML with its room, robots, objects, randomisation, instructions, budget and phases, whose conditions are expressions
-//! ([`crate::conditions`]).
+//! A task's file: TOML with its room, robots, objects, randomisation, instructions, budget and phases,
+//! whose conditions are expressions ([`crate::conditions`]).
 //!
 //! A task is made of its texts alone, which recordings and results hold; so whoever has one of those has the task.
 

@@ -3,7 +3,8 @@
 use super::{PhaseSetting, find};
 use crate::scoring::{Facts, Predicate};
 
-/// Makes `task()` and a function for each condition: `name = phase setting`, and behind it in brackets which one of several.
+/// Makes `task()` and a function for each condition: `name = phase setting`, and behind it in brackets
+/// which one of several.
 macro_rules! conditions {
     ($task:literal: $($name:ident = $phase:literal $setting:ident $([$index:literal])?,)*) => {
         fn task() -> &'static $crate::tasks::Task {

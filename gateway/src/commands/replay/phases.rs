@@ -25,7 +25,8 @@ pub fn told(recording: &Recording) -> Result<String, Box<dyn std::error::Error>>
     Ok(told)
 }
 
-/// Returns a row for each part of a condition, and one for all of them at once: place, setting, when it held, text.
+/// Returns a row for each part of a condition, and one for all of them at once: place, setting, when it
+/// held, text.
 fn rows(condition: &ConditionTrace) -> Vec<[String; 4]> {
     let ConditionTrace { setting, for_s, held, parts, most_at_once } = condition;
     let part = |(index, part): (usize, &PartTrace)| {

@@ -43,7 +43,8 @@ fn played(task: &'static Task) -> Vec<(PhaseTimes, Option<String>)> {
     episodes.into_iter().map(|played| (played.result.phases, played.result.state_hash)).collect()
 }
 
-/// A user's copy of a task, with a comment more, is another task that is played and scored as the program's own.
+/// A user's copy of a task, with a comment more, is another task that is played and scored as the program's
+/// own.
 #[test]
 fn a_copy_of_a_task_is_scored_as_the_task_itself() {
     for id in ["handover", "big_table"] {

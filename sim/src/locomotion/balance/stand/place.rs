@@ -44,7 +44,8 @@ pub(in crate::locomotion::balance) struct StandingPlace {
 /// What is known of a place that commands move.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct MovedPlace {
-    /// Pelvis over the centre of mass of the robot, with what it carries, once it stands with its arms as they are; heading frame.
+    /// Pelvis over the centre of mass of the robot, with what it carries, once it stands with its arms as
+    /// they are; heading frame.
     rest_m: Vector,
     /// What its legs added to the way from the pelvis to the centre of mass as it last stood, heading frame.
     standing_legs_m: Vector,
@@ -77,7 +78,8 @@ impl StandingPlace {
         }
     }
 
-    /// Moves the point under the centre of mass as arms and loads have moved that from the pelvis, whose place stays.
+    /// Moves the point under the centre of mass as arms and loads have moved that from the pelvis, whose
+    /// place stays.
     fn follow_arms(&mut self, body: &BodyEstimate, load: &Load, heading_rad: f32) {
         let Some(moved) = &mut self.moved else { return };
         let away_m = flat(body.world_from_pelvis().translation - load.weights_point_m);
