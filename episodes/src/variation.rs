@@ -15,7 +15,7 @@ pub struct Variation {
     /// How far the seed moves things.
     #[serde(default)]
     pub spread: Spread,
-    /// How much an expert's demonstrations differ in pace, pauses and ways: 0 for not at all, up to [`Variation::MOST_VARIETY`].
+    /// How much an expert's demonstrations differ in pace, pauses and ways: 0 for not at all, up to [`Variation::MAX_VARIETY`].
     #[serde(default)]
     pub variety: u8,
     /// How much slow noise is added to what robots are told before they do it; 1 is 0.016 rad on the joints of arms.
@@ -24,9 +24,9 @@ pub struct Variation {
 }
 
 impl Variation {
-    pub const MOST_VARIETY: u8 = 3;
+    pub const MAX_VARIETY: u8 = 3;
     /// Experts lose most episodes long before.
-    pub const MOST_DISTURB: f32 = 5.0;
+    pub const MAX_DISTURB: f32 = 5.0;
 
     pub(crate) fn is_benchmarks(&self) -> bool {
         *self == Variation::default()

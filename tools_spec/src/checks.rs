@@ -1,6 +1,6 @@
 //! Checks that need no world. Each returns the sentence a caller needs: what is wrong, where, and what would work.
 
-use crate::limits::{LARGEST, MOST_PIXELS, SMALLEST_COMPONENT};
+use crate::limits::{LARGEST, MAX_PIXELS, SMALLEST_COMPONENT};
 use crate::parts::{BASE_COLUMNS, PixelRegion};
 
 /// Every number is finite and of sane size.
@@ -71,9 +71,9 @@ pub fn pixels(pixels: &[[i64; 2]]) -> Result<(), String> {
     if pixels.is_empty() {
         return Err("pixels is empty; give at least one [u, v], as [[160, 120]]".into());
     }
-    if pixels.len() > MOST_PIXELS {
+    if pixels.len() > MAX_PIXELS {
         return Err(format!(
-            "pixels holds {}; give at most {MOST_PIXELS}, as every tenth one by a region with stride 10",
+            "pixels holds {}; give at most {MAX_PIXELS}, as every tenth one by a region with stride 10",
             pixels.len()
         ));
     }
@@ -85,7 +85,7 @@ pub fn region(region: &PixelRegion) -> Result<(), String> {
     if region.stride == 0 {
         return Err("region.stride is 0; give at least 1, as 10 for every tenth pixel across and down".into());
     }
-    let fits = |stride: u32| region.count(stride) <= MOST_PIXELS as u128;
+    let fits = |stride: u32| region.count(stride) <= MAX_PIXELS as u128;
     if fits(region.stride) {
         return Ok(());
     }
@@ -94,7 +94,7 @@ pub fn region(region: &PixelRegion) -> Result<(), String> {
         Some(stride) => format!("; with stride {stride} it fits"),
         None => String::new(),
     };
-    Err(format!("region names {count} pixels; name at most {MOST_PIXELS}{way}"))
+    Err(format!("region names {count} pixels; name at most {MAX_PIXELS}{way}"))
 }
 
 /// Checks every entry of a list of robots, and says which robot a refusal is about.

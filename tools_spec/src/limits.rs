@@ -10,10 +10,10 @@ pub const LARGEST: f64 = 1e6;
 pub const SMALLEST_COMPONENT: f64 = 1e-6;
 
 /// The most control steps that any protocol allows for one command.
-pub const MOST_STEPS: u32 = 50;
+pub const MAX_STEPS: u32 = 50;
 
 /// The most pixels that one call may ask for.
-pub const MOST_PIXELS: usize = 4096;
+pub const MAX_PIXELS: usize = 4096;
 
 /// Names of robots, of which an episode has the first two or three.
 pub const ROBOT_NAMES: [&str; 3] = ["A", "B", "C"];

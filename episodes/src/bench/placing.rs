@@ -29,7 +29,7 @@ const PLACES: usize = 3;
 const AWAY_M: [f32; 2] = [0.05, 0.6];
 const TURN_RAD: f32 = FRAC_PI_2;
 const CARRIED_TURN_RAD: f32 = 0.3;
-const MOST_STEPS: u32 = 1500;
+const MAX_STEPS: u32 = 1500;
 
 /// What came of a robot's or a team's calls: the worst of all.
 #[derive(Clone, Debug, Default)]
@@ -151,7 +151,7 @@ fn send(
         }
     };
     let robots = team.iter().zip(goals).map(destination).collect();
-    let call = ToolCall::from(WalkTo { steps: MOST_STEPS, robots });
+    let call = ToolCall::from(WalkTo { steps: MAX_STEPS, robots });
     session.call(call).map_err(Box::new)?;
     Ok(())
 }

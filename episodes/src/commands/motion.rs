@@ -22,8 +22,8 @@ const GAIN: f64 = 0.5;
 const GOING_STEPS: u32 = 75;
 /// Hands give way by no more than this ahead and to the side (m) and about the vertical (rad). They creep back at this rate while they may
 /// give way, faster when they may no more.
-const MOST_YIELD_M: f64 = 0.06;
-const MOST_YIELD_RAD: f64 = 0.15;
+const MAX_YIELD_M: f64 = 0.06;
+const MAX_YIELD_RAD: f64 = 0.15;
 const LEAK_1_S: f64 = 0.1;
 const RETURN_1_S: f64 = 3.0;
 /// Of what is missing to a wrist's target, in metres, a radian counts for this.
@@ -34,7 +34,7 @@ const LATELY_PART: f64 = 0.1;
 const NEARER_M: f64 = 0.003;
 const NEARER_PART: f64 = 0.15;
 /// A hand that has given way by less is where it was told to be: metres or radians.
-const LEAST_TOLD: f64 = 0.003;
+const MIN_REPORTED: f64 = 0.003;
 
 /// What of a robot stays the same throughout an episode.
 #[derive(Clone)]
@@ -207,9 +207,9 @@ impl Motion {
             *yielded = (*yielded + rate / CONTROL_HZ).clamp(-most, most);
         };
         let [ahead_m, left_m] = yielded_m;
-        one(ahead_m, pull_n[0], ahead_n_s_m, MOST_YIELD_M);
-        one(left_m, pull_n[1], side_n_s_m, MOST_YIELD_M);
-        one(yielded_rad, *turning_n_m, turn_n_m_s_rad, MOST_YIELD_RAD);
+        one(ahead_m, pull_n[0], ahead_n_s_m, MAX_YIELD_M);
+        one(left_m, pull_n[1], side_n_s_m, MAX_YIELD_M);
+        one(yielded_rad, *turning_n_m, turn_n_m_s_rad, MAX_YIELD_RAD);
     }
 
     /// From wrists as they were told to be to where they have given way to, if the middle between them was told to be at `middle_m`
@@ -314,7 +314,7 @@ impl Motion {
         let MotionState { yielded_m, yielded_rad, aims, .. } = &self.state;
         let [ahead_m, left_m] = *yielded_m;
         let most = ahead_m.abs().max(left_m.abs()).max(yielded_rad.abs());
-        let asked = aims[side].in_pelvis(&self.state.world_from_pelvis).filter(|_| most > LEAST_TOLD)?;
+        let asked = aims[side].in_pelvis(&self.state.world_from_pelvis).filter(|_| most > MIN_REPORTED)?;
         let given_way = self.asked_wrists()[side]?;
         Some(given_way.translation.vector - asked.translation.vector)
     }

@@ -12,7 +12,7 @@ use super::syntax::{Node, NodeKind, Operator, Relation};
 use super::{Mistake, Names};
 
 /// So many parts are looked at in a control step, terms counted wherever they stand.
-const MOST_PARTS: usize = 5000;
+const MAX_PARTS: usize = 5000;
 
 pub fn truth(node: &Node, names: &Names) -> Result<Arc<Truth>, Mistake> {
     let truth = Checker { names }.truth(node)?;
@@ -45,11 +45,11 @@ pub fn joined(node: &Node) -> Vec<&Node> {
 }
 
 fn small(size: usize, at: &Range<usize>) -> Result<(), Mistake> {
-    match size <= MOST_PARTS {
+    match size <= MAX_PARTS {
         true => Ok(()),
         false => Err(Mistake::new(
             at.clone(),
-            format!("this has {size} parts, terms counted wherever they stand; {MOST_PARTS} are the most"),
+            format!("this has {size} parts, terms counted wherever they stand; {MAX_PARTS} are the most"),
         )),
     }
 }

@@ -13,7 +13,7 @@ import urllib.request
 EPISODE = f"{os.environ['TANDEM_URL']}/v1/episodes/{os.environ['TANDEM_EPISODE']}"
 RISE_M = 0.1
 NEAR_M = 0.01
-MOST_COMMANDS = 8
+MAX_COMMANDS = 8
 
 
 def call(tool, **arguments):
@@ -37,7 +37,7 @@ def main():
     steps = start["status"]["budget"]["steps_per_command"]
     mine = os.environ.get("TANDEM_ROBOT")
     targets = [raised(robot["robot"]) for robot in start["robots"] if mine in (None, robot["robot"])]
-    for _ in range(MOST_COMMANDS):
+    for _ in range(MAX_COMMANDS):
         reports = call("move_wrists", steps=steps, robots=targets)["robots"]
         if all(report["right"]["position_error_m"] < NEAR_M for report in reports):
             break

@@ -27,7 +27,7 @@ RIGHT_ARM_SEEN = slice(29, 36)
 """The same joints among the 43 of `agent_pos`."""
 JOINTS = 7
 SPREAD_RAD = 0.4
-LEAST_SPREAD_RAD = 0.03
+MIN_SPREAD_RAD = 0.03
 ELITE_SHARE = 0.25
 
 
@@ -68,7 +68,7 @@ def main() -> None:
         earned = np.concatenate(ray.get(asked))
         elite = np.argsort(earned)[-max(2, int(ELITE_SHARE * len(earned))) :]
         best = poses.reshape(-1, JOINTS)[elite]
-        mean, spread = best.mean(axis=0), np.maximum(best.std(axis=0), LEAST_SPREAD_RAD)
+        mean, spread = best.mean(axis=0), np.maximum(best.std(axis=0), MIN_SPREAD_RAD)
         print(f"round {number}: best return {earned.max():.3f}, mean {earned.mean():.3f}", flush=True)
     print("pose of A's right arm:", np.round(mean, 2).tolist())
 

@@ -315,7 +315,7 @@ class Plan:
 
 MAX_SEEDS = 100_000
 
-MOST_ALIKE = 3
+MAX_EQUAL_FAILURES = 3
 """First episodes that fail alike, after which no further one is begun."""
 
 
@@ -347,10 +347,10 @@ class _WatchedPolicy:
             if not self._failures:
                 traceback.print_exception(error, file=sys.stderr)
             self._failures.append(f"{type(error).__name__}: {error}")
-            is_broken = not self._has_played and len(self._failures) >= MOST_ALIKE and len(set(self._failures)) == 1
+            is_broken = not self._has_played and len(self._failures) >= MAX_EQUAL_FAILURES and len(set(self._failures)) == 1
             if is_broken:
                 self.broken = (
-                    f"the policy has failed alike in the first {MOST_ALIKE} episodes ({self._failures[0]}); mend it, and run "
+                    f"the policy has failed alike in the first {MAX_EQUAL_FAILURES} episodes ({self._failures[0]}); mend it, and run "
                     "the evaluation again: what was played is kept"
                 )
         if is_broken:

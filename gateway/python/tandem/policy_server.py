@@ -25,7 +25,7 @@ Infer: TypeAlias = Callable[[dict[str, Any], dict[str, Any]], Mapping[str, Any]]
 MOMENT = "moment"
 """Under this key, or one that begins so, a map sends `["episode", "step", "reset"]`."""
 
-MOST_PRINTED = 20
+MAX_PRINTED = 20
 """Different tracebacks that are printed."""
 
 REMEMBERED = 256
@@ -107,7 +107,7 @@ class _Answering:
     def print_once(self, error: Exception) -> None:
         """Prints what a policy has raised, each thing once."""
         told = f"{type(error).__name__}: {error}"
-        if told not in self._printed and len(self._printed) < MOST_PRINTED:
+        if told not in self._printed and len(self._printed) < MAX_PRINTED:
             self._printed.add(told)
             traceback.print_exception(error, file=sys.stderr)
 

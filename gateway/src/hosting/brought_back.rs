@@ -20,7 +20,7 @@ use super::{
 };
 
 /// Number of episodes that stay awake, however long nobody asks them for anything. Each has some megabytes.
-const MOST_AWAKE: usize = 96;
+const MAX_AWAKE: usize = 96;
 
 /// An episode may be put aside after a second for so many control steps, which is ten times what bringing it
 /// back takes.
@@ -156,7 +156,7 @@ impl EpisodeTable {
             episode.thread.end_if_abandoned(self.settings.idle_timeout);
         }
         let mut awake: Vec<_> = episodes.iter().filter(|episode| episode.thread.may_sleep()).collect();
-        let Some(too_many) = awake.len().checked_sub(MOST_AWAKE).filter(|count| *count > 0) else { return };
+        let Some(too_many) = awake.len().checked_sub(MAX_AWAKE).filter(|count| *count > 0) else { return };
         awake.sort_by_key(|episode| std::cmp::Reverse(episode.thread.idle()));
         for episode in awake.into_iter().take(too_many) {
             let quiet_s = (episode.thread.env_steps() / STEPS_PER_IDLE_S).max(1);

@@ -11,7 +11,7 @@ use tokio::sync::Semaphore;
 
 use super::{
     problem::ApiError,
-    watching::{KnownEvaluations, MOST_WATCHERS, RecordingReader, WatchKey},
+    watching::{KnownEvaluations, MAX_WATCHERS, RecordingReader, WatchKey},
 };
 use crate::{
     hosting::{Caller, EpisodeTable},
@@ -43,7 +43,7 @@ pub struct AppState {
 impl AppState {
     /// A server that holds no episode yet.
     pub fn new(table: Arc<EpisodeTable>, settings: Arc<Settings>, watch_key: WatchKey) -> AppState {
-        let watchers = Arc::new(Semaphore::new(MOST_WATCHERS));
+        let watchers = Arc::new(Semaphore::new(MAX_WATCHERS));
         let (recordings, films) = (RecordingReader::start(), RecordingReader::start());
         let evaluations = KnownEvaluations::default();
         AppState { table, settings, watch_key, watchers, recordings, films, evaluations }

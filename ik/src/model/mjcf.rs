@@ -75,7 +75,7 @@ impl Model {
 }
 
 /// Elements inside one another, at most; the parser recurses.
-const MOST_NESTED: usize = 200;
+const MAX_NESTING: usize = 200;
 
 fn refuse(kind: &str, name: &Option<String>, what: &str) -> IkError {
     match name {
@@ -147,8 +147,8 @@ fn check_depth(xml: &str) -> Result<(), IkError> {
         } else if !tag.starts_with("<!") && !tag.starts_with("<?") && !tag.ends_with("/>") {
             depth += 1;
         }
-        if depth > MOST_NESTED {
-            let what = format!("more than {MOST_NESTED} elements inside one another; nest fewer");
+        if depth > MAX_NESTING {
+            let what = format!("more than {MAX_NESTING} elements inside one another; nest fewer");
             return Err(IkError::Unsupported(what));
         }
         rest = &rest[length..];

@@ -17,7 +17,7 @@ use crate::tasks::{ERROR_CLAMP, Task};
 const MAX_HALVINGS: usize = 5;
 /// Damping per joint that caution multiplies, 1/rad or 1/m.
 const CAUTION: f64 = 1e-2;
-const MOST_CAUTIOUS: f64 = 1e3;
+const MAX_CAUTION: f64 = 1e3;
 /// An objective that grows by this part is the same up to rounding.
 const SAME: f64 = 1e-9;
 /// Violations that a step must mend at once rather than in a line search's time, rad or m per step.
@@ -70,8 +70,8 @@ impl Solver {
         }
         self.caution = match scale {
             1.0 => (self.caution * 0.5).max(1.0),
-            0.0 => (self.caution * 3.0).min(MOST_CAUTIOUS),
-            _ => (self.caution * 1.5).min(MOST_CAUTIOUS),
+            0.0 => (self.caution * 3.0).min(MAX_CAUTION),
+            _ => (self.caution * 1.5).min(MAX_CAUTION),
         };
         self.remember(scale);
         Ok(())

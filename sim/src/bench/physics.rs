@@ -40,7 +40,7 @@ enum Situation {
     Holding,
 }
 
-const MOST_ROBOTS: usize = 3;
+const MAX_ROBOTS: usize = 3;
 const ROUNDS: usize = 3;
 /// Control steps in which robots come to rest, or into their stride.
 const SETTLING_CONTROL_STEPS: usize = 75;
@@ -60,7 +60,7 @@ const WALKING_M_S: f32 = -0.2;
 pub fn physics(mut done: impl FnMut(&PhysicsCase)) -> Result<PhysicsReport, SimError> {
     let mut cases = Vec::new();
     for situation in [Situation::Standing, Situation::Walking, Situation::Holding] {
-        for robots in 1..=MOST_ROBOTS {
+        for robots in 1..=MAX_ROBOTS {
             let case = measure(situation, robots)?;
             done(&case);
             cases.push(case);
@@ -154,7 +154,7 @@ fn check(world: &World, situation: Situation) {
 /// Handover's places, and a third robot that stands free. Each robot has its bottle; those that nobody holds yet lie
 /// out of reach.
 fn kitchen(robots: usize, bottles: usize) -> WorldSpec {
-    const PLACES: [(f32, f32, f32); MOST_ROBOTS] = [(0.0, 0.0, 0.0), (0.74, -0.12, PI), (-0.9, -1.2, 0.5)];
+    const PLACES: [(f32, f32, f32); MAX_ROBOTS] = [(0.0, 0.0, 0.0), (0.74, -0.12, PI), (-0.9, -1.2, 0.5)];
     let robot = |(index, (x, y, yaw_rad)): (usize, &(f32, f32, f32))| RobotPlacement {
         name: format!("{index}"),
         position_m: [*x, *y],
@@ -201,12 +201,12 @@ mod tests {
 
     #[test]
     fn held_bottles_do_not_slip() {
-        let (mut world, commands) = begin(Situation::Holding, MOST_ROBOTS).unwrap();
+        let (mut world, commands) = begin(Situation::Holding, MAX_ROBOTS).unwrap();
         let mut hold_s = |time_s: f32| {
             for _ in 0..(time_s / crate::CONTROL_DT_S) as usize {
                 world.control_step(&commands).unwrap();
             }
-            (0..MOST_ROBOTS).map(|robot| held_m(&world, robot)).collect::<Vec<_>>()
+            (0..MAX_ROBOTS).map(|robot| held_m(&world, robot)).collect::<Vec<_>>()
         };
         let (before_m, after_m) = (hold_s(2.0), hold_s(5.0));
         for (robot, (before_m, after_m)) in before_m.into_iter().zip(after_m).enumerate() {

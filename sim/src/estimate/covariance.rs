@@ -25,16 +25,16 @@ pub(super) struct Covariance([Errors; ERRORS]);
 
 /// A measurement's derivatives by the errors, those that are not zero.
 pub(super) struct MeasurementRow {
-    parts: [(usize, f64); MOST_PARTS],
+    parts: [(usize, f64); MAX_PARTS],
     len: usize,
 }
 
 /// Two of the place, three of the turn.
-const MOST_PARTS: usize = 5;
+const MAX_PARTS: usize = 5;
 
 impl MeasurementRow {
     pub fn of<const N: usize>(parts: [(usize, f64); N]) -> MeasurementRow {
-        let mut row = MeasurementRow { parts: [(0, 0.0); MOST_PARTS], len: 0 };
+        let mut row = MeasurementRow { parts: [(0, 0.0); MAX_PARTS], len: 0 };
         parts.into_iter().for_each(|(error, derivative)| row.push(error, derivative));
         row
     }

@@ -9,7 +9,7 @@ use super::support::{self, Element, Support, Takes, value};
 use crate::SimError;
 
 /// Elements inside one another, at most: the parser recurses.
-const MOST_NESTED: usize = 200;
+const MAX_NESTING: usize = 200;
 /// Ways to say a rotation; an element has one at most.
 const ROTATIONS: [&str; 6] = ["quat", "axisangle", "euler", "xyaxes", "zaxis", "fullinertia"];
 
@@ -67,8 +67,8 @@ fn check_depth(source: &MjcfText, xml: &roxmltree::Document) -> Result<(), SimEr
     for node in xml.descendants().filter(Node::is_element) {
         let depth = node.parent_element().map_or(0, |parent| depths[parent.id().get_usize()] + 1);
         depths[node.id().get_usize()] = depth;
-        if depth > MOST_NESTED {
-            let what = format!("more than {MOST_NESTED} elements inside one another; nest fewer");
+        if depth > MAX_NESTING {
+            let what = format!("more than {MAX_NESTING} elements inside one another; nest fewer");
             return Err(source.refuse(&node, what));
         }
     }

@@ -49,7 +49,7 @@ const WEIGHT_FILTER_TIME_S: f32 = 0.12;
 /// Part of the estimate that is fed forward. At 1 two robots that pull on one object would pull without end.
 const FED_FORWARD_SHARE: f32 = 0.85;
 /// A weight explains at least this part of the torques; an arm that presses sideways shows another pattern.
-const LEAST_EXPLAINED: f32 = 0.6;
+const MIN_EXPLAINED_SHARE: f32 = 0.6;
 /// Dex3-1 hands are not made for more.
 const LARGEST_WEIGHT_N: f32 = 35.0;
 
@@ -57,7 +57,7 @@ const LARGEST_WEIGHT_N: f32 = 35.0;
 const THUMB_JOINTS: usize = 3;
 const GRIP_FILTER_TIME_S: f32 = 0.2;
 /// More than fingers weigh, less than those that hold press with; what holds does so until it presses with half of that.
-const LEAST_PRESS_N_M: f32 = 0.2;
+const MIN_PRESS_N_M: f32 = 0.2;
 const STILL_PRESSES: f32 = 0.5;
 
 impl HandLoads {
@@ -132,7 +132,7 @@ impl Grip {
         }
         let (thumb, fingers) = self.torque_n_m.split_at(THUMB_JOINTS);
         let press = |joints: &&[f32], pressed: bool| {
-            let least_n_m = if pressed { LEAST_PRESS_N_M * STILL_PRESSES } else { LEAST_PRESS_N_M };
+            let least_n_m = if pressed { MIN_PRESS_N_M * STILL_PRESSES } else { MIN_PRESS_N_M };
             joints.iter().any(|torque| torque.abs() > least_n_m)
         };
         let parts = [thumb, fingers];
@@ -201,7 +201,7 @@ impl Payload {
         let along: f32 = lever_m.iter().zip(&arm.excess_n_m).map(|(lever, excess)| lever * excess).sum();
         let total: f32 = arm.excess_n_m.iter().map(|excess| excess * excess).sum();
         let explained = along * along / (square * total).max(1e-6);
-        let measured_n = if explained > LEAST_EXPLAINED { along / square } else { 0.0 };
+        let measured_n = if explained > MIN_EXPLAINED_SHARE { along / square } else { 0.0 };
         let measured_n = measured_n.clamp(0.0, LARGEST_WEIGHT_N);
         self.weight_n += (measured_n - self.weight_n) * (dt_s / WEIGHT_FILTER_TIME_S);
     }

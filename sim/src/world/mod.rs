@@ -22,8 +22,8 @@ pub use objects::{ObjectFile, ObjectModel, ObjectPart, ObjectPlacement, ObjectSt
 pub use snapshot::Snapshot;
 pub use step::{BodyTouch, HandContacts, ObjectStep, RobotStep, Step, Touch};
 pub use watch::{
-    DEEP_M, Extremes, FARTHEST_BEYOND_RAD, FASTEST_M_S, Greatest, LEAST_SCALE_J, LONGEST_DEEP_S,
-    MOST_MADE_SHARE, WINDOW_S, Watch,
+    DEEP_M, Extremes, FARTHEST_BEYOND_RAD, FASTEST_M_S, Greatest, LONGEST_DEEP_S, MAX_ENERGY_SHARE,
+    MIN_SCALE_J, WINDOW_S, Watch,
 };
 
 use rapier3d::math::Pose;

@@ -12,11 +12,11 @@ use crate::robot::RobotCommand;
 /// No link moves faster: a fall from the ceiling ends at 7 m/s, and the fastest joints whip a hand to 20 m/s.
 pub const FASTEST_M_S: f64 = 25.0;
 /// Over any [`WINDOW_S`] no more than this share of what was there and was put in may come from nothing.
-pub const MOST_MADE_SHARE: f64 = 0.05;
+pub const MAX_ENERGY_SHARE: f64 = 0.05;
 pub const WINDOW_S: f64 = 0.2;
 /// Where less than this was there and put in, it counts as this: what a robot of 35 kg has gained when it has fallen by 30 cm.
 /// What pushes bodies out of each other lifts such a robot out of the tolerated depth with less than 5 % of it.
-pub const LEAST_SCALE_J: f64 = 100.0;
+pub const MIN_SCALE_J: f64 = 100.0;
 /// Nothing overlaps by more than this for longer than that.
 pub const DEEP_M: f64 = 0.02;
 pub const LONGEST_DEEP_S: f64 = 0.1;
@@ -102,7 +102,7 @@ impl Extremes {
     pub fn broken(&self) -> [bool; 4] {
         [
             (&self.speed_m_s, FASTEST_M_S),
-            (&self.made_share, MOST_MADE_SHARE),
+            (&self.made_share, MAX_ENERGY_SHARE),
             (&self.deep_s, LONGEST_DEEP_S),
             (&self.beyond_rad, FARTHEST_BEYOND_RAD),
         ]
@@ -145,7 +145,7 @@ impl Watch {
             format!("{name}, of {put_in_j:.0} J")
         };
         self.extremes.made_j.see(made_j, most);
-        self.extremes.made_share.see(made_j / put_in_j.max(LEAST_SCALE_J), most);
+        self.extremes.made_share.see(made_j / put_in_j.max(MIN_SCALE_J), most);
     }
 
     fn look_at_overlaps(&mut self, dynamics: &Dynamics) {

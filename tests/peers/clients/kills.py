@@ -22,10 +22,10 @@ from pathlib import Path
 
 TANDEM = Path(__file__).resolve().parents[3] / "target/release/tandem"
 TASKS, SEEDS = "handover", "0-1"
-LEAST_S, MOST_S = 0.3, 2.5
+MIN_S, MAX_S = 0.3, 2.5
 # A server is killed so long after its episode has begun.
 SERVED_S = 0.05, 0.7
-MOST_MISSING = 25
+MAX_MISSING = 25
 
 
 def tandem(*words):
@@ -106,7 +106,7 @@ def recordings(chance, kills, work):
         print(f"recording {number}: {made} steps answered, {kept} kept and verified")
     if missing:
         print(f"at most {max(missing)} steps missing over {len(missing)} kills")
-    if not missing or max(missing) > MOST_MISSING:
+    if not missing or max(missing) > MAX_MISSING:
         faults.append(f"steps missing: {missing}")
     return faults
 
@@ -137,7 +137,7 @@ def find(value, key):
 def resumed(chance, kills, work, name, command, outcome):
     """Kills `command` again and again in one folder, lets it end, and compares with a run that nobody stopped."""
     stopped, whole = work / f"{name}-stopped", work / f"{name}-whole"
-    hits = sum(killed(command(stopped), chance.uniform(LEAST_S, MOST_S)) for _ in range(kills))
+    hits = sum(killed(command(stopped), chance.uniform(MIN_S, MAX_S)) for _ in range(kills))
     ends = [run(command(folder)) for folder in (stopped, whole)]
     faults = [f"{name}: {end.stderr}" for end in ends if end.returncode]
     here, there = outcome(stopped), outcome(whole)

@@ -28,7 +28,7 @@ PROGRAMS = Path(sys.executable).parent
 SEEDS = (2000, 2001)
 SAMPLES = 10
 # What the codecs lose at their settings, small pictures more than large ones; PNG loses nothing.
-LEAST_DB = {"av1": 30.0, "h264": 28.0, "png": 90.0, "depth_png": 90.0}
+MIN_DB = {"av1": 30.0, "h264": 28.0, "png": 90.0, "depth_png": 90.0}
 # Half of a step at 10 m and of a millimetre, to which LeRobot rounds.
 DEPTH_MM = 2.8
 ACT = {
@@ -169,7 +169,7 @@ def main():
             (exported,) = export_lerobot(runs, scratch / name, settings, only_successful=True)
             folder = converted(exported.folder) if name == "v2" else exported.folder
             data_set, worst_db = compare(name, folder, recordings, settings.stride, robot)
-            assert worst_db > LEAST_DB.get(name, LEAST_DB["h264"]), (name, worst_db)
+            assert worst_db > MIN_DB.get(name, MIN_DB["h264"]), (name, worst_db)
             if name == "av1":
                 compare_statistics(data_set)
                 play(data_set, recordings, settings.rate_hz)

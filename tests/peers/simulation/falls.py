@@ -30,7 +30,7 @@ TANDEM = Path(os.environ.get("CARGO_TARGET_DIR", REPOSITORY / "target")) / "rele
 DT_S = 0.005
 SUBSTEPS = 4
 WINDOW_STEPS = 40
-LEAST_SCALE_J = 100.0
+MIN_SCALE_J = 100.0
 DEEP_M = 0.02
 GUARDS = [mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC]
 
@@ -124,7 +124,7 @@ def look(model, data, seen, window, deep, joints, places):
     _, put_in, taken, made = np.sum(window, axis=0)
     made_j = made + max(taken, 0.0)
     seen.made_j = max(seen.made_j, made_j)
-    seen.made_share = max(seen.made_share, made_j / max(window[0][0] + put_in, LEAST_SCALE_J))
+    seen.made_share = max(seen.made_share, made_j / max(window[0][0] + put_in, MIN_SCALE_J))
     depths = defaultdict(float)
     for contact in data.contact:
         pair = tuple(contact.geom)

@@ -26,7 +26,7 @@ from physics_timing import TANDEM, Kitchen
 WIDTH_PX, HEIGHT_PX = 320, 240
 STATES = 8
 CAMERAS = ["0_egocentric", "1_egocentric"]
-LEAST_RATIO = 3.0
+MIN_RATIO = 3.0
 
 
 def theirs_ms():
@@ -66,7 +66,7 @@ def main():
     for theirs_once, ours_once in pairs:
         print(f"  MuJoCo {theirs_once:6.1f} ms   Tandem {ours_once:6.1f} ms")
     print(f"best against best: {theirs / ours:.1f} times as fast")
-    return theirs / ours >= LEAST_RATIO
+    return theirs / ours >= MIN_RATIO
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ use std::{
 
 use super::sources::{everywhere, expect_none, files, root};
 
-const MOST_FILES: usize = 12;
+const MAX_FILES: usize = 12;
 
 /// The heading under which ARCHITECTURE.md says why some folders have more.
 const REASONS: &str = "## Folders with more than twelve files";
@@ -23,9 +23,9 @@ fn with_reason(text: &str) -> BTreeSet<&str> {
 
 /// What is wrong with the number of files in these folders.
 fn crowded(counts: &BTreeMap<String, usize>, reasons: &BTreeSet<&str>) -> Vec<String> {
-    let many = |folder: &str| counts.get(folder).is_some_and(|count| *count > MOST_FILES);
+    let many = |folder: &str| counts.get(folder).is_some_and(|count| *count > MAX_FILES);
     let unexplained =
-        counts.iter().filter(|(folder, count)| **count > MOST_FILES && !reasons.contains(folder.as_str()));
+        counts.iter().filter(|(folder, count)| **count > MAX_FILES && !reasons.contains(folder.as_str()));
     let unexplained = unexplained.map(|(folder, count)| format!("{folder}: {count} files"));
     let needless = reasons.iter().filter(|folder| !many(folder));
     unexplained.chain(needless.map(|folder| format!("{folder} needs no reason (any more)"))).collect()
@@ -40,7 +40,7 @@ fn folders_are_small() {
         *counts.entry(folder).or_default() += 1;
     }
     let rule = format!(
-        "a folder has at most {MOST_FILES} files; group them, merge what belongs together, or, where one file stands for one \
+        "a folder has at most {MAX_FILES} files; group them, merge what belongs together, or, where one file stands for one \
          thing, say so in ARCHITECTURE.md under {REASONS:?}"
     );
     expect_none(&crowded(&counts, &with_reason(&architecture)), &rule);
@@ -55,12 +55,12 @@ fn crowded_folders_are_found() {
         let found = crowded(&BTreeMap::from([("a".into(), count)]), &with_reason(&text));
         assert_eq!(found.len(), expected, "{count} files, {table:?}: {found:?}");
     };
-    check(MOST_FILES, "", 0);
-    check(MOST_FILES + 1, "", 1);
-    check(MOST_FILES + 1, "| `a` | one file a letter |", 0);
-    check(MOST_FILES + 1, "| `a` |  |", 1);
-    check(MOST_FILES, "| `a` | one file a letter |", 1);
-    check(MOST_FILES, "| `b` | gone |", 1);
+    check(MAX_FILES, "", 0);
+    check(MAX_FILES + 1, "", 1);
+    check(MAX_FILES + 1, "| `a` | one file a letter |", 0);
+    check(MAX_FILES + 1, "| `a` |  |", 1);
+    check(MAX_FILES, "| `a` | one file a letter |", 1);
+    check(MAX_FILES, "| `b` | gone |", 1);
 }
 
 #[test]

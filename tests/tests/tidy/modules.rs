@@ -114,7 +114,7 @@ struct Map<'a> {
 }
 
 /// Longer chains of re-exports than anybody writes: a circle among them.
-const MOST_HOPS: usize = 8;
+const MAX_HOPS: usize = 8;
 
 impl<'a> Map<'a> {
     fn new(modules: &'a [Module]) -> Map<'a> {
@@ -139,7 +139,7 @@ impl<'a> Map<'a> {
             let child = [at.as_slice(), std::slice::from_ref(&next)].concat();
             if self.names.contains(&child) {
                 at = child;
-            } else if let Some(target) = self.imported.get(&(&at, next)).filter(|_| hops < MOST_HOPS) {
+            } else if let Some(target) = self.imported.get(&(&at, next)).filter(|_| hops < MAX_HOPS) {
                 hops += 1;
                 rest.splice(0..0, target.iter().cloned());
                 at = Name::new();

@@ -10,15 +10,15 @@ use crate::limits::{ROBOT_PATTERN, one_of};
 use crate::tool::read_as;
 
 /// The most characters of a note: more than a model says in one go.
-const MOST_CHARACTERS: usize = 50_000;
+const MAX_CHARACTERS: usize = 50_000;
 /// The characters that results keep of how a model's play ended.
-const MOST_ENDING_CHARACTERS: usize = 500;
+const MAX_ENDING_CHARACTERS: usize = 500;
 /// The most characters of a model's name.
-const MOST_NAME_CHARACTERS: usize = 200;
+const MAX_NAME_CHARACTERS: usize = 200;
 /// The most tokens, dollars and seconds of one note: what is more has been counted wrongly.
-const MOST_TOKENS: u32 = 1_000_000_000;
-const MOST_USD: f64 = 1e6;
-const MOST_SECONDS: f64 = 1e6;
+const MAX_TOKENS: u32 = 1_000_000_000;
+const MAX_USD: f64 = 1e6;
+const MAX_SECONDS: f64 = 1e6;
 
 /// Something that whoever plays says of its play, kept in the recording for those who read the episode later: what a model thought, what
 /// it said, what that took. It changes nothing of the episode, costs no call, no steps and no time, and no policy is told of it.
@@ -26,7 +26,7 @@ const MOST_SECONDS: f64 = 1e6;
 #[serde(deny_unknown_fields)]
 pub struct Note {
     /// The words, at most 50,000 characters. They may be empty where the note says what was used.
-    #[schemars(length(max = MOST_CHARACTERS))]
+    #[schemars(length(max = MAX_CHARACTERS))]
     pub text: String,
     /// What the words are. Null: a note.
     pub kind: Option<NoteKind>,
@@ -36,13 +36,13 @@ pub struct Note {
     /// What the model read and wrote for it. Null: not said.
     pub tokens: Option<TokenCount>,
     /// What that cost in US dollars. Null: not said.
-    #[schemars(range(min = 0, max = MOST_USD))]
+    #[schemars(range(min = 0, max = MAX_USD))]
     pub usd: Option<f64>,
     /// The model, by the name that its server has for it, at most 200 characters. Null: not said.
-    #[schemars(length(max = MOST_NAME_CHARACTERS))]
+    #[schemars(length(max = MAX_NAME_CHARACTERS))]
     pub model: Option<String>,
     /// How long the model took, in seconds. Null: not said.
-    #[schemars(range(min = 0, max = MOST_SECONDS))]
+    #[schemars(range(min = 0, max = MAX_SECONDS))]
     pub seconds: Option<f64>,
     /// How the model's play ends with this note. Null: it goes on.
     pub ending: Option<AgentEnding>,
@@ -117,14 +117,14 @@ pub enum NoteKind {
 #[serde(deny_unknown_fields)]
 pub struct TokenCount {
     /// Tokens that the model read, those from a cache included.
-    #[schemars(range(max = MOST_TOKENS))]
+    #[schemars(range(max = MAX_TOKENS))]
     pub input: u32,
     /// Tokens that the model wrote, its thoughts included.
-    #[schemars(range(max = MOST_TOKENS))]
+    #[schemars(range(max = MAX_TOKENS))]
     pub output: u32,
     /// Of those that it read, how many came from a cache. Left out: none.
     #[serde(default)]
-    #[schemars(range(max = MOST_TOKENS))]
+    #[schemars(range(max = MAX_TOKENS))]
     pub cached: u32,
 }
 
@@ -169,21 +169,21 @@ impl Note {
             }
             _ => Ok(()),
         };
-        long("text", &self.text, MOST_CHARACTERS)?;
-        long("model", self.model.as_deref().unwrap_or_default(), MOST_NAME_CHARACTERS)?;
+        long("text", &self.text, MAX_CHARACTERS)?;
+        long("model", self.model.as_deref().unwrap_or_default(), MAX_NAME_CHARACTERS)?;
         let used = self.tokens.is_some() || self.usd.is_some() || self.seconds.is_some();
         if self.text.is_empty() && !used && self.ending.is_none() {
             return Err("it says nothing; give a text, or the tokens, usd or seconds that were used".into());
         }
         let TokenCount { input, output, cached } = self.tokens.unwrap_or_default();
         for (name, count) in [("input", input), ("output", output), ("cached", cached)] {
-            if count > MOST_TOKENS {
+            if count > MAX_TOKENS {
                 return Err(format!(
-                    "tokens.{name} is {count}; give 0 to {MOST_TOKENS}, those of this note alone"
+                    "tokens.{name} is {count}; give 0 to {MAX_TOKENS}, those of this note alone"
                 ));
             }
         }
-        for (name, number, most) in [("usd", self.usd, MOST_USD), ("seconds", self.seconds, MOST_SECONDS)] {
+        for (name, number, most) in [("usd", self.usd, MAX_USD), ("seconds", self.seconds, MAX_SECONDS)] {
             if let Some(number) = number.filter(|number| !(0.0..=most).contains(number)) {
                 return Err(format!("{name} is {number}; give 0 to {most}, that of this note alone"));
             }
@@ -255,7 +255,7 @@ impl Usage {
             self.models.push(model.clone());
         }
         if let Some(ending) = note.ending {
-            let text = note.text.chars().take(MOST_ENDING_CHARACTERS).collect();
+            let text = note.text.chars().take(MAX_ENDING_CHARACTERS).collect();
             self.endings.retain(|known| known.robot != note.robot);
             self.endings.push(ModelEnding { robot: note.robot.clone(), ending, text });
         }
@@ -273,7 +273,7 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_back_and_most_may_be_left_out() {
-        for note in [Note::example(), Note { text: "ü".repeat(MOST_CHARACTERS), ..Note::default() }] {
+        for note in [Note::example(), Note { text: "ü".repeat(MAX_CHARACTERS), ..Note::default() }] {
             assert_eq!(Note::parse(json!(note)), Ok(note));
         }
         let few = Note::parse(json!({ "text": "", "tokens": { "input": 10, "output": 2 } })).unwrap();

@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use super::format::Format;
 use super::plain::{body_schema, plain_schema};
 use super::spec::ToolSpec;
-use crate::limits::MOST_STEPS;
+use crate::limits::MAX_STEPS;
 use crate::listing::EpisodeList;
 use crate::parts::{Heard, Hints, Note, Partner, Wording};
 use crate::refusal::ProblemBody;
@@ -58,7 +58,7 @@ fn tool(spec: &ToolSpec) -> Value {
     let success = if spec.name == StartEpisode::NAME { "201" } else { "200" };
     let mut call = operation(spec.name, &spec.description, success, reply);
     if spec.route.method == "POST" {
-        call["requestBody"] = json_body(spec.body_schema(MOST_STEPS));
+        call["requestBody"] = json_body(spec.body_schema(MAX_STEPS));
     }
     call
 }

@@ -10,8 +10,8 @@ use crate::parts::{CommandReply, PoseFrame};
 use crate::tool::Tool;
 
 /// Softer hands would be thrown about by what they feel of their own motion.
-const LEAST_COMPLIANCE_N_S_M: f64 = 50.0;
-const LEAST_COMPLIANCE_N_M_S_RAD: f64 = 5.0;
+const MIN_COMPLIANCE_N_S_M: f64 = 50.0;
+const MIN_COMPLIANCE_N_M_S_RAD: f64 = 5.0;
 
 /// Move wrists, fingers and base of one or more robots for a number of control steps of 20 ms. Inverse kinematics turns
 /// wrist poses into arm and waist joints. Robots that are not named hold still; a hand without a wrist target keeps its
@@ -79,15 +79,15 @@ pub struct WristMove {
     /// How both hands give way to what pulls or pushes them along the way that the robot faces, as a partner at the other end of
     /// a load does: at 1 m/s under as many newtons, up to 6 cm. 250 suits two robots that walk with a load; at least 50.
     /// Null: hands keep to their targets.
-    #[schemars(range(min = LEAST_COMPLIANCE_N_S_M))]
+    #[schemars(range(min = MIN_COMPLIANCE_N_S_M))]
     pub compliance_n_s_m: Option<f64>,
     /// How both hands together give way to what pulls or pushes them to the robot's left or right, as a partner who sways does: at
     /// 1 m/s under as many newtons, up to 6 cm; at least 50. Null: not to the sides.
-    #[schemars(range(min = LEAST_COMPLIANCE_N_S_M))]
+    #[schemars(range(min = MIN_COMPLIANCE_N_S_M))]
     pub side_compliance_n_s_m: Option<f64>,
     /// How both hands together give way to what turns them about the vertical through the middle between the wrists: at 1 rad/s under
     /// as many newton metres, up to 0.15 rad; at least 5. Null: they do not turn.
-    #[schemars(range(min = LEAST_COMPLIANCE_N_M_S_RAD))]
+    #[schemars(range(min = MIN_COMPLIANCE_N_M_S_RAD))]
     pub turn_compliance_n_m_s_rad: Option<f64>,
     /// Left finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]. Positive angles
     /// close thumb_1 and thumb_2, negative ones middle and index. Null: the target stays.
@@ -148,9 +148,9 @@ impl WristMove {
             self.right_fingers_rad.as_ref().map_or(&[], |fingers| &fingers[..]),
         )?;
         for (name, given, least, common) in [
-            ("compliance_n_s_m", self.compliance_n_s_m, LEAST_COMPLIANCE_N_S_M, 250),
-            ("side_compliance_n_s_m", self.side_compliance_n_s_m, LEAST_COMPLIANCE_N_S_M, 500),
-            ("turn_compliance_n_m_s_rad", self.turn_compliance_n_m_s_rad, LEAST_COMPLIANCE_N_M_S_RAD, 40),
+            ("compliance_n_s_m", self.compliance_n_s_m, MIN_COMPLIANCE_N_S_M, 250),
+            ("side_compliance_n_s_m", self.side_compliance_n_s_m, MIN_COMPLIANCE_N_S_M, 500),
+            ("turn_compliance_n_m_s_rad", self.turn_compliance_n_m_s_rad, MIN_COMPLIANCE_N_M_S_RAD, 40),
         ] {
             checks::finite(name, given.as_slice())?;
             if let Some(soft) = given.filter(|given| *given < least) {

@@ -21,7 +21,7 @@ pub struct QueryDepth {
     pub robot: String,
     /// Pixels as [u, v]: column 0 to 319 from the left, row 0 to 239 from the top, at most 4096 of them.
     /// Example: [[160, 120], [170, 120]]. Null: those of `region`.
-    #[schemars(length(min = 1, max = limits::MOST_PIXELS), extend("items" = limits::pixel()))]
+    #[schemars(length(min = 1, max = limits::MAX_PIXELS), extend("items" = limits::pixel()))]
     pub pixels: Option<Vec<[i64; 2]>>,
     /// Pixels of a rectangle, row by row, at most 4096 of them. Null: those of `pixels`.
     pub region: Option<PixelRegion>,

@@ -8,7 +8,7 @@ use super::get_status::StatusReply;
 use crate::tool::Tool;
 
 /// The most characters that are said at once.
-const MOST_CHARACTERS: usize = 500;
+const MAX_CHARACTERS: usize = 500;
 
 /// Say something to the operators of the other robots: at most 500 characters, which they hear with their next reply. Costs no
 /// steps; physics stands still. Answers as get_status does.
@@ -16,7 +16,7 @@ const MOST_CHARACTERS: usize = 500;
 #[serde(deny_unknown_fields)]
 pub struct Say {
     /// What to say, 1 to 500 characters.
-    #[schemars(length(min = 1, max = MOST_CHARACTERS))]
+    #[schemars(length(min = 1, max = MAX_CHARACTERS))]
     pub text: String,
 }
 
@@ -32,8 +32,8 @@ impl Tool for Say {
     fn validate(&self) -> Result<(), String> {
         match self.text.chars().count() {
             0 => Err("text is empty; give 1 to 500 characters".into()),
-            count if count > MOST_CHARACTERS => {
-                Err(format!("text has {count} characters; give at most {MOST_CHARACTERS}"))
+            count if count > MAX_CHARACTERS => {
+                Err(format!("text has {count} characters; give at most {MAX_CHARACTERS}"))
             }
             _ => Ok(()),
         }

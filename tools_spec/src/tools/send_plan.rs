@@ -10,7 +10,7 @@ use crate::tool::Tool;
 use crate::tools::{MoveWrists, SendJointChunk, Wait, Walk};
 
 /// The most commands of a plan.
-const MOST_COMMANDS: usize = 20;
+const MAX_COMMANDS: usize = 20;
 
 /// Carry out up to 20 commands one after another, each as if it had been called by itself: with its own steps, recorded and counted as a
 /// tool call. The plan stops after the first command after which something that it `expects` is not so. The reply is that of the last command
@@ -19,7 +19,7 @@ const MOST_COMMANDS: usize = 20;
 #[serde(deny_unknown_fields)]
 pub struct SendPlan {
     /// The commands, at most 20.
-    #[schemars(length(min = 1, max = MOST_COMMANDS))]
+    #[schemars(length(min = 1, max = MAX_COMMANDS))]
     pub commands: Vec<PlannedCommand>,
 }
 
@@ -99,8 +99,8 @@ impl Tool for SendPlan {
     fn validate(&self) -> Result<(), String> {
         match self.commands.len() {
             0 => return Err("commands is empty; give 1 to 20".into()),
-            count if count > MOST_COMMANDS => {
-                return Err(format!("commands holds {count}; give at most {MOST_COMMANDS}"));
+            count if count > MAX_COMMANDS => {
+                return Err(format!("commands holds {count}; give at most {MAX_COMMANDS}"));
             }
             _ => {}
         }

@@ -9,9 +9,9 @@ use crate::tool::Tool;
 use crate::tools::PlanReply;
 
 /// The most control steps of one call: thirty seconds.
-const MOST_STEPS: u32 = 1500;
+const MAX_STEPS: u32 = 1500;
 /// The most waypoints of a robot.
-const MOST_WAYPOINTS: usize = 10;
+const MAX_WAYPOINTS: usize = 10;
 
 /// Walk to places in the start frame, looking at odometry on the way: arms keep their joints and go along, or push and carry with `carry`.
 /// It is carried out as short commands, each recorded and counted as a tool call, until every robot stands within 1.5 cm and 1.5 degrees of
@@ -21,7 +21,7 @@ const MOST_WAYPOINTS: usize = 10;
 #[serde(deny_unknown_fields)]
 pub struct WalkTo {
     /// The most control steps of 20 ms to take, up to 1500. A way takes about 120, and 250 a metre and 150 a quarter turn; where robots carry, 450 a metre.
-    #[schemars(range(min = 1, max = MOST_STEPS))]
+    #[schemars(range(min = 1, max = MAX_STEPS))]
     pub steps: u32,
     /// One entry per robot that is to walk; each robot at most once. Robots that are not named hold still.
     #[schemars(length(min = 1, max = limits::ROBOT_NAMES.len()), extend("not" = limits::a_robot_twice()))]
@@ -41,7 +41,7 @@ pub struct Destination {
     pub heading_rad: Option<f64>,
     /// Places to go by on the way, in order, without a stop. Robots of one call that carry have as many waypoints as each other, and go by
     /// them together. Null: none.
-    #[schemars(length(max = MOST_WAYPOINTS))]
+    #[schemars(length(max = MAX_WAYPOINTS))]
     pub waypoints: Option<Vec<Waypoint>>,
     /// True: it pushes or carries what its hands hold. Wrists stay where they are to it and as high over the floor though its pelvis sinks
     /// as it walks, and lead it by what it lags. Robots of one call that carry go at one pace of 0.2 m/s and give way to each other
@@ -85,8 +85,8 @@ impl Tool for WalkTo {
     }
 
     fn validate(&self) -> Result<(), String> {
-        if !(1..=MOST_STEPS).contains(&self.steps) {
-            return Err(format!("steps is {}; give 1 to {MOST_STEPS}, as 500", self.steps));
+        if !(1..=MAX_STEPS).contains(&self.steps) {
+            return Err(format!("steps is {}; give 1 to {MAX_STEPS}, as 500", self.steps));
         }
         checks::robots(&self.robots())?;
         checks::each(
@@ -96,8 +96,8 @@ impl Tool for WalkTo {
                 checks::finite("to_m", &entry.to_m)?;
                 checks::finite("heading_rad", entry.heading_rad.as_slice())?;
                 let waypoints = entry.waypoints.as_deref().unwrap_or_default();
-                if waypoints.len() > MOST_WAYPOINTS {
-                    return Err(format!("{} waypoints; give {MOST_WAYPOINTS} at most", waypoints.len()));
+                if waypoints.len() > MAX_WAYPOINTS {
+                    return Err(format!("{} waypoints; give {MAX_WAYPOINTS} at most", waypoints.len()));
                 }
                 waypoints.iter().try_for_each(|waypoint| {
                     checks::finite("at_m", &waypoint.at_m)?;

@@ -20,14 +20,14 @@ const STEP_PART: f32 = 0.03;
 const ALIKE_SHARE: f32 = 0.06;
 const BRIGHTER: f32 = 1.8;
 /// What is smaller is no surface: edges of things mix colours.
-const LEAST_PIXELS: usize = 12;
+const MIN_PIXELS: usize = 12;
 /// Saturation and value below which a colour is grey or black, and value above which it is white.
 const GREY_SATURATION: f32 = 0.25;
 const BLACK_VALUE: f32 = 0.2;
 const WHITE_VALUE: f32 = 0.75;
 
 /// The most surfaces of a colour that are told.
-const MOST_SURFACES: usize = 3;
+const MAX_SURFACES: usize = 3;
 /// What reaches farther, or fills more of the picture and goes on beyond it, is no thing but what things stand on or before.
 const BACKGROUND_M: f64 = 2.0;
 const BACKGROUND_PART: f64 = 0.25;
@@ -70,7 +70,7 @@ pub fn find(view: &RobotView, query: &SurfaceQuery, poses: &CameraPoses) -> Vec<
                 let ((one_behind, one_m), (other_behind, other_m)) = (order(one), order(other));
                 one_behind.cmp(&other_behind).then(one_m.total_cmp(&other_m))
             });
-            found.truncate(MOST_SURFACES);
+            found.truncate(MAX_SURFACES);
             found
         }
         (None, None) => Vec::new(),
@@ -90,7 +90,7 @@ fn of_color(view: &RobotView, color: Color) -> Vec<Vec<usize>> {
     for seed in 0..view.depth_m.len() {
         if !seen[seed] && is_of_it(seed) {
             let pixels = joined(view, seed, &mut seen, &is_of_it);
-            if pixels.len() >= LEAST_PIXELS && is_broad(view, &pixels) {
+            if pixels.len() >= MIN_PIXELS && is_broad(view, &pixels) {
                 found.push(pixels);
             }
         }

@@ -4,15 +4,15 @@ use nalgebra::{Matrix3, Point3, Vector2, Vector3};
 
 /// Slices are this high, and say something with so many points.
 const SLICE_M: f64 = 0.01;
-const LEAST_POINTS: usize = 5;
+const MIN_POINTS: usize = 5;
 /// Slices are arcs that lie off circles by less, and by less than this part of the radius, and that go round by more than this.
 const OFF_M: f64 = 0.002;
 const OFF_PART: f64 = 0.06;
-const LEAST_ARC_RAD: f64 = 1.2;
+const MIN_ARC_RAD: f64 = 1.2;
 const RADII_M: std::ops::Range<f64> = 0.01..0.4;
 /// So many slices, and so large a part of all, are about one axis, to within so much or so large a part of the radius.
-const LEAST_SLICES: usize = 3;
-const LEAST_PART: f64 = 0.5;
+const MIN_SLICES: usize = 3;
+const MIN_SHARE: f64 = 0.5;
 const ABOUT_M: f64 = 0.006;
 const ABOUT_PART: f64 = 0.15;
 
@@ -43,10 +43,10 @@ pub fn axis(points_m: &[Point3<f64>], eye_m: &Point3<f64>) -> Option<Axis> {
         let slice = ((point_m.z - bottom_m) / SLICE_M) as usize;
         slices[slice.min(count - 1)].push(point_m.coords.xy());
     }
-    let told = slices.iter().filter(|slice| slice.len() >= LEAST_POINTS);
+    let told = slices.iter().filter(|slice| slice.len() >= MIN_POINTS);
     let circles: Vec<Option<Circle>> = told.map(|slice| arc(slice, &eye_m.coords.xy())).collect();
     let mut arcs: Vec<Circle> = circles.iter().flatten().copied().collect();
-    let enough = |arcs: usize| arcs >= LEAST_SLICES && arcs as f64 >= LEAST_PART * circles.len() as f64;
+    let enough = |arcs: usize| arcs >= MIN_SLICES && arcs as f64 >= MIN_SHARE * circles.len() as f64;
     if !enough(arcs.len()) {
         return None;
     }
@@ -86,7 +86,7 @@ fn arc(points_m: &[Vector2<f64>], eye_m: &Vector2<f64>) -> Option<Circle> {
     });
     let (low, high) = angles_rad
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), angle| (low.min(angle), high.max(angle)));
-    (is_round && stands_out && high - low > LEAST_ARC_RAD).then_some(Circle { middle_m, radius_m })
+    (is_round && stands_out && high - low > MIN_ARC_RAD).then_some(Circle { middle_m, radius_m })
 }
 
 #[cfg(test)]

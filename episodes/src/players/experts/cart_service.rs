@@ -18,7 +18,7 @@ const WALK_M_S: f32 = 0.35;
 const CAME_M: f32 = 0.3;
 const STANDS_M_S: f32 = 0.03;
 /// A waits for that, too, for so many commands at most.
-const MOST_STOPPING_BEATS: u32 = 20;
+const MAX_STOPPING_BEATS: u32 = 20;
 /// How fast B walks with the bottle in its hand.
 const CARRY_M_S: f32 = 0.25;
 /// While B walks its pelvis is up to 12 cm lower than where it stands, and the bottle with it: it has to clear the table all the same.
@@ -48,7 +48,7 @@ fn park(commander: &mut Commander) -> Result<(), PlayerError> {
     let mark = commander.facts()?.object("parking_mark").pose_in_world;
     team.carry_to(commander, &mark, PUSH_M_S)?;
     // What is let go of while it rolls rolls on.
-    for _ in 0..MOST_STOPPING_BEATS {
+    for _ in 0..MAX_STOPPING_BEATS {
         if commander.facts()?.speed_m_s("service_trolley") < STANDS_M_S {
             break;
         }

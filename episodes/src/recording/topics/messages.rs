@@ -304,9 +304,9 @@ impl CallMoment {
 }
 
 /// The longest arguments that are kept of a call which was refused before it reached the episode: a caller may send anything.
-const MOST_UNREAD_BYTES: usize = 10_000;
+const MAX_UNREAD_BYTES: usize = 10_000;
 /// The same of a tool's name that may be none.
-const MOST_NAME_BYTES: usize = 100;
+const MAX_NAME_BYTES: usize = 100;
 
 /// The beginning of a text that is too long.
 fn beginning(text: &str, most_bytes: usize) -> Option<&str> {
@@ -361,13 +361,13 @@ impl ToolCallRecord {
         outcome: Result<&str, &str>,
     ) -> Result<ToolCallRecord, OutputError> {
         let is_json = serde_json::from_str::<serde::de::IgnoredAny>(arguments).is_ok();
-        let arguments = match beginning(arguments, MOST_UNREAD_BYTES) {
+        let arguments = match beginning(arguments, MAX_UNREAD_BYTES) {
             Some(beginning) => serde_json::to_string(&format!("{beginning}... ({} bytes)", arguments.len()))?,
             None if is_json => arguments.to_owned(),
             None => serde_json::to_string(arguments)?,
         };
         let message = ToolCallMessage {
-            tool: beginning(tool, MOST_NAME_BYTES).unwrap_or(tool).into(),
+            tool: beginning(tool, MAX_NAME_BYTES).unwrap_or(tool).into(),
             control_step: at.control_step,
             thought_ns: at.thought_ns(),
             arguments,

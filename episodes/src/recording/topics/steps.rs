@@ -20,7 +20,7 @@ const HEADER_BYTES: usize = 1 + 2 * size_of::<u64>();
 /// So many steps before tell what to expect of the next.
 const REMEMBERED: usize = 3;
 /// A step of a higher number is written plainly: as a number of variable length it could be taken for a word of four bytes.
-const MOST_STEPS: u64 = 1 << 21;
+const MAX_STEPS: u64 = 1 << 21;
 
 /// What a reader who does not know Tandem is told of these messages.
 const DESCRIPTION: &str = "A control step of Tandem. Little endian: u8 kind (1: differences, 2: plain), u64 control_step, u64 state_hash; \
@@ -103,7 +103,7 @@ impl StepEncoder {
     /// The message of the step that follows those before.
     pub fn encode(&mut self, step: &Step, state_hash: u64) -> Result<StepRow, OutputError> {
         let failed = |source: postcard::Error| OutputError::Encode(source.into());
-        let plain = step.control_step >= MOST_STEPS;
+        let plain = step.control_step >= MAX_STEPS;
         let mut row = vec![if plain { PLAIN } else { DIFFERENCES }];
         row.extend(step.control_step.to_le_bytes());
         row.extend(state_hash.to_le_bytes());
@@ -306,10 +306,10 @@ mod tests {
         assert!(zeros(&rows[8]) > 0.8, "what stays is zero: {}", zeros(&rows[8]));
 
         // A step whose number could be taken for a word.
-        let late = Step { control_step: MOST_STEPS, ..steps().remove(3) };
+        let late = Step { control_step: MAX_STEPS, ..steps().remove(3) };
         let row = encoder.encode(&late, 1).unwrap().0;
         let again = decoder.decode(&row).unwrap();
-        assert_eq!((row[0], again.control_step), (PLAIN, MOST_STEPS));
+        assert_eq!((row[0], again.control_step), (PLAIN, MAX_STEPS));
     }
 
     #[test]

@@ -36,7 +36,7 @@ const STRAYS_COMMANDS: u32 = 3;
 /// Velocity for what a robot is off its path, and the most of it with the path's own; turning. Twice the gain
 /// makes robots that walk half a second behind their commands swing from side to side, more and more.
 const GAIN_1_S: f64 = 0.5;
-const MOST_M_S: f64 = 0.3;
+const MAX_SPEED_M_S: f64 = 0.3;
 const TURN_RAD_S: f64 = 0.4;
 /// How hands give way to partners.
 const COMPLIANCE_N_S_M: f64 = 250.0;
@@ -283,7 +283,7 @@ impl Session {
         let to_be = carrier.at(leg);
         let heading_rad = self.stands_at(carrier.robot).heading_rad;
         let in_start_m_s = Rotation2::new(to_be.heading_rad) * shift_m * rate_1_s + GAIN_1_S * off_m;
-        let own_m_s = (Rotation2::new(-heading_rad) * in_start_m_s).cap_magnitude(MOST_M_S);
+        let own_m_s = (Rotation2::new(-heading_rad) * in_start_m_s).cap_magnitude(MAX_SPEED_M_S);
         let turning = turn_rad * rate_1_s + GAIN_1_S * wrapped(to_be.heading_rad - heading_rad);
         [own_m_s.x, own_m_s.y, turning.clamp(-TURN_RAD_S, TURN_RAD_S)]
     }

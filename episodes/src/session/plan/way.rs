@@ -13,7 +13,7 @@ pub const WALK_STEPS: u32 = 13;
 const M_PER_RAD: f64 = 0.5;
 /// Short walks make up for this part of what others have missed, and for no more than so much.
 const MISSED_PART: f64 = 0.5;
-const MOST_MISSED_M: f64 = 0.04;
+const MAX_MISS_M: f64 = 0.04;
 
 /// A place and a heading on the floor, in a start frame.
 #[derive(Clone, Copy, Debug)]
@@ -99,7 +99,7 @@ impl Corrections {
     pub fn pulse(&mut self, missing: &Missing) -> [f64; 3] {
         let [ahead_m, left_m]: [f64; 2] = missing.way_m.into();
         let missed_m = self.missed_ahead_m.map_or(0.0, |missed_m| missed_m + MISSED_PART * ahead_m);
-        let missed_m = missed_m.clamp(-MOST_MISSED_M, MOST_MISSED_M);
+        let missed_m = missed_m.clamp(-MAX_MISS_M, MAX_MISS_M);
         self.missed_ahead_m = Some(missed_m);
         [ahead_m + missed_m, left_m, missing.turn_rad].map(|way| way * CONTROL_HZ / f64::from(WALK_STEPS))
     }

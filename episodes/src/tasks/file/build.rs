@@ -18,8 +18,8 @@ use crate::scoring::{Phase, ROBOT_NAMES};
 use crate::tasks::embedded::origin_of;
 use crate::tasks::{ChosenOption, ObjectSpot, Offset, RobotSpot, Task, TaskOrigin, TaskSource};
 
-const MOST_OBJECTS: usize = 64;
-const MOST_PHASES: usize = 12;
+const MAX_OBJECTS: usize = 64;
+const MAX_PHASES: usize = 12;
 /// Robots that begin nearer to each other touch.
 const ROBOT_NAMES_APART_M: f64 = 0.35;
 /// Nothing is farther away than this.
@@ -129,8 +129,8 @@ impl Reading<'_> {
             Names { robots: robots.iter().map(|robot| robot.name.to_owned()).collect(), ..Names::default() };
         let objects = self.objects(&table.objects, &mut names);
         let randomize = self.offsets(&table.randomize, &objects, &names);
-        if table.phases.as_ref().is_empty() || table.phases.as_ref().len() > MOST_PHASES {
-            self.wrong(table.phases.span(), format!("a task has 1 to {MOST_PHASES} [[phases]]"));
+        if table.phases.as_ref().is_empty() || table.phases.as_ref().len() > MAX_PHASES {
+            self.wrong(table.phases.span(), format!("a task has 1 to {MAX_PHASES} [[phases]]"));
         }
         let phases = phases::phases(self, table.terms, table.phases.into_inner(), &mut names);
         let rewordings = self.rewordings(&table.rewordings, &table.shared_instruction, &robots);
@@ -278,10 +278,10 @@ impl Reading<'_> {
 
     fn objects(&mut self, tables: &[ObjectTable], names: &mut Names) -> Vec<ObjectSpot> {
         let mut found: Vec<ObjectSpot> = Vec::new();
-        if let Some(beyond) = tables.get(MOST_OBJECTS) {
-            self.wrong(beyond.name.span(), format!("a task has at most {MOST_OBJECTS} objects"));
+        if let Some(beyond) = tables.get(MAX_OBJECTS) {
+            self.wrong(beyond.name.span(), format!("a task has at most {MAX_OBJECTS} objects"));
         }
-        for table in tables.iter().take(MOST_OBJECTS) {
+        for table in tables.iter().take(MAX_OBJECTS) {
             self.id(&table.name, "an object");
             self.finite(&table.position_m, table.position_m.as_ref(), FARTHEST_M);
             let name = table.name.as_ref().as_str();

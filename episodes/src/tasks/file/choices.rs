@@ -9,7 +9,7 @@ use super::table::ChoiceTable;
 use crate::tasks::ChosenOption;
 
 /// A task is made for each way to choose.
-const MOST_WAYS: usize = 64;
+const MAX_COMBINATIONS: usize = 64;
 
 /// A choice as its file has it.
 pub(super) struct Choice {
@@ -43,8 +43,8 @@ impl Reading<'_> {
             }
             let options = table.options.into_inner().into_iter().map(Spanned::into_inner).collect();
             found.push(Choice { name: table.name.into_inner(), options });
-            if found.iter().map(|choice| choice.options.len().max(1)).product::<usize>() > MOST_WAYS {
-                self.wrong(0..0, format!("there are at most {MOST_WAYS} ways to choose in a file"));
+            if found.iter().map(|choice| choice.options.len().max(1)).product::<usize>() > MAX_COMBINATIONS {
+                self.wrong(0..0, format!("there are at most {MAX_COMBINATIONS} ways to choose in a file"));
                 break;
             }
         }

@@ -18,10 +18,10 @@ from .memory import CHARACTERS_A_TOKEN, estimate
 from .seat import Note, Seat
 from .settings import AgentSettings
 
-MOST_SILENT = 2
+MAX_SILENT_TURNS = 2
 """Replies without a call, one after another, after which the episode is finished."""
 
-MOST_CUTS = 4
+MAX_CUTS = 4
 """How often a conversation is halved that an endpoint finds too long, before that is the end."""
 
 SHOWN_CHARACTERS = 200
@@ -123,7 +123,7 @@ class Player:
             return Stopped("refused", reply.refusal)
         if reply.filtered:
             return Stopped("content_filter", reply.words)
-        if self._progress.silent >= MOST_SILENT:
+        if self._progress.silent >= MAX_SILENT_TURNS:
             return Stopped("silent", reply.words)
         self._record(Told(CUT_NUDGE if reply.cut else NUDGE))
         return None
@@ -138,7 +138,7 @@ class Player:
         """Asks the model, with less of the conversation where it is too long for it, and counts what that took."""
         began_s = time.monotonic()
         memory = self._progress.memory
-        for _ in range(MOST_CUTS):
+        for _ in range(MAX_CUTS):
             try:
                 reply = self._model.ask(self._begun.instructions, self._begun.tools, memory.turns)
                 break

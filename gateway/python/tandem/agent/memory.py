@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from .conversation import Answer, Answers, Reply, Told, Turn
 
-MOST_PICTURES = 20
+MAX_PICTURES = 20
 """Pictures that are shown; of more, the latest half stays. Each cut has the endpoint read anew what it had cached."""
 
 CHARACTERS_A_TOKEN = 4
@@ -22,7 +22,7 @@ LISTED_CHARACTERS = 160
 class Memory:
     """What the model remembers: our first words, and the latest turns."""
 
-    def __init__(self, opening: str, most_pictures: int = MOST_PICTURES) -> None:
+    def __init__(self, opening: str, most_pictures: int = MAX_PICTURES) -> None:
         self._opening = opening
         self._most_pictures = most_pictures
         self._listed: list[str] = []

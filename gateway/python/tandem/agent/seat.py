@@ -14,11 +14,11 @@ from ..errors import EpisodeEnded, Refused, SimulatorFailed
 from .conversation import Answer, Call, Ending, Picture, listed
 from .tools import Tool, offered
 
-MOST_ANSWER_CHARACTERS = 60_000
+MAX_ANSWER_CHARACTERS = 60_000
 """Of a longer reply the model is shown the beginning."""
 
-MOST_NOTE_CHARACTERS = 50_000
-MOST_NAME_CHARACTERS = 200
+MAX_NOTE_CHARACTERS = 50_000
+MAX_NAME_CHARACTERS = 200
 """What the server takes of a note's words, and of the model's name."""
 
 LONGEST_WAIT_S = 30.0
@@ -104,8 +104,8 @@ class Seat:
                 self.phases = tuple(f"{phase['number']} {phase['id']}" for phase in listed(phases))
         pictures = _take_pictures(reply)
         text = json.dumps(reply, separators=(",", ":"), ensure_ascii=False)
-        if len(text) > MOST_ANSWER_CHARACTERS:
-            text = f"{text[:MOST_ANSWER_CHARACTERS]} ... ({len(text)} characters; the rest is not shown: ask for less)"
+        if len(text) > MAX_ANSWER_CHARACTERS:
+            text = f"{text[:MAX_ANSWER_CHARACTERS]} ... ({len(text)} characters; the rest is not shown: ask for less)"
         return Answer(call, text, pictures)
 
     def _post(self, tool: str, arguments: dict[str, Any], key: str) -> dict[str, Any]:
@@ -133,8 +133,8 @@ class Seat:
             said = {name: value for name, value in asdict(note).items() if name != "ending" or value is not None}
             body = {
                 **said,
-                "text": note.text[:MOST_NOTE_CHARACTERS],
-                "model": (note.model or "")[:MOST_NAME_CHARACTERS],
+                "text": note.text[:MAX_NOTE_CHARACTERS],
+                "model": (note.model or "")[:MAX_NAME_CHARACTERS],
             }
             self.client.request("POST", f"/v1/episodes/{self.episode_id}/notes", body, key=key)
         except Refused as refused:

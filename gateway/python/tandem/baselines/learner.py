@@ -23,7 +23,7 @@ WARM_UP = 100
 
 LARGEST_GRADIENT = 10.0
 
-LEAST_DEVIATIONS = {"states": 0.05, "chunks": 0.05, "objects": 0.02}
+MIN_DEVIATIONS = {"states": 0.05, "chunks": 0.05, "objects": 0.02}
 """What hardly moves is not blown up when it is normalised."""
 
 BASE_NOISE = (0.03, 0.03, 0.03, 0.01)
@@ -180,7 +180,7 @@ class Learner:
         # Robots stand before the last axis.
         seen = torch.cat([values[..., list(chosen), :] for chosen in robots.tolist()])
         axes = tuple(range(seen.dim() - 2))
-        return seen.mean(axes), seen.std(axes).clamp(min=LEAST_DEVIATIONS[name])
+        return seen.mean(axes), seen.std(axes).clamp(min=MIN_DEVIATIONS[name])
 
     def _rate(self, step: int) -> float:
         return min(1.0, (step + 1) / WARM_UP) * (0.5 * (1 + math.cos(math.pi * step / self.settings.steps)) + 0.01)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 
 FEWEST_SAMPLES = 100
-MOST_SAMPLES = 10_000
+MAX_SAMPLES = 10_000
 SAMPLED_POWER = 0.75
 
 LARGEST_SIDE_PX = 300
@@ -42,7 +42,7 @@ def of_numbers(values: NDArray[Any]) -> Statistics:
 def sampled(pictures: int) -> set[int]:
     """The pictures of an episode whose colours are counted: as many as LeRobot takes."""
     fewest = min(FEWEST_SAMPLES, pictures)
-    count = max(fewest, min(int(pictures**SAMPLED_POWER), MOST_SAMPLES))
+    count = max(fewest, min(int(pictures**SAMPLED_POWER), MAX_SAMPLES))
     return set(np.round(np.linspace(0, pictures - 1, count)).astype(int).tolist())
 
 

@@ -33,7 +33,7 @@ pub struct CollectArgs {
     /// How much demonstrations of the same task differ in pace, pauses and ways, and how often hands miss and come back: 0 for
     /// not at all, to 3.
     #[arg(long, value_name = "N", default_value_t = 0, conflicts_with = "operators",
-          value_parser = clap::value_parser!(u8).range(..=i64::from(Variation::MOST_VARIETY)))]
+          value_parser = clap::value_parser!(u8).range(..=i64::from(Variation::MAX_VARIETY)))]
     variety: u8,
     /// How much slow noise is added to what robots are told before they do it; 1 is 0.016 rad on the joints of arms, and 0.03 m/s
     /// and 0.06 rad/s on a base that walks. What they were told is recorded as the action.
@@ -51,8 +51,8 @@ pub struct CollectArgs {
 
 /// How much to disturb.
 fn parse_level(text: &str) -> Result<f32, String> {
-    let level = text.parse().ok().filter(|level| (0.0..=Variation::MOST_DISTURB).contains(level));
-    level.ok_or_else(|| format!("no level; give 0 to {}, as 1", Variation::MOST_DISTURB))
+    let level = text.parse().ok().filter(|level| (0.0..=Variation::MAX_DISTURB).contains(level));
+    level.ok_or_else(|| format!("no level; give 0 to {}, as 1", Variation::MAX_DISTURB))
 }
 
 /// Plays and records.

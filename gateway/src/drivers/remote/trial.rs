@@ -22,7 +22,7 @@ use super::{
 /// Rows of a made-up answer where the map leaves open how many there are.
 const ROWS: usize = 10;
 /// Policies answer with 8 to 100 rows: where a map says nothing of its own, no more are taken for granted.
-const MOST_MADE_UP_ROWS: usize = 100;
+const MAX_TRIAL_ROWS: usize = 100;
 
 /// Tries `map` with as many robots as there are tasks for, and says what came of it.
 pub fn try_map(map: &PolicyMap) -> Result<String, RemoteError> {
@@ -268,9 +268,9 @@ impl<'a> MapTrial<'a> {
 /// Whether a made-up answer can have as many rows as the map executes of it.
 fn check_execute(map: &PolicyMap) -> Result<(), RemoteError> {
     match (map.chunk.rows, map.chunk.execute) {
-        (None, Some(execute)) if execute > MOST_MADE_UP_ROWS => Err(RemoteError::Misfit(format!(
-            "a made-up answer has at most {MOST_MADE_UP_ROWS} rows, of which [chunk] execute = {execute} are to be executed; give \
-             execute at most as many rows as the policy answers with, and where these are more than {MOST_MADE_UP_ROWS}, rows = \
+        (None, Some(execute)) if execute > MAX_TRIAL_ROWS => Err(RemoteError::Misfit(format!(
+            "a made-up answer has at most {MAX_TRIAL_ROWS} rows, of which [chunk] execute = {execute} are to be executed; give \
+             execute at most as many rows as the policy answers with, and where these are more than {MAX_TRIAL_ROWS}, rows = \
              how many as well"
         ))),
         _ => Ok(()),

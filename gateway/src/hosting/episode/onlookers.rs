@@ -20,7 +20,7 @@ const FRAME_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Steps are told at once that are worth so many intervals, so that what an agent commands now and then is told whole, however fast
 /// it is simulated: ten simulated seconds.
-const MOST_AHEAD: Duration = Duration::from_secs(5);
+const MAX_LEAD: Duration = Duration::from_secs(5);
 
 /// What an episode tells, for as many as listen.
 #[derive(Debug)]
@@ -103,7 +103,7 @@ impl Pace {
     /// Whether one step more may be told at `now`.
     fn allows(&self, now: Instant) -> bool {
         let even_at = self.even_at.get().max(now);
-        let allowed = even_at.duration_since(now) < MOST_AHEAD;
+        let allowed = even_at.duration_since(now) < MAX_LEAD;
         if allowed {
             self.even_at.set(even_at + FRAME_INTERVAL);
         }

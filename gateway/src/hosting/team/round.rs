@@ -8,7 +8,7 @@ use tokio::{sync::oneshot, task::AbortHandle};
 use crate::hosting::{Answer, HostingError, durable::Keyed};
 
 /// The most that waits for one operator to hear it.
-const MOST_UNHEARD: usize = 32;
+const MAX_UNHEARD: usize = 32;
 
 /// The operators, by seat, as they stand before a step.
 #[derive(Debug)]
@@ -276,9 +276,9 @@ impl Round {
     /// Refuses words that would be too many for those who are to hear them.
     pub fn check_unheard(&self, from: usize) -> Result<(), HostingError> {
         let others = self.operators.iter().enumerate().filter(|(seat, _)| *seat != from);
-        match others.map(|(_, other)| other).find(|other| other.heard.len() >= MOST_UNHEARD) {
+        match others.map(|(_, other)| other).find(|other| other.heard.len() >= MAX_UNHEARD) {
             Some(other) => {
-                Err(HostingError::TooMuchSaid { robot: other.robot.clone(), unheard: MOST_UNHEARD })
+                Err(HostingError::TooMuchSaid { robot: other.robot.clone(), unheard: MAX_UNHEARD })
             }
             None => Ok(()),
         }

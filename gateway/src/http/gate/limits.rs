@@ -18,7 +18,7 @@ use super::waiting::Connection;
 use crate::{http::problem::ApiError, settings::Settings};
 
 /// How many addresses are remembered. Beyond, those are forgotten that may send at their full rate again.
-const MOST_ADDRESSES: usize = 1024;
+const MAX_ADDRESSES: usize = 1024;
 
 /// The address that a request came from.
 #[derive(Debug, Clone, Copy)]
@@ -97,9 +97,9 @@ impl Rates {
         let grown = |(allowed, since): (f64, Instant)| {
             (allowed + now.saturating_duration_since(since).as_secs_f64() * most).min(most)
         };
-        if self.allowances.len() >= MOST_ADDRESSES && !self.allowances.contains_key(&address) {
+        if self.allowances.len() >= MAX_ADDRESSES && !self.allowances.contains_key(&address) {
             self.allowances.retain(|_, allowance| grown(*allowance) < most);
-            if self.allowances.len() >= MOST_ADDRESSES {
+            if self.allowances.len() >= MAX_ADDRESSES {
                 return false;
             }
         }
@@ -135,7 +135,7 @@ mod tests {
     #[test]
     fn addresses_are_forgotten_that_have_their_allowance_back() {
         let (mut rates, began) = (Rates::new(1), Instant::now());
-        for number in 0..MOST_ADDRESSES as u32 {
+        for number in 0..MAX_ADDRESSES as u32 {
             assert!(rates.take(address(number), began));
         }
         assert!(!rates.take(address(u32::MAX), began), "no room to remember one more");

@@ -25,7 +25,7 @@ use crate::{
 };
 
 /// How many are listed, the newest first.
-const MOST_LISTED: usize = 200;
+const MAX_LISTED: usize = 200;
 
 /// How deep below the runs folder episodes lie: those of an evaluation are in a folder of its folder.
 const DEPTH: usize = 4;
@@ -56,7 +56,7 @@ pub fn list(runs: &Path, running: &[String]) -> Vec<Value> {
             json!({ "run": run, "result": result, "ended_unix_s": ended_s, "recorded": recorded, "strip": strip }),
         )
     };
-    found.into_iter().filter_map(entry).take(MOST_LISTED).collect()
+    found.into_iter().filter_map(entry).take(MAX_LISTED).collect()
 }
 
 fn collect(folder: &Path, depth: usize, found: &mut Vec<(SystemTime, PathBuf)>) {

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     hosting::{EpisodeThread, HostingError, LiveWatch},
-    http::{app::AppState, problem::ApiError, watching::MOST_WATCHERS},
+    http::{app::AppState, problem::ApiError, watching::MAX_WATCHERS},
 };
 
 /// What comes first in the message of a picture; that of a step begins with 1.
@@ -50,7 +50,7 @@ pub async fn live(
 ) -> Result<Response, ApiError> {
     let thread = thread(&app, &wanted)?;
     let place = app.watchers.clone().try_acquire_owned();
-    let place = place.map_err(|_| ApiError::Busy { limit: MOST_WATCHERS })?;
+    let place = place.map_err(|_| ApiError::Busy { limit: MAX_WATCHERS })?;
     let watch = thread.watch().await?;
     // The episode must not live on because somebody watches it.
     drop(thread);

@@ -32,7 +32,7 @@ use crate::http::problem::ApiError;
 const WRITE_LIMIT: Duration = Duration::from_secs(10);
 
 /// The most that a page says at once.
-const MOST_BYTES: u64 = 4096;
+const MAX_BYTES: u64 = 4096;
 
 /// The two ends of a socket.
 pub struct PageSocket {
@@ -121,7 +121,7 @@ impl PageReader {
         let Some((header, length)) = FrameHeader::parse(&mut cursor).map_err(io::Error::other)? else {
             return Ok(None);
         };
-        let Some(mask) = header.mask.filter(|_| header.is_final && length <= MOST_BYTES) else {
+        let Some(mask) = header.mask.filter(|_| header.is_final && length <= MAX_BYTES) else {
             return Err(io::Error::other("a page sends whole, short, masked frames"));
         };
         let begin = cursor.position() as usize;

@@ -9,4 +9,4 @@ pub use key::{Host, WatchKey, Watcher};
 pub use recording_reader::{RECORDING, RecordingReader, no_recording, unreadable};
 
 /// How many pages may watch at once.
-pub const MOST_WATCHERS: usize = 64;
+pub const MAX_WATCHERS: usize = 64;

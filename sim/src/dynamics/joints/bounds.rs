@@ -66,7 +66,7 @@ struct JointRange {
 /// A joint without other rows gets one for its range at first only if it could reach an end when this much faster, rad/s or m/s.
 const NEAR_RANGE: f64 = 10.0;
 /// A joint that would be beyond its range by more (rad or m) without a row gets one, and the step is repeated.
-const MOST_BEYOND: f64 = 0.01;
+const MAX_OVERSHOOT: f64 = 0.01;
 
 impl Tree {
     /// Whether a joint has a row in any case.
@@ -91,7 +91,7 @@ impl Tree {
         for i in 0..self.links.len() {
             let Some([low, high]) = self.links[i].joint.axis().and_then(|axis| axis.range) else { continue };
             let next = self.q[i] + dt_s * v[self.layout.first_dof[i]];
-            let beyond = next < low - MOST_BEYOND || next > high + MOST_BEYOND;
+            let beyond = next < low - MAX_OVERSHOOT || next > high + MAX_OVERSHOOT;
             if beyond && !self.range_is_row(i, dt_s) {
                 self.overrun[i] = true;
                 more = true;

@@ -13,7 +13,7 @@ use rapier3d::glamx::{DMat3, DQuat, DVec3};
 use super::tree::Tree;
 
 /// Eight iterations suffice for 40 rad per step; below 1 rad per step three do.
-const MOST_ITERATIONS: usize = 8;
+const MAX_ITERATIONS: usize = 8;
 const TOLERANCE: f64 = 1e-14;
 
 impl Tree {
@@ -55,7 +55,7 @@ impl Tree {
 
 fn midpoint_spin(inertia: &DMat3, before: DVec3, dt_s: f64) -> DVec3 {
     let mut after = before;
-    for _ in 0..MOST_ITERATIONS {
+    for _ in 0..MAX_ITERATIONS {
         let mean = (before + after) * 0.5;
         let momentum = *inertia * mean;
         let residual = *inertia * (after - before) + mean.cross(momentum) * dt_s;

@@ -22,7 +22,7 @@ const TURN_FADE_M: f32 = 0.12;
 const TURN_INERTIA_KG_M2: f32 = 1.2;
 const CORRECTIONS: usize = 2;
 /// Height of the centre of mass over the ground: a robot that is lower has fallen.
-const LEAST_HEIGHT_M: f32 = 0.4;
+const MIN_HEIGHT_M: f32 = 0.4;
 /// A knee that is almost straight must not ask for the impossible.
 const DAMPING: f32 = 0.004;
 /// Damping of the ground force that torques give away. With twenty times as much, half of a pull on a robot that leans
@@ -110,7 +110,7 @@ fn leg_torques(
 ) -> LegTorques {
     let point_m = contact.pressure_m;
     let scale = &body.model.scale;
-    let height_m = (body.com_m.z - point_m.z).max(scale.length_m(LEAST_HEIGHT_M));
+    let height_m = (body.com_m.z - point_m.z).max(scale.length_m(MIN_HEIGHT_M));
     let away_m = flat(body.com_m - point_m);
     let mut pelvis = Acceleration {
         linear_m_s2: away_m * ((GRAVITY_M_S2 + motion.lift_m_s2) / height_m) + Vector::Z * motion.lift_m_s2,

@@ -50,9 +50,9 @@ const EITHER_FOOT_M: f32 = 0.01;
 /// capture point's way ahead, counts like its way to the side. Tuned on punches at shoulders and elbows, seeds 2000-2099.
 const SPIN_S_RAD: f32 = 1.0;
 /// No change of mind within this time after planting.
-const LEAST_STANDING_S: f32 = 0.1;
+const MIN_STANDING_S: f32 = 0.1;
 /// Feet and capture point from which standing succeeds.
-const LEAST_STEPS: u32 = 2;
+const MIN_STEPS: u32 = 2;
 const LARGEST_STAGGER_M: f32 = 0.12;
 const LARGEST_WIDTH_M: f32 = 0.36;
 const CAPTURED_M: f32 = 0.066;
@@ -230,7 +230,7 @@ impl BalanceState {
                 let lost = stance.capture_m.x > forward_m + farther_m * load.ahead
                     || stance.capture_m.x < -backward_m
                     || stance.capture_m.y.abs() > half_width_m + scale.length_m(SIDEWAYS_M);
-                if (moving || lost) && self.time_in_mode_s > scale.time_s(LEAST_STANDING_S) {
+                if (moving || lost) && self.time_in_mode_s > scale.time_s(MIN_STANDING_S) {
                     let spin_rad_s = body.pelvis_angular_velocity_rad_s.z;
                     let left_carries = self.left_carries_first(scale, &stance, lost.then_some(spin_rad_s));
                     let goal_rad = self.place.map_or(self.heading_rad, |place| place.heading_rad);
@@ -246,7 +246,7 @@ impl BalanceState {
                 let feet_together = stance.left_from_right_m.x.abs() < scale.length_m(LARGEST_STAGGER_M)
                     && stance.left_from_right_m.y < scale.stance_width_m(LARGEST_WIDTH_M);
                 let back = self.place.is_none_or(|place| place.is_moved()) || step.to_turn_rad() < BACK_RAD;
-                let landed = step.just_landed() && step.steps() >= LEAST_STEPS;
+                let landed = step.just_landed() && step.steps() >= MIN_STEPS;
                 if !moving && back && landed && captured && feet_together {
                     let kept_m = self.place.and_then(|place| place.rest_m(body, load, self.heading_rad));
                     let rest_m = kept_m.unwrap_or(self.pelvis_from_middle_m);

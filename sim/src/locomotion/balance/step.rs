@@ -70,7 +70,7 @@ const EARLIEST_LANDING: f32 = 0.65;
 const LATEST_LANDING: f32 = 1.25;
 const GROUND_M: f32 = 0.002;
 /// Height of the centre of mass over the ground: a robot that is lower has fallen.
-const LEAST_HEIGHT_M: f32 = 0.4;
+const MIN_HEIGHT_M: f32 = 0.4;
 
 /// A leg that carries is driven by torque; the drives need some stiffness, around the measured angle.
 const KP_N_M_RAD: f32 = 1.0;
@@ -150,7 +150,7 @@ impl Stepping {
         let heading = Rotation::from_rotation_z(self.heading_rad);
         let scale = &body.model.scale;
         let [ahead, left] = self.landing_axes(body, velocity.yaw_rate_rad_s);
-        let rate_1_s = (GRAVITY_M_S2 / (body.com_m.z - ground_m).max(scale.length_m(LEAST_HEIGHT_M))).sqrt();
+        let rate_1_s = (GRAVITY_M_S2 / (body.com_m.z - ground_m).max(scale.length_m(MIN_HEIGHT_M))).sqrt();
         let pelvis_m = body.world_from_pelvis().translation;
         let faced = self.faced_axes(body, dt_s);
         let starts = self.steps < STARTING_STEPS;

@@ -17,7 +17,7 @@ const HEIGHT_M: f32 = 0.044;
 /// A foot that meets no ground goes on down.
 const PROBING_M_S: f32 = 0.25;
 /// The goal stands still for the last part of the way.
-const LEAST_REMAINING_S: f32 = 0.03;
+const MIN_REMAINING_S: f32 = 0.03;
 const LARGEST_ACCELERATION_M_S2: f32 = 60.0;
 /// The farthest that a foot at rest gets in the time T: this times T^2.
 const REACH_M_S2: f32 = 14.0;
@@ -56,10 +56,10 @@ impl Swing {
         }
         self.pace = pace;
         let remaining_s = (AIR_S - time_s) / pace;
-        if remaining_s > LEAST_REMAINING_S {
+        if remaining_s > MIN_REMAINING_S {
             self.to = goal;
         }
-        let remaining_s = remaining_s.max(LEAST_REMAINING_S);
+        let remaining_s = remaining_s.max(MIN_REMAINING_S);
         let jerk_m_s3 = (self.to.translation - self.position_m) * (60.0 / remaining_s.powi(3))
             - self.velocity_m_s * (36.0 / (remaining_s * remaining_s))
             - self.acceleration_m_s2 * (9.0 / remaining_s);

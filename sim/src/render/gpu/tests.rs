@@ -14,7 +14,7 @@ mod skipped;
 
 use skipped::skipped;
 
-const LEAST_PSNR_DB: f64 = 40.0;
+const MIN_PSNR_DB: f64 = 40.0;
 const DEPTH_TOLERANCE_M: f32 = 1e-4;
 /// The share of pixels that may show another thing.
 const STRAY_IDS: f64 = 0.002;
@@ -84,7 +84,7 @@ fn both_renderers_draw_the_same() {
             let (drawn, expected) = (gpu.render(&step, &camera), embedded.render(&step, &camera));
             let size = format!("{} x {}", camera.width, camera.height);
             let (psnr_db, depth_m) = (psnr_db(&drawn, &expected), depth_p99_m(&drawn, &expected));
-            assert!(psnr_db >= LEAST_PSNR_DB, "{size}: {psnr_db:.1} dB");
+            assert!(psnr_db >= MIN_PSNR_DB, "{size}: {psnr_db:.1} dB");
             assert!(depth_m <= DEPTH_TOLERANCE_M, "{size}: depths differ by {depth_m} m");
             let stray = drawn.ids.iter().zip(&expected.ids).filter(|(a, b)| a != b).count();
             assert!(stray as f64 <= STRAY_IDS * expected.ids.len() as f64, "{size}: {stray} other ids");

@@ -28,7 +28,7 @@ const PRESS_M: f32 = 0.004;
 /// It is set down once it is over its place within this, or has been moved there so many times.
 const OVER_M: f32 = 0.015;
 const OVER_RAD: f32 = 0.02;
-const MOST_MOVES_OVER: u32 = 3;
+const MAX_MOVES_OVER: u32 = 3;
 
 /// Where a carried object is by the distance it has gone, and how fast it goes.
 pub struct ObjectPath<'a> {
@@ -228,7 +228,7 @@ impl<'a> CarryTeam<'a> {
     pub fn set_down(&self, commander: &mut Commander, place: &Pose) -> Result<(), PlayerError> {
         self.give_way(commander, false);
         let mut object = self.object(commander)?;
-        for _ in 0..MOST_MOVES_OVER {
+        for _ in 0..MAX_MOVES_OVER {
             let over = at_height(place, object.translation.z);
             move_together(commander, self.grasps, &|share| object.lerp(&over, share), 4, 0.15)?;
             object = self.object(commander)?;

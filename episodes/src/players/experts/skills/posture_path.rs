@@ -12,7 +12,7 @@ const AT_END_M: f32 = 1e-4;
 /// The slowest that a path is followed.
 const CREEP_M_S: f32 = 0.02;
 /// What a robot's base is asked for, corrections included.
-const MOST_M_S: f32 = 0.35;
+const MAX_SPEED_M_S: f32 = 0.35;
 
 /// How one robot stands and where its hands are, world frame.
 #[derive(Clone, Copy)]
@@ -88,7 +88,7 @@ pub fn follow_while(
             };
             RobotMove {
                 robot: now.robot,
-                base: steer(&facts.robots[now.robot].pelvis_in_world, &now.stand, drift, MOST_M_S),
+                base: steer(&facts.robots[now.robot].pelvis_in_world, &now.stand, drift, MAX_SPEED_M_S),
                 wrists: WristTargets::InWorld(now.wrists),
             }
         };

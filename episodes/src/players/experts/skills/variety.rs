@@ -12,7 +12,7 @@ const PAUSES: f32 = 0.12;
 const PAUSE_S: [f32; 2] = [0.1, 0.5];
 /// How far a hand strays from its straight line, as a part of its way, and at most.
 const STRAY: f32 = 0.08;
-const MOST_STRAY_M: f32 = 0.02;
+const MAX_STRAY_M: f32 = 0.02;
 /// How often a free hand misses on a long way, and by how much.
 const MISSES: f32 = 0.12;
 const MISS_M: [f32; 2] = [0.01, 0.03];
@@ -71,7 +71,7 @@ impl Variety {
 
     /// How far hands are off their straight line half way along `way_m`, never below it.
     pub fn stray_m(&mut self, way_m: f32) -> Vector {
-        let most_m = (STRAY * way_m).min(MOST_STRAY_M) * self.level_factor;
+        let most_m = (STRAY * way_m).min(MAX_STRAY_M) * self.level_factor;
         self.aside_m(most_m)
     }
 

@@ -20,8 +20,8 @@ const LONGEST_SIDE_PX: u32 = 4096;
 const RATES_HZ: [f64; 2] = [2.0, 1000.0];
 const LONGEST_HISTORY: usize = 32;
 /// More than three minutes of rows at 50 a second.
-const MOST_ROWS: usize = 10_000;
-const MOST_LEADING_AXES: usize = 8;
+const MAX_ROWS: usize = 10_000;
+const MAX_LEADING_AXES: usize = 8;
 /// How long a policy may be waited for: up to a day. An answer takes some time.
 const LONGEST_S: f64 = 86400.0;
 const SHORTEST_REPLY_S: f64 = 0.001;
@@ -53,9 +53,9 @@ impl PolicyMap {
                 return Err(format!("{name} is {value_s}; give seconds, from {least_s} to {LONGEST_S}"));
             }
         }
-        if self.leading_axes > MOST_LEADING_AXES {
+        if self.leading_axes > MAX_LEADING_AXES {
             let given = self.leading_axes;
-            return Err(format!("leading_axes is {given}; give {MOST_LEADING_AXES} at most"));
+            return Err(format!("leading_axes is {given}; give {MAX_LEADING_AXES} at most"));
         }
         self.check_chunk()?;
         self.history.as_ref().map_or(Ok(()), check_history)?;
@@ -153,8 +153,8 @@ impl PolicyMap {
         for (name, count) in [("rows", chunk.rows), ("execute", chunk.execute)] {
             match count {
                 Some(0) => return Err(format!("[chunk] {name} is 0; a chunk has at least one row")),
-                Some(count) if count > MOST_ROWS => {
-                    return Err(format!("[chunk] {name} is {count}; give {MOST_ROWS} at most"));
+                Some(count) if count > MAX_ROWS => {
+                    return Err(format!("[chunk] {name} is {count}; give {MAX_ROWS} at most"));
                 }
                 _ => {}
             }
@@ -219,9 +219,9 @@ fn check_paths(keys: &[&String]) -> Result<(), String> {
 
 fn check_history(history: &HistorySpan) -> Result<(), String> {
     match (history.length, history.stride) {
-        (2..=LONGEST_HISTORY, 1..=MOST_ROWS) => Ok(()),
-        (_, stride) if stride > MOST_ROWS => {
-            Err(format!("[history] stride is {stride}; give {MOST_ROWS} at most"))
+        (2..=LONGEST_HISTORY, 1..=MAX_ROWS) => Ok(()),
+        (_, stride) if stride > MAX_ROWS => {
+            Err(format!("[history] stride is {stride}; give {MAX_ROWS} at most"))
         }
         (_, 0) => {
             Err("[history] stride is 0; give how many rows are executed between two observations".into())

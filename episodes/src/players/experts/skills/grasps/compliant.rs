@@ -22,7 +22,7 @@ const GIVES: usize = 16;
 const CLOSING_GIVES: usize = 6;
 /// A wrist gives way by a metre for so many newtons in each step, and by no more than this.
 const STIFFNESS_N_M: f32 = 300.0;
-const MOST_GIVE_M: f32 = 0.01;
+const MAX_GIVE_M: f32 = 0.01;
 /// A wrist's goal is never farther than this from the wrist.
 const LEASH_M: f32 = 0.03;
 
@@ -85,7 +85,7 @@ fn close_compliantly(
             let mut felt_n = facts.robots[grasp.robot].hand_force_n[grasp.side];
             // Up and down, a hand feels its weight.
             felt_n.z = 0.0;
-            let given_m = goal.translation + (felt_n / STIFFNESS_N_M).clamp_length_max(MOST_GIVE_M);
+            let given_m = goal.translation + (felt_n / STIFFNESS_N_M).clamp_length_max(MAX_GIVE_M);
             goal.translation = wrist.translation + (given_m - wrist.translation).clamp_length_max(LEASH_M);
             moves.push(HandMove { world_from_wrist: Some(*goal), ..grasp.closing(closed) });
         }
