@@ -1,4 +1,4 @@
-//! `tandem export`: data sets of recordings, which the Python package writes.
+//! `tandem export`: data sets from recordings, which the Python package writes.
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -71,7 +71,7 @@ struct LerobotArgs {
 }
 
 impl LerobotArgs {
-    /// The arguments for Python, which has the same.
+    /// Returns the arguments for Python, whose flags are the same.
     fn arguments(&self) -> Vec<String> {
         let LerobotArgs { runs, out, format, view, cameras, images, codec, size, rate, .. } = self;
         let texts = [
@@ -97,7 +97,7 @@ impl LerobotArgs {
     }
 }
 
-/// Has Python write it.
+/// Lets Python write the data set.
 pub fn run(args: ExportArgs) -> CommandResult {
     let ExportFormat::Lerobot(args) = args.format;
     let module = PythonModule::new(PythonPart::Export, args.arguments())?;

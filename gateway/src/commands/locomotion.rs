@@ -50,7 +50,7 @@ enum LocomotionPart {
     },
 }
 
-/// Plays the cases, prints a line per case as it ends and one of what was measured, and writes JSON where it is asked for.
+/// Plays the cases, prints a line per case as it ends and a summary, and writes JSON if a file is named.
 pub fn run(args: LocomotionArgs) -> CommandResult {
     let LocomotionPart::Bench { locomotion, sensing, robot, cases, seeds, json } = args.part;
     let robot = match ROBOTS.contains(&robot.as_str()) {

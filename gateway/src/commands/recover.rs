@@ -14,7 +14,7 @@ pub struct RecoverArgs {
     partial: PathBuf,
 }
 
-/// Recovers, and says how much there was.
+/// Recovers the recording, and prints how much it has.
 pub fn run(args: RecoverArgs) -> CommandResult {
     let recovered = tandem_episodes::recover(&args.partial)?;
     println!(

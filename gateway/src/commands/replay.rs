@@ -1,4 +1,4 @@
-//! `tandem replay`: recordings simulated again, filmed, or drawn with depth.
+//! `tandem replay`: recordings simulated again, filmed, or rendered with depth.
 
 mod phases;
 
@@ -81,7 +81,7 @@ impl FromStr for SizeFlag {
     }
 }
 
-/// Does with each recording what the flags say; without any flag, prints what it holds.
+/// Processes each recording as the flags say. Without any flag, prints its contents.
 pub fn run(args: ReplayArgs) -> CommandResult {
     if args.video.is_some() && args.recordings.len() > 1 {
         return Err("--video films one recording; give one".into());
@@ -121,7 +121,8 @@ pub fn run(args: ReplayArgs) -> CommandResult {
     Ok(if all_same { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Says in which step the simulator failed; with `--verify`, makes that step again. Returns whether it fails as it did.
+/// Reports the step in which the simulator failed. With `--verify`, repeats that step and returns true if
+/// it fails in the same way.
 fn failed_step(path: &Path, args: &ReplayArgs) -> Result<bool, Box<dyn std::error::Error>> {
     if args.video.is_some() || args.render.is_some() {
         return Err(format!(
@@ -174,7 +175,7 @@ fn describe(recording: &Recording) {
     }
 }
 
-/// What its policy was told, and what is not as Tandem usually has it.
+/// Lists the assistance of the policy, and deviations from Tandem's defaults.
 fn told(spec: &EpisodeSpec, result: Option<&ResultReply>) -> String {
     let shown = result.map_or(&[][..], |result| &result.extra_information[..]);
     let assistance = format!("assistance: {}", spec.assistance);
@@ -183,7 +184,7 @@ fn told(spec: &EpisodeSpec, result: Option<&ResultReply>) -> String {
     [assistance.clone()].into_iter().chain(besides).collect::<Vec<_>>().join(", ")
 }
 
-/// Prints how the recording compares, and returns whether it is the same.
+/// Prints the result of the comparison, and returns true if both are the same.
 fn print_verified(verified: &Verification) -> bool {
     if let Some(build) = &verified.other_build {
         println!(
@@ -221,7 +222,8 @@ fn print_verified(verified: &Verification) -> bool {
     }
 }
 
-/// The folder for the pictures of one recording. Of several recordings each has its own, named as the folder that it lies in.
+/// Returns the folder for the images of one recording. With several recordings, each has its own, named
+/// like the recording's folder.
 fn folder_for(folder: &Path, recording: &Path, recordings: usize) -> PathBuf {
     let own = recording.parent().and_then(Path::file_name);
     match (recordings, own) {

@@ -1,4 +1,4 @@
-//! `tandem report`: what episodes came to, for people and for programs.
+//! `tandem report`: results of episodes, for people and for programs.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -63,7 +63,7 @@ pub fn run(args: ReportArgs) -> CommandResult {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Films an episode; what cannot be filmed says so in its place, and the rest of the report is none the worse.
+/// Films an episode. If that fails, the report has the reason in its place.
 fn film(place: FilmPlace) -> Film {
     let content = place.episode.clone().and_then(|FilmedEpisode { recording, .. }| {
         let read = Recording::read(&recording).map_err(|error| error.to_string())?;

@@ -1,4 +1,4 @@
-//! `tandem tasks`: what there is to play; `tandem tasks check`: whether a task of one's own can be played.
+//! `tandem tasks`: the list of tasks; `tandem tasks check`: validation of the user's own task.
 
 use std::{
     fmt::Write,
@@ -43,7 +43,7 @@ struct CheckArgs {
     out: Option<PathBuf>,
 }
 
-/// Prints the tasks as `list_tasks` has them, or what was found in a file.
+/// Prints the tasks in the form of `list_tasks`, or the findings for a file.
 pub fn run(args: TasksArgs) -> CommandResult {
     if let Some(TasksAction::Check(args)) = args.action {
         return check(args);
@@ -58,7 +58,7 @@ pub fn run(args: TasksArgs) -> CommandResult {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The program fails if something falls.
+/// Checks a file. The program fails if something falls.
 fn check(args: CheckArgs) -> CommandResult {
     let task = read_task(&args.file)?;
     let own = tandem_episodes::task_list(
@@ -96,7 +96,7 @@ fn check(args: CheckArgs) -> CommandResult {
 fn told(list: &TaskList) -> String {
     let mut text = String::new();
     let mut suite = list.tasks.first().and_then(|task| task.suite.as_ref());
-    // Writing to a text cannot fail.
+    // Writing to a string cannot fail.
     for task in &list.tasks {
         if task.suite.as_ref() != suite {
             suite = task.suite.as_ref();

@@ -1,4 +1,4 @@
-//! `tandem bench`: figures that anybody can repeat.
+//! `tandem bench`: benchmarks that any user can repeat.
 
 mod machine;
 mod tools;
@@ -91,10 +91,10 @@ enum BenchPart {
     },
 }
 
-/// Measures a part, prints a table, and returns the report as JSON.
+/// A function that measures a part, prints a table, and returns the report as JSON.
 type Measure = fn() -> Result<Value, Box<dyn Error>>;
 
-/// The parts that `bench all` measures; a new part adds its line.
+/// Parts that `bench all` measures; a new part adds its line.
 const PARTS: [(&str, Measure); 6] = [
     ("physics", || Ok(serde_json::to_value(measure_physics()?)?)),
     ("render", || Ok(serde_json::to_value(measure_pictures(RendererKind::Cpu)?)?)),
@@ -108,7 +108,7 @@ const PARTS: [(&str, Measure); 6] = [
     ("falls", || Ok(serde_json::to_value(measure_falls(FALLS_EPISODES, "")?)?)),
 ];
 
-/// Four of each case.
+/// Default number of episodes: four of each case.
 const FALLS_EPISODES: usize = 60;
 
 /// Measures a part and prints a table.
@@ -140,7 +140,7 @@ fn all(json: Option<&Path>) -> CommandResult {
     write(reports, json)
 }
 
-/// Writes a report, with the machine that it was measured on, where a file is named.
+/// Writes a report with its machine, if a file is named.
 fn write(report: impl Serialize, json: Option<&Path>) -> CommandResult {
     if let Some(path) = json {
         WithMachine::here(report).write(path)?;

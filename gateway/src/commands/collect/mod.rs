@@ -49,7 +49,7 @@ pub struct CollectArgs {
     run: RunFlags,
 }
 
-/// How much to disturb.
+/// Parses the level of disturbance.
 fn parse_level(text: &str) -> Result<f32, String> {
     let level = text.parse().ok().filter(|level| (0.0..=Variation::MAX_DISTURB).contains(level));
     level.ok_or_else(|| format!("no level; give 0 to {}, as 1", Variation::MAX_DISTURB))

@@ -19,10 +19,10 @@ use crate::{
     settings::{Layer, Settings},
 };
 
-/// Has the system pick a free port.
+/// Port number that makes the system pick a free port.
 const FREE_PORT: u16 = 0;
 
-/// How long an episode waits for its people to begin, and to come back.
+/// Time that an episode waits for its people to begin, and to come back.
 const IDLE_S: u32 = 3600;
 
 /// Who drives, and where they reach this machine.
@@ -47,12 +47,13 @@ pub struct PeopleFlags {
 }
 
 impl PeopleFlags {
-    /// How many people are to drive, if any are.
+    /// Returns the number of people that are to drive, if any.
     pub fn operators(&self) -> Option<u8> {
         self.operators
     }
 
-    /// Has people play what of `plan` is not in `folder` yet. Those that somebody marks bad are put into a folder beside it.
+    /// Lets people play the episodes of `plan` that are not in `folder` yet. Bad ones are moved to a
+    /// folder beside it.
     pub fn collect(self, plan: EvaluationPlan, folder: &Path) -> Result<(), Box<dyn Error>> {
         let robots = robots_of(&plan.tasks, self.operators)?;
         let people = People::start(self.settings(&plan, folder)?, &robots, planned(&plan), aside(folder))?;
@@ -62,7 +63,7 @@ impl PeopleFlags {
         played.map(drop)
     }
 
-    /// A server for these episodes alone.
+    /// Returns the settings of a server for these episodes alone.
     fn settings(self, plan: &EvaluationPlan, folder: &Path) -> Result<Settings, Box<dyn Error>> {
         let listen = self.listen.unwrap_or(SocketAddr::from((Ipv4Addr::LOCALHOST, FREE_PORT)));
         let flags = Layer {
@@ -92,7 +93,7 @@ impl PeopleFlags {
     }
 }
 
-/// The robots of all these tasks, one for each of `operators`.
+/// Returns the robots of all these tasks, one for each of `operators`.
 fn robots_of(tasks: &[&'static Task], operators: Option<u8>) -> Result<Vec<&'static str>, String> {
     let wanted = usize::from(operators.unwrap_or_default());
     if let Some(task) = tasks.iter().find(|task| task.robots.len() != wanted) {
@@ -104,19 +105,19 @@ fn robots_of(tasks: &[&'static Task], operators: Option<u8>) -> Result<Vec<&'sta
     Ok(tasks.first().map_or_else(Vec::new, |task| task.robot_names().collect()))
 }
 
-/// The episodes of a plan, in their order.
+/// Lists the episodes of a plan, in order.
 fn planned(plan: &EvaluationPlan) -> Vec<(&'static str, u32)> {
     plan.episodes().0.iter().map(|spec| (spec.task.id, spec.seed)).collect()
 }
 
-/// Where episodes are put that somebody marks bad: beside the folder, so that no data set is made of them.
+/// Returns the folder for bad episodes. It is beside the run's folder, so that no data set includes them.
 fn aside(folder: &Path) -> PathBuf {
     let mut name = folder.file_name().map_or_else(OsString::new, OsString::from);
     name.push("-bad");
     folder.with_file_name(name)
 }
 
-/// The links, and on a terminal a QR code below each.
+/// Returns the links, each with a QR code if the output is a terminal.
 fn invitation(people: &People) -> Result<String, Box<dyn Error>> {
     let mut text = String::new();
     for (robot, link) in people.links() {

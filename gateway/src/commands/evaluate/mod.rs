@@ -1,4 +1,4 @@
-//! `tandem evaluate`: how far a policy gets, over tasks and seeds.
+//! `tandem evaluate`: a policy's success over tasks and seeds.
 
 mod progress;
 mod table;
@@ -75,11 +75,11 @@ pub struct EvaluateArgs {
     run: RunFlags,
 }
 
-/// Phases named on the command line.
+/// Phases on the command line.
 #[derive(Debug, Clone)]
 struct PhaseList(Vec<String>);
 
-/// The phases that `text` names: `all`, or numbers and ids separated by commas.
+/// Parses phases: `all`, or numbers and ids separated by commas.
 fn parse_phases(text: &str) -> Result<PhaseList, String> {
     let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
     match names.iter().any(String::is_empty) {
@@ -88,7 +88,7 @@ fn parse_phases(text: &str) -> Result<PhaseList, String> {
     }
 }
 
-/// The phases that are named, of which each task that is played may have some.
+/// Resolves the named phases. Each has to occur in at least one of the tasks that are played.
 fn phases_of(PhaseList(names): PhaseList, tasks: &[&'static Task]) -> Result<Vec<String>, String> {
     let most = tasks.iter().map(|task| task.phases.len()).max().unwrap_or_default();
     let numbers: Vec<String> = (0..most).map(Phase::number).collect();
@@ -174,7 +174,7 @@ fn seeds(plan: &EvaluationPlan, starts: &Starts) -> Result<Vec<u32>, String> {
     }
 }
 
-/// Refuses to tell tasks in two other wordings at once.
+/// Refuses two different rewordings of tasks at once.
 pub fn check_words(
     plan: &EvaluationPlan,
     stresses: impl IntoIterator<Item = Stress>,
@@ -186,7 +186,8 @@ pub fn check_words(
     }
 }
 
-/// What has failed in `folder`, to begin again so many seconds before; what cannot be begun again is logged.
+/// Returns starts that replay the failures in `folder`, each from `before_s` seconds before its failure.
+/// Failures that cannot be replayed are logged.
 fn begin_again(folder: &Path, before_s: u32) -> Result<Starts, Box<dyn Error>> {
     let (failed, left_out) = failed_episodes(folder)?;
     left_out.iter().for_each(|line| tracing::warn!("not begun again: {line}"));
@@ -199,7 +200,8 @@ fn begin_again(folder: &Path, before_s: u32) -> Result<Starts, Box<dyn Error>> {
     Ok(Starts::Moments { failed, before_s })
 }
 
-/// Plays `plan` into `folder`, says how it goes on, prints a table, and returns how many of the episodes count.
+/// Plays `plan` into `folder`, reports progress, prints a table, and returns how many of the episodes
+/// count.
 pub fn play_and_print(plan: &EvaluationPlan, folder: &Path) -> Result<usize, Box<dyn Error>> {
     let run = EvaluationRun::begin(plan, folder)?;
     println!("{}, in {}", in_words(run.kept()), folder.display());
@@ -216,7 +218,7 @@ pub fn play_and_print(plan: &EvaluationPlan, folder: &Path) -> Result<usize, Box
     Ok(evaluation.episodes.iter().filter(|episode| episode.counts()).count())
 }
 
-/// What a run has when it begins, as `5 kept, 25 to play`.
+/// Describes the state of a run at its start, for example `5 kept, 25 to play`.
 fn in_words(kept: KeptEpisodes) -> String {
     let KeptEpisodes { kept, of_other_builds, to_play, unreadable } = kept;
     let mut words = match (kept, of_other_builds) {
@@ -230,7 +232,7 @@ fn in_words(kept: KeptEpisodes) -> String {
     words
 }
 
-/// What is said of a run that a signal ends: what it has come to by now, and how to go on.
+/// Prints the results up to now and the command to continue, for a run that a signal ends.
 fn print_interrupted(run: &EvaluationRun) {
     let KeptEpisodes { kept, to_play, .. } = run.kept();
     println!("\ninterrupted; {kept} episodes are kept, {to_play} are left");

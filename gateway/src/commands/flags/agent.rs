@@ -1,17 +1,18 @@
-//! The flags that say which language model plays and what it may use up: those of `python -m tandem.agent`, which reads them.
+//! The flags for the choice and the limits of a language model. They are those of `python -m
+//! tandem.agent`, which parses them.
 
 use std::iter;
 
 use clap::{CommandFactory, Parser};
 use serde_json::Value;
 
-/// Of a program's time, the part after which a model finishes by itself, in twelfths.
+/// Part of a program's time limit after which a model finishes by itself, in twelfths.
 const OWN_TWELFTHS: u32 = 11;
 
-/// Flags that are no numbers, even if they look like some.
+/// Flags whose values are strings, even if they look like numbers.
 const TEXTS: [&str; 4] = ["model", "api", "base-url", "effort"];
 
-/// How long after the model's own time it is stopped.
+/// Time after the model's own limit at which it is stopped.
 const GRACE_S: u32 = 300;
 
 /// A language model.
@@ -80,7 +81,7 @@ fn parse_object(text: &str) -> Result<String, String> {
     }
 }
 
-/// The flags as they stand behind `agent:`.
+/// The flags after `agent:`.
 #[derive(Debug, Parser)]
 #[command(no_binary_name = true, disable_help_flag = true)]
 struct AgentOptions {
@@ -89,7 +90,8 @@ struct AgentOptions {
 }
 
 impl AgentFlags {
-    /// What stands behind `agent:` on the command line, as MODEL or MODEL?api=anthropic&max-usd=2.
+    /// Parses the text after `agent:` on the command line, for example MODEL or
+    /// MODEL?api=anthropic&max-usd=2.
     pub fn parse_policy(text: &str) -> Result<AgentFlags, String> {
         let (model, options) = text.split_once('?').unwrap_or((text, ""));
         if model.trim().is_empty() {
@@ -108,17 +110,17 @@ impl AgentFlags {
         AgentOptions::try_parse_from(arguments).map(|options| options.flags).map_err(refused)
     }
 
-    /// The model's name; empty where none is given, as by who resumes an episode.
+    /// Returns the model's name; empty if none is given, as in a resumed episode.
     pub fn model(&self) -> &str {
         self.model.as_deref().unwrap_or_default()
     }
 
-    /// How long a program may take that is given `usual_s` where nobody says otherwise.
+    /// Returns the time limit of a program whose default is `usual_s`.
     pub fn limit_s(&self, usual_s: u32) -> u32 {
         usual_s.max(self.max_seconds.map_or(0, |own_s| own_s.saturating_add(GRACE_S)))
     }
 
-    /// The arguments for Python, where the program is stopped after `limit_s`.
+    /// Returns the arguments for Python if the program is stopped after `limit_s`.
     pub fn arguments(&self, limit_s: u32) -> Vec<String> {
         let own_s = self.max_seconds.unwrap_or((limit_s / 12 * OWN_TWELFTHS).max(1));
         let own_s = ("max-seconds", Some(own_s.to_string()));
@@ -127,7 +129,7 @@ impl AgentFlags {
         given.chain([own_s]).filter_map(written).collect()
     }
 
-    /// What results keep of it.
+    /// Returns the policy's card in results.
     pub fn card(&self) -> Value {
         let read = |flag: &str, value: String| match TEXTS.contains(&flag) {
             true => Value::String(value),
@@ -138,7 +140,7 @@ impl AgentFlags {
         Value::Object(given.collect())
     }
 
-    /// Each flag with its value.
+    /// Returns each flag with its value.
     fn given(&self) -> [(&'static str, Option<String>); 16] {
         let text = |number: Option<f64>| number.map(|number| number.to_string());
         [
@@ -162,7 +164,7 @@ impl AgentFlags {
     }
 }
 
-/// The names of the flags, but for the model's.
+/// Lists the names of the flags except the model's.
 fn options_of_agents() -> String {
     let command = AgentOptions::command();
     let names = command.get_arguments().filter_map(clap::Arg::get_long).filter(|name| *name != "model");

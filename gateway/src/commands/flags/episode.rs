@@ -1,4 +1,4 @@
-//! The flags that say which episodes to play, and by robots of which kind.
+//! The flags for the choice of episodes.
 
 use std::{error::Error, ops::RangeInclusive, path::PathBuf, str::FromStr};
 
@@ -57,11 +57,12 @@ pub struct EpisodeFlags {
     world: WorldFlags,
 }
 
-/// Tasks named on the command line. The name keeps clap from taking it for a flag that is given several times.
+/// Tasks on the command line. The type's name keeps clap from taking it for a flag that can be given
+/// several times.
 #[derive(Debug, Clone)]
 struct TaskList(Vec<&'static Task>);
 
-/// The built-in tasks that `text` names: `all` of the benchmark's, those of a suite, or ids separated by commas.
+/// Parses built-in tasks: `all` of the benchmark's, those of a suite, or ids separated by commas.
 fn parse_tasks(text: &str) -> Result<TaskList, String> {
     let found: Result<_, _> = match text {
         "all" => Ok(tasks::cohub().to_vec()),
@@ -75,8 +76,8 @@ fn parse_tasks(text: &str) -> Result<TaskList, String> {
     found.map(TaskList).map_err(told)
 }
 
-/// What is played: the tasks of files, and beside them the built-in ones that are named and that none of them replaces; all of these
-/// where nothing is given.
+/// Returns the tasks to play: those of files, and the named built-in ones that no file replaces. Without
+/// any, it returns all tasks of the benchmark.
 fn played(named: Option<TaskList>, of_files: Vec<&'static Task>) -> Vec<&'static Task> {
     let named = match named {
         Some(TaskList(named)) => named,
@@ -89,7 +90,7 @@ fn played(named: Option<TaskList>, of_files: Vec<&'static Task>) -> Vec<&'static
 }
 
 impl EpisodeFlags {
-    /// The plan to have `player` play these episodes, told as `assistance` says where no flag does.
+    /// Returns the plan for `player` to play these episodes; `assistance` is the default.
     pub fn plan(
         self,
         player: &dyn Policy,
@@ -139,11 +140,12 @@ impl EpisodeFlags {
     }
 }
 
-/// Seeds on the command line, in every command that takes any: `3`, or `0-9`, or `0..9`, with both ends included.
+/// Seeds on the command line, in every command that takes any: `3`, or `0-9`, or `0..9`, with both ends
+/// included.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seeds(pub RangeInclusive<u32>);
 
-/// The most seeds of one command.
+/// Maximum number of seeds of one command.
 const MAX_SEEDS: u64 = 100_000;
 
 /// A text that names no seeds, or too many.
@@ -205,7 +207,7 @@ mod tests {
         assert!(told.contains("4294967296 seeds; give at most 100000"), "{told}");
     }
 
-    /// What a flag for seeds says of itself in each command that has one, under the command.
+    /// Collects the help text of the flag for seeds in each command that has one.
     fn help_on_seeds(command: &clap::Command, path: &str, found: &mut Vec<(String, String)>) {
         for of in command.get_subcommands() {
             let path = format!("{path} {}", of.get_name());
@@ -213,7 +215,7 @@ mod tests {
             if let Some(flag) = of.get_arguments().find(is_seeds) {
                 let name = flag.get_long().unwrap_or_default();
                 let help = flag.get_help().map(ToString::to_string).unwrap_or_default();
-                // With what else has to be given, behind a flag or in its place.
+                // Required flags are added, including one of each required group.
                 let groups = of.get_groups().filter(|group| group.is_required_set());
                 let of_groups: Vec<_> = groups.filter_map(|group| group.get_args().next()).collect();
                 let is_required =

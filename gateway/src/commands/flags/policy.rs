@@ -1,4 +1,4 @@
-//! The flags that say who plays: one of the program's own players, a program, or a learned policy at a server.
+//! The flags for the choice of a policy: a built-in player, a program, or a learned policy at a server.
 
 use std::{error::Error, path::PathBuf, sync::Arc, time::Duration};
 
@@ -17,16 +17,16 @@ use crate::{
     hosting::PartnerPolicy,
 };
 
-/// The prefix of --policy that names a program.
+/// Prefix of --policy that names a program.
 const EXEC: &str = "exec:";
 
-/// The prefix of --policy that names a language model.
+/// Prefix of --policy that names a language model.
 const AGENT: &str = "agent:";
 
-/// The prefix of --policy that names recordings.
+/// Prefix of --policy that names recordings.
 const OPEN_LOOP: &str = "open-loop:";
 
-/// How long a program may run in an episode, unless a flag says otherwise.
+/// Default time limit of a program in an episode.
 const LIMIT_S: u32 = 3600;
 
 /// Who plays.
@@ -121,7 +121,7 @@ fn parse_urls(protocol: PolicyProtocol, urls: &str) -> Result<Vec<String>, Strin
             Some(rest) if rest.split('/').next().is_some_and(|authority| authority.contains('@')) => {
                 Err("an address takes no key; give it by --policy-key-file or TANDEM_POLICY_KEY".into())
             }
-            // No policy's server listens where the web does.
+            // The default port of the web is never that of a policy's server.
             Some(_) if plain == "ws://" && url.starts_with(plain) && port_of(url).is_none() => {
                 Err(format!("{url:?} names no port; give {protocol}:{plain}HOST:PORT"))
             }
@@ -134,14 +134,14 @@ fn parse_urls(protocol: PolicyProtocol, urls: &str) -> Result<Vec<String>, Strin
     urls.split(',').map(check).collect()
 }
 
-/// The port that an address names.
+/// Returns the port in a URL.
 fn port_of(url: &str) -> Option<u16> {
     let authority = url.split_once("://")?.1.split('/').next()?;
     authority.rsplit_once(']').map_or(authority, |(_, behind)| behind).rsplit_once(':')?.1.parse().ok()
 }
 
 impl PolicyFlags {
-    /// Makes the policy; what it needs is read, and no server is asked yet.
+    /// Creates the policy and reads its inputs. No server is contacted yet.
     pub fn policy(self) -> Result<Box<dyn Policy>, Box<dyn Error>> {
         let misplaced = |flag: &str, who: &str| Err(format!("{flag} is for {who}").into());
         let driving = self.driving()?;
@@ -207,7 +207,7 @@ impl PolicyFlags {
     }
 }
 
-/// The policy at `urls` with the map that `flag` gives, or else its protocol's own.
+/// Creates the policy at `urls` with the map that `flag` gives, or else the protocol's default.
 fn remote_policy(
     protocol: PolicyProtocol,
     urls: Vec<String>,
@@ -251,7 +251,7 @@ fn parse_partner(text: &str) -> Result<PartnerAddress, String> {
 }
 
 impl PartnerFlags {
-    /// The policy, if there is one; what it needs is read, and no server is asked yet.
+    /// Creates the policy if there is one, and reads its inputs. No server is contacted yet.
     pub fn policy(self) -> Result<Option<Arc<dyn PartnerPolicy>>, Box<dyn Error>> {
         let Some(PartnerAddress(protocol, urls)) = self.partner else { return Ok(None) };
         let policy = remote_policy(protocol, urls, self.partner_map, "--partner-map")?;
@@ -259,7 +259,7 @@ impl PartnerFlags {
     }
 }
 
-/// One of the program's own players.
+/// A built-in player.
 #[derive(Debug)]
 struct BuiltIn(&'static players::PlayerEntry);
 

@@ -1,4 +1,4 @@
-//! The flags that say where a run lies, and what becomes of one that is there already.
+//! The flags for the folder of a run, and for the treatment of an existing one.
 
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,7 @@ pub struct RunFlags {
 }
 
 impl RunFlags {
-    /// What becomes of a run that the folder holds already.
+    /// Returns the treatment of an existing run in the folder.
     pub fn existing(&self) -> ExistingRun {
         match (self.overwrite, self.resume_with_new_build) {
             (true, _) => ExistingRun::Overwrite,
@@ -33,7 +33,7 @@ impl RunFlags {
         }
     }
 
-    /// The folder for `plan`, which without a flag is called as the policy is, or as `name` says.
+    /// Returns the folder for `plan`. Its default name is that of the policy, or `name`.
     pub fn folder(&self, plan: &EvaluationPlan, name: Option<&str>) -> PathBuf {
         self.out.clone().unwrap_or_else(|| default_folder(plan, name, Path::new(RUNS)))
     }

@@ -1,4 +1,4 @@
-//! The flags that say what goes wrong in episodes.
+//! The flags for stress: disturbances in episodes.
 
 use clap::Args;
 use tandem_episodes::stress::{Stress, StressAxis, StressLevel};
@@ -17,12 +17,12 @@ pub struct StressFlags {
 }
 
 impl StressFlags {
-    /// As the spec of an episode has it.
+    /// Returns the stress for the specification of an episode.
     pub fn stress(&self) -> Option<Stress> {
         self.stress.map(|axis| Stress { axis, level: self.level.unwrap_or(StressLevel::One) })
     }
 
-    /// The same in the settings of a server.
+    /// Adds the stress to the settings of a server.
     pub fn over(self, layer: Layer) -> Layer {
         Layer { stress: self.stress, level: self.level, ..layer }
     }
@@ -40,11 +40,12 @@ pub struct StressPlanFlags {
     level: Option<Levels>,
 }
 
-/// Axes on the command line. The name keeps clap from taking it for a flag that is given several times.
+/// Axes on the command line. The type's name keeps clap from taking it for a flag that can be given
+/// several times.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Axes(Vec<StressAxis>);
 
-/// Levels on the command line; likewise.
+/// Levels on the command line. The type's name has the same reason.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Levels(Vec<StressLevel>);
 
@@ -71,7 +72,7 @@ fn parse_levels(text: &str) -> Result<Levels, String> {
 }
 
 impl StressPlanFlags {
-    /// Everything that is laid over episodes, axis by axis.
+    /// Returns all combinations of axes and levels, axis by axis.
     pub fn stresses(&self) -> Vec<Stress> {
         let levels = self.level.as_ref().map_or(&StressLevel::ALL[..], |Levels(levels)| levels);
         let axes = self.stress.iter().flat_map(|Axes(axes)| axes);

@@ -1,4 +1,4 @@
-//! The flags that say in which room, by robots of which kind, and who draws it.
+//! The flags for the scene, the robots and the renderer.
 
 use std::path::PathBuf;
 
@@ -38,32 +38,32 @@ impl WorldFlags {
         self.scene.as_deref().map(read_scene).transpose()
     }
 
-    /// Reads the robot from the file that the flag names, or takes the embedded one.
+    /// Reads the robot from the file that the flag names, or returns the embedded one.
     pub fn read_robot(&self) -> Result<RobotFile, SimError> {
         read_robot(self.robot.as_deref())
     }
 
-    /// The tasks of the files that the flag names.
+    /// Reads the tasks from the files that the flag names.
     pub fn read_task_files(&self) -> Result<Vec<&'static Task>, SettingsError> {
         self.task_file.iter().flatten().map(|path| read_task_file(path)).collect()
     }
 
-    /// Which controller the flag names; its file is not read yet.
+    /// Returns the controller that the flag names; its file is not read yet.
     pub fn controller(&self) -> Controller {
         self.locomotion.controller()
     }
 
-    /// What robots know of themselves.
+    /// Returns the robots' sensing of their own state.
     pub fn sensing(&self) -> Sensing {
         self.sensing.sensing()
     }
 
-    /// Who draws.
+    /// Returns the renderer.
     pub fn renderer(&self) -> RendererKind {
         self.renderer
     }
 
-    /// The same as settings of a server.
+    /// Converts the flags to settings of a server.
     pub fn layer(self) -> Layer {
         Layer {
             scene: self.scene,
@@ -87,7 +87,7 @@ pub struct LocomotionFlag {
 }
 
 impl LocomotionFlag {
-    /// Which controller the flag names; its file is not read yet.
+    /// Returns the controller that the flag names; its file is not read yet.
     pub fn controller(&self) -> Controller {
         Controller::from_file(self.file.as_deref())
     }
@@ -107,7 +107,7 @@ pub struct SensingFlags {
 }
 
 impl SensingFlags {
-    /// Both as one value.
+    /// Returns both flags as one value.
     pub fn sensing(&self) -> Sensing {
         Sensing { state_estimate: self.state_estimate, sensors: self.sensors }
     }

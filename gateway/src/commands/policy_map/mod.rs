@@ -1,4 +1,4 @@
-//! `tandem policy-map`: maps between robots and learned policies, before a policy is there.
+//! `tandem policy-map`: maps between robots and learned policies, without a policy.
 
 use std::process::ExitCode;
 
@@ -32,7 +32,7 @@ enum MapAction {
     },
 }
 
-/// Prints, and fails where a map cannot be followed.
+/// Prints a map or the report on one. The program fails if a map cannot be followed.
 pub fn run(args: PolicyMapArgs) -> CommandResult {
     match args.action {
         MapAction::Show { name } => print(preset(&name).unwrap_or_default())?,
