@@ -1,4 +1,4 @@
-//! Settings: flags first, then environment (`TANDEM_*`), then a TOML file, then defaults.
+//! Settings. Flags precede the environment (`TANDEM_*`), then a TOML file, then defaults.
 
 mod durability;
 mod error;
@@ -30,7 +30,7 @@ pub use durability::Durability;
 pub use error::SettingsError;
 pub use tls::{Certificate, TlsError};
 
-/// One source of settings; what it leaves out comes from the next. The doc comments are the help text.
+/// One source of settings; missing ones come from the next source. The doc comments are help texts.
 #[derive(Debug, Clone, Default, PartialEq, Args, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Layer {
@@ -52,7 +52,8 @@ pub struct Layer {
     /// environment, as TANDEM_TOKEN. An address that other machines reach is refused without [default: none].
     #[arg(long, env = "TANDEM_TOKEN_FILE", value_name = "FILE")]
     pub token_file: Option<PathBuf>,
-    /// The token itself: never a flag, which the list of processes would show, nor a line of a file with other settings.
+    /// The token itself. It is never a flag, which the process list would show, nor a line of the
+    /// settings file.
     #[arg(skip)]
     #[serde(skip)]
     pub token: Option<Token>,
@@ -149,7 +150,7 @@ pub enum Record {
 }
 
 impl Layer {
-    /// How many episodes may be held at once, where nobody says it.
+    /// Default number of episodes that may be held at once.
     pub const MAX_EPISODES: u32 = 8;
 
     fn or(self, next: Layer) -> Layer {
@@ -188,12 +189,12 @@ impl Layer {
         }
     }
 
-    /// These settings, and from the file at `config` what they leave out.
+    /// Returns these settings, with missing ones from the file at `config`.
     pub fn over_file(self, config: &Path) -> Result<Layer, SettingsError> {
         Ok(self.or(read_layer(config)?))
     }
 
-    /// Refuses numbers and names that no server could be used with.
+    /// Refuses values with which no server could be used.
     pub fn check(&self) -> Result<(), SettingsError> {
         let numbers = [
             ("thinking_limit", self.thinking_limit.map(u64::from), "3600"),
@@ -219,12 +220,12 @@ impl Layer {
         }
     }
 
-    /// Address to serve on.
+    /// Returns the address to serve on.
     pub fn address(&self) -> SocketAddr {
         self.listen.unwrap_or(SocketAddr::from(([127, 0, 0, 1], 8700)))
     }
 
-    /// The token that is given; none is needed where no other machine reaches the address.
+    /// Returns the given token. None is needed if only this machine can reach the address.
     pub fn find_token(&self) -> Result<Option<Token>, SettingsError> {
         let token = match (&self.token_file, &self.token) {
             (Some(_), Some(_)) => return Err(SettingsError::TwoTokens),
@@ -241,39 +242,39 @@ impl Layer {
         Ok(token)
     }
 
-    /// What HTTPS is served with, if it is.
+    /// Returns the certificate for HTTPS, if there is one.
     pub fn certificate(&self) -> Result<Option<Certificate>, TlsError> {
         Certificate::of(self.tls_cert.as_deref(), self.tls_key.as_deref())
     }
 
-    /// Folder that recordings are written to.
+    /// Returns the folder for recordings.
     pub fn runs_folder(&self) -> PathBuf {
         self.runs.clone().unwrap_or_else(|| "runs".into())
     }
 
-    /// The benchmark's tasks, and those of files.
+    /// Reads the task files, and adds them to the benchmark's tasks.
     pub fn read_tasks(&self) -> Result<TaskSet, SettingsError> {
         let files = self.task_file.iter().flatten();
         Ok(TaskSet::with_files(files.map(|path| read_task_file(path)).collect::<Result<_, _>>()?))
     }
 
-    /// The instructions of the file, which may name these tasks, or the tasks' own.
+    /// Reads the instructions from the file for these tasks. Without a file, the tasks' own apply.
     pub fn read_instructions(&self, tasks: &TaskSet) -> Result<Instructions, InstructionsError> {
         let path = self.instructions.as_deref();
         path.map_or_else(|| Ok(Instructions::default()), |path| Instructions::read(path, tasks))
     }
 
-    /// The robots.
+    /// Reads the robots' description.
     pub fn read_robot(&self) -> Result<RobotFile, SimError> {
         read_robot(self.robot.as_deref())
     }
 
-    /// The base controller; its file is not read yet.
+    /// Returns the base controller; its file is not read yet.
     pub fn controller(&self) -> Controller {
         Controller::from_file(self.locomotion.as_deref())
     }
 
-    /// What robots know of themselves.
+    /// Returns the robots' sensing of their own state.
     pub fn sensing(&self) -> Sensing {
         Sensing {
             state_estimate: self.state_estimate.unwrap_or_default(),
@@ -281,18 +282,18 @@ impl Layer {
         }
     }
 
-    /// What goes wrong in every episode.
+    /// Returns the stress of every episode, if any.
     pub fn stress(&self) -> Option<Stress> {
         self.stress.map(|axis| Stress { axis, level: self.level.unwrap_or(StressLevel::One) })
     }
 
-    /// Who draws pictures.
+    /// Returns the renderer.
     pub fn renderer(&self) -> RendererKind {
         self.renderer.unwrap_or_default()
     }
 }
 
-/// Whether a text is the name of a host alone, as requests name it before the port.
+/// Returns true if a text is a host name without a port.
 fn is_host(name: &str) -> bool {
     let part = |part: &str| {
         !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte))
@@ -300,74 +301,74 @@ fn is_host(name: &str) -> bool {
     name.split('.').all(part) || name.parse::<IpAddr>().is_ok()
 }
 
-/// Every setting, resolved.
+/// All settings, resolved.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// Address to serve on; port 0 takes a free one.
+    /// Address to serve on; port 0 picks a free one.
     pub listen: SocketAddr,
-    /// Names that the server is reached by, besides its address and localhost.
+    /// Names of the server besides its address and localhost.
     pub allowed_hosts: Vec<String>,
-    /// What HTTPS is served with; HTTP is served without.
+    /// Certificate for HTTPS; `None` for plain HTTP.
     pub certificate: Option<Certificate>,
-    /// What every request has to send.
+    /// Token that every request needs.
     pub token: Option<Token>,
-    /// Folder that recordings are written to, one folder per episode.
+    /// Folder for recordings, one folder per episode.
     pub runs: PathBuf,
-    /// When recordings can be read.
+    /// Time from which recordings are readable.
     pub record: Visibility,
-    /// What there is to play.
+    /// Tasks that can be played.
     pub tasks: TaskSet,
     /// Instructions in place of the tasks' own.
     pub instructions: Instructions,
-    /// The scene in place of the tasks' own.
+    /// Scene in place of the tasks' own.
     pub scene: Option<SceneFile>,
-    /// What describes the robots.
+    /// Description of the robots.
     pub robot: RobotFile,
     /// The base controller of every robot.
     pub locomotion: Controller,
-    /// What robots know of themselves.
+    /// The robots' sensing of their own state.
     pub sensing: Sensing,
-    /// What goes wrong in every episode.
+    /// Stress of every episode.
     pub stress: Option<Stress>,
-    /// What that controller follows.
+    /// Velocity limits of that controller.
     pub base_limits: BaseLimits,
-    /// Who draws pictures.
+    /// Renderer of camera images.
     pub renderer: RendererKind,
-    /// How much policies are told.
+    /// Amount of information that policies get.
     pub assistance: Assistance,
-    /// What they are told about their success.
+    /// Disclosure of success to policies.
     pub disclosure: Disclosure,
-    /// Whether they are told how to grasp.
+    /// Hints on grasping in policies' texts.
     pub hints: Hints,
-    /// How long policies may think, if not as long as the protocol has it, in seconds.
+    /// Limit on thinking time in seconds; `None` for the protocol's own.
     pub thinking_limit_s: Option<u32>,
-    /// Episodes that may be held at once.
+    /// Maximum number of episodes held at once.
     pub max_episodes: u32,
-    /// Largest request body that is read.
+    /// Maximum size of a request body in bytes.
     pub max_body_bytes: usize,
-    /// Longest that a header may take to arrive, and a body as well.
+    /// Time limit for a header, and for a body as well.
     pub request_timeout: Duration,
-    /// Requests that may be under way at once.
+    /// Maximum number of concurrent requests.
     pub max_requests: usize,
-    /// Requests that one address may send per second, if there is a limit.
+    /// Maximum number of requests per second of one address, if limited.
     pub rate_limit: Option<u32>,
-    /// How long after its last call an episode is taken for abandoned.
+    /// Time after its last call when an episode counts as abandoned.
     pub idle_timeout: Duration,
-    /// Longest that closing the episodes may take at the end.
+    /// Time limit for closing the episodes at shutdown.
     pub stop_timeout: Duration,
-    /// How safe a call is before it is answered.
+    /// Durability of a call before it is answered.
     pub durability: Durability,
-    /// Where others find the server, if not at its address.
+    /// URL for other servers, if it differs from the address.
     pub advertised_url: Option<String>,
 }
 
 impl Settings {
-    /// Which texts policies read.
+    /// Returns the choice of texts for policies.
     pub fn wording(&self) -> Wording {
         Wording { assistance: self.assistance, hints: self.hints }
     }
 
-    /// The episode that these settings make of a start.
+    /// Returns the specification of an episode with these settings.
     pub fn spec(&self, start: &StartEpisode) -> Result<EpisodeSpec, EpisodeError> {
         let protocol = start.protocol.unwrap_or(Protocol::Agentic);
         Ok(EpisodeSpec {
@@ -386,7 +387,8 @@ impl Settings {
         })
     }
 
-    /// Fills what `flags` (and the environment, which clap reads) leave out from the file at `config`, then from defaults.
+    /// Fills settings missing in `flags` (which include the environment) from the file at `config`, then
+    /// from defaults.
     pub fn resolve(flags: Layer, config: Option<&Path>) -> Result<Arc<Settings>, SettingsError> {
         let file = match config {
             Some(path) => read_layer(path)?,
@@ -440,7 +442,7 @@ impl Settings {
     }
 }
 
-/// Parses a flag whose value is one of `all` by its name; `--help` and the error for a wrong name list the names.
+/// Parses a flag whose value is the name of one of `all`. `--help` and errors list the names.
 pub fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
     all: [T; N],
     name: fn(T) -> &'static str,
@@ -456,7 +458,7 @@ fn read_layer(path: &Path) -> Result<Layer, SettingsError> {
     toml::from_str(&text).map_err(|source| SettingsError::Parse { path: path.into(), source })
 }
 
-/// Reads a task's file and tries the task: what may be meant so is logged.
+/// Reads a task's file and tries the task. Problems that may be intended are logged.
 pub fn read_task_file(path: &Path) -> Result<&'static Task, SettingsError> {
     let task = read_task(path)?;
     let check = check_task(task, &[FIRST_SEED], None)
@@ -465,17 +467,17 @@ pub fn read_task_file(path: &Path) -> Result<&'static Task, SettingsError> {
     Ok(task)
 }
 
-/// A task is tried with it.
+/// Seed of the trial.
 const FIRST_SEED: u32 = 0;
 
-/// Reads a scene, and logs what of its file does not happen quite as in MuJoCo.
+/// Reads a scene, and logs where its file deviates from MuJoCo.
 pub fn read_scene(path: &Path) -> Result<SceneFile, SimError> {
     let (scene, approximations) = SceneFile::with_approximations(path)?;
     approximations.iter().for_each(|line| tracing::warn!("not quite as in MuJoCo: {line}"));
     Ok(scene)
 }
 
-/// Reads the robot of a file, or takes the embedded one, and logs what of the file does not happen quite as in MuJoCo.
+/// Reads the robot from a file, or returns the embedded one. Logs where the file deviates from MuJoCo.
 pub fn read_robot(path: Option<&Path>) -> Result<RobotFile, SimError> {
     let Some(path) = path else { return Ok(RobotFile::default()) };
     let (robot, approximations) = RobotFile::with_approximations(path)?;

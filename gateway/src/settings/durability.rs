@@ -1,4 +1,4 @@
-//! How safe a call is before it is answered.
+//! Durability of a call before it is answered.
 
 use serde::Deserialize;
 
