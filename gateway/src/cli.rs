@@ -15,7 +15,7 @@ use crate::commands::{
 #[derive(Debug, Parser)]
 #[command(name = "tandem", version)]
 pub struct Cli {
-    /// What to do.
+    /// Subcommand to run.
     #[command(subcommand)]
     command: CliCommand,
 }

@@ -37,19 +37,20 @@ pub struct Layer {
     /// Address to serve on [default: 127.0.0.1:8700].
     #[arg(long, env = "TANDEM_LISTEN", value_name = "ADDRESS:PORT")]
     pub listen: Option<SocketAddr>,
-    /// Further names that the server is reached by, separated by commas; a request for another host is refused
-    /// [default: the address of --listen and localhost].
+    /// Additional names of the server, separated by commas; requests for other hosts are refused [default:
+    /// the address of --listen and localhost].
     #[arg(long, env = "TANDEM_ALLOWED_HOST", value_name = "NAMES", value_delimiter = ',')]
     pub allowed_host: Option<Vec<String>>,
-    /// File with a certificate in PEM form, with which HTTPS is served in place of HTTP, as headsets want it; needs --tls-key
+    /// PEM file with a certificate, to serve HTTPS instead of HTTP, as headsets require; needs --tls-key
     /// [default: none].
     #[arg(long, env = "TANDEM_TLS_CERT", value_name = "FILE")]
     pub tls_cert: Option<PathBuf>,
-    /// File with the certificate's private key in PEM form [default: none].
+    /// PEM file with the certificate's private key [default: none].
     #[arg(long, env = "TANDEM_TLS_KEY", value_name = "FILE")]
     pub tls_key: Option<PathBuf>,
-    /// File with the token that every request has to send, as `Authorization: Bearer TOKEN`; or give the token itself in the
-    /// environment, as TANDEM_TOKEN. An address that other machines reach is refused without [default: none].
+    /// File with the token that every request has to send as `Authorization: Bearer TOKEN`; the environment
+    /// variable TANDEM_TOKEN can hold the token itself. Required if other machines can reach the address
+    /// [default: none].
     #[arg(long, env = "TANDEM_TOKEN_FILE", value_name = "FILE")]
     pub token_file: Option<PathBuf>,
     /// The token itself. It is never a flag, which the process list would show, nor a line of the
@@ -57,95 +58,103 @@ pub struct Layer {
     #[arg(skip)]
     #[serde(skip)]
     pub token: Option<Token>,
-    /// Folder that recordings are written to, one folder per episode [default: runs].
+    /// Folder for recordings, one folder per episode [default: runs].
     #[arg(long, env = "TANDEM_RUNS", value_name = "DIR")]
     pub runs: Option<PathBuf>,
-    /// When recordings can be read: under way, or only after the end, which keeps them in memory until then
-    /// [default: live].
+    /// Time from which recordings are readable: during the episode, or only after it, which keeps them in
+    /// memory until then [default: live].
     #[arg(long, env = "TANDEM_RECORD")]
     pub record: Option<Record>,
-    /// JSON file with instructions in place of the tasks' own: {"handover": {"joint": "...", "robots": {"A": "..."}}}.
+    /// JSON file with instructions in place of the tasks' own: {"handover": {"joint": "...", "robots": {"A":
+    /// "..."}}}.
     #[arg(long, env = "TANDEM_INSTRUCTIONS", value_name = "FILE")]
     pub instructions: Option<PathBuf>,
-    /// MJCF file of a scene in place of the tasks' own; its site `task` says where.
+    /// MJCF file of a scene in place of the tasks' own; its site `task` marks the origin of tasks.
     #[arg(long, env = "TANDEM_SCENE", value_name = "FILE")]
     pub scene: Option<PathBuf>,
-    /// File that describes the robots in place of the embedded one: MJCF that names joints as the embedded robot's does, or a TOML file
-    /// that says of another MJCF which of its joints are which [default: a Unitree G1 with Dex3-1 hands].
+    /// File with a robot in place of the embedded one: MJCF with the embedded robot's joint names, or a TOML
+    /// file that maps the joints of another MJCF [default: a Unitree G1 with Dex3-1 hands].
     #[arg(long, env = "TANDEM_ROBOT", value_name = "FILE")]
     pub robot: Option<PathBuf>,
-    /// TOML files with tasks of your own, separated by commas; one that is called as a built-in task takes its place.
+    /// TOML files with your own tasks, separated by commas; a task with the name of a built-in one replaces
+    /// it.
     #[arg(long, env = "TANDEM_TASK_FILE", value_name = "FILES", value_delimiter = ',')]
     pub task_file: Option<Vec<PathBuf>>,
-    /// ONNX file with a velocity policy for the G1 in place of our own base controller; looped:FILE puts a loop over the robot's place around it.
+    /// ONNX file with a velocity policy for the G1 in place of the built-in base controller; looped:FILE adds
+    /// a position loop around it.
     #[arg(long, env = "TANDEM_LOCOMOTION", value_name = "FILE")]
     pub locomotion: Option<PathBuf>,
-    /// Where robots have their own state from: an estimator over what they sense, or the simulator, which no real robot has
-    /// [default: estimator].
+    /// Source of the robots' own state: an estimator on their sensors, or the simulator, which no real robot
+    /// has [default: estimator].
     #[arg(long, env = "TANDEM_STATE_ESTIMATE", value_name = "SOURCE", value_parser = one_of(StateSource::ALL, StateSource::name))]
     pub state_estimate: Option<StateSource>,
-    /// What robots sense: everything exactly, or with noise, bias and latency as a G1 does [default: ideal].
+    /// Sensor model of the robots: exact, or with the noise, bias and latency of a G1 [default: ideal].
     #[arg(long, env = "TANDEM_SENSORS", value_name = "NAME", value_parser = one_of(SensorModel::ALL, SensorModel::name))]
     pub sensors: Option<SensorModel>,
-    /// What goes wrong in every episode: one axis of what `evaluate` lays over episodes; results name it [default: nothing].
+    /// Disturbance in every episode: one of the stress axes of `evaluate`; results name it [default:
+    /// nothing].
     #[arg(long, env = "TANDEM_STRESS", value_name = "AXIS", value_parser = one_of(StressAxis::ALL, StressAxis::name))]
     pub stress: Option<StressAxis>,
-    /// How much of it, from 1 to 3 [default: 1].
+    /// Level of the stress, from 1 to 3 [default: 1].
     #[arg(long, env = "TANDEM_LEVEL", value_name = "LEVEL")]
     pub level: Option<StressLevel>,
-    /// Who draws pictures: a graphics processor, the embedded renderer, or whichever is there [default: auto].
+    /// Renderer of images: the GPU, the embedded CPU renderer, or whichever is available [default: auto].
     #[arg(long, env = "TANDEM_RENDERER", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
     pub renderer: Option<RendererKind>,
-    /// What policies are told: `paper` what the benchmark tells its agents, and success at the end; `full` all that robots sense,
-    /// phases as they are reached, and how to grasp [default: full].
+    /// Information for policies: `paper` as in the benchmark, with success reported at the end; `full` with
+    /// all sensor values, phases as they are reached, and hints on grasping [default: full].
     #[arg(long, env = "TANDEM_ASSISTANCE", value_name = "WHAT", value_parser = one_of(Assistance::ALL, Assistance::name))]
     pub assistance: Option<Assistance>,
-    /// For experiments: what is told of phases, whatever the assistance has: `live` tells them in every reply and ends an episode on
-    /// success, `end` tells them at the end, `never` only in the files; neither of these two ends an episode on success.
+    /// For experiments: disclosure of phases, independent of the assistance: `live` in every reply, `end` at
+    /// the end, `never` only in files; only with `live` does success end the episode.
     #[arg(long, hide = true, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = one_of(Disclosure::ALL, Disclosure::name))]
     pub disclosure: Option<Disclosure>,
-    /// For experiments: whether texts say how to grasp, whatever the assistance has.
+    /// For experiments: hints on grasping in texts, independent of the assistance.
     #[arg(long, hide = true, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = one_of(Hints::ALL, Hints::name))]
     pub hints: Option<Hints>,
-    /// How long a policy may think in an episode, for those that wait for slow models; results name it [default: as the protocol has it].
+    /// Limit on a policy's thinking time in an episode, for slow models; results name it [default: that of
+    /// the protocol].
     #[arg(long, env = "TANDEM_THINKING_LIMIT", value_name = "SECONDS")]
     pub thinking_limit: Option<u32>,
-    /// Episodes that may be held at once; each costs a thread and about 7 MB, beside 40 MB that they share [default: 8].
+    /// Maximum number of episodes held at once; each takes a thread and about 7 MB, plus 40 MB shared by all
+    /// [default: 8].
     #[arg(long, env = "TANDEM_MAX_EPISODES", value_name = "N")]
     pub max_episodes: Option<u32>,
-    /// Largest request body that is read [default: 2000000].
+    /// Maximum size of a request body in bytes [default: 2000000].
     #[arg(long, env = "TANDEM_MAX_BODY_BYTES", value_name = "BYTES")]
     pub max_body_bytes: Option<usize>,
-    /// Longest that the header of a request may take to arrive, and its body as well [default: 30].
+    /// Time limit for the arrival of a request's header, and the same for its body [default: 30].
     #[arg(long, env = "TANDEM_REQUEST_TIMEOUT", value_name = "SECONDS")]
     pub request_timeout: Option<u32>,
-    /// Requests that may be under way at once; further ones get 503 [default: 256].
+    /// Maximum number of concurrent requests; further ones get 503 [default: 256].
     #[arg(long, env = "TANDEM_MAX_REQUESTS", value_name = "N")]
     pub max_requests: Option<usize>,
-    /// Requests that one address may send per second; further ones get 429 [default: any number].
+    /// Maximum number of requests per second from one address; further ones get 429 [default: unlimited].
     #[arg(long, env = "TANDEM_RATE_LIMIT", value_name = "N")]
     pub rate_limit: Option<u32>,
-    /// An episode without a call for so long is ended and gives its place back [default: 900].
+    /// Time without a call after which an episode is ended and its place is free [default: 900].
     #[arg(long, env = "TANDEM_IDLE_TIMEOUT", value_name = "SECONDS")]
     pub idle_timeout: Option<u32>,
-    /// Longest that closing the episodes may take when the server stops [default: 30].
+    /// Time limit for closing the episodes when the server stops [default: 30].
     #[arg(long, env = "TANDEM_STOP_TIMEOUT", value_name = "SECONDS")]
     pub stop_timeout: Option<u32>,
-    /// How safe a call is before it is answered: "system" outlives the process, "disk" a power cut, too [default: system].
+    /// Durability of a call before it is answered: "system" survives the end of the process, "disk" also a
+    /// power cut [default: system].
     #[arg(long, env = "TANDEM_DURABLE", value_name = "HOW")]
     pub durable: Option<Durability>,
-    /// Where other servers on the same folder of runs, and clients that they send here, find this one [default: the address].
+    /// URL of this server for other servers on the same runs folder, and for clients that they redirect here
+    /// [default: the address].
     #[arg(long, env = "TANDEM_ADVERTISE", value_name = "URL")]
     pub advertise: Option<String>,
 }
 
-/// When recordings can be read.
+/// Time from which recordings are readable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Record {
-    /// Under way, as `episode.mcap.partial`.
+    /// During the episode, as `episode.mcap.partial`.
     Live,
-    /// After the end of the episode.
+    /// After the episode.
     After,
 }
 

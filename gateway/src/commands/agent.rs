@@ -47,8 +47,9 @@ const INTERRUPTED: i32 = 130;
 /// File in an episode's folder to which Python writes the flags of the run.
 const AGENT_FILE: &str = "agent.json";
 
-/// Have a language model play a task, by any endpoint that speaks OpenAI's or Anthropic's formats. Python plays: pip install
-/// './gateway/python[agents]' in a checkout of the repository. Keys are read from the environment: OPENAI_API_KEY, ANTHROPIC_API_KEY.
+/// Let a language model play a task through any endpoint with OpenAI's or Anthropic's formats. This needs the
+/// Python package: pip install './gateway/python[agents]' in a checkout of the repository. API keys are read
+/// from the environment: OPENAI_API_KEY, ANTHROPIC_API_KEY.
 #[allow(
     rustdoc::broken_intra_doc_links,
     reason = "the command line's help names an extra of the wheel, and no link"
@@ -60,27 +61,27 @@ pub struct AgentArgs {
     given: GivenFlags,
     #[command(flatten)]
     agent: AgentFlags,
-    /// The id of the task [default: that of --task-file, or else handover].
+    /// Id of the task [default: that of --task-file, or else handover].
     #[arg(long, value_name = "TASK")]
     task: Option<String>,
     /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
     #[arg(long, alias = "seed", default_value = "0", value_name = "SEEDS")]
     seeds: Seeds,
-    /// What the model is told, as for `serve`.
+    /// Information for the model, as in `serve`.
     #[arg(long, env = "TANDEM_ASSISTANCE", value_name = "WHAT", value_parser = one_of(Assistance::ALL, Assistance::name),
           default_value = Assistance::Full.name())]
     assistance: Assistance,
-    /// A model for each robot, which sees and commands that robot alone.
+    /// Use one model per robot, which sees and commands only that robot.
     #[arg(long)]
     per_robot: bool,
-    /// With --per-robot: let the models talk to each other by the tool say.
+    /// With --per-robot: let the models talk to each other with the tool `say`.
     #[arg(long, requires = "per_robot")]
     talk: bool,
-    /// Folder that recordings are written to, one folder per episode.
+    /// Folder for recordings, one folder per episode.
     #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
     runs: PathBuf,
-    /// Resume the episode of this folder, for example runs/handover-seed0, whose agent was killed, instead of a new one.
-    /// Limits, prices and --base-url may be given anew; everything else is as it was.
+    /// Resume the episode in this folder, for example runs/handover-seed0, after its agent was killed. Only
+    /// limits, prices and --base-url can be changed.
     #[arg(long, value_name = "FOLDER")]
     resume: Option<PathBuf>,
     #[command(flatten)]

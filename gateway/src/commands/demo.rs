@@ -38,14 +38,14 @@ const FREE_PORT: u16 = 0;
 /// Percentage of episodes that have to reach the last phase.
 const PASS_PERCENT: usize = 80;
 
-/// Play the Handover task by a scripted expert over real HTTP, and write what happened. With --task-file that task is played; where no
-/// expert knows it, nobody acts.
+/// Play the Handover task with its scripted expert over real HTTP, and record it. --task-file replaces the
+/// task; without an expert for it, the robots do nothing.
 #[derive(Debug, clap::Args)]
 pub struct DemoArgs {
     /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
     #[arg(long, alias = "seed", default_value = "0", value_name = "SEEDS")]
     seeds: Seeds,
-    /// Folder that the results are written to, one folder per episode.
+    /// Folder for results, one folder per episode.
     #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
     runs: PathBuf,
     #[command(flatten)]

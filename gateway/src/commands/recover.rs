@@ -6,10 +6,11 @@ use tandem_episodes::LeftOut;
 
 use super::CommandResult;
 
-/// Make a whole recording of one that was interrupted: FILE.mcap of FILE.mcap.partial.
+/// Recover an interrupted recording: FILE.mcap from FILE.mcap.partial.
 #[derive(Debug, clap::Args)]
 pub struct RecoverArgs {
-    /// What the interrupted episode left, as runs/handover-seed0/episode.mcap.partial. It stays as it is.
+    /// Partial recording of an interrupted episode, for example runs/handover-seed0/episode.mcap.partial. It
+    /// is not changed.
     #[arg(value_name = "FILE")]
     partial: PathBuf,
 }

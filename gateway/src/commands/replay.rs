@@ -19,44 +19,47 @@ use tandem_tools_spec::ResultReply;
 use super::CommandResult;
 use crate::settings::one_of;
 
-/// Play recordings again: say what they hold, verify them, film them, or draw what every camera saw with depth.
+/// Replay recordings: describe, verify or film them, or render the images and depth of every camera.
 #[derive(Debug, clap::Args)]
 pub struct ReplayArgs {
-    /// Recordings, as runs/handover-seed0/episode.mcap, or their folders, or the failed_step.checkpoint beside one.
+    /// Recordings, for example runs/handover-seed0/episode.mcap, or their folders, or the
+    /// failed_step.checkpoint beside one.
     #[arg(value_name = "FILES", required = true)]
     recordings: Vec<PathBuf>,
-    /// Simulate again and compare the state after every step, result and phases; names the first step that differs.
+    /// Simulate again and compare the state after every step, the result and the phases; report the first
+    /// step that differs.
     #[arg(long)]
     verify: bool,
-    /// Say of the first phase that was not reached which parts of its conditions held, when, and how near the others came.
+    /// For the first phase that was not reached, report which parts of its conditions held, when, and how
+    /// close the others came.
     #[arg(long)]
     phases: bool,
-    /// Film of one recording: FILE.webp, FILE.gif, or where an ffmpeg is installed FILE.mp4.
+    /// Video of one recording: FILE.webp, FILE.gif, or with ffmpeg installed FILE.mp4.
     #[arg(long, value_name = "FILE")]
     video: Option<PathBuf>,
-    /// What films: `third_person`, or a robot's name.
+    /// Camera of the video: `third_person`, or a robot's name.
     #[arg(long, value_name = "CAMERA", default_value = "third_person")]
     camera: String,
-    /// Folder for pictures and depth of every camera; of several recordings, a folder in it for each. Goes on where an
-    /// interrupted run stopped.
+    /// Folder for the images and depth of every camera; several recordings have a subfolder each. An
+    /// interrupted run is continued.
     #[arg(long, value_name = "DIR")]
     render: Option<PathBuf>,
-    /// Pictures a second, of simulated time.
+    /// Images per second of simulated time.
     #[arg(long, value_name = "HZ", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=50))]
     rate: u32,
-    /// Size of the pictures, as 640x480 [default: the camera's own].
+    /// Size of the images, for example 640x480 [default: the camera's own].
     #[arg(long, value_name = "WIDTHxHEIGHT")]
     size: Option<SizeFlag>,
     /// Cameras of --render, separated by commas: third_person or robots' names [default: all].
     #[arg(long, value_name = "CAMERAS", value_delimiter = ',', requires = "render")]
     cameras: Vec<String>,
-    /// With --render: pictures alone, in half the time.
+    /// With --render: write only images, in half the time.
     #[arg(long, requires = "render")]
     no_depth: bool,
-    /// Who draws the pictures of --render [default: who drew the episode].
+    /// Renderer for --render [default: that of the episode].
     #[arg(long, value_name = "NAME", requires = "render", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
     renderer: Option<RendererKind>,
-    /// Threads that draw.
+    /// Number of rendering threads.
     #[arg(long, default_value_t = 1, value_name = "N")]
     jobs: usize,
 }

@@ -20,13 +20,13 @@ use crate::{
 /// Serve episodes over HTTP until SIGINT or SIGTERM.
 #[derive(Debug, clap::Args)]
 pub struct ServeArgs {
-    /// TOML file with any of the settings below; flags and environment come first.
+    /// TOML file with any of the settings below; flags and the environment take precedence.
     #[arg(long, env = "TANDEM_CONFIG", value_name = "FILE")]
     pub(super) config: Option<PathBuf>,
-    /// Log for people, or one JSON object per line.
+    /// Log format: text for people, or one JSON object per line.
     #[arg(long, env = "TANDEM_LOG_FORMAT", value_name = "FORMAT", default_value = "text")]
     log_format: LogFormat,
-    /// Who may drive beside people.
+    /// Policy that can drive beside people.
     #[command(flatten)]
     partner: PartnerFlags,
     /// Settings given as flags or environment.

@@ -6,10 +6,10 @@ use clap_complete::Shell;
 
 use crate::commands::{CommandResult, print};
 
-/// Print what a shell has to know to complete the command line.
+/// Print a completion script for a shell.
 #[derive(Debug, clap::Args)]
 pub struct CompletionsArgs {
-    /// The shell.
+    /// Shell to complete for.
     #[arg(value_name = "SHELL")]
     shell: Shell,
 }

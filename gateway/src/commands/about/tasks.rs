@@ -16,7 +16,8 @@ use crate::commands::{CommandResult, Seeds, print};
 #[derive(Debug, clap::Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct TasksArgs {
-    /// As JSON, as `GET /v1/tasks` has it: with the robots' instructions, the budgets and the limits of the base command.
+    /// Print JSON as in `GET /v1/tasks`, including the robots' instructions, the budgets and the limits of
+    /// the base command.
     #[arg(long)]
     json: bool,
     #[command(subcommand)]
@@ -28,8 +29,8 @@ enum TasksAction {
     Check(CheckArgs),
 }
 
-/// Check a task's file: every mistake with its line and column, what falls while nobody acts, and a picture of the start from every
-/// camera.
+/// Check a task's file: every mistake with its line and column, everything that falls without any action, and
+/// an image of the start from every camera.
 #[derive(Debug, clap::Args)]
 struct CheckArgs {
     /// TOML file with the task.
@@ -38,7 +39,7 @@ struct CheckArgs {
     /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
     #[arg(long, value_name = "SEEDS", default_value = "0-4")]
     seeds: Seeds,
-    /// Folder for the pictures [default: runs/tasks and the task's id].
+    /// Folder for the images [default: runs/tasks and the task's id].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }

@@ -25,23 +25,25 @@ const FREE_PORT: u16 = 0;
 /// Time that an episode waits for its people to begin, and to come back.
 const IDLE_S: u32 = 3600;
 
-/// Who drives, and where they reach this machine.
+/// Flags for demonstrations of people.
 #[derive(Debug, Args)]
 pub struct PeopleFlags {
-    /// Demonstrations of so many people in place of the experts': each drives one robot in a browser, by a link that is printed.
+    /// Number of people to record in place of the experts; each drives one robot in a browser with a printed
+    /// link.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=3))]
     operators: Option<u8>,
-    /// With --operators: address to serve their pages on, as 0.0.0.0:8700 for people at other machines [default: 127.0.0.1 and a free port].
+    /// With --operators: address of their pages, for example 0.0.0.0:8700 for people at other machines
+    /// [default: 127.0.0.1 and a free port].
     #[arg(long, value_name = "ADDRESS", requires = "operators")]
     listen: Option<SocketAddr>,
-    /// With --operators: name that they reach this machine by, for the links [default: its address].
+    /// With --operators: name of this machine in the links [default: its address].
     #[arg(long, value_name = "HOST", requires = "operators")]
     allowed_host: Option<String>,
-    /// With --operators: file with a certificate in PEM form, with which their pages are HTTPS, as headsets want it; needs --tls-key
-    /// [default: none].
+    /// With --operators: PEM file with a certificate, to serve their pages with HTTPS, as headsets require;
+    /// needs --tls-key [default: none].
     #[arg(long, value_name = "FILE", requires = "operators")]
     tls_cert: Option<PathBuf>,
-    /// With --operators: file with the certificate's private key in PEM form [default: none].
+    /// With --operators: PEM file with the certificate's private key [default: none].
     #[arg(long, value_name = "FILE", requires = "operators")]
     tls_key: Option<PathBuf>,
 }

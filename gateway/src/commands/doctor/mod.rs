@@ -12,11 +12,11 @@ use tandem_tools_spec::Protocol;
 use super::{CommandResult, print, serve::ServeArgs};
 use crate::{settings::Layer, token::Token};
 
-/// Say what works on this machine: all that a server's settings name, pictures, physics, the port, the folder of recordings, clocks
-/// and cores.
+/// Check this machine: the files in a server's settings, physics, rendering, the port, the runs folder,
+/// clocks and cores.
 #[derive(Debug, clap::Args)]
 pub struct DoctorArgs {
-    /// The settings of the server that is to run here.
+    /// Settings of the server that is to run here.
     #[command(flatten)]
     serve: ServeArgs,
 }

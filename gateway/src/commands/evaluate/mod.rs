@@ -31,7 +31,7 @@ use super::{
 use crate::{drivers::with_last_words, settings::SettingsError};
 use progress::with_progress;
 
-/// Play tasks over seeds in parallel worlds and count the phases reached. Goes on where an interrupted run stopped.
+/// Play tasks over seeds in parallel worlds and count the phases reached. An interrupted run is continued.
 #[derive(Debug, clap::Args)]
 pub struct EvaluateArgs {
     #[command(flatten)]
@@ -40,32 +40,35 @@ pub struct EvaluateArgs {
     episodes: EpisodeFlags,
     #[command(flatten)]
     stress: StressPlanFlags,
-    /// Play the failures of another evaluation again, from some seconds before the moment at which each went wrong, with the whole budget
-    /// ahead: its folder, in which episodes were recorded by this build. Tasks, seeds, world and stress are theirs.
+    /// Folder of another evaluation whose failures are replayed from shortly before each failure, with the
+    /// whole budget. This build must have recorded them; tasks, seeds, world and stress are taken over.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["from", "demos", "tasks", "seeds", "spread", "scene", "task_file", "stress"])]
     retry_from: Option<PathBuf>,
-    /// How many seconds before.
+    /// Seconds before the failure at which --retry-from begins.
     #[arg(long, value_name = "SECONDS", default_value_t = 3, requires = "retry_from")]
     before: u32,
-    /// Phases to begin at, by number or id, as p2 or p1,transfer, or `all`: each episode starts where that phase began in the
-    /// demonstration of its task and seed, with the whole budget ahead, and that phase alone counts.
+    /// Phases to begin with, by number or id, for example p2 or p1,transfer, or `all`. Each episode starts
+    /// where that phase began in the demonstration of its task and seed, with the whole budget; only that
+    /// phase counts.
     #[arg(long, value_name = "PHASES", value_parser = parse_phases, requires = "demos")]
     from: Option<PhaseList>,
-    /// Folder of demonstrations, as `collect` or `serve` writes them; this build has to have recorded them.
+    /// Folder of demonstrations from `collect` or `serve`, recorded by this build.
     #[arg(long, value_name = "DIR", requires = "from")]
     demos: Option<PathBuf>,
-    /// Begin in the training demonstrations instead of those of --seeds: the first 50 of each task by seed, as the benchmark does and as
-    /// `export` splits data sets.
+    /// Begin in the training demonstrations instead of those of --seeds: the first 50 of each task by seed,
+    /// the same split as in the benchmark and in `export`.
     #[arg(long, requires = "from", conflicts_with = "seeds")]
     training_demos: bool,
-    /// Play share I of N, counted from 0, as 0/10; shares may write to one folder, and `report` joins folders.
+    /// Play share I of N, counted from 0, for example 0/10; shares may use one folder, and `report` joins
+    /// folders.
     #[arg(long, value_name = "I/N", default_value = "0/1")]
     shard: ShardFlag,
-    /// Record every episode in a folder of its own, for `replay` and for the pictures of a report.
+    /// Record every episode in its own folder, for `replay` and for the images in reports.
     #[arg(long)]
     record: bool,
-    /// How often an episode in which the policy itself failed (its program or its server crashed or was gone) is played again, by one run
-    /// after another, before it counts as a failure. Until then it is listed apart. Results keep every attempt.
+    /// Number of retries of an episode in which the policy itself failed (its program or server crashed or
+    /// was gone), by consecutive runs, before it counts as a failure. Until then it is listed separately.
+    /// Results keep every attempt.
     #[arg(long, value_name = "N", default_value_t = EvaluationPlan::DEFAULT_RETRIES)]
     retries: u32,
     /// The same as --retries 0.

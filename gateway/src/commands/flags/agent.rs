@@ -18,52 +18,56 @@ const GRACE_S: u32 = 300;
 /// A language model.
 #[derive(Debug, Clone, clap::Args)]
 pub struct AgentFlags {
-    /// The model's name at its endpoint.
+    /// Name of the model at its endpoint.
     #[arg(long, value_name = "NAME")]
     model: Option<String>,
-    /// What the endpoint speaks: OpenAI's Responses, its Chat Completions (Ollama, vLLM and most others), or Anthropic's Messages.
+    /// API of the endpoint: OpenAI's Responses, its Chat Completions (Ollama, vLLM and most others), or
+    /// Anthropic's Messages.
     #[arg(long, value_name = "API", default_value = "openai", value_parser = ["openai", "openai-chat", "anthropic"])]
     api: String,
-    /// Where the endpoint is, as http://127.0.0.1:11434/v1 [default: the API's maker].
+    /// URL of the endpoint, for example http://127.0.0.1:11434/v1 [default: that of the API's vendor].
     #[arg(long, value_name = "URL")]
     base_url: Option<String>,
-    /// How much the model thinks, in its API's words, as low or high [default: its own].
+    /// Reasoning effort in the API's terms, for example low or high [default: that of the model].
     #[arg(long, value_name = "WORD")]
     effort: Option<String>,
     /// Sampling temperature [default: the endpoint's].
     #[arg(long = "temperature", value_name = "T", value_parser = parse_amount)]
     temperature_value: Option<f64>,
-    /// Share of likely tokens to sample from [default: the endpoint's].
+    /// Probability mass of the tokens to sample from [default: the endpoint's].
     #[arg(long = "top-p", value_name = "P", value_parser = parse_amount)]
     top_share: Option<f64>,
-    /// Seed of the sampling, for openai-chat [default: the endpoint's].
+    /// Sampling seed, for openai-chat [default: the endpoint's].
     #[arg(long, value_name = "N")]
     sampling_seed: Option<u32>,
-    /// Further fields of each request to the endpoint, as {"top_k": 40} [default: none].
+    /// Additional fields of each request to the endpoint, for example {"top_k": 40} [default: none].
     #[arg(long, value_name = "JSON", value_parser = parse_object)]
     extra_body: Option<String>,
-    /// Longest conversation in tokens; the older half of a longer one becomes a list of calls [default: 100000].
+    /// Maximum length of the conversation in tokens; the older half of a longer one becomes a list of calls
+    /// [default: 100000].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     context_tokens: Option<u32>,
-    /// Tokens read and written in an episode, after which it is finished [default: any number].
+    /// Maximum number of input and output tokens of an episode, after which it is finished [default:
+    /// unlimited].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     max_tokens_total: Option<u64>,
-    /// US dollars spent in an episode, by the prices below, after which it is finished [default: any amount].
+    /// Maximum cost of an episode in US dollars by the prices below, after which it is finished [default:
+    /// unlimited].
     #[arg(long, value_name = "USD")]
     max_usd: Option<f64>,
-    /// Calls of tools in an episode, after which it is finished [default: 500].
+    /// Maximum number of tool calls of an episode, after which it is finished [default: 500].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     max_calls: Option<u32>,
-    /// Time for an episode, after which it is finished [default: 3300].
+    /// Maximum time of an episode, after which it is finished [default: 3300].
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
     max_seconds: Option<u32>,
-    /// Price of a million tokens that are read.
+    /// Price of a million input tokens.
     #[arg(long = "usd-per-million-input", value_name = "USD")]
     million_input_usd: Option<f64>,
-    /// Price of a million tokens that are written.
+    /// Price of a million output tokens.
     #[arg(long = "usd-per-million-output", value_name = "USD")]
     million_output_usd: Option<f64>,
-    /// Price of a million tokens that are read from a cache [default: as other tokens that are read].
+    /// Price of a million cached input tokens [default: the price of input tokens].
     #[arg(long = "usd-per-million-cached", value_name = "USD")]
     million_cached_usd: Option<f64>,
 }

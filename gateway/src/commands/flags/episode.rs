@@ -15,42 +15,46 @@ use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 use super::{WorldFlags, read_seed_key};
 use crate::settings::one_of;
 
-/// Which episodes to play.
+/// Flags for the choice of episodes.
 #[derive(Debug, Args)]
 pub struct EpisodeFlags {
-    /// Ids of built-in tasks separated by commas, or `all` for the benchmark's ten, or `tandem+` for that suite [default: none with
-    /// --task-file, and else all].
+    /// Ids of built-in tasks separated by commas, or `all` for the benchmark's ten, or `tandem+` for that
+    /// suite [default: none with --task-file, and else all].
     #[arg(long, value_name = "TASKS", value_parser = parse_tasks)]
     tasks: Option<TaskList>,
     /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
     #[arg(long, default_value = "0-9", value_name = "SEEDS")]
     seeds: Seeds,
-    /// A file with a key of yours, by which what the seeds mean is drawn: nobody without it can simulate an episode in advance. Results name
-    /// the key by its fingerprint. Without it, a seed means the same everywhere.
+    /// File with your own secret key, which changes the meaning of seeds, so that no one without it can
+    /// simulate an episode in advance. Results name the key's fingerprint. Without a key, a seed means the
+    /// same everywhere.
     #[arg(long, value_name = "FILE")]
     seed_key: Option<PathBuf>,
-    /// The rules.
+    /// Rules of play.
     #[arg(long, value_parser = one_of(Protocol::ALL, Protocol::name), default_value = Protocol::Agentic.name())]
     protocol: Protocol,
-    /// What policies are told, as for `serve` [default: paper for evaluate, full for collect].
+    /// Information for policies, as in `serve` [default: paper for evaluate, full for collect].
     #[arg(long, env = "TANDEM_ASSISTANCE", value_name = "WHAT", value_parser = one_of(Assistance::ALL, Assistance::name))]
     assistance: Option<Assistance>,
-    /// For experiments: what is told of phases, whatever the assistance has; only `live` ends an episode on success.
+    /// For experiments: disclosure of phases, independent of the assistance; only `live` ends an episode on
+    /// success.
     #[arg(long, hide = true, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = one_of(Disclosure::ALL, Disclosure::name))]
     disclosure: Option<Disclosure>,
-    /// For experiments: whether texts say how to grasp, whatever the assistance has.
+    /// For experiments: hints on grasping in texts, independent of the assistance.
     #[arg(long, hide = true, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = one_of(Hints::ALL, Hints::name))]
     hints: Option<Hints>,
-    /// JSON file with instructions in place of the tasks' own, as for `serve`; results name them.
+    /// JSON file with instructions in place of the tasks' own, as in `serve`; results name them.
     #[arg(long, env = "TANDEM_INSTRUCTIONS", value_name = "FILE")]
     instructions: Option<PathBuf>,
-    /// How far the seed moves things, as a multiple of the benchmark's randomisation; above 1 it turns them, too.
+    /// Range of the randomised object poses, as a multiple of the benchmark's; above 1, objects are also
+    /// rotated.
     #[arg(long, value_name = "TIMES", value_parser = one_of(Spread::ALL, Spread::name), default_value = Spread::default().name())]
     spread: Spread,
-    /// How long a policy may think in an episode, for those that wait for slow models; results name it [default: as the protocol has it].
+    /// Limit on a policy's thinking time in an episode, for slow models; results name it [default: that of
+    /// the protocol].
     #[arg(long, env = "TANDEM_THINKING_LIMIT", value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
     thinking_limit: Option<u32>,
-    /// Worlds that run side by side.
+    /// Number of worlds that run in parallel.
     #[arg(long, default_value_t = 1, value_name = "N")]
     jobs: usize,
     #[command(flatten)]

@@ -29,33 +29,35 @@ const OPEN_LOOP: &str = "open-loop:";
 /// Default time limit of a program in an episode.
 const LIMIT_S: u32 = 3600;
 
-/// Who plays.
+/// Flags for the choice of a policy.
 #[derive(Debug, clap::Args)]
 pub struct PolicyFlags {
     #[arg(long, value_name = "POLICY", default_value = "expert", value_parser = parse_policy, help = help())]
     policy: PolicyChoice,
-    /// How the policy at a server is asked and understood: a preset, openpi, xpolicylab or gr00t_n17_g1, or a TOML file [default:
-    /// openpi for openpi:, xpolicylab for xpolicylab:, none for act:].
+    /// Policy map for a policy at a server: a preset (openpi, xpolicylab or gr00t_n17_g1) or a TOML file
+    /// [default: openpi for openpi:, xpolicylab for xpolicylab:, none for act:].
     #[arg(long, value_name = "NAME|FILE")]
     policy_map: Option<String>,
-    /// File with the key that the policy's server wants, which is sent as `Authorization` (openpi, xpolicylab: `Api-Key KEY`; act:
-    /// `Bearer KEY`; a key that names its scheme, as `Basic ...`, as it is), over wss:// and https:// or to this machine; or give the
-    /// key itself in the environment, as TANDEM_POLICY_KEY [default: none].
+    /// File with the key for the policy's server, sent as `Authorization` (openpi, xpolicylab: `Api-Key KEY`;
+    /// act: `Bearer KEY`; a key that names its scheme, such as `Basic ...`, unchanged), only over wss:// and
+    /// https:// or to this machine; the environment variable TANDEM_POLICY_KEY can hold the key itself
+    /// [default: none].
     #[arg(long, value_name = "FILE")]
     policy_key_file: Option<PathBuf>,
-    /// Longest that a program may run in one episode [default: 3600].
+    /// Time limit of a program in one episode [default: 3600].
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
     policy_limit: Option<u32>,
-    /// Start one program for each robot, which sees and commands that robot alone.
+    /// Start one program per robot, which sees and commands only that robot.
     #[arg(long)]
     per_robot: bool,
-    /// With --per-robot: let the programs talk to each other by the tool say.
+    /// With --per-robot: let the programs talk to each other with the tool `say`.
     #[arg(long, requires = "per_robot")]
     talk: bool,
-    /// With --per-robot: how long the others wait for one that does not command, before its robot holds still [default: 120].
+    /// With --per-robot: time that the others wait for a missing command before its robot holds still
+    /// [default: 120].
     #[arg(long = "patience", value_name = "SECONDS", requires = "per_robot")]
     patience_s: Option<f64>,
-    /// What results and reports call the policy, where the text of --policy is no good name.
+    /// Name of the policy in results and reports, instead of the text of --policy.
     #[arg(long, value_name = "NAME")]
     policy_name: Option<String>,
 }
@@ -224,15 +226,15 @@ fn remote_policy(
 /// The flags of a policy that may drive one robot beside people.
 #[derive(Debug, Default, clap::Args)]
 pub struct PartnerFlags {
-    /// A learned policy at a server that people may have drive a robot beside them on /operate: openpi:ws://HOST:PORT,
-    /// xpolicylab:ws://HOST:PORT or act:http://HOST:PORT/act, as `evaluate --policy` takes it [default: none].
+    /// Learned policy at a server that can drive a robot beside people on /operate: openpi:ws://HOST:PORT,
+    /// xpolicylab:ws://HOST:PORT or act:http://HOST:PORT/act, as in `evaluate --policy` [default: none].
     #[arg(long, env = "TANDEM_PARTNER", value_name = "POLICY", value_parser = parse_partner)]
     partner: Option<PartnerAddress>,
-    /// How that policy is asked and understood, as `evaluate --policy-map` takes it.
+    /// Policy map of that policy, as in `evaluate --policy-map`.
     #[arg(long, env = "TANDEM_PARTNER_MAP", value_name = "NAME|FILE", requires = "partner")]
     partner_map: Option<String>,
-    /// File with the key that its server wants, as `evaluate --policy-key-file` takes it; or give the key itself in the environment, as
-    /// TANDEM_POLICY_KEY.
+    /// File with the key for its server, as in `evaluate --policy-key-file`; the environment variable
+    /// TANDEM_POLICY_KEY can hold the key itself.
     #[arg(long, env = "TANDEM_PARTNER_KEY_FILE", value_name = "FILE", requires = "partner")]
     partner_key_file: Option<PathBuf>,
 }

@@ -11,14 +11,15 @@ const RUNS: &str = "runs";
 /// The folder of a run.
 #[derive(Debug, Args)]
 pub struct RunFlags {
-    /// Folder of the run, for `results.json` and one file per episode [default: in the folder runs, a name made of policy, protocol and
-    /// everything else that makes the run what it is].
+    /// Folder of the run, for `results.json` and one file per episode [default: a folder in runs that is
+    /// named after the policy, the protocol and all other settings of the run].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Go on with the same run of another build of the program: what that has played is kept and marked, and only the rest is played.
+    /// Continue a run of another build of the program: its episodes are kept and marked, and only the missing
+    /// ones are played.
     #[arg(long)]
     resume_with_new_build: bool,
-    /// Delete the run that the folder holds, and begin anew.
+    /// Delete an existing run in the folder and start over.
     #[arg(long, conflicts_with = "resume_with_new_build")]
     overwrite: bool,
 }

@@ -5,13 +5,13 @@ use tandem_episodes::stress::{Stress, StressAxis, StressLevel};
 
 use crate::settings::{Layer, one_of};
 
-/// What goes wrong in every episode.
+/// Stress of every episode.
 #[derive(Debug, Args)]
 pub struct StressFlags {
-    /// What goes wrong: one axis of what `evaluate` lays over episodes; results name it.
+    /// Disturbance: one of the stress axes of `evaluate`; results name it.
     #[arg(long, env = "TANDEM_STRESS", value_name = "AXIS", value_parser = one_of(StressAxis::ALL, StressAxis::name))]
     stress: Option<StressAxis>,
-    /// How much of it, from 1 to 3 [default: 1].
+    /// Level of the stress, from 1 to 3 [default: 1].
     #[arg(long, env = "TANDEM_LEVEL", value_name = "LEVEL", requires = "stress")]
     level: Option<StressLevel>,
 }
@@ -28,14 +28,15 @@ impl StressFlags {
     }
 }
 
-/// What goes wrong in evaluations beside the plain one.
+/// Stress of evaluations that are played in addition to the plain one.
 #[derive(Debug, Args)]
 pub struct StressPlanFlags {
-    /// Play under stress, too: axes separated by commas, of camera, light, texture, layout, mass, friction, sensors, latency, push, words
-    /// and partner, or `all`. Each axis and level is laid over the same episodes, in a folder of its own in the folder `stress` of --out.
+    /// Also play under stress: a comma-separated list of camera, light, texture, layout, mass, friction,
+    /// sensors, latency, push, words and partner, or `all`. Each axis and level repeats the same episodes in
+    /// its own folder, in the folder `stress` of --out.
     #[arg(long, env = "TANDEM_STRESS", value_name = "AXES", value_parser = parse_axes)]
     stress: Option<Axes>,
-    /// Which levels of each axis: one, or a range as 1..3 or 1-3, both ends included [default: 1..3].
+    /// Levels of each axis: one, or a range such as 1..3 or 1-3, both ends included [default: 1..3].
     #[arg(long, env = "TANDEM_LEVEL", value_name = "LEVELS", value_parser = parse_levels, requires = "stress")]
     level: Option<Levels>,
 }

@@ -15,7 +15,8 @@ pub enum RotationForm {
     QuaternionWxyz,
     /// Order x, y, z, w.
     QuaternionXyzw,
-    /// The first two columns of the matrix, as in Zhou et al. 2019, "On the Continuity of Rotation Representations".
+    /// The first two columns of the matrix, as in Zhou et al. 2019, "On the Continuity of Rotation
+    /// Representations".
     Columns,
     /// The first two rows of the matrix, as `matrix_to_rotation_6d` of PyTorch3D.
     Rows,

@@ -175,7 +175,8 @@ mod tests {
         assert_eq!(read_reply(b"\xc3").map(|reply| reply.describe()), Ok("a boolean".into()));
     }
 
-    /// `msgpack.packb(x, default=msgpack_numpy.encode)` of msgpack-numpy 0.4.8, x = {"a": np.float32([[1.5, -2]]), "n": np.float32(3)}.
+    /// The bytes of `msgpack.packb(x, default=msgpack_numpy.encode)` of msgpack-numpy 0.4.8, where x =
+    /// {"a": np.float32([[1.5, -2]]), "n": np.float32(3)}.
     const KNOWN_PACKAGE: &[u8] = b"\x82\xa1a\x85\xc4\x02nd\xc3\xc4\x04type\xa3<f4\xc4\x04kind\xc4\x00\xc4\x05shape\x92\x01\x02\
         \xc4\x04data\xc4\x08\x00\x00\xc0?\x00\x00\x00\xc0\xa1n\x83\xc4\x02nd\xc2\xc4\x04type\xa3<f4\xc4\x04data\
         \xc4\x04\x00\x00@@";
