@@ -1,7 +1,7 @@
 //! Parts that only the Python package has, started as separate programs.
 //!
-//! These are the tool loop of language models, because the vendors' official SDKs are in Python, and data
-//! sets, because the libraries of their formats are.
+//! One is the tool loop of language models, because the vendors' official SDKs are in Python. The other
+//! is data sets, because the libraries of their formats are.
 
 use std::{env, io, process::Command};
 

@@ -48,7 +48,7 @@ pub struct EpisodeTable {
 /// Purpose of a server, and the policy that can drive beside people.
 #[derive(Debug, Default)]
 pub struct Guests {
-    /// Decides who starts episodes and drives their robots.
+    /// Purpose of the server, which decides who starts episodes and drives their robots.
     pub purpose: Purpose,
     /// Policy that drives a robot on request of a person; pages cannot name another one.
     pub partner: Option<Arc<dyn PartnerPolicy>>,

@@ -173,8 +173,8 @@ impl Program {
                 let env_steps = episode.env_steps();
                 let found: Vec<(ProgramExit, u32)> =
                     exits.into_iter().map(|exit| exit.unwrap_or((running, env_steps))).collect();
-                // A program that left in order had done its part if the others played the episode to its
-                // end, or if one of them is to blame for the end.
+                // A program that left in order had done its part if the others completed the episode, or
+                // if one of them is to blame for its end.
                 let excused = episode.ended() || found.iter().any(|(exit, _)| exit.is_failure());
                 let judged = found.into_iter().map(|(exit, env_steps)| match exit {
                     ProgramExit::Left if excused => (ProgramExit::After, env_steps),

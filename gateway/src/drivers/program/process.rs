@@ -37,7 +37,8 @@ impl ProcessGroups {
 /// A program with all its children. Dropping it stops them.
 pub struct ProcessGroup {
     child: Child,
-    /// Ends the group once this process is gone for any reason. `None` if it could not be started.
+    /// Process that ends the group once this process is gone for any reason; `None` if it could not be
+    /// started.
     guard: Option<Child>,
     groups: Arc<ProcessGroups>,
     outputs: Vec<KeptOutput>,

@@ -64,8 +64,8 @@ impl RotationForm {
     }
 }
 
-/// Gram-Schmidt orthogonalization: the first vector keeps its direction, the second its orthogonal part,
-/// and the third follows.
+/// Returns the Gram-Schmidt orthogonalization of two vectors: the first keeps its direction, the second
+/// its orthogonal part, and the third follows.
 fn matrix_of(values: &[f64]) -> Option<UnitQuaternion<f64>> {
     let &[x0, x1, x2, y0, y1, y2] = values else { return None };
     let x = Vector3::new(x0, x1, x2).try_normalize(SHORTEST)?;

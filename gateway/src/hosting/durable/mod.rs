@@ -1,7 +1,8 @@
 //! Episodes that outlive the process which holds them.
 //!
-//! Each has a journal beside the runs, to which every call is written before its answer is sent, and a
-//! lease that names the server which plays it. The server that takes the lease replays the journal.
+//! Each has a journal beside the runs, to which every call is written before its answer is sent. Each
+//! also has a lease that names the server which plays it. The server that takes the lease replays the
+//! journal.
 
 mod journal_file;
 mod lease;

@@ -33,7 +33,7 @@ pub enum Job {
         told: Tell<Vec<Answer>>,
         reply: ReplySender<Vec<Answer>>,
     },
-    /// Keeps an answer that was combined from several.
+    /// Storage of an answer that was combined from several.
     KeepAnswer {
         keyed: Keyed,
         answer: Box<Answer>,
@@ -45,7 +45,7 @@ pub enum Job {
         key: Option<String>,
         reply: ReplySender<()>,
     },
-    /// Records a call that was refused before it arrived here.
+    /// Record of a call that was refused before it arrived here.
     Refused {
         operator: Option<String>,
         call: Box<RefusedCall>,
@@ -70,16 +70,16 @@ pub enum Job {
         operator: Option<String>,
         reply: ReplySender<LiveView>,
     },
-    /// Begins the journal from which the episode can be brought back.
+    /// Start of the journal from which the episode can be brought back.
     BeginJournal {
         heading: Box<Heading>,
         reply: ReplySender<()>,
     },
-    /// Answers as soon as the episode is awake.
+    /// A request that is answered as soon as the episode is awake.
     Awake {
         reply: ReplySender<()>,
     },
-    /// Puts the episode to sleep until the next job.
+    /// Sleep until the next job.
     Sleep,
     Close {
         /// True if the next server is to bring the episode back.
@@ -94,7 +94,7 @@ pub type Work = Box<dyn FnOnce(WorkOn) + Send>;
 /// Argument of a [`Work`]: the session, or the reason why there is none.
 pub type WorkOn<'a> = Result<(&'a mut PanicGuard, &'a SharedStatus), HostingError>;
 
-/// Converts an outcome into the caller's answer before it is written to the journal.
+/// Conversion of an outcome into the caller's answer, before it is written to the journal.
 pub type Tell<T> = Box<dyn FnOnce(Result<T, HostingError>) -> Result<T, HostingError> + Send>;
 
 pub type ReplySender<T> = oneshot::Sender<Result<T, HostingError>>;

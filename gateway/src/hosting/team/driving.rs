@@ -6,7 +6,7 @@
 //! a person is away.
 //!
 //! A log of 50 commands a second replays bit for bit. The wall clock only decides, before a call is made,
-//! which setpoint becomes a command. The session sees whole control steps in the order of its calls, the
+//! which setpoint becomes a command. The session sees whole control steps in the order of its calls. The
 //! recording holds each call with exact numbers, and replay makes the same calls again. Setpoints that
 //! were never commanded leave no trace in the world or the log.
 

@@ -16,7 +16,7 @@ pub struct Round {
     operators: Vec<Operator>,
     /// Number of steps that have been made.
     number: u64,
-    /// Stops the patience timer that is running.
+    /// Handle that stops the patience timer; `None` while none is running.
     patience: Option<AbortHandle>,
 }
 
@@ -73,13 +73,13 @@ pub enum Company {
 #[derive(Debug)]
 enum OperatorState {
     Thinking,
-    /// Has commanded; the step is not made yet.
+    /// The operator has commanded; the step is not made yet.
     Waiting(Box<Pending>),
-    /// Its command is being executed.
+    /// The operator's command is being executed.
     Acting,
-    /// Has used up the others' patience; nobody waits for it.
+    /// The operator has used up the others' patience; they do not wait for it.
     Silent,
-    /// Has called finish.
+    /// The operator has called finish.
     Finished,
 }
 

@@ -21,7 +21,7 @@ use crate::drivers::remote::{
     request::{PolicyObservation, withheld},
 };
 
-/// Executes a policy's actions and keeps track of the robots' state.
+/// Executor of a policy's actions, which keeps track of the robots' state.
 pub struct Executor<'a> {
     map: &'a PolicyMap,
     /// Maximum number of control steps per command.

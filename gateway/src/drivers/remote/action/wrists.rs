@@ -125,8 +125,8 @@ mod tests {
         UnitQuaternion::from_scaled_axis(axis * FRAC_PI_2)
     }
 
-    /// A pelvis two metres ahead that has turned left, and a wrist in front of it whose fingers point
-    /// down.
+    /// Returns the poses of a wrist in the pelvis frame and of the pelvis. The pelvis is two metres ahead
+    /// and has turned left. The wrist is in front of it, and its fingers point down.
     fn poses() -> (Isometry3<f64>, Isometry3<f64>) {
         let pelvis_from_wrist =
             Isometry3::from_parts(Translation3::new(0.3, 0.2, 0.1), quarter(Vector3::y()));
