@@ -40,8 +40,8 @@ pub fn look_at_runs_folder(runs: &Path) -> Result<(), String> {
     tried
 }
 
-/// Returns the public name of an episode: its task and seed, or a random text if the seed is hidden from
-/// policies.
+/// Returns the public name of an episode: its task and its seed, or a random text in place of a hidden
+/// seed.
 pub fn episode_name(spec: &EpisodeSpec) -> Result<String, TokenError> {
     let task = spec.task.id;
     Ok(match spec.told_seed() {
