@@ -25,7 +25,7 @@ __all__ = ["Baseline", "PolicyKind", "Scope", "Sharing", "TrainingSettings", "lo
 
 
 def __getattr__(name: str) -> object:
-    """What needs PyTorch is loaded when it is asked for."""
+    """Loads a module that needs PyTorch when it is first used."""
     if name in ("Baseline", "load"):
         from . import policy
 
