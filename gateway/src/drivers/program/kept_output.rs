@@ -34,7 +34,7 @@ impl KeptOutput {
         Ok(KeptOutput(ended))
     }
 
-    /// Waits until all of it is written, for at most [`LAST_WORDS_WAIT`].
+    /// Waits until all of it is written, for at most `LAST_WORDS_WAIT`.
     pub fn finish(self) {
         // The other end sends nothing; it is dropped at the end.
         let _ = self.0.recv_timeout(LAST_WORDS_WAIT);

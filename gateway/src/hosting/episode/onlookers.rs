@@ -19,7 +19,7 @@ const KEPT_EVENTS: usize = 256;
 /// Long-term minimum time between two steps that watchers receive; a page does not draw more often.
 const FRAME_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Lead over [`FRAME_INTERVAL`] up to which steps are sent at once.
+/// Lead over `FRAME_INTERVAL` up to which steps are sent at once.
 ///
 /// It corresponds to ten simulated seconds, so a single command of an agent is sent whole, however fast
 /// it is simulated.

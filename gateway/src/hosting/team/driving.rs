@@ -114,7 +114,7 @@ impl Driver {
     }
 
     /// Returns the robots that the person waits for, once its own command has been waiting for longer
-    /// than [`AWAY_AFTER`].
+    /// than `AWAY_AFTER`.
     pub fn waits_for(&self) -> Vec<String> {
         let wheels = self.team.wheels();
         let since = self.seats.first().and_then(|seat| wheels.under_way[*seat]);

@@ -275,7 +275,7 @@ impl Round {
         self.operators.iter_mut().map(|operator| operator.end(made)).collect()
     }
 
-    /// Refuses a message that would exceed [`MAX_UNHEARD`] for one of its recipients.
+    /// Refuses a message that would exceed `MAX_UNHEARD` for one of its recipients.
     pub fn check_unheard(&self, from: usize) -> Result<(), HostingError> {
         let others = self.operators.iter().enumerate().filter(|(seat, _)| *seat != from);
         match others.map(|(_, other)| other).find(|other| other.heard.len() >= MAX_UNHEARD) {
