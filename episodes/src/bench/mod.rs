@@ -1,4 +1,4 @@
-//! Parts of Tandem measured on their own, on the robot that the episodes use.
+//! Benchmarks of Tandem's parts on their own, with the robot that the episodes use.
 
 mod carrying;
 mod env;
@@ -28,12 +28,12 @@ use crate::commands;
 use crate::players::PlayerError;
 use crate::spec::{Controller, RobotFile};
 
-/// Targets drawn where no file gives any.
+/// Number of targets that are drawn if no file gives any.
 const SAMPLED_TARGETS: usize = 200;
 const SAMPLE_SEED: u64 = 1;
 const WRISTS: [&str; 2] = ["left_wrist_yaw_link", "right_wrist_yaw_link"];
 
-/// Why the measurement cannot be made.
+/// Reason why the measurement cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
     #[error("cannot read the targets {path}: {source}")]
@@ -54,8 +54,9 @@ pub enum BenchError {
     NoEpisodes,
 }
 
-/// Plays the cases whose names contain one of the words of `filter`, separated by commas, on these seeds, robots on their own first, then
-/// two that carry something between them, if they have fingers; calls `done` after each case.
+/// Plays the cases whose names contain one of the words of `filter`, separated by commas, on these seeds.
+/// Single robots come first, then two that carry something between them, if they have fingers. Calls `done`
+/// after each case.
 pub fn locomotion(
     robot: &RobotFile,
     controller: &Controller,
@@ -86,12 +87,12 @@ pub fn locomotion(
     Ok(report)
 }
 
-/// Times physics steps of one to three robots; `done` hears of each case as it ends.
+/// Times physics steps of one to three robots; calls `done` after each case.
 pub fn physics(done: impl FnMut(&PhysicsCase)) -> Result<PhysicsReport, BenchError> {
     Ok(bench::physics(done)?)
 }
 
-/// Times pictures of the kitchen; `done` hears of each set as it ends.
+/// Times images of the kitchen; calls `done` after each set.
 pub fn pictures(
     renderer: RendererKind,
     done: impl FnMut(&PicturesCase),
