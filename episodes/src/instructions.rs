@@ -97,7 +97,7 @@ impl Instructions {
         Some(OwnWords::of(joint, robots))
     }
 
-    /// Returns true if the file names no task.
+    /// Returns `true` if the file names no task.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }

@@ -13,7 +13,7 @@ const ENOLCK: i32 = if cfg!(target_os = "linux") { 37 } else { 77 };
 /// Interval between two attempts of a wait.
 const RETRY_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Exclusive or shared kind of a lock.
+/// Kind of a lock: exclusive or shared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LockKind {
     /// At most one holder.
@@ -43,6 +43,10 @@ pub struct FileLock {
 impl FileLock {
     /// Attempts to lock the file at `path`. Creates the file if it is missing; an existing file keeps its
     /// content.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be opened, or locking fails for another reason.
     pub fn attempt(path: &Path, kind: LockKind) -> io::Result<Locking> {
         loop {
             let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
@@ -64,8 +68,12 @@ impl FileLock {
         }
     }
 
-    /// Waits for an exclusive lock on the file at `path` while `waits` returns true. Returns `None` if the
+    /// Waits for an exclusive lock on the file at `path` while `waits` returns `true`. Returns `None` if the
     /// file system has no locks or the wait has ended.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be opened, or locking fails for another reason.
     pub fn wait(path: &Path, waits: impl Fn() -> bool) -> io::Result<Option<FileLock>> {
         loop {
             match FileLock::attempt(path, LockKind::Exclusive)? {
@@ -98,12 +106,12 @@ impl Drop for FileLock {
     }
 }
 
-/// Returns true for the errors of a file system without locks, and false for those of a lock that is held.
+/// Returns `true` for the errors of a file system without locks, and false for those of a lock that is held.
 fn is_unsupported(error: &io::Error) -> bool {
     error.kind() == io::ErrorKind::Unsupported || error.raw_os_error() == Some(ENOLCK)
 }
 
-/// Returns true if `file` is the one at `path` now.
+/// Returns `true` if `file` is the one at `path` now.
 #[cfg(unix)]
 fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     use std::os::unix::fs::MetadataExt;
@@ -115,7 +123,7 @@ fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
-/// Returns true: other systems do not remove or rename a file that is open.
+/// Returns `true`: other systems do not remove or rename a file that is open.
 #[cfg(not(unix))]
 fn is_at(_: &File, _: &Path) -> io::Result<bool> {
     Ok(true)

@@ -1,5 +1,5 @@
-//! Uncertainty of counts of episodes: exact and score intervals of rates, of means of rates, and of the
-//! difference between two policies on the same episodes.
+//! Uncertainty of counts of episodes: exact and score intervals of rates and of means of rates. There are
+//! also intervals of the difference between two policies on the same episodes.
 
 use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
 
@@ -41,8 +41,9 @@ pub fn wilson(count: Count) -> [f64; 2] {
     [-1.0, 1.0].map(|sign| ((middle + sign * reach) / (1.0 + Z * Z / n)).clamp(0.0, 1.0))
 }
 
-/// Returns the mean of rates that each count the same, and its interval: the distances of the exact limits
-/// from their own rates, added as squares (Zou and Donner, 2008). `None` without any trials.
+/// Returns the mean of rates that each count the same, and its interval (Zou and Donner, 2008). The
+/// distances of the exact limits from their own rates are added as squares. Returns `None` without any
+/// trials.
 pub fn mean_share(counts: &[Count]) -> Option<(f64, [f64; 2])> {
     let known: Vec<(f64, [f64; 2])> =
         counts.iter().filter_map(|count| Some((count.share()?, clopper_pearson(*count)))).collect();
@@ -82,8 +83,8 @@ impl Pairs {
     }
 }
 
-/// Returns the two-sided exact p-value of equal success (McNemar, 1947): the probability of a split at
-/// least as uneven among the episodes in which only one policy succeeds, if both are equally good.
+/// Returns the two-sided exact p-value of equal success (McNemar, 1947). It is the probability of so uneven
+/// a split, or a more uneven one, among the episodes in which only one policy succeeds.
 pub fn mcnemar(pairs: Pairs) -> f64 {
     let (fewer, discordant) = (pairs.first_only.min(pairs.second_only), pairs.first_only + pairs.second_only);
     let tail = Binomial::new(0.5, discordant as u64).map_or(1.0, |split| split.cdf(fewer as u64));

@@ -121,6 +121,10 @@ impl Batch {
 
     /// Begins an episode in each world that has an entry: with the given seed, or with that of the world's
     /// next round. The episodes of a round do not depend on how many began automatically in the last one.
+    ///
+    /// # Errors
+    ///
+    /// If an episode cannot be started or recorded.
     pub fn reset(
         &mut self,
         seeds: &[Option<Option<u32>>],
@@ -135,6 +139,10 @@ impl Batch {
     /// Takes one control step in each world, or begins its next episode. `last` receives the final
     /// observation of an episode whose world begins anew in the same step. If any action is invalid, no
     /// world steps.
+    ///
+    /// # Errors
+    ///
+    /// If an action is invalid, or a world has no episode under way.
     pub fn step(
         &mut self,
         step: BatchStep,
@@ -217,6 +225,10 @@ impl Batch {
     }
 
     /// Renders the images of a world's robots in this size.
+    ///
+    /// # Errors
+    ///
+    /// If there is no such world, or it has no episode under way.
     pub fn draw(&mut self, world: usize, size_px: [u32; 2]) -> Result<Vec<u8>, BatchError> {
         self.ask(world, |session| {
             let robots = session.spec().task.robots.len();
@@ -225,6 +237,10 @@ impl Batch {
     }
 
     /// Returns the hash of a world's state; see [`Session::state_hash`].
+    ///
+    /// # Errors
+    ///
+    /// If there is no such world, or it has no episode under way.
     pub fn state_hash(&mut self, world: usize) -> Result<String, BatchError> {
         self.ask(world, |session| session.state_hash())
     }

@@ -98,7 +98,7 @@ impl BatchWorld {
         BatchWorld { index, stride, round_seed: None, episodes: 0, session: None, over: false, progress: 0.0 }
     }
 
-    /// Returns true if the world can take a step under this kind of reset.
+    /// Returns `true` if the world can take a step under this kind of reset.
     pub fn takes(&self, autoreset: Autoreset) -> bool {
         if self.over { autoreset != Autoreset::Disabled } else { self.session.is_some() }
     }

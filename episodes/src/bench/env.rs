@@ -53,6 +53,10 @@ pub struct EnvCase {
 }
 
 /// Times every case; calls `done` after each.
+///
+/// # Errors
+///
+/// If a world cannot be built or stepped.
 pub fn env(mut done: impl FnMut(&EnvCase)) -> Result<EnvReport, BenchError> {
     let most = available_parallelism().map_or(1, usize::from).min(WORLDS);
     let mut threads = vec![1];

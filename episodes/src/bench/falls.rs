@@ -15,6 +15,10 @@ const FIRST_SEED: u32 = 2000;
 
 /// Plays `episodes` episodes, spread evenly over the cases whose names contain one of the words of
 /// `filter`, separated by commas. Calls `done` after each case.
+///
+/// # Errors
+///
+/// If no case matches `filter`, or a world cannot be built.
 pub fn falls(
     episodes: usize,
     filter: &str,

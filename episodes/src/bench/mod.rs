@@ -57,6 +57,10 @@ pub enum BenchError {
 /// Plays the cases whose names contain one of the words of `filter`, separated by commas, on these seeds.
 /// Single robots come first, then two that carry something between them, if they have fingers. Calls `done`
 /// after each case.
+///
+/// # Errors
+///
+/// If a file cannot be read, or a world cannot be built.
 pub fn locomotion(
     robot: &RobotFile,
     controller: &Controller,
@@ -101,6 +105,10 @@ pub fn pictures(
 }
 
 /// Solves the targets of a file, or 200 that are drawn from the robot's own joint ranges.
+///
+/// # Errors
+///
+/// If the targets cannot be read, or the model cannot be used.
 pub fn ik(targets: Option<&Path>) -> Result<IkReport, BenchError> {
     let whole = Model::from_mjcf(assets::robot(assets::DEFAULT_ROBOT)?)?;
     let set = match targets {

@@ -1,5 +1,5 @@
-//! Cache of single episodes: each is stored in a file of its own, and the next run takes it from there if
-//! it is the same.
+//! Cache of single episodes: each is stored in a file of its own. The next run takes it from there if it is
+//! the same.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -93,7 +93,7 @@ impl EpisodeCache<'_> {
             Err(PlayError::Episode(EpisodeError::Checkpoint(CheckpointError::NoPhase { .. }))) => {
                 Ok(PlannedOutcome::LeftOut("its demonstration did not come so far".into()))
             }
-            // The world failed before the policy could act; other worlds may not.
+            // The world failed before the policy could act. Other episodes may still work.
             Err(PlayError::Episode(error @ EpisodeError::Diverged { .. })) => {
                 Ok(PlannedOutcome::LeftOut(format!("the simulator failed before the policy's turn: {error}")))
             }
@@ -127,7 +127,7 @@ impl EpisodeCache<'_> {
         same.then_some(PlayedEpisode { keep_failed, ..cached })
     }
 
-    /// Returns true if the episode has a result that this build cannot parse.
+    /// Returns `true` if the episode has a result that this build cannot parse.
     pub fn is_unreadable(&self, spec: &EpisodeSpec) -> bool {
         self.read(spec).is_some_and(|bytes| serde_json::from_slice::<PlayedEpisode>(&bytes).is_err())
     }
@@ -136,13 +136,13 @@ impl EpisodeCache<'_> {
         std::fs::read(self.folder.join(format!("{}.json", name(spec)))).ok()
     }
 
-    /// Returns true if the policy itself failed, and the episode has been retried as often as the plan
+    /// Returns `true` if the policy itself failed, and the episode has been retried as often as the plan
     /// says.
     fn keeps_failure(&self, result: &ResultReply, attempts: &[Attempt]) -> bool {
         result.ended == EndReason::PolicyFailed && failures_of_policy(attempts) >= self.plan.retries as usize
     }
 
-    /// Returns true if the plan drops the recording of this episode because it failed.
+    /// Returns `true` if the plan drops the recording of this episode because it failed.
     fn is_not_kept(&self, played: &PlayedEpisode) -> bool {
         self.plan.files.only_successful && !played.succeeded()
     }
@@ -200,7 +200,7 @@ impl EpisodeCache<'_> {
     }
 }
 
-/// Returns true if the recording in `folder` is whole, and belongs to the episode with this result. Its
+/// Returns `true` if the recording in `folder` is whole, and belongs to the episode with this result. Its
 /// `result.json` is written last.
 fn is_recorded(folder: &Path, result: &ResultReply) -> bool {
     let bytes = std::fs::read(folder.join(RESULT_FILE)).unwrap_or_default();

@@ -141,7 +141,7 @@ impl RunIdentity {
         found
     }
 
-    /// Returns true if the run `now` has the same episodes, and more.
+    /// Returns `true` if the run `now` has the same episodes, and more.
     pub fn grows_to(&self, now: &RunIdentity) -> bool {
         self.tasks.len() < now.tasks.len() || self.seeds.0.len() < now.seeds.0.len()
     }

@@ -147,7 +147,7 @@ impl<'a> EvaluationRun<'a> {
         Ok(EvaluationRun { folder, place, cache, work, undemonstrated })
     }
 
-    /// Returns true if two processes in this folder would not notice each other.
+    /// Returns `true` if two processes in this folder would not notice each other.
     pub fn is_without_locks(&self) -> bool {
         self.place.without_locks
     }
@@ -173,6 +173,10 @@ impl<'a> EvaluationRun<'a> {
 
     /// Plays the episodes that are not cached yet, writes `results.json`, and calls `progress` after each
     /// episode.
+    ///
+    /// # Errors
+    ///
+    /// If an episode or a file fails. Cached episodes are kept.
     pub fn play(&self, progress: &(dyn Fn(EpisodeEvent) + Sync)) -> Result<Evaluation, EvaluationError> {
         let shard = self.cache.plan.shard;
         let planned =

@@ -76,7 +76,7 @@ impl PlannedEpisodes {
     }
 }
 
-/// Returns true if an evaluation uses this file name for its planned episodes.
+/// Returns `true` if an evaluation uses this file name for its planned episodes.
 pub(super) fn is_planned_file(name: &str) -> bool {
     name == WHOLE || (name.starts_with(SHARE) && name.ends_with(".json"))
 }

@@ -107,8 +107,8 @@ impl EvaluationFolder {
     }
 }
 
-/// Returns true if a process plays in `folder`; `None` if the file system cannot tell, or the lock file is
-/// missing.
+/// Returns `true` if a process plays in `folder`; `None` if the file system cannot report it, or the lock
+/// file is missing.
 pub fn is_being_played(folder: &Path) -> Option<bool> {
     let path = folder.join(PRESENCE_FILE);
     if !path.exists() {

@@ -133,7 +133,7 @@ pub fn find(name: &str) -> Result<&'static PlayerEntry, PlayerError> {
     })
 }
 
-/// Returns the player for a task that nobody else plays: its expert, or the idle player if it has none.
+/// Returns the player for a task without another policy: its expert, or the idle player if it has none.
 pub fn expert_or_nobody(task: &'static Task) -> Result<&'static PlayerEntry, PlayerError> {
     find(if experts::solves(task) { "expert" } else { "idle" })
 }

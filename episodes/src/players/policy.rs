@@ -26,7 +26,7 @@ pub trait Policy: Debug + Send + Sync {
         None
     }
 
-    /// Returns true if the policy's user wants it to end.
+    /// Returns `true` if the policy's user wants it to end.
     fn is_interrupted(&self) -> bool {
         false
     }

@@ -122,7 +122,7 @@ impl CheckedFile {
     }
 }
 
-/// Checks the bytes from `start`, the end of the data, to the mark at the end of the file. Returns true if
+/// Checks the bytes from `start`, the end of the data, to the mark at the end of the file. Returns `true` if
 /// a checksum covers them.
 fn check_summary(bytes: &[u8], start: usize, own: bool) -> Result<bool, Damage> {
     let footer = FilePart::Record(op::FOOTER);
@@ -142,7 +142,7 @@ fn check_summary(bytes: &[u8], start: usize, own: bool) -> Result<bool, Damage> 
     is_covered(saved, summed, own).map_err(|fault| fault.of(FilePart::Summary, start))
 }
 
-/// Describes in words the parts that no checksum covers.
+/// Describes the parts that no checksum covers.
 fn uncovered(data: bool, summary: bool, without: WithoutChecksum) -> Vec<String> {
     let WithoutChecksum { chunks, attachments, metadata } = without;
     let of_data = [

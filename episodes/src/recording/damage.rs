@@ -15,7 +15,7 @@ pub struct Damage {
 }
 
 impl Damage {
-    /// Returns true if not even the first bytes are those of an MCAP file.
+    /// Returns `true` if not even the first bytes are those of an MCAP file.
     pub fn is_of_another_format(&self) -> bool {
         self.part == FilePart::Magic && self.offset == 0
     }

@@ -129,7 +129,7 @@ impl<'a> DataSection<'a> {
         Ok(None)
     }
 
-    /// Checks the data up to the present position, which must be the end of the data. Returns true if a
+    /// Checks the data up to the present position, which must be the end of the data. Returns `true` if a
     /// checksum covers them.
     pub fn check_end(&self) -> Result<bool, Damage> {
         let saved = self
@@ -139,7 +139,7 @@ impl<'a> DataSection<'a> {
         self.is_covered(saved, data).map_err(|fault| fault.of(FilePart::DataSection, 0))
     }
 
-    /// Returns true if Tandem wrote the file.
+    /// Returns `true` if Tandem wrote the file.
     pub fn is_own(&self) -> bool {
         self.own
     }
@@ -266,7 +266,7 @@ impl<'a> DataSection<'a> {
     }
 }
 
-/// Checks `bytes` against a saved checksum. Returns false if there is none: programs other than Tandem may
+/// Checks `bytes` against a saved checksum. Returns `false` if there is none: programs other than Tandem may
 /// leave it out, which is written as 0.
 pub fn is_covered(saved: u32, bytes: &[u8], own: bool) -> Result<bool, Fault> {
     match crc32fast::hash(bytes) {

@@ -25,7 +25,7 @@ pub fn with_checksum(name: &str, mut metadata: BTreeMap<String, String>) -> Meta
     Metadata { name: name.into(), metadata }
 }
 
-/// Checks a record against its checksum. Returns false if it has none, as in recordings of earlier
+/// Checks a record against its checksum. Returns `false` if it has none, as in recordings of earlier
 /// versions.
 pub fn is_covered(record: &Metadata) -> Result<bool, Fault> {
     let Some(saved) = record.metadata.get(CHECKSUM) else { return Ok(false) };

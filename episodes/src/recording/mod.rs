@@ -6,9 +6,9 @@
 //! JSON Schema. `/steps` holds each [`tandem_sim::Step`] bit for bit, including the state before the first
 //! one; everything else is for people.
 //!
-//! The file has all that a replay needs: the episode's spec, the build, each tool call with the time
-//! charged to the policy's clock, and the hash of the whole state after every step. Its attachments are
-//! checkpoints of the policy's start and of the beginning of every later phase.
+//! The file has all that a replay needs. It includes the episode's spec and build, each tool call with the
+//! time charged to the policy's clock, and the hash of the whole state after every step. Its attachments
+//! are checkpoints of the policy's start and of the beginning of every later phase.
 //!
 //! The file is `episode.mcap.partial` until [`Recorder::finish`] renames it, so an `episode.mcap` is always
 //! complete. A recorder that is dropped earlier still writes the index. One whose process is killed leaves

@@ -186,6 +186,10 @@ impl Recording {
     }
 
     /// Returns the phases that the episode reached.
+    ///
+    /// # Errors
+    ///
+    /// If a message cannot be read.
     pub fn phases(&self) -> Result<Vec<PhaseReached>, RecordingError> {
         let phase = |message: Result<(f64, PhaseMessage), RecordingError>| {
             let (_, PhaseMessage { id, number, time_s }) = message?;
@@ -195,6 +199,10 @@ impl Recording {
     }
 
     /// Returns the tool calls of the episode in their order: those that count, which a replay makes again.
+    ///
+    /// # Errors
+    ///
+    /// If a message cannot be read.
     pub fn tool_calls(&self) -> Result<Vec<RecordedCall>, RecordingError> {
         let call = |message: Result<(f64, ToolCallMessage), RecordingError>| {
             let (time_s, message) = message?;
@@ -225,6 +233,10 @@ impl Recording {
     }
 
     /// Scores the recorded steps by this build's conditions of the task.
+    ///
+    /// # Errors
+    ///
+    /// If a step cannot be read, or the recording belongs to another task.
     pub fn score(&self) -> Result<Scores, RecordingError> {
         self.score_with(|_| {})
     }

@@ -219,7 +219,7 @@ impl Appender {
         Some(self.recorder)
     }
 
-    /// Executes an append. Returns false once something has failed.
+    /// Executes an append. Returns `false` once something has failed.
     fn append(&mut self, append: Append) -> bool {
         match append {
             Append::Step(write) => {

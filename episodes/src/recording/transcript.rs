@@ -24,6 +24,10 @@ pub enum TranscriptEntry {
 impl Recording {
     /// Returns every call and every note in their order, including refused calls and those that do not
     /// count.
+    ///
+    /// # Errors
+    ///
+    /// If a message cannot be read.
     pub fn transcript(&self) -> Result<Vec<TranscriptEntry>, RecordingError> {
         let mut notes = self.notes()?.into_iter().peekable();
         let (mut entries, mut count) = (Vec::new(), 0);

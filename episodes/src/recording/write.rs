@@ -67,6 +67,10 @@ impl Recorder {
 
     /// Opens a recording in an existing run folder. Writes the episode's description, the robots' shapes,
     /// and `start`, the state before the first recorded step.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be created or written.
     pub fn create(
         folder: &Path,
         visibility: Visibility,
@@ -186,6 +190,10 @@ impl Recorder {
     }
 
     /// Writes the result and the index, and gives the file its name.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be written.
     pub fn finish(mut self, result: &ResultReply) -> Result<PathBuf, OutputError> {
         self.file.metadata(metadata::RESULT, &[(RESULT_FILE, &serde_json::to_string(result)?)])?;
         self.file.finish()

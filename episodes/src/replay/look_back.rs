@@ -80,8 +80,9 @@ impl RecordedEpisode {
         self.message.clone()
     }
 
-    /// Returns the image of robot `name` as a PNG file, in the step nearest to `time_s` among the displayed
-    /// steps and those that a policy was shown. Returns `None` if there is no such robot or step.
+    /// Returns the image of robot `name` as a PNG file, in the step nearest to `time_s`. Candidates are the
+    /// displayed steps, and those of which a policy was shown images. Returns `None` if there is no such
+    /// robot or step.
     pub fn picture(&self, time_s: f64, name: &str) -> Option<Result<Vec<u8>, PictureError>> {
         let away = |step: &&Step| (step.time_s - time_s).abs();
         let step =

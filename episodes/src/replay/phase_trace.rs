@@ -101,6 +101,10 @@ impl Held {
 impl PhaseTrace {
     /// Traces the phase that would have been next when the recording ends; `None` if the last one was
     /// reached.
+    ///
+    /// # Errors
+    ///
+    /// If the recording cannot be read.
     pub fn of(recording: &Recording) -> Result<Option<PhaseTrace>, RecordingError> {
         let task = recording.spec.task;
         let reached = recording.phases()?;

@@ -61,6 +61,10 @@ pub struct EpisodeRenderer {
 
 impl EpisodeRenderer {
     /// Creates the renderer of the episode `spec`. The world is built for it and stays at rest.
+    ///
+    /// # Errors
+    ///
+    /// If the world cannot be built.
     pub fn of(spec: &EpisodeSpec) -> Result<EpisodeRenderer, EpisodeError> {
         Ok(EpisodeRenderer { observer: Observer::new(spec, &build(spec)?.world) })
     }

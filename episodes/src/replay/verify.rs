@@ -153,7 +153,8 @@ fn text_of(hash: &Option<String>) -> String {
 }
 
 /// Compares the recorded result with the simulated one, and with the phases scored from the recorded steps.
-/// Another build may have left out departures that this one names.
+/// Departures and extra information are compared for the same build only, because another build may have
+/// named fewer.
 fn compare_results(
     recording: &Recording,
     recorded: &ResultReply,

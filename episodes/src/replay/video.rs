@@ -111,6 +111,10 @@ const SHORT_SIZE: PictureSize = PictureSize { width: 320, height: 240 };
 const SHORT_END_MS: i32 = 1500;
 
 /// Renders a whole recording from the third-person camera, as a [`ShortFilm`].
+///
+/// # Errors
+///
+/// If the recording cannot be replayed, or the video cannot be encoded.
 pub fn short_film(recording: &Recording) -> Result<ShortFilm, VideoError> {
     let mut scene = EpisodeRenderer::of(&recording.spec).map_err(ReplayError::from)?;
     let failed = |error| webp_failed(recording.path(), error);

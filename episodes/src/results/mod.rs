@@ -19,6 +19,10 @@ use crate::spec::EpisodeSpec;
 pub const RESULT_FILE: &str = "result.json";
 
 /// Writes `result.json` into a run folder. A reader sees the old file or the new one, never a part.
+///
+/// # Errors
+///
+/// If the file cannot be written.
 pub fn write_result(result: &ResultReply, folder: &Path) -> Result<PathBuf, OutputError> {
     let mut text = serde_json::to_string_pretty(result)?;
     text.push('\n');
@@ -114,7 +118,7 @@ impl PlayedEpisode {
         self.spec.start_phase()
     }
 
-    /// Returns true if phase number `phase`, from 0, was reached.
+    /// Returns `true` if phase number `phase`, from 0, was reached.
     pub fn reached(&self, phase: usize) -> bool {
         self.result.phases.reached_s(&Phase::number(phase)).is_some()
     }
@@ -130,7 +134,7 @@ impl PlayedEpisode {
         asked.iter().chain(self.result.extra_information.iter().filter(move |what| !is_said(what)))
     }
 
-    /// Returns true if the phase that counts was reached: the one that the episode began at, or the last.
+    /// Returns `true` if the phase that counts was reached: the one that the episode began at, or the last.
     pub fn succeeded(&self) -> bool {
         self.reached(self.start_phase().unwrap_or(self.spec.task.phases.len() - 1))
     }
@@ -151,7 +155,7 @@ impl PlayedEpisode {
         failed.filter(|_| !self.succeeded())
     }
 
-    /// Returns true if the episode counts in rates and averages.
+    /// Returns `true` if the episode counts in rates and averages.
     pub fn counts(&self) -> bool {
         self.exclusion().is_none()
     }

@@ -95,7 +95,7 @@ impl FactsTracker {
         &self.memory
     }
 
-    /// Returns true if a memory belongs to the same objects and the same number of robots.
+    /// Returns `true` if a memory belongs to the same objects and the same number of robots.
     pub fn fits(&self, memory: &[ObjectMemory]) -> bool {
         let is_same = |(own, other): (&ObjectMemory, &ObjectMemory)| {
             own.name == other.name && own.grasps.is_alike(&other.grasps)

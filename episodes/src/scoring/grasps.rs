@@ -80,7 +80,7 @@ impl ObjectGrasps {
         }
     }
 
-    /// Returns true if another memory belongs to the same object and the same number of robots.
+    /// Returns `true` if another memory belongs to the same object and the same number of robots.
     pub fn is_alike(&self, other: &ObjectGrasps) -> bool {
         self.object == other.object && self.detectors.len() == other.detectors.len()
     }

@@ -10,8 +10,8 @@ use super::{Facts, Grip};
 const FAR_M: f32 = 1.5;
 /// Tilt beyond which an object has fallen over.
 const FALLEN_OVER_RAD: f32 = 1.0;
-/// Middle of a hand's grasp, in the frame of the wrist: ahead and inward, in front of the palm, which faces
-/// left on the right hand.
+/// Middle of a hand's grasp in the frame of the wrist, ahead and inward. It is in front of the palm, which
+/// faces left on the right hand.
 const GRASP_IN_WRIST_M: [f32; 2] = [0.12, 0.055];
 /// Nearness of a hand that touches an object; a hand that holds it has 1.
 const TOUCHING: f32 = 0.75;

@@ -11,7 +11,7 @@ pub const STILL_M_S: f32 = 0.05;
 /// Largest angular speed of a placed object.
 pub const STILL_RAD_S: f32 = 0.15;
 
-/// Returns true if no robot has touched `object` for 0.2 s, and it stands upright and still.
+/// Returns `true` if no robot has touched `object` for 0.2 s, and it is upright and still.
 pub fn stands_released(f: &Facts, object: &str) -> bool {
     f.untouched_s(object) >= RELEASE_S
         && f.tilt_rad(object) <= UPRIGHT_RAD
@@ -19,19 +19,19 @@ pub fn stands_released(f: &Facts, object: &str) -> bool {
         && f.turn_rate_rad_s(object) <= STILL_RAD_S
 }
 
-/// Returns true if `object` is within `half_m` of `target` on each axis of the world.
+/// Returns `true` if `object` is within `half_m` of `target` on each axis of the world.
 pub fn within_box(f: &Facts, object: &str, target: &str, half_m: f32) -> bool {
     let apart = f.position_m(object) - f.position_m(target);
     apart.abs().max_element() <= half_m
 }
 
-/// Returns true if `object` is within `half_m` of `target` on both horizontal axes of the world.
+/// Returns `true` if `object` is within `half_m` of `target` on both horizontal axes of the world.
 pub fn above_box(f: &Facts, object: &str, target: &str, half_m: f32) -> bool {
     let apart = f.position_m(object) - f.position_m(target);
     apart.truncate().abs().max_element() <= half_m
 }
 
-/// Returns true if the origin of `object` is within `within_m` of its initial height.
+/// Returns `true` if the origin of `object` is within `within_m` of its initial height.
 pub fn stands_as_high(f: &Facts, object: &str, within_m: f32) -> bool {
     f.lift_m(object).abs() <= within_m
 }

@@ -43,7 +43,7 @@ impl Scores {
         Ok(Scores { tracker: FactsTracker::new(objects, robot, start)?, phases: PhaseTracker::new(phases) })
     }
 
-    /// Returns true if a step has all objects that the phases' conditions may refer to.
+    /// Returns `true` if a step has all objects that the phases' conditions may refer to.
     pub fn sees(&self, step: &Step) -> bool {
         self.tracker.memory().iter().all(|object| step.object(object.name()).is_some())
     }
@@ -77,7 +77,7 @@ impl Scores {
         self.phases.memory()
     }
 
-    /// Returns true if the last phase has been reached.
+    /// Returns `true` if the last phase has been reached.
     pub fn complete(&self) -> bool {
         self.phases.complete()
     }
@@ -86,7 +86,7 @@ impl Scores {
         ScoreMemory { objects: self.tracker.memory().to_vec(), phases: self.phases.memory().clone() }
     }
 
-    /// Restores an earlier [`Scores::memory`] of the same phases and objects. Returns false, and changes
+    /// Restores an earlier [`Scores::memory`] of the same phases and objects. Returns `false`, and changes
     /// nothing, if it belongs to others.
     #[must_use]
     pub fn set_memory(&mut self, memory: ScoreMemory) -> bool {

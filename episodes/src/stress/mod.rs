@@ -1,6 +1,6 @@
 //! Stress on episodes, to measure the robustness of policies: one axis per file. Each is a function of seed
-//! and level alone, applied to the episode of the plain run, so that both can be compared seed by seed. Its
-//! effects on robots and objects are forces or properties that a real world could have.
+//! and level alone, applied to the episode of the plain run. The two can therefore be compared seed by
+//! seed. Its effects on robots and objects are forces or properties that a real world could have.
 //!
 //! To add an axis: one file here, its name in [`StressAxis`], and the place where it acts.
 
@@ -233,7 +233,7 @@ pub fn task_words(stress: Option<Stress>, task: &'static Task) -> TaskWords {
     reworded.unwrap_or_else(|| TaskWords::of(task))
 }
 
-/// Returns true if `stress` can be applied to `task`. Reworded instructions exist only for some tasks.
+/// Returns `true` if `stress` can be applied to `task`. Reworded instructions exist only for some tasks.
 pub fn is_possible(stress: Option<Stress>, task: &'static Task) -> bool {
     let words = stress.and_then(|stress| stress.on(StressAxis::Words));
     words.is_none_or(|level| reworded(task, level).is_some())

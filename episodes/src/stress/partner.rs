@@ -136,7 +136,7 @@ impl Silence {
         (partner.failing == Failing::SaysNothing).then_some(silence)
     }
 
-    /// Returns true if the message that this robot sends after `said` earlier ones is delivered.
+    /// Returns `true` if the message that this robot sends after `said` earlier ones is delivered.
     pub fn lets_hear(&self, robot: usize, said: u32) -> bool {
         robot != self.robot || self.heard_of.is_some_and(|of| said.is_multiple_of(of))
     }

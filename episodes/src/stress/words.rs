@@ -1,5 +1,5 @@
 //! Wording stress: the same task, more colloquial, then shorter, then roundabout. Rewordings keep all
-//! information on what is to be done, with which hand and by which robot.
+//! information on the actions, the hands and the robots that carry them out.
 
 use std::collections::BTreeMap;
 use std::sync::OnceLock;

@@ -276,7 +276,7 @@ impl TaskCheck {
     }
 }
 
-/// Returns true if a phase would be reached at once, were it next.
+/// Returns `true` if a phase would be reached at once, were it next.
 fn holds(done: &Done, facts: &Facts) -> bool {
     match done {
         Done::When(condition) => condition.holds(facts),

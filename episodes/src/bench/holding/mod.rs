@@ -230,8 +230,8 @@ fn standing(session: &Session) -> Vec<RobotCommand> {
 mod tests {
     use super::*;
 
-    /// Largest drift of pelvises and loads once a team has had 1.5 s to stop; the last is the largest time
-    /// until the last robot stands.
+    /// Limits: the drift of pelvises and of loads once a team has had 1.5 s to stop, and the time until the
+    /// last robot stands.
     const MAX_SWAY_M: f32 = 0.03;
     const MAX_LOAD_DRIFT_M: f32 = 0.02;
     const MAX_STANDING_AFTER_S: f32 = 1.5;

@@ -1,5 +1,5 @@
-//! The BigTable expert: three robots take the edge with both hands, lift, carry the table straight to the
-//! disc in step, set it down and let go.
+//! The BigTable expert: three robots take the edge with both hands, lift, and carry the table straight to
+//! the disc in step. They set it down there and let go.
 
 use std::f32::consts::PI;
 

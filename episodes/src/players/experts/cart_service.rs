@@ -22,8 +22,8 @@ const STANDS_M_S: f32 = 0.03;
 const MAX_STOPPING_BEATS: u32 = 20;
 /// Speed at which B walks with the bottle in its hand.
 const CARRY_M_S: f32 = 0.25;
-/// Height by which B lifts the bottle. While B walks, its pelvis is up to 12 cm lower than at rest, and so
-/// is the bottle, which still has to clear the table.
+/// Height by which B lifts the bottle. While B walks, its pelvis and the bottle are up to 12 cm lower than
+/// at rest. The bottle still has to clear the table.
 const LIFT_M: f32 = 0.26;
 /// Distance that B steps back from the trolley before it turns.
 const BACK_M: f32 = 0.30;

@@ -1,4 +1,4 @@
-//! The FrameHang expert: each robot takes one side of the frame, both lift it in front of the peg, push the
+//! The FrameHang expert: each robot takes one side of the frame. Both lift it in front of the peg, push the
 //! loop over it and lower.
 
 use std::f32::consts::FRAC_PI_2;
@@ -97,7 +97,7 @@ fn give_way(commander: &mut Commander, give_way: bool) {
     }
 }
 
-/// Returns true if the frame hangs straight on the peg. A frame that hangs askew when it is released stays
+/// Returns `true` if the frame hangs straight on the peg. A frame that hangs askew when it is released stays
 /// so, because no hand has room behind it to take it again.
 fn is_straight_on_peg(facts: &Facts) -> bool {
     facts.threads("wall_peg", ["root", "tip"], "frame", "loop") && facts.tilt_rad("frame") < ASKEW_RAD

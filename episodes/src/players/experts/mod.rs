@@ -73,12 +73,12 @@ impl Expert {
     }
 }
 
-/// Returns true if there is an expert of `task`.
+/// Returns `true` if there is an expert of `task`.
 pub fn solves(task: &'static Task) -> bool {
     Expert::of(task).is_ok()
 }
 
-/// Returns true if `task` has the robots and objects of the built-in task with its id, which its expert
+/// Returns `true` if `task` has the robots and objects of the built-in task with its id, which its expert
 /// asks for by name.
 fn has_what_it_needs(task: &Task) -> bool {
     let Ok(own) = TaskSet::default().find(task.id) else { return false };

@@ -221,7 +221,7 @@ impl<'a> CallOutcome<'a> {
         CallOutcome::Problem(error.to_string())
     }
 
-    /// Returns true if the call was answered.
+    /// Returns `true` if the call was answered.
     pub fn is_ok(&self) -> bool {
         !matches!(self, CallOutcome::Problem(_))
     }

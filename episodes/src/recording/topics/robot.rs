@@ -86,8 +86,8 @@ impl RobotTopics {
         }
     }
 
-    /// Appends an image from the robot's head camera, unless there is already one of this moment. Physics
-    /// stands still between commands, and so do images.
+    /// Appends an image from the robot's head camera, unless there is already one of this moment. Between
+    /// commands the simulation pauses, so images do not change.
     pub fn picture(
         &mut self,
         file: &mut McapFile,

@@ -92,7 +92,7 @@ fn texts(path: &Path) -> Option<Vec<ColumnTexts>> {
     serde_json::from_str(&found.get_text().ok()?).ok()
 }
 
-/// Returns true if the image has exactly the size for these texts.
+/// Returns `true` if the image has exactly the size for these texts.
 fn fits(strip: &RgbImage, columns: &[ColumnTexts]) -> bool {
     let rows = columns.iter().map(|column| column.labels.len()).max().unwrap_or(0);
     (strip.width() as usize, strip.height() as usize) == size(columns.len(), rows)

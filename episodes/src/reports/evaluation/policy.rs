@@ -114,7 +114,7 @@ pub struct ByCollaboration {
 pub struct ShownReport {
     /// The name in results, for example `odometry`.
     pub what: String,
-    /// Number of the episodes that count and showed it.
+    /// Number of counted episodes that showed it.
     pub episodes: usize,
     /// Number of replies that showed it, by the robot concerned.
     pub replies: BTreeMap<String, u32>,
@@ -373,7 +373,7 @@ fn reasons(episodes: &[&PlayedEpisode]) -> Vec<FailureReason> {
     reasons
 }
 
-/// Returns at most `most` failures for which `wanted` returns true, with their policies, in turns from
+/// Returns at most `most` failures for which `wanted` returns `true`, with their policies, in turns from
 /// every policy and task.
 pub fn failed_by_turns(
     loaded: &LoadedEpisodes,

@@ -67,17 +67,17 @@ pub enum Grip {
 }
 
 impl Facts {
-    /// Returns true if this hand of this robot holds `object`.
+    /// Returns `true` if this hand of this robot holds `object`.
     pub fn holds(&self, robot: usize, side: Side, object: &str) -> bool {
         self.object(object).hands[robot][side] == Grip::Holding
     }
 
-    /// Returns true if any hand of this robot holds `object`.
+    /// Returns `true` if any hand of this robot holds `object`.
     pub fn holds_any(&self, robot: usize, object: &str) -> bool {
         self.object(object).hands[robot].iter().any(|grip| *grip == Grip::Holding)
     }
 
-    /// Returns true if neither hand of this robot touches `object`.
+    /// Returns `true` if neither hand of this robot touches `object`.
     pub fn hands_off(&self, robot: usize, object: &str) -> bool {
         self.object(object).hands[robot] == Sides::both(Grip::Off)
     }
@@ -138,7 +138,7 @@ impl Facts {
         self.object(object).angular_velocity_rad_s.length()
     }
 
-    /// Returns true if each of these robots holds `object` with a hand.
+    /// Returns `true` if each of these robots holds `object` with a hand.
     pub fn held_by_all(&self, robots: &[usize], object: &str) -> bool {
         robots.iter().all(|robot| self.holds_any(*robot, object))
     }
@@ -175,21 +175,21 @@ impl Facts {
         self.point_m(object, self.site(object, site).position_m())
     }
 
-    /// Returns true if the origin of `object` is between the walls of `vessel` and over its floor,
+    /// Returns `true` if the origin of `object` is between the walls of `vessel` and over its floor,
     /// according to its shapes.
     pub fn inside_vessel(&self, object: &str, vessel: &str) -> bool {
         let vessel = self.object(vessel);
         vessel.model.encloses(vessel.pose_in_world.inverse() * self.position_m(object))
     }
 
-    /// Returns true if the origin of `object` is inside a box site of `container`.
+    /// Returns `true` if the origin of `object` is inside a box site of `container`.
     pub fn inside_box(&self, object: &str, container: &str, site: &str) -> bool {
         let [low_m, high_m] = self.site(container, site).corners_m();
         let local = self.object(container).pose_in_world.inverse() * self.position_m(object);
         local.cmpge(low_m).all() && local.cmple(high_m).all()
     }
 
-    /// Returns true if a box site of `object` is, seen along z of `target`, wholly within a box site of
+    /// Returns `true` if a box site of `object` is, seen along z of `target`, wholly within a box site of
     /// `target`.
     pub fn within_mark(&self, object: &str, site: &str, target: &str, mark: &str) -> bool {
         let (site, mark) = (self.site(object, site), self.site(target, mark));
@@ -203,7 +203,7 @@ impl Facts {
         (beside_m.abs() + half_m).truncate().cmple(mark.size_m.truncate()).all()
     }
 
-    /// Returns true if a rod of `object`, from one site to another, passes through a ring of `carrier`, a
+    /// Returns `true` if a rod of `object`, from one site to another, passes through a ring of `carrier`, a
     /// site with its axis along y.
     pub fn threads(&self, object: &str, ends: [&str; 2], carrier: &str, ring: &str) -> bool {
         let ring = self.site(carrier, ring);

@@ -13,7 +13,7 @@ pub type Condition = Arc<dyn Predicate>;
 
 /// An expression over the facts of a control step.
 pub trait Predicate: Send + Sync {
-    /// Returns true if it holds at this control step.
+    /// Returns `true` if it holds at this control step.
     fn holds(&self, facts: &Facts) -> bool;
 }
 
@@ -119,7 +119,7 @@ impl PhaseTracker {
         &self.memory
     }
 
-    /// Returns true if a memory can belong to these phases.
+    /// Returns `true` if a memory can belong to these phases.
     pub fn fits(&self, memory: &PhaseMemory) -> bool {
         memory.reached_s.len() <= self.phases.len()
     }
@@ -129,7 +129,7 @@ impl PhaseTracker {
         self.memory = memory;
     }
 
-    /// Evaluates one control step. Returns true if it reached a phase.
+    /// Evaluates one control step. Returns `true` if it reached a phase.
     pub fn update(&mut self, facts: &Facts) -> bool {
         let memory = &mut self.memory;
         let before = memory.reached_s.len();
@@ -158,19 +158,19 @@ impl PhaseTracker {
         reached as f64 + f64::from(next)
     }
 
-    /// Returns true if the last phase has been reached.
+    /// Returns `true` if the last phase has been reached.
     pub fn complete(&self) -> bool {
         self.memory.reached_s.len() == self.phases.len()
     }
 }
 
 impl PhaseMemory {
-    /// Returns true if the next phase is a sequence whose `first` has held, unbroken.
+    /// Returns `true` if the next phase is a sequence whose `first` has held, unbroken.
     pub fn underway(&self) -> bool {
         self.underway
     }
 
-    /// Returns true if the next phase has been spoiled.
+    /// Returns `true` if the next phase has been spoiled.
     pub fn spoiled(&self) -> bool {
         self.spoiled
     }
@@ -214,7 +214,7 @@ impl PhaseMemory {
     }
 }
 
-/// Returns true if `condition` has held without a break for `for_s`; `since_s` stores the time since which
+/// Returns `true` if `condition` has held without a break for `for_s`; `since_s` stores the time since which
 /// it has held.
 fn lasted(since_s: &mut Option<f64>, condition: &Condition, for_s: f64, facts: &Facts) -> bool {
     *since_s = condition.holds(facts).then(|| since_s.unwrap_or(facts.time_s));

@@ -1,4 +1,4 @@
-//! The BlindCarry expert: both lift the table by its legs; on its way it shifts to the gap, passes it, and
+//! The BlindCarry expert: both lift the table by its legs. On its way it shifts to the gap, passes it, and
 //! comes back to the marks.
 
 use std::f32::consts::PI;

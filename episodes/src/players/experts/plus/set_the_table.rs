@@ -1,6 +1,6 @@
 //! The SetTheTable expert: each robot takes one thing after another from its sideboard, turns to the table
-//! and puts it on its place. Both work at the same time, each on its side, and begin where the idle left
-//! hand is over nothing that stands.
+//! and puts it on its place. Both work at the same time, each on its side, and begin where nothing is below
+//! the idle left hand.
 //!
 //! After each thing both hands return to their first poses. A hand stays where it is in the world while its
 //! robot rises from a walk, and is therefore lower on the next walk. Without the return, in the second

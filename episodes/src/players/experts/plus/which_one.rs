@@ -15,8 +15,8 @@ use crate::scoring::{A, B};
 const WALK_M_S: f32 = 0.35;
 /// Speed at which B walks with the bottle in its hand.
 const CARRY_M_S: f32 = 0.25;
-/// Lift of the bottle. While B walks, its pelvis is up to 12 cm lower than at rest, and so is the bottle,
-/// which still has to clear the counter.
+/// Lift of the bottle. While B walks, its pelvis and the bottle are up to 12 cm lower than at rest. The
+/// bottle still has to clear the counter.
 const LIFT_M: Vector = Vector::new(0.0, 0.0, 0.26);
 /// Step that B takes back from the shelf before it turns; nearer by, its left hand would sweep over the
 /// other bottles.

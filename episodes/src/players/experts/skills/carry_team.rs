@@ -262,7 +262,7 @@ impl<'a> CarryTeam<'a> {
     }
 }
 
-/// Returns true if an object is over a place, seen from above.
+/// Returns `true` if an object is over a place, seen from above.
 fn is_over(object: &Pose, place: &Pose) -> bool {
     let off_m = (object.translation - place.translation).truncate().length();
     off_m < OVER_M && wrapped_rad(heading_rad(object) - heading_rad(place)).abs() < OVER_RAD

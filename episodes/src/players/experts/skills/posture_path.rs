@@ -51,7 +51,7 @@ pub fn follow(commander: &mut Commander, path: &PosturePath) -> Result<(), Playe
     follow_while(commander, path, 0.0, &mut |_| true).map(drop)
 }
 
-/// Follows a path from `gone_m` on, while `well` returns true; see [`follow`].
+/// Follows a path from `gone_m` on, while `well` returns `true`; see [`follow`].
 pub fn follow_while(
     commander: &mut Commander,
     path: &PosturePath,

@@ -10,8 +10,8 @@ const SLOWER: f32 = 0.12;
 /// Probability of a pause before a motion at level 1, and the range of its duration.
 const PAUSES: f32 = 0.12;
 const PAUSE_S: [f32; 2] = [0.1, 0.5];
-/// Largest detour of a hand from its straight line, as a share of its way; `MAX_STRAY_M` is the absolute
-/// limit.
+/// Largest detour of a hand from its straight line at level 1, as a share of its way; `MAX_STRAY_M` is the
+/// absolute limit.
 const STRAY: f32 = 0.08;
 const MAX_STRAY_M: f32 = 0.02;
 /// Probability at level 1 that a free hand misses after a long way, and the range of the error.

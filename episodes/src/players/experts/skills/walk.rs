@@ -197,7 +197,7 @@ impl Sway {
         (0..robots).map(mean).collect()
     }
 
-    /// Returns true if the mean is meaningful: over two steps, or for a single pose, before any sway.
+    /// Returns `true` if the mean is meaningful: over two steps, or for a single pose, before any sway.
     fn is_told(&self) -> bool {
         [1, TWO_STEPS_COMMANDS].contains(&self.recent.len())
     }

@@ -66,8 +66,8 @@ mod tests {
     use super::*;
     use crate::players::experts::skills::place;
 
-    /// Robots stand 1 m ahead of the object's middle and 0.5 m behind it; the object turns by a quarter,
-    /// and then goes 2 m ahead.
+    /// Robots are 1 m ahead of the object's middle and 0.5 m behind it. The object turns by a quarter, and
+    /// then goes 2 m ahead.
     #[test]
     fn a_way_is_as_long_as_that_of_the_robot_with_farthest_to_go() {
         let ahead_m = |x_m: f32| place(Vector::X * x_m, 0.0);

@@ -21,7 +21,7 @@ const LEAVE_S: f32 = 1.2;
 const GIVE_S: f32 = 0.1;
 const GIVES: usize = 16;
 const CLOSING_GIVES: usize = 6;
-/// Force per metre at which a wrist gives way in each step; `MAX_GIVE_M` limits the distance.
+/// Stiffness against which a wrist gives way in each step; `MAX_GIVE_M` limits the distance.
 const STIFFNESS_N_M: f32 = 300.0;
 const MAX_GIVE_M: f32 = 0.01;
 /// Largest distance of a wrist's goal from the wrist.
@@ -62,7 +62,7 @@ fn grasp_from(commander: &mut Commander, grasps: &[HandGrasp], first_stop: usize
 }
 
 /// Closes hands at the poses in `around`. Each wrist's goal makes up for its position error, for example
-/// after it has given way to partners, and gives way to the forces that the hand feels.
+/// after it has given way to partners. It also gives way to the forces that the hand feels.
 fn close_compliantly(
     commander: &mut Commander,
     grasps: &[HandGrasp],

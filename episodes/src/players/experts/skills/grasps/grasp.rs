@@ -93,7 +93,7 @@ impl HandGrasp<'_> {
         HandMove::shape(self.robot, self.side, self.open_rad())
     }
 
-    /// Returns true if this hand itself holds its object.
+    /// Returns `true` if this hand itself holds its object.
     pub fn is_held(&self, facts: &Facts) -> bool {
         facts.holds(self.robot, self.side, self.object)
     }

@@ -73,7 +73,7 @@ pub fn stand_on(
     let down = grasp.carry(commander, place_m)?;
     commander.perform(0.8, &[down])?;
     release(commander, grasp)?;
-    // The object has to have stood released for a moment.
+    // The object counts as placed only after a moment without touch.
     commander.perform(1.0, &[grasp.open()])
 }
 

@@ -1,6 +1,5 @@
-//! Holds as data: the hand's turn, the position of the held place in the hand, the fingers' closure, the
-//! stops on the way in and out, and the distance of the robot. They are given for right hands; left hands
-//! mirror them.
+//! Holds as data: the hand's turn, the position of the place in the hand, the closure of the fingers, the
+//! stops, and the robot's distance. They are given for right hands; left hands mirror them.
 
 use std::f32::consts::FRAC_PI_2;
 
