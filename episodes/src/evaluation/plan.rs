@@ -50,9 +50,10 @@ pub struct EvaluationPlan<'a> {
     pub shard: Shard,
     /// Number of worlds that run in parallel, each on a thread of its own.
     pub jobs: usize,
-    /// Records every episode in a folder of its own (`episode.mcap`, `strip.png`, `report.html`).
+    /// True if every episode is recorded in a folder of its own (`episode.mcap`, `strip.png`,
+    /// `report.html`).
     pub record: bool,
-    /// Selection of these files that stay.
+    /// The files among these that are kept.
     pub files: KeptFiles,
     /// Number of retries of an episode in which the policy itself failed, over all runs. After them, it
     /// counts as a failure.
