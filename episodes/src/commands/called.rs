@@ -275,6 +275,11 @@ impl OperatorCommand {
     pub fn steps(&self) -> u32 {
         self.steps
     }
+
+    /// Name of the tool.
+    pub fn tool(&self) -> &'static str {
+        self.call.call().name()
+    }
 }
 
 #[cfg(test)]

@@ -95,6 +95,56 @@ fn a_plan_that_cannot_be_carried_out_moves_nothing() {
     assert!(refused.contains("this episode has no plans"), "{refused}");
 }
 
+/// A hand goes down at one speed until it touches, and a wait ends with what it is for.
+#[test]
+fn a_command_lasts_until_what_it_expects_holds() {
+    let mut session = agentic();
+    let to = |position_m: [f64; 3], steps: u32| {
+        json!({ "steps": steps, "robots": [{ "robot": "A", "right_position_m": position_m, "right_quaternion_wxyz": [0.707, -0.707, 0, 0] }] })
+    };
+    let over = json!({ "tool": "move_wrists", "arguments": to([0.33, -0.33, 0.32], 25) });
+    let settle = json!({ "tool": "wait", "arguments": { "steps": 25 } });
+    let lower = json!({
+        "tool": "move_wrists", "arguments": to([0.33, -0.33, -0.05], 300),
+        "expects": { "force_above_n": 12 }, "until": true,
+    });
+    let reply = plan(&mut session, "send_plan", json!({ "commands": [over, settle, lower] })).unwrap();
+    assert_eq!(reply.stopped, None, "{reply:?}");
+    let lowering_steps = reply.executed_steps - 50;
+    assert!((100..300).contains(&lowering_steps) && lowering_steps % 5 == 0, "{reply:?}");
+    let still = json!({
+        "tool": "wait", "arguments": { "steps": 12 }, "expects": { "phase_reached": "p1" }, "until": true,
+    });
+    let reply = plan(&mut session, "send_plan", json!({ "commands": [still] })).unwrap();
+    assert_eq!(reply.executed_steps, 12);
+    assert!(reply.stopped.unwrap().contains("its steps are done and p1 has not been reached"));
+    for (command, says) in [
+        (json!({ "tool": "wait", "arguments": { "steps": 5 }, "until": true }), "needs a condition"),
+        (json!({ "tool": "wait", "arguments": { "steps": 501 }, "expects": { "arrived": true }, "until": true }), "at most 500"),
+        (json!({ "tool": "wait", "arguments": { "steps": 5 }, "expects": { "heard": true } }), "for operators"),
+        (json!({ "tool": "send_joint_chunk", "arguments": { "robots": [] }, "expects": { "arrived": true }, "until": true }), "cannot have `until`"),
+    ] {
+        let refused = plan(&mut session, "send_plan", json!({ "commands": [command] })).unwrap_err();
+        assert!(refused.contains(says), "{refused}");
+    }
+}
+
+#[test]
+fn a_plan_walks_and_goes_on() {
+    let mut session = agentic();
+    let commands = json!([
+        { "tool": "walk_to", "arguments": { "steps": 500, "robots": [{ "robot": "A", "to_m": [-0.2, 0.0] }] } },
+        { "tool": "wait", "arguments": { "steps": 5 }, "expects": { "base_stepping": false } },
+    ]);
+    let reply = plan(&mut session, "send_plan", json!({ "commands": commands })).unwrap();
+    assert_eq!(reply.stopped, None, "{reply:?}");
+    let [x_m, ..] = reply.last.robots[A].pelvis_in_start.unwrap().position_m;
+    assert!((x_m + 0.2).abs() < 0.02, "{x_m}");
+    let nowhere = json!({ "tool": "walk_to", "arguments": { "steps": 500, "robots": [{ "robot": "C", "to_m": [0, 0] }] } });
+    let refused = plan(&mut session, "send_plan", json!({ "commands": [nowhere] })).unwrap_err();
+    assert!(refused.contains("no robot \"C\""), "{refused}");
+}
+
 /// A plan's commands are what the tools take, `short` among it: the reply is short where the last command asked for that.
 #[test]
 fn commands_of_a_plan_may_ask_for_short_replies() {

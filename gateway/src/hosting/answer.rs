@@ -59,7 +59,7 @@ impl Answer {
             ToolReply::Manage(ManageReply::GetStatus(status)) | ToolReply::Talk(TalkReply::Say(status)) => {
                 status.fallen.retain(|entry| entry.robot == robot)
             }
-            // Looks are asked of the own robot alone, a plan's commands are answered so already, and a result is of all.
+            // A look is of the own robot alone, the commands of a plan are already answered so, and a result concerns all robots.
             ToolReply::Look(_) | ToolReply::Plan(_) | ToolReply::Manage(ManageReply::Finish(_)) => {}
         }
         self

@@ -90,6 +90,9 @@ pub struct Partner {
     pub robot: String,
     /// What it did while the command was executed.
     pub did: PartnerDid,
+    /// The tool by which its operator commanded it; left out where none did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool: Option<String>,
 }
 
 /// What the robot of another operator did during a command.
@@ -111,6 +114,12 @@ pub struct Heard {
     pub from: String,
     /// What it said.
     pub text: String,
+    /// The control step that the episode was at.
+    #[serde(default)]
+    pub step: u32,
+    /// Which of the speaker's sayings it is, counted from 1.
+    #[serde(default)]
+    pub number: u32,
 }
 
 #[cfg(test)]

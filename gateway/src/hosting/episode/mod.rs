@@ -388,7 +388,7 @@ impl EpisodeThread {
         answer.blocking_recv().map_err(|_| HostingError::EpisodeStopped)?
     }
 
-    /// Does something with the session in its turn.
+    /// Runs `work` on the session in its turn.
     async fn work<T: Send + 'static>(
         &self,
         work: impl FnOnce(&mut Session) -> Result<T, HostingError> + Send + 'static,

@@ -183,7 +183,7 @@ impl Team {
         match &call.call().tool {
             ToolCall::Act(_) => self.act(episode, seat, call, keyed).await,
             ToolCall::Talk(TalkCall::Say(say)) => {
-                let words = Heard { from: robot.into(), text: say.text.clone() };
+                let words = Heard { from: robot.into(), text: say.text.clone(), step: 0, number: 0 };
                 self.say(episode, seat, call, words, keyed).await
             }
             ToolCall::Plan(_) => self.plan(episode, seat, call, keyed).await,
@@ -237,7 +237,8 @@ impl Team {
             let mut round = team.round();
             let said = round.count_said(seat);
             if team.silence.is_none_or(|silence| silence.lets_hear(seat, said)) {
-                round.spread(seat, &words);
+                let step = answer.step.unwrap_or_default();
+                round.spread(seat, &Heard { step, number: said + 1, ..words });
             }
             answer
         })
@@ -386,7 +387,7 @@ impl Team {
     async fn execute(self: Arc<Self>, episode: &Arc<EpisodeThread>, pending: Vec<(usize, Pending)>) {
         let (mut replies, mut commands, mut asked) = (Vec::new(), Vec::new(), Vec::new());
         for (seat, Pending { command, keyed, reply }) in pending {
-            asked.push((seat, command.steps()));
+            asked.push((seat, command.steps(), command.tool()));
             commands.push((command, keyed));
             replies.push(reply);
         }
@@ -395,8 +396,9 @@ impl Team {
         let told = move |outcome: Result<Vec<Answer>, HostingError>| {
             over.store(true, Relaxed);
             let did = team.round().end(outcome.as_ref().ok().and_then(|answers| answers.first()));
-            let tell = |((seat, asked_steps), answer)| {
-                let partners = team.partners(seat, &did);
+            let tools: Vec<(usize, &'static str)> = asked.iter().map(|(seat, _, tool)| (*seat, *tool)).collect();
+            let tell = |((seat, asked_steps, _), answer)| {
+                let partners = team.partners(seat, &did, &tools);
                 Answer { partners, ..team.for_seat(answer, seat) }.cut_off_after(asked_steps)
             };
             outcome.map(|answers| asked.into_iter().zip(answers).map(tell).collect())
@@ -429,9 +431,13 @@ impl Team {
     }
 
     /// Returns the behaviour of the partners of `seat`, out of that of all robots in `did`.
-    fn partners(&self, seat: usize, did: &[PartnerDid]) -> Vec<Partner> {
-        let all = self.seats.iter().zip(did).enumerate().filter(|(other, _)| *other != seat);
-        all.map(|(_, (other, did))| Partner { robot: other.robot.clone(), did: *did }).collect()
+    fn partners(&self, seat: usize, did: &[PartnerDid], tools: &[(usize, &'static str)]) -> Vec<Partner> {
+        let others = self.seats.iter().zip(did).enumerate().filter(|(other, _)| *other != seat);
+        let partner = |(other, (who, did)): (usize, (&Seat, &PartnerDid))| {
+            let tool = tools.iter().find(|(seat, _)| *seat == other).map(|(_, tool)| (*tool).to_owned());
+            Partner { robot: who.robot.clone(), did: *did, tool }
+        };
+        others.map(partner).collect()
     }
 
     /// Refuses a call that names an unknown robot.

@@ -3,6 +3,7 @@
 mod driving;
 mod page;
 mod partners;
+mod plans;
 mod processes;
 mod restarts;
 mod rounds;

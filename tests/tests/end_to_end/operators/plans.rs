@@ -1,0 +1,55 @@
+//! Plans and walks of one operator beside the commands of another.
+
+use serde_json::json;
+
+use super::team::Team;
+
+/// B's wait of 50 steps is answered once, though A's walk is many short commands.
+#[test]
+fn a_walk_goes_on_beside_the_partners_commands() {
+    let team = Team::start(json!({}));
+    let walk = json!({ "steps": 300, "robots": [{ "robot": "A", "to_m": [-0.2, 0.0] }] });
+    let (a, waits) = std::thread::scope(|scope| {
+        let walks = scope.spawn(|| team.ask(0, "walk_to", walk).ok());
+        let mut waits = Vec::new();
+        while !walks.is_finished() && waits.len() < 20 {
+            waits.push(team.ask(1, "wait", json!({ "steps": 50 })));
+        }
+        team.ask(1, "finish", json!({}));
+        (walks.join().expect("A's reply"), waits)
+    });
+    assert_eq!(a["stopped"], json!(null), "{a}");
+    assert!(a["commands"].as_u64().is_some_and(|commands| commands > 5), "{a}");
+    assert_eq!(a["last"]["robots"].as_array().map(Vec::len), Some(1), "{a}");
+    let whole = waits.into_iter().map(|answer| answer.ok()).filter(|reply| reply["stop_reason"] == "steps_done");
+    let whole: Vec<_> = whole.map(|reply| reply["executed_steps"].clone()).collect();
+    assert!(whole.len() >= 3 && whole.iter().all(|steps| *steps == 50), "{whole:?}");
+    team.verified();
+}
+
+#[test]
+fn an_operator_waits_in_one_call_until_it_hears() {
+    let team = Team::start(json!({ "talk": true }));
+    let until = |heard: bool| {
+        json!({ "commands": [
+            { "tool": "wait", "arguments": { "steps": 400 }, "expects": { "heard": heard }, "until": true },
+        ] })
+    };
+    let b = std::thread::scope(|scope| {
+        let waits = scope.spawn(|| team.ask(1, "send_plan", until(true)).ok());
+        for _ in 0..2 {
+            team.ask(0, "wait", json!({ "steps": 10 })).ok();
+        }
+        team.ask(0, "say", json!({ "text": "IN PLACE" })).ok();
+        // What is said is heard with the reply to the next command.
+        team.ask(0, "wait", json!({ "steps": 10 })).ok();
+        waits.join().expect("B's reply")
+    });
+    assert_eq!((&b["stopped"], &b["heard"][0]["text"]), (&json!(null), &json!("IN PLACE")), "{b}");
+    assert!(b["executed_steps"].as_u64().is_some_and(|steps| (20..=30).contains(&steps)), "{b}");
+    let foreign = json!({ "commands": [
+        { "tool": "walk", "arguments": { "steps": 5, "robots": [{ "robot": "A", "vx_m_s": 0.1, "vy_m_s": 0, "yaw_rate_rad_s": 0 }] } },
+    ] });
+    team.ask(1, "send_plan", foreign).refused(409, &["yours is \"B\""]);
+    team.verified();
+}
