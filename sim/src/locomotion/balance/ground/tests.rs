@@ -1,4 +1,4 @@
-//! How two feet share a force, and what a leg's torques do.
+//! Sharing of a force between two feet, and the effect of a leg's torques.
 
 use rapier3d::math::Rotation;
 
@@ -16,7 +16,7 @@ fn soles() -> Sides<Pose> {
     }
 }
 
-/// Moment about the centre of mass for which the force acts at `pressure_m` on the ground.
+/// Returns the moment about the centre of mass for which the force acts at `pressure_m` on the ground.
 fn moment_n_m(pressure_m: Vector) -> Vector {
     (pressure_m - COM_M).cross(FORCE_N)
 }
@@ -58,7 +58,8 @@ fn pressure_stays_under_the_feet() {
     }
 }
 
-/// A moment that would tip the feet costs horizontal force, and only as much as brings the pressure back under them.
+/// A moment that would tip the feet costs horizontal force, and only as much as brings the pressure back
+/// under them.
 #[test]
 fn tipping_moments_cost_horizontal_force() {
     let pressure_m = Vector::new(0.3, 0.0, 0.0);
@@ -77,7 +78,8 @@ fn tipping_moments_cost_horizontal_force() {
     assert!((kept_n - FORCE_N).length() < 1e-3, "{kept_n}");
 }
 
-/// The ground's power on a leg that moves about its hip is minus the joints': tau . q' = -(f . v + m . w).
+/// The ground's power on a leg that moves about its hip is minus the joints': tau . q' = -(f . v + m .
+/// w).
 #[test]
 fn leg_torques_do_the_work_of_the_ground() {
     let standing = Posed::standing();
