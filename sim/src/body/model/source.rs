@@ -10,9 +10,9 @@ use crate::{SimError, assets};
 #[derive(Debug)]
 pub struct RobotSource {
     pub model: RobotModel,
-    /// The MJCF, in which joints, wrists and camera are called as of every robot.
+    /// The MJCF, in which joints, wrists and camera have their published names.
     pub document: Document,
-    /// Tells robots of different files apart, with all that these name.
+    /// Hash that distinguishes robots of different files, including all files that these name.
     pub fingerprint: u64,
 }
 
