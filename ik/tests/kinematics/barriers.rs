@@ -1,4 +1,4 @@
-//! Barriers hold while targets press against them, let go of what overlaps, and come to rest.
+//! Barriers hold while targets press against them, separate overlapping shapes, and come to rest.
 
 use nalgebra::{Isometry3, Vector3};
 use tandem_ik::{
@@ -39,7 +39,8 @@ fn solver(model: &Model) -> Solver {
     solver
 }
 
-/// Hands sent through each other, through the trunk and through the head stop at the margin and stay there.
+/// Hands sent through each other, through the trunk and through the head stop at the margin and stay
+/// there.
 #[test]
 fn shapes_keep_apart_and_rest() {
     let model = common::g1();
@@ -86,7 +87,8 @@ fn overlapping_shapes_come_apart_at_bounded_speed() {
     assert!(apart > 0.0, "still {apart} m");
 }
 
-/// Two pairs that demand opposite things hold still rather than fail; one that contradicts an equality is named.
+/// Two barriers with opposite demands hold still rather than fail; one that contradicts an equality is
+/// named.
 #[test]
 fn contradictions_hold_still_or_are_named() {
     let model = common::g1();
@@ -135,7 +137,8 @@ fn a_frame_stays_beyond_its_plane() {
     );
 }
 
-/// Solutions with the barrier on: what is reached is free of overlap, and the report says how near shapes are.
+/// Solutions with the barrier on: reached ones are free of overlap, and the report gives the distance of
+/// the closest shapes.
 #[test]
 fn planned_solutions_do_not_overlap() {
     let model = common::g1();

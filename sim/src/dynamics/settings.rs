@@ -17,8 +17,8 @@ impl Softness {
         omega / (dt_s * omega + 2.0 * self.damping_ratio)
     }
 
-    /// Returns the compliance of a row as a share of its effective mass:  with e = 1 / (dt correction) -
-    /// 1,  e^2 / ((1 + e) 4 zeta^2).
+    /// Returns the compliance of a row as a share of its effective mass:
+    /// with e = 1 / (dt correction) - 1,  e^2 / ((1 + e) 4 zeta^2).
     pub(super) fn compliance(&self, dt_s: f64) -> f64 {
         let e = 1.0 / (dt_s * self.correction_per_s(dt_s)) - 1.0;
         e * e / ((1.0 + e) * 4.0 * self.damping_ratio * self.damping_ratio)

@@ -151,7 +151,7 @@ impl Grip {
     }
 }
 
-/// Finds the force on a palm that explains most of the torques on an arm's joints.
+/// Least squares fit of the force on a palm that explains most of the torques on an arm's joints.
 struct PalmFit {
     jacobian_m: SMatrix<f32, 3, ARM_JOINTS>,
     factor: Option<Cholesky<f32, Const<3>>>,

@@ -51,7 +51,7 @@ pub struct Extremes {
     pub joint_speed_share: Greatest,
 }
 
-/// Watches a world, physics step by physics step.
+/// Watcher of a world, physics step by physics step.
 #[derive(Default)]
 pub struct Watch {
     pub extremes: Extremes,

@@ -5,8 +5,8 @@
 //! satisfies
 //!   sum_c (f_c / mu_c)^2 <= n^2,   mu_c the coefficient of lane c: 1 for the tangents, m for spin and roll,
 //! the elliptic cone of MuJoCo, which for sliding and spin is the limit surface of Howe and Cutkosky
-//! 1996. Within the cone friction stops the motion. On its surface it dissipates most, f_c ~ -mu_c^2
-//! v_c: no direction is preferred.
+//! 1996. Within the cone friction stops the motion. On its surface it dissipates most, f_c ~ -mu_c^2 v_c:
+//! no direction is preferred.
 
 use serde::{Deserialize, Serialize};
 

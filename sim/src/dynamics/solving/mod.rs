@@ -256,7 +256,7 @@ impl WithSimd for Settling<'_> {
     }
 }
 
-/// Builds all rows of contacts on the widest vectors, like [`Settling`].
+/// Construction of all rows of contacts on the widest vectors, like [`Settling`].
 struct Gathering<'a> {
     solver: &'a mut Solver,
     trees: &'a Trees,

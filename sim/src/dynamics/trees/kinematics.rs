@@ -22,8 +22,8 @@ impl WithSimd for Kinematics<'_> {
 }
 
 impl Tree {
-    /// Computes poses and axes from joint positions, with p the parent:  R = R_p R_0 R(q),  r = r_p +
-    /// R_p (t_0 + ...),  and the axes
+    /// Computes poses and axes from joint positions, with p the parent:  R = R_p R_0 R(q),
+    /// r = r_p + R_p (t_0 + ...),  and the axes
     ///   S = (a, r_a x a) of a hinge through r_a,  S = (0, a) of a slide,  both with a = R_p R_0 direction.
     /// Source: Featherstone 2008, section 4.1 and table 4.1, in world axes.
     pub(in crate::dynamics) fn kinematics(&mut self) {

@@ -69,7 +69,7 @@ pub(super) struct Action {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct RecurrentState(pub(super) Vec<Vec<f32>>);
 
-/// A checked file, ready to run. Robots share it; each has its own [`RecurrentState`].
+/// A checked file, ready to run. Robots share it; each has its own `RecurrentState`.
 pub struct Network {
     name: String,
     model: Model,

@@ -27,7 +27,7 @@ use target::RenderTarget;
 use view::{Row, SrgbTable, View};
 use workspace::Workspace;
 
-/// Renders on the calling thread, and several images of a state in parallel. It holds its buffers only
+/// Renderer on the calling thread, and several images of a state in parallel. It holds its buffers only
 /// while it draws. The shadows of its last state are reused the next time, unless too many other
 /// renderers have drawn in between.
 pub(super) struct CpuRenderer {

@@ -4,8 +4,8 @@ use rapier3d::math::{Matrix, Vector};
 
 use crate::render::{TriangleMesh, Vertex};
 
-/// The normal at a point p of some triangles, in their mesh's frame and of any length: `normal +
-/// slope_1_m * p`.
+/// The normal at a point p of some triangles, in their mesh's frame and of any length:
+/// `normal + slope_1_m * p`.
 #[derive(Clone, Copy, Debug)]
 pub struct Bend {
     pub normal: Vector,

@@ -28,8 +28,8 @@ impl Faces {
         Faces { planes_m, count: mesh.triangles.len() }
     }
 
-    /// Writes the numbers of the triangles that may be visible, in their order, from a point (x, y, z,
-    /// 1) of the mesh's frame, or against a direction (x, y, z, 0).
+    /// Writes the numbers of the triangles that may be visible, in their order, from a point
+    /// (x, y, z, 1) of the mesh's frame, or against a direction (x, y, z, 0).
     #[inline(always)]
     pub fn put_front(&self, front: &mut Vec<u32>, [x, y, z, w]: [f32; 4]) {
         front.resize(self.planes_m.len() * LANES, 0);

@@ -8,7 +8,7 @@ use crate::body::posed::Posed;
 const COM_M: Vector = Vector::new(0.02, 0.01, 0.7);
 const FORCE_N: Vector = Vector::new(8.0, -5.0, 330.0);
 
-/// Feet 24 cm apart, the left one a little ahead and turned out.
+/// Returns feet 24 cm apart, the left one a little ahead and turned out.
 fn soles() -> Sides<Pose> {
     Sides {
         left: Pose::from_parts(Vector::new(0.05, 0.12, 0.0), Rotation::from_rotation_z(0.2)),

@@ -3,8 +3,8 @@
 //!
 //! A pull from the world does not depend on the robot's motion. A held object may react to the lean: of
 //! two robots that hold one load, each feels the other's lean as a growing pull. If both lean away by x,
-//! a load of the stiffness k between them pulls with 2 k x at the height z. Against that both lean by  2
-//! k x z / (m g),  which is more than x from k = 200 N/m on; a lead increases that gain further. If a
+//! a load of the stiffness k between them pulls with 2 k x at the height z. Against that both lean by
+//! 2 k x z / (m g),  which is more than x from k = 200 N/m on; a lead increases that gain further. If a
 //! hand meets an obstacle by its own motion, such as a counter or the wall of a bin, the obstacle pushes
 //! back: the robot would lean into it and the hand slide away. So a robot leans ahead only with hands
 //! that are still, empty and free of contact.

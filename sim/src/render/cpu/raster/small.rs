@@ -21,8 +21,8 @@ pub(super) const SMALL_BLOCKS: usize = 2;
 const OVERLAP: f32 = 1e-5;
 
 impl Outlines {
-    /// Computes the slopes. An edge from p to q has those samples on its inner side where `(x - px) (qy
-    /// - py) - (y - py) (qx - px) >= 0`.
+    /// Computes the slopes. An edge from p to q has those samples on its inner side where
+    /// `(x - px) (qy - py) - (y - py) (qx - px) >= 0`.
     #[inline(always)]
     pub(super) fn slopes(&self, grid: Grid, reaches: &Reaches) -> Slopes {
         let pitch = grid.pitch_px as f32;
