@@ -40,7 +40,7 @@ pub struct Report {
 /// One way to solve, over all targets.
 #[derive(Clone, Debug, Serialize)]
 pub struct Measured {
-    /// `default` and `tuned` are Pink's two; the others add what this crate has beyond it.
+    /// Name of the way; `default` and `tuned` are Pink's two, the others use features beyond Pink.
     pub name: &'static str,
     /// Share of the targets reached, 0..=1.
     pub reached: f64,

@@ -65,6 +65,11 @@ impl Dynamics {
         }
     }
 
+    /// Adds a tree.
+    ///
+    /// # Panics
+    ///
+    /// Panics if all trees together have more than 65535 degrees of freedom.
     pub fn add_tree(&mut self, tree: Tree) -> TreeId {
         let id = self.trees.push(tree);
         let dofs = self.trees.dofs();
@@ -75,6 +80,10 @@ impl Dynamics {
     }
 
     /// Adds a collider; it has no mass.
+    ///
+    /// # Panics
+    ///
+    /// Panics if the shape is not convex.
     pub fn add_collider(&mut self, collider: Collider) -> ColliderId {
         self.collision.add(collider, &self.trees, &self.settings)
     }

@@ -1,11 +1,11 @@
 //! Estimation of a robot's own motion: a contact-aided error-state Kalman filter over IMU, joint
-//! encoders and joint torques, after Bloesch et al. 2013 ("State estimation for legged robots") and
+//! encoders and joint torques. It follows Bloesch et al. 2013 ("State estimation for legged robots") and
 //! Hartley et al. 2020 ("Contact-aided invariant extended Kalman filtering"). It has no access to the
 //! physics world, and infers contacts only from the legs' torques.
 //!
-//! State: rotation R, velocity v and place p of the IMU, gyro bias b_g, accelerometer bias b_a, and for
-//! each foot the point f_i of the ground that it stands on and its heading psi_i. The error of the
-//! rotation is in world axes, R = exp(theta) R^:
+//! State: rotation R, velocity v and place p of the IMU, gyro bias b_g, accelerometer bias b_a. For each
+//! foot it also has the point f_i of the ground that the foot stands on, and the foot's heading psi_i.
+//! The error of the rotation is in world axes, R = exp(theta) R^:
 //!
 //!   R+ = R exp((w - b_g) dt),   v+ = v + (R (a - b_a) + g) dt,   p+ = p + v+ dt
 //!   theta' = -R b_g,   v' = -[R a]x theta - R b_a,   p' = v

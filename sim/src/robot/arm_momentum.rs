@@ -1,7 +1,7 @@
 //! External torques on an arm, observed by the change of the arm's momentum (De Luca et al. 2006,
 //! "Collision detection and safe reaction with the DLR-III lightweight manipulator arm").
 //!
-//! For joint i with its axis a (unit, world) through o, let P and L be the linear momentum of everything
+//! Let joint i have its axis a (unit, world) through o. Let P and L be the linear momentum of everything
 //! beyond it and its moment about o, and p = a . L + armature qd. Then
 //!   p' = tau - tau_gravity + c + tau_ext,   c = (w x a) . L - a . (o' x P),
 //! with w the spin of the link and o' the velocity of o, whatever pelvis and waist do. The observer

@@ -25,9 +25,9 @@ use crate::dynamics::trees::{LinkId, Trees};
 use crate::dynamics::{DPose3, DVec3};
 
 /// Angle by which a round shape turns before its points are searched anew, in rad. At the one degree
-/// that Parry allows, a bottle that whirled on its rim by two degrees gained energy until it fell over,
-/// and a cylinder that rolled at 5 cm/s reached 18 cm/s. At zero, a shape at rest on a round base gets
-/// other corners in every step and trembles.
+/// that Parry allows, a bottle that whirled on its rim by two degrees gained energy until it fell over.
+/// A cylinder that rolled at 5 cm/s reached 18 cm/s. At zero, a shape at rest on a round base gets other
+/// corners in every step and trembles.
 const ROUND_TURNS_RAD: f64 = 0.001;
 /// Two faces are in full contact if no point is deeper than their corners by more than this.
 const FACE_M: f32 = 0.001;

@@ -1,8 +1,8 @@
 //! Friction of colliders as in MJCF, and contacts as rows: one normal, and friction in a cone.
 //!
-//! A contact has N lanes. Lane 0 is the normal impulse n >= 0, lanes 1 and 2 are the tangents, 3 is the
-//! spin about the normal, 4 and 5 are the roll about the tangents (N = 4 leaves them out). Friction
-//! satisfies
+//! A contact has N lanes. Lane 0 is the normal impulse n >= 0, and lanes 1 and 2 are the tangents. Lane
+//! 3 is the spin about the normal, and lanes 4 and 5 are the roll about the tangents (N = 4 leaves them
+//! out). Friction satisfies
 //!   sum_c (f_c / mu_c)^2 <= n^2,   mu_c the coefficient of lane c: 1 for the tangents, m for spin and roll,
 //! the elliptic cone of MuJoCo, which for sliding and spin is the limit surface of Howe and Cutkosky
 //! 1996. Within the cone friction stops the motion. On its surface it dissipates most, f_c ~ -mu_c^2 v_c:

@@ -72,8 +72,8 @@ pub struct Drive {
 /// something else turns the motor, its voltage exceeds the supply's. It drives a current back through
 /// the diodes of its bridge, which no controller can prevent. It then brakes along the same line
 /// whatever the setpoint is, and from 120 % on with more than `most`. Like the rest of the law, this
-/// holds at the end of the step, so that no motor drives itself beyond its limit within a step, however
-/// light its link is.
+/// holds at the end of the step. So no motor drives itself beyond its limit within a step, however light
+/// its link is.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DriveLaw {
     pub rest: f64,

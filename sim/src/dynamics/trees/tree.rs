@@ -66,6 +66,11 @@ pub struct Tree {
 }
 
 impl Tree {
+    /// Builds a tree at rest from its links, parents first.
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`TreeError`] if the links do not form a tree or a joint moves nothing that has inertia.
     pub fn new(name: &str, links: Vec<Link>) -> Result<Tree, TreeError> {
         check(name, &links)?;
         let layout = Layout::of(&links);

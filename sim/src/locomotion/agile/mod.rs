@@ -2,8 +2,8 @@
 //! exports for the G1.
 //!
 //! The policy normally receives the commands unchanged. With a loop over its place (`place`) it receives
-//! instead the velocity that keeps the robot where the commands would have taken it, by the robot's own
-//! estimate of its place.
+//! instead the velocity that keeps the robot where the commands would have taken it. The loop uses the
+//! robot's own estimate of its place.
 //!
 //! The policy runs once per control step and drives the legs by PD targets with its own gains. It also
 //! balances with the roll and pitch of the waist, which belong to the task here. So the policy observes

@@ -28,10 +28,10 @@ pub(super) struct Gait {
 impl Gait {
     /// Computes the gait. With E = e^{w t}, t the transfer, G = e^{w (T - t)} and K = G (E - 1) / (w t):
     ///   b = v T (1 - E G + K) / (E G - 1)  along the motion,   width (E G + 1 - K) / (E G + 1)  to the inside.
-    /// The foot that swings 2 v T ahead adds the remainder of s u to the capture point when it lands, 2
-    /// v T s e^{w a} with a the time from the middle of its flight: b is smaller by that over E G - 1.
-    /// To the sides b is unchanged, because robots that start to walk sideways have no room for the
-    /// narrower step.
+    /// The foot that swings 2 v T ahead adds the remainder of s u to the capture point when it lands.
+    /// This is 2 v T s e^{w a} with a the time from the middle of its flight: b is smaller by that over
+    /// E G - 1. To the sides b is unchanged, because robots that start to walk sideways have no room for
+    /// the narrower step.
     pub(super) fn new(scale: &BodyScale, rate_1_s: f32, velocity_m_s: Vector, outside_axis: Vector) -> Gait {
         let [transfer_s, period_s] = [TRANSFER_S, PERIOD_S].map(|g1_s| scale.time_s(g1_s));
         let transfer = (rate_1_s * transfer_s).exp();

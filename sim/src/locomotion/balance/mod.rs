@@ -176,9 +176,9 @@ impl BalanceState {
         }
     }
 
-    /// Returns the commanded velocity. For a robot that is to stand it returns the velocity to its
-    /// place, if the robot was pushed out of its stance or has not reached the place that commands took
-    /// it to.
+    /// Returns the commanded velocity. For a robot that is to stand it may return the velocity to its
+    /// place. That is so if the robot was pushed out of its stance, or has not reached the place that
+    /// commands took it to.
     fn velocity_to_place(
         &mut self,
         body: &BodyEstimate,

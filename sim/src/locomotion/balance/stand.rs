@@ -57,9 +57,9 @@ const LEANING_TIME_S: f32 = 0.25;
 /// Zone of the centre of mass of a robot that holds something with partners: smaller, because the feet
 /// have to hold the partners' pull.
 const HELD_ZONE_M: f32 = 0.028;
-/// Yielding to partners. A robot whose hands are pulled harder than this by a shared load moves along
-/// the pull, at this rate per newton, while its centre of mass stays in a zone. So pulls between
-/// standing robots decay.
+/// Yielding to partners. Beyond this pull of a shared load on its hands, a robot moves along the pull.
+/// It moves at this rate per newton, while its centre of mass stays in a zone. So pulls between standing
+/// robots decay.
 const PULLED_N: f32 = 12.0;
 const GIVING_WAY_M_S_N: f32 = 0.002;
 const GIVING_WAY_ZONE_M: f32 = 0.035;

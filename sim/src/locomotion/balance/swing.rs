@@ -49,8 +49,8 @@ impl Swing {
     }
 
     /// Moves one physics step along the path to `goal`, `time_s` (at the pace of the gait) after
-    /// lift-off. The jerk of the minimum-jerk path from position x, velocity v, acceleration a to rest
-    /// at x1 in T is  60 (x1 - x) / T^3 - 36 v / T^2 - 9 a / T.
+    /// lift-off. The minimum-jerk path leads from position x, velocity v, acceleration a to rest at x1
+    /// in T. Its jerk is  60 (x1 - x) / T^3 - 36 v / T^2 - 9 a / T.
     pub(super) fn advance(&mut self, goal: Pose, time_s: f32, pace: f32, dt_s: f32) {
         if time_s <= 0.0 {
             return;

@@ -13,7 +13,7 @@ pub struct Bend {
     pub slope_1_m: Option<Matrix>,
 }
 
-/// Corners have the normals that a bend gives them, but for this much of their direction.
+/// Tolerance on the directions of corner normals that a bend gives.
 const TOLERANCE: f32 = 1e-3;
 
 impl TriangleMesh {

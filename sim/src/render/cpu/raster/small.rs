@@ -6,8 +6,8 @@ use super::{EDGES, Grid, LANE, Outlines, Reach, Reaches, Wide};
 use crate::render::shading::lanes::{LANES, Lanes, lanes};
 
 /// Linear functions over small triangles, in the order of `EDGES` and then nearness. They are given by
-/// the steps from sample to sample and from row to row, and by the values in their first rows at the
-/// beginning of their first block and of the next.
+/// their steps from sample to sample and from row to row, and by their start values. The latter are
+/// those in the first row at the beginning of the first block and of the next.
 pub(super) struct Slopes {
     across: [Lanes; 4],
     down: [Lanes; 4],
