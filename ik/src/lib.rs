@@ -10,10 +10,9 @@
 //! Everything is f64 and SI: metres, radians, seconds. Poses are `nalgebra::Isometry3<f64>` in the frame
 //! of the model's root, which is fixed. Twists are ordered [linear; angular].
 //!
-//! [`Solver::step`] takes one such step and yields Pink's iterates. [`Solver::track`] takes one that does
-//! not increase the objective unless limits or barriers demand it, for streamed targets that may be out
-//! of reach. [`Solver::solve`] iterates to a solution, with restarts for planning. All three report an
-//! [`Outcome`].
+//! [`Solver::step`] takes one such step and yields Pink's iterates. [`Solver::track`] takes one that does not
+//! increase the objective unless limits or barriers demand it, for streamed targets that may be out of reach.
+//! [`Solver::solve`] iterates to a solution, with restarts for planning. All three report an [`Outcome`].
 //!
 //! ```
 //! use tandem_ik::{Configuration, FrameTask, Model, PostureTask, Solver, Task};

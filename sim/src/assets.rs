@@ -1,5 +1,4 @@
-//! MJCF files embedded in the binary: `robots/<name>/robot.xml`, `scenes/<name>.xml`,
-//! `objects/<name>.xml`.
+//! MJCF files embedded in the binary: `robots/<name>/robot.xml`, `scenes/<name>.xml`, `objects/<name>.xml`.
 
 use std::sync::LazyLock;
 

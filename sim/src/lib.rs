@@ -1,5 +1,4 @@
-//! Physics of the robots and their rooms: MJCF loading, dynamics, balance control, cameras and
-//! renderers.
+//! Physics of the robots and their rooms: MJCF loading, dynamics, balance control, cameras and renderers.
 //!
 //! The modules, each of which uses only those before it: [`dynamics`], [`mjcf`], [`body`], [`estimate`]
 //! and [`locomotion`], [`robot`], [`world`], then [`render`] and [`mod@bench`].

@@ -1,5 +1,4 @@
-//! Reading of files that users name: regular ones of a bounded size, because a device or a pipe has no
-//! end.
+//! Reading of files that users name: regular ones of a bounded size, because a device or a pipe has no end.
 
 use std::{
     fs::{self, File},

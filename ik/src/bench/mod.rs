@@ -1,13 +1,11 @@
-//! Benchmark of the crate on pairs of wrist targets, in the way that Pink and its relatives are
-//! measured.
+//! Benchmark of the crate on pairs of wrist targets, in the way that Pink and its relatives are measured.
 //!
 //! A targets file holds the free joints, their start coordinates, and poses to reach:
 //! ```text
 //!   {"free_joints": [NAME], "start_q_rad": [NUMBER], "frames": [NAME], "limits": {NAME: {"velocity": rad/s}},
 //!    "targets": [{"frames": {NAME: {"position_m": [x, y, z], "quaternion_wxyz": [w, x, y, z]}}}]}
 //! ```
-//! Without a file, [`TargetSet::sample`] draws targets by forward kinematics, which makes them
-//! reachable.
+//! Without a file, [`TargetSet::sample`] draws targets by forward kinematics, which makes them reachable.
 
 mod targets;
 
@@ -25,8 +23,7 @@ use crate::tasks::Task;
 /// Length of a step, s.
 pub const DT_S: f64 = 0.02;
 const MAX_STEPS: usize = 300;
-/// Damping cost of the tuned run. Pink's damping task leaves dt out, so this is its cost of 0.01 times
-/// dt.
+/// Damping cost of the tuned run. Pink's damping task leaves dt out, so this is its cost of 0.01 times dt.
 pub const TUNED_DAMPING_COST: f64 = 1e-2 * DT_S;
 const RESTARTS: usize = 10;
 
@@ -57,8 +54,7 @@ pub struct Measured {
 struct Way {
     name: &'static str,
     damping_cost: f64,
-    /// Number of restarts; `None` steps until the frames reach their targets, as Pink's users write the
-    /// loop.
+    /// Number of restarts; `None` steps until the frames reach their targets, as Pink's users write the loop.
     restarts: Option<usize>,
 }
 

@@ -142,8 +142,7 @@ impl<'m> Configuration<'m> {
         if mass_kg > 0.0 { moment / mass_kg } else { Vector3::zeros() }
     }
 
-    /// Computes the columns of the centre of mass Jacobian, 3 x nv, m per rad or per m, written to
-    /// `columns`.
+    /// Computes the columns of the centre of mass Jacobian, 3 x nv, m per rad or per m, written to `columns`.
     pub fn center_of_mass_jacobian(&self, columns: &mut [Vector3<f64>]) {
         columns.fill(Vector3::zeros());
         let total_kg: f64 = self.model.masses.iter().map(|mass| mass.mass_kg).sum();

@@ -13,8 +13,7 @@ use crate::error::IkError;
 
 impl Model {
     /// Reads MJCF text. The one top-level body is the root, and its free joint is left out. Speeds are
-    /// unlimited, as MJCF has no velocity limits. Only masses stated in the file count, not those of
-    /// shapes.
+    /// unlimited, as MJCF has no velocity limits. Only masses stated in the file count, not those of shapes.
     ///
     /// # Errors
     ///

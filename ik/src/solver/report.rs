@@ -8,8 +8,7 @@ use crate::tasks::FrameError;
 /// Outcome of a step or a solution.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// Every frame and centre of mass that has a target is within [`Tolerance`], and no barrier is
-    /// crossed.
+    /// Every frame and centre of mass that has a target is within [`Tolerance`], and no barrier is crossed.
     Reached,
     /// The joints are on the way.
     Moving,

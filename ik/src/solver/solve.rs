@@ -44,8 +44,7 @@ struct Attempt {
 }
 
 impl Solver {
-    /// Moves `configuration` to `tasks`. If no attempt succeeds, it is left at the best coordinates
-    /// found.
+    /// Moves `configuration` to `tasks`. If no attempt succeeds, it is left at the best coordinates found.
     pub fn solve(
         &mut self,
         configuration: &mut Configuration,

@@ -6,9 +6,8 @@
 //! alpha/2 |W e|^2,  of which the quadratic program's solution is a descent direction. If halving does
 //! not help, the joints stay and further steps are damped by
 //!   mu = CAUTION^2 (caution^2 - 1),
-//! with caution tripled if no part of a step helps, raised by half if only a part does, and halved after
-//! a whole step. Source: Levenberg 1944; Nocedal and Wright, Numerical Optimization, 2006, chapters 3
-//! and 10.
+//! with caution tripled if no part of a step helps, raised by half if only a part does, and halved after a
+//! whole step. Source: Levenberg 1944; Nocedal and Wright, Numerical Optimization, 2006, chapters 3 and 10.
 
 use super::report::Outcome;
 use super::step::Solver;

@@ -1,5 +1,4 @@
-//! Common parts of tasks on poses: the weighting and clamping of their error, its columns and its six
-//! rows.
+//! Common parts of tasks on poses: the weighting and clamping of their error, its columns and its six rows.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector6};
 

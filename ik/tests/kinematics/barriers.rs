@@ -39,8 +39,7 @@ fn solver(model: &Model) -> Solver {
     solver
 }
 
-/// Hands sent through each other, through the trunk and through the head stop at the margin and stay
-/// there.
+/// Hands sent through each other, through the trunk and through the head stop at the margin and stay there.
 #[test]
 fn shapes_keep_apart_and_rest() {
     let model = common::g1();
@@ -87,8 +86,7 @@ fn overlapping_shapes_come_apart_at_bounded_speed() {
     assert!(apart > 0.0, "still {apart} m");
 }
 
-/// Two barriers with opposite demands hold still rather than fail; one that contradicts an equality is
-/// named.
+/// Two barriers with opposite demands hold still rather than fail; one that contradicts an equality is named.
 #[test]
 fn contradictions_hold_still_or_are_named() {
     let model = common::g1();

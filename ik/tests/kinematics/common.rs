@@ -1,5 +1,4 @@
-//! The G1 of the tests: pelvis fixed, waist and arms free, capsules about trunk, head, forearms and
-//! hands.
+//! The G1 of the tests: pelvis fixed, waist and arms free, capsules about trunk, head, forearms and hands.
 
 use nalgebra::Point3;
 use tandem_ik::{Capsule, Configuration, Model, SelfCollision};

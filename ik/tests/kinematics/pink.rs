@@ -1,5 +1,4 @@
-//! Two wrists of a G1 on 200 reachable targets, compared with Pink 4.4 with quadprog on the same
-//! targets.
+//! Two wrists of a G1 on 200 reachable targets, compared with Pink 4.4 with quadprog on the same targets.
 
 use nalgebra::{Isometry3, Translation3};
 use serde_json::Value;

@@ -131,12 +131,11 @@ const fn moving(name: &'static str, [vx_m_s, vy_m_s, yaw_rate_rad_s]: [f32; 3]) 
     Case { name, duration_s: 21.0 + STOP_S, plan: Plan::Move(velocity), ..HOLD }
 }
 
-/// Rise time of pulls at hands, as when fingers close on a load. Let f be the force at both hands
-/// together at the height z, m g the weight, and a the reach of the feet ahead of their middle. The
-/// centre of mass then has to lean by  f z / (m g) - a  against a steady pull. A sudden pull leaves no
-/// time for that. With the pressure at the toes the centre of mass still follows the pull, by
-/// c'' = (g / h) (c + f z / (m g) - a)  from the first instant. At 2 x 25 N f z / (m g) is 15 cm, and
-/// soles of 17 cm have a = 8.5 cm.
+/// Rise time of pulls at hands, as when fingers close on a load. Let f be the force at both hands together at
+/// the height z, m g the weight, and a the reach of the feet ahead of their middle. The centre of mass then
+/// has to lean by  f z / (m g) - a  against a steady pull. A sudden pull leaves no time for that. With the
+/// pressure at the toes the centre of mass still follows the pull, by c'' = (g / h) (c + f z / (m g) - a)
+/// from the first instant. At 2 x 25 N f z / (m g) is 15 cm, and soles of 17 cm have a = 8.5 cm.
 pub(super) const PULL_RISE_S: f32 = 1.0;
 
 /// End times of pulls at the hands of a standing robot. A long pull lasts to the end of the case, which

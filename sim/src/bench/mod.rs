@@ -1,6 +1,5 @@
-//! Benchmarks of base controllers: standing, loads, walking, stopping, squatting, pushes and a tour,
-//! with several seeds each. They also measure the time of a physics step and of an image, and falling
-//! robots.
+//! Benchmarks of base controllers: standing, loads, walking, stopping, squatting, pushes and a tour, with
+//! several seeds each. They also measure the time of a physics step and of an image, and falling robots.
 
 mod cases;
 mod falls;
@@ -134,8 +133,7 @@ pub fn run(
     Ok(LocomotionReport { robot: robot.into(), controller: choice.name(), sensing, cases })
 }
 
-/// Returns the result of `trial` for each of these seeds, running as many at once as there are
-/// processors.
+/// Returns the result of `trial` for each of these seeds, running as many at once as there are processors.
 pub fn over_seeds<T: Send>(seeds: &RangeInclusive<u32>, trial: impl Fn(u32) -> T + Sync) -> Vec<T> {
     let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
     let seeds: Vec<u32> = seeds.clone().collect();

@@ -48,8 +48,7 @@ const CONTROL_STEPS: usize = 150;
 /// Number of control steps in which fingers nearly close before the bottle is put between them.
 const CLOSING_CONTROL_STEPS: usize = 25;
 const NEARLY: f32 = 0.8;
-/// A hand closed round an upright cylinder of 7 cm, right hand: thumb 0 to 2, middle 0 and 1, index 0
-/// and 1.
+/// A hand closed round an upright cylinder of 7 cm, right hand: thumb 0 to 2, middle 0 and 1, index 0 and 1.
 const CLOSED_RAD: [f32; HAND_JOINTS] = [0.0, 0.75, -0.8, 1.1, 1.3, 1.1, 1.3];
 /// Middle of the grasped cylinder in the frame of the wrist, and the grasp height above a bottle's base.
 const GRASP_IN_WRIST_M: Vector = Vector::new(0.12, 0.055, 0.0);

@@ -1,5 +1,4 @@
-//! Duration of rendering: the images of both robots' head cameras in one state of Handover's kitchen, in
-//! two sizes, and that of the camera in the room.
+//! Duration of rendering in Handover's kitchen: both head cameras, in two sizes, and the camera in the room.
 
 use std::f32::consts::PI;
 use std::time::{Duration, Instant};
@@ -26,8 +25,7 @@ pub struct PicturesCase {
     pub pictures: usize,
     pub width: u32,
     pub height: u32,
-    /// CPU time of the thread that requests them; if the system does not report it, the same as
-    /// `wall_ms`.
+    /// CPU time of the thread that requests them; if the system does not report it, the same as `wall_ms`.
     pub busy_ms: Spread,
     pub wall_ms: Spread,
 }

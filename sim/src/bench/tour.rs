@@ -77,8 +77,7 @@ pub(super) fn legs(tour: &Tour, random: &mut SplitMix64) -> Vec<Leg> {
         .collect()
 }
 
-/// Returns the command that walks straight to the target without turning, and stands within [`NEAR_M`]
-/// of it.
+/// Returns the command that walks straight to the target without turning, and stands within [`NEAR_M`] of it.
 pub(super) fn command(
     away_m: Vector,
     heading_rad: f32,

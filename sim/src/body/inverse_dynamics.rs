@@ -1,8 +1,6 @@
-//! Inverse dynamics of one robot: the joint torques and the external wrench that a wanted motion
-//! requires.
+//! Inverse dynamics of one robot: the joint torques and the external wrench that a wanted motion requires.
 //!
-//! Newton-Euler in the world frame. Outwards, with r, a the origin and axis of a joint and p the parent
-//! link:
+//! Newton-Euler in the world frame. Outwards, with r, a the origin and axis of a joint and p the parent link:
 //!   w = w_p + a q',   dw = dw_p + a q'' + w_p x a q',   acc = acc_p + dw_p x r + w_p x (w_p x r).
 //! Inwards: f = m (acc_c - g),  n = I dw + w x I w,  summed up to the pelvis;  tau = a . n + armature
 //! q''. Source: Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 5.

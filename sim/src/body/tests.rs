@@ -7,8 +7,7 @@ use super::{ARM_JOINTS, ARMS, Acceleration, JOINTS, UPPER, joint_names};
 use crate::{GRAVITY_M_S2, Side};
 
 const STILL: Acceleration = Acceleration { linear_m_s2: Vector::ZERO, angular_rad_s2: Vector::ZERO };
-/// Time step of differences: the truncation error shrinks with its square, rounding grows with its
-/// inverse.
+/// Time step of differences: the truncation error shrinks with its square, rounding grows with its inverse.
 const DT_S: f32 = 0.005;
 
 fn check_near(measured: Vector, expected: Vector, tolerance: f32, what: &str) {

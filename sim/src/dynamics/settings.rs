@@ -37,13 +37,11 @@ pub struct Settings {
     /// Softness of contacts between two moving things, and of contacts with fixed ones.
     pub contact: Softness,
     pub ground_contact: Softness,
-    /// Penetration depth that is not corrected. At 0 a bottle precesses on its rim; at 1 mm hung frames
-    /// slip.
+    /// Penetration depth that is not corrected. At 0 a bottle precesses on its rim; at 1 mm hung frames slip.
     pub slop_m: f64,
     /// Maximum speed at which penetration is corrected.
     pub fastest_correction_m_s: f64,
-    /// Margin on the closing speed. A gap that would stay open even if it closed faster by this gets no
-    /// row.
+    /// Margin on the closing speed. A gap that would stay open even if it closed faster by this gets no row.
     pub margin_m_s: f64,
     /// Maximum distance between a contact and the one of the last step that it continues.
     pub match_m: f64,

@@ -55,8 +55,7 @@ pub struct SensorReadings {
     pub joints: JointReadings,
     /// Angular velocity of the pelvis, in its axes.
     pub gyro_rad_s: Vector,
-    /// Specific force at the IMU, its mean since the last reading, in the pelvis' axes: upwards 9.81 at
-    /// rest.
+    /// Specific force at the IMU, its mean since the last reading, in the pelvis' axes: upwards 9.81 at rest.
     pub specific_force_m_s2: Vector,
 }
 
@@ -240,8 +239,7 @@ impl StateEstimator {
 
     fn correct(&mut self, model: &RobotModel, pelvis_from_link: &[Pose], dt_s: f64) {
         let still = self.is_still();
-        // A walking robot's heading and the gyro's bias about the vertical are considered, not
-        // corrected.
+        // A walking robot's heading and the gyro's bias about the vertical are considered, not corrected.
         let considered: &[usize] = if still { &[] } else { &[TURN + 2, GYRO_BIAS + 2] };
         let mut update = Update { covariance: &mut self.covariance, errors: [0.0; ERRORS], considered };
         for (side, foot) in Side::BOTH.into_iter().zip(self.feet.iter()) {

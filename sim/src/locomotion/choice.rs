@@ -28,8 +28,7 @@ impl LocomotionChoice {
     ///
     /// # Errors
     ///
-    /// Returns an error if the file cannot be used, or if the crate was built without the feature
-    /// `onnx`.
+    /// Returns an error if the file cannot be used, or if the crate was built without the feature `onnx`.
     pub fn from_file(path: &Path, looped: bool) -> Result<LocomotionChoice, SimError> {
         from_onnx(path, looped)
     }

@@ -1,5 +1,4 @@
-//! Base control: turns a base command into torques of the twelve leg joints, through ground contact
-//! alone.
+//! Base control: turns a base command into torques of the twelve leg joints, through ground contact alone.
 
 #[cfg(feature = "onnx")]
 mod agile;

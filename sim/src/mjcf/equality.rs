@@ -1,5 +1,4 @@
-//! Constraints of a file on pairs of joints or bodies: couplings, welds, pins, and bodies that never
-//! touch.
+//! Constraints of a file on pairs of joints or bodies: couplings, welds, pins, and bodies that never touch.
 
 use mjcf_rs::equality::Equality as Element;
 use rapier3d::glamx::{DPose3, DVec3};

@@ -8,8 +8,7 @@ use crate::SimError;
 pub struct Key {
     pub name: String,
     pub time_s: f64,
-    /// The coordinates of all joints, in the order of [`Document::trees`]; see
-    /// [`LinkJoint::coordinates`].
+    /// The coordinates of all joints, in the order of [`Document::trees`]; see [`LinkJoint::coordinates`].
     pub positions: Vec<f64>,
     /// A number for each degree of freedom; a free joint has its velocity in world axes and its spin in
     /// its body's axes.

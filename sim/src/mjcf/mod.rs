@@ -112,8 +112,7 @@ impl Document {
         Ok(document)
     }
 
-    /// Returns the elements of the file that only approximate MuJoCo, one per line with their first
-    /// place.
+    /// Returns the elements of the file that only approximate MuJoCo, one per line with their first place.
     pub fn approximations(&self) -> &[String] {
         &self.checked.approximated
     }
@@ -129,8 +128,7 @@ impl Document {
         }
     }
 
-    /// Returns a hash of the content, including all files that it includes and names; comments do not
-    /// count.
+    /// Returns a hash of the content, including all files that it includes and names; comments do not count.
     pub fn fingerprint(&self) -> u64 {
         let read = (&self.model, &self.cameras, &self.meshes, &self.texture_rgb, &self.speed_limit_values);
         let mut content = format!("{read:?}");

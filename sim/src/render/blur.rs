@@ -27,8 +27,7 @@ fn kernel(blur_px: f32) -> Vec<f32> {
     weights.into_iter().map(|weight| weight / sum).collect()
 }
 
-/// Blurs along `lines` lines of `length` pixels; `at` gives the index of the red value of a line's
-/// pixel.
+/// Blurs along `lines` lines of `length` pixels; `at` gives the index of the red value of a line's pixel.
 fn spread(
     from_values: &[f32],
     weight_values: &[f32],

@@ -11,8 +11,7 @@ pub(super) fn read(tree: &Tree, model: &RobotModel) -> ([f32; JOINTS], [f32; JOI
     (of(Tree::joint_position), of(Tree::joint_velocity))
 }
 
-/// Returns the torques that the drives exerted in the last step, limits and implicit parts included (N
-/// m).
+/// Returns the torques that the drives exerted in the last step, limits and implicit parts included (N m).
 pub(super) fn torques_n_m(tree: &Tree, model: &RobotModel) -> [f32; JOINTS] {
     std::array::from_fn(|joint| of_joint(model, joint, |link| tree.drive_effort(link)))
 }

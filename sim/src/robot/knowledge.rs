@@ -18,8 +18,7 @@ use crate::{PHYSICS_DT_S, Sides};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StateSource {
-    /// A filter over inertial measurement unit, joint encoders and joint torques, as a real robot needs
-    /// it.
+    /// A filter over inertial measurement unit, joint encoders and joint torques, as a real robot needs it.
     #[default]
     Estimator,
     /// The simulator's own state, which no real robot has.

@@ -113,8 +113,7 @@ impl World {
         pressed.filter_map(press).collect()
     }
 
-    /// Returns pairs of a robot's own links that press on each other, with the force (N): empty in a
-    /// clean pose.
+    /// Returns pairs of a robot's own links that press on each other, with the force (N).
     pub fn self_contacts(&self, robot: usize) -> Vec<(String, String, f32)> {
         let mut forces_n: BTreeMap<(usize, usize), f32> = BTreeMap::new();
         for (owners, force_n) in self.presses() {

@@ -148,8 +148,7 @@ fn a_robot_that_walks_against_a_post_keeps_its_feet_out_of_it() {
     let places = [0.24, 0.28, 0.32, 0.36, 0.40].map(through);
     let (through_m, ahead_m) =
         places.into_iter().max_by(|one, other| one.0.total_cmp(&other.0)).expect("five");
-    // The collision shape ends 4.5 mm above the drawn sole, which shows where a foot comes down on the
-    // post.
+    // The collision shape ends 4.5 mm above the drawn sole, which shows where a foot comes down on the post.
     let deepest_m = walked_m(robot(), ahead_m);
     println!("{places:?}: {deepest_m} m at {ahead_m} m");
     assert!(deepest_m < DRAWN_M + 0.0055, "{deepest_m} m at {ahead_m} m");

@@ -20,10 +20,9 @@ const PLAIN: Friction = Friction {
 };
 
 impl World {
-    /// Puts an endless plane under the lowest shape of the scene, unless the scene has such a plane
-    /// itself. Exported rooms have boxes for floors, and anything that goes over the edge of one would
-    /// fall forever. In a scene without colliders it is at z = 0, where robots are put. The plane is not
-    /// drawn.
+    /// Puts an endless plane under the lowest shape of the scene, unless the scene has such a plane itself.
+    /// Exported rooms have boxes for floors, and anything that goes over the edge of one would fall forever.
+    /// In a scene without colliders it is at z = 0, where robots are put. The plane is not drawn.
     pub(super) fn lay_ground(&mut self) {
         // No joint moves a plane.
         let carries = |(collider, at): (&Collider, DPose3)| {

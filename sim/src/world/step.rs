@@ -25,8 +25,7 @@ pub struct Step {
     pub body_touches: Vec<BodyTouch>,
 }
 
-/// State of one robot: sensed values after the step, its estimate of its place, the truth, and its
-/// command for the step.
+/// One robot: sensed values after the step, its estimate of its place, the truth, and the step's command.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotStep {
     pub sensed: RobotSensed,
@@ -63,8 +62,7 @@ pub struct BodyTouch {
     pub robot: usize,
 }
 
-/// Normal contact forces (N, world) that a hand's parts exert on an object, averaged over the last
-/// physics step.
+/// Mean normal contact forces (N, world) of a hand's parts on an object in the last physics step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct HandContacts {
     pub thumb_n: Vector,

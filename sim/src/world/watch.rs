@@ -18,8 +18,7 @@ pub const FASTEST_M_S: f64 = 25.0;
 pub const MAX_ENERGY_SHARE: f64 = 0.05;
 pub const WINDOW_S: f64 = 0.2;
 /// Minimum energy that the share refers to: the energy that a robot of 35 kg gains in a fall of 30 cm.
-/// Pushing bodies out of each other lifts such a robot out of the tolerated depth with less than 5 % of
-/// it.
+/// Pushing bodies out of each other lifts such a robot out of the tolerated depth with less than 5 % of it.
 pub const MIN_SCALE_J: f64 = 100.0;
 /// Maximum overlap, and the maximum time for which it may be exceeded.
 pub const DEEP_M: f64 = 0.02;

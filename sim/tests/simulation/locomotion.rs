@@ -79,8 +79,7 @@ fn walks_as_high_as_policies_are_told() {
         };
         (0..200).map(|_| height_m()).collect()
     };
-    // At this height it loses its stance at times, steps up and goes down again: its lowest height
-    // counts.
+    // At this height it loses its stance at times, steps up and goes down again: its lowest height counts.
     let lowest_m = heights_m_at(0.0).into_iter().fold(f32::MAX, f32::min);
     assert!((0.49..0.56).contains(&lowest_m), "it stands {lowest_m} m high, told 0.50 m");
     let height_m = heights_m_at(0.4)[199];

@@ -1,6 +1,5 @@
 //! The scenes for comparing Tandem's physics with MuJoCo: the reader finds the same bodies, masses and
-//! coordinates in them. Their sensors' readings stay within the tolerance recorded with MuJoCo's
-//! readings.
+//! coordinates in them. Their sensors' readings stay within the tolerance recorded with MuJoCo's readings.
 
 use std::path::{Path, PathBuf};
 

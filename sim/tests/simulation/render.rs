@@ -197,8 +197,7 @@ fn ids_name_the_nearest_thing() {
 
 #[test]
 fn neighbouring_triangles_leave_no_gap() {
-    // Within the image of a closed shape nothing of the floor behind it may show, whichever way it is
-    // turned.
+    // Within the image of a closed shape nothing of the floor behind it may show, whichever way it is turned.
     for step in 0..24 {
         let rotation =
             Rotation::from_rotation_x(0.37 * step as f32) * Rotation::from_rotation_z(0.61 * step as f32);
@@ -226,14 +225,12 @@ fn neighbouring_triangles_leave_no_gap() {
 fn a_thing_in_the_sun_darkens_the_floor() {
     let camera = overhead(2.0);
     let block_at = |x: f32, z: f32| step(&[at(x, 0.0, z)]);
-    // One renderer for all three images: shadows must follow the step. The first block is below the
-    // floor.
+    // One renderer for all three images: shadows must follow the step. The first block is below the floor.
     let mut renderer = cpu(floor_and(TriangleMesh::cuboid(Vector::splat(0.05))));
     let empty = renderer.render(&block_at(0.0, -5.0), &camera);
     let left = renderer.render(&block_at(-0.3, 0.3), &camera);
     let right = renderer.render(&block_at(0.3, 0.3), &camera);
-    // The sun is at (-0.306, 0.354, 0.884): from 0.3 m up, the shadow falls 0.104 m to +x and 0.12 m to
-    // -y.
+    // The sun is at (-0.306, 0.354, 0.884): from 0.3 m up, the shadow falls 0.104 m to +x and 0.12 m to -y.
     for (x, shaded, lit) in [(-0.3, &left, &right), (0.3, &right, &left)] {
         let pixel = pixel_at(&camera, Vector::new(x + 0.104, -0.12, 0.0));
         let [empty, shaded, lit] = [&empty, shaded, lit].map(|frame| rgb(frame, pixel));

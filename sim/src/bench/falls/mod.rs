@@ -120,8 +120,7 @@ impl FallsCase {
         }
     }
 
-    /// Column heads of its lines: greatest values, and in brackets the number of episodes beyond the
-    /// limit.
+    /// Column heads of its lines: greatest values, and in brackets the number of episodes beyond the limit.
     pub const HEAD: &str = "case                  episodes fallen diverged  fastest link    energy made        deeper than 2 cm      beyond range  fastest joint";
 }
 

@@ -34,9 +34,8 @@ pub struct LinkModel {
     solid: Solid,
 }
 
-/// One actuated hinge, with the PD gains and limits of its position actuator. A joint of the published
-/// order that the robot lacks is rigid: it is at 0 and has a zero axis, so that no force has a moment
-/// about it.
+/// One actuated hinge, with the PD gains and limits of its position actuator. A joint of the published order
+/// that the robot lacks is rigid: it is at 0 and has a zero axis, so that no force has a moment about it.
 #[derive(Clone, Debug)]
 pub struct JointModel {
     pub name: String,

@@ -179,8 +179,7 @@ fn excluded(document: &Document, tree: &BodyTree) -> Result<BTreeSet<(usize, usi
     Ok(excluded)
 }
 
-/// Returns the links that fingers move, in the order of links, and the palm's position relative to the
-/// wrist.
+/// Returns the links that fingers move, in the order of links, and the palm's position relative to the wrist.
 fn hand(joints: &[JointModel], side: Side, wrist: &SiteModel) -> HandLinks {
     let (thumb, fingers) = joints[HANDS[side]..HANDS[side] + HAND_JOINTS].split_at(THUMB_JOINTS);
     let links = |joints: &[JointModel]| {

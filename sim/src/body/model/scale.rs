@@ -181,8 +181,7 @@ mod tests {
     use super::*;
     use crate::body::posed::model;
 
-    /// A robot described like the G1 is moved like the G1, except that its ankles are stronger than it
-    /// needs.
+    /// A robot described like the G1 is moved like the G1, except that its ankles are stronger than it needs.
     #[test]
     fn the_g1_has_the_scale_of_a_g1() {
         let own = BodyScale::between(model(), model());

@@ -1,5 +1,4 @@
-//! The rest posture of a robot: its legs bent as much as a G1's, its soles flat under its centre of
-//! mass.
+//! The rest posture of a robot: its legs bent as much as a G1's, its soles flat under its centre of mass.
 
 use rapier3d::math::{Pose, Vector};
 

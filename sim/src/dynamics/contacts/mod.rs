@@ -36,8 +36,7 @@ pub struct ContactPoint {
     pub(in crate::dynamics) memory: Impulses,
 }
 
-/// Impulses of the correcting pass: normal, tangent (world axes), spin about the normal, roll (world
-/// axes).
+/// Impulses of the correcting pass: normal, tangent (world axes), spin about the normal, roll (world axes).
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Impulses {
     pub normal: f64,

@@ -1,5 +1,4 @@
-//! Pairs of colliders near each other: Rapier's broad phase, on bounds grown by the motion within a
-//! step.
+//! Pairs of colliders near each other: Rapier's broad phase, on bounds grown by the motion within a step.
 
 use std::collections::BTreeSet;
 

@@ -264,8 +264,7 @@ impl JointRow {
         AbreastRow { column: &column[self.places.clone()], y: &y[self.places.clone()] }
     }
 
-    /// Applies the drives to the velocities. Returns the greatest change by a motor that is turned too
-    /// fast.
+    /// Applies the drives to the velocities. Returns the greatest change by a motor that is turned too fast.
     #[inline(never)]
     fn drive(&self, drives: &mut [BoundedDrive], v: &mut Abreast) -> f64 {
         let mut greatest = 0.0f64;
@@ -323,8 +322,7 @@ impl JointRange {
         [self.down[at], self.up[at]]
     }
 
-    /// Returns true if neither end has an effect. Most joints are far from both, so this is a fast
-    /// check.
+    /// Returns true if neither end has an effect. Most joints are far from both, so this is a fast check.
     #[inline(always)]
     fn rests(&self, pass: Pass, v: Abreast) -> bool {
         let [down, up] = self.allowed(pass);

@@ -1,5 +1,4 @@
-//! Equalities: coupled joints, points held together, and welds that can be switched, for example a
-//! latch.
+//! Equalities: coupled joints, points held together, and welds that can be switched, for example a latch.
 
 use pulp::Simd;
 use rapier3d::glamx::{DMat3, DPose3, DVec3};

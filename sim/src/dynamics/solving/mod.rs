@@ -40,8 +40,7 @@ const HARD_J: f64 = 0.3;
 pub struct Solver {
     /// Whitened velocities of all trees.
     pub w: Whitened,
-    /// Whitened velocities before the step, and their change by contacts; used only by
-    /// [`Solver::take_only`].
+    /// Whitened velocities before the step, and their change by contacts; used only by [`Solver::take_only`].
     before: Vec<f64>,
     change: Whitened,
     joints: JointRows,
@@ -139,8 +138,7 @@ impl Solver {
         }
     }
 
-    /// Keeps the state that the next step begins with. Nothing of the last step changes before this
-    /// call.
+    /// Keeps the state that the next step begins with. Nothing of the last step changes before this call.
     pub fn commit(&mut self, trees: &mut Trees, dt_s: f64) {
         self.joints.commit(trees, dt_s);
         self.equalities.commit();
@@ -169,9 +167,8 @@ impl Solver {
     /// leave part of the speed that separates penetrating bodies. The impulses P of all contacts of a
     /// heap have then done work, and a share s of them does
     ///   W(s) = s P . (v + v' - (1 - s) M^-1 P) / 2,   v and v' the velocities before and after the step.
-    /// The share that stays is the one that does no work. It preserves all momentum and all friction
-    /// cones. Remaining approach velocities, and joints that move on into their stops, are stopped in
-    /// the next step.
+    /// The share that stays is the one that does no work. It preserves all momentum and all friction cones.
+    /// Remaining approach velocities, and joints that move on into their stops, are stopped in the next step.
     fn take_only(&mut self, trees: &Trees, candidates: &[Candidate]) {
         self.before.resize(self.w.len(), 0.0);
         for (tree, offset) in trees.all.iter().zip(&trees.offset) {
@@ -238,8 +235,7 @@ impl Solver {
     }
 }
 
-/// Work for the widest vectors of the processor. They add and multiply exactly as scalars do, bit for
-/// bit.
+/// Work for the widest vectors of the processor. They add and multiply exactly as scalars do, bit for bit.
 struct Settling<'a> {
     solver: &'a mut Solver,
     trees: &'a Trees,
@@ -291,8 +287,7 @@ impl HeapWork {
     }
 }
 
-/// Returns the kinetic energy, including the terms that springs, dampers and drives add to the mass
-/// matrix.
+/// Returns the kinetic energy, including the terms that springs, dampers and drives add to the mass matrix.
 fn kinetic_j(w: &[f64]) -> f64 {
     0.5 * w.iter().map(|w| w * w).sum::<f64>()
 }

@@ -95,12 +95,10 @@ pub struct Diverged {
     pub speed: f64,
 }
 
-/// Maximum velocity, m/s or rad/s. No real motion comes near; beyond it, Rapier's f32 would soon
-/// overflow.
+/// Maximum velocity, m/s or rad/s. No real motion comes near; beyond it, Rapier's f32 would soon overflow.
 const FASTEST: f64 = 1e6;
 
-/// Work for the widest vectors of the processor. They add and multiply exactly as scalars do, bit for
-/// bit.
+/// Work for the widest vectors of the processor. They add and multiply exactly as scalars do, bit for bit.
 struct Whitening<'a> {
     trees: &'a mut Trees,
     w: &'a mut [f64],

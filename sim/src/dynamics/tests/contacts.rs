@@ -73,8 +73,7 @@ fn dynamics_impacts_do_not_gain_energy() {
     }
 }
 
-/// Bodies of unequal mass that fall on each other end at rest and never have more energy than at the
-/// start.
+/// Bodies of unequal mass that fall on each other end at rest and never have more energy than at the start.
 #[test]
 fn dynamics_pile_comes_to_rest() {
     let mut bench = Bench::with_floor(DOWN, sliding(0.5));

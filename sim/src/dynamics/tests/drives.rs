@@ -7,8 +7,7 @@ use super::super::{Axis, Drive, Joint, Mass, Tree};
 use super::bench::{Bench, DOWN, DT_S, Random, jointed, link, sliding};
 use super::inverse::efforts;
 
-/// Far from its target a drive exerts its limit, and the reported effort explains the change of
-/// momentum.
+/// Far from its target a drive exerts its limit, and the reported effort explains the change of momentum.
 #[test]
 fn dynamics_drive_saturates() {
     let mass = Mass::of_box(3.0, DVec3::splat(0.1));

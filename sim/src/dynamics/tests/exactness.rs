@@ -1,5 +1,4 @@
-//! Bit-identical reruns, whatever Rapier's broad phase has seen before, and errors for non-finite
-//! numbers.
+//! Bit-identical reruns, whatever Rapier's broad phase has seen before, and errors for non-finite numbers.
 
 use rapier3d::glamx::{DPose3, DVec3};
 use rapier3d::prelude::SharedShape;

@@ -32,8 +32,7 @@ fn bottle(bench: &mut Bench, tilt: DVec3, spin_rad_s: DVec3, friction: Friction)
     tree
 }
 
-/// Tilt (degrees), heading of the tilt axis in the floor, spin about the vertical, and spin across that
-/// axis.
+/// Tilt (degrees), heading of the tilt axis in the floor, spin about the vertical, and spin across that axis.
 const ROCKS: [[f64; 4]; 8] = [
     [1.0, 0.3, 0.0, 0.6],
     [2.0, 0.0, 0.0, 0.6],

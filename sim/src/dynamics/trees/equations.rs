@@ -73,8 +73,7 @@ impl Tree {
         }
     }
 
-    /// Fills the packed rows from the links' own inertias (see [`Tree::bias`]), armatures and implicit
-    /// terms.
+    /// Fills the packed rows from the links' own inertias (see [`Tree::bias`]), armatures and implicit terms.
     #[inline(always)]
     pub(in crate::dynamics) fn composite_mass_matrix(&mut self) {
         for i in (0..self.links.len()).rev() {

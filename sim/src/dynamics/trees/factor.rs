@@ -1,9 +1,9 @@
 //! The factor of a mass matrix, M = L^T D L along the tree, and the whitened velocities w = D^1/2 L v.
 //!
 //! Rows of constraints are whitened as Y = D^-1/2 L^-T J^T. Then the kinetic energy is |w|^2 / 2, an
-//! impulse lambda changes w by Y lambda, and the effective inverse mass of a row is Y . Y. Neither M^-1
-//! J^T nor J M^-1 J^T is formed. L has the sparsity of the tree: each column is non-zero only on the
-//! path to the world. Source: Featherstone 2008, section 6.5 and table 6.3.
+//! impulse lambda changes w by Y lambda, and the effective inverse mass of a row is Y . Y. Neither M^-1 J^T
+//! nor J M^-1 J^T is formed. L has the sparsity of the tree: each column is non-zero only on the path to
+//! the world. Source: Featherstone 2008, section 6.5 and table 6.3.
 
 use pulp::Simd;
 
@@ -51,8 +51,7 @@ impl Factor {
         }
     }
 
-    /// Computes w = D^1/2 L v + D^-1/2 L^-T (dt rhs): the whitened velocity at the end of an
-    /// unconstrained step. It overwrites `rhs`.
+    /// Computes w = D^1/2 L v + D^-1/2 L^-T (dt rhs), the unconstrained whitened velocity; overwrites `rhs`.
     pub fn whiten(&self, layout: &Layout, dt_s: f64, v: &[f64], rhs: &mut [f64], w: &mut [f64]) {
         for k in (0..layout.dofs()).rev() {
             let row = &self.h[layout.row(k)];
@@ -92,8 +91,7 @@ impl Factor {
         }
     }
 
-    /// Computes Y = D^-1/2 L^-T J^T in place, for N rows at once that are zero outside the path of
-    /// degree of freedom `k`.
+    /// Computes Y = D^-1/2 L^-T J^T in place, for N rows that are zero outside the path of degree of freedom `k`.
     #[inline(always)]
     pub fn whiten_rows<S: Simd, const N: usize>(
         &self,

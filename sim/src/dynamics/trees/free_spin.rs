@@ -5,9 +5,8 @@
 //! which preserves |I w| and w . I w for any step size, so that a tumbling body neither gains energy nor
 //! loses it. It is solved by Newton's iteration; the derivative is  I + dt/2 ([m] I - [I m]).
 //!
-//! Contacts are solved for the spin at the end of this rotation, but their impulses act when the step
-//! begins: the resulting spin gyrates as a whole. Without that, a top would tilt by  omega dt / 2  of
-//! its precession.
+//! Contacts are solved for the spin at the end of this rotation, but their impulses act when the step begins:
+//! the resulting spin gyrates as a whole. Without that, a top would tilt by  omega dt / 2  of its precession.
 
 use rapier3d::glamx::{DMat3, DQuat, DVec3};
 

@@ -25,8 +25,7 @@ pub enum Joint {
     Slide(Axis),
 }
 
-/// Joint of one degree of freedom. Positions are in rad for a hinge and m for a slide, efforts in N m
-/// and N.
+/// Joint of one degree of freedom. Positions are in rad for a hinge and m for a slide, efforts in N m and N.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
     /// Unit vector, link frame.
@@ -68,12 +67,11 @@ pub struct Drive {
 /// +-most. A motor that turns fast pushes less in the direction in which it turns, and brakes with its
 /// full effort:
 ///   impulse <= slope (speed_limit - v'),   slope = most / (0.2 speed_limit),   for v' > 0,
-/// which is the full effort at 80 % of the limit and zero at the limit. Beyond the limit, where
-/// something else turns the motor, its voltage exceeds the supply's. It drives a current back through
-/// the diodes of its bridge, which no controller can prevent. It then brakes along the same line
-/// whatever the setpoint is, and from 120 % on with more than `most`. Like the rest of the law, this
-/// holds at the end of the step. So no motor drives itself beyond its limit within a step, however light
-/// its link is.
+/// which is the full effort at 80 % of the limit and zero at the limit. Beyond the limit, where something
+/// else turns the motor, its voltage exceeds the supply's. It drives a current back through the diodes of its
+/// bridge, which no controller can prevent. It then brakes along the same line whatever the setpoint is, and
+/// from 120 % on with more than `most`. Like the rest of the law, this holds at the end of the step. So no
+/// motor drives itself beyond its limit within a step, however light its link is.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DriveLaw {
     pub rest: f64,

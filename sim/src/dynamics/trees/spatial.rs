@@ -7,8 +7,7 @@ use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 use rapier3d::glamx::{DMat3, DPose3, DQuat, DVec3};
 use rapier3d::math::Pose;
 
-/// Velocity, acceleration or joint axis: `angular` [rad/s], `linear` [m/s] of the point at the
-/// reference.
+/// Velocity, acceleration or joint axis: `angular` [rad/s], `linear` [m/s] of the point at the reference.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct MotionVector {
     pub angular: DVec3,

@@ -69,8 +69,7 @@ impl Tree {
         }
     }
 
-    /// Applies a force (N, world axes) at a point (world frame) of a link in the next step; forces add
-    /// up.
+    /// Applies a force (N, world axes) at a point (world frame) of a link in the next step; forces add up.
     pub fn push(&mut self, link: usize, point_m: DVec3, force_n: DVec3) {
         self.external[link] += ForceVector::at(point_m - self.reference_m, force_n);
     }

@@ -182,8 +182,7 @@ fn keep_place(place: &mut ReferencePlace, body: &BodyEstimate, command: [f32; 3]
     place.follow(pelvis, command, dt_s)
 }
 
-/// Returns the joint angles minus the task's waist targets, as if the task had commanded an upright
-/// waist.
+/// Returns the joint angles minus the task's waist targets, as if the task had commanded an upright waist.
 fn less_waist_targets(body: &BodyEstimate) -> [f32; JOINTS] {
     let mut q_rad = body.q_rad;
     for (i, target_rad) in body.waist_target_rad.into_iter().enumerate() {

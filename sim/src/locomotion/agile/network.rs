@@ -1,9 +1,8 @@
 //! The ONNX file of a velocity policy: its required tensors, and how it is run.
 //!
-//! The network takes `root_link_quat_w`, `root_ang_vel_b`, `velocity_commands`, `joint_pos` and
-//! `joint_vel`. It returns `action_joint_pos`, `action_joint_pos_kp_gains` and
-//! `action_joint_pos_kd_gains`. Every other input `X` (last actions, histories) is a memory: the output
-//! `X_out` is its value at the next step.
+//! The network takes `root_link_quat_w`, `root_ang_vel_b`, `velocity_commands`, `joint_pos` and `joint_vel`.
+//! It returns `action_joint_pos`, `action_joint_pos_kp_gains` and `action_joint_pos_kd_gains`. Every other
+//! input `X` (last actions, histories) is a memory: the output `X_out` is its value at the next step.
 
 use std::error::Error;
 use std::fmt;
@@ -39,8 +38,7 @@ const SENSED: [(&str, usize); 5] = [
 const ACTIONS: [&str; 3] = ["action_joint_pos", "action_joint_pos_kp_gains", "action_joint_pos_kd_gains"];
 /// Suffix that a memory's output has after the input's name.
 const FED_BACK: &str = "_out";
-/// Number of warm-up steps: more than the five frames of a history, so that the actions in it have
-/// settled.
+/// Number of warm-up steps: more than the five frames of a history, so that the actions in it have settled.
 const STEPS_TO_REMEMBER: usize = 25;
 
 /// Observation of the network at one control step.
@@ -78,8 +76,7 @@ pub struct Network {
     outputs: Vec<NodeId>,
     /// Shapes of the memories.
     memories: Vec<Vec<usize>>,
-    /// One thread: the layers are too small to distribute, and sums do not depend on the number of
-    /// cores.
+    /// One thread: the layers are too small to distribute, and sums do not depend on the number of cores.
     thread: Arc<ThreadPool>,
 }
 
@@ -224,8 +221,7 @@ impl Network {
         Ok(self.model.run(inputs, &self.outputs, Some(options))?)
     }
 
-    /// Splits the outputs into action and memory. Shapes have been checked, so that no value is left
-    /// out.
+    /// Splits the outputs into action and memory. Shapes have been checked, so that no value is left out.
     fn split(&self, outputs: Vec<Value>) -> RunResult<(Action, RecurrentState)> {
         let floats = |value: Value| {
             let tensor: Option<Tensor<f32>> = value.into_tensor();

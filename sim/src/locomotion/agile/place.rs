@@ -14,8 +14,7 @@ use crate::plane::{heading_rad, wrapped_rad};
 
 const GAIN_1_S: f32 = 1.5;
 const INTEGRAL_1_S: f32 = 0.5 * GAIN_1_S;
-/// Errors above which a standing robot begins to correct, and (`BACK_M`, `BACK_RAD`) below which it
-/// stops.
+/// Errors above which a standing robot begins to correct, and (`BACK_M`, `BACK_RAD`) below which it stops.
 const STRAYED_M: f32 = 0.10;
 const STRAYED_RAD: f32 = 0.15;
 const BACK_M: f32 = 0.04;

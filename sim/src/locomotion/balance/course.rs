@@ -38,8 +38,7 @@ impl Course {
         [ahead, left]: [Vector; 2],
         dt_s: f32,
     ) -> [f32; 2] {
-        // A robot that is to stop stops where it can: the bias was learned in another direction of
-        // motion.
+        // A robot that is to stop stops where it can: the bias was learned in another direction of motion.
         let stopping = velocity == BaseVelocity::STILL;
         if starts || stopping {
             self.reference_m = pelvis_m;

@@ -33,8 +33,7 @@ const LARGEST_JOINT_ACCELERATION_RAD_S2: f32 = 400.0;
 
 /// Share of the joints' limits within which torques stay as long as easing off helps.
 const EFFORT_USED: f32 = 0.9;
-/// Shares of the wanted turning and of the feet's acceleration that remain when a robot eases off
-/// completely.
+/// Shares of the wanted turning and of the feet's acceleration that remain when a robot eases off completely.
 const EASED_TURN: f32 = 0.64;
 const EASED_FEET: f32 = 0.2;
 
@@ -240,8 +239,7 @@ pub(super) fn ground_force_n(
     })
 }
 
-/// Returns the Jacobian of an ankle roll link: linear over angular velocity per joint velocity of its
-/// leg.
+/// Returns the Jacobian of an ankle roll link: linear over angular velocity per joint velocity of its leg.
 fn foot_jacobian(body: &BodyEstimate, side: Side) -> SMatrix<f32, 6, 6> {
     let first = LEGS[side];
     let foot_m = body.world_from_foot(side).translation;

@@ -11,8 +11,7 @@ use super::swing::Swing;
 use crate::body::BodyScale;
 use crate::plane::flat;
 
-/// Range of footholds relative to the stance foot, along the heading and to the inside: the feet never
-/// cross.
+/// Range of footholds relative to the stance foot, along the heading and to the inside: the feet never cross.
 const REACH_M: [f32; 2] = [-0.4, 0.48];
 const SPREAD_M: [f32; 2] = [0.08, 0.52];
 /// Range of footholds without strain; those of walking sideways are inside.
@@ -101,8 +100,7 @@ impl FootstepInputs<'_> {
         Footstep { pressure_m, foothold_m, pace, strain_m }
     }
 
-    /// Returns the foothold nearest to `point_m` within a reach along the heading and a spread to the
-    /// inside.
+    /// Returns the foothold nearest to `point_m` within a reach along the heading and a spread to the inside.
     fn nearest_m(&self, point_m: Vector, reach_m: [f32; 2], spread_m: [f32; 2]) -> Vector {
         let reach_m = reach_m.map(|g1_m| self.scale.length_m(g1_m));
         let spread_m = [self.scale.apart_m(spread_m[0]), self.scale.length_m(spread_m[1])];

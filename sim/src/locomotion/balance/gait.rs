@@ -9,8 +9,7 @@ use crate::body::BodyScale;
 pub(super) const TRANSFER_S: f32 = 0.05;
 pub(super) const PERIOD_S: f32 = TRANSFER_S + SWING_S;
 const WIDTH_M: f32 = 0.24;
-/// Extra width per length of a sideways step: walking sideways brings the feet together at every other
-/// step.
+/// Extra width per length of a sideways step: walking sideways brings the feet together at every other step.
 const WIDENING: f32 = 0.3;
 /// Angular momentum of a swinging leg per speed of its foot, over mass times height of the robot; tuned
 /// on punches, seeds 2000-3149.

@@ -7,8 +7,7 @@ use crate::body::BodyEstimate;
 use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Sides};
 
-/// A robot and its loads as one body: each load is a mass in the palm, whose swing does not push the
-/// robot.
+/// A robot and its loads as one body: each load is a mass in the palm, whose swing does not push the robot.
 pub(super) struct LadenRobot {
     carried_kg: Sides<f32>,
     pub mass_kg: f32,

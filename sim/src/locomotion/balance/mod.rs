@@ -44,8 +44,7 @@ const BACKWARD_M: f32 = 0.07;
 /// Extra forward distance for a robot that leans ahead of a pull.
 const FARTHER_M: f32 = 0.01;
 const SIDEWAYS_M: f32 = 0.005;
-/// Distance of the capture point from the middle of the feet within which both feet count as equally
-/// near.
+/// Distance of the capture point from the middle of the feet within which both feet count as equally near.
 const EITHER_FOOT_M: f32 = 0.01;
 /// Weight of the spin in choosing the swing leg. A leg that swings ahead turns the pelvis to its own
 /// side, and one that swings back to the other. A robot that a blow has set spinning steps with the leg

@@ -146,8 +146,7 @@ mod tests {
         assert!(left_m_s2 < 0.3, "{left_m_s2} m/s^2 of the pull that has ended are believed");
     }
 
-    /// A blow of 300 N for 0.08 s on 34 kg. A lasting push counts for no more than
-    /// [`LARGEST_PUSH_M_S2`].
+    /// A blow of 300 N for 0.08 s on 34 kg. A lasting push counts for no more than [`LARGEST_PUSH_M_S2`].
     #[test]
     fn a_blow_is_no_push_and_no_push_is_without_bound() {
         let (_, largest_m_s2) =

@@ -1,9 +1,8 @@
 //! Standing: both feet stay planted, the pelvis holds its place and follows the height command.
 //!
-//! Each physics step places the pelvis so that the centre of mass stays over the feet, and solves both
-//! legs' inverse kinematics for it. It then adds the torques of a virtual spring and damper on centre of
-//! mass and trunk, shared by the feet as ground reaction forces. PD and feedforward act through the leg
-//! joints alone.
+//! Each physics step places the pelvis so that the centre of mass stays over the feet, and solves both legs'
+//! inverse kinematics for it. It then adds the torques of a virtual spring and damper on centre of mass and
+//! trunk, shared by the feet as ground reaction forces. PD and feedforward act through the leg joints alone.
 
 mod ahead;
 mod partner;
@@ -404,8 +403,7 @@ mod tests {
         }
     }
 
-    /// A pull grows by 2 x 25 N in a second. A held object reacts to the lean, so nothing is predicted
-    /// there.
+    /// A pull grows by 2 x 25 N in a second. A held object reacts to the lean, so nothing is predicted there.
     #[test]
     fn a_growing_pull_is_leant_against_before_it_is_there() {
         let body = Posed::standing().body();

@@ -1,17 +1,15 @@
-//! Stepping: one foot carries the robot, the other swings to the foothold that the capture point
-//! requires.
+//! Stepping: one foot carries the robot, the other swings to the foothold that the capture point requires.
 //!
 //! With x the balance point, v its velocity, u that of the swinging foot, s = [`SWING_INERTIA`] and w =
 //! sqrt(g / h), the capture point  xi = x + (v - s u) / w  obeys
 //!   xi' = w (xi - p) + s u,   p the centre of pressure,
 //! which moves from the old foot to the new one within the transfer time and stays there. The remaining
-//! contribution of s u until the foot lands is part of the steady gait's offset b. The plan of a step
-//! ignores it: including it brought no gain. A foot put down at xi(T) - b  leaves the capture point the
-//! offset b from the new foot; see [`Gait`]. The centre of mass moves along with a leg that swings, and
-//! stops with it: v - s u is the speed that lasts, known from the angular momentum about the ground.
-//! Without it a robot that was hit steps too far, the farther the faster it steps, and at the next step
-//! too far the other way. Source: Englsberger, Ott, Albu-Schaeffer 2015; Khadiv et al. 2016; angular
-//! momentum: Gong, Grizzle 2022.
+//! contribution of s u until the foot lands is part of the steady gait's offset b. The plan of a step ignores
+//! it: including it brought no gain. A foot put down at xi(T) - b  leaves the capture point the offset b from
+//! the new foot; see [`Gait`]. The centre of mass moves along with a leg that swings, and stops with it: v -
+//! s u is the speed that lasts, known from the angular momentum about the ground. Without it a robot that was
+//! hit steps too far, the farther the faster it steps, and at the next step too far the other way. Source:
+//! Englsberger, Ott, Albu-Schaeffer 2015; Khadiv et al. 2016; angular momentum: Gong, Grizzle 2022.
 
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
@@ -62,8 +60,7 @@ const LIFT_RANGE: [f32; 2] = [-0.45, 0.6];
 const TRUNK_STIFFNESS_1_S2: f32 = 90.0;
 const TRUNK_DAMPING_1_S: f32 = 19.0;
 const LARGEST_TURN_RAD_S2: f32 = 50.0;
-/// Factor on the turning about the vertical: a stance foot holds less about that axis than about the
-/// others.
+/// Factor on the turning about the vertical: a stance foot holds less about that axis than about the others.
 const YAW_PART: f32 = 0.6;
 /// Range of the pelvis height: walking is neither stretched nor crouched.
 const HIGHEST_M: f32 = 0.745;
@@ -95,8 +92,7 @@ pub(super) struct Stepping {
     /// Yaw of the heading minus yaw of the pelvis.
     lag_rad: f32,
     stance: Side,
-    /// Time for which the capture point has been moving over the first stance foot, before the first
-    /// step.
+    /// Time for which the capture point has been moving over the first stance foot, before the first step.
     shifting_s: Option<f32>,
     /// Time since the stance foot landed.
     time_s: f32,
@@ -133,8 +129,7 @@ impl Stepping {
         step
     }
 
-    /// Returns the angle between the heading and the one to which the commands alone would have turned
-    /// it.
+    /// Returns the angle between the heading and the one to which the commands alone would have turned it.
     pub(super) fn to_turn_rad(&self) -> f32 {
         wrapped_rad(self.goal_rad - self.heading_rad).abs()
     }
@@ -148,8 +143,7 @@ impl Stepping {
         self.time_s == 0.0 && self.shifting_s.is_none()
     }
 
-    /// Runs one physics step. It also returns the expected horizontal acceleration of the centre of
-    /// mass.
+    /// Runs one physics step. It also returns the expected horizontal acceleration of the centre of mass.
     pub(super) fn tick(
         &mut self,
         body: &BodyEstimate,
@@ -174,8 +168,7 @@ impl Stepping {
         let strays = flat(body.com_velocity_m_s - commanded_m_s).length() > scale.speed_m_s(STRAYING_M_S);
         let course_m_s =
             if strays { Vector::ZERO } else { faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1] };
-        // A robot that turns while it walks takes the coming step in the direction that it will face by
-        // then.
+        // A robot that turns while it walks takes the coming step in the direction that it will face by then.
         let coming = Rotation::from_rotation_z(velocity.yaw_rate_rad_s * scale.time_s(PERIOD_S));
         let gait = Gait::new(scale, rate_1_s, coming * course_m_s, outside);
         let (_, foot_m_s, _) = foot_motion(body, self.stance.other());
@@ -208,8 +201,7 @@ impl Stepping {
         (drives(body, &torques), torques.acceleration_m_s2)
     }
 
-    /// Moves the pelvis height towards `height_m`, within the range of walking and the reach of both
-    /// legs.
+    /// Moves the pelvis height towards `height_m`, within the range of walking and the reach of both legs.
     fn rise(&mut self, body: &BodyEstimate, height_m: f32, dt_s: f32) {
         let scale = &body.model.scale;
         let wanted_m = height_m

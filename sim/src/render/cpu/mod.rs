@@ -1,5 +1,4 @@
-//! The embedded renderer: a visibility buffer of triangle numbers, shaded afterwards, four samples a
-//! pixel.
+//! The embedded renderer: a visibility buffer of triangle numbers, shaded afterwards, four samples a pixel.
 
 pub mod contact;
 mod raster;

@@ -18,8 +18,7 @@ const CELLS: usize = TEXELS / CELL;
 const _: () = assert!(CELLS == u128::BITS as usize, "a row of cells is the bits of a number");
 /// The cell of everything outside of the map, which is in the sun.
 const OUTSIDE: u32 = (CELLS * CELLS) as u32;
-/// Texels that the filter reads along each axis: a cell covers those that a filter starting in it can
-/// reach.
+/// Texels that the filter reads along each axis: a cell covers those that a filter starting in it can reach.
 const TAPS: usize = 4;
 const GRID: Grid = Grid { width: TEXELS, height: TEXELS, pitch_px: 1.0 };
 
@@ -210,8 +209,7 @@ impl ShadowLayer {
         }
     }
 
-    /// Measures a run of cells from right to left, since a cell extends over the first texels of the
-    /// next.
+    /// Measures a run of cells from right to left, since a cell extends over the first texels of the next.
     #[inline(always)]
     fn measure_run(&mut self, row: usize, columns: Range<usize>) {
         let mut beside = [f32::INFINITY, 0.0];

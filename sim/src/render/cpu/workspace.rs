@@ -1,6 +1,5 @@
-//! Buffers for drawing: megabytes that a renderer does not need while it waits for its next image. So
-//! the renderers of a process share them, and at most as many draw at the same time as there are
-//! processor cores.
+//! Buffers for drawing: megabytes that a renderer does not need while it waits for its next image. So the
+//! renderers of a process share them, and at most as many draw at the same time as there are processor cores.
 
 use std::sync::{Condvar, LazyLock, Mutex, MutexGuard, PoisonError};
 use std::thread;

@@ -17,8 +17,7 @@ use crate::{Step, World};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scenery {
     pub parts: Vec<Part>,
-    /// Radius around [`PlacedScenery::focus_m`] within which shadows are drawn: the smaller, the
-    /// sharper.
+    /// Radius around [`PlacedScenery::focus_m`] within which shadows are drawn: the smaller, the sharper.
     pub focus_radius_m: f32,
     pub light: Light,
 }

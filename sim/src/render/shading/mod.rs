@@ -48,14 +48,12 @@ pub const OUTLINE: f32 = 0.45;
 /// Minimum relative depth difference for an outline between two things: there is none where they touch.
 pub const OUTLINE_DEPTH_STEP: f32 = 0.02;
 
-/// Texels along each side of the shadow's map: 2.4 mm at a focus of 1.25 m, so that fingers cast
-/// shadows.
+/// Texels along each side of the shadow's map: 2.4 mm at a focus of 1.25 m, so that fingers cast shadows.
 pub const TEXELS: usize = 1024;
 /// Offset of "nearness" in the map, which is this minus the distance from the plane through the focus
 /// that faces the sun. So it grows towards the sun.
 pub const SUN_DISTANCE_M: f32 = 8.0;
-/// Offsets of the lookup point along the surface normal and towards the sun, which prevent
-/// self-shadowing.
+/// Offsets of the lookup point along the surface normal and towards the sun, which prevent self-shadowing.
 pub const NORMAL_OFFSET_M: f32 = 0.006;
 pub const BIAS_M: f32 = 0.004;
 

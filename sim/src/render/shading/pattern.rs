@@ -9,8 +9,7 @@ use super::lanes::{Affine, Lanes, lanes};
 pub enum Pattern {
     #[default]
     Plain,
-    /// Squares of half a metre in the world's ground plane; every other one has this colour, sRGB, 0 to
-    /// 1.
+    /// Squares of half a metre in the world's ground plane; every other one has this colour, sRGB, 0 to 1.
     Checker([f32; 3]),
     /// Grain along the longest side.
     Wood,

@@ -1,5 +1,4 @@
-//! Objects: all named things in a world except robots. A file with inner joints gives one object per
-//! link.
+//! Objects: all named things in a world except robots. A file with inner joints gives one object per link.
 
 mod insert;
 mod model;

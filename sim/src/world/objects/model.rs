@@ -44,9 +44,8 @@ pub struct ObjectPart {
 }
 
 impl ObjectModel {
-    /// Reads the parts that an object's file has in a world under the name `name`, without building a
-    /// world: a scorer needs only sites and shapes. The object itself is first, then come the parts that
-    /// move on it.
+    /// Reads the parts that a file has in a world under `name`, without building a world (for scorers).
+    /// The object itself is first, then come the parts that move on it.
     ///
     /// # Errors
     ///
@@ -69,26 +68,23 @@ impl ObjectModel {
         self.sites.iter().find(|site| site.name == name)
     }
 
-    /// Returns the extent of the object's colliding shapes along a world direction (a unit vector) from
-    /// the world's origin, with the object at `world_from_object`.
+    /// Returns the extent of the colliding shapes along a unit vector from the origin, both of the world.
     pub fn reach_m(&self, world_from_object: &Pose, direction: Vector) -> f32 {
         self.solid.reach_m(world_from_object, direction)
     }
 
-    /// Returns the height above the floor of the lowest point of the colliding shapes, with the object
-    /// at `world_from_object`.
+    /// Returns the height above the floor of the lowest point of the colliding shapes.
     pub fn lowest_m(&self, world_from_object: &Pose) -> f32 {
         -self.reach_m(world_from_object, Vector::NEG_Z)
     }
 
-    /// Returns true if a point of the object's frame is in the open between walls and over a floor. That
-    /// is, every ray from it that is level in the object's own frame or goes down hits the object.
+    /// Returns true if a point (object's frame) is in the open, but between walls and over a floor: every ray
+    /// from it that is level in the object's own frame, or goes down, hits the object.
     pub fn encloses(&self, point_m: Vector) -> bool {
         self.solid.encloses(point_m)
     }
 
-    /// Reads an object's file. Returns the document, and the one body directly in its world with
-    /// everything on it.
+    /// Reads an object's file. Returns the document, and its one top-level body with everything on it.
     pub(super) fn read(file: &ObjectFile) -> Result<(Document, BodyTree), SimError> {
         let document = match file {
             ObjectFile::Embedded(name) => Document::parse(name, assets::object(name)?)?,

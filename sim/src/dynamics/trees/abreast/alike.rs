@@ -116,8 +116,7 @@ impl Alike {
                 lv += *l * self.v[j];
             }
             let inverse_root_d = self.inverse_root_d[k];
-            // This velocity is not needed again: only degrees of freedom further out have it on their
-            // paths.
+            // This velocity is not needed again: only degrees of freedom further out have it on their paths.
             self.v[k] = lv.with(inverse_root_d, |lv, inverse_root_d| lv / inverse_root_d)
                 + force * dt_s * inverse_root_d;
         }

@@ -49,8 +49,7 @@ fn the_robot_falls_away_from_the_pressure() {
     for away_m in [Vector::new(0.04, 0.0, 0.0), Vector::new(-0.03, 0.02, 0.0)] {
         let acceleration_m_s2 = solve(&body, &STILL, body.com_m - away_m, None).acceleration_m_s2;
         let expected_m_s2 = away_m * (GRAVITY_M_S2 / body.com_m.z);
-        // The stance legs move less than the trunk, so the robot accelerates a little less than a point
-        // mass.
+        // The stance legs move less than the trunk, so the robot accelerates a little less than a point mass.
         let part = acceleration_m_s2.length() / expected_m_s2.length();
         assert!((0.8..1.0).contains(&part), "{acceleration_m_s2}, not {expected_m_s2}");
         let across = acceleration_m_s2.cross(expected_m_s2).length() / expected_m_s2.length();

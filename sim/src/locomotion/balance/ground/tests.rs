@@ -78,8 +78,7 @@ fn tipping_moments_cost_horizontal_force() {
     assert!((kept_n - FORCE_N).length() < 1e-3, "{kept_n}");
 }
 
-/// The ground's power on a leg that moves about its hip is minus the joints': tau . q' = -(f . v + m .
-/// w).
+/// The ground's power on a leg that moves about its hip is minus the joints': tau . q' = -(f . v + m . w).
 #[test]
 fn leg_torques_do_the_work_of_the_ground() {
     let standing = Posed::standing();

@@ -1,13 +1,12 @@
 //! Separation of a partner's pull through a shared load from forces of the world.
 //!
-//! Robots that hold one load are joined by a spring: arms and a table have some 1000 N/m. Each comes to
-//! rest over its feet to a centimetre or two, which is 20 to 30 N between them, and the observer takes
-//! that for a push. A robot may feed this force forward, lean against it and count it as a loss of
-//! stance. It then holds its own place to the millimetre, and so does its partner: two integrators at
-//! the ends of one spring. 27 N at the hands move the balance point by 7 cm. So robots at rest stepped
-//! out of a stance that nothing threatened, pulled each other while they stepped, and came to rest
-//! elsewhere, without end. Two robots that step and lean against each other with all of the force are
-//! even in equilibrium at any force.
+//! Robots that hold one load are joined by a spring: arms and a table have some 1000 N/m. Each comes to rest
+//! over its feet to a centimetre or two, which is 20 to 30 N between them, and the observer takes that for a
+//! push. A robot may feed this force forward, lean against it and count it as a loss of stance. It then holds
+//! its own place to the millimetre, and so does its partner: two integrators at the ends of one spring. 27 N
+//! at the hands move the balance point by 7 cm. So robots at rest stepped out of a stance that nothing
+//! threatened, pulled each other while they stepped, and came to rest elsewhere, without end. Two robots that
+//! step and lean against each other with all of the force are even in equilibrium at any force.
 //!
 //! So a robot whose fingers press on something attributes the part of the push that its hands feel to a
 //! partner. It resists that part with the stiffness of its pelvis alone, and steps as if it were absent,

@@ -35,8 +35,7 @@ const MOVED_SHIFT_M: f32 = 0.04;
 /// The same for a robot that holds something with partners.
 const HELD_SHIFT_M: f32 = 0.02;
 
-/// Middle of the soles and heading of a robot that stands, or of one that stops where commands have
-/// taken it.
+/// Middle of the soles and heading of a robot that stands, or of one that stops where commands have taken it.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 pub(in crate::locomotion::balance) struct StandingPlace {
     pub middle_m: Vector,

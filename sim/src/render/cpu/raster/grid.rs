@@ -50,8 +50,7 @@ impl<T: Copy> SampleRows<T> {
         &self.numbers[start..start + self.grid.width]
     }
 
-    /// Returns the slices that begin at a sample and at those below it; rows continue into the next
-    /// ones.
+    /// Returns the slices that begin at a sample and at those below it; rows continue into the next ones.
     #[inline(always)]
     pub fn rows_from(&self, row: usize, column: usize) -> impl Iterator<Item = &[T]> {
         let stride = self.grid.stride();

@@ -11,8 +11,7 @@ struct Edge {
     offset_value: f64,
 }
 
-/// The samples of a triangle in one row of a grid: nearness at the first, and the step from each to the
-/// next.
+/// The samples of a triangle in one row of a grid: nearness at the first, and the step from each to the next.
 #[derive(Clone, Copy)]
 struct Span {
     row: usize,

@@ -1,5 +1,4 @@
-//! Rasteriser: finds the samples of an image that are inside a triangle, row by row, and its nearness
-//! there.
+//! Rasteriser: finds the samples of an image that are inside a triangle, row by row, and its nearness there.
 
 mod batch;
 mod grid;
@@ -58,9 +57,8 @@ const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 const LANE: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 impl Outlines {
-    /// Calls `each` for all vectors of samples that front faces reach. Its arguments are the vector's
-    /// number in the grid, the triangle's tag and the nearness of the samples, which is 0 outside of the
-    /// triangle.
+    /// Calls `each` for all vectors of samples that front faces reach. Its arguments are the vector's number
+    /// in the grid, the triangle's tag and the nearness of the samples, which is 0 outside of the triangle.
     #[inline(always)]
     pub fn draw<S: Simd>(&self, simd: S, grid: Grid, mut each: impl FnMut(usize, u32, S::f32s)) {
         let reaches = self.reaches(grid);
