@@ -11,8 +11,8 @@ static ASSETS: Dir = include_dir!("$TANDEM_SIM_ASSETS");
 /// The robot used unless another file is given.
 pub const DEFAULT_ROBOT: &str = "g1_dex3";
 
-/// The same with the effort limits of Unitree's URDF in place of those of its MJCF, which disagree: 35 N
-/// m in place of 50 at ankles, waist roll and waist pitch.
+/// The same with the effort limits of Unitree's URDF in place of those of its MJCF, which disagree:
+/// 35 N m in place of 50 at ankles, waist roll and waist pitch.
 pub const URDF_EFFORTS_ROBOT: &str = "g1_dex3_urdf_efforts";
 
 pub const ROBOTS: [&str; 2] = [DEFAULT_ROBOT, URDF_EFFORTS_ROBOT];

@@ -7,8 +7,8 @@ use super::pose::{clamped, read_columns, weighted_square, write_pose_rows};
 use crate::model::{Configuration, FrameId, Model};
 use crate::spatial::Log6;
 
-/// Task to move a frame to a pose. Error: e = log(frame^-1 target), 6, [m; rad], in the frame itself; J =
-/// J_l^-1(e) J_body, with J_l the left Jacobian of SE(3).
+/// Task to move a frame to a pose. Error: e = log(frame^-1 target), 6, [m; rad], in the frame itself;
+/// J = J_l^-1(e) J_body, with J_l the left Jacobian of SE(3).
 #[derive(Clone, Debug)]
 pub struct FrameTask {
     /// The frame to move.

@@ -158,8 +158,8 @@ fn dynamics_weld_and_connect() {
     assert!(bench.position_m(body).z < before_m - 0.5);
 }
 
-/// A top on a pin at steady precession W keeps its tilt:  I1 W^2 cos(tilt) - I3 w3 W + m g h = 0,  I1
-/// about the pin.
+/// A top on a pin at steady precession W keeps its tilt, with I1 about the pin:
+/// I1 W^2 cos(tilt) - I3 w3 W + m g h = 0.
 #[test]
 fn dynamics_top_precesses() {
     let (mass_kg, height_m, tilt_rad, precession_rad_s) = (1.0, 0.04, 0.3_f64, 1.6);

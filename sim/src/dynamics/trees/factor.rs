@@ -91,7 +91,7 @@ impl Factor {
         }
     }
 
-    /// Computes Y = D^-1/2 L^-T J^T in place, for N rows that are zero outside the path of degree of freedom `k`.
+    /// Computes Y = D^-1/2 L^-T J^T in place, for N rows that are zero off the path of dof `k`.
     #[inline(always)]
     pub fn whiten_rows<S: Simd, const N: usize>(
         &self,
