@@ -9,9 +9,9 @@
 //! Finally it computes new positions (`trees::kinematics`), and removes spurious energy from fast trees
 //! (`trees::energy`). This module has no knowledge of robots or file formats.
 //!
-//! SI units, radians, world axes with z opposite to gravity if gravity is set so, f64 throughout. The
-//! same sequence of calls gives the same bits: trees and colliders are numbered in the order in which
-//! they were added, and so are contacts.
+//! SI units, radians, f64 throughout. The direction of gravity in the world axes is a setting. The same
+//! sequence of calls gives the same bits: trees and colliders are numbered in the order in which they
+//! were added, and so are contacts.
 
 mod contacts;
 mod energy_balance;

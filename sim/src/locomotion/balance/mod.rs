@@ -38,7 +38,8 @@ const LARGEST_CHANGE_RAD_S2: f32 = 1.5;
 /// Thresholds below which a command means to stand.
 const STILL_M_S: f32 = 0.01;
 const STILL_RAD_S: f32 = 0.01;
-/// Distances of the capture point beyond a sole's centre that end standing: forward, backward, sideways.
+/// Distances of the capture point that end standing: forward and backward from the middle of the feet,
+/// sideways beyond a sole's centre.
 const FORWARD_M: f32 = 0.075;
 const BACKWARD_M: f32 = 0.07;
 /// Extra forward distance for a robot that leans ahead of a pull.
@@ -263,9 +264,9 @@ impl BalanceState {
         }
     }
 
-    /// Returns true if the left foot carries first, which is the foot nearer to the capture point. If
-    /// both are equally near, it is the one that the robot turns away from. A robot that has lost its
-    /// stance also considers its spin: see [`SPIN_S_RAD`].
+    /// Returns true if the left foot carries first. The foot nearer to the capture point does; if both are
+    /// equally near, it is the one that the robot turns away from. A robot that has lost its stance also
+    /// considers its spin: see [`SPIN_S_RAD`].
     fn left_carries_first(&self, scale: &BodyScale, stance: &Stance, lost_rad_s: Option<f32>) -> bool {
         let capture_m = stance.capture_m;
         if let Some(spin_rad_s) = lost_rad_s {
