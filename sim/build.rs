@@ -1,4 +1,5 @@
-//! Tells the library where its embedded files are: `tests/extras` compiles the same sources from another folder.
+//! Passes the folder of the embedded files to the library: `tests/extras` compiles the same sources from
+//! another folder.
 
 use std::{env, path::Path};
 

@@ -11,7 +11,7 @@ use tandem_ik::{Configuration, DampingTask, FrameTask, Model, PostureTask, Solve
 #[path = "../tests/kinematics/common.rs"]
 mod common;
 
-/// Both wrists 12 cm away from where they are, posture and damping.
+/// Returns targets 12 cm away for both wrists, with posture and damping.
 fn tasks(model: &Model, start: &Configuration) -> Vec<Task> {
     let mut tasks: Vec<Task> = ["left_wrist", "right_wrist"]
         .map(|site| {
@@ -26,7 +26,7 @@ fn tasks(model: &Model, start: &Configuration) -> Vec<Task> {
     tasks
 }
 
-/// Runs `once` in batches for a second, and prints the time of one in the median batch.
+/// Runs `once` in batches for a second, and prints the time of one run in the median batch.
 fn measure(name: &str, mut once: impl FnMut()) {
     const BATCH: u32 = 20;
     let mut batch_us = || {

@@ -1,4 +1,4 @@
-//! Prints what [`tandem_ik::bench`] measures, as JSON: `bench ROBOT.urdf|ROBOT.xml TARGETS.json`.
+//! Prints the measurements of [`tandem_ik::bench`] as JSON: `bench ROBOT.urdf|ROBOT.xml TARGETS.json`.
 
 use std::{env, error::Error, fs};
 

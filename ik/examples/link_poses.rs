@@ -1,8 +1,9 @@
-//! Prints where every named frame of a robot is, for each line of joint coordinates on standard input.
+//! Prints the poses of all named frames of a robot for each line of joint coordinates on standard input.
 //!
-//! `link_poses ROBOT.xml` first prints the joints' names, which is the order it expects. Each input line is a JSON list
-//! of coordinates (rad or m); each output line maps names to `[x, y, z, qw, qx, qy, qz]` in the root's frame, and
-//! `center_of_mass` to `[x, y, z]`. Other programs check their kinematics against ours with it.
+//! `link_poses ROBOT.xml` first prints the joints' names, in the order of the expected coordinates. Each
+//! input line is a JSON list of coordinates (rad or m). Each output line maps names to
+//! `[x, y, z, qw, qx, qy, qz]` in the root's frame, and `center_of_mass` to `[x, y, z]`. Other programs
+//! use it to check their kinematics against this crate.
 
 use std::{env, error::Error, fs, io};
 

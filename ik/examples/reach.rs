@@ -1,7 +1,7 @@
-//! A G1 moves both wrists, one step of 20 ms after another: `cargo run -p tandem-ik --release --example reach`.
+//! A G1 moves both wrists in steps of 20 ms: `cargo run -p tandem-ik --release --example reach`.
 //!
-//! The loop is the one that users of Pink know: set targets, solve for velocities, integrate. Speed limits, a barrier
-//! between the hands, and an account of what happened come with it.
+//! The loop is the one that users of Pink know: set targets, solve for velocities, integrate. In
+//! addition it has speed limits, a barrier between the hands, and a report of the outcome.
 
 use std::error::Error;
 

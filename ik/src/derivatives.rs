@@ -1,5 +1,5 @@
-//! Everything that is a derivative against central differences, on the whole G1: Jacobians of frames, rows of tasks and of
-//! barriers.
+//! All derivatives against central differences, on the whole G1: Jacobians of frames, rows of tasks and
+//! of barriers.
 
 use nalgebra::{Point3, UnitQuaternion, Vector3, Vector6};
 
@@ -13,11 +13,11 @@ use crate::tasks::{
 };
 
 const ROBOT: &str = include_str!("../../sim/assets/robots/g1_dex3/robot.xml");
-/// rad; the differences are then good to about 1e-9.
+/// Step of the differences, rad, which are then accurate to about 1e-9.
 const STEP: f64 = 1e-5;
 const WITHIN: f64 = 1e-7;
 
-/// Coordinates within every joint's range, different for each joint.
+/// Returns coordinates within every joint's range, different for each joint.
 fn somewhere(model: &Model) -> Vec<f64> {
     let place = |(index, joint): (usize, &Joint)| {
         0.5 * (joint.lower + joint.upper) + 0.3 * (joint.upper - joint.lower) * (1.7 * index as f64).sin()
@@ -25,7 +25,7 @@ fn somewhere(model: &Model) -> Vec<f64> {
     model.joints().iter().enumerate().map(place).collect()
 }
 
-/// Central difference of `value` along each joint.
+/// Returns the central difference of `value` along each joint.
 fn differences(configuration: &Configuration, value: impl Fn(&Configuration) -> Vec<f64>) -> Vec<Vec<f64>> {
     let shifted = |joint: usize, by: f64| {
         let mut q = configuration.q().to_vec();

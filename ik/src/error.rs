@@ -1,6 +1,6 @@
-//! What can go wrong while a model is built or a problem is set up.
+//! Errors of building a model or setting up a problem.
 
-/// The text names what was asked for and what there is.
+/// Error of this crate. The text names the requested item and the available ones.
 #[derive(Debug, thiserror::Error)]
 pub enum IkError {
     /// The MJCF text cannot be read.
@@ -13,37 +13,37 @@ pub enum IkError {
     /// A file of targets cannot be read.
     #[error("not a valid targets file: {0}")]
     Targets(#[from] serde_json::Error),
-    /// Something in the file that this crate has no use for.
+    /// The file contains something that this crate does not support.
     #[error("{0}")]
     Unsupported(String),
     /// A frame is not in the model.
     #[error("no frame `{name}`; have: {have}")]
     UnknownFrame {
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// Names there are, separated by commas.
+        /// Available names, separated by commas.
         have: String,
     },
     /// A joint is not in the model.
     #[error("no joint `{name}`; have: {have}")]
     UnknownJoint {
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// Names there are, separated by commas.
+        /// Available names, separated by commas.
         have: String,
     },
     /// A vector of joint coordinates has the wrong length.
     #[error("{got} joint coordinates given, the model has {expected} joints")]
     WrongLength {
-        /// Length of the vector given.
+        /// Length of the given vector.
         got: usize,
-        /// Joints of the model.
+        /// Number of joints of the model.
         expected: usize,
     },
     /// A number is NaN or infinite.
     #[error("{what} is not finite")]
     NotFinite {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
     },
 }

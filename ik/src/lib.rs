@@ -7,12 +7,12 @@
 //!   subject to  lower <= dq <= upper,  barrier rows,  equality tasks
 //! ```
 //!
-//! Everything is f64 and SI: metres, radians, seconds. Poses are `nalgebra::Isometry3<f64>` in the frame of the model's
-//! root, which stands still. Twists are ordered [linear; angular].
+//! Everything is f64 and SI: metres, radians, seconds. Poses are `nalgebra::Isometry3<f64>` in the frame
+//! of the model's root, which is fixed. Twists are ordered [linear; angular].
 //!
-//! [`Solver::step`] takes one such step and yields Pink's iterates. [`Solver::track`] takes one that never makes things
-//! worse, for targets that stream in and may be out of reach. [`Solver::solve`] goes all the way, with restarts for
-//! planning. All three say how it ended as an [`Outcome`].
+//! [`Solver::step`] takes one such step and yields Pink's iterates. [`Solver::track`] takes one that does not
+//! increase the objective unless limits or barriers demand it, for streamed targets that may be out of reach.
+//! [`Solver::solve`] iterates to a solution, with restarts for planning. All three report an [`Outcome`].
 //!
 //! ```
 //! use tandem_ik::{Configuration, FrameTask, Model, PostureTask, Solver, Task};
@@ -20,7 +20,8 @@
 //! # fn main() -> Result<(), tandem_ik::IkError> {
 //! let xml = r#"<mujoco><compiler angle="radian"/><worldbody><body name="base"><body name="upper" pos="0 0 1">
 //!     <joint name="shoulder" axis="0 1 0" range="-2 2"/><body name="lower" pos="0.3 0 0">
-//!     <joint name="elbow" axis="0 1 0" range="-2 2"/><site name="hand" pos="0.3 0 0"/></body></body></body></worldbody></mujoco>"#;
+//!     <joint name="elbow" axis="0 1 0" range="-2 2"/><site name="hand" pos="0.3 0 0"/>
+//!     </body></body></body></worldbody></mujoco>"#;
 //! let model = Model::from_mjcf(xml)?;
 //! let mut configuration = Configuration::new(&model, &[0.3, 0.3])?;
 //! let hand = model.frame("hand")?;
@@ -40,7 +41,7 @@
 //! # }
 //! ```
 //!
-//! The same for a robot's file: its right arm is all that may move, and a wrist goes to a target.
+//! The same for a robot's file: only its right arm may move, and a wrist goes to a target.
 //!
 //! ```
 //! use tandem_ik::{Configuration, FrameTask, Model, Outcome, SolveOptions, Solver, Task};
@@ -48,7 +49,8 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../sim/assets/robots/g1_dex3/robot.xml");
 //! let robot = Model::from_mjcf(&std::fs::read_to_string(file)?)?;
-//! let moves = |name: &&str| ["right_shoulder", "right_elbow", "right_wrist"].iter().any(|part| name.contains(part));
+//! let parts = ["right_shoulder", "right_elbow", "right_wrist"];
+//! let moves = |name: &&str| parts.iter().any(|part| name.contains(part));
 //! let free: Vec<&str> = robot.joints().iter().map(|joint| joint.name.as_str()).filter(moves).collect();
 //! let arm = robot.reduced(&free, &vec![0.0; robot.nv()])?;
 //! let mut configuration = Configuration::new(&arm, &[0.0, -0.2, 0.0, 0.9, 0.0, 0.0, 0.0])?;

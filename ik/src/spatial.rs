@@ -4,10 +4,10 @@
 
 use nalgebra::{Isometry3, Matrix3, UnitQuaternion, Vector3, Vector6};
 
-/// Below this angle (rad) series replace the closed forms, whose differences cancel.
+/// Angle (rad) below which series replace the closed forms, whose differences cancel.
 const SMALL_ANGLE_RAD: f64 = 1e-3;
 
-/// Rotation vector of a rotation, the short way round; continuous up to pi.
+/// Returns the rotation vector of a rotation, the short way round; continuous up to pi.
 pub fn log3(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
     let quaternion = rotation.quaternion();
     let (w, v) = if quaternion.w < 0.0 {
@@ -20,7 +20,7 @@ pub fn log3(rotation: &UnitQuaternion<f64>) -> Vector3<f64> {
     v * scale
 }
 
-/// Inverse of the left Jacobian of SO(3) at rotation vector `w`:
+/// Returns the inverse of the left Jacobian of SO(3) at rotation vector `w`:
 ///   J^-1 = 1 - w^/2 + (1/t^2 - (1 + cos t) / (2 t sin t)) w^ w^,   t = |w|.
 pub fn left_jacobian_inverse3(w: &Vector3<f64>) -> Matrix3<f64> {
     let square = w.norm_squared();
@@ -38,7 +38,7 @@ pub fn left_jacobian_inverse3(w: &Vector3<f64>) -> Matrix3<f64> {
 ///   J^-1 = [ diagonal  upper ]
 ///          [ 0         diagonal ]
 pub struct Log6 {
-    /// [v m; w rad].
+    /// Twist [v m; w rad].
     pub twist: Vector6<f64>,
     /// Both diagonal blocks.
     pub diagonal: Matrix3<f64>,
@@ -56,7 +56,7 @@ impl Log6 {
         Log6 { twist: Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z), diagonal, upper }
     }
 
-    /// J^-1 times a twist given as its two halves.
+    /// Returns J^-1 times a twist given as its two halves.
     pub fn transform(&self, linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
         let top = self.diagonal * linear + self.upper * angular;
         let bottom = self.diagonal * angular;
@@ -64,7 +64,7 @@ impl Log6 {
     }
 }
 
-/// Off-diagonal block Q of the left Jacobian of SE(3); Barfoot 2017, equation 7.86.
+/// Returns the off-diagonal block Q of the left Jacobian of SE(3); Barfoot 2017, equation 7.86.
 fn coupling(v: &Vector3<f64>, w: &Vector3<f64>) -> Matrix3<f64> {
     let square = w.norm_squared();
     let t = square.sqrt();

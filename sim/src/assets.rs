@@ -1,4 +1,4 @@
-//! MJCF files that the binary carries: `robots/<name>/robot.xml`, `scenes/<name>.xml`, `objects/<name>.xml`.
+//! MJCF files embedded in the binary: `robots/<name>/robot.xml`, `scenes/<name>.xml`, `objects/<name>.xml`.
 
 use std::sync::LazyLock;
 
@@ -11,8 +11,8 @@ static ASSETS: Dir = include_dir!("$TANDEM_SIM_ASSETS");
 /// The robot used unless another file is given.
 pub const DEFAULT_ROBOT: &str = "g1_dex3";
 
-/// The same with the effort limits of Unitree's URDF in place of those of its MJCF, which disagree: 35 N m in place of 50 at
-/// ankles, waist roll and waist pitch.
+/// The same with the effort limits of Unitree's URDF in place of those of its MJCF, which disagree:
+/// 35 N m in place of 50 at ankles, waist roll and waist pitch.
 pub const URDF_EFFORTS_ROBOT: &str = "g1_dex3_urdf_efforts";
 
 pub const ROBOTS: [&str; 2] = [DEFAULT_ROBOT, URDF_EFFORTS_ROBOT];
@@ -22,9 +22,13 @@ static URDF_EFFORTS: LazyLock<Option<String>> = LazyLock::new(|| {
     Some(own.replace(r#"forcerange="-50 50""#, r#"forcerange="-35 35""#))
 });
 
-/// Text of an embedded robot file.
+/// Returns the text of an embedded robot file.
+///
+/// # Errors
+///
+/// Returns an error with the available names if there is no such robot.
 pub fn robot(name: &str) -> Result<&'static str, SimError> {
-    // The text is made of the default's, so it is looked at for this name alone.
+    // The text is derived from the default's, so it is built only for this name.
     if name == URDF_EFFORTS_ROBOT
         && let Some(text) = URDF_EFFORTS.as_deref()
     {
@@ -33,12 +37,20 @@ pub fn robot(name: &str) -> Result<&'static str, SimError> {
     text("robot", "robots", name, &format!("robots/{name}/robot.xml"))
 }
 
-/// Text of an embedded scene file.
+/// Returns the text of an embedded scene file.
+///
+/// # Errors
+///
+/// Returns an error with the available names if there is no such scene.
 pub fn scene(name: &str) -> Result<&'static str, SimError> {
     text("scene", "scenes", name, &format!("scenes/{name}.xml"))
 }
 
-/// Text of an embedded object file.
+/// Returns the text of an embedded object file.
+///
+/// # Errors
+///
+/// Returns an error with the available names if there is no such object.
 pub fn object(name: &str) -> Result<&'static str, SimError> {
     text("object", "objects", name, &format!("objects/{name}.xml"))
 }

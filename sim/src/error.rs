@@ -1,8 +1,8 @@
-//! What can go wrong with a world.
+//! Errors of a world.
 
 use crate::dynamics::{Diverged, OtherWorld, TreeError};
 
-/// Loading failed, or a step; the text names the file or body and what would work.
+/// Error of loading or of a step. The text names the file or body and a remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum SimError {
     #[error("no {kind} `{name}`; have: {have}")]

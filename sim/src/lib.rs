@@ -1,10 +1,11 @@
 //! Physics of the robots and their rooms: MJCF loading, dynamics, balance control, cameras and renderers.
 //!
-//! Rooms, each knowing only those before it: [`dynamics`], [`mjcf`], [`body`], [`estimate`] and [`locomotion`], [`robot`],
-//! [`world`], then [`render`] and [`mod@bench`].
+//! The modules, each of which uses only those before it: [`dynamics`], [`mjcf`], [`body`], [`estimate`]
+//! and [`locomotion`], [`robot`], [`world`], then [`render`] and [`mod@bench`].
 //!
-//! Units are SI, z is up, frames are right-handed, quaternions are written `wxyz`. One [`World`] is stepped by one
-//! thread; the same binary, specification and commands give the same [`World::state_hash`], bit for bit.
+//! Units are SI, z is up, frames are right-handed, quaternions are written `wxyz`. One [`World`] is
+//! stepped by one thread. The same binary, specification and commands give the same
+//! [`World::state_hash`], bit for bit.
 //!
 //! A world is made from a specification, stepped with one command per robot, and read as a [`Step`]:
 //!
@@ -12,9 +13,11 @@
 //! use tandem_sim::{RobotPlacement, World, WorldSpec};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let robot = |name: &str, x_m: f32| RobotPlacement { name: name.into(), position_m: [x_m, 0.0], yaw_rad: 0.0 };
-//! let spec = WorldSpec { scene: "floor".into(), robots: vec![robot("A", 0.0), robot("B", 1.5)], objects: vec![] };
-//! let mut world = World::new(&spec)?;
+//! let robot = |name: &str, x_m: f32| {
+//!     RobotPlacement { name: name.into(), position_m: [x_m, 0.0], yaw_rad: 0.0 }
+//! };
+//! let robots = vec![robot("A", 0.0), robot("B", 1.5)];
+//! let mut world = World::new(&WorldSpec { scene: "floor".into(), robots, objects: vec![] })?;
 //! let commands = [world.rest_command(0), world.rest_command(1)];
 //! let mut step = world.present();
 //! for _ in 0..25 {
@@ -29,7 +32,7 @@
 //! # }
 //! ```
 //!
-//! A renderer draws what a camera sees after a step:
+//! A renderer draws the image of a camera after a step:
 //!
 //! ```
 //! use tandem_sim::render::{Cameras, RendererKind, Scenery, encode_png};

@@ -1,6 +1,6 @@
-//! Whose collider it is, as its tag says.
+//! The owner of a collider, encoded in its tag.
 
-/// What a collider belongs to; the rest is the room.
+/// Owner of a collider; colliders without one belong to the room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Owner {
     Link { robot: usize, link: usize },
@@ -8,7 +8,7 @@ pub(crate) enum Owner {
 }
 
 impl Owner {
-    /// Tag of a collider. Indices count from 1, so that 0 is the room's.
+    /// Returns the tag of a collider. Indices count from 1, so that 0 is the room's.
     pub fn tag(self) -> u128 {
         match self {
             Owner::Link { robot, link } => ((robot as u128 + 1) << 32) | (link as u128 + 1),

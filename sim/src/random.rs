@@ -2,18 +2,18 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Steele, Lea and Flood's SplitMix64: ten lines, so that a seed means the same in every version of Tandem, whatever becomes of
-/// random number crates.
+/// Steele, Lea and Flood's SplitMix64: ten lines, so that a seed has the same meaning in every version
+/// of Tandem, independently of random number crates.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct SplitMix64(pub u64);
 
 impl SplitMix64 {
-    /// Uniform between the two, from the 24 highest bits, which is what an f32 holds.
+    /// Draws a uniform number between the two, from the 24 highest bits, which an f32 can hold.
     pub fn uniform(&mut self, [low, high]: [f32; 2]) -> f32 {
         low + (high - low) * ((self.next() >> 40) as f32 / (1u64 << 24) as f32)
     }
 
-    /// Normally distributed about 0 with a standard deviation of 1, after Box and Muller.
+    /// Draws a normally distributed number with mean 0 and standard deviation 1, after Box and Muller.
     pub fn normal(&mut self) -> f32 {
         let [radius, angle] =
             [self.next(), self.next()].map(|bits| ((bits >> 40) as f32 + 0.5) / (1u64 << 24) as f32);

@@ -1,10 +1,10 @@
-//! Left and right: which arm, hand, leg or foot, and one of a kind for each.
+//! Left and right: the side of an arm, hand, leg or foot, and pairs of values by side.
 
 use std::ops::{Index, IndexMut};
 
 use serde::{Deserialize, Serialize};
 
-/// Which hand, arm, leg or foot.
+/// Side of a hand, arm, leg or foot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Side {
     Left,
@@ -25,7 +25,7 @@ impl Side {
         }
     }
 
-    /// Prefix of link, joint and site names.
+    /// Returns the prefix of link, joint and site names.
     pub fn name(self) -> &'static str {
         match self {
             Side::Left => "left",
@@ -33,7 +33,8 @@ impl Side {
         }
     }
 
-    /// The sign of y on this side: 1 left, -1 right. It mirrors sideways parts of vectors, and roll and yaw of joints.
+    /// Returns the sign of y on this side: 1 left, -1 right. It mirrors sideways parts of vectors, and
+    /// roll and yaw of joints.
     pub fn sign(self) -> f32 {
         match self {
             Side::Left => 1.0,
@@ -42,7 +43,8 @@ impl Side {
     }
 }
 
-/// A pair with one value for each side: `feet[Side::Left]`. It is written and hashed as the left one, then the right one.
+/// A pair with one value for each side: `feet[Side::Left]`. It is serialised and hashed as the left one,
+/// then the right one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sides<T> {
     pub left: T,
@@ -50,7 +52,7 @@ pub struct Sides<T> {
 }
 
 impl<T> Sides<T> {
-    /// The left one is made first.
+    /// Creates both values, the left one first.
     pub fn from_fn(mut make: impl FnMut(Side) -> T) -> Sides<T> {
         Sides { left: make(Side::Left), right: make(Side::Right) }
     }
@@ -63,12 +65,12 @@ impl<T> Sides<T> {
         Sides { left: &self.left, right: &self.right }
     }
 
-    /// Each with its side: left, then right.
+    /// Returns each value with its side: left, then right.
     pub fn by_side(self) -> impl Iterator<Item = (Side, T)> {
         Side::BOTH.into_iter().zip(self)
     }
 
-    /// Left, then right.
+    /// Returns left, then right.
     pub fn iter(&self) -> impl Iterator<Item = &T> {
         [&self.left, &self.right].into_iter()
     }
@@ -118,7 +120,7 @@ impl<T> IntoIterator for Sides<T> {
 mod tests {
     use super::*;
 
-    /// The state hash contains controllers' memories, which held arrays once.
+    /// The state hash contains controllers' memories, which used to be arrays.
     #[test]
     fn written_as_the_array_of_left_and_right() {
         let sides = Sides { left: (1.5_f32, Some(7_u32)), right: (-2.0, None) };

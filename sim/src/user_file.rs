@@ -1,4 +1,4 @@
-//! Reads files that users name: regular ones of a bounded size, because a device or a pipe has no end.
+//! Reading of files that users name: regular ones of a bounded size, because a device or a pipe has no end.
 
 use std::{
     fs::{self, File},
@@ -6,13 +6,17 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// The most bytes of a file with settings, a task, a scene or a map.
+/// Maximum size in bytes of a file with settings, a task, a scene or a map.
 pub const MAX_TEXT_BYTES: u64 = 16 << 20;
 
-/// What some editors put in front of a text in UTF-8.
+/// Mark that some editors put in front of a UTF-8 text.
 const BYTE_ORDER_MARK: char = '\u{feff}';
 
 /// Reads a text of at most `max_bytes`, without a byte order mark.
+///
+/// # Errors
+///
+/// Returns an error if the file cannot be read, is larger, or is not UTF-8.
 pub fn read_text(path: &Path, max_bytes: u64) -> io::Result<String> {
     let text = String::from_utf8(read_bytes(path, max_bytes)?).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
@@ -26,6 +30,10 @@ pub fn read_text(path: &Path, max_bytes: u64) -> io::Result<String> {
 }
 
 /// Reads a regular file of at most `max_bytes`.
+///
+/// # Errors
+///
+/// Returns an error if the file cannot be read, is not a regular file, or is larger.
 pub fn read_bytes(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open_regular(path)?.take(max_bytes + 1).read_to_end(&mut bytes)?;
@@ -38,15 +46,20 @@ pub fn read_bytes(path: &Path, max_bytes: u64) -> io::Result<Vec<u8>> {
 }
 
 /// Opens a regular file.
+///
+/// # Errors
+///
+/// Returns an error if the file cannot be opened or is not a regular file.
 pub fn open_regular(path: &Path) -> io::Result<File> {
-    // Opening a pipe would wait for somebody to write into it.
+    // Opening a pipe would wait for a writer.
     if !fs::metadata(path)?.is_file() {
         return Err(io::Error::other("it is no regular file; give one, and no folder, device or pipe"));
     }
     File::open(path)
 }
 
-/// Finds the file that another one names with the separators of Windows, where there is none of the very name.
+/// Returns the path of a file that another file names, with Windows separators replaced if there is no
+/// file of the exact name.
 pub fn with_own_separators(path: PathBuf) -> PathBuf {
     let Some(text) = path.to_str().filter(|text| text.contains('\\')) else { return path };
     let other = PathBuf::from(text.replace('\\', "/"));

@@ -1,4 +1,4 @@
-//! Spheres swept along segments, and where two of them come closest.
+//! Spheres swept along segments, and the closest points of two of them.
 
 use nalgebra::{Point3, Vector3};
 
@@ -11,7 +11,7 @@ pub struct Capsule {
     pub frame: FrameId,
     /// Ends of the segment in that frame, m.
     pub ends: [Point3<f64>; 2],
-    /// m.
+    /// Radius, m.
     pub radius_m: f64,
 }
 
@@ -37,7 +37,8 @@ impl Segment {
     }
 }
 
-/// Closest points of two segments. Source: Ericson, Real-time collision detection, 2004, section 5.1.9.
+/// Returns the closest points of two segments. Source: Ericson, Real-time collision detection, 2004,
+/// section 5.1.9.
 pub(super) fn closest_points([a, b]: [[Vector3<f64>; 2]; 2]) -> [Vector3<f64>; 2] {
     let (da, db, between) = (a[1] - a[0], b[1] - b[0], a[0] - b[0]);
     let (aa, bb, f) = (da.norm_squared(), db.norm_squared(), db.dot(&between));

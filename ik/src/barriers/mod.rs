@@ -1,10 +1,11 @@
 //! Barriers: distances that must not shrink below a margin, as linear constraints on dq.
 //!
-//! For a distance h(q) with margin m the row  dh/dq dq >= -gain (h - m)  lets h approach m exponentially and not cross
-//! it. Source: Ames et al., Control barrier functions: theory and applications, 2019.
+//! For a distance h(q) with margin m the row  dh/dq dq >= -gain (h - m)  lets h approach m exponentially
+//! and not cross it. Source: Ames et al., Control barrier functions: theory and applications, 2019.
 //!
-//! Rows come and go without a jump in dq if the range, where a pair's row first appears, is so far out that the row does
-//! not bind there:  gain (range - margin) >= what the joints can close in one step.
+//! Rows appear and disappear without a jump in dq if the range, where a pair's row first appears, is
+//! large enough that the row does not bind there:  gain (range - margin) >= the distance that the joints
+//! can close in one step.
 
 mod capsule;
 mod self_collision;
@@ -18,21 +19,22 @@ use nalgebra::Vector3;
 use crate::model::{Configuration, FrameId};
 use crate::qp::Row;
 
-/// A plane that a frame stays beyond: normal . p >= offset with p the origin of the frame, in the root's frame.
+/// A plane that a frame stays beyond: normal . p >= offset with p the origin of the frame, in the root's
+/// frame.
 #[derive(Clone, Debug)]
 pub struct PositionBarrier {
-    /// The frame.
+    /// The frame that stays beyond the plane.
     pub frame: FrameId,
     /// Unit vector to the free side.
     pub normal: Vector3<f64>,
-    /// m.
+    /// Offset of the plane along the normal, m.
     pub offset_m: f64,
-    /// Part of the distance that one step may take.
+    /// Share of the distance that one step may take.
     pub gain: f64,
 }
 
 impl PositionBarrier {
-    /// Distance of the frame's origin to the plane, m; negative beyond it.
+    /// Returns the distance of the frame's origin to the plane, m; negative beyond it.
     pub fn height_m(&self, configuration: &Configuration) -> f64 {
         self.normal.dot(&configuration.root_from_frame(self.frame).translation.vector) - self.offset_m
     }

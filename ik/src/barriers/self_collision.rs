@@ -1,21 +1,21 @@
-//! Shapes of one robot that must not meet.
+//! Self-collision: shapes of one robot that must not meet.
 
 use super::capsule::{Capsule, Segment, closest_points};
 use crate::model::Configuration;
 use crate::qp::Rows;
 
-/// Keeps pairs of capsules apart.
+/// Pairs of capsules that are kept apart.
 #[derive(Clone, Debug, Default)]
 pub struct SelfCollision {
     /// Shapes of the robot.
     pub capsules: Vec<Capsule>,
     /// Pairs of indices into `capsules`.
     pub pairs: Vec<[usize; 2]>,
-    /// Distance between surfaces that is kept, m.
+    /// Minimum distance between surfaces, m.
     pub margin_m: f64,
-    /// Pairs further apart than this add no row, m.
+    /// Distance beyond which pairs add no row, m.
     pub range_m: f64,
-    /// Part of the distance beyond the margin that one step may take.
+    /// Share of the distance beyond the margin that one step may take.
     pub gain: f64,
 }
 
@@ -24,15 +24,15 @@ pub struct SelfCollision {
 pub struct ClosestPair {
     /// Index into [`SelfCollision::pairs`].
     pub pair: usize,
-    /// Distance between surfaces, m; negative where they overlap.
+    /// Distance between surfaces, m; negative if they overlap.
     pub distance_m: f64,
 }
 
-/// Directions of nearly coincident axes are noise: below this distance no row is written, m.
+/// Distance of axes below which no row is written, m: directions of nearly coincident axes are noise.
 const SMALLEST_AXIS_DISTANCE_M: f64 = 1e-6;
 
 impl SelfCollision {
-    /// Nearest pair, if there are any.
+    /// Returns the nearest pair, or `None` if there are no pairs.
     pub fn closest(&self, configuration: &Configuration) -> Option<ClosestPair> {
         let pairs = self.pairs.iter().enumerate().map(|(pair, indices)| {
             let [a, b] = indices.map(|index| &self.capsules[index]);
@@ -43,7 +43,8 @@ impl SelfCollision {
         pairs.min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))
     }
 
-    /// Writes one row per pair within range, owned by `owner(pair)`; spheres about the capsules keep distant pairs cheap.
+    /// Writes one row per pair within range, owned by `owner(pair)`. Bounding spheres of the capsules
+    /// keep distant pairs cheap.
     pub(crate) fn write<Owner>(
         &self,
         configuration: &Configuration,

@@ -1,11 +1,11 @@
-//! Measures the crate on pairs of wrist targets, the way that Pink and its relatives are measured.
+//! Benchmark of the crate on pairs of wrist targets, in the way that Pink and its relatives are measured.
 //!
-//! A targets file holds the joints that are free, where they start, and poses to reach:
+//! A targets file holds the free joints, their start coordinates, and poses to reach:
 //! ```text
 //!   {"free_joints": [NAME], "start_q_rad": [NUMBER], "frames": [NAME], "limits": {NAME: {"velocity": rad/s}},
 //!    "targets": [{"frames": {NAME: {"position_m": [x, y, z], "quaternion_wxyz": [w, x, y, z]}}}]}
 //! ```
-//! Without a file, [`TargetSet::sample`] draws targets that are reachable because joint coordinates put them there.
+//! Without a file, [`TargetSet::sample`] draws targets by forward kinematics, which makes them reachable.
 
 mod targets;
 
@@ -23,11 +23,11 @@ use crate::tasks::Task;
 /// Length of a step, s.
 pub const DT_S: f64 = 0.02;
 const MAX_STEPS: usize = 300;
-/// Pink's damping task leaves dt out, so its cost of 0.01 is ours times dt.
+/// Damping cost of the tuned run. Pink's damping task leaves dt out, so this is its cost of 0.01 times dt.
 pub const TUNED_DAMPING_COST: f64 = 1e-2 * DT_S;
 const RESTARTS: usize = 10;
 
-/// What a run measured.
+/// Measurements of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// One entry per way to solve.
@@ -37,24 +37,24 @@ pub struct Report {
 /// One way to solve, over all targets.
 #[derive(Clone, Debug, Serialize)]
 pub struct Measured {
-    /// `default` and `tuned` are Pink's two; the others add what this crate has beyond it.
+    /// Name of the way; `default` and `tuned` are Pink's two, the others use features beyond Pink.
     pub name: &'static str,
-    /// Part of the targets reached, 0..=1.
+    /// Share of the targets reached, 0..=1.
     pub reached: f64,
-    /// Steps, over reached targets.
+    /// Median number of steps, over reached targets.
     pub iterations_median: f64,
     /// Kinematics, Jacobians and quadratic program of one step, us.
     pub step_us_median: f64,
-    /// From start to target, over reached targets, ms.
+    /// Time from start to target, over reached targets, ms.
     pub solve_ms_median: f64,
 }
 
-/// How targets are approached.
+/// A way to approach targets.
 #[derive(Clone, Copy)]
 struct Way {
     name: &'static str,
     damping_cost: f64,
-    /// `None` steps until the frames are there, as Pink's users write the loop.
+    /// Number of restarts; `None` steps until the frames reach their targets, as Pink's users write the loop.
     restarts: Option<usize>,
 }
 
@@ -66,6 +66,10 @@ const WAYS: [Way; 4] = [
 ];
 
 /// Solves every target in every way. `whole` may have more joints than the set frees.
+///
+/// # Errors
+///
+/// Returns an error if the set names joints or frames that the model lacks.
 pub fn run(whole: &Model, set: &TargetSet) -> Result<Report, IkError> {
     let model = set.reduce(whole)?;
     let configurations = WAYS.iter().map(|way| measure(&model, set, way)).collect::<Result<_, _>>()?;
@@ -105,7 +109,8 @@ fn measure(model: &Model, set: &TargetSet, way: &Way) -> Result<Measured, IkErro
     })
 }
 
-/// Steps as Pink's users write the loop; how many it took, unless they run out.
+/// Steps as Pink's users write the loop. Returns the number of steps, or `None` if the target was not
+/// reached.
 fn step_until_reached(
     solver: &mut Solver,
     configuration: &mut Configuration,
@@ -126,7 +131,7 @@ fn step_until_reached(
     solver.is_reached(configuration, tasks).then_some(MAX_STEPS)
 }
 
-/// 0 where nothing was measured.
+/// Returns the median, or 0 without values.
 fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)

@@ -1,4 +1,4 @@
-//! Poses to reach, from a file or drawn.
+//! Target poses, from a file or drawn at random.
 
 use std::collections::BTreeMap;
 
@@ -12,16 +12,16 @@ use crate::tasks::{DampingTask, FrameTask, PostureTask, Task};
 
 const POSTURE_COST: f64 = 1e-3;
 
-/// Frames, where the joints start, and poses to reach from there.
+/// Frames, start coordinates of the joints, and poses to reach from there.
 #[derive(Clone, Debug, Deserialize)]
 pub struct TargetSet {
     /// Joints that move; every other joint of the model is locked at 0.
     pub free_joints: Vec<String>,
-    /// One per free joint, rad.
+    /// One start coordinate per free joint, rad.
     pub start_q_rad: Vec<f64>,
     /// Names of the frames to move.
     pub frames: Vec<String>,
-    /// Largest speeds where the model's file gives none or others.
+    /// Maximum speeds of joints for which the model's file gives none or others.
     #[serde(default)]
     pub limits: BTreeMap<String, SpeedLimit>,
     /// One entry per problem.
@@ -31,18 +31,18 @@ pub struct TargetSet {
 /// Limit of one joint.
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub struct SpeedLimit {
-    /// rad/s.
+    /// Maximum speed, rad/s.
     pub velocity: f64,
 }
 
 /// One problem: a pose for each frame, by name.
 #[derive(Clone, Debug, Deserialize)]
 pub struct Target {
-    /// In the root's frame.
+    /// Poses in the root's frame.
     pub frames: BTreeMap<String, TargetPose>,
 }
 
-/// A pose as files write it.
+/// A pose in the format of targets files.
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub struct TargetPose {
     /// x, y, z.
@@ -52,13 +52,21 @@ pub struct TargetPose {
 }
 
 impl TargetSet {
-    /// Reads a targets file.
+    /// Parses a targets file.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the text is not a valid targets file.
     pub fn from_json(text: &str) -> Result<TargetSet, IkError> {
         Ok(serde_json::from_str(text)?)
     }
 
-    /// Draws `count` targets: each free joint uniform in the middle 80 % of its range, poses by forward kinematics.
-    /// Shapes may overlap there.
+    /// Draws `count` targets: each free joint uniform in the middle 80 % of its range, poses by forward
+    /// kinematics. The robot's shapes may overlap in these poses.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if `start_q_rad` does not fit the model or a frame is unknown.
     pub fn sample(
         model: &Model,
         frames: &[&str],
@@ -87,7 +95,11 @@ impl TargetSet {
         })
     }
 
-    /// The model with the free joints only, at the speeds that the set asks for.
+    /// Returns the model with only the free joints, and with the speed limits of the set.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the model lacks a joint of the set.
     pub fn reduce(&self, whole: &Model) -> Result<Model, IkError> {
         let free: Vec<&str> = self.free_joints.iter().map(String::as_str).collect();
         let mut model = whole.reduced(&free, &vec![0.0; whole.nv()])?;
@@ -98,7 +110,12 @@ impl TargetSet {
         Ok(model)
     }
 
-    /// The tasks of one target: every frame at its pose, posture at the start, damping if it costs anything.
+    /// Returns the tasks of one target: every frame at its pose, posture at the start, and damping if
+    /// its cost is positive.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the target or the model lacks a frame of the set.
     pub fn tasks(&self, model: &Model, target: &Target, damping_cost: f64) -> Result<Vec<Task>, IkError> {
         let mut tasks = Vec::with_capacity(self.frames.len() + 2);
         for name in &self.frames {
@@ -126,7 +143,7 @@ impl TargetPose {
         TargetPose { position_m: [p.x, p.y, p.z], quaternion_wxyz: [q.w, q.i, q.j, q.k] }
     }
 
-    /// The pose.
+    /// Returns the pose as an isometry.
     pub fn isometry(&self) -> Isometry3<f64> {
         let [w, i, j, k] = self.quaternion_wxyz;
         let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k));

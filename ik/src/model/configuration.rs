@@ -1,4 +1,5 @@
-//! A model at one set of joint coordinates: poses, Jacobians, centre of mass. Nothing allocates after construction.
+//! A model at one set of joint coordinates: poses, Jacobians, centre of mass. Nothing allocates after
+//! construction.
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 
@@ -6,7 +7,7 @@ use super::parts::{FrameId, Joint, JointKind};
 use super::tree::Model;
 use crate::error::IkError;
 
-/// Joint coordinates with the poses that follow from them.
+/// Joint coordinates with the resulting poses.
 #[derive(Clone, Debug)]
 pub struct Configuration<'m> {
     model: &'m Model,
@@ -15,7 +16,11 @@ pub struct Configuration<'m> {
 }
 
 impl<'m> Configuration<'m> {
-    /// The model at coordinates `q` (rad or m, model order).
+    /// Creates a configuration of the model at coordinates `q` (rad or m, model order).
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if `q` has the wrong length or a coordinate is not finite.
     pub fn new(model: &'m Model, q: &[f64]) -> Result<Configuration<'m>, IkError> {
         let mut configuration = Configuration {
             model,
@@ -26,7 +31,11 @@ impl<'m> Configuration<'m> {
         Ok(configuration)
     }
 
-    /// Moves to other coordinates.
+    /// Changes the coordinates.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if `q` has the wrong length or a coordinate is not finite.
     pub fn set(&mut self, q: &[f64]) -> Result<(), IkError> {
         if q.len() != self.model.nv() {
             return Err(IkError::WrongLength { got: q.len(), expected: self.model.nv() });
@@ -65,25 +74,26 @@ impl<'m> Configuration<'m> {
         }
     }
 
-    /// The model.
+    /// Returns the model.
     pub fn model(&self) -> &'m Model {
         self.model
     }
 
-    /// Coordinates, rad or m.
+    /// Returns the coordinates, rad or m.
     pub fn q(&self) -> &[f64] {
         &self.q
     }
 
-    /// Pose of a frame in the root's frame.
+    /// Returns the pose of a frame in the root's frame.
     pub fn root_from_frame(&self, frame: FrameId) -> Isometry3<f64> {
         let frame = &self.model.frames[frame.0];
         frame.joint.map_or(Isometry3::identity(), |joint| self.root_from_joint[joint])
             * frame.joint_from_frame
     }
 
-    /// Velocity (m/s, rad/s) of a frame's origin and the frame's angular velocity per unit speed of one joint that
-    /// supports it, both expressed in the frame itself: one column of the body Jacobian.
+    /// Returns the velocity (m/s, rad/s) of a frame's origin and the frame's angular velocity per unit
+    /// speed of one joint that supports it. Both are expressed in the frame itself: one column of the
+    /// body Jacobian.
     pub(crate) fn body_jacobian_column(
         &self,
         root_from_frame: &Isometry3<f64>,
@@ -94,7 +104,7 @@ impl<'m> Configuration<'m> {
         (frame_from_root * linear, frame_from_root * angular)
     }
 
-    /// Body Jacobian of a frame, 6 x nv, [m; rad] per rad or m, written to `columns`.
+    /// Computes the body Jacobian of a frame, 6 x nv, [m; rad] per rad or m, written to `columns`.
     pub fn frame_jacobian(&self, frame: FrameId, columns: &mut [Vector6<f64>]) {
         columns.fill(Vector6::zeros());
         let root_from_frame = self.root_from_frame(frame);
@@ -105,7 +115,8 @@ impl<'m> Configuration<'m> {
         }
     }
 
-    /// Velocity of a point (root frame) that moves with the tip of `joint`, and angular velocity, per unit joint speed.
+    /// Returns the velocity of a point (root frame) that moves with the tip of `joint`, and the angular
+    /// velocity, per unit joint speed.
     pub(crate) fn velocity_of_point(
         &self,
         point: &Vector3<f64>,
@@ -119,7 +130,7 @@ impl<'m> Configuration<'m> {
         }
     }
 
-    /// Centre of mass in the root's frame, m; the root's origin if nothing has mass.
+    /// Returns the centre of mass in the root's frame, m; the root's origin if nothing has mass.
     pub fn center_of_mass(&self) -> Vector3<f64> {
         let mut moment = Vector3::zeros();
         let mut mass_kg = 0.0;
@@ -131,7 +142,7 @@ impl<'m> Configuration<'m> {
         if mass_kg > 0.0 { moment / mass_kg } else { Vector3::zeros() }
     }
 
-    /// Columns of the centre of mass Jacobian, 3 x nv, m per rad or per m, written to `columns`.
+    /// Computes the columns of the centre of mass Jacobian, 3 x nv, m per rad or per m, written to `columns`.
     pub fn center_of_mass_jacobian(&self, columns: &mut [Vector3<f64>]) {
         columns.fill(Vector3::zeros());
         let total_kg: f64 = self.model.masses.iter().map(|mass| mass.mass_kg).sum();

@@ -12,20 +12,32 @@ use super::tree::Model;
 use crate::error::IkError;
 
 impl Model {
-    /// Reads MJCF text. The one top-level body is the root, and a free joint of it is left out; speeds are unlimited, as
-    /// MJCF has no velocity limits. Masses are those that the file states; those of shapes do not count. What would
-    /// place or move a frame otherwise than in MuJoCo is refused.
+    /// Reads MJCF text. The one top-level body is the root, and its free joint is left out. Speeds are
+    /// unlimited, as MJCF has no velocity limits. Only masses stated in the file count, not those of shapes.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the text is not MJCF, or if an element would place or move a frame
+    /// differently from MuJoCo.
     pub fn from_mjcf(xml: &str) -> Result<Model, IkError> {
         Model::from_mjcf_in(xml, Path::new("."))
     }
 
-    /// The same, for text that includes files named relative to `folder`.
+    /// Reads MJCF text that includes files named relative to `folder`.
+    ///
+    /// # Errors
+    ///
+    /// Returns the same errors as [`Model::from_mjcf`].
     pub fn from_mjcf_in(xml: &str, folder: &Path) -> Result<Model, IkError> {
         check_depth(xml)?;
         Model::from_parsed_mjcf(&mjcf_rs::Model::from_str(xml, folder)?)
     }
 
-    /// The same, for a file that somebody has parsed.
+    /// Builds the model of a parsed file.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if an element would place or move a frame differently from MuJoCo.
     pub fn from_parsed_mjcf(document: &mjcf_rs::Model) -> Result<Model, IkError> {
         check_names(document)?;
         let mut joints: Vec<Joint> = Vec::new();
@@ -74,7 +86,7 @@ impl Model {
     }
 }
 
-/// Elements inside one another, at most; the parser recurses.
+/// Maximum nesting of elements; the parser recurses.
 const MAX_NESTING: usize = 200;
 
 fn refuse(kind: &str, name: &Option<String>, what: &str) -> IkError {
@@ -118,7 +130,7 @@ fn read_joint(
     Ok(Joint { name, parent, parent_from_joint, axis, kind, lower, upper, velocity })
 }
 
-/// Joints have names of their own, and so have frames of a kind.
+/// Checks that joints have distinct names, and so have frames of a kind.
 fn check_names(document: &mjcf_rs::Model) -> Result<(), IkError> {
     let mut seen = HashSet::new();
     for (_, entry) in document.bodies_iter() {

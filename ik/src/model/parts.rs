@@ -1,8 +1,8 @@
-//! What a model is made of: joints, frames fixed to them, and the masses they carry.
+//! Parts of a model: joints, frames fixed to them, and the masses they carry.
 
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 
-/// How a joint moves.
+/// Kind of motion of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointKind {
     /// Turns about its axis; coordinate in rad.
@@ -28,7 +28,7 @@ pub struct Joint {
     pub lower: f64,
     /// Largest coordinate, rad or m.
     pub upper: f64,
-    /// Largest speed, rad/s or m/s; infinite where the file gives none.
+    /// Maximum speed, rad/s or m/s; infinite if the file gives none.
     pub velocity: f64,
 }
 
@@ -56,7 +56,7 @@ pub(crate) struct Mass {
 }
 
 impl Joint {
-    /// Pose in the joint's frame at rest after moving by `q`.
+    /// Returns the pose, in the joint's frame at rest, after moving by `q`.
     pub(crate) fn motion(&self, q: f64) -> Isometry3<f64> {
         match self.kind {
             JointKind::Hinge => Isometry3::from_parts(
@@ -71,7 +71,7 @@ impl Joint {
 }
 
 impl Mass {
-    /// A body's mass, whose centre lies at `centre_m` in its frame.
+    /// Creates a body's mass, whose centre is at `centre_m` in its frame.
     pub(crate) fn new(mass_kg: f64, centre_m: Vector3<f64>) -> Mass {
         Mass { mass_kg, moment_kg_m: centre_m * mass_kg }
     }

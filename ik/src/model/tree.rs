@@ -1,12 +1,12 @@
-//! The tree itself: its joints, frames and masses, found by name; and the same tree with most of its joints locked, as of a
-//! robot that stands and moves its arms.
+//! The tree itself: its joints, frames and masses, found by name. It can be reduced by locking joints,
+//! for example for a robot that stands and moves its arms.
 
 use nalgebra::Isometry3;
 
 use super::parts::{Frame, FrameId, Joint, Mass};
 use crate::error::IkError;
 
-/// Kinematic tree with a fixed root. Joints come parents first.
+/// Kinematic tree with a fixed root. Joints are ordered parents first.
 #[derive(Clone, Debug, Default)]
 pub struct Model {
     pub(crate) joints: Vec<Joint>,
@@ -29,8 +29,12 @@ impl Model {
         Model { joints, frames, masses, supports }
     }
 
-    /// The same tree with only the joints `free` left, in their given order if that order has parents first; every other
-    /// joint is locked at its coordinate in `locked_at` (all joints of this model, rad or m).
+    /// Returns the same tree with only the joints `free`, in model order. Every other joint is locked at
+    /// its coordinate in `locked_at` (all joints of this model, rad or m).
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if `locked_at` has the wrong length or a joint is unknown.
     pub fn reduced(&self, free: &[&str], locked_at: &[f64]) -> Result<Model, IkError> {
         if locked_at.len() != self.nv() {
             return Err(IkError::WrongLength { got: locked_at.len(), expected: self.nv() });
@@ -38,7 +42,7 @@ impl Model {
         for name in free {
             self.joint(name)?;
         }
-        // Per joint: the free joint that it ends up on, and its pose in that joint's frame.
+        // Per joint: the free joint that it is attached to, and its pose in that joint's frame.
         let mut placed: Vec<(Option<usize>, Isometry3<f64>)> = Vec::with_capacity(self.nv());
         let mut joints = Vec::new();
         let mut masses = vec![Mass::default(); free.len() + 1];
@@ -63,22 +67,26 @@ impl Model {
         Ok(Model::assemble(joints, frames.collect(), masses))
     }
 
-    /// Joints in the order of all coordinate vectors.
+    /// Returns the joints in the order of all coordinate vectors.
     pub fn joints(&self) -> &[Joint] {
         &self.joints
     }
 
-    /// Number of joints.
+    /// Returns the number of joints.
     pub fn nv(&self) -> usize {
         self.joints.len()
     }
 
-    /// Frames in file order.
+    /// Returns the frames in file order.
     pub fn frames(&self) -> &[Frame] {
         &self.frames
     }
 
-    /// Index of a joint.
+    /// Returns the index of a joint.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error with the available names if there is no such joint.
     pub fn joint(&self, name: &str) -> Result<usize, IkError> {
         self.joints.iter().position(|joint| joint.name == name).ok_or_else(|| IkError::UnknownJoint {
             name: name.into(),
@@ -86,7 +94,11 @@ impl Model {
         })
     }
 
-    /// Handle of a frame.
+    /// Returns the handle of a frame.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error with the available names if there is no such frame.
     pub fn frame(&self, name: &str) -> Result<FrameId, IkError> {
         let index = self.frames.iter().position(|frame| frame.name == name);
         index.map(FrameId).ok_or_else(|| IkError::UnknownFrame {
@@ -95,12 +107,12 @@ impl Model {
         })
     }
 
-    /// Name of a frame.
+    /// Returns the name of a frame.
     pub fn frame_name(&self, frame: FrameId) -> &str {
         &self.frames[frame.0].name
     }
 
-    /// Joints that move a frame, root first.
+    /// Returns the joints that move a frame, root first.
     pub(crate) fn support(&self, frame: FrameId) -> &[usize] {
         self.frames[frame.0].joint.map_or(&[], |joint| &self.supports[joint])
     }

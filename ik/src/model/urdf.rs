@@ -10,7 +10,11 @@ use super::tree::Model;
 use crate::error::IkError;
 
 impl Model {
-    /// Reads URDF text. Joints come depth first, children in file order.
+    /// Reads URDF text. Joints are ordered depth first, children in file order.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the text is not URDF, or has loops or joints of unsupported types.
     pub fn from_urdf(xml: &str) -> Result<Model, IkError> {
         let robot = urdf_rs::read_from_string(xml)?;
         let links: HashMap<&str, &urdf_rs::Link> =

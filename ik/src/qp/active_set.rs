@@ -1,17 +1,19 @@
-//! The active set: which constraint to add, how far to go for it, and which ones to drop on the way.
+//! The active set: the next constraint to add, the length of the step towards it, and the constraints
+//! dropped on the way.
 
 use faer::Par;
 use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
 
 use super::problem::{Constraint, Qp, QpFailure};
 
-/// A violation below this is rounding.
+/// Violation below which it counts as rounding.
 const TOLERANCE: f64 = 1e-11;
-/// Relative size below which a constraint's normal lies in the span of the active ones.
+/// Relative size below which a constraint's normal is in the span of the active ones.
 const DEPENDENT: f64 = 1e-20;
 
 impl Qp {
-    /// The inactive constraint with the largest violation, the sign of its normal, and its (negative) slack.
+    /// Returns the inactive constraint with the largest violation, the sign of its normal, and its
+    /// (negative) slack.
     pub(super) fn most_violated(&self) -> Option<(Constraint, f64, f64)> {
         let mut worst: Option<(Constraint, f64, f64)> = None;
         let mut consider = |constraint: Constraint, sign: f64, slack: f64| {
@@ -36,7 +38,7 @@ impl Qp {
         worst
     }
 
-    /// basis = L^-T.
+    /// Sets basis = L^-T.
     pub(super) fn start_basis(&mut self) {
         self.inverse.fill(0.0);
         for i in 0..self.n {
@@ -84,7 +86,8 @@ impl Qp {
         }
     }
 
-    /// d = basis' a, the primal direction in the complement of the active normals, and the dual direction.
+    /// Computes d = basis' a, the primal direction in the complement of the active normals, and the dual
+    /// direction.
     fn project(&mut self, constraint: Constraint, sign: f64) {
         let (n, active) = (self.n, self.active.len());
         for k in 0..n {
@@ -110,7 +113,8 @@ impl Qp {
         }
     }
 
-    /// Largest dual step before a multiplier changes sign, and whose it is. Equalities never leave.
+    /// Returns the largest dual step before a multiplier changes sign, and the index of that multiplier.
+    /// Equalities never leave.
     fn dual_limit(&self) -> (f64, usize) {
         let mut limit = (f64::INFINITY, 0);
         for (k, (constraint, _)) in self.active.iter().enumerate() {
@@ -125,7 +129,8 @@ impl Qp {
         limit
     }
 
-    /// Appends a constraint to the active set: Givens rotations collect d beyond the active part in one entry.
+    /// Appends a constraint to the active set: Givens rotations collect d beyond the active part in one
+    /// entry.
     fn extend(&mut self, constraint: Constraint, sign: f64) {
         let (n, active) = (self.n, self.active.len());
         for k in (active + 1..n).rev() {
@@ -140,7 +145,7 @@ impl Qp {
         self.active.push((constraint, sign));
     }
 
-    /// Takes an active constraint out and restores the triangle.
+    /// Removes an active constraint and restores the triangle.
     fn remove(&mut self, index: usize) {
         let (n, active) = (self.n, self.active.len());
         self.active.remove(index);
@@ -173,7 +178,8 @@ impl Qp {
     }
 }
 
-/// Unlike `hypot` without care for overflow: normals are of moderate size, and this takes a third of the time.
+/// Returns the length of (a, b). Unlike `hypot` it does not guard against overflow: normals are of
+/// moderate size, and this takes a third of the time.
 fn length(a: f64, b: f64) -> f64 {
     (a * a + b * b).sqrt()
 }

@@ -1,5 +1,5 @@
-//! A problem's data and work space, its rows, which are written anew for every solution in memory that is kept, and the way from
-//! the unconstrained minimum to the solution.
+//! A problem's data and work space, and the way from the unconstrained minimum to the solution. Rows are
+//! rewritten for every solution in retained memory.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt;
@@ -19,15 +19,15 @@ pub enum Constraint {
 /// One linear constraint with dense coefficients.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Row {
-    /// a.
+    /// Coefficients a.
     pub coefficients: Vec<f64>,
-    /// b.
+    /// Bound b.
     pub bound: f64,
-    /// a' x = b instead of a' x >= b.
+    /// True for a' x = b, false for a' x >= b.
     pub equality: bool,
 }
 
-/// Why there is no solution.
+/// Reason for a missing solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum QpFailure {
     /// H is not positive definite.
@@ -41,13 +41,13 @@ pub enum QpFailure {
 /// Problem data and work space for `n` variables.
 pub struct Qp {
     pub(super) n: usize,
-    /// Lower triangle is read.
+    /// Hessian H, of which the lower triangle is read.
     pub hessian: Mat<f64>,
-    /// c.
+    /// Linear cost c.
     pub linear: Vec<f64>,
-    /// Bounds on x; may be infinite.
+    /// Lower bounds on x; may be infinite.
     pub lower: Vec<f64>,
-    /// Bounds on x; may be infinite.
+    /// Upper bounds on x; may be infinite.
     pub upper: Vec<f64>,
     /// Further constraints; only the first `used_rows` count.
     pub(super) rows: Vec<Row>,
@@ -71,7 +71,7 @@ pub struct Qp {
 }
 
 impl Qp {
-    /// Work space for `n` variables.
+    /// Allocates the work space for `n` variables.
     pub fn new(n: usize) -> Qp {
         let scratch =
             MemBuffer::new(llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default()));
@@ -98,12 +98,17 @@ impl Qp {
         }
     }
 
-    /// Constraints that hold with equality at the solution.
+    /// Returns the constraints that hold with equality at the solution.
     pub fn active(&self) -> impl Iterator<Item = Constraint> + '_ {
         self.active.iter().map(|(constraint, _)| *constraint)
     }
 
-    /// Solves the problem as it stands; the result is in [`Qp::x`].
+    /// Solves the present problem; the result is in [`Qp::x`].
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`QpFailure`] if the problem is not convex or infeasible, or if the active set does not
+    /// settle.
     pub fn solve(&mut self) -> Result<(), QpFailure> {
         self.unconstrained_minimum()?;
         self.active.clear();
@@ -146,14 +151,14 @@ impl Qp {
     }
 }
 
-/// Adds rows under one owner after the other.
+/// Writer of rows, each with its owner.
 pub(crate) struct Rows<'a, Owner> {
     pub qp: &'a mut Qp,
     pub owners: &'a mut Vec<Owner>,
 }
 
 impl<Owner> Rows<'_, Owner> {
-    /// A new row, zero so far.
+    /// Adds a row of zeros and returns it.
     pub fn push(&mut self, owner: Owner) -> &mut Row {
         self.owners.push(owner);
         self.qp.push_row()
@@ -161,12 +166,12 @@ impl<Owner> Rows<'_, Owner> {
 }
 
 impl Qp {
-    /// Forgets all rows; their memory is kept.
+    /// Removes all rows; their memory is retained.
     pub fn clear_rows(&mut self) {
         self.used_rows = 0;
     }
 
-    /// A new row, zero so far.
+    /// Adds a row of zeros and returns it.
     pub fn push_row(&mut self) -> &mut Row {
         if self.used_rows == self.rows.len() {
             self.rows.push(Row { coefficients: vec![0.0; self.n], bound: 0.0, equality: false });
@@ -178,20 +183,20 @@ impl Qp {
         row
     }
 
-    /// Rows since [`Qp::clear_rows`].
+    /// Returns the rows since [`Qp::clear_rows`].
     pub fn rows(&self) -> &[Row] {
         &self.rows[..self.used_rows]
     }
 
-    /// Whether x = 0 keeps all bounds and equalities to `tolerance`.
+    /// Returns true if x = 0 satisfies all bounds and equalities to `tolerance`.
     pub fn accepts_standstill(&self, tolerance: f64) -> bool {
         let within = |(lower, upper): (&f64, &f64)| *lower <= tolerance && *upper >= -tolerance;
         let keeps = |row: &Row| !row.equality || row.bound.abs() <= tolerance;
         self.lower.iter().zip(&self.upper).all(within) && self.rows().iter().all(keeps)
     }
 
-    /// Lowers the bound of every inequality that the start x = 0 violates to `cap` of the largest  a' x  within the
-    /// bounds on x; says whether there was any.
+    /// Lowers the bound of every inequality that the start x = 0 violates to `cap` of the largest  a' x
+    /// within the bounds on x. Returns true if there was any.
     pub fn cap_inequalities(&mut self, cap: impl Fn(f64) -> f64) -> bool {
         let mut lowered = false;
         for row in self.rows[..self.used_rows].iter_mut().filter(|row| !row.equality && row.bound > 0.0) {

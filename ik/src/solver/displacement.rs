@@ -1,4 +1,5 @@
-//! The quadratic program of one step: bounds, cost and rows from limits, tasks and barriers, and its solution.
+//! The quadratic program of one step: bounds, cost and rows from limits, tasks and barriers, and its
+//! solution.
 
 use super::program::{Cost, Equalities, RowOwner, name_failure};
 use super::report::Outcome;
@@ -7,16 +8,16 @@ use crate::model::{Configuration, Model};
 use crate::qp::{QpFailure, Rows};
 use crate::tasks::{FrameError, Sink, StepContext, Task};
 
-/// Added to the Hessian's diagonal: joints that no task moves stay where they are.
+/// Term on the Hessian's diagonal: joints that no task moves stay where they are.
 const REGULARIZATION: f64 = 1e-12;
-/// Part of the speed that the joints could give to a violated barrier that it may ask for.
+/// Maximum recovery speed of a violated barrier, as a share of the speed that the joints can provide.
 const RECOVERY: f64 = 0.5;
 
 impl Solver {
     /// Sets up and solves the quadratic program; the displacement is in `self.qp.x`.
     ///
-    /// A barrier that is violated already asks for a way out. It may ask for part of what the joints can do, and for
-    /// no more than standing still if such demands contradict each other.
+    /// A violated barrier demands a recovery motion. The demand is limited to a share of what the joints
+    /// can do, and dropped to standing still if such demands contradict each other.
     pub(crate) fn displacement(
         &mut self,
         configuration: &Configuration,

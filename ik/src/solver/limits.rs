@@ -2,23 +2,24 @@
 
 use crate::model::{Configuration, Model};
 
-/// What bounds a joint's displacement dq in a step of dt:
+/// Bounds on a joint's displacement dq in a step of dt:
 ///   gain (lower - q) <= dq <= gain (upper - q)                configuration
 ///   |dq| <= velocity dt                                       velocity
 ///   |dq - v_last dt| <= acceleration dt^2                     acceleration
-///   |v| <= -a dt + sqrt(a^2 dt^2 + 2 a (upper - q))           braking: v dt + v^2 / (2 a) is what stopping takes
+///   |v| <= -a dt + sqrt(a^2 dt^2 + 2 a (upper - q))           braking: stopping takes v dt + v^2 / (2 a)
 /// A joint that starts outside its range comes back, no faster than its velocity limit.
 #[derive(Clone, Debug)]
 pub struct Limits {
-    /// Part of the way to a limit that one step may take; 0.5 keeps joints off their stops, `None` leaves limits out.
+    /// Share of the distance to a limit that one step may take; 0.5 keeps joints off their stops, `None`
+    /// leaves limits out.
     pub configuration_gain: Option<f64>,
-    /// Largest speed per joint, rad/s or m/s; one of 0 keeps its joint where it is, through restarts too.
+    /// Maximum speed per joint, rad/s or m/s. A speed of 0 holds the joint, through restarts too.
     pub velocity: Vec<f64>,
-    /// Largest acceleration per joint, rad/s^2 or m/s^2.
+    /// Maximum acceleration per joint, rad/s^2 or m/s^2.
     pub acceleration: Option<Vec<f64>>,
 }
 
-/// Which limit is the tightest.
+/// Kind of the tightest limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LimitKind {
     /// A joint's range.
@@ -30,13 +31,14 @@ pub enum LimitKind {
 }
 
 impl Limits {
-    /// The file's ranges and velocities; gain 0.5, no acceleration limit.
+    /// Creates limits from the file's ranges and velocities, with gain 0.5 and no acceleration limit.
     pub fn of(model: &Model) -> Limits {
         let velocity = model.joints().iter().map(|joint| joint.velocity).collect();
         Limits { configuration_gain: Some(0.5), velocity, acceleration: None }
     }
 
-    /// Largest displacement of a joint downwards (negative) and upwards, and which limit sets each.
+    /// Returns the largest displacement of a joint downwards (negative) and upwards, with the kind of
+    /// limit that sets each.
     pub(crate) fn interval(
         &self,
         configuration: &Configuration,
@@ -68,7 +70,7 @@ impl Limits {
             raise(&mut low, (gain * (range.lower - q)).min(fastest), LimitKind::Configuration);
             lower(&mut high, (gain * (range.upper - q)).max(-fastest), LimitKind::Configuration);
         }
-        // Braking hard may contradict the range: the range wins, so that the interval is never empty.
+        // Hard braking may contradict the range: the range wins, so that the interval is never empty.
         if low.0 > high.0 {
             if low.1 == LimitKind::Configuration { high.0 = low.0 } else { low.0 = high.0 }
         }

@@ -1,4 +1,5 @@
-//! From tasks, limits and barriers to joints that move: one step, steps that never make things worse, whole solutions.
+//! Solvers for tasks, limits and barriers: single steps, guarded steps for streamed targets, and
+//! complete solutions.
 
 mod displacement;
 mod limits;

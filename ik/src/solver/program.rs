@@ -1,11 +1,11 @@
-//! Writes tasks, constraints and barriers into the quadratic program, and remembers whose each row is.
+//! Writing of tasks, constraints and barriers into the quadratic program, with the owner of each row.
 
 use crate::barriers::{PositionBarrier, SelfCollision};
 use crate::model::Model;
 use crate::qp::{Constraint, Qp, QpFailure, Rows};
 use crate::tasks::{Sink, Task};
 
-/// Adds tasks to the cost; only the lower triangle of the Hessian is written.
+/// Writer of tasks into the cost; only the lower triangle of the Hessian is written.
 pub(crate) struct Cost<'a> {
     pub qp: &'a mut Qp,
 }
@@ -35,7 +35,7 @@ impl Sink for Cost<'_> {
     }
 }
 
-/// Whose a row of the quadratic program is, by position in the list it came from.
+/// Owner of a row of the quadratic program, by position in its list.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum RowOwner {
     Equality(usize),
@@ -43,7 +43,7 @@ pub(crate) enum RowOwner {
     Position(usize),
 }
 
-/// Adds one task as equations.
+/// Writer of one task as equations.
 pub(crate) struct Equalities<'a, 'b> {
     pub rows: &'a mut Rows<'b, RowOwner>,
     pub task: usize,
@@ -68,7 +68,7 @@ impl Sink for Equalities<'_, '_> {
     fn damp(&mut self, _: f64) {}
 }
 
-/// Names what cannot be kept.
+/// Returns the name of the constraint that cannot be satisfied.
 pub(crate) fn name_failure(
     failure: QpFailure,
     model: &Model,

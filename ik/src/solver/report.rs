@@ -1,11 +1,11 @@
-//! What steps and solutions say about themselves.
+//! Reports of steps and solutions.
 
 use super::limits::LimitKind;
 use crate::barriers::ClosestPair;
 use crate::model::{Configuration, Joint};
 use crate::tasks::FrameError;
 
-/// How a step or a solution ended.
+/// Outcome of a step or a solution.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// Every frame and centre of mass that has a target is within [`Tolerance`], and no barrier is crossed.
@@ -14,34 +14,34 @@ pub enum Outcome {
     Moving,
     /// No further progress.
     Stalled {
-        /// Joints at a limit of their range: what would have to give way.
+        /// Joints at a limit of their range, which may prevent progress.
         saturated: Vec<usize>,
     },
     /// The constraints contradict each other.
     Infeasible {
-        /// The joint, equality task or barrier that cannot be kept.
+        /// The joint, equality task or barrier that cannot be satisfied.
         constraint: String,
     },
 }
 
-/// When a frame counts as reached.
+/// Errors within which a frame counts as reached.
 #[derive(Clone, Copy, Debug)]
 pub struct Tolerance {
-    /// m.
+    /// Position error, m.
     pub position_m: f64,
-    /// rad.
+    /// Orientation error, rad.
     pub orientation_rad: f64,
 }
 
 impl Default for Tolerance {
-    /// 1 mm and half a degree.
+    /// Returns 1 mm and half a degree.
     fn default() -> Self {
         Tolerance { position_m: 1e-3, orientation_rad: 0.5_f64.to_radians() }
     }
 }
 
 impl Tolerance {
-    /// Whether this is near enough.
+    /// Returns true if an error is within the tolerance.
     pub fn accepts(&self, error: &FrameError) -> bool {
         error.position_m <= self.position_m && error.orientation_rad <= self.orientation_rad
     }
@@ -52,24 +52,24 @@ impl Tolerance {
 pub struct ClampedJoint {
     /// Index in the model.
     pub joint: usize,
-    /// The limit that did it.
+    /// The limit that cut it short.
     pub limit: LimitKind,
-    /// What is left of the joint's range in the direction that it was stopped in, rad or m.
+    /// Remaining range of the joint in the direction in which it was stopped, rad or m.
     pub margin: f64,
 }
 
-/// How a solution ended.
+/// Report of a solution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolveReport {
-    /// `Moving` if the iterations ran out.
+    /// Outcome; `Moving` if the iterations ran out.
     pub outcome: Outcome,
     /// Steps over all attempts.
     pub iterations: usize,
     /// Attempts after the first.
     pub restarts: usize,
-    /// Per task that has one, in order; see [`crate::Task::error`].
+    /// Errors of the tasks that have one, in order; see [`crate::Task::error`].
     pub errors: Vec<FrameError>,
-    /// Joints that a limit stopped in the last step of the attempt that is reported.
+    /// Joints that a limit stopped in the last step of the reported attempt.
     pub clamped: Vec<ClampedJoint>,
     /// The pair of shapes nearest to touching.
     pub closest_pair: Option<ClosestPair>,
@@ -77,10 +77,10 @@ pub struct SolveReport {
     pub final_speed: f64,
 }
 
-/// Joints within this of a limit count as saturated, rad or m.
+/// Distance to a limit within which a joint counts as saturated, rad or m.
 const SATURATED: f64 = 1e-3;
 
-/// Joints at a limit of their range.
+/// Returns the joints at a limit of their range.
 pub fn saturated(configuration: &Configuration) -> Vec<usize> {
     let at_limit = |joint: &Joint, q: f64| q < joint.lower + SATURATED || q > joint.upper - SATURATED;
     let joints = configuration.model().joints().iter().zip(configuration.q());

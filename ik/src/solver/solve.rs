@@ -1,14 +1,15 @@
-//! Whole solutions: steps with a clamped error and a line search, until the frames are there or nothing moves.
+//! Complete solutions: steps with a clamped error and a line search, until the frames are reached or
+//! nothing moves.
 
 use super::report::{ClampedJoint, Outcome, SolveReport, saturated};
 use super::step::{Solver, frame_errors};
 use crate::model::{Configuration, Joint};
 use crate::tasks::Task;
 
-/// How long and how hard to try.
+/// Limits on the effort of a solution.
 #[derive(Clone, Debug)]
 pub struct SolveOptions {
-    /// Steps of one attempt.
+    /// Maximum number of steps of one attempt.
     pub max_iterations: usize,
     /// Further attempts from random coordinates after a stall; for planning, never for streaming.
     pub restarts: usize,
@@ -19,21 +20,21 @@ pub struct SolveOptions {
 }
 
 impl Default for SolveOptions {
-    /// 200 steps, no restarts.
+    /// Returns options with 200 steps and no restarts.
     fn default() -> Self {
         SolveOptions { max_iterations: 200, restarts: 0, seed: 1, constraints: Vec::new() }
     }
 }
 
-/// An attempt has stalled after this many steps without the squared error falling by [`PROGRESS`].
+/// Number of steps without the squared error falling by [`PROGRESS`] after which an attempt has stalled.
 const PATIENCE: usize = 20;
 const PROGRESS: f64 = 0.98;
-/// The last attempt goes on until the joints are slower than this, rad/s or m/s.
+/// Joint speed below which the last attempt ends, rad/s or m/s.
 const REST_SPEED: f64 = 0.04;
-/// Random starts keep this part of each joint's range.
+/// Share of each joint's range that random starts use.
 const START_RANGE: f64 = 0.8;
 
-/// Where an attempt ended.
+/// Final state of an attempt.
 struct Attempt {
     outcome: Outcome,
     q: Vec<f64>,
@@ -43,7 +44,7 @@ struct Attempt {
 }
 
 impl Solver {
-    /// Moves `configuration` to `tasks`. If no attempt gets there, it is left at the best coordinates found.
+    /// Moves `configuration` to `tasks`. If no attempt succeeds, it is left at the best coordinates found.
     pub fn solve(
         &mut self,
         configuration: &mut Configuration,
@@ -101,7 +102,7 @@ impl Solver {
         }
     }
 
-    /// How an attempt ended.
+    /// Runs the steps of an attempt and returns its outcome.
     fn iterate(
         &mut self,
         configuration: &mut Configuration,
@@ -138,7 +139,7 @@ fn squared_error(configuration: &Configuration, tasks: &[Task]) -> f64 {
     frame_errors(configuration, tasks).map(|error| error.squared()).sum()
 }
 
-/// Uniform in the middle of a joint's range; xorshift64 (Marsaglia 2003).
+/// Draws a coordinate uniformly in the middle of a joint's range; xorshift64 (Marsaglia 2003).
 pub(crate) fn random_coordinate(joint: &Joint, state: &mut u64) -> f64 {
     *state ^= *state << 13;
     *state ^= *state >> 7;

@@ -8,7 +8,8 @@ use crate::model::{Configuration, Model};
 use crate::qp::{Constraint, Qp};
 use crate::tasks::{FrameError, Task, TaskScratch};
 
-/// Solves for joint displacements of one model; keeps its work space, so that a step that moves does not allocate.
+/// Solver for joint displacements of one model. It retains its work space, so that a step that moves
+/// does not allocate.
 pub struct Solver {
     /// Length of a step, s.
     pub dt_s: f64,
@@ -18,9 +19,9 @@ pub struct Solver {
     pub self_collision: Option<SelfCollision>,
     /// Planes to stay beyond.
     pub position_barriers: Vec<PositionBarrier>,
-    /// When a frame counts as reached.
+    /// Tolerance within which a frame counts as reached.
     pub tolerance: Tolerance,
-    /// What [`Solver::track`] remembers of failed steps, at least 1; goes with the joints where these are saved.
+    /// Memory of [`Solver::track`] of failed steps, at least 1. Save it along with the joints.
     pub caution: f64,
     pub(super) qp: Qp,
     pub(super) row_owners: Vec<RowOwner>,
@@ -30,11 +31,12 @@ pub struct Solver {
     pub(super) bounds: Vec<[(f64, LimitKind); 2]>,
 }
 
-/// A step slower than this, in rad/s or m/s, away from its goal has stalled: it would not get anywhere in seconds.
+/// Speed below which a step away from its goal has stalled, in rad/s or m/s: it would make no progress
+/// in seconds.
 const STALLED_SPEED: f64 = 0.02;
 
 impl Solver {
-    /// Work space for `model`, with its own limits.
+    /// Creates a solver for `model`, with the model's limits.
     pub fn new(model: &Model, dt_s: f64) -> Solver {
         let nv = model.nv();
         Solver {
@@ -53,8 +55,9 @@ impl Solver {
         }
     }
 
-    /// Moves `configuration` by one step of [`Solver::dt_s`] towards `tasks`; `constraints` are tasks that hold exactly.
-    /// These are Pink's iterates: a target out of reach keeps the joints moving; see [`Solver::track`].
+    /// Moves `configuration` by one step of [`Solver::dt_s`] towards `tasks`; `constraints` are tasks
+    /// that hold exactly. These are Pink's iterates: a target out of reach keeps the joints moving; see
+    /// [`Solver::track`].
     pub fn step(
         &mut self,
         configuration: &mut Configuration,
@@ -70,14 +73,14 @@ impl Solver {
         self.outcome(configuration, tasks)
     }
 
-    /// Takes `scale` times the displacement found for the last velocity.
+    /// Stores `scale` times the displacement as the last velocity.
     pub(crate) fn remember(&mut self, scale: f64) {
         for (velocity, dq) in self.last_velocity.iter_mut().zip(&self.qp.x) {
             *velocity = scale * dq / self.dt_s;
         }
     }
 
-    /// What a step that led to `configuration` amounts to.
+    /// Returns the outcome of a step that led to `configuration`.
     pub(crate) fn outcome(&self, configuration: &Configuration, tasks: &[Task]) -> Outcome {
         if self.is_reached(configuration, tasks) {
             Outcome::Reached
@@ -88,17 +91,18 @@ impl Solver {
         }
     }
 
-    /// Largest joint speed of the last step, rad/s or m/s.
+    /// Returns the largest joint speed of the last step, rad/s or m/s.
     pub fn fastest(&self) -> f64 {
         self.last_velocity.iter().fold(0.0, |fastest, velocity| fastest.max(velocity.abs()))
     }
 
-    /// Joint speeds of the last step, rad/s or m/s.
+    /// Returns the joint speeds of the last step, rad/s or m/s.
     pub fn velocity(&self) -> &[f64] {
         &self.last_velocity
     }
 
-    /// Joints whose last step a limit cut short; `configuration` is where that step led.
+    /// Returns the joints whose last step was cut short by a limit; `configuration` must be the result
+    /// of that step.
     pub fn clamped(&self, configuration: &Configuration) -> impl Iterator<Item = ClampedJoint> {
         let (joints, q) = (configuration.model().joints(), configuration.q());
         self.qp.active().filter_map(move |constraint| match constraint {
@@ -114,25 +118,25 @@ impl Solver {
         })
     }
 
-    /// The pair of shapes nearest to touching, if there are shapes.
+    /// Returns the pair of shapes nearest to touching, if there are shapes.
     pub fn closest_pair(&self, configuration: &Configuration) -> Option<ClosestPair> {
         self.self_collision.as_ref().and_then(|barrier| barrier.closest(configuration))
     }
 
-    /// Forgets the last steps: the next one starts at rest and without caution.
+    /// Clears the memory of the last steps: the next one starts at rest and without caution.
     pub fn rest(&mut self) {
         self.last_velocity.fill(0.0);
         self.caution = 1.0;
     }
 
-    /// Whether there are targets, all of them are within tolerance, and no barrier is crossed.
+    /// Returns true if there are targets, all of them are within tolerance, and no barrier is crossed.
     pub fn is_reached(&self, configuration: &Configuration, tasks: &[Task]) -> bool {
         let mut errors = frame_errors(configuration, tasks).peekable();
         let there = errors.peek().is_some() && errors.all(|error| self.tolerance.accepts(&error));
         there && !self.crosses_barrier(configuration)
     }
 
-    /// Whether shapes overlap or a frame is beyond its plane.
+    /// Returns true if shapes overlap or a frame is beyond its plane.
     pub(crate) fn crosses_barrier(&self, configuration: &Configuration) -> bool {
         let beyond = |barrier: &PositionBarrier| barrier.height_m(configuration) < -self.tolerance.position_m;
         self.closest_pair(configuration).is_some_and(|pair| pair.distance_m < 0.0)
@@ -140,7 +144,7 @@ impl Solver {
     }
 }
 
-/// Errors of the tasks that have one, in order; see [`Task::error`].
+/// Returns the errors of the tasks that have one, in order; see [`Task::error`].
 pub fn frame_errors(configuration: &Configuration, tasks: &[Task]) -> impl Iterator<Item = FrameError> {
     tasks.iter().filter_map(|task| task.error(configuration))
 }

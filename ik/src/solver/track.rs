@@ -1,12 +1,13 @@
-//! Steps that do not make things worse: errors are clamped, steps halved, and failures make the solver cautious.
+//! Steps that do not increase the objective, unless limits or barriers demand it: errors are clamped,
+//! steps halved, and failures make the solver cautious.
 //!
-//! Near a singular posture, a straight arm for one, a step along J^+ e overshoots, and the next one overshoots back. Here
-//! a step is halved until it lowers the objective  sum over tasks  alpha/2 |W e|^2,  of which the quadratic program's
-//! solution is a descent direction. Where halving does not help, the joints stay and further steps are damped by
+//! Near a singular posture, for example a straight arm, a step along J^+ e overshoots, and the next one
+//! overshoots back. Here a step is halved until it lowers the objective  sum over tasks
+//! alpha/2 |W e|^2,  of which the quadratic program's solution is a descent direction. If halving does
+//! not help, the joints stay and further steps are damped by
 //!   mu = CAUTION^2 (caution^2 - 1),
-//! with caution tripled where no part of a step helps, raised by half where only a part does, and halved after a whole
-//! step. Source: Levenberg 1944; Nocedal and Wright,
-//! Numerical Optimization, 2006, chapters 3 and 10.
+//! with caution tripled if no part of a step helps, raised by half if only a part does, and halved after a
+//! whole step. Source: Levenberg 1944; Nocedal and Wright, Numerical Optimization, 2006, chapters 3 and 10.
 
 use super::report::Outcome;
 use super::step::Solver;
@@ -18,13 +19,14 @@ const MAX_HALVINGS: usize = 5;
 /// Damping per joint that caution multiplies, 1/rad or 1/m.
 const CAUTION: f64 = 1e-2;
 const MAX_CAUTION: f64 = 1e3;
-/// An objective that grows by this part is the same up to rounding.
+/// Relative growth of an objective that counts as rounding.
 const SAME: f64 = 1e-9;
-/// Violations that a step must mend at once rather than in a line search's time, rad or m per step.
+/// Violations from which on a step must correct them at once, without a line search, rad or m per step.
 const URGENT: f64 = 1e-4;
 
 impl Solver {
-    /// One step as [`Solver::step`], for targets that may move and may be out of reach: there the joints come to rest.
+    /// Takes one step like [`Solver::step`], for targets that may move and may be out of reach, where
+    /// the joints come to rest.
     pub fn track(
         &mut self,
         configuration: &mut Configuration,
@@ -40,7 +42,7 @@ impl Solver {
         }
     }
 
-    /// Moves by a part of the quadratic program's solution that lowers the objective, maybe none.
+    /// Moves by the part of the quadratic program's solution that lowers the objective, possibly none.
     pub(crate) fn guarded_step(
         &mut self,
         configuration: &mut Configuration,
@@ -50,7 +52,7 @@ impl Solver {
         let before = objective(configuration, tasks);
         let damping = CAUTION * CAUTION * (self.caution * self.caution - 1.0);
         self.displacement(configuration, tasks, constraints, Some(ERROR_CLAMP), damping)?;
-        // Joints that must brake or come back, and shapes that must part, do so whatever it costs.
+        // Joints that must brake or come back, and shapes that must part, do so at any cost.
         let urgent = self.crosses_barrier(configuration) || !self.qp.accepts_standstill(URGENT);
         let mut scale = 1.0;
         configuration.advance(&self.qp.x, scale);

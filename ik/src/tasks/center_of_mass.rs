@@ -5,14 +5,14 @@ use nalgebra::Vector3;
 use super::goal::{FrameError, Goal, Sink, StepContext, TaskScratch};
 use crate::model::{Configuration, Model};
 
-/// Puts the centre of mass at a point. e = target - centre, 3, m.
+/// Task to move the centre of mass to a point. e = target - centre, 3, m.
 #[derive(Clone, Debug)]
 pub struct CenterOfMassTask {
-    /// In the root's frame, m.
+    /// Target in the root's frame, m.
     pub target: Vector3<f64>,
     /// Cost per metre, along the root's axes; 0 leaves an axis free.
     pub cost: Vector3<f64>,
-    /// alpha in 0..=1.
+    /// Gain alpha in 0..=1.
     pub gain: f64,
 }
 

@@ -7,31 +7,31 @@ use super::pose::{clamped, read_columns, weighted_square, write_pose_rows};
 use crate::model::{Configuration, FrameId, Model};
 use crate::spatial::Log6;
 
-/// Puts a frame at a pose. Error: e = log(frame^-1 target), 6, [m; rad], in the frame itself;
+/// Task to move a frame to a pose. Error: e = log(frame^-1 target), 6, [m; rad], in the frame itself;
 /// J = J_l^-1(e) J_body, with J_l the left Jacobian of SE(3).
 #[derive(Clone, Debug)]
 pub struct FrameTask {
-    /// The frame.
+    /// The frame to move.
     pub frame: FrameId,
-    /// Where it should be, in the root's frame.
+    /// Target pose in the root's frame.
     pub target: Isometry3<f64>,
     /// Cost per metre.
     pub position_cost: f64,
     /// Cost per radian.
     pub orientation_cost: f64,
-    /// alpha in 0..=1: the part of the error to remove in one step.
+    /// Gain alpha in 0..=1: the share of the error to remove in one step.
     pub gain: f64,
-    /// lambda, dimensionless.
+    /// Levenberg-Marquardt damping lambda, dimensionless.
     pub lm_damping: f64,
 }
 
 impl FrameTask {
-    /// Cost 1 per metre and per radian, gain 1, no Levenberg-Marquardt damping.
+    /// Creates a task with cost 1 per metre and per radian, gain 1, no Levenberg-Marquardt damping.
     pub fn new(frame: FrameId, target: Isometry3<f64>) -> FrameTask {
         FrameTask { frame, target, position_cost: 1.0, orientation_cost: 1.0, gain: 1.0, lm_damping: 0.0 }
     }
 
-    /// What is missing; a component without cost is not asked for and counts as 0.
+    /// Returns the remaining error; a component without cost counts as 0.
     pub fn error(&self, configuration: &Configuration) -> FrameError {
         FrameError::of(&self.missing(configuration), [self.position_cost, self.orientation_cost])
     }

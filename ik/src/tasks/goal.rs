@@ -1,22 +1,23 @@
-//! What every task can say and do, how far a frame is from where it should be, and where a task writes its rows.
+//! The interface of all tasks, the error of a frame, and the receiver of a task's rows.
 
 use nalgebra::{Isometry3, Vector3, Vector6};
 
 use crate::model::{Configuration, Model};
 
-/// One kind of task. [`super::Task`] asks the one that it holds.
+/// One kind of task, which a [`super::Task`] delegates to.
 pub(crate) trait Goal {
-    /// What is missing to a frame's pose or to the centre of mass; `None` for tasks that only shape the way there.
+    /// Returns the error of a frame's pose or of the centre of mass; `None` for tasks that only shape
+    /// the way there.
     fn frame_error(&self, _: &Configuration) -> Option<FrameError> {
         None
     }
 
-    /// alpha/2 |W e|^2; 0 for tasks on velocities, which a line search leaves alone.
+    /// Returns alpha/2 |W e|^2; 0 for tasks on velocities, which a line search leaves alone.
     fn objective(&self, _: &Configuration) -> f64 {
         0.0
     }
 
-    /// For messages: what the task is about.
+    /// Describes the subject of the task, for messages.
     fn describe(&self, model: &Model) -> String;
 
     /// Writes  W J  and  alpha W e  at `configuration`.
@@ -29,21 +30,21 @@ pub(crate) trait Goal {
     );
 }
 
-/// Receives a task's weighted rows.
+/// Receiver of a task's weighted rows.
 pub(crate) trait Sink {
-    /// One row: (joint, W J) for the joints that move it, and  alpha W e.
+    /// Adds one row: (joint, W J) for the joints that move it, and  alpha W e.
     fn row(&mut self, entries: &[(usize, f64)], error: f64);
-    /// The same weight on every joint: W 1 dq = W e, with e per joint.
+    /// Adds the same weight on every joint: W 1 dq = W e, with e per joint.
     fn diagonal(&mut self, weight: f64, error: &dyn Fn(usize) -> f64);
-    /// mu, on every joint.
+    /// Adds mu on every joint.
     fn damp(&mut self, mu: f64);
 }
 
-/// What tasks need to know beside the configuration.
+/// Context of a step beside the configuration.
 pub(crate) struct StepContext<'a> {
     pub dt_s: f64,
     pub last_velocity: &'a [f64],
-    /// Errors of frames are cut to this.
+    /// Maximum errors of frames; larger ones are clamped.
     pub error_clamp: Option<FrameError>,
 }
 
@@ -65,7 +66,7 @@ impl TaskScratch {
     }
 }
 
-/// What a frame is away from its target.
+/// Distance of a frame from its target.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrameError {
     /// Distance of the origins, m.
@@ -82,11 +83,11 @@ impl FrameError {
         }
     }
 
-    /// Squared, metres and radians alike.
+    /// Returns the squared error, with metres and radians weighted alike.
     pub(crate) fn squared(&self) -> f64 {
         self.position_m.powi(2) + self.orientation_rad.powi(2)
     }
 }
 
-/// What one step of a whole solution takes on: far targets do not upset near joints.
+/// Maximum error per step of a complete solution, so that far targets do not upset near joints.
 pub(crate) const ERROR_CLAMP: FrameError = FrameError { position_m: 0.3, orientation_rad: 0.9 };

@@ -3,14 +3,14 @@
 use super::goal::{Goal, Sink, StepContext, TaskScratch};
 use crate::model::{Configuration, Model};
 
-/// Keeps all joints near coordinates. J = 1, e = target - q, nv.
+/// Task to keep all joints near coordinates. J = 1, e = target - q, nv.
 #[derive(Clone, Debug)]
 pub struct PostureTask {
-    /// Model order, rad or m.
+    /// Target coordinates in model order, rad or m.
     pub target: Vec<f64>,
     /// Cost per rad or m.
     pub cost: f64,
-    /// alpha in 0..=1.
+    /// Gain alpha in 0..=1.
     pub gain: f64,
 }
 
@@ -36,16 +36,17 @@ impl Goal for PostureTask {
     }
 }
 
-/// Keeps  sum_i ratio_i q_i = offset, with each joint named once.  J = ratios, e = offset - ratios' q, 1.
+/// Task to keep  sum_i ratio_i q_i = offset, with each joint named once.  J = ratios, e = offset - ratios' q,
+/// 1.
 #[derive(Clone, Debug)]
 pub struct JointCouplingTask {
-    /// Joint and its ratio.
+    /// Joints with their ratios.
     pub ratios: Vec<(usize, f64)>,
-    /// rad or m.
+    /// Offset, rad or m.
     pub offset: f64,
     /// Cost per rad or m.
     pub cost: f64,
-    /// alpha in 0..=1.
+    /// Gain alpha in 0..=1.
     pub gain: f64,
 }
 

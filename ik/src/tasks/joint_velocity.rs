@@ -3,10 +3,10 @@
 use super::goal::{Goal, Sink, StepContext, TaskScratch};
 use crate::model::{Configuration, Model};
 
-/// Asks for joint speeds. J = 1 / dt, e = target, nv, rad/s.
+/// Task that demands joint speeds. J = 1 / dt, e = target, nv, rad/s.
 #[derive(Clone, Debug)]
 pub struct JointVelocityTask {
-    /// Model order, rad/s or m/s.
+    /// Target speeds in model order, rad/s or m/s.
     pub target: Vec<f64>,
     /// Cost per rad/s or m/s.
     pub cost: f64,
@@ -22,7 +22,8 @@ impl Goal for JointVelocityTask {
     }
 }
 
-/// Costs joint speed: J = 1 / dt, e = 0, nv, rad/s. Pink's damping task leaves dt out; its cost is this one's over dt.
+/// Task that penalises joint speed: J = 1 / dt, e = 0, nv, rad/s. Pink's damping task leaves dt out;
+/// its cost is this one's over dt.
 #[derive(Clone, Debug)]
 pub struct DampingTask {
     /// Cost per rad/s or m/s.
@@ -39,7 +40,7 @@ impl Goal for DampingTask {
     }
 }
 
-/// Costs changes of joint speed since the last step. J = 1 / dt, e = last velocity, nv, rad/s.
+/// Task that penalises changes of joint speed since the last step. J = 1 / dt, e = last velocity, nv, rad/s.
 #[derive(Clone, Debug)]
 pub struct LowAccelerationTask {
     /// Cost per rad/s or m/s.

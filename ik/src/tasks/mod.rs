@@ -1,10 +1,10 @@
-//! What is asked of the joints, as weighted least squares in the joint displacement dq.
+//! Tasks on the joints, as weighted least squares in the joint displacement dq.
 //!
-//! Each task asks for  J dq = alpha e  at a cost, and adds to the quadratic program
+//! Each task demands  J dq = alpha e  at a cost, and adds to the quadratic program
 //!   1/2 |W (J dq - alpha e)|^2 + 1/2 mu |dq|^2,   mu = lambda |alpha W e|^2,
-//! so that  H += (WJ)'(WJ) + mu I,  c -= alpha (WJ)'(We).
-//! J: k x nv; e: k; W: diagonal. lambda is Levenberg-Marquardt damping, which fades as the error does.
-//! Source: Sugihara, Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method, 2011.
+//! so that  H += (WJ)'(WJ) + mu I,  c -= alpha (WJ)'(We). J: k x nv; e: k; W: diagonal. lambda is
+//! Levenberg-Marquardt damping, which fades as the error does. Source: Sugihara, Solvability-unconcerned
+//! inverse kinematics by the Levenberg-Marquardt method, 2011.
 
 mod center_of_mass;
 mod frame;
@@ -24,7 +24,7 @@ pub use relative_frame::RelativeFrameTask;
 
 use crate::model::Configuration;
 
-/// One thing to achieve; see the variants.
+/// One objective; see the variants.
 #[derive(Clone, Debug)]
 pub enum Task {
     /// A frame at a pose in the root's frame.
@@ -46,12 +46,13 @@ pub enum Task {
 }
 
 impl Task {
-    /// What is missing to a frame's pose or to the centre of mass; `None` for tasks that only shape the way there.
+    /// Returns the error of a frame's pose or of the centre of mass; `None` for tasks that only shape
+    /// the way there.
     pub fn error(&self, configuration: &Configuration) -> Option<FrameError> {
         self.goal().frame_error(configuration)
     }
 
-    /// The task of its kind.
+    /// Returns the task of its kind.
     pub(crate) fn goal(&self) -> &dyn Goal {
         match self {
             Task::Frame(task) => task,

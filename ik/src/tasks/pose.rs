@@ -1,4 +1,4 @@
-//! What tasks on poses share: how the least squares weigh their error, how it is cut down, its columns and its six rows.
+//! Common parts of tasks on poses: the weighting and clamping of their error, its columns and its six rows.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector6};
 
@@ -6,13 +6,13 @@ use super::goal::{FrameError, Sink, TaskScratch};
 use crate::model::{Configuration, FrameId};
 use crate::spatial::Log6;
 
-/// |W e|^2 of a pose's error.
+/// Returns |W e|^2 of a pose's error.
 pub(super) fn weighted_square(error: &Vector6<f64>, [position, orientation]: [f64; 2]) -> f64 {
     (position * error.fixed_rows::<3>(0)).norm_squared()
         + (orientation * error.fixed_rows::<3>(3)).norm_squared()
 }
 
-/// A pose that is missing, cut to the clamp's distance and angle: the way starts in the same direction.
+/// Clamps a pose error to the clamp's distance and angle; the motion starts in the same direction.
 pub(super) fn clamped(missing: &Isometry3<f64>, clamp: Option<FrameError>) -> Isometry3<f64> {
     let Some(clamp) = clamp else { return *missing };
     let (way, turn) = (missing.translation.vector, missing.rotation.scaled_axis());
@@ -22,7 +22,7 @@ pub(super) fn clamped(missing: &Isometry3<f64>, clamp: Option<FrameError>) -> Is
     Isometry3::from_parts(translation.into(), rotation)
 }
 
-/// Sets the columns of the joints that move a frame, as the logarithm of its error sees them.
+/// Computes the columns of the joints that move a frame, for the logarithm of its error.
 pub(super) fn read_columns(
     scratch: &mut TaskScratch,
     configuration: &Configuration,
@@ -37,7 +37,7 @@ pub(super) fn read_columns(
     }
 }
 
-/// One row per component of the error whose columns are in `scratch`.
+/// Writes one row per component of the error whose columns are in `scratch`.
 pub(super) fn write_pose_rows(
     scratch: &mut TaskScratch,
     error: &Vector6<f64>,

@@ -7,20 +7,20 @@ use super::pose::{clamped, read_columns, weighted_square, write_pose_rows};
 use crate::model::{Configuration, FrameId, Model};
 use crate::spatial::Log6;
 
-/// Puts a frame at a pose in another frame that moves too.
+/// Task to move a frame to a pose in another frame that moves too.
 #[derive(Clone, Debug)]
 pub struct RelativeFrameTask {
     /// The frame to move.
     pub frame: FrameId,
     /// The frame that the target is given in.
     pub reference: FrameId,
-    /// Where `frame` should be, in `reference`.
+    /// Target pose of `frame`, in `reference`.
     pub target: Isometry3<f64>,
     /// Cost per metre.
     pub position_cost: f64,
     /// Cost per radian.
     pub orientation_cost: f64,
-    /// alpha in 0..=1.
+    /// Gain alpha in 0..=1.
     pub gain: f64,
 }
 
@@ -55,7 +55,7 @@ impl Goal for RelativeFrameTask {
         let root_from_frame = configuration.root_from_frame(self.frame);
         let missing = Log6::of(&clamped(&self.missing(configuration), context.error_clamp));
         read_columns(scratch, configuration, self.frame, &missing);
-        // The reference carries the goal along: the frame sees it move the other way.
+        // The target moves along with the reference: relative to the frame it moves the other way.
         for &joint in configuration.model().support(self.reference) {
             let (linear, angular) =
                 configuration.velocity_of_point(&root_from_frame.translation.vector, joint);

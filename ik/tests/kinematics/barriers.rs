@@ -1,4 +1,4 @@
-//! Barriers hold while targets press against them, let go of what overlaps, and come to rest.
+//! Barriers hold while targets press against them, separate overlapping shapes, and come to rest.
 
 use nalgebra::{Isometry3, Vector3};
 use tandem_ik::{
@@ -86,7 +86,7 @@ fn overlapping_shapes_come_apart_at_bounded_speed() {
     assert!(apart > 0.0, "still {apart} m");
 }
 
-/// Two pairs that demand opposite things hold still rather than fail; one that contradicts an equality is named.
+/// Two barriers with opposite demands hold still rather than fail; one that contradicts an equality is named.
 #[test]
 fn contradictions_hold_still_or_are_named() {
     let model = common::g1();
@@ -135,7 +135,8 @@ fn a_frame_stays_beyond_its_plane() {
     );
 }
 
-/// Solutions with the barrier on: what is reached is free of overlap, and the report says how near shapes are.
+/// Solutions with the barrier on: reached ones are free of overlap, and the report gives the distance of
+/// the closest shapes.
 #[test]
 fn planned_solutions_do_not_overlap() {
     let model = common::g1();

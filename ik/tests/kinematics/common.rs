@@ -1,4 +1,4 @@
-//! The G1 that tests move: pelvis fixed, waist and arms free, capsules about trunk, head, forearms and hands.
+//! The G1 of the tests: pelvis fixed, waist and arms free, capsules about trunk, head, forearms and hands.
 
 use nalgebra::Point3;
 use tandem_ik::{Capsule, Configuration, Model, SelfCollision};
@@ -9,7 +9,7 @@ pub const ROBOT: &str = include_str!("../../../sim/assets/robots/g1_dex3/robot.x
 pub const READY_RAD: [f64; 17] =
     [0.0, 0.0, 0.0, 0.2, 0.2, 0.0, 1.28, 0.0, 0.0, 0.0, 0.2, -0.2, 0.0, 1.28, 0.0, 0.0, 0.0];
 
-/// Waist (3), left arm (7), right arm (7).
+/// Returns the model with waist (3), left arm (7) and right arm (7).
 pub fn g1() -> Model {
     let whole = Model::from_mjcf(ROBOT).expect("the robot's file");
     let arm = [
@@ -30,12 +30,12 @@ pub fn g1() -> Model {
     whole.reduced(&free, &vec![0.0; whole.nv()]).expect("joints of the robot")
 }
 
-/// The robot at [`READY_RAD`].
+/// Returns the robot at [`READY_RAD`].
 pub fn ready(model: &Model) -> Configuration<'_> {
     Configuration::new(model, &READY_RAD).expect("17 numbers")
 }
 
-/// Ten pairs: both forearms and hands against the trunk, the head and each other.
+/// Returns ten pairs: both forearms and hands against the trunk, the head and each other.
 pub fn self_collision(model: &Model) -> SelfCollision {
     let capsule = |link: &str, a: [f64; 3], b: [f64; 3], radius_m: f64| Capsule {
         frame: model.frame(link).expect("a link"),

@@ -152,7 +152,8 @@ fn the_other_tasks_do_what_they_say() {
     assert!((configuration.center_of_mass() - goal).xy().norm() < 1e-3);
 }
 
-/// A joint that may not move keeps its coordinate bit for bit, also where a solution begins anew from random coordinates.
+/// A joint that may not move keeps its coordinate bit for bit, even if a solution restarts from random
+/// coordinates.
 #[test]
 fn a_joint_without_speed_stays_through_steps_and_restarts() {
     let model = common::g1();

@@ -1,4 +1,5 @@
-//! Inverse kinematics on a G1's arms and waist: models, limits, barriers, tracking, and the solver against others.
+//! Inverse kinematics on a G1's arms and waist: models, limits, barriers, tracking, and comparisons with
+//! other solvers.
 
 mod allocation;
 mod barriers;

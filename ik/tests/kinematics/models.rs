@@ -1,4 +1,5 @@
-//! Models from both formats agree with each other and with Pinocchio's poses; bad names and numbers are told.
+//! Models from both formats agree with each other and with Pinocchio's poses; bad names and numbers are
+//! reported.
 
 use serde_json::Value;
 use tandem_ik::{Configuration, Model, bench::TargetSet};
@@ -8,7 +9,7 @@ use super::common;
 const TARGETS: &str = include_str!("../data/wrist_targets.json");
 const URDF: &str = include_str!("../data/g1_upper_body.urdf");
 
-/// The files round lengths to 1e-7 m or so.
+/// Tolerance on poses: the files round lengths to about 1e-7 m.
 const POSE_TOLERANCE: f64 = 2e-6;
 
 #[test]

@@ -1,4 +1,4 @@
-//! Two wrists of a G1 on 200 reachable targets, held against Pink 4.4 with quadprog on the same targets.
+//! Two wrists of a G1 on 200 reachable targets, compared with Pink 4.4 with quadprog on the same targets.
 
 use nalgebra::{Isometry3, Translation3};
 use serde_json::Value;
@@ -28,7 +28,7 @@ impl Bench {
         Configuration::new(&self.model, &self.set.start_q_rad).expect("17 numbers")
     }
 
-    /// Steps until every wrist is there, as Pink's users write the loop.
+    /// Steps until every wrist is at its target, as Pink's users write the loop.
     fn iterate(&self, target: &Target, damping_cost: f64) -> Option<u64> {
         let tasks = self.tasks(target, damping_cost);
         let mut solver = Solver::new(&self.model, DT_S);

@@ -2,7 +2,7 @@
 
 use tandem_ik::qp::{Constraint, Qp, QpFailure};
 
-/// Uniform in -1..1; splitmix64.
+/// Draws a number uniformly in -1..1; splitmix64.
 fn uniform(state: &mut u64) -> f64 {
     *state = state.wrapping_add(0x9E37_79B9_7F4A_7C15);
     let mut bits = *state;
@@ -18,11 +18,11 @@ struct Problem {
     linear: Vec<f64>,
     lower: Vec<f64>,
     upper: Vec<f64>,
-    /// a, b, and whether it is an equality.
+    /// a, b, and true for an equality.
     rows: Vec<(Vec<f64>, f64, bool)>,
 }
 
-/// H = B B' + 0.1; some point is inside the bounds and rows.
+/// Creates a problem with H = B B' + 0.1 and some point inside the bounds and rows.
 fn random_problem(seed: u64) -> Problem {
     let random = &mut seed.clone();
     let n = 2 + (seed % 19) as usize;
@@ -62,7 +62,7 @@ fn load(problem: &Problem) -> Qp {
     qp
 }
 
-/// What `tests/peers/numerics/qp.py` has had Clarabel find, problem by problem.
+/// Solutions by Clarabel, recorded by `tests/peers/numerics/qp.py`, problem by problem.
 #[derive(serde::Deserialize)]
 struct Recorded {
     solutions: Vec<Vec<f64>>,

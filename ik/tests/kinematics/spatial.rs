@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 use tandem_ik::spatial::{Log6, log3};
 
-/// Turns of every size, the smallest below the series' limit and the largest next to pi.
+/// Angles of every size, the smallest below the series' limit and the largest next to pi.
 const ANGLES_RAD: [f64; 9] = [0.0, 1e-12, 1e-7, 0.9e-3, 1.1e-3, 0.1, 1.0, 3.0, 3.13];
 
 fn poses() -> Vec<Isometry3<f64>> {
@@ -19,7 +19,7 @@ fn assert_close(a: Vector6<f64>, b: Vector6<f64>, within: f64, pose: &Isometry3<
     assert!((a - b).amax() < within, "{a} against {b} at {pose:?}");
 }
 
-/// exp of a small twist, to second order.
+/// Returns the exponential of a small twist, to second order.
 fn small_motion(twist: &Vector6<f64>) -> Isometry3<f64> {
     let (v, w) = (twist.fixed_rows::<3>(0).into_owned(), twist.fixed_rows::<3>(3).into_owned());
     Isometry3::from_parts((v + 0.5 * w.cross(&v)).into(), UnitQuaternion::from_scaled_axis(w))
@@ -41,7 +41,7 @@ fn logarithm_of_the_inverse_is_the_negative() {
     assert_eq!(Log6::of(&Isometry3::identity()).twist, Vector6::zeros());
 }
 
-/// A screw motion leaves its own twist alone: J^-1 xi = xi.
+/// A screw motion does not change its own twist: J^-1 xi = xi.
 #[test]
 fn twists_are_fixed_points_of_their_jacobian() {
     for pose in poses() {

@@ -49,7 +49,7 @@ fn unreachable_targets_bring_the_joints_to_rest() {
                 !matches!(outcome, Outcome::Reached | Outcome::Infeasible { .. }),
                 "{case}, {number}: {outcome:?}"
             );
-            // What is left is slow progress along a valley of the objective, not vibration.
+            // The remaining motion is slow progress along a valley of the objective, not vibration.
             assert!(fastest < 0.3, "{case}, target {number}: {fastest} rad/s in the last second");
             resting += usize::from(fastest < 0.05);
         }
@@ -57,7 +57,8 @@ fn unreachable_targets_bring_the_joints_to_rest() {
     }
 }
 
-/// The left wrist goes round a circle of 8 cm radius in 2 s; half the error a step makes a lag of two steps.
+/// The left wrist goes round a circle of 8 cm radius in 2 s; removing half of the error per step gives a
+/// lag of two steps.
 #[test]
 fn moving_targets_are_followed() {
     let model = common::g1();

@@ -16,11 +16,11 @@ pub struct Case {
     pub(super) disturbance: Disturbance,
 }
 
-/// What the base is told.
+/// Plan of the base commands.
 #[derive(Clone)]
 pub(super) enum Plan {
     Hold,
-    /// The last [`STOP_S`] seconds are a stop.
+    /// A velocity command; the last [`STOP_S`] seconds are a stop.
     Move(BaseVelocity),
     /// Down and up again, a third of the time each.
     Squat {
@@ -32,7 +32,7 @@ pub(super) enum Plan {
     Tour(Tour),
 }
 
-/// Along which a robot is told to go.
+/// Axis of a commanded velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum PulseAxis {
     Ahead,
@@ -40,11 +40,12 @@ pub(super) enum PulseAxis {
     Turn,
 }
 
-/// Speeds (m/s and rad/s) and durations of pulses: each seed has one of ten speeds, and the duration of its decade and place.
+/// Speeds (m/s and rad/s) and durations of pulses. The last digit of the seed selects the speed; seed
+/// and tens together select the duration.
 const PULSE_SPEEDS: [f32; 10] = [0.03, -0.05, 0.1, -0.1, 0.15, -0.15, 0.2, -0.3, 0.3, -0.2];
 const PULSE_S: [f32; 4] = [0.5, 1.0, 2.0, 3.0];
 
-/// The velocity of a seed's pulse, and for how long it is told.
+/// Returns the velocity of a seed's pulse, and its duration.
 pub(super) fn pulse(axis: PulseAxis, seed: u32, scale: &BodyScale) -> (BaseVelocity, f32) {
     let speed = PULSE_SPEEDS[seed as usize % PULSE_SPEEDS.len()];
     let duration_s = PULSE_S[(seed as usize + seed as usize / PULSE_SPEEDS.len()) % PULSE_S.len()];
@@ -57,7 +58,7 @@ pub(super) fn pulse(axis: PulseAxis, seed: u32, scale: &BodyScale) -> (BaseVeloc
     (velocity, duration_s)
 }
 
-/// What else happens.
+/// Disturbance during a case.
 #[derive(Clone)]
 pub(super) enum Disturbance {
     None,
@@ -78,7 +79,7 @@ pub(super) enum Disturbance {
 }
 
 impl Case {
-    /// The same for a robot of another size: with its speeds and heights, loads and forces.
+    /// Scales the case to a robot of another size: speeds and heights, loads and forces.
     pub(super) fn of_size(&self, scale: &BodyScale) -> Case {
         let plan = match self.plan.clone() {
             Plan::Hold => Plan::Hold,
@@ -130,15 +131,15 @@ const fn moving(name: &'static str, [vx_m_s, vy_m_s, yaw_rate_rad_s]: [f32; 3]) 
     Case { name, duration_s: 21.0 + STOP_S, plan: Plan::Move(velocity), ..HOLD }
 }
 
-/// Pulls at hands rise for so long, as they do while fingers close on a load. With the force f at both hands together at the
-/// height z, weight m g and a reach a of the feet ahead of their middle, the centre of mass has to lean by  f z / (m g) - a
-/// against a steady pull. A pull that comes at once leaves no time for that: while the pressure is at the toes the centre of
-/// mass still goes along with the pull, by  c'' = (g / h) (c + f z / (m g) - a)  from the first instant. At 2 x 25 N
-/// f z / (m g) is 15 cm, and soles of 17 cm have a = 8.5 cm.
+/// Rise time of pulls at hands, as when fingers close on a load. Let f be the force at both hands together at
+/// the height z, m g the weight, and a the reach of the feet ahead of their middle. The centre of mass then
+/// has to lean by  f z / (m g) - a  against a steady pull. A sudden pull leaves no time for that. With the
+/// pressure at the toes the centre of mass still follows the pull, by c'' = (g / h) (c + f z / (m g) - a)
+/// from the first instant. At 2 x 25 N f z / (m g) is 15 cm, and soles of 17 cm have a = 8.5 cm.
 pub(super) const PULL_RISE_S: f32 = 1.0;
 
-/// A robot that stands is pulled by its hands until then: to the end of its case, so that it is looked at as it is pulled, or for a
-/// while, so that it is looked at when it has been left alone again.
+/// End times of pulls at the hands of a standing robot. A long pull lasts to the end of the case, which
+/// measures the pulled robot. A short one ends earlier, so that the recovery is measured.
 const LONG_PULL_END_S: f32 = 20.0;
 const SHORT_PULL_END_S: f32 = 7.0;
 

@@ -1,4 +1,4 @@
-//! Numbers of a trial, from its log.
+//! Measurements of a trial, from its log.
 
 use rapier3d::math::{Rotation, Vector};
 
@@ -10,14 +10,14 @@ use crate::locomotion::{BaseCommand, BaseVelocity};
 use crate::plane::flat;
 use crate::{Side, Sides};
 
-/// Arms rise and loads swing out before anything is asked or measured.
+/// Time before commands and measurements begin, in which arms rise and loads swing out.
 pub(super) const SETTLE_S: f32 = 2.0;
-/// A velocity is measured after the start of motion has faded.
+/// Time after the start of motion before a velocity is measured.
 const RAMP_S: f32 = 2.0;
-/// A foot that is so much higher than at the start is in the air.
+/// Height above its start from which on a foot is in the air.
 const LIFTED_M: f32 = 0.015;
 
-/// What came out; see [`super::CaseReport`].
+/// Result of a trial; see [`super::CaseReport`].
 #[derive(Clone, Debug, Default)]
 pub(super) struct Trial {
     pub fell: bool,
@@ -38,14 +38,14 @@ pub(super) struct Sample {
     pub pelvis_m: Vector,
     /// Angle between its vertical axis and the world's.
     pub pelvis_tilt_rad: f32,
-    /// Ankle roll links.
+    /// Positions of the ankle roll links.
     pub feet_m: Sides<Vector>,
-    /// Unwrapped.
+    /// Unwrapped heading.
     pub heading_rad: f32,
     pub command: BaseCommand,
 }
 
-/// Fills in what the case measures; the robot stands.
+/// Fills in the measurements of the case, for a robot that has not fallen.
 pub(super) fn measure(
     case: &Case,
     seed: u32,
@@ -113,11 +113,11 @@ fn squat_error_m<'a>(case: &Case, at: impl Fn(f32) -> &'a Sample) -> Option<f32>
     ends.iter().map(error_m).reduce(f32::max)
 }
 
-/// Share of a pulse's way by which a robot may be off without being counted.
+/// Tolerated share of a pulse's displacement and turn.
 const PULSE_SHARE: f32 = 0.1;
 
-/// Returns how far a robot came to rest from where a pulse should have taken it, and how far it is turned from there: what is beyond
-/// [`PULSE_SHARE`] of the way and of the turn.
+/// Returns the position and heading error of a robot at rest after a pulse: the parts beyond
+/// [`PULSE_SHARE`] of the displacement and of the turn.
 fn off_pulse(from: &Sample, to: &Sample, velocity: BaseVelocity, pulse_s: f32) -> [f32; 2] {
     let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } = velocity;
     let way_m = Vector::new(vx_m_s, vy_m_s, 0.0) * pulse_s;
@@ -128,7 +128,7 @@ fn off_pulse(from: &Sample, to: &Sample, velocity: BaseVelocity, pulse_s: f32) -
     [off_m, off_rad].map(|off| off.max(0.0))
 }
 
-/// How often a foot left the ground.
+/// Returns the number of times that a foot left the ground.
 fn steps(log: &[Sample]) -> u32 {
     let lifted = |sample: &Sample, side: Side| sample.feet_m[side].z - log[0].feet_m[side].z > LIFTED_M;
     let lifts =
@@ -136,13 +136,14 @@ fn steps(log: &[Sample]) -> u32 {
     Side::BOTH.into_iter().map(|side| lifts(side) as u32).sum()
 }
 
-/// How far the mean height of the pelvis over a walk is from the commanded one.
+/// Returns the deviation of the mean pelvis height over a walk from the commanded one.
 fn walking_height_error_m(log: &[Sample]) -> f32 {
     let error_m = |sample: &Sample| sample.pelvis_m.z - sample.command.pelvis_height_m;
     (log.iter().map(error_m).sum::<f32>() / log.len() as f32).abs()
 }
 
-/// Largest deviation of the mean velocity in the heading frame, as a part of the commanded speed (m/s or rad/s).
+/// Returns the largest deviation of the mean velocity in the heading frame, as a share of the commanded
+/// speed (m/s or rad/s).
 fn velocity_error(log: &[Sample], velocity: BaseVelocity) -> f32 {
     let mut moved = [0.0_f32; 3];
     for pair in log.windows(2) {
@@ -162,7 +163,7 @@ fn velocity_error(log: &[Sample], velocity: BaseVelocity) -> f32 {
     linear.max(angular)
 }
 
-/// Time until the pelvis stays slower than a limit, averaged over a fifth of a second.
+/// Returns the time until the pelvis stays slower than a limit, averaged over a fifth of a second.
 fn slower_after_s(log: &[Sample], limit_m_s: f32) -> f32 {
     const WINDOW: usize = 10;
     let speed_m_s =

@@ -1,5 +1,5 @@
-//! What a base controller can do: standing, loads, walking, stopping, squatting, pushes and a tour, several seeds each. And
-//! how long a step of physics and a picture take, and what becomes of robots that fall.
+//! Benchmarks of base controllers: standing, loads, walking, stopping, squatting, pushes and a tour, with
+//! several seeds each. They also measure the time of a physics step and of an image, and falling robots.
 
 mod cases;
 mod falls;
@@ -33,55 +33,55 @@ use measure::Trial;
 /// Results of all cases.
 #[derive(Clone, Debug, Serialize)]
 pub struct LocomotionReport {
-    /// Of [`crate::assets::ROBOTS`], or the name of a file.
+    /// Name in [`crate::assets::ROBOTS`], or of a file.
     pub robot: String,
-    /// As recordings call it, with the loop if there is one.
+    /// Name in recordings, with the loop if there is one.
     pub controller: String,
     #[serde(flatten)]
     pub sensing: Sensing,
     pub cases: Vec<CaseReport>,
 }
 
-/// One case over its seeds. A number is the worst of the robots that did not fall; energy is a mean. `None`: not
-/// measured in this case.
+/// One case over its seeds. A number is the worst of the robots that did not fall; velocity error and
+/// power are means. `None` if not measured in this case.
 #[derive(Clone, Debug, Serialize)]
 pub struct CaseReport {
     pub case: String,
     pub seeds: usize,
     pub survived: usize,
-    /// Deviation of the mean velocity, as a part of the command: mean over the seeds.
+    /// Deviation of the mean velocity, as a share of the command: mean over the seeds.
     #[serde(rename = "velocity_error")]
     pub velocity_error_share: Option<f32>,
     pub heading_error_deg: Option<f32>,
     pub final_drift_m: Option<f32>,
     pub sway_m: Option<f32>,
     pub height_error_m: Option<f32>,
-    /// From the zero command until the pelvis stays slower than 0.1 m/s, and than 0.02 m/s.
+    /// Time from the zero command until the pelvis stays slower than 0.1 m/s, and than 0.02 m/s.
     pub standing_after_s: Option<f32>,
     pub still_after_s: Option<f32>,
-    /// How often a foot left the ground while the robot was to stand.
+    /// Number of times that a foot left the ground while the robot was to stand.
     pub steps: Option<u32>,
-    /// Largest angle between the pelvis of a robot that walks and level.
+    /// Largest tilt of the pelvis of a walking robot.
     pub pelvis_tilt_deg: Option<f32>,
-    /// The most that what robots carried between them was ever tilted.
+    /// Maximum tilt of a load carried by several robots.
     pub load_tilt_deg: Option<f32>,
-    /// How far what robots held went after they had come to rest: the mean of each second, horizontally.
+    /// Drift of held objects after they came to rest: the mean of each second, horizontally.
     pub load_drift_m: Option<f32>,
     /// Mean absolute mechanical power of all joints.
     pub power_w: f32,
 }
 
-/// A figure and how much it varies: median and quartiles.
+/// A measured value and its spread: median and quartiles.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
     pub median: f64,
     pub quartiles: [f64; 2],
 }
 
-/// Time that this thread has been running, in nanoseconds, is the first word of this file of Linux.
+/// Linux file whose first word is the running time of this thread in nanoseconds.
 const BUSY: &str = "/proc/thread-self/schedstat";
 
-/// Processor time of this thread, or the time since `started` where the system does not tell.
+/// Returns the CPU time of this thread, or the time since `started` if the system does not report it.
 pub fn busy_since(started: Instant) -> Duration {
     let text = std::fs::read_to_string(BUSY).unwrap_or_default();
     let ns = text.split_whitespace().next().and_then(|word| word.parse().ok());
@@ -89,7 +89,11 @@ pub fn busy_since(started: Instant) -> Duration {
 }
 
 impl Spread {
-    /// The spread of at least one number; it puts them in order.
+    /// Computes the spread of `values`, which it sorts.
+    ///
+    /// # Panics
+    ///
+    /// Panics if `values` is empty.
     pub fn of(values: &mut [f64]) -> Spread {
         values.sort_unstable_by(f64::total_cmp);
         let at = |share: f64| values[((values.len() - 1) as f64 * share).round() as usize];
@@ -97,13 +101,18 @@ impl Spread {
     }
 }
 
-/// Whether a case's name contains one of the comma-separated words of `filter`.
+/// Returns true if a case's name contains one of the comma-separated words of `filter`.
 pub fn is_asked(filter: &str, case: &str) -> bool {
     filter.split(',').any(|word| case.contains(word))
 }
 
-/// Runs every case that `filter` asks for, on these seeds, with a robot of which results have this name; `done` hears of each case as it
-/// ends. Speeds, heights, loads and forces of the cases are a G1's: a robot of another size has its own.
+/// Runs every case that matches `filter`, on these seeds, with a robot named `robot` in the results.
+/// `done` is called after each case. Speeds, heights, loads and forces of the cases are those of a G1; a
+/// robot of another size has scaled ones.
+///
+/// # Errors
+///
+/// Returns an error if a world cannot be built or physics diverges.
 pub fn run(
     robot: &str,
     model: &Arc<RobotModel>,
@@ -124,7 +133,7 @@ pub fn run(
     Ok(LocomotionReport { robot: robot.into(), controller: choice.name(), sensing, cases })
 }
 
-/// What `trial` makes of each of these seeds, as many at once as there are processors.
+/// Returns the result of `trial` for each of these seeds, running as many at once as there are processors.
 pub fn over_seeds<T: Send>(seeds: &RangeInclusive<u32>, trial: impl Fn(u32) -> T + Sync) -> Vec<T> {
     let threads = std::thread::available_parallelism().map_or(1, NonZero::get);
     let seeds: Vec<u32> = seeds.clone().collect();
@@ -145,7 +154,7 @@ pub fn over_seeds<T: Send>(seeds: &RangeInclusive<u32>, trial: impl Fn(u32) -> T
 }
 
 impl LocomotionReport {
-    /// What was measured, in a line below the table.
+    /// Returns a line on the settings of the measurement, for below the table.
     pub fn settings(&self) -> String {
         let Sensing { state_estimate, sensors } = self.sensing;
         let (state_estimate, sensors) = (state_estimate.name(), sensors.name());
@@ -185,7 +194,7 @@ impl CaseReport {
     pub const HEAD: &str = "case                        alive  v err  heading    drift     sway   height  \
                             stands  still  steps  pelvis   tilt     load  power";
 
-    /// The report of a case in which nothing has been measured yet.
+    /// Creates the report of a case without measurements.
     pub fn of(case: &str, seeds: usize) -> CaseReport {
         CaseReport {
             case: case.into(),

@@ -20,7 +20,8 @@ pub(super) enum Arms {
 /// Hands a forearm's length ahead of the chest: shoulder pitch, roll, yaw, elbow, wrist.
 const FORWARD_LEFT_RAD: [f32; ARM_JOINTS] = [-0.35, 0.2, 0.0, 0.3, 0.0, 0.0, 0.0];
 const RAISE_S: f32 = 1.5;
-/// Fists press on themselves as they would on a load: targets are beyond the range of their joints.
+/// Start of closing. Fists press on themselves as they would on a load: targets are beyond the range of
+/// their joints.
 const CLOSES_AT_S: f32 = 4.0;
 const CLOSING_S: f32 = 0.3;
 const FIST_LEFT_RAD: [f32; HAND_JOINTS] = [0.0, 0.0, 2.3, -2.1, -2.3, -2.1, -2.3];
@@ -28,7 +29,8 @@ const FIST_LEFT_RAD: [f32; HAND_JOINTS] = [0.0, 0.0, 2.3, -2.1, -2.3, -2.1, -2.3
 /// Joint targets over time.
 pub(super) struct ArmMotion {
     waves: Sides<[Wave; ARM_JOINTS]>,
-    /// An arm that lacks joints is held as at rest: the same angles would take it elsewhere.
+    /// True if the arms are held out. An arm that lacks joints is held as at rest, since the same angles
+    /// would take it elsewhere.
     held_out: bool,
     closes: bool,
 }

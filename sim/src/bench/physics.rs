@@ -1,5 +1,5 @@
-//! How long a physics step of 5 ms takes: robots in the kitchen of Handover that stand, walk, or hold a bottle each.
-//! `tests/peers/simulation/physics_timing.py` steps the same situations in MuJoCo.
+//! Duration of a physics step of 5 ms: robots in Handover's kitchen that stand, walk, or hold a bottle
+//! each. `tests/peers/simulation/physics_timing.py` steps the same situations in MuJoCo.
 
 use std::f32::consts::PI;
 use std::time::{Duration, Instant};
@@ -29,7 +29,7 @@ pub struct PhysicsCase {
     pub median_step_us: f64,
     #[serde(rename = "step_us_quartiles")]
     pub quartiles_step_us: [f64; 2],
-    /// Simulated time per time of the whole: physics, sensing and the robots' controllers.
+    /// Simulated time per wall-clock time of physics, sensing and the robots' controllers together.
     pub realtime_factor: f64,
 }
 
@@ -42,21 +42,25 @@ enum Situation {
 
 const MAX_ROBOTS: usize = 3;
 const ROUNDS: usize = 3;
-/// Control steps in which robots come to rest, or into their stride.
+/// Number of control steps in which robots come to rest, or into their stride.
 const SETTLING_CONTROL_STEPS: usize = 75;
 const CONTROL_STEPS: usize = 150;
-/// Fingers have closed nearly before the bottle is put between them.
+/// Number of control steps in which fingers nearly close before the bottle is put between them.
 const CLOSING_CONTROL_STEPS: usize = 25;
 const NEARLY: f32 = 0.8;
 /// A hand closed round an upright cylinder of 7 cm, right hand: thumb 0 to 2, middle 0 and 1, index 0 and 1.
 const CLOSED_RAD: [f32; HAND_JOINTS] = [0.0, 0.75, -0.8, 1.1, 1.3, 1.1, 1.3];
-/// Middle of the grasped cylinder in the frame of the wrist, and how far above its base a bottle is held.
+/// Middle of the grasped cylinder in the frame of the wrist, and the grasp height above a bottle's base.
 const GRASP_IN_WRIST_M: Vector = Vector::new(0.12, 0.055, 0.0);
 const HELD_AT_M: f32 = 0.1;
 /// Backwards, away from the counter and from each other.
 const WALKING_M_S: f32 = -0.2;
 
-/// Measures every situation with one to three robots; `done` hears of each as it ends.
+/// Measures every situation with one to three robots; `done` is called after each.
+///
+/// # Errors
+///
+/// Returns an error if a world cannot be built or physics diverges.
 pub fn physics(mut done: impl FnMut(&PhysicsCase)) -> Result<PhysicsReport, SimError> {
     let mut cases = Vec::new();
     for situation in [Situation::Standing, Situation::Walking, Situation::Holding] {
@@ -102,7 +106,7 @@ fn measure(situation: Situation, robots: usize) -> Result<PhysicsCase, SimError>
     })
 }
 
-/// A world and the commands under which it stays what it is.
+/// Builds a world and the commands that keep it in its situation.
 fn begin(situation: Situation, robots: usize) -> Result<(World, Vec<RobotCommand>), SimError> {
     let bottles = if situation == Situation::Holding { robots } else { 1 };
     let mut world = World::new(&kitchen(robots, bottles))?;
@@ -134,7 +138,7 @@ fn close(commands: &mut [RobotCommand], closed_share: f32) {
     }
 }
 
-/// Nobody fell and nothing was dropped: otherwise the time is that of another situation.
+/// Checks that no robot fell and nothing was dropped: otherwise the time is that of another situation.
 fn check(world: &World, situation: Situation) {
     let present = world.present();
     for (index, robot) in present.robots.iter().enumerate() {
@@ -151,8 +155,8 @@ fn check(world: &World, situation: Situation) {
     }
 }
 
-/// Handover's places, and a third robot that stands free. Each robot has its bottle; those that nobody holds yet lie
-/// out of reach.
+/// Returns Handover's places, and a third robot that stands free. Each robot has its bottle; bottles
+/// that are not held yet are out of reach.
 fn kitchen(robots: usize, bottles: usize) -> WorldSpec {
     const PLACES: [(f32, f32, f32); MAX_ROBOTS] = [(0.0, 0.0, 0.0), (0.74, -0.12, PI), (-0.9, -1.2, 0.5)];
     let robot = |(index, (x, y, yaw_rad)): (usize, &(f32, f32, f32))| RobotPlacement {
@@ -190,7 +194,7 @@ impl Situation {
 mod tests {
     use super::*;
 
-    /// In the frame of the wrist that holds it.
+    /// Returns the position of the bottle in the frame of the wrist that holds it.
     fn held_m(world: &World, robot: usize) -> Vector {
         let present = world.present();
         let bottle = present.object(&bottle_name(robot)).expect("a bottle for every robot").world_from_object;

@@ -1,4 +1,4 @@
-//! How long pictures take: those of both robots' eyes in one state of Handover's kitchen, in two sizes, and that of the camera in the room.
+//! Duration of rendering in Handover's kitchen: both head cameras, in two sizes, and the camera in the room.
 
 use std::f32::consts::PI;
 use std::time::{Duration, Instant};
@@ -10,33 +10,38 @@ use super::{Spread, busy_since};
 use crate::render::{Camera, Cameras, Renderer, RendererKind, Scenery};
 use crate::{ObjectPlacement, RobotPlacement, SimError, Step, World, WorldSpec};
 
-/// Times of all sets of pictures.
+/// Times of all sets of images.
 #[derive(Clone, Debug, Serialize)]
 pub struct PicturesReport {
-    /// Who drew, and on what device.
+    /// Name of the renderer and its device.
     pub renderer: String,
     pub cases: Vec<PicturesCase>,
 }
 
-/// Pictures of one state: colour, depth and ids, or colour alone.
+/// Images of one state: colour, depth and ids, or colour alone.
 #[derive(Clone, Debug, Serialize)]
 pub struct PicturesCase {
     pub name: &'static str,
     pub pictures: usize,
     pub width: u32,
     pub height: u32,
-    /// Processor time of the thread that asks for them; where the system does not tell, as `wall_ms`.
+    /// CPU time of the thread that requests them; if the system does not report it, the same as `wall_ms`.
     pub busy_ms: Spread,
     pub wall_ms: Spread,
 }
 
-/// What many learned policies look at.
+/// Common input size of learned policies.
 const SMALL_PX: [u32; 2] = [128, 128];
-/// Each gives a time; processor time is counted in ticks of some milliseconds, so that many states go into one.
+/// Number of measured batches, and of states in each. CPU time is counted in ticks of some milliseconds,
+/// so a batch needs many states.
 const BATCHES: usize = 9;
 const STATES: usize = 10;
 
-/// Times all sets; `done` hears of each as it ends.
+/// Times all sets; `done` is called after each.
+///
+/// # Errors
+///
+/// Returns an error if a world cannot be built or physics diverges.
 pub fn pictures(kind: RendererKind, mut done: impl FnMut(&PicturesCase)) -> Result<PicturesReport, SimError> {
     let world = World::new(&kitchen())?;
     let cameras = Cameras::of(&world);
@@ -62,10 +67,10 @@ pub fn pictures(kind: RendererKind, mut done: impl FnMut(&PicturesCase)) -> Resu
     Ok(PicturesReport { renderer, cases })
 }
 
-/// The cameras of a set of pictures.
+/// The cameras of a set of images.
 type Views<'a> = dyn Fn(&Step) -> Vec<Camera> + 'a;
 
-/// Draws a picture: all of it, or its colours alone, as learned policies have them.
+/// Renderer of an image: all of it, or its colours alone, as learned policies use them.
 type Draw = fn(&mut dyn Renderer, &Step, &Camera);
 
 fn whole(renderer: &mut dyn Renderer, step: &Step, camera: &Camera) {

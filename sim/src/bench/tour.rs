@@ -1,4 +1,5 @@
-//! The tour: waypoints in a square, reached one after the other under punches; and one leg of it, under a hard punch.
+//! The tour: waypoints in a square, reached one after the other under punches; and one leg of it, under
+//! a hard punch.
 
 use rapier3d::math::Vector;
 
@@ -11,7 +12,7 @@ pub(super) struct Tour {
     pub waypoints: usize,
     pub half_side_m: f32,
     pub leg_s: f32,
-    /// When on a leg, how hard, and for how long.
+    /// Time on a leg, force and duration of a punch.
     pub punch_at_s: [f32; 2],
     pub punch_n: [f32; 2],
     pub punch_s: f32,
@@ -43,7 +44,7 @@ const BODIES: [&str; 6] = [
 const POSITION_GAIN_1_S: f32 = 1.0;
 const NEAR_M: f32 = 0.05;
 
-/// One leg: where to, and the punch on the way.
+/// One leg: its target, and the punch on the way.
 pub(super) struct Leg {
     pub target_m: Vector,
     pub punch_at_s: f32,
@@ -51,7 +52,7 @@ pub(super) struct Leg {
     pub punch_n: Vector,
 }
 
-/// Legs of a seed.
+/// Returns the legs of a seed.
 pub(super) fn legs(tour: &Tour, random: &mut SplitMix64) -> Vec<Leg> {
     let reach_m = tour.leg_s * 0.25;
     let mut from_m = Vector::ZERO;
@@ -76,7 +77,7 @@ pub(super) fn legs(tour: &Tour, random: &mut SplitMix64) -> Vec<Leg> {
         .collect()
 }
 
-/// Walks straight to the target without turning; stands within [`NEAR_M`] of it.
+/// Returns the command that walks straight to the target without turning, and stands within [`NEAR_M`] of it.
 pub(super) fn command(
     away_m: Vector,
     heading_rad: f32,

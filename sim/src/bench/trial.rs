@@ -17,10 +17,10 @@ use crate::robot::{RobotCommand, RobotTruth, Sensing};
 use crate::{CONTROL_DT_S as DT_S, RobotPlacement, Side, SimError, World, WorldSpec};
 
 const PUSH_S: f32 = 1.0;
-/// Of a robot that stands: its arms are where they are held by then.
+/// Start of pulls at a standing robot: its arms are held out by then.
 const PULLS_AT_S: f32 = 4.0;
 
-/// Runs until the time is up or the robot lies.
+/// Runs until the time is up or the robot has fallen.
 pub(super) fn run(
     case: &Case,
     seed: u32,
@@ -79,7 +79,7 @@ pub(super) fn run(
     Ok(trial)
 }
 
-/// The command of a pulse that begins once the arms are held out.
+/// Returns the command of a pulse that begins once the arms are held out.
 fn pulse_command((velocity, pulse_s): (BaseVelocity, f32), time_s: f32, rest: BaseCommand) -> BaseCommand {
     let told = (SETTLE_S..SETTLE_S + pulse_s - 0.5 * DT_S).contains(&time_s);
     let BaseVelocity { vx_m_s, vy_m_s, yaw_rate_rad_s } = if told { velocity } else { BaseVelocity::STILL };
@@ -150,7 +150,7 @@ fn disturb(case: &Case, world: &mut World, seed: u32, direction: Vector, legs: &
     }
 }
 
-/// Pushes the link that the embedded robot's file calls so, during the next control step.
+/// Pushes the link with this name in the embedded robot's file, during the next control step.
 fn push_published(world: &mut World, name: &str, point_in_link_m: Vector, force_n: Vector) {
     let model = &world.robots()[0].model;
     let link = &model.links[model.published_link(name).unwrap_or_default()];
@@ -168,7 +168,7 @@ fn pull(world: &mut World, sides: &[Side], force_n: Vector) {
     }
 }
 
-/// Any direction, no more than 45 degrees out of the horizontal.
+/// Returns a random direction, at most 45 degrees out of the horizontal.
 fn pull_direction(random: &mut SplitMix64) -> Vector {
     let (angle, rise) = (random.uniform([0.0, TAU]), random.uniform([-PI / 4.0, PI / 4.0]));
     Vector::new(angle.cos() * rise.cos(), angle.sin() * rise.cos(), rise.sin())

@@ -8,8 +8,8 @@ use rapier3d::math::{Pose, Vector};
 use super::{JOINTS, LEG_JOINTS, LEGS, RobotModel, SiteModel, WAIST_JOINTS};
 use crate::{GRAVITY_M_S2, Side, Sides};
 
-/// What a robot takes its own body to be, which is what a controller may know: joint readings, link poses, centre of
-/// mass. The world frame is where the robot believes it to be.
+/// A robot's estimate of its own body, which is all that a controller may use: joint readings, link
+/// poses, centre of mass. The world frame is the robot's estimate of it.
 pub struct BodyEstimate {
     pub model: Arc<RobotModel>,
     pub q_rad: [f32; JOINTS],
@@ -21,17 +21,18 @@ pub struct BodyEstimate {
     pub com_velocity_m_s: Vector,
     /// Velocity of the middle of each palm.
     pub palm_velocity_m_s: Sides<Vector>,
-    /// What each arm does to the trunk, as a force at its palm: that of the world on the hand, and the inertia of the moving arm.
+    /// Load of each arm on the trunk, as a force at its palm: the force of the world on the hand, and
+    /// the inertia of the moving arm.
     pub hand_reaction_n: Sides<Vector>,
-    /// Thumb and fingers press on something.
+    /// True if thumb and fingers press on something.
     pub hand_holds: Sides<bool>,
-    /// Thumb or fingers press on something.
+    /// True if thumb or fingers press on something.
     pub hand_presses: Sides<bool>,
-    /// Arms or fingers are told to move.
+    /// True if arms or fingers are commanded to move.
     pub arms_told: bool,
-    /// Where the task wants the waist: yaw, roll, pitch.
+    /// Waist targets of the task: yaw, roll, pitch.
     pub waist_target_rad: [f32; WAIST_JOINTS],
-    /// What follows of all this, once somebody has asked for it.
+    /// Derived quantities, computed on first use.
     pub(crate) known: KnownOfBody,
 }
 
@@ -41,14 +42,14 @@ pub(crate) struct KnownOfBody {
     gravity_n_m: OnceCell<[f32; JOINTS]>,
 }
 
-/// Where a pelvis is and how it moves.
+/// Pose and velocity of a pelvis.
 pub(crate) struct PelvisMotion {
     pub world_from_pelvis: Pose,
     pub velocity_m_s: Vector,
     pub spin_rad_s: Vector,
 }
 
-/// How a link moves: the velocity of its origin, and its spin, in world axes.
+/// Velocity of a link's origin, and its spin, in world axes.
 #[derive(Clone, Copy)]
 pub(crate) struct LinkMotion {
     pub velocity_m_s: Vector,
@@ -56,7 +57,8 @@ pub(crate) struct LinkMotion {
 }
 
 impl LinkMotion {
-    /// Of all links. Velocities run outwards from the pelvis: with o the origin of a link, a the axis of its joint and p its parent,
+    /// Computes the motions of all links, outwards from the pelvis: with o the origin of a link, a the
+    /// axis of its joint and p its parent,
     ///   w = w_p + a qd,   v = v_p + w_p x (o - o_p).
     fn of_links(
         model: &RobotModel,
@@ -85,7 +87,7 @@ impl LinkMotion {
 }
 
 impl BodyEstimate {
-    /// The body by its joints, its pelvis and the poses that both give its links, with nothing in its hands.
+    /// Creates the estimate from joints, pelvis and the resulting link poses, with nothing in the hands.
     pub(crate) fn of_motion(
         model: &Arc<RobotModel>,
         pelvis: &PelvisMotion,
@@ -125,7 +127,7 @@ impl BodyEstimate {
         }
     }
 
-    /// How all links move.
+    /// Returns the motions of all links.
     pub(crate) fn link_motions(&self) -> &[LinkMotion] {
         let pelvis = LinkMotion {
             velocity_m_s: self.pelvis_velocity_m_s,
@@ -135,7 +137,7 @@ impl BodyEstimate {
         self.known.link_motions.get_or_init(of_links)
     }
 
-    /// Middle of each palm, where loads of the hands are taken to act.
+    /// Returns the middle of each palm, where loads of the hands are assumed to act.
     pub fn palms_m(&self) -> Sides<Vector> {
         self.model.hands.each_ref().map(|hand| self.world_from_link[hand.wrist] * hand.palm_in_wrist_m)
     }
@@ -148,25 +150,25 @@ impl BodyEstimate {
         self.world_from_link[site.link] * site.link_from_site
     }
 
-    /// Centres of the soles.
+    /// Returns the poses of the soles' centres.
     pub fn world_from_soles(&self) -> Sides<Pose> {
         self.model.soles.each_ref().map(|sole| self.world_from_site(sole))
     }
 
-    /// Ankle roll link, to which a sole belongs.
+    /// Returns the pose of the ankle roll link, to which a sole belongs.
     pub fn world_from_foot(&self, side: Side) -> Pose {
         self.world_from_link[self.model.joints[LEGS[side] + LEG_JOINTS - 1].link]
     }
 
-    /// Origin and unit axis of a joint in the world.
+    /// Returns the origin and the unit axis of a joint in the world.
     pub fn joint_axis(&self, joint: usize) -> (Vector, Vector) {
         let joint = &self.model.joints[joint];
         let world = self.world_from_link[joint.link];
         (world.translation, world.rotation * joint.axis)
     }
 
-    /// Torques that hold the links against gravity, pelvis fixed: tau_j = -a_j . (r_j x m_j g), with m_j and r_j the
-    /// mass beyond joint j and its centre relative to the joint.
+    /// Returns the torques that hold the links against gravity, pelvis fixed: tau_j = -a_j . (r_j x m_j
+    /// g), with m_j and r_j the mass beyond joint j and its centre relative to the joint.
     pub fn gravity_torques_n_m(&self) -> [f32; JOINTS] {
         *self.known.gravity_n_m.get_or_init(|| self.torques_against_gravity_n_m())
     }
@@ -193,7 +195,7 @@ impl BodyEstimate {
         })
     }
 
-    /// Moment of a force at a point about a joint's axis: one column of J^T f.
+    /// Returns the moment of a force at a point about a joint's axis: one column of J^T f.
     pub fn moment_n_m(&self, joint: usize, point_m: Vector, force_n: Vector) -> f32 {
         let (origin, axis) = self.joint_axis(joint);
         axis.dot((point_m - origin).cross(force_n))

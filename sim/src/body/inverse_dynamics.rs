@@ -1,9 +1,9 @@
-//! Inverse dynamics of one robot: joint torques and the wrench from outside that a wanted motion takes.
+//! Inverse dynamics of one robot: the joint torques and the external wrench that a wanted motion requires.
 //!
 //! Newton-Euler in the world frame. Outwards, with r, a the origin and axis of a joint and p the parent link:
 //!   w = w_p + a q',   dw = dw_p + a q'' + w_p x a q',   acc = acc_p + dw_p x r + w_p x (w_p x r).
-//! Inwards: f = m (acc_c - g),  n = I dw + w x I w,  summed up to the pelvis;  tau = a . n + armature q''.
-//! Source: Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 5.
+//! Inwards: f = m (acc_c - g),  n = I dw + w x I w,  summed up to the pelvis;  tau = a . n + armature
+//! q''. Source: Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 5.
 
 use rapier3d::math::Vector;
 
@@ -17,11 +17,11 @@ pub struct Acceleration {
     pub angular_rad_s2: Vector,
 }
 
-/// What a motion takes.
+/// Torques, force and moment that a motion requires.
 pub struct Effort {
     /// Torque on each joint, in published order.
     pub torque_n_m: [f32; JOINTS],
-    /// Force on the whole robot from outside, beside gravity.
+    /// External force on the whole robot, beside gravity.
     pub force_n: Vector,
     /// Moment on the whole robot about the pelvis' origin.
     pub moment_n_m: Vector,
@@ -29,7 +29,7 @@ pub struct Effort {
     pub links: Vec<Acceleration>,
 }
 
-/// Motion of a link, and the force and moment about its origin that it takes, gravity included.
+/// Motion of a link, and the force and moment about its origin that it requires, gravity included.
 struct Moving {
     spin_rad_s: Vector,
     acceleration: Acceleration,
@@ -38,7 +38,8 @@ struct Moving {
 }
 
 impl BodyEstimate {
-    /// Effort of the acceleration of the pelvis and of all joints (rad/s^2), at the measured positions and velocities.
+    /// Returns the effort of an acceleration of the pelvis and of all joints (rad/s^2), at the measured
+    /// positions and velocities.
     pub fn inverse_dynamics(&self, pelvis: Acceleration, qdd_rad_s2: &[f32; JOINTS]) -> Effort {
         let mut links: Vec<Moving> = Vec::with_capacity(self.model.links.len());
         for (index, link) in self.model.links.iter().enumerate() {
@@ -74,7 +75,8 @@ impl BodyEstimate {
         }
     }
 
-    /// Angular velocity and acceleration of a link from its parent's; `offset_m` leads to it from the parent's origin.
+    /// Returns the angular velocity and the acceleration of a link from those of its parent; `offset_m`
+    /// is the vector from the parent's origin.
     fn follow(
         &self,
         parent: &Moving,
@@ -92,7 +94,7 @@ impl BodyEstimate {
         (turning_rad_s + along_rad_s, Acceleration { linear_m_s2, angular_rad_s2 })
     }
 
-    /// Force and moment about its origin that the motion of one link takes.
+    /// Returns the force and the moment about its origin that the motion of one link requires.
     fn effort_of_link(
         &self,
         link: usize,

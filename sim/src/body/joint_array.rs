@@ -1,4 +1,4 @@
-//! How one number for each joint is written: serde itself stops at arrays of 32.
+//! Serialisation of one number per joint: serde supports arrays only up to length 32.
 
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};

@@ -2,18 +2,19 @@
 
 use crate::{Side, Sides};
 
-/// Joints of the robot in published order.
+/// Number of joints of the robot, in published order.
 pub const JOINTS: usize = 43;
-/// Joints a task commands: arms 14, hands 14, waist 3.
+/// Number of joints that a task commands: arms 14, hands 14, waist 3.
 pub const UPPER_JOINTS: usize = 31;
 pub(crate) const LEG_JOINTS: usize = 6;
 pub const WAIST_JOINTS: usize = 3;
 pub const ARM_JOINTS: usize = 7;
 pub const HAND_JOINTS: usize = 7;
-/// Of a hand's joints the first.
+/// Number of thumb joints, which are the first of a hand.
 pub(crate) const THUMB_JOINTS: usize = 3;
 
-/// First joint of each group in published order: left leg, right leg, waist, left arm, left hand, right arm, right hand.
+/// First joint of each group in published order: left leg, right leg, waist, left arm, left hand, right
+/// arm, right hand.
 pub(crate) const LEGS: Sides<usize> = Sides { left: 0, right: 6 };
 pub(crate) const WAIST: usize = 12;
 pub(crate) const ARMS: Sides<usize> = Sides { left: 15, right: 29 };
@@ -29,7 +30,7 @@ const LEG_NAMES: [&str; LEG_JOINTS] =
 const WAIST_NAMES: [&str; WAIST_JOINTS] = ["waist_yaw", "waist_roll", "waist_pitch"];
 const ARM_NAMES: [&str; ARM_JOINTS] =
     ["shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll", "wrist_pitch", "wrist_yaw"];
-/// Roll and yaw joints of the right arm turn the other way than the left arm's.
+/// True for the roll and yaw joints, which turn in opposite directions on the right and left arms.
 pub(crate) const MIRRORED_ARM: [bool; ARM_JOINTS] = [false, true, true, false, true, false, true];
 const HAND_NAMES: [&str; HAND_JOINTS] = [
     "hand_thumb_0",
@@ -41,7 +42,7 @@ const HAND_NAMES: [&str; HAND_JOINTS] = [
     "hand_index_1",
 ];
 
-/// Names of the 43 joints in published order.
+/// Returns the names of the 43 joints in published order.
 pub fn joint_names() -> [String; JOINTS] {
     let limb = |side: Side, joints: &'static [&'static str]| {
         joints.iter().map(move |joint| format!("{}_{joint}_joint", side.name()))
@@ -56,8 +57,8 @@ pub fn joint_names() -> [String; JOINTS] {
     std::array::from_fn(|_| names.next().unwrap_or_default())
 }
 
-/// Index in published order of each of the 31 commanded joints, in action order:
-/// left_arm 7, right_arm 7, left_hand 7, right_hand 7, waist 3.
+/// Index in published order of each of the 31 commanded joints, in action order: left_arm 7, right_arm
+/// 7, left_hand 7, right_hand 7, waist 3.
 pub const UPPER: [usize; UPPER_JOINTS] = {
     let mut order = [0; UPPER_JOINTS];
     let mut i = 0;

@@ -1,5 +1,6 @@
-//! What a controller may know of a robot: its model, the order of its joints, kinematics and inverse dynamics. It knows no
-//! physics world: whoever senses a robot there fills in a [`BodyEstimate`].
+//! Knowledge of a robot that is open to a controller: its model, the order of its joints, kinematics and
+//! inverse dynamics. This module has no physics world: the code that senses a robot fills in a
+//! [`BodyEstimate`].
 
 mod estimate;
 mod inverse_dynamics;

@@ -7,7 +7,7 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use super::{Acceleration, BodyEstimate, JOINTS, KnownOfBody, RobotModel};
 use crate::{GRAVITY_M_S2, Sides, assets};
 
-/// The embedded robot.
+/// Returns the embedded robot.
 pub(crate) fn model() -> &'static Arc<RobotModel> {
     static MODEL: OnceLock<Arc<RobotModel>> = OnceLock::new();
     MODEL.get_or_init(|| {
@@ -16,7 +16,7 @@ pub(crate) fn model() -> &'static Arc<RobotModel> {
     })
 }
 
-/// A pose and how it moves.
+/// A pose and its velocities.
 #[derive(Clone)]
 pub(crate) struct Posed {
     pub world_from_pelvis: Pose,
@@ -27,7 +27,7 @@ pub(crate) struct Posed {
 }
 
 impl Posed {
-    /// The robot at rest as its file has it, the soles on the ground.
+    /// Returns the robot at rest as in its file, the soles on the ground.
     pub(crate) fn standing() -> Posed {
         let mut posed = Posed {
             world_from_pelvis: Pose::IDENTITY,
@@ -40,7 +40,8 @@ impl Posed {
         posed
     }
 
-    /// A robot with something of everything: turned, leaning and moving, each joint within its limits. `seed` varies it.
+    /// Returns a robot that is turned, leaning and moving, with each joint within its limits. `seed`
+    /// varies it.
     pub(crate) fn tumbling(seed: u32) -> Posed {
         let wave = |i: usize, part: f32| (1.7 * i as f32 + 2.3 * seed as f32 + part).sin();
         let mut posed = Posed::standing();
@@ -57,7 +58,8 @@ impl Posed {
         posed
     }
 
-    /// `time_s` later under constant accelerations, of the pelvis and of the joints (rad/s^2).
+    /// Returns the state `time_s` later under constant accelerations of the pelvis and of the joints
+    /// (rad/s^2).
     pub(crate) fn after(&self, time_s: f32, pelvis: Acceleration, qdd_rad_s2: &[f32; JOINTS]) -> Posed {
         let half_s2 = 0.5 * time_s * time_s;
         let turn_rad = self.pelvis_angular_velocity_rad_s * time_s + pelvis.angular_rad_s2 * half_s2;
@@ -78,7 +80,7 @@ impl Posed {
         }
     }
 
-    /// The robot as a controller sees it, with nothing in the hands.
+    /// Returns the body estimate for a controller, with nothing in the hands.
     pub(crate) fn body(&self) -> BodyEstimate {
         let model = model();
         let world_from_link = model.forward_kinematics(self.world_from_pelvis, &self.q_rad);
@@ -107,7 +109,7 @@ impl Posed {
         }
     }
 
-    /// Kinetic and potential energy of all links, without the joints' armatures.
+    /// Returns the kinetic and potential energy of all links, without the joints' armatures.
     pub(crate) fn energy_j(&self) -> f64 {
         let model = model();
         let world_from_link = model.forward_kinematics(self.world_from_pelvis, &self.q_rad);
@@ -125,7 +127,7 @@ impl Posed {
         energies_j.sum()
     }
 
-    /// Motions of all links, at their origins.
+    /// Returns the motions of all links, at their origins.
     fn motions(&self) -> Vec<PosedMotion> {
         let model = model();
         let world_from_link = model.forward_kinematics(self.world_from_pelvis, &self.q_rad);

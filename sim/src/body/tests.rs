@@ -7,14 +7,14 @@ use super::{ARM_JOINTS, ARMS, Acceleration, JOINTS, UPPER, joint_names};
 use crate::{GRAVITY_M_S2, Side};
 
 const STILL: Acceleration = Acceleration { linear_m_s2: Vector::ZERO, angular_rad_s2: Vector::ZERO };
-/// For differences: what is left out shrinks with its square, rounding grows with its inverse.
+/// Time step of differences: the truncation error shrinks with its square, rounding grows with its inverse.
 const DT_S: f32 = 0.005;
 
 fn check_near(measured: Vector, expected: Vector, tolerance: f32, what: &str) {
     assert!((measured - expected).length() < tolerance, "{what}: {measured}, not {expected}");
 }
 
-/// Before and after, `DT_S` each.
+/// Returns the states `DT_S` before and after.
 fn around(posed: &Posed, pelvis: Acceleration, qdd_rad_s2: &[f32; JOINTS]) -> [Posed; 2] {
     [-DT_S, DT_S].map(|time_s| posed.after(time_s, pelvis, qdd_rad_s2))
 }
@@ -30,7 +30,7 @@ fn the_centre_of_mass_moves_as_its_velocity_says() {
     }
 }
 
-/// tau_j = J_j . f, with J_j how far the palm moves per angle of the joint.
+/// tau_j = J_j . f, with J_j the displacement of the palm per angle of the joint.
 #[test]
 fn moments_are_those_of_virtual_work() {
     let force_n = Vector::new(3.0, -5.0, 8.0);
@@ -68,7 +68,7 @@ fn gravity_torques_are_the_slope_of_the_potential_energy() {
     }
 }
 
-/// A robot at rest takes its weight from outside and gravity's torques from its joints.
+/// A robot at rest needs an external force equal to its weight, and gravity's torques from its joints.
 #[test]
 fn rest_takes_the_weight() {
     let body = Posed::standing().body();
@@ -82,7 +82,8 @@ fn rest_takes_the_weight() {
     }
 }
 
-/// Force: what changes the momentum, and the weight. Power of all torques: what changes the energy.
+/// The force equals the change of momentum plus the weight. The power of all torques equals the change
+/// of energy.
 #[test]
 fn effort_changes_momentum_and_energy() {
     for seed in 0..5 {
@@ -114,7 +115,7 @@ fn effort_changes_momentum_and_energy() {
     }
 }
 
-/// The order is written down once; here the action row is spelt out by name.
+/// The order is defined once; here the action row is written out by name.
 #[test]
 fn the_action_row_is_arms_hands_waist() {
     let names = joint_names();
@@ -135,7 +136,7 @@ fn the_action_row_is_arms_hands_waist() {
         != (name.contains("hip") || name.contains("knee") || name.contains("ankle"))));
 }
 
-/// Unitree's MJCF and URDF agree but for ankles, waist roll and waist pitch.
+/// Unitree's MJCF and URDF agree except for ankles, waist roll and waist pitch.
 #[test]
 fn effort_limits_are_those_of_the_mjcf_or_of_the_urdf() {
     let parse = |name| {

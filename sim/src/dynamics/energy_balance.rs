@@ -1,24 +1,25 @@
-//! Where the kinetic energy of a step came from, for benches and tests. A step itself runs nothing of this.
+//! The energy balance of a step by its sources, for benches and tests. A step itself runs none of this.
 //!
 //! The solver finds velocities v' from those before, v, by
 //!   M(q) (v' - v) = P - dt h,
-//! with the impulses P of everything that acts and the Coriolis and gyroscopic forces h, which in truth do no work. With the mean
-//! velocity u = (v + v') / 2, the impulses have done the work
+//! with the impulses P of everything that acts and the Coriolis and gyroscopic forces h, which in truth
+//! do no work. With the mean velocity u = (v + v') / 2, the impulses have done the work
 //!   P . u = K(q, v') - K(q, v) + dt h . u,
-//! exactly. Part of it is known one by one: gravity, springs, drives, pushes. The rest is what contacts, ends of ranges, dry
-//! friction, dampers and equalities did, and they can only take:
+//! exactly. Part of it is known term by term: gravity, springs, drives, pushes. The rest is the work of
+//! contacts, ends of ranges, dry friction, dampers and equalities, which can only remove energy:
 //!   taken = P . u - W_gravity - W_springs - W_drives - W_pushes <= 0.
-//! The step then moves positions to q' and ends with velocities v''. Energy that nothing put in is what it has beyond all that,
-//! U being the potential of gravity and springs:
+//! The step then moves positions to q' and ends with velocities v''. Its spurious energy is the
+//! remainder, with U the potential of gravity and springs:
 //!   made = [K + U](q', v'') - [K + U](q, v) - W_drives - W_pushes - taken
 //!        = K(q', v'') - K(q, v') - dt h . u + U(q') - U(q) + W_gravity + W_springs.
-//! What pushes bodies out of each other moves positions alone: where that lifts something, it has been made, too.
+//! Pushing bodies out of each other moves positions alone. Energy from lifting something that way counts
+//! as made, too.
 
 use super::trees::spatial::{ForceVector, Inertia, MotionVector};
 use super::trees::tree::Tree;
 use super::{DVec3, Dynamics};
 
-/// What [`Dynamics::energy_balance`] has to know of the state before the step, its pushes included.
+/// State before the step that [`Dynamics::energy_balance`] needs, pushes included.
 pub struct EnergyBefore {
     trees: Vec<TreeBefore>,
 }
@@ -39,22 +40,24 @@ struct TreeBefore {
 pub struct EnergyBalance {
     /// Kinetic energy before the step.
     pub kinetic: f64,
-    /// Work of every drive, push and spring, and of gravity on every tree, that was positive.
+    /// Sum of the positive works of each drive, push and spring, and of gravity on each tree.
     pub put_in: f64,
-    /// Work of contacts, ends of ranges, dry friction, dampers and equalities; not above 0 where they are solved well.
+    /// Work of contacts, ends of ranges, dry friction, dampers and equalities; not above 0 if they are
+    /// solved well.
     pub taken: f64,
-    /// What nothing put in, by tree.
+    /// Spurious energy, by tree.
     pub made: Vec<f64>,
 }
 
 impl Dynamics {
-    /// To be asked for after drives and pushes are set, before [`Dynamics::step`].
+    /// Records the state before a step. Call it after drives and pushes are set and before
+    /// [`Dynamics::step`].
     pub fn energy_before(&self) -> EnergyBefore {
         let gravity = self.settings.gravity_m_s2;
         EnergyBefore { trees: self.trees.all.iter().map(|tree| TreeBefore::of(tree, gravity)).collect() }
     }
 
-    /// The energy of the step that has been made since.
+    /// Returns the energy balance of the step made since `before`.
     pub fn energy_balance(&self, before: &EnergyBefore) -> EnergyBalance {
         let mut balance = EnergyBalance::default();
         for ((tree, before), offset) in self.trees.all.iter().zip(&before.trees).zip(&self.trees.offset) {
@@ -80,11 +83,13 @@ impl TreeBefore {
         }
     }
 
-    /// Adds the step of one tree, which ended as `tree` is now. `solved` are the velocities that the solver found.
+    /// Adds the step of one tree. `tree` is its state at the end, `solved` are the velocities that the
+    /// solver found.
     fn close(&self, tree: &Tree, solved: &[f64], dt_s: f64, gravity: DVec3, balance: &mut EnergyBalance) {
         let mut solved = solved.to_vec();
         if tree.is_lone() {
-            // It gyrates on its own, exactly: impulses act before, and the solver's velocity has the gyration in it.
+            // A lone body's gyration is integrated separately and exactly. Impulses act before it, and
+            // the solver's velocity includes it.
             let gyration = tree.half_gyration_rad_s * 2.0;
             (DVec3::from_slice(&solved[3..6]) - gyration).write_to_slice(&mut solved[3..6]);
         }
@@ -116,7 +121,7 @@ impl TreeBefore {
         balance.made.push(kinetic_now - kinetic_solved - coriolis + lifted + weights + springs);
     }
 
-    /// v = v_p + S q', where the tree was.
+    /// Returns the links' velocities, v = v_p + S q', in the configuration before the step.
     fn link_velocities(&self, tree: &Tree, v: &[f64]) -> Vec<MotionVector> {
         let mut velocities: Vec<MotionVector> = Vec::with_capacity(tree.links.len());
         for (i, link) in tree.links.iter().enumerate() {
@@ -130,7 +135,8 @@ impl TreeBefore {
         velocities
     }
 
-    /// h . u, link by link: the force that its own motion asks of each, without gravity, at its mean velocity.
+    /// Returns h . u, link by link: the force that the link's own motion requires, without gravity, at
+    /// its mean velocity.
     fn coriolis_power(&self, tree: &Tree, mean: &[MotionVector]) -> f64 {
         let mut accelerations: Vec<MotionVector> = Vec::with_capacity(tree.links.len());
         let mut power = 0.0;
@@ -141,7 +147,8 @@ impl TreeBefore {
                     let before = self.velocity[parent];
                     accelerations[parent] + before.cross(velocity - before)
                 }
-                // As in `equations`: of a free link it is a point that moves whose velocity is a degree of freedom.
+                // As in `equations`: the degrees of freedom of a free link are the velocity of a moving
+                // point.
                 None if link.joint.dofs() == 6 => {
                     MotionVector { angular: DVec3::ZERO, linear: -velocity.angular.cross(velocity.linear) }
                 }
@@ -156,7 +163,7 @@ impl TreeBefore {
     }
 }
 
-/// Of each link about the tree's reference, as the tree is now.
+/// Returns the inertia of each link about the tree's reference, in the current configuration.
 fn inertias(tree: &Tree) -> Vec<Inertia> {
     (0..tree.links.len()).map(|link| tree.inertia_of(link)).collect()
 }

@@ -1,14 +1,17 @@
-//! Articulated trees and their contacts: dynamics in reduced coordinates on the collision detection of Rapier and Parry.
+//! Articulated trees and their contacts: dynamics in reduced coordinates on the collision detection of
+//! Rapier and Parry.
 //!
-//! A step ([`Dynamics::step`], in `solving`) finds what is near (`contacts::near`: Rapier's broad phase) and where it touches
-//! (`contacts::collision`: Parry's manifolds). Then it is, for every [`Tree`]: bias forces and mass matrix
-//! (`trees::equations`), its factor M = L^T D L and whitened velocities (`trees::factor`); then rows of contacts
-//! (`contacts::friction`), joints (`joints::bounds`) and equalities (`joints::equality`), Gauss-Seidel on them
-//! (`solving`), and new positions (`trees::kinematics`), after which a fast tree has no energy that nothing gave it
-//! (`trees::energy`). It knows no robot and no file format.
+//! A step ([`Dynamics::step`], in `solving`) finds pairs that are near (`contacts::near`: Rapier's broad
+//! phase) and their contact points (`contacts::collision`: Parry's manifolds). For every [`Tree`] it
+//! then computes bias forces and the mass matrix (`trees::equations`), its factor M = L^T D L and
+//! whitened velocities (`trees::factor`). It builds rows of contacts (`contacts::friction`), joints
+//! (`joints::bounds`) and equalities (`joints::equality`), and runs Gauss-Seidel on them (`solving`).
+//! Finally it computes new positions (`trees::kinematics`), and removes spurious energy from fast trees
+//! (`trees::energy`). This module has no knowledge of robots or file formats.
 //!
-//! SI units, radians, world axes with z wherever gravity says, f64 throughout. The same sequence of calls gives the same
-//! bits: trees and colliders count in the order in which they were added, and so do contacts.
+//! SI units, radians, f64 throughout. The direction of gravity in the world axes is a setting. The same
+//! sequence of calls gives the same bits: trees and colliders are numbered in the order in which they
+//! were added, and so are contacts.
 
 mod contacts;
 mod energy_balance;
@@ -39,7 +42,7 @@ use contacts::collision::Collision;
 use solving::Solver;
 use trees::Trees;
 
-/// Everything that moves in a world.
+/// All moving things of a world.
 pub struct Dynamics {
     pub settings: Settings,
     trees: Trees,
@@ -62,6 +65,11 @@ impl Dynamics {
         }
     }
 
+    /// Adds a tree.
+    ///
+    /// # Panics
+    ///
+    /// Panics if all trees together have more than 65535 degrees of freedom.
     pub fn add_tree(&mut self, tree: Tree) -> TreeId {
         let id = self.trees.push(tree);
         let dofs = self.trees.dofs();
@@ -72,11 +80,15 @@ impl Dynamics {
     }
 
     /// Adds a collider; it has no mass.
+    ///
+    /// # Panics
+    ///
+    /// Panics if the shape is not convex.
     pub fn add_collider(&mut self, collider: Collider) -> ColliderId {
         self.collision.add(collider, &self.trees, &self.settings)
     }
 
-    /// Lets these links never touch from now on. It has to be called before the first step.
+    /// Excludes contacts between these two links. Call it before the first step.
     pub fn keep_apart(&mut self, a: LinkId, b: LinkId) {
         self.collision.keep_apart(a, b);
     }
@@ -85,12 +97,12 @@ impl Dynamics {
         self.solver.equalities.push(equality, active)
     }
 
-    /// Switches an equality on or off: locks and opens a latch.
+    /// Switches an equality on or off, for example to lock and open a latch.
     pub fn set_active(&mut self, equality: EqualityId, active: bool) {
         self.solver.equalities.set_active(equality, active);
     }
 
-    /// All trees, in the order in which they were added.
+    /// Returns all trees, in the order in which they were added.
     pub fn tree_ids(&self) -> impl Iterator<Item = TreeId> + use<> {
         self.trees.ids()
     }
@@ -107,13 +119,13 @@ impl Dynamics {
         self.collision.collider(id)
     }
 
-    /// Leaves colliders of this tag only a share of their friction; see [`Friction::left`].
+    /// Reduces the friction of all colliders with this tag to a share; see [`Friction::left`].
     pub fn leave_friction(&mut self, tag: u128, share: f64) {
         let of_tag = self.collision.colliders_mut().filter(|collider| collider.tag == tag);
         of_tag.for_each(|collider| collider.friction.left = share);
     }
 
-    /// All colliders, in the order in which they were added, and where they are.
+    /// Returns all colliders with their world poses, in the order in which they were added.
     pub fn colliders(&self) -> impl Iterator<Item = (&Collider, DPose3)> {
         let world_from = |link: &LinkId| self.trees.world_from(*link);
         self.collision.colliders().map(move |collider| {
@@ -122,13 +134,13 @@ impl Dynamics {
         })
     }
 
-    /// All points of contact of the last step.
+    /// Returns all contact points of the last step.
     pub fn touches(&self) -> &[ContactPoint] {
         &self.solver.touches
     }
 
-    /// What pressed on a collider in the last step: the other collider and the force on this one (N, world axes),
-    /// friction included, point by point.
+    /// Returns the contacts on a collider in the last step, point by point: the other collider and the
+    /// force on this one (N, world axes), friction included.
     pub fn forces_on(&self, collider: ColliderId) -> impl Iterator<Item = (ColliderId, DVec3)> {
         let per_s = 1.0 / self.settings.dt_s;
         self.touches().iter().filter_map(move |touch| match touch.colliders {

@@ -1,4 +1,5 @@
-//! Numbers of a step. All were measured on grasps, stacks and walking robots at 200 Hz; change one with a reason.
+//! Parameters of a step. All were tuned on grasps, stacks and walking robots at 200 Hz; a change needs a
+//! reason.
 
 use rapier3d::glamx::DVec3;
 
@@ -10,13 +11,14 @@ pub struct Softness {
 }
 
 impl Softness {
-    /// Share of a position error that is taken back per second:  omega / (dt omega + 2 zeta).
+    /// Returns the share of a position error that is corrected per second:  omega / (dt omega + 2 zeta).
     pub(super) fn correction_per_s(&self, dt_s: f64) -> f64 {
         let omega = std::f64::consts::TAU * self.frequency_hz;
         omega / (dt_s * omega + 2.0 * self.damping_ratio)
     }
 
-    /// By how much of its effective mass a row gives way:  with e = 1 / (dt correction) - 1,  e^2 / ((1 + e) 4 zeta^2).
+    /// Returns the compliance of a row as a share of its effective mass:
+    /// with e = 1 / (dt correction) - 1,  e^2 / ((1 + e) 4 zeta^2).
     pub(super) fn compliance(&self, dt_s: f64) -> f64 {
         let e = 1.0 / (dt_s * self.correction_per_s(dt_s)) - 1.0;
         e * e / ((1.0 + e) * 4.0 * self.damping_ratio * self.damping_ratio)
@@ -27,22 +29,23 @@ impl Softness {
 pub struct Settings {
     pub dt_s: f64,
     pub gravity_m_s2: DVec3,
-    /// Sweeps that correct positions, and after them sweeps that do not and are rigid: without the second kind, or if
-    /// the next step began with their impulses, a held bottle would slip by a third of a millimetre.
+    /// Number of sweeps that correct positions, and of rigid sweeps after them that do not. Without the
+    /// second kind, or if the next step began with their impulses, a held bottle would slip by a third
+    /// of a millimetre.
     pub sweeps: usize,
     pub relaxing_sweeps: usize,
-    /// Softness of contacts between two things that move, and of contacts with what does not.
+    /// Softness of contacts between two moving things, and of contacts with fixed ones.
     pub contact: Softness,
     pub ground_contact: Softness,
-    /// Depth that is left alone. At 0 a bottle precesses on its rim; at 1 mm hung frames slip.
+    /// Penetration depth that is not corrected. At 0 a bottle precesses on its rim; at 1 mm hung frames slip.
     pub slop_m: f64,
-    /// Depth is taken back no faster than this.
+    /// Maximum speed at which penetration is corrected.
     pub fastest_correction_m_s: f64,
-    /// A gap that would stay open if it closed faster by this gets no row.
+    /// Margin on the closing speed. A gap that would stay open even if it closed faster by this gets no row.
     pub margin_m_s: f64,
-    /// A contact continues one of the last step that lies no farther away.
+    /// Maximum distance between a contact and the one of the last step that it continues.
     pub match_m: f64,
-    /// Share of an error of limits and equalities that is taken back per second.
+    /// Share of an error of limits and equalities that is corrected per second.
     pub joint_correction_per_s: f64,
 }
 
@@ -67,8 +70,9 @@ impl Settings {
 /// The two kinds of sweeps of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pass {
-    /// Takes back penetration and errors of joints; positions move by what it finds.
+    /// Corrects penetration and errors of joints. Its velocities move the positions.
     Correcting,
-    /// Rigid and without correction, so that pushing out of a wall leaves no speed behind; velocities are what it finds.
+    /// Rigid and without correction, so that pushing out of a wall leaves no speed behind. Its
+    /// velocities are those at the end of the step.
     Relaxing,
 }

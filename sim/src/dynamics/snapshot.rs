@@ -1,4 +1,4 @@
-//! Saving and restoring everything that outlasts a step.
+//! Saving and restoring all state that outlasts a step.
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -18,14 +18,14 @@ pub struct DynamicsState {
     manifolds: Vec<Manifold>,
 }
 
-/// A state that belongs to another world.
+/// Error of restoring a state that belongs to another world.
 #[derive(Debug, Error, PartialEq)]
 #[error(
     "the state has other trees or equalities than this world; one taken from a world of the same making would fit"
 )]
 pub struct OtherWorld;
 
-/// [`DynamicsState`] where it lies; serialised, both are the same bytes.
+/// [`DynamicsState`] by reference; both serialise to the same bytes.
 #[derive(Serialize)]
 struct PresentState<'a> {
     trees: Vec<TreeState>,
@@ -35,7 +35,7 @@ struct PresentState<'a> {
 }
 
 impl Dynamics {
-    /// The present state, to be serialised at once.
+    /// Returns a view of the present state for immediate serialisation.
     pub fn present(&self) -> impl Serialize {
         PresentState {
             trees: self.trees.all.iter().map(|tree| tree.state()).collect(),
@@ -54,7 +54,11 @@ impl Dynamics {
         }
     }
 
-    /// Takes back a state of this world, or of one made like it. An error leaves all as it was.
+    /// Restores a state of this world, or of one built the same way.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`OtherWorld`] if the state does not fit; nothing changes then.
     pub fn restore(&mut self, state: &DynamicsState) -> Result<(), OtherWorld> {
         let trees = &mut self.trees.all;
         let fits = trees.len() == state.trees.len()

@@ -1,10 +1,10 @@
-//! The covariance of the errors of a state, and what a measurement makes of both.
+//! The covariance of the errors of a state, and its update by measurements.
 
 use pulp::{Arch, Simd, WithSimd};
 use rapier3d::glamx::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
-/// Where each part of the error begins.
+/// Start index of each part of the error.
 pub(super) const TURN: usize = 0;
 pub(super) const VELOCITY: usize = 3;
 pub(super) const PLACE: usize = 6;
@@ -13,23 +13,23 @@ pub(super) const ACC_BIAS: usize = 12;
 pub(super) const FEET: usize = 15;
 pub(super) const HEADINGS: usize = 21;
 pub(super) const ERRORS: usize = 23;
-/// Turn, velocity and place, which a step of time changes.
+/// Number of errors that a step of time changes: turn, velocity and place.
 const MOVING: usize = GYRO_BIAS;
 
 /// One number for each error.
 pub(super) type Errors = [f64; ERRORS];
 
-/// Symmetric, rows and columns in the order of the errors.
+/// Symmetric matrix, rows and columns in the order of the errors.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Covariance([Errors; ERRORS]);
 
-/// A measurement's derivatives by the errors, those that are not zero.
+/// A measurement's non-zero derivatives by the errors.
 pub(super) struct MeasurementRow {
     parts: [(usize, f64); MAX_PARTS],
     len: usize,
 }
 
-/// Two of the place, three of the turn.
+/// Maximum number of derivatives: two of the place, three of the turn.
 const MAX_PARTS: usize = 5;
 
 impl MeasurementRow {
@@ -56,9 +56,10 @@ impl Covariance {
         Covariance(rows)
     }
 
-    /// P+ = F P F^T with F the step of the errors over `dt_s`:
+    /// Computes P+ = F P F^T with F the step of the errors over `dt_s`:
     ///   theta+ = theta - R b_g dt,   v+ = v - [f]x theta dt - R b_a dt,   p+ = p + v dt.
-    /// F changes the first three parts alone, so of P F^T what the others have with them is what F P has, mirrored.
+    /// F changes only the first three parts, so the covariances of the others with them in P F^T are
+    /// those of F P, mirrored.
     pub fn predict(&mut self, rotation: DMat3, force_m_s2: DVec3, dt_s: f64) {
         let by_bias = rotation * -dt_s;
         let by_turn = cross(force_m_s2) * -dt_s;
@@ -91,18 +92,18 @@ impl Covariance {
         }
     }
 
-    /// The error has taken a step of its own, of this standard deviation.
+    /// Adds an independent step of this standard deviation to the error.
     pub fn widen(&mut self, error: usize, sigma: f64) {
         self.0[error][error] += sigma * sigma;
     }
 
-    /// The error has nothing to do with the others any more.
+    /// Removes all correlations of the error, and its variance.
     pub fn forget(&mut self, error: usize) {
         self.0[error] = [0.0; ERRORS];
         self.0.iter_mut().for_each(|row| row[error] = 0.0);
     }
 
-    /// The error at `to` is, from now on, the one that `from` has at this moment.
+    /// Replaces the error at `to` by a copy of the present one at `from`.
     pub fn copy(&mut self, from: usize, to: usize) {
         self.0[to] = self.0[from];
         self.0[to][to] = self.0[from][from];
@@ -129,7 +130,7 @@ impl Covariance {
         self.0[to] = row;
     }
 
-    /// h^T P h.
+    /// Computes h^T P h.
     fn variance(&self, row: &MeasurementRow) -> f64 {
         let parts = &row.parts[..row.len];
         let by_row = parts.iter().map(|(i, d_i)| {
@@ -139,7 +140,7 @@ impl Covariance {
         by_row.sum()
     }
 
-    /// P h.
+    /// Computes P h.
     fn times(&self, row: &MeasurementRow) -> Errors {
         let mut product = [0.0; ERRORS];
         for (error, derivative) in &row.parts[..row.len] {
@@ -149,16 +150,16 @@ impl Covariance {
     }
 }
 
-/// Measurements of one instant, one number after the other: each says  y = h . errors + noise.
+/// Measurements of one instant, one number after the other: each means  y = h . errors + noise.
 pub(super) struct Update<'a> {
     pub covariance: &'a mut Covariance,
     pub errors: Errors,
-    /// Errors that stay what they are; how uncertain they are is reckoned with (Schmidt's filter).
+    /// Errors that are not corrected, but whose uncertainty is taken into account (Schmidt's filter).
     pub considered: &'a [usize],
 }
 
 impl Update<'_> {
-    /// Where a measurement is more than `SLIP_GATE` off, its error at `slipped` has moved by what is missing.
+    /// Widens the error at `slipped` by the deviation, if a measurement exceeds `SLIP_GATE`.
     pub fn gate(&mut self, row: &MeasurementRow, y: f64, sigma: f64, slipped: usize) {
         let rest = y - row.dot(&self.errors);
         if rest * rest > super::SLIP_GATE * (self.covariance.variance(row) + sigma * sigma) {
@@ -166,7 +167,9 @@ impl Update<'_> {
         }
     }
 
-    ///   k = P h / s,   s = h^T P h + sigma^2,   P+ = P - k (P h)^T - P h k^T + s k k^T,   k = 0 where considered.
+    /// Applies a measurement:
+    ///   k = P h / s,   s = h^T P h + sigma^2,
+    ///   P+ = P - k (P h)^T - P h k^T + s k k^T,   k = 0 where considered.
     pub fn measure(&mut self, row: &MeasurementRow, y: f64, sigma: f64) {
         let product = self.covariance.times(row);
         let spread = row.dot(&product) + sigma * sigma;
@@ -176,7 +179,8 @@ impl Update<'_> {
         self.restore(kept, &product, step);
     }
 
-    /// The covariances of the considered errors with one another, which a measurement leaves as they are.
+    /// Returns the covariances of the considered errors with one another, which a measurement leaves
+    /// unchanged.
     fn considered_block(&self) -> [[f64; 2]; 2] {
         let mut kept = [[0.0; 2]; 2];
         for (i, error) in self.considered.iter().enumerate() {
@@ -197,7 +201,7 @@ impl Update<'_> {
     }
 }
 
-/// Work for the widest vectors that the processor has: of every row its part of  k (P h)^T.
+/// Work for the widest vectors of the processor: the part of  k (P h)^T  for every row.
 struct Taking<'a, 'b> {
     update: &'a mut Update<'b>,
     product: &'a Errors,
@@ -212,7 +216,7 @@ impl WithSimd for Taking<'_, '_> {
     fn with_simd<S: Simd>(self, _simd: S) {
         let Taking { update, product, spread, step } = self;
         for (i, line) in update.covariance.0.iter_mut().enumerate() {
-            // What a measurement says nothing of stays: headings, of a robot that walks.
+            // Errors unrelated to a measurement stay unchanged, for example headings of a walking robot.
             if product[i] == 0.0 {
                 continue;
             }
@@ -223,7 +227,7 @@ impl WithSimd for Taking<'_, '_> {
     }
 }
 
-/// The matrix of a cross product: [v]x w = v x w.
+/// Returns the matrix of a cross product: [v]x w = v x w.
 pub(super) fn cross(v: DVec3) -> DMat3 {
     DMat3::from_cols(DVec3::new(0.0, v.z, -v.y), DVec3::new(-v.z, 0.0, v.x), DVec3::new(v.y, -v.x, 0.0))
 }

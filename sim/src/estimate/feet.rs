@@ -1,4 +1,5 @@
-//! Which foot carries the robot, how surely, and where on its sole: from the torques of the legs.
+//! Contact estimates of the feet from the torques of the legs: the stance foot, its certainty, and the
+//! centre of pressure on its sole.
 
 use rapier3d::glamx::{DQuat, DVec3};
 use rapier3d::math::{Pose, Rotation, Vector};
@@ -8,16 +9,16 @@ use serde::{Deserialize, Serialize};
 use crate::body::{JOINTS, LEG_JOINTS, LEGS, RobotModel};
 use crate::{GRAVITY_M_S2, Side, Sides};
 
-/// One foot as the estimate has it.
+/// The estimate of one foot.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Foot {
     /// Ankle roll link, to which the sole belongs.
     pub link: usize,
     /// The point of the ground under the centre of pressure, world frame.
     pub point_m: DVec3,
-    /// Which way the foot faces, since the robot stands still.
+    /// Heading of the foot since the robot has stood still.
     pub heading_rad: f64,
-    /// That the foot stands: 0 it surely does not, 1 it surely does.
+    /// Certainty that the foot stands, from 0 (certainly not) to 1 (certainly).
     pub contact_share: f64,
     /// Centre of pressure in the link's frame, filtered.
     pressure_m: Vector,
@@ -25,24 +26,24 @@ pub(super) struct Foot {
     force_n: f32,
 }
 
-/// Force and moment about a foot's link origin with which the ground answers a leg, world axes.
+/// Force and moment about a foot's link origin with which the ground reacts to a leg, world axes.
 struct GroundWrench {
     force_n: Vector,
     moment_n_m: Vector,
 }
 
-/// A foot carries nothing below the first force, and surely stands above the second.
+/// Forces below which a foot carries nothing, and above which it certainly stands.
 const LIFTED_N: f32 = 40.0;
 const STANDING_N: f32 = 110.0;
 const FORCE_FILTER_TIME_S: f32 = 0.006;
 const PRESSURE_FILTER_TIME_S: f32 = 0.015;
-/// A foot so much higher than the other does not stand.
+/// Height above the other foot from which on a foot does not stand.
 const HIGHER_M: f32 = 0.012;
-/// Of the least squares for a wrench: a stretched leg cannot feel along itself.
+/// Damping of the least squares for a wrench: a stretched leg cannot feel along itself.
 const WRENCH_DAMPING: f32 = 2e-4;
 
 impl Foot {
-    /// A foot that carries half of the robot, with nothing known of where.
+    /// Creates a foot that carries half of the robot, with unknown position.
     pub fn standing(model: &RobotModel, side: Side) -> Foot {
         let sole = &model.soles[side];
         Foot {
@@ -55,12 +56,13 @@ impl Foot {
         }
     }
 
-    /// From the IMU to the centre of pressure, in the pelvis' axes.
+    /// Returns the vector from the IMU to the centre of pressure, in the pelvis' axes.
     pub fn arm_m(&self, pelvis_from_foot: &Pose, model: &RobotModel) -> DVec3 {
         (*pelvis_from_foot * self.pressure_m - model.imu_in_pelvis_m).as_dvec3()
     }
 
-    /// One reading of the legs' torques. Where a centre of pressure moves, its point of the ground moves along.
+    /// Processes one reading of the legs' torques. If a centre of pressure moves, its point of the
+    /// ground moves along.
     pub fn feel(
         feet: &mut Sides<Foot>,
         model: &RobotModel,
@@ -93,8 +95,9 @@ impl Foot {
         }
     }
 
-    /// Moves the centre of pressure to where the wrench has it, on the sole; returns by how much, in the link's frame. With h the
-    /// sole's depth below the link's origin,  x = -(m_y + h f_x) / f_z,  y = (m_x - h f_y) / f_z.
+    /// Moves the centre of pressure towards that of the wrench, on the sole. Returns the displacement in
+    /// the link's frame. With h the sole's depth below the link's origin,  x = -(m_y + h f_x) / f_z,  y
+    /// = (m_x - h f_y) / f_z.
     fn press(
         &mut self,
         model: &RobotModel,
@@ -122,8 +125,8 @@ impl Foot {
     }
 }
 
-/// J^T w = tau_gravity - tau, by damped least squares, in the pelvis' axes; `down_direction` is that of gravity. J: 6 x 6, rows force and
-/// moment, columns the leg's joints [m; 1].
+/// Solves J^T w = tau_gravity - tau by damped least squares, in the pelvis' axes; `down_direction` is
+/// that of gravity. J: 6 x 6, rows force and moment, columns the leg's joints [m; 1].
 fn ground_wrench(
     model: &RobotModel,
     pelvis_from_link: &[Pose],
@@ -156,7 +159,7 @@ fn ground_wrench(
     }
 }
 
-/// Which way the x axis points, seen from above.
+/// Returns the direction of the x axis, seen from above.
 pub(super) fn facing_rad(rotation: DQuat) -> f64 {
     let forward = rotation * DVec3::X;
     forward.y.atan2(forward.x)

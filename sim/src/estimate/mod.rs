@@ -1,17 +1,20 @@
-//! What a robot can know of its own motion: a contact-aided error-state Kalman filter over IMU, joint encoders and joint
-//! torques, after Bloesch et al. 2013 ("State estimation for legged robots") and Hartley et al. 2020 ("Contact-aided
-//! invariant extended Kalman filtering"). It knows no physics world and no contact but what the legs' torques tell.
+//! Estimation of a robot's own motion: a contact-aided error-state Kalman filter over IMU, joint
+//! encoders and joint torques. It follows Bloesch et al. 2013 ("State estimation for legged robots") and
+//! Hartley et al. 2020 ("Contact-aided invariant extended Kalman filtering"). It has no access to the
+//! physics world, and infers contacts only from the legs' torques.
 //!
-//! State: rotation R, velocity v and place p of the IMU, gyro bias b_g, accelerometer bias b_a, for each foot the point f_i of
-//! the ground that it stands on and its heading psi_i. The error of the rotation is in world axes, R = exp(theta) R^:
+//! State: rotation R, velocity v and place p of the IMU, gyro bias b_g, accelerometer bias b_a. For each
+//! foot it also has the point f_i of the ground that the foot stands on, and the foot's heading psi_i.
+//! The error of the rotation is in world axes, R = exp(theta) R^:
 //!
 //!   R+ = R exp((w - b_g) dt),   v+ = v + (R (a - b_a) + g) dt,   p+ = p + v+ dt
 //!   theta' = -R b_g,   v' = -[R a]x theta - R b_a,   p' = v
-//!   0 = R r_i(q) - (f_i - p)           r_i: from the IMU to the point of the sole where the ground pushes, by the encoders
-//!   0 = f_i,z                          the floor is level, and at the height at which it was told
-//!   0 = heading(R R_i(q)) - psi_i      only of a robot that stands still: feet twist under one that walks
+//!   0 = R r_i(q) - (f_i - p)           r_i: from the IMU to the sole's pressure point, by the encoders
+//!   0 = f_i,z                          the floor is level, at the given initial height
+//!   0 = heading(R R_i(q)) - psi_i      only while standing still: feet twist under a walking robot
 //!
-//! The point moves over the sole with the centre of pressure (a foot that tips rests on its edge), and f_i moves along.
+//! The point moves over the sole with the centre of pressure (a foot that tips rests on its edge), and
+//! f_i moves along.
 
 mod covariance;
 mod feet;
@@ -35,7 +38,7 @@ use covariance::{
 };
 use feet::{Foot, facing_rad};
 
-/// What the joints of a robot read at one instant, in the published order.
+/// Readings of a robot's joints at one instant, in the published order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointReadings {
     #[serde(with = "joint_array")]
@@ -46,7 +49,7 @@ pub struct JointReadings {
     pub torque_n_m: [f32; JOINTS],
 }
 
-/// What the sensors of a robot read at one instant.
+/// Readings of a robot's sensors at one instant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SensorReadings {
     pub joints: JointReadings,
@@ -56,8 +59,8 @@ pub struct SensorReadings {
     pub specific_force_m_s2: Vector,
 }
 
-/// Where a robot takes its pelvis to be and how it moves. Place and heading at the start are told once, and are the frame
-/// of all that follows.
+/// Estimator of pose and motion of a robot's pelvis. The initial place and heading are given once, and
+/// define the frame of all later estimates.
 #[derive(Clone, Serialize, Deserialize)]
 pub(crate) struct StateEstimator {
     world_from_imu: DQuat,
@@ -67,34 +70,35 @@ pub(crate) struct StateEstimator {
     acc_bias_m_s2: DVec3,
     feet: Sides<Foot>,
     covariance: Covariance,
-    /// Since when both feet have stood while the pelvis hardly turned.
+    /// Time for which both feet have stood while the pelvis hardly turned.
     still_s: f32,
-    /// How old readings are when they come.
+    /// Age of readings when they arrive.
     latency_s: f32,
 }
 
-/// Noise of a gyro and an accelerometer reading at 200 Hz. Velocities change by less than a third for three times more or less.
+/// Noise of a gyro and an accelerometer reading at 200 Hz. Velocities change by less than a third for
+/// three times more or less.
 const GYRO_NOISE_RAD_S: f64 = 4e-3;
 const ACC_NOISE_M_S2: f64 = 0.1;
 /// Random walks of the biases, per root of a second.
 const GYRO_WALK_RAD_S: f64 = 2e-5;
 const ACC_WALK_M_S2: f64 = 1e-4;
-/// Random walk of a foot's point, per root of a second: while the robot stands still, while it walks (feet slip a little), and
-/// in flight.
+/// Random walk of a foot's point, per root of a second: while the robot stands still, while it walks
+/// (feet slip a little), and in flight.
 const STILL_WALK_M: f64 = 5e-4;
 const STEPPING_WALK_M: f64 = 3e-3;
 const FLYING_WALK_M: f64 = 3.0;
 const STILL_HEADING_WALK_RAD: f64 = 1e-3;
-/// Kinematics: encoders, and legs that give.
+/// Noise of kinematics: encoders, and legs that yield.
 const POINT_NOISE_M: f64 = 5e-4;
 const HEADING_NOISE_RAD: f64 = 2e-3;
 const FLOOR_NOISE_M: f64 = 4e-3;
-/// A foot that is so many standard deviations, squared, from where it stood has slipped.
+/// Squared number of standard deviations beyond which a foot has slipped from its place.
 const SLIP_GATE: f64 = 9.0;
-/// Feet tell of the heading of a robot that has stood still so long, turning less than this.
+/// Time of standing still, and maximum spin, from which on feet are used to estimate the heading.
 const STILL_S: f32 = 0.4;
 const STILL_RAD_S: f32 = 0.1;
-/// A foot of which so much is sure stands on the floor.
+/// Certainty from which on a foot counts as standing on the floor.
 const SURE: f64 = 0.9;
 
 /// Standard deviations at the start.
@@ -105,8 +109,9 @@ const START_ACC_BIAS_M_S2: f64 = 2e-2;
 const START_KNOWN: f64 = 1e-4;
 
 impl StateEstimator {
-    /// A robot that has stood long enough for its accelerometer's mean, `still_force_m_s2`, to tell how it is tilted. Of
-    /// `world_from_pelvis` it takes place and heading. Readings will come `latency_s` late.
+    /// Creates the estimator of a robot that has stood long enough for its accelerometer's mean,
+    /// `still_force_m_s2`, to determine its tilt. It takes place and heading from `world_from_pelvis`.
+    /// Readings arrive `latency_s` late.
     pub(crate) fn new(
         model: &RobotModel,
         world_from_pelvis: &Pose,
@@ -146,7 +151,8 @@ impl StateEstimator {
         }
     }
 
-    /// One reading, `dt_s` after the last one. Returns the poses of all links in the pelvis frame, by the joints.
+    /// Processes one reading, `dt_s` after the last one. Returns the poses of all links in the pelvis
+    /// frame, by the joints.
     pub(crate) fn update(&mut self, model: &RobotModel, readings: &SensorReadings, dt_s: f32) -> Vec<Pose> {
         self.predict(readings, f64::from(dt_s));
         let pelvis_from_link = model.forward_kinematics(Pose::IDENTITY, &readings.joints.q_rad);
@@ -157,9 +163,9 @@ impl StateEstimator {
         pelvis_from_link
     }
 
-    /// The body by this estimate, the readings that it was last updated with, and what [`StateEstimator::update`] returned. The
-    /// pelvis is taken to where it is by now, joints are left as they were read: their velocities, differences of readings,
-    /// are later still, and what they would add is mostly noise.
+    /// Returns the body by this estimate, the last readings, and the result of
+    /// [`StateEstimator::update`]. The pelvis is extrapolated to the present, joints are not. Their
+    /// velocities, differences of readings, are even later, and extrapolation would add mostly noise.
     pub(crate) fn body(
         &self,
         model: &Arc<RobotModel>,
@@ -194,7 +200,7 @@ impl StateEstimator {
         self.still_s > STILL_S
     }
 
-    /// Positions move by the new velocity, as the simulator integrates.
+    /// Predicts the state. Positions move by the new velocity, as in the simulator.
     fn predict(&mut self, readings: &SensorReadings, dt_s: f64) {
         let turn_rad = (readings.gyro_rad_s.as_dvec3() - self.gyro_bias_rad_s) * dt_s;
         let half = self.world_from_imu * DQuat::from_scaled_axis(turn_rad * 0.5);
@@ -212,7 +218,7 @@ impl StateEstimator {
         }
     }
 
-    /// From the moment on at which the robot stands still, the feet's headings are those that they have then.
+    /// Detects that the robot stands still; from that moment on, the feet keep their present headings.
     fn see_stillness(&mut self, readings: &SensorReadings, pelvis_from_link: &[Pose], dt_s: f32) {
         let spin_rad_s = readings.gyro_rad_s - self.gyro_bias_rad_s.as_vec3();
         let stands =
@@ -243,7 +249,8 @@ impl StateEstimator {
                 .exp();
             let at = FEET + 3 * side.index();
             (at..at + 3).for_each(|error| update.covariance.widen(error, walk_m * dt_s.sqrt()));
-            // A foot in the air tells nothing; where it comes down, its point is as uncertain as the flight was long.
+            // A foot in the air gives no information; after landing, its point's uncertainty reflects
+            // the duration of the flight.
             if foot.contact_share == 0.0 {
                 continue;
             }
@@ -289,7 +296,7 @@ impl StateEstimator {
     }
 }
 
-/// The same angle within half a turn of zero.
+/// Returns the same angle within half a turn of zero.
 fn wrapped_rad(angle_rad: f64) -> f64 {
     (angle_rad + PI).rem_euclid(TAU) - PI
 }

@@ -9,7 +9,8 @@ use crate::body::posed::{Posed, model};
 use crate::body::{LEG_JOINTS, LEGS};
 use crate::random::SplitMix64;
 
-/// What the sensors of a robot read that stands on both feet, its weight shared equally under the middles of its soles.
+/// Returns the readings of a robot that stands on both feet, its weight shared equally under the middles
+/// of its soles.
 fn standing() -> SensorReadings {
     let body = Posed::standing().body();
     let mut torque_n_m = body.gravity_torques_n_m();
@@ -50,7 +51,7 @@ fn a_robot_that_stands_stays_where_it_is() {
     assert!(body.pelvis_velocity_m_s.length() < 1e-3 && body.com_velocity_m_s.length() < 1e-3);
 }
 
-/// A robot that stands tells what is gyro and what is turning by its feet, about the vertical as well.
+/// A standing robot separates gyro bias and turning by its feet, about the vertical as well.
 #[test]
 fn a_gyros_bias_is_learnt_while_both_feet_stand() {
     let bias_rad_s = Vector::new(1e-3, -8e-4, 9e-4);
@@ -65,7 +66,7 @@ fn a_gyros_bias_is_learnt_while_both_feet_stand() {
     assert!(heading_rad(&body.world_from_pelvis()).abs() < 3e-3);
 }
 
-/// On one leg the other's reading says so, and its point of the ground is soon unknown.
+/// On one leg the other foot's reading shows it, and its point of the ground is soon unknown.
 #[test]
 fn a_foot_that_carries_nothing_does_not_stand() {
     let mut readings = standing();
@@ -80,7 +81,7 @@ fn a_foot_that_carries_nothing_does_not_stand() {
     assert_eq!(estimator.feet.right.contact_share, 1.0);
 }
 
-/// A covariance with something of everything.
+/// Returns a covariance without zeros.
 fn mixed() -> (Covariance, [[f64; ERRORS]; ERRORS]) {
     let mut random = SplitMix64(3);
     let roots: [[f64; ERRORS]; ERRORS] =
@@ -123,7 +124,7 @@ fn a_prediction_is_the_product_of_three_matrices() {
     check(&covariance, &product(&product(&step, &before), &transposed));
 }
 
-/// By the textbook, and with errors that are considered by Joseph's form.
+/// By the textbook, and for considered errors by Joseph's form.
 #[test]
 fn a_measurement_is_josephs_form() {
     for considered in [&[][..], &[TURN + 2, GYRO_BIAS + 2][..]] {

@@ -1,4 +1,4 @@
-//! Which base controller the robots of a world get.
+//! The choice of the base controller for the robots of a world.
 
 use std::path::Path;
 #[cfg(feature = "onnx")]
@@ -10,24 +10,30 @@ use super::{Balance, BaseLimits, Locomotion};
 use crate::SimError;
 use crate::body::{BodyScale, RobotModel};
 
-/// Cheap to clone: a file is read and checked once, and robots share its network.
+/// Choice of a base controller. Cheap to clone: a file is read and checked once, and robots share its
+/// network.
 #[derive(Clone, Debug, Default)]
 pub enum LocomotionChoice {
-    /// Our own.
+    /// Tandem's own controller.
     #[default]
     Balance,
-    /// A velocity policy that was read from an ONNX file, and whether a loop over its place is around it.
+    /// A velocity policy from an ONNX file, with a loop over its place if `looped` is true.
     #[cfg(feature = "onnx")]
     Onnx { network: Arc<Network>, looped: bool },
 }
 
 impl LocomotionChoice {
-    /// The policy of a file. `looped`: it is told not the commands, but what keeps the robot where they would have taken it.
+    /// Reads the policy of a file. With `looped`, the policy receives the velocity that keeps the robot
+    /// where the commands would have taken it, rather than the commands.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the file cannot be used, or if the crate was built without the feature `onnx`.
     pub fn from_file(path: &Path, looped: bool) -> Result<LocomotionChoice, SimError> {
         from_onnx(path, looped)
     }
 
-    /// A fresh controller for one robot.
+    /// Creates a controller for one robot.
     pub fn controller(&self) -> Box<dyn Locomotion> {
         match self {
             LocomotionChoice::Balance => Box::new(Balance::default()),
@@ -36,12 +42,16 @@ impl LocomotionChoice {
         }
     }
 
-    /// Base commands that such a controller follows with a robot of this size.
+    /// Returns the base commands that such a controller follows with a robot of this size.
     pub fn limits(&self, scale: &BodyScale) -> BaseLimits {
         self.controller().limits(scale)
     }
 
-    /// Whether such a controller can move this robot; the text says why not.
+    /// Checks that such a controller can move this robot.
+    ///
+    /// # Errors
+    ///
+    /// Returns the reason as text if it cannot.
     #[cfg(feature = "onnx")]
     pub fn check_robot(&self, model: &RobotModel) -> Result<(), String> {
         match self {
@@ -50,7 +60,7 @@ impl LocomotionChoice {
         }
     }
 
-    /// Whether such a controller can move this robot; ours can.
+    /// Checks that such a controller can move this robot; Tandem's own always can.
     #[cfg(not(feature = "onnx"))]
     pub fn check_robot(&self, _model: &RobotModel) -> Result<(), String> {
         match self {
@@ -58,7 +68,8 @@ impl LocomotionChoice {
         }
     }
 
-    /// What recordings and results call it: `balance`, or the file's name with a hash of its content, and the loop if there is one.
+    /// Returns the name in recordings and results: `balance`, or the file's name with a hash of its
+    /// content, prefixed with `looped:` for a loop.
     pub fn name(&self) -> String {
         match self {
             LocomotionChoice::Balance => "balance".into(),

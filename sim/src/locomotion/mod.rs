@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::Sides;
 use crate::body::{BodyEstimate, BodyScale, JointDrive, LEG_JOINTS, WAIST_JOINTS};
 
-/// What a policy asks of the base, in the robot's own heading frame.
+/// Setpoint of a policy for the base, in the robot's own heading frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BaseCommand {
     pub vx_m_s: f32,
@@ -24,7 +24,7 @@ pub struct BaseCommand {
     pub pelvis_height_m: f32,
 }
 
-/// How the base goes, in its own heading frame.
+/// Velocity of the base, in its own heading frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BaseVelocity {
     pub vx_m_s: f32,
@@ -37,7 +37,7 @@ impl BaseVelocity {
 }
 
 impl BaseCommand {
-    /// Stays where it is, with the pelvis at this height.
+    /// Creates a command to stay in place, with the pelvis at this height.
     pub fn standing(pelvis_height_m: f32) -> BaseCommand {
         BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m }
     }
@@ -47,7 +47,7 @@ impl BaseCommand {
     }
 }
 
-/// Smallest and largest value that a controller can follow.
+/// Smallest and largest values that a controller can follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BaseLimits {
     pub vx_m_s: [f32; 2],
@@ -57,7 +57,7 @@ pub struct BaseLimits {
 }
 
 impl BaseLimits {
-    /// The nearest command within the limits.
+    /// Returns the nearest command within the limits.
     pub fn clamp(&self, command: BaseCommand) -> BaseCommand {
         let within = |value: f32, [low, high]: [f32; 2]| value.clamp(low, high);
         BaseCommand {
@@ -72,28 +72,30 @@ impl BaseLimits {
 /// Drives of both legs, from the hip to the ankle.
 pub type LegCommand = Sides<[JointDrive; LEG_JOINTS]>;
 
-/// A base controller. It sees its own robot only, and acts through joint drives of legs and waist only.
+/// A base controller. It observes only its own robot, and acts only through the joint drives of legs and
+/// waist.
 pub trait Locomotion: Send {
-    /// Of a robot of this size.
+    /// Returns the limits for a robot of this size.
     fn limits(&self, scale: &BodyScale) -> BaseLimits;
 
-    /// One physics step.
+    /// Runs one physics step.
     fn tick(&mut self, body: &BodyEstimate, command: &BaseCommand, dt_s: f32) -> LegCommand;
 
-    /// What is added to the task's waist targets (yaw, roll, pitch) until the next [`Locomotion::tick`], by a controller
-    /// that balances with the waist.
+    /// Returns the offset on the task's waist targets (yaw, roll, pitch) until the next
+    /// [`Locomotion::tick`], for a controller that balances with the waist.
     fn waist_offset_rad(&self) -> [f32; WAIST_JOINTS] {
         [0.0; WAIST_JOINTS]
     }
 
-    /// Whether it is stepping rather than standing; `None` where it does not tell the two apart.
+    /// Returns true if the robot is stepping rather than standing. Returns `None` if the controller does
+    /// not distinguish the two.
     fn is_stepping(&self) -> Option<bool> {
         None
     }
 
-    /// Internal state, for snapshots and the state hash.
+    /// Serialises the internal state, for snapshots and the state hash.
     fn save(&self) -> Result<Vec<u8>, postcard::Error>;
 
-    /// Takes back what [`Locomotion::save`] gave.
+    /// Restores a state from [`Locomotion::save`].
     fn load(&mut self, state: &[u8]) -> Result<(), postcard::Error>;
 }

@@ -1,19 +1,19 @@
-//! Equalities of a file between the links that its bodies became, and links that never touch.
+//! Equalities of a file between the links of its bodies, and links that never touch.
 
 use crate::SimError;
 use crate::dynamics::{DPose3, Dynamics, Equality, LinkId, TreeId};
 use crate::mjcf::{BodyTree, Document, EqualityKind};
 
-/// A tree of a file, and what it became: `None` is a part of the world.
+/// A tree of a file and its id in dynamics; `None` for a part of the world.
 pub(crate) struct PlacedTree<'a> {
     pub tree: &'a BodyTree,
     pub id: Option<TreeId>,
 }
 
-/// One body that an equality names.
+/// One body of an equality.
 #[derive(Clone, Copy)]
 struct End {
-    /// `None` is the world.
+    /// Link of the body; `None` is the world.
     link: Option<LinkId>,
     /// The body's pose in the frame of the link, or of the world.
     carrier_from_body: DPose3,
@@ -60,7 +60,7 @@ pub(crate) fn add_equalities(
     Ok(())
 }
 
-/// Between two parts of the world there is nothing to hold.
+/// Returns the weld of two ends; `None` between two parts of the world, where there is nothing to hold.
 fn weld(a: End, b: End, a_from_b: DPose3) -> Option<Equality> {
     let (a, b, a_from_b) = if a.link.is_some() { (a, b, a_from_b) } else { (b, a, a_from_b.inverse()) };
     let between_links = a.carrier_from_body * a_from_b * b.carrier_from_body.inverse();
@@ -87,7 +87,8 @@ fn end(dynamics: &Dynamics, placed: &[PlacedTree], world_from_file: &DPose3, bod
     world
 }
 
-/// Links that the file's `<exclude>` names never touch. Two parts of the room do not anyway.
+/// Excludes contacts between the links that the file's `<exclude>` names. Two parts of the room never
+/// touch anyway.
 pub(crate) fn keep_apart(
     dynamics: &mut Dynamics,
     document: &Document,
@@ -109,7 +110,7 @@ pub(crate) fn keep_apart(
     Ok(())
 }
 
-/// The link that a joint of a file moves, unless that is a part of the world.
+/// Returns the link that a joint of a file moves, unless it is part of the world.
 pub(super) fn joint_link(placed: &[PlacedTree], joint: &str) -> Option<LinkId> {
     placed.iter().find_map(|PlacedTree { tree, id }| {
         let index = tree.links.iter().position(|link| link.joint.name() == Some(joint))?;

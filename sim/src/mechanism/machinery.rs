@@ -1,15 +1,16 @@
-//! What the keys of a file say: the state in which it begins, and what its actuators are told and when.
+//! Keys of a file: the initial state, and the schedule of its actuators' controls.
 
 use super::{PlacedTree, joint_link};
 use crate::SimError;
 use crate::dynamics::{DPose3, DQuat, DVec3, Drive, Dynamics, LinkId, TreeId};
 use crate::mjcf::{Actuator, ActuatorKind, Document, Key, LinkJoint};
 
-/// Actuators do what the key `start` tells them, and from the time of every later key what that one does.
+/// Actuators of a file. They follow the controls of the key `start`, and from the time of every later
+/// key those of that key.
 #[derive(Default)]
 pub(crate) struct Machinery {
     actuated: Vec<(LinkId, Actuator)>,
-    /// Those that tell the actuators something, earliest first.
+    /// Keys with controls, earliest first.
     keys: Vec<Key>,
 }
 
@@ -17,7 +18,7 @@ pub(crate) struct Machinery {
 pub(crate) const START: &str = "start";
 
 impl Machinery {
-    /// The actuators and keys of a file whose trees were placed.
+    /// Collects the actuators and keys of a file whose trees were placed.
     pub fn of(document: &Document, placed: &[PlacedTree]) -> Result<Machinery, SimError> {
         let mut actuated: Vec<(LinkId, Actuator)> = Vec::new();
         for actuator in document.actuators()? {
@@ -38,7 +39,7 @@ impl Machinery {
         Ok(Machinery { actuated, keys })
     }
 
-    /// Sets what acts from this time on. An actuator that no key has told anything yet is told 0, as in MuJoCo.
+    /// Sets the drives from this time on. As in MuJoCo, an actuator's control is 0 before the first key.
     pub fn drive(&self, dynamics: &mut Dynamics, time_s: f64) {
         let key = self.keys.iter().rev().find(|key| key.time_s <= time_s);
         for (index, (link, actuator)) in self.actuated.iter().enumerate() {
@@ -56,8 +57,8 @@ fn drive(actuator: &Actuator, command: f64) -> Drive {
     }
 }
 
-/// Puts the trees of a file, which lies at `world_from_file`, where a key has them. What the key leaves out stays as the bodies are
-/// placed, at rest.
+/// Sets the trees of a file, which is at `world_from_file`, to the state of a key. Bodies that the key
+/// leaves out stay in their placed poses, at rest.
 pub(crate) fn begin(dynamics: &mut Dynamics, placed: &[PlacedTree], key: &Key, world_from_file: &DPose3) {
     let (mut positions, mut velocities) = (key.positions.as_slice(), key.velocities.as_slice());
     for PlacedTree { tree, id } in placed {
@@ -80,7 +81,7 @@ pub(crate) fn begin(dynamics: &mut Dynamics, placed: &[PlacedTree], key: &Key, w
     }
 }
 
-/// A free body by the numbers of MuJoCo's `qpos` and `qvel`.
+/// Sets a free body to the numbers of MuJoCo's `qpos` and `qvel`.
 fn put(
     dynamics: &mut Dynamics,
     id: TreeId,
@@ -102,7 +103,7 @@ fn put(
     tree.set_base(world_from_body, velocity_m_s, spin_rad_s);
 }
 
-/// The next numbers of a key, unless it has none.
+/// Takes the next numbers of a key, unless it has none.
 fn take<const N: usize>(rest: &mut &[f64]) -> Option<[f64; N]> {
     let (next, others) = rest.split_first_chunk()?;
     *rest = others;

@@ -1,5 +1,5 @@
-//! From what files say to what dynamics takes: surfaces, links, equalities, actuators and the state to begin with. Robots and
-//! objects are made of these.
+//! Conversion of file content to dynamics: surfaces, links, equalities, actuators and the initial state.
+//! Robots and objects consist of these.
 
 mod equality;
 mod machinery;
@@ -18,13 +18,14 @@ use crate::dynamics::{Axis, Collider, DPose3, DQuat, Dynamics, Joint, Link, Link
 use crate::mjcf::{Actuator, AxisJoint, BodyLink, BodyTree, Geom, LinkJoint, Primitive};
 use crate::owner::Owner;
 
-/// The pose in full precision; its rotation is a unit quaternion again.
+/// Converts the pose to double precision, with a normalised quaternion.
 pub(crate) fn precise(pose: &Pose) -> DPose3 {
     let [x, y, z, w] = pose.rotation.to_array().map(f64::from);
     DPose3::from_parts(pose.translation.as_dvec3(), DQuat::from_xyzw(x, y, z, w).normalize())
 }
 
-/// Adds the collision shape of a geom, if it has one, to a link or to the world; the geom's pose is in the frame of either.
+/// Adds the collision shape of a geom, if it has one, to a link or to the world; the geom's pose is in
+/// the frame of either.
 pub(crate) fn add_collider(dynamics: &mut Dynamics, geom: &Geom, on: Option<LinkId>, owner: Option<Owner>) {
     let Some((body_from_shape, shape)) = geom.collider().filter(|_| geom.collides) else { return };
     dynamics.add_collider(Collider {
@@ -37,8 +38,8 @@ pub(crate) fn add_collider(dynamics: &mut Dynamics, geom: &Geom, on: Option<Link
     });
 }
 
-/// Links of a tree of a file, which is put at `world_from_file` with its top. Drives of its joints are as strong as the
-/// file's actuators.
+/// Builds the links of a file's tree, with the top of the tree placed by `world_from_file`. Drives of
+/// its joints have the strength of the file's actuators.
 pub(crate) fn links(tree: &BodyTree, world_from_file: &DPose3, actuators: &[Actuator]) -> Vec<Link> {
     tree.links.iter().map(|link| self::link(link, world_from_file, actuators)).collect()
 }

@@ -1,4 +1,4 @@
-//! How far rigid bodies reach, and what they enclose: of all that collides of them.
+//! Extents and enclosed space of rigid bodies, by their colliding shapes.
 
 use std::fmt;
 
@@ -8,12 +8,13 @@ use rapier3d::prelude::SharedShape;
 
 use crate::mjcf::Geom;
 
-/// Ways to look from a point that may be enclosed; the staves of a vessel leave no gaps between them.
+/// Number of horizontal directions tested from a point that may be enclosed; the staves of a vessel
+/// leave no gaps between them.
 const HEADINGS: u32 = 16;
-/// No body is as wide as this.
+/// Length of test rays; no body is as wide as this.
 const SIGHT_M: f32 = 10.0;
 
-/// All shapes of a rigid body that collide, in its frame.
+/// All colliding shapes of a rigid body, in its frame.
 #[derive(Clone)]
 pub(crate) struct Solid {
     shapes: Vec<(Pose, SharedShape)>,
@@ -24,8 +25,9 @@ impl Solid {
         Solid { shapes: geoms.iter().filter(|geom| geom.collides).filter_map(Geom::collider).collect() }
     }
 
-    /// How far the body at `world_from_body` reaches along a direction of the world, a unit vector, from the world's origin:
-    /// that of its farthest point, whatever the shape. A body that nothing collides with reaches nowhere.
+    /// Returns the extent of the body at `world_from_body` along a world direction (a unit vector) from
+    /// the world's origin: that of its farthest point, whatever the shape. Returns negative infinity for
+    /// a body without colliding shapes.
     pub fn reach_m(&self, world_from_body: &Pose, direction: Vector) -> f32 {
         let reaches_m = self.shapes.iter().filter_map(|(body_from_shape, shape)| {
             let world_from_shape = *world_from_body * *body_from_shape;
@@ -36,8 +38,8 @@ impl Solid {
         reaches_m.fold(f32::NEG_INFINITY, f32::max)
     }
 
-    /// Whether a point of the body's frame lies in the open between walls and over a floor: whichever way one looks from
-    /// there, level in the body's own frame or down, one sees the body.
+    /// Returns true if a point of the body's frame is in the open between walls and over a floor. That
+    /// is, every ray from it that is level in the body's own frame or goes down hits the body.
     pub fn encloses(&self, point_m: Vector) -> bool {
         let solid = self.shapes.iter().any(|(pose, shape)| shape.contains_point(pose, point_m));
         let sees = |direction: Vector| {
@@ -57,13 +59,13 @@ impl fmt::Debug for Solid {
     }
 }
 
-/// Reaches of every kind of shape against closed forms.
+/// Extents of every kind of shape against closed forms.
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::mjcf::Document;
 
-    /// A body with one geom.
+    /// Builds a body with one geom.
     fn body(geom: &str) -> Solid {
         let meshes = r#"<asset><mesh name="wedge" vertex="0 0 0  1 0 0  0 1 0  0 0 1"/></asset>"#;
         let xml = format!("<mujoco>{meshes}<worldbody>{geom}</worldbody></mujoco>");
@@ -89,7 +91,7 @@ mod tests {
             (r#"<geom type="cylinder" fromto="0 0 0 1 0 0" size="0.1"/>"#, Vector::X, 1.0),
             (r#"<geom type="mesh" mesh="wedge"/>"#, slanted, 0.8),
             (r#"<geom type="mesh" mesh="wedge"/>"#, -slanted, 0.0),
-            // Nothing collides with what is only drawn.
+            // Nothing collides with a shape that is only drawn.
             (r#"<geom size="0.2" contype="0" conaffinity="0"/>"#, Vector::X, f32::NEG_INFINITY),
             // The farther of two.
             (r#"<geom size="0.2"/><geom size="0.1" pos="0.3 0 0"/>"#, Vector::X, 0.4),

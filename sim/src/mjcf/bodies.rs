@@ -1,4 +1,5 @@
-//! Bodies of a file as trees: links, the joints between them, their masses, geoms and sites. Plain data; nothing moves.
+//! Bodies of a file as trees: links, the joints between them, their masses, geoms and sites. Plain data
+//! without dynamics.
 
 use mjcf_rs::body::{GeomType, InertiaSpec, Inertial};
 use rapier3d::glamx::DPose3;
@@ -15,14 +16,14 @@ pub struct BodyTree {
     pub links: Vec<BodyLink>,
 }
 
-/// A rigid part of a tree: a body with its joint, and the bodies without a joint that sit on it.
+/// A rigid part of a tree: a body with its joint, and the bodies without a joint that are fixed to it.
 #[derive(Clone, Debug)]
 pub struct BodyLink {
-    /// The name of the body that has the joint; the world is called "world".
+    /// Name of the body that has the joint; "world" for the world.
     pub name: String,
     /// Index into [`BodyTree::links`]; `None` is the world.
     pub parent: Option<usize>,
-    /// The pose with the joint at 0.
+    /// Pose with the joint at 0.
     pub parent_from_link: DPose3,
     pub joint: LinkJoint,
     /// Mass and inertia in the link's frame.
@@ -40,12 +41,12 @@ pub struct PlacedBody {
 }
 
 impl BodyTree {
-    /// Nothing in it moves.
+    /// Returns true if nothing in the tree moves.
     pub fn is_fixed(&self) -> bool {
         self.links.iter().all(|link| link.joint == LinkJoint::Fixed)
     }
 
-    /// The link of which a body is a part, and the body's pose in its frame.
+    /// Returns the link that a body is part of, and the body's pose in its frame.
     pub fn body(&self, name: &str) -> Option<(usize, DPose3)> {
         self.links.iter().enumerate().find_map(|(index, link)| {
             let body = link.bodies.iter().find(|body| body.name == name)?;
@@ -54,7 +55,7 @@ impl BodyTree {
     }
 }
 
-/// Where a body of the file ended up.
+/// The link that a body of the file became part of.
 #[derive(Clone, Copy)]
 struct Place {
     tree: usize,
@@ -63,8 +64,8 @@ struct Place {
 }
 
 impl Document {
-    /// The world itself as a fixed tree, then every top-level body. The coordinates of all links in this order are
-    /// MuJoCo's `qpos`.
+    /// Returns the world itself as a fixed tree, then every top-level body. The coordinates of all links
+    /// in this order are MuJoCo's `qpos`.
     pub fn trees(&self) -> Result<Vec<BodyTree>, SimError> {
         let mut trees: Vec<BodyTree> = Vec::new();
         let mut places: Vec<Place> = Vec::new();
@@ -97,7 +98,7 @@ impl Document {
         Ok(trees)
     }
 
-    /// As in MuJoCo, planes are on bodies that no joint moves.
+    /// Refuses planes on bodies that a joint moves, as MuJoCo does.
     fn refuse_planes_that_move(&self, id: usize, links: &[BodyLink], link: usize) -> Result<(), SimError> {
         let geoms = &self.model.bodies[id].body.geoms;
         let Some(plane) = geoms.iter().position(|geom| geom.type_ == GeomType::Plane) else { return Ok(()) };
@@ -109,7 +110,7 @@ impl Document {
         Err(self.source.refuse_at(self.checked.bodies[id].geoms[plane], what))
     }
 
-    /// Every joint moves something that has mass.
+    /// Checks that every joint moves something that has mass.
     fn check_masses(&self, trees: &[BodyTree], places: &[Place]) -> Result<(), SimError> {
         for (index, tree) in trees.iter().enumerate() {
             let mut carried_kg: Vec<f32> = tree.links.iter().map(|link| link.mass.mass()).collect();
@@ -163,7 +164,7 @@ fn new_link(parent: Option<usize>, parent_from_link: DPose3, joint: LinkJoint) -
     }
 }
 
-/// Mass properties of an `<inertial>`, in the body's frame.
+/// Returns the mass properties of an `<inertial>`, in the body's frame.
 fn stated_mass(inertial: &Inertial) -> MassProperties {
     let inertia = match inertial.inertia {
         InertiaSpec::Diagonal(d) => Matrix::from_diagonal(vector(d)),
@@ -175,8 +176,8 @@ fn stated_mass(inertial: &Inertial) -> MassProperties {
         .transform_by(&pose(&inertial.pose))
 }
 
-/// Mass properties of a geom filled evenly, in its body's frame. As in MuJoCo, a geom weighs something whether or not it
-/// collides, unless its mass is 0; a plane weighs nothing.
+/// Returns the mass properties of a uniformly filled geom, in its body's frame. As in MuJoCo, a geom has
+/// mass whether or not it collides, unless its mass is 0. A plane has no mass.
 fn mass_of_geom(geom: &Geom) -> MassProperties {
     let Some((body_from_shape, shape)) = geom.collider() else { return MassProperties::default() };
     let of_unit_density = match geom.primitive {
@@ -196,7 +197,7 @@ fn mass_of_geom(geom: &Geom) -> MassProperties {
     mass
 }
 
-/// m = 4/3 pi a b c,  I_xx = m (b^2 + c^2) / 5.
+/// Computes m = 4/3 pi a b c,  I_xx = m (b^2 + c^2) / 5.
 fn ellipsoid(radii_m: Vector) -> MassProperties {
     let mass = 4.0 / 3.0 * std::f32::consts::PI * radii_m.x * radii_m.y * radii_m.z;
     let s = radii_m * radii_m * (mass / 5.0);

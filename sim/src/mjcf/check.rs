@@ -1,4 +1,4 @@
-//! Goes through a file element by element and accepts or refuses each as the table in [`support`] says.
+//! Check of a file, element by element, against the table in [`support`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,21 +8,21 @@ use super::source::{self, MjcfText};
 use super::support::{self, Element, Support, Takes, value};
 use crate::SimError;
 
-/// Elements inside one another, at most: the parser recurses.
+/// Maximum nesting of elements: the parser recurses.
 const MAX_NESTING: usize = 200;
-/// Ways to say a rotation; an element has one at most.
+/// Attributes that give a rotation; an element has at most one.
 const ROTATIONS: [&str; 6] = ["quat", "axisangle", "euler", "xyaxes", "zaxis", "fullinertia"];
 
-/// What is known of a file whose elements were all accepted.
+/// Findings about a file whose elements were all accepted.
 #[derive(Debug, Default)]
 pub(super) struct Checked {
-    /// What is not quite as in MuJoCo, each with the first line that has it.
+    /// Elements that differ slightly from MuJoCo, each with the first line that has it.
     pub approximated: Vec<String>,
     /// Bodies in the order of `mjcf-rs`: the world, then every body before those on it.
     pub bodies: Vec<BodyBytes>,
 }
 
-/// Where a body and what is on it stand in the text.
+/// Positions in the text of a body and of the elements on it.
 #[derive(Debug, Default)]
 pub(super) struct BodyBytes {
     pub body: usize,
@@ -75,7 +75,8 @@ fn check_depth(source: &MjcfText, xml: &roxmltree::Document) -> Result<(), SimEr
     Ok(())
 }
 
-/// Angles in a class are read with the settings that stand before it; in MuJoCo all settings come first.
+/// Refuses settings after a class with angles: angles in a class are read with the settings before it,
+/// and in MuJoCo all settings come first.
 fn check_angles(source: &MjcfText, root: &Node) -> Result<(), SimError> {
     let has_angles = |node: Node| node.has_attribute("euler") || node.has_attribute("axisangle");
     let mut sections =
@@ -86,11 +87,11 @@ fn check_angles(source: &MjcfText, root: &Node) -> Result<(), SimError> {
     }
 }
 
-/// What a default class states of its own.
+/// A default class's own attributes.
 #[derive(Default)]
 struct Class {
     parent: Option<String>,
-    /// How many words it states, by element and attribute.
+    /// Number of words of each attribute, by element and attribute.
     words: BTreeMap<(String, String), usize>,
 }
 
@@ -99,13 +100,13 @@ struct Check<'a> {
     /// The names in use, by kind of element.
     names: BTreeMap<&'static str, BTreeSet<String>>,
     classes: BTreeMap<String, Class>,
-    /// Elements and attributes that have been told of.
+    /// Elements and attributes that have been reported.
     approximated: BTreeSet<(String, String)>,
     found: Checked,
 }
 
 impl Check<'_> {
-    /// Names are unique among elements of a kind.
+    /// Collects names, which must be unique among elements of a kind.
     fn collect_names(&mut self, root: &Node) -> Result<(), SimError> {
         for node in root.descendants().filter(Node::is_element) {
             let within = node.parent_element().map_or("", |parent| parent.tag_name().name());
@@ -149,7 +150,8 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// In MuJoCo all actuators have one set of defaults, here each kind has its own.
+    /// Refuses defaults that MuJoCo would share: there all actuators have one set of defaults, here each
+    /// kind has its own.
     fn check_shared_defaults(&self, root: &Node) -> Result<(), SimError> {
         let of = |tag: &str, within: &str| {
             let within =
@@ -165,7 +167,8 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Checks what an element holds. `body` is the one in which it stands, `class` that of its elements by default.
+    /// Checks the content of an element. `body` is the body that contains it, `class` the default class
+    /// of its elements.
     fn children(&mut self, node: &Node, body: usize, class: Option<&str>) -> Result<(), SimError> {
         let within = node.tag_name().name();
         for child in node.children().filter(Node::is_element) {
@@ -191,7 +194,8 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// Notes where bodies, joints and geoms stand; the body in which the element's own content stands.
+    /// Records the positions of bodies, joints and geoms. Returns the body that contains the element's
+    /// own content.
     fn locate(&mut self, node: &Node, body: usize) -> usize {
         let byte = node.range().start;
         let in_tree = node.ancestors().any(|one| one.has_tag_name("worldbody"));
@@ -266,7 +270,7 @@ impl Check<'_> {
         }
     }
 
-    /// Where MuJoCo would mix what an element states with what its class does, the element has to state all of it.
+    /// Checks that an element gives all parts of a value that MuJoCo would combine with its class's.
     fn check_inherited(&self, node: &Node, element: &str, class: Option<&str>) -> Result<(), SimError> {
         let class = match is_default(&node.parent_element().unwrap_or(*node)) {
             true => node.parent_element().and_then(|parent| self.parent_of(parent.attribute("class"))),
@@ -295,7 +299,7 @@ impl Check<'_> {
         self.classes.get(class.unwrap_or("main"))?.parent.as_deref()
     }
 
-    /// How many words the nearest class that has it states for an attribute.
+    /// Returns the number of words of an attribute in the nearest class that has it.
     fn inherited(&self, class: Option<&str>, element: &str, attribute: &str) -> Option<usize> {
         let key = (element.to_string(), attribute.to_string());
         let mut class = class;

@@ -1,4 +1,4 @@
-//! What a file asks of pairs of joints or bodies: couplings, welds, pins, and bodies that never touch.
+//! Constraints of a file on pairs of joints or bodies: couplings, welds, pins, and bodies that never touch.
 
 use mjcf_rs::equality::Equality as Element;
 use rapier3d::glamx::{DPose3, DVec3};
@@ -8,22 +8,23 @@ use crate::SimError;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct EqualityConstraint {
-    /// The name is empty where the file gives none.
+    /// Name in the file; empty if it gives none.
     pub name: String,
-    /// Whether it holds from the beginning.
+    /// True if the constraint holds from the beginning.
     pub active: bool,
     pub kind: EqualityKind,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub enum EqualityKind {
-    /// q = a_0 + a_1 p + a_2 p^2 + a_3 p^3 + a_4 p^4 with q of `joint` and p of `other`; p is 0 where there is no other.
+    /// q = a_0 + a_1 p + a_2 p^2 + a_3 p^3 + a_4 p^4 with q of `joint` and p of `other`; without
+    /// `other`, p is 0.
     Coupling { joint: String, other: Option<String>, coefficients: [f64; 5] },
     /// `body` keeps its pose in `other`, or in the world.
     Weld {
         body: String,
         other: Option<String>,
-        /// `None`: as the file places them.
+        /// Pose of `other` in `body`; `None` for the poses in the file.
         body_from_other: Option<DPose3>,
     },
     /// A point of `body` keeps its place in `other`, or in the world.
@@ -46,7 +47,7 @@ impl Document {
             Element::Weld(weld) => {
                 let body = self.known_body(&weld.body1)?;
                 let other = weld.body2.as_deref().map(|name| self.known_body(name)).transpose()?;
-                // MuJoCo's default is a quaternion of 0, which stands for "as placed".
+                // MuJoCo's default is a quaternion of 0, which means "as placed".
                 let body_from_other = weld.relpose.filter(|pose| pose.rotation.length_squared() > 0.0);
                 let body_from_other = body_from_other
                     .map(|pose| DPose3::from_parts(pose.translation, pose.rotation.normalize()));
@@ -66,7 +67,7 @@ impl Document {
         Ok(EqualityConstraint { name: common.name.clone().unwrap_or_default(), active: common.active, kind })
     }
 
-    /// Pairs of bodies that never touch.
+    /// Returns pairs of bodies that never touch.
     pub fn exclusions(&self) -> Result<Vec<[String; 2]>, SimError> {
         let named = |name: &str| match self.model.body_id_by_name(name) {
             Some(_) => Ok(name.to_string()),

@@ -1,4 +1,5 @@
-//! Files that an MJCF file names: meshes (OBJ and STL), and pictures on materials, of which only the colour is taken.
+//! Files that an MJCF file refers to: meshes (OBJ and STL), and images of materials, of which only the
+//! colour is used.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -15,7 +16,7 @@ use crate::{
     user_file::{open_regular, with_own_separators},
 };
 
-/// Triangles as a file has them, in metres, counter-clockwise seen from outside.
+/// Triangles of a file, in metres, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     pub vertices_m: Vec<Vector>,
@@ -23,7 +24,7 @@ pub struct Mesh {
 }
 
 impl Document {
-    /// The meshes that its assets name files of, scaled as the assets say.
+    /// Reads the meshes of assets that name a file, scaled as the assets specify.
     pub(super) fn read_meshes(&self) -> Result<BTreeMap<String, Arc<Mesh>>, SimError> {
         let mut found = BTreeMap::new();
         for asset in &self.model.assets.meshes {
@@ -35,7 +36,7 @@ impl Document {
         Ok(found)
     }
 
-    /// The mean colours of the textures that its assets name files of.
+    /// Reads the mean colours of textures that name a file.
     pub(super) fn read_textures(&self) -> Result<BTreeMap<String, [f32; 3]>, SimError> {
         let mut found = BTreeMap::new();
         for asset in &self.model.assets.textures {
@@ -57,7 +58,7 @@ impl Document {
         }
         let scale = vector(asset.scale);
         mesh.vertices_m.iter_mut().for_each(|vertex_m| *vertex_m *= scale);
-        // A reflection turns what was outside inside.
+        // A reflection turns surfaces inside out.
         if scale.x * scale.y * scale.z < 0.0 {
             mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
         }
@@ -65,7 +66,7 @@ impl Document {
     }
 }
 
-/// Reads a file of the kind that its name says.
+/// Reads a file of the kind given by its extension.
 fn read(path: &Path) -> Result<Mesh, SimError> {
     let kind = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     let open = || open_regular(path).map(BufReader::new).map_err(|source| unreadable(path, source));
@@ -155,7 +156,7 @@ mod tests {
     fn files_of_both_kinds_are_read_and_scaled() {
         let mesh = read_geom("tent.obj", OBJ, "1 2 1").expect("an OBJ file");
         assert_eq!((mesh.vertices_m.len(), mesh.triangles.len()), (5, 3));
-        // The reader counts vertices as the faces first name them.
+        // The reader numbers vertices in the order in which the faces use them.
         let corners_m = mesh.triangles[2].map(|corner| mesh.vertices_m[corner as usize]);
         assert_eq!(corners_m, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 1.0, 1.0]].map(Vector::from));
 

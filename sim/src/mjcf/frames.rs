@@ -1,4 +1,5 @@
-//! What a file gives a name to, so that nobody else has to know where it is: sites, which are points and regions, and cameras.
+//! Named frames of a file, by which other code finds places: sites, which are points and regions, and
+//! cameras.
 
 use rapier3d::math::{Matrix, Pose, Rotation, Vector};
 
@@ -11,8 +12,8 @@ use crate::SimError;
 pub struct Site {
     pub name: String,
     pub body_from_site: Pose,
-    /// MJCF's `size`: of a sphere the radius; of a cylinder (along z) the radius and half the length; of a box half the
-    /// extents.
+    /// MJCF's `size`: the radius of a sphere; the radius and half the length of a cylinder (along z);
+    /// half the extents of a box.
     pub size_m: Vector,
 }
 
@@ -25,17 +26,17 @@ impl Site {
         }
     }
 
-    /// The point in the body's frame.
+    /// Returns the point in the body's frame.
     pub fn position_m(&self) -> Vector {
         self.body_from_site.translation
     }
 
-    /// The radius of a sphere or a cylinder.
+    /// Returns the radius of a sphere or a cylinder.
     pub fn radius_m(&self) -> f32 {
         self.size_m.x
     }
 
-    /// Smallest and largest corner, in the body's frame, of a box that lies along its axes.
+    /// Returns the smallest and largest corner, in the body's frame, of a box aligned with its axes.
     pub fn corners_m(&self) -> [Vector; 2] {
         [self.position_m() - self.size_m, self.position_m() + self.size_m]
     }
@@ -45,7 +46,7 @@ impl Site {
 #[derive(Clone, Debug)]
 pub struct MjcfCamera {
     pub name: String,
-    /// Body it is fixed to; `None` is the world.
+    /// Body that the camera is fixed to; `None` is the world.
     pub body: Option<String>,
     pub body_from_camera: Pose,
     pub vertical_fov_rad: f32,
@@ -54,7 +55,7 @@ pub struct MjcfCamera {
 }
 
 impl MjcfCamera {
-    /// The same camera, seen from a frame in which the file's world lies at `frame_from_file`.
+    /// Returns the same camera in a frame in which the file's world has the pose `frame_from_file`.
     pub fn moved(&self, frame_from_file: &Pose) -> MjcfCamera {
         let body_from_camera = match self.body {
             Some(_) => self.body_from_camera,
@@ -74,7 +75,7 @@ pub(super) fn cameras(source: &MjcfText) -> Result<Vec<MjcfCamera>, SimError> {
 }
 
 fn camera(source: &MjcfText, node: roxmltree::Node) -> Result<MjcfCamera, SimError> {
-    // Whether they are right in number and finite has been checked.
+    // Their number and finiteness have been checked.
     let numbers = |attribute: &str| -> Option<Vec<f32>> {
         let words = node.attribute(attribute)?.split_whitespace();
         Some(words.filter_map(|word| word.parse().ok()).collect())

@@ -1,4 +1,4 @@
-//! Geoms: primitive shapes with pose, material and friction, as Rapier colliders and as things to draw.
+//! Geoms: primitive shapes with pose, material and friction, as Rapier colliders and for drawing.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use super::{Document, Mesh, pose, vector};
 use crate::SimError;
 use crate::dynamics::{Directions, Friction};
 
-/// Shape in its own frame; axial shapes lie along z, as in MJCF.
+/// Shape in its own frame; axial shapes are along z, as in MJCF.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Primitive {
     Sphere {
@@ -37,7 +37,7 @@ pub enum Primitive {
     Convex {
         vertices_m: Vec<Vector>,
     },
-    /// Drawn as it is; it collides as its hull, as in MuJoCo.
+    /// Drawn as the mesh itself; it collides as its hull, as in MuJoCo.
     Mesh(Arc<Mesh>),
 }
 
@@ -61,13 +61,14 @@ pub struct Geom {
 const LAST_DRAWN_GROUP: i32 = 2;
 const DEFAULT_DENSITY_KG_M3: f64 = 1000.0;
 const DEFAULT_RGBA: [f64; 4] = [0.5, 0.5, 0.5, 1.0];
-/// A plane collides as a slab of this thickness, which nothing gets through, and this far around whatever is near it: it has no
-/// end, whatever is drawn of it, as in MuJoCo. Half-spaces have no mass centre and no bounds.
+/// Dimensions of the slab as which a plane collides: its thickness, which nothing passes, and its reach
+/// around nearby shapes. The plane is endless, whatever its drawn size, as in MuJoCo. Half-spaces have
+/// no mass centre and no bounds.
 const PLANE_THICKNESS_M: f32 = 2.0;
 const PLANE_REACH_M: f32 = 50.0;
 
 impl Geom {
-    /// Geom `index` of a body.
+    /// Reads geom `index` of a body.
     pub(super) fn read(document: &Document, body: usize, index: usize) -> Result<Geom, SimError> {
         let geom = &document.model.bodies[body].body.geoms[index];
         let refuse = |what: &str| document.source.refuse_at(document.checked.bodies[body].geoms[index], what);
@@ -90,10 +91,10 @@ impl Geom {
         })
     }
 
-    /// Collision shape and its pose in the body's frame; `None` for a degenerate mesh.
+    /// Returns the collision shape and its pose in the body's frame; `None` for a degenerate mesh.
     pub(crate) fn collider(&self) -> Option<(Pose, SharedShape)> {
         let mut body_from_shape = self.body_from_geom;
-        // Rapier's cylinders and capsules lie along y, MJCF's along z.
+        // Rapier's cylinders and capsules are along y, MJCF's along z.
         let y_to_z = Pose::from_rotation(Rotation::from_rotation_x(std::f32::consts::FRAC_PI_2));
         let shape = match &self.primitive {
             Primitive::Sphere { radius_m } => SharedShape::ball(*radius_m),
@@ -117,7 +118,7 @@ impl Geom {
     }
 }
 
-/// The shape of a geom; `half_length_m` is that of a shape between two ends.
+/// Returns the shape of a geom; `half_length_m` is that of a shape between two ends.
 fn primitive(
     document: &Document,
     geom: &mjcf_rs::body::Geom,
@@ -162,7 +163,7 @@ fn primitive(
     Ok(primitive)
 }
 
-/// The geom's own colour, or its material's; a picture on the material tints it.
+/// Returns the geom's own colour, or its material's; an image on the material tints it.
 fn rgba(
     document: &Document,
     geom: &mjcf_rs::body::Geom,
@@ -186,12 +187,13 @@ fn friction(geom: &mjcf_rs::body::Geom) -> Result<Friction, String> {
 fn checker_rgb(document: &Document, material: &mjcf_rs::assets::Material) -> Option<[[f32; 3]; 2]> {
     let texture = document.model.assets.texture(material.texture.as_ref()?)?;
     let checker = texture.builtin.as_deref() == Some("checker");
-    // MuJoCo's own colours where the file gives none.
+    // MuJoCo's own colours if the file gives none.
     let rgb = [texture.rgb1.unwrap_or([0.8; 3]), texture.rgb2.unwrap_or([0.5; 3])];
     checker.then(|| rgb.map(|rgb| rgb.map(|c| c as f32)))
 }
 
-/// Pose with z from the first to the second end point, centred between them, and half the distance.
+/// Returns the pose with z from the first to the second end point, centred between them, and half the
+/// distance.
 fn between(ends_m: [f64; 6]) -> (Pose, f32) {
     let a = vector([ends_m[0], ends_m[1], ends_m[2]]);
     let b = vector([ends_m[3], ends_m[4], ends_m[5]]);
@@ -214,7 +216,7 @@ fn mesh(document: &Document, geom: &mjcf_rs::body::Geom) -> Result<Primitive, St
     })
 }
 
-/// Points of a Fibonacci sphere, scaled: an ellipsoid's convex hull for collision.
+/// Returns points of a Fibonacci sphere, scaled: an ellipsoid's convex hull for collision.
 fn ellipsoid_points(radii_m: Vector) -> Vec<Vector> {
     const POINTS: usize = 96;
     const GOLDEN_ANGLE_RAD: f32 = 2.399_963_2;

@@ -1,4 +1,4 @@
-//! Joints of bodies, and what drives them, as plain data.
+//! Joints of bodies and their actuators, as plain data.
 
 use mjcf_rs::Tristate;
 use mjcf_rs::body::JointType;
@@ -13,11 +13,11 @@ use super::stated::stated;
 use crate::SimError;
 use crate::dynamics::Axis;
 
-/// What a body may do against its parent.
+/// Freedom of a body relative to its parent.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LinkJoint {
     Fixed,
-    /// Only a top-level body has it.
+    /// Allowed only on a top-level body.
     Free {
         name: String,
     },
@@ -29,39 +29,39 @@ pub enum LinkJoint {
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisJoint {
     pub name: String,
-    /// The effort has no limit here: the actuator has one.
+    /// The axis, without a limit of effort: the actuator has one.
     pub axis: Axis,
 }
 
-/// Drives one hinge or slide. Efforts are N m or N, positions rad or m.
+/// Actuator of one hinge or slide. Efforts are in N m or N, positions in rad or m.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Actuator {
     pub joint: String,
     pub kind: ActuatorKind,
-    /// Commands are clamped to this range.
+    /// Range to which commands are clamped.
     pub control_range: Option<[f64; 2]>,
     pub effort_range: Option<[f64; 2]>,
-    /// rad/s or m/s at which it can push no further.
+    /// Speed (rad/s or m/s) at which the actuator can push no further.
     pub speed_limit: Option<f64>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ActuatorKind {
-    /// Exerts what it is told.
+    /// Exerts the commanded effort.
     Motor,
-    /// kp (what it is told - q) - kd q'.
+    /// Exerts kp (command - q) - kd q'.
     Position { kp: f64, kd: f64 },
 }
 
-/// The `<numeric>` in which a file says how fast its motors turn, in the order of its actuators: MJCF has nothing else for it,
-/// and MuJoCo reads past it.
+/// Name of the `<numeric>` with the speed limits of a file's motors, in the order of its actuators. MJCF
+/// has no other place for them, and MuJoCo ignores it.
 const SPEED_LIMITS: &str = "actuator_speed_limit";
 
 pub(super) fn speed_limits(source: &MjcfText) -> Result<Option<Vec<f64>>, SimError> {
     let xml = source.xml()?;
     let mut numerics = xml.descendants().filter(|node| node.has_tag_name("numeric"));
     let limits = numerics.find(|node| node.attribute("name") == Some(SPEED_LIMITS));
-    // The table of support has let only numbers pass.
+    // The support table has accepted only numbers.
     let words = |node: roxmltree::Node| {
         let words = node.attribute("data").unwrap_or_default().split_ascii_whitespace();
         words.filter_map(|word| word.parse().ok()).collect()
@@ -69,12 +69,13 @@ pub(super) fn speed_limits(source: &MjcfText) -> Result<Option<Vec<f64>>, SimErr
     Ok(limits.map(words))
 }
 
-/// Ranges by the names of joints that `mjcf-rs` reads past.
+/// Ranges by the names of joints, which `mjcf-rs` does not read.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct UnreadRanges {
-    /// `actuatorfrcrange` of a joint: what all its actuators do to it stays within.
+    /// `actuatorfrcrange` of a joint: the limits of the total effort of all its actuators.
     effort: BTreeMap<String, [f64; 2]>,
-    /// `inheritrange` of a position actuator: its `ctrlrange` is the joint's range, so many times as wide.
+    /// `inheritrange` of a position actuator: the width of its `ctrlrange` as a multiple of the joint's
+    /// range.
     inherited_share: BTreeMap<String, f64>,
 }
 
@@ -86,7 +87,7 @@ impl UnreadRanges {
             node.ancestors().any(|one| one.has_tag_name("worldbody") || one.has_tag_name("actuator"))
         };
         for node in xml.descendants().filter(acts) {
-            // The table of support has let only numbers pass.
+            // The support table has accepted only numbers.
             let numbers = |attribute: &str| -> Vec<f64> {
                 let words = stated(&node, attribute).unwrap_or_default().split_ascii_whitespace();
                 words.filter_map(|word| word.parse().ok()).collect()
@@ -126,7 +127,7 @@ impl LinkJoint {
         }
     }
 
-    /// Numbers of MuJoCo's `qvel`.
+    /// Returns the count of numbers in MuJoCo's `qvel`.
     pub fn freedoms(&self) -> usize {
         match self {
             LinkJoint::Fixed => 0,
@@ -135,7 +136,7 @@ impl LinkJoint {
         }
     }
 
-    /// Numbers of MuJoCo's `qpos`: a free joint has a position and a quaternion.
+    /// Returns the count of numbers in MuJoCo's `qpos`: a free joint has a position and a quaternion.
     pub fn coordinates(&self) -> usize {
         match self {
             LinkJoint::Fixed => 0,
@@ -198,7 +199,7 @@ impl Document {
         })
     }
 
-    /// The efforts that a joint takes, by itself and by an actuator's range, if it has one.
+    /// Returns the range of efforts on a joint, by its own limit and by an actuator's range, if any.
     pub fn effort_range(&self, joint: &str, of_actuator: Option<[f64; 2]>) -> Option<[f64; 2]> {
         match (self.unread.effort.get(joint), of_actuator) {
             (Some([low, high]), Some([least, most])) => Some([low.max(least), high.min(most)]),
@@ -206,7 +207,7 @@ impl Document {
         }
     }
 
-    /// The range of commands that a position actuator takes from its joint.
+    /// Returns the range of commands that a position actuator inherits from its joint.
     fn inherited_range(&self, joint: &str) -> Result<Option<[f64; 2]>, SimError> {
         let Some(share) = self.unread.inherited_share.get(joint) else { return Ok(None) };
         let [low, high] = self.axis_joint(joint)?.range.ok_or_else(|| {
@@ -216,7 +217,7 @@ impl Document {
         Ok(Some([middle - half, middle + half]))
     }
 
-    /// A hinge or slide by name.
+    /// Finds a hinge or slide by name.
     pub(super) fn axis_joint(&self, name: &str) -> Result<&mjcf_rs::body::Joint, SimError> {
         let axes = || {
             let joints = self.model.bodies.iter().flat_map(|entry| &entry.body.joints);
@@ -230,7 +231,7 @@ impl Document {
 }
 
 impl Document {
-    /// The joint of a body.
+    /// Returns the joint of a body.
     pub(super) fn joint(&self, body: usize) -> Result<LinkJoint, SimError> {
         let entry = &self.model.bodies[body];
         let joint = match entry.body.joints.as_slice() {
@@ -277,7 +278,7 @@ impl Document {
         Ok(AxisJoint { name, axis })
     }
 
-    /// A range, if it limits anything; `what` is limited.
+    /// Returns a range if it limits anything; `what` is the limited quantity.
     fn limits(
         &self,
         what: &str,

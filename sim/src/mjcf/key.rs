@@ -1,18 +1,19 @@
-//! Keys of a file: states, and what actuators are told at a time.
+//! Keys of a file: states, and the actuators' controls at a time.
 
 use super::{Document, LinkJoint};
 use crate::SimError;
 
-/// MJCF's `<key>`. What a file leaves out is empty.
+/// MJCF's `<key>`. Parts that the file leaves out are empty.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Key {
     pub name: String,
     pub time_s: f64,
     /// The coordinates of all joints, in the order of [`Document::trees`]; see [`LinkJoint::coordinates`].
     pub positions: Vec<f64>,
-    /// A number for each degree of freedom; a free joint has its velocity in world axes and its spin in the axes of its body.
+    /// A number for each degree of freedom; a free joint has its velocity in world axes and its spin in
+    /// its body's axes.
     pub velocities: Vec<f64>,
-    /// What the actuators are told, in the order of [`Document::actuators`].
+    /// Controls of the actuators, in the order of [`Document::actuators`].
     pub controls: Vec<f64>,
 }
 

@@ -1,6 +1,7 @@
-//! The one reader of MJCF, for robots, scenes and objects: the text with all that it includes (`source`), every element
-//! and attribute accepted or refused by one table (`check`, `support`), parsed by `mjcf-rs`, and then as we use it:
-//! bodies in trees, shapes, joints with their actuators, equalities, keys, and what that parser leaves out.
+//! The only reader of MJCF, for robots, scenes and objects. It assembles the text with all includes
+//! (`source`), and accepts or refuses every element and attribute by one table (`check`, `support`). It
+//! parses the text with `mjcf-rs`, and converts it to its own types: bodies in trees, shapes, joints
+//! with their actuators, equalities, keys, and the parts that `mjcf-rs` leaves out.
 
 mod bodies;
 mod check;
@@ -37,37 +38,50 @@ use check::Checked;
 use joints::UnreadRanges;
 use source::MjcfText;
 
-/// A parsed file. What it says is all in effect, or it would not have been read.
+/// A parsed file. All its content is in effect; otherwise it would have been refused.
 #[derive(Debug)]
 pub struct Document {
     pub file: String,
     pub model: mjcf_rs::Model,
     pub cameras: Vec<MjcfCamera>,
-    /// How fast the motors turn, in the order of the actuators, where the file says so.
+    /// Speed limits of the motors, in the order of the actuators; `None` if the file gives none.
     speed_limit_values: Option<Vec<f64>>,
     unread: UnreadRanges,
     source: MjcfText,
     checked: Checked,
-    /// The folder in which files lie that it names.
+    /// Folder that the file's references are relative to.
     folder: PathBuf,
-    /// What the files hold that its assets name, by asset.
+    /// Content of the files that assets name, by asset.
     meshes: BTreeMap<String, Arc<Mesh>>,
     texture_rgb: BTreeMap<String, [f32; 3]>,
 }
 
 impl Document {
-    /// Parses MJCF text; `file` is what error messages call it. Files that it names are looked for in the working folder.
+    /// Parses MJCF text; `file` is its name in error messages. Files that it names are searched in the
+    /// working folder.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the text is not MJCF, or has elements or attributes that are refused.
     pub fn parse(file: &str, xml: &str) -> Result<Document, SimError> {
         Document::parse_in(file, xml, Path::new("."))
     }
 
-    /// Parses MJCF text that has to be whole: it means the same wherever it is read, so it may name no other file.
+    /// Parses self-contained MJCF text, which may name no other file.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the text names a file, or as for [`Document::parse`].
     pub fn parse_alone(file: &str, xml: &str) -> Result<Document, SimError> {
         source::refuse_files(file, xml)?;
         Document::parse(file, xml)
     }
 
-    /// Reads a file. What it includes, its meshes and its pictures are read from where they lie beside it.
+    /// Reads a file. Its includes, meshes and images are found relative to it.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if a file cannot be read, or as for [`Document::parse`].
     pub fn read(path: &Path) -> Result<Document, SimError> {
         let file = path.display().to_string();
         let xml = read_text(path, MAX_TEXT_BYTES)
@@ -98,12 +112,12 @@ impl Document {
         Ok(document)
     }
 
-    /// What the file says that does not happen quite as in MuJoCo, a line each with the first place that says it.
+    /// Returns the elements of the file that only approximate MuJoCo, one per line with their first place.
     pub fn approximations(&self) -> &[String] {
         &self.checked.approximated
     }
 
-    /// A geom that only collides with others, or that others only collide with, collides with all here.
+    /// Reports geoms with one-sided collision masks: here they collide with all others.
     fn approximate_collisions(&mut self) {
         let bodies = self.model.bodies.iter().zip(&self.checked.bodies);
         let mut one_sided = bodies.flat_map(|(entry, bytes)| entry.body.geoms.iter().zip(&bytes.geoms));
@@ -114,7 +128,7 @@ impl Document {
         }
     }
 
-    /// Tells files of different content apart, with all that they include and name; comments do not count.
+    /// Returns a hash of the content, including all files that it includes and names; comments do not count.
     pub fn fingerprint(&self) -> u64 {
         let read = (&self.model, &self.cameras, &self.meshes, &self.texture_rgb, &self.speed_limit_values);
         let mut content = format!("{read:?}");
@@ -128,17 +142,17 @@ impl Document {
         SimError::Unsupported { file: self.file.clone(), what: what.into() }
     }
 
-    /// The refusal of a body, with its line and the names around it.
+    /// Returns the error that refuses a body, with its line and the names around it.
     fn refuse_body(&self, body: usize, what: &str) -> SimError {
         self.source.refuse_at(self.checked.bodies[body].body, what)
     }
 
-    /// Geoms of a body, in that body's frame.
+    /// Returns the geoms of a body, in that body's frame.
     fn geoms(&self, body: usize) -> Result<Vec<Geom>, SimError> {
         (0..self.model.bodies[body].body.geoms.len()).map(|index| Geom::read(self, body, index)).collect()
     }
 
-    /// Sites of what never moves, in the frame of the file.
+    /// Returns the sites of fixed trees, in the frame of the file.
     pub fn room_sites(&self) -> Result<Vec<Site>, SimError> {
         let trees = self.trees()?;
         let links = trees.iter().filter(|tree| tree.is_fixed()).flat_map(|tree| &tree.links);
@@ -153,13 +167,13 @@ impl Document {
         Ok(links.flat_map(placed).collect())
     }
 
-    /// Sites of a body, in that body's frame.
+    /// Returns the sites of a body, in that body's frame.
     fn sites(&self, body: usize) -> impl Iterator<Item = Site> {
         self.model.bodies[body].body.sites.iter().map(Site::read)
     }
 }
 
-/// MJCF pose (f64) as a Rapier pose (f32).
+/// Converts an MJCF pose (f64) to a Rapier pose (f32).
 pub(crate) fn pose(p: &mjcf_rs::Pose) -> Pose {
     let (t, r) = (p.translation, p.rotation);
     Pose::from_parts(

@@ -1,4 +1,4 @@
-//! The text of a file with everything that it includes in its place, and the line that each part of it comes from.
+//! The text of a file with all its includes in place, and the source line of each part.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -15,9 +15,9 @@ use crate::{
 pub(super) struct MjcfText {
     pub text: String,
     files: Vec<SourceFile>,
-    /// Earliest first; together they are the text.
+    /// Pieces in order of position; together they are the text.
     pieces: Vec<Piece>,
-    /// Where included files are looked for if they are not beside the file that includes them.
+    /// Folder in which included files are searched if they are not beside the including file.
     folder: PathBuf,
 }
 
@@ -25,11 +25,11 @@ pub(super) struct MjcfText {
 struct SourceFile {
     name: String,
     text: String,
-    /// Tells files apart that are included by different names.
+    /// Canonical path, which identifies files that are included by different names.
     path: Option<PathBuf>,
 }
 
-/// A part of the text that stands in a file without a break.
+/// A contiguous part of the text from one file.
 #[derive(Debug)]
 struct Piece {
     start: usize,
@@ -38,7 +38,8 @@ struct Piece {
 }
 
 impl MjcfText {
-    /// Puts included files where MuJoCo puts them: what stands in their root element replaces the `<include>`.
+    /// Reads a text and inserts included files as MuJoCo does: the content of their root element
+    /// replaces the `<include>`.
     pub fn read(file: &str, xml: &str, folder: &Path) -> Result<MjcfText, SimError> {
         let mut source =
             MjcfText { text: String::new(), files: Vec::new(), pieces: Vec::new(), folder: folder.into() };
@@ -47,19 +48,19 @@ impl MjcfText {
         Ok(source)
     }
 
-    /// The text as a tree of elements.
+    /// Parses the text as a tree of elements.
     pub fn xml(&self) -> Result<roxmltree::Document<'_>, SimError> {
         let file = || self.files[0].name.clone();
         roxmltree::Document::parse(&self.text).map_err(|source| SimError::Xml { file: file(), source })
     }
 
-    /// The refusal of an element, with its line and the names around it.
+    /// Returns the error that refuses an element, with its line and the names around it.
     pub fn refuse(&self, node: &Node, what: impl AsRef<str>) -> SimError {
         let what = format!("{}: {}", describe(node), what.as_ref());
         SimError::Unsupported { file: self.line(node.range().start), what }
     }
 
-    /// The refusal of the element that begins at a byte of the text.
+    /// Returns the error that refuses the element that begins at a byte of the text.
     pub fn refuse_at(&self, byte: usize, what: &str) -> SimError {
         let xml = match self.xml() {
             Ok(xml) => xml,
@@ -69,14 +70,14 @@ impl MjcfText {
         self.refuse(&node.unwrap_or(xml.root_element()), what)
     }
 
-    /// The file and line in which a byte of the text stands, as `scene.xml:12`.
+    /// Returns the file and line of a byte of the text, for example `scene.xml:12`.
     pub fn line(&self, byte: usize) -> String {
         let after = self.pieces.partition_point(|piece| piece.start <= byte);
         let piece = &self.pieces[after.saturating_sub(1)];
         self.files[piece.file].line(piece.start_in_file + byte - piece.start)
     }
 
-    /// Appends a file: the whole of it, or what its root element holds.
+    /// Appends a file: the whole of it, or the content of its root element.
     fn append(&mut self, file: usize, folder: &Path, inside_only: bool) -> Result<(), SimError> {
         let SourceFile { name, text, .. } = &self.files[file];
         let (name, text) = (name.clone(), text.clone());
@@ -110,7 +111,7 @@ impl MjcfText {
         self.text.push_str(&self.files[file].text[range]);
     }
 
-    /// Reads the file that an `<include>` of another names, and says in which folder it lies.
+    /// Reads the file that an `<include>` of another file names. Returns its index and its folder.
     fn open(&mut self, by: usize, include: &Node, folder: &Path) -> Result<(usize, PathBuf), SimError> {
         let refuse =
             |what: String| SimError::Unsupported { file: self.files[by].line(include.range().start), what };
@@ -155,12 +156,12 @@ impl SourceFile {
     }
 }
 
-/// Where the content of an element stands.
+/// Returns the range of an element's content.
 fn inside(node: &Node) -> Option<Range<usize>> {
     Some(node.first_child()?.range().start..node.last_child()?.range().end)
 }
 
-/// An element by its name, or else by the nearest element around it that has one.
+/// Describes an element by its name, or else by the nearest element around it that has one.
 pub(super) fn describe(node: &Node) -> String {
     let tag = |node: &Node| node.tag_name().name().to_string();
     let name = |node: &Node| {

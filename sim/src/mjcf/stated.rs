@@ -1,8 +1,8 @@
-//! What elements state or take from their classes, where `mjcf-rs` does not read it.
+//! Lookup of attributes, own or inherited from classes, that `mjcf-rs` does not read.
 
 use roxmltree::Node;
 
-/// An attribute of an element: its own, or that of the nearest class that has it.
+/// Returns an attribute of an element: its own, or that of the nearest class that has it.
 pub(super) fn stated<'a>(node: &Node<'a, '_>, attribute: &str) -> Option<&'a str> {
     node.attribute(attribute).or_else(|| {
         let around = node.ancestors().skip(1).find_map(|one| one.attribute("childclass"));

@@ -1,4 +1,4 @@
-//! Trees, equalities and actuators of small files, and what is refused.
+//! Trees, equalities and actuators of small files, and refusals.
 
 use rapier3d::glamx::{DPose3, DQuat, DVec3};
 
@@ -60,7 +60,7 @@ fn bodies_without_a_joint_belong_to_the_link_that_carries_them() {
     let leaf = &trees[1].links[1];
     assert_eq!(leaf.bodies[1].name, "plate");
     assert_eq!(leaf.bodies[1].link_from_body.translation, DVec3::new(0.7, 0.0, 0.0));
-    // The plate is turned half round, so its x is the leaf's -x.
+    // The plate is turned by half a turn, so its x is the leaf's -x.
     assert!((leaf.sites[0].position_m().x - 0.6).abs() < 1e-6);
     let bolt = &trees[1].links[2];
     assert!((bolt.parent_from_link.translation - DVec3::new(0.65, 0.0, 0.0)).length() < 1e-9);
@@ -214,7 +214,7 @@ fn geoms_have_mujocos_friction_unless_they_state_it() {
     assert_eq!(friction(r#"friction="0.6 0.01 0.002" condim="6" priority="2""#), stated);
 }
 
-/// Why a file is refused.
+/// Returns the error for a refused file.
 fn refusal(inside: &str) -> String {
     let xml = format!("<mujoco><compiler angle=\"radian\" autolimits=\"true\"/>\n{inside}</mujoco>");
     let read = || {
@@ -306,7 +306,7 @@ fn bodies_nested_too_deep_are_refused() {
     }
 }
 
-/// Every file of ours is read, and means here what it means in MuJoCo.
+/// Every embedded file is read, and has the same meaning as in MuJoCo.
 #[test]
 fn our_own_files_have_nothing_that_is_approximated() {
     let folder = |path: &str| std::path::Path::new(env!("TANDEM_SIM_ASSETS")).join(path);
@@ -403,8 +403,9 @@ fn included_files_keep_their_lines_and_are_read_once() {
     assert!(error.contains("root.xml:1`: an included file is no <include> itself"), "{error}");
 }
 
-/// A joint's own limit of effort counts with its actuators', and a position actuator may take its commands' range from the joint, whoever
-/// states it: the element, or a class that it has or inherits.
+/// A joint's own limit of effort applies together with its actuators'. A position actuator may inherit
+/// its commands' range from the joint. The attribute may be on the element, or on a class that it has or
+/// inherits.
 #[test]
 fn limits_are_those_of_joint_and_actuator_together() {
     let found = document(

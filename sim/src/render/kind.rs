@@ -1,20 +1,20 @@
-//! Which renderer draws.
+//! The choice of the renderer.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Renderer, Scenery, cpu};
 use crate::SimError;
 
-/// Who draws what cameras see. No state of a world depends on it.
+/// Renderer of camera images. No state of a world depends on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RendererKind {
-    /// A graphics processor where there is one, or else the embedded renderer.
+    /// A GPU if there is one, otherwise the embedded renderer.
     #[default]
     Auto,
     /// The embedded one.
     Cpu,
-    /// A graphics processor, or software in its place.
+    /// A GPU, or software in its place.
     Gpu,
 }
 
@@ -29,7 +29,11 @@ impl RendererKind {
         }
     }
 
-    /// A line about who will draw, for the log. An error if this build lacks what was asked for.
+    /// Returns a line for the log about the renderer in use.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if this build lacks the requested renderer.
     pub fn describe(self) -> Result<String, SimError> {
         match self {
             RendererKind::Cpu => Ok(EMBEDDED.into()),
@@ -38,7 +42,7 @@ impl RendererKind {
         }
     }
 
-    /// Draws a scenery. Where a graphics processor cannot, the embedded renderer does.
+    /// Creates a renderer for a scenery. If a GPU cannot be used, it is the embedded renderer.
     pub fn renderer(self, scenery: Scenery) -> Box<dyn Renderer> {
         match self {
             RendererKind::Auto if on_real_gpu().is_some() => gpu(scenery),
@@ -63,7 +67,7 @@ fn on_gpu() -> Result<String, SimError> {
     Err(SimError::WithoutGpu)
 }
 
-/// Only where there is a graphics processor, and not software in its place.
+/// Describes a hardware GPU; `None` if there is none or only software in its place.
 #[cfg(feature = "gpu")]
 fn on_real_gpu() -> Option<String> {
     super::gpu::is_real().then(on_gpu).and_then(Result::ok)

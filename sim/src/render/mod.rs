@@ -1,7 +1,7 @@
-//! Pictures of a world: RGB, metric depth and instance ids for any camera.
+//! Images of a world: RGB, metric depth and instance ids for any camera.
 //!
-//! [`Scenery`] is what there is to see, built once per world; a [`Step`] says where it is; a [`Renderer`] draws it:
-//! [`RendererKind`] says which. The embedded one needs nothing of the system.
+//! [`Scenery`] is everything visible, built once per world; a [`Step`] gives the poses; a [`Renderer`],
+//! chosen by [`RendererKind`], draws it. The embedded one has no system requirements.
 
 mod blur;
 mod cpu;
@@ -27,37 +27,38 @@ use crate::Step;
 #[cfg(feature = "gpu")]
 use gpu::colours as together;
 
-/// Draws the scenery that it was made for.
+/// A renderer of the scenery that it was made for.
 pub trait Renderer: Send {
-    /// What it is, and on what device.
+    /// Returns the name of the renderer and its device.
     fn name(&self) -> &str;
 
-    /// What each of `cameras` sees after `step`, in their order. They may be drawn side by side.
+    /// Renders the image of each camera after `step`, in their order. They may be drawn in parallel.
     fn render_all(&mut self, step: &Step, cameras: &[Camera]) -> Vec<Frame>;
 
-    /// What `camera` sees after `step`.
+    /// Renders the image of `camera` after `step`.
     fn render(&mut self, step: &Step, camera: &Camera) -> Frame {
         self.render_all(step, slice::from_ref(camera)).swap_remove(0)
     }
 
-    /// The colours alone of what `camera` sees after `step`, as [`Frame::rgb`], drawn on this thread: for who has threads of its own.
+    /// Renders only the colours of the image of `camera` after `step`, as [`Frame::rgb`], on this
+    /// thread: for callers with their own threads.
     fn render_colours(&mut self, step: &Step, camera: &Camera) -> Vec<u8> {
         self.render(step, camera).rgb
     }
 
-    /// Whether [`render_colours_together`] draws its pictures and those of others in less time than each of them does.
+    /// Returns true if [`render_colours_together`] draws several requests faster than one by one.
     fn draws_together(&self) -> bool {
         false
     }
 
-    /// Itself, if it draws on a graphics processor.
+    /// Returns the renderer itself if it draws on a GPU.
     #[cfg(feature = "gpu")]
     fn on_gpu(&mut self) -> Option<&mut gpu::GpuRenderer> {
         None
     }
 }
 
-/// What of a picture is drawn.
+/// Parts of an image to draw.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Wanted {
     All,
@@ -72,8 +73,9 @@ pub struct RenderRequest<'a> {
     pub cameras: Vec<Camera>,
 }
 
-/// The colours alone, as [`Frame::rgb`], of what the cameras of several worlds see: world by world, camera by camera. A graphics
-/// processor gets all of it in one submission, and all pictures are read back at once; other renderers draw one after another.
+/// Renders only the colours, as [`Frame::rgb`], of the camera images of several worlds: world by world,
+/// camera by camera. A GPU gets all of them in one submission, and all images are read back at once.
+/// Other renderers draw one after another.
 pub fn render_colours_together(mut requests: Vec<RenderRequest>) -> Vec<Vec<Vec<u8>>> {
     together(&mut requests).unwrap_or_else(|| {
         let each = |RenderRequest { renderer, step, cameras }: RenderRequest| {
@@ -88,28 +90,33 @@ fn together(_: &mut [RenderRequest]) -> Option<Vec<Vec<Vec<u8>>>> {
     None
 }
 
-/// A rendered picture, row by row from the top left.
+/// A rendered image, row by row from the top left.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     pub width: u32,
     pub height: u32,
     /// Three bytes a pixel, sRGB.
     pub rgb: Vec<u8>,
-    /// Distance along the optical axis at the pixel's centre; infinite where nothing is.
+    /// Distance along the optical axis at the pixel's centre; infinite if nothing is there.
     pub depth_m: Vec<f32>,
-    /// What is seen there: 0 nothing, 1 the room, then robots, then objects.
+    /// Id of the visible thing: 0 nothing, 1 the room, then robots, then objects.
     pub ids: Vec<u32>,
 }
 
-/// The embedded renderer; it draws on the calling thread, and on one more for each further picture of a state.
+/// Creates the embedded renderer. It draws on the calling thread, and on one more for each further image
+/// of a state.
 pub fn cpu(scenery: Scenery) -> Box<dyn Renderer> {
     Box::new(cpu::CpuRenderer::new(scenery))
 }
 
-/// Why a picture could not be encoded.
+/// Error of encoding an image.
 pub type PictureError = image::ImageError;
 
 /// Encodes 8-bit RGB, three bytes a pixel, as a PNG file; fast rather than small.
+///
+/// # Errors
+///
+/// Returns an error if `rgb` does not have the size of the image.
 pub fn encode_png(width: u32, height: u32, rgb: &[u8]) -> Result<Vec<u8>, PictureError> {
     let mut bytes = Vec::with_capacity(rgb.len() / 2);
     PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive).write_image(
@@ -121,10 +128,15 @@ pub fn encode_png(width: u32, height: u32, rgb: &[u8]) -> Result<Vec<u8>, Pictur
     Ok(bytes)
 }
 
-/// What one step of a 16-bit sample of depth stands for.
+/// Depth per step of a 16-bit sample.
 pub const DEPTH_UNIT_M: f64 = 0.001;
 
-/// Encodes depth as a PNG file of 16 bits of [`DEPTH_UNIT_M`]; 0 where nothing is or it is further than that can say.
+/// Encodes depth as a 16-bit PNG file in units of [`DEPTH_UNIT_M`]. A sample is 0 if nothing is there or
+/// the depth exceeds the range.
+///
+/// # Errors
+///
+/// Returns an error if `depth_m` does not have the size of the image.
 pub fn encode_depth_png(width: u32, height: u32, depth_m: &[f32]) -> Result<Vec<u8>, PictureError> {
     let units = |depth_m: &f32| {
         let units = (f64::from(*depth_m) / DEPTH_UNIT_M).round();

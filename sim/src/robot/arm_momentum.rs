@@ -1,12 +1,14 @@
-//! What the world does to an arm, felt by how the arm's momentum changes (De Luca et al. 2006, "Collision detection and safe
-//! reaction with the DLR-III lightweight manipulator arm").
+//! External torques on an arm, observed by the change of the arm's momentum (De Luca et al. 2006,
+//! "Collision detection and safe reaction with the DLR-III lightweight manipulator arm").
 //!
-//! Of joint i with its axis a (unit, world) through o, let P and L be linear momentum of all beyond it and its moment about o, and
-//! p = a . L + armature qd. Then
+//! Let joint i have its axis a (unit, world) through o. Let P and L be the linear momentum of everything
+//! beyond it and its moment about o, and p = a . L + armature qd. Then
 //!   p' = tau - tau_gravity + c + tau_ext,   c = (w x a) . L - a . (o' x P),
-//! with w the spin of the link and o' the velocity of o, whatever pelvis and waist do. The observer follows the part that is known,
+//! with w the spin of the link and o' the velocity of o, whatever pelvis and waist do. The observer
+//! follows the part that is known,
 //!   p^' = tau - tau_gravity + c + r,   r = (p - p^) / time,
-//! so that r is tau_ext, low-passed; no acceleration is needed, which joint encoders could not tell. At rest r is tau_gravity - tau.
+//! so that r is tau_ext, low-passed. It needs no acceleration, which joint encoders could not provide.
+//! At rest r is tau_gravity - tau.
 
 use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
@@ -30,8 +32,8 @@ struct JointMomentum {
 }
 
 impl ArmMomentum {
-    /// One physics step, in which the drives of the arm whose first joint is `first` exerted `excess_n_m` beyond what holds the
-    /// arm against gravity. Returns the torques that come from outside.
+    /// Runs one physics step, in which the drives of the arm whose first joint is `first` exerted
+    /// `excess_n_m` beyond the torques that hold the arm against gravity. Returns the external torques.
     pub(super) fn update(
         &mut self,
         body: &BodyEstimate,
@@ -42,7 +44,7 @@ impl ArmMomentum {
     ) -> [f32; ARM_JOINTS] {
         let momenta = arm_momenta(body, motions, first);
         let mut followed_n_m_s = self.followed_n_m_s.unwrap_or_else(|| {
-            // As if it had been so for long.
+            // Starts as if the present torques had acted for long.
             std::array::from_fn(|i| momenta[i].along_n_m_s + excess_n_m[i] * OBSERVER_TIME_S)
         });
         for (i, followed) in followed_n_m_s.iter_mut().enumerate() {
@@ -54,13 +56,13 @@ impl ArmMomentum {
     }
 }
 
-/// The joints of the arm whose first is `first`, from the shoulder on.
+/// Computes the momenta of the arm's joints, of which `first` is the first, from the shoulder on.
 fn arm_momenta(body: &BodyEstimate, motions: &[LinkMotion], first: usize) -> [JointMomentum; ARM_JOINTS] {
     let model = &body.model;
     let shoulder = model.joints[first].link;
     let is_beyond = |link: &LinkModel| link.parent.is_some_and(|parent| parent >= shoulder);
     let end = shoulder + 1 + model.links[shoulder + 1..].iter().take_while(|link| is_beyond(link)).count();
-    // Linear momentum of a link and of all beyond it, and its moment about the shoulder's origin.
+    // Linear momentum of a link and everything beyond it, and its moment about the shoulder's origin.
     let about_m = body.world_from_link[shoulder].translation;
     let mut momenta = vec![(Vector::ZERO, Vector::ZERO); end - shoulder];
     for index in (shoulder..end).rev() {

@@ -1,14 +1,16 @@
-//! What a robot's hands feel: the force on each, and the weight that each carries. Both are read from the arms' own joint
-//! torques, as far as gravity does not explain them.
+//! Forces on a robot's hands, and the weight that each carries. Both are estimated from the arms' own
+//! joint torques, minus the part that gravity explains.
 //!
-//! Force: torques tau_ext from outside are J^T f with f the force on the palm, so
+//! Force: external torques tau_ext are J^T f with f the force on the palm, so
 //!   f = (J J^T + damping I)^-1 J tau_ext,   J: 3 x 7 [m],
-//! low-passed. What the world does is told with tau_ext of [`ArmMomentum`], which knows the arm's own motion. What an arm does to
-//! the trunk, its inertia included, is felt with tau_ext = tau_gravity - tau: the balance has to know both. Damping keeps a stretched arm, which cannot feel along itself, from reporting nonsense.
+//! low-passed. The force of the world uses tau_ext of [`ArmMomentum`], which accounts for the arm's own
+//! motion. The load of an arm on the trunk, its inertia included, uses tau_ext = tau_gravity - tau: the
+//! balance needs both. Damping keeps a stretched arm, which cannot feel along itself, from reporting
+//! nonsense.
 //!
-//! Weight: at rest the torque beyond gravity is J^T f with f the load at the palm. Only the vertical part is estimated, as the
-//! least squares fit  w = -(J_z . tau) / (J_z . J_z),  low-passed, and never negative: pushing on a table is not a load.
-//! The arms' torques that carry it are fed forward.
+//! Weight: at rest the torque beyond gravity is J^T f with f the load at the palm. Only the vertical
+//! part is estimated, as the least squares fit  w = -(J_z . tau) / (J_z . J_z),  low-passed, and never
+//! negative: pushing on a table is not a load. The arms' torques that carry it are fed forward.
 
 use rapier3d::math::Vector;
 use rapier3d::na::{Cholesky, Const, SMatrix, SVector};
@@ -22,14 +24,14 @@ use crate::body::{ARM_JOINTS, ARMS, BodyEstimate, HAND_JOINTS, HANDS, JOINTS};
 pub(super) struct HandLoads {
     momentum: Sides<ArmMomentum>,
     payload: Sides<Payload>,
-    /// Of the world on each hand.
+    /// Force of the world on each hand.
     force: Sides<HandForce>,
     /// The same with the inertia of the moving arm.
     reaction: Sides<HandForce>,
     grip: Sides<Grip>,
 }
 
-/// What one arm tells of its hand at one instant.
+/// Measurements of one arm at one instant.
 struct Arm {
     /// Torque of each joint per newton at the palm along world x, y, z: the rows of J.
     levers_m: [[f32; ARM_JOINTS]; 3],
@@ -37,32 +39,36 @@ struct Arm {
     excess_n_m: [f32; ARM_JOINTS],
 }
 
-/// Slow against the arm's own motion, fast against a partner who starts to pull; where the observer filters before, together as slow.
+/// Filter times: slow compared with the arm's own motion, fast compared with a partner's pull. Where the
+/// observer filters first, both together have the same time.
 const REACTION_FILTER_TIME_S: f32 = 0.2;
 const FORCE_FILTER_TIME_S: f32 = REACTION_FILTER_TIME_S - OBSERVER_TIME_S;
 const FORCE_DAMPING_M2: f32 = 0.002;
-/// More than an arm can hold is an impact.
+/// Maximum force: more than an arm can hold is an impact.
 const LARGEST_FORCE_N: f32 = 80.0;
 
-/// Slow against the arm's own motion, fast against a lift of one second.
+/// Filter time: slow compared with the arm's own motion, fast compared with a lift of one second.
 const WEIGHT_FILTER_TIME_S: f32 = 0.12;
-/// Part of the estimate that is fed forward. At 1 two robots that pull on one object would pull without end.
+/// Share of the estimated weight that is fed forward. At 1 two robots that pull on one object would pull
+/// without end.
 const FED_FORWARD_SHARE: f32 = 0.85;
-/// A weight explains at least this part of the torques; an arm that presses sideways shows another pattern.
+/// Minimum share of the torques that a weight must explain; an arm that presses sideways shows another
+/// pattern.
 const MIN_EXPLAINED_SHARE: f32 = 0.6;
-/// Dex3-1 hands are not made for more.
+/// Maximum weight: Dex3-1 hands are not made for more.
 const LARGEST_WEIGHT_N: f32 = 35.0;
 
-/// Of the seven joints of a hand.
+/// Number of thumb joints among the seven joints of a hand.
 const THUMB_JOINTS: usize = 3;
 const GRIP_FILTER_TIME_S: f32 = 0.2;
-/// More than fingers weigh, less than those that hold press with; what holds does so until it presses with half of that.
+/// Minimum torque of a pressing finger: more than the weight of fingers, less than a grip's torque. A
+/// press continues down to half of it.
 const MIN_PRESS_N_M: f32 = 0.2;
 const STILL_PRESSES: f32 = 0.5;
 
 impl HandLoads {
-    /// One physics step: `torque_n_m` are the drives' torques of the last step. Returns the torques that hold all joints
-    /// against gravity and the arms against the weights in the hands.
+    /// Runs one physics step; `torque_n_m` are the drives' torques of the last step. Returns the torques
+    /// that hold all joints against gravity and the arms against the weights in the hands.
     pub(super) fn update(&mut self, body: &BodyEstimate, torque_n_m: &[f32], dt_s: f32) -> [f32; JOINTS] {
         let gravity_n_m = body.gravity_torques_n_m();
         let mut load_n_m = gravity_n_m;
@@ -90,22 +96,22 @@ impl HandLoads {
         load_n_m
     }
 
-    /// Force of the world on each hand (world frame).
+    /// Returns the force of the world on each hand (world frame).
     pub(super) fn force_n(&self) -> Sides<Vector> {
         self.force.each_ref().map(HandForce::force_n)
     }
 
-    /// The same with the inertia of the moving arm: what each arm does to the trunk.
+    /// Returns the same with the inertia of the moving arm: the load of each arm on the trunk.
     pub(super) fn reaction_n(&self) -> Sides<Vector> {
         self.reaction.each_ref().map(HandForce::force_n)
     }
 
-    /// Whose thumb or fingers press on something.
+    /// Returns true for hands whose thumb or fingers press on something.
     pub(super) fn presses(&self) -> Sides<bool> {
         self.grip.each_ref().map(|grip| grip.presses)
     }
 
-    /// Whose thumb and fingers both press on something.
+    /// Returns true for hands whose thumb and fingers both press on something.
     pub(super) fn holds(&self) -> Sides<bool> {
         self.grip.each_ref().map(Grip::holds)
     }
@@ -116,7 +122,7 @@ impl HandLoads {
     }
 }
 
-/// What presses with thumb and fingers alike.
+/// Detection of presses by thumb and fingers.
 #[derive(Clone, Default, Serialize, Deserialize)]
 struct Grip {
     torque_n_m: [f32; HAND_JOINTS],
@@ -125,7 +131,7 @@ struct Grip {
 }
 
 impl Grip {
-    /// One physics step; torques of the thumb's joints, then of the fingers'.
+    /// Runs one physics step; torques of the thumb's joints come first, then those of the fingers'.
     fn update(&mut self, torque_n_m: &[f32], dt_s: f32) {
         for (felt_n_m, torque_n_m) in self.torque_n_m.iter_mut().zip(torque_n_m) {
             *felt_n_m += (torque_n_m - *felt_n_m) * (dt_s / GRIP_FILTER_TIME_S);
@@ -145,7 +151,7 @@ impl Grip {
     }
 }
 
-/// Finds the force on a palm that does most of what an arm's joints feel.
+/// Least squares fit of the force on a palm that explains most of the torques on an arm's joints.
 struct PalmFit {
     jacobian_m: SMatrix<f32, 3, ARM_JOINTS>,
     factor: Option<Cholesky<f32, Const<3>>>,
@@ -170,12 +176,12 @@ struct HandForce {
 }
 
 impl HandForce {
-    /// World frame.
+    /// Returns the force in the world frame.
     fn force_n(&self) -> Vector {
         self.force_n
     }
 
-    /// One physics step, in which the palm did `outside_n_m` to the joints.
+    /// Runs one physics step, in which the palm exerted `outside_n_m` on the joints.
     fn update(&mut self, fit: &PalmFit, outside_n_m: [f32; ARM_JOINTS], filter_time_s: f32, dt_s: f32) {
         let Some(fitted_n) = fit.force_n(outside_n_m) else { return };
         let measured_n = fitted_n.clamp_length_max(LARGEST_FORCE_N);
@@ -194,7 +200,7 @@ impl Payload {
         self.weight_n
     }
 
-    /// One physics step.
+    /// Runs one physics step.
     fn update(&mut self, arm: &Arm, dt_s: f32) {
         let lever_m = &arm.levers_m[2];
         let square: f32 = lever_m.iter().map(|lever| lever * lever).sum();
@@ -206,7 +212,7 @@ impl Payload {
         self.weight_n += (measured_n - self.weight_n) * (dt_s / WEIGHT_FILTER_TIME_S);
     }
 
-    /// Torques of the arm's joints that carry the estimated weight.
+    /// Returns the torques of the arm's joints that carry the estimated weight.
     fn torques_n_m(&self, arm: &Arm) -> [f32; ARM_JOINTS] {
         arm.levers_m[2].map(|lever_m| FED_FORWARD_SHARE * self.weight_n * lever_m)
     }
@@ -218,7 +224,7 @@ mod tests {
     use crate::body::posed::{Posed, model};
     use crate::{PHYSICS_DT_S, Side};
 
-    /// Arms bent in front of the body.
+    /// Returns a robot with its arms bent in front of the body.
     fn holding() -> BodyEstimate {
         let mut posed = Posed::standing();
         for (side, first) in ARMS.by_side() {
@@ -228,7 +234,8 @@ mod tests {
         posed.body()
     }
 
-    /// Feels long enough for the filters, with torques that hold the arms against gravity and a force on each palm.
+    /// Runs long enough for the filters, with torques that hold the arms against gravity and a force on
+    /// each palm.
     fn feel(body: &BodyEstimate, force_n: Sides<Vector>) -> (HandLoads, [f32; JOINTS]) {
         let mut torque_n_m = body.gravity_torques_n_m();
         for (side, first) in ARMS.by_side() {
@@ -269,7 +276,7 @@ mod tests {
 
     #[test]
     fn a_force_on_a_hand_is_recovered_in_every_direction() {
-        // But for the damping, which costs most along the arm.
+        // Except for the damping, which costs most along the arm.
         let body = holding();
         for force_n in
             [Vector::new(0.0, 0.0, -12.0), Vector::new(10.0, 0.0, 0.0), Vector::new(-3.0, 8.0, 5.0)]
@@ -284,7 +291,7 @@ mod tests {
         }
     }
 
-    /// Neither a table under the hand nor a pull to the side is something that it carries.
+    /// A table under the hand and a pull to the side are not carried weights.
     #[test]
     fn only_weights_are_carried() {
         for force_n in [Vector::Z * 15.0, Vector::Y * 15.0] {

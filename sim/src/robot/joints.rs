@@ -1,9 +1,9 @@
-//! The joints of a robot, in published order: what they read and how they are driven.
+//! The joints of a robot, in published order: their readings and drives.
 
 use crate::body::{JOINTS, JointDrive, RobotModel};
 use crate::dynamics::{Drive, Tree};
 
-/// Coordinates (rad) and velocities (rad/s).
+/// Returns coordinates (rad) and velocities (rad/s).
 pub(super) fn read(tree: &Tree, model: &RobotModel) -> ([f32; JOINTS], [f32; JOINTS]) {
     let of = |value: fn(&Tree, usize) -> f64| {
         std::array::from_fn(|joint| of_joint(model, joint, |link| value(tree, link)))
@@ -11,12 +11,12 @@ pub(super) fn read(tree: &Tree, model: &RobotModel) -> ([f32; JOINTS], [f32; JOI
     (of(Tree::joint_position), of(Tree::joint_velocity))
 }
 
-/// Torques that the drives exerted in the last step, limits and implicit parts included (N m).
+/// Returns the torques that the drives exerted in the last step, limits and implicit parts included (N m).
 pub(super) fn torques_n_m(tree: &Tree, model: &RobotModel) -> [f32; JOINTS] {
     std::array::from_fn(|joint| of_joint(model, joint, |link| tree.drive_effort(link)))
 }
 
-/// 0 of a joint that the robot lacks.
+/// Returns a joint's value, or 0 for a joint that the robot lacks.
 fn of_joint(model: &RobotModel, joint: usize, value: impl Fn(usize) -> f64) -> f32 {
     let joint = &model.joints[joint];
     if joint.exists() { value(joint.link) as f32 } else { 0.0 }

@@ -1,4 +1,5 @@
-//! How a robot comes to know its own body: by its sensors and an estimator, or, for comparison, by the simulator's own state.
+//! A robot's knowledge of its own body: by its sensors and an estimator, or, for comparison, by the
+//! simulator's own state.
 
 use std::sync::Arc;
 
@@ -13,7 +14,7 @@ use crate::mechanism::rounded;
 use crate::plane::{flat, heading_rad};
 use crate::{PHYSICS_DT_S, Sides};
 
-/// Where what a robot knows of its pelvis comes from.
+/// Source of a robot's knowledge of its pelvis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StateSource {
@@ -24,7 +25,7 @@ pub enum StateSource {
     Truth,
 }
 
-/// What the robots of a world know of themselves.
+/// Configuration of the robots' sensors and state estimate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Sensing {
     pub state_estimate: StateSource,
@@ -43,24 +44,24 @@ impl StateSource {
 }
 
 impl Sensing {
-    /// What robots knew before they had an estimator: the simulator's own state.
+    /// Knowledge of robots before the estimator existed: the simulator's own state.
     pub const TRUTH: Sensing = Sensing { state_estimate: StateSource::Truth, sensors: SensorModel::Ideal };
 }
 
-/// Sensors, what they read last, and what has been made of it.
+/// Sensors, their last readings, and the estimate from them.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct SelfKnowledge {
     sensors: Sensors,
     readings: SensorReadings,
-    /// `None` where truth is the source.
+    /// The estimator; `None` if truth is the source.
     estimator: Option<StateEstimator>,
-    /// On the floor under the pelvis at the start, z up, x where the pelvis faced.
+    /// Frame on the floor under the pelvis at the start, z up, x where the pelvis faced.
     world_from_start: Pose,
 }
 
 impl SelfKnowledge {
-    /// A robot that has stood still for a second, and is told that its pelvis is at `told`, of which it believes place and
-    /// heading. Equal seeds give equal noise.
+    /// Creates the knowledge of a robot that has stood still for a second. It takes place and heading of
+    /// its pelvis from `told`. Equal seeds give equal noise.
     pub(super) fn new(
         model: &RobotModel,
         tree: &Tree,
@@ -81,7 +82,7 @@ impl SelfKnowledge {
         SelfKnowledge { sensors, readings, estimator, world_from_start }
     }
 
-    /// One physics step. Returns the body by what is known then, with nothing in its hands.
+    /// Runs one physics step. Returns the resulting body estimate, with nothing in its hands.
     pub(super) fn update(&mut self, model: &Arc<RobotModel>, tree: &Tree) -> BodyEstimate {
         self.readings = self.sensors.read(tree, model, PHYSICS_DT_S);
         let Some(estimator) = &mut self.estimator else { return from_truth(model, tree, &self.readings) };
@@ -97,7 +98,7 @@ impl SelfKnowledge {
         &self.world_from_start
     }
 
-    /// The body by what was known at the last update.
+    /// Returns the body estimate of the last update.
     pub(super) fn body(&self, model: &Arc<RobotModel>, tree: &Tree) -> BodyEstimate {
         match &self.estimator {
             Some(estimator) => {
@@ -109,7 +110,8 @@ impl SelfKnowledge {
     }
 }
 
-/// The body as the simulator has it, with ideal sensors to the last bit. Masses are the model's, whatever was loaded on a hand.
+/// Returns the body by the simulator's state, with ideal sensors to the last bit. Masses are the
+/// model's, regardless of loads on a hand.
 fn from_truth(model: &Arc<RobotModel>, tree: &Tree, readings: &SensorReadings) -> BodyEstimate {
     let mut com_m = Vector::ZERO;
     let mut com_velocity_m_s = Vector::ZERO;
@@ -153,8 +155,8 @@ mod tests {
     use crate::body::posed::{Posed, model};
     use crate::dynamics::{DVec3, Dynamics, Settings};
 
-    /// What is read from the physics world is what the model's kinematics make of joints and pelvis: here of a robot in the
-    /// air, touching nothing, with an arm on the move.
+    /// The values read from the physics world are those of the model's kinematics for joints and pelvis.
+    /// The robot is in the air, touching nothing, with an arm on the move.
     #[test]
     fn poses_and_velocities_are_those_of_the_model() {
         let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), DVec3::Z * -9.81));

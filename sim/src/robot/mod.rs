@@ -1,4 +1,4 @@
-//! One robot in a world: put there, sensed, driven.
+//! One robot in a world: creation, sensing and driving.
 
 mod arm_momentum;
 mod hand_loads;
@@ -28,7 +28,7 @@ use crate::{CONTROL_DT_S, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError};
 use hand_loads::HandLoads;
 use knowledge::SelfKnowledge;
 
-/// What one robot is told for one control step.
+/// Command for one robot in one control step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotCommand {
     /// Absolute joint targets in action order (see [`UPPER`]).
@@ -40,15 +40,15 @@ pub struct RobotCommand {
 pub struct Robot {
     pub name: String,
     pub model: Arc<RobotModel>,
-    /// Its links are the model's.
+    /// Tree of the robot; its links are the model's.
     pub(crate) tree: TreeId,
     locomotion: Box<dyn Locomotion>,
     memory: RobotMemory,
-    /// What the robot takes its body to be since the last [`Robot::sense`].
+    /// The robot's estimate of its body since the last [`Robot::sense`].
     body: BodyEstimate,
 }
 
-/// Everything of a robot that lives outside dynamics and outlasts a step.
+/// All state of a robot outside dynamics that outlasts a step.
 #[derive(Clone, Serialize, Deserialize)]
 struct RobotMemory {
     /// Upper-body targets at the last control step; within a step they move linearly to the new command.
@@ -59,13 +59,13 @@ struct RobotMemory {
     fallen: bool,
 }
 
-/// Arms and fingers whose targets move slower are told to be still.
+/// Rate of change of a target below which an arm or finger counts as commanded to be still.
 const STILL_TOLD_RAD_S: f32 = 0.2;
 const FALLEN_HEIGHT_M: f64 = 0.4;
 const FALLEN_TILT_COSINE: f64 = 0.5;
 
 impl Robot {
-    /// Base commands that this robot can follow.
+    /// Returns the base commands that this robot can follow.
     pub fn base_limits(&self) -> BaseLimits {
         self.locomotion.limits(&self.model.scale)
     }
@@ -74,7 +74,8 @@ impl Robot {
         self.locomotion = locomotion;
     }
 
-    /// Replaces sensors and what the robot knows by them, as of a robot that has stood still until now and is told where it is.
+    /// Replaces the sensors and the knowledge from them. The robot is assumed to have stood still until
+    /// now, at the pose `told`.
     pub(crate) fn set_sensing(&mut self, dynamics: &Dynamics, told: &Pose, sensing: Sensing, seed: u64) {
         let tree = dynamics.tree(self.tree);
         self.memory.knowledge = SelfKnowledge::new(&self.model, tree, told, sensing, seed);
@@ -86,14 +87,15 @@ impl Robot {
         let tree = dynamics.tree(self.tree);
         let body = self.memory.knowledge.update(&self.model, tree);
         self.take(body);
-        // The simulator's word, whatever the robot takes itself to be: it is scored, and ends what its legs can do.
+        // This uses the simulator's state rather than the robot's estimate: it is scored, and switches
+        // off the legs.
         let pelvis = tree.world_from_link(0);
         let upright = (pelvis.rotation * DVec3::Z).z;
         self.memory.fallen |= pelvis.translation.z < self.model.scale.precise_height_m(FALLEN_HEIGHT_M)
             || upright < FALLEN_TILT_COSINE;
     }
 
-    /// The body as it was known when this robot's memory was made.
+    /// Restores the body estimate from the time when this robot's memory was made.
     fn recollect(&mut self, dynamics: &Dynamics) {
         let body = self.memory.knowledge.body(&self.model, dynamics.tree(self.tree));
         self.take(body);
@@ -107,7 +109,8 @@ impl Robot {
         self.body = BodyEstimate { hand_reaction_n, hand_holds, hand_presses, waist_target_rad, ..body };
     }
 
-    /// Sets this robot's joint drives for one physics step, `substep` counting from 0 within the control step.
+    /// Sets this robot's joint drives for one physics step, `substep` counting from 0 within the control
+    /// step.
     pub(crate) fn drive(&mut self, dynamics: &mut Dynamics, command: &RobotCommand, substep: u32) {
         self.body.arms_told = self.arms_told(command);
         let torque_n_m = &self.memory.knowledge.readings().joints.torque_n_m;
@@ -123,14 +126,14 @@ impl Robot {
         self.remember(command, substep);
     }
 
-    /// Whether the command moves an arm or a finger.
+    /// Returns true if the command moves an arm or a finger.
     fn arms_told(&self, command: &RobotCommand) -> bool {
         let columns = self.memory.last_upper_rad.iter().zip(&command.upper_rad).take(WAIST_COLUMN);
         columns.into_iter().any(|(from, to)| (to - from).abs() > STILL_TOLD_RAD_S * CONTROL_DT_S)
     }
 
-    /// The upper body goes linearly from the last command to this one. A controller that balances with the waist adds to
-    /// the waist's targets.
+    /// Sets the drives of the upper body, whose targets move linearly from the last command to this one.
+    /// A controller that balances with the waist adds to the waist's targets.
     fn set_upper_body(
         &self,
         drives: &mut [JointDrive; JOINTS],
@@ -164,17 +167,17 @@ impl Robot {
         }
     }
 
-    /// Where the last control step's command took the waist.
+    /// Returns the waist targets of the last control step's command.
     fn waist_target_rad(&self) -> [f32; WAIST_JOINTS] {
         std::array::from_fn(|i| self.memory.last_upper_rad[WAIST_COLUMN + i])
     }
 
-    /// Serialises everything of the robot that lives outside dynamics.
+    /// Serialises all state of the robot outside dynamics.
     pub(crate) fn save(&self) -> Result<Vec<u8>, SimError> {
         Ok(postcard::to_stdvec(&(&self.memory, self.locomotion.save()?))?)
     }
 
-    /// `dynamics` are those of the moment at which it was saved.
+    /// Restores saved state. `dynamics` must be those of the moment at which it was saved.
     pub(crate) fn load(&mut self, dynamics: &Dynamics, bytes: &[u8]) -> Result<(), SimError> {
         let (memory, locomotion): (RobotMemory, Vec<u8>) = postcard::from_bytes(bytes)?;
         self.locomotion.load(&locomotion)?;
@@ -184,8 +187,9 @@ impl Robot {
     }
 }
 
-/// Legs of a robot that has fallen: no controller here gets up, and one that goes on balancing on its back thrashes about with
-/// kilowatts. The dampers of the drives let it sink. Waist, arms and hands go on doing what they are told.
+/// Returns the drives of the legs of a robot that has fallen. No controller here gets up, and one that
+/// goes on balancing on its back thrashes about with kilowatts. The dampers of the drives let it sink.
+/// Waist, arms and hands still follow their commands.
 fn limp_legs(model: &RobotModel) -> LegCommand {
     LEGS.map(|first| {
         std::array::from_fn(|i| JointDrive {

@@ -1,4 +1,5 @@
-//! What the sensors of a robot read: ideal ones the simulator's own state, those of a G1 with noise, bias and latency.
+//! Readings of a robot's sensors: ideal ones report the simulator's own state, those of a G1 add noise,
+//! bias and latency.
 
 use rapier3d::math::{Rotation, Vector};
 use serde::{Deserialize, Serialize};
@@ -10,7 +11,7 @@ use crate::dynamics::Tree;
 use crate::estimate::{JointReadings, SensorReadings};
 use crate::random::SplitMix64;
 
-/// How good a robot's sensors are.
+/// Quality of a robot's sensors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SensorModel {
@@ -26,7 +27,7 @@ pub enum SensorModel {
 }
 
 impl SensorModel {
-    /// Those that settings name; the others are laid over episodes as stress.
+    /// Models available in settings; the others are applied to episodes as stress.
     pub const ALL: [SensorModel; 2] = [SensorModel::Ideal, SensorModel::G1];
 
     pub fn name(self) -> &'static str {
@@ -39,7 +40,7 @@ impl SensorModel {
     }
 }
 
-/// Standard deviations of what is added to each reading at 200 Hz, and how late readings are.
+/// Standard deviations of the noise on each reading at 200 Hz, and the latency of readings.
 struct Noise {
     gyro_rad_s: f32,
     gyro_bias_rad_s: f32,
@@ -48,12 +49,12 @@ struct Noise {
     encoder_rad: f32,
     torque_n_m: f32,
     latency_s: f32,
-    /// Joint velocities are differences of positions, low-passed at this frequency.
+    /// Cutoff frequency of joint velocities, which are low-passed differences of positions.
     rate_cutoff_hz: f32,
 }
 
 impl Noise {
-    /// As late, with so many times the noise and bias.
+    /// Returns the noise and bias multiplied by `factor`, with the same latency.
     fn times(&self, factor: f32) -> Noise {
         Noise {
             gyro_rad_s: factor * self.gyro_rad_s,
@@ -79,7 +80,7 @@ const G1: Noise = Noise {
     rate_cutoff_hz: 40.0,
 };
 
-/// Readings over which a robot at rest takes the mean of its accelerometer: one second.
+/// Number of readings over which a robot at rest averages its accelerometer: one second.
 const STILL_READINGS: f32 = 200.0;
 
 /// The sensors of one robot.
@@ -91,7 +92,7 @@ pub(super) struct Sensors {
     acc_bias_m_s2: Vector,
     /// Velocity of the IMU and rotation of the pelvis at the last reading.
     last_motion: Option<(Vector, Rotation)>,
-    /// What the last reading would have been without noise and latency.
+    /// The last reading without noise and latency.
     last_ideal: Option<SensorReadings>,
     last: Option<SensorReadings>,
 }
@@ -123,13 +124,13 @@ impl Sensors {
         }
     }
 
-    /// Each part with a standard deviation of 1.
+    /// Draws a vector, each part with a standard deviation of 1.
     fn normal(&mut self) -> Vector {
         let mut draw = || self.random.normal();
         Vector::new(draw(), draw(), draw())
     }
 
-    /// One physics step after the last reading.
+    /// Reads the sensors one physics step after the last reading.
     pub(super) fn read(&mut self, tree: &Tree, model: &RobotModel, dt_s: f32) -> SensorReadings {
         let ideal = self.ideal(tree, model, dt_s);
         let Some(noise) = self.noise() else { return ideal };
@@ -155,12 +156,12 @@ impl Sensors {
         read
     }
 
-    /// How old readings are when they come.
+    /// Returns the age of readings when they arrive.
     pub(super) fn latency_s(&self) -> f32 {
         self.noise().map_or(0.0, |noise| noise.latency_s)
     }
 
-    /// What the accelerometer reads in the mean over a second at rest, where an exact one reads `ideal_m_s2`.
+    /// Returns the mean accelerometer reading over a second at rest, for an exact value of `ideal_m_s2`.
     pub(super) fn still_force_m_s2(&mut self, ideal_m_s2: Vector) -> Vector {
         let noise_m_s2 = self.noise().map_or(0.0, |noise| noise.acc_m_s2 / STILL_READINGS.sqrt());
         ideal_m_s2 + self.acc_bias_m_s2 + self.normal() * noise_m_s2
@@ -183,7 +184,7 @@ impl Sensors {
     }
 }
 
-/// The readings of `share` of a step before `now`, where `before` was a step ago.
+/// Returns the readings `share` of a step before `now`, where `before` was a step ago.
 fn between(now: &SensorReadings, before: &SensorReadings, share: f32) -> SensorReadings {
     let mix = |now: &[f32; JOINTS], before: &[f32; JOINTS]| {
         std::array::from_fn(|joint| now[joint] + (before[joint] - now[joint]) * share)
@@ -209,7 +210,7 @@ mod tests {
     use crate::body::posed::model;
     use crate::dynamics::{DVec3, Dynamics, Settings};
 
-    /// A robot in the air, before its first step.
+    /// Returns a robot in the air, before its first step.
     fn hanging() -> (Dynamics, Robot) {
         let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), DVec3::Z * -9.81));
         let placement = RobotPlacement { name: "A".into(), position_m: [0.0; 2], yaw_rad: 0.0 };
@@ -240,8 +241,8 @@ mod tests {
         check(|read| read.joints.torque_n_m[7], G1.torque_n_m);
         check(|read| read.gyro_rad_s.z, G1.gyro_rad_s);
         check(|read| read.specific_force_m_s2.x, G1.acc_m_s2);
-        // Differences of white noise s have 2 s^2 / dt^2; y += a (d - y) leaves 2 a^2 s^2 / dt^2 / (2 - a), and a is 0.7154 at 40 Hz
-        // and 200 readings a second.
+        // Differences of white noise s have variance 2 s^2 / dt^2. The filter y += a (d - y) leaves 2
+        // a^2 s^2 / dt^2 / (2 - a), and a is 0.7154 at 40 Hz and 200 readings a second.
         check(|read| read.joints.qd_rad_s[3], 0.8926 * G1.encoder_rad / PHYSICS_DT_S);
         assert!(read(1) == readings && read(2) != readings, "the seed decides");
 
@@ -276,7 +277,8 @@ mod tests {
         check(&forces_m_s2, G1.acc_bias_m_s2, G1.acc_m_s2);
     }
 
-    /// A robot that begins to fall feels nothing at once; by noisy sensors it feels most of its weight still.
+    /// A robot that begins to fall measures no force at once; with noisy sensors it still measures most
+    /// of its weight.
     #[test]
     fn readings_are_late() {
         let upwards = |sensors: SensorModel| {

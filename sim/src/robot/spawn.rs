@@ -1,4 +1,4 @@
-//! Puts a robot model into a world as one tree.
+//! Insertion of a robot model into a world as one tree.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use crate::locomotion::{Balance, BaseCommand};
 use crate::mechanism::{add_collider, precise};
 use crate::owner::Owner;
 
-/// A robot stands on the floor here, facing `yaw_rad` (0 looks along +x).
+/// Place of a robot on the floor, facing `yaw_rad` (0 looks along +x).
 #[derive(Clone, Debug)]
 pub struct RobotPlacement {
     pub name: String,
@@ -23,7 +23,8 @@ pub struct RobotPlacement {
 }
 
 impl Robot {
-    /// Inserts a robot standing on the floor (z = 0) in its rest pose. `index` tells robots of one world apart.
+    /// Inserts a robot standing on the floor (z = 0) in its rest pose. `index` is its index among the
+    /// robots of the world.
     pub(crate) fn spawn(
         dynamics: &mut Dynamics,
         model: &Arc<RobotModel>,
@@ -64,7 +65,7 @@ impl Robot {
     }
 }
 
-/// Pelvis pose at which the lowest collision shape of the feet touches the floor.
+/// Returns the pelvis pose at which the lowest collision shape of the feet touches the floor.
 fn standing_pelvis(model: &RobotModel, placement: &RobotPlacement, q_rad: &[f32]) -> Pose {
     let [x, y] = placement.position_m;
     let heading = Rotation::from_rotation_z(placement.yaw_rad);
@@ -81,7 +82,7 @@ fn standing_pelvis(model: &RobotModel, placement: &RobotPlacement, q_rad: &[f32]
     at(-lowest_m)
 }
 
-/// A link of the model with the joint that carries it; the first is free.
+/// Returns a link of the model with the joint that carries it; the first is free.
 fn tree_link(model: &RobotModel, link: &body::LinkModel) -> Link {
     let joint = link.joint.map_or(Joint::Free, |joint| {
         let joint = &model.joints[joint];

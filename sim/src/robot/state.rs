@@ -1,5 +1,5 @@
-//! What is known of a robot, by who may know it: what it senses, what it takes its place in the world to be, and what only the
-//! simulator knows.
+//! Knowledge of a robot, by access: the values that it senses, its estimate of its place in the world,
+//! and the truth of the simulator.
 
 use rapier3d::math::{Pose, Vector};
 use serde::{Deserialize, Serialize};
@@ -12,27 +12,27 @@ use crate::estimate::JointReadings;
 use crate::locomotion::BaseCommand;
 use crate::mechanism::rounded;
 
-/// What a robot senses, in frames of its own: all that a reply or a policy may be made of, but for
+/// Values that a robot senses, in frames of its own. A reply or a policy may use only these and
 /// [`RobotTruth::fallen`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotSensed {
     pub joints: JointReadings,
-    /// The way down, which the IMU measures, in the pelvis frame.
+    /// Direction of gravity, which the IMU measures, in the pelvis frame.
     pub gravity_in_pelvis: Vector,
-    /// The pelvis by the robot's own odometry: the start frame lies on the floor under the pelvis as it was put into the world,
-    /// z up, x where the pelvis faced.
+    /// The pelvis by the robot's own odometry. The start frame is on the floor under the initial
+    /// position of the pelvis, z up, x where the pelvis faced.
     pub start_from_pelvis: Pose,
     pub pelvis_from_wrist: Sides<Pose>,
-    /// Axes as [`crate::mjcf::MjcfCamera`]'s.
+    /// Pose of the camera; axes as in [`crate::mjcf::MjcfCamera`].
     pub pelvis_from_camera: Pose,
     /// External force on each hand, pelvis frame, estimated from joint torques.
     pub hand_force_in_pelvis_n: Sides<Vector>,
-    /// Whether its base controller steps, as far as that tells.
+    /// True while its base controller steps; `None` if the controller does not report it.
     pub is_stepping: Option<bool>,
 }
 
-/// Where a robot takes itself to be, for what steers its hands and its base: by its estimator, in a frame that was the world's
-/// when it started. No reply shows it.
+/// A robot's estimate of its own place, which steers its hands and its base: by its estimator, in a
+/// frame that was the world's at the start. No reply shows it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotEstimate {
     pub world_from_pelvis: Pose,
@@ -40,21 +40,22 @@ pub struct RobotEstimate {
     pub hand_force_n: Sides<Vector>,
 }
 
-/// What only the simulator knows of a robot: for scoring, recordings, pictures and experts.
+/// State of a robot that only the simulator knows: for scoring, recordings, images and experts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotTruth {
-    /// Every link, in the order of [`crate::body::RobotModel::links`]; the pelvis is the first.
+    /// Pose of every link, in the order of [`crate::body::RobotModel::links`]; the pelvis is the first.
     pub world_from_link: Vec<Pose>,
     pub world_from_wrist: Sides<Pose>,
-    /// Axes as [`crate::mjcf::MjcfCamera`]'s.
+    /// Pose of the camera; axes as in [`crate::mjcf::MjcfCamera`].
     pub world_from_camera: Pose,
-    /// Pelvis below 0.4 m or tilted beyond 60 degrees. Stays true: nothing puts a robot back. The one thing here that reaches
-    /// a robot and its policy: it takes the power from the legs, and replies tell it.
+    /// True once the pelvis was below 0.4 m or tilted beyond 60 degrees. It stays true: nothing puts a
+    /// robot back. It is the only field here that affects a robot and its policy: the legs lose power,
+    /// and replies report it.
     pub fallen: bool,
 }
 
 impl RobotSensed {
-    /// Mechanical power of all joints, each counted whichever way it works.
+    /// Returns the mechanical power of all joints; each counts with its absolute value.
     pub fn power_w(&self) -> f32 {
         let JointReadings { qd_rad_s, torque_n_m, .. } = &self.joints;
         torque_n_m.iter().zip(qd_rad_s).map(|(torque, rate)| (torque * rate).abs()).sum()
@@ -68,7 +69,7 @@ impl RobotTruth {
 }
 
 impl Robot {
-    /// What the robot senses, and what it makes of that.
+    /// Returns the sensed values and the poses derived from them.
     pub(crate) fn sensed(&self) -> RobotSensed {
         let body = &self.body;
         let world_from_pelvis = body.world_from_pelvis();
@@ -94,7 +95,7 @@ impl Robot {
         }
     }
 
-    /// Where the robot takes itself to be.
+    /// Returns the robot's estimate of its own place.
     pub(crate) fn estimate(&self) -> RobotEstimate {
         RobotEstimate {
             world_from_pelvis: self.body.world_from_pelvis(),
@@ -102,7 +103,7 @@ impl Robot {
         }
     }
 
-    /// What the simulator knows.
+    /// Returns the simulator's state of the robot.
     pub(crate) fn truth(&self, dynamics: &Dynamics) -> RobotTruth {
         let tree = dynamics.tree(self.tree);
         let links = 0..self.model.links.len();
@@ -119,18 +120,19 @@ impl Robot {
         }
     }
 
-    /// The command of the last control step.
+    /// Returns the command of the last control step.
     pub(crate) fn last_command(&self) -> RobotCommand {
         let upper_rad = std::array::from_fn(|i| self.memory.last_upper_rad[i]);
         RobotCommand { upper_rad, base: self.memory.base }
     }
 
-    /// The command under which the robot stays as it is, by its encoders and by where it takes its pelvis to be.
+    /// Returns the command under which the robot stays as it is, by its encoders and its estimate of its
+    /// pelvis.
     pub(crate) fn rest_command(&self) -> RobotCommand {
         let base = BaseCommand::standing(self.body.world_from_pelvis().translation.z);
         let upper_rad = UPPER.map(|joint| {
             let model = &self.model.joints[joint];
-            // Noise may read a joint at its stop as beyond it.
+            // With noise, a joint at its stop may read as beyond it.
             self.body.q_rad[joint].clamp(model.lower_rad, model.upper_rad)
         });
         RobotCommand { upper_rad, base: self.base_limits().clamp(base) }

@@ -1,4 +1,4 @@
-//! What a hand feels of an object, and a robot of itself.
+//! Contacts of hands with objects, and of a robot with itself.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,14 +19,14 @@ struct Press {
     force_n: Vector,
 }
 
-/// Where a robot pressed on something.
+/// A point at which a robot pressed on something.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotPress {
     /// The robot's link.
     pub link: String,
     /// The object or the other robot; `None` for the room.
     pub on: Option<String>,
-    /// World frame.
+    /// Position in the world frame.
     pub at_m: Vector,
 }
 
@@ -44,7 +44,7 @@ impl HandContacts {
 }
 
 impl World {
-    /// All hands that touch an object, in the order of the objects.
+    /// Returns all hands that touch an object, in the order of the objects.
     pub(super) fn touches(&self) -> Vec<Touch> {
         let mut found: BTreeMap<(usize, usize), Sides<HandContacts>> = BTreeMap::new();
         for Press { object, robot, link, force_n } in self.presses_on_objects() {
@@ -60,14 +60,14 @@ impl World {
         by_hand.filter(|touch| touch.contacts != HandContacts::default()).collect()
     }
 
-    /// All robots that touch an object, in the order of the objects.
+    /// Returns all robots that touch an object, in the order of the objects.
     pub(super) fn body_touches(&self) -> Vec<BodyTouch> {
         let touch = |press: Press| BodyTouch { object: press.object, robot: press.robot };
         let found: BTreeSet<BodyTouch> = self.presses_on_objects().map(touch).collect();
         found.into_iter().collect()
     }
 
-    /// Points at which robots pressed on objects in the last step.
+    /// Returns the points at which robots pressed on objects in the last step.
     fn presses_on_objects(&self) -> impl Iterator<Item = Press> {
         self.presses().filter_map(|(owners, force_n)| match owners {
             [Some(Owner::Link { robot, link }), Some(Owner::Object(object))] => {
@@ -80,7 +80,8 @@ impl World {
         })
     }
 
-    /// Points that pressed in the last step: whose colliders they are between, and the normal force on the second (N, world).
+    /// Returns the points that pressed in the last step: the owners of their colliders, and the normal
+    /// force on the second (N, world).
     fn presses(&self) -> impl Iterator<Item = ([Option<Owner>; 2], Vector)> {
         let owner = |id: ColliderId| Owner::of_tag(self.dynamics.collider(id).tag);
         self.dynamics.touches().iter().filter(|touch| touch.normal_impulse_n_s > 0.0).map(move |touch| {
@@ -89,7 +90,7 @@ impl World {
         })
     }
 
-    /// Where a robot's links pressed in the last step on what is none of them.
+    /// Returns the points at which a robot's links pressed on anything else in the last step.
     pub fn presses_of(&self, robot: usize) -> Vec<RobotPress> {
         let owner = |id: ColliderId| Owner::of_tag(self.dynamics.collider(id).tag);
         let press = |touch: &ContactPoint| {
@@ -112,7 +113,7 @@ impl World {
         pressed.filter_map(press).collect()
     }
 
-    /// Pairs of a robot's own links that press on each other, with the force (N): empty in a clean pose.
+    /// Returns pairs of a robot's own links that press on each other, with the force (N).
     pub fn self_contacts(&self, robot: usize) -> Vec<(String, String, f32)> {
         let mut forces_n: BTreeMap<(usize, usize), f32> = BTreeMap::new();
         for (owners, force_n) in self.presses() {

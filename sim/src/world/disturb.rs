@@ -1,5 +1,5 @@
-//! What no command can make: pushes at a link, weights fused to a hand, objects put elsewhere. For benches and tests of
-//! controllers, and for what is laid over an episode as stress; no tool reaches them.
+//! Disturbances that no command can make: pushes at a link, weights fused to a hand, objects moved
+//! elsewhere. They serve benches, tests of controllers and stress on episodes; no tool reaches them.
 
 use std::ops::Range;
 
@@ -13,27 +13,27 @@ use crate::locomotion::Locomotion;
 use crate::mechanism::{precise, rounded};
 use crate::owner::Owner;
 
-/// Resting contacts are a little deeper than nothing.
+/// Overlap that counts as contact: resting contacts are a little deeper than zero.
 const ALLOWED_OVERLAP_M: f64 = 0.002;
 
 /// A force for one control step.
 pub(super) struct Push {
     link: LinkId,
     point_in_link_m: Vector,
-    /// World frame.
+    /// Force in the world frame.
     force_n: Vector,
 }
 
-/// A force that acts on a robot while some control steps are made, as of somebody who pushes it.
+/// A force that acts on a robot during some control steps, like a push by a person.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlannedPush {
     pub robot: usize,
     /// Name of the link that is pushed.
     pub link: String,
     pub point_in_link_m: Vector,
-    /// World frame.
+    /// Force in the world frame.
     pub force_n: Vector,
-    /// Of the world's control steps, counted from 0, those in which it acts.
+    /// The world's control steps, counted from 0, in which it acts.
     pub control_steps: Range<u64>,
 }
 
@@ -47,8 +47,11 @@ impl Push {
 }
 
 impl World {
-    /// Sets the force (N, world) that pulls at a point (link frame) of a robot's link during the next control step, in
-    /// addition to other pushes. An unknown link is a bug of the caller.
+    /// Adds a force (N, world) at a point (link frame) of a robot's link during the next control step.
+    ///
+    /// # Panics
+    ///
+    /// Panics if the robot has no such link.
     pub fn push(&mut self, robot: usize, link: &str, point_in_link_m: Vector, force_n: Vector) {
         let link = self.robot_link(robot, link);
         self.pushes.push(Push { link, point_in_link_m, force_n });
@@ -60,8 +63,12 @@ impl World {
         robot.tree.link(found.unwrap_or_else(|| panic!("no link `{link}` in the robot's file")))
     }
 
-    /// Sets all pushes that are planned. They are part of the set-up, not of the state: a world that is taken back to a snapshot gets
-    /// them anew. An unknown link is a bug of the caller.
+    /// Sets all planned pushes. They are part of the set-up, not of the state: after restoring a
+    /// snapshot, the caller has to set them again.
+    ///
+    /// # Panics
+    ///
+    /// Panics if a robot has no such link.
     pub fn plan_pushes(&mut self, planned: Vec<PlannedPush>) {
         let push = |PlannedPush { robot, link, point_in_link_m, force_n, control_steps }: PlannedPush| {
             let link = self.robot_link(robot, &link);
@@ -70,7 +77,8 @@ impl World {
         self.planned_pushes = planned.into_iter().map(push).collect();
     }
 
-    /// Makes an object, with all that moves on it, so many times as heavy as its file has it. It is part of the set-up.
+    /// Multiplies the mass of an object and everything that moves on it by `factor`. It is part of the
+    /// set-up.
     pub fn scale_mass(&mut self, object: &str, factor: f64) {
         for index in self.parts_of(object) {
             let Some(link) = self.objects[index].link else { continue };
@@ -81,7 +89,7 @@ impl World {
         }
     }
 
-    /// Makes an object, with all that moves on it, weigh this much in all. It is part of the set-up.
+    /// Scales an object and everything that moves on it to this total mass. It is part of the set-up.
     pub fn set_mass(&mut self, object: &str, mass_kg: f64) {
         let link_kg = |index: usize| {
             let link = self.objects[index].link?;
@@ -91,14 +99,15 @@ impl World {
         self.scale_mass(object, mass_kg / now_kg);
     }
 
-    /// Leaves an object, with all that moves on it, only this share of its friction with whatever it touches. It is part of the set-up.
+    /// Reduces the friction of an object and everything that moves on it to this share. It is part of
+    /// the set-up.
     pub fn leave_friction(&mut self, object: &str, share: f64) {
         for index in self.parts_of(object) {
             self.dynamics.leave_friction(Owner::Object(index).tag(), share);
         }
     }
 
-    /// Indices of an object and of what moves on it.
+    /// Returns the indices of an object and everything that moves on it.
     fn parts_of(&self, object: &str) -> Vec<usize> {
         let is_part = |name: &str| {
             name.strip_prefix(object).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
@@ -106,7 +115,7 @@ impl World {
         (0..self.objects.len()).filter(|index| is_part(&self.objects[*index].name)).collect()
     }
 
-    /// Fuses a point mass to a palm: the controller is not told.
+    /// Fuses a point mass to a palm, without informing the controller.
     pub fn load_hand(&mut self, robot: usize, side: Side, mass_kg: f32, point_in_wrist_m: Vector) {
         let robot = &self.robots[robot];
         let wrist = robot.model.hands[side].wrist;
@@ -115,13 +124,14 @@ impl World {
         self.dynamics.tree_mut(robot.tree).set_mass(wrist, Mass::from_rapier(&whole));
     }
 
-    /// As [`World::push`], at a point of the link that a hinge or slide of an object carries, in that link's frame.
+    /// Pushes like [`World::push`], at a point of the link that a hinge or slide of an object carries,
+    /// in that link's frame.
     pub(crate) fn push_object(&mut self, joint: &str, point_in_link_m: Vector, force_n: Vector) {
         let link = self.jointed_link(joint);
         self.pushes.push(Push { link, point_in_link_m, force_n });
     }
 
-    /// Sets a hinge of an object, by the name that its file gives.
+    /// Sets a hinge of an object, by its name in the file.
     pub(crate) fn set_object_hinge(&mut self, joint: &str, position_rad: f64, velocity_rad_s: f64) {
         let link = self.jointed_link(joint);
         self.dynamics.tree_mut(link.tree).set_joint(link.link, position_rad, velocity_rad_s);
@@ -132,17 +142,17 @@ impl World {
             .unwrap_or_else(|| panic!("no joint `{joint}`"))
     }
 
-    /// Puts a robot somewhere, at rest, as its joints are.
+    /// Moves a robot to a pose, at rest, with its joints unchanged.
     pub(crate) fn put_robot(&mut self, robot: usize, world_from_pelvis: Pose) {
         let tree = self.dynamics.tree_mut(self.robots[robot].tree);
         tree.set_base(precise(&world_from_pelvis), DVec3::ZERO, DVec3::ZERO);
     }
 
-    /// Whether a robot overlaps with anything else where it is.
+    /// Returns true if a robot overlaps with anything else at its present pose.
     pub(crate) fn overlaps(&mut self, robot: usize) -> bool {
         let tree = self.robots[robot].tree;
         let before = self.dynamics.state();
-        // A step finds out what touches, and is taken back.
+        // A trial step finds the contacts, and is undone.
         let stepped = self.dynamics.step();
         let of_robot = |touch: &ContactPoint| {
             let [a, b] = touch.colliders.map(|id| self.dynamics.collider(id).on.map(|on| on.tree));
@@ -154,7 +164,8 @@ impl World {
         overlaps
     }
 
-    /// Whether a box along the world's axes meets the bounds of anything that collides; floors that have no end are left out.
+    /// Returns true if a box along the world's axes meets the bounds of any collider other than an
+    /// endless floor.
     pub fn touches_box(&self, middle_m: Vector, half_m: Vector) -> bool {
         let [low_m, high_m] = [middle_m - half_m, middle_m + half_m];
         self.dynamics.colliders().filter(|(collider, _)| !collider.endless).any(
@@ -165,7 +176,11 @@ impl World {
         )
     }
 
-    /// Puts a free object somewhere, at rest. An unknown one is a bug of the caller.
+    /// Moves a free object to a pose, at rest.
+    ///
+    /// # Panics
+    ///
+    /// Panics if there is no such free object.
     pub(crate) fn put_object(&mut self, name: &str, world_from_object: Pose) {
         let link = self.link_of(|object| object.name == name);
         let link = link.unwrap_or_else(|| panic!("no free object `{name}`"));
@@ -173,7 +188,7 @@ impl World {
         tree.set_base(precise(&world_from_object), DVec3::ZERO, DVec3::ZERO);
     }
 
-    /// Gives a robot another base controller, which starts from how the robot stands now.
+    /// Gives a robot another base controller, which starts from the robot's present posture.
     pub fn set_locomotion(&mut self, robot: usize, locomotion: Box<dyn Locomotion>) {
         self.robots[robot].set_locomotion(locomotion);
     }
@@ -195,7 +210,7 @@ mod tests {
         vec![world.rest_command(0)]
     }
 
-    /// How much a crate that slides at 2 m/s slows down in a fifth of a second.
+    /// Returns the loss of speed in a fifth of a second of a crate that slides at 2 m/s.
     fn slowed_m_s(mut world: World) -> f64 {
         let commands = rest(&world);
         for _ in 0..10 {
@@ -212,7 +227,7 @@ mod tests {
 
     #[test]
     fn a_slippery_object_is_slowed_by_what_is_left_of_friction_and_a_heavy_one_as_any() {
-        // Wood on wood, as both files have it.
+        // Wood on wood, as in both files.
         let expected_m_s = 0.4 * f64::from(GRAVITY_M_S2) * 10.0 * f64::from(CONTROL_DT_S);
         for (share, times) in [(1.0, 1.0), (0.5, 1.0), (1.0, 2.0)] {
             let mut world = world();

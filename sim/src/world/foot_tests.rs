@@ -1,4 +1,4 @@
-//! Feet against what stands on the floor: toes do not pass through table legs, bottles and other feet.
+//! Feet against things on the floor: toes do not pass through table legs, bottles and other feet.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
@@ -14,10 +14,10 @@ use crate::mechanism::{add_collider, precise, rounded};
 use crate::mjcf::{Document, Geom};
 use crate::{RobotPlacement, assets};
 
-/// How deep what is drawn of a foot may be in something: contacts give way a little, and what collides is simpler than what is
-/// drawn.
+/// Maximum depth of a foot's drawn shape in an obstacle: contacts yield a little, and collision shapes
+/// are simpler than drawn ones.
 const DRAWN_M: f32 = 0.004;
-/// Height of the ankle when the foot stands.
+/// Height of the ankle of a planted foot.
 const ANKLE_M: f32 = 0.035;
 /// A leg of a table, 28 mm square.
 const TABLE_LEG: &str = r#"<geom type="box" size="0.014 0.014 0.15" pos="0 0 0.15"/>"#;
@@ -26,7 +26,7 @@ fn robot() -> RobotModel {
     RobotModel::parse("robot.xml", assets::robot(assets::DEFAULT_ROBOT).expect("embedded")).expect("a robot")
 }
 
-/// Geoms of a foot in the frame of its link.
+/// Returns the geoms of a foot in the frame of its link.
 fn foot(robot: &RobotModel) -> &[Geom] {
     &robot.links[robot.soles.left.link].geoms
 }
@@ -40,7 +40,7 @@ fn drawn(world_from_body: &Pose, geoms: &[Geom]) -> Vec<(Pose, SharedShape)> {
     shapes.map(|(body_from_shape, shape)| (*world_from_body * body_from_shape, shape)).collect()
 }
 
-/// How deep convex shapes are in others.
+/// Returns the maximum depth of convex shapes in others.
 fn depth_m(shapes: &[(Pose, SharedShape)], others: &[(Pose, SharedShape)]) -> f32 {
     let pairs = shapes.iter().flat_map(|shape| others.iter().map(move |other| (shape, other)));
     let depths_m = pairs.map(|((pose, shape), (other_pose, other))| {
@@ -50,7 +50,7 @@ fn depth_m(shapes: &[(Pose, SharedShape)], others: &[(Pose, SharedShape)]) -> f3
     depths_m.fold(0.0, f32::max)
 }
 
-/// What a toe is pushed against, turned about the vertical.
+/// Returns the obstacle for a toe, turned about the vertical.
 fn obstacle(name: &str, robot: &RobotModel, yaw_rad: f32) -> Vec<Geom> {
     let (geoms, height_m) = match name {
         "another foot" => (foot(robot).to_vec(), ANKLE_M),
@@ -61,8 +61,8 @@ fn obstacle(name: &str, robot: &RobotModel, yaw_rad: f32) -> Vec<Geom> {
     geoms.into_iter().map(|geom| Geom { body_from_geom: place * geom.body_from_geom, ..geom }).collect()
 }
 
-/// How deep a foot gets that 100 N push for two seconds along a rail, toe first, beside the middle of an obstacle, and where it
-/// comes to rest.
+/// Pushes a foot with 100 N for two seconds along a rail, toe first, beside the middle of an obstacle.
+/// Returns its maximum depth and its final position.
 fn pushed_m(robot: &RobotModel, obstacle: &[Geom], across_m: f32) -> [f32; 2] {
     let mut dynamics = Dynamics::new(Settings::new(0.005, DVec3::ZERO));
     let link = Link {
@@ -89,8 +89,8 @@ fn pushed_m(robot: &RobotModel, obstacle: &[Geom], across_m: f32) -> [f32; 2] {
 #[test]
 fn a_toe_that_is_pushed_against_something_stays_out_of_it() {
     let robot = robot();
-    // What is drawn of a foot goes from 0.068 m behind the ankle to 0.138 m before it, and 0.036 m to each side. Corners of two
-    // feet pass each other where these lie 3 cm beside each other.
+    // The drawn shape of a foot goes from 0.068 m behind the ankle to 0.138 m before it, and 0.036 m to
+    // each side. Corners of two feet pass each other where these are 3 cm apart sideways.
     for (name, yaw_rad, across_m, rest_m) in [
         ("table leg", 0.0, 0.0, -0.152),
         ("table leg", 0.0, 0.012, -0.152),
@@ -106,8 +106,8 @@ fn a_toe_that_is_pushed_against_something_stays_out_of_it() {
     }
 }
 
-/// How deep the feet of a robot get that walks with its left one against a post that nothing moves, so far ahead, too low for knees to
-/// meet it.
+/// Walks a robot with its left foot against a fixed post at this distance, too low for the knees to meet
+/// it. Returns the maximum depth of its feet in the post.
 fn walked_m(robot: RobotModel, ahead_m: f32) -> f32 {
     let robot = Arc::new(robot);
     let post = format!(r#"<geom type="box" size="0.014 0.014 0.05" pos="{ahead_m} 0.12 0.05"/>"#);
@@ -137,7 +137,7 @@ fn walked_m(robot: RobotModel, ahead_m: f32) -> f32 {
 
 #[test]
 fn a_robot_that_walks_against_a_post_keeps_its_feet_out_of_it() {
-    // With nothing but the corners on which it stands, a foot goes through a post that stands where it comes down.
+    // A foot with only its standing corners goes through a post at its foothold.
     let ours = assets::robot(assets::DEFAULT_ROBOT).expect("embedded");
     let corners = ours.replace(r#"<geom class="collision" type="mesh" mesh="foot_shell"/>"#, "");
     assert_ne!(ours, corners);
@@ -148,7 +148,7 @@ fn a_robot_that_walks_against_a_post_keeps_its_feet_out_of_it() {
     let places = [0.24, 0.28, 0.32, 0.36, 0.40].map(through);
     let (through_m, ahead_m) =
         places.into_iter().max_by(|one, other| one.0.total_cmp(&other.0)).expect("five");
-    // What collides ends 4.5 mm above the sole that is drawn, which shows where a foot comes down on the post.
+    // The collision shape ends 4.5 mm above the drawn sole, which shows where a foot comes down on the post.
     let deepest_m = walked_m(robot(), ahead_m);
     println!("{places:?}: {deepest_m} m at {ahead_m} m");
     assert!(deepest_m < DRAWN_M + 0.0055, "{deepest_m} m at {ahead_m} m");

@@ -1,4 +1,4 @@
-//! What is under a room whose own floor ends.
+//! The ground under a room whose own floor ends.
 
 use rapier3d::math::{Pose, Vector};
 
@@ -7,7 +7,7 @@ use crate::dynamics::{Collider, DPose3, DVec3, Directions, Friction};
 use crate::mechanism::{add_collider, rounded};
 use crate::mjcf::{Geom, Primitive};
 
-/// A plane that leans by less carries what falls on it.
+/// Cosine of the tilt below which a plane carries things that fall on it.
 const CARRIES_COSINE: f64 = 0.5;
 /// MJCF's defaults.
 const PLAIN: Friction = Friction {
@@ -20,9 +20,9 @@ const PLAIN: Friction = Friction {
 };
 
 impl World {
-    /// Puts a plane without an end under the lowest shape of the scene, unless the scene has such a plane itself: exported rooms
-    /// have boxes for floors, and what goes over the edge of one would fall for ever. In a scene of which nothing collides it is at
-    /// z = 0, where robots are put. Nobody sees it.
+    /// Puts an endless plane under the lowest shape of the scene, unless the scene has such a plane itself.
+    /// Exported rooms have boxes for floors, and anything that goes over the edge of one would fall forever.
+    /// In a scene without colliders it is at z = 0, where robots are put. The plane is not drawn.
     pub(super) fn lay_ground(&mut self) {
         // No joint moves a plane.
         let carries = |(collider, at): (&Collider, DPose3)| {
@@ -31,7 +31,8 @@ impl World {
         if self.dynamics.colliders().any(carries) {
             return;
         }
-        // What moves counts, too: it is not to begin within the ground. Walls that are planes have no lowest point.
+        // Moving things count, too: none may start within the ground. Walls that are planes have no
+        // lowest point.
         let shapes = self.dynamics.colliders().filter(|(collider, _)| !collider.endless);
         let bottom_m = |(collider, at): (&Collider, DPose3)| {
             (collider.shape.compute_aabb(&rounded(&at)).mins.z, collider.friction)

@@ -1,4 +1,4 @@
-//! Nothing but what a robot senses reaches its controller, its hands' frames and its replies.
+//! Only sensed values reach a robot's controller, its hands' frames and its replies.
 
 use rapier3d::math::{Pose, Rotation, Vector};
 
@@ -11,7 +11,7 @@ use crate::robot::{RobotCommand, RobotPlacement, Sensing, SensorModel, StateSour
 const PLACE_M: [f32; 2] = [40.0, -30.0];
 const YAW_RAD: f32 = 1.6;
 
-/// A robot that stands at a place and is told that it stands at the origin and looks along x.
+/// Creates a robot at a place whose estimate starts at the origin, looking along x.
 fn misled(position_m: [f32; 2], yaw_rad: f32, sensing: Sensing) -> World {
     let robot = RobotPlacement { name: "A".into(), position_m, yaw_rad };
     let mut world =
@@ -22,7 +22,7 @@ fn misled(position_m: [f32; 2], yaw_rad: f32, sensing: Sensing) -> World {
     world
 }
 
-/// It walks a curve with an arm on the move and both hands pulled back a little, as it looks.
+/// Walks a curve with an arm on the move and a small pull backwards on one hand. Returns the steps.
 fn walk(world: &mut World) -> Vec<RobotStep> {
     let rest = world.rest_command(0);
     let base = BaseCommand { vx_m_s: 0.3, yaw_rate_rad_s: 0.2, ..rest.base };
@@ -42,8 +42,9 @@ fn apart(a: &Pose, b: &Pose) -> f32 {
     (a.translation - b.translation).length() + 2.0 * (a.rotation.inverse() * b.rotation).xyz().length()
 }
 
-/// Where a world is put and how it is turned changes nothing of what a robot does, knows and tells: two that are told the same
-/// do the same, 50 m apart and with another heading. Left over is what rounding grows to on two legs.
+/// Place and heading of a world have no effect on a robot's actions, estimates and replies. Two robots
+/// with the same initial estimate act alike, 50 m apart and with another heading. The remaining
+/// difference is rounding that grows on two legs.
 #[test]
 fn where_the_world_is_reaches_no_robot() {
     for sensors in SensorModel::ALL {
@@ -62,7 +63,7 @@ fn where_the_world_is_reaches_no_robot() {
             Pose::from_parts(Vector::new(PLACE_M[0], PLACE_M[1], 0.0), Rotation::from_rotation_z(YAW_RAD));
         let walked_m = last.sensed.start_from_pelvis.translation.truncate().length();
         assert!(walked_m > 0.2, "{walked_m}");
-        // It is off by just what it was misled by.
+        // Its error is exactly the wrong initial estimate.
         assert!(
             apart(&(world_from_told * there.estimate.world_from_pelvis), &there.truth.world_from_pelvis())
                 < 0.05
@@ -70,7 +71,7 @@ fn where_the_world_is_reaches_no_robot() {
     }
 }
 
-/// The simulator's own state is no such thing: the same robot knows where it is, whatever it was told.
+/// With the simulator's own state, the same robot knows its true place, whatever its initial estimate.
 #[test]
 fn the_simulators_state_is_not_misled() {
     let mut world = misled(PLACE_M, YAW_RAD, Sensing::TRUTH);
@@ -80,7 +81,8 @@ fn the_simulators_state_is_not_misled() {
     assert!(believed.translation.truncate().length() > 40.0 && heading_rad(&believed) > 1.0);
 }
 
-/// The command under which a robot stays as it is comes of its readings, and of where it takes its pelvis to be.
+/// The command under which a robot stays as it is follows from its readings and from its estimate of its
+/// pelvis.
 #[test]
 fn a_robot_stays_as_it_senses_itself() {
     let mut world = misled([0.0; 2], 0.0, Sensing::default());

@@ -37,7 +37,7 @@ use crate::{CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, S
 use disturb::Push;
 use objects::{Furniture, Object};
 
-/// Everything a world is made of.
+/// Specification of a world.
 #[derive(Clone, Debug)]
 pub struct WorldSpec {
     pub scene: SceneSource,
@@ -45,12 +45,12 @@ pub struct WorldSpec {
     pub objects: Vec<ObjectPlacement>,
 }
 
-/// Where the scene of a world comes from.
+/// Source of a world's scene.
 #[derive(Clone, Debug)]
 pub enum SceneSource {
-    /// A scene that the binary carries, by name.
+    /// A scene embedded in the binary, by name.
     Embedded(String),
-    /// A scene that was read, and where its own origin lies.
+    /// A scene that was read, and the pose of its origin.
     Read { document: Arc<Document>, world_from_scene: Pose },
 }
 
@@ -73,18 +73,26 @@ pub struct World {
     control_steps: u64,
     /// Pushes of the next control step.
     pushes: Vec<Push>,
-    /// Those of later control steps, each with its steps.
+    /// Pushes of later control steps, each with its steps.
     planned_pushes: Vec<(Range<u64>, Push)>,
 }
 
 impl World {
-    /// Builds the world at rest, of embedded robots; nothing has been stepped yet.
+    /// Builds the world at rest, with embedded robots; no step has been made yet.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if a file of the specification cannot be used.
     pub fn new(spec: &WorldSpec) -> Result<World, SimError> {
         let model = RobotModel::parse("robot.xml", assets::robot(assets::DEFAULT_ROBOT)?)?;
         World::with_robot(spec, Arc::new(model))
     }
 
     /// Builds the world as [`World::new`] does, with robots of another file.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if a file of the specification cannot be used.
     pub fn with_robot(spec: &WorldSpec, model: Arc<RobotModel>) -> Result<World, SimError> {
         let mut world = match &spec.scene {
             SceneSource::Embedded(name) => World::of_scene(Document::parse(name, assets::scene(name)?)?)?,
@@ -101,8 +109,12 @@ impl World {
         Ok(world)
     }
 
-    /// A scene with what its own file has in it, and no more. It begins as its key `start` has it; its actuators do what
-    /// that key tells them, and from the time of every later key what that one does.
+    /// Builds a scene with only the content of its own file. It begins in its key `start`. Its actuators
+    /// follow that key's controls, and from the time of every later key those of that key.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the scene contains something unsupported.
     pub fn of_scene(scene: Document) -> Result<World, SimError> {
         World::furnished(&scene, &Pose::IDENTITY)
     }
@@ -126,13 +138,22 @@ impl World {
         })
     }
 
-    /// Advances by one control step, and says what it left behind. One command per robot, in the order of
-    /// [`World::robots`]. After an error the world stands where its last physics step left it, and cannot go on.
+    /// Advances by one control step and returns the resulting state. There must be one command per
+    /// robot, in the order of [`World::robots`].
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Diverged`] if physics diverged. The world is then in the state after its last valid
+    /// physics step, and cannot go on.
+    ///
+    /// # Panics
+    ///
+    /// Panics if the number of commands is not that of the robots.
     pub fn control_step(&mut self, commands: &[RobotCommand]) -> Result<Step, Diverged> {
         self.step_by(commands, World::advance)
     }
 
-    /// One control step whose physics steps `advance` makes.
+    /// Runs one control step whose physics steps `advance` makes.
     fn step_by(
         &mut self,
         commands: &[RobotCommand],
@@ -149,7 +170,7 @@ impl World {
         Ok(self.present())
     }
 
-    /// Sets what acts on the robots and the scene's joints in the next physics step.
+    /// Sets the drives and forces on the robots and the scene's joints for the next physics step.
     pub(crate) fn drive(&mut self, commands: &[RobotCommand], substep: u32) {
         for (robot, command) in self.robots.iter_mut().zip(commands) {
             robot.drive(&mut self.dynamics, command, substep);
@@ -160,18 +181,18 @@ impl World {
         pushes.for_each(|push| push.apply(&mut self.dynamics));
     }
 
-    /// One physics step.
+    /// Runs one physics step.
     pub(crate) fn advance(&mut self) -> Result<(), Diverged> {
         self.dynamics.step()
     }
 
-    /// What robots sense of it.
+    /// Reads the sensors of all robots.
     pub(crate) fn sense(&mut self) {
         self.robots.iter_mut().for_each(|robot| robot.sense(&self.dynamics));
     }
 
-    /// Gives all robots other sensors, whose noise `seed` decides, and another way to know themselves. They take it that
-    /// they have stood still until now.
+    /// Gives all robots other sensors, whose noise `seed` decides, and another state estimate. The
+    /// estimate assumes that they have stood still until now.
     pub fn set_sensing(&mut self, sensing: Sensing, seed: u32) {
         for (index, robot) in self.robots.iter_mut().enumerate() {
             let told = robot.truth(&self.dynamics).world_from_pelvis();
@@ -183,33 +204,35 @@ impl World {
         &self.robots
     }
 
-    /// The command under which a robot stays as it is, by what it senses.
+    /// Returns the command under which a robot stays as it is, by its own readings.
     pub fn rest_command(&self, robot: usize) -> RobotCommand {
         self.robots[robot].rest_command()
     }
 
-    /// Geoms of the scene that do not move, world frame.
+    /// Returns the geoms of the scene that do not move, world frame.
     pub fn room(&self) -> &[crate::mjcf::Geom] {
         &self.fixed
     }
 
-    /// Cameras of the scene's file, world frame.
+    /// Returns the cameras of the scene's file, world frame.
     pub fn cameras(&self) -> &[MjcfCamera] {
         &self.cameras
     }
 
-    /// Position of a hinge (rad) or a slide (m) of an object, by the name that its file gives; the first that has it.
+    /// Returns the position of a hinge (rad) or a slide (m) of an object, by its name in the file; the
+    /// first one of that name. Returns `None` if there is none.
     pub fn joint_position(&self, joint: &str) -> Option<f64> {
         let link = self.link_of(|object| object.joint.as_deref() == Some(joint))?;
         Some(self.dynamics.tree(link.tree).joint_position(link.link))
     }
 
-    /// The link of the first object of which this is true; none if that does not move.
+    /// Returns the link of the first object that satisfies the predicate. Returns `None` if there is
+    /// none or it does not move.
     fn link_of(&self, is: impl Fn(&Object) -> bool) -> Option<LinkId> {
         self.objects.iter().find(|object| is(object))?.link
     }
 
-    /// Every object's name and what its file says of it.
+    /// Returns every object's name and the model from its file.
     pub fn object_models(&self) -> impl Iterator<Item = (&str, &ObjectModel)> {
         self.objects.iter().map(|object| (object.name.as_str(), &object.model))
     }

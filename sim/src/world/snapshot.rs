@@ -15,11 +15,16 @@ pub struct Snapshot {
     control_steps: u64,
 }
 
-/// More than the dynamics of three robots in a kitchen take, so that a hash allocates once.
+/// Initial capacity for serialised dynamics: more than three robots in a kitchen take, so that a hash
+/// allocates once.
 const DYNAMICS_BYTES: usize = 1 << 16;
 
 impl World {
-    /// About half a megabyte for two robots.
+    /// Takes a snapshot, which is about half a megabyte for two robots.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if a robot's state cannot be serialised.
     pub fn snapshot(&self) -> Result<Snapshot, SimError> {
         Ok(Snapshot {
             dynamics: self.dynamics.state(),
@@ -28,7 +33,11 @@ impl World {
         })
     }
 
-    /// Takes the world back to a snapshot. On an error the world is as it was.
+    /// Restores a snapshot.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the snapshot does not fit; the world is then unchanged.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result<(), SimError> {
         let before = (self.dynamics.state(), self.save_robots()?);
         self.dynamics.restore(&snapshot.dynamics)?;
@@ -52,8 +61,8 @@ impl World {
         Ok(())
     }
 
-    /// Hash of everything that decides the future, in full precision: positions, velocities and impulses of dynamics,
-    /// controllers, step count.
+    /// Returns a hash of all state that determines the future, in full precision: positions, velocities
+    /// and impulses of dynamics, controllers, step count.
     pub fn state_hash(&self) -> u64 {
         let mut hash = Xxh3::new();
         hash.update(&self.control_steps.to_le_bytes());

@@ -1,4 +1,4 @@
-//! What one control step left behind: plain, serialisable, complete. Whoever looks at a world reads this.
+//! The result of one control step: plain, serialisable, complete. All observers of a world read it.
 
 use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
@@ -11,27 +11,27 @@ use crate::{CONTROL_HZ, Side, Sides};
 /// The world after one control step, or before the first.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Step {
-    /// Steps made so far.
+    /// Number of steps made so far.
     pub control_step: u64,
     /// Simulated time since the first step.
     pub time_s: f64,
-    /// In the order of [`World::robots`].
+    /// Robots, in the order of [`World::robots`].
     pub robots: Vec<RobotStep>,
-    /// In the order of [`World::object_models`].
+    /// Objects, in the order of [`World::object_models`].
     pub objects: Vec<ObjectStep>,
-    /// Hands that touch an object; those that touch none have no entry.
+    /// Hands that touch an object; hands that touch none have no entry.
     pub touches: Vec<Touch>,
     /// Robots that touch an object with any part of them, hands included.
     pub body_touches: Vec<BodyTouch>,
 }
 
-/// One robot: what it senses after the step, where it takes itself to be, where it is, and what it was told for the step.
+/// One robot: sensed values after the step, its estimate of its place, the truth, and the step's command.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RobotStep {
     pub sensed: RobotSensed,
     pub estimate: RobotEstimate,
     pub truth: RobotTruth,
-    /// Before the first step, the command under which the robot rests.
+    /// The command of the step; before the first step, the one under which the robot rests.
     pub command: RobotCommand,
 }
 
@@ -53,7 +53,7 @@ pub struct Touch {
     pub contacts: HandContacts,
 }
 
-/// One robot on one object, with whatever part.
+/// One robot on one object, with any part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct BodyTouch {
     /// Index into [`Step::objects`].
@@ -62,7 +62,7 @@ pub struct BodyTouch {
     pub robot: usize,
 }
 
-/// Normal contact forces (N, world) that a hand's parts exert on an object, averaged over the last physics step.
+/// Mean normal contact forces (N, world) of a hand's parts on an object in the last physics step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct HandContacts {
     pub thumb_n: Vector,
@@ -71,7 +71,8 @@ pub struct HandContacts {
 }
 
 impl RobotStep {
-    /// The external force on each hand that the robot feels, turned into the world as it is.
+    /// Returns the external force on each hand that the robot senses, converted to the world frame with
+    /// the true pose.
     pub fn hand_force_in_world_n(&self) -> Sides<Vector> {
         let world_from_pelvis = self.truth.world_from_pelvis();
         self.sensed.hand_force_in_pelvis_n.map(|force_n| world_from_pelvis.rotation * force_n)
@@ -79,17 +80,17 @@ impl RobotStep {
 }
 
 impl Step {
-    /// State of an object, by the name that tasks call it.
+    /// Returns the state of an object, by its name in tasks.
     pub fn object(&self, name: &str) -> Option<&ObjectState> {
         self.objects.iter().find(|object| object.name == name).map(|object| &object.state)
     }
 
-    /// Whether any part of any robot touches an object; false of one that is unknown.
+    /// Returns true if any part of any robot touches an object; false for an unknown one.
     pub fn is_touched(&self, object: &str) -> bool {
         self.body_touches.iter().any(|touch| self.objects[touch.object].name == object)
     }
 
-    /// Forces of one hand on one object; zero if the object is unknown or out of touch.
+    /// Returns the forces of one hand on one object; zero if the object is unknown or not touched.
     pub fn contacts(&self, robot: usize, side: Side, object: &str) -> HandContacts {
         let of_hand = |touch: &&Touch| {
             touch.robot == robot && touch.side == side && self.objects[touch.object].name == object
@@ -99,7 +100,7 @@ impl Step {
 }
 
 impl World {
-    /// The world as it stands: what the last [`World::control_step`] returned, also after a restore.
+    /// Returns the present world: the result of the last [`World::control_step`], also after a restore.
     pub fn present(&self) -> Step {
         let object =
             |object: &Object| ObjectStep { name: object.name.clone(), state: object.state(&self.dynamics) };

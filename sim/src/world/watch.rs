@@ -1,4 +1,5 @@
-//! What a bench looks for in every physics step: speeds, energy that nothing put in, overlaps, joints beyond their ranges.
+//! Limits that a bench checks in every physics step: speeds, spurious energy, overlaps, joints beyond
+//! their ranges.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -9,36 +10,39 @@ use crate::PHYSICS_DT_S;
 use crate::dynamics::{ColliderId, Diverged, Dynamics, EnergyBalance, TreeId};
 use crate::robot::RobotCommand;
 
-/// No link moves faster: a fall from the ceiling ends at 7 m/s, and the fastest joints whip a hand to 20 m/s.
+/// Maximum speed of a link: a fall from the ceiling ends at 7 m/s, and the fastest joints whip a hand to
+/// 20 m/s.
 pub const FASTEST_M_S: f64 = 25.0;
-/// Over any [`WINDOW_S`] no more than this share of what was there and was put in may come from nothing.
+/// Maximum share of spurious energy in any [`WINDOW_S`], relative to the energy present plus the energy
+/// put in.
 pub const MAX_ENERGY_SHARE: f64 = 0.05;
 pub const WINDOW_S: f64 = 0.2;
-/// Where less than this was there and put in, it counts as this: what a robot of 35 kg has gained when it has fallen by 30 cm.
-/// What pushes bodies out of each other lifts such a robot out of the tolerated depth with less than 5 % of it.
+/// Minimum energy that the share refers to: the energy that a robot of 35 kg gains in a fall of 30 cm.
+/// Pushing bodies out of each other lifts such a robot out of the tolerated depth with less than 5 % of it.
 pub const MIN_SCALE_J: f64 = 100.0;
-/// Nothing overlaps by more than this for longer than that.
+/// Maximum overlap, and the maximum time for which it may be exceeded.
 pub const DEEP_M: f64 = 0.02;
 pub const LONGEST_DEEP_S: f64 = 0.1;
-/// No joint is beyond its range by more.
+/// Maximum distance of a joint beyond its range.
 pub const FARTHEST_BEYOND_RAD: f64 = 0.1;
 
-/// The greatest value of something, and where it was.
+/// The greatest value of a quantity, and the place where it occurred.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Greatest {
     pub value: f64,
     pub at: String,
 }
 
-/// The greatest of everything that was watched, in m/s, J, shares, m, s and rad (m of slides).
+/// The greatest values of all watched quantities, in m/s, J, shares, m, s and rad (m for slides).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Extremes {
     /// Speed of a link's centre of mass.
     pub speed_m_s: Greatest,
-    /// Kinetic energy that came from nothing in a window, and its share of what was there and was put in.
+    /// Spurious kinetic energy in a window, and its share of the energy present plus the energy put in.
     pub made_j: Greatest,
     pub made_share: Greatest,
-    /// Overlap of two colliders at any time, and for how long a pair overlapped by more than [`DEEP_M`].
+    /// Overlap of two colliders at any time, and the time for which a pair overlapped by more than
+    /// [`DEEP_M`].
     pub depth_m: Greatest,
     pub deep_s: Greatest,
     pub beyond_rad: Greatest,
@@ -46,17 +50,21 @@ pub struct Extremes {
     pub joint_speed_share: Greatest,
 }
 
-/// Watches a world, physics step by physics step.
+/// Watcher of a world, physics step by physics step.
 #[derive(Default)]
 pub struct Watch {
     pub extremes: Extremes,
     window: VecDeque<EnergyBalance>,
-    /// Pairs that overlap by too much, and for how many physics steps by now.
+    /// Pairs that overlap by too much, and the number of physics steps so far.
     deep: BTreeMap<[ColliderId; 2], u32>,
 }
 
 impl World {
-    /// As [`World::control_step`], under the eyes of `watch`.
+    /// Runs [`World::control_step`] while `watch` checks every physics step.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Diverged`] if physics diverged.
     pub fn watched_step(&mut self, commands: &[RobotCommand], watch: &mut Watch) -> Result<Step, Diverged> {
         self.step_by(commands, |world| {
             let before = world.dynamics.energy_before();
@@ -69,20 +77,20 @@ impl World {
 
 impl Greatest {
     fn see(&mut self, value: f64, at: impl FnOnce() -> String) {
-        // What is no number is greater than any.
+        // NaN counts as greater than any number.
         if value > self.value || value.is_nan() {
             *self = Greatest { value, at: at() };
         }
     }
 
-    /// The greater of both.
+    /// Keeps the greater of both.
     pub fn join(&mut self, other: &Greatest, at: impl FnOnce(&str) -> String) {
         self.see(other.value, || at(&other.at));
     }
 }
 
 impl Extremes {
-    /// Takes over what was greater in `other`; `at` says where that was.
+    /// Takes over the values that are greater in `other`; `at` gives their place.
     pub fn join(&mut self, other: &Extremes, at: impl Fn(&str) -> String) {
         let pairs = [
             (&mut self.speed_m_s, &other.speed_m_s),
@@ -98,7 +106,7 @@ impl Extremes {
         }
     }
 
-    /// Which limits are broken: speed, energy, depth, range.
+    /// Returns true for each broken limit: speed, energy, depth, range.
     pub fn broken(&self) -> [bool; 4] {
         [
             (&self.speed_m_s, FASTEST_M_S),
@@ -111,7 +119,7 @@ impl Extremes {
 }
 
 impl Watch {
-    /// Looks at what a physics step left behind.
+    /// Checks the result of a physics step.
     fn look(&mut self, dynamics: &Dynamics, balance: EnergyBalance) {
         for id in dynamics.tree_ids() {
             let tree = dynamics.tree(id);

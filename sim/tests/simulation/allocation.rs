@@ -1,6 +1,6 @@
 //! A step allocates nothing once its buffers have grown.
 
-// Counting allocations takes a global allocator, whose trait is unsafe to implement.
+// Counting allocations requires a global allocator, whose trait is unsafe to implement.
 #![allow(unsafe_code)]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -12,7 +12,7 @@ use tandem_sim::dynamics::{
 };
 
 thread_local! {
-    /// Of this thread alone: other tests run beside this one.
+    /// Count of this thread alone: other tests run in parallel.
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
 }
 

@@ -1,4 +1,4 @@
-//! What becomes of what falls: robots go limp, and the floor has no edge.
+//! Falling: robots go limp, and the floor has no edge.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ fn the_legs_of_a_fallen_robot_are_limp() {
         }
         let step = world.control_step(&command).expect("it stays finite");
         let robot = &step.robots[0];
-        // What a faster robot gains by integration is taken back after its drives have acted.
+        // Spurious energy of a faster robot is removed after its drives have acted.
         if fell && robot.sensed.joints.qd_rad_s.iter().all(|speed| speed.abs() < 8.0) {
             checked += 1;
             let model = &world.robots()[0].model;
@@ -46,7 +46,7 @@ fn the_legs_of_a_fallen_robot_are_limp() {
     assert!(arm_rad.abs() < 0.6, "its arm still does what it is told: {arm_rad} rad away");
 }
 
-/// The floor of home_098 is drawn to y = -2 m. A robot that is put beyond stands, and so does a bottle.
+/// The floor of home_098 is drawn to y = -2 m. A robot placed beyond stands, and so does a bottle.
 #[test]
 fn floors_go_on_where_they_are_no_longer_drawn() {
     let bottle = ObjectPlacement {
@@ -68,7 +68,7 @@ fn floors_go_on_where_they_are_no_longer_drawn() {
     assert!(bottle_m.z.abs() < 0.05, "{bottle_m}");
 }
 
-/// A scene in which nothing collides has a ground all the same, where robots stand.
+/// A scene without colliders has a ground all the same, where robots stand.
 #[test]
 fn robots_stand_in_a_scene_of_nothing() {
     let ghost = r#"<geom type="box" size="1 1 1" pos="4 0 -5" contype="0" conaffinity="0"/>"#;
@@ -90,7 +90,7 @@ fn robots_stand_in_a_scene_of_nothing() {
     }
 }
 
-/// A floor that is a box ends, but what goes over its edge comes to rest on a ground below.
+/// A floor that is a box ends, but a thing that goes over its edge comes to rest on a ground below.
 #[test]
 fn what_goes_over_the_edge_of_a_box_lands_below_it() {
     let bottle = |name: &str, x_m: f32| ObjectPlacement {
@@ -133,7 +133,7 @@ fn what_goes_over_the_edge_of_a_box_lands_below_it() {
     }
 }
 
-/// A floor is below a mesh wherever the frame is that its vertices are in.
+/// A floor carries a mesh, wherever the frame of its vertices is.
 #[test]
 fn a_mesh_far_from_its_frame_lies_on_the_floor() {
     let corners = [59.9, 60.1].map(|x| format!("{x} -0.1 -0.1  {x} 0.1 -0.1  {x} -0.1 0.1  {x} 0.1 0.1"));

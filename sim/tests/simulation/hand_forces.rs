@@ -1,17 +1,17 @@
-//! What hands feel while arms move: the world, and not the arms' own inertia.
+//! Hand forces while arms move: only the force of the world, without the arms' own inertia.
 
 use tandem_sim::{
     ARM_COLUMNS, CONTROL_DT_S, RobotCommand, RobotPlacement, RobotStep, Sensing, SensorModel, Side, Vector,
     World, WorldSpec,
 };
 
-/// Hands a forearm's length ahead of the chest, and whether a right arm mirrors the joint.
+/// Hands a forearm's length ahead of the chest, and true for joints that a right arm mirrors.
 const FORWARD: [(f32, bool); 7] =
     [(-0.35, false), (0.3, true), (0.0, true), (0.3, false), (0.0, true), (0.0, false), (0.0, true)];
 const RAISED_S: f32 = 2.0;
 
-/// A robot that waves its arms from [`RAISED_S`] on, every joint by 0.3 rad at 1.3 times a second at most, and whose right palm is
-/// pulled by `pull_n` from `pulled_s` on. Gives what it feels at each instant.
+/// Runs a robot that waves its arms from [`RAISED_S`] on, every joint by 0.3 rad at 1.3 times a second
+/// at most. Its right palm is pulled by `pull_n` from `pulled_s` on. Calls `look` at each instant.
 fn waves(sensors: SensorModel, pull_n: Vector, pulled_s: f32, mut look: impl FnMut(f32, &RobotStep)) {
     let placement = RobotPlacement { name: "A".into(), position_m: [0.0; 2], yaw_rad: 0.0 };
     let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
@@ -41,7 +41,7 @@ fn waves(sensors: SensorModel, pull_n: Vector, pulled_s: f32, mut look: impl FnM
     }
 }
 
-/// Empty hands feel next to nothing, however the arms swing.
+/// Empty hands feel almost no force while the arms swing.
 #[test]
 fn hands_that_wave_feel_little() {
     for (sensors, most_n, mean_n) in [(SensorModel::Ideal, 2.0, 0.8), (SensorModel::G1, 3.0, 1.0)] {

@@ -1,4 +1,4 @@
-//! The default base controller walks, carries, gives way and comes back, bit for bit again.
+//! The default base controller walks, carries, yields and comes back, with bit-identical reruns.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use tandem_sim::{
     bench,
 };
 
-/// The cases whose names contain this word.
+/// Runs the cases whose names contain this word.
 fn reports(word: &str, seeds: usize) -> Vec<bench::CaseReport> {
     let robot = RobotSource::embedded(DEFAULT_ROBOT).unwrap();
     let report = bench::run(
@@ -34,8 +34,8 @@ fn walks_as_commanded_and_stops() {
     for case in ["forward_0.4", "mix_backward_right_turn", "left_0.25_2kg"] {
         let report = report(case, 1);
         assert_eq!(report.survived, 1, "{report:?}");
-        // The bench prints 0.4 to 2.3 %, 0.0 to 0.4 degrees, 0.6 to 0.9 s and 1.1 to 1.5 s; out of level 0.9 to
-        // 3.2 degrees.
+        // The bench prints 0.4 to 2.3 %, 0.0 to 0.4 degrees, 0.6 to 0.9 s and 1.1 to 1.5 s; tilts of 0.9
+        // to 3.2 degrees.
         assert!(report.velocity_error_share.unwrap() < 0.03, "{report:?}");
         assert!(report.heading_error_deg.unwrap() < 1.0, "{report:?}");
         assert!(report.standing_after_s.unwrap() < 1.0 && report.still_after_s.unwrap() < 1.7, "{report:?}");
@@ -56,8 +56,8 @@ fn short_commands_move_the_base_by_speed_times_time() {
     }
 }
 
-/// What the brief tells of the pelvis of a robot that steps: 0.62 to 0.68 m, whatever is commanded. It sinks to step from a higher
-/// stand, and rises to step from a lower one.
+/// The pelvis of a stepping robot is 0.62 to 0.68 m high, as the brief for policies states, whatever is
+/// commanded. It sinks to step from a higher stance, and rises to step from a lower one.
 #[test]
 fn walks_as_high_as_policies_are_told() {
     let (mut world, mut command) = walking();
@@ -79,7 +79,7 @@ fn walks_as_high_as_policies_are_told() {
         };
         (0..200).map(|_| height_m()).collect()
     };
-    // So low it loses its stance at times, and steps up and goes down again: its lowest counts.
+    // At this height it loses its stance at times, steps up and goes down again: its lowest height counts.
     let lowest_m = heights_m_at(0.0).into_iter().fold(f32::MAX, f32::min);
     assert!((0.49..0.56).contains(&lowest_m), "it stands {lowest_m} m high, told 0.50 m");
     let height_m = heights_m_at(0.4)[199];
@@ -102,8 +102,9 @@ fn hardly_a_punch_fells_a_robot() {
     assert!(report.survived >= 39, "{report:?}");
 }
 
-/// What the bench prints of ten seeds, which are ten directions: 7.0 cm and 0.0 degrees at 15 N a hand, 13.3 cm and 1.1 degrees at
-/// 25 N, level, and 6.1 cm and 0.1 degrees if it is at one hand; nobody takes a step.
+/// Results of the bench for ten seeds, which are ten directions: 7.0 cm and 0.0 degrees at 15 N a hand,
+/// 13.3 cm and 1.1 degrees at 25 N, level, and 6.1 cm and 0.1 degrees with 25 N at one hand. No robot
+/// takes a step.
 #[test]
 fn keeps_its_place_while_its_hands_are_pulled() {
     for (case, drift_m) in
@@ -116,8 +117,8 @@ fn keeps_its_place_while_its_hands_are_pulled() {
     }
 }
 
-/// 40 N at both hands are more than a robot can stand against. Left alone after three seconds it goes back
-/// to where it stood, but for 9.3 cm and 3.3 degrees on the bench.
+/// 40 N at both hands are more than a robot can withstand. Released after three seconds, it goes back to
+/// its place, within 9.3 cm and 3.3 degrees on the bench.
 #[test]
 fn goes_back_to_its_place_after_it_was_pulled_away() {
     let report = report("stand_pull_40n", 10);

@@ -1,4 +1,4 @@
-//! Worlds from outside: physics, walking and pictures.
+//! Worlds from outside: physics, walking and images.
 
 mod allocation;
 mod falls;

@@ -1,4 +1,4 @@
-//! How fast motors turn joints, whatever they are told.
+//! Maximum speed of motors, whatever the command.
 
 use tandem_sim::{
     ARM_COLUMNS, CONTROL_DT_S, RobotCommand, RobotPlacement, Side, UPPER, UPPER_JOINTS, WAIST_COLUMN, World,
@@ -10,7 +10,8 @@ const FORWARD: [(usize, f32, bool); 3] = [(0, -0.35, false), (1, 0.5, true), (3,
 const RAISED_S: f32 = 1.5;
 const JUMPS_S: f32 = 0.3;
 
-/// The greatest speed of a joint, as a share of its motor's, that is sent from one end of its range to the other at once, and back.
+/// Returns the greatest speed of a joint, as a share of its motor's, when its target jumps from one end
+/// of its range to the other and back.
 fn fastest_share(column: usize) -> f32 {
     let placement = RobotPlacement { name: "A".into(), position_m: [0.0; 2], yaw_rad: 0.0 };
     let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
@@ -45,7 +46,7 @@ fn fastest_share(column: usize) -> f32 {
     fastest
 }
 
-/// Joints of arms and hands, one at a time: what swings or strikes turns joints faster, but no motor does.
+/// Joints of arms and hands, one at a time: swings and blows may turn joints faster, but no motor does.
 #[test]
 fn no_motor_turns_its_joint_faster_than_it_can() {
     let mut fast = 0;

@@ -1,4 +1,4 @@
-//! What a robot's own odometry says of its way, against where it went.
+//! A robot's own odometry against its true motion.
 
 use tandem_sim::{BaseCommand, Pose, RobotCommand, RobotPlacement, RobotStep, World, WorldSpec};
 
@@ -12,8 +12,8 @@ fn pelvis(world: &World) -> RobotStep {
     world.present().robots.remove(0)
 }
 
-/// How far the odometry is off, in place and in heading, after a walk of `seconds` that ends at rest, and how long the
-/// way was.
+/// Returns the errors of the odometry in place and heading after a walk of `seconds` that ends at rest,
+/// and the length of the walk.
 fn drift(velocity: [f32; 3], seconds: u32) -> ([f32; 2], f32) {
     let mut world = world();
     let rest = world.rest_command(0);

@@ -1,5 +1,5 @@
-//! The scenes that MuJoCo judges our physics by: our reader sees the same bodies, masses and coordinates in them, and what
-//! their sensors read stays within the tolerance that is recorded with MuJoCo's readings.
+//! The scenes for comparing Tandem's physics with MuJoCo: the reader finds the same bodies, masses and
+//! coordinates in them. Their sensors' readings stay within the tolerance recorded with MuJoCo's readings.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use serde_json::Value;
 use tandem_sim::mjcf::{BodyLink, BodyTree, Document, LinkJoint};
 use tandem_sim::{CONTROL_HZ, Step, Vector, World};
 
-/// MuJoCo's recorded view of a scene, and the scene's file beside it.
+/// Returns MuJoCo's recorded data of each scene, and the scene's file beside it.
 fn references() -> Vec<(PathBuf, Value)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/peers/scenes");
     let entries = std::fs::read_dir(&folder).expect("the folder of the scenes");
@@ -87,7 +87,7 @@ fn every_scene_says_where_it_begins_and_what_is_read() {
     }
 }
 
-/// What a sensor reads, in MuJoCo's order.
+/// Returns a sensor's reading, in MuJoCo's order.
 fn reading(world: &World, step: &Step, sensor: &Sensor) -> Vec<f64> {
     let name = sensor.objname.as_deref().unwrap_or_default();
     if sensor.kind == "jointpos" {
@@ -112,7 +112,7 @@ fn reading(world: &World, step: &Step, sensor: &Sensor) -> Vec<f64> {
     vector.to_array().map(f64::from).to_vec()
 }
 
-/// Readings of all sensors at the instants that the reference has: instants x sensors.
+/// Returns the readings of all sensors at the instants of the reference: instants x sensors.
 fn play(document: Document, reference: &Value) -> Vec<Vec<Vec<f64>>> {
     let [seconds, hz] = ["seconds", "hz"].map(|key| reference[key].as_f64().expect("a number"));
     let sensors = document.model.sensors.clone();
@@ -132,8 +132,8 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().expect("numbers").iter().map(|number| number.as_f64().expect("a number")).collect()
 }
 
-/// Where a quantity of a scene is farther from the truth than its tolerance, at its worst; `None` if nowhere. With a
-/// `since_s` in the reference it is how far it has moved since then that counts.
+/// Returns the worst deviation of a quantity of a scene beyond its tolerance; `None` if there is none.
+/// With a `since_s` in the reference, the change of the error since then counts.
 fn violation(reference: &Value, quantity: &Value, have: &[Vec<f64>]) -> Option<String> {
     let [hz, since_s] = ["hz", "since_s"].map(|key| reference[key].as_f64().expect("a number"));
     let tolerance = quantity["tolerance"].as_f64().expect("a tolerance");

@@ -1,4 +1,4 @@
-//! Pictures against closed forms: depth, projection, ids, shadow, anti-aliasing, and the same bits every time.
+//! Images against closed forms: depth, projection, ids, shadow, anti-aliasing, and bit-identical reruns.
 
 use std::f32::consts::{FRAC_PI_3, PI};
 
@@ -9,7 +9,7 @@ use tandem_sim::{ObjectState, ObjectStep, Pose, Rotation, Step, Vector};
 
 const GREY: [f32; 3] = [0.6, 0.6, 0.6];
 
-/// Parts around the origin that do not move; the first has id 1.
+/// Returns parts around the origin that do not move; the first has id 1.
 fn scenery(parts: Vec<(TriangleMesh, Pose)>) -> Scenery {
     let part = |((mesh, carrier_from_mesh), id)| Part {
         mesh,
@@ -27,7 +27,7 @@ fn scenery(parts: Vec<(TriangleMesh, Pose)>) -> Scenery {
     }
 }
 
-/// A floor, and something that moves.
+/// Returns a floor, and something that moves.
 fn floor_and(mesh: TriangleMesh) -> Scenery {
     let mut scenery = scenery(vec![floor(), (mesh, Pose::IDENTITY)]);
     scenery.parts[1].carrier = Carrier::Object(0);
@@ -57,7 +57,7 @@ fn camera(world_from_camera: Pose) -> Camera {
     Camera { world_from_camera, vertical_fov_rad: FRAC_PI_3, width: 160, height: 120, blur_px: 0.0 }
 }
 
-/// Looks straight down from above the origin.
+/// Returns a camera that looks straight down from above the origin.
 fn overhead(height_m: f32) -> Camera {
     camera(at(0.0, 0.0, height_m))
 }
@@ -66,12 +66,12 @@ fn look_at(eye_m: Vector, target_m: Vector) -> Camera {
     camera(Pose::look_at_rh(eye_m, target_m, Vector::Z).inverse())
 }
 
-/// A picture of what does not move.
+/// Renders an image of fixed things.
 fn render(scenery: &Scenery, camera: &Camera) -> Frame {
     cpu(scenery.clone()).render(&step(&[]), camera)
 }
 
-/// Index of the pixel that shows a point of the world.
+/// Returns the index of the pixel that shows a point of the world.
 fn pixel_at(camera: &Camera, point_m: Vector) -> usize {
     let ([u, v], _) = camera.project(point_m).expect("the point is in front of the camera");
     v as usize * camera.width as usize + u as usize
@@ -81,8 +81,9 @@ fn rgb(frame: &Frame, pixel: usize) -> [u8; 3] {
     [frame.rgb[3 * pixel], frame.rgb[3 * pixel + 1], frame.rgb[3 * pixel + 2]]
 }
 
-/// Compares the depth of each pixel with that of its ray (camera frame, 1 m deep), where there is one.
-/// `too_deep_m` is how far a faceted shape lies within the true one. Returns how many pixels were compared.
+/// Compares the depth of each pixel with that of its ray (camera frame, 1 m deep), if there is one.
+/// `too_deep_m` is the distance of a faceted shape inside the true one. Returns the number of compared
+/// pixels.
 fn check_depth(
     scenery: &Scenery,
     camera: &Camera,
@@ -108,7 +109,8 @@ fn check_depth(
 
 #[test]
 fn floor_depth_is_that_of_the_ray() {
-    // A large floor reaches behind every one of these cameras, and is cut at the near plane; the last is nearly in it.
+    // A large floor extends behind every one of these cameras, and is cut at the near plane; the last
+    // camera is almost in it.
     for (eye, target) in [
         (Vector::new(0.0, 0.0, 1.2), Vector::new(1.0, 0.0, 0.7)),
         (Vector::new(0.3, -2.0, 1.6), Vector::new(0.0, 0.5, 0.0)),
@@ -131,7 +133,8 @@ fn sphere_depth_is_that_of_the_ray() {
         &overhead(distance_m),
         0.008,
         |ray| {
-            // |depth * ray + distance * z|^2 = radius^2, the nearer solution; rays that graze the sphere are left out.
+            // |depth * ray + distance * z|^2 = radius^2, the nearer solution;
+            // rays that graze the sphere are left out.
             let (a, b) = (ray.length_squared(), -distance_m);
             let discriminant = b * b - a * (distance_m * distance_m - radius_m * radius_m);
             (discriminant > 0.5 * radius_m * radius_m).then(|| (-b - discriminant.sqrt()) / a)
@@ -194,7 +197,7 @@ fn ids_name_the_nearest_thing() {
 
 #[test]
 fn neighbouring_triangles_leave_no_gap() {
-    // Inside the picture of a closed shape nothing of the floor behind it may show, whichever way it is turned.
+    // Within the image of a closed shape nothing of the floor behind it may show, whichever way it is turned.
     for step in 0..24 {
         let rotation =
             Rotation::from_rotation_x(0.37 * step as f32) * Rotation::from_rotation_z(0.61 * step as f32);
@@ -208,7 +211,7 @@ fn neighbouring_triangles_leave_no_gap() {
             let frame = render(&scenery(vec![floor(), shape]), &camera);
             for (pixel, id) in frame.ids.iter().enumerate() {
                 let (u, v) = ((pixel % 160) as f32 + 0.5, (pixel / 160) as f32 + 0.5);
-                // The picture of the sphere that fits into all three, less a margin for facets.
+                // The image of the sphere that fits into all three, less a margin for facets.
                 let from_axis = camera.unproject([u, v], 1.0).truncate().length();
                 if from_axis < 0.9 * (0.3f32 / 0.7).asin().tan() {
                     assert_eq!(*id, 2, "step {step}: gap at ({u}, {v})");
@@ -222,12 +225,12 @@ fn neighbouring_triangles_leave_no_gap() {
 fn a_thing_in_the_sun_darkens_the_floor() {
     let camera = overhead(2.0);
     let block_at = |x: f32, z: f32| step(&[at(x, 0.0, z)]);
-    // One renderer for all three pictures: shadows must follow the step. The first block is below the floor.
+    // One renderer for all three images: shadows must follow the step. The first block is below the floor.
     let mut renderer = cpu(floor_and(TriangleMesh::cuboid(Vector::splat(0.05))));
     let empty = renderer.render(&block_at(0.0, -5.0), &camera);
     let left = renderer.render(&block_at(-0.3, 0.3), &camera);
     let right = renderer.render(&block_at(0.3, 0.3), &camera);
-    // The sun stands at (-0.306, 0.354, 0.884): from 0.3 m up, the shadow falls 0.104 m to +x and 0.12 m to -y.
+    // The sun is at (-0.306, 0.354, 0.884): from 0.3 m up, the shadow falls 0.104 m to +x and 0.12 m to -y.
     for (x, shaded, lit) in [(-0.3, &left, &right), (0.3, &right, &left)] {
         let pixel = pixel_at(&camera, Vector::new(x + 0.104, -0.12, 0.0));
         let [empty, shaded, lit] = [&empty, shaded, lit].map(|frame| rgb(frame, pixel));
@@ -238,7 +241,7 @@ fn a_thing_in_the_sun_darkens_the_floor() {
 
 #[test]
 fn fingers_cast_shadows() {
-    // 16 mm thick and 40 mm above a counter, as a finger over a table.
+    // 16 mm thick and 40 mm above a counter, like a finger over a table.
     let camera = overhead(1.0);
     let finger = (
         TriangleMesh::capsule(0.008, 0.04),
@@ -259,14 +262,14 @@ fn fingers_cast_shadows() {
 fn what_stands_darkens_the_floor_beside_it_and_what_hovers_leaves_it_bright() {
     let camera = look_at(Vector::new(-0.4, 0.0, 0.3), Vector::ZERO);
     let mut renderer = cpu(floor_and(TriangleMesh::cuboid(Vector::new(0.05, 0.05, 0.005))));
-    // Of the floor on the side that the sun shines on.
+    // Brightness of the floor on the sunlit side.
     let mut brightness = |height_m: f32, x: f32| {
         let frame = renderer.render(&step(&[at(0.0, 0.0, height_m)]), &camera);
         let pixel = pixel_at(&camera, Vector::new(x, 0.02, 0.0));
         assert_eq!(frame.ids[pixel], 1, "the pixel shows the floor");
         f32::from(rgb(&frame, pixel)[0])
     };
-    // A board at -5 m is not to be seen.
+    // A board at -5 m is invisible.
     assert!(brightness(0.005, -0.058) < 0.95 * brightness(-5.0, -0.058), "beside it");
     assert_eq!(brightness(0.005, -0.12), brightness(-5.0, -0.12), "further away");
     assert_eq!(brightness(0.1, -0.03), brightness(-5.0, -0.03), "below a board in the air");
@@ -293,7 +296,7 @@ fn textures_darken_parts_of_a_surface_and_leave_depth_and_ids_as_they_are() {
 
 #[test]
 fn an_edge_is_the_mean_of_both_sides_in_linear_light() {
-    // A wall whose edge runs through the middle of the picture's column 80, half a pixel to the right.
+    // A wall whose edge runs through the middle of the image's column 80, half a pixel to the right.
     let camera = overhead(1.0);
     let half_pixel_m = 0.5 / camera.focal_px();
     let frame =
@@ -363,7 +366,7 @@ fn colours_alone_are_those_of_the_whole_picture() {
     }
 }
 
-/// Renderers share what they need while they draw; what one has lit is nobody else's light.
+/// Renderers share buffers while they draw; light computed for one is not used by another.
 #[test]
 fn pictures_do_not_depend_on_who_else_draws() {
     let roof = |height_m: f32| {
@@ -400,8 +403,8 @@ fn pictures_do_not_depend_on_who_else_draws() {
 
 #[test]
 fn meshes_have_the_volume_of_their_shapes_and_normals_that_point_out() {
-    // A circle of twelve sides has 4.5 % less area, one of eight, as thin shapes have, 10 %, and a half circle of six turned around its
-    // axis 6.7 % less volume.
+    // A circle of twelve sides has 4.5 % less area, and one of eight, as in thin shapes, 10 %. A half
+    // circle of six sides turned around its axis has 6.7 % less volume.
     let (round, thin, ball) = (0.046, 0.1, 0.11);
     let tetrahedron = [Vector::ZERO, Vector::X, Vector::Y, Vector::Z];
     let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];

@@ -1,4 +1,4 @@
-//! Robots of files: those that lack joints, and those that a description makes of other people's MJCF.
+//! Robots of files: those that lack joints, and those that a description builds from third-party MJCF.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,7 +12,7 @@ fn walker() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../gateway/examples/robots/walker.toml")
 }
 
-/// The embedded robot's file without its fingers: what is left are the lines of 29 joints.
+/// Returns the embedded robot's file without its fingers: the lines of 29 joints remain.
 fn without_fingers() -> String {
     let mut text = assets::robot(DEFAULT_ROBOT).expect("embedded").to_string();
     let xml = roxmltree::Document::parse(&text).expect("XML");
@@ -65,7 +65,8 @@ fn a_robot_without_fingers_stands_with_joints_that_it_lacks_at_0() {
     }
 }
 
-/// Of another size, with other names, a waist that turns and arms of four joints: by the same controller, as the bench has it.
+/// A robot of another size, with other names, a waist that turns and arms of four joints. It is moved by
+/// the same controller, as in the bench.
 #[test]
 fn a_described_robot_stands_walks_and_squats() {
     let model = Arc::new(RobotSource::read(&walker()).expect("a robot").model);
@@ -81,7 +82,7 @@ fn a_described_robot_stands_walks_and_squats() {
     }
 }
 
-/// Why the description is refused once `from` in it has become `to`.
+/// Returns the error for the description with `from` replaced by `to`.
 #[track_caller]
 fn refusal(from: &str, to: &str) -> String {
     let text = std::fs::read_to_string(walker()).expect("the description");

@@ -30,7 +30,7 @@ fn world() -> World {
     World::new(&kitchen()).expect("embedded files load")
 }
 
-/// Commands that let both robots wave their arms in front of them, by control step.
+/// Returns the commands of both robots waving their arms in front of them, by control step.
 fn waving(rest: &[RobotCommand], step: u64) -> Vec<RobotCommand> {
     let time_s = step as f32 * CONTROL_DT_S;
     let wave = |joint: usize, robot: usize| {
@@ -50,7 +50,7 @@ fn rest(world: &World) -> Vec<RobotCommand> {
     (0..world.robots().len()).map(|robot| world.rest_command(robot)).collect()
 }
 
-/// The last step of several that wave.
+/// Runs several waving steps and returns the last one.
 fn run(world: &mut World, rest: &[RobotCommand], steps: u64) -> Step {
     let mut step = world.present();
     for _ in 0..steps {
@@ -83,7 +83,7 @@ fn robots_stand_while_their_arms_move() {
     assert!(sway.x < 0.015 && sway.y < 0.015 && sway.z < 0.005, "pelvis sways {sway} m");
 }
 
-/// A robot is its file: one with a torso of 10 kg stands and waves without a word of code.
+/// A robot is its file: one with a torso of 10 kg stands and waves without any code.
 #[test]
 fn another_robots_file_is_all_it_takes() {
     let ours = assets::robot(assets::DEFAULT_ROBOT).expect("embedded");

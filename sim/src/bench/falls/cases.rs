@@ -1,4 +1,4 @@
-//! The table of cases, and the worlds of those that are no task's.
+//! The table of cases, and the worlds of those that do not belong to a task.
 
 use std::f32::consts::{PI, TAU};
 
@@ -10,7 +10,7 @@ use crate::body::{ARM_COLUMNS, ARM_JOINTS};
 use crate::random::SplitMix64;
 use crate::{CONTROL_DT_S, ObjectPlacement, RobotPlacement, SimError, World, WorldSpec};
 
-/// One situation; a seed draws its commands and how things fall.
+/// One situation; a seed draws its commands and the initial poses.
 pub struct FallCase {
     pub name: &'static str,
     pub place: FallPlace,
@@ -21,9 +21,9 @@ pub struct FallCase {
 pub enum FallPlace {
     /// The world of a task, over the whole budget of its episodes.
     Task,
-    /// The world of a task, with its first robot dropped on one of its objects and what that stands on.
+    /// The world of a task, with its first robot dropped on one of its objects and the object's support.
     TaskFromAbove,
-    /// A robot alone on a floor that nothing balances.
+    /// A robot alone on a floor, without balance control.
     Floor,
     /// A robot dropped on another.
     OnRobot,
@@ -64,31 +64,37 @@ pub const FALL_CASES: [FallCase; 15] = [
     case("door_on_hand", FallPlace::Door, SLIGHT),
 ];
 
-/// Control steps of what is no whole budget: what falls lies still by then.
+/// Number of control steps of cases without a task's budget: falling things are at rest by then.
 const SHORT_STEPS: u32 = 300;
 const DROP_M: f32 = 1.0;
 /// Height of a robot's head.
 const HEAD_M: f32 = 1.3;
-/// A robot that lies reaches so far below its pelvis.
+/// Extent of a lying robot below its pelvis.
 const LYING_M: f32 = 0.15;
 const AIM_M: f32 = 0.2;
-/// Some objects hang on walls, and robots stand beside them: one that would begin within them is put elsewhere, a little higher.
+/// Maximum number of draws of a start pose, and the extra height per draw. Some objects hang on walls next
+/// to robots: a pose that overlaps with them is drawn again, a little higher.
 const DRAWS: usize = 1000;
 const HIGHER_M: f32 = 0.05;
 
-/// A robot before the doorway whose right arm goes through it, close to the post of the latch.
+/// Position of a robot before the doorway, whose right arm reaches through it, close to the latch post.
 const AT_DOOR_M: [f32; 2] = [-0.28, -0.25];
 const REACHING_RAD: [f32; ARM_JOINTS] = [-0.35, -0.2, 0.0, 0.3, 0.0, 0.0, 0.0];
 const HINGE: &str = "hinge";
 const OPEN_RAD: f64 = 1.2;
-/// When the door is let go, and how it is pushed shut: at its edge, at the height of the hand, as by a person in a hurry.
+/// Time at which the door is released, and its push: at its edge, at the height of the hand, as by a
+/// person in a hurry.
 const SHUTS_AFTER_S: f32 = 1.5;
 const SLAM_RAD_S: f64 = 3.0;
 const SHUTTING_N: f32 = 40.0;
 const EDGE_M: Vector = Vector::new(-0.025, -0.9, 1.0);
 
 impl FallCase {
-    /// The world of a case that is no task's.
+    /// Builds the world of a case that does not belong to a task.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if an embedded file cannot be used.
     pub fn world(&self) -> Result<World, SimError> {
         let robot =
             |name: &str, position_m: [f32; 2]| RobotPlacement { name: name.into(), position_m, yaw_rad: 0.0 };
@@ -108,7 +114,8 @@ impl FallCase {
         World::new(&WorldSpec { scene: "floor".into(), robots, objects })
     }
 
-    /// Plays one seed in `world`, that of a task or [`FallCase::world`]; `budget_steps` are the control steps of a task's episode.
+    /// Plays one seed in `world`, that of a task or [`FallCase::world`]; `budget_steps` is the number of
+    /// control steps of a task's episode.
     pub fn play(&self, world: &mut World, budget_steps: u32, seed: u64) -> FallTrial {
         let mut random = SplitMix64(seed ^ 0x5eed);
         match self.place {
@@ -153,13 +160,13 @@ impl FallCase {
                 let (sine, cosine) = (angle_rad as f32).sin_cos();
                 world.push_object(HINGE, EDGE_M, Vector::new(-cosine, -sine, 0.0) * SHUTTING_N);
             }
-            // It stands at the door until it is struck; what its arm does is drawn.
+            // It stands at the door until it is struck; its arm motion is drawn.
             vec![crate::RobotCommand { base: rest.base, ..robot.next(step) }]
         })
     }
 }
 
-/// Puts the first robot above one of the objects and what that stands on, where nothing is in its way.
+/// Puts the first robot above one of the objects and the object's support, at a pose without overlap.
 fn drop_on_an_object(world: &mut World, random: &mut SplitMix64) {
     let objects = world.present().objects;
     for draw in 0..DRAWS {
@@ -174,7 +181,7 @@ fn drop_on_an_object(world: &mut World, random: &mut SplitMix64) {
     panic!("the robot overlaps with something wherever it is put, up to {} m", HIGHER_M * DRAWS as f32);
 }
 
-/// On its front, its back or a side, about here.
+/// Returns a pose on the front, the back or a side, near `at_m`.
 fn lying(at_m: Vector, random: &mut SplitMix64) -> Pose {
     let mut by_m = || random.uniform([-AIM_M, AIM_M]);
     let at_m = at_m + Vector::new(by_m(), by_m(), 0.0);
@@ -187,7 +194,8 @@ fn lying(at_m: Vector, random: &mut SplitMix64) -> Pose {
 mod tests {
     use super::*;
 
-    /// The door strikes the arm in the doorway, and drives the robot, which stands otherwise, back from where it stood.
+    /// The door strikes the arm in the doorway, and drives the robot, which would stand otherwise, back
+    /// from its place.
     #[test]
     fn the_door_strikes_the_robot_before_it() {
         let case = FALL_CASES.iter().find(|case| case.name == "door_on_hand").expect("a case");
@@ -200,7 +208,7 @@ mod tests {
         }
     }
 
-    /// What is dropped meets a robot: otherwise the case would show nothing.
+    /// Dropped tables must meet a robot: otherwise the case would show nothing.
     #[test]
     fn tables_meet_robots() {
         let case = FALL_CASES.iter().find(|case| case.name == "table_on_robot").expect("a case");

@@ -1,4 +1,4 @@
-//! What staggering robots are told.
+//! Commands of staggering robots.
 
 use std::sync::Arc;
 
@@ -7,18 +7,18 @@ use crate::locomotion::{BaseCommand, BaseLimits};
 use crate::random::SplitMix64;
 use crate::{CONTROL_DT_S, RobotCommand, World};
 
-/// How a robot staggers.
+/// Parameters of a robot's staggering.
 #[derive(Clone, Copy, Debug)]
 pub struct Stagger {
-    /// Share of the way from rest to anywhere in its range that a joint is sent.
+    /// Amplitude of a joint's target, as a share of the way from rest to a random position in its range.
     pub amplitude_share: f32,
-    /// Control steps after which everything is drawn anew.
+    /// Number of control steps after which all targets are drawn anew.
     pub hold_steps: u32,
-    /// How fast targets move.
+    /// Speed of the targets.
     pub pace_rad_s: f32,
 }
 
-/// Base velocities are drawn up to this, and then what the controller can follow of it.
+/// Maximum drawn base velocities, before they are clamped to the controller's limits.
 const FASTEST_BASE_M_S: f32 = 0.5;
 const FASTEST_TURN_RAD_S: f32 = 0.5;
 
@@ -54,7 +54,7 @@ impl Staggering {
         self.rest_rad = rest_rad;
     }
 
-    /// The command of control step `step`, which count from 0.
+    /// Returns the command of control step `step`, counted from 0.
     pub fn next(&mut self, step: u32) -> RobotCommand {
         if step.is_multiple_of(self.how.hold_steps) {
             self.draw();

@@ -1,5 +1,6 @@
-//! A robot alone on a floor, all of whose joints, legs included, are sent anywhere by plain position targets: nothing balances. What
-//! it is told can be told to the same robot elsewhere, as `tests/peers/simulation/falls.py` does in MuJoCo.
+//! A robot alone on a floor without balance control: all joints, legs included, follow random position
+//! targets. The same commands can be sent to the robot in another simulator, as
+//! `tests/peers/simulation/falls.py` does in MuJoCo.
 
 use std::sync::Arc;
 
@@ -12,14 +13,14 @@ use crate::locomotion::{BaseCommand, BaseLimits, LegCommand, Locomotion};
 use crate::random::SplitMix64;
 use crate::{CONTROL_DT_S, PHYSICS_STEPS_PER_CONTROL, RobotCommand, Side, Sides, World};
 
-/// What a robot alone on a floor was told.
+/// Commands of a robot alone on a floor.
 #[derive(Clone, Debug, Serialize)]
 pub struct FloorEpisode {
     pub seed: u64,
     pub amplitude_share: f32,
     pub hold_steps: u32,
-    /// Joint targets at the end of each control step, in published order; within it they move there linearly, and the drives'
-    /// dampers are fed that speed forward.
+    /// Joint targets at the end of each control step, in published order. Within the step they move
+    /// there linearly, and the drives' dampers receive that speed as feedforward.
     pub targets_rad: Vec<Vec<f32>>,
 }
 
@@ -55,7 +56,7 @@ impl FloorEpisode {
     }
 }
 
-/// Sends the robot of a world of one robot anywhere.
+/// Sends random joint targets to the robot of a world of one robot.
 pub(super) fn thrash(world: &mut World, how: Stagger, steps: u32, seed: u64) -> FallTrial {
     let model = world.robots()[0].model.clone();
     let rest_rad = world.present().robots[0].sensed.joints.q_rad;

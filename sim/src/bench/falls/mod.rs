@@ -1,5 +1,5 @@
-//! Falls: robots that stagger, are dropped, are struck, and what physics makes of it. Nothing here is an episode's: a bench puts
-//! robots in the air and pushes doors.
+//! Falls: robots that stagger, are dropped or are struck, and the resulting physics. This is not part of
+//! an episode: a bench puts robots in the air and pushes doors.
 
 mod cases;
 mod commands;
@@ -16,18 +16,18 @@ use crate::dynamics::Diverged;
 use crate::world::{Extremes, Watch};
 use crate::{RobotCommand, World};
 
-/// How a world fared.
+/// Result of one trial.
 #[derive(Clone, Debug, Serialize)]
 pub struct FallTrial {
-    /// What was played, as a task and its seed.
+    /// The played case, for example a task and its seed.
     pub played: String,
     pub control_steps: u32,
-    /// Robots that lay at the end.
+    /// Number of fallen robots at the end.
     pub fallen: usize,
-    /// Where physics gave numbers that are not finite, if it did.
+    /// Place where physics gave numbers that are not finite, if it did.
     pub diverged: Option<String>,
     pub extremes: Extremes,
-    /// Where robots are alone on a floor: what they were told.
+    /// Commands of a robot alone on a floor.
     #[serde(skip)]
     pub floor: Option<FloorEpisode>,
 }
@@ -37,17 +37,17 @@ pub struct FallTrial {
 pub struct FallsCase {
     pub case: String,
     pub episodes: usize,
-    /// Robots that lay at the end of their episodes.
+    /// Number of fallen robots at the end of their episodes.
     pub fallen: usize,
     pub diverged: usize,
-    /// Where that was, episode by episode.
+    /// Places of the divergence, episode by episode.
     pub diverged_at: Vec<String>,
-    /// Episodes that broke each limit.
+    /// Number of episodes that broke each limit.
     pub broken: Broken,
     pub greatest: Extremes,
 }
 
-/// Episodes in which something was beyond its limit, see [`crate::world::Extremes`].
+/// Number of episodes that exceeded each limit, see [`crate::world::Extremes`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Broken {
     pub speed: usize,
@@ -60,12 +60,12 @@ pub struct Broken {
 #[derive(Clone, Debug, Serialize)]
 pub struct FallsReport {
     pub cases: Vec<FallsCase>,
-    /// What robots alone on a floor were told, and how they fared.
+    /// Trials of robots alone on a floor, with their commands.
     #[serde(skip)]
     pub floor: Vec<(FallTrial, FloorEpisode)>,
 }
 
-/// Plays `steps` control steps; `next` says what robots are told for each, and may disturb the world.
+/// Plays `steps` control steps; `next` gives the robots' commands for each, and may disturb the world.
 fn play(
     world: &mut World,
     steps: u32,
@@ -95,7 +95,7 @@ fn play(
 }
 
 impl FallsCase {
-    /// What the trials of one case come to.
+    /// Summarises the trials of one case.
     pub fn of(case: &str, trials: &[FallTrial]) -> FallsCase {
         let mut greatest = Extremes::default();
         let mut broken = Broken::default();
@@ -120,7 +120,7 @@ impl FallsCase {
         }
     }
 
-    /// Column heads of its lines: greatest values, and in brackets how many episodes were beyond the limit.
+    /// Column heads of its lines: greatest values, and in brackets the number of episodes beyond the limit.
     pub const HEAD: &str = "case                  episodes fallen diverged  fastest link    energy made        deeper than 2 cm      beyond range  fastest joint";
 }
 

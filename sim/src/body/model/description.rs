@@ -1,5 +1,5 @@
-//! A robot's description: a TOML file that says of somebody else's MJCF which of its joints are which of a robot's, where its wrists and
-//! its camera are, and what that file does not say of its drives.
+//! A robot's description: a TOML file that adapts third-party MJCF. It maps that file's joints to a
+//! robot's, places wrists and camera, and adds data of the drives that the MJCF lacks.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -9,33 +9,34 @@ use serde::Deserialize;
 use crate::SimError;
 use crate::user_file::{MAX_TEXT_BYTES, read_text};
 
-/// What the file says. Joints are called as published, but for those that are not.
+/// Content of the file. Joints have their published names, except where stated otherwise.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RobotDescription {
-    /// The MJCF file, from the folder of the description.
+    /// The MJCF file, relative to the folder of the description.
     pub model: PathBuf,
-    /// The embedded robot of which joints have effort, speed limit, armature and dry friction, where nothing else says them.
+    /// Embedded robot that supplies the joints' effort, speed limit, armature and dry friction where
+    /// nothing else gives them.
     pub like: Option<String>,
-    /// What the MJCF calls joints that it calls otherwise.
+    /// Names of joints in the MJCF, by published name, where they differ.
     #[serde(default)]
     pub joints: BTreeMap<String, String>,
-    /// Joints of the MJCF that nobody moves, as it calls them, and where each stays.
+    /// Fixed angles of MJCF joints that are not moved, by their MJCF names.
     #[serde(default)]
     pub held_rad: BTreeMap<String, f64>,
-    /// How waist, arms and hands are at rest, where it is not as in the MJCF's first key.
+    /// Rest angles of waist, arms and hands that differ from the MJCF's first key.
     #[serde(default)]
     pub rest_rad: BTreeMap<String, f32>,
     #[serde(default)]
     pub effort_n_m: BTreeMap<String, f32>,
     #[serde(default)]
     pub speed_limit_rad_s: BTreeMap<String, f32>,
-    /// Wrists, unless the MJCF has sites `left_wrist` and `right_wrist`.
+    /// Frames of the wrists, unless the MJCF has sites `left_wrist` and `right_wrist`.
     #[serde(default)]
     pub left_wrist: Option<BodyFrame>,
     #[serde(default)]
     pub right_wrist: Option<BodyFrame>,
-    /// The camera in the head, unless the MJCF has one that is called `egocentric`.
+    /// The camera in the head, unless the MJCF has one named `egocentric`.
     pub camera: Option<HeadCamera>,
 }
 
@@ -63,7 +64,7 @@ fn along_the_body() -> [f64; 4] {
 }
 
 impl RobotDescription {
-    /// The file's content, and its text.
+    /// Reads the file. Returns its content and its text.
     pub fn read(path: &Path) -> Result<(RobotDescription, String), SimError> {
         let file = path.display().to_string();
         let text = read_text(path, MAX_TEXT_BYTES)

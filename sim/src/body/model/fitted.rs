@@ -1,5 +1,6 @@
-//! A robot that a description makes of somebody else's MJCF. Masses, inertias, geometry and ranges are the MJCF's. Gains are the G1's for
-//! a robot of this weight and size, whatever its actuators have: the base controller counts on them.
+//! A robot built by a description from third-party MJCF. Masses, inertias, geometry and ranges are those
+//! of the MJCF. Gains are the G1's, scaled to this robot's weight and size, whatever its actuators
+//! specify: the base controller relies on them.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -18,8 +19,8 @@ use crate::mjcf::{AxisJoint, BodyTree, Document, LinkJoint, MjcfCamera};
 use crate::user_file::with_own_separators;
 use crate::{Side, Sides, SimError, assets};
 
-/// Reads a description, and the MJCF that it names, in which joints, wrists and camera are then called as of every robot; with a number
-/// that tells both from others.
+/// Reads a description and the MJCF that it names. In the returned document, joints, wrists and camera
+/// have the published names. The number is a fingerprint of both files.
 pub(super) fn read(path: &Path) -> Result<(RobotModel, Document, u64), SimError> {
     let (description, text) = RobotDescription::read(path)?;
     let folder = path.parent().unwrap_or(Path::new("."));
@@ -43,14 +44,14 @@ fn embedded(name: &str) -> Result<RobotModel, SimError> {
 }
 
 struct Fitting {
-    /// What messages call the description.
+    /// Name of the description in messages.
     file: String,
     description: RobotDescription,
     like: Option<RobotModel>,
     g1: RobotModel,
 }
 
-/// What the MJCF says of a joint in other places than on the joint itself.
+/// Data of a joint that the MJCF gives in places other than the joint itself.
 #[derive(Default)]
 struct SaidElsewhere {
     effort_range_n_m: Option<[f64; 2]>,
@@ -62,7 +63,7 @@ impl Fitting {
         SimError::Unsupported { file: self.file.clone(), what: what.into() }
     }
 
-    /// Names that the description gives numbers for, and joints that it gives names, are published ones.
+    /// Checks that all joints for which the description gives names or numbers are published ones.
     fn check_names(&self) -> Result<(), SimError> {
         let RobotDescription { joints, rest_rad, effort_n_m, speed_limit_rad_s, .. } = &self.description;
         let names = joint_names();
@@ -81,8 +82,8 @@ impl Fitting {
         Ok(())
     }
 
-    /// Gives joints their published names, and makes rigid those that are held. What the file says of joints beside them is told by
-    /// published name, and taken out of it.
+    /// Gives joints their published names, and makes held joints rigid. Returns the data that the file
+    /// gives outside the joints, by published name, and removes it from the document.
     fn rename_joints(&self, document: &mut Document) -> Result<BTreeMap<String, SaidElsewhere>, SimError> {
         let mut rest_rad = rest_rad(document)?;
         let mut said = BTreeMap::new();
@@ -127,7 +128,8 @@ impl Fitting {
         joints.iter().find(|(_, name)| *name == own).map_or(own, |(published, _)| published).into()
     }
 
-    /// Every joint of the file has a use or is held, and every name of the description is one of the file's joints.
+    /// Checks that every joint of the file has a use or is held, and that every name of the description
+    /// is one of the file's joints.
     fn check_joints_of(&self, document: &Document) -> Result<(), SimError> {
         let RobotDescription { model, joints, held_rad, .. } = &self.description;
         let model = model.display();
@@ -158,7 +160,7 @@ impl Fitting {
         Ok(())
     }
 
-    /// Adds the wrists and the camera that the description has.
+    /// Adds the wrists and the camera of the description.
     fn add_frames(&self, document: &mut Document) -> Result<(), SimError> {
         let RobotDescription { left_wrist, right_wrist, camera, .. } = &self.description;
         for (side, frame) in [(Side::Left, left_wrist), (Side::Right, right_wrist)] {
@@ -219,7 +221,8 @@ impl Fitting {
         Ok(model)
     }
 
-    /// A joint with what the file or the description says of it; what follows from the robot's size is still to come.
+    /// Returns a joint with the data of the file and the description; the parts that depend on the
+    /// robot's size follow later.
     fn joint(
         &self,
         joint: &AxisJoint,
@@ -272,7 +275,7 @@ impl Fitting {
         })
     }
 
-    /// Gains, rotor inertias that nobody says, and palms, as of a G1 of this weight and size.
+    /// Sets gains, missing rotor inertias, and palms to those of a G1 of this weight and size.
     fn derive_drives(&self, model: &mut RobotModel) {
         let scale = model.scale.clone();
         for (joint, g1) in model.joints.iter_mut().zip(&self.g1.joints).filter(|(joint, _)| joint.exists()) {
@@ -288,7 +291,7 @@ impl Fitting {
     }
 }
 
-/// Angles of the file's first key, by what the file calls the joints; none without a key.
+/// Returns the angles of the file's first key, by the file's joint names; empty without a key.
 fn rest_rad(document: &Document) -> Result<BTreeMap<String, f64>, SimError> {
     let Some(key) = document.keys()?.into_iter().next() else { return Ok(BTreeMap::new()) };
     let joints = document.model.bodies.iter().flat_map(|entry| &entry.body.joints);
@@ -304,7 +307,7 @@ fn rest_rad(document: &Document) -> Result<BTreeMap<String, f64>, SimError> {
     Ok(angles_rad)
 }
 
-/// The middle of what a foot stands on.
+/// Returns the middle of the area that a foot stands on.
 fn sole(tree: &BodyTree, link: usize) -> Option<SiteModel> {
     let corners_m = corners_m(&tree.links[link].geoms);
     let low_m = corners_m.iter().copied().reduce(Vector::min)?;
@@ -313,7 +316,7 @@ fn sole(tree: &BodyTree, link: usize) -> Option<SiteModel> {
     Some(SiteModel { link, link_from_site: Pose::from_translation(middle_m) })
 }
 
-/// A camera with the lens of the G1's: its y axis points up, and it looks along -z.
+/// Returns a camera with the lens of the G1's: its y axis points up, and it looks along -z.
 fn head_camera(camera: &HeadCamera, g1: &MjcfCamera) -> MjcfCamera {
     let (sine, cosine) = camera.down_deg.to_radians().sin_cos();
     let (right, up) = (-Vector::Y, Vector::new(sine, 0.0, cosine));

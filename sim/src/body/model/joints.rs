@@ -1,4 +1,4 @@
-//! The joints of a robot's file in published order, and rigid ones where it has none.
+//! The joints of a robot's file in published order, with rigid ones for those that it lacks.
 
 use rapier3d::math::Vector;
 
@@ -7,7 +7,7 @@ use crate::SimError;
 use crate::body::layout::{ARM_JOINTS, ARMS, HAND_JOINTS, HANDS, LEGS, WAIST, WAIST_JOINTS, joint_names};
 use crate::mjcf::{Actuator, ActuatorKind, AxisJoint, BodyTree, Document, LinkJoint};
 
-/// The joints that the file's actuators move.
+/// Returns the joints that the file's actuators move.
 pub(super) fn joints_of_file(document: &Document, tree: &BodyTree) -> Result<Vec<JointModel>, SimError> {
     let rest = document.keys()?.into_iter().next();
     let rest = rest.ok_or_else(|| document.unsupported("needs a <keyframe> to stand in"))?.positions;
@@ -20,7 +20,7 @@ pub(super) fn joints_of_file(document: &Document, tree: &BodyTree) -> Result<Vec
         if joints.iter().any(|joint| joint.link == link) {
             return Err(refuse("has two actuators; put both into one"));
         }
-        // Before a joint's own coordinate there are seven of the root, and one of each joint before it.
+        // A joint's own coordinate follows seven of the root, and one of each joint before it.
         let rest_rad = rest.get(6 + link).copied().unwrap_or(0.0) as f32;
         let joint = match &tree.links[link].joint {
             LinkJoint::Hinge(joint) => joint_model(joint, &actuator, link, rest_rad),
@@ -31,7 +31,8 @@ pub(super) fn joints_of_file(document: &Document, tree: &BodyTree) -> Result<Vec
     in_published_order(joints).map_err(|what| document.unsupported(what))
 }
 
-/// The joints that a robot has in published order, with those that it lacks. The text of an error says what would be right.
+/// Returns the joints in published order, including rigid ones for those that the robot lacks. The text
+/// of an error says what would be right.
 pub(super) fn in_published_order(mut found: Vec<JointModel>) -> Result<Vec<JointModel>, String> {
     let names = joint_names();
     if let Some(other) = found.iter().find(|joint| !names.contains(&joint.name)) {
@@ -50,7 +51,7 @@ pub(super) fn in_published_order(mut found: Vec<JointModel>) -> Result<Vec<Joint
     Ok(joints)
 }
 
-/// The link on which a joint of the published order is; `joints` are those before it.
+/// Returns the link that carries a joint of the published order; `joints` are those before it.
 fn carrier(joints: &[JointModel], index: usize) -> usize {
     let end = |first: usize, count: usize| joints[first + count - 1].link;
     for (first, hand) in ARMS.into_iter().zip(HANDS) {
@@ -65,7 +66,7 @@ fn carrier(joints: &[JointModel], index: usize) -> usize {
 }
 
 impl JointModel {
-    /// A joint that a robot lacks, in the link where it would be.
+    /// Creates a joint that a robot lacks, in the link where it would be.
     fn lacking(name: String, link: usize) -> JointModel {
         JointModel {
             name,

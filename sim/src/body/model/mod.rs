@@ -1,4 +1,5 @@
-//! A robot as its MJCF file describes it: links, joints with gains and limits, sites, cameras, self-collision pairs.
+//! A robot as its MJCF file describes it: links, joints with gains and limits, sites, cameras,
+//! self-collision pairs.
 
 mod description;
 mod fitted;
@@ -33,14 +34,14 @@ pub struct LinkModel {
     solid: Solid,
 }
 
-/// One actuated hinge, with the PD gains and limits of its position actuator. A joint of the published order that the robot lacks is
-/// rigid: it stands at 0 and turns about no axis, so that no force has a moment about it.
+/// One actuated hinge, with the PD gains and limits of its position actuator. A joint of the published order
+/// that the robot lacks is rigid: it is at 0 and has a zero axis, so that no force has a moment about it.
 #[derive(Clone, Debug)]
 pub struct JointModel {
     pub name: String,
-    /// The link that it carries; of a joint that the robot lacks the one in which it would be.
+    /// Link that the joint moves; for a joint that the robot lacks, the link in which it would be.
     pub link: usize,
-    /// The axis in the link's frame; 0 of a joint that the robot lacks.
+    /// The axis in the link's frame; zero for a joint that the robot lacks.
     pub axis: Vector,
     pub lower_rad: f32,
     pub upper_rad: f32,
@@ -49,14 +50,14 @@ pub struct JointModel {
     pub kp_n_m_rad: f32,
     pub kd_n_m_s_rad: f32,
     pub effort_n_m: f32,
-    /// At which its motor can push no further; infinite if the file does not say.
+    /// Speed at which the motor can push no further; infinite if the file gives none.
     pub speed_limit_rad_s: f32,
     /// Coordinate in the file's first keyframe.
     pub rest_rad: f32,
 }
 
 impl JointModel {
-    /// Whether the robot has this joint.
+    /// Returns true if the robot has this joint.
     pub fn exists(&self) -> bool {
         self.axis != Vector::ZERO
     }
@@ -74,25 +75,25 @@ pub struct SiteModel {
 pub struct RobotModel {
     /// Parents before children; 0 is the pelvis.
     pub links: Vec<LinkModel>,
-    /// Published order.
+    /// Joints in published order.
     pub joints: Vec<JointModel>,
-    /// The frames that tasks put somewhere.
+    /// The frames that tasks give targets for.
     pub wrists: Sides<SiteModel>,
-    /// Centre of the sole.
+    /// Centres of the soles.
     pub soles: Sides<SiteModel>,
-    /// Points of the link that carries a sole on which it can stand, in that link's frame.
+    /// Points on which each foot can stand, in the frame of the link that carries the sole.
     pub sole_corners_m: Sides<Vec<Vector>>,
-    /// Where the inertial measurement unit is: site `imu` of the pelvis, or the pelvis' own origin.
+    /// Position of the inertial measurement unit: site `imu` of the pelvis, or the pelvis' own origin.
     pub imu_in_pelvis_m: Vector,
     pub egocentric: MjcfCamera,
     pub egocentric_link: usize,
     pub mass_kg: f32,
-    /// How large it is beside the robot for which the base controller's numbers were found.
+    /// Size relative to the robot for which the base controller's parameters were tuned.
     pub scale: BodyScale,
     /// Link pairs that never touch, smaller index first.
     excluded: BTreeSet<(usize, usize)>,
     pub hands: Sides<HandLinks>,
-    /// What its file says that does not happen quite as in MuJoCo.
+    /// Elements of its file that are only approximated relative to MuJoCo.
     pub approximations: Vec<String>,
 }
 
@@ -108,12 +109,12 @@ pub struct HandLinks {
 }
 
 impl RobotModel {
-    /// Pairs of links that never touch.
+    /// Returns the pairs of links that never touch.
     pub(crate) fn apart(&self) -> impl Iterator<Item = (usize, usize)> {
         self.excluded.iter().copied()
     }
 
-    /// World poses of all links for a pelvis pose and joint coordinates in published order.
+    /// Returns the world poses of all links for a pelvis pose and joint coordinates in published order.
     pub fn forward_kinematics(&self, pelvis: Pose, q_rad: &[f32]) -> Vec<Pose> {
         let mut world_from_link: Vec<Pose> = Vec::with_capacity(self.links.len());
         for link in &self.links {
@@ -129,14 +130,15 @@ impl RobotModel {
         world_from_link
     }
 
-    /// How far what collides of the robot reaches along a direction of the world, a unit vector, from the world's origin, with
-    /// its links at these poses.
+    /// Returns the extent of the robot's colliding shapes along a world direction (a unit vector) from
+    /// the world's origin, with its links at these poses.
     pub fn reach_m(&self, world_from_link: &[Pose], direction: Vector) -> f32 {
         let links = self.links.iter().zip(world_from_link);
         links.map(|(link, pose)| link.solid.reach_m(pose, direction)).fold(f32::NEG_INFINITY, f32::max)
     }
 
-    /// The link that the embedded robot's file calls so: the pelvis, or the one that carries the joint of that name.
+    /// Returns the link with this name in the embedded robot's file: the pelvis, or the one that carries
+    /// the joint of that name.
     pub fn published_link(&self, name: &str) -> Option<usize> {
         let joint = match name {
             "pelvis" => return Some(0),
@@ -146,7 +148,7 @@ impl RobotModel {
         self.joints.iter().find(|candidate| candidate.name == joint).map(|found| found.link)
     }
 
-    /// Whether it has a hand that can close: a thumb, and a finger against it.
+    /// Returns true if the robot has a hand that can close: a thumb, and a finger against it.
     pub fn has_fingers(&self) -> bool {
         self.hands.iter().any(|hand| !hand.thumb.is_empty() && !hand.fingers.is_empty())
     }

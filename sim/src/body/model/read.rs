@@ -1,5 +1,5 @@
-//! A robot's file: a mechanism as any other, and on top of it the layout of a robot: which joints its actuators move and in
-//! which order, where hands and soles are, where it sees from, how it stands.
+//! Reading of a robot's file: a mechanism like any other, and on top of it the layout of a robot. The
+//! layout consists of the joints and their order, hands, soles, camera and stance.
 
 use std::collections::BTreeSet;
 
@@ -12,20 +12,29 @@ use crate::mechanism::Solid;
 use crate::mjcf::{BodyTree, Document, Geom, LinkJoint, MjcfCamera, pose};
 use crate::{Side, Sides, SimError};
 
-/// A foot stands on what is lowest of it, to within this.
+/// Height above a foot's lowest point up to which its corners belong to the sole.
 const SOLE_M: f32 = 0.002;
-/// Middle of the palm, from a wrist, whose x axis points along the fingers.
+/// Middle of the palm in the frame of a wrist, whose x axis points along the fingers.
 pub(super) const PALM_IN_WRIST_M: Vector = Vector::new(0.12, 0.0, 0.0);
 
 impl RobotModel {
     /// Reads a robot's MJCF: see [`RobotModel::of`].
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the text is not MJCF or does not describe a robot.
     pub fn parse(file: &str, xml: &str) -> Result<RobotModel, SimError> {
         RobotModel::of(&Document::parse(file, xml)?)
     }
 
-    /// The robot of a document that has what is asked of a robot: one free root body, hinges with position actuators, called as the
-    /// published joints, sites `left_wrist`, `right_wrist`, `left_foot`, `right_foot`, a camera `egocentric` and a first keyframe to stand
-    /// in. Its waist, arms and hands may lack joints.
+    /// Builds the robot of a document that meets the requirements on a robot. These are one free root
+    /// body, hinges with position actuators and the published joint names, and sites `left_wrist`,
+    /// `right_wrist`, `left_foot` and `right_foot`. It also needs a camera `egocentric` and a first
+    /// keyframe to stand in. Its waist, arms and hands may lack joints.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error that names the first requirement that the document does not meet.
     pub fn of(document: &Document) -> Result<RobotModel, SimError> {
         let tree = only_tree(document)?;
         let joints = joints_of_file(document, &tree)?;
@@ -34,7 +43,7 @@ impl RobotModel {
     }
 }
 
-/// The robot of a tree whose joints and soles are known.
+/// Builds the robot of a tree whose joints and soles are known.
 pub(super) fn assemble(
     document: &Document,
     tree: &BodyTree,
@@ -61,7 +70,8 @@ pub(super) fn assemble(
     })
 }
 
-/// The tree that a robot is. What a file has beside it would not come along when the robot is put into a world.
+/// Returns the tree of a robot. Other content of the file would not be included when the robot is put
+/// into a world, so it is an error.
 pub(super) fn only_tree(document: &Document) -> Result<BodyTree, SimError> {
     let mut trees = document.trees()?.into_iter();
     let world = trees.next().into_iter().flat_map(|world| world.links);
@@ -102,7 +112,7 @@ fn links(document: &Document, tree: &BodyTree, joints: &[JointModel]) -> Result<
     tree.links.iter().enumerate().map(read).collect()
 }
 
-/// The camera in the head, and the link that carries it.
+/// Returns the camera in the head, and the link that carries it.
 fn camera(document: &Document, tree: &BodyTree) -> Result<(MjcfCamera, usize), SimError> {
     let camera = document.cameras.iter().find(|camera| camera.name == "egocentric");
     let needed = || document.unsupported("needs a <camera name=\"egocentric\"> in the head");
@@ -112,7 +122,7 @@ fn camera(document: &Document, tree: &BodyTree) -> Result<(MjcfCamera, usize), S
     Ok((MjcfCamera { body_from_camera, ..camera.clone() }, link))
 }
 
-/// The sites `left_NAME` and `right_NAME`.
+/// Returns the sites `left_NAME` and `right_NAME`.
 fn sites(
     document: &Document,
     tree: &BodyTree,
@@ -131,8 +141,8 @@ fn sites(
     Ok(Sides { left: site(Side::Left)?, right: site(Side::Right)? })
 }
 
-/// What of a foot stands on the floor: of a sphere its lowest point, of anything else the lower corners of its box; without those of
-/// shapes that end higher.
+/// Returns the points of a foot that rest on the floor. For a sphere it is its lowest point, for any
+/// other shape the lower corners of its box. Points of shapes that end higher are left out.
 pub(super) fn corners_m(geoms: &[Geom]) -> Vec<Vector> {
     let colliding = geoms.iter().filter(|geom| geom.collides).filter_map(Geom::collider);
     let corners = colliding.flat_map(|(link_from_shape, shape)| match shape.as_ball() {
@@ -156,7 +166,7 @@ fn imu_in_pelvis_m(tree: &BodyTree) -> Vector {
     imu.map_or(Vector::ZERO, |site| site.body_from_site.translation)
 }
 
-/// Link pairs that never touch: those that the file names, and neighbours.
+/// Returns link pairs that never touch: those that the file names, and neighbours.
 fn excluded(document: &Document, tree: &BodyTree) -> Result<BTreeSet<(usize, usize)>, SimError> {
     let mut excluded = BTreeSet::new();
     for pair in document.exclusions()? {
@@ -169,7 +179,7 @@ fn excluded(document: &Document, tree: &BodyTree) -> Result<BTreeSet<(usize, usi
     Ok(excluded)
 }
 
-/// The links that fingers move, in the order of links, and where the palm is from the wrist.
+/// Returns the links that fingers move, in the order of links, and the palm's position relative to the wrist.
 fn hand(joints: &[JointModel], side: Side, wrist: &SiteModel) -> HandLinks {
     let (thumb, fingers) = joints[HANDS[side]..HANDS[side] + HAND_JOINTS].split_at(THUMB_JOINTS);
     let links = |joints: &[JointModel]| {
@@ -190,7 +200,7 @@ mod tests {
     use super::*;
     use crate::assets;
 
-    /// Why the embedded robot is refused once `from` in its file has become `to`.
+    /// Returns the error for the embedded robot's file with `from` replaced by `to`.
     #[track_caller]
     fn refusal(from: &str, to: &str) -> String {
         let text = assets::robot(assets::DEFAULT_ROBOT).expect("embedded");

@@ -1,8 +1,9 @@
-//! How large a robot is beside the G1, for which the base controller's numbers were found.
+//! The size of a robot relative to the G1, for which the base controller's parameters were tuned.
 //!
-//! Two bodies that differ in size alone, with lengths as l to 1 and masses as m to 1, move alike if times are as sqrt(l) to 1, for
-//! gravity is the same for both: accelerations are then equal, speeds as sqrt(l), forces as m and torques as m l to 1 (Froude's
-//! similarity). Where bodies differ in more than size, in soles and hips, each of these has its own ratio.
+//! Consider two bodies that differ only in size, with lengths as l to 1 and masses as m to 1. They move
+//! alike if times are as sqrt(l) to 1, because gravity is the same for both. Accelerations are then
+//! equal, speeds as sqrt(l), forces as m and torques as m l to 1 (Froude's similarity). Where bodies
+//! differ in more than size, in soles and hips, each of these has its own ratio.
 
 use rapier3d::math::{Pose, Vector};
 
@@ -10,26 +11,26 @@ use super::RobotModel;
 use crate::body::layout::{JOINTS, LEG_JOINTS, LEGS};
 use crate::{GRAVITY_M_S2, Side};
 
-/// Ratios to the G1. Whatever is asked of it is a number of the G1's, and that of this robot is given.
+/// Ratios to the G1. Each method converts a value for the G1 to the value for this robot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BodyScale {
     length_ratio: f32,
     time_ratio: f32,
     mass_ratio: f32,
-    /// How much higher the pelvis stands than a G1's of this size.
+    /// Height of the pelvis above that of a G1 of this size.
     higher_m: f32,
     hip_width_ratio: f32,
     sole_length_ratio: f32,
     sole_width_ratio: f32,
-    /// How much wider a sole is than a G1's of this size.
+    /// Width of a sole beyond that of a G1 of this size.
     wider_sole_m: f32,
-    /// Ankle roll link to the centre of its sole.
+    /// Vector from the ankle roll link to the centre of its sole.
     pub sole_in_foot_m: Vector,
-    /// How far ankles can hold the whole weight from under them, ahead and to the side.
+    /// Distances at which ankles can hold the whole weight, ahead and to the side.
     pub ankle_reach_m: [f32; 2],
 }
 
-/// An ankle that holds a robot needs some of its effort for other things.
+/// Share of an ankle's effort available for holding the robot.
 const ANKLE_EFFORT_USED: f32 = 0.8;
 
 impl BodyScale {
@@ -47,7 +48,7 @@ impl BodyScale {
         ankle_reach_m: [f32::INFINITY; 2],
     };
 
-    /// The scale of a robot whose legs have their rest angles.
+    /// Computes the scale of a robot, whose legs must have their rest angles.
     pub(super) fn between(g1: &RobotModel, own: &RobotModel) -> BodyScale {
         let length_ratio = own.leg_m() / g1.leg_m();
         let [own_sole_m, g1_sole_m] = [own, g1].map(RobotModel::sole_half_extents_m);
@@ -71,32 +72,32 @@ impl BodyScale {
         g1_m * self.length_ratio
     }
 
-    /// A height of the pelvis over the ground.
+    /// Scales a height of the pelvis over the ground.
     pub fn height_m(&self, g1_m: f32) -> f32 {
         g1_m * self.length_ratio + self.higher_m
     }
 
-    /// The same in double precision.
+    /// Scales a height of the pelvis in double precision.
     pub fn precise_height_m(&self, g1_m: f64) -> f64 {
         g1_m * f64::from(self.length_ratio) + f64::from(self.higher_m)
     }
 
-    /// A distance between feet, to their sides, with the feet as far apart as the hips.
+    /// Scales a lateral distance between feet that are as far apart as the hips.
     pub fn stance_width_m(&self, g1_m: f32) -> f32 {
         g1_m * self.hip_width_ratio
     }
 
-    /// A distance between feet, to their sides, that keeps their soles apart.
+    /// Scales a lateral distance between feet that keeps their soles apart.
     pub fn apart_m(&self, g1_m: f32) -> f32 {
         g1_m * self.length_ratio + self.wider_sole_m
     }
 
-    /// A distance along a sole.
+    /// Scales a distance along a sole.
     pub fn along_sole_m(&self, g1_m: f32) -> f32 {
         g1_m * self.sole_length_ratio
     }
 
-    /// A distance across a sole.
+    /// Scales a distance across a sole.
     pub fn across_sole_m(&self, g1_m: f32) -> f32 {
         g1_m * self.sole_width_ratio
     }
@@ -105,17 +106,17 @@ impl BodyScale {
         g1_s * self.time_ratio
     }
 
-    /// A rate per time, or an angular velocity.
+    /// Scales a rate per time, or an angular velocity.
     pub fn rate_1_s(&self, g1_1_s: f32) -> f32 {
         g1_1_s / self.time_ratio
     }
 
-    /// A stiffness per mass, or an angular acceleration.
+    /// Scales a stiffness per mass, or an angular acceleration.
     pub fn rate_1_s2(&self, g1_value: f32) -> f32 {
         g1_value / self.length_ratio
     }
 
-    /// An angle per length.
+    /// Scales an angle per length.
     pub fn per_length(&self, g1_rad_m: f32) -> f32 {
         g1_rad_m / self.length_ratio
     }
@@ -128,12 +129,12 @@ impl BodyScale {
         g1_n * self.mass_ratio
     }
 
-    /// A moment, or a stiffness about an axis.
+    /// Scales a moment, or a stiffness about an axis.
     pub fn moment_n_m(&self, g1_n_m: f32) -> f32 {
         g1_n_m * (self.mass_ratio * self.length_ratio)
     }
 
-    /// A damping about an axis.
+    /// Scales a damping about an axis.
     pub fn damping_n_m_s(&self, g1_n_m_s: f32) -> f32 {
         g1_n_m_s * (self.mass_ratio * self.length_ratio * self.time_ratio)
     }
@@ -144,13 +145,13 @@ impl BodyScale {
 }
 
 impl RobotModel {
-    /// Origin of a joint of the left leg in the pelvis frame, the joints as in `q_rad`.
+    /// Returns the origin of a joint of the left leg in the pelvis frame, with the joints as in `q_rad`.
     pub(super) fn leg_joint_m(&self, index: usize, q_rad: &[f32]) -> Vector {
         let poses = self.forward_kinematics(Pose::IDENTITY, q_rad);
         poses[self.joints[LEGS.left + index].link].translation
     }
 
-    /// From the axis of the hip that rolls over the knee to the ankle.
+    /// Returns the length of a leg from the hip's roll axis over the knee to the ankle.
     pub(super) fn leg_m(&self) -> f32 {
         let [hip_m, knee_m, ankle_m] = [1, 3, LEG_JOINTS - 1].map(|i| self.leg_joint_m(i, &[0.0; JOINTS]));
         (knee_m - hip_m).length() + (ankle_m - knee_m).length()
@@ -160,7 +161,7 @@ impl RobotModel {
         self.leg_joint_m(1, &[0.0; JOINTS]).y
     }
 
-    /// Of the pelvis over the soles, as the robot stands at rest.
+    /// Returns the height of the pelvis over the soles at rest.
     fn rest_height_m(&self) -> f32 {
         let poses = self.forward_kinematics(Pose::IDENTITY, &self.rest_rad());
         let sole = &self.soles[Side::Left];
@@ -180,7 +181,7 @@ mod tests {
     use super::*;
     use crate::body::posed::model;
 
-    /// So a robot that is described as the G1 is moved as the G1 is, but for ankles that are stronger than it needs.
+    /// A robot described like the G1 is moved like the G1, except that its ankles are stronger than it needs.
     #[test]
     fn the_g1_has_the_scale_of_a_g1() {
         let own = BodyScale::between(model(), model());
@@ -188,7 +189,7 @@ mod tests {
         assert_eq!(BodyScale { ankle_reach_m: BodyScale::G1.ankle_reach_m, ..own }, BodyScale::G1);
     }
 
-    /// Of a body four times as long and twice as heavy, which is slower by half.
+    /// A body four times as long and twice as heavy is slower by half.
     #[test]
     fn numbers_go_with_their_units() {
         let scale =
@@ -200,7 +201,7 @@ mod tests {
             (20.0, 24.0, 48.0)
         );
         assert_eq!((scale.inertia_kg_m2(1.0), scale.height_m(0.5)), (32.0, 2.1));
-        // A stiffness about an axis holds a weight at a length: both change alike.
+        // A stiffness about an axis holds a weight at a length: both scale alike.
         let weight_n_m = scale.force_n(1.0) * scale.length_m(1.0);
         assert_eq!(scale.moment_n_m(1.0), weight_n_m);
     }

@@ -1,4 +1,4 @@
-//! Where a robot comes from: an embedded file, MJCF of somebody's own, or a description of somebody else's.
+//! Sources of a robot: an embedded file, the user's own MJCF, or a description of third-party MJCF.
 
 use std::path::Path;
 
@@ -10,14 +10,19 @@ use crate::{SimError, assets};
 #[derive(Debug)]
 pub struct RobotSource {
     pub model: RobotModel,
-    /// The MJCF, in which joints, wrists and camera are called as of every robot.
+    /// The MJCF, in which joints, wrists and camera have their published names.
     pub document: Document,
-    /// Tells robots of different files apart, with all that these name.
+    /// Hash that distinguishes robots of different files, including all files that these name.
     pub fingerprint: u64,
 }
 
 impl RobotSource {
-    /// Reads a file: MJCF as [`RobotModel::of`] takes it, or, called `.toml`, a description of somebody else's MJCF.
+    /// Reads a file: MJCF for [`RobotModel::of`], or with the extension `.toml` a description of
+    /// third-party MJCF.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if a file cannot be read or does not describe a robot.
     pub fn read(path: &Path) -> Result<RobotSource, SimError> {
         if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml")) {
             let (model, document, fingerprint) = fitted::read(path)?;
@@ -26,7 +31,11 @@ impl RobotSource {
         RobotSource::of(Document::read(path)?)
     }
 
-    /// An embedded robot.
+    /// Reads an embedded robot.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if no embedded robot has this name.
     pub fn embedded(name: &str) -> Result<RobotSource, SimError> {
         RobotSource::of(Document::parse(name, assets::robot(name)?)?)
     }

@@ -1,4 +1,4 @@
-//! How a robot stands at rest: its legs bent as much as a G1's, its soles flat under its centre of mass.
+//! The rest posture of a robot: its legs bent as much as a G1's, its soles flat under its centre of mass.
 
 use rapier3d::math::{Pose, Vector};
 
@@ -14,7 +14,7 @@ const NEWTON_STEPS: usize = 12;
 const STEP_RAD: f32 = 0.02;
 
 impl RobotModel {
-    /// Bends the legs as they are to be at rest; all other joints have their rest angles.
+    /// Bends the legs to their rest angles; all other joints keep theirs.
     pub(super) fn bend_legs(&mut self, g1: &RobotModel) {
         let wanted = g1.extension(&g1.rest_rad());
         let mut q_rad: [f32; JOINTS] = std::array::from_fn(|joint| self.joints[joint].rest_rad);
@@ -28,7 +28,7 @@ impl RobotModel {
         }
         set(&mut q_rad, HIP, -0.5 * low_rad);
         set(&mut q_rad, ANKLE, -0.5 * low_rad);
-        // Newton's method, with differences for derivatives.
+        // Newton's method, with finite differences for derivatives.
         for _ in 0..NEWTON_STEPS {
             let off = self.off_balance(&q_rad);
             let [by_hip, by_ankle] = [HIP, ANKLE].map(|index| {
@@ -58,13 +58,14 @@ impl RobotModel {
         }
     }
 
-    /// How far the left leg is stretched: hip to ankle, as a part of its length.
+    /// Returns the extension of the left leg: distance from hip to ankle, as a share of its length.
     fn extension(&self, q_rad: &[f32]) -> f32 {
         let [hip_m, ankle_m] = [1, LEG_JOINTS - 1].map(|index| self.leg_joint_m(index, q_rad));
         (ankle_m - hip_m).length() / self.leg_m()
     }
 
-    /// x: how far the centre of mass is ahead of the left sole's centre (m); y: how far that sole's toes point down (rad).
+    /// Returns the balance errors. x: distance of the centre of mass ahead of the left sole's centre
+    /// (m); y: downward pitch of that sole's toes (rad).
     fn off_balance(&self, q_rad: &[f32]) -> Vector {
         let poses = self.forward_kinematics(Pose::IDENTITY, q_rad);
         let moments = self.links.iter().zip(&poses);

@@ -1,4 +1,4 @@
-//! Colliders: convex shapes on links and in the world, and where they are in a step.
+//! Colliders: convex shapes on links and in the world, and their poses in a step.
 
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::shape::TypedShape;
@@ -10,46 +10,50 @@ use crate::dynamics::settings::Settings;
 use crate::dynamics::trees::{LinkId, Trees};
 use crate::dynamics::{DMat3, DPose3, DVec3};
 
-/// A collider of a world; they count in the order in which they were added.
+/// Index of a collider of a world. Colliders are numbered in the order in which they were added.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct ColliderId(pub(in crate::dynamics) u32);
 
 /// A convex shape that touches others.
 pub struct Collider {
     pub shape: SharedShape,
-    /// The link that carries it, or the world.
+    /// The link that carries the collider; `None` for the world.
     pub on: Option<LinkId>,
     /// Pose of the shape in the link's frame, or in the world's.
     pub body_from_shape: DPose3,
     pub friction: Friction,
-    /// Whether it goes on for ever along its x and y axes. The shape is then the part of it near something else.
+    /// True if the collider extends without end along its x and y axes. Its shape is then only the part
+    /// of it near another collider.
     pub endless: bool,
-    /// Tells whoever owns the world whose collider it is.
+    /// Tag by which the owner of the world recognises the collider.
     pub tag: u128,
 }
 
-/// A collider where it is in this step.
+/// A collider at its pose in this step.
 pub struct Surface {
     pub collider: Collider,
-    /// The link that carries it, if something moves that.
+    /// The link that carries it; `None` if nothing moves that link.
     pub body: Option<LinkId>,
-    /// Whether it rolls on what Parry takes for edges and corners; of balls it knows where they touch.
+    /// True if the shape rolls on features that Parry treats as edges and corners. Balls are not round
+    /// in this sense: Parry finds their point of contact exactly.
     pub is_round: bool,
-    /// Middle and half extents of its bounds, in its own frame.
+    /// Centre and half extents of the bounds, in the shape's frame.
     middle_m: DVec3,
     half_m: DVec3,
     half_length_m: f64,
     pub world_from_shape: DPose3,
-    /// How near another surface may be that it could touch within the step; each side of a pair has a part in it.
+    /// Distance that the surface may close within the step. Two surfaces can touch if their distance is
+    /// below the sum of both.
     pub reach_m: f64,
-    /// World frame, with its reach.
+    /// Bounds in the world frame, grown by `reach_m`.
     pub bounds: Aabb,
 }
 
-/// The part of an endless collider that counts is moved by whole multiples of this. A shape has to reach farther than this
-/// beyond what it meets; between two moves it lies still, and points of contact continue those of the step before.
+/// Distance by whose whole multiples the shape of an endless collider is moved. The shape has to extend
+/// farther than this beyond what it meets. Between two moves it stays still, so that contact points
+/// continue those of the step before.
 const TILE_M: f64 = 32.0;
-/// Bounds of an endless collider, from its middle.
+/// Half extent of an endless collider's bounds.
 const ENDLESS_M: f64 = 1e6;
 
 impl ColliderId {
@@ -84,7 +88,7 @@ impl Surface {
         surface
     }
 
-    /// Puts it where its link is now, which turns this fast.
+    /// Places the surface by the pose and the spin of its link.
     #[inline(always)]
     pub fn place(&mut self, world_from_body: &DPose3, spin_rad_s: f64, trees: &Trees, settings: &Settings) {
         self.world_from_shape = *world_from_body * self.collider.body_from_shape;
@@ -103,13 +107,14 @@ impl Surface {
         self.bounds = Aabb::new((middle_m - half_m).as_vec3(), (middle_m + half_m).as_vec3());
     }
 
-    /// The vector from the middle of this surface to that of another, in the frame of this one.
+    /// Returns the vector from the centre of this surface to that of another, in the frame of this one.
     pub fn towards(&self, other: &Surface) -> DVec3 {
         let middle_m = other.world_from_shape * other.middle_m;
         self.world_from_shape.inverse() * middle_m - self.middle_m
     }
 
-    /// Where the shape is that another surface may meet: of an endless collider the part that lies beside that one.
+    /// Returns the pose of the shape that another surface may meet. The shape of an endless collider is
+    /// moved next to that surface.
     pub fn beside(&self, other: &Surface) -> DPose3 {
         let other_m = other.world_from_shape * other.middle_m;
         let near = other_m.distance_squared(self.world_from_shape.translation) < (0.5 * TILE_M).powi(2);

@@ -1,8 +1,9 @@
-//! From where the colliders are to candidates for contacts.
+//! Collision detection: from the poses of colliders to candidates for contacts.
 //!
-//! Parry moves the points of a pair along while it hardly turns: of two faces that lie on each other it would choose now the
-//! one and now the other. So the points of the last step are part of the state. What is round may turn by far less: the place where it
-//! touches runs ahead of a point that goes along with it, and a force that acts behind that place drives it on.
+//! Parry carries the points of a pair along while the pair hardly turns. Of two faces that touch it
+//! would otherwise choose one in some steps and the other in others. So the points of the last step are
+//! part of the state. Round shapes may turn by far less. Their place of contact runs ahead of a point
+//! that is carried along, and a force that acts behind that place accelerates the shape.
 
 use pulp::{Arch, Simd, WithSimd};
 use rapier3d::math::Vector;
@@ -23,11 +24,12 @@ use crate::dynamics::trees::spatial::rounded;
 use crate::dynamics::trees::{LinkId, Trees};
 use crate::dynamics::{DPose3, DVec3};
 
-/// So far (rad) a round shape turns before its points are sought anew. At the degree that Parry allows, a bottle that whirled on its rim
-/// by two degrees gained energy until it fell over, and a cylinder that rolled at 5 cm/s sped up to 18; at none at all, what stands
-/// still gets other corners of its round base in every step and trembles.
+/// Angle by which a round shape turns before its points are searched anew, in rad. At the one degree
+/// that Parry allows, a bottle that whirled on its rim by two degrees gained energy until it fell over.
+/// A cylinder that rolled at 5 cm/s reached 18 cm/s. At zero, a shape at rest on a round base gets other
+/// corners in every step and trembles.
 const ROUND_TURNS_RAD: f64 = 0.001;
-/// Two faces lie on each other where no point is deeper than their corners by this.
+/// Two faces are in full contact if no point is deeper than their corners by more than this.
 const FACE_M: f32 = 0.001;
 
 #[derive(Default)]
@@ -38,12 +40,12 @@ pub struct Collision {
     pub candidates: Vec<Candidate>,
     /// Manifolds of the last step that have points, in the order of their colliders.
     pub manifolds: Vec<Manifold>,
-    /// Manifolds of this step; [`Collision::commit`] makes them those of the last.
+    /// Manifolds of this step; [`Collision::commit`] makes them those of the last step.
     found: Vec<Manifold>,
     spare: Vec<ContactManifold<(), ()>>,
 }
 
-/// Parry's points of two colliders.
+/// Parry's contact points of two colliders.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Manifold {
     colliders: [ColliderId; 2],
@@ -51,7 +53,11 @@ pub struct Manifold {
 }
 
 impl Collision {
-    /// A shape that is not convex is a bug of the caller.
+    /// Adds a collider.
+    ///
+    /// # Panics
+    ///
+    /// Panics if the shape is not convex.
     pub fn add(&mut self, collider: Collider, trees: &Trees, settings: &Settings) -> ColliderId {
         assert!(collider.shape.is_convex(), "a collider has a convex shape");
         let surface = Surface::new(collider, trees, settings);
@@ -76,7 +82,7 @@ impl Collision {
         self.surfaces.iter_mut().map(|surface| &mut surface.collider)
     }
 
-    /// Collects what touches, or will within the step.
+    /// Collects the points that touch, or will touch within the step.
     pub fn detect(&mut self, trees: &Trees, settings: &Settings) {
         Arch::new().dispatch(Placing { collision: self, trees, settings });
         self.near.update(&self.surfaces, trees);
@@ -104,18 +110,18 @@ impl Collision {
         }
     }
 
-    /// Keeps what the next step begins with.
+    /// Keeps the manifolds that the next step begins with.
     pub fn commit(&mut self) {
         std::mem::swap(&mut self.manifolds, &mut self.found);
     }
 
-    /// Puts the colliders that move where their links are.
+    /// Places the moving colliders by the poses of their links.
     #[inline(always)]
     fn place(&mut self, trees: &Trees, settings: &Settings) {
         let mut last = None;
         for (index, surface) in self.surfaces.iter_mut().enumerate() {
             let Some(body) = surface.body else { continue };
-            // Colliders of a link follow each other.
+            // Colliders of one link are adjacent.
             let (pose, spin_rad_s) = match last {
                 Some((link, pose, spin_rad_s)) if link == body => (pose, spin_rad_s),
                 _ => (trees.world_from(body), trees.spin_rad_s(body)),
@@ -127,7 +133,7 @@ impl Collision {
     }
 }
 
-/// Work for the widest registers that the processor has, with the same bits.
+/// Work for the widest registers of the processor, with bit-identical results.
 struct Placing<'a> {
     collision: &'a mut Collision,
     trees: &'a Trees,
@@ -153,7 +159,7 @@ struct NearPair<'a> {
 }
 
 impl NearPair<'_> {
-    /// Points of contact, from those of the last step on if there were any.
+    /// Finds the contact points, starting from those of the last step if there are any.
     fn find(&self, before: Option<&ContactManifold<(), ()>>, manifold: &mut ContactManifold<(), ()>) {
         let [first, second] = self.surfaces;
         manifold.clear();
@@ -162,7 +168,7 @@ impl NearPair<'_> {
                 (manifold.local_n1, manifold.local_n2) = (before.local_n1, before.local_n2);
                 manifold.points.extend_from_slice(&before.points);
             }
-            // Where Parry begins to look.
+            // Starting direction of Parry's search.
             Some(before) => manifold.local_n1 = before.local_n1,
             None => manifold.local_n1 = first.towards(second).as_vec3(),
         }
@@ -176,25 +182,27 @@ impl NearPair<'_> {
         if let Some(overlap) = Overlap::of([a, b], &a_from_b) {
             overlap.mend(before, manifold);
         }
-        // Parry may find no direction between two that only just touch; in the next step they are a little deeper, or apart.
+        // Parry may find no direction between two shapes that only just touch. In the next step they are
+        // a little deeper, or apart.
         if !manifold.local_n1.is_normalized() {
             manifold.clear();
         }
     }
 
-    /// Whether the points of the last step may go on, as far as that is not Parry's to say.
+    /// Returns true if the points of the last step may be carried along. Parry checks the other
+    /// conditions itself.
     fn is_continued(&self, before: &ContactManifold<(), ()>) -> bool {
         if !self.surfaces.iter().any(|surface| surface.is_round) {
             return true;
         }
         let [world_from_a, world_from_b] = self.world_from_shapes;
         let a_from_b = world_from_a.rotation.inverse() * world_from_b.rotation;
-        // The normals were opposite where the points were found, and each goes along with its shape.
+        // The normals were opposite when the points were found, and each moves with its shape.
         let [of_a, of_b] = [before.local_n1, before.local_n2].map(Vector::as_dvec3);
         of_a.cross(a_from_b * of_b).length() < ROUND_TURNS_RAD
     }
 
-    /// Collects the points that touch, or will within the step.
+    /// Collects the points that touch, or will touch within the step.
     fn collect(&self, manifold: &ContactManifold<(), ()>, candidates: &mut Vec<Candidate>) {
         let [first, second] = self.surfaces;
         let normal = (first.world_from_shape.rotation * manifold.local_n1.as_dvec3()).normalize();
@@ -202,8 +210,9 @@ impl NearPair<'_> {
         let friction = Friction::between(&first.collider.friction, &second.collider.friction);
         let bodies = self.surfaces.map(|surface| surface.body);
         let mut number = 0;
-        // The nearest point is added to the corners of two faces that lie on each other; it lies between them and wanders. Of a hull
-        // that is tilted the face that looks there the most may be another than the one that is deepest: then it is what counts.
+        // Parry adds the nearest point to the corners of two faces in contact; it lies between them and
+        // wanders. The face of a tilted hull that is most aligned with the normal may not be the deepest
+        // one. In that case the added point is needed.
         let of_faces = |point: &&TrackedContact<()>| point.fid1 != PackedFeatureId::UNKNOWN;
         let deepest_m =
             manifold.points.iter().filter(of_faces).map(|point| point.dist).fold(f32::MAX, f32::min);

@@ -1,17 +1,19 @@
-//! Friction of colliders as MJCF has it, and contacts as rows: one normal, and friction in a cone.
+//! Friction of colliders as in MJCF, and contacts as rows: one normal, and friction in a cone.
 //!
-//! Of a contact with N lanes, lane 0 is the normal impulse n >= 0, lanes 1 and 2 the tangents, 3 the spin about the
-//! normal, 4 and 5 the roll about the tangents (N = 4 leaves them out). Friction keeps to
+//! A contact has N lanes. Lane 0 is the normal impulse n >= 0, and lanes 1 and 2 are the tangents. Lane
+//! 3 is the spin about the normal, and lanes 4 and 5 are the roll about the tangents (N = 4 leaves them
+//! out). Friction satisfies
 //!   sum_c (f_c / mu_c)^2 <= n^2,   mu_c the coefficient of lane c: 1 for the tangents, m for spin and roll,
-//! the elliptic cone of MuJoCo, which for sliding and spin is the limit surface of Howe and Cutkosky 1996. Within the
-//! cone friction stops what moves; on its surface it dissipates most, f_c ~ -mu_c^2 v_c: no direction is preferred.
+//! the elliptic cone of MuJoCo, which for sliding and spin is the limit surface of Howe and Cutkosky
+//! 1996. Within the cone friction stops the motion. On its surface it dissipates most, f_c ~ -mu_c^2 v_c:
+//! no direction is preferred.
 
 use serde::{Deserialize, Serialize};
 
 use crate::dynamics::settings::Pass;
 use crate::dynamics::trees::rows::{ConstraintRows, Whitened};
 
-/// Which of the three coefficients act: MJCF's `condim` 1, 3, 4 and 6.
+/// The friction coefficients that act: MJCF's `condim` 1, 3, 4 and 6.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Directions {
     None,
@@ -21,7 +23,7 @@ pub enum Directions {
 }
 
 impl Directions {
-    /// Reads MJCF's `condim`; `None` for a number that MJCF does not have.
+    /// Parses MJCF's `condim`. Returns `None` for a number that MJCF does not define.
     pub(crate) fn from_condim(condim: u32) -> Option<Directions> {
         match condim {
             1 => Some(Directions::None),
@@ -44,13 +46,14 @@ pub struct Friction {
     /// Moment about a tangent per normal force.
     pub roll_m: f64,
     pub priority: i32,
-    /// What the state of the surface leaves of friction with whatever touches it: 1 as it is made, less where it is wet or greasy.
+    /// Remaining share of friction due to the state of the surface: 1 as manufactured, less if it is wet
+    /// or greasy.
     pub left: f64,
 }
 
 impl Friction {
-    /// What acts between two colliders: the values of the one with the higher priority, else the larger of each; and of these, what
-    /// both surfaces leave.
+    /// Combines the friction of two colliders. The values are those of the collider with the higher
+    /// priority, otherwise the larger of each. They are multiplied by the `left` of both surfaces.
     /// Source: MuJoCo, "Contact parameters" in the chapter on modelling.
     pub fn between(a: &Friction, b: &Friction) -> Friction {
         let Friction { directions, slide, spin_m, roll_m, priority, .. } = Friction::as_made(a, b);
@@ -80,7 +83,8 @@ impl Friction {
         }
     }
 
-    /// Coefficients of the lanes of a contact (see the module's text); 0 where none acts.
+    /// Returns the coefficients of the lanes of a contact (see the module's text); 0 for a lane that
+    /// does not act.
     pub(in crate::dynamics) fn lanes(&self) -> [f64; 6] {
         let [slide, spin, roll] = match self.directions {
             Directions::None => [0.0; 3],
@@ -97,15 +101,15 @@ pub struct Contacts<const N: usize> {
     pub all: Vec<Contact<N>>,
 }
 
-/// What a contact asks for beside its rows.
+/// Parameters of a contact beside its rows.
 pub struct Terms<const N: usize> {
-    /// Added to the normal velocity, with correction of the position and without.
+    /// Velocities added to the normal velocity, with correction of the position and without.
     pub bias_m_s: [f64; 2],
-    /// Share of the effective mass by which the contact gives way.
+    /// Compliance as a share of the effective mass.
     pub softness: f64,
     /// mu_c; that of the normal is not used.
     pub friction: [f64; N],
-    /// Impulses to begin with.
+    /// Initial impulses.
     pub impulse: [f64; N],
 }
 
@@ -118,7 +122,8 @@ pub struct Contact<const N: usize> {
     inverse_mass: [[f64; N]; N],
     mass: [f64; N],
     pair_mass: [Symmetric2; 2],
-    /// s mu_c^2, with s below the inverse of the largest eigenvalue of  diag(mu) A diag(mu)  over the friction lanes.
+    /// s mu_c^2, with s below the inverse of the largest eigenvalue of  diag(mu) A diag(mu)  over the
+    /// friction lanes.
     slide_gain: [f64; N],
     pub impulse: [f64; N],
 }
@@ -135,7 +140,7 @@ impl<const N: usize> Contacts<N> {
         self.all.clear();
     }
 
-    /// The rows of the contact were pushed just before, with this inverse mass.
+    /// Adds a contact. Its rows must have been pushed just before and have this inverse mass.
     #[inline(always)]
     pub fn push(&mut self, inverse_mass: [[f64; N]; N], terms: Terms<N>) {
         let mu = terms.friction;
@@ -159,7 +164,7 @@ impl<const N: usize> Contacts<N> {
         });
     }
 
-    /// Adds what the impulses, as they are now, do.
+    /// Adds the effect of the current impulses.
     pub fn push_impulses(&self, w: &mut Whitened) {
         for (group, contact) in self.all.iter().enumerate() {
             if contact.impulse != [0.0; N] {
@@ -168,7 +173,8 @@ impl<const N: usize> Contacts<N> {
         }
     }
 
-    /// One sweep of Gauss-Seidel, contact by contact, each of which changes by this share of what it would.
+    /// Runs one Gauss-Seidel sweep, contact by contact. Each impulse changes by this share of its full
+    /// update.
     #[inline(always)]
     pub fn sweep(&mut self, pass: Pass, share: f64, w: &mut Whitened) {
         for (group, contact) in self.all.iter_mut().enumerate() {
@@ -192,7 +198,7 @@ impl<const N: usize> Contacts<N> {
 }
 
 impl<const N: usize> Contact<N> {
-    /// The impulses that this contact alone would choose at the velocities `v` along its lanes.
+    /// Returns the impulses that this contact alone would choose at the velocities `v` along its lanes.
     #[inline(always)]
     fn update(&self, pass: Pass, mut v: [f64; N]) -> [f64; N] {
         let (a, old) = (&self.inverse_mass, &self.impulse);
@@ -216,14 +222,15 @@ impl<const N: usize> Contact<N> {
         if N < 6 {
             return slid;
         }
-        // The step suits the tangents; rolls, of less inertia and friction, need a second to keep up with a ball that speeds up.
+        // The step size suits the tangents. Rolls have less inertia and friction and need a second step
+        // to follow a ball that accelerates.
         for c in 1..N {
             v[c] += (1..N).map(|d| a[d][c] * (slid[d] - old[d])).sum::<f64>();
         }
         self.slide(&slid, &v, normal)
     }
 
-    /// One step of projected gradients from the impulses `from`, at the velocities `v`.
+    /// Takes one step of projected gradients from the impulses `from`, at the velocities `v`.
     #[inline(always)]
     fn slide(&self, from: &[f64; N], v: &[f64; N], normal: f64) -> [f64; N] {
         let mut slid = [normal; N];
@@ -238,13 +245,14 @@ impl<const N: usize> Contact<N> {
         slid
     }
 
-    /// sum_c (f_c / mu_c)^2 over the friction lanes.
+    /// Returns sum_c (f_c / mu_c)^2 over the friction lanes.
     #[inline(always)]
     fn fullness(&self, impulse: &[f64; N]) -> f64 {
         (1..N).map(|c| impulse[c] * self.inverse_friction[c]).map(|share| share * share).sum()
     }
 
-    /// Impulses that stop all lanes: the two tangents together, then spin, then the two rolls together.
+    /// Returns impulses that stop all lanes: the two tangents together, then the spin, then the two
+    /// rolls together.
     #[inline(always)]
     fn stick(&self, mut v: [f64; N]) -> [f64; N] {
         let (a, old) = (&self.inverse_mass, &self.impulse);
@@ -284,8 +292,8 @@ struct Symmetric2 {
 }
 
 impl Symmetric2 {
-    /// Inverse of the block of two lanes that begins at `lane`, if there is one. Two lanes that are not independent
-    /// are each taken by itself and does half.
+    /// Inverts the block of two lanes that begins at `lane`; zero if there is no such block. Two
+    /// dependent lanes are each inverted alone and take half of the impulse.
     fn inverse_of<const N: usize>(a: &[[f64; N]; N], lane: usize) -> Symmetric2 {
         if lane + 1 >= N {
             return Symmetric2::default();
@@ -300,15 +308,15 @@ impl Symmetric2 {
     }
 }
 
-/// 0 for what nothing moves.
+/// Inverts an inverse mass; 0 if nothing can move.
 fn inverse(inverse_mass: f64) -> f64 {
     if inverse_mass > 0.0 { inverse_mass.recip() } else { 0.0 }
 }
 
-/// Two directions whose determinant is below this share are one.
+/// Threshold on the determinant, as a share, below which two directions count as one.
 const DEPENDENT: f64 = 1e-12;
 
-/// Larger eigenvalue of the 2 x 2 block that begins at `lane`.
+/// Returns the larger eigenvalue of the 2 x 2 block that begins at `lane`.
 fn largest_of_pair<const N: usize>(a: &[[f64; N]; N], lane: usize) -> f64 {
     let (p, q, r) = (a[lane][lane], a[lane][lane + 1], a[lane + 1][lane + 1]);
     let half = 0.5 * (p - r);

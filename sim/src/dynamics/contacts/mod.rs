@@ -1,4 +1,4 @@
-//! Where colliders touch, and what a contact asks of the velocities there.
+//! Contacts between colliders, and the constraints that they put on velocities.
 
 pub mod collider;
 pub mod collision;
@@ -16,21 +16,21 @@ use friction::Friction;
 /// A point at which two colliders touched in the last step.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct ContactPoint {
-    /// The one that was added earlier first.
+    /// The two colliders, the one added earlier first.
     pub colliders: [ColliderId; 2],
-    /// World frame, midway between the surfaces.
+    /// Position in the world frame, midway between the surfaces.
     pub point_m: DVec3,
-    /// Unit, from the first collider to the second.
+    /// Unit normal, from the first collider to the second.
     pub normal: DVec3,
-    /// Negative where they overlap.
+    /// Distance between the surfaces; negative if they overlap.
     pub gap_m: f64,
     /// Impulse on the second collider in the last step, friction included, N s.
     pub impulse_n_s: DVec3,
-    /// Part of it along the normal.
+    /// Part of the impulse along the normal.
     pub normal_impulse_n_s: f64,
-    /// Number of the point among those of the same colliders.
+    /// Number of the point among those of the same pair.
     pub(in crate::dynamics) number: u32,
-    /// The point on each collider, in its own frame.
+    /// The point on each collider, in the collider's own frame.
     pub(in crate::dynamics) local_m: [DVec3; 2],
     /// Impulses with which the next step begins.
     pub(in crate::dynamics) memory: Impulses,
@@ -46,7 +46,7 @@ pub struct Impulses {
 }
 
 impl Impulses {
-    /// The same impulses as lanes of a contact with these directions (normal, two tangents).
+    /// Returns the impulses as lanes of a contact with these directions (normal, two tangents).
     pub fn lanes(&self, [_, t1, t2]: [DVec3; 3]) -> [f64; 6] {
         let (tangent, roll) = (self.tangent, self.roll);
         [self.normal, tangent.dot(t1), tangent.dot(t2), self.spin, roll.dot(t1), roll.dot(t2)]
@@ -58,7 +58,7 @@ impl Impulses {
     }
 }
 
-/// A contact point on its way through a step.
+/// A contact point in the course of a step.
 #[derive(Clone, Copy)]
 pub struct Candidate {
     pub touch: ContactPoint,
@@ -68,7 +68,8 @@ pub struct Candidate {
     pub directions: [DVec3; 3],
 }
 
-/// The point of the last step that this one continues, among those of the same pair: the nearest on either surface.
+/// Returns the impulses of the last step's point that this one continues: of the same pair, the nearest
+/// one on either surface. Returns `None` if no point is within `match_m`.
 pub fn continued(touch: &ContactPoint, before: &[ContactPoint], match_m: f64) -> Option<Impulses> {
     let away = |old: &ContactPoint| {
         let on = |side: usize| old.local_m[side].distance_squared(touch.local_m[side]);

@@ -1,4 +1,4 @@
-//! Which colliders are near each other: Rapier's broad phase, on bounds that reach as far as things come in a step.
+//! Pairs of colliders near each other: Rapier's broad phase, on bounds grown by the motion within a step.
 
 use std::collections::BTreeSet;
 
@@ -12,13 +12,13 @@ use crate::dynamics::trees::{LinkId, Trees};
 
 #[derive(Default)]
 pub struct NearPairs {
-    /// Pairs in order, the smaller collider first: all that could touch in this step, and some that could not. Which
-    /// of those are among them depends on the past, so that nothing else may.
+    /// Pairs in order, the smaller collider first: all that could touch in this step, and some that
+    /// could not. The latter depend on the past, so nothing else may depend on them.
     pub pairs: Vec<[ColliderId; 2]>,
-    /// Links that never touch, smaller first.
+    /// Pairs of links that never touch, smaller first.
     apart: BTreeSet<(LinkId, LinkId)>,
     broad_phase: BroadPhaseBvh,
-    /// What the broad phase asks of the colliders; it has no bodies to ask.
+    /// Colliders as the broad phase reads them; it has no bodies to read.
     colliders: ColliderSet,
     handles: Vec<ColliderHandle>,
     bodies: RigidBodySet,
@@ -28,7 +28,7 @@ pub struct NearPairs {
 
 impl NearPairs {
     pub fn add(&mut self, surface: &Surface) -> ColliderId {
-        // All are fixed for Rapier; of two that no tree moves it makes no pair.
+        // For Rapier all colliders are fixed. It makes no pair of two that no tree moves.
         let kinds = match surface.body {
             Some(_) => ActiveCollisionTypes::FIXED_FIXED,
             None => ActiveCollisionTypes::empty(),
@@ -46,7 +46,7 @@ impl NearPairs {
         self.apart.insert((a.min(b), a.max(b)));
     }
 
-    /// Tells where a collider is; [`NearPairs::update`] follows.
+    /// Sets the bounds of a collider; [`NearPairs::update`] must follow.
     pub fn place(&mut self, id: ColliderId, surface: &Surface) {
         self.broad_phase.set_aabb(&self.parameters, self.handles[id.index()], surface.bounds);
     }
@@ -81,7 +81,8 @@ fn in_order(pair: &ColliderPair) -> [ColliderId; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// Bodies of one tree that a joint joins do not collide, as in MuJoCo; nor do two that are kept apart.
+/// Returns true if two colliders may touch. As in MuJoCo, bodies of one tree that a joint connects do
+/// not collide. Neither do two links that are kept apart.
 fn may_touch(
     pair: [ColliderId; 2],
     surfaces: &[Surface],

@@ -1,33 +1,35 @@
-//! Whether two shapes overlap as Parry says, and as what they do where it went astray.
+//! Corrections of Parry's contact points for overlapping shapes, where its search fails.
 //!
-//! Of shapes that overlap Parry looks for the depth by growing a polytope within their Minkowski difference (EPA), in single
-//! precision and from where its search for a distance broke off. Now and then that ends at a facet far inside, most often where a
-//! shape is a hull of many faces or as large as a floor: a foot was told to be 2.7 m deep in a floor that it touched, along a
-//! normal that was nobody's. Along a unit vector n, from a to b, two shapes overlap by
+//! For overlapping shapes Parry searches for the depth by growing a polytope within their Minkowski
+//! difference (EPA), in single precision and from the end of its search for a distance. Occasionally the
+//! search ends at a facet far inside, most often for a hull of many faces or a shape as large as a
+//! floor. A foot was reported 2.7 m deep in a floor that it touched, along a normal of neither shape.
+//! Along a unit vector n, from a to b, two shapes overlap by
 //!   o(n) = max over a of n . x - min over b of n . x,
-//! and the depth is the least of that over all n: no other normal is true whose o is clearly more than that of a face, or of the
-//! last step's normal.
+//! and the depth is the least of that over all n. So a normal is wrong if its o clearly exceeds that of
+//! a face or of the last step's normal.
 
 use rapier3d::math::{Pose, Vector};
 use rapier3d::parry::query::{ContactManifold, TrackedContact};
 use rapier3d::parry::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeatureMap, Shape, TypedShape};
 
-/// Less overlap along the normal is nowhere far from the depth.
+/// Overlap along the normal below which the result is always close to the depth.
 const DEEP_M: f32 = 0.005;
-/// By so much less do shapes overlap along the normal that is taken instead.
+/// Difference in overlap that a replacement normal must win by.
 const CLEARLY_M: f32 = 0.001;
 
 /// Two convex shapes, the second in the frame of the first.
 pub struct Overlap<'a> {
     shapes: [&'a dyn Shape; 2],
-    /// Both without their rounding, and how much that is of both together.
+    /// Both shapes without their rounding, and the radii of the rounding.
     cores: [&'a dyn PolygonalFeatureMap; 2],
     radii_m: [f32; 2],
     a_from_b: &'a Pose,
 }
 
 impl<'a> Overlap<'a> {
-    /// Of shapes for which Parry searches; of balls, two boxes and two capsules it knows the depth by formula.
+    /// Returns the overlap of shapes for which Parry searches. Returns `None` for balls, two boxes and
+    /// two capsules, whose depth Parry computes by formula.
     pub fn of(shapes: [&'a dyn Shape; 2], a_from_b: &'a Pose) -> Option<Overlap<'a>> {
         let [(a, radius_a_m), (b, radius_b_m)] =
             [shapes[0].as_polygonal_feature_map()?, shapes[1].as_polygonal_feature_map()?];
@@ -43,8 +45,8 @@ impl<'a> Overlap<'a> {
         })
     }
 
-    /// Replaces points that overlap along a normal that cannot be true, and those that Parry has lost although the last step's, in
-    /// `before`, were deep.
+    /// Replaces points along a normal that cannot be right. It also restores points that Parry has lost
+    /// although those of the last step, in `before`, were deep.
     pub fn mend(&self, before: Option<&ContactManifold<(), ()>>, manifold: &mut ContactManifold<(), ()>) {
         let overlaps = |manifold: &ContactManifold<(), ()>, by_m: f32| {
             manifold.points.iter().any(|point| point.dist < -by_m)
@@ -60,13 +62,13 @@ impl<'a> Overlap<'a> {
         let last = before.filter(|before| !before.points.is_empty()).map(|before| before.local_n1);
         let less = |best: Along, other: Along| if other.depth_m < best.depth_m { other } else { best };
         let Some(least) = self.normals(last).map(|normal| self.along(normal)).reduce(less) else { return };
-        // Of what is apart along it, the points are those of a gap.
+        // If the shapes are separated along this normal, its points would be those of a gap.
         if least.depth_m + CLEARLY_M < found_m && !(is_lost && least.depth_m < 0.0) {
             self.touch(&least, manifold);
         }
     }
 
-    /// Normals of all faces, and that of the last step.
+    /// Returns the normals of all faces, and that of the last step.
     fn normals(&self, last: Option<Vector>) -> impl Iterator<Item = Vector> {
         let of_a = face_normals(self.shapes[0]);
         let of_b = face_normals(self.shapes[1]).map(|normal| -(self.a_from_b.rotation * normal));
@@ -81,7 +83,7 @@ impl<'a> Overlap<'a> {
         Along { normal, on_a_m, on_b_m, core_depth_m, depth_m }
     }
 
-    /// Points along this normal, made as Parry makes them.
+    /// Replaces the manifold by the points along this normal, constructed as Parry does.
     fn touch(&self, along: &Along, manifold: &mut ContactManifold<(), ()>) {
         let Along { normal, on_a_m, on_b_m, core_depth_m, .. } = *along;
         let b_from_a = self.a_from_b.inverse();
@@ -116,7 +118,7 @@ impl<'a> Overlap<'a> {
     }
 }
 
-/// How two shapes overlap along a normal: the outermost points of both cores, in the frame of the first.
+/// Overlap of two shapes along a normal: the outermost points of both cores, in the frame of the first.
 struct Along {
     normal: Vector,
     on_a_m: Vector,
@@ -125,7 +127,7 @@ struct Along {
     depth_m: f32,
 }
 
-/// Outward normals of a shape's faces, in its frame; of what is round those of its ends.
+/// Returns the outward normals of a shape's faces, in its frame; for a round shape those of its ends.
 fn face_normals(shape: &dyn Shape) -> impl Iterator<Item = Vector> {
     let axes: &[Vector] = match shape.as_typed_shape() {
         TypedShape::Cuboid(_) | TypedShape::RoundCuboid(_) => &[Vector::X, Vector::Y, Vector::Z],

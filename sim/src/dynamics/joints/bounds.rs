@@ -1,4 +1,5 @@
-//! Rows of single joints: drives at their limits, dry friction and limits of position, all along one degree of freedom.
+//! Rows of single joints: drives at their limits, dry friction and limits of position, all along one
+//! degree of freedom.
 
 use std::array::from_fn;
 use std::ops::Range;
@@ -12,28 +13,29 @@ use crate::dynamics::trees::tree::Tree;
 
 #[derive(Default)]
 pub struct JointRows {
-    /// In the order of links, those of trees that are alike side by side.
+    /// All rows in the order of links, those of similar trees side by side.
     all: Vec<JointRow>,
-    /// Which of them each lot of trees that are alike has.
+    /// Range of rows of each lot of similar trees.
     of_alike: Vec<Range<usize>>,
-    /// Of all rows the columns within a tree, and Y in them.
+    /// Columns within a tree, and Y in them, of all rows.
     column: Vec<u16>,
     y: Vec<Abreast>,
     drives: Vec<BoundedDrive>,
-    /// Whitened velocities of the trees whose turn it is.
+    /// Whitened velocities of the trees being processed.
     w: Vec<Abreast>,
 }
 
-/// The rows of one joint in each tree of a lot. Where a tree has none, masses, friction and impulses are zero.
+/// The rows of one joint in each tree of a lot. For a tree that has none, masses, friction and impulses
+/// are zero.
 struct JointRow {
     link: usize,
     exists: [bool; ABREAST],
-    /// Where columns and Y lie among those of all rows.
+    /// Range of this row's columns and Y among those of all rows.
     places: Range<usize>,
     /// Y . Y, and its inverse.
     inverse_mass: Abreast,
     mass: Abreast,
-    /// Which of all bounded drives are those of this joint.
+    /// Range of this joint's drives among all bounded drives.
     drives: Range<usize>,
     dry: DryFriction,
     range: JointRange,
@@ -51,30 +53,32 @@ struct DryFriction {
     impulse: Abreast,
 }
 
-/// Both ends of a joint's range: the velocities towards them that are allowed, by [`Pass`], and the impulses. No velocity reaches the
-/// ends that a joint does not have.
+/// Both ends of a joint's range: the allowed velocities towards them, by [`Pass`], and the impulses. If
+/// a joint has no such end, no velocity reaches it.
 struct JointRange {
     exists: [bool; ABREAST],
     down: [Abreast; 2],
     up: [Abreast; 2],
     impulse_up: Abreast,
     impulse_down: Abreast,
-    /// Whether one of them is not zero.
+    /// True if one of the impulses is not zero.
     pushes: bool,
 }
 
-/// A joint without other rows gets one for its range at first only if it could reach an end when this much faster, rad/s or m/s.
+/// Extra speed (rad/s or m/s) for deciding on a row for the range. A joint without other rows gets one
+/// at first only if it could reach an end when moving this much faster.
 const NEAR_RANGE: f64 = 10.0;
-/// A joint that would be beyond its range by more (rad or m) without a row gets one, and the step is repeated.
+/// Overshoot (rad or m) beyond the range from which on a joint without a row gets one, and the step is
+/// repeated.
 const MAX_OVERSHOOT: f64 = 0.01;
 
 impl Tree {
-    /// Whether a joint has a row in any case.
+    /// Returns true if a joint has a row in any case.
     fn is_held(&self, link: usize) -> bool {
         self.bounded[link] || self.links[link].joint.axis().is_some_and(|axis| axis.friction_loss > 0.0)
     }
 
-    /// Whether a joint's range is a part of its row.
+    /// Returns true if a joint's range is part of its row.
     fn range_is_row(&self, link: usize, dt_s: f64) -> bool {
         let Some([low, high]) = self.links[link].joint.axis().and_then(|axis| axis.range) else {
             return false;
@@ -84,8 +88,8 @@ impl Tree {
         self.is_held(link) || self.overrun[link] || q - reach < low || q + reach > high
     }
 
-    /// Adds the joints that leave their ranges when they move by the velocities `v` and were not near an end; whether there
-    /// were any.
+    /// Marks the joints that were not near an end but leave their ranges when they move by the
+    /// velocities `v`. Returns true if there were any.
     pub(in crate::dynamics) fn hold_more(&mut self, dt_s: f64, v: &[f64]) -> bool {
         let mut more = false;
         for i in 0..self.links.len() {
@@ -102,7 +106,7 @@ impl Tree {
 }
 
 impl JointRows {
-    /// Rows of the joints that may need one. The trees are factorised.
+    /// Builds the rows of the joints that may need one. The trees must be factorised.
     #[inline(always)]
     pub fn prepare(&mut self, trees: &Trees, settings: &Settings) {
         self.all.clear();
@@ -193,7 +197,8 @@ impl JointRows {
         }
     }
 
-    /// The greatest velocity (rad/s or m/s) that an end of a range, or a motor that is turned too fast, took back.
+    /// Runs one sweep. Returns the greatest velocity (rad/s or m/s) removed by an end of a range or by a
+    /// motor that is turned too fast.
     #[inline(always)]
     pub fn sweep(&mut self, pass: Pass, trees: &Trees, w: &mut Whitened) -> f64 {
         let mut greatest = 0.0f64;
@@ -225,7 +230,7 @@ impl JointRows {
         greatest
     }
 
-    /// Gives the trees the impulses of dry friction and the efforts of bounded drives.
+    /// Passes the impulses of dry friction and the efforts of bounded drives to the trees.
     pub fn commit(&self, trees: &mut Trees, dt_s: f64) {
         for (alike, rows) in trees.alike.iter().zip(&self.of_alike) {
             for row in &self.all[rows.clone()] {
@@ -240,8 +245,9 @@ impl JointRows {
     }
 }
 
-/// Velocity towards an end of the range that is allowed at a distance: up to the end within the step; beyond the end
-/// backwards, or none while relaxing.
+/// Returns the allowed velocities towards an end of the range at a distance, correcting and relaxing.
+/// Before the end, the joint may reach it within the step. Beyond the end, the velocity must lead back,
+/// or be zero while relaxing.
 #[inline(always)]
 fn approach(distance: Abreast, settings: &Settings) -> [Abreast; 2] {
     let open = distance.0.map(|distance| distance.max(0.0) / settings.dt_s);
@@ -258,7 +264,7 @@ impl JointRow {
         AbreastRow { column: &column[self.places.clone()], y: &y[self.places.clone()] }
     }
 
-    /// The drives change the velocities; returns the greatest change by a motor that is turned too fast.
+    /// Applies the drives to the velocities. Returns the greatest change by a motor that is turned too fast.
     #[inline(never)]
     fn drive(&self, drives: &mut [BoundedDrive], v: &mut Abreast) -> f64 {
         let mut greatest = 0.0f64;
@@ -274,7 +280,7 @@ impl JointRow {
 }
 
 impl BoundedDrive {
-    /// Begins with the effort of the last step.
+    /// Creates the row, starting with the effort of the last step.
     fn new(tree: &Tree, link: usize, lane: usize, dt_s: f64) -> BoundedDrive {
         let law = tree.laws[link];
         let impulse = tree.effort[link] * dt_s;
@@ -289,7 +295,7 @@ impl BoundedDrive {
 }
 
 impl DryFriction {
-    /// Only where there is friction.
+    /// Applies dry friction to the lanes that have any.
     #[inline(always)]
     fn update(&mut self, inverse_mass: Abreast, mass: Abreast, v: &mut Abreast) {
         let stopping = self.impulse - *v * mass;
@@ -306,7 +312,7 @@ impl DryFriction {
 }
 
 impl JointRange {
-    /// Velocities towards both ends that are allowed.
+    /// Returns the allowed velocities towards both ends.
     #[inline(always)]
     fn allowed(&self, pass: Pass) -> [Abreast; 2] {
         let at = match pass {
@@ -316,7 +322,7 @@ impl JointRange {
         [self.down[at], self.up[at]]
     }
 
-    /// Whether none of the ends has anything to do. Most joints are far from both, which is soon seen.
+    /// Returns true if neither end has an effect. Most joints are far from both, so this is a fast check.
     #[inline(always)]
     fn rests(&self, pass: Pass, v: Abreast) -> bool {
         let [down, up] = self.allowed(pass);
@@ -325,7 +331,7 @@ impl JointRange {
         !self.pushes & above.and(below).all()
     }
 
-    /// The ends change the velocities; returns the greatest change.
+    /// Applies the ends to the velocities. Returns the greatest change.
     #[inline(never)]
     fn update(&mut self, pass: Pass, inverse_mass: Abreast, mass: Abreast, v: &mut Abreast) -> f64 {
         let [down, up] = self.allowed(pass);

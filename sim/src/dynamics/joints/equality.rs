@@ -1,4 +1,4 @@
-//! Equalities: coupled joints, points held together, and welds that can be switched, such as a latch.
+//! Equalities: coupled joints, points held together, and welds that can be switched, for example a latch.
 
 use pulp::Simd;
 use rapier3d::glamx::{DMat3, DPose3, DVec3};
@@ -11,11 +11,12 @@ use crate::dynamics::trees::{LinkId, Trees};
 
 #[derive(Clone, Debug)]
 pub enum Equality {
-    /// MJCF's `joint`:  follower = a0 + a1 leader + ... + a4 leader^4; without a leader the follower is held at a0.
+    /// MJCF's `joint`:  follower = a0 + a1 leader + ... + a4 leader^4; without a leader the follower is
+    /// held at a0.
     Couple { follower: LinkId, leader: Option<LinkId>, polynomial: [f64; 5] },
     /// MJCF's `connect`: a point of `a` and one of `b` coincide; `None` is the world.
     Connect { a: LinkId, a_point_m: DVec3, b: Option<LinkId>, b_point_m: DVec3 },
-    /// MJCF's `weld`: `b` stays where it is in `a`.
+    /// MJCF's `weld`: `b` keeps its pose in `a`.
     Weld { a: LinkId, a_from_b: DPose3, b: Option<LinkId> },
 }
 
@@ -38,20 +39,21 @@ pub struct Equalities {
     blocks: Vec<Block>,
 }
 
-/// Three rows that are solved together; a coupling uses the first only.
+/// Three rows that are solved together; a coupling uses only the first.
 struct Block {
     equality: usize,
-    /// First or second block of its equality.
+    /// Index of this block, 0 or 1, within its equality.
     part: usize,
-    /// Velocity that takes the error back.
+    /// Velocity that corrects the error.
     correction: DVec3,
     mass: DMat3,
     impulse: DVec3,
-    /// Its value after the correcting sweeps.
+    /// Impulse after the correcting sweeps.
     remembered: DVec3,
 }
 
-/// Added to the diagonal of a block's inverse mass, as a share of its trace: rows that nothing can move stay solvable.
+/// Share of its trace added to the diagonal of a block's inverse mass, which keeps rows solvable that
+/// nothing can move.
 const REGULARISATION: f64 = 1e-9;
 
 impl Equalities {
@@ -113,7 +115,8 @@ impl Equalities {
         self.close(index, 0, inverse_mass, ends_m[1] - ends_m[0], settings);
     }
 
-    /// Row of  follower' - p'(leader) leader' = 0;  gives its inverse mass and the error  follower - p(leader).
+    /// Adds the row of  follower' - p'(leader) leader' = 0. Returns its inverse mass and the error
+    /// follower - p(leader).
     #[inline(always)]
     fn couple<S: Simd>(
         &mut self,

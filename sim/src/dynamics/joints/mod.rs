@@ -1,13 +1,15 @@
-//! What acts along joints: drives and passive springs, implicit in the step; rows of bounds; equalities.
+//! Forces along joints: drives and passive springs, implicit in the step; rows of bounds; equalities.
 //!
-//! A drive's effort at the end of the step, from the position q and velocity v at its beginning and v' at its end:
+//! A drive's effort at the end of the step, from the position q and velocity v at its beginning and v'
+//! at its end:
 //!   tau = kp (target - q - dt v') - kd v' + feedforward.
 //! Inserted into M (v' - v) = dt (tau - bias), the terms with v' move to the left:
 //!   (M + dt kd + dt^2 kp) v' = M v + dt (kp (target - q) + feedforward - bias),
-//! which is exact and costs nothing. Springs and dampers of the joint itself enter the same way. It knows no limit,
-//! though: a drive near its limit is left out of the mass matrix and becomes a bounded row of the solver (`bounds`).
-//! Which ones are near is guessed from the last step, and the step is repeated where the guess was wrong, so that no
-//! effort, implicit parts included, is beyond its limit but that of a motor which something turns too fast.
+//! which is exact and costs nothing. Springs and dampers of the joint itself enter the same way. This
+//! form has no limit, though. A drive near its limit is left out of the mass matrix and becomes a
+//! bounded row of the solver (`bounds`). The set of such drives is guessed from the last step, and the
+//! step is repeated if the guess was wrong. So no effort, implicit parts included, exceeds its limit.
+//! The only exception is a motor that something turns too fast.
 
 pub mod bounds;
 pub mod equality;
@@ -15,25 +17,25 @@ pub mod equality;
 use super::trees::link::{Axis, Drive, DriveLaw};
 use super::trees::tree::Tree;
 
-/// A drive that exerted more than this share of its limit in the last step is a row in the next.
+/// Share of its limit that a drive must have exerted in the last step to be a row in the next.
 const NEAR_LIMIT: f64 = 0.8;
-/// From this share of its speed limit on a drive pushes less.
+/// Share of its speed limit from which on a drive pushes less.
 const SLACKENS: f64 = 0.8;
-/// Efforts keep to their limits to this share.
+/// Relative tolerance to which efforts respect their limits.
 const TOLERANCE: f64 = 1e-9;
 
 impl DriveLaw {
-    /// What the limit of effort falls by per speed where the drive is fast.
+    /// Returns the slope of the effort limit over speed for a fast drive.
     fn slope(&self) -> f64 {
         self.most / (self.speed_limit * (1.0 - SLACKENS))
     }
 
-    /// Whether a drive still has its whole effort at the velocity `v`.
+    /// Returns true if a drive still has its full effort at the velocity `v`.
     fn is_strong(&self, v: f64) -> bool {
         v.abs() <= SLACKENS * self.speed_limit
     }
 
-    /// Smallest and largest impulse at the velocity `v` of the end of the step.
+    /// Returns the smallest and largest impulse at the velocity `v` at the end of the step.
     fn bounds(&self, v: f64) -> [f64; 2] {
         if self.is_strong(v) {
             return [-self.most, self.most];
@@ -44,9 +46,9 @@ impl DriveLaw {
         [low.max((-self.most).min(high)), high.min(self.most.max(low))]
     }
 
-    /// The impulse that meets the law at the velocity that it leaves behind:  v' = v + (T' - T) Y.Y,  where v is the
-    /// velocity with the impulse T. Every part of the law falls with v', so that each is met by itself and the least
-    /// counts.
+    /// Returns the impulse that satisfies the law at the resulting velocity:  v' = v + (T' - T) Y.Y,
+    /// where v is the velocity with the impulse T. Every part of the law decreases with v', so that each
+    /// is solved alone and the least one applies.
     pub(in crate::dynamics) fn meet(&self, inverse_mass: f64, v: f64, impulse: f64) -> f64 {
         let line = |rest: f64, implicit: f64| {
             impulse + (rest - implicit * v - impulse) / (1.0 + implicit * inverse_mass)
@@ -58,7 +60,7 @@ impl DriveLaw {
         let slope = self.slope();
         let slack = slope * self.speed_limit;
         let [low, high] = [line(-slack, slope), line(slack, slope)];
-        // Not `clamp`, which panics at what is not a number; the step will say that physics diverged.
+        // Not `clamp`, which panics on NaN; the step will report that physics diverged.
         wanted.max(low).min(high)
     }
 }
@@ -81,7 +83,7 @@ impl Tree {
         }
     }
 
-    /// Takes down what the drives are told, and guesses which of them will be at their limits.
+    /// Records the drive commands, and guesses which drives will be at their limits.
     pub(in crate::dynamics) fn begin_drives(&mut self, dt_s: f64) {
         self.overrun.fill(false);
         for (i, link) in self.links.iter().enumerate() {
@@ -92,8 +94,8 @@ impl Tree {
         }
     }
 
-    /// Adds the drives that turned out to be beyond their limits at the velocities `v` of the end of the step; whether
-    /// there were any.
+    /// Marks the drives that exceed their limits at the velocities `v` of the end of the step. Returns
+    /// true if there were any.
     pub(in crate::dynamics) fn bound_more(&mut self, v: &[f64]) -> bool {
         let mut more = false;
         for i in 0..self.links.len() {
@@ -112,9 +114,9 @@ impl Tree {
         more
     }
 
-    /// Adds springs, dampers and the drives that are not rows to the right-hand side, which holds -bias, and sets their
-    /// part of the diagonal. The right-hand side is that of M' (v' - v) with M' the matrix above, so the velocity's own
-    /// share is taken off.
+    /// Adds springs, dampers and the drives that are not rows to the right-hand side, which holds -bias,
+    /// and sets their part of the diagonal. The right-hand side is that of M' (v' - v) with M' the
+    /// matrix above, so the contribution of v is subtracted.
     #[inline(always)]
     pub(in crate::dynamics) fn joint_forces(&mut self, dt_s: f64) {
         for i in 0..self.links.len() {
@@ -131,7 +133,7 @@ impl Tree {
         }
     }
 
-    /// Efforts of the drives that are not rows, at the velocities `v` of the end of the step.
+    /// Stores the efforts of the drives that are not rows, at the velocities `v` of the end of the step.
     pub(in crate::dynamics) fn keep_efforts(&mut self, dt_s: f64, v: &[f64]) {
         for i in 0..self.links.len() {
             if self.links[i].joint.axis().is_some() && !self.bounded[i] {

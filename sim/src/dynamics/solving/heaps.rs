@@ -1,19 +1,20 @@
-//! Which trees touch each other, directly or through others: what their contacts do is theirs alone.
+//! Contact islands, called heaps here: trees that touch each other, directly or through others. Contacts
+//! of one heap have no effect on another.
 
 use crate::dynamics::contacts::Candidate;
 
 #[derive(Default)]
 pub struct Heaps {
-    /// The number of its heap for every tree.
+    /// Heap of every tree.
     of_tree: Vec<usize>,
-    /// How many contacts of its heap come before each candidate, and the candidate.
+    /// Number of contacts of the same heap before each candidate, and the candidate.
     turns: Vec<(usize, usize)>,
-    /// Contacts so far, by heap.
+    /// Running number of contacts, by heap.
     counts: Vec<usize>,
 }
 
 impl Heaps {
-    /// Finds the heaps of so many trees, by the points at which they may touch.
+    /// Finds the heaps of `trees` trees, by the points at which they may touch.
     pub fn find(&mut self, trees: usize, candidates: &[Candidate]) {
         self.of_tree.clear();
         self.of_tree.extend(0..trees);
@@ -29,13 +30,13 @@ impl Heaps {
         self.of_tree[tree]
     }
 
-    /// One of the two bodies that touch is a tree's.
+    /// Returns the heap of a contact. At least one of the two touching bodies belongs to a tree.
     pub fn of_contact(&self, candidate: &Candidate) -> usize {
         candidate.bodies.iter().flatten().next().map_or(0, |body| self.of_tree[body.tree.index()])
     }
 
-    /// The candidates, those of a heap in their order, and the heaps taking turns: a processor works at the same time on contacts
-    /// that have no part in each other.
+    /// Returns the candidates with the heaps taking turns; those of one heap stay in order. A processor
+    /// can then work on independent contacts at the same time.
     pub fn in_turn(&mut self, candidates: &[Candidate]) -> impl Iterator<Item = usize> {
         self.counts.clear();
         self.counts.resize(self.of_tree.len(), 0);

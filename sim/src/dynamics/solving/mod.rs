@@ -1,4 +1,5 @@
-//! Contacts, joints and equalities of a step, and the impulses that meet them: projected Gauss-Seidel on whitened velocities.
+//! The constraint solver: contacts, joints and equalities of a step, by projected Gauss-Seidel on
+//! whitened velocities.
 
 mod heaps;
 mod step;
@@ -17,45 +18,49 @@ use crate::dynamics::trees::Trees;
 use crate::dynamics::trees::rows::Whitened;
 use crate::dynamics::trees::spatial::ForceVector;
 
-/// Velocity (rad/s or m/s) which, taken back in the last sweep by the end of a range or by a motor that is turned too fast, says that
-/// more are needed, and how many at most: what is heavy presses a light link against its stop.
+/// Velocity (rad/s or m/s) removed in the last sweep from which on more sweeps follow, and their maximum
+/// number. Only the ends of ranges and motors that are turned too fast count. An example is a heavy body
+/// that presses a light link against its stop.
 const UNSETTLED: f64 = 2.0;
 const MORE_SWEEPS: usize = 32;
-/// After so many of these contacts change by a share of what they would: friction at a finger that is wedged between the floor and its
-/// stop goes to and fro for ever otherwise, each sweep taking back what the one before did.
+/// Number of these extra sweeps after which contacts change only by a share of their full update.
+/// Without it, friction at a finger wedged between the floor and its stop oscillates forever, each sweep
+/// undoing the one before.
 const WHOLE_SWEEPS: usize = 8;
 const DAMPED_SHARE: f64 = 0.5;
-/// Where something lies deeper in another, as many more: what is heavy presses something light into the floor.
+/// Penetration depth from which on as many sweeps are added, for example when a heavy body presses a
+/// light one into the floor.
 const DEEP_M: f64 = 0.01;
-/// So deep nothing gives way any more.
+/// Penetration depth from which on a contact is rigid.
 const RIGID_M: f64 = 0.02;
-/// J that the relaxing sweeps took: where it was so much, there may be more that they should have taken.
+/// Energy (J) removed by the relaxing sweeps above which they may have failed to remove all of it.
 const HARD_J: f64 = 0.3;
 
 #[derive(Default)]
 pub struct Solver {
     /// Whitened velocities of all trees.
     pub w: Whitened,
-    /// Likewise before the step, and what contacts change; only where [`Solver::take_only`] needs them.
+    /// Whitened velocities before the step, and their change by contacts; used only by [`Solver::take_only`].
     before: Vec<f64>,
     change: Whitened,
     joints: JointRows,
     pub equalities: Equalities,
     heaps: Heaps,
-    /// Contacts that slide and spin, and contacts that also resist rolling; both in the order in which heaps take turns.
+    /// Contacts that slide and spin, and contacts that also resist rolling; both in the order in which
+    /// heaps take turns.
     plain: Contacts<4>,
     rolling: Contacts<6>,
-    /// With which impulses each candidate begins, and its number among the contacts of its kind.
+    /// Initial impulses of each candidate, and its index among the contacts of its kind.
     begins: Vec<[f64; 6]>,
     places: Vec<usize>,
     /// Contact points of the last step, in the order of their colliders.
     pub touches: Vec<ContactPoint>,
-    /// Contact points of this step; [`Solver::commit`] makes them those of the last.
+    /// Contact points of this step; [`Solver::commit`] makes them those of the last step.
     found: Vec<ContactPoint>,
 }
 
 impl Solver {
-    /// Builds all rows. The trees are factorised, and `w` holds the velocities without constraints.
+    /// Builds all rows. The trees must be factorised, and `w` must hold the unconstrained velocities.
     pub fn prepare(&mut self, trees: &Trees, candidates: &[Candidate], settings: &Settings) {
         self.w.clear_margins();
         self.begin(candidates, settings);
@@ -84,7 +89,7 @@ impl Solver {
         }
     }
 
-    /// Finds the impulses with which candidates begin: those of the contacts that they continue.
+    /// Finds the initial impulses of candidates: those of the contacts that they continue.
     fn begin(&mut self, candidates: &[Candidate], settings: &Settings) {
         self.begins.clear();
         let mut before = 0;
@@ -100,7 +105,8 @@ impl Solver {
         }
     }
 
-    /// Impulses that correct positions; `w` is what positions move by. They are what the next step begins with.
+    /// Finds the impulses that correct positions; `w` becomes the velocity of the positions. The next
+    /// step begins with these impulses.
     pub fn correct(&mut self, trees: &Trees, candidates: &[Candidate], sweeps: usize) {
         self.joints.warm_start(trees, &mut self.w);
         self.equalities.warm_start(&mut self.w);
@@ -116,7 +122,8 @@ impl Solver {
         }
     }
 
-    /// Impulses without correction; `w` is then the velocity at the end of the step, and the touches tell what acted.
+    /// Finds the impulses without correction. `w` then is the velocity at the end of the step, and the
+    /// contact points report the impulses that acted.
     pub fn relax(&mut self, trees: &Trees, candidates: &[Candidate], sweeps: usize) {
         let corrected_j = kinetic_j(&self.w);
         self.settle(trees, Pass::Relaxing, sweeps);
@@ -131,14 +138,15 @@ impl Solver {
         }
     }
 
-    /// Keeps what the next step begins with. Before, nothing of the last step has changed.
+    /// Keeps the state that the next step begins with. Nothing of the last step changes before this call.
     pub fn commit(&mut self, trees: &mut Trees, dt_s: f64) {
         self.joints.commit(trees, dt_s);
         self.equalities.commit();
         std::mem::swap(&mut self.touches, &mut self.found);
     }
 
-    /// So many sweeps, and more where ends of ranges and motors that are turned too fast are not settled by then.
+    /// Runs `sweeps` sweeps, and more if ends of ranges or motors that are turned too fast have not
+    /// settled by then.
     fn settle(&mut self, trees: &Trees, pass: Pass, sweeps: usize) {
         Arch::new().dispatch(Settling { solver: self, trees, pass, sweeps });
     }
@@ -155,11 +163,12 @@ impl Solver {
         }
     }
 
-    /// Contacts ought to take energy only. Sweeps that have not settled can leave a part of the speed with which things were pushed
-    /// out of each other; the impulses P of all contacts of a heap have then done work, and of a share s of them
+    /// Scales contact impulses so that contacts only remove energy. Sweeps that have not settled can
+    /// leave part of the speed that separates penetrating bodies. The impulses P of all contacts of a
+    /// heap have then done work, and a share s of them does
     ///   W(s) = s P . (v + v' - (1 - s) M^-1 P) / 2,   v and v' the velocities before and after the step.
-    /// The share that stays is the one that does none. It keeps all momentum and all cones of friction; what goes on approaching,
-    /// and joints that run on into their ends, the next step stops.
+    /// The share that stays is the one that does no work. It preserves all momentum and all friction cones.
+    /// Remaining approach velocities, and joints that move on into their stops, are stopped in the next step.
     fn take_only(&mut self, trees: &Trees, candidates: &[Candidate]) {
         self.before.resize(self.w.len(), 0.0);
         for (tree, offset) in trees.all.iter().zip(&trees.offset) {
@@ -202,7 +211,7 @@ impl Solver {
         }
     }
 
-    /// Impulses of the contact that a candidate became.
+    /// Returns the impulses of the contact that a candidate became.
     fn impulse(&self, index: usize, candidate: &Candidate) -> [f64; 6] {
         let mut lanes = [0.0; 6];
         match candidate.friction.directions {
@@ -214,8 +223,8 @@ impl Solver {
         lanes
     }
 
-    /// Contacts change by this share of what they would. The greatest velocity (rad/s or m/s) that joints took back, see
-    /// [`JointRows::sweep`].
+    /// Runs one sweep in which contacts change by this share of their full update. Returns the greatest
+    /// velocity (rad/s or m/s) that joints removed, see [`JointRows::sweep`].
     #[inline(always)]
     fn sweep(&mut self, trees: &Trees, pass: Pass, share: f64) -> f64 {
         let pushed = self.joints.sweep(pass, trees, &mut self.w);
@@ -226,7 +235,7 @@ impl Solver {
     }
 }
 
-/// Work for the widest vectors that the processor has. They add and multiply as single numbers do, bit for bit.
+/// Work for the widest vectors of the processor. They add and multiply exactly as scalars do, bit for bit.
 struct Settling<'a> {
     solver: &'a mut Solver,
     trees: &'a Trees,
@@ -243,7 +252,7 @@ impl WithSimd for Settling<'_> {
     }
 }
 
-/// Likewise, all rows of contacts.
+/// Construction of all rows of contacts on the widest vectors, like [`Settling`].
 struct Gathering<'a> {
     solver: &'a mut Solver,
     trees: &'a Trees,
@@ -260,16 +269,16 @@ impl WithSimd for Gathering<'_> {
     }
 }
 
-/// What the contacts of a heap did in a step.
+/// Work of the contacts of a heap in a step.
 #[derive(Clone, Copy, Default)]
 struct HeapWork {
-    /// Twice the work of their impulses, and twice what these would do to things at rest.
+    /// Twice the work of their impulses, and twice the work that these would do on bodies at rest.
     twice_j: f64,
     own_j: f64,
 }
 
 impl HeapWork {
-    /// The share of the impulses that does no work.
+    /// Returns the share of the impulses that does no work.
     fn share(self) -> f64 {
         match self.twice_j > 0.0 {
             true => (1.0 - self.twice_j / self.own_j).max(0.0),
@@ -278,18 +287,19 @@ impl HeapWork {
     }
 }
 
-/// With what springs, dampers and drives add to the mass matrix.
+/// Returns the kinetic energy, including the terms that springs, dampers and drives add to the mass matrix.
 fn kinetic_j(w: &[f64]) -> f64 {
     0.5 * w.iter().map(|w| w * w).sum::<f64>()
 }
 
-/// How much of its softness a contact still has: all of it to a depth of 1 cm, nothing at 2 cm. An arm presses a finger that is
-/// stretched against its stop with 300 times its weight into something, and would hold it 2 cm deep otherwise.
+/// Returns the remaining share of a contact's softness: 1 to a depth of 1 cm, 0 at 2 cm. An arm presses
+/// a finger that is stretched against its stop with 300 times its weight into something. Without this,
+/// the finger would stay 2 cm deep.
 fn giving_share(gap_m: f64) -> f64 {
     ((RIGID_M + gap_m) / (RIGID_M - DEEP_M)).clamp(0.0, 1.0)
 }
 
-/// Adds a contact; returns its number.
+/// Adds a contact. Returns its index.
 #[inline(always)]
 fn push<S: Simd, const N: usize>(
     simd: S,
@@ -321,8 +331,8 @@ fn push<S: Simd, const N: usize>(
     let correction_m_s = depth_m * softness.correction_per_s(settings.dt_s);
     let mut friction = candidate.friction.lanes();
     if gap_m > 0.0 {
-        // Only what is pressed resists rolling. A ball in a bowl would lose a part of its spin to every face that it is about to
-        // reach.
+        // Only a loaded contact resists rolling. Otherwise a ball in a bowl would lose part of its spin
+        // to every face that it is about to reach.
         friction[4..].fill(0.0);
     }
     let terms = Terms {

@@ -1,4 +1,4 @@
-//! One step of everything.
+//! One step of all dynamics.
 
 use pulp::{Arch, Simd, WithSimd};
 use thiserror::Error;
@@ -10,8 +10,12 @@ use crate::dynamics::trees::tree::Tree;
 use crate::dynamics::{DVec3, Dynamics};
 
 impl Dynamics {
-    /// Detects collisions, finds what forces act, and moves all trees by one step; once its buffers have grown it allocates
-    /// nothing. An error leaves all state as it was.
+    /// Detects collisions, finds the acting forces, and moves all trees by one step. It allocates
+    /// nothing once its buffers have grown.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`Diverged`] if a velocity is no longer finite; all state then is as it was.
     pub fn step(&mut self) -> Result<(), Diverged> {
         self.collision.detect(&self.trees, &self.settings);
         self.trees.all.iter_mut().for_each(|tree| tree.begin_drives(self.settings.dt_s));
@@ -37,7 +41,7 @@ impl Dynamics {
         Ok(())
     }
 
-    /// Velocities at the end of the step, with the drives as they are bounded.
+    /// Solves for the velocities at the end of the step, with the present set of bounded drives.
     fn solve(&mut self) {
         let Dynamics { settings, trees, collision, solver, moving_v, final_v } = self;
         Arch::new().dispatch(Whitening { trees, w: &mut solver.w, settings });
@@ -49,8 +53,8 @@ impl Dynamics {
         Arch::new().dispatch(Unwhitening { trees, w: &solver.w, v: final_v });
     }
 
-    /// Makes rows of the drives that exceeded their limits and of the joints that left their ranges; every round adds one at
-    /// least, so that it ends.
+    /// Adds rows for the drives that exceeded their limits and for the joints that left their ranges.
+    /// Every round adds at least one, so the loop ends.
     fn bound_more(&mut self) -> bool {
         let mut more = false;
         for (tree, range) in self.trees.ranges() {
@@ -60,7 +64,7 @@ impl Dynamics {
         more
     }
 
-    /// Positions are as finite as the velocities that they move by.
+    /// Checks that velocities are finite. Positions are as finite as the velocities that move them.
     fn check(&self) -> Result<(), Diverged> {
         for (tree, offset) in self.trees.all.iter().zip(&self.trees.offset) {
             for (dof, link) in tree.layout.link_of.iter().enumerate() {
@@ -79,7 +83,7 @@ impl Dynamics {
     }
 }
 
-/// The step gave a number that is not finite or will not be for long; the state is that before the step.
+/// The step produced a number that is not finite or soon will not be. The state is that before the step.
 #[derive(Debug, Error, PartialEq)]
 #[error(
     "physics diverged at link `{link}` of `{tree}`: a velocity came out as {speed:.3e} m/s or rad/s, which is not finite or soon will not be"
@@ -87,14 +91,14 @@ impl Dynamics {
 pub struct Diverged {
     pub tree: String,
     pub link: String,
-    /// Of one of the link's degrees of freedom, m/s or rad/s.
+    /// Velocity of one of the link's degrees of freedom, m/s or rad/s.
     pub speed: f64,
 }
 
-/// m/s or rad/s. Nothing real comes near; beyond, Rapier's f32 would soon overflow.
+/// Maximum velocity, m/s or rad/s. No real motion comes near; beyond it, Rapier's f32 would soon overflow.
 const FASTEST: f64 = 1e6;
 
-/// Work for the widest vectors that the processor has. They add and multiply as single numbers do, bit for bit.
+/// Work for the widest vectors of the processor. They add and multiply exactly as scalars do, bit for bit.
 struct Whitening<'a> {
     trees: &'a mut Trees,
     w: &'a mut [f64],
@@ -114,7 +118,7 @@ impl WithSimd for Whitening<'_> {
     }
 }
 
-/// Likewise.
+/// Work on the widest vectors, like [`Whitening`].
 struct Unwhitening<'a> {
     trees: &'a mut Trees,
     w: &'a [f64],
@@ -131,7 +135,7 @@ impl WithSimd for Unwhitening<'_> {
 }
 
 impl Tree {
-    /// Sets up the mass matrix, what is on the right, and the velocities of a step without forces.
+    /// Sets up the mass matrix, the right-hand side, and the velocities of a step without forces.
     #[inline(always)]
     fn prepare(&mut self, dt_s: f64, gravity_m_s2: DVec3) {
         self.bias(gravity_m_s2);

@@ -21,7 +21,7 @@ impl Bench {
         Bench { dynamics: Dynamics::new(Settings::new(DT_S, gravity_m_s2)) }
     }
 
-    /// With the upper side of a large slab at z = 0.
+    /// Creates a world with the upper side of a large slab at z = 0.
     pub fn with_floor(gravity_m_s2: DVec3, friction: Friction) -> Bench {
         let mut bench = Bench::new(gravity_m_s2);
         bench.add_slab(20.0, friction);
@@ -32,7 +32,7 @@ impl Bench {
         self.dynamics.add_tree(tree)
     }
 
-    /// A fixed slab with its upper side at z = 0.
+    /// Adds a fixed slab with its upper side at z = 0.
     pub fn add_slab(&mut self, half_width_m: f32, friction: Friction) {
         let shape = SharedShape::cuboid(half_width_m, half_width_m, 0.1);
         let body_from_shape = DPose3::from_translation(DVec3::new(0.0, 0.0, -0.1));
@@ -46,7 +46,7 @@ impl Bench {
         });
     }
 
-    /// A floor without an end at z = 0, of which a part of 80 m is there at a time.
+    /// Adds an endless floor at z = 0, of which a part of 80 m exists at a time.
     pub fn add_endless_floor(&mut self, friction: Friction) {
         let shape = SharedShape::cuboid(40.0, 40.0, 1.0);
         let body_from_shape = DPose3::from_translation(DVec3::new(0.0, 0.0, -1.0));
@@ -72,7 +72,7 @@ impl Bench {
         })
     }
 
-    /// A lone box of even density.
+    /// Adds a lone box of uniform density.
     pub fn add_box(&mut self, mass_kg: f64, half_m: DVec3, at: DPose3, friction: Friction) -> TreeId {
         let tree = self.add(lone("box", at, Mass::of_box(mass_kg, half_m)));
         let half = half_m.as_vec3();
@@ -80,7 +80,7 @@ impl Bench {
         tree
     }
 
-    /// A lone solid ball.
+    /// Adds a lone solid ball.
     pub fn add_ball(&mut self, mass_kg: f64, radius_m: f64, at_m: DVec3, friction: Friction) -> TreeId {
         let inertia_kg_m2 = DMat3::from_diagonal(DVec3::splat(0.4 * mass_kg * radius_m * radius_m));
         let mass = Mass { mass_kg, com_m: DVec3::ZERO, inertia_kg_m2 };
@@ -101,7 +101,7 @@ impl Bench {
         self.dynamics.tree(tree).world_from_link(0).translation
     }
 
-    /// Kinetic and potential energy of a tree; armatures left out.
+    /// Returns the kinetic and potential energy of a tree, without armatures.
     pub fn energy_j(&self, tree: TreeId) -> f64 {
         let tree = self.dynamics.tree(tree);
         let gravity = self.dynamics.settings.gravity_m_s2;
@@ -120,7 +120,7 @@ fn link_energy_j(tree: &Tree, link: usize, gravity_m_s2: DVec3) -> f64 {
         - mass.mass_kg * gravity_m_s2.dot(pose * mass.com_m)
 }
 
-/// Momentum of a tree and angular momentum about the world's origin.
+/// Returns the momentum of a tree and its angular momentum about the world's origin.
 pub fn momentum(tree: &Tree) -> (DVec3, DVec3) {
     let mut sum = (DVec3::ZERO, DVec3::ZERO);
     for (index, link) in tree.links().iter().enumerate() {
@@ -141,12 +141,12 @@ pub fn lone(name: &str, at: DPose3, mass: Mass) -> Tree {
     Tree::new(name, vec![link]).expect("one free link")
 }
 
-/// A link at an offset from its parent, or from the world.
+/// Builds a link at an offset from its parent, or from the world.
 pub fn link(parent: Option<usize>, at_m: DVec3, joint: Joint, mass: Mass) -> Link {
     Link { name: "link".into(), parent, parent_from_link: DPose3::from_translation(at_m), joint, mass }
 }
 
-/// One joint on the world.
+/// Builds a tree of one joint on the world.
 pub fn jointed(joint: Joint, mass: Mass) -> Tree {
     Tree::new("jointed", vec![link(None, DVec3::ZERO, joint, mass)]).expect("one moving link")
 }
@@ -159,7 +159,7 @@ pub fn sliding(slide: f64) -> Friction {
     Friction { directions: Directions::Slide, slide, spin_m: 0.0, roll_m: 0.0, priority: 0, left: 1.0 }
 }
 
-/// Numbers in -1..1, the same every time.
+/// Pseudo-random numbers in -1..1, the same in every run.
 pub struct Random(pub u64);
 
 impl Random {
@@ -173,7 +173,7 @@ impl Random {
     }
 }
 
-/// A tree of many links with every kind of joint, odd masses and offsets.
+/// Builds a tree of many links with every kind of joint, irregular masses and offsets.
 pub fn bush(root: Joint, random: &mut Random) -> Tree {
     let mut links = Vec::new();
     for index in 0..14_usize {
@@ -197,7 +197,7 @@ pub fn bush(root: Joint, random: &mut Random) -> Tree {
     Tree::new("bush", links).expect("links with mass")
 }
 
-/// Random joint positions and velocities.
+/// Sets random joint positions and velocities.
 pub fn stir(tree: &mut Tree, random: &mut Random, fast: f64) {
     for link in 0..tree.links().len() {
         tree.set_joint(link, 0.5 * random.number(), fast * random.number());

@@ -21,15 +21,15 @@ fn dynamics_stack_of_eight_boxes_stands() {
     let settled = place(&bench);
     bench.run_s(8.0);
     for (level, after) in place(&bench).into_iter().enumerate() {
-        // Contacts are soft: those at the bottom give by a millimetre under the others' weight.
+        // Contacts are soft: those at the bottom give by a millimetre under the weight of the others.
         let (sunk_m, crept_m) = (after - built[level], after - settled[level]);
         assert!(sunk_m.length() < 0.0015 * (level + 1) as f64, "box {level} moved by {sunk_m}");
         assert!(crept_m.length() < 3e-4, "box {level} crept by {crept_m}");
     }
 }
 
-/// Contacts are soft by the lighter side's mass: a hundred times its weight presses them in by some millimetres, at once
-/// and no further.
+/// Contacts are soft in proportion to the lighter side's mass. A hundred times its weight presses them
+/// in by some millimetres, at once and no further.
 #[test]
 fn dynamics_light_box_bears_a_hundred_times_its_weight() {
     let half_m = DVec3::splat(0.05);
@@ -65,7 +65,7 @@ fn dynamics_impacts_do_not_gain_energy() {
         for step in 0..600 {
             bench.step();
             let now_j = bench.energy_j(body);
-            // Taking back penetration lifts by a fraction of a millimetre.
+            // Correcting penetration lifts the box by a fraction of a millimetre.
             assert!(now_j < last_j + 2e-3 * start_j, "{now_j} after {last_j} J in step {step}");
             last_j = now_j;
         }
@@ -73,7 +73,7 @@ fn dynamics_impacts_do_not_gain_energy() {
     }
 }
 
-/// Things of unequal mass that fall on each other end at rest and never have more energy than at the start.
+/// Bodies of unequal mass that fall on each other end at rest and never have more energy than at the start.
 #[test]
 fn dynamics_pile_comes_to_rest() {
     let mut bench = Bench::with_floor(DOWN, sliding(0.5));
@@ -111,7 +111,7 @@ fn dynamics_fast_ball_stops_at_the_floor() {
     assert!((bench.position_m(ball).z - 0.04).abs() < 1e-3);
 }
 
-/// A resting box is held by its weight, and the contacts say so.
+/// A resting box is held by a force equal to its weight, and the contacts report it.
 #[test]
 fn dynamics_contacts_report_the_weight() {
     let mut bench = Bench::with_floor(DOWN, sliding(0.5));
@@ -129,7 +129,7 @@ fn dynamics_contacts_report_the_weight() {
     assert_eq!(bench.dynamics.touches().len(), 4);
 }
 
-/// A part of an endless floor is wherever something comes down on it, and is as good there as at its middle.
+/// An endless floor carries a body at any distance just as it does at its centre.
 #[test]
 fn dynamics_endless_floor_carries_everywhere() {
     let settled = |x_m: f64| {
@@ -144,7 +144,7 @@ fn dynamics_endless_floor_carries_everywhere() {
         place_m.x - x_m
     };
     let slid_m = settled(0.0);
-    // 15.9 m: it slides from one part of the floor to the next.
+    // From 15.9 m it slides from one part of the floor to the next.
     for x_m in [15.9, 60.0, -700.0] {
         assert!((settled(x_m) - slid_m).abs() < 1e-3, "{} {slid_m}", settled(x_m));
     }

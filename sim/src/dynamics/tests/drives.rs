@@ -1,4 +1,4 @@
-//! Drives keep to their limits of effort and speed, and report what acts.
+//! Drives respect their limits of effort and speed, and report the efforts that act.
 
 use rapier3d::glamx::{DPose3, DVec3};
 
@@ -7,7 +7,7 @@ use super::super::{Axis, Drive, Joint, Mass, Tree};
 use super::bench::{Bench, DOWN, DT_S, Random, jointed, link, sliding};
 use super::inverse::efforts;
 
-/// Far from its target a drive exerts its limit, and what it reports is what changes the momentum.
+/// Far from its target a drive exerts its limit, and the reported effort explains the change of momentum.
 #[test]
 fn dynamics_drive_saturates() {
     let mass = Mass::of_box(3.0, DVec3::splat(0.1));
@@ -32,21 +32,22 @@ fn dynamics_drive_saturates() {
     assert!((bench.dynamics.tree(id).joint_position(0) - 2.0).abs() < 1e-3);
 }
 
-/// A floating chain on the floor whose drives all ask for too much: within limits.
+/// A floating chain on the floor stays within its limits although all drives ask for too much.
 #[test]
 fn dynamics_saturated_chain_on_the_floor() {
     let (limited, _) = saturated_chain(0.4, 0.003, 600);
     assert!(limited > 500, "{limited}");
 }
 
-/// One that falls from high up, and is too heavy to become fast: by inverse dynamics true as well.
+/// A chain that falls from high up, and is too heavy to become fast, also satisfies inverse dynamics.
 #[test]
 fn dynamics_saturated_chain_in_the_air() {
     let (limited, checked) = saturated_chain(100.0, 0.5, 80);
     assert!(limited > 100 && checked > 70, "{limited} {checked}");
 }
 
-/// How many efforts were at their limits, and in how many steps all were those of inverse dynamics.
+/// Returns the number of efforts at their limits, and the number of steps in which all efforts match
+/// inverse dynamics.
 fn saturated_chain(height_m: f64, armature: f64, steps: usize) -> (usize, usize) {
     let limit = 4.0;
     let mut links =
@@ -85,14 +86,15 @@ fn saturated_chain(height_m: f64, armature: f64, steps: usize) -> (usize, usize)
     (limited, checked)
 }
 
-/// While nothing touches and the tree is slow, the reported efforts are those of inverse dynamics. Says whether it was so.
+/// Checks that the reported efforts match inverse dynamics. Returns false if something touches or the
+/// tree is fast, where no comparison is possible.
 fn check_efforts(
     bench: &Bench,
     id: super::super::TreeId,
     at: &super::super::TreeState,
     before: &[f64],
 ) -> bool {
-    // Of a fast tree, energy that the integration made is taken back (see `energy`), which no drive did.
+    // For a fast tree, energy that the integration made is removed (see `energy`), which no drive did.
     let fast = |v: &[f64]| v.iter().any(|v| v.abs() > FAST_RAD / DT_S);
     if !bench.dynamics.touches().is_empty() || fast(before) || fast(&bench.dynamics.tree(id).v) {
         return false;
@@ -110,7 +112,7 @@ fn check_efforts(
     true
 }
 
-/// A drive holds a load against gravity with the limit just above it, and gives way just below.
+/// A drive holds a load against gravity with the limit just above it, and yields just below.
 #[test]
 fn dynamics_drive_gives_way_beyond_its_limit() {
     let mut mass = Mass::of_box(2.0, DVec3::splat(0.05));
@@ -130,7 +132,7 @@ fn dynamics_drive_gives_way_beyond_its_limit() {
     assert!(sag(0.97) > 0.1, "{}", sag(0.97));
 }
 
-/// A wheel of this inertia on a motor of 2 N m that turns 10 rad/s at most.
+/// Builds a flywheel of this inertia on a motor of 2 N m that turns 10 rad/s at most.
 fn motor(inertia_kg_m2: f64) -> (Bench, super::super::TreeId) {
     let mut axis = Axis::along(DVec3::Z);
     (axis.effort_limit, axis.speed_limit, axis.armature) = (2.0, 10.0, inertia_kg_m2);
@@ -139,7 +141,7 @@ fn motor(inertia_kg_m2: f64) -> (Bench, super::super::TreeId) {
     (bench, id)
 }
 
-/// What a motor told to push with all it has exerts in a step that begins at this speed.
+/// Returns the effort of a motor with this feedforward in a step that begins at this speed.
 fn effort_at(speed: f64, push_n_m: f64) -> f64 {
     // So heavy that the speed is the same at the end of the step.
     let (mut bench, id) = motor(1e6);
@@ -169,7 +171,7 @@ fn dynamics_motor_at_its_speed_limit_pushes_nothing_and_beyond_it_brakes() {
     }
 }
 
-/// However light the wheel is, and whether the drive is told an effort or a place far away.
+/// The limit holds for any inertia, with a feedforward effort and with a distant target.
 #[test]
 fn dynamics_motor_does_not_drive_itself_beyond_its_speed_limit() {
     let effort = Drive { feedforward: 50.0, ..Drive::NONE };
@@ -189,8 +191,8 @@ fn dynamics_motor_does_not_drive_itself_beyond_its_speed_limit() {
     }
 }
 
-/// A wheel that something turns at three times the speed of its motor, which is told to go on: it comes down to that speed and stays
-/// there, however light it is.
+/// A flywheel turns at three times the speed of its motor, which keeps driving. It slows down to the
+/// motor's speed and stays there, however light it is.
 #[test]
 fn dynamics_motor_brakes_what_turns_too_fast() {
     for inertia_kg_m2 in [1e-5, 1e-3, 0.02] {

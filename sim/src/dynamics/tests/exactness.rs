@@ -1,4 +1,4 @@
-//! The same bits again, whatever Rapier's broad phase has seen before; and nothing that is not finite.
+//! Bit-identical reruns, whatever Rapier's broad phase has seen before, and errors for non-finite numbers.
 
 use rapier3d::glamx::{DPose3, DVec3};
 use rapier3d::prelude::SharedShape;
@@ -6,7 +6,7 @@ use rapier3d::prelude::SharedShape;
 use super::super::{Drive, DynamicsState, Equality, Joint, TreeState};
 use super::bench::{Bench, DOWN, Random, bush, sliding, stir};
 
-/// Boxes, balls and a tree that fall on each other.
+/// Builds a scene of boxes, balls and a tree that fall on each other.
 fn scene() -> Bench {
     let mut bench = Bench::new(DOWN);
     bench.add_slab(5.0, sliding(0.6));
@@ -52,7 +52,7 @@ fn dynamics_reruns_are_equal_to_the_bit() {
     assert!(!first.dynamics.touches().is_empty());
 }
 
-/// What was near before, and in which order it came near, is nothing to the contacts of now.
+/// Contacts do not depend on pairs that were near before, or on the order in which they came near.
 #[test]
 fn dynamics_the_past_of_the_broad_phase_does_not_matter() {
     let (mut first, mut second) = (scene(), scene());
@@ -86,7 +86,7 @@ fn dynamics_restored_worlds_go_on_as_they_would_have() {
     assert!(Bench::new(DOWN).dynamics.restore(&state).is_err());
 }
 
-/// A force that is not a number ends the step with the name of what it hit, and the state stays as it was.
+/// A force that is not a number ends the step with the name of the tree, and the state is unchanged.
 #[test]
 fn dynamics_divergence_is_an_error_and_changes_nothing() {
     let mut bench = scene();

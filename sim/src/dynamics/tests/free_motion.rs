@@ -1,4 +1,4 @@
-//! Motion that nothing touches.
+//! Motion without contacts.
 
 use rapier3d::glamx::{DMat3, DPose3, DVec3};
 
@@ -46,7 +46,7 @@ fn dynamics_tumbling_body() {
     assert!(worst.0 < 1e-9 && worst.1 < 5e-3 && worst.2 < 1e-9, "{worst:?}");
 }
 
-/// Drives inside a floating tree move its momentum only by the error of the integration.
+/// Drives inside a floating tree change its momentum only by the error of the integration.
 #[test]
 fn dynamics_thrashing_tree_keeps_its_momentum() {
     let mut random = Random(7);
@@ -74,7 +74,7 @@ fn dynamics_thrashing_tree_keeps_its_momentum() {
     assert!(dp < 0.01 && dl < 0.01, "{dp} {dl}");
 }
 
-/// Left alone, a tree that whirls about keeps its momentum and gains no energy.
+/// A tree that whirls without outside forces keeps its momentum and gains no energy.
 #[test]
 fn dynamics_whirling_tree_gains_no_energy() {
     for (fast, seed) in [(40.0, 12), (150.0, 13)] {

@@ -1,4 +1,4 @@
-//! Friction that slides, spins and rolls, against closed forms.
+//! Sliding, spinning and rolling friction against closed forms.
 
 use std::f64::consts::TAU;
 
@@ -10,7 +10,7 @@ use super::bench::{Bench, DOWN, DT_S, G_M_S2, lone, sliding};
 
 const HALF_M: DVec3 = DVec3::new(0.1, 0.1, 0.05);
 
-/// A box at rest on a floor that gravity makes a slope towards `azimuth`.
+/// Builds a box at rest on a floor that gravity makes a slope towards `azimuth`.
 fn on_slope(slope_rad: f64, azimuth_rad: f64, mu: f64) -> (Bench, TreeId) {
     let (sin, cos) = slope_rad.sin_cos();
     let down = DVec3::new(sin * azimuth_rad.cos(), sin * azimuth_rad.sin(), -cos) * G_M_S2;
@@ -20,8 +20,8 @@ fn on_slope(slope_rad: f64, azimuth_rad: f64, mu: f64) -> (Bench, TreeId) {
     (bench, body)
 }
 
-/// 0.5 degrees below the friction angle a box holds, 0.5 degrees above it slides as far as it should, straight down; in
-/// eight directions.
+/// In eight directions, a box holds 0.5 degrees below the friction angle. 0.5 degrees above it, the box
+/// slides by the expected distance, straight down.
 #[test]
 fn dynamics_slopes_at_both_sides_of_the_friction_angle() {
     let mu: f64 = 0.5;
@@ -42,7 +42,7 @@ fn dynamics_slopes_at_both_sides_of_the_friction_angle() {
     }
 }
 
-/// v^2 / (2 mu g), less half a step: velocities first, then positions.
+/// The distance is v^2 / (2 mu g), less half a step: velocities first, then positions.
 #[test]
 fn dynamics_sliding_distance() {
     for eighth in 0..8 {
@@ -72,7 +72,7 @@ fn rolling(roll_m: f64) -> Friction {
     }
 }
 
-/// A ball that rolls at 0.5 m/s; gives how far it gets in `time_s` and how fast it still is.
+/// Rolls a ball at 0.5 m/s. Returns its distance after `time_s` and its speed at that time.
 fn roll(friction: Friction, time_s: f64) -> (f64, f64) {
     let radius_m = 0.05;
     let mut bench = Bench::with_floor(DOWN, friction);
@@ -97,7 +97,7 @@ fn dynamics_ball_rolls_on_without_rolling_friction() {
     }
 }
 
-/// Moment r m g about the contact, where the ball's inertia is 7/5 m R^2:  a = 5/7 r g / R.
+/// The moment is r m g about the contact, where the ball's inertia is 7/5 m R^2:  a = 5/7 r g / R.
 #[test]
 fn dynamics_ball_comes_to_rest_by_rolling_friction() {
     let roll_m = 0.002;
@@ -108,7 +108,7 @@ fn dynamics_ball_comes_to_rest_by_rolling_friction() {
     assert!(speed_m_s < 1e-6, "{speed_m_s}");
 }
 
-/// On a slope a ball rolls at 5/7 of what slides without friction.
+/// On a slope a ball accelerates at 5/7 of the rate of a body that slides without friction.
 #[test]
 fn dynamics_ball_rolls_down_a_slope() {
     let (sin, cos) = 10f64.to_radians().sin_cos();
@@ -123,7 +123,7 @@ fn dynamics_ball_rolls_down_a_slope() {
     );
 }
 
-/// A ball that spins on one point:  I w' = -spin m g.
+/// A ball spins on one point:  I w' = -spin m g.
 #[test]
 fn dynamics_torsional_friction_stops_a_top() {
     let spin_m = 0.003;
@@ -149,7 +149,7 @@ fn dynamics_torsional_friction_stops_a_top() {
     assert!(bench.dynamics.tree(ball).link_spin_rad_s(0).length() < 1e-6);
 }
 
-/// A disc that lies on the points of its rim:  I w' = -mu m g R.
+/// A disc rests on the points of its rim:  I w' = -mu m g R.
 #[test]
 fn dynamics_disc_stops_spinning() {
     let (radius_m, half_m, mass_kg) = (0.1, 0.02, 1.0);
@@ -172,7 +172,7 @@ fn dynamics_disc_stops_spinning() {
     assert!(bench.dynamics.tree(disc).link_spin_rad_s(0).length() < 1e-4);
 }
 
-/// MJCF's rule: the higher priority wins, else the larger of each.
+/// MJCF's rule: the higher priority wins, otherwise the larger of each.
 #[test]
 fn dynamics_friction_of_a_pair() {
     let floor = Friction {
@@ -196,7 +196,7 @@ fn dynamics_friction_of_a_pair() {
     let sole = Friction { slide: 0.6, priority: 1, ..floor };
     assert_eq!(Friction::between(&sole, &ball), sole);
     assert_eq!(Friction::between(&ball, &sole), sole);
-    // What a surface leaves it leaves of whatever acts, whoever's numbers count.
+    // The share `left` applies to the resulting friction, whichever collider's values are used.
     let greasy = Friction { left: 0.5, ..ball };
     assert_eq!(Friction::between(&greasy, &sole), Friction { slide: 0.3, roll_m: 0.00005, ..sole });
     assert_eq!(Friction::between(&greasy, &greasy).lanes(), [1.0, 0.1, 0.1, 0.0025, 0.0, 0.0]);

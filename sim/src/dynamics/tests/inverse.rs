@@ -1,13 +1,13 @@
-//! Forward dynamics against inverse dynamics that is written another way: accelerations of points, no spatial vectors.
+//! Forward dynamics against an independent inverse dynamics: accelerations of points, no spatial vectors.
 
 use rapier3d::glamx::{DMat3, DVec3};
 
 use super::super::{Drive, Joint, Tree};
 use super::bench::{Bench, DOWN, DT_S, Random, bush, hinge, stir};
 
-/// Efforts of an acceleration `a` by degree of freedom, from Newton and Euler link by link:
+/// Computes the efforts of an acceleration `a` by degree of freedom, from Newton and Euler link by link:
 ///   c'' = o'' + dw x r + w x (w x r),  f = m (c'' - g),  n = I dw + w x I w.
-/// The force on a free first link, and the moment about its centre of mass.
+/// For a free first link these are the force on it, and the moment about its centre of mass.
 pub fn efforts(tree: &Tree, v: &[f64], a: &[f64], gravity_m_s2: DVec3) -> Vec<f64> {
     let mut motion: Vec<(DVec3, DVec3, DVec3)> = Vec::new();
     let mut loads: Vec<(DVec3, DVec3)> = Vec::new();
@@ -29,7 +29,8 @@ pub fn efforts(tree: &Tree, v: &[f64], a: &[f64], gravity_m_s2: DVec3) -> Vec<f6
                 origin = DVec3::from_slice(&a[..3]) - turn.cross(arm_com) - spin.cross(spin.cross(arm_com));
             }
             Joint::Hinge(axis) => {
-                // The origin turns about the anchor: undo the parent's arm to the origin, redo it by the anchor.
+                // The origin turns about the anchor: subtract the parent's arm to the origin, then add
+                // the arm from the anchor.
                 let along = pose.rotation * axis.direction;
                 let arm = -(pose.rotation * axis.anchor_m);
                 let anchor = origin - turn.cross(arm) - spin.cross(spin.cross(arm));
@@ -54,7 +55,7 @@ pub fn efforts(tree: &Tree, v: &[f64], a: &[f64], gravity_m_s2: DVec3) -> Vec<f6
     gathered(tree, a, loads, dof)
 }
 
-/// Sums what each link takes, force and moment about the world's origin, inwards along the tree.
+/// Sums the loads of the links, force and moment about the world's origin, inwards along the tree.
 fn gathered(tree: &Tree, a: &[f64], mut loads: Vec<(DVec3, DVec3)>, mut dof: usize) -> Vec<f64> {
     let mut efforts = vec![0.0; dof];
     for index in (0..loads.len()).rev() {
@@ -95,7 +96,7 @@ fn dofs(joint: &Joint) -> usize {
 fn check(root: Joint, seed: u64) {
     let mut random = Random(seed);
     let mut tree = bush(root, &mut random);
-    // Slow, and driven gently: of a fast tree energy is taken back that the integration made (see `energy`).
+    // Slow, and driven gently: energy that the integration made is removed from a fast tree (see `energy`).
     stir(&mut tree, &mut random, 2.0);
     let mut wanted = vec![0.0; tree.dofs()];
     for link in 0..tree.links().len() {

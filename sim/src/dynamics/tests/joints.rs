@@ -124,7 +124,7 @@ fn dynamics_coupled_joints_follow() {
     }
 }
 
-/// A welded body hangs without moving; switched off, it falls; a point that is held stays where it is.
+/// A welded body hangs without moving; switched off, it falls. A point that is connected stays in place.
 #[test]
 fn dynamics_weld_and_connect() {
     let half_m = DVec3::new(0.1, 0.05, 0.02);
@@ -158,7 +158,8 @@ fn dynamics_weld_and_connect() {
     assert!(bench.position_m(body).z < before_m - 0.5);
 }
 
-/// A top on a pin at steady precession W keeps its tilt:  I1 W^2 cos(tilt) - I3 w3 W + m g h = 0,  I1 about the pin.
+/// A top on a pin at steady precession W keeps its tilt, with I1 about the pin:
+/// I1 W^2 cos(tilt) - I3 w3 W + m g h = 0.
 #[test]
 fn dynamics_top_precesses() {
     let (mass_kg, height_m, tilt_rad, precession_rad_s) = (1.0, 0.04, 0.3_f64, 1.6);
@@ -189,7 +190,7 @@ fn dynamics_top_precesses() {
     }
 }
 
-/// A weld whose far side is a hinge: the latch of a door that somebody pulls at.
+/// A coupling that holds a hinge: the latch of a door that is pulled.
 #[test]
 fn dynamics_latch_holds_a_door() {
     let half_m = DVec3::new(0.4, 0.02, 1.0);
@@ -224,7 +225,8 @@ fn dynamics_trees_that_cannot_be_are_named() {
     assert!(Tree::new("pair", two).err().unwrap().to_string().contains("only the first link"));
 }
 
-/// A heavy ball strikes a finger that is far from the end of its range: it stops there, and the ball on it.
+/// A heavy ball strikes a finger that is far from the end of its range. The finger stops at that end,
+/// and the ball on it.
 #[test]
 fn dynamics_blow_does_not_drive_a_light_link_beyond_its_range() {
     for speed_m_s in [1.0, 3.0, 6.0] {

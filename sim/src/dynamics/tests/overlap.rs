@@ -1,4 +1,4 @@
-//! What is told of shapes that overlap, where Parry's search for it goes astray.
+//! Contacts of overlapping shapes for which Parry's search fails.
 
 use rapier3d::glamx::{DPose3, DVec3};
 use rapier3d::math::{Pose, Rotation, Vector};
@@ -10,15 +10,15 @@ use super::super::Mass;
 use super::super::contacts::overlap::Overlap;
 use super::bench::{Bench, Random, lone, sliding};
 
-/// How near shapes are that Parry is asked about.
+/// Distance within which Parry is asked for contacts.
 const NEAR_M: f32 = 0.006;
-/// Depths below this are left as Parry tells them.
+/// Depths below this are left as Parry reports them.
 const SHALLOW_M: f32 = 0.005;
-/// What `least_m` finds may be so far from the depth: its grid of directions is coarse. Faces alone, of which depths are mended, miss
-/// that of two edges by as much.
+/// Tolerance for comparing depths with `least_m`, whose grid of directions is coarse. Corrected depths
+/// come from faces alone and miss that of two edges by as much.
 const COARSE_M: f32 = 0.006;
 
-/// A robot's foot: the shell of `sim/assets/robots/g1_dex3/robot.xml`.
+/// Builds a robot's foot: the shell of `sim/assets/robots/g1_dex3/robot.xml`.
 fn foot() -> SharedShape {
     let ring = |[back, front]: [f32; 2], [heel, toe]: [f32; 2], [narrow, wide]: [f32; 2], z: f32| {
         [
@@ -56,8 +56,8 @@ fn deepest_m(manifold: &ContactManifold<(), ()>) -> f32 {
     -manifold.points.iter().map(|point| point.dist).fold(f32::MAX, f32::min)
 }
 
-/// Caught where robots fell: a foot that touches a floor, on which it was 2.7, 0.7 and 0.3 m deep, and the post of a door. Should
-/// Parry be right one day, nothing here is needed any more.
+/// Cases recorded when robots fell: a foot that touches a floor, reported 2.7, 0.7 and 0.3 m deep, and
+/// the post of a door. If Parry is fixed one day, this correction is obsolete.
 #[test]
 fn dynamics_parry_is_mended_where_it_went_astray() {
     let floor = SharedShape::cuboid(50.0, 50.0, 1.0);
@@ -80,7 +80,7 @@ fn dynamics_parry_is_mended_where_it_went_astray() {
     assert!(astray > 0, "Parry is right");
 }
 
-/// The least overlap over many directions, which no depth may be far beyond.
+/// Returns the least overlap over many directions, which no depth may exceed by much.
 fn least_m([a, b]: [&dyn Shape; 2], a_from_b: &Pose) -> f32 {
     let radius_m = |shape: &dyn Shape| shape.as_polygonal_feature_map().expect("not a ball").1;
     let [core_a, core_b] = [a, b].map(|shape| shape.as_polygonal_feature_map().expect("not a ball").0);
@@ -99,8 +99,8 @@ fn least_m([a, b]: [&dyn Shape; 2], a_from_b: &Pose) -> f32 {
     least_m + radius_m(a) + radius_m(b)
 }
 
-/// A foot, a plank, a post and a bottle thrown into each other and a floor: none is deeper than it is, and what is mended already is
-/// left alone.
+/// A foot, a plank, a post and a bottle are thrown into each other and a floor. No reported depth is too
+/// large, and a corrected manifold is left alone.
 #[test]
 fn dynamics_no_depth_is_beyond_the_least_overlap() {
     let shapes = [
@@ -135,7 +135,8 @@ fn dynamics_no_depth_is_beyond_the_least_overlap() {
     assert!(met > 200, "{met}");
 }
 
-/// A foot under the edge of a table, tilted: the face of it that looks up the most is not the one that is in the table.
+/// A foot is tilted under the edge of a table. Its face that points up the most is not the one inside
+/// the table.
 #[test]
 fn dynamics_what_is_deepest_is_told_whichever_face_looks_there() {
     let turn = Rotation::from_xyzw(-0.75593925, 0.6344424, -0.058423493, -0.15041757).normalize();

@@ -1,4 +1,4 @@
-//! Round things that rock on a rim and roll.
+//! Round bodies that rock on a rim and roll.
 
 use rapier3d::glamx::{DMat3, DPose3, DQuat, DVec3};
 use rapier3d::prelude::SharedShape;
@@ -10,7 +10,7 @@ const RADIUS_M: f64 = 0.035;
 const HALF_HEIGHT_M: f64 = 0.1;
 const STILL_RAD_S: f64 = 0.01;
 
-/// A bottle as in `sim/assets/objects/bottle.xml`, on its rim.
+/// Builds a bottle as in `sim/assets/objects/bottle.xml`, on its rim.
 fn bottle(bench: &mut Bench, tilt: DVec3, spin_rad_s: DVec3, friction: Friction) -> TreeId {
     let mass = Mass {
         mass_kg: 0.5,
@@ -32,8 +32,7 @@ fn bottle(bench: &mut Bench, tilt: DVec3, spin_rad_s: DVec3, friction: Friction)
     tree
 }
 
-/// Tilts (degrees, about an axis in the floor that has this heading), and what the bottle then spins about the vertical and across
-/// that axis.
+/// Tilt (degrees), heading of the tilt axis in the floor, spin about the vertical, and spin across that axis.
 const ROCKS: [[f64; 4]; 8] = [
     [1.0, 0.3, 0.0, 0.6],
     [2.0, 0.0, 0.0, 0.6],
@@ -57,7 +56,7 @@ fn rocking(
     (bench, tree)
 }
 
-/// A bottle that is let go of on its rim gains no energy, whichever way it turns.
+/// A bottle released on its rim gains no energy, whichever way it turns.
 #[test]
 fn dynamics_bottle_that_whirls_on_its_rim_gains_nothing() {
     for rock in ROCKS {
@@ -67,14 +66,14 @@ fn dynamics_bottle_that_whirls_on_its_rim_gains_nothing() {
         for step in 0..1600 {
             bench.step();
             let now_j = bench.energy_j(tree);
-            // 1 mJ lifts it by 0.2 mm: taking back what it has sunk in does less.
+            // 1 mJ lifts it by 0.2 mm; correcting penetration does less.
             assert!(now_j < least_j + 1e-3, "{rock:?}: {now_j} J after {least_j} J in step {step}");
             least_j = least_j.min(now_j);
         }
     }
 }
 
-/// With the friction of its file it comes to rest, upright, whichever way it turned.
+/// With the friction of its file the bottle comes to rest upright, whichever way it turned.
 #[test]
 fn dynamics_bottle_on_its_rim_comes_to_rest() {
     let friction = Friction {
@@ -95,7 +94,7 @@ fn dynamics_bottle_on_its_rim_comes_to_rest() {
     }
 }
 
-/// What rolls slowly on its side does not speed up.
+/// A cylinder that rolls slowly on its side does not accelerate.
 #[test]
 fn dynamics_cylinder_that_rolls_slowly_does_not_speed_up() {
     let speed_m_s = 0.05;

@@ -1,17 +1,19 @@
-//! What a fast tree may not gain: kinetic energy that no force gave it.
+//! Removal of spurious kinetic energy, which no force put in, from fast trees.
 //!
-//! Coriolis forces are explicit in a step, and positions move along straight lines in joint coordinates. Below a twentieth
-//! of a radian per step neither matters. A fallen robot that thrashes about is faster, and there the two together feed kinetic
-//! energy, the more the faster it is: left alone, it has no bound. In truth Coriolis forces do no work. With the impulses P
-//! of everything else,
-//!   M (v' - v) = P - dt h,   so that the work is   P . (v + v') / 2 = K(q, v') - K(q, v) + dt h . (v + v') / 2,
+//! Coriolis forces are explicit in a step, and positions move along straight lines in joint coordinates.
+//! Below a twentieth of a radian per step neither matters. A fallen robot that thrashes about is faster.
+//! There the two together feed kinetic energy, the more the faster the robot is, without bound. In truth
+//! Coriolis forces do no work. With the impulses P of everything else,
+//!   M (v' - v) = P - dt h,   so that the work is
+//!   P . (v + v') / 2 = K(q, v') - K(q, v) + dt h . (v + v') / 2,
 //! and a step ought to end with
 //!   K = K(q, v') + dt h . (v + v') / 2.
-//! Likewise its momentum and the moment of it, H = sum I_i v_i about a point that stays, ought to be
+//! Likewise its momentum and the moment of it, H = sum I_i v_i about a fixed point, ought to be
 //!   H = H(q, v') + dt sum f_i,   f_i the Coriolis and gyroscopic forces of the links.
-//! A tree's motion is that of one rigid body with its H, and that of its links against each other; the two are orthogonal
-//! in M (Koenig), and their energies add up. The first is set to what H ought to be; what is then left of the energy bounds
-//! the second. Slow trees are left as they are, bit for bit, and a lone body has an integrator of its own (`free_spin`).
+//! A tree's motion is that of one rigid body with its H, plus that of its links against each other. The
+//! two are orthogonal in M (Koenig), and their energies add up. The first is set so that H is as above;
+//! the energy left over bounds the second. Slow trees are unchanged, bit for bit, and a lone body has
+//! its own integrator (`free_spin`).
 
 use rapier3d::glamx::DVec3;
 
@@ -19,20 +21,22 @@ use super::link::Joint;
 use super::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
 use super::tree::Tree;
 
-/// rad per step of a joint or of the base; slower trees are left as they are.
+/// Speed of a joint or of the base, rad per step, above which a tree counts as fast; slower trees are
+/// unchanged.
 pub(in crate::dynamics) const FAST_RAD: f64 = 0.05;
 
-/// What a step ought to end with.
+/// Energy and momentum that a step ought to end with.
 pub(in crate::dynamics) struct Due {
     energy_j: f64,
-    /// About `about_m`.
+    /// Momentum about `about_m`.
     momentum: ForceVector,
     about_m: DVec3,
 }
 
 impl Tree {
-    /// Energy and momentum that the step ought to end with, of a tree that is fast and no lone body. `v` are the velocities
-    /// that the solver found, `w` the same whitened; the tree is as it was before the step.
+    /// Returns the energy and momentum that the step ought to end with. `v` are the velocities that the
+    /// solver found, `w` the same whitened; the tree is in its state before the step. Returns `None` for
+    /// a slow tree or a lone body.
     pub(in crate::dynamics) fn due(
         &mut self,
         gravity_m_s2: DVec3,
@@ -61,8 +65,8 @@ impl Tree {
         Some(Due { energy_j: 0.5 * twice_j, momentum, about_m: self.reference_m })
     }
 
-    /// Sets the forces of the links to what they take to move as they do without accelerating their joints, each with all
-    /// beyond it.
+    /// Computes the forces that the links need to move as they do without accelerating their joints,
+    /// each including all links beyond it.
     fn gyroscopic_forces(&mut self, gravity_m_s2: DVec3) {
         let lifted = MotionVector { angular: DVec3::ZERO, linear: -gravity_m_s2 };
         for i in 0..self.links.len() {
@@ -78,12 +82,12 @@ impl Tree {
         }
     }
 
-    /// Degrees of freedom of the base that do not turn.
+    /// Returns the number of degrees of freedom of the base that do not turn.
     fn linear_dofs(&self) -> usize {
         if matches!(self.links[0].joint, Joint::Free) { 3 } else { 0 }
     }
 
-    /// Gives a tree that has been moved the momentum that is due, and takes what it has beyond the energy.
+    /// Gives a moved tree the momentum that is due, and removes its energy above that due.
     pub(in crate::dynamics) fn settle(&mut self, due: &Due) {
         let (whole, momentum, has_j) = self.motion();
         let (mut rigid, mut wanted) = (MotionVector::default(), MotionVector::default());
@@ -107,7 +111,8 @@ impl Tree {
         self.velocities();
     }
 
-    /// Inertia of the whole, its momentum, and its kinetic energy with that of the drives.
+    /// Returns the inertia of the whole tree, its momentum, and its kinetic energy including that of the
+    /// drives.
     fn motion(&self) -> (Inertia, ForceVector, f64) {
         let mut whole = Inertia::default();
         let mut momentum = ForceVector::default();
@@ -127,7 +132,7 @@ impl Tree {
     }
 }
 
-/// How a rigid body with this momentum moves, about the reference.
+/// Returns the motion of a rigid body with this momentum, about the reference.
 fn rigid_motion(whole: &Inertia, momentum: ForceVector) -> MotionVector {
     let com_m = whole.first_kg_m / whole.mass_kg;
     let velocity_m_s = momentum.linear / whole.mass_kg;

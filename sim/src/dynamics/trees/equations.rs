@@ -1,11 +1,13 @@
 //! The equations of motion of a tree, M v' + bias = tau: the bias forces and the mass matrix M.
 //!
-//! Bias forces are what the joints must exert so that nothing accelerates, from Newton and Euler. Outwards:
+//! Bias forces are those that the joints must exert so that nothing accelerates, from Newton and Euler.
+//! Outwards:
 //!   a_i = a_p + v_p x S q',  f_i = I_i a_i + v_i x* I_i v_i,  with a_0 = -g;
-//! inwards:  bias_k = S_k . f,  f_p += f_i.
-//! Source: Featherstone 2008, section 5.3, in world axes about the tree's reference.
+//! inwards:  bias_k = S_k . f,  f_p += f_i. Source: Featherstone 2008, section 5.3, in world axes about
+//! the tree's reference.
 //!
-//! The mass matrix comes by composite rigid bodies. With I_c the inertia of a link and everything beyond it:
+//! The mass matrix is computed by composite rigid bodies. With I_c the inertia of a link and everything
+//! beyond it:
 //!   M_jk = S_j . I_c(k) S_k for j on the path to k.
 //! Source: Featherstone 2008, section 6.2.
 
@@ -16,7 +18,7 @@ use super::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
 use super::tree::Tree;
 
 impl Tree {
-    /// Sets `rhs` to -bias with the forces from outside, and each link's own spatial inertia.
+    /// Sets `rhs` to -bias plus the external forces, and each link's own spatial inertia.
     #[inline(always)]
     pub(in crate::dynamics) fn bias(&mut self, gravity_m_s2: DVec3) {
         let count = self.links.len();
@@ -41,7 +43,7 @@ impl Tree {
         }
     }
 
-    /// Inertia of a link by itself.
+    /// Returns the inertia of a link alone.
     #[inline(always)]
     pub(in crate::dynamics) fn inertia_of(&self, i: usize) -> Inertia {
         let (mass_kg, com_m) = (self.links[i].mass.mass_kg, self.centre_m(i));
@@ -50,7 +52,8 @@ impl Tree {
         Inertia { mass_kg, first_kg_m: com_m * mass_kg, second_kg_m2 }
     }
 
-    /// a_p + v_p x S q', the acceleration with q'' = 0. Gravity is an acceleration of the world upwards.
+    /// Returns a_p + v_p x S q', the acceleration with q'' = 0. Gravity is an upward acceleration of the
+    /// world.
     #[inline(always)]
     fn velocity_product(&self, i: usize, gravity_m_s2: DVec3) -> MotionVector {
         let lifted = MotionVector { angular: DVec3::ZERO, linear: -gravity_m_s2 };
@@ -60,7 +63,8 @@ impl Tree {
                 let before = self.velocity[parent];
                 self.acceleration[parent] + before.cross(velocity - before)
             }
-            // The velocity of a free joint is that of a point that moves, the spatial one that of where it passes.
+            // The velocity of a free joint is that of a moving point; the spatial velocity is that at a
+            // fixed point.
             None if matches!(self.links[i].joint, Joint::Free) => {
                 lifted
                     - MotionVector { angular: DVec3::ZERO, linear: velocity.angular.cross(velocity.linear) }

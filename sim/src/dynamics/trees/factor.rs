@@ -1,22 +1,22 @@
 //! The factor of a mass matrix, M = L^T D L along the tree, and the whitened velocities w = D^1/2 L v.
 //!
-//! Rows of constraints are whitened as Y = D^-1/2 L^-T J^T: then the kinetic energy is |w|^2 / 2, an impulse lambda
-//! changes w by Y lambda, and the effective inverse mass of a row is Y . Y. Neither M^-1 J^T nor J M^-1 J^T is formed.
-//! L has the sparsity of the tree: column by column, only the path to the world.
-//! Source: Featherstone 2008, section 6.5 and table 6.3.
+//! Rows of constraints are whitened as Y = D^-1/2 L^-T J^T. Then the kinetic energy is |w|^2 / 2, an
+//! impulse lambda changes w by Y lambda, and the effective inverse mass of a row is Y . Y. Neither M^-1 J^T
+//! nor J M^-1 J^T is formed. L has the sparsity of the tree: each column is non-zero only on the path to
+//! the world. Source: Featherstone 2008, section 6.5 and table 6.3.
 
 use pulp::Simd;
 
 use super::layout::Layout;
 
 pub struct Factor {
-    /// Packed rows: M, after [`Factor::factorise`] L, whose diagonal is 1 and not stored.
+    /// Packed rows: M, and after [`Factor::factorise`] L, whose diagonal is 1 and not stored.
     pub h: Vec<f64>,
     d: Vec<f64>,
     pub inverse_root_d: Vec<f64>,
 }
 
-/// Anything below is rounding, not inertia: a gram at a tenth of a millimetre has 1e-11 kg m^2.
+/// Smallest pivot that is inertia and not rounding: a gram at a tenth of a millimetre has 1e-11 kg m^2.
 const SMALLEST_INERTIA: f64 = 1e-14;
 
 impl Factor {
@@ -29,7 +29,7 @@ impl Factor {
         self.d[dof] > SMALLEST_INERTIA
     }
 
-    /// M = L^T D L in place, from the leaves inwards.
+    /// Computes M = L^T D L in place, from the leaves inwards.
     pub fn factorise(&mut self, layout: &Layout) {
         for k in (0..layout.dofs()).rev() {
             let range = layout.row(k);
@@ -51,7 +51,7 @@ impl Factor {
         }
     }
 
-    /// w = D^1/2 L v + D^-1/2 L^-T (dt rhs): the whitened velocity at the end of a step without constraints. It uses up `rhs`.
+    /// Computes w = D^1/2 L v + D^-1/2 L^-T (dt rhs), the unconstrained whitened velocity; overwrites `rhs`.
     pub fn whiten(&self, layout: &Layout, dt_s: f64, v: &[f64], rhs: &mut [f64], w: &mut [f64]) {
         for k in (0..layout.dofs()).rev() {
             let row = &self.h[layout.row(k)];
@@ -68,7 +68,7 @@ impl Factor {
         }
     }
 
-    /// w = D^1/2 L v.
+    /// Computes w = D^1/2 L v.
     pub fn whiten_velocity(&self, layout: &Layout, v: &[f64], w: &mut [f64]) {
         for k in 0..layout.dofs() {
             let path = layout.path(k);
@@ -78,7 +78,7 @@ impl Factor {
         }
     }
 
-    /// v = L^-1 D^-1/2 w.
+    /// Computes v = L^-1 D^-1/2 w.
     pub fn unwhiten(&self, layout: &Layout, w: &[f64], v: &mut [f64]) {
         for k in 0..layout.dofs() {
             let row = &self.h[layout.row(k)];
@@ -91,7 +91,7 @@ impl Factor {
         }
     }
 
-    /// Y = D^-1/2 L^-T J^T in place, for N rows at once that are zero outside the path of degree of freedom `k`.
+    /// Computes Y = D^-1/2 L^-T J^T in place, for N rows that are zero off the path of dof `k`.
     #[inline(always)]
     pub fn whiten_rows<S: Simd, const N: usize>(
         &self,
@@ -116,7 +116,7 @@ impl Factor {
     }
 }
 
-/// t -= l pivot, number by number.
+/// Computes t -= l pivot, element by element.
 #[inline(always)]
 fn subtract<S: Simd>(simd: S, t: &mut [f64], l: f64, pivot: &[f64]) {
     let ((wide_t, t), (wide_pivot, pivot)) = (S::as_mut_simd_f64s(t), S::as_simd_f64s(pivot));

@@ -1,24 +1,25 @@
-//! How the spin of a lone body changes by itself.
+//! Torque-free rotation of a lone body.
 //!
 //! Euler's equation by the implicit midpoint rule, m = (w + w') / 2:
 //!   I (w' - w) + dt m x I m = 0,
-//! which keeps |I w| and w . I w whatever the step, so that a tumbling body neither gains energy nor loses it.
-//! Newton's iteration on it; the derivative is  I + dt/2 ([m] I - [I m]).
+//! which preserves |I w| and w . I w for any step size, so that a tumbling body neither gains energy nor
+//! loses it. It is solved by Newton's iteration; the derivative is  I + dt/2 ([m] I - [I m]).
 //!
-//! Contacts are solved for the spin that ends like this, but their impulses act when the step begins: the spin that they
-//! left gyrates as a whole. Were it turned without its gyration, a top would tilt by  omega dt / 2  of its precession.
+//! Contacts are solved for the spin at the end of this rotation, but their impulses act when the step begins:
+//! the resulting spin gyrates as a whole. Without that, a top would tilt by  omega dt / 2  of its precession.
 
 use rapier3d::glamx::{DMat3, DQuat, DVec3};
 
 use super::tree::Tree;
 
-/// Eight iterations suffice for 40 rad per step; below 1 rad per step three do.
+/// Maximum number of iterations: eight suffice for 40 rad per step; below 1 rad per step three do.
 const MAX_ITERATIONS: usize = 8;
 const TOLERANCE: f64 = 1e-14;
 
 impl Tree {
-    /// Velocities with which a step without forces ends; of a tree of several links those with which it begins (its
-    /// gyroscopic forces are part of the bias). Takes a lone body's gyroscopic moment out of the right-hand side.
+    /// Computes the velocities at the end of a step without forces. For a tree of several links these
+    /// are the initial velocities, since its gyroscopic forces are part of the bias. It removes a lone
+    /// body's gyroscopic moment from the right-hand side.
     pub(in crate::dynamics) fn spin_freely(&mut self, dt_s: f64, v: &mut [f64]) {
         v.copy_from_slice(&self.v);
         self.half_gyration_rad_s = DVec3::ZERO;
@@ -36,8 +37,8 @@ impl Tree {
         }
     }
 
-    /// By how much a free body turns in a step (rad, world axes) in which positions move by the spin `moving`, and the spin
-    /// at the end of it; `after` is that spin as the solver found it.
+    /// Returns the rotation of a free body in a step (rad, world axes) and its spin at the end. `moving`
+    /// is the spin by which positions move, `after` the final spin as the solver found it.
     pub(in crate::dynamics) fn spin_on(&self, dt_s: f64, moving: DVec3, after: DVec3) -> (DVec3, DVec3) {
         let gyration = self.half_gyration_rad_s * 2.0;
         if gyration == DVec3::ZERO {
@@ -47,7 +48,7 @@ impl Tree {
         let pushed = moving - gyration;
         let moved = midpoint_spin(&inertia, pushed, dt_s);
         let turn_rad = (pushed + moved) * (0.5 * dt_s);
-        // In the body's axes the new spin is what it was: the world's turns with the body.
+        // In the body's axes the new spin is unchanged: the world's axes turn with the body.
         let carried = DQuat::from_scaled_axis(turn_rad) * DQuat::from_scaled_axis(-moved * dt_s);
         (turn_rad, carried * midpoint_spin(&inertia, after - gyration, dt_s))
     }
@@ -69,7 +70,7 @@ fn midpoint_spin(inertia: &DMat3, before: DVec3, dt_s: f64) -> DVec3 {
     after
 }
 
-/// [v] with [v] u = v x u.
+/// Returns [v] with [v] u = v x u.
 fn skew(v: DVec3) -> DMat3 {
     DMat3::from_cols(DVec3::new(0.0, v.z, -v.y), DVec3::new(-v.z, 0.0, v.x), DVec3::new(v.y, -v.x, 0.0))
 }

@@ -7,7 +7,7 @@ use super::link::Joint;
 use super::spatial::{MotionVector, turned};
 use super::tree::Tree;
 
-/// Work for the widest registers that the processor has, with the same bits.
+/// Work for the widest registers of the processor, with bit-identical results.
 struct Kinematics<'a> {
     tree: &'a mut Tree,
 }
@@ -22,7 +22,8 @@ impl WithSimd for Kinematics<'_> {
 }
 
 impl Tree {
-    /// From joint positions, with p the parent:  R = R_p R_0 R(q),  r = r_p + R_p (t_0 + ...),  and the axes
+    /// Computes poses and axes from joint positions, with p the parent:  R = R_p R_0 R(q),
+    /// r = r_p + R_p (t_0 + ...),  and the axes
     ///   S = (a, r_a x a) of a hinge through r_a,  S = (0, a) of a slide,  both with a = R_p R_0 direction.
     /// Source: Featherstone 2008, section 4.1 and table 4.1, in world axes.
     pub(in crate::dynamics) fn kinematics(&mut self) {
@@ -76,7 +77,7 @@ impl Tree {
         self.velocities();
     }
 
-    /// v = v_p + S q'.
+    /// Computes v = v_p + S q'.
     #[inline(always)]
     pub(in crate::dynamics) fn velocities(&mut self) {
         for (i, link) in self.links.iter().enumerate() {
@@ -89,8 +90,9 @@ impl Tree {
         }
     }
 
-    /// Moves the positions by the velocities `v` for one step, and takes over `after` as velocities; [`Tree::kinematics`]
-    /// follows. A lone body turns by the mean of its angular velocities over the step, see [`Tree::spin_on`].
+    /// Moves the positions by the velocities `v` for one step, and stores `after` as velocities.
+    /// [`Tree::kinematics`] must follow. A lone body turns by the mean of its angular velocities over
+    /// the step, see [`Tree::spin_on`].
     pub(in crate::dynamics) fn integrate(&mut self, dt_s: f64, v: &[f64], after: &[f64]) {
         self.v.copy_from_slice(after);
         if let Joint::Free = self.links[0].joint {
@@ -114,17 +116,17 @@ impl Tree {
         DPose3::from_parts(self.reference_m + self.position_m[link], rotation)
     }
 
-    /// Velocity of the link's origin, world frame.
+    /// Returns the velocity of the link's origin, world frame.
     pub fn link_velocity_m_s(&self, link: usize) -> DVec3 {
         self.velocity[link].at(self.position_m[link])
     }
 
-    /// Velocity of the link's centre of mass, world frame.
+    /// Returns the velocity of the link's centre of mass, world frame.
     pub fn com_velocity_m_s(&self, link: usize) -> DVec3 {
         self.velocity[link].at(self.centre_m(link))
     }
 
-    /// Velocity of a point that is fixed to a link and now lies at `point_m` in the world.
+    /// Returns the velocity of a point that is fixed to a link and currently at `point_m` in the world.
     pub fn point_velocity_m_s(&self, link: usize, point_m: DVec3) -> DVec3 {
         self.velocity[link].at(point_m - self.reference_m)
     }
@@ -133,7 +135,7 @@ impl Tree {
         self.velocity[link].angular
     }
 
-    /// Centre of mass of a link relative to the reference.
+    /// Returns the centre of mass of a link relative to the reference.
     pub(in crate::dynamics) fn centre_m(&self, link: usize) -> DVec3 {
         self.position_m[link] + self.rotation[link] * self.links[link].mass.com_m
     }

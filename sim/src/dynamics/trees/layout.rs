@@ -1,17 +1,19 @@
-//! Where the numbers of a tree lie: degrees of freedom and the packed rows of its sparse matrices.
+//! Memory layout of a tree: degrees of freedom and the packed rows of its sparse matrices.
 
 use super::link::Link;
 
-/// Row k of a packed matrix holds the columns on the path from the world to degree of freedom k, k itself last: where
-/// M and its factor L are not zero (Featherstone 2008, chapter 8). Degrees of freedom of one joint follow each other.
+/// Layout of packed matrices. Row k holds the columns on the path from the world to degree of freedom k,
+/// k itself last: the non-zero columns of M and its factor L (Featherstone 2008, chapter 8). Degrees of
+/// freedom of one joint are adjacent.
 #[derive(PartialEq)]
 pub struct Layout {
-    /// First degree of freedom of each link's joint; that of the next moving link where it has none.
+    /// First degree of freedom of each link's joint; for a fixed joint that of the next moving link.
     pub first_dof: Vec<usize>,
-    /// Last degree of freedom on the path to each link; `None` where nothing moves it.
+    /// Last degree of freedom on the path to each link; `None` if nothing moves it.
     pub last_dof: Vec<Option<usize>>,
     pub link_of: Vec<usize>,
-    /// For each link, the first of the links that it is rigidly one with; and for that one, the same of its parent.
+    /// For each link, the first link that it is rigidly connected to, and the same for the parent of
+    /// that link.
     rigid: Vec<usize>,
     rigid_parent: Vec<Option<usize>>,
     start: Vec<usize>,
@@ -53,7 +55,7 @@ impl Layout {
         layout
     }
 
-    /// Rigidly one, or joined by one joint.
+    /// Returns true if two links are rigidly connected or have one joint between them.
     pub fn are_neighbours(&self, a: usize, b: usize) -> bool {
         let (ra, rb) = (self.rigid[a], self.rigid[b]);
         ra == rb || self.rigid_parent[a] == Some(rb) || self.rigid_parent[b] == Some(ra)
@@ -63,18 +65,18 @@ impl Layout {
         self.link_of.len()
     }
 
-    /// Length of all packed rows together.
+    /// Returns the total length of all packed rows.
     pub fn packed(&self) -> usize {
         self.path.len()
     }
 
-    /// Where row `dof` lies in a packed matrix.
+    /// Returns the range of row `dof` in a packed matrix.
     #[inline]
     pub fn row(&self, dof: usize) -> std::ops::Range<usize> {
         self.start[dof]..self.start[dof + 1]
     }
 
-    /// Columns of row `dof`.
+    /// Returns the columns of row `dof`.
     #[inline]
     pub fn path(&self, dof: usize) -> &[u16] {
         &self.path[self.row(dof)]

@@ -1,15 +1,16 @@
-//! What a tree is made of: links, their joints and masses. Nothing here knows robots or file formats.
+//! Components of a tree: links, their joints and masses. This module has no knowledge of robots or file
+//! formats.
 
 use rapier3d::glamx::{DMat3, DPose3, DVec3};
 use rapier3d::prelude::MassProperties;
 
-/// A rigid body and the joint that holds it to its parent.
+/// A rigid body and the joint that connects it to its parent.
 #[derive(Clone, Debug)]
 pub struct Link {
     pub name: String,
     /// An earlier link of the tree; `None` is the world.
     pub parent: Option<usize>,
-    /// Pose with the joint at 0. A free link starts there in the world.
+    /// Pose with the joint at 0; for a free link the initial pose in the world.
     pub parent_from_link: DPose3,
     pub joint: Joint,
     pub mass: Mass,
@@ -24,14 +25,14 @@ pub enum Joint {
     Slide(Axis),
 }
 
-/// Joint of one degree of freedom. Positions are rad of a hinge and m of a slide, efforts N m and N.
+/// Joint of one degree of freedom. Positions are in rad for a hinge and m for a slide, efforts in N m and N.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
     /// Unit vector, link frame.
     pub direction: DVec3,
-    /// Where a hinge's axis runs through, link frame.
+    /// Point on a hinge's axis, link frame.
     pub anchor_m: DVec3,
-    /// Inertia of the drive as the joint feels it: kg m^2 or kg.
+    /// Inertia of the drive as seen by the joint: kg m^2 or kg.
     pub armature: f64,
     /// Effort of dry friction.
     pub friction_loss: f64,
@@ -42,33 +43,35 @@ pub struct Axis {
     pub spring_rest: f64,
     /// Lowest and highest position.
     pub range: Option<[f64; 2]>,
-    /// What a drive can exert at most; infinite for a joint that is never driven to its limit.
+    /// Maximum effort of a drive; infinite for a joint that is never driven to its limit.
     pub effort_limit: f64,
-    /// At which a drive can push no further; near it, it pushes less. Infinite for one that knows no such speed.
+    /// Speed at which a drive can push no further; near it, it pushes less. Infinite for a drive without
+    /// such a speed.
     pub speed_limit: f64,
 }
 
-/// What a joint's drive is told; it stays until it is told again and is not part of a state.
+/// Setpoint of a joint's drive. It stays in effect until it is replaced and is not part of a state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drive {
-    /// rad or m.
+    /// Target position, rad or m.
     pub target: f64,
     /// Effort per position.
     pub kp: f64,
     /// Effort per velocity; the damper acts on the joint's own velocity.
     pub kd: f64,
-    /// Effort.
+    /// Constant effort, N m or N.
     pub feedforward: f64,
 }
 
-/// A drive's impulse in a step as a function of the velocity v' at its end:  rest - implicit v', within +-most. A motor that
-/// turns fast pushes less in the direction in which it turns, and brakes with all it has:
+/// A drive's impulse in a step as a function of the velocity v' at its end:  rest - implicit v', within
+/// +-most. A motor that turns fast pushes less in the direction in which it turns, and brakes with its
+/// full effort:
 ///   impulse <= slope (speed_limit - v'),   slope = most / (0.2 speed_limit),   for v' > 0,
-/// which is all of it at 80 % of the limit and nothing at the limit. Beyond the limit, where something else turns it, its
-/// voltage is above the supply's and drives a current back through the diodes of its bridge, which no controller holds back: it
-/// brakes whatever it is told, along the same line, and from 120 % on with more than it could push.
-/// It holds at the end of the step as the rest does, so that no motor drives itself beyond its limit within a step, however
-/// light its link is.
+/// which is the full effort at 80 % of the limit and zero at the limit. Beyond the limit, where something
+/// else turns the motor, its voltage exceeds the supply's. It drives a current back through the diodes of its
+/// bridge, which no controller can prevent. It then brakes along the same line whatever the setpoint is, and
+/// from 120 % on with more than `most`. Like the rest of the law, this holds at the end of the step. So no
+/// motor drives itself beyond its limit within a step, however light its link is.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DriveLaw {
     pub rest: f64,
@@ -82,7 +85,7 @@ impl Drive {
 }
 
 impl Axis {
-    /// An axis through the link's origin with nothing on it.
+    /// Creates an axis through the link's origin without drive, spring, friction or range.
     pub fn along(direction: DVec3) -> Axis {
         Axis {
             direction: direction.normalize(),
@@ -126,7 +129,7 @@ pub struct Mass {
 }
 
 impl Mass {
-    /// The mass of links that only carry others: two joints in a row have one between them.
+    /// Mass of links that only carry others, for example the link between two joints in a row.
     pub const NONE: Mass = Mass { mass_kg: 0.0, com_m: DVec3::ZERO, inertia_kg_m2: DMat3::ZERO };
 
     pub fn from_rapier(mass: &MassProperties) -> Mass {
@@ -139,7 +142,7 @@ impl Mass {
         }
     }
 
-    /// The mass of a solid box of even density, centred.
+    /// Returns the mass of a solid box of uniform density, centred.
     pub fn of_box(mass_kg: f64, half_extents_m: DVec3) -> Mass {
         let s = half_extents_m * half_extents_m * (mass_kg / 3.0);
         let inertia_kg_m2 = DMat3::from_diagonal(DVec3::new(s.y + s.z, s.x + s.z, s.x + s.y));

@@ -1,4 +1,4 @@
-//! All trees of a world, and where each one's degrees of freedom lie among all.
+//! All trees of a world, and the offsets of their degrees of freedom.
 
 pub mod abreast;
 pub mod energy;
@@ -49,7 +49,7 @@ pub struct Trees {
     pub all: Vec<Tree>,
     /// First degree of freedom of each tree among all.
     pub offset: Vec<usize>,
-    /// Those that have joints, by their layouts, and those that have none.
+    /// Trees with joints, grouped by layout, and trees without.
     pub alike: Vec<Alike>,
     pub jointless: Vec<usize>,
 }
@@ -72,7 +72,7 @@ impl Trees {
         id
     }
 
-    /// Gives the tree that comes next a place among those that are like it.
+    /// Assigns the next tree to a group of its layout.
     fn set_beside(&mut self, layout: &Layout) {
         let next = self.all.len();
         let is_like = |alike: &&mut Alike| self.all[alike.trees[0]].layout == *layout;
@@ -90,7 +90,7 @@ impl Trees {
         self.offset.last().zip(self.all.last()).map_or(0, |(offset, tree)| offset + tree.dofs())
     }
 
-    /// Each tree with its range among all degrees of freedom.
+    /// Returns each tree with its range among all degrees of freedom.
     pub fn ranges(&mut self) -> impl Iterator<Item = (&mut Tree, std::ops::Range<usize>)> {
         self.all.iter_mut().zip(&self.offset).map(|(tree, offset)| {
             let range = *offset..offset + tree.dofs();
@@ -98,7 +98,8 @@ impl Trees {
         })
     }
 
-    /// Factorises all mass matrices, and sets `w` to the whitened velocities at the end of a step without constraints.
+    /// Factorises all mass matrices, and sets `w` to the whitened velocities at the end of an
+    /// unconstrained step.
     #[inline(always)]
     pub fn whiten(&mut self, dt_s: f64, w: &mut [f64]) {
         for alike in &mut self.alike {
@@ -112,7 +113,7 @@ impl Trees {
         }
     }
 
-    /// Velocities of all trees from the whitened ones.
+    /// Computes the velocities of all trees from the whitened ones.
     #[inline(always)]
     pub fn unwhiten(&mut self, w: &[f64], v: &mut [f64]) {
         for alike in &mut self.alike {
@@ -125,7 +126,7 @@ impl Trees {
         }
     }
 
-    /// Whether something moves a link; without, it is part of the world.
+    /// Returns true if something moves a link; otherwise it is part of the world.
     pub fn moves(&self, link: LinkId) -> bool {
         self.all[link.tree.index()].layout.last_dof[link.link].is_some()
     }
@@ -138,8 +139,9 @@ impl Trees {
         self.all[link.tree.index()].world_from_link(link.link)
     }
 
-    /// Appends N rows whose unit impulses act on the second body as `wrenches` says and on the first as its opposite;
-    /// `None` is the world. `wrenches` gets the tree's reference point. Returns the inverse masses.
+    /// Appends N rows whose unit impulses act on the second body by `wrenches` and on the first by their
+    /// opposite; `None` is the world. `wrenches` takes the tree's reference point. Returns the inverse
+    /// masses.
     #[inline(always)]
     pub fn push_rows<S: Simd, const N: usize>(
         &self,

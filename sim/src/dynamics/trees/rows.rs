@@ -7,27 +7,30 @@ use pulp::Simd;
 use super::spatial::ForceVector;
 use super::tree::Tree;
 
-/// Groups of N rows that share their columns: of each group the columns that are not zero, and in them Y (see `factor`).
+/// Groups of N rows that share their columns: the non-zero columns of each group, and Y in them (see
+/// `factor`).
 pub struct ConstraintRows<const N: usize> {
     /// The last group, column by column, until another one begins.
     y: Vec<[f64; N]>,
     column: Vec<u16>,
-    /// All groups.
+    /// The blocks of all groups.
     blocks: Vec<RowBlock<N>>,
     groups: Vec<Range<usize>>,
 }
 
-/// Columns that are worked on side by side: the sums over every fourth column of a group grow independently of each other.
+/// Columns processed side by side: the sums over every fourth column of a group are independent of each
+/// other.
 const SIDE: usize = 4;
 
-/// Neighbours among a group's columns that are neighbours among all, each at the place that it has in sums. What is at other places
-/// is none of the group's.
+/// Columns of a group that are adjacent both in the group and among all, each at its place in the sums.
+/// The other places do not belong to the group.
 struct RowBlock<const N: usize> {
     /// Zero at other places.
     y: [Quad; N],
-    /// Added to what is there otherwise: zeros here, and what changes nothing, zeros of the other sign, at other places.
+    /// Bits combined with the sum: zeros at places of the group, and at other places zeros of the other
+    /// sign, whose addition changes nothing.
     nothing: Quad,
-    /// Where they begin in [`Whitened`].
+    /// Start of the block in [`Whitened`].
     first: usize,
 }
 
@@ -35,7 +38,7 @@ struct RowBlock<const N: usize> {
 #[repr(align(32))]
 struct Quad([f64; SIDE]);
 
-/// Whitened velocities of all trees. Before and behind them is room for blocks that reach beyond.
+/// Whitened velocities of all trees, with margins on both sides for blocks that extend beyond them.
 pub struct Whitened(Vec<f64>);
 
 const MARGIN: usize = SIDE - 1;
@@ -51,7 +54,7 @@ impl Whitened {
         self.0.resize(dofs + 2 * MARGIN, 0.0);
     }
 
-    /// Whatever a step that diverged has left beyond the velocities.
+    /// Clears the values that a diverged step may have left in the margins.
     pub fn clear_margins(&mut self) {
         let end = self.0.len() - MARGIN;
         self.0[..MARGIN].fill(0.0);
@@ -86,18 +89,19 @@ impl<const N: usize> ConstraintRows<N> {
         self.groups.clear();
     }
 
-    /// Begins a group; the groups follow each other.
+    /// Begins a group; groups are adjacent.
     pub fn begin(&mut self) {
         self.y.clear();
         self.column.clear();
     }
 
-    /// Columns of the group so far.
+    /// Returns the number of columns of the group so far.
     pub fn columns(&self) -> usize {
         self.column.len()
     }
 
-    /// Appends what wrenches about the tree's reference do on a link: J^T = S . wrench along the path, then whitened.
+    /// Appends the effect of wrenches about the tree's reference on a link: J^T = S . wrench along the
+    /// path, then whitened.
     #[inline(always)]
     pub fn push_link<S: Simd>(
         &mut self,
@@ -130,7 +134,8 @@ impl<const N: usize> ConstraintRows<N> {
         tree.factor.whiten_rows(simd, &tree.layout, dof, &mut self.y[first..]);
     }
 
-    /// Adds a second part on the same tree, from the column `second` of the group on, to the first, where their paths coincide.
+    /// Adds a second part on the same tree, from the column `second` of the group on, to the first,
+    /// where their paths coincide.
     pub fn merge(&mut self, second: usize) {
         let paths = (0..second).zip(second..self.column.len());
         let shared = paths.take_while(|(a, b)| self.column[*a] == self.column[*b]).count();
@@ -166,7 +171,7 @@ impl<const N: usize> ConstraintRows<N> {
         a
     }
 
-    /// Makes a block of the column at this place of the group and of its neighbours; returns how many they are.
+    /// Makes a block of the column at this place of the group and its neighbours. Returns their number.
     #[inline(always)]
     fn push_block(&mut self, place: usize) -> usize {
         let begin = place % SIDE;
@@ -180,7 +185,7 @@ impl<const N: usize> ConstraintRows<N> {
             self.blocks.push(RowBlock { y, nothing: Quad::default(), first });
             return SIDE;
         }
-        // Filled where it lies: to move what has been written number by number, a processor has to wait for it.
+        // Filled in place: moving data just written number by number would stall the processor.
         self.blocks.push(RowBlock { y: [Quad::default(); N], nothing: Quad([-0.0; SIDE]), first });
         if let Some(block) = self.blocks.last_mut() {
             for (side, y) in (begin..).zip(y) {
@@ -193,7 +198,7 @@ impl<const N: usize> ConstraintRows<N> {
         count
     }
 
-    /// Velocities along the rows of a group.
+    /// Returns the velocities along the rows of a group.
     #[inline(always)]
     pub fn velocity(&self, group: usize, w: &Whitened) -> [f64; N] {
         let mut sums = [[0.0; SIDE]; N];

@@ -22,7 +22,7 @@ pub struct ForceVector {
 }
 
 impl MotionVector {
-    /// v x m, the rate of a motion vector that is carried along by v.
+    /// Computes v x m, the rate of a motion vector that moves with v.
     #[inline]
     pub fn cross(self, m: MotionVector) -> MotionVector {
         MotionVector {
@@ -31,7 +31,7 @@ impl MotionVector {
         }
     }
 
-    /// v x* f, the rate of a force vector that is carried along by v.
+    /// Computes v x* f, the rate of a force vector that moves with v.
     #[inline]
     pub fn cross_force(self, f: ForceVector) -> ForceVector {
         ForceVector {
@@ -45,7 +45,7 @@ impl MotionVector {
         self.angular.dot(f.angular) + self.linear.dot(f.linear)
     }
 
-    /// Velocity of a point given relative to the reference.
+    /// Returns the velocity of a point given relative to the reference.
     #[inline]
     pub fn at(self, point_m: DVec3) -> DVec3 {
         self.linear + self.angular.cross(point_m)
@@ -53,7 +53,7 @@ impl MotionVector {
 }
 
 impl ForceVector {
-    /// A force that acts at a point given relative to the reference.
+    /// Creates a force that acts at a point given relative to the reference.
     #[inline]
     pub fn at(point_m: DVec3, force_n: DVec3) -> ForceVector {
         ForceVector { angular: point_m.cross(force_n), linear: force_n }
@@ -152,7 +152,7 @@ impl Symmetric {
         )
     }
 
-    /// R I R^T.
+    /// Computes R I R^T.
     #[inline]
     pub fn rotated(&self, r: &DMat3) -> Symmetric {
         let a = r.x_axis * self.xx + r.y_axis * self.xy + r.z_axis * self.xz;
@@ -169,7 +169,7 @@ impl Symmetric {
         }
     }
 
-    /// m (c.c 1 - c c^T), what a point mass adds about the reference.
+    /// Computes m (c.c 1 - c c^T), the contribution of a point mass about the reference.
     #[inline]
     pub fn of_point(mass_kg: f64, c: DVec3) -> Symmetric {
         Symmetric {
@@ -204,7 +204,7 @@ pub struct Inertia {
 }
 
 impl Inertia {
-    /// I v: momentum of a velocity, force of an acceleration.
+    /// Computes I v: the momentum of a velocity, or the force of an acceleration.
     #[inline]
     pub fn mul(&self, v: MotionVector) -> ForceVector {
         ForceVector {
@@ -223,7 +223,7 @@ impl AddAssign for Inertia {
     }
 }
 
-/// Turn by the rotation vector `turn_rad`, world axes.
+/// Turns by the rotation vector `turn_rad`, world axes.
 #[inline]
 pub fn turned(rotation: DQuat, turn_rad: DVec3) -> DQuat {
     if turn_rad == DVec3::ZERO {
@@ -232,7 +232,7 @@ pub fn turned(rotation: DQuat, turn_rad: DVec3) -> DQuat {
     (DQuat::from_scaled_axis(turn_rad) * rotation).normalize()
 }
 
-/// The pose in single precision, as colliders and everything outside of dynamics have it.
+/// Converts the pose to single precision, which colliders and everything outside of dynamics use.
 pub(crate) fn rounded(pose: &DPose3) -> Pose {
     Pose::from_parts(pose.translation.as_vec3(), pose.rotation.as_quat())
 }

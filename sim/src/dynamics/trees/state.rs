@@ -7,7 +7,7 @@ use super::link::Joint;
 use super::spatial::ForceVector;
 use super::tree::Tree;
 
-/// Everything of a tree that outlasts a step, in full precision.
+/// All state of a tree that outlasts a step, in full precision.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TreeState {
     base: DPose3,
@@ -18,35 +18,37 @@ pub struct TreeState {
 }
 
 impl Tree {
-    /// Position of a hinge (rad) or slide (m); 0 of other joints.
+    /// Returns the position of a hinge (rad) or slide (m); 0 for other joints.
     pub fn joint_position(&self, link: usize) -> f64 {
         self.q[link]
     }
 
-    /// Velocity of a hinge (rad/s) or slide (m/s); 0 of other joints.
+    /// Returns the velocity of a hinge (rad/s) or slide (m/s); 0 for other joints.
     pub fn joint_velocity(&self, link: usize) -> f64 {
         self.links[link].joint.axis().map_or(0.0, |_| self.v[self.layout.first_dof[link]])
     }
 
-    /// Speed of a joint as a share of its motor's limit, if that has one.
+    /// Returns the speed of a joint as a share of its motor's limit. Returns `None` if the motor has no
+    /// limit.
     pub fn motor_speed_share(&self, link: usize) -> Option<f64> {
         let limit = self.links[link].joint.axis()?.speed_limit;
         limit.is_finite().then(|| self.joint_velocity(link).abs() / limit)
     }
 
-    /// How far a hinge (rad) or slide (m) is beyond its range; 0 within it, and of other joints.
+    /// Returns the distance of a hinge (rad) or slide (m) beyond its range; 0 within it, and for other
+    /// joints.
     pub fn beyond_range(&self, link: usize) -> f64 {
         let range = self.links[link].joint.axis().and_then(|axis| axis.range);
         range.map_or(0.0, |[low, high]| (low - self.q[link]).max(self.q[link] - high).max(0.0))
     }
 
-    /// What the drive of a joint exerted on average over the last step (N m or N): within its effort limit, unless it brakes what
-    /// turns faster than it could.
+    /// Returns the mean effort of a joint's drive over the last step (N m or N). It is within the effort
+    /// limit, unless the drive brakes a motion faster than its own limit.
     pub fn drive_effort(&self, link: usize) -> f64 {
         self.effort[link]
     }
 
-    /// Sets a hinge or slide; nothing happens to other joints.
+    /// Sets the position and velocity of a hinge or slide; no effect on other joints.
     pub fn set_joint(&mut self, link: usize, position: f64, velocity: f64) {
         if self.links[link].joint.axis().is_some() {
             self.q[link] = position;
@@ -55,7 +57,8 @@ impl Tree {
         }
     }
 
-    /// Puts a free tree somewhere; the velocity is that of the first link's origin. Nothing happens to a fixed tree.
+    /// Sets the pose and velocity of a free tree; the velocity is that of the first link's origin. No
+    /// effect on a fixed tree.
     pub fn set_base(&mut self, world_from_base: DPose3, velocity_m_s: DVec3, spin_rad_s: DVec3) {
         if matches!(self.links[0].joint, Joint::Free) {
             self.base = world_from_base;
@@ -66,17 +69,17 @@ impl Tree {
         }
     }
 
-    /// A force (N, world axes) at a point (world frame) of a link, for the next step; forces add up.
+    /// Applies a force (N, world axes) at a point (world frame) of a link in the next step; forces add up.
     pub fn push(&mut self, link: usize, point_m: DVec3, force_n: DVec3) {
         self.external[link] += ForceVector::at(point_m - self.reference_m, force_n);
     }
 
-    /// A torque (N m, world axes) on a link, for the next step.
+    /// Applies a torque (N m, world axes) to a link in the next step.
     pub fn twist(&mut self, link: usize, torque_n_m: DVec3) {
         self.external[link] += ForceVector::moment(torque_n_m);
     }
 
-    /// Centre of mass of the whole tree, world frame.
+    /// Returns the centre of mass of the whole tree, world frame.
     pub fn com_m(&self) -> DVec3 {
         let moment = |(i, link): (usize, &crate::dynamics::Link)| self.centre_m(i) * link.mass.mass_kg;
         let sum: DVec3 = self.links.iter().enumerate().map(moment).sum();
@@ -93,12 +96,12 @@ impl Tree {
         }
     }
 
-    /// Whether a state is one of a tree like this.
+    /// Returns true if a state is one of a tree like this.
     pub(in crate::dynamics) fn fits(&self, state: &TreeState) -> bool {
         state.q.len() == self.q.len() && state.v.len() == self.v.len()
     }
 
-    /// Takes back a state that fits.
+    /// Restores a state that fits.
     pub(in crate::dynamics) fn restore(&mut self, state: &TreeState) {
         self.base = state.base;
         self.q.clone_from(&state.q);

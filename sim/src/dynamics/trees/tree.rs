@@ -8,40 +8,42 @@ use super::layout::Layout;
 use super::link::{Drive, DriveLaw, Joint, Link, Mass};
 use super::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
 
-/// Links joined into a tree. A robot is a tree with a free first link, a door one on a fixed first link, a lone
-/// object a tree of one free link.
+/// Links joined into a tree. A robot is a tree with a free first link, a door one on a fixed first link,
+/// a lone object a tree of one free link.
 ///
-/// Degrees of freedom, in the order of the links: a free joint has the velocity of the link's centre of mass and its
-/// angular velocity, both in world axes; a hinge or slide has one. The centre of mass and not the origin, because then
-/// a lone body's mass matrix has no coupling and its centre flies straight.
+/// The degrees of freedom are in the order of the links. A free joint has the velocity of the link's
+/// centre of mass and its angular velocity, both in world axes; a hinge or slide has one. The centre of
+/// mass is used rather than the origin, because then a lone body's mass matrix has no coupling and its
+/// centre flies straight.
 pub struct Tree {
     pub name: String,
     pub(in crate::dynamics) links: Vec<Link>,
     pub(in crate::dynamics) layout: Layout,
     /// Pose of a free first link in the world.
     pub(in crate::dynamics) base: DPose3,
-    /// Joint positions, by link; 0 where the joint has none.
+    /// Joint positions, by link; 0 if the joint has none.
     pub(in crate::dynamics) q: Vec<f64>,
     pub(in crate::dynamics) v: Vec<f64>,
-    /// What each link's drive is told, by link.
+    /// Setpoint of each link's drive, by link.
     pub(in crate::dynamics) drives: Vec<Drive>,
-    /// What that comes to in this step, by link.
+    /// Resulting law of each drive in this step, by link.
     pub(in crate::dynamics) laws: Vec<DriveLaw>,
-    /// Whether a link's drive is a row of the solver in this step, by link.
+    /// True if a link's drive is a row of the solver in this step, by link.
     pub(in crate::dynamics) bounded: Vec<bool>,
-    /// Whether a joint would leave its range in this step although it was not near an end, by link.
+    /// True if a joint would leave its range in this step although it was not near an end, by link.
     pub(in crate::dynamics) overrun: Vec<bool>,
-    /// Forces from outside, by link, about the reference; they act in the next step only.
+    /// External forces, by link, about the reference; they act only in the next step.
     pub(in crate::dynamics) external: Vec<ForceVector>,
-    /// What the drives exerted in the last step, by link.
+    /// Efforts of the drives in the last step, by link.
     pub(in crate::dynamics) effort: Vec<f64>,
     /// Impulses of dry friction in the last step, by link, with which the next begins.
     pub(in crate::dynamics) dry_friction: Vec<f64>,
-    /// Where the step would end without constraints, by degree of freedom.
+    /// Velocities at the end of an unconstrained step, by degree of freedom.
     pub(in crate::dynamics) unconstrained: Vec<f64>,
-    /// Origin of the spatial vectors, world frame: centre of mass of a free first link, origin of a fixed one.
+    /// Origin of the spatial vectors, world frame: centre of mass of a free first link, origin of a
+    /// fixed one.
     pub(in crate::dynamics) reference_m: DVec3,
-    /// How links are turned in their parents with their joints at 0.
+    /// Rotations of links in their parents with their joints at 0.
     pub(in crate::dynamics) parent_from_link_rotation: Vec<DMat3>,
     pub(in crate::dynamics) rotation: Vec<DMat3>,
     /// Origins of the links relative to the reference.
@@ -55,15 +57,20 @@ pub struct Tree {
     pub(in crate::dynamics) inertia: Vec<Inertia>,
     /// Inertia of each link about its centre of mass, link axes.
     pub(in crate::dynamics) own_inertia: Vec<Symmetric>,
-    /// What springs, dampers and drives add to the diagonal of the mass matrix.
+    /// Terms that springs, dampers and drives add to the diagonal of the mass matrix.
     pub(in crate::dynamics) implicit: Vec<f64>,
     pub(in crate::dynamics) rhs: Vec<f64>,
     pub(in crate::dynamics) factor: Factor,
-    /// Half of what [`Tree::spin_freely`] added to the spin.
+    /// Half of the change of spin by [`Tree::spin_freely`].
     pub(in crate::dynamics) half_gyration_rad_s: DVec3,
 }
 
 impl Tree {
+    /// Builds a tree at rest from its links, parents first.
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`TreeError`] if the links do not form a tree or a joint moves nothing that has inertia.
     pub fn new(name: &str, links: Vec<Link>) -> Result<Tree, TreeError> {
         check(name, &links)?;
         let layout = Layout::of(&links);
@@ -122,12 +129,13 @@ impl Tree {
         self.v.len()
     }
 
-    /// Whether the tree is one free body: its mass matrix is block diagonal and its gyroscopic motion integrated on its own.
+    /// Returns true if the tree is one free body. Its mass matrix is block diagonal, and its gyroscopic
+    /// motion is integrated separately.
     pub(in crate::dynamics) fn is_lone(&self) -> bool {
         self.links.len() == 1 && matches!(self.links[0].joint, Joint::Free)
     }
 
-    /// Another mass for a link, from the next step on. It is part of the set-up, not of the state.
+    /// Replaces the mass of a link, from the next step on. It is part of the set-up, not of the state.
     pub fn set_mass(&mut self, link: usize, mass: Mass) {
         self.own_inertia[link] = Symmetric::of(&mass.inertia_kg_m2);
         self.links[link].mass = mass;
@@ -139,7 +147,7 @@ impl Tree {
     }
 }
 
-/// A tree that cannot be built.
+/// Error of building a tree.
 #[derive(Debug, Error, PartialEq)]
 pub enum TreeError {
     #[error("tree `{tree}` has no link")]

@@ -1,11 +1,12 @@
-//! The order in which a velocity policy sees and drives joints.
+//! The order in which a velocity policy observes and drives joints.
 
 use crate::body::joint_names;
 
 pub(super) const OBSERVED_JOINTS: usize = 29;
 pub(super) const CONTROLLED_JOINTS: usize = 14;
 
-/// Joints of `joint_pos` and `joint_vel`, without `_joint`: every joint but the hands', breadth first.
+/// Joints of `joint_pos` and `joint_vel`, without `_joint`: every joint except those of the hands,
+/// breadth first.
 pub(super) const OBSERVED: [&str; OBSERVED_JOINTS] = [
     "left_hip_pitch",
     "right_hip_pitch",
@@ -38,7 +39,7 @@ pub(super) const OBSERVED: [&str; OBSERVED_JOINTS] = [
     "right_wrist_yaw",
 ];
 
-/// Joints of the actions: the legs', and of the waist roll and pitch.
+/// Joints of the actions: those of the legs, and the waist's roll and pitch.
 pub(super) const CONTROLLED: [&str; CONTROLLED_JOINTS] = [
     "left_hip_pitch",
     "right_hip_pitch",
@@ -56,7 +57,7 @@ pub(super) const CONTROLLED: [&str; CONTROLLED_JOINTS] = [
     "right_ankle_roll",
 ];
 
-/// Where the policy's joints are in published order.
+/// Indices of the policy's joints in published order.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct JointMap {
     pub observed: [usize; OBSERVED_JOINTS],
@@ -78,7 +79,7 @@ impl JointMap {
 mod tests {
     use super::*;
 
-    /// Numbers of the published order: legs 0 to 11, waist 12 to 14, left arm 15 to 21, right arm 29 to 35.
+    /// Indices in published order: legs 0 to 11, waist 12 to 14, left arm 15 to 21, right arm 29 to 35.
     #[test]
     fn joints_are_found_by_name() {
         let map = JointMap::new();

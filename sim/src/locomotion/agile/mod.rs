@@ -1,12 +1,14 @@
-//! A base controller that somebody else trained: a velocity policy as an ONNX file, of the kind that AGILE exports for the
-//! G1.
+//! A base controller trained elsewhere: a velocity policy as an ONNX file, of the kind that AGILE
+//! exports for the G1.
 //!
-//! It is told the commands as they are. With a loop over its place (`place`) it is told instead what keeps the robot where the commands
-//! would have taken it, by what the robot itself knows of its place.
+//! The policy normally receives the commands unchanged. With a loop over its place (`place`) it receives
+//! instead the velocity that keeps the robot where the commands would have taken it. The loop uses the
+//! robot's own estimate of its place.
 //!
-//! The policy runs once per control step and drives the legs by PD targets with its own gains. Roll and pitch of the waist,
-//! which it balances with, belong to the task here: the policy sees them less the task's targets, as if the task had asked
-//! for an upright waist, and what it wants of them is added to the task's targets.
+//! The policy runs once per control step and drives the legs by PD targets with its own gains. It also
+//! balances with the roll and pitch of the waist, which belong to the task here. So the policy observes
+//! them minus the task's targets, as if the task had commanded an upright waist, and its targets for
+//! them are added to the task's.
 
 mod joints;
 mod network;
@@ -34,7 +36,8 @@ const LIMITS: BaseLimits = BaseLimits {
     // The policy has no height command; it stands and walks here.
     pelvis_height_m: [0.73, 0.73],
 };
-/// A robot whose hands pull down by this much together leans, and would walk for ever to where it should be.
+/// Total downward pull on the hands (N) that suspends the loop. A robot with such a load leans, and
+/// would walk forever towards its reference place.
 const HEAVY_N: f32 = 50.0;
 
 /// The controller of one robot under a policy.
@@ -50,17 +53,17 @@ struct AgileState {
     memory: RecurrentState,
     action: Action,
     place: ReferencePlace,
-    /// Physics steps so far.
+    /// Number of physics steps so far.
     ticks: u32,
 }
 
 impl Agile {
-    /// `looped`: with a loop over its place.
+    /// Creates a controller; `looped` adds the loop over its place.
     pub fn new(network: Arc<Network>, looped: bool) -> Agile {
         Agile { network, joints: JointMap::new(), looped, state: None }
     }
 
-    /// It moves robots that have all joints of which the policy is told.
+    /// Checks that a robot has all joints that the policy observes.
     pub(super) fn check_robot(model: &RobotModel) -> Result<(), String> {
         let joints = JointMap::new().observed.map(|joint| &model.joints[joint]);
         let lacking: Vec<&str> =
@@ -87,7 +90,7 @@ impl Agile {
         }
     }
 
-    /// Stands as it is until the policy has spoken.
+    /// Creates a state that holds the present posture until the policy has run.
     fn begin(&self, body: &BodyEstimate) -> AgileState {
         let q_rad = less_waist_targets(body);
         let joints = &body.model.joints;
@@ -132,7 +135,8 @@ impl Locomotion for Agile {
                 velocity =
                     keep_place(&mut state.place, body, velocity, dt_s * PHYSICS_STEPS_PER_CONTROL as f32);
             }
-            // A network that ran at load runs again; should it ever not, the last targets hold the robot.
+            // A network that ran when it was loaded will run again. If it ever fails, the last targets
+            // hold the robot.
             if let Ok((action, memory)) = self.network.run(&self.observe(body, velocity), &state.memory)
                 && action.usable()
             {
@@ -167,7 +171,7 @@ impl Locomotion for Agile {
     }
 }
 
-/// What a policy is told so that it keeps up with the commands.
+/// Returns the velocity command with which the policy keeps up with the commands.
 fn keep_place(place: &mut ReferencePlace, body: &BodyEstimate, command: [f32; 3], dt_s: f32) -> [f32; 3] {
     let pelvis = body.world_from_pelvis();
     let pulled_down_n: f32 = body.hand_reaction_n.into_iter().map(|force| -force.z).sum();
@@ -178,7 +182,7 @@ fn keep_place(place: &mut ReferencePlace, body: &BodyEstimate, command: [f32; 3]
     place.follow(pelvis, command, dt_s)
 }
 
-/// Joint angles as they would be had the task asked for an upright waist.
+/// Returns the joint angles minus the task's waist targets, as if the task had commanded an upright waist.
 fn less_waist_targets(body: &BodyEstimate) -> [f32; JOINTS] {
     let mut q_rad = body.q_rad;
     for (i, target_rad) in body.waist_target_rad.into_iter().enumerate() {

@@ -1,8 +1,8 @@
-//! The ONNX file of a velocity policy: which tensors it must have, and how it is run.
+//! The ONNX file of a velocity policy: its required tensors, and how it is run.
 //!
-//! The network takes `root_link_quat_w`, `root_ang_vel_b`, `velocity_commands`, `joint_pos` and `joint_vel` and gives
-//! `action_joint_pos`, `action_joint_pos_kp_gains` and `action_joint_pos_kd_gains`. Every other input `X` (last actions,
-//! histories) is a memory: the output `X_out` is its value at the next step.
+//! The network takes `root_link_quat_w`, `root_ang_vel_b`, `velocity_commands`, `joint_pos` and `joint_vel`.
+//! It returns `action_joint_pos`, `action_joint_pos_kp_gains` and `action_joint_pos_kd_gains`. Every other
+//! input `X` (last actions, histories) is a memory: the output `X_out` is its value at the next step.
 
 use std::error::Error;
 use std::fmt;
@@ -19,7 +19,7 @@ use super::joints::{CONTROLLED_JOINTS, OBSERVED_JOINTS};
 use crate::SimError;
 use crate::user_file::read_bytes;
 
-/// The most bytes of a network's file.
+/// Maximum size of a network's file in bytes.
 const MAX_NETWORK_BYTES: u64 = 1 << 30;
 
 const ORIENTATION: &str = "root_link_quat_w";
@@ -36,26 +36,26 @@ const SENSED: [(&str, usize); 5] = [
 ];
 /// Targets (rad), stiffness (N m/rad), damping (N m s/rad).
 const ACTIONS: [&str; 3] = ["action_joint_pos", "action_joint_pos_kp_gains", "action_joint_pos_kd_gains"];
-/// What a memory's output is called beyond the input's name.
+/// Suffix that a memory's output has after the input's name.
 const FED_BACK: &str = "_out";
-/// More steps than the five frames that histories have, so that the actions in them have settled.
+/// Number of warm-up steps: more than the five frames of a history, so that the actions in it have settled.
 const STEPS_TO_REMEMBER: usize = 25;
 
-/// What the network sees at one control step.
+/// Observation of the network at one control step.
 #[derive(Clone, Debug)]
 pub(super) struct NetworkInputs {
-    /// Pelvis in the world.
+    /// Orientation of the pelvis in the world.
     pub quaternion_wxyz: [f32; 4],
     /// Angular velocity of the pelvis, in its own frame.
     pub angular_velocity_rad_s: [f32; 3],
     /// Forward m/s, left m/s, turning rad/s.
     pub velocity_command: [f32; 3],
-    /// In the order of [`super::joints::OBSERVED`].
+    /// Joint angles, in the order of [`super::joints::OBSERVED`].
     pub q_rad: [f32; OBSERVED_JOINTS],
     pub qd_rad_s: [f32; OBSERVED_JOINTS],
 }
 
-/// What the network asks of the joints, in the order of [`super::joints::CONTROLLED`].
+/// Targets and gains of the joints, in the order of [`super::joints::CONTROLLED`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Action {
     pub target_rad: [f32; CONTROLLED_JOINTS],
@@ -67,7 +67,7 @@ pub(super) struct Action {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct RecurrentState(pub(super) Vec<Vec<f32>>);
 
-/// A checked file, ready to run. Robots share it; what differs between them is `RecurrentState`.
+/// A checked file, ready to run. Robots share it; each has its own `RecurrentState`.
 pub struct Network {
     name: String,
     model: Model,
@@ -76,7 +76,7 @@ pub struct Network {
     outputs: Vec<NodeId>,
     /// Shapes of the memories.
     memories: Vec<Vec<usize>>,
-    /// One thread: the layers are too small to share out, and sums do not depend on how many cores there are.
+    /// One thread: the layers are too small to distribute, and sums do not depend on the number of cores.
     thread: Arc<ThreadPool>,
 }
 
@@ -95,6 +95,11 @@ type RunResult<T> = Result<T, Box<dyn Error + Send + Sync>>;
 
 impl Network {
     /// Reads a file, checks names and shapes, and runs it once.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the file cannot be read, is not ONNX, has other tensors or shapes, or does
+    /// not run.
     pub fn from_file(path: &Path) -> Result<Network, SimError> {
         let file = path.display().to_string();
         let bytes = read_bytes(path, MAX_NETWORK_BYTES)
@@ -120,7 +125,7 @@ impl Network {
         Ok(network)
     }
 
-    /// The file's name without its folders, and a hash of its content.
+    /// Returns the file's name without its folders, and a hash of its content.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -165,7 +170,7 @@ impl Network {
         Ok(Network { name, model, inputs, outputs, memories, thread })
     }
 
-    /// What a run gave has to fit the joints, and the memories that it is fed back into.
+    /// Checks that the outputs of a run match the joints, and the memories that they are fed back into.
     fn expect_outputs(&self, file: &str, values: &[Value]) -> Result<(), SimError> {
         let action = [1, CONTROLLED_JOINTS];
         let expected = ACTIONS.iter().map(|_| &action[..]).chain(self.memories.iter().map(Vec::as_slice));
@@ -175,8 +180,9 @@ impl Network {
         Ok(())
     }
 
-    /// The memory of a robot that has stood as in `observation` for half a second, acting as the policy wanted. One that
-    /// had not acted before would be thrown into the policy's own stance: it hops a third of a metre.
+    /// Returns the memory of a robot that has stood as in `observation` for half a second, acting as the
+    /// policy asked. Without such a past, the robot would be thrown into the policy's own stance: it
+    /// hops a third of a metre.
     pub(super) fn remember(&self, observation: &NetworkInputs) -> RunResult<RecurrentState> {
         let mut memory = self.blank();
         for _ in 0..STEPS_TO_REMEMBER {
@@ -189,7 +195,7 @@ impl Network {
         RecurrentState(self.memories.iter().map(|shape| vec![0.0; shape.iter().product()]).collect())
     }
 
-    /// One control step.
+    /// Runs one control step.
     pub(super) fn run(
         &self,
         observation: &NetworkInputs,
@@ -198,7 +204,7 @@ impl Network {
         self.split(self.evaluate(observation, memory)?)
     }
 
-    /// Values of [`Network::outputs`].
+    /// Returns the values of [`Network::outputs`].
     fn evaluate(&self, observation: &NetworkInputs, memory: &RecurrentState) -> RunResult<Vec<Value>> {
         let mut inputs = Vec::with_capacity(self.inputs.len());
         for input in &self.inputs {
@@ -215,7 +221,7 @@ impl Network {
         Ok(self.model.run(inputs, &self.outputs, Some(options))?)
     }
 
-    /// Shapes have been checked, so that none is left out.
+    /// Splits the outputs into action and memory. Shapes have been checked, so that no value is left out.
     fn split(&self, outputs: Vec<Value>) -> RunResult<(Action, RecurrentState)> {
         let floats = |value: Value| {
             let tensor: Option<Tensor<f32>> = value.into_tensor();
@@ -250,7 +256,8 @@ impl NetworkInputs {
 }
 
 impl Action {
-    /// Whether joints can be driven by it: numbers, and stiffness above zero.
+    /// Returns true if the action can drive joints: all values are finite, stiffness is above zero and
+    /// damping is not negative.
     pub(super) fn usable(&self) -> bool {
         let finite = |values: &[f32]| values.iter().all(|value| value.is_finite());
         finite(&self.target_rad)
@@ -261,7 +268,8 @@ impl Action {
     }
 }
 
-/// The part of an ONNX file that tells it from others: some files that are none would keep rten's reader busy for ever.
+/// The part of an ONNX file that distinguishes it from others. Some files of other formats would keep
+/// rten's reader busy forever.
 #[derive(Clone, PartialEq, Message)]
 struct Outline {
     #[prost(message, optional, tag = "7")]
@@ -286,7 +294,7 @@ fn names(model: &Model, nodes: &[NodeId]) -> Vec<String> {
     nodes.iter().map(name).collect()
 }
 
-/// Dimensions without a size, as a batch, count as 1.
+/// Returns an input's shape. Dimensions without a fixed size, for example a batch, count as 1.
 fn input_shape(model: &Model, index: usize) -> Vec<usize> {
     let size = |dimension| match dimension {
         Dimension::Fixed(size) => size,

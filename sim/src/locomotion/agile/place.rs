@@ -1,7 +1,8 @@
 //! Outer loop of a velocity policy: keeps the robot where its commands would have taken it.
 //!
-//! A velocity policy ignores commands below 0.1 m/s, walks slower than it is told and creeps while it settles. A reference
-//! place moves with the command, and while the robot is told to move, or has strayed, the policy is told
+//! A velocity policy ignores commands below 0.1 m/s, walks slower than commanded and creeps while it
+//! settles. A reference place moves with the command. While the robot is commanded to move, or has
+//! strayed, the policy receives
 //!   v = v_command + k e + k/2 int(e dt),   e: reference minus pelvis, in the pelvis's heading frame [m].
 
 use std::f32::consts::PI;
@@ -13,21 +14,22 @@ use crate::plane::{heading_rad, wrapped_rad};
 
 const GAIN_1_S: f32 = 1.5;
 const INTEGRAL_1_S: f32 = 0.5 * GAIN_1_S;
-/// A robot that stands begins to correct beyond the first, and stops within the second.
+/// Errors above which a standing robot begins to correct, and (`BACK_M`, `BACK_RAD`) below which it stops.
 const STRAYED_M: f32 = 0.10;
 const STRAYED_RAD: f32 = 0.15;
 const BACK_M: f32 = 0.04;
 const BACK_RAD: f32 = 0.06;
-/// The reference moves no further ahead: a robot that is held up does not rush when it comes free.
+/// Maximum distance of the reference ahead of the robot, so that a robot that was held up does not rush
+/// once free.
 const LEASH_M: f32 = 0.3;
 const LEASH_RAD: f32 = 0.5;
-/// What the integral adds at most, forward and left.
+/// Maximum contribution of the integral, forward and left.
 const LARGEST_INTEGRAL_M_S: [f32; 2] = [0.5, 0.3];
-/// What the policy is told at most: forward, left, turning.
+/// Limits of the velocity sent to the policy: forward, left, turning.
 const SMALLEST_COMMAND: [f32; 3] = [-0.6, -0.4, -0.8];
 const LARGEST_COMMAND: [f32; 3] = [0.8, 0.4, 0.8];
 
-/// Where the robot should be, as its commands have moved that place.
+/// The pose that the commands have moved the robot's reference to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct ReferencePlace {
     position_m: [f32; 2],
@@ -38,7 +40,7 @@ pub(super) struct ReferencePlace {
 }
 
 impl ReferencePlace {
-    /// The place where the pelvis is.
+    /// Creates a reference at the pelvis.
     pub(super) fn of(world_from_pelvis: Pose) -> ReferencePlace {
         let at = world_from_pelvis.translation;
         ReferencePlace {
@@ -50,7 +52,8 @@ impl ReferencePlace {
         }
     }
 
-    /// Moves on with a command (forward m/s, left m/s, turning rad/s) and returns the one that keeps up with it.
+    /// Moves the reference by a command (forward m/s, left m/s, turning rad/s). Returns the velocity
+    /// that keeps up with it.
     pub(super) fn follow(&mut self, world_from_pelvis: Pose, command: [f32; 3], dt_s: f32) -> [f32; 3] {
         let moving = command != [0.0; 3];
         let (leash_m, leash_rad) = if moving { (LEASH_M, LEASH_RAD) } else { (f32::MAX, PI) };
@@ -73,7 +76,7 @@ impl ReferencePlace {
         } else if distance_m < BACK_M && turned_rad.abs() < BACK_RAD {
             self.correcting = false;
         }
-        // What made up for slow walking would carry a robot past its stop.
+        // The integral that compensated slow walking would carry a robot past its stop.
         if moving != self.moving || !(moving || self.correcting) {
             self.integral_m_s = [0.0; 2];
         }
@@ -129,7 +132,7 @@ mod tests {
         }
         assert_eq!(told[0], LARGEST_COMMAND[0]);
         assert!((place.position_m[0] - LEASH_M).abs() < 1e-5, "{place:?}");
-        // Pushed away while it stands, it comes back however far that is.
+        // A robot pushed away while it stands comes back from any distance.
         let told = place.follow(at(2.0, 0.0, 0.0), [0.0; 3], DT_S);
         assert_eq!(told[0], SMALLEST_COMMAND[0]);
         assert!((place.position_m[0] - LEASH_M).abs() < 1e-5, "{place:?}");

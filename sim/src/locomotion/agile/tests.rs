@@ -1,4 +1,4 @@
-//! Policies that are made here: what a file must have, and that one which has it drives a robot.
+//! Policies built for tests: the requirements on a file, and a robot driven by a valid one.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use super::network::Network;
 use super::*;
 use crate::{RobotPlacement, SimError, World, WorldSpec};
 
-/// Where the controlled joints stand among the observed ones.
+/// Indices of the controlled joints among the observed ones.
 const CONTROLLED_OF_OBSERVED: [i64; 14] = [0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 13, 14, 17, 18];
 
 fn value(name: &str, shape: &[i64]) -> ValueInfoProto {
@@ -53,7 +53,8 @@ fn integers(name: &str, values: &[i64]) -> TensorProto {
     }
 }
 
-/// Wants every joint to be where it is, a milliradian further with every step, at stiffness `kp`.
+/// Builds a policy whose targets are the joints' present angles plus a milliradian more with every step,
+/// at stiffness `kp`.
 fn limp(kp: f32) -> GraphProto {
     GraphProto {
         input: vec![
@@ -198,7 +199,8 @@ fn memories_come_back_and_begin_as_after_half_a_second() {
     assert_eq!(memory.0[1], [28.0; 28]);
 }
 
-/// Wants every joint to be ahead of where it is by the forward velocity that the policy is told.
+/// Builds a policy whose targets are the joints' angles plus the forward velocity command that the
+/// policy receives.
 fn telling() -> GraphProto {
     let mut graph = limp(50.0);
     graph.initializer.extend([integers("forward", &[0; 14]), integers("command_column", &[3, 1])]);
@@ -212,7 +214,8 @@ fn telling() -> GraphProto {
     graph
 }
 
-/// A robot that does not come along: the policy hears the command, and in a loop over its place what would catch up.
+/// The robot does not move. The policy receives the plain command, or with the loop a command that would
+/// catch up.
 #[test]
 fn a_policy_is_told_the_command_unless_a_loop_is_asked_for() {
     let network = Arc::new(read(telling()).unwrap());
@@ -252,7 +255,7 @@ fn a_policy_drives_the_robot_and_snapshots_continue_bit_for_bit() {
     second.restore(&snapshot).unwrap();
     run(&mut second, 6);
     assert_eq!(first.state_hash(), second.state_hash());
-    // The policy wants the waist ever further ahead of where it is, and it follows.
+    // The policy's waist target is ever further ahead of the waist, and the waist follows.
     let waist_rad = first.present().robots[0].sensed.joints.q_rad[WAIST + 1];
     assert!(waist_rad > 2e-3, "{waist_rad}");
 }

@@ -1,4 +1,4 @@
-//! Position loop of stepping: a steady gait falls a little short of its command, and makes up for it.
+//! Position loop of stepping: it compensates a steady gait that falls a little short of its command.
 
 use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
@@ -10,11 +10,12 @@ use crate::plane::flat;
 const POSITION_GAIN_1_S: f32 = 1.0;
 const BIAS_GAIN_1_S2: f32 = 1.0;
 const LARGEST_CORRECTION_M_S: [f32; 2] = [0.3, 0.12];
-/// A robot that was pushed farther than this off its way does not come back for it.
+/// Maximum distance by which the reference may lead. A robot that was pushed farther off its way does
+/// not come back for it.
 const LEASH_M: f32 = 0.15;
 const LARGEST_ERROR_M: f32 = 0.3;
 
-/// Where the pelvis should be by now, and what the velocity command lacked so far.
+/// Reference position of the pelvis, and the learned deficit of the velocity command.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Course {
     reference_m: Vector,
@@ -26,8 +27,8 @@ impl Course {
         Course { reference_m: pelvis_m, bias_m_s: [0.0; 2] }
     }
 
-    /// Velocity to plan with: the command, plus what brings the pelvis back to where it should be
-    /// by now. A robot that still `starts` gathers speed: what it stays behind then is not made up for.
+    /// Returns the velocity to plan with: the command, plus the velocity that brings the pelvis back to
+    /// its reference. While `starts` is true the robot gathers speed, and its lag is not compensated.
     pub(super) fn corrected_velocity(
         &mut self,
         scale: &BodyScale,
@@ -75,7 +76,7 @@ mod tests {
     const DT_S: f32 = 1.0 / 200.0;
     const AXES: [Vector; 2] = [Vector::X, Vector::Y];
 
-    /// A gait that goes 80 % of what it is told ends up at the commanded velocity.
+    /// A gait that reaches 80 % of its command ends up at the commanded velocity.
     #[test]
     fn a_slow_gait_is_told_to_hurry() {
         let command = BaseVelocity { vx_m_s: 0.3, ..BaseVelocity::STILL };

@@ -1,4 +1,5 @@
-//! Leg torques by inverse dynamics: trunk and feet accelerate as wanted, the ground answers at the wanted point.
+//! Leg torques by inverse dynamics: trunk and feet accelerate as wanted, and the ground reacts at the
+//! wanted point.
 
 #[cfg(test)]
 mod tests;
@@ -12,27 +13,27 @@ use crate::body::{Acceleration, BodyEstimate, Effort, JOINTS, LEG_JOINTS, LEGS};
 use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Side, Sides};
 
-/// Horizontal force within what friction surely gives.
+/// Maximum ratio of horizontal to vertical force, which friction surely provides.
 const FRICTION_USED: f32 = 0.43;
-/// Friction holds a foot against turning by its corners, up to 15 N m; less where the pressure is at toe or heel, whose
-/// corners are close.
+/// Maximum moment about the vertical that friction at a foot's corners holds is 15 N m. It is less if
+/// the pressure is at toe or heel, where the corners are close.
 const LARGEST_TURN_N_M: f32 = 14.0;
 const TURN_FADE_M: f32 = 0.12;
 /// Inertia of trunk and arms about the vertical.
 const TURN_INERTIA_KG_M2: f32 = 1.2;
 const CORRECTIONS: usize = 2;
-/// Height of the centre of mass over the ground: a robot that is lower has fallen.
+/// Minimum height of the centre of mass over the ground: a lower robot has fallen.
 const MIN_HEIGHT_M: f32 = 0.4;
-/// A knee that is almost straight must not ask for the impossible.
+/// Damping of the legs' inverse: a knee that is almost straight must not demand the impossible.
 const DAMPING: f32 = 0.004;
-/// Damping of the ground force that torques give away. With twenty times as much, half of a pull on a robot that leans
-/// is not seen: its legs are almost straight.
+/// Damping of the ground force inferred from torques. With twenty times as much, half of a pull on a
+/// leaning robot is not seen: its legs are almost straight.
 const FORCE_DAMPING: f32 = 0.0002;
 const LARGEST_JOINT_ACCELERATION_RAD_S2: f32 = 400.0;
 
-/// Torques stay within this part of the joints' limits as long as easing off helps.
+/// Share of the joints' limits within which torques stay as long as easing off helps.
 const EFFORT_USED: f32 = 0.9;
-/// What is left of the wanted turning and of the feet's acceleration when a robot eases off altogether.
+/// Shares of the wanted turning and of the feet's acceleration that remain when a robot eases off completely.
 const EASED_TURN: f32 = 0.64;
 const EASED_FEET: f32 = 0.2;
 
@@ -40,26 +41,26 @@ const EASED_FEET: f32 = 0.2;
 pub(super) struct WantedMotion {
     pub lift_m_s2: f32,
     pub turn_rad_s2: Vector,
-    /// Accelerations of the ankle roll links; zero for a foot that stands.
+    /// Accelerations of the ankle roll links; zero for a stance foot.
     pub feet: Sides<Acceleration>,
 }
 
-/// Where the ground acts on the feet.
+/// Place where the ground acts on the feet.
 pub(super) struct GroundContact {
     pub pressure_m: Vector,
-    /// The only foot that carries; `None` for both.
+    /// The only stance foot; `None` for both.
     pub foot: Option<Side>,
 }
 
 /// Torques of both legs.
 pub(super) struct LegTorques {
     pub torque_n_m: Sides<[f32; LEG_JOINTS]>,
-    /// Horizontal acceleration of the centre of mass that they bring.
+    /// Resulting horizontal acceleration of the centre of mass.
     pub acceleration_m_s2: Vector,
 }
 
-/// [`leg_torques`], with trunk and feet driven less hard if a joint could not do it: torques that saturate fit no motion,
-/// and tip the foot that carries.
+/// Computes [`leg_torques`], with trunk and feet driven less hard if a joint's limit would be exceeded.
+/// Saturated torques fit no motion, and tip the stance foot.
 pub(super) fn leg_torques_within_limits(
     body: &BodyEstimate,
     load: &Load,
@@ -99,9 +100,9 @@ pub(super) fn leg_torques_within_limits(
     }
 }
 
-/// Torques of both legs. The pelvis accelerates sideways as it must for the ground force to have no moment about the
-/// pressure point, and turns no harder than one foot can hold: both are linear in its acceleration, and found by correcting
-/// it [`CORRECTIONS`] times.
+/// Computes the torques of both legs. The sideways acceleration of the pelvis is such that the ground
+/// force has no moment about the pressure point. Its turning is no harder than one foot can hold. Both
+/// are linear in the pelvis's acceleration, and found by correcting it [`CORRECTIONS`] times.
 fn leg_torques(
     body: &BodyEstimate,
     load: &Load,
@@ -134,7 +135,8 @@ fn leg_torques(
 }
 
 impl GroundContact {
-    /// A foot holds less against turning the nearer the pressure is to toe or heel.
+    /// Returns the maximum moment about the vertical. A foot holds less the nearer the pressure is to
+    /// toe or heel.
     fn most_turn_n_m(&self, body: &BodyEstimate) -> f32 {
         let scale = &body.model.scale;
         let largest_n_m = scale.moment_n_m(LARGEST_TURN_N_M);
@@ -149,11 +151,11 @@ impl GroundContact {
     }
 }
 
-/// What the ground has to do for a motion of the pelvis.
+/// Ground reaction to a motion of the pelvis.
 struct GroundReaction {
     effort: Effort,
     force_n: Vector,
-    /// Moment about the pressure point that the force does not have.
+    /// Moment about the pressure point that the force cannot provide.
     rest_n_m: Vector,
 }
 
@@ -176,8 +178,8 @@ impl GroundReaction {
         GroundReaction { force_n: effort.force_n - load.force_n, rest_n_m, effort }
     }
 
-    /// Accelerates the pelvis away from the moment that is left, no harder than friction gives, and turns it less where
-    /// the foot would spin.
+    /// Accelerates the pelvis away from the remaining moment, no harder than friction allows, and turns
+    /// it less if the foot would spin.
     fn correct(&self, pelvis: &mut Acceleration, body: &BodyEstimate, height_m: f32, most_turn_n_m: f32) {
         let mass_kg = body.model.mass_kg;
         let away = Vector::new(-self.rest_n_m.y, self.rest_n_m.x, 0.0);
@@ -191,7 +193,7 @@ impl GroundReaction {
         pelvis.angular_rad_s2.z -= too_much_n_m / body.model.scale.inertia_kg_m2(TURN_INERTIA_KG_M2);
     }
 
-    /// Torques with which the legs push on the ground.
+    /// Returns the torques with which the legs push on the ground.
     fn pushes_n_m(
         &self,
         body: &BodyEstimate,
@@ -220,7 +222,7 @@ impl GroundReaction {
     }
 }
 
-/// Force (N) with which the ground answers the torques of one leg whose foot stands:
+/// Returns the ground force (N) inferred from the torques of one leg whose foot is planted:
 ///   J^T w = tau_dynamics - tau,  by damped least squares.
 pub(super) fn ground_force_n(
     body: &BodyEstimate,
@@ -237,7 +239,7 @@ pub(super) fn ground_force_n(
     })
 }
 
-/// Linear over angular velocity of an ankle roll link per joint velocity of its leg.
+/// Returns the Jacobian of an ankle roll link: linear over angular velocity per joint velocity of its leg.
 fn foot_jacobian(body: &BodyEstimate, side: Side) -> SMatrix<f32, 6, 6> {
     let first = LEGS[side];
     let foot_m = body.world_from_foot(side).translation;

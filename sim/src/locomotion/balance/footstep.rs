@@ -1,4 +1,5 @@
-//! Plans the rest of a step: where the ground should push now, where the swinging foot should land, and how soon.
+//! Planning of the rest of a step: the present centre of pressure, the foothold of the swinging foot,
+//! and the pace.
 
 #[cfg(test)]
 mod tests;
@@ -10,29 +11,30 @@ use super::swing::Swing;
 use crate::body::BodyScale;
 use crate::plane::flat;
 
-/// Footholds lie within these of the foot that carries, along the heading and to the inside: the feet never cross.
+/// Range of footholds relative to the stance foot, along the heading and to the inside: the feet never cross.
 const REACH_M: [f32; 2] = [-0.4, 0.48];
 const SPREAD_M: [f32; 2] = [0.08, 0.52];
-/// A foothold outside of these is a strain; those of walking sideways lie within.
+/// Range of footholds without strain; those of walking sideways are inside.
 const EASY_REACH_M: [f32; 2] = [-0.22, 0.3];
 const EASY_SPREAD_M: [f32; 2] = [0.12, 0.46];
-/// The capture point runs away exponentially: a robot that was hit hurries, to need a nearer foothold. At twice the pace of the gait
-/// the hips saturate as the foot lifts, and it meets the ground 15 cm before its foothold. Tuned on punches at shoulders and elbows,
-/// seeds 2000-2159.
+/// Paces to choose from, beside the gait's own. The capture point diverges exponentially, so a robot
+/// that was hit hurries to need a nearer foothold. At twice the pace of the gait the hips saturate as
+/// the foot lifts, and it meets the ground 15 cm before its foothold. Tuned on punches at shoulders and
+/// elbows, seeds 2000-2159.
 const FASTER: [f32; 4] = [1.175, 1.35, 1.525, 1.7];
-/// Strain per pace above one, and per distance between the foothold that is needed and the nearest within reach.
+/// Strain per pace above one, and per distance between the needed foothold and the nearest within reach.
 const HURRY_M: f32 = 0.01;
 const MISS: f32 = 0.1;
-/// How far the centre of pressure goes from the sole's centre: along and across the foot.
+/// Maximum distance of the centre of pressure from the sole's centre: along and across the foot.
 const PRESSURE_M: [f32; 2] = [0.075, 0.018];
 
-/// What a footstep is planned from. Horizontal vectors, world frame.
+/// Inputs of a footstep. Horizontal vectors, world frame.
 pub(super) struct FootstepInputs<'a> {
     pub scale: &'a BodyScale,
     pub gait: &'a Gait,
     pub swing: &'a Swing,
     pub capture_m: Vector,
-    /// Pose of the sole that carries, and the centre of the one that carried before.
+    /// Pose of the stance sole, and the centre of the previous stance sole.
     pub stance: Pose,
     pub old_m: Vector,
     pub ahead_axis: Vector,
@@ -41,7 +43,7 @@ pub(super) struct FootstepInputs<'a> {
     pub time_s: f32,
 }
 
-/// The plan: centre of pressure now, centre of the sole when it lands, and how much faster than a G1's gait.
+/// The plan: centre of pressure now, centre of the sole at landing, and pace relative to a G1's gait.
 pub(super) struct Footstep {
     pub pressure_m: Vector,
     pub foothold_m: Vector,
@@ -50,8 +52,8 @@ pub(super) struct Footstep {
 }
 
 impl FootstepInputs<'_> {
-    /// The footstep of the pace that strains least. A step hurries from its first instant on: while the pressure moves to the foot
-    /// that carries, the capture point already runs away.
+    /// Returns the footstep of the pace with the least strain. A step hurries from its first instant on:
+    /// while the pressure moves to the stance foot, the capture point already diverges.
     pub(super) fn plan(&self, dt_s: f32) -> Footstep {
         let faster = if self.time_s < PERIOD_S { &FASTER[..] } else { &[] };
         let gait = self.at_pace(1.0, dt_s);
@@ -61,13 +63,13 @@ impl FootstepInputs<'_> {
             .fold(gait, |best, next| if next.strain_m < best.strain_m { next } else { best })
     }
 
-    /// Where the capture point of the steady gait is, `remaining_s` before the swinging foot lands.
+    /// Returns the capture point of the steady gait, `remaining_s` before the swinging foot lands.
     pub(super) fn steady_capture_m(&self, remaining_s: f32) -> Vector {
         let gait = self.gait;
         flat(self.stance.translation) + (gait.step_m + gait.offset_m) * (-gait.rate_1_s * remaining_s).exp()
     }
 
-    /// The footstep at so many times the pace of this robot's gait.
+    /// Plans the footstep at `pace_factor` times the pace of this robot's gait.
     fn at_pace(&self, pace_factor: f32, dt_s: f32) -> Footstep {
         let (gait, scale) = (self.gait, self.scale);
         let pace = scale.rate_1_s(pace_factor);
@@ -98,7 +100,7 @@ impl FootstepInputs<'_> {
         Footstep { pressure_m, foothold_m, pace, strain_m }
     }
 
-    /// The foothold nearest to `point_m` within a reach along the heading and a spread to the inside.
+    /// Returns the foothold nearest to `point_m` within a reach along the heading and a spread to the inside.
     fn nearest_m(&self, point_m: Vector, reach_m: [f32; 2], spread_m: [f32; 2]) -> Vector {
         let reach_m = reach_m.map(|g1_m| self.scale.length_m(g1_m));
         let spread_m = [self.scale.apart_m(spread_m[0]), self.scale.length_m(spread_m[1])];

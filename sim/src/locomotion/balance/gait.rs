@@ -1,21 +1,21 @@
-//! A steady gait: where the feet go and where the capture point is when they land.
+//! A steady gait: its footholds, and the capture point when a foot lands.
 
 use rapier3d::math::Vector;
 
 use super::swing::{AIR_S, SWING_S};
 use crate::body::BodyScale;
 
-/// The pressure moves from the old foot to the new one.
+/// Time in which the pressure moves from the old foot to the new one.
 pub(super) const TRANSFER_S: f32 = 0.05;
 pub(super) const PERIOD_S: f32 = TRANSFER_S + SWING_S;
 const WIDTH_M: f32 = 0.24;
-/// Walking sideways brings the feet together at every other step.
+/// Extra width per length of a sideways step: walking sideways brings the feet together at every other step.
 const WIDENING: f32 = 0.3;
-/// Angular momentum of a swinging leg per speed of its foot, over mass times height of the robot; tuned on punches,
-/// seeds 2000-3149.
+/// Angular momentum of a swinging leg per speed of its foot, over mass times height of the robot; tuned
+/// on punches, seeds 2000-3149.
 pub(super) const SWING_INERTIA: f32 = 0.09;
 
-/// Where the feet and the capture point of a steady gait are, one step ahead, relative to the stance foot.
+/// Feet and capture point of a steady gait, one step ahead, relative to the stance foot.
 pub(super) struct Gait {
     pub rate_1_s: f32,
     /// Next foothold.
@@ -25,11 +25,12 @@ pub(super) struct Gait {
 }
 
 impl Gait {
-    /// With E = e^{w t}, t the transfer, G = e^{w (T - t)} and K = G (E - 1) / (w t):
+    /// Computes the gait. With E = e^{w t}, t the transfer, G = e^{w (T - t)} and K = G (E - 1) / (w t):
     ///   b = v T (1 - E G + K) / (E G - 1)  along the motion,   width (E G + 1 - K) / (E G + 1)  to the inside.
-    /// The foot that swings 2 v T ahead adds to the capture point what is left of s u when it lands, 2 v T s e^{w a}
-    /// with a the time from the middle of its flight: b is smaller by that over E G - 1. To the sides b stays as it
-    /// is, for robots that start to walk sideways have no room for the narrower step.
+    /// The foot that swings 2 v T ahead adds the remainder of s u to the capture point when it lands.
+    /// This is 2 v T s e^{w a} with a the time from the middle of its flight: b is smaller by that over
+    /// E G - 1. To the sides b is unchanged, because robots that start to walk sideways have no room for
+    /// the narrower step.
     pub(super) fn new(scale: &BodyScale, rate_1_s: f32, velocity_m_s: Vector, outside_axis: Vector) -> Gait {
         let [transfer_s, period_s] = [TRANSFER_S, PERIOD_S].map(|g1_s| scale.time_s(g1_s));
         let transfer = (rate_1_s * transfer_s).exp();
@@ -47,8 +48,8 @@ impl Gait {
         }
     }
 
-    /// Capture point after `time_s` for a pressure that moves from `now_m` to `then_m` within `ramp_s`; without a ramp it is
-    /// there already.
+    /// Returns the capture point after `time_s` for a pressure that moves from `now_m` to `then_m`
+    /// within `ramp_s`. Without a ramp the pressure is at `then_m` already.
     pub(super) fn predict(
         &self,
         capture_m: Vector,
@@ -72,7 +73,7 @@ mod tests {
 
     const RATE_1_S: f32 = 3.7;
 
-    /// Pressure from `now` to `then` within the ramp, in small steps:  xi' = w (xi - p).
+    /// The pressure moves from `now` to `then` within the ramp, in small steps:  xi' = w (xi - p).
     #[test]
     fn prediction_solves_the_capture_point_equation() {
         let gait = Gait::new(&BodyScale::G1, RATE_1_S, Vector::ZERO, Vector::Y);
@@ -91,7 +92,8 @@ mod tests {
         }
     }
 
-    /// A capture point that lands with the offset of the steady gait does so again one step later, whatever the velocity.
+    /// If the capture point has the offset of the steady gait at landing, it has it again one step
+    /// later, at any velocity.
     #[test]
     fn a_steady_gait_repeats() {
         for (x, y) in [(0.0, 0.0), (0.4, 0.0), (-0.3, 0.0), (0.0, 0.3), (0.2, -0.25)] {

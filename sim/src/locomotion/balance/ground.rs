@@ -1,4 +1,5 @@
-//! Ground reaction forces: how two planted feet share a wanted net force, and the leg torques that produce it.
+//! Ground reaction forces: how two planted feet share a wanted net force, and the leg torques that
+//! produce it.
 
 #[cfg(test)]
 mod tests;
@@ -9,27 +10,27 @@ use crate::body::{BodyEstimate, BodyScale, LEG_JOINTS, LEGS};
 use crate::plane::flat;
 use crate::{Side, Sides};
 
-/// Force on one foot and the point of the ground where it acts, world frame.
+/// Force on one foot and its point of application on the ground, world frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FootForce {
     pub force_n: Vector,
     pub point_m: Vector,
 }
 
-/// Centre of pressure stays this far inside the sole, along and across the foot.
+/// Half extents of the sole's area for the centre of pressure, along and across the foot.
 const SOLE_HALF_LENGTH_M: f32 = 0.075;
 const SOLE_HALF_WIDTH_M: f32 = 0.022;
-/// Neither foot ever loses contact while standing.
+/// Minimum share of the load on a foot: neither foot ever loses contact while standing.
 const SMALLEST_SHARE: f32 = 0.03;
-/// Below this the centre of pressure is undefined.
+/// Vertical force below which the centre of pressure is undefined.
 const SMALLEST_VERTICAL_FORCE_N: f32 = 20.0;
 
-/// The middle between two soles.
+/// Returns the point midway between two soles.
 pub(super) fn middle_m(soles: &Sides<Pose>) -> Vector {
     (soles.left.translation + soles.right.translation) * 0.5
 }
 
-/// The point nearest to `point_m` where two planted feet can have their centre of pressure.
+/// Returns the point nearest to `point_m` that two planted feet can have as their centre of pressure.
 pub(super) fn nearest_support_m(scale: &BodyScale, point_m: Vector, soles: Sides<Pose>) -> Vector {
     let share = share(point_m, soles);
     let middle_m = between_m(soles, share);
@@ -38,7 +39,7 @@ pub(super) fn nearest_support_m(scale: &BodyScale, point_m: Vector, soles: Sides
     middle_m + flat(turn * inside_m)
 }
 
-/// How two feet share a load at a point of the line between their soles.
+/// Returns the shares of two feet of a load at a point of the line between their soles.
 fn share(point_m: Vector, soles: Sides<Pose>) -> Sides<f32> {
     let across = flat(soles.left.translation - soles.right.translation);
     let along_line = flat(point_m - soles.right.translation).dot(across) / across.length_squared();
@@ -46,20 +47,20 @@ fn share(point_m: Vector, soles: Sides<Pose>) -> Sides<f32> {
     Sides { left, right: 1.0 - left }
 }
 
-/// The point of that line at which the load is shared so.
+/// Returns the point of that line at which the load has these shares.
 fn between_m(soles: Sides<Pose>, share: Sides<f32>) -> Vector {
     soles.left.translation * share.left + soles.right.translation * share.right
 }
 
-/// The nearest point of a sole, in its frame.
+/// Returns the nearest point of a sole, in its frame.
 fn within_sole_m(scale: &BodyScale, point_in_sole_m: Vector) -> Vector {
     let length_m = scale.along_sole_m(SOLE_HALF_LENGTH_M);
     let width_m = scale.across_sole_m(SOLE_HALF_WIDTH_M);
     Vector::new(point_in_sole_m.x.clamp(-length_m, length_m), point_in_sole_m.y.clamp(-width_m, width_m), 0.0)
 }
 
-/// The net force nearest to `force_n` whose centre of pressure, with a moment about the centre of mass, lies within the
-/// feet: a trunk that stays upright matters more than where the robot drifts.
+/// Returns the net force nearest to `force_n` whose centre of pressure is within the feet, given a
+/// moment about the centre of mass. An upright trunk matters more than the robot's drift.
 pub(super) fn supported_force_n(
     scale: &BodyScale,
     com_m: Vector,
@@ -77,6 +78,7 @@ pub(super) fn supported_force_n(
     )
 }
 
+/// Returns the centre of pressure:
 ///   p = c + ( -(m_y + h f_x), m_x - h f_y ) / f_z,   h = height of c above the soles.
 fn centre_of_pressure_m(
     scale: &BodyScale,
@@ -95,8 +97,9 @@ fn centre_of_pressure_m(
     )
 }
 
-/// Splits a net force (N) and a moment (N m) about the centre of mass over two feet, given by their sole centres
-/// (world). The centre of pressure is shared along the line between the soles; what is left moves each foot's own.
+/// Splits a net force (N) and a moment (N m) about the centre of mass over two feet, given by their sole
+/// centres (world). The centre of pressure is shared along the line between the soles; the remainder
+/// moves each foot's own centre.
 pub(super) fn distribute(
     scale: &BodyScale,
     com_m: Vector,
@@ -116,15 +119,16 @@ pub(super) fn distribute(
     })
 }
 
-/// Force (N) on the left foot, whose opposite acts on the right one, of a moment about the vertical:
+/// Returns the force (N) on the left foot, whose opposite acts on the right one, of a moment about the
+/// vertical:
 ///   d x f = m z,   d from the right sole to the left one.
 pub(super) fn couple_n(moment_n_m: f32, soles: Sides<Pose>) -> Vector {
     let apart_m = flat(soles.left.translation - soles.right.translation);
     Vector::Z.cross(apart_m) * (moment_n_m / apart_m.length_squared())
 }
 
-/// Torques with which a leg pushes on the ground so that the ground answers with `foot` and a free moment:
-/// tau = -J^T [f; m].
+/// Returns the torques with which a leg pushes on the ground so that the ground reacts with `foot` and a
+/// free moment: tau = -J^T [f; m].
 pub(super) fn leg_torques_n_m(
     body: &BodyEstimate,
     side: Side,

@@ -8,11 +8,11 @@ use crate::body::{LEG_JOINTS, LEGS, RobotModel};
 
 pub(super) type LegAngles = [f32; LEG_JOINTS];
 
-/// Largest change of a joint in one iteration: the linearisation holds within it.
+/// Maximum change of a joint in one iteration, within which the linearisation holds.
 const MAX_STEP_RAD: f32 = 0.3;
 const DAMPING: f32 = 1e-5;
 
-/// Rotation vector (axis times angle, shortest way) of a rotation.
+/// Returns the rotation vector (axis times angle, shortest way) of a rotation.
 pub(super) fn rotation_vector_rad(rotation: Rotation) -> Vector {
     let q = if rotation.w < 0.0 { -rotation } else { rotation };
     let sine = Vector::new(q.x, q.y, q.z);
@@ -20,7 +20,7 @@ pub(super) fn rotation_vector_rad(rotation: Rotation) -> Vector {
     if length < 1e-6 { sine * 2.0 } else { sine * (2.0 * length.atan2(q.w) / length) }
 }
 
-/// Joint origins, joint axes and foot pose for a pelvis pose and leg angles.
+/// Returns joint origins, joint axes and foot pose for a pelvis pose and leg angles.
 fn forward(
     model: &RobotModel,
     side: Side,
@@ -40,8 +40,9 @@ fn forward(
     (origins, axes, frame)
 }
 
-/// Leg angles that put the ankle roll link at `foot` (world) for a pelvis at `pelvis` (world), starting from
-/// `start_rad`:  (J^T J + damping I) dq = J^T e, with e = [position error m; rotation error rad].
+/// Returns the leg angles that put the ankle roll link at `foot` (world) for a pelvis at `pelvis`
+/// (world), starting from `start_rad`:  (J^T J + damping I) dq = J^T e, with e = [position error m;
+/// rotation error rad].
 pub(super) fn inverse(
     model: &RobotModel,
     side: Side,
@@ -87,7 +88,7 @@ mod tests {
         std::array::from_fn(|i| Posed::standing().q_rad[LEGS[side] + i])
     }
 
-    /// Combinations of three angles per joint, within the limits.
+    /// Returns combinations of three angles per joint, within the limits.
     fn grid(side: Side) -> impl Iterator<Item = LegAngles> {
         const STEPS: [f32; 3] = [0.25, 0.5, 0.8];
         (0..STEPS.len().pow(LEG_JOINTS as u32)).map(move |number| {
@@ -126,7 +127,7 @@ mod tests {
         }
     }
 
-    /// A foot wanted far below: the leg is stretched towards it, within its limits.
+    /// A foot target is far below: the leg is stretched towards it, within its limits.
     #[test]
     fn out_of_reach_the_leg_is_stretched() {
         let pelvis = Posed::standing().world_from_pelvis;

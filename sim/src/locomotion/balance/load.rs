@@ -1,4 +1,4 @@
-//! What pulls and pushes, as seen by the balance: a wrench about the centre of mass and the point it has to stand over.
+//! Loads as seen by the balance: a wrench about the centre of mass, and the point to balance over.
 
 use rapier3d::math::Vector;
 
@@ -7,7 +7,7 @@ use crate::body::BodyEstimate;
 use crate::plane::flat;
 use crate::{GRAVITY_M_S2, Sides};
 
-/// A robot and what its hands carry, as one body: what is carried is a mass in each palm. Its swing does not push the robot.
+/// A robot and its loads as one body: each load is a mass in the palm, whose swing does not push the robot.
 pub(super) struct LadenRobot {
     carried_kg: Sides<f32>,
     pub mass_kg: f32,
@@ -34,31 +34,32 @@ pub(super) struct Load {
     pub force_n: Vector,
     /// Moment about the centre of mass.
     pub moment_n_m: Vector,
-    /// Where the centre of pressure of a robot at rest lies: the centre of mass, moved by the wrench and the push.
+    /// Centre of pressure of a robot at rest: the centre of mass, moved by the wrench and the push.
     pub balance_point_m: Vector,
-    /// The same without the push: where the robot and what it carries have their centre of mass.
+    /// The same without the push: the common centre of mass of the robot and its loads.
     pub weights_point_m: Vector,
-    /// How fast the balance point moves because the push changes.
+    /// Velocity of the balance point due to changes of the push.
     pub balance_point_m_s: Vector,
-    /// Velocity of the robot and of what it carries, as one body.
+    /// Velocity of the robot and its loads, as one body.
     pub velocity_m_s: Vector,
-    /// How much the robot leans ahead of pulls, 0 to 1: see [`super::stand::Ahead`].
+    /// Degree to which the robot leans ahead of pulls, 0 to 1: see [`super::stand::Ahead`].
     pub ahead: f32,
-    /// How much the robot gives way to what pulls its hands, 0 to 1: see [`super::stand::Partner`].
+    /// Degree to which the robot yields to pulls on its hands, 0 to 1: see [`super::stand::Partner`].
     pub yield_share: f32,
 }
 
-/// Pushes and pulls are taken to act this high over the centre of mass: at the chest and the hands.
+/// Assumed height of pushes and pulls over the centre of mass: at the chest and the hands.
 const PUSH_LEVER_M: f32 = 0.19;
-/// A lighter weight is arm motion and friction, not a load.
+/// Weight below which a load counts as arm motion and friction.
 const DEAD_ZONE_N: f32 = 6.0;
-/// More about the vertical than a foot can hold is not fed forward.
+/// Maximum moment about the vertical that is fed forward, as much as a foot can hold.
 const LARGEST_TURN_N_M: f32 = 20.0;
-/// So much less of it if feet hold it that push in opposite directions.
+/// Reduction of that maximum if the feet hold the moment by pushing in opposite directions.
 const TURN_LEFT_OUT_N_M: f32 = 10.0;
 
 impl Load {
-    /// With height h of the centre of mass c over the ground and vertical load N = m g - f_z:
+    /// Computes the load. With height h of the centre of mass c over the ground and vertical load N = m
+    /// g - f_z:
     ///   p = c + ( m_y + h f_x, -m_x + h f_y ) / N.
     pub(super) fn of(
         body: &BodyEstimate,
@@ -85,8 +86,8 @@ impl Load {
         }
         let weights_point_m = balanced_m(force_n, moment_n_m);
         for (hand_n, palm_m) in body.hand_reaction_n.into_iter().zip(palms_m) {
-            // What pulls sideways is part of the push. What turns the robot, the hands alone tell: the push
-            // acts over the centre of mass.
+            // A sideways pull is part of the push. A moment about the vertical is known from the hands
+            // alone: the push acts over the centre of mass.
             moment_n_m.z += (palm_m - body.com_m).cross(flat(hand_n)).z;
         }
         let largest_turn_n_m =
@@ -139,7 +140,7 @@ mod tests {
         let away_m = loaded.balance_point_m - common_m;
         assert!(away_m.x.abs() < 1e-5 && away_m.y.abs() < 1e-5, "{away_m}");
 
-        // What lifts, and what is lighter than the dead zone, is no load.
+        // An upward pull, or a weight below the dead zone, is no load.
         body.hand_reaction_n = Sides { left: Vector::Z * 30.0, right: Vector::Z * -0.9 * DEAD_ZONE_N };
         assert_eq!(
             Load::of(&body, &LadenRobot::of(&body), 0.0, ObservedPush::default(), 0.0).force_n,
@@ -147,7 +148,7 @@ mod tests {
         );
     }
 
-    /// A robot at rest whose hands swing 3 kg each forward: momentum is shared by all that moves.
+    /// A robot at rest swings 3 kg in each hand forward: everything that moves shares the momentum.
     #[test]
     fn what_swings_in_the_hands_belongs_to_the_robot() {
         let mut body = Posed::standing().body();
@@ -161,7 +162,7 @@ mod tests {
         assert!((laden.velocity_m_s - Vector::X * (6.0 / mass_kg)).length() < 1e-5, "{}", laden.velocity_m_s);
     }
 
-    /// Against a steady push a robot leans: moments about the pressure point cancel.
+    /// A robot leans against a steady push: moments about the pressure point cancel.
     #[test]
     fn a_push_is_leant_against() {
         let body = Posed::standing().body();

@@ -1,4 +1,5 @@
-//! The default base controller: stands while it can, steps when it is told to move or is pushed out of its stance.
+//! The default base controller: it stands while it can, and steps when commanded to move or pushed out
+//! of its stance.
 
 mod course;
 mod effort;
@@ -31,40 +32,43 @@ const LIMITS: BaseLimits = BaseLimits {
     yaw_rate_rad_s: [-0.5, 0.5],
     pelvis_height_m: [0.50, 0.76],
 };
-/// A velocity command changes no faster than this.
+/// Maximum rate of change of a velocity command.
 const LARGEST_CHANGE_M_S2: f32 = 0.8;
 const LARGEST_CHANGE_RAD_S2: f32 = 1.5;
-/// Below these a command means to stand.
+/// Thresholds below which a command means to stand.
 const STILL_M_S: f32 = 0.01;
 const STILL_RAD_S: f32 = 0.01;
-/// Standing ends when the capture point leaves the feet by this much: forward, backward, sideways beyond a sole's centre.
+/// Distances of the capture point that end standing: forward and backward from the middle of the feet,
+/// sideways beyond a sole's centre.
 const FORWARD_M: f32 = 0.075;
 const BACKWARD_M: f32 = 0.07;
-/// So much farther forward for a robot that leans ahead of a pull.
+/// Extra forward distance for a robot that leans ahead of a pull.
 const FARTHER_M: f32 = 0.01;
 const SIDEWAYS_M: f32 = 0.005;
-/// A capture point so near to the middle of the feet is as near to one as to the other.
+/// Distance of the capture point from the middle of the feet within which both feet count as equally near.
 const EITHER_FOOT_M: f32 = 0.01;
-/// A leg that swings ahead turns the pelvis to its own side, and one that swings back to the other: a robot that a blow has set
-/// spinning steps with the leg that stops the spin, which is the one that the spin carries along. This, times spin and the
-/// capture point's way ahead, counts like its way to the side. Tuned on punches at shoulders and elbows, seeds 2000-2099.
+/// Weight of the spin in choosing the swing leg. A leg that swings ahead turns the pelvis to its own
+/// side, and one that swings back to the other. A robot that a blow has set spinning steps with the leg
+/// that stops the spin, which is the one that the spin carries along. This weight, times the spin and
+/// the capture point's distance ahead, counts like its distance to the side. Tuned on punches at
+/// shoulders and elbows, seeds 2000-2099.
 const SPIN_S_RAD: f32 = 1.0;
-/// No change of mind within this time after planting.
+/// Minimum time of standing after planting before another change of mode.
 const MIN_STANDING_S: f32 = 0.1;
-/// Feet and capture point from which standing succeeds.
+/// Conditions on steps, feet and capture point under which standing succeeds.
 const MIN_STEPS: u32 = 2;
 const LARGEST_STAGGER_M: f32 = 0.12;
 const LARGEST_WIDTH_M: f32 = 0.36;
 const CAPTURED_M: f32 = 0.066;
-/// A robot that leans farther against a push would fall when the push ends.
+/// Maximum lean against a push: a robot that leans farther would fall when the push ends.
 const LARGEST_LEAN_M: f32 = 0.1;
 
-/// A robot that was pushed out of its stance is back once it is turned by less than this from where it stood, and does not come back
-/// after this time.
+/// Limits of a return after a push out of the stance: the heading error at which the robot is back, and
+/// the time after which it gives up.
 const BACK_RAD: f32 = 0.1;
 const LONGEST_RETURN_S: f32 = 10.0;
 
-/// Stands or steps; see the module's text.
+/// The controller of one robot, which stands or steps; see the module's text.
 #[derive(Default)]
 pub struct Balance {
     state: Option<BalanceState>,
@@ -77,7 +81,7 @@ struct BalanceState {
     /// Velocity command after the ramp.
     velocity: BaseVelocity,
     time_in_mode_s: f32,
-    /// Where the pelvis rests over the middle of the soles, heading frame.
+    /// Rest position of the pelvis over the middle of the soles, heading frame.
     pelvis_from_middle_m: Vector,
     observer: PushObserver,
     quick_observer: PushObserver,
@@ -172,8 +176,9 @@ impl BalanceState {
         }
     }
 
-    /// Returns the commanded velocity, or that to its place for a robot that is to stand and was pushed out of its stance or has
-    /// not yet come to where commands took it.
+    /// Returns the commanded velocity. For a robot that is to stand it may return the velocity to its
+    /// place. That is so if the robot was pushed out of its stance, or has not reached the place that
+    /// commands took it to.
     fn velocity_to_place(
         &mut self,
         body: &BodyEstimate,
@@ -207,7 +212,7 @@ impl BalanceState {
         velocity_m_s.map_or(command, |to_m_s| BaseVelocity { vx_m_s: to_m_s.x, vy_m_s: to_m_s.y, ..command })
     }
 
-    /// Remembers where a robot with empty hands stands.
+    /// Records the place of a robot that stands with empty hands.
     fn keep_place(&mut self, body: &BodyEstimate) {
         if !self.ahead.is_free() || self.place.is_some_and(|place| place.is_moved()) {
             self.place = None;
@@ -259,8 +264,9 @@ impl BalanceState {
         }
     }
 
-    /// The foot nearer to the capture point; of feet that are as near, the one from which the robot turns away. A robot that
-    /// has lost its stance heeds how fast it spins: see [`SPIN_S_RAD`].
+    /// Returns true if the left foot carries first. The foot nearer to the capture point does; if both are
+    /// equally near, it is the one that the robot turns away from. A robot that has lost its stance also
+    /// considers its spin: see [`SPIN_S_RAD`].
     fn left_carries_first(&self, scale: &BodyScale, stance: &Stance, lost_rad_s: Option<f32>) -> bool {
         let capture_m = stance.capture_m;
         if let Some(spin_rad_s) = lost_rad_s {
@@ -288,7 +294,7 @@ impl BalanceState {
     }
 }
 
-/// Base commands that a robot of this size can follow.
+/// Returns the base commands that a robot of this size can follow.
 fn limits(scale: &BodyScale) -> BaseLimits {
     BaseLimits {
         vx_m_s: LIMITS.vx_m_s.map(|g1_m_s| scale.speed_m_s(g1_m_s)),
@@ -303,7 +309,7 @@ fn is_moving(velocity: &BaseVelocity) -> bool {
     vx_m_s.abs() > STILL_M_S || vy_m_s.abs() > STILL_M_S || yaw_rate_rad_s.abs() > STILL_RAD_S
 }
 
-/// One physics step from a velocity towards another.
+/// Moves a velocity towards another for one physics step.
 fn ramped(from: BaseVelocity, to: BaseVelocity, scale: &BodyScale, dt_s: f32) -> BaseVelocity {
     let towards = |from: f32, to: f32, most: f32| from + (to - from).clamp(-most, most);
     let (most_m_s, most_rad_s) = (LARGEST_CHANGE_M_S2 * dt_s, scale.rate_1_s2(LARGEST_CHANGE_RAD_S2) * dt_s);
@@ -319,7 +325,8 @@ mod tests {
     use super::*;
     use crate::body::posed::Posed;
 
-    /// Whether the left foot carries a robot with its capture point here, that spins so if it has lost its stance.
+    /// Returns true if the left foot carries first with the capture point here, and with this spin if
+    /// the stance was lost.
     fn left_carries(capture_m: [f32; 2], lost_rad_s: Option<f32>) -> bool {
         let body = Posed::standing().body();
         let state = BalanceState::new(&body);
@@ -329,7 +336,8 @@ mod tests {
         state.left_carries_first(&BodyScale::G1, &stance, lost_rad_s)
     }
 
-    /// Blown ahead or back at an elbow it swings the leg that stops the spin, though the other foot is a little nearer.
+    /// A blow ahead or back at an elbow sets the robot spinning. It swings the leg that stops the spin,
+    /// though the other foot is a little nearer.
     #[test]
     fn a_robot_that_spins_steps_with_the_leg_that_stops_it() {
         for (ahead_m, spin_rad_s, left) in

@@ -1,51 +1,51 @@
-//! What pushes the robot beside gravity and the ground force that was asked for.
+//! Observer of pushes: forces beside gravity and the commanded ground force.
 
 use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
 
-/// How soon an observer believes what it sees.
+/// Poles and rate limits of an observer.
 pub(super) struct ObserverRates {
     poles_1_s: f32,
     largest_change_m_s3: f32,
-    /// Of a push that grows less.
+    /// Maximum rate of a decreasing push.
     largest_fall_m_s3: f32,
 }
 
-/// A blow is over before a foot lands: only what lasts is a push.
+/// Maximum rate of change: a blow ends before a foot lands, so only a lasting force is a push.
 const LARGEST_CHANGE_M_S3: f32 = 4.5;
 pub(super) const CALM: ObserverRates = ObserverRates {
     poles_1_s: 16.0,
     largest_change_m_s3: LARGEST_CHANGE_M_S3,
     largest_fall_m_s3: LARGEST_CHANGE_M_S3,
 };
-/// For a robot that leans ahead of a pull. What ends is believed sooner: one that goes on leaning against a pull that has ended
-/// falls.
+/// Rates for a robot that leans ahead of a pull. The end of a push is recognised sooner: a robot that
+/// goes on leaning against a pull that has ended falls.
 pub(super) const QUICK: ObserverRates =
     ObserverRates { poles_1_s: 22.0, largest_change_m_s3: LARGEST_CHANGE_M_S3, largest_fall_m_s3: 9.0 };
 const LARGEST_PUSH_M_S2: f32 = 2.0;
 const GROWTH_TIME_S: f32 = 0.08;
 
-/// Horizontal acceleration of the centre of mass by everything that was not expected, and how fast it changes.
+/// Horizontal acceleration of the centre of mass by all unexpected forces, and its rate of change.
 #[derive(Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct ObservedPush {
     pub acceleration_m_s2: Vector,
     pub growth_m_s3: Vector,
 }
 
-/// A push taken apart by what it comes through.
+/// A push split by its path into the robot.
 pub(super) struct SplitPush {
-    /// What does not come through hands that hold something; horizontal.
+    /// The part that does not come through hands that hold something; horizontal.
     pub rest: ObservedPush,
-    /// What does, as far as the robot withstands it; horizontal.
+    /// The part through the hands, as far as the robot withstands it; horizontal.
     pub hands_m_s2: Vector,
     /// Height of the palms over the centre of mass.
     pub hands_lever_m: f32,
-    /// Share of the hands' part to which the robot gives way, 0 to 1.
+    /// Share of the hands' part to which the robot yields, 0 to 1.
     pub yield_share: f32,
 }
 
 impl From<ObservedPush> for SplitPush {
-    /// The push on a robot whose hands hold nothing.
+    /// Converts the push on a robot whose hands hold nothing.
     fn from(rest: ObservedPush) -> SplitPush {
         SplitPush { rest, hands_m_s2: Vector::ZERO, hands_lever_m: 0.0, yield_share: 0.0 }
     }
@@ -60,7 +60,8 @@ pub(super) struct PushObserver {
 }
 
 impl PushObserver {
-    /// What counts for a robot that leans ahead of pulls by the part `ahead`: the push as it is known so far, and as `quick` sees it.
+    /// Returns the push for a robot that leans ahead of pulls by the share `ahead`, combining the calm
+    /// estimate with that of `quick`.
     pub(super) fn push_ahead(&self, quick: &PushObserver, ahead: f32) -> ObservedPush {
         let [calm, quick] = [self, quick].map(|observer| observer.push);
         let sooner_m_s2 = quick.acceleration_m_s2 - calm.acceleration_m_s2;
@@ -70,12 +71,12 @@ impl PushObserver {
         }
     }
 
-    /// Acceleration of the centre of mass that the coming physics step should bring.
+    /// Sets the expected acceleration of the centre of mass in the coming physics step.
     pub(super) fn expect(&mut self, acceleration_m_s2: Vector) {
         self.expected_m_s2 = acceleration_m_s2;
     }
 
-    /// One physics step later.
+    /// Updates the estimate after one physics step.
     pub(super) fn update(&mut self, com_velocity_m_s: Vector, rates: &ObserverRates, dt_s: f32) {
         let measured = Vector::new(com_velocity_m_s.x, com_velocity_m_s.y, 0.0);
         let velocity = self.velocity_m_s.get_or_insert(measured);
@@ -97,7 +98,7 @@ mod tests {
 
     const DT_S: f32 = 1.0 / 200.0;
 
-    /// A body that is accelerated by what was asked for and a push that nobody told of.
+    /// Observes a body that is accelerated by the expected acceleration and an unannounced push.
     fn observe(
         rates: &ObserverRates,
         seconds: f32,
@@ -130,14 +131,14 @@ mod tests {
         }
     }
 
-    /// Fingers that close on a load: 50 N on 34 kg within a second, and gone at once.
+    /// Fingers close on a load: 50 N on 34 kg within a second, then suddenly none.
     #[test]
     fn a_growing_pull_is_found_as_it_grows_and_its_end_soon() {
         let pull_m_s2 = |time_s: f32| Vector::X * if time_s < 1.0 { 1.5 * time_s } else { 0.0 };
         let (observer, _) = observe(&QUICK, 1.0, pull_m_s2);
         let ObservedPush { acceleration_m_s2, growth_m_s3 } = observer.push;
         assert!((growth_m_s3 - Vector::X * 1.5).length() < 0.01, "{growth_m_s3}");
-        // Two poles at `poles_1_s` follow a ramp so much later.
+        // Two poles at `poles_1_s` follow a ramp with this delay.
         let late_s = (1.5 - acceleration_m_s2.x) / 1.5;
         assert!((late_s - 2.0 / QUICK.poles_1_s).abs() < 0.01, "{late_s} s");
         let (observer, _) = observe(&QUICK, 1.3, pull_m_s2);
@@ -145,7 +146,7 @@ mod tests {
         assert!(left_m_s2 < 0.3, "{left_m_s2} m/s^2 of the pull that has ended are believed");
     }
 
-    /// 300 N for 0.08 s on 34 kg. What lasts may count for no more than [`LARGEST_PUSH_M_S2`].
+    /// A blow of 300 N for 0.08 s on 34 kg. A lasting push counts for no more than [`LARGEST_PUSH_M_S2`].
     #[test]
     fn a_blow_is_no_push_and_no_push_is_without_bound() {
         let (_, largest_m_s2) =

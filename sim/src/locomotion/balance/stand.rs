@@ -1,8 +1,8 @@
 //! Standing: both feet stay planted, the pelvis holds its place and follows the height command.
 //!
-//! Each physics step: place the pelvis so that the centre of mass stays over the feet, solve both legs' inverse
-//! kinematics for it, and add the torques of a virtual spring and damper on centre of mass and trunk, shared by the
-//! feet as ground reaction forces. PD and feedforward act through the leg joints alone.
+//! Each physics step places the pelvis so that the centre of mass stays over the feet, and solves both legs'
+//! inverse kinematics for it. It then adds the torques of a virtual spring and damper on centre of mass and
+//! trunk, shared by the feet as ground reaction forces. PD and feedforward act through the leg joints alone.
 
 mod ahead;
 mod partner;
@@ -24,41 +24,45 @@ pub(super) use ahead::Ahead;
 pub(super) use partner::Partner;
 pub(super) use place::StandingPlace;
 
-/// The centre of mass, with what the hands carry, may lie this far from the middle of the feet before the pelvis gives way.
+/// Maximum distance of the centre of mass, loads included, from the middle of the feet before the pelvis
+/// shifts.
 const COM_ZONE_M: f32 = 0.0435;
-/// A robot that walked comes to rest nearer to where it is: its centre of mass so far from the middle.
+/// The same for a robot that comes to rest after walking, which settles nearer to its present position.
 const RESTING_ZONE_M: f32 = 0.01;
-/// The feet hold a push that takes the balance point no farther from their middle; the pelvis leans against the rest. Hands
-/// that come down on a table push the robot back, and harder the farther it leans into them: one that leaned against every
-/// push would run away.
+/// Maximum distance of the balance point from the middle of the feet that the feet hold alone; the
+/// pelvis leans against the rest of a push. Hands that come down on a table push the robot back, and
+/// harder the farther it leans into them: a robot that leaned against every push would run away.
 const PUSH_ZONE_M: f32 = 0.03;
-/// To the sides they hold so much more of a pull that is leant against ahead of it.
+/// Extra distance to the sides for a pull that the robot leans ahead of.
 const WIDER_ZONE_M: f32 = 0.01;
-/// Of a robot that leans ahead this part of a moment about the vertical is held by feet that push in opposite directions, the rest
-/// by each foot on its own.
+/// Share of a moment about the vertical that feet pushing in opposite directions hold, for a robot that
+/// leans ahead. Each foot holds the rest on its own.
 const COUPLE_SHARE: f32 = 0.5;
-/// A pull that grows is leant against as it will be in this time, at most so much farther.
+/// Prediction time for a growing pull, and the maximum extra lean.
 const LEAD_S: f32 = 0.4;
 const LARGEST_LEAD_M: f32 = 0.08;
 const LEAN_RATE_1_S: f32 = 6.0;
-/// Distance from the hip's roll axis to the ankle roll link of a leg that is bent enough: a robot that leans far is lower, for
-/// legs that are stretched hold it nowhere.
+/// Distance from the hip's roll axis to the ankle roll link of a sufficiently bent leg. A robot that
+/// leans far is lower, because stretched legs cannot hold it.
 const LEG_M: f32 = 0.595;
-/// Ahead and to the sides.
+/// Maximum shift ahead and to the sides.
 const LARGEST_SHIFT_M: [f32; 2] = [0.2, 0.1];
-/// To the sides, of a robot that leans ahead of pulls, so much more.
+/// Extra shift to the sides for a robot that leans ahead of pulls.
 const FARTHER_ASIDE_M: f32 = 0.025;
-/// The lean leaves out little changes of the push: one that followed them would sway for ever, for joints rub.
+/// Dead zone of the lean. Following small changes of the push, the robot would sway forever because of
+/// joint friction.
 const LEAN_PLAY_M: f32 = 0.01;
 const LEANING_TIME_S: f32 = 0.25;
-/// Centre of mass of a robot that holds something with partners: nearer to the middle, for the feet have to hold what partners pull.
+/// Zone of the centre of mass of a robot that holds something with partners: smaller, because the feet
+/// have to hold the partners' pull.
 const HELD_ZONE_M: f32 = 0.028;
-/// A robot pulled harder than this by what it holds with partners goes where its hands are pulled, at this rate per newton, while its
-/// centre of mass stays in a zone: what pulls between robots that stand fades.
+/// Yielding to partners. Beyond this pull of a shared load on its hands, a robot moves along the pull.
+/// It moves at this rate per newton, while its centre of mass stays in a zone. So pulls between standing
+/// robots decay.
 const PULLED_N: f32 = 12.0;
 const GIVING_WAY_M_S_N: f32 = 0.002;
 const GIVING_WAY_ZONE_M: f32 = 0.035;
-/// Below this pelvis height the trunk leans forward, so that the hips can go back.
+/// Pelvis height below which the trunk leans forward, so that the hips can go back.
 const LEAN_BELOW_M: f32 = 0.70;
 const LEAN_RAD_PER_M: f32 = 2.0;
 const LARGEST_LEAN_RAD: f32 = 0.5;
@@ -71,24 +75,24 @@ const VERTICAL_STIFFNESS_1_S2: f32 = 80.0;
 const VERTICAL_DAMPING_1_S: f32 = 15.0;
 const TRUNK_STIFFNESS_N_M_RAD: f32 = 150.0;
 const TRUNK_DAMPING_N_M_S_RAD: f32 = 15.0;
-/// Horizontal force stays within this share of the vertical one: the feet must not slip.
+/// Maximum ratio of horizontal to vertical force, so that the feet do not slip.
 const FRICTION_USED: f32 = 0.53;
 const SMALLEST_LOAD_SHARE: f32 = 0.2;
 
 /// Inverse kinematics is warm-started from the last step, so that two iterations are enough.
 const IK_ITERATIONS: usize = 2;
 
-/// How fast a robot that plants its feet while moving comes to rest over them.
+/// Rate at which a robot that plants its feet while moving comes to rest over them.
 const SETTLING_1_S: f32 = 5.0;
 const TILT_SETTLING_TIME_S: f32 = 0.15;
 
 /// A robot with both feet planted; see the module's text.
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Stand {
-    /// Ankle roll links where they were planted, world.
+    /// Poses of the ankle roll links at planting, world.
     feet: Sides<Pose>,
     soles: Sides<Pose>,
-    /// Pelvis over the middle of the feet, and what it still is away from there since planting.
+    /// Pelvis over the middle of the feet, and its remaining offset and velocity since planting.
     home_m: Vector,
     offset_m: Vector,
     offset_rate_m_s: Vector,
@@ -97,17 +101,17 @@ pub(super) struct Stand {
     /// Shift of the pelvis against a push, in the heading frame.
     lean_m: Vector,
     lean_rate_m_s: Vector,
-    /// Where the shift is going.
+    /// Goal of the shift.
     lean_goal_m: Vector,
     height_m: f32,
     q_rad: Sides<LegAngles>,
 }
 
-/// How a robot that stepped comes to rest.
+/// Rest posture of a robot that stepped.
 pub(super) struct Resting<'a> {
     /// Pelvis over the middle of the soles, heading frame.
     pub rest_m: Vector,
-    /// Whether the pelvis keeps to that as one that stands does, rather than to the middle of the feet.
+    /// True if the pelvis keeps to that position as in standing, rather than to the middle of the feet.
     pub keeps: bool,
     /// Load against which the robot leans.
     pub load: &'a Load,
@@ -145,8 +149,8 @@ impl Stand {
             stand.lean_goal_m = stand.lean_m;
             stand.offset_m = flat(pelvis.translation - stand.home_m) - heading * stand.lean_m;
             if keeps {
-                // The centre of mass of a robot that has stepped is farther ahead of its pelvis than once it is upright: it is
-                // shifted as it stands up.
+                // The centre of mass of a robot that has stepped is farther ahead of its pelvis than
+                // once it is upright: it shifts as the robot straightens.
                 stand.home_m -= shift_m;
             }
             stand.offset_rate_m_s = flat(body.com_velocity_m_s);
@@ -154,15 +158,15 @@ impl Stand {
         stand
     }
 
-    /// Where the centre of mass, with what is carried, would be with the pelvis at home: from the middle of the feet, in the
-    /// heading frame.
+    /// Returns the centre of mass, loads included, for a pelvis at home: from the middle of the feet, in
+    /// the heading frame.
     fn weights_m(&self, body: &BodyEstimate, load: &Load) -> Vector {
         let away_m = load.weights_point_m - body.world_from_pelvis().translation;
         Rotation::from_rotation_z(-self.heading_rad) * flat(self.home_m + away_m - middle_m(&self.soles))
     }
 
-    /// Shift of the pelvis against what of a push the feet do not hold, with the centre of mass at `weights_m`; all
-    /// in the heading frame, from the middle of the feet.
+    /// Returns the shift of the pelvis against the part of a push that the feet do not hold, with the
+    /// centre of mass at `weights_m`; all in the heading frame, from the middle of the feet.
     fn against_push_m(&self, scale: &BodyScale, weights_m: Vector, load: &Load) -> Vector {
         let push_m = flat(load.balance_point_m - load.weights_point_m);
         let coming_m = (load.balance_point_m_s * scale.time_s(LEAD_S))
@@ -176,7 +180,7 @@ impl Stand {
         within_reach_m(held_m - balance_m, scale, load.ahead)
     }
 
-    /// One physics step towards a pelvis height over the soles.
+    /// Runs one physics step towards a pelvis height over the soles.
     pub(super) fn tick(
         &mut self,
         body: &BodyEstimate,
@@ -219,8 +223,8 @@ impl Stand {
         (legs, flat(push_n / body.model.mass_kg))
     }
 
-    /// Pelvis (world) that keeps the centre of mass within [`COM_ZONE_M`] of the middle of the planted feet,
-    /// as near to home as that and a push allow.
+    /// Returns the pelvis goal (world) that keeps the centre of mass within [`COM_ZONE_M`] of the middle
+    /// of the planted feet, as near to home as that and a push allow.
     fn pelvis_goal(&mut self, body: &BodyEstimate, load: &Load, dt_s: f32) -> PelvisGoal {
         let heading = Rotation::from_rotation_z(self.heading_rad);
         let weights_m = self.weights_m(body, load);
@@ -241,8 +245,8 @@ impl Stand {
         }
     }
 
-    /// Returns how far a robot that gives way to its partners goes in one physics step where its hands are pulled, with the centre
-    /// of mass at `weights_m`; all in the heading frame.
+    /// Returns the displacement, in one physics step, of a robot that yields to its partners along the
+    /// pull on its hands, with the centre of mass at `weights_m`; all in the heading frame.
     fn giving_way_m(&self, body: &BodyEstimate, load: &Load, weights_m: Vector, dt_s: f32) -> Vector {
         let scale = &body.model.scale;
         let pull_n = flat(body.hand_reaction_n.left + body.hand_reaction_n.right);
@@ -257,7 +261,8 @@ impl Stand {
         Vector::new(within(way_m.x, weights_m.x), within(way_m.y, weights_m.y), 0.0)
     }
 
-    /// One physics step of the lean towards `wanted_m`, without a jerk if it leans ahead of pulls; gives its acceleration.
+    /// Moves the lean towards `wanted_m` for one physics step, without a jerk if it leans ahead of
+    /// pulls. Returns its acceleration.
     fn lean(&mut self, scale: &BodyScale, wanted_m: Vector, ahead: f32, dt_s: f32) -> Vector {
         let play_m = scale.length_m(LEAN_PLAY_M);
         if ahead == 0.0 {
@@ -277,7 +282,7 @@ impl Stand {
         leaning_m_s2
     }
 
-    /// Height up to which both legs reach with the pelvis over `position_m`.
+    /// Returns the height up to which both legs reach with the pelvis over `position_m`.
     fn highest_m(&self, body: &BodyEstimate, position_m: Vector) -> f32 {
         let leg_m = body.model.scale.length_m(LEG_M);
         let pelvis_m = body.world_from_pelvis().translation;
@@ -291,12 +296,12 @@ impl Stand {
     }
 }
 
-/// Returns how far the centre of mass may be from the middle of the feet under a load, on a G1.
+/// Returns the maximum distance of the centre of mass from the middle of the feet under a load, on a G1.
 fn com_zone_m(load: &Load) -> f32 {
     COM_ZONE_M + (HELD_ZONE_M - COM_ZONE_M) * load.yield_share
 }
 
-/// Shift that brings a point back into a zone round the middle of the feet.
+/// Returns the shift that brings a point back into a zone round the middle of the feet.
 fn back_into_m(g1_zone_m: f32, scale: &BodyScale, point_m: Vector) -> Vector {
     let zone_m = scale.length_m(g1_zone_m);
     let zone_m = Vector::new(zone_m, zone_m, 0.0);
@@ -309,7 +314,7 @@ fn within_reach_m(shift_m: Vector, scale: &BodyScale, ahead: f32) -> Vector {
     shift_m.clamp(-most_m, most_m)
 }
 
-/// Force with which the ground answers the drives of one leg.
+/// Returns the reaction force of the ground to the drives of one leg.
 fn push_n(
     body: &BodyEstimate,
     side: Side,
@@ -324,19 +329,20 @@ fn push_n(
     ground_force_n(body, side, gravity_n_m, &applied_n_m)
 }
 
-/// Where the pelvis should be, and how it should move.
+/// Target pose and motion of the pelvis.
 struct PelvisGoal {
     pose: Pose,
     velocity_m_s: Vector,
     acceleration_m_s2: Vector,
 }
 
-/// Leg torques of the ground forces that accelerate the centre of mass and right the trunk towards `goal`.
+/// Returns the leg torques of the ground forces that accelerate the centre of mass and right the trunk
+/// towards `goal`.
 fn balance_torques_n_m(body: &BodyEstimate, load: &Load, goal: &PelvisGoal) -> Sides<[f32; LEG_JOINTS]> {
     let mass_kg = body.model.mass_kg;
     let pelvis = body.world_from_pelvis();
     let error_m = goal.pose.translation - pelvis.translation;
-    // The velocity is that of the pelvis, which holds still while arms swing.
+    // The velocity is that of the pelvis, which stays still while arms swing.
     let rate_m_s = goal.velocity_m_s - body.pelvis_velocity_m_s;
     let scale = &body.model.scale;
     let [level_1_s2, upright_1_s2] =
@@ -397,7 +403,7 @@ mod tests {
         }
     }
 
-    /// A pull that grows by 2 x 25 N in a second. What hands hold answers to the lean: there nothing is led.
+    /// A pull grows by 2 x 25 N in a second. A held object reacts to the lean, so nothing is predicted there.
     #[test]
     fn a_growing_pull_is_leant_against_before_it_is_there() {
         let body = Posed::standing().body();
@@ -415,7 +421,7 @@ mod tests {
         assert_eq!(lean_m(0.0, 0.1, 1.45), 0.0);
     }
 
-    /// While a hand holds something the lean follows late, and what it is to be later counts for nothing.
+    /// While a hand holds something, the lean follows with a delay, and its prediction has no effect.
     #[test]
     fn a_robot_that_holds_something_leans_as_far_as_it_is_pushed_now() {
         let mut stand = Stand::plant(&Posed::standing().body(), 0.0, None);
@@ -424,7 +430,7 @@ mod tests {
             assert_eq!(stand.lean(&BodyScale::G1, wanted_m, 0.0, 0.005), Vector::ZERO);
         }
         assert!((stand.lean_m.y - (0.08 - LEAN_PLAY_M)).abs() < 1e-4, "{}", stand.lean_m);
-        // A hand that opens finds the robot where it is, and at rest.
+        // When the hand opens, the robot continues from its present lean, at rest.
         let held_m = stand.lean_m;
         let started_m_s2 = stand.lean(&BodyScale::G1, wanted_m, 1.0, 0.005);
         assert!(started_m_s2.length() < 0.01, "{started_m_s2}");

@@ -1,15 +1,15 @@
-//! Stepping: one foot carries the robot, the other swings to where the capture point asks for it.
+//! Stepping: one foot carries the robot, the other swings to the foothold that the capture point requires.
 //!
-//! With x the balance point, v its velocity, u that of the swinging foot, s = [`SWING_INERTIA`] and w = sqrt(g / h), the
-//! capture point  xi = x + (v - s u) / w  obeys
+//! With x the balance point, v its velocity, u that of the swinging foot, s = [`SWING_INERTIA`] and w =
+//! sqrt(g / h), the capture point  xi = x + (v - s u) / w  obeys
 //!   xi' = w (xi - p) + s u,   p the centre of pressure,
-//! which moves from the old foot to the new one within the transfer time and stays there. What s u still adds until the
-//! foot lands, the offset b of the steady gait takes into account, the plan of a step does not: that won nothing. A foot
-//! put down at xi(T) - b  leaves the capture point the offset b from the new foot; see [`Gait`]. The centre of mass
-//! moves along with a leg that swings, and stops with it: v - s u is the speed that lasts, known from the angular
-//! momentum about the ground. Without it a robot that was hit steps too far, the farther the faster it steps, and at the
-//! next step too far the other way. Source: Englsberger, Ott, Albu-Schaeffer 2015; Khadiv et al. 2016; angular momentum:
-//! Gong, Grizzle 2022.
+//! which moves from the old foot to the new one within the transfer time and stays there. The remaining
+//! contribution of s u until the foot lands is part of the steady gait's offset b. The plan of a step ignores
+//! it: including it brought no gain. A foot put down at xi(T) - b  leaves the capture point the offset b from
+//! the new foot; see [`Gait`]. The centre of mass moves along with a leg that swings, and stops with it: v -
+//! s u is the speed that lasts, known from the angular momentum about the ground. Without it a robot that was
+//! hit steps too far, the farther the faster it steps, and at the next step too far the other way. Source:
+//! Englsberger, Ott, Albu-Schaeffer 2015; Khadiv et al. 2016; angular momentum: Gong, Grizzle 2022.
 
 use rapier3d::math::{Pose, Rotation, Vector};
 use serde::{Deserialize, Serialize};
@@ -28,51 +28,58 @@ use crate::plane::{flat, heading_rad, wrapped_rad};
 use crate::{GRAVITY_M_S2, Side, Sides};
 
 const SHIFT_GAIN: f32 = 3.0;
-/// The first foot lifts when the capture point is this near to where a step would have left it, or when a robot that
-/// falls forward or backward has no time to shift.
+/// Distance between the capture point and its position at the end of a step, below which the first foot
+/// lifts. It also lifts if a robot that falls forward or backward beyond the second distance has no time
+/// to shift.
 const SHIFTED_M: f32 = 0.012;
 const LATEST_M: f32 = 0.1;
-/// A robot that leans against partners would shift for ever: they pull the more the farther it leans.
+/// Maximum duration of the shift. A robot that leans against partners would otherwise shift forever:
+/// they pull the more the farther it leans.
 const LONGEST_SHIFT_S: f32 = 0.5;
-/// A robot gathers speed over so many steps.
+/// Number of steps in which a robot gathers speed.
 const STARTING_STEPS: u32 = 5;
-/// One foot holds little against turning: a robot that is turned by force gives way, and turns back slowly.
+/// Maximum heading error. One foot holds little against turning: a robot that is turned by force yields,
+/// and turns back slowly.
 const HEADING_LEASH_RAD: f32 = 0.35;
 const RETURN_RAD_S: f32 = 0.4;
-/// A robot that a blow has set spinning turns by a radian while its foot swings: footholds lie within reach of where it will face
-/// then, or the legs would cross. What spins less than this sways as walking robots do. Tuned on punches back at shoulders and
-/// elbows of walking robots, seeds 2600-2799.
+/// Spin (rad/s) above which footholds are planned for the heading at landing. A robot that a blow has
+/// set spinning turns by a radian while its foot swings, and otherwise its legs would cross. A slower
+/// spin is the normal sway of walking robots. Tuned on punches back at shoulders and elbows of walking
+/// robots, seeds 2600-2799.
 const SWAYING_RAD_S: f32 = 1.0;
 const LARGEST_SPIN_TURN_RAD: f32 = 0.8;
-/// A robot whose velocity is this far from the commanded one was hit: it steps to stand, not to go on. Tuned on the same punches.
+/// Velocity error that indicates a blow: the robot then steps to stand, not to go on. Tuned on the same
+/// punches.
 const STRAYING_M_S: f32 = 0.6;
-/// The pelvis sways about the vertical with every step: it faces where it points in the mean of this time.
+/// Averaging time of the pelvis's facing direction. The pelvis sways about the vertical with every step.
 const FACING_TIME_S: f32 = 0.2;
 const LIFT_STIFFNESS_1_S2: f32 = 90.0;
 const LIFT_DAMPING_1_S: f32 = 15.0;
-/// Vertical acceleration stays within these parts of gravity.
+/// Range of the vertical acceleration, as shares of gravity.
 const LIFT_RANGE: [f32; 2] = [-0.45, 0.6];
 const TRUNK_STIFFNESS_1_S2: f32 = 90.0;
 const TRUNK_DAMPING_1_S: f32 = 19.0;
 const LARGEST_TURN_RAD_S2: f32 = 50.0;
-/// A foot that carries holds less about the vertical than about the other axes.
+/// Factor on the turning about the vertical: a stance foot holds less about that axis than about the others.
 const YAW_PART: f32 = 0.6;
-/// Walking is neither stretched nor crouched.
+/// Range of the pelvis height: walking is neither stretched nor crouched.
 const HIGHEST_M: f32 = 0.745;
 const LOWEST_M: f32 = 0.62;
 const RAISING_M_S: f32 = 0.15;
 const LOWERING_M_S: f32 = 0.8;
-/// Distance from the hip's roll axis to the ankle roll link of a leg that is bent enough.
+/// Distance from the hip's roll axis to the ankle roll link of a sufficiently bent leg.
 const LEG_M: f32 = 0.49;
 const ANKLE_HEIGHT_M: f32 = 0.053;
-/// A step ends when the foot meets the ground in the last part of the swing, or is overdue.
+/// Shares of the swing time at which a step may end at the earliest, by contact with the ground, and
+/// must end at the latest.
 const EARLIEST_LANDING: f32 = 0.65;
 const LATEST_LANDING: f32 = 1.25;
 const GROUND_M: f32 = 0.002;
-/// Height of the centre of mass over the ground: a robot that is lower has fallen.
+/// Minimum height of the centre of mass over the ground: a lower robot has fallen.
 const MIN_HEIGHT_M: f32 = 0.4;
 
-/// A leg that carries is driven by torque; the drives need some stiffness, around the measured angle.
+/// Drive gains: a stance leg is driven by torque, but its drives need some stiffness around the measured
+/// angle.
 const KP_N_M_RAD: f32 = 1.0;
 const KD_N_M_S_RAD: f32 = 1.0;
 
@@ -80,12 +87,12 @@ const KD_N_M_S_RAD: f32 = 1.0;
 #[derive(Clone, Serialize, Deserialize)]
 pub(super) struct Stepping {
     pub(super) heading_rad: f32,
-    /// Where the commands alone would have turned the heading.
+    /// Heading to which the commands alone would have turned the robot.
     goal_rad: f32,
-    /// How far where the pelvis faces stays behind the heading.
+    /// Yaw of the heading minus yaw of the pelvis.
     lag_rad: f32,
     stance: Side,
-    /// Before the first step: for how long the capture point has been moving over the first stance foot.
+    /// Time for which the capture point has been moving over the first stance foot, before the first step.
     shifting_s: Option<f32>,
     /// Time since the stance foot landed.
     time_s: f32,
@@ -96,7 +103,8 @@ pub(super) struct Stepping {
 }
 
 impl Stepping {
-    /// Starts stepping, and turns to the heading `goal_rad`; the first foot to carry is the one nearer to the capture point.
+    /// Starts stepping, and turns to the heading `goal_rad`. The first stance foot is the left one if
+    /// `left_carries` is true.
     pub(super) fn start(
         body: &BodyEstimate,
         heading_rad: f32,
@@ -121,7 +129,7 @@ impl Stepping {
         step
     }
 
-    /// How far the heading is from where the commands alone would have turned it.
+    /// Returns the angle between the heading and the one to which the commands alone would have turned it.
     pub(super) fn to_turn_rad(&self) -> f32 {
         wrapped_rad(self.goal_rad - self.heading_rad).abs()
     }
@@ -130,12 +138,12 @@ impl Stepping {
         self.steps
     }
 
-    /// The swing foot touched down in the last physics step.
+    /// Returns true if the swing foot touched down in the last physics step.
     pub(super) fn just_landed(&self) -> bool {
         self.time_s == 0.0 && self.shifting_s.is_none()
     }
 
-    /// One physics step; also gives the horizontal acceleration of the centre of mass that it should bring.
+    /// Runs one physics step. It also returns the expected horizontal acceleration of the centre of mass.
     pub(super) fn tick(
         &mut self,
         body: &BodyEstimate,
@@ -160,7 +168,7 @@ impl Stepping {
         let strays = flat(body.com_velocity_m_s - commanded_m_s).length() > scale.speed_m_s(STRAYING_M_S);
         let course_m_s =
             if strays { Vector::ZERO } else { faced[0] * velocity_m_s[0] + faced[1] * velocity_m_s[1] };
-        // A robot that turns while it walks goes the coming step where it will face by then.
+        // A robot that turns while it walks takes the coming step in the direction that it will face by then.
         let coming = Rotation::from_rotation_z(velocity.yaw_rate_rad_s * scale.time_s(PERIOD_S));
         let gait = Gait::new(scale, rate_1_s, coming * course_m_s, outside);
         let (_, foot_m_s, _) = foot_motion(body, self.stance.other());
@@ -193,7 +201,7 @@ impl Stepping {
         (drives(body, &torques), torques.acceleration_m_s2)
     }
 
-    /// Goes up or down towards a height of the pelvis, as far as it walks so high and both legs reach.
+    /// Moves the pelvis height towards `height_m`, within the range of walking and the reach of both legs.
     fn rise(&mut self, body: &BodyEstimate, height_m: f32, dt_s: f32) {
         let scale = &body.model.scale;
         let wanted_m = height_m
@@ -205,7 +213,7 @@ impl Stepping {
         self.height_m += (wanted_m - self.height_m).clamp(-lowering_m, raising_m);
     }
 
-    /// Turns the heading as commanded, within the leash of where the robot faces.
+    /// Turns the heading as commanded, within the leash of the robot's facing direction.
     fn turn(&mut self, body: &BodyEstimate, yaw_rate_rad_s: f32, dt_s: f32) {
         self.goal_rad += yaw_rate_rad_s * dt_s;
         let most_rad = body.model.scale.rate_1_s(RETURN_RAD_S) * dt_s;
@@ -215,7 +223,8 @@ impl Stepping {
         self.heading_rad += ahead_rad.clamp(-HEADING_LEASH_RAD, HEADING_LEASH_RAD) - ahead_rad;
     }
 
-    /// Ahead and left of where the robot will face when the swinging foot lands, if it was set spinning; of its heading otherwise.
+    /// Returns the axes ahead and left at the landing of the swinging foot, for a robot that was set
+    /// spinning; otherwise those of its heading.
     fn landing_axes(&self, body: &BodyEstimate, yaw_rate_rad_s: f32) -> [Vector; 2] {
         let scale = &body.model.scale;
         let swaying_rad_s = scale.rate_1_s(SWAYING_RAD_S);
@@ -227,7 +236,8 @@ impl Stepping {
         [facing * Vector::X, facing * Vector::Y]
     }
 
-    /// Ahead and left of where the pelvis faces: a velocity is meant along these, and it may stay behind the heading.
+    /// Returns the axes ahead and left of the pelvis's facing direction. A velocity command refers to
+    /// these; they may lag behind the heading.
     fn faced_axes(&mut self, body: &BodyEstimate, dt_s: f32) -> [Vector; 2] {
         let lag_rad = wrapped_rad(self.heading_rad - heading_rad(&body.world_from_pelvis()));
         self.lag_rad += (lag_rad - self.lag_rad) * (dt_s / body.model.scale.time_s(FACING_TIME_S));
@@ -235,7 +245,7 @@ impl Stepping {
         [facing * Vector::X, facing * Vector::Y]
     }
 
-    /// One physics step of the swinging foot.
+    /// Runs one physics step of the swinging foot.
     fn advance(
         &mut self,
         scale: &BodyScale,
@@ -252,8 +262,8 @@ impl Stepping {
         self.swing.advance(goal, self.time_s - TRANSFER_S, footstep.pace, dt_s);
     }
 
-    /// Largest height of the pelvis at which both legs reach, now and where the swinging one will land: a leg that is
-    /// straight can neither lift its foot nor let the pelvis down.
+    /// Returns the maximum height of the pelvis at which both legs reach, now and at the swinging foot's
+    /// landing. A straight leg can neither lift its foot nor lower the pelvis.
     fn within_reach_m(&self, body: &BodyEstimate) -> f32 {
         let scale = &body.model.scale;
         let (leg_m, ankle_height_m) = (scale.length_m(LEG_M), scale.length_m(ANKLE_HEIGHT_M));
@@ -291,7 +301,8 @@ impl Stepping {
         }
     }
 
-    /// Torques of both legs for a centre of pressure, an upright trunk and the swinging foot's path.
+    /// Returns the torques of both legs for a centre of pressure, an upright trunk and the swinging
+    /// foot's path.
     fn carry(
         &self,
         body: &BodyEstimate,
@@ -328,7 +339,7 @@ impl Stepping {
     }
 }
 
-/// Torques as drives, whose springs and dampers add nothing at the measured angle and velocity.
+/// Converts torques to drives, whose springs and dampers add nothing at the measured angle and velocity.
 fn drives(body: &BodyEstimate, torques: &LegTorques) -> LegCommand {
     let kd_n_m_s_rad = body.model.scale.damping_n_m_s(KD_N_M_S_RAD);
     Sides::from_fn(|side| {
@@ -344,8 +355,8 @@ fn drives(body: &BodyEstimate, torques: &LegTorques) -> LegCommand {
     })
 }
 
-/// Where the capture point has to be when the first foot lifts, as a step that just ended would leave it; and whether
-/// the foot lifts now.
+/// Returns the required capture point at lift-off of the first foot, as a step that just ended would
+/// leave it, and true if the foot lifts now.
 fn shift(now: &FootstepInputs) -> (Vector, bool) {
     let scale = now.scale;
     let target_m = now.steady_capture_m(scale.time_s(SWING_S));
@@ -354,7 +365,7 @@ fn shift(now: &FootstepInputs) -> (Vector, bool) {
     (target_m, late || (target_m - now.capture_m).dot(now.outside_axis) < scale.length_m(SHIFTED_M))
 }
 
-/// Height of the lowest point of a sole.
+/// Returns the height of the lowest point of a sole.
 fn clearance_m(scale: &BodyScale, sole: &Pose) -> f32 {
     let corner = |x: f32, y: f32| (*sole * Vector::new(scale.along_sole_m(x), scale.across_sole_m(y), 0.0)).z;
     corner(0.085, 0.03).min(corner(0.085, -0.03)).min(corner(-0.085, 0.025)).min(corner(-0.085, -0.025))
@@ -367,7 +378,8 @@ mod tests {
     use super::*;
     use crate::body::posed::Posed;
 
-    /// Which way the robot that spins so will face, from its heading, when the foot lands that lifts now.
+    /// Returns the future facing direction, relative to the heading, of a robot with this spin when the
+    /// present swing foot lands.
     fn turn_rad(spin_rad_s: f32, yaw_rate_rad_s: f32, time_s: f32) -> f32 {
         let mut posed = Posed::standing();
         posed.pelvis_angular_velocity_rad_s = Vector::Z * spin_rad_s;

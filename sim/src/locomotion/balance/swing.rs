@@ -1,4 +1,4 @@
-//! The foot in the air: a path that jerks least, planned anew at each instant to where the foot has to go.
+//! The swing foot: a minimum-jerk path, replanned at each instant to the present foothold.
 
 #[cfg(test)]
 mod tests;
@@ -11,15 +11,15 @@ use crate::Side;
 use crate::body::{Acceleration, BodyEstimate, BodyScale, LEG_JOINTS, LEGS};
 
 pub(super) const SWING_S: f32 = 0.25;
-/// The foot is down a little before the step ends.
+/// Time in the air: the foot is down a little before the step ends.
 pub(super) const AIR_S: f32 = 0.93 * SWING_S;
 const HEIGHT_M: f32 = 0.044;
-/// A foot that meets no ground goes on down.
+/// Downward speed of a foot that has not met the ground.
 const PROBING_M_S: f32 = 0.25;
-/// The goal stands still for the last part of the way.
+/// Remaining time from which on the goal is fixed.
 const MIN_REMAINING_S: f32 = 0.03;
 const LARGEST_ACCELERATION_M_S2: f32 = 60.0;
-/// The farthest that a foot at rest gets in the time T: this times T^2.
+/// Maximum displacement of a foot at rest in the time T, divided by T^2.
 const REACH_M_S2: f32 = 14.0;
 const STIFFNESS_1_S2: f32 = 300.0;
 const DAMPING_1_S: f32 = 35.0;
@@ -33,23 +33,24 @@ pub(super) struct Swing {
     position_m: Vector,
     velocity_m_s: Vector,
     acceleration_m_s2: Vector,
-    /// How much faster than in the gait.
+    /// Pace relative to the gait.
     pace: f32,
 }
 
 impl Swing {
-    /// The foot stands; its next swing starts from where it is.
+    /// Plants the foot; its next swing starts from there.
     pub(super) fn plant(&mut self, body: &BodyEstimate, side: Side) {
         *self = Swing::at(body.world_from_foot(side));
     }
 
-    /// A foot that stands.
+    /// Creates the state of a planted foot.
     pub(super) fn at(foot: Pose) -> Swing {
         Swing { from: foot, to: foot, position_m: foot.translation, pace: 1.0, ..Swing::default() }
     }
 
-    /// One physics step of the path to `goal`, `time_s` (at the pace of the gait) after lift-off. The jerk of least jerk
-    /// from position x, velocity v, acceleration a to rest at x1 in T:  60 (x1 - x) / T^3 - 36 v / T^2 - 9 a / T.
+    /// Moves one physics step along the path to `goal`, `time_s` (at the pace of the gait) after
+    /// lift-off. The minimum-jerk path leads from position x, velocity v, acceleration a to rest at x1
+    /// in T. Its jerk is  60 (x1 - x) / T^3 - 36 v / T^2 - 9 a / T.
     pub(super) fn advance(&mut self, goal: Pose, time_s: f32, pace: f32, dt_s: f32) {
         if time_s <= 0.0 {
             return;
@@ -69,8 +70,9 @@ impl Swing {
         self.position_m += self.velocity_m_s * dt_s;
     }
 
-    /// The place nearest to `sole_m` where the sole can come to rest in time. A foot that is left to itself stops at
-    ///   x + 0.6 v T + 0.15 a T^2,   where the jerk of least jerk is zero.
+    /// Returns the place nearest to `sole_m` where the sole can come to rest in time. Without further
+    /// jerk a foot stops at
+    ///   x + 0.6 v T + 0.15 a T^2,   where the jerk of the minimum-jerk path is zero.
     pub(super) fn reachable_m(&self, scale: &BodyScale, sole_m: Vector, time_s: f32, pace: f32) -> Vector {
         let remaining_s = ((AIR_S - time_s) / pace).max(0.0);
         let resting_m = self.sole_m(scale)
@@ -81,17 +83,17 @@ impl Swing {
         sole_m - change_m + change_m.clamp_length_max(REACH_M_S2 * remaining_s * remaining_s)
     }
 
-    /// Where the sole's centre is on its path, without the lift.
+    /// Returns the sole's centre on its path, without the lift.
     pub(super) fn sole_m(&self, scale: &BodyScale) -> Vector {
         self.position_m + self.from.rotation * scale.sole_in_foot_m
     }
 
-    /// Where the ankle roll link is going.
+    /// Returns the goal of the ankle roll link.
     pub(super) fn goal_m(&self) -> Vector {
         self.to.translation
     }
 
-    /// Acceleration of the foot that keeps it on its path.
+    /// Returns the acceleration of the foot that keeps it on its path.
     pub(super) fn wanted(&self, body: &BodyEstimate, side: Side, time_s: f32) -> Acceleration {
         let (foot, speed_m_s, spin_rad_s) = foot_motion(body, side);
         let p = (time_s / AIR_S).clamp(0.0, 1.0);
@@ -115,7 +117,8 @@ impl Swing {
     }
 }
 
-/// Height over the path along the ground, `time_s` after lift-off, with its first and second derivative:
+/// Returns the height over the path along the ground, `time_s` after lift-off, with its first and second
+/// derivative:
 ///   16 h p^2 (1 - p)^2,   p = t / T;   after T down, until something is met.
 fn lift(time_s: f32) -> [f32; 3] {
     if time_s > AIR_S {
@@ -129,7 +132,7 @@ fn lift(time_s: f32) -> [f32; 3] {
     ]
 }
 
-/// Pose, velocity and angular velocity of an ankle roll link, world frame.
+/// Returns pose, velocity and angular velocity of an ankle roll link, world frame.
 pub(super) fn foot_motion(body: &BodyEstimate, side: Side) -> (Pose, Vector, Vector) {
     let first = LEGS[side];
     let foot = body.world_from_foot(side);

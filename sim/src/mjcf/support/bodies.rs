@@ -1,4 +1,4 @@
-//! What stands in `<worldbody>` and `<body>`, and in defaults for it.
+//! Elements of `<worldbody>` and `<body>`, and their defaults.
 
 use super::{
     AMOUNT, Attribute, CLASS, COLOR, Element, MAYBE, NAME, NUMBER, POSE, Sign, Support, Takes, USER,
@@ -6,7 +6,7 @@ use super::{
 };
 
 const TREE: &[&str] = &["worldbody", "body", "frame"];
-/// Elements in which bodies and what is on them stand, or what classes say of these.
+/// Elements that contain bodies and their parts, or the defaults for them.
 const TREE_OR_DEFAULT: &[&str] = &["worldbody", "body", "frame", "default"];
 
 pub(super) const ELEMENTS: &[Element] = &[

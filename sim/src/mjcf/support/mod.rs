@@ -1,5 +1,5 @@
-//! What becomes of every element and attribute of MJCF: the table by which files are accepted or refused, and which
-//! `docs/src/mjcf.md` shows.
+//! The support table of MJCF: its entry for every element and attribute decides whether a file is
+//! accepted. `docs/src/mjcf.md` shows it.
 
 mod bodies;
 #[cfg(test)]
@@ -7,31 +7,31 @@ mod page;
 mod sections;
 pub(super) mod value;
 
-/// What becomes of an element or an attribute.
+/// Support of an element or an attribute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Support {
-    /// It does here what it does in MuJoCo.
+    /// It has the same effect as in MuJoCo.
     Mapped,
-    /// Something like it happens here; the note says what. A value in [`Takes::Only`] is exact.
+    /// It has a similar effect, described in the note. A value in [`Takes::Only`] is exact.
     Approximated,
-    /// It has no effect on motion or on what is drawn here.
+    /// It has no effect on motion or on the drawn image.
     Ignored,
-    /// A file that has it is not read. A value in [`Takes::Only`] is what happens anyway, and accepted.
+    /// A file that has it is not read. A value in [`Takes::Only`] is the actual behaviour, and accepted.
     Refused,
 }
 
-/// An element by its name and the elements in which it stands.
+/// An element by its name and the elements that may contain it.
 pub(super) struct Element {
     pub name: &'static str,
     pub within: &'static [&'static str],
     pub support: Support,
-    /// Elements of one kind have names that differ.
+    /// Kind of the element; names are unique within a kind.
     pub kind: Option<&'static str>,
     pub attributes: &'static [&'static [Attribute]],
     pub note: &'static str,
 }
 
-/// Attributes of an element of which the same is true.
+/// Attributes of an element with the same support.
 #[derive(Clone, Copy)]
 pub(super) struct Attribute {
     pub names: &'static [&'static str],
@@ -40,18 +40,18 @@ pub(super) struct Attribute {
     pub note: &'static str,
 }
 
-/// What an attribute may say.
+/// Values that an attribute accepts.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Takes {
-    /// Anything.
+    /// Any text.
     Text,
-    /// Between so many and so many numbers.
+    /// A count of numbers between `least` and `most`.
     Numbers {
         least: usize,
         most: usize,
         sign: Sign,
     },
-    /// So many numbers, of which the first three give a direction.
+    /// This count of numbers, of which the first three give a direction.
     Direction(usize),
     /// Four numbers that are not all 0.
     Quaternion,
@@ -64,7 +64,7 @@ pub(super) enum Takes {
     Class,
     /// The name of an element of this kind.
     NameOf(&'static str),
-    /// One of these values, or something that is approximated or refused.
+    /// One of these values; others are approximated or refused.
     Only(&'static [&'static str]),
 }
 
@@ -75,12 +75,12 @@ pub(super) enum Sign {
     Positive,
 }
 
-/// What is known of an element that stands in another.
+/// Returns the entry of an element within another.
 pub(super) fn element(within: &str, name: &str) -> Option<&'static Element> {
     all().find(|element| element.name == name && element.within.contains(&within))
 }
 
-/// Names of the elements that may stand in another.
+/// Returns the names of the elements that another may contain.
 pub(super) fn names_within(within: &str) -> Vec<&'static str> {
     let read = |element: &&Element| element.support != Support::Refused && element.within.contains(&within);
     all().filter(read).map(|element| element.name).collect()
@@ -121,7 +121,7 @@ const fn refused(names: &'static [&'static str], note: &'static str) -> Attribut
     attribute(Support::Refused, names, Takes::Text, note)
 }
 
-/// Refused unless it says what happens anyway.
+/// Builds attributes that are refused unless they have the value that matches the actual behaviour.
 const fn only(
     names: &'static [&'static str],
     values: &'static [&'static str],
@@ -145,7 +145,7 @@ const COLOR: Takes = Takes::Numbers { least: 4, most: 4, sign: Sign::NotNegative
 const NAME: Attribute = mapped(&["name"], Takes::Text);
 const CLASS: Attribute = mapped(&["class"], Takes::Class);
 const USER: Attribute = ignored(&["user"], "nobody asks for it");
-/// Position and rotation; of the ways to say a rotation only one at a time.
+/// Position and rotation, with at most one form of rotation.
 const POSE: &[Attribute] = &[
     mapped(&["pos"], numbers(3, 3)),
     mapped(&["quat"], Takes::Quaternion),

@@ -1,4 +1,4 @@
-//! The table as `docs/src/mjcf.md` shows it. `UPDATE_EXPECT=1` writes the page again.
+//! The table in the form of `docs/src/mjcf.md`. `UPDATE_EXPECT=1` rewrites the page.
 
 use super::{Attribute, Element, Support, Takes, all};
 
@@ -71,7 +71,7 @@ fn attribute_row(alike: &[&Attribute]) -> String {
     format!("| | {} | {support} | {} |\n", names.join(", "), escaped(note))
 }
 
-/// What becomes of an attribute, and why.
+/// Returns the support of an attribute, and the note.
 fn happens(attribute: &Attribute) -> (String, &'static str) {
     let support = match attribute.takes {
         Takes::Only(values) => {
@@ -92,7 +92,7 @@ fn word(support: Support) -> &'static str {
     }
 }
 
-/// Angle brackets of a note would be HTML.
+/// Escapes angle brackets, which would be HTML.
 fn escaped(note: &str) -> String {
     note.replace('<', "&lt;").replace('>', "&gt;")
 }

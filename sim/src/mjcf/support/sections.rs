@@ -1,4 +1,4 @@
-//! What stands beside the bodies: settings, defaults, assets, contacts, equalities, actuators and keys.
+//! Elements beside the bodies: settings, defaults, assets, contacts, equalities, actuators and keys.
 
 use super::{
     AMOUNT, ANY_NUMBERS, Attribute, BOOLEAN, CLASS, COLOR, Element, MAYBE, NAME, NUMBER, Support, Takes,

@@ -1,8 +1,8 @@
-//! Values of attributes against what they may be.
+//! Check of attribute values against the accepted ones.
 
 use super::{Sign, Takes};
 
-/// What an attribute should say instead of this; `None` if it may say it.
+/// Returns the accepted form of an attribute's value, or `None` if the value is accepted.
 pub(in crate::mjcf) fn wanted(value: &str, takes: Takes) -> Option<String> {
     let (right, wanted) = match takes {
         Takes::Text | Takes::Class | Takes::NameOf(_) => return None,
@@ -37,7 +37,7 @@ pub(in crate::mjcf) fn wanted(value: &str, takes: Takes) -> Option<String> {
     (!right).then_some(wanted)
 }
 
-/// Numbers are compared as numbers; those that are left out are 0.
+/// Compares numbers as numbers; omitted ones are 0.
 pub(in crate::mjcf) fn is_one_of(value: &str, values: &[&str]) -> bool {
     values.iter().any(|usual| match (numbers(value), numbers(usual)) {
         (Some(have), Some(usual)) => {
@@ -66,7 +66,7 @@ impl Sign {
     }
 }
 
-/// Finite numbers with blanks between them.
+/// Parses finite numbers separated by blanks.
 fn numbers(value: &str) -> Option<Vec<f64>> {
     let finite = |word: &str| word.parse().ok().filter(|number: &f64| number.is_finite());
     value.split_ascii_whitespace().map(finite).collect()

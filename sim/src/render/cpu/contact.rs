@@ -1,4 +1,5 @@
-//! Where things nearly touch what carries them: a soft darkness that tells standing from hovering.
+//! Contact shadows: soft darkness where things nearly touch their support, which distinguishes standing
+//! from hovering.
 
 use pulp::{Arch, Simd, WithSimd};
 use rapier3d::math::Vector;
@@ -9,17 +10,17 @@ use crate::render::shading::CONTACT_TEXELS;
 use crate::render::shading::lanes::{Affine, Lanes, lanes};
 use crate::render::{Carrier, Part, PlacedScenery};
 
-/// What is this far above a surface darkens it no more.
+/// Height above a surface from which on a thing does not darken it.
 const REACH_M: f32 = 0.06;
-/// Things sink so deep into what carries them.
+/// Maximum depth to which things sink into their support.
 pub const SINK_M: f32 = 0.03;
-/// Nothing higher carries anything.
+/// Maximum height of a support.
 const HIGHEST_SUPPORT_M: f32 = 1.5;
-/// Heights are drawn as nearness, which is positive.
+/// Offset that makes heights positive, since they are drawn as nearness.
 const DATUM_M: f32 = 4.0;
 /// Weights of a texel's neighbours in each direction.
 const BLUR: [f32; 5] = [1.0 / 9.0, 2.0 / 9.0, 3.0 / 9.0, 2.0 / 9.0, 1.0 / 9.0];
-/// Texels along each side of a square that is looked at as a whole.
+/// Texels along each side of a square that is tested as a whole.
 const CELL: usize = 8;
 const CELLS: usize = CONTACT_TEXELS / CELL;
 const GRID: Grid = Grid { width: CONTACT_TEXELS, height: CONTACT_TEXELS, pitch_px: 1.0 };
@@ -30,23 +31,23 @@ pub struct ContactMap {
     /// World coordinates of its first corner, and texels per metre.
     pub corner_m: [f32; 2],
     pub texels_per_m: f32,
-    /// For each texel, row by row: the height of what can carry things, and how dark it is there, from 0 to 1.
+    /// For each texel, row by row: the height of the support, and the darkness there, from 0 to 1.
     pub texel_values: Vec<[f32; 2]>,
-    /// What the map is around; `None` before the first. What can carry things is drawn when it changes.
+    /// Centre of the map; `None` before the first. The support is redrawn when it changes.
     focus_m: Option<Vector>,
     support: SampleRows<f32>,
     underside: SampleRows<f32>,
     corners_m: Vec<[f32; 3]>,
-    /// How dark it is, smoothed along the rows, and in which of them it is dark.
+    /// Darkness smoothed along the rows, and the rows that have any.
     across_share: Vec<[f32; CONTACT_TEXELS]>,
     across_dark: Vec<bool>,
-    /// Rows whose texels have to be written: it was dark there, or they are not yet of what can carry things.
+    /// Rows whose texels have to be written: they were dark, or do not have the present support yet.
     stale_rows: Vec<bool>,
-    /// Whether it is dark in or right beside a square of texels, row by row. Mostly it is not.
+    /// True for a square of texels with darkness in it or right beside it, row by row. Most have none.
     dark_cells: Vec<bool>,
 }
 
-/// A map to draw, compiled for the registers that there are.
+/// A map to draw, compiled for the available registers.
 struct ContactDrawing<'a> {
     map: &'a mut ContactMap,
     prepared: &'a Prepared,
@@ -63,7 +64,7 @@ impl WithSimd for ContactDrawing<'_> {
 }
 
 impl ContactMap {
-    /// The next map is drawn as the first one is.
+    /// Discards the map, so that the next one is drawn in full.
     pub fn forget(&mut self) {
         self.focus_m = None;
     }
@@ -123,7 +124,8 @@ impl ContactMap {
         self.fill(simd, layer, &batch.take());
     }
 
-    /// Whether a part, given by a sphere around it, is over the map and near what it could touch.
+    /// Returns true if a part, given by a sphere around it, is over the map and near a surface that it
+    /// could touch.
     fn concerns(&self, layer: HeightLayer, centre_m: Vector, around_m: f32) -> bool {
         let [u, v] = self.place(centre_m);
         let around = around_m * self.texels_per_m;
@@ -138,14 +140,15 @@ impl ContactMap {
         low_m < support_m + REACH_M && high_m > support_m - SINK_M
     }
 
-    /// Column and row above which a point is, counted from the corner.
+    /// Returns the column and row below a point, counted from the corner.
     #[inline(always)]
     fn place(&self, point_m: Vector) -> [f32; 2] {
         let [x_m, y_m] = self.corner_m;
         [(point_m.x - x_m) * self.texels_per_m, (point_m.y - y_m) * self.texels_per_m]
     }
 
-    /// Rows run along y as they do not in pictures: what is seen to turn counter-clockwise faces down.
+    /// Projects a triangle to the map. Rows run along y, unlike in images, so a triangle seen
+    /// counter-clockwise faces down.
     #[inline(always)]
     fn projected(&self, layer: HeightLayer, [a, b, c]: [[f32; 3]; 3]) -> [[f32; 3]; 3] {
         let ([x_m, y_m], scale) = (self.corner_m, self.texels_per_m);
@@ -174,7 +177,8 @@ impl ContactMap {
         );
     }
 
-    /// Dark where the lowest underside is near, smoothed. In most rows it is dark nowhere, and they stay as they are.
+    /// Darkens texels whose lowest underside is near the support, smoothed. Most rows have no darkness,
+    /// and stay unchanged.
     #[inline(always)]
     fn darken(&mut self) {
         self.dark_cells.clear();
@@ -224,7 +228,7 @@ impl ContactMap {
         }
     }
 
-    /// How dark it is at points of the world: 0 where they are not near what carries things.
+    /// Returns the darkness at points of the world: 0 if they are not near the support.
     #[inline(always)]
     pub fn darkness<const N: usize>(&self, [x_m, y_m, z_m]: &[Lanes<N>; 3]) -> Lanes<N> {
         let u: Lanes<N> = lanes(|i| (x_m[i] - self.corner_m[0]) * self.texels_per_m - 0.5);
@@ -256,7 +260,7 @@ impl ContactMap {
     }
 }
 
-/// What is drawn from above, and what from below.
+/// Layers of the map: drawn from above and from below.
 #[derive(Clone, Copy, PartialEq)]
 enum HeightLayer {
     Support,
@@ -272,7 +276,7 @@ impl HeightLayer {
     }
 }
 
-/// How dark it is in a row of texels, before it is smoothed.
+/// Returns the darkness of a row of texels, before smoothing.
 #[inline(always)]
 fn row_darkness(support_m: &[f32], underside_m: &[f32]) -> [f32; CONTACT_TEXELS] {
     let mut dark = [0.0; CONTACT_TEXELS];
@@ -287,7 +291,7 @@ fn row_darkness(support_m: &[f32], underside_m: &[f32]) -> [f32; CONTACT_TEXELS]
     dark
 }
 
-/// Whether one of some numbers is not 0.
+/// Returns true if one of the numbers is not 0.
 #[inline(always)]
 fn any(values: &[f32]) -> bool {
     values.iter().fold(0, |bits, value| bits | value.to_bits()) != 0
@@ -304,7 +308,7 @@ fn blurred(at: impl Fn(usize, usize) -> f32) -> [f32; CONTACT_TEXELS] {
     sums
 }
 
-/// The neighbour that a weight is for; at the rim, the rim itself.
+/// Returns the neighbour that a weight applies to; at the border, the border itself.
 #[inline(always)]
 fn shifted(i: usize, offset: usize) -> usize {
     (i + offset).saturating_sub(BLUR.len() / 2).min(CONTACT_TEXELS - 1)

@@ -26,19 +26,20 @@ use target::RenderTarget;
 use view::{Row, SrgbTable, View};
 use workspace::Workspace;
 
-/// Renders on the calling thread, and several pictures of a state side by side. Its buffers it has only while it draws; the shadows
-/// of its last state are there the next time, unless too many others have drawn meanwhile.
+/// Renderer on the calling thread, and several images of a state in parallel. It holds its buffers only
+/// while it draws. The shadows of its last state are reused the next time, unless too many other
+/// renderers have drawn in between.
 pub(super) struct CpuRenderer {
     prepared: Prepared,
     srgb: SrgbTable,
-    /// No other renderer of this process has it.
+    /// Number of this renderer, unique in the process.
     number: u64,
 }
 
-/// A state of the scenery with its light: what pictures from all cameras have in common.
+/// A state of the scenery with its light, shared by the images of all cameras.
 #[derive(Default)]
 struct LitState {
-    /// What shadow, contacts and facets are of.
+    /// State that shadow, contacts and facets belong to.
     placed: PlacedScenery,
     shadow: ShadowMap,
     contact: ContactMap,
@@ -46,7 +47,7 @@ struct LitState {
 }
 
 impl LitState {
-    /// Becomes anybody's: nothing of what it was lit for is taken for what is to be drawn next.
+    /// Clears the state for any renderer: no cached light is reused for the next drawing.
     fn forget(&mut self) {
         self.placed = PlacedScenery::default();
         self.shadow.forget();
@@ -54,12 +55,12 @@ impl LitState {
     }
 }
 
-/// The buffers of one picture.
+/// The buffers of one image.
 #[derive(Default)]
 struct Canvas {
     row: Row,
     samples: RenderTarget,
-    /// One sample a pixel, at its centre: what depth and ids are read from.
+    /// One sample a pixel, at its centre, from which depth and ids are read.
     centres: RenderTarget,
 }
 
@@ -73,8 +74,8 @@ impl CpuRenderer {
         }
     }
 
-    /// What each of `cameras` sees, the first drawn on this thread and the others beside it. A picture is the same bit for bit,
-    /// whatever is drawn beside it.
+    /// Renders the image of each camera, the first on this thread and the others in parallel. An image
+    /// is the same bit for bit, regardless of the others.
     pub(super) fn draw_placed(&mut self, placed: PlacedScenery, cameras: &[Camera]) -> Vec<Frame> {
         self.draw(placed, cameras, Wanted::All)
     }
@@ -124,8 +125,8 @@ impl Renderer for CpuRenderer {
     }
 }
 
-/// The light of a state to draw. This and [`PictureDrawing`] are compiled once more for processors with wide registers, with
-/// everything that is inlined into them; their bits are the same.
+/// The light of a state to draw. This and [`PictureDrawing`] are compiled once more for processors with
+/// wide registers, with everything that is inlined into them; the results are bit-identical.
 struct StateDrawing<'a> {
     state: &'a mut LitState,
     prepared: &'a Prepared,
@@ -145,7 +146,7 @@ impl WithSimd for StateDrawing<'_> {
     }
 }
 
-/// A picture to draw.
+/// An image to draw.
 struct PictureDrawing<'a> {
     state: &'a LitState,
     prepared: &'a Prepared,

@@ -1,5 +1,5 @@
-//! Sheets in one state of the world, and their light: one sun with shadow, a sky that lights from above, a faint lamp at
-//! the camera.
+//! Sheets in one state of the world, and their light: one sun with shadow, a sky that lights from above,
+//! and a faint headlight at the camera.
 
 use rapier3d::math::{Matrix, Pose, Vector};
 
@@ -10,10 +10,10 @@ use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
 use crate::render::shading::{CONTACT, HIGHLIGHT, LAMP, SAMPLES};
 use crate::render::{Camera, Carrier, Light, Pattern, PlacedScenery};
 
-/// So many points are shaded together: enough for a loop to be worth its beginning, few enough to stay near the processor.
-/// Pictures have other last bits with another number, for a strip ends where a batch does.
+/// Number of points that are shaded together: enough to amortise a loop, few enough to fit the cache.
+/// Another number changes the last bits of images, since a strip ends where a batch does.
 pub(super) const BATCH: usize = 64;
-/// Points are worked on in whole blocks, the last of which may reach beyond the batch.
+/// Capacity for whole blocks of points, the last of which may extend beyond the batch.
 const ROOM: usize = BATCH + LANES;
 
 /// A sheet in the world.
@@ -25,11 +25,11 @@ pub(super) struct Facet {
     pub linear_rgb: [Vector; 2],
     pub pattern: Pattern,
     pub pattern_from_world: Affine,
-    /// Whether it is the room's, and darkened by what stands on it.
+    /// True if it belongs to the room, and is darkened by things on it.
     pub carries: bool,
 }
 
-/// Where the rays of a picture's samples begin, and how they go in the world, to a depth of 1 m.
+/// Origin and directions of the rays of an image's samples in the world, to a depth of 1 m.
 pub(super) struct Rays {
     eye_m: Vector,
     /// The ray through the first sample, and the steps from one to the next.
@@ -38,7 +38,7 @@ pub(super) struct Rays {
     down_ray: Vector,
 }
 
-/// Pixels side by side that show one sheet.
+/// Adjacent pixels that show one sheet.
 pub(super) struct Strip<'a> {
     pub facet: &'a Facet,
     /// Column and row of the first sample.
@@ -47,23 +47,23 @@ pub(super) struct Strip<'a> {
     pub nearness_1_m: &'a [f32],
     pub first_pixel: usize,
     pub count: usize,
-    /// How much of the pixels it is.
+    /// Share of the pixels that the sheet covers.
     pub share: f32,
 }
 
-/// Points that are shaded together. They are kept coordinate by coordinate and worked on in loops that do not branch: so
-/// several of them are done at once.
+/// Points that are shaded together. They are stored coordinate by coordinate and processed in branchless
+/// loops, so that several points are processed at once.
 pub(super) struct Surfaces {
     count: usize,
     /// Points in the world; the directions are in the world, too.
     point_m: Vectors,
-    /// Rays from the camera to the points; they have any length, as the normals have.
+    /// Rays from the camera to the points; rays and normals have any length.
     ray: Vectors,
     normal: Vectors,
     albedo: Vectors,
-    /// What contacts leave of all light.
+    /// Share of light that contact shadows leave.
     open_share: [f32; ROOM],
-    /// The pixel of each point, and how much it counts there.
+    /// The pixel of each point, and its weight there.
     pixels: [u32; ROOM],
     pixel_share: [f32; ROOM],
     /// Place in the shadow map, and the cell there.
@@ -75,7 +75,7 @@ pub(super) struct Surfaces {
     sunlit_share: [f32; ROOM],
 }
 
-/// As many vectors as there are points.
+/// One vector per point.
 struct Vectors([[f32; ROOM]; 3]);
 
 impl Vectors {
@@ -112,7 +112,7 @@ fn dot(a: &[Lanes; 3], b: &[Lanes; 3], i: usize) -> f32 {
     a[0][i] * b[0][i] + a[1][i] * b[1][i] + a[2][i] * b[2][i]
 }
 
-/// Makes the facets those of a state, by their sheets' numbers; so far they are those of the state `before`.
+/// Updates the facets, by their sheets' numbers, from the state `before` to another.
 pub(super) fn place(
     facets: &mut Vec<Facet>,
     prepared: &Prepared,
@@ -131,7 +131,7 @@ pub(super) fn place(
     }
 }
 
-/// Places the facets of a part, whose sheets these are.
+/// Places the facets of a part with these sheets.
 fn place_part(facets: &mut [Facet], sheets: &[Sheet], prepared: &Prepared, number: usize, pose: Pose) {
     let part = &prepared.scenery.parts[number];
     let rotation = Matrix::from_quat(pose.rotation);
@@ -184,7 +184,7 @@ impl Surfaces {
         }
     }
 
-    /// How many more can be pushed.
+    /// Returns the number of points that can still be pushed.
     pub(super) fn room(&self) -> usize {
         BATCH - self.count
     }
@@ -206,7 +206,7 @@ impl Surfaces {
         for start in (0..strip.count).step_by(N) {
             let at = self.count + start;
             let samples = &strip.nearness_1_m[start * SAMPLES..];
-            // Those behind the strip are of no meaning, but in the last strip of a row there are none.
+            // Samples beyond the strip have no meaning, but the last strip of a row has none beyond it.
             let nearness_1_m: Lanes<N> = if samples.len() >= N * SAMPLES {
                 lanes(|i| samples[i * SAMPLES])
             } else {
@@ -236,7 +236,7 @@ impl Surfaces {
         }
     }
 
-    /// Adds the linear colours of all that were pushed to those of their pixels; then they are forgotten.
+    /// Adds the linear colours of all pushed points to those of their pixels, and clears the points.
     #[inline(always)]
     pub(super) fn shade(&mut self, light: &Light, shadow: &ShadowMap, sum_rgb: &mut [Vec<f32>; 3]) {
         let count = std::mem::take(&mut self.count);
@@ -271,7 +271,7 @@ impl Surfaces {
         }
     }
 
-    /// How points face what they are lit by.
+    /// Computes the orientation of points relative to the light sources.
     #[inline(always)]
     fn face(&mut self, at: usize, light: &Light, shadow: &ShadowMap) {
         let (ray, normal) = (self.ray.block(at), self.normal.block(at));
@@ -289,7 +289,7 @@ impl Surfaces {
         *block_mut::<f32, LANES>(&mut self.eye_factor, at) = lanes(|i| towards_eye[i].abs());
         *block_mut::<f32, LANES>(&mut self.sun_factor, at) = sun_factor;
         self.normal.set(at, normal);
-        // Neither highlight nor shadow counts where the sun does not shine at all.
+        // Without sunlight, neither highlight nor shadow matters.
         if sun_factor.iter().fold(true, |away, factor| away & (*factor <= 0.0)) {
             return;
         }
@@ -308,7 +308,7 @@ impl Surfaces {
         *block_mut::<u32, LANES>(&mut self.cell, at) = ShadowMap::cells(&texel);
     }
 
-    /// Adds up the light, as far as the points count.
+    /// Returns the total light, weighted by the points' shares.
     #[inline(always)]
     fn lit(&self, at: usize, light: &Light) -> [Lanes; 3] {
         let (albedo, normal) = (self.albedo.block(at), self.normal.block(at));
@@ -331,7 +331,7 @@ impl Surfaces {
 }
 
 impl Facet {
-    /// Normals of any length.
+    /// Returns normals of any length.
     #[inline(always)]
     fn normals<const N: usize>(&self, point_m: &[Lanes<N>; 3]) -> [Lanes<N>; 3] {
         let normal = axes(|axis| [self.normal[axis]; N]);
@@ -344,7 +344,7 @@ impl Facet {
         )
     }
 
-    /// Linear colours of the surface, without light.
+    /// Returns the linear colours of the surface, without light.
     #[inline(always)]
     fn albedo<const N: usize>(&self, point_m: &[Lanes<N>; 3]) -> [Lanes<N>; 3] {
         let [first, second] = self.linear_rgb;

@@ -11,26 +11,27 @@ use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
 use crate::render::shading::{BIAS_M, FADE_TEXELS, NORMAL_OFFSET_M, TEXELS, sun_map};
 use crate::render::{Carrier, PlacedScenery, Scenery};
 
-/// Texels along each side of a cell: what is nearer than all of a cell is in the sun there, without a look at its texels.
+/// Texels along each side of a cell. A point nearer than everything in its cell is in the sun, without a
+/// look at the texels.
 const CELL: usize = 8;
 const CELLS: usize = TEXELS / CELL;
 const _: () = assert!(CELLS == u128::BITS as usize, "a row of cells is the bits of a number");
 /// The cell of everything outside of the map, which is in the sun.
 const OUTSIDE: u32 = (CELLS * CELLS) as u32;
-/// Texels that the filter takes along each axis: a cell counts those that a filter begun in it can reach.
+/// Texels that the filter reads along each axis: a cell covers those that a filter starting in it can reach.
 const TAPS: usize = 4;
 const GRID: Grid = Grid { width: TEXELS, height: TEXELS, pitch_px: 1.0 };
 
 #[derive(Default)]
 pub(super) struct ShadowMap {
-    /// What the map is around; `None` before the first.
+    /// Centre of the map; `None` before the first.
     focus_m: Option<Vector>,
     map_from_world: Affine,
-    /// The room's shadows, which stay while the focus does.
+    /// The room's shadows, which are valid while the focus stays.
     still: ShadowLayer,
     /// The shadows of everything.
     all: ShadowLayer,
-    /// For each row of cells, those in which `all` may differ from `still`, a bit a column.
+    /// For each row of cells, those in which `all` may differ from `still`, one bit a column.
     moving: Vec<u128>,
     corners: Vec<[f32; 3]>,
     front: Vec<u32>,
@@ -47,7 +48,7 @@ struct ShadowLayer {
 }
 
 impl ShadowMap {
-    /// The next shadows are drawn as the first ones are.
+    /// Discards the map, so that the next shadows are drawn in full.
     pub(super) fn forget(&mut self) {
         self.focus_m = None;
     }
@@ -73,7 +74,7 @@ impl ShadowMap {
         self.all.measure(&self.moving);
     }
 
-    /// Draws the shadows of the room, or those of all other parts, into the layer that is theirs.
+    /// Draws the shadows of the room, or those of all other parts, into their layer.
     #[inline(always)]
     fn draw_parts<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &PlacedScenery, of_room: bool) {
         let mut batch = TriangleBatch::default();
@@ -116,7 +117,8 @@ impl ShadowMap {
         layer.fill(simd, &batch.take());
     }
 
-    /// Where surfaces are looked up: column and row, counted from the first texel's centre, and nearness.
+    /// Returns the lookup coordinates of surfaces: column and row, counted from the first texel's
+    /// centre, and nearness.
     #[inline(always)]
     pub(super) fn texels(&self, points_m: &[Lanes; 3], normals: &[Lanes; 3]) -> [Lanes; 3] {
         let shifted: [Lanes; 3] = axes(
@@ -127,7 +129,7 @@ impl ShadowMap {
         [lanes(|i| u[i] - 0.5), lanes(|i| v[i] - 0.5), lanes(|i| nearness_m[i] + BIAS_M)]
     }
 
-    /// The cells of filters that begin at some texels.
+    /// Returns the cells of filters that begin at some texels.
     #[inline(always)]
     pub(super) fn cells([u, v, _]: &[Lanes; 3]) -> [u32; LANES] {
         let inside = |i: f32| (i >= 1.0) & (i < (TEXELS - 3) as f32);
@@ -138,7 +140,8 @@ impl ShadowMap {
         })
     }
 
-    /// 1 in the sun, 0 in the shadow, smooth over three texels; points outside the map are in the sun.
+    /// Returns 1 in the sun, 0 in the shadow, smooth over three texels; points outside the map are in
+    /// the sun.
     #[inline(always)]
     pub(super) fn sunlit(&self, [u, v, nearness_m]: [f32; 3], cell: u32) -> f32 {
         let [least_m, greatest_m] = self.all.cells_m[cell as usize];
@@ -152,7 +155,7 @@ impl ShadowMap {
         }
     }
 
-    /// Four taps with a tent's weights along each axis are a bilinear filter three texels wide.
+    /// Filters bilinearly over three texels: four taps with a tent's weights along each axis.
     #[inline(always)]
     fn filtered(&self, [u, v, nearness_m]: [f32; 3]) -> f32 {
         let (column, row) = (usize::from(u as u16), usize::from(v as u16));
@@ -171,7 +174,7 @@ impl ShadowMap {
 }
 
 impl ShadowLayer {
-    /// Makes what moved as it is without.
+    /// Restores the moving cells to their state without moving parts.
     fn restore(&mut self, still: &ShadowLayer, moving: &[u128]) {
         let of_rows = moving.iter().enumerate();
         for (row, columns) in of_rows.flat_map(|(row, moving)| runs(*moving).map(move |run| (row, run))) {
@@ -196,7 +199,7 @@ impl ShadowLayer {
         );
     }
 
-    /// Finds the least and the greatest of some cells.
+    /// Computes the least and the greatest nearness of some cells.
     #[inline(always)]
     fn measure(&mut self, drawn: &[u128]) {
         for (row, drawn) in drawn.iter().enumerate() {
@@ -206,7 +209,7 @@ impl ShadowLayer {
         }
     }
 
-    /// Goes from right to left, for a cell reaches over the first texels of the next.
+    /// Measures a run of cells from right to left, since a cell extends over the first texels of the next.
     #[inline(always)]
     fn measure_run(&mut self, row: usize, columns: Range<usize>) {
         let mut beside = [f32::INFINITY, 0.0];
@@ -237,7 +240,7 @@ impl ShadowLayer {
     }
 }
 
-/// Columns and rows of the cells whose filters reach what is between some corners.
+/// Returns the columns and rows of the cells whose filters reach the bounds of some corners.
 fn reached_cells(corners: &[[f32; 3]]) -> [Range<usize>; 2] {
     let mut low = [f32::INFINITY; 2];
     let mut high = [f32::NEG_INFINITY; 2];
@@ -248,7 +251,7 @@ fn reached_cells(corners: &[[f32; 3]]) -> [Range<usize>; 2] {
     [cells(low[0], high[0]), cells(low[1], high[1])]
 }
 
-/// The columns whose bits are set, in runs.
+/// Returns the runs of columns whose bits are set.
 fn runs(mut columns: u128) -> impl Iterator<Item = Range<usize>> {
     std::iter::from_fn(move || {
         let start = columns.trailing_zeros();
@@ -258,7 +261,7 @@ fn runs(mut columns: u128) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// The cells whose filters reach what is between two texels.
+/// Returns the cells whose filters reach the range between two texels.
 fn cells(low_px: f32, high_px: f32) -> Range<usize> {
     let cell = |texel: f32| texel.clamp(0.0, TEXELS as f32) as usize / CELL;
     cell(low_px - TAPS as f32)..(cell(high_px) + 1).min(CELLS)

@@ -1,4 +1,4 @@
-//! For each sample of a picture, the nearest sheet and how near it is.
+//! The render target: for each sample of an image, the nearest sheet and its nearness.
 
 use pulp::Simd;
 use rapier3d::math::{Pose, Vector};
@@ -10,7 +10,7 @@ use crate::render::shading::SAMPLES;
 use crate::render::shading::lanes::{Affine, Lanes, lanes};
 use crate::render::{Camera, PlacedScenery};
 
-/// Nearest surface per sample. `nearness_1_m` is 1 / depth, which is linear over a triangle's picture.
+/// Nearest surface per sample. `nearness_1_m` is 1 / depth, which is linear over a triangle's image.
 #[derive(Default)]
 pub(super) struct RenderTarget {
     grid: Grid,
@@ -18,7 +18,8 @@ pub(super) struct RenderTarget {
     sheet: SampleRows<u32>,
 }
 
-/// Fills `samples`, [`SAMPLES`] a pixel along each axis, and where they are wanted `centres`, one a pixel, with all that `camera` sees.
+/// Fills `samples`, [`SAMPLES`] a pixel along each axis, and if given `centres`, one a pixel, with the
+/// camera's view.
 #[inline(always)]
 pub(super) fn draw<S: Simd>(
     simd: S,
@@ -80,7 +81,7 @@ pub(super) fn draw<S: Simd>(
     fill(simd, samples, centres, &batch.take());
 }
 
-/// How a camera's frame comes onto the picture's samples.
+/// Projection of a camera's frame to the image's samples.
 struct Lens {
     focal_px: f32,
     centre_px: [f32; 2],
@@ -92,7 +93,7 @@ impl Lens {
         Lens { focal_px: camera.focal_px() * SAMPLES as f32, centre_px: [width * 0.5, height * 0.5] }
     }
 
-    /// Column, row and nearness.
+    /// Returns column, row and nearness.
     #[inline(always)]
     fn screen(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
         let nearness = -1.0 / z;
@@ -100,7 +101,7 @@ impl Lens {
         [cx + x * self.focal_px * nearness, cy - y * self.focal_px * nearness, nearness]
     }
 
-    /// Whether a mesh's bounding sphere reaches into the pyramid of view.
+    /// Returns true if a mesh's bounding sphere reaches into the viewing pyramid.
     fn sees(&self, (centre, radius): (Vector, f32), camera_from_mesh: Pose) -> bool {
         let c = camera_from_mesh * centre;
         let inside = |across: f32, half: f32| {
@@ -133,13 +134,13 @@ impl RenderTarget {
         self.grid.height
     }
 
-    /// Nearness of the samples of a row.
+    /// Returns the nearness of the samples of a row.
     #[inline(always)]
     pub(super) fn nearness_1_m(&self, row: usize) -> &[f32] {
         self.nearness_1_m.row(row)
     }
 
-    /// Numbers of the sheets that a finished row shows.
+    /// Returns the numbers of the sheets that a finished row shows.
     #[inline(always)]
     pub(super) fn sheets(&self, row: usize) -> &[u32] {
         self.sheet.row(row)
@@ -151,8 +152,8 @@ impl RenderTarget {
         self.sheet.fit(grid, NOTHING);
     }
 
-    /// Has a row show nothing where nothing was drawn: before, there is what other pictures showed. Hardly a row has such samples, so that
-    /// this takes less time than making all sheets nothing at first.
+    /// Clears the sheets of a row where nothing was drawn, which still hold values of other images. Few
+    /// rows have such samples, so this is faster than clearing all sheets at first.
     #[inline(always)]
     pub(super) fn finish_row(&mut self, row: usize) {
         let nearness_1_m = self.nearness_1_m.row(row);
@@ -163,7 +164,7 @@ impl RenderTarget {
         }
     }
 
-    /// Puts triangles, tagged with their sheets, into those samples that they are the nearest of.
+    /// Draws triangles, tagged with their sheets, into those samples for which they are the nearest.
     #[inline(always)]
     fn fill<S: Simd>(&mut self, simd: S, outlines: &Outlines) {
         let nearest = S::as_mut_simd_f32s(self.nearness_1_m.all_mut()).0;
@@ -176,7 +177,7 @@ impl RenderTarget {
             |i, sheet, nearness| {
                 let nearer = simd.greater_than_f32s(nearness, nearest[i]);
                 nearest[i] = simd.max_f32s(nearness, nearest[i]);
-                // A choice between both would be compiled to a store under a mask, which takes some processors 20 ns.
+                // A selection would be compiled to a masked store, which takes some processors 20 ns.
                 let change =
                     simd.select_u32s(nearer, simd.xor_u32s(owner[i], simd.splat_u32s(sheet)), nothing);
                 owner[i] = simd.xor_u32s(owner[i], change);
@@ -185,7 +186,7 @@ impl RenderTarget {
     }
 }
 
-/// The part of a triangle beyond the near plane: three or four corners.
+/// Returns the part of a triangle beyond the near plane: three or four corners.
 fn clip_near(corners_m: [Vector; 3]) -> ([Vector; 4], usize) {
     let visible = |p: Vector| p.z < -NEAR_M;
     let mut kept = [Vector::ZERO; 4];

@@ -1,4 +1,4 @@
-//! From samples to pixels: colour where a camera's rays meet triangles, and outlines between things.
+//! Resolution of samples to pixels: colour where a camera's rays meet triangles, and outlines between things.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use crate::render::scene::prepared::{NOTHING, Prepared};
 use crate::render::shading::lanes::{LANES, Lanes, lanes};
 use crate::render::shading::{OUTLINE, OUTLINE_DEPTH_STEP, SAMPLES, SKY, SRGB_STEPS};
 
-/// Pixels that are looked at together.
+/// Number of pixels that are tested together.
 const TOGETHER: usize = size_of::<u64>();
 const PER_PIXEL: usize = SAMPLES * SAMPLES;
 
@@ -28,19 +28,20 @@ pub(super) struct View<'a> {
     pub rays: Rays,
 }
 
-/// What is kept from picture to picture, so that it need not be made anew.
+/// Buffers that are reused from image to image.
 pub(super) struct Row {
     surfaces: Surfaces,
-    /// For each column of samples, whether an edge is in it or to its right: some bits are set.
+    /// For each column of samples, non-zero if an edge is in it or to its right.
     edges: Vec<u32>,
-    /// For each pixel, 1 if an edge is in it or beside it, otherwise 0; behind the last are as many ones as are looked at together.
+    /// For each pixel, 1 if an edge is in it or beside it, otherwise 0. Behind the last are [`TOGETHER`]
+    /// ones.
     mixed: Vec<u8>,
-    /// Linear colours of the pixels, as far as they are known: all red shares, all green, all blue.
+    /// Linear colours of the pixels so far: all red shares, all green, all blue.
     sum_rgb: [Vec<f32>; 3],
 }
 
 impl View<'_> {
-    /// The picture, three bytes a pixel.
+    /// Returns the image, three bytes a pixel.
     #[inline(always)]
     pub(super) fn rgb(&mut self, row: &mut Row, srgb: &SrgbTable) -> Vec<u8> {
         let (width, height) = (self.target.width() / SAMPLES, self.target.height() / SAMPLES);
@@ -62,7 +63,8 @@ impl View<'_> {
         rgb
     }
 
-    /// Colours of a row of pixels: means of their samples. A sheet that covers several of them is shaded once.
+    /// Computes the colours of a row of pixels: means of their samples. A sheet that covers several of
+    /// them is shaded once.
     #[inline(always)]
     fn row(&self, y: usize, width: usize, row: &mut Row) {
         let last = self.target.height() - 1;
@@ -84,7 +86,7 @@ impl View<'_> {
                 x += 1;
                 continue;
             }
-            // Pixels show one sheet as far as they are plain: an edge would be in the last of them.
+            // Pixels show one sheet as long as they are plain: an edge would be in the last of them.
             let end = next_mixed(&row.mixed, x).min(x + row.surfaces.room());
             self.show(row, x..end, [x * SAMPLES, y * SAMPLES], rows[0][x * SAMPLES], 1.0);
             x = end;
@@ -92,7 +94,8 @@ impl View<'_> {
         row.surfaces.shade(&self.prepared.scenery.light, self.shadow, &mut row.sum_rgb);
     }
 
-    /// Neighbouring pixels that one sheet covers, or a share of them, seen where the first one's `sample` is.
+    /// Shows a sheet on neighbouring pixels that it covers, or on a share of them, sampled at the first
+    /// one's `sample`.
     #[inline(always)]
     fn show(&self, row: &mut Row, pixels: Range<usize>, sample: [usize; 2], sheet: u32, share: f32) {
         if sheet == NOTHING {
@@ -112,11 +115,11 @@ impl View<'_> {
         row.surfaces.push(&self.rays, self.contact, &strip);
     }
 
-    /// A pixel with an edge in or beside it, `rows` being those of its samples and the one below.
+    /// Shades a pixel with an edge in or beside it; `rows` are those of its samples and the one below.
     #[inline(always)]
     fn mixed(&self, row: &mut Row, [x, y]: [usize; 2], rows: [&[u32]; SAMPLES + 1]) {
         let sx = x * SAMPLES;
-        // At the border of the picture the last samples are their own neighbours.
+        // At the border of the image the last samples are their own neighbours.
         let columns = [sx, sx + 1, (sx + SAMPLES).min(self.target.width() - 1)];
         let seen = [picked(rows[0], columns), picked(rows[1], columns), picked(rows[2], columns)];
         let [above, here, below] = &seen;
@@ -140,7 +143,8 @@ impl View<'_> {
         [self.prepared.id(a), self.prepared.id(b), self.prepared.id(c)]
     }
 
-    /// How often a sample of a pixel in row `y` and its neighbour to the right or below show different things at different depths.
+    /// Returns the number of samples in row `y` whose neighbour to the right or below shows another
+    /// thing at another depth.
     fn outlines(&self, y: usize, columns: [usize; 3], seen: &Neighbours, ids: &Neighbours) -> u32 {
         let last = self.target.height() - 1;
         let two_things = |[r, c]: [usize; 2], [other_r, other_c]: [usize; 2]| {
@@ -149,7 +153,7 @@ impl View<'_> {
         let nearness_1_m =
             |[r, c]: [usize; 2]| self.target.nearness_1_m((y * SAMPLES + r).min(last))[columns[c]];
         let mut edges = 0;
-        // Samples in the last row or column of the picture have no outline.
+        // Samples in the last row or column of the image have no outline.
         for r in 0..SAMPLES.min(last - y * SAMPLES) {
             for c in 0..columns[2] - columns[0] {
                 for other in [[r, c + 1], [r + 1, c]] {
@@ -175,7 +179,7 @@ impl Default for Row {
     }
 }
 
-/// The first pixel from one on that is mixed.
+/// Returns the first mixed pixel from `x` on.
 #[inline(always)]
 fn next_mixed(mixed: &[u8], mut x: usize) -> usize {
     loop {
@@ -203,7 +207,7 @@ fn mark_edges([top, middle, bottom]: [&[u32]; SAMPLES + 1], edges: &mut Vec<u32>
     }
 }
 
-/// Table from linear light to sRGB, as pictures have it.
+/// Table from linear light to sRGB, as used in images.
 pub(super) struct SrgbTable([u8; SRGB_STEPS]);
 
 const LAST: f32 = (SRGB_STEPS - 1) as f32;
@@ -240,7 +244,7 @@ impl SrgbTable {
     }
 }
 
-/// A number whose lowest bits are the place in the table.
+/// Returns a number whose lowest bits are the index in the table.
 #[inline(always)]
 fn place(linear_value: f32) -> f32 {
     const ALL_BITS_WHOLE: f32 = (1 << 23) as f32;

@@ -1,42 +1,42 @@
-//! What drawing needs and no picture keeps: megabytes, of which a renderer that waits for its next picture needs none. So the renderers
-//! of a process share them, and no more of them draw at the same time than there are processor cores.
+//! Buffers for drawing: megabytes that a renderer does not need while it waits for its next image. So the
+//! renderers of a process share them, and at most as many draw at the same time as there are processor cores.
 
 use std::sync::{Condvar, LazyLock, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
 use super::{Canvas, LitState};
 
-/// Lit states that wait for their renderers' next pictures. With fewer, two renderers that draw by turns would light their rooms anew
-/// each time; where more draw at the same time, there are as many as draw.
+/// Number of lit states kept for their renderers' next images. With fewer, two renderers that alternate
+/// would light their rooms anew each time. If more draw at the same time, as many are kept as draw.
 const WAITING_STATES: usize = 2;
 
-/// Canvases that wait for pictures: as many as a task has robots, and the third person.
+/// Number of canvases kept for images: as many as a task has robots, and the third person.
 const WAITING_CANVASES: usize = 4;
 
-/// What nobody draws with at the moment.
+/// Buffers that are not in use.
 struct Shared {
-    /// Renderers that draw.
+    /// Number of renderers that draw.
     drawing: usize,
-    /// Each with the number of the renderer that it was lit for, the latest last.
+    /// Lit states with the number of their renderer, the latest last.
     states: Vec<(u64, LitState)>,
     canvases: Vec<Canvas>,
 }
 
 static SHARED: Mutex<Shared> = Mutex::new(Shared { drawing: 0, states: Vec::new(), canvases: Vec::new() });
-/// One that drew has ended.
+/// Signals that a drawing has ended.
 static ENDED: Condvar = Condvar::new();
 
-/// What one renderer draws with. It is given back when it is dropped, unless the drawing has panicked.
+/// Buffers in use by one renderer. They are given back on drop, unless the drawing has panicked.
 pub struct Workspace {
     renderer: u64,
-    /// What the renderer drew with last, if that has not gone to another one.
+    /// The renderer's last state, if no other renderer has taken it.
     pub state: LitState,
-    /// One for each picture.
+    /// One canvas for each image.
     pub canvases: Vec<Canvas>,
 }
 
 impl Workspace {
-    /// Waits for a place among those that draw. `renderer` is a number that no other renderer of this process has.
+    /// Waits until the renderer may draw. `renderer` is a number unique in this process.
     pub fn take(renderer: u64, pictures: usize) -> Workspace {
         let most = processors();
         let mut shared = ENDED.wait_while(lock(), |shared| shared.drawing >= most);
@@ -48,7 +48,7 @@ impl Workspace {
         Workspace { renderer, state: shared.take_state(renderer), canvases }
     }
 
-    /// Lets go of what was lit for a renderer that is no more.
+    /// Drops the state of a renderer that no longer exists.
     pub fn forget(renderer: u64) {
         lock().states.retain(|(lit_for, _)| *lit_for != renderer);
     }
@@ -88,7 +88,7 @@ fn lock() -> MutexGuard<'static, Shared> {
     SHARED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Asked once: the system reads files to tell.
+/// Returns the number of processors. It is queried once, since the system reads files for it.
 fn processors() -> usize {
     static PROCESSORS: LazyLock<usize> =
         LazyLock::new(|| thread::available_parallelism().map_or(1, usize::from));

@@ -1,4 +1,4 @@
-//! The graphics processor: which there are, and one that is ready to draw.
+//! Selection and opening of the GPU.
 
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -10,10 +10,10 @@ use wgpu::{
 
 use super::passes::Passes;
 
-/// Longer than this no picture takes, or the device hangs.
+/// Maximum time for an image, after which the device counts as hung.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Why there is no picture from a graphics processor.
+/// Error of drawing on a GPU.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GpuError {
     #[error("there is no graphics processor with a Vulkan, Metal or Direct3D 12 driver")]
@@ -32,12 +32,12 @@ pub(super) struct Gpu {
     pub device: Device,
     pub queue: Queue,
     pub passes: Passes,
-    /// The first thing that went wrong since it was last asked.
+    /// The first fault since the last query.
     fault: Arc<Mutex<Option<String>>>,
 }
 
 impl Gpu {
-    /// The best that there is; software is the last choice.
+    /// Opens the best adapter; software is the last choice.
     pub(super) fn open() -> Result<Gpu, GpuError> {
         let adapter = best().ok_or(GpuError::Missing)?;
         let name = name(&adapter);
@@ -50,7 +50,7 @@ impl Gpu {
         let (device, queue) = opened.map_err(|error| unusable(error.to_string()))?;
         let fault = Arc::new(Mutex::new(None));
         let first = fault.clone();
-        // Unless somebody listens, an error ends the process.
+        // Without a handler, an error ends the process.
         device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             first.lock().expect("no holder panics").get_or_insert(error.to_string());
         }));
@@ -60,7 +60,7 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// Waits until all that was asked for is done.
+    /// Waits until all submitted work is done.
     pub(super) fn settle(&self) -> Result<(), GpuError> {
         let waited = self.device.poll(PollType::Wait { submission_index: None, timeout: Some(PATIENCE) });
         let fault = self.fault.lock().expect("no holder panics").take();
@@ -76,12 +76,12 @@ impl Gpu {
     }
 }
 
-/// Whether there is a graphics processor that is one, not software in its place.
+/// Returns true if there is a hardware GPU, not only software in its place.
 pub(super) fn is_real() -> bool {
     best().is_some_and(|adapter| rank(&adapter) >= REAL)
 }
 
-/// From this rank on, an adapter is hardware.
+/// Rank from which on an adapter is hardware.
 const REAL: u32 = 2;
 
 fn best() -> Option<Adapter> {
@@ -99,7 +99,7 @@ fn rank(adapter: &Adapter) -> u32 {
     }
 }
 
-/// Name as in `llvmpipe (LLVM 15.0.6, 256 bits) (Vulkan)`.
+/// Returns a name, for example `llvmpipe (LLVM 15.0.6, 256 bits) (Vulkan)`.
 fn name(adapter: &Adapter) -> String {
     let info = adapter.get_info();
     format!("{} ({:?})", info.name, info.backend)

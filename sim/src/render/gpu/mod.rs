@@ -1,5 +1,5 @@
-//! The renderer on a graphics processor, by wgpu. It draws what the embedded renderer draws, in the same steps: which triangle
-//! each sample sees, then the colours of those; the two check each other.
+//! The GPU renderer, by wgpu. It draws the same images as the embedded renderer, in the same steps: the
+//! triangle that each sample sees, then its colour. The two check each other.
 
 mod device;
 mod passes;
@@ -29,7 +29,7 @@ use targets::{Attachments, PictureBuffers, Targets};
 pub(super) use together::colours;
 use together::{Asked, Region};
 
-/// Name of the device that draws.
+/// Returns the name of the device that draws.
 pub(super) fn name() -> Result<String, GpuError> {
     Ok(open()?.name.clone())
 }
@@ -38,7 +38,7 @@ pub(super) fn renderer(scenery: Scenery) -> Result<Box<dyn Renderer>, GpuError> 
     Ok(Box::new(GpuRenderer::new(open()?, scenery)))
 }
 
-/// Whether there is a graphics processor that is one, not software in its place.
+/// Returns true if there is a hardware GPU, not only software in its place.
 pub(super) fn is_real() -> bool {
     static REAL: OnceLock<bool> = OnceLock::new();
     *REAL.get_or_init(device::is_real)
@@ -47,24 +47,24 @@ pub(super) fn is_real() -> bool {
 /// Side of the squares of pixels that are resolved together.
 const GROUP: u32 = 8;
 
-/// Draws on a graphics processor; if that fails, on the calling thread from then on.
+/// Renderer on a GPU; after a failure it draws on the calling thread.
 pub struct GpuRenderer {
     gpu: Arc<Gpu>,
     prepared: Prepared,
     scene: SceneBuffers,
     shadow: TextureView,
-    /// Where the parts are in the device's memory, and what the shadow is of.
+    /// Poses of the parts in the device's memory, which the shadow also belongs to.
     placed: Option<PlacedScenery>,
     contact: ContactMap,
-    /// Targets of the last picture's size.
+    /// Targets of the last image's size.
     targets: Option<Targets>,
-    /// Where pictures are read, if this renderer has drawn alone or as the first of several.
+    /// Buffers from which images are read, if this renderer has drawn alone or as the first of several.
     pictures: Option<PictureBuffers>,
     embedded: Option<Box<dyn Renderer>>,
 }
 
-/// The best device that there is, once it has shown that it draws what it should. A process opens it once: that takes
-/// longer than many pictures.
+/// Opens the best device, once it has passed a test image. A process opens it once: that takes longer
+/// than many images.
 fn open() -> Result<Arc<Gpu>, GpuError> {
     static OPENED: OnceLock<Result<Arc<Gpu>, GpuError>> = OnceLock::new();
     let opened = OPENED.get_or_init(|| {
@@ -99,7 +99,7 @@ impl GpuRenderer {
         }
     }
 
-    /// Tells the device where all parts are; returns whether it did not know.
+    /// Uploads the poses of all parts. Returns true if they changed.
     fn place(&mut self, placed: &PlacedScenery) -> bool {
         let moved = self.placed.as_ref() != Some(placed);
         if moved {
@@ -111,7 +111,7 @@ impl GpuRenderer {
         moved
     }
 
-    /// Has the shadow drawn that all views of a state share; there has to be one.
+    /// Encodes the shadow that all views of a state share; there must be at least one view.
     fn encode_shadow(&self, encoder: &mut CommandEncoder) {
         let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
             depth_stencil_attachment: Some(nearest(&self.shadow)),
@@ -122,7 +122,7 @@ impl GpuRenderer {
         pass.draw(0..self.scene.corners, 0..1);
     }
 
-    /// Has a picture drawn, that of a view, which goes to `region` of the buffer of all pictures.
+    /// Encodes the image of a view, which goes to `region` of the buffer of all images.
     fn encode(&mut self, encoder: &mut CommandEncoder, view: usize, region: &Region, drawn: &Buffer) {
         let size_px = [region.width, region.height];
         if !self.targets.as_ref().is_some_and(|targets| targets.fit(size_px, region.bytes, drawn)) {
@@ -157,7 +157,8 @@ impl GpuRenderer {
         pass.dispatch_workgroups(region.width.div_ceil(GROUP), region.height.div_ceil(GROUP), 1);
     }
 
-    /// What each camera sees; `None` where the device cannot draw it, now or before, so that the embedded renderer has to.
+    /// Renders the image of each camera. Returns `None` if the device cannot, now or earlier, so that
+    /// the embedded renderer has to.
     fn draw(&mut self, step: &Step, cameras: &[Camera], wanted: Wanted) -> Option<Vec<Frame>> {
         if self.embedded.is_some() {
             return None;
@@ -176,7 +177,7 @@ impl GpuRenderer {
     }
 }
 
-/// Keeps what is nearest: depths are nearness, and begin with none.
+/// Returns an attachment that keeps the nearest surface: depths are nearness, and start at none.
 fn nearest(depth: &TextureView) -> RenderPassDepthStencilAttachment<'_> {
     RenderPassDepthStencilAttachment {
         view: depth,

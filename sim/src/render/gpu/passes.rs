@@ -1,4 +1,4 @@
-//! The passes of a picture: shadow, samples, centres, and the mean of the samples.
+//! The passes of an image: shadow, samples, centres, and the mean of the samples.
 
 use wgpu::{
     BindGroupLayout, BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BufferBindingType,
@@ -11,16 +11,16 @@ use wgpu::{
 use super::shader;
 
 pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
-/// Numbers of triangles.
+/// Format of triangle numbers.
 pub(super) const TRIANGLES: TextureFormat = TextureFormat::R32Uint;
 
 pub(super) struct Passes {
-    /// What there is to see, and from where.
+    /// Bindings of the scene and the view.
     pub scene: BindGroupLayout,
-    /// What the first passes have drawn, and where the picture goes.
+    /// Bindings of the first passes' results and of the image's destination.
     pub targets: BindGroupLayout,
     pub shadow: RenderPipeline,
-    /// Passes over samples, and over centres.
+    /// Pass over samples, and over centres.
     pub triangles: RenderPipeline,
     pub resolve: ComputePipeline,
     /// The same without depths and ids.
@@ -47,7 +47,7 @@ impl Passes {
                 texture(TextureSampleType::Depth),
                 texture(TextureSampleType::Uint),
                 texture(TextureSampleType::Uint),
-                // Where in the buffer of all pictures this one is.
+                // Offset of this image in the buffer of all images.
                 BindingType::Buffer {
                     ty: BufferBindingType::Storage { read_only: false },
                     has_dynamic_offset: true,
@@ -92,7 +92,7 @@ fn texture(sample_type: TextureSampleType) -> BindingType {
     BindingType::Texture { sample_type, view_dimension: TextureViewDimension::D2, multisampled: false }
 }
 
-/// Bindings numbered in their order.
+/// Creates a layout with bindings numbered in their order.
 fn layout(device: &Device, visibility: ShaderStages, types: &[BindingType]) -> BindGroupLayout {
     let entries: Vec<BindGroupLayoutEntry> = (0..)
         .zip(types)
@@ -101,7 +101,8 @@ fn layout(device: &Device, visibility: ShaderStages, types: &[BindingType]) -> B
     device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: None, entries: &entries })
 }
 
-/// Draws front faces, the greatest depth first: depths are nearness. Corners come from the scene, not from vertex buffers.
+/// Creates a pipeline that draws front faces, the greatest depth first: depths are nearness. Corners
+/// come from the scene, not from vertex buffers.
 fn render_pipeline(
     device: &Device,
     layout: &PipelineLayout,

@@ -1,4 +1,4 @@
-//! A picture by which a renderer shows that it draws what the embedded one draws.
+//! A test image by which a renderer proves that it draws like the embedded one.
 
 use rapier3d::math::{Pose, Vector};
 
@@ -6,12 +6,12 @@ use crate::render::cpu::CpuRenderer;
 use crate::render::{Camera, Carrier, Frame, Light, Part, Pattern, PlacedScenery, Scenery, TriangleMesh};
 
 const SIDE_PX: u32 = 64;
-/// So large a share of the pixels may show another thing: on edges, renderers may decide otherwise.
+/// Maximum share of pixels with another id: on edges, renderers may decide differently.
 const STRAY_IDS: f32 = 0.02;
 /// Mean difference of colours, in steps of 255.
 const MEAN_DIFFERENCE: f32 = 1.0;
 
-/// A ball over a checkered floor, with its shadow.
+/// Returns a ball over a checkered floor, with its shadow.
 pub fn scenery() -> Scenery {
     let part = |mesh: TriangleMesh, rgb: [f32; 3], pattern: Pattern, id: u32| Part {
         mesh,
@@ -43,7 +43,7 @@ pub fn camera() -> Camera {
     }
 }
 
-/// Whether another renderer's picture of it is right.
+/// Returns true if another renderer's image of the scenery is right.
 pub fn accepts(drawn: &Frame) -> bool {
     let expected = CpuRenderer::new(scenery()).draw_placed(placed(), &[camera()]).swap_remove(0);
     let count = expected.ids.len() as f32;

@@ -1,4 +1,4 @@
-//! A scenery in a device's memory, and where it is in one state.
+//! A scenery in a device's memory, and its poses in one state.
 
 use rapier3d::math::{Matrix, Pose, Vector};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
@@ -12,22 +12,22 @@ use crate::render::scene::prepared::Prepared;
 use crate::render::shading::{CONTACT_TEXELS, SAMPLES, sun_map};
 use crate::render::{Camera, Carrier, Part, Pattern, PlacedScenery};
 
-/// Numbers in `picture.wgsl`'s `View`, and in its `Part`.
+/// Count of numbers in `picture.wgsl`'s `View`, and in its `Part`.
 const VIEW_NUMBERS: usize = 64;
 const PART_NUMBERS: usize = 24;
 
-/// What `picture.wgsl` calls its group 0, once for each view that is drawn at the same time.
+/// Group 0 of `picture.wgsl`, once for each view that is drawn at the same time.
 pub(super) struct SceneBuffers {
     corner_numbers: Buffer,
     faces: Buffer,
     parts: Buffer,
     contacts: Buffer,
     views: Vec<SceneView>,
-    /// Corners of all triangles.
+    /// Number of corners of all triangles.
     pub corners: u32,
 }
 
-/// What a camera is told to the device by, and the scene as that camera sees it.
+/// Uniforms of a camera, and the scene bound with them.
 struct SceneView {
     numbers: Buffer,
     group: BindGroup,
@@ -52,7 +52,7 @@ impl SceneBuffers {
         }
     }
 
-    /// The scene as the view of this number sees it.
+    /// Returns the scene's bindings for the view with this number.
     pub(super) fn group(&self, view: usize) -> &BindGroup {
         &self.views[view].group
     }
@@ -65,7 +65,7 @@ impl SceneBuffers {
         self.views.push(SceneView { numbers, group });
     }
 
-    /// Puts every part where it is.
+    /// Uploads the pose of every part.
     pub(super) fn place(&self, gpu: &Gpu, prepared: &Prepared, placed: &PlacedScenery, contact: &ContactMap) {
         let colours = prepared.linear_rgb.iter().zip(&prepared.grain);
         let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).zip(colours);
@@ -75,7 +75,7 @@ impl SceneBuffers {
         gpu.queue.write_buffer(&self.contacts, 0, &bytes(&bits(contact.texel_values.as_flattened())));
     }
 
-    /// Looks through a camera, in the view of this number: one that there is, or the next.
+    /// Sets the camera of the view with this number, which exists or is the next.
     pub(super) fn look(
         &mut self,
         gpu: &Gpu,
@@ -124,7 +124,7 @@ fn initialised(gpu: &Gpu, numbers: &[u32], usage: BufferUsages) -> Buffer {
     gpu.device.create_buffer_init(&BufferInitDescriptor { label: None, contents: &contents, usage })
 }
 
-/// Three corners a triangle, with the number of their part.
+/// Returns three corners a triangle, with the number of their part.
 fn part_corners(part: &Part, number: u32) -> impl Iterator<Item = [u32; 4]> {
     part.mesh.triangles.iter().flatten().map(move |corner| {
         let Vector { x, y, z } = part.mesh.vertices[*corner as usize].position_m;
@@ -132,7 +132,7 @@ fn part_corners(part: &Part, number: u32) -> impl Iterator<Item = [u32; 4]> {
     })
 }
 
-/// The normal at a triangle's first corner, and how it changes from there.
+/// Returns the normal at a triangle's first corner, and its derivatives.
 fn face(bend: Bend, [x, y, z, _]: [u32; 4]) -> [u32; 16] {
     let slope_1_m = bend.slope_1_m.unwrap_or(Matrix::ZERO);
     let corner_m = Vector::from([x, y, z].map(f32::from_bits));

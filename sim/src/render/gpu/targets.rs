@@ -1,4 +1,4 @@
-//! What pictures are drawn into, and the buffer in which they are read.
+//! Render targets of images, and the buffer from which they are read.
 
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, Buffer, BufferBinding,
@@ -10,29 +10,30 @@ use super::device::{Gpu, GpuError};
 use super::passes::{DEPTH, TRIANGLES};
 use crate::render::shading::{SAMPLES, TEXELS};
 
-/// Pictures in this buffer begin at multiples of so many bytes.
+/// Alignment of images in this buffer, in bytes.
 pub(super) const ALIGNMENT_BYTES: u64 = 256;
 
-/// Pictures of all views that are drawn together: written by the device, and copied from there to where the processor can read them.
+/// Images of all views that are drawn together: written by the device, and copied from there to memory
+/// that the CPU can read.
 pub(super) struct PictureBuffers {
     pub drawn: Buffer,
     pub readable: Buffer,
 }
 
-/// What pictures of one size are drawn into, one after another.
+/// Render targets for images of one size, drawn one after another.
 pub(super) struct Targets {
     pub width: u32,
     pub height: u32,
-    /// Of a picture, in the buffer.
+    /// Size of an image in the buffer.
     bytes: u64,
     drawn: Buffer,
     pub samples: Attachments,
     pub centres: Attachments,
-    /// What `picture.wgsl` calls its group 1, with the first picture in the buffer.
+    /// Group 1 of `picture.wgsl`, with the first image in the buffer.
     pub group: BindGroup,
 }
 
-/// Triangles, and how near they are.
+/// Triangle numbers and their nearness.
 pub(super) struct Attachments {
     pub triangles: TextureView,
     pub depth: TextureView,
@@ -56,7 +57,7 @@ impl PictureBuffers {
 }
 
 impl Targets {
-    /// For pictures that have so many bytes in a buffer.
+    /// Allocates targets for images of `bytes` bytes.
     pub(super) fn new(
         gpu: &Gpu,
         shadow: &TextureView,
@@ -79,13 +80,13 @@ impl Targets {
         Targets { width, height, bytes, drawn: drawn.clone(), samples, centres, group }
     }
 
-    /// Whether such pictures can be drawn into them.
+    /// Returns true if such images can be drawn into these targets.
     pub(super) fn fit(&self, size_px: [u32; 2], bytes: u64, drawn: &Buffer) -> bool {
         ([self.width, self.height], self.bytes) == (size_px, bytes) && self.drawn == *drawn
     }
 }
 
-/// An error if the device has no textures as large as a picture takes.
+/// Returns an error if the device has no textures of the required size.
 pub(super) fn check_size(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<(), GpuError> {
     let most = gpu.device.limits().max_texture_dimension_2d / SAMPLES as u32;
     if width > most || height > most {
@@ -94,7 +95,7 @@ pub(super) fn check_size(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<(), Gpu
     Ok(())
 }
 
-/// The shadow's map.
+/// Creates the shadow's map.
 pub(super) fn shadow_map(gpu: &Gpu) -> TextureView {
     texture(gpu, DEPTH, TEXELS as u32, TEXELS as u32)
 }

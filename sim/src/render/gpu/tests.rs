@@ -1,5 +1,5 @@
-//! The renderer on a graphics processor draws what the embedded one draws. Software such as Mesa's will do for one; where there
-//! is none, these tests say so and pass.
+//! The GPU renderer draws the same images as the embedded one. Software such as Mesa's is sufficient;
+//! without any, these tests report it and pass.
 
 use std::f32::consts::PI;
 
@@ -16,10 +16,10 @@ use skipped::skipped;
 
 const MIN_PSNR_DB: f64 = 40.0;
 const DEPTH_TOLERANCE_M: f32 = 1e-4;
-/// The share of pixels that may show another thing.
+/// Maximum share of pixels that may show another thing.
 const STRAY_IDS: f64 = 0.002;
 
-/// `None`, and a line, where pictures are drawn by the embedded renderer anyway.
+/// Returns a renderer, or `None` with a message if images are drawn by the embedded renderer anyway.
 fn gpu(scenery: Scenery) -> Option<Box<dyn Renderer>> {
     let renderer = RendererKind::Gpu.renderer(scenery);
     let found = renderer.name() != RendererKind::Cpu.name();
@@ -48,7 +48,7 @@ fn kitchen() -> World {
     .expect("embedded files")
 }
 
-/// Every camera of the world, and one whose picture is of an odd size.
+/// Returns every camera of the world, and one with an odd image size.
 fn views(world: &World, step: &Step) -> Vec<Camera> {
     let cameras = Cameras::of(world);
     let heads = (0..world.robots().len()).map(|robot| cameras.egocentric(step, robot));
@@ -56,13 +56,13 @@ fn views(world: &World, step: &Step) -> Vec<Camera> {
     heads.chain([cameras.third_person(), odd]).collect()
 }
 
-/// Peak signal-to-noise ratio.
+/// Returns the peak signal-to-noise ratio.
 fn psnr_db(a: &Frame, b: &Frame) -> f64 {
     let squares = a.rgb.iter().zip(&b.rgb).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2));
     10.0 * (255.0 * 255.0 * a.rgb.len() as f64 / squares.sum::<f64>()).log10()
 }
 
-/// Depth difference that 99 of 100 pixels do not exceed.
+/// Returns the depth difference that 99 of 100 pixels do not exceed.
 fn depth_p99_m(a: &Frame, b: &Frame) -> f32 {
     let pairs = a.depth_m.iter().zip(&b.depth_m);
     let mut differences_m: Vec<f32> = pairs.map(|(a, b)| if a == b { 0.0 } else { (a - b).abs() }).collect();
@@ -76,7 +76,7 @@ fn both_renderers_draw_the_same() {
     let Some(mut gpu) = gpu(Scenery::of(&world)) else { return };
     let mut embedded = cpu(Scenery::of(&world));
     let commands: Vec<_> = (0..world.robots().len()).map(|robot| world.rest_command(robot)).collect();
-    // Twice, for what moves has to be seen to have moved.
+    // Twice, to verify that moved parts are drawn at their new poses.
     for _ in 0..2 {
         let step =
             (0..25).map(|_| world.control_step(&commands).expect("it stays finite")).last().expect("one");
@@ -113,7 +113,7 @@ fn an_empty_scenery_is_sky() {
     assert_eq!(gpu.render(&world.present(), &camera), expected);
 }
 
-/// How often `draw` has this thread submit work, and read pictures back.
+/// Counts the submissions and readbacks of this thread during `draw`.
 fn counted<T>(draw: impl FnOnce() -> T) -> (T, [u32; 2]) {
     let now = || [counts::SUBMISSIONS.get(), counts::READ_BACKS.get()];
     let [submissions, read_backs] = now();
@@ -129,7 +129,7 @@ fn pictures_of_many_worlds_are_one_submission_and_one_read_back() {
     else {
         return;
     };
-    // Each in another state; twice, for what moves has to be seen to have moved.
+    // Each in another state; twice, to verify that moved parts are drawn at their new poses.
     for _ in 0..2 {
         let advance = |(number, world): (usize, &mut World)| {
             let commands = [world.rest_command(0), world.rest_command(1)];

@@ -1,5 +1,5 @@
-//! Pictures of several worlds, drawn by the device in one submission and read back at once: what a submission and a wait for it cost,
-//! many pictures share.
+//! Images of several worlds, drawn by the device in one submission and read back at once: many images
+//! share the cost of a submission and a wait.
 
 use wgpu::{Buffer, CommandEncoder, MapMode};
 
@@ -9,7 +9,7 @@ use super::targets::{ALIGNMENT_BYTES, PictureBuffers, check_size};
 use crate::render::blur::blurred;
 use crate::render::{Camera, Frame, PlacedScenery, RenderRequest, Wanted};
 
-/// What one renderer is asked for.
+/// Request to one renderer.
 pub(super) struct Asked<'a> {
     pub renderer: &'a mut GpuRenderer,
     pub placed: PlacedScenery,
@@ -17,7 +17,7 @@ pub(super) struct Asked<'a> {
     pub wanted: Wanted,
 }
 
-/// Where in the buffer of all pictures one of them is.
+/// Region of an image in the buffer of all images.
 pub(super) struct Region {
     pub width: u32,
     pub height: u32,
@@ -27,7 +27,8 @@ pub(super) struct Region {
     pub bytes: u64,
 }
 
-/// The colours that all requests are for; `None` where a renderer is not on the device, or the device fails.
+/// Returns the colours for all requests. Returns `None` if a renderer is not on the device, or the
+/// device fails.
 pub fn colours(requests: &mut [RenderRequest]) -> Option<Vec<Vec<Vec<u8>>>> {
     let asked = requests.iter_mut().map(|request| {
         let renderer = request.renderer.on_gpu()?;
@@ -38,7 +39,8 @@ pub fn colours(requests: &mut [RenderRequest]) -> Option<Vec<Vec<Vec<u8>>>> {
     Some(frames.into_iter().map(|frames| frames.into_iter().map(|frame| frame.rgb).collect()).collect())
 }
 
-/// What each camera sees, renderer by renderer. After an error no renderer takes anything for drawn.
+/// Renders the image of each camera, renderer by renderer. After an error no renderer assumes that
+/// anything was drawn.
 pub(super) fn draw(asked: &mut [Asked]) -> Result<Vec<Vec<Frame>>, GpuError> {
     let Some(first) = asked.first() else { return Ok(Vec::new()) };
     let gpu = first.renderer.gpu.clone();
@@ -90,7 +92,7 @@ impl Asked<'_> {
     }
 }
 
-/// The regions of all pictures, renderer by renderer, and how many bytes they have together.
+/// Returns the regions of all images, renderer by renderer, and their total number of bytes.
 fn regions(asked: &[Asked]) -> (Vec<Vec<Region>>, u64) {
     let mut end = 0;
     let mut region = |camera: &Camera, wanted: Wanted| {
@@ -111,7 +113,7 @@ fn regions(asked: &[Asked]) -> (Vec<Vec<Region>>, u64) {
     (regions, end)
 }
 
-/// Waits for all pictures.
+/// Waits for all images and reads them.
 fn read(
     gpu: &Gpu,
     readable: &Buffer,
@@ -149,7 +151,7 @@ fn frame(mapped: &[u8], region: &Region) -> Frame {
     }
 }
 
-/// How often this thread has asked the device.
+/// Counters of this thread's requests to the device.
 #[cfg(test)]
 pub(super) mod counts {
     use std::cell::Cell;

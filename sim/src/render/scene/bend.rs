@@ -1,18 +1,19 @@
-//! Which way a mesh's surface faces: triangles that go over into each other share one answer.
+//! Orientation of a mesh's surface: triangles that continue each other smoothly share one bend.
 
 use rapier3d::math::{Matrix, Vector};
 
 use crate::render::{TriangleMesh, Vertex};
 
-/// The normal at a point p of some triangles, in their mesh's frame and of any length: `normal + slope_1_m * p`.
+/// The normal at a point p of some triangles, in their mesh's frame and of any length:
+/// `normal + slope_1_m * p`.
 #[derive(Clone, Copy, Debug)]
 pub struct Bend {
     pub normal: Vector,
-    /// `None` where they are flat.
+    /// `None` if they are flat.
     pub slope_1_m: Option<Matrix>,
 }
 
-/// Corners have the normals that a bend gives them, but for this much of their direction.
+/// Tolerance on the directions of corner normals that a bend gives.
 const TOLERANCE: f32 = 1e-3;
 
 impl TriangleMesh {
@@ -34,15 +35,17 @@ impl TriangleMesh {
 }
 
 impl Bend {
-    /// That of the ellipsoid in a box: the gradient of (x / r_x)^2 + (y / r_y)^2 + (z / r_z)^2 about the middle.
+    /// Returns the bend of the ellipsoid in a box: the gradient of (x / r_x)^2 + (y / r_y)^2 + (z /
+    /// r_z)^2 about the middle.
     fn of_ellipsoid([low, high]: [Vector; 2]) -> Bend {
         let (middle, radii_m) = ((low + high) * 0.5, ((high - low) * 0.5).max(Vector::splat(f32::EPSILON)));
         let slope_1_m = Matrix::from_diagonal(radii_m.min_element() / (radii_m * radii_m));
         Bend { normal: -(slope_1_m * middle), slope_1_m: Some(slope_1_m) }
     }
 
-    /// The bend of a plane, else of a surface whose normals are linear in each coordinate by itself, as spheres' and those of
-    /// cylinders along an axis, else of the whole mesh's ellipsoid, else of these corners alone.
+    /// Returns the first bend that fits of these: a plane; a surface whose normals are linear in each
+    /// coordinate alone, such as spheres and cylinders along an axis; the whole mesh's ellipsoid.
+    /// Otherwise it returns the bend of these corners alone.
     fn of(corners: &[Vertex; 3], ellipsoid: Bend) -> Bend {
         let [a, b, c] = corners;
         let flat = Bend { normal: a.normal, slope_1_m: None };
@@ -65,7 +68,8 @@ impl Bend {
         })
     }
 
-    /// A point p of triangle a, b, c with face f = ab x ac has the weights
+    /// Returns the bend that interpolates the corners. A point p of triangle a, b, c with face f = ab x
+    /// ac has the weights
     ///   w_b = (ac x f) . ap / |f|^2,   w_c = (f x ab) . ap / |f|^2
     /// and the normal n_a + w_b (n_b - n_a) + w_c (n_c - n_a).
     fn between([a, b, c]: &[Vertex; 3]) -> Bend {

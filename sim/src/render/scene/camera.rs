@@ -5,41 +5,44 @@ use rapier3d::math::{Pose, Vector};
 use crate::mjcf::MjcfCamera;
 use crate::{Step, World};
 
-/// Axes as [`crate::mjcf::MjcfCamera`]'s. Square pixels, principal point in the middle.
+/// A pinhole camera with square pixels and the principal point in the middle; axes as in
+/// [`crate::mjcf::MjcfCamera`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     pub world_from_camera: Pose,
     pub vertical_fov_rad: f32,
     pub width: u32,
     pub height: u32,
-    /// How far its colours are blurred: the standard deviation of what a point is spread over, in pixels. Depth stays sharp.
+    /// Blur of its colours: the standard deviation over which a point is spread, in pixels. Depth stays
+    /// sharp.
     pub blur_px: f32,
 }
 
-/// How the camera in a robot's head differs from what the robot's file says, which is all that the robot knows of it.
+/// Deviation of the camera in a robot's head from the robot's file. The robot knows only the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LensFlaw {
-    /// From where it is to where it ought to be.
+    /// Pose of the actual lens in the nominal camera frame.
     pub camera_from_lens: Pose,
     pub blur_px: f32,
 }
 
-/// What a picture's pixels mean, without distortion, as other libraries count: the centre of pixel (0, 0) lies at (0, 0), so a
-/// point (x, y, z) in the camera's frame (x right, y down, z forward) is seen at
+/// Intrinsics of an image without distortion, in the convention of other libraries: the centre of pixel
+/// (0, 0) is at (0, 0). A point (x, y, z) in the camera's frame (x right, y down, z forward) is seen at
 ///
 ///   u = f x / z + cx,   v = f y / z + cy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intrinsics {
     pub width: u32,
     pub height: u32,
-    /// The same in both directions: pixels are square.
+    /// Focal length, the same in both directions: pixels are square.
     pub focal_px: f32,
     pub cx: f32,
     pub cy: f32,
 }
 
 impl Intrinsics {
-    /// The optical axis goes through the middle of the picture, which lies half a pixel from the centre of a pixel.
+    /// Computes the intrinsics. The optical axis goes through the middle of the image, half a pixel from
+    /// the centre of a pixel.
     fn new(vertical_fov_rad: f32, width: u32, height: u32) -> Intrinsics {
         Intrinsics {
             width,
@@ -50,7 +53,8 @@ impl Intrinsics {
         }
     }
 
-    /// Point in the camera's frame, with its axes as [`crate::mjcf::MjcfCamera`]'s, that is seen at `uv_px` at a depth.
+    /// Returns the point in the camera's frame, with axes as in [`crate::mjcf::MjcfCamera`], that is
+    /// seen at `uv_px` at a depth.
     pub fn unproject(&self, uv_px: [f32; 2], depth_m: f32) -> Vector {
         let scale = depth_m / self.focal_px;
         Vector::new((uv_px[0] - self.cx) * scale, (self.cy - uv_px[1]) * scale, -depth_m)
@@ -64,10 +68,10 @@ impl From<&MjcfCamera> for Intrinsics {
     }
 }
 
-/// Nothing nearer than this is drawn.
+/// Distance below which nothing is drawn.
 pub const NEAR_M: f32 = 0.01;
 
-/// Cameras of one world, as its files describe them.
+/// Cameras of one world, as described in its files.
 #[derive(Clone, Debug)]
 pub struct Cameras {
     /// The camera in each robot's head, by robot.
@@ -75,35 +79,35 @@ pub struct Cameras {
     third_person: Camera,
 }
 
-/// Third-person view where a scene's file gives none: from the side, a little above.
+/// Third-person view for scenes without one: from the side, a little above.
 const FALLBACK_EYE_M: Vector = Vector::new(0.4, -2.4, 1.6);
 const FALLBACK_TARGET_M: Vector = Vector::new(0.4, 0.0, 0.8);
 const THIRD_PERSON: &str = "third_person";
 
 impl LensFlaw {
-    /// That of a camera that is as its file says.
+    /// Lens of a camera that matches its file.
     pub const NONE: LensFlaw = LensFlaw { camera_from_lens: Pose::IDENTITY, blur_px: 0.0 };
 }
 
 impl Camera {
-    /// What this camera's pixels mean to others.
+    /// Returns the intrinsics of this camera.
     pub fn intrinsics(&self) -> Intrinsics {
         Intrinsics::new(self.vertical_fov_rad, self.width, self.height)
     }
 
-    /// Focal length in pixels, the same in both directions.
+    /// Returns the focal length in pixels, the same in both directions.
     pub fn focal_px(&self) -> f32 {
         self.intrinsics().focal_px
     }
 
-    /// Where the optical axis meets the picture, in pixels from the top left corner.
+    /// Returns the point where the optical axis meets the image, in pixels from the top left corner.
     pub fn principal_point_px(&self) -> [f32; 2] {
         let Intrinsics { cx, cy, .. } = self.intrinsics();
         [cx + 0.5, cy + 0.5]
     }
 
-    /// Picture coordinates (pixels from the top left corner, the first pixel's centre at 0.5, 0.5) and depth of a point
-    /// of the world; `None` behind the camera.
+    /// Returns the image coordinates (pixels from the top left corner, the first pixel's centre at 0.5,
+    /// 0.5) and depth of a point of the world. Returns `None` behind the camera.
     pub fn project(&self, point_in_world_m: Vector) -> Option<([f32; 2], f32)> {
         let point = self.world_from_camera.inverse() * point_in_world_m;
         let depth_m = -point.z;
@@ -115,7 +119,7 @@ impl Camera {
         Some(([cx + point.x * scale, cy - point.y * scale], depth_m))
     }
 
-    /// Point in the camera's frame that is seen at picture coordinates `uv_px` at a depth.
+    /// Returns the point in the camera's frame that is seen at image coordinates `uv_px` at a depth.
     pub fn unproject(&self, uv_px: [f32; 2], depth_m: f32) -> Vector {
         self.intrinsics().unproject(uv_px.map(|px| px - 0.5), depth_m)
     }
@@ -142,7 +146,7 @@ impl Cameras {
         self.heads[robot].1 = lens;
     }
 
-    /// The camera in a robot's head, as `step` left it.
+    /// Returns the camera in a robot's head after `step`.
     pub fn egocentric(&self, step: &Step, robot: usize) -> Camera {
         let (head, lens) = &self.heads[robot];
         let world_from_camera = step.robots[robot].truth.world_from_camera;
@@ -154,7 +158,7 @@ impl Cameras {
         }
     }
 
-    /// The scene's camera that sees all robots.
+    /// Returns the scene's camera that sees all robots.
     pub fn third_person(&self) -> Camera {
         self.third_person
     }

@@ -1,15 +1,16 @@
-//! Which triangles of a mesh turn away, told by their planes and without their corners.
+//! Back-face test of a mesh's triangles, by their planes and without their corners.
 
 use crate::render::TriangleMesh;
 use crate::render::shading::lanes::{LANES, Lanes, lanes};
 
-/// The planes of a mesh's triangles, in its frame and in whole blocks: normals of length 1, and how far along them the planes lie.
+/// The planes of a mesh's triangles, in its frame and in whole blocks: unit normals, and the offsets of
+/// the planes along them.
 pub struct Faces {
     planes_m: Vec<[Lanes; 4]>,
     count: usize,
 }
 
-/// A face that turns away by less is counted among those that do not: rounding may have it drawn.
+/// Tolerance below which a back face counts as visible: rounding may draw it.
 const GRAZING: f32 = 1e-4;
 
 impl Faces {
@@ -27,8 +28,8 @@ impl Faces {
         Faces { planes_m, count: mesh.triangles.len() }
     }
 
-    /// Puts the numbers of the triangles that may be seen, in their order, from a point (x, y, z, 1) of the mesh's frame, or against a
-    /// direction (x, y, z, 0).
+    /// Writes the numbers of the triangles that may be visible, in their order, from a point
+    /// (x, y, z, 1) of the mesh's frame, or against a direction (x, y, z, 0).
     #[inline(always)]
     pub fn put_front(&self, front: &mut Vec<u32>, [x, y, z, w]: [f32; 4]) {
         front.resize(self.planes_m.len() * LANES, 0);

@@ -1,12 +1,13 @@
-//! Triangles that nobody ever sees: those inside of another part of the same body, as most caps of capsules at a joint are.
+//! Removal of triangles that are never visible: those inside of another part of the same body, such as
+//! most caps of capsules at a joint.
 
 use rapier3d::math::Vector;
 
 use crate::render::{Carrier, Part};
 
-/// What lies less deep stays: rounding may bring it out.
+/// Minimum depth of a hidden triangle; less deep ones stay, since rounding may bring them out.
 const DEPTH_M: f32 = 1e-4;
-/// Corners of a convex mesh may lie so far in front of its faces.
+/// Maximum distance of a convex mesh's corners in front of its faces.
 const ROUNDING_M: f32 = 1e-5;
 
 /// A part in its carrier's frame.
@@ -60,7 +61,7 @@ impl Placed {
     }
 }
 
-/// Whether a point is so deep behind all of some faces.
+/// Returns true if a point is at least this deep behind all of some faces.
 fn is_deeper(faces_m: &[(Vector, f32)], point_m: Vector, depth_m: f32) -> bool {
     faces_m.iter().all(|(normal, along_m)| normal.dot(point_m) < along_m - depth_m)
 }

@@ -20,17 +20,18 @@ pub struct TriangleMesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Bands from pole to pole of a shape with so large a radius, an even number, and half as many as there are corners around it. Edges lie
-/// up to 1.1 mm inside of thin shapes, of larger ones a thirtieth of the radius.
+/// Returns the number of latitude bands for a shape of this radius: even, and half of the number of
+/// corners around it. Edges are up to 1.1 mm inside of thin shapes, and a thirtieth of the radius inside
+/// of larger ones.
 fn rings(radius_m: f32) -> u32 {
     if radius_m < 0.015 { 4 } else { 6 }
 }
 
-/// An unbounded plane is drawn this large.
+/// Drawn size of an unbounded plane.
 const PLANE_M: f32 = 20.0;
 
 impl TriangleMesh {
-    /// The surface of a shape; of points, their convex hull.
+    /// Returns the surface of a shape; for points, their convex hull.
     pub fn of(primitive: &Primitive) -> TriangleMesh {
         match primitive {
             Primitive::Sphere { radius_m } => TriangleMesh::sphere(*radius_m),
@@ -55,7 +56,7 @@ impl TriangleMesh {
         TriangleMesh::capsule(radius_m, 0.0)
     }
 
-    /// A capsule along z; with no length, a sphere.
+    /// Returns a capsule along z; with no length, a sphere.
     pub fn capsule(radius_m: f32, half_length_m: f32) -> TriangleMesh {
         TriangleMesh::round(rings(radius_m), radius_m, half_length_m)
     }
@@ -69,7 +70,7 @@ impl TriangleMesh {
         mesh
     }
 
-    /// A cylinder along z.
+    /// Returns a cylinder along z.
     pub fn cylinder(radius_m: f32, half_length_m: f32) -> TriangleMesh {
         let mut mesh = TriangleMesh::default();
         let segments = 2 * rings(radius_m);
@@ -116,7 +117,7 @@ impl TriangleMesh {
         mesh
     }
 
-    /// A rectangle at z = 0; 0 stands for no bound.
+    /// Returns a rectangle at z = 0; an extent of 0 means unbounded.
     pub fn plane(half_extents_m: [f32; 2]) -> TriangleMesh {
         let [x, y] = half_extents_m.map(|half_m| if half_m > 0.0 { half_m } else { PLANE_M });
         let corners = [(-x, -y), (x, -y), (x, y), (-x, y)];
@@ -124,7 +125,7 @@ impl TriangleMesh {
         TriangleMesh { vertices: corners.map(vertex).to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]] }
     }
 
-    /// Triangles with flat faces.
+    /// Returns triangles with flat faces.
     pub fn faceted(points_m: &[Vector], triangles: &[[u32; 3]]) -> TriangleMesh {
         let mut mesh = TriangleMesh::default();
         for triangle in triangles {
@@ -137,25 +138,25 @@ impl TriangleMesh {
         mesh
     }
 
-    /// Centre and radius of a sphere around the mesh.
+    /// Returns the centre and the radius of a sphere around the mesh.
     pub fn bounds(&self) -> (Vector, f32) {
         let [low, high] = self.corners_m();
         ((low + high) * 0.5, (high - low).length() * 0.5)
     }
 
-    /// The corners of the box around the mesh, with the least coordinates and the greatest.
+    /// Returns the corners of the mesh's bounding box, with the least coordinates and the greatest.
     pub fn corners_m(&self) -> [Vector; 2] {
         let points = self.vertices.iter().map(|vertex| vertex.position_m);
         [points.clone().fold(Vector::INFINITY, Vector::min), points.fold(Vector::NEG_INFINITY, Vector::max)]
     }
 
-    /// The number of the axis along which the mesh is longest.
+    /// Returns the number of the axis along which the mesh is longest.
     pub fn longest_axis(&self) -> usize {
         let [low, high] = self.corners_m();
         (high - low).max_position()
     }
 
-    /// A capsule of so many bands; with no length, a sphere.
+    /// Returns a capsule of `rings` bands; with no length, a sphere.
     fn round(rings: u32, radius_m: f32, half_length_m: f32) -> TriangleMesh {
         let (mut mesh, segments) = (TriangleMesh::default(), 2 * rings);
         for ring in 0..=rings {
@@ -173,9 +174,9 @@ impl TriangleMesh {
         mesh
     }
 
-    /// One circle of a sphere, moved along z.
+    /// Adds one circle of a sphere, moved along z.
     fn ring(&mut self, polar_rad: f32, radius_m: f32, shift_m: f32, segments: u32) {
-        // Rounding makes the sine negative at the lower pole, where all points must be one.
+        // Rounding makes the sine negative at the lower pole, where all points must coincide.
         let across = polar_rad.sin().max(0.0);
         for i in 0..=segments {
             let (sin, cos) = (TAU * i as f32 / segments as f32).sin_cos();
@@ -185,7 +186,7 @@ impl TriangleMesh {
         }
     }
 
-    /// A band of triangles between two circles, the upper one first.
+    /// Adds a band of triangles between two circles, the upper one first.
     fn join(&mut self, upper: u32, lower: u32, segments: u32) {
         for i in 0..segments {
             let (a, b, c, d) = (upper + i, upper + i + 1, lower + i, lower + i + 1);

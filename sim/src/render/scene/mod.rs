@@ -1,4 +1,4 @@
-//! What is drawn: the meshes and colours of a world, and where a step has put them. Cameras look at it.
+//! The visible content of a world: meshes and colours, their poses after a step, and the cameras.
 
 pub mod bend;
 pub mod camera;
@@ -17,7 +17,7 @@ use crate::{Step, World};
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scenery {
     pub parts: Vec<Part>,
-    /// Shadows are drawn within this distance of [`PlacedScenery::focus_m`]: the smaller, the sharper.
+    /// Radius around [`PlacedScenery::focus_m`] within which shadows are drawn: the smaller, the sharper.
     pub focus_radius_m: f32,
     pub light: Light,
 }
@@ -31,15 +31,15 @@ pub struct Part {
     /// sRGB, 0 to 1.
     pub rgb: [f32; 3],
     pub pattern: Pattern,
-    /// What [`crate::render::Frame::ids`] shows for it; parts of one thing share one. 0 is the background.
+    /// Id in [`crate::render::Frame::ids`]; parts of one thing share one. 0 is the background.
     pub id: u32,
     pub casts_shadow: bool,
 }
 
-/// What a part belongs to, by its place in a [`Step`].
+/// Carrier of a part, by its place in a [`Step`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Carrier {
-    /// It never moves; its frame is the world's.
+    /// The fixed room; its frame is the world's.
     Room,
     Link {
         robot: usize,
@@ -48,30 +48,31 @@ pub enum Carrier {
     Object(usize),
 }
 
-/// Where every part of a scenery is after a step.
+/// Poses of all parts of a scenery after a step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlacedScenery {
     /// Pose of each part.
     pub world_from_mesh: Vec<Pose>,
-    /// The point between the robots, around which shadows have to be sharp. It moves in steps, so that the room's
-    /// shadows need seldom be drawn.
+    /// The point between the robots, around which shadows have to be sharp. It moves in steps, so that
+    /// the room's shadows are seldom redrawn.
     pub focus_m: Vector,
 }
 
 /// Ids: 0 the background, 1 the room, then robots, then objects.
 const ROOM_ID: u32 = 1;
-/// Around the middle between the robots: counter, objects and all hands.
+/// Focus around the middle between the robots: it covers counter, objects and all hands.
 const FOCUS_HEIGHT_M: f32 = 0.8;
 const FOCUS_STEP_M: f32 = 0.1;
 const FOCUS_RADIUS_M: f32 = 1.25;
-/// The light stands for lamps at this height: walls and what hangs above them cast no shadow into the room.
+/// Height of the lamps that the light represents: walls and things that hang above them cast no shadow
+/// into the room.
 const LAMPS_M: f32 = 2.2;
 /// The accent of each robot, in place of the material `accent` of the robot's file.
 const ACCENTS: [[f32; 4]; 3] = [[0.12, 0.35, 0.85, 1.0], [0.95, 0.48, 0.08, 1.0], [0.15, 0.62, 0.28, 1.0]];
 const ACCENT_MATERIAL: &str = "accent";
 
 impl Scenery {
-    /// Everything in `world` that is drawn.
+    /// Collects everything in `world` that is drawn.
     pub fn of(world: &World) -> Scenery {
         let mut parts: Vec<Part> =
             drawn(world.room()).map(|geom| part(geom, Carrier::Room, geom.rgba, ROOM_ID)).collect();
@@ -95,7 +96,7 @@ impl Scenery {
         Scenery { parts, focus_radius_m: FOCUS_RADIUS_M, light: Light::default() }
     }
 
-    /// Where `step`, a step of the world that this is the scenery of, has put every part.
+    /// Returns the poses of all parts after `step`, which must be a step of this scenery's world.
     pub fn place(&self, step: &Step) -> PlacedScenery {
         let world_from_carrier = |carrier: Carrier| match carrier {
             Carrier::Room => Pose::IDENTITY,
@@ -116,7 +117,8 @@ impl Scenery {
     }
 }
 
-/// Colour of a geom of robot number `robot`. Robots differ in their accents alone, so that partners can be told apart.
+/// Returns the colour of a geom of robot number `robot`. Robots differ only in their accents, which
+/// distinguish partners.
 pub fn robot_rgba(geom: &Geom, robot: usize) -> [f32; 4] {
     match geom.material.as_deref() {
         Some(ACCENT_MATERIAL) => ACCENTS[robot % ACCENTS.len()],
@@ -144,7 +146,7 @@ fn part(geom: &Geom, carrier: Carrier, [r, g, b, _]: [f32; 4], id: u32) -> Part 
     }
 }
 
-/// Height of the highest point of a part of the room.
+/// Returns the height of the highest point of a part of the room.
 fn top_m(part: &Part) -> f32 {
     let heights_m = part.mesh.vertices.iter().map(|vertex| (part.carrier_from_mesh * vertex.position_m).z);
     heights_m.fold(0.0, f32::max)

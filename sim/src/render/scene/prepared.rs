@@ -1,4 +1,4 @@
-//! A scenery with what drawing wants to know of it and what never changes.
+//! A scenery with precomputed constant data for drawing.
 
 use std::collections::HashMap;
 
@@ -10,7 +10,7 @@ use crate::render::shading::lanes::Points;
 use crate::render::shading::linear;
 use crate::render::{Part, Pattern, Scenery, TriangleMesh};
 
-/// Marks a sample at which nothing is.
+/// Mark of a sample without a surface.
 pub const NOTHING: u32 = u32::MAX;
 
 pub struct Prepared {
@@ -27,17 +27,17 @@ pub struct Prepared {
     pub sheet_of: Vec<u32>,
     /// Number of the first triangle of each part.
     first: Vec<usize>,
-    /// What a picture's ids show for each sheet.
+    /// Id in images of each sheet.
     ids: Vec<u32>,
     /// Centre and radius of a sphere around each part, in its mesh's frame.
     pub bounds: Vec<(Vector, f32)>,
     /// The two colours of each part.
     pub linear_rgb: Vec<[Vector; 2]>,
-    /// Which axis of each part's mesh comes first in its pattern: the one that a grain runs along.
+    /// Axis of each part's mesh that comes first in its pattern: the one that a grain runs along.
     pub grain: Vec<usize>,
 }
 
-/// Neighbouring triangles of a part, as shading wants them.
+/// Neighbouring triangles of a part, for shading.
 #[derive(Clone, Copy)]
 pub struct Sheet {
     pub part: u32,
@@ -76,7 +76,7 @@ impl Prepared {
         &self.sheet_of[self.first[part]..self.first[part + 1]]
     }
 
-    /// What a picture's ids show where it shows a sheet.
+    /// Returns the id of a sheet in images.
     #[inline(always)]
     pub fn id(&self, sheet: u32) -> u32 {
         // No sheet has the number of nothing.
@@ -84,7 +84,7 @@ impl Prepared {
     }
 }
 
-/// Print stands upright, whatever is longest.
+/// Returns the grain axis; print is upright, whichever axis is longest.
 fn grain(part: &Part) -> usize {
     if part.pattern == Pattern::Print { 0 } else { part.mesh.longest_axis() }
 }
@@ -103,7 +103,7 @@ fn joined(mesh: &TriangleMesh) -> (Points, Vec<[u32; 3]>) {
     (Points::new(&places_m), triangles)
 }
 
-/// The two linear colours of a part.
+/// Returns the two linear colours of a part.
 fn colours(part: &Part) -> [Vector; 2] {
     let first = linear(part.rgb);
     [first, part.pattern.second_rgb(first)]

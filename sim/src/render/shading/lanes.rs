@@ -1,14 +1,14 @@
-//! Numbers and maps of points, worked on several at once.
+//! Numbers and maps of points, processed several at once.
 
 use rapier3d::math::{Matrix, Pose, Vector};
 
-/// As many numbers as the widest registers in common use hold.
+/// Count of numbers in the widest registers in common use.
 pub const LANES: usize = 8;
 
 /// A block of numbers, or a smaller one.
 pub type Lanes<const N: usize = LANES> = [f32; N];
 
-/// Numbers of a block. A loop, for compilers make few instructions of it.
+/// Computes the numbers of a block. It is a loop, which compilers turn into few instructions.
 #[inline(always)]
 pub fn lanes<T: Copy + Default, const N: usize>(each: impl Fn(usize) -> T) -> [T; N] {
     let mut numbers = [T::default(); N];
@@ -18,17 +18,17 @@ pub fn lanes<T: Copy + Default, const N: usize>(each: impl Fn(usize) -> T) -> [T
     numbers
 }
 
-/// Three of something, by their axes.
+/// Computes three values, by their axes.
 #[inline(always)]
 pub fn axes<T>(each: impl Fn(usize) -> T) -> [T; 3] {
     [each(0), each(1), each(2)]
 }
 
-/// An affine map of points: each coordinate is a scalar product, and a number more.
+/// An affine map of points: each coordinate is a scalar product plus a constant.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Affine(pub [(Vector, f32); 3]);
 
-/// Points, coordinate by coordinate, in whole blocks: the last one may hold a few of no meaning.
+/// Points, coordinate by coordinate, in whole blocks: the last one may hold a few meaningless ones.
 #[derive(Default)]
 pub struct Points {
     count: usize,
@@ -44,7 +44,7 @@ impl Affine {
         Affine([row(0), row(1), row(2)])
     }
 
-    /// The map that first moves a point as `pose` does and then as this one.
+    /// Returns the map that first moves a point by `pose` and then by this one.
     pub fn after(self, pose: Pose) -> Affine {
         let back = pose.rotation.inverse();
         Affine(self.0.map(|(axis, constant)| (back * axis, constant + axis.dot(pose.translation))))
@@ -88,7 +88,7 @@ impl Points {
         self.count
     }
 
-    /// Puts what `map` makes of each point, by the points' numbers.
+    /// Writes the result of `map` for each point, by the points' numbers.
     #[inline(always)]
     pub fn map_into<const N: usize>(
         &self,

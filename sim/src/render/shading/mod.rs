@@ -1,5 +1,5 @@
-//! What renderers have to agree on: the light, the shadow's map, outlines, patterns, and
-//! arithmetic on several points at once. All colours are linear.
+//! Definitions that renderers share: the light, the shadow's map, outlines, patterns, and arithmetic on
+//! several points at once. All colours are linear.
 
 pub mod lanes;
 pub mod pattern;
@@ -11,15 +11,15 @@ use lanes::Affine;
 /// Samples a pixel along each axis; a power of two, so that dividing by it is exact.
 pub const SAMPLES: usize = 2;
 
-/// What lights a scenery, as linear colours: a sun with shadows, and a sky.
+/// Light of a scenery, as linear colours: a sun with shadows, and a sky.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
     pub sun_rgb: Vector,
     /// Direction to the sun, a unit vector that does not point straight up.
     pub sun_direction: Vector,
-    /// Light of the sky on what faces down.
+    /// Light of the sky on surfaces that face down.
     pub below_rgb: Vector,
-    /// Light of the sky on what faces up.
+    /// Light of the sky on surfaces that face up.
     pub above_rgb: Vector,
 }
 
@@ -35,40 +35,41 @@ impl Default for Light {
     }
 }
 
-/// A faint lamp at the camera.
+/// Strength of a faint headlight at the camera.
 pub const LAMP: f32 = 0.15;
-/// The sun's reflection: its strength where a surface mirrors the sun to the camera. The exponent of the cosine is 40.
+/// The sun's reflection: its strength where a surface mirrors the sun to the camera. The exponent of the
+/// cosine is 40.
 pub const HIGHLIGHT: f32 = 0.15;
-/// Colour where nothing is.
+/// Background colour.
 pub const SKY: Vector = Vector::new(0.45, 0.55, 0.70);
 
-/// How much the outline between two things darkens.
+/// Strength of the darkening by an outline between two things.
 pub const OUTLINE: f32 = 0.45;
-/// Two things are outlined where their depths differ by more than this part: not where they touch.
+/// Minimum relative depth difference for an outline between two things: there is none where they touch.
 pub const OUTLINE_DEPTH_STEP: f32 = 0.02;
 
 /// Texels along each side of the shadow's map: 2.4 mm at a focus of 1.25 m, so that fingers cast shadows.
 pub const TEXELS: usize = 1024;
-/// "Nearness" in the map is this minus the distance from the plane through the focus that faces the sun, so that it grows
-/// towards the sun.
+/// Offset of "nearness" in the map, which is this minus the distance from the plane through the focus
+/// that faces the sun. So it grows towards the sun.
 pub const SUN_DISTANCE_M: f32 = 8.0;
-/// A surface does not shade itself: it is looked up this far along its normal, and this much nearer to the sun.
+/// Offsets of the lookup point along the surface normal and towards the sun, which prevent self-shadowing.
 pub const NORMAL_OFFSET_M: f32 = 0.006;
 pub const BIAS_M: f32 = 0.004;
 
-/// Shadows fade out this far from the map's border, so that none ends in a line.
+/// Distance from the map's border over which shadows fade out, so that none ends in a line.
 pub const FADE_TEXELS: f32 = 120.0;
 
 /// Texels along each side of the map of contacts: 1 cm at a focus of 1.25 m.
 pub const CONTACT_TEXELS: usize = 256;
-/// How much darker it is where things stand.
+/// Strength of contact shadows.
 pub const CONTACT: f32 = 0.5;
 
 /// Steps of the table from linear light to sRGB bytes.
 pub const SRGB_STEPS: usize = 4096;
 
-/// Maps points of the world to the map of the shadows of a sun that stands in the direction `sun_direction`, around a focus: column and row,
-/// counted from its corner, and nearness.
+/// Returns the map from points of the world to the shadow map around a focus, for a sun in the direction
+/// `sun_direction`: column and row, counted from its corner, and nearness.
 pub fn sun_map(sun_direction: Vector, focus_m: Vector, radius_m: f32) -> Affine {
     let half = 0.5 * TEXELS as f32;
     let right = Vector::Z.cross(sun_direction).normalize() * (half / radius_m);
@@ -77,7 +78,7 @@ pub fn sun_map(sun_direction: Vector, focus_m: Vector, radius_m: f32) -> Affine 
     Affine([about_focus(right, half), about_focus(down, half), about_focus(sun_direction, SUN_DISTANCE_M)])
 }
 
-/// sRGB, as files have it, to linear light.
+/// Converts sRGB, as used in files, to linear light.
 pub fn linear(rgb: [f32; 3]) -> Vector {
     let decode = |v: f32| if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
     Vector::from(rgb.map(decode))

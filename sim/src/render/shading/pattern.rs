@@ -1,10 +1,10 @@
-//! Textures made in code: how much of a surface's second colour there is at a point.
+//! Procedural textures: the share of a surface's second colour at a point.
 
 use rapier3d::math::{Matrix, Pose, Vector};
 
 use super::lanes::{Affine, Lanes, lanes};
 
-/// How a surface varies between two colours.
+/// Pattern of a surface between two colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Pattern {
     #[default]
@@ -15,26 +15,28 @@ pub enum Pattern {
     Wood,
     /// A coarse weave.
     Fabric,
-    /// Lines of words, one above the other along the mesh's z: what stands on labels and boxes.
+    /// Lines of words, one above the other along the mesh's z, for labels and boxes.
     Print,
 }
 
-/// Words in names of materials that make them so. The names are those of MJCF files; no scene has to say more.
+/// Words in names of materials that select a pattern. The names are those of MJCF files, and scenes need
+/// nothing else.
 const WOODS: [&str; 8] = ["wood", "birch", "oak", "walnut", "pine", "beech", "plank", "batten"];
 const FABRICS: [&str; 7] = ["fabric", "cloth", "velvet", "curtain", "carpet", "rug", "cushion"];
 const PRINTS: [&str; 2] = ["label", "print"];
-/// The second colour, as a part of the first: calm enough for what lies on it to stand out.
+/// The second colour, as a share of the first: calm enough for things on it to stand out.
 const WOOD_DARK: f32 = 0.70;
 const FABRIC_DARK: f32 = 0.75;
 const INK_DARK: f32 = 0.45;
 
 pub const CHECKER_PER_M: f32 = 2.0;
-/// Broad bands, fine lines, and how far a band strays along the grain.
+/// Broad bands, fine lines, and the displacement of a band along the grain.
 pub const BANDS_PER_M: f32 = 13.0;
 pub const LINES_PER_M: f32 = 41.0;
 pub const STRAY: f32 = 0.4;
 pub const THREADS_PER_M: f32 = 18.0;
-/// Lines of print and words in them; the gaps are parts of half a period, and words of the next line are set off.
+/// Lines of print and words in them; the gaps are shares of half a period, and words of the next line
+/// are shifted.
 pub const TEXT_PER_M: f32 = 48.0;
 pub const TEXT_GAP: f32 = 0.55;
 pub const WORDS_PER_M: f32 = 27.0;
@@ -42,7 +44,7 @@ pub const WORD_GAP: f32 = 0.3;
 pub const WORD_STRAY: f32 = 0.37;
 
 impl Pattern {
-    /// The pattern of a material, by its name.
+    /// Returns the pattern of a material, by its name.
     pub fn of(material: &str) -> Pattern {
         let has = |words: &[&str]| words.iter().any(|word| material.contains(word));
         match () {
@@ -53,7 +55,7 @@ impl Pattern {
         }
     }
 
-    /// Linear; the first colour is given.
+    /// Returns the second linear colour for a given first one.
     pub(in crate::render) fn second_rgb(self, linear_rgb: Vector) -> Vector {
         match self {
             Pattern::Plain => linear_rgb,
@@ -64,8 +66,8 @@ impl Pattern {
         }
     }
 
-    /// Takes a point of the world to the frame in which the pattern is told: a checker's is the world, all others' is the mesh's
-    /// with x along the grain.
+    /// Returns the map from the world to the frame of the pattern: for a checker it is the world, for
+    /// all others the mesh's with x along the grain.
     pub(in crate::render) fn frame(self, world_from_mesh: Pose, grain: usize) -> Affine {
         if let Pattern::Checker(_) = self {
             return Affine::IDENTITY;
@@ -78,7 +80,7 @@ impl Pattern {
         Affine([axis(0), axis(1), axis(2)])
     }
 
-    /// Shares of the second colour, from 0 to 1, at several points of [`Pattern::frame`].
+    /// Returns the shares of the second colour, from 0 to 1, at several points of [`Pattern::frame`].
     #[inline(always)]
     pub(in crate::render) fn shares<const N: usize>(self, points_m: [Lanes<N>; 3]) -> Lanes<N> {
         match self {
@@ -91,7 +93,8 @@ impl Pattern {
     }
 }
 
-/// Inlined to the last, or else it would not be compiled for wide registers.
+/// Applies a function to each point. It is fully inlined; otherwise it would not be compiled for wide
+/// registers.
 #[inline(always)]
 fn each<const N: usize>([x_m, y_m, z_m]: &[Lanes<N>; 3], share: impl Fn([f32; 3]) -> f32) -> Lanes<N> {
     lanes(
@@ -100,7 +103,7 @@ fn each<const N: usize>([x_m, y_m, z_m]: &[Lanes<N>; 3], share: impl Fn([f32; 3]
     )
 }
 
-/// 1 where the sum of two whole numbers is even.
+/// Returns 1 if the sum of two whole numbers is even.
 #[inline(always)]
 fn checker([x_m, y_m, _]: [f32; 3]) -> f32 {
     let half = 0.5 * (floor(x_m * CHECKER_PER_M) + floor(y_m * CHECKER_PER_M));
@@ -126,7 +129,7 @@ fn print([x_m, y_m, z_m]: [f32; 3]) -> f32 {
     if wave(line) > TEXT_GAP && word > WORD_GAP { 1.0 } else { 0.0 }
 }
 
-/// A wave that goes up and down between 0 and 1 with a period of 1.
+/// Returns a triangle wave between 0 and 1 with a period of 1.
 #[inline(always)]
 fn wave(value: f32) -> f32 {
     1.0 - 2.0 * (value - rounded(value)).abs()
@@ -137,7 +140,7 @@ fn floor(value: f32) -> f32 {
     rounded(value - 0.5)
 }
 
-/// The nearest whole number, if there are no more than four million: a sum has no digits left for parts.
+/// Returns the nearest whole number, up to four million: a larger sum has no digits left for fractions.
 #[inline(always)]
 fn rounded(value: f32) -> f32 {
     const NO_PARTS: f32 = (3 << 22) as f32;

@@ -1,4 +1,4 @@
-//! Puts scenes and objects into a world.
+//! Insertion of scenes and objects into a world.
 
 use rapier3d::math::Pose;
 
@@ -12,7 +12,7 @@ use crate::mechanism::{
 use crate::mjcf::{BodyLink, BodyTree, Document, Geom};
 use crate::owner::Owner;
 
-/// What a scene's file brings into a world.
+/// Content of a scene's file in a world.
 pub(in crate::world) struct Furniture {
     /// Geoms that do not move, world frame.
     pub fixed: Vec<Geom>,
@@ -20,8 +20,8 @@ pub(in crate::world) struct Furniture {
     pub machinery: Machinery,
 }
 
-/// Inserts a scene with its origin at `world_from_scene`: bodies that no joint moves are its room, the links of the others become
-/// objects. All begin as the key `start` has them, if there is one.
+/// Inserts a scene with its origin at `world_from_scene`. Bodies that no joint moves are its room, the
+/// links of the others become objects. All begin in the key `start`, if there is one.
 pub(in crate::world) fn insert_scene(
     dynamics: &mut Dynamics,
     scene: &Document,
@@ -48,7 +48,7 @@ pub(in crate::world) fn insert_scene(
         };
         placed.push(PlacedTree { tree, id });
     }
-    // Welds hold bodies as they are placed, whatever they begin with.
+    // Welds hold bodies in their placed poses, whatever their initial state.
     add_equalities(dynamics, scene, &placed, &world_from_file)?;
     let machinery = Machinery::of(scene, &placed)?;
     if let Some(start) = scene.keys()?.iter().find(|key| key.name == START) {
@@ -58,8 +58,8 @@ pub(in crate::world) fn insert_scene(
     Ok(Furniture { fixed, objects, machinery })
 }
 
-/// Inserts an object file: one top-level body, a mark if no joint moves it. The body has the placement's name, and the
-/// links on it have their own after it.
+/// Inserts an object file: one top-level body, which is a mark if no joint moves it. The body has the
+/// placement's name, and the links on it have their own after it.
 pub(in crate::world) fn insert_object(
     dynamics: &mut Dynamics,
     placement: &ObjectPlacement,
@@ -114,7 +114,7 @@ fn insert_moving(
     Ok(id)
 }
 
-/// Geoms of a link that does not move, in the frame of its file.
+/// Returns the geoms of a link that does not move, in the frame of its file.
 fn in_file(link: &BodyLink) -> impl Iterator<Item = Geom> {
     let file_from_link = rounded(&link.parent_from_link);
     link.geoms

@@ -1,4 +1,4 @@
-//! Objects: everything named in a world that is not a robot. One that has joints inside is an object per link.
+//! Objects: all named things in a world except robots. A file with inner joints gives one object per link.
 
 mod insert;
 mod model;
@@ -18,9 +18,9 @@ pub(super) use insert::{Furniture, insert_object, insert_scene};
 /// An object file put into the world.
 #[derive(Clone, Debug)]
 pub struct ObjectPlacement {
-    /// What tasks call it.
+    /// Name of the object in tasks.
     pub name: String,
-    /// Several objects may share one.
+    /// The object's file; several objects may share one.
     pub file: ObjectFile,
     pub world_from_object: Pose,
 }
@@ -33,15 +33,15 @@ pub struct ObjectState {
     pub angular_velocity_rad_s: Vector,
 }
 
-/// Something named that is not a robot: a link that moves, or a mark that only is looked at.
+/// A named thing that is not a robot: a link that moves, or a mark that is only looked at.
 pub(super) struct Object {
-    /// What tasks call it.
+    /// Name of the object in tasks.
     pub name: String,
     pub model: ObjectModel,
     pub link: Option<LinkId>,
     /// Name of a link's joint in its file.
     pub joint: Option<String>,
-    /// Where a mark lies; a link's pose is that of dynamics.
+    /// Pose of a mark; a link's pose is that of dynamics.
     pub world_from_mark: Pose,
 }
 

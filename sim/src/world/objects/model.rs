@@ -1,4 +1,4 @@
-//! What an object's file says of it, whichever world it is put into.
+//! The model of an object from its file, independent of the world that it is put into.
 
 use rapier3d::math::{Pose, Vector};
 
@@ -6,12 +6,12 @@ use crate::mechanism::{Solid, rounded};
 use crate::mjcf::{BodyLink, BodyTree, Document, Geom, LinkJoint, Site};
 use crate::{SimError, assets};
 
-/// Where an object comes from.
+/// Source of an object.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ObjectFile {
-    /// A file that the binary carries, by its name in `assets/objects`.
+    /// A file embedded in the binary, by its name in `assets/objects`.
     Embedded(String),
-    /// MJCF that names no other files, and what messages call it.
+    /// MJCF that refers to no other files, and its name in messages.
     Text { name: String, mjcf: String },
 }
 
@@ -21,31 +21,35 @@ impl From<&str> for ObjectFile {
     }
 }
 
-/// A rigid body of a file as tasks and pictures see it, in its own frame.
+/// A rigid body of a file for tasks and images, in its own frame.
 #[derive(Clone, Debug)]
 pub struct ObjectModel {
     /// Name of the body in its file.
     pub name: String,
     pub geoms: Vec<Geom>,
     pub sites: Vec<Site>,
-    /// Of this body alone, without the parts that move on it.
+    /// Mass of this body alone, without the parts that move on it.
     pub mass_kg: f32,
     solid: Solid,
 }
 
-/// A rigid part of an object, as the file has it with every joint at 0.
+/// A rigid part of an object, in the file's pose with every joint at 0.
 #[derive(Clone, Debug)]
 pub struct ObjectPart {
-    /// What it is called in a world.
+    /// Name of the part in a world.
     pub name: String,
-    /// The object's frame is that of its first part.
+    /// Pose in the object's frame, which is that of its first part.
     pub object_from_part: Pose,
     pub model: ObjectModel,
 }
 
 impl ObjectModel {
-    /// Reads what an object's file becomes in a world where it is called `name`, without a world: a scorer needs sites and
-    /// shapes alone. The object itself is first, then come the parts that move on it.
+    /// Reads the parts that a file has in a world under `name`, without building a world (for scorers).
+    /// The object itself is first, then come the parts that move on it.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the file is not an object's.
     pub fn parts(file: &ObjectFile, name: &str) -> Result<Vec<ObjectPart>, SimError> {
         let (_, tree) = ObjectModel::read(file)?;
         let mut parts: Vec<ObjectPart> = Vec::with_capacity(tree.links.len());
@@ -64,24 +68,23 @@ impl ObjectModel {
         self.sites.iter().find(|site| site.name == name)
     }
 
-    /// How far what collides of the object reaches along a direction of the world, a unit vector, from the world's origin, with
-    /// the object at `world_from_object`.
+    /// Returns the extent of the colliding shapes along a unit vector from the origin, both of the world.
     pub fn reach_m(&self, world_from_object: &Pose, direction: Vector) -> f32 {
         self.solid.reach_m(world_from_object, direction)
     }
 
-    /// Height above the floor of the lowest point of what collides, with the object at `world_from_object`.
+    /// Returns the height above the floor of the lowest point of the colliding shapes.
     pub fn lowest_m(&self, world_from_object: &Pose) -> f32 {
         -self.reach_m(world_from_object, Vector::NEG_Z)
     }
 
-    /// Whether a point of the object's frame lies in the open between walls and over a floor: whichever way one looks from
-    /// there, level in the object's own frame or down, one sees the object.
+    /// Returns true if a point (object's frame) is in the open, but between walls and over a floor: every ray
+    /// from it that is level in the object's own frame, or goes down, hits the object.
     pub fn encloses(&self, point_m: Vector) -> bool {
         self.solid.encloses(point_m)
     }
 
-    /// An object's file, and the one body that lies directly in its world with all that is on it.
+    /// Reads an object's file. Returns the document, and its one top-level body with everything on it.
     pub(super) fn read(file: &ObjectFile) -> Result<(Document, BodyTree), SimError> {
         let document = match file {
             ObjectFile::Embedded(name) => Document::parse(name, assets::object(name)?)?,
@@ -120,7 +123,7 @@ impl ObjectModel {
     }
 }
 
-/// What a part of an object is called: as the object, or with its own name after the object's.
+/// Returns the name of a part: that of the object, or its own name after the object's.
 pub(super) fn part_name(object: &str, link: &BodyLink) -> String {
     match link.parent {
         None => object.into(),

@@ -1,5 +1,5 @@
-//! Objects against what is said of them: sites lie on shapes or in the open, and what robots carry is as large and as heavy as its page
-//! says.
+//! Objects against their documentation: sites are on shapes or in the open, and objects that robots
+//! carry have the documented size and mass.
 
 use rapier3d::math::Vector;
 use rapier3d::parry::bounding_volume::BoundingVolume as _;
@@ -8,7 +8,7 @@ use super::ObjectModel;
 use crate::assets;
 use crate::mjcf::Site;
 
-/// Distance from a point of an object to its nearest shape; 0 inside one.
+/// Returns the distance from a point of an object to its nearest shape; 0 inside one.
 fn clearance_m(model: &ObjectModel, point_m: Vector) -> f32 {
     let shapes = model.geoms.iter().filter(|geom| geom.collides).filter_map(|geom| geom.collider());
     shapes.map(|(pose, shape)| shape.distance_to_point(&pose, point_m, true)).fold(f32::INFINITY, f32::min)
@@ -25,7 +25,7 @@ fn site<'a>(model: &'a ObjectModel, name: &str) -> &'a Site {
 
 #[test]
 fn sites_lie_on_the_shapes_or_in_the_open() {
-    // How far the nearest shape is, at least and at most; on a surface to rounding.
+    // Minimum and maximum distance to the nearest shape; on a surface up to rounding.
     const SOLID_M: [f32; 2] = [0.0, 1e-6];
     for (name, sites, [low_m, high_m]) in [
         ("bottle", &["grip_low", "grip_high"][..], SOLID_M),
@@ -40,12 +40,12 @@ fn sites_lie_on_the_shapes_or_in_the_open() {
         ("service_trolley", &["left", "right", "ring"], SOLID_M),
         ("wall_peg", &["root", "tip"], SOLID_M),
         ("cup", &["lip"], [0.0, 0.003]),
-        // The axes of vessels, as far from the wall as they are wide inside.
+        // Axes of vessels: the distance to the wall is the inner radius.
         ("cup", &["grip"], [0.030, 0.035]),
         ("glass", &["grip"], [0.028, 0.033]),
         ("glass", &["mouth"], [0.040, 0.047]),
         ("crate", &["inside"], [0.08, 0.09]),
-        // A hole of 60 mm less what the chords of its ring cut off.
+        // A hole of 60 mm minus the part that the chords of its ring cut off.
         ("frame", &["loop"], [0.028, 0.030]),
     ] {
         let model = object(name);
@@ -59,7 +59,7 @@ fn sites_lie_on_the_shapes_or_in_the_open() {
 
 #[test]
 fn regions_have_the_extent_of_what_they_stand_for() {
-    // The corners of the room in the crate touch its walls and its floor, from within.
+    // The corners of the region in the crate touch its walls and its floor, from within.
     let model = object("crate");
     let [low_m, high_m] = site(&model, "inside").corners_m();
     for outwards in [Vector::NEG_X, Vector::X, Vector::NEG_Y, Vector::Y] {
@@ -89,8 +89,8 @@ fn feet_are_as_wide_as_the_legs_that_stand_on_them() {
 
 #[test]
 fn vessels_enclose_what_is_between_their_walls() {
-    // The glass widens from 29.2 mm on its floor over 32.0 mm below its flared mouth to 49.0 mm at the rim, the cup from
-    // 27 mm to 37 mm.
+    // The glass widens from 29.2 mm on its floor over 32.0 mm below its flared mouth to 49.0 mm at the
+    // rim, the cup from 27 mm to 37 mm.
     for (name, height_m, radius_m) in [
         ("glass", 0.009, 0.0292),
         ("glass", 0.050, 0.0305),
@@ -102,7 +102,7 @@ fn vessels_enclose_what_is_between_their_walls() {
     ] {
         let model = object(name);
         for heading_rad in [0.0, 1.0, 2.5, 4.0] {
-            // Twelve staves: between two of them the wall is up to 3.5 % further off.
+            // There are twelve staves: between two of them the wall is up to 3.5 % further away.
             let at_m = |share: f32| {
                 let across_m = radius_m * share;
                 Vector::new(across_m * f32::cos(heading_rad), across_m * f32::sin(heading_rad), height_m)
@@ -133,7 +133,8 @@ fn the_lowest_point_is_that_of_the_shape_as_it_lies() {
     }
 }
 
-/// What several robots carry, or one with both hands: how far it reaches along each axis, rims and all, and its mass.
+/// Objects that several robots carry, or one with both hands: their extent along each axis, rims
+/// included, and their mass.
 const CARRIED: [(&str, [f32; 3], f32); 5] = [
     ("round_table", [0.80, 0.80, 0.74], 3.55),
     ("office_table", [0.90, 0.60, 0.74], 3.4),
@@ -154,7 +155,7 @@ fn carried_objects_are_held_by_what_they_have() {
         for added in ["rail", "handle", "bar", "apron"] {
             assert!(!names.iter().any(|name| name.contains(added)), "{name} has a {added}: {names:?}");
         }
-        // Nothing sticks out, whatever it is called, and whether it collides or not.
+        // Nothing sticks out, whatever its name, and whether it collides or not.
         let model = object(name);
         let shapes = model.geoms.iter().filter_map(|geom| geom.collider());
         let bounds =

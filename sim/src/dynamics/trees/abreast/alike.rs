@@ -1,4 +1,4 @@
-//! Trees that are alike: their mass matrices are factorised side by side, and their velocities whitened.
+//! Trees of one layout: their mass matrices are factorised side by side, and their velocities whitened.
 
 use std::array::from_fn;
 
@@ -9,12 +9,12 @@ use crate::dynamics::trees::tree::Tree;
 
 /// Trees of one layout, at most as many as there are lanes.
 pub struct Alike {
-    /// Their numbers among all.
+    /// Indices of the trees among all.
     pub trees: Vec<usize>,
-    /// As `factor` has them: L, whose packed rows are first those of M, and D^-1/2.
+    /// The factors as in `factor`: L, whose packed rows are first those of M, and D^-1/2.
     l: Vec<Abreast>,
     inverse_root_d: Vec<Abreast>,
-    /// Velocities and right-hand sides that are being whitened.
+    /// Velocities and right-hand sides during whitening.
     v: Vec<Abreast>,
     rhs: Vec<Abreast>,
 }
@@ -24,13 +24,13 @@ impl Alike {
         Alike { trees: vec![tree], l: vec![], inverse_root_d: vec![], v: vec![], rhs: vec![] }
     }
 
-    /// What the trees have in common.
+    /// Returns the layout that the trees share.
     pub fn layout<'a>(&self, trees: &'a Trees) -> &'a Layout {
         &trees.all[self.trees[0]].layout
     }
 
-    /// Sets lanes to the numbers of the trees. Those without a tree have the first one's, so that nothing in them is out of the
-    /// ordinary.
+    /// Fills the lanes with the numbers of the trees. Lanes without a tree get those of the first tree,
+    /// which keeps their values ordinary.
     #[inline(always)]
     fn gather<'a>(&self, of: impl Fn(usize) -> &'a [f64], lanes: &mut Vec<Abreast>) {
         let first = of(self.trees[0]);
@@ -40,19 +40,19 @@ impl Alike {
         lanes.extend((0..first.len()).map(|at| Abreast(from_fn(|lane| sources[lane][at]))));
     }
 
-    /// Sets the numbers of the tree in this lane.
+    /// Copies out the numbers of the tree in this lane.
     #[inline(always)]
     fn scatter(lanes: &[Abreast], lane: usize, to: &mut [f64]) {
         to.iter_mut().zip(lanes).for_each(|(to, from)| *to = from.0[lane]);
     }
 
-    /// Takes the trees' velocities out of those of all.
+    /// Gathers the trees' velocities from those of all trees.
     #[inline(always)]
     pub fn load(&self, trees: &Trees, w: &[f64], lanes: &mut Vec<Abreast>) {
         self.gather(|tree| &w[trees.offset[tree]..][..trees.all[tree].dofs()], lanes);
     }
 
-    /// Puts them back.
+    /// Writes the trees' velocities back.
     #[inline(always)]
     pub fn store(&self, offset: &[usize], lanes: &[Abreast], w: &mut [f64]) {
         for (lane, tree) in self.trees.iter().enumerate() {
@@ -60,8 +60,8 @@ impl Alike {
         }
     }
 
-    /// Factorises the mass matrices of the trees, and sets `w` to their whitened velocities at the end of a step without constraints:
-    /// what `factor` does for one tree, lane by lane.
+    /// Factorises the mass matrices of the trees, and sets `w` to their whitened velocities at the end
+    /// of an unconstrained step. It does lane by lane what `factor` does for one tree.
     #[inline(always)]
     pub fn whiten(&mut self, all: &mut [Tree], offset: &[usize], dt_s: f64, w: &mut [f64]) {
         let [mut l, mut v, mut rhs] = [&mut self.l, &mut self.v, &mut self.rhs].map(std::mem::take);
@@ -116,13 +116,13 @@ impl Alike {
                 lv += *l * self.v[j];
             }
             let inverse_root_d = self.inverse_root_d[k];
-            // Nothing that comes asks for this velocity any more: only degrees of freedom further out have it on their paths.
+            // This velocity is not needed again: only degrees of freedom further out have it on their paths.
             self.v[k] = lv.with(inverse_root_d, |lv, inverse_root_d| lv / inverse_root_d)
                 + force * dt_s * inverse_root_d;
         }
     }
 
-    /// v = L^-1 D^-1/2 w, lane by lane.
+    /// Computes v = L^-1 D^-1/2 w, lane by lane.
     #[inline(always)]
     pub fn unwhiten(&mut self, trees: &[Tree], offset: &[usize], w: &[f64], v: &mut [f64]) {
         let mut lanes = std::mem::take(&mut self.v);
@@ -141,7 +141,8 @@ impl Alike {
         self.v = lanes;
     }
 
-    /// Y = D^-1/2 L^-T e_k, the whitened row of degree of freedom `k` alone, on its path. Appends it; returns Y . Y.
+    /// Appends Y = D^-1/2 L^-T e_k, the whitened row of degree of freedom `k` alone, on its path.
+    /// Returns Y . Y.
     #[inline(always)]
     pub fn push_unit_row(&self, layout: &Layout, k: usize, all: &mut Vec<Abreast>) -> Abreast {
         let path = layout.path(k);

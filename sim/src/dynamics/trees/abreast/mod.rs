@@ -1,5 +1,6 @@
-//! Trees of one layout side by side, as robots of one model are: each has a lane of a vector, and what is done to one is done to all.
-//! Lanes have no part in each other, and add and multiply as single numbers do, bit for bit.
+//! Trees of one layout side by side, for example robots of one model. Each has a lane of a vector, and
+//! every operation acts on all lanes. Lanes are independent, and add and multiply exactly as scalars do,
+//! bit for bit.
 
 mod alike;
 
@@ -9,7 +10,7 @@ use std::ops::{Add, AddAssign, Mul, Sub};
 pub use alike::Alike;
 
 pub const ABREAST: usize = 4;
-/// Sums over every fourth column grow independently of each other, as in `rows`.
+/// Number of independent partial sums, each over every fourth column, as in `rows`.
 const SIDE: usize = 4;
 
 /// One number of each tree.
@@ -17,7 +18,7 @@ const SIDE: usize = 4;
 #[repr(align(32))]
 pub struct Abreast(pub [f64; ABREAST]);
 
-/// Rows of one degree of freedom side by side: their columns that are not zero, and Y in them.
+/// Rows of one degree of freedom side by side: their non-zero columns, and Y in them.
 pub struct AbreastRow<'a> {
     pub column: &'a [u16],
     pub y: &'a [Abreast],
@@ -32,7 +33,8 @@ impl Abreast {
         Abreast(from_fn(|lane| of(self.0[lane], other.0[lane])))
     }
 
-    /// All bits where it is so, and none elsewhere: a mask, which stays in a vector.
+    /// Returns a mask that stays in a vector: all bits set in lanes where the condition holds, none
+    /// elsewhere.
     #[inline(always)]
     pub fn mask(self, other: Abreast, is: impl Fn(f64, f64) -> bool) -> Abreast {
         self.with(other, |a, b| f64::from_bits(if is(a, b) { u64::MAX } else { 0 }))
@@ -48,13 +50,13 @@ impl Abreast {
         self.with(other, |a, b| f64::from_bits(a.to_bits() | b.to_bits()))
     }
 
-    /// Whether a bit of one of the numbers is set.
+    /// Returns true if a bit of one of the numbers is set.
     #[inline(always)]
     pub fn any(self) -> bool {
         self.0.iter().fold(0, |bits, number| bits | number.to_bits()) != 0
     }
 
-    /// Whether all bits of all numbers are set.
+    /// Returns true if all bits of all numbers are set.
     #[inline(always)]
     pub fn all(self) -> bool {
         self.0.iter().fold(u64::MAX, |bits, number| bits & number.to_bits()) == u64::MAX
@@ -96,7 +98,7 @@ impl AddAssign for Abreast {
 }
 
 impl AbreastRow<'_> {
-    /// Velocities along the rows.
+    /// Returns the velocities along the rows.
     #[inline(always)]
     pub fn velocity(&self, w: &[Abreast]) -> Abreast {
         let mut sums = [Abreast::ZERO; SIDE];
@@ -113,7 +115,8 @@ impl AbreastRow<'_> {
         sums[0] + sums[1] + sums[2] + sums[3]
     }
 
-    /// Adds impulses where the mask says that they act; elsewhere velocities stay what they are, the sign of a zero included.
+    /// Adds impulses in the lanes of the mask. Velocities of other lanes are unchanged, including the
+    /// sign of a zero.
     #[inline(always)]
     pub fn push_impulse(&self, impulse: Abreast, acts: Abreast, w: &mut [Abreast]) {
         let impulse = impulse.and(acts);

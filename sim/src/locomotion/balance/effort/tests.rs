@@ -14,7 +14,8 @@ fn solve(body: &BodyEstimate, motion: &WantedMotion, pressure_m: Vector, foot: O
     leg_torques_within_limits(body, &load, motion, &GroundContact { pressure_m: flat(pressure_m), foot })
 }
 
-/// On one foot under the centre of mass: each joint of that leg holds up all that is above it, and the other leg hangs.
+/// The robot stands on one foot under the centre of mass. Each joint of that leg carries everything
+/// above it, and the other leg hangs.
 #[test]
 fn one_leg_holds_the_rest_of_the_robot() {
     let body = Posed::standing().body();
@@ -25,7 +26,7 @@ fn one_leg_holds_the_rest_of_the_robot() {
         let hanging_n_m = gravity_n_m[LEGS[Side::Right] + i];
         assert!((torques.torque_n_m[Side::Right][i] - hanging_n_m).abs() < 0.02);
 
-        // The links from this joint down to the foot follow each other in the file.
+        // The links from this joint down to the foot are adjacent in the file.
         let joint = LEGS[Side::Left] + i;
         let below = body.model.joints[joint].link..=body.model.joints[LEGS[Side::Left] + 5].link;
         let (origin_m, axis) = body.joint_axis(joint);
@@ -40,14 +41,15 @@ fn one_leg_holds_the_rest_of_the_robot() {
     }
 }
 
-/// The linear inverted pendulum: a pressure that is off by d accelerates by g d / h, away from it.
+/// The linear inverted pendulum: a centre of pressure that is off by d accelerates the robot by g d / h,
+/// away from it.
 #[test]
 fn the_robot_falls_away_from_the_pressure() {
     let body = Posed::standing().body();
     for away_m in [Vector::new(0.04, 0.0, 0.0), Vector::new(-0.03, 0.02, 0.0)] {
         let acceleration_m_s2 = solve(&body, &STILL, body.com_m - away_m, None).acceleration_m_s2;
         let expected_m_s2 = away_m * (GRAVITY_M_S2 / body.com_m.z);
-        // Legs that stand move less than the trunk: a little slower than a point mass.
+        // The stance legs move less than the trunk, so the robot accelerates a little less than a point mass.
         let part = acceleration_m_s2.length() / expected_m_s2.length();
         assert!((0.8..1.0).contains(&part), "{acceleration_m_s2}, not {expected_m_s2}");
         let across = acceleration_m_s2.cross(expected_m_s2).length() / expected_m_s2.length();
@@ -79,8 +81,8 @@ fn torques_ease_off_rather_than_saturate() {
     assert!((most_used(&eased) - EFFORT_USED).abs() < 1e-3, "eased, it uses {}", most_used(&eased));
 }
 
-/// What the ground gives is found again from the torques against it, but for the damping, which leaves little of what goes
-/// along a straight leg.
+/// The ground force is recovered from the torques against it, except for the damping, which removes much
+/// of a force along a straight leg.
 #[test]
 fn a_ground_force_is_recovered() {
     let body = Posed::standing().body();

@@ -7,7 +7,7 @@ use crate::body::BodyScale;
 const DT_S: f32 = 1.0 / 200.0;
 const RATE_1_S: f32 = 3.75;
 
-/// The linear inverted pendulum on feet that are planned here:
+/// The linear inverted pendulum on planned feet:
 ///   x' = w (xi - x),   xi' = w (xi - p).
 struct Pendulum {
     com_m: Vector,
@@ -18,7 +18,7 @@ struct Pendulum {
 }
 
 impl Pendulum {
-    /// In the middle of stepping in place, as a steady gait is when its foot lands.
+    /// Creates a pendulum in the middle of stepping in place, at the landing of a steady gait.
     fn stepping() -> Pendulum {
         let gait = Gait::new(&BodyScale::G1, RATE_1_S, Vector::ZERO, Vector::Y);
         let stance_m = Vector::ZERO;
@@ -31,7 +31,7 @@ impl Pendulum {
         }
     }
 
-    /// One step, until the foot is down.
+    /// Runs one step, until the foot is down.
     fn step(&mut self, velocity_m_s: Vector) {
         let foot = |sole_m: Vector| Pose::from_translation(sole_m - BodyScale::G1.sole_in_foot_m);
         let outside = Vector::Y * self.stance.sign();
@@ -62,7 +62,7 @@ impl Pendulum {
         self.stance = self.stance.other();
     }
 
-    /// The velocity over two steps.
+    /// Returns the mean velocity over two steps.
     fn velocity_m_s(&mut self, command_m_s: Vector) -> Vector {
         let before_m = self.com_m;
         self.step(command_m_s);
@@ -71,7 +71,7 @@ impl Pendulum {
     }
 }
 
-/// However it is pushed, within what feet reach, it steps in place again.
+/// After any push within the reach of the feet it steps in place again.
 #[test]
 fn steps_bring_a_pushed_pendulum_to_rest() {
     for (x, y) in [(0.0, 0.0), (0.12, 0.0), (-0.1, 0.0), (0.05, 0.04), (-0.05, -0.04)] {

@@ -1,4 +1,4 @@
-//! How two feet share a force, and what a leg's torques do.
+//! Sharing of a force between two feet, and the effect of a leg's torques.
 
 use rapier3d::math::Rotation;
 
@@ -8,7 +8,7 @@ use crate::body::posed::Posed;
 const COM_M: Vector = Vector::new(0.02, 0.01, 0.7);
 const FORCE_N: Vector = Vector::new(8.0, -5.0, 330.0);
 
-/// Feet 24 cm apart, the left one a little ahead and turned out.
+/// Returns feet 24 cm apart, the left one a little ahead and turned out.
 fn soles() -> Sides<Pose> {
     Sides {
         left: Pose::from_parts(Vector::new(0.05, 0.12, 0.0), Rotation::from_rotation_z(0.2)),
@@ -16,7 +16,7 @@ fn soles() -> Sides<Pose> {
     }
 }
 
-/// Moment about the centre of mass for which the force acts at `pressure_m` on the ground.
+/// Returns the moment about the centre of mass for which the force acts at `pressure_m` on the ground.
 fn moment_n_m(pressure_m: Vector) -> Vector {
     (pressure_m - COM_M).cross(FORCE_N)
 }
@@ -58,7 +58,8 @@ fn pressure_stays_under_the_feet() {
     }
 }
 
-/// A moment that would tip the feet costs horizontal force, and only as much as brings the pressure back under them.
+/// A moment that would tip the feet costs horizontal force, and only as much as brings the pressure back
+/// under them.
 #[test]
 fn tipping_moments_cost_horizontal_force() {
     let pressure_m = Vector::new(0.3, 0.0, 0.0);

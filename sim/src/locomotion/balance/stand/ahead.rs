@@ -1,11 +1,13 @@
-//! Whether a robot that stands leans ahead of pulls: against what a pull that grows will be, before it is there.
+//! Leaning ahead of pulls: a standing robot leans against the predicted size of a growing pull before it
+//! is reached.
 //!
-//! A pull from the world is there whatever the robot does. What its hands hold may answer to the lean: of two robots that hold
-//! one load each feels the other's lean as a pull that grows. If both lean away by x, a load of the stiffness k between them
-//! pulls with 2 k x at the height z, and against that both lean by  2 k x z / (m g),  which is more than x from
-//! k = 200 N/m on; a lead makes that gain greater still. And what a hand meets of its own motion, a counter or the wall of a bin,
-//! pushes back: the robot would lean into it and the hand slide away. So a robot leans ahead with hands that are still and empty
-//! and met nothing.
+//! A pull from the world does not depend on the robot's motion. A held object may react to the lean: of
+//! two robots that hold one load, each feels the other's lean as a growing pull. If both lean away by x,
+//! a load of the stiffness k between them pulls with 2 k x at the height z. Against that both lean by
+//! 2 k x z / (m g),  which is more than x from k = 200 N/m on; a lead increases that gain further. If a
+//! hand meets an obstacle by its own motion, such as a counter or the wall of a bin, the obstacle pushes
+//! back: the robot would lean into it and the hand slide away. So a robot leans ahead only with hands
+//! that are still, empty and free of contact.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,22 +16,22 @@ use crate::locomotion::BaseCommand;
 
 const BEGINS_1_S: f32 = 1.0;
 const ENDS_1_S: f32 = 5.0;
-/// A robot told to stand lower bends down to something.
+/// Pelvis height below which a command means bending down to something.
 const LOWEST_M: f32 = 0.70;
-/// Arms and fingers come to rest so long after they were last told to move.
+/// Time after the last command until arms and fingers have come to rest.
 const STILL_S: f32 = 0.5;
-/// A hand that feels so much before has met something, until it feels no more than so little.
+/// Force (N) from which on a moving hand has met something, and (`LEFT_N`) down to which this remains so.
 const MET_N: f32 = 8.0;
 const LEFT_N: f32 = 6.0;
 
-/// How much a robot leans ahead of pulls, 0 to 1; see the module's text.
+/// Degree to which a robot leans ahead of pulls, 0 to 1; see the module's text.
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub(in crate::locomotion::balance) struct Ahead {
     share: f32,
     free: bool,
-    /// Since arms and fingers were last told to move.
+    /// Time since arms and fingers were last commanded to move.
     still_s: f32,
-    /// A hand has met something of its own motion.
+    /// True if a hand has met something by its own motion.
     met: bool,
 }
 
@@ -38,7 +40,7 @@ impl Ahead {
         self.share
     }
 
-    /// The hands are still and empty, they have met nothing, and the robot is not to bend down.
+    /// Returns true if the hands are still, empty and free of contact, and the robot is not to bend down.
     pub(in crate::locomotion::balance) fn is_free(&self) -> bool {
         self.free
     }
@@ -71,11 +73,11 @@ mod tests {
 
     const DT_S: f32 = 1.0 / 200.0;
     const UPRIGHT_M: f32 = 0.76;
-    /// Until arms that are still count as still, and the robot leans ahead as far as it does.
+    /// Time until still arms count as still and the robot leans ahead fully.
     const BEGUN_S: f32 = STILL_S + 1.1 / BEGINS_1_S;
 
     impl Ahead {
-        /// What is left of leaning ahead after so long with this body.
+        /// Returns the share of leaning ahead after this time with this body.
         fn share_after(&mut self, body: &BodyEstimate, height_m: f32, seconds: f32) -> f32 {
             for _ in 0..(seconds / DT_S) as usize {
                 self.update(body, &BaseCommand::standing(height_m), DT_S);

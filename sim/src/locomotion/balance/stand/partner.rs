@@ -1,17 +1,19 @@
-//! Tells what a partner does through a shared load from what the world does.
+//! Separation of a partner's pull through a shared load from forces of the world.
 //!
-//! Robots that hold one load are joined by a spring: arms and a table have some 1000 N/m. Each comes to rest over its feet to a
-//! centimetre or two, which is 20 to 30 N between them, and the observer takes that for a push. A robot that feeds it
-//! forward, leans against it and counts it in whether its stance is lost holds its own place to the millimetre, and so does its
-//! partner: two integrators at the ends of one spring. 27 N at the hands move the balance point by 7 cm, so robots at rest
-//! stepped out of a stance that nothing threatened, pulled each other while they stepped, and came to rest elsewhere, without
-//! end. Two robots that step and lean against each other with all of the force are even in equilibrium at any force.
+//! Robots that hold one load are joined by a spring: arms and a table have some 1000 N/m. Each comes to rest
+//! over its feet to a centimetre or two, which is 20 to 30 N between them, and the observer takes that for a
+//! push. A robot may feed this force forward, lean against it and count it as a loss of stance. It then holds
+//! its own place to the millimetre, and so does its partner: two integrators at the ends of one spring. 27 N
+//! at the hands move the balance point by 7 cm. So robots at rest stepped out of a stance that nothing
+//! threatened, pulled each other while they stepped, and came to rest elsewhere, without end. Two robots that
+//! step and lean against each other with all of the force are even in equilibrium at any force.
 //!
-//! So a robot whose fingers press on something takes the part of the push that its hands feel for a partner's. It stands against
-//! that on the stiffness of its pelvis alone, and steps as if it were not there, which lets the force decay. The
-//! part that hands do not feel, a shove at the chest for example, is withstood as ever, but for what friction and moving arms
-//! leave unexplained. What pulls hands harder than feet can hold is the world's, and is withstood, too. Whether both fingers and thumb
-//! press is not asked: hands that hook round a table's leg press with one of them.
+//! So a robot whose fingers press on something attributes the part of the push that its hands feel to a
+//! partner. It resists that part with the stiffness of its pelvis alone, and steps as if it were absent,
+//! which lets the force decay. The part that hands do not feel, for example a shove at the chest, is
+//! withstood as before, except for the share that friction and moving arms leave unexplained. A pull on
+//! the hands beyond what feet can hold is the world's, and is withstood, too. It is not required that
+//! both fingers and thumb press: hands that hook round a table's leg press with one of them.
 
 use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
@@ -21,34 +23,36 @@ use crate::body::BodyEstimate;
 use crate::plane::flat;
 
 const BEGINS_1_S: f32 = 2.0;
-/// Fingers that slip on an edge press again within a moment.
+/// Rate at which a hold ends: fingers that slip on an edge press again within a moment.
 const ENDS_1_S: f32 = 1.0;
-/// A pull above this, 38 N on a G1, for this long is the world's, until it is half of that.
+/// Pull (38 N on a G1) and its duration from which on it is the world's, and the share of that pull down
+/// to which it remains so.
 const STRONG_M_S2: f32 = 1.1;
 const STRONG_S: f32 = 0.1;
 const STILL_STRONG: f32 = 0.5;
 const WITHSTANDS_1_S: f32 = 5.0;
 const GIVES_WAY_1_S: f32 = 1.0;
-/// The force estimate of a stretched arm is a quarter too small, and slower than the observer.
+/// Factor and offset on the felt force: the estimate for a stretched arm is a quarter too small, and
+/// slower than the observer.
 const EXPLAINED_SHARE: f32 = 1.3;
 const EXPLAINED_M_S2: f32 = 0.2;
-/// Unexplained pushes below this are the estimate's errors while something is held: 17 N on a G1.
+/// Unexplained push that counts as an error of the estimate while something is held: 17 N on a G1.
 const UNEXPLAINED_M_S2: f32 = 0.5;
 
-/// Estimate of how much a robot gives way; see the module's text.
+/// Estimate of how far a robot yields; see the module's text.
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub(in crate::locomotion::balance) struct Partner {
-    /// Whether fingers press on something, 0 to 1.
+    /// Degree to which fingers press on something, 0 to 1.
     hold_share: f32,
     /// Time for which the pull has been strong.
     strong_s: f32,
     strong: bool,
-    /// Whether the pull is the world's, 0 to 1.
+    /// Degree to which the pull is the world's, 0 to 1.
     world_share: f32,
 }
 
 impl Partner {
-    /// Takes apart the push that was observed in one physics step on a robot that weighs `mass_kg` with its load.
+    /// Splits the push observed in one physics step on a robot of `mass_kg`, load included.
     pub(in crate::locomotion::balance) fn split(
         &mut self,
         body: &BodyEstimate,
@@ -83,7 +87,8 @@ impl Partner {
     }
 }
 
-/// Returns the part of a push that comes through the hands: along what they feel, and not much more than that.
+/// Returns the part of a push that comes through the hands: along the felt force, and not much more than
+/// that.
 fn explained_m_s2(push_m_s2: Vector, felt_m_s2: Vector) -> Vector {
     let along = felt_m_s2.normalize_or_zero();
     let most_m_s2 = felt_m_s2.length() * EXPLAINED_SHARE + EXPLAINED_M_S2;

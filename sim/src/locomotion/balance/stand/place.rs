@@ -9,28 +9,30 @@ use crate::body::{BodyEstimate, BodyScale, LEG_JOINTS, LEGS};
 use crate::locomotion::BaseVelocity;
 use crate::plane::flat;
 
-/// A robot that stood and was pushed out of its stance steps back to where it stood: farther than the leash it does not come
-/// back, nearer than this it is back.
+/// Distances for a robot that was pushed out of its stance and steps back to it. Beyond the leash it
+/// does not come back; within the second distance it is back.
 const LEASH_M: f32 = 1.0;
 const BACK_M: f32 = 0.04;
 const RETURN_1_S: f32 = 1.0;
 const RETURN_M_S: f32 = 0.15;
 
-/// A robot that stops coasts for this long at the speed that it has.
+/// Time for which a stopping robot coasts at its present speed.
 const COASTS_S: f32 = 0.2;
-/// A robot that was told to move for no longer than this steps on until its feet are near to where commands took it, or for a while.
-/// One that walks farther corrects its commands by what it sees: it stops as soon as it can.
+/// Maximum duration of a short move. After one, the robot steps on until its feet are near its commanded
+/// place, or for a while. In a longer walk the caller corrects the commands by observation, so the robot
+/// stops as soon as it can.
 const MOVED_SHORT_S: f32 = 2.5;
-/// From then on what a robot stays behind its command, or is ahead of it, is forgotten in this time; beyond the leash it is at once.
+/// Time in which a longer walk forgets the robot's lag or lead on its command; beyond the leash it is
+/// forgotten at once.
 const FORGETS_S: f32 = 4.0;
 const MOVED_LEASH_M: f32 = 0.25;
 const MOVED_NEAR_M: f32 = 0.012;
 const MOVED_LONGEST_S: f32 = 0.4;
 const MOVED_RETURN_1_S: f32 = 2.0;
 const MOVED_RETURN_M_S: f32 = 0.2;
-/// The pelvis of a robot that has stopped so makes up for as much of what its feet are off.
+/// Maximum shift of the pelvis that compensates the position error of the feet after such a stop.
 const MOVED_SHIFT_M: f32 = 0.04;
-/// That of one that holds something with partners makes up for less.
+/// The same for a robot that holds something with partners.
 const HELD_SHIFT_M: f32 = 0.02;
 
 /// Middle of the soles and heading of a robot that stands, or of one that stops where commands have taken it.
@@ -41,13 +43,14 @@ pub(in crate::locomotion::balance) struct StandingPlace {
     moved: Option<MovedPlace>,
 }
 
-/// What is known of a place that commands move.
+/// State of a place that commands move.
 #[derive(Clone, Copy, Serialize, Deserialize)]
 struct MovedPlace {
-    /// Pelvis over the centre of mass of the robot, with what it carries, once it stands with its arms as
-    /// they are; heading frame.
+    /// Pelvis over the centre of mass of the robot, loads included, once it stands with its present arm
+    /// posture; heading frame.
     rest_m: Vector,
-    /// What its legs added to the way from the pelvis to the centre of mass as it last stood, heading frame.
+    /// Contribution of the legs to the offset from the pelvis to the centre of mass in the last stance,
+    /// heading frame.
     standing_legs_m: Vector,
     /// Time for which commands have moved it, and time since they ended.
     told_s: f32,
@@ -55,13 +58,13 @@ struct MovedPlace {
 }
 
 impl StandingPlace {
-    /// The place of a robot that stands where it is.
+    /// Creates the place of a robot that stands here.
     pub(in crate::locomotion::balance) fn new(middle_m: Vector, heading_rad: f32) -> StandingPlace {
         StandingPlace { middle_m, heading_rad, moved: None }
     }
 
-    /// The place from which commands take a robot: its feet come under where its centre of mass is now, so that the pelvis need not
-    /// leave its own place.
+    /// Creates the place from which commands take a robot. Its feet come under the present centre of
+    /// mass, so that the pelvis need not move.
     pub(in crate::locomotion::balance) fn of_mover(
         body: &BodyEstimate,
         load: &Load,
@@ -78,8 +81,8 @@ impl StandingPlace {
         }
     }
 
-    /// Moves the point under the centre of mass as arms and loads have moved that from the pelvis, whose
-    /// place stays.
+    /// Moves the point under the centre of mass as arms and loads have shifted the centre relative to
+    /// the pelvis; the pelvis's place is unchanged.
     fn follow_arms(&mut self, body: &BodyEstimate, load: &Load, heading_rad: f32) {
         let Some(moved) = &mut self.moved else { return };
         let away_m = flat(body.world_from_pelvis().translation - load.weights_point_m);
@@ -89,12 +92,12 @@ impl StandingPlace {
         moved.rest_m = rest_m;
     }
 
-    /// Whether commands took the robot here.
+    /// Returns true if commands took the robot here.
     pub(in crate::locomotion::balance) fn is_moved(&self) -> bool {
         self.moved.is_some()
     }
 
-    /// Goes on with the robot as a command has it for one physics step.
+    /// Moves the place by a command for one physics step.
     pub(in crate::locomotion::balance) fn advance(
         &mut self,
         body: &BodyEstimate,
@@ -123,8 +126,9 @@ impl StandingPlace {
         }
     }
 
-    /// Returns the velocity (heading frame) with which a robot that steps comes to its place, one physics step later; `None` once
-    /// it is there, or has tried for long enough. `landed`: a foot has just touched down.
+    /// Returns the velocity (heading frame) with which a stepping robot approaches its place, and
+    /// advances by one physics step. `landed` means that a foot has just touched down. Returns `None`
+    /// once the robot is there, or has tried for long enough.
     pub(in crate::locomotion::balance) fn velocity_m_s(
         &mut self,
         body: &BodyEstimate,
@@ -152,8 +156,8 @@ impl StandingPlace {
         goes_on.then(|| towards_m_s(scale, away_m, heading_rad, MOVED_RETURN_1_S, MOVED_RETURN_M_S))
     }
 
-    /// Returns where the pelvis of a robot that stops with its feet here rests over their middle, heading frame; `None` if no
-    /// command moved it.
+    /// Returns the rest position of the pelvis over the middle of the feet, heading frame, for a robot
+    /// that stops here. Returns `None` if no command moved it.
     pub(in crate::locomotion::balance) fn rest_m(
         &self,
         body: &BodyEstimate,
@@ -172,7 +176,8 @@ impl StandingPlace {
     }
 }
 
-/// Returns what the legs add to the way from the pelvis to the centre of mass; horizontal, heading frame.
+/// Returns the legs' contribution to the offset from the pelvis to the centre of mass; horizontal,
+/// heading frame.
 fn legs_m(body: &BodyEstimate, heading_rad: f32) -> Vector {
     let pelvis_m = body.world_from_pelvis().translation;
     let links = LEGS.into_iter().flat_map(|first| &body.model.joints[first..first + LEG_JOINTS]);
@@ -204,7 +209,7 @@ mod tests {
         Load::of(body, &LadenRobot::of(body), 0.0, ObservedPush::default(), 0.0)
     }
 
-    /// Where commands of some seconds take the place of a robot that has not moved.
+    /// Returns the place after a command of some seconds to a robot that has not moved.
     fn moved(command: &BaseVelocity, seconds: f32) -> (BodyEstimate, StandingPlace) {
         let body = Posed::standing().body();
         let mut place = StandingPlace::of_mover(&body, &load(&body), 0.0);
@@ -214,7 +219,7 @@ mod tests {
         (body, place)
     }
 
-    /// How far a place is from where the robot's centre of mass is.
+    /// Returns the vector from the robot's centre of mass to a place.
     fn way_m(body: &BodyEstimate, place: &StandingPlace) -> Vector {
         flat(place.middle_m - load(body).weights_point_m)
     }

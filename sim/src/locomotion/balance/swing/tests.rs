@@ -13,7 +13,7 @@ fn ahead(x_m: f32) -> Pose {
     Pose::from_translation(Vector::new(x_m, 0.05, 0.0))
 }
 
-/// Path to a goal that may change on the way; position and velocity after each physics step.
+/// Flies a path to a goal that may change on the way. Returns position and velocity after each physics step.
 fn fly(goal: impl Fn(f32) -> Pose, pace: f32) -> (Swing, Vec<(Vector, Vector)>) {
     let mut swing = Swing::at(START);
     let mut path = Vec::new();
@@ -37,7 +37,7 @@ fn starts_and_ends_at_rest_where_it_should() {
         let fastest_m_s = path.iter().map(|(_, velocity)| velocity.length()).fold(0.0, f32::max);
         let (_, first_m_s) = path[0];
         assert!(first_m_s.length() < 0.1 * fastest_m_s, "starts with {first_m_s}");
-        // Least jerk is 15/8 of the mean speed in the middle.
+        // The minimum-jerk path has 15/8 of the mean speed in the middle.
         let expected_m_s = 1.875 * goal.translation.length() / AIR_S * pace;
         assert!((fastest_m_s / expected_m_s - 1.0).abs() < 0.1, "{fastest_m_s} {expected_m_s}");
     }
@@ -74,7 +74,7 @@ fn the_foot_is_lifted_and_set_down_smoothly() {
     );
 }
 
-/// What `reachable_m` calls reachable, the path reaches; and a foot left to itself stops where it says.
+/// The path reaches the goals that `reachable_m` returns, and a foot without a force stops where predicted.
 #[test]
 fn far_goals_are_brought_within_reach() {
     let mut swing = Swing::at(START);
@@ -121,7 +121,7 @@ fn a_foot_off_its_path_is_pulled_back() {
     assert!((off.angular_rad_s2.z - 0.02 * STIFFNESS_1_S2).abs() < 1e-2, "{}", off.angular_rad_s2);
 }
 
-/// The path is the ankle roll link's, footholds are the sole's.
+/// The path is that of the ankle roll link, footholds are those of the sole.
 #[test]
 fn the_sole_is_where_the_robots_file_has_it() {
     for (side, sole) in model().soles.by_side() {

@@ -1,15 +1,15 @@
-//! Triangles on their way to the rasteriser: prepared eight at a time.
+//! Preparation of triangles for the rasteriser, eight at a time.
 
 use super::{Outlines, Wide, wide};
 use crate::render::shading::lanes::{LANES, Lanes, lanes};
 
-/// Projected triangles that wait until there are as many as are prepared at once.
+/// Projected triangles that wait for a full batch.
 #[derive(Default)]
 pub struct TriangleBatch {
     count: usize,
-    /// For each corner its picture coordinates and its nearness.
+    /// For each corner its image coordinates and its nearness.
     corners: [[Lanes; 3]; 3],
-    /// What each triangle is drawn as.
+    /// Tag that each triangle is drawn with.
     tags: [u32; LANES],
 }
 
@@ -18,7 +18,7 @@ impl TriangleBatch {
         self.count == LANES
     }
 
-    /// Adds a triangle, for which there has to be room. Corners are picture coordinates and nearness.
+    /// Adds a triangle; the batch must not be full. Corners are image coordinates and nearness.
     #[inline(always)]
     pub fn push(&mut self, corners: [[f32; 3]; 3], tag: u32) {
         let place = self.count % LANES;
@@ -31,7 +31,7 @@ impl TriangleBatch {
         self.count += 1;
     }
 
-    /// Takes all that wait.
+    /// Takes all waiting triangles.
     #[inline(always)]
     pub fn take(&mut self) -> Outlines {
         let corners = self.corners;
@@ -41,7 +41,7 @@ impl TriangleBatch {
         let minus = |to: &Wide, from: &Wide| -> Wide { lanes(|i| to[i] - from[i]) };
         let (ux, uy, un) = (minus(bx, ax), minus(by, ay), minus(&bn, &an));
         let (vx, vy, vn) = (minus(cx, ax), minus(cy, ay), minus(&cn, &an));
-        // Rows count downwards, so that what is counter-clockwise has a negative area.
+        // Rows count downwards, so a counter-clockwise triangle has a negative area.
         let area: Wide = lanes(|i| ux[i] * vy[i] - uy[i] * vx[i]);
         let per_area: Wide = lanes(|i| 1.0 / area[i]);
         Outlines {

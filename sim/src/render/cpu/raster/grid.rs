@@ -1,19 +1,20 @@
-//! A number for each sample of a picture.
+//! A number for each sample of an image.
 
 use crate::render::shading::lanes::LANES;
 
-/// Samples in rows and columns, whose first are half a pitch from the picture's corner.
+/// Samples in rows and columns, the first of which are half a pitch from the image's corner.
 #[derive(Clone, Copy, Default)]
 pub struct Grid {
     pub width: usize,
     pub height: usize,
-    /// Distance between neighbours, in the unit that triangles are given in.
+    /// Distance between neighbours, in the unit of the triangles.
     pub pitch_px: f64,
 }
 
 impl Grid {
-    /// Distance from a row to the next: rows consist of whole blocks, the last of which may reach beyond the picture. Were it a whole
-    /// number of kilobytes, the samples of a column would all want the same few places of a processor's cache.
+    /// Returns the distance from a row to the next: rows consist of whole blocks, the last of which may
+    /// extend beyond the image. A multiple of a kilobyte is avoided, since the samples of a column would
+    /// then compete for the same few cache sets.
     pub fn stride(self) -> usize {
         const KILOBYTE: usize = 1024 / size_of::<f32>();
         let stride = self.width.next_multiple_of(LANES);
@@ -29,14 +30,15 @@ pub struct SampleRows<T> {
 }
 
 impl<T: Copy> SampleRows<T> {
-    /// Makes every number `value`.
+    /// Sets every number to `value`.
     pub fn reset(&mut self, grid: Grid, value: T) {
         self.grid = grid;
         self.numbers.clear();
         self.numbers.resize(grid.stride() * grid.height, value);
     }
 
-    /// Makes room for a number at each sample. What it is stays open: `value`, or something of an earlier grid.
+    /// Allocates a number for each sample. Its content is unspecified: `value`, or a number of an
+    /// earlier grid.
     pub fn fit(&mut self, grid: Grid, value: T) {
         self.grid = grid;
         self.numbers.resize(grid.stride() * grid.height, value);
@@ -48,7 +50,7 @@ impl<T: Copy> SampleRows<T> {
         &self.numbers[start..start + self.grid.width]
     }
 
-    /// What begins at a sample and at those below it; the rows go on to the next ones.
+    /// Returns the slices that begin at a sample and at those below it; rows continue into the next ones.
     #[inline(always)]
     pub fn rows_from(&self, row: usize, column: usize) -> impl Iterator<Item = &[T]> {
         let stride = self.grid.stride();
@@ -67,7 +69,7 @@ impl<T: Copy> SampleRows<T> {
         self.numbers.clone_from(&other.numbers);
     }
 
-    /// All of them, row by row.
+    /// Returns all numbers, row by row.
     pub fn all_mut(&mut self) -> &mut [T] {
         &mut self.numbers
     }

@@ -1,17 +1,17 @@
-//! Large triangles: where each row of samples begins and ends is measured.
+//! Large triangles: the start and end of each row of samples are computed.
 
 use pulp::Simd;
 
 use super::{EDGES, Grid, LANE, Outlines, Reach, larger, smaller, whole_f32};
 
-/// Where a line crosses a height: `x = slope_ratio * y + offset_value`.
+/// Crossing of a line with a height: `x = slope_ratio * y + offset_value`.
 #[derive(Clone, Copy)]
 struct Edge {
     slope_ratio: f64,
     offset_value: f64,
 }
 
-/// The samples of a triangle in one row of a grid: nearness at the first, and from each to the next.
+/// The samples of a triangle in one row of a grid: nearness at the first, and the step from each to the next.
 #[derive(Clone, Copy)]
 struct Span {
     row: usize,
@@ -21,13 +21,14 @@ struct Span {
     step_value: f32,
 }
 
-/// Rows of a large triangle that are measured at once.
+/// Number of rows of a large triangle that are computed at once.
 const ROWS: usize = 4;
-/// In so few blocks a large triangle is drawn wherever its rows begin and end: where they do is hard to foresee for processors.
+/// Maximum number of blocks per row for which a large triangle is drawn in all of them, regardless of
+/// where its rows start and end: branch prediction cannot foresee these.
 const NARROW_BLOCKS: usize = 5;
 
 impl Outlines {
-    /// Measures where each row begins and ends.
+    /// Computes the start and end of each row.
     #[inline(always)]
     pub(super) fn draw_large<S: Simd>(
         &self,
@@ -68,7 +69,7 @@ impl Outlines {
         }
     }
 
-    /// What is inside lies to the right of the first two, and to the left of the others.
+    /// Returns the edges; the inside is to the right of the first two, and to the left of the others.
     #[inline(always)]
     fn edges(&self, i: usize) -> ([Edge; 2], [Edge; 2]) {
         let mut left = [Edge { slope_ratio: 0.0, offset_value: f64::NEG_INFINITY }; 2];
@@ -95,7 +96,7 @@ impl Outlines {
 }
 
 impl Span {
-    /// Goes through all blocks that the triangle can reach.
+    /// Visits all blocks that the triangle can reach.
     #[inline(always)]
     fn draw_within<S: Simd>(
         self,
@@ -137,11 +138,11 @@ impl Span {
         let length = simd.splat_f32s(end_value - first_value);
         let before = simd.splat_f32s(first_value - (first * lanes) as f32);
         let start_vector = self.row * (grid.stride() / lanes);
-        // How far each sample is from the first of the span.
+        // Distance of each sample from the first of the span.
         let mut offset = simd.sub_f32s(S::as_simd_f32s(&LANE).0[0], before);
         for vector in first..=last {
             let mut nearness = simd.add_f32s(start, simd.mul_f32s(step, offset));
-            // Only the first and the last reach beyond the span.
+            // Only the first and the last extend beyond the span.
             if vector == first || vector == last {
                 let inside = simd.and_m32s(
                     simd.greater_than_or_equal_f32s(offset, nothing),

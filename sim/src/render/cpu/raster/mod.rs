@@ -1,4 +1,4 @@
-//! Rasteriser: the samples of a picture, row by row; which of them lie in a triangle, and how near it is there.
+//! Rasteriser: finds the samples of an image that are inside a triangle, row by row, and its nearness there.
 
 mod batch;
 mod grid;
@@ -13,28 +13,28 @@ use pulp::Simd;
 use crate::render::shading::lanes::{LANES, Lanes, lanes};
 use small::{SMALL_BLOCKS, SMALL_ROWS};
 
-/// The pictures of some triangles.
+/// Images of some triangles.
 ///
-/// Their planes and the edges of large ones are f64: a floor triangle clipped at the near plane has corners 1e4 pixels off the
-/// picture, and f32 gradients would err by centimetres. In f64 the edge that two triangles share also comes out
-/// the same for both, to the bit, and leaves no gap.
+/// Their planes and the edges of large ones are f64. A floor triangle clipped at the near plane has
+/// corners 1e4 pixels off the image, and f32 gradients would err by centimetres. In f64 the edge that
+/// two triangles share is also the same for both, to the bit, and leaves no gap.
 pub struct Outlines {
     count: usize,
     corners: [[Lanes; 3]; 3],
     tags: [u32; LANES],
-    /// Picture coordinates of the corners.
+    /// Image coordinates of the corners.
     places: [[Wide; 2]; 3],
-    /// Nearness at the first corner, and how it changes.
+    /// Nearness at the first corner, and its derivatives.
     nearness_value: Wide,
     x_factor: Wide,
     y_factor: Wide,
-    /// Whether the camera sees the corners counter-clockwise.
+    /// True if the camera sees the corners counter-clockwise.
     front: [bool; LANES],
 }
 
 type Wide = [f64; LANES];
 
-/// The samples of a grid that triangles can reach, the last ones included.
+/// Ranges of samples of a grid that triangles can reach, the last ones included.
 struct Reaches {
     some: [bool; LANES],
     x0: [u32; LANES],
@@ -43,7 +43,7 @@ struct Reaches {
     y1: [u32; LANES],
 }
 
-/// The samples of a grid that a triangle can reach, the last ones included.
+/// Range of samples of a grid that a triangle can reach, the last ones included.
 #[derive(Clone, Copy)]
 struct Reach {
     x0: u32,
@@ -57,8 +57,8 @@ const EDGES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 const LANE: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 impl Outlines {
-    /// Calls `each` for all vectors of samples that front faces reach into, with their number in the grid, the triangle's tag and the
-    /// nearness of their samples: 0 for those outside of it.
+    /// Calls `each` for all vectors of samples that front faces reach. Its arguments are the vector's number
+    /// in the grid, the triangle's tag and the nearness of the samples, which is 0 outside of the triangle.
     #[inline(always)]
     pub fn draw<S: Simd>(&self, simd: S, grid: Grid, mut each: impl FnMut(usize, u32, S::f32s)) {
         let reaches = self.reaches(grid);
@@ -76,7 +76,8 @@ impl Outlines {
         }
     }
 
-    /// In f32 this is exact: where halves are lost, a coordinate is outside of the picture.
+    /// Computes the reached samples. This is exact in f32: if halves are lost, a coordinate is outside
+    /// of the image.
     #[inline(always)]
     fn reaches(&self, grid: Grid) -> Reaches {
         let per_pitch = (1.0 / grid.pitch_px) as f32;
@@ -97,7 +98,7 @@ impl Outlines {
 }
 
 impl Reach {
-    /// How many blocks of each row it is in.
+    /// Returns the number of blocks of each row that it spans.
     #[inline(always)]
     fn blocks(self) -> usize {
         self.x1 as usize / LANES - self.x0 as usize / LANES + 1
@@ -109,7 +110,7 @@ fn wide(values: &Lanes) -> Wide {
     lanes(|i| f64::from(values[i]))
 }
 
-/// As `max` and `min` of numbers, which care for what is no number.
+/// Returns the larger value, without the NaN handling of `max` (and `min`, below).
 #[inline(always)]
 pub fn larger<T: PartialOrd>(value: T, min: T) -> T {
     if value > min { value } else { min }
@@ -120,8 +121,8 @@ pub fn smaller<T: PartialOrd>(value: T, max: T) -> T {
     if value < max { value } else { max }
 }
 
-/// A number that is whole, not negative and below 8 million. It becomes the lowest bits of the sum; a cast would look at each for
-/// itself.
+/// Converts a number that is whole, not negative and below 8 million. It becomes the lowest bits of the
+/// sum; a cast would process each number separately.
 #[inline(always)]
 pub fn whole_f32(value: f32) -> u32 {
     const ALL_BITS_WHOLE: f32 = (1u32 << 23) as f32;

@@ -1,26 +1,28 @@
-//! Small triangles: every sample that they can reach is looked at.
+//! Small triangles: every sample that they can reach is tested.
 
 use pulp::Simd;
 
 use super::{EDGES, Grid, LANE, Outlines, Reach, Reaches, Wide};
 use crate::render::shading::lanes::{LANES, Lanes, lanes};
 
-/// What changes linearly over small triangles, in the order of `EDGES` and then nearness: from sample to sample, from row to row, and
-/// what it is in their first rows at the beginning of their first block and of the next.
+/// Linear functions over small triangles, in the order of `EDGES` and then nearness. They are given by
+/// their steps from sample to sample and from row to row, and by their start values. The latter are
+/// those in the first row at the beginning of the first block and of the next.
 pub(super) struct Slopes {
     across: [Lanes; 4],
     down: [Lanes; 4],
     starts: [[Lanes; 4]; SMALL_BLOCKS],
 }
 
-/// A triangle is small if it is no higher, and reaches into no more blocks of each row.
+/// Maximum height of a small triangle, and maximum number of blocks that it spans in each row.
 pub(super) const SMALL_ROWS: u32 = 16;
 pub(super) const SMALL_BLOCKS: usize = 2;
-/// A small triangle is drawn this far beyond its edges, in parts of their lengths: f32 then leaves no gaps.
+/// Extension of a small triangle beyond its edges, as a share of their lengths: f32 then leaves no gaps.
 const OVERLAP: f32 = 1e-5;
 
 impl Outlines {
-    /// An edge from p to q has those samples on its inner side where `(x - px) (qy - py) - (y - py) (qx - px) >= 0`.
+    /// Computes the slopes. An edge from p to q has those samples on its inner side where
+    /// `(x - px) (qy - py) - (y - py) (qx - px) >= 0`.
     #[inline(always)]
     pub(super) fn slopes(&self, grid: Grid, reaches: &Reaches) -> Slopes {
         let pitch = grid.pitch_px as f32;
@@ -65,7 +67,7 @@ impl Outlines {
 }
 
 impl Slopes {
-    /// Looks at each sample of a small triangle.
+    /// Tests each sample of a small triangle.
     #[inline(always)]
     pub(super) fn draw<S: Simd>(
         &self,
