@@ -99,9 +99,7 @@ fn a_plan_that_cannot_be_carried_out_moves_nothing() {
 #[test]
 fn a_command_lasts_until_what_it_expects_holds() {
     let mut session = agentic();
-    let to = |position_m: [f64; 3], steps: u32| {
-        json!({ "steps": steps, "robots": [{ "robot": "A", "right_position_m": position_m, "right_quaternion_wxyz": [0.707, -0.707, 0, 0] }] })
-    };
+    let to = |position_m: [f64; 3], steps: u32| json!({ "steps": steps, "robots": [{ "robot": "A", "right_position_m": position_m, "right_quaternion_wxyz": [0.707, -0.707, 0, 0] }] });
     let over = json!({ "tool": "move_wrists", "arguments": to([0.33, -0.33, 0.32], 25) });
     let settle = json!({ "tool": "wait", "arguments": { "steps": 25 } });
     let lower = json!({
@@ -120,9 +118,18 @@ fn a_command_lasts_until_what_it_expects_holds() {
     assert!(reply.stopped.unwrap().contains("its steps are done and p1 has not been reached"));
     for (command, says) in [
         (json!({ "tool": "wait", "arguments": { "steps": 5 }, "until": true }), "needs a condition"),
-        (json!({ "tool": "wait", "arguments": { "steps": 501 }, "expects": { "arrived": true }, "until": true }), "at most 500"),
-        (json!({ "tool": "wait", "arguments": { "steps": 5 }, "expects": { "heard": true } }), "for operators"),
-        (json!({ "tool": "send_joint_chunk", "arguments": { "robots": [] }, "expects": { "arrived": true }, "until": true }), "cannot have `until`"),
+        (
+            json!({ "tool": "wait", "arguments": { "steps": 501 }, "expects": { "arrived": true }, "until": true }),
+            "at most 500",
+        ),
+        (
+            json!({ "tool": "wait", "arguments": { "steps": 5 }, "expects": { "heard": true } }),
+            "for operators",
+        ),
+        (
+            json!({ "tool": "send_joint_chunk", "arguments": { "robots": [] }, "expects": { "arrived": true }, "until": true }),
+            "cannot have `until`",
+        ),
     ] {
         let refused = plan(&mut session, "send_plan", json!({ "commands": [command] })).unwrap_err();
         assert!(refused.contains(says), "{refused}");

@@ -396,7 +396,8 @@ impl Team {
         let told = move |outcome: Result<Vec<Answer>, HostingError>| {
             over.store(true, Relaxed);
             let did = team.round().end(outcome.as_ref().ok().and_then(|answers| answers.first()));
-            let tools: Vec<(usize, &'static str)> = asked.iter().map(|(seat, _, tool)| (*seat, *tool)).collect();
+            let tools: Vec<(usize, &'static str)> =
+                asked.iter().map(|(seat, _, tool)| (*seat, *tool)).collect();
             let tell = |((seat, asked_steps, _), answer)| {
                 let partners = team.partners(seat, &did, &tools);
                 Answer { partners, ..team.for_seat(answer, seat) }.cut_off_after(asked_steps)

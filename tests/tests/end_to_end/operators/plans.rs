@@ -21,7 +21,8 @@ fn a_walk_goes_on_beside_the_partners_commands() {
     assert_eq!(a["stopped"], json!(null), "{a}");
     assert!(a["commands"].as_u64().is_some_and(|commands| commands > 5), "{a}");
     assert_eq!(a["last"]["robots"].as_array().map(Vec::len), Some(1), "{a}");
-    let whole = waits.into_iter().map(|answer| answer.ok()).filter(|reply| reply["stop_reason"] == "steps_done");
+    let whole =
+        waits.into_iter().map(|answer| answer.ok()).filter(|reply| reply["stop_reason"] == "steps_done");
     let whole: Vec<_> = whole.map(|reply| reply["executed_steps"].clone()).collect();
     assert!(whole.len() >= 3 && whole.iter().all(|steps| *steps == 50), "{whole:?}");
     team.verified();
