@@ -1,4 +1,5 @@
-//! Episodes: tasks and their phases, budgets, grasp detection, and the session that runs tool calls on a world.
+//! Episodes: tasks and their phases, budgets, grasp detection, and the session that runs tool calls on a
+//! world.
 //!
 //! A [`Session`] is one episode. It answers tool calls, and its result says which phases they reached:
 //!
@@ -49,7 +50,7 @@ mod words;
 
 pub use commands::{Called, OperatorCall, OperatorCommand};
 pub use conditions::{FUNCTIONS, Function};
-pub use describe::{brief, task_list};
+pub use describe::{brief, task_list, teamwork};
 pub use error::{CheckpointError, EpisodeError, RobotError, SceneError};
 pub use fingerprint::{build, name_program};
 pub use instructions::{Instructions, InstructionsError};
@@ -71,7 +72,7 @@ pub use scoring::{
 };
 pub use session::{
     Audience, BringBack, CallReply, Caller, Checkpoint, Clock, FAILED_STEP_FILE, FailedStep, JournalEntry,
-    Outcome, Request, RunFiles, RunFolder, Session, monotonic,
+    Outcome, PlanAdvance, PlanRun, Request, RunFiles, RunFolder, Session, monotonic,
 };
 pub use spec::{
     Controller, EpisodeSpec, KeyedSeed, MomentStart, OwnRobot, PhaseStart, RobotFile, SceneFile, Start,

@@ -9,17 +9,15 @@
 use nalgebra::{Isometry3, Rotation2, Vector2};
 use tandem_sim::{CONTROL_HZ, Side, Sides};
 use tandem_tools_spec::{
-    ActCall, CommandReply, Destination, Grip, HandState, MoveWrists, PlanReply, RobotReport, WalkTo,
-    WristMove,
+    ActCall, CommandReply, Destination, Grip, HandState, MoveWrists, RobotReport, WalkTo, WristMove,
 };
 
-use super::PlanProgress;
+use super::PlanAdvance;
 use super::walk_to::{ATTEMPTS, CALM_COMMANDS, THERE_M, THERE_RAD, WELL_M, WELL_RAD, all_stand};
 use super::way::{Corrections, Missing, Stand, WALK_STEPS, Way, wrapped};
 use crate::EpisodeError;
 use crate::commands;
 use crate::convert::isometry_from_sim;
-use crate::recording::CallerRecord;
 use crate::session::Session;
 
 /// How fast a path is gone, and how soon that is so.
@@ -47,6 +45,7 @@ const RESTING_COMMANDS: u32 = 12;
 const LOST_COMMANDS: u32 = 4;
 
 /// One robot on its way.
+#[derive(Debug)]
 struct Carrier {
     name: String,
     robot: usize,
@@ -79,8 +78,11 @@ enum CarryStage {
 }
 
 /// Robots that go along one path.
-struct CarryPlan {
+#[derive(Debug)]
+pub struct CarryPlan {
     carriers: Vec<Carrier>,
+    /// Control steps that are left.
+    left_steps: u32,
     /// Length of each way, the longest of the robots'.
     ways_m: Vec<f64>,
     pace: PathPace,
@@ -93,7 +95,7 @@ struct CarryPlan {
 }
 
 /// How far a path has been gone, and how fast.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct PathPace {
     gone_m: f64,
     pace_m_s: f64,
@@ -118,13 +120,14 @@ impl PathPace {
 }
 
 impl CarryPlan {
-    fn new(carriers: Vec<Carrier>) -> CarryPlan {
+    fn new(carriers: Vec<Carrier>, left_steps: u32) -> CarryPlan {
         let ways = carriers.iter().map(|carrier| carrier.ways.len()).min().unwrap_or(0);
         let longest =
             |leg: usize| carriers.iter().map(|carrier| carrier.ways[leg].length_m()).fold(0.0, f64::max);
         CarryPlan {
             ways_m: (0..ways).map(longest).collect(),
             carriers,
+            left_steps,
             pace: PathPace::default(),
             stage: CarryStage::OnWay,
             attempts: 0,
@@ -160,40 +163,34 @@ impl CarryPlan {
             self.stage = CarryStage::Resting { commands: 0, calm: 0 };
         }
     }
+
+    /// Returns the next command, after the reply to the one before.
+    pub fn advance(&mut self, session: &Session, last: Option<&CommandReply>) -> PlanAdvance {
+        if let Some(reply) = last {
+            self.left_steps = self.left_steps.saturating_sub(reply.executed_steps);
+            if reply.fallen.iter().any(|robot| robot.fallen) {
+                return PlanAdvance::Done(Some("a robot has fallen".into()));
+            }
+            if let Some(why) = session.why_not_on(reply, self) {
+                self.stop(why);
+            }
+            if session.is_done(all_stand(reply), self) {
+                return PlanAdvance::Done(self.stopped.take());
+            }
+        }
+        if self.left_steps == 0 {
+            let used_up = || format!("the steps are used up; {}", session.how_far_off(self));
+            return PlanAdvance::Done(Some(self.stopped.clone().unwrap_or_else(used_up)));
+        }
+        PlanAdvance::Make(session.next_moves(self, self.left_steps.min(WALK_STEPS)))
+    }
 }
 
 impl Session {
-    /// Takes robots, and what those hold that carry, to their places.
-    pub(super) fn carry_to(
-        &mut self,
-        caller: CallerRecord,
-        walk: &WalkTo,
-    ) -> Result<PlanReply, EpisodeError> {
+    /// Begins a walk of robots, and what those hold that carry, to their places.
+    pub(super) fn carry_plan(&self, walk: &WalkTo) -> Result<CarryPlan, EpisodeError> {
         let carriers = walk.robots.iter().map(|entry| self.carrier(entry));
-        let mut plan = CarryPlan::new(carriers.collect::<Result<_, _>>()?);
-        let mut progress = PlanProgress::default();
-        loop {
-            let left = walk.steps.saturating_sub(progress.executed_steps());
-            if left == 0 {
-                let used_up = || format!("the steps are used up; {}", self.how_far_off(&plan));
-                let why = plan.stopped.clone().unwrap_or_else(used_up);
-                return self.plan_reply(progress, Some(why));
-            }
-            let call = self.next_moves(&mut plan, left.min(WALK_STEPS));
-            let reply = match self.make_planned(caller, call, &mut progress)? {
-                Err(why) => return self.plan_reply(progress, Some(why)),
-                Ok(reply) if reply.fallen.iter().any(|robot| robot.fallen) => {
-                    return self.plan_reply(progress, Some("a robot has fallen".into()));
-                }
-                Ok(reply) => reply,
-            };
-            if let Some(why) = self.why_not_on(reply, &mut plan) {
-                plan.stop(why);
-            }
-            if self.is_done(all_stand(reply), &mut plan) {
-                return self.plan_reply(progress, plan.stopped);
-            }
-        }
+        Ok(CarryPlan::new(carriers.collect::<Result<_, _>>()?, walk.steps))
     }
 
     fn carrier(&self, entry: &Destination) -> Result<Carrier, EpisodeError> {

@@ -4,15 +4,12 @@
 use std::collections::VecDeque;
 
 use nalgebra::Vector2;
-use tandem_tools_spec::{
-    ActCall, BaseState, CommandReply, Destination, PlanReply, Wait, Walk, WalkMove, WalkTo,
-};
+use tandem_tools_spec::{ActCall, BaseState, CommandReply, Destination, Wait, Walk, WalkMove, WalkTo};
 
-use super::PlanProgress;
 use super::way::{Corrections, Missing, Stand, WALK_STEPS};
+use super::{PlanAdvance, PlanStage};
 use crate::EpisodeError;
 use crate::commands;
-use crate::recording::CallerRecord;
 use crate::session::Session;
 
 /// Speed by what is missing, and the most of it: ahead, back, to the sides; turning.
@@ -50,6 +47,7 @@ enum WalkerStage {
 }
 
 /// One robot on its way.
+#[derive(Debug)]
 struct Walker {
     name: String,
     robot: usize,
@@ -64,67 +62,80 @@ struct Walker {
     corrections: Corrections,
 }
 
-impl Session {
-    pub(super) fn check_destinations(&self, walk: &WalkTo) -> Result<(), EpisodeError> {
-        walk.robots.iter().try_for_each(|entry| commands::find(&entry.robot, &self.motions).map(drop))
+/// Robots on their way, each to a place of its own.
+#[derive(Debug)]
+pub struct WalkPlan {
+    walkers: Vec<Walker>,
+    /// Control steps that are left.
+    left_steps: u32,
+    /// Short walks from where robots came to rest.
+    attempts: u32,
+    /// Commands in a row for which all have stood.
+    calm: u32,
+    /// True while the last command was a walk.
+    walks: bool,
+}
+
+impl WalkPlan {
+    /// Returns the next command, after the reply to the one before.
+    pub fn advance(&mut self, session: &Session, last: Option<&CommandReply>) -> PlanAdvance {
+        if let Some(done) = last.and_then(|reply| self.after(session, reply)) {
+            return done;
+        }
+        if self.left_steps == 0 {
+            let why = format!("the steps are used up; {}", session.how_far(&self.walkers));
+            return PlanAdvance::Done(Some(why));
+        }
+        let steps = self.left_steps.min(WALK_STEPS);
+        let moves: Vec<WalkMove> =
+            self.walkers.iter_mut().filter_map(|walker| session.next_walk(walker)).collect();
+        self.walks = !moves.is_empty();
+        PlanAdvance::Make(match self.walks {
+            true => ActCall::Walk(Walk { steps, robots: moves }),
+            false => ActCall::Wait(Wait { steps }),
+        })
     }
 
-    /// Walks until every robot stands at its place.
-    pub(super) fn walk_to(&mut self, caller: CallerRecord, walk: &WalkTo) -> Result<PlanReply, EpisodeError> {
+    /// Takes the reply to a command; returns whether and why it was the last.
+    fn after(&mut self, session: &Session, reply: &CommandReply) -> Option<PlanAdvance> {
+        self.left_steps = self.left_steps.saturating_sub(reply.executed_steps);
+        let stopped = |why: String| Some(PlanAdvance::Done(Some(why)));
+        if reply.fallen.iter().any(|robot| robot.fallen) {
+            return stopped("a robot has fallen".into());
+        }
+        if let Some(walker) = self.walkers.iter().find(|walker| walker.walks > PATIENCE_WALKS) {
+            let (name, far) = (&walker.name, session.how_far(&self.walkers));
+            return stopped(format!("{name} gets no nearer: something is in its way or holds it; {far}"));
+        }
+        self.calm = if self.walks || !all_stand(reply) { 0 } else { self.calm + 1 };
+        if self.calm < CALM_COMMANDS {
+            return None;
+        }
+        let off: Vec<Missing> = self.walkers.iter().map(|walker| session.missing_of(walker)).collect();
+        let all_within = |most_m, most_rad| off.iter().all(|off| off.is_within(most_m, most_rad));
+        if all_within(WELL_M, WELL_RAD) {
+            return Some(PlanAdvance::Done(None));
+        }
+        if self.attempts == ATTEMPTS {
+            let why = (!all_within(THERE_M, THERE_RAD))
+                .then(|| format!("it came no nearer than this; {}", session.how_far(&self.walkers)));
+            return Some(PlanAdvance::Done(why));
+        }
+        self.attempts += 1;
+        self.walkers.iter_mut().zip(&off).for_each(|(walker, off)| walker.try_again(off));
+        None
+    }
+}
+
+impl Session {
+    /// Begins a walk, for which every robot has to be one of the episode's.
+    pub(super) fn walk_stage(&self, walk: &WalkTo) -> Result<PlanStage, EpisodeError> {
         if walk.robots.iter().any(|entry| entry.carry == Some(true)) {
-            return self.carry_to(caller, walk);
+            return self.carry_plan(walk).map(PlanStage::Carry);
         }
-        let walkers = walk.robots.iter().map(|entry| self.walker(entry));
-        let mut walkers: Vec<Walker> = walkers.collect::<Result<_, _>>()?;
-        let mut progress = PlanProgress::default();
-        let (mut attempts, mut calm) = (0, 0);
-        loop {
-            let left = walk.steps.saturating_sub(progress.executed_steps());
-            if left == 0 {
-                let why = format!("the steps are used up; {}", self.how_far(&walkers));
-                return self.plan_reply(progress, Some(why));
-            }
-            let steps = left.min(WALK_STEPS);
-            let moves: Vec<WalkMove> =
-                walkers.iter_mut().filter_map(|walker| self.next_walk(walker)).collect();
-            let walks = !moves.is_empty();
-            let call = if walks {
-                ActCall::Walk(Walk { steps, robots: moves })
-            } else {
-                ActCall::Wait(Wait { steps })
-            };
-            let stands = match self.make_planned(caller, call, &mut progress)? {
-                Err(why) => return self.plan_reply(progress, Some(why)),
-                Ok(reply) if reply.fallen.iter().any(|robot| robot.fallen) => {
-                    return self.plan_reply(progress, Some("a robot has fallen".into()));
-                }
-                Ok(reply) => all_stand(reply),
-            };
-            if let Some(walker) = walkers.iter().find(|walker| walker.walks > PATIENCE_WALKS) {
-                let name = walker.name.clone();
-                let why = format!(
-                    "{name} gets no nearer: something is in its way or holds it; {}",
-                    self.how_far(&walkers)
-                );
-                return self.plan_reply(progress, Some(why));
-            }
-            calm = if walks || !stands { 0 } else { calm + 1 };
-            if calm < CALM_COMMANDS {
-                continue;
-            }
-            let off: Vec<Missing> = walkers.iter().map(|walker| self.missing_of(walker)).collect();
-            let all_within = |most_m, most_rad| off.iter().all(|off| off.is_within(most_m, most_rad));
-            if all_within(WELL_M, WELL_RAD) {
-                return self.plan_reply(progress, None);
-            }
-            if attempts == ATTEMPTS {
-                let why = (!all_within(THERE_M, THERE_RAD))
-                    .then(|| format!("it came no nearer than this; {}", self.how_far(&walkers)));
-                return self.plan_reply(progress, why);
-            }
-            attempts += 1;
-            walkers.iter_mut().zip(&off).for_each(|(walker, off)| walker.try_again(off));
-        }
+        let walkers = walk.robots.iter().map(|entry| self.walker(entry)).collect::<Result<_, _>>()?;
+        let left_steps = walk.steps;
+        Ok(PlanStage::Walk(WalkPlan { walkers, left_steps, attempts: 0, calm: 0, walks: false }))
     }
 
     fn walker(&self, entry: &Destination) -> Result<Walker, EpisodeError> {

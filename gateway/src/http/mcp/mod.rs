@@ -1,8 +1,9 @@
-//! The MCP route: the same tools for hosts that speak the Model Context Protocol. Every call names its episode, so the
-//! route keeps no sessions.
+//! The MCP route: the same tools for hosts that use the Model Context Protocol. Every call names its
+//! episode, so the route keeps no sessions.
 
 mod envelope;
 mod prompt;
+mod resources;
 
 use std::sync::Arc;
 
@@ -17,7 +18,8 @@ use rmcp::{
     model::{
         CallToolRequestParams, CallToolResponse, CallToolResult, ContentBlock, DiscoverResult,
         GetPromptRequestParams, GetPromptResponse, Implementation, InitializeRequestParams, InitializeResult,
-        ListPromptsResult, ListToolsResult, PaginatedRequestParams, ServerCapabilities, ServerConfig, Tool,
+        ListPromptsResult, ListResourcesResult, ListToolsResult, PaginatedRequestParams,
+        ReadResourceRequestParams, ReadResourceResponse, ServerCapabilities, ServerConfig, Tool,
     },
     service::RequestContext,
     transport::streamable_http_server::{
@@ -38,25 +40,26 @@ use super::{
 };
 use crate::hosting::{Answer, Caller, HostingError, RefusedCall};
 
-/// What the library wants to be accepted; the answers are JSON.
+/// Accept header that the library requires; the answers are JSON.
 const ACCEPTED: &str = "application/json, text/event-stream";
 
-/// What a host tells its model about the server as a whole: only what `caller` can do.
+/// Returns what a host tells its model about the server as a whole: only what `caller` can do.
 fn instructions(caller: &Caller) -> String {
     let begin = match caller {
         Caller::Host => "Call list_tasks, then start_episode, then look".into(),
-        // Its episode goes on already, and no other can be begun.
+        // An operator's episode is already under way, and it cannot start another.
         Caller::Operator { episode, robot } => {
             format!("You are the operator of robot {robot} in the episode {episode}, which has begun. Look")
         }
     };
     format!(
         "Simulated humanoids that must work together. {begin} with observe and act with move_wrists, walk, send_joint_chunk or wait \
-         until the task is done, then call finish. Physics stands still between calls."
+         until the task is done, then call finish. Physics stands still between calls. Replies are short; `short: false` gives \
+         the whole one."
     )
 }
 
-/// The routes to nest at `/mcp`, behind the gate, which has checked `Host` and `Origin`.
+/// Returns the routes to nest at `/mcp`, behind the gate, which has checked `Host` and `Origin`.
 pub fn router(app: AppState) -> Router {
     Router::new().fallback_service(service(app)).layer(middleware::from_fn(check_body))
 }
@@ -70,7 +73,7 @@ fn service(app: AppState) -> StreamableHttpService<McpServer, NeverSessionManage
     StreamableHttpService::new(move || Ok(McpServer { app: app.clone() }), Arc::default(), config)
 }
 
-/// Answers MCP requests from the table of episodes.
+/// An MCP server that answers from the table of episodes.
 #[derive(Debug, Clone)]
 struct McpServer {
     app: AppState,
@@ -78,9 +81,11 @@ struct McpServer {
 
 impl ServerHandler for McpServer {
     fn get_info(&self) -> ServerConfig {
-        ServerConfig::new(ServerCapabilities::builder().enable_tools().enable_prompts().build())
-            .with_server_info(Implementation::new("tandem", env!("CARGO_PKG_VERSION")))
-            .with_instructions(instructions(&Caller::Host))
+        ServerConfig::new(
+            ServerCapabilities::builder().enable_tools().enable_prompts().enable_resources().build(),
+        )
+        .with_server_info(Implementation::new("tandem", env!("CARGO_PKG_VERSION")))
+        .with_instructions(instructions(&Caller::Host))
     }
 
     async fn initialize(
@@ -90,12 +95,12 @@ impl ServerHandler for McpServer {
     ) -> Result<InitializeResult, ErrorData> {
         context.peer.set_peer_info(request.clone());
         let server = self.negotiate_initialize(&request)?;
-        Ok(server.with_instructions(instructions(caller_of(&context).unwrap_or(&Caller::Host))))
+        Ok(server.with_instructions(self.instructions(caller_of(&context).unwrap_or(&Caller::Host)).await))
     }
 
     async fn discover(&self, context: RequestContext<RoleServer>) -> Result<DiscoverResult, ErrorData> {
         let caller = caller_of(&context).unwrap_or(&Caller::Host);
-        let server = self.get_info().with_instructions(instructions(caller));
+        let server = self.get_info().with_instructions(self.instructions(caller).await);
         Ok(DiscoverResult::from_server_info(self.supported_protocol_versions().into_owned(), server))
     }
 
@@ -130,6 +135,24 @@ impl ServerHandler for McpServer {
         Ok(prompt::prompt(&request.name, arguments, list, self.app.settings.wording(), caller)?.into())
     }
 
+    async fn list_resources(
+        &self,
+        _: Option<PaginatedRequestParams>,
+        context: RequestContext<RoleServer>,
+    ) -> Result<ListResourcesResult, ErrorData> {
+        let caller = caller_of(&context).unwrap_or(&Caller::Host);
+        Ok(ListResourcesResult::with_all_items(resources::resources(caller)))
+    }
+
+    async fn read_resource(
+        &self,
+        request: ReadResourceRequestParams,
+        context: RequestContext<RoleServer>,
+    ) -> Result<ReadResourceResponse, ErrorData> {
+        let caller = caller_of(&context).unwrap_or(&Caller::Host);
+        Ok(resources::read(&self.app, caller, &request.uri).await?.into())
+    }
+
     async fn call_tool(
         &self,
         request: CallToolRequestParams,
@@ -141,7 +164,10 @@ impl ServerHandler for McpServer {
             let text = format!("no tool {:?}; have: {}", request.name, have.join(", "));
             return Err(ErrorData::invalid_params(text, None));
         }
-        let args = Value::Object(request.arguments.unwrap_or_default());
+        let mut args = request.arguments.unwrap_or_default();
+        // A model reads every reply, so that a short one is the default, as the instructions say.
+        args.entry("short").or_insert(true.into());
+        let args = Value::Object(args);
         let episode = args["episode_id"].as_str().map(str::to_owned);
         let called = match duplicate_field(&context) {
             Some(DuplicateField(reason)) => Err(ApiError::MalformedJson(reason.clone())),
@@ -155,7 +181,8 @@ impl ServerHandler for McpServer {
         self.log_call(&request.name, episode.as_deref(), called.as_ref().err());
         let result = match called {
             Ok(content) => CallToolResult::success(content),
-            // A refusal is served as the tool's answer, which the model reads; protocol errors often stay with the host.
+            // A refusal is returned as the tool's answer, which the model reads; protocol errors often
+            // stay with the host.
             Err(error) => CallToolResult::error(refusal_blocks(&error)),
         };
         Ok(result.into())
@@ -163,6 +190,17 @@ impl ServerHandler for McpServer {
 }
 
 impl McpServer {
+    /// Returns the instructions for `caller`. An operator's have its part of the task and how to play with partners, since a model may see
+    /// nothing else of the briefing.
+    async fn instructions(&self, caller: &Caller) -> String {
+        let begin = instructions(caller);
+        let Caller::Operator { episode, .. } = caller else { return begin };
+        let Ok(briefing) = self.app.table.briefing(episode, caller).await else { return begin };
+        let own = briefing.instructions.into_iter().map(|entry| format!(" Your part: {}", entry.instruction));
+        let teamwork = briefing.brief.teamwork.map(|text| format!(" {text}"));
+        [begin].into_iter().chain(own).chain(teamwork).collect()
+    }
+
     async fn call(&self, caller: &Caller, name: &str, args: Value) -> Result<Vec<ContentBlock>, ApiError> {
         match name {
             ListTasks::NAME => {
@@ -181,9 +219,10 @@ impl McpServer {
         }
     }
 
-    /// Logs a call and counts a refusal: the log line of the HTTP request knows neither the tool nor the problem.
+    /// Logs a call and counts a refusal. The log line of the HTTP request has neither the tool nor the
+    /// problem.
     fn log_call(&self, tool: &str, episode: Option<&str>, refusal: Option<&ApiError>) {
-        // An episode that does not exist may be anything that a caller made up, and is not logged.
+        // An unknown id may be arbitrary text of the caller, so it is not logged.
         let episode = episode.filter(|id| self.app.table.get(id).is_ok());
         let problem = refusal.map(ApiError::kind);
         if let Some(kind) = problem {
@@ -204,7 +243,7 @@ impl McpServer {
         let call = Call::parse(name, args).map_err(|error| ApiError::from(error.naming_episode(named)));
         let id = match (handle, caller) {
             (Some(Value::String(id)), _) => id,
-            // An operator's token says which episode.
+            // An operator's token implies its episode.
             (None, Caller::Operator { episode, .. }) => episode.clone(),
             (None, Caller::Host) if TalkCall::TOOLS.contains(&name) => {
                 return Err(HostingError::NoTalk.into());
@@ -237,7 +276,7 @@ impl McpServer {
     }
 }
 
-/// The content of an answer: its JSON without pictures, then the pictures.
+/// Returns the content of an answer: its JSON without images, then the images.
 fn content(answer: &Answer) -> Result<Vec<ContentBlock>, ApiError> {
     let mut text = serde_json::to_value(answer).map_err(|error| ApiError::Reply(error.into()))?;
     let seen = match (&answer.reply, &answer.observation) {
@@ -261,18 +300,18 @@ fn content(answer: &Answer) -> Result<Vec<ContentBlock>, ApiError> {
     Ok(content)
 }
 
-/// The caller, as the gate has identified it.
+/// Returns the caller that the gate has identified.
 fn caller_of(context: &RequestContext<RoleServer>) -> Option<&Caller> {
     context.extensions.get::<Parts>()?.extensions.get()
 }
 
-/// Says which robot each of the following pictures is from.
+/// Names the robot of each of the following images.
 fn image_captions(images: &[CameraImage]) -> String {
     let of = |(index, image): (usize, &CameraImage)| format!(" Image {}: {}.", index + 1, image.robot);
     format!("{} images follow.{}", images.len(), images.iter().enumerate().map(of).collect::<String>())
 }
 
-/// A refusal as a model reads it.
+/// Returns a refusal as text for a model.
 fn refusal_blocks(error: &ApiError) -> Vec<ContentBlock> {
     let failed = error.recording_failed().map(|reason| format!("recording_failed: {reason}"));
     let result = error.result().and_then(|result| serde_json::to_string(result).ok());
@@ -280,11 +319,11 @@ fn refusal_blocks(error: &ApiError) -> Vec<ContentBlock> {
     [error.body().detail].into_iter().chain(failed).chain(result).map(ContentBlock::text).collect()
 }
 
-/// Says that a body names a field twice. The JSON-RPC library behind this would keep the last of the two.
+/// A duplicate field in a body. The JSON-RPC library would keep the last of the two.
 #[derive(Clone)]
 struct DuplicateField(String);
 
-/// Refuses what is no message. A body that names a field twice is noted on the request, for the answer to its call.
+/// Refuses invalid messages. A duplicate field is recorded on the request, for the answer to its call.
 async fn check_body(request: extract::Request, next: Next) -> Response {
     let (mut parts, body) = request.into_parts();
     accept_whatever_fits(&mut parts);
@@ -301,7 +340,8 @@ async fn check_body(request: extract::Request, next: Next) -> Response {
     next.run(extract::Request::from_parts(parts, bytes.into())).await
 }
 
-/// Spells out for the library behind this what a client takes that takes anything, or says nothing of it.
+/// Sets the Accept header that the library requires, for a client that accepts anything or sends no such
+/// header.
 fn accept_whatever_fits(parts: &mut Parts) {
     let accepted = parts.headers.get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());
     let ranges: Vec<&str> = accepted.flat_map(|value| value.split(',')).collect();
