@@ -1,14 +1,14 @@
-//! What counts of episodes leave open: exact and score intervals of rates, of means of rates, and of what two policies
-//! differ by on the same episodes.
+//! Statistics of episodes: exact and score intervals of rates, of means of rates, and of the difference
+//! between two policies on the same episodes.
 
 use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
 
-/// Half of what an interval of 95 % leaves out.
+/// Half of the probability outside a 95 % interval.
 const TAIL: f64 = 0.025;
-/// Quantile of the normal distribution that leaves that much above.
+/// Quantile of the standard normal distribution at `1 - TAIL`.
 const Z: f64 = 1.959_963_984_540_054;
 
-/// Successes of trials.
+/// Number of successes among trials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Count {
     pub successes: usize,
@@ -16,13 +16,14 @@ pub struct Count {
 }
 
 impl Count {
-    /// `None` without trials.
+    /// Returns the rate of success; `None` without trials.
     pub fn share(self) -> Option<f64> {
         (self.trials > 0).then(|| self.successes as f64 / self.trials as f64)
     }
 }
 
-/// The exact 95 % interval of a rate (Clopper and Pearson, 1934): the limits are quantiles of beta distributions.
+/// Returns the exact 95 % interval of a rate (Clopper and Pearson, 1934). Its limits are quantiles of
+/// beta distributions.
 pub fn clopper_pearson(count: Count) -> [f64; 2] {
     let (k, n) = (count.successes as f64, count.trials as f64);
     let quantile = |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |beta| beta.inverse_cdf(p));
@@ -31,7 +32,7 @@ pub fn clopper_pearson(count: Count) -> [f64; 2] {
     [low, high]
 }
 
-/// Score interval of a rate, 95 % (Wilson, 1927).
+/// Returns the 95 % score interval of a rate (Wilson, 1927).
 pub fn wilson(count: Count) -> [f64; 2] {
     let (k, n) = (count.successes as f64, count.trials as f64);
     let share = k / n;
@@ -40,8 +41,8 @@ pub fn wilson(count: Count) -> [f64; 2] {
     [-1.0, 1.0].map(|sign| ((middle + sign * reach) / (1.0 + Z * Z / n)).clamp(0.0, 1.0))
 }
 
-/// Mean of rates that each count the same, and an interval of it: how far each exact limit is from its own rate, added as
-/// squares (Zou and Donner, 2008). `None` without any trials.
+/// Returns the unweighted mean of rates and an interval of it; `None` without any trials. The distances
+/// of the exact limits from their rates are added in quadrature (Zou and Donner, 2008).
 pub fn mean_share(counts: &[Count]) -> Option<(f64, [f64; 2])> {
     let known: Vec<(f64, [f64; 2])> =
         counts.iter().filter_map(|count| Some((count.share()?, clopper_pearson(*count)))).collect();
@@ -53,7 +54,7 @@ pub fn mean_share(counts: &[Count]) -> Option<(f64, [f64; 2])> {
     (!known.is_empty()).then(|| (mean, [mean - reach(0), mean + reach(1)]))
 }
 
-/// Which of two policies succeeded on the same episodes, counted.
+/// Outcomes of two policies on the same episodes, counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Pairs {
     pub both: usize,
@@ -75,23 +76,25 @@ impl Pairs {
         Count { successes: self.both + self.second_only, trials: self.total() }
     }
 
-    /// Rate of the second less that of the first; `None` without pairs.
+    /// Returns the rate of the second policy minus that of the first; `None` without pairs.
     pub fn difference_share(self) -> Option<f64> {
         Some(self.second().share()? - self.first().share()?)
     }
 }
 
-/// How likely episodes of which only one policy succeeds are split so unevenly if both are as good: two-sided, exact (McNemar,
-/// 1947).
+/// Returns the p-value of the discordant episodes if both policies are equally good: two-sided, exact
+/// (McNemar, 1947).
 pub fn mcnemar(pairs: Pairs) -> f64 {
     let (fewer, discordant) = (pairs.first_only.min(pairs.second_only), pairs.first_only + pairs.second_only);
     let tail = Binomial::new(0.5, discordant as u64).map_or(1.0, |split| split.cdf(fewer as u64));
     (2.0 * tail).min(1.0)
 }
 
-/// 95 % interval of [`Pairs::difference_share`] (Newcombe, 1998, the tenth of its methods): score limits of both rates, and how
-/// they go together. For p1, p2 with limits [l1, u1], [l2, u2] and correlation phi,
-///   lower = p2 - p1 - sqrt((p2 - l2)^2 - 2 phi (p2 - l2) (u1 - p1) + (u1 - p1)^2), and the upper one with the others.
+/// Returns the 95 % interval of [`Pairs::difference_share`] (Newcombe, 1998, method 10), from the score
+/// limits of both rates and their correlation. For p1, p2 with limits [l1, u1], [l2, u2] and correlation
+/// phi,
+///   lower = p2 - p1 - sqrt((p2 - l2)^2 - 2 phi (p2 - l2) (u1 - p1) + (u1 - p1)^2),
+/// and the upper limit follows with u2 and l1.
 pub fn newcombe(pairs: Pairs) -> Option<[f64; 2]> {
     let (first, second) = (pairs.first(), pairs.second());
     let (p1, p2) = (first.share()?, second.share()?);
@@ -102,7 +105,7 @@ pub fn newcombe(pairs: Pairs) -> Option<[f64; 2]> {
     Some([difference - reach(p2 - l2, u1 - p1), difference + reach(u2 - p2, p1 - l1)])
 }
 
-/// The correlation of two binary outcomes, corrected for continuity where it is positive.
+/// Returns the correlation of two binary outcomes, corrected for continuity where it is positive.
 fn correlation(pairs: Pairs) -> f64 {
     let [a, b, c, d] = [pairs.both, pairs.first_only, pairs.second_only, pairs.neither].map(|n| n as f64);
     let margins = (a + b) * (c + d) * (a + c) * (b + d);
