@@ -1,7 +1,7 @@
-//! README and the book in `docs/` are true: their commands run or are at least accepted, their bodies are answered, their links lead
-//! somewhere, and their tables say what the code says.
+//! Tests of README and the book in `docs/`: commands run or are at least accepted, request bodies are
+//! accepted, links are valid, and tables match the code.
 //!
-//! Every block of code says in its fence what becomes of it here:
+//! The fence of every code block declares its check:
 //!
 //! | fence | what happens |
 //! |---|---|
