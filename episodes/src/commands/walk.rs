@@ -1,4 +1,5 @@
-//! `walk`: the base moves, and the waist if it is told to; arms and hands keep their joints.
+//! `walk`: moves the base, and the waist if the command has a target for it; arms and hands keep their
+//! joints.
 
 use tandem_sim::{BaseCommand, CONTROL_HZ};
 use tandem_tools_spec::WalkMove;
@@ -6,19 +7,19 @@ use tandem_tools_spec::WalkMove;
 use super::columns::{self, Clamped};
 use super::motion::{Compliance, Motion};
 
-/// The trunk turns no faster.
+/// Maximum yaw rate of the trunk.
 const WAIST_RAD_S: f64 = 1.0;
 
-/// The same base command at every step, while the waist turns where it is to.
+/// The same base command at every step, while the waist turns to its target.
 pub struct WalkTrajectory {
     base: BaseCommand,
-    /// Where the waist begins, and where it is to turn, if it is.
+    /// Angle of the waist at the start, and its target, if it has one.
     from_rad: f64,
     to_rad: Option<f64>,
 }
 
 impl WalkTrajectory {
-    /// Has `motion` take up what `entry` asks of it.
+    /// Starts `entry` on `motion`.
     pub fn begin(entry: &WalkMove, motion: &mut Motion, clamped: &mut Clamped) -> WalkTrajectory {
         let velocity = [entry.vx_m_s, entry.vy_m_s, entry.yaw_rate_rad_s];
         let base =
@@ -31,7 +32,7 @@ impl WalkTrajectory {
         WalkTrajectory { base, from_rad: motion.state().upper_rad[yaw], to_rad }
     }
 
-    /// One control step.
+    /// Makes one control step.
     pub fn advance(&self, step: u32, motion: &mut Motion) {
         if let Some(to_rad) = self.to_rad {
             let most_rad = WAIST_RAD_S * f64::from(step) / CONTROL_HZ;
