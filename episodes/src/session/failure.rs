@@ -31,7 +31,7 @@ impl Rewind {
         }
     }
 
-    /// Forgets the snapshot, because the world is about to be replaced.
+    /// Drops the snapshot when the world is replaced.
     pub fn forget(&mut self) {
         *self = Rewind::default();
     }
