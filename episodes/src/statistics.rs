@@ -91,10 +91,10 @@ pub fn mcnemar(pairs: Pairs) -> f64 {
 }
 
 /// Returns the 95 % interval of [`Pairs::difference_share`] (Newcombe, 1998, method 10), from the score
-/// limits of both rates and their correlation. For p1, p2 with limits [l1, u1], [l2, u2] and correlation
-/// phi,
-///   lower = p2 - p1 - sqrt((p2 - l2)^2 - 2 phi (p2 - l2) (u1 - p1) + (u1 - p1)^2),
-/// and the upper limit follows with u2 and l1.
+/// limits of both rates and their correlation. With rates p1 and p2, limits [l1, u1] and [l2, u2], and
+/// correlation phi:
+///   lower = p2 - p1 - sqrt((p2 - l2)^2 - 2 phi (p2 - l2) (u1 - p1) + (u1 - p1)^2).
+/// The upper limit follows with u2 and l1.
 pub fn newcombe(pairs: Pairs) -> Option<[f64; 2]> {
     let (first, second) = (pairs.first(), pairs.second());
     let (p1, p2) = (first.share()?, second.share()?);

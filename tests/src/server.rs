@@ -89,13 +89,13 @@ impl TestServer {
         link.split_once('#').expect("a link with a key").1.into()
     }
 
-    /// Stops the server in the way of SIGTERM.
+    /// Stops the server like SIGTERM.
     pub fn stop(&mut self) {
         let left = self.server.take().expect("a running server").stop();
         assert!(left.is_empty(), "{left:?} did not end");
     }
 
-    /// Stops the server in the way of SIGTERM, and starts another on the same folder of runs.
+    /// Stops the server like SIGTERM, and starts another on the same folder of runs.
     pub fn restart(&mut self, guests: Guests) {
         let left = self.server.take().expect("a running server").stop_keeping();
         assert!(left.is_empty(), "{left:?} did not stop");

@@ -1,13 +1,13 @@
-//! Reports of skipped tests. Rust's test harness has no way to skip a test at run time, and it captures
-//! the output of passing tests. This line bypasses the capture, so every run of `cargo test` shows it.
-//! Tests of other crates include this file, too.
+//! Reports of skipped tests. Rust's test harness cannot skip a test at run time, and it captures the
+//! output of passing tests. This line bypasses the capture, so every run of `cargo test` shows it. Tests
+//! of other crates include this file, too.
 
 use std::collections::BTreeSet;
 use std::io::{self, Write};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 
-/// Lines printed so far; each is printed once.
+/// Printed lines; each is printed once.
 static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
 /// Reports that the test on this thread skips something, and why.

@@ -22,9 +22,8 @@ const LEASH_M: f64 = 0.25;
 const COASTS_S: f64 = 0.25;
 const COASTS_S2_M: f64 = 0.6;
 const CONTROL_S: f64 = 0.02;
-/// Control steps with still feet after which the pelvis counts as rising or sinking, while it is off its
-/// height, only if its vertical speed exceeds the threshold. Just after the feet have come together, the
-/// pelvis does not yet rise.
+/// A pelvis off its height counts as moving for this many control steps after the feet have stopped, even
+/// if it does not rise yet. Later it counts as moving only above this vertical speed.
 const PLANTED_STEPS: u32 = 10;
 const RISES_M_S: f64 = 0.02;
 /// Weight of one control step in the running mean of the vertical speed.

@@ -81,8 +81,8 @@ impl UpperBody {
         }
     }
 
-    /// Returns the tasks of one step: the wrists with `targets`, whose error is to shrink by the fraction
-    /// `gain`, and secondary tasks that minimise other motion.
+    /// Returns the tasks of one step: the wrists with `targets`, and secondary tasks that minimise other
+    /// motion. The step removes the fraction `gain` of the wrists' error.
     pub fn tasks(&self, targets: &Sides<Option<Isometry3<f64>>>, gain: f64) -> Vec<Task> {
         let mut tasks: Vec<Task> = Vec::with_capacity(7);
         for (side, target) in targets.by_side() {
@@ -206,8 +206,9 @@ fn g1_capsules(model: &Model) -> Result<Vec<Capsule>, IkError> {
 }
 
 /// Returns the capsules of a robot whose file names its links differently, from the places of its joints.
-/// They are a trunk below the shoulders and as wide, a head around the camera, a forearm up to the link
-/// of the wrist, and that link up to the palm. Their thickness is that of a G1, scaled to this robot.
+/// They are a trunk below the shoulders and as wide, a head around the camera, and a forearm and a hand
+/// of each arm. The forearm extends to the link of the wrist, and the hand from there to the palm. Their
+/// thickness is that of a G1, scaled to this robot.
 fn capsules(model: &Model, robot: &RobotModel) -> Result<Vec<Capsule>, IkError> {
     let poses = robot.forward_kinematics(Pose::IDENTITY, &[0.0; JOINTS]);
     let (name, size) = (|link: usize| &robot.links[link].name, f64::from(robot.scale.length_m(1.0)));

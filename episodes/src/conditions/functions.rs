@@ -345,8 +345,8 @@ impl Fact<'_> {
     }
 }
 
-/// Returns the direction opposite to the x axis of the object at `place`, and the coordinate along it of
-/// the site given by the next argument.
+/// Returns the direction opposite to the x axis of the object at `place`. The second value is the
+/// coordinate along it of the site in the next argument.
 fn behind(f: &Fact, place: usize) -> (Vector, f32) {
     let object = f.object(place);
     let back = f.facts.object(object).pose_in_world.rotation * Vector::NEG_X;

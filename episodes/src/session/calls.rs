@@ -39,7 +39,7 @@ pub enum Caller<'a> {
 /// The audience of an answer.
 #[derive(Clone, Copy, Debug)]
 pub enum Audience<'a> {
-    /// The caller, who receives the information that the episode's assistance grants.
+    /// The caller; it receives the information that the episode's assistance grants.
     Caller,
     /// This process, which receives all information on behalf of a policy. The list is the information
     /// shown to the policy beyond the benchmark's own policies; results name it.

@@ -61,7 +61,7 @@ impl Session {
         }
     }
 
-    /// Returns the state like [`Session::live_view`], for the person who drives `robot` and sees the
+    /// Returns the state like [`Session::live_view`], for the person driving `robot`, with a view of the
     /// whole scene. It counts as an observation, so that recordings and results include it; its image is
     /// not used.
     pub fn drivers_view(&mut self, robot: &str) -> Result<LiveView, EpisodeError> {

@@ -53,7 +53,7 @@ pub struct Task {
     pub benchmark_steps: u32,
     /// Control steps of an episode under the agentic protocol.
     pub agentic_steps: u32,
-    /// Thinking time of a policy under the agentic protocol.
+    /// Limit of a policy's thinking time under the agentic protocol.
     pub thinking_s: u32,
     /// Phases p1, p2, ... in the order in which they must be reached.
     pub phases: &'static [Phase],

@@ -314,8 +314,8 @@ mod tests {
     const WIDTH: usize = 60;
     const HEIGHT: usize = 40;
 
-    /// Returns a view of a grey wall at 2 m, a red square rotated onto its corner at 1 m, and a red spot
-    /// on the wall.
+    /// Returns a view of a grey wall at 2 m with a red spot, and a red square rotated onto its corner at
+    /// 1 m.
     fn view() -> RobotView {
         let mut rgb = Vec::new();
         let mut depth_m = Vec::new();

@@ -27,8 +27,8 @@ pub use error::TaskFileError;
 
 use crate::tasks::{self, Task, TaskSource};
 
-/// Cache of all tasks built so far. Tasks live as long as the program, and a server or a report may read
-/// the same task thousands of times.
+/// Cache of all tasks. Tasks live as long as the program, and a server or a report may read the same task
+/// thousands of times.
 static MADE: Mutex<Vec<&'static Task>> = Mutex::new(Vec::new());
 
 /// Reads a task file and the MJCF files that it names.

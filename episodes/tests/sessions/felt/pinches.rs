@@ -1,5 +1,5 @@
-//! A test of replies on a pinch of a round object by fingers that do not oppose each other, which is not
-//! scored as a grip.
+//! A test of replies on a pinch that is not scored as a grip: a round object between fingers that do not
+//! oppose each other.
 
 use std::collections::BTreeMap;
 

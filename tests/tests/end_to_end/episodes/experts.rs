@@ -242,7 +242,7 @@ impl PrivilegedEpisode for Carry {
 }
 
 /// Regression test: a walking robot is lower than a standing one. B walked the bottle into the edge of
-/// the table, which turned it by 45 degrees in the hand, and the opening fingers knocked it over.
+/// the table, which turned it by 45 degrees in the hand. The opening fingers then knocked it over.
 #[test]
 fn a_bottle_is_carried_over_the_edge_of_the_table() {
     let spec = EpisodeSpec::new(tasks::find("cart_service").expect("a task"), 2029, Protocol::Benchmark);

@@ -54,7 +54,7 @@ fn entered(team: &Team, robot: usize) -> String {
 }
 
 impl DriversSocket {
-    /// Enters as the operator of robot number `robot`, in the way of the page.
+    /// Enters like the page, as the operator of robot number `robot`.
     pub fn open(team: &Team, robot: usize) -> DriversSocket {
         DriversSocket::open_for(team, &[robot])
     }

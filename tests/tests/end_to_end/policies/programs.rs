@@ -253,7 +253,7 @@ fn a_crash_of_one_of_two_programs_is_named() {
     }
 }
 
-/// Checks the result when B's program crashes, for each behaviour of A's.
+/// Checks the result of an episode in which B's program crashes, with A's in this role.
 fn check_named_crash(role: &str) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let driving = Driving { operators: Some(Operators::PerRobot), patience_s: Some(1.0), talk: None };
