@@ -13,8 +13,8 @@ use super::{modules::modules, sources::expect_none};
 /// rad or m, and its costs and errors are weighted.
 const CRATES: [&str; 4] = ["tools_spec", "sim", "episodes", "gateway"];
 
-/// Files in which numbers belong to joints of any kind, in rad or m as in `ik`. In others, the rows of a
-/// solver or a filter mix units.
+/// Files with coordinates of any joint, in rad or m as in `ik`, or with rows of a solver or a filter, which
+/// mix units.
 const GENERALISED: [&str; 7] = [
     "sim/src/dynamics/",
     "sim/src/estimate/covariance.rs",
