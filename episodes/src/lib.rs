@@ -49,7 +49,7 @@ mod words;
 
 pub use commands::{Called, OperatorCall, OperatorCommand};
 pub use conditions::{FUNCTIONS, Function};
-pub use describe::{brief, task_list};
+pub use describe::{brief, task_list, teamwork};
 pub use error::{CheckpointError, EpisodeError, RobotError, SceneError};
 pub use fingerprint::{build, name_program};
 pub use instructions::{Instructions, InstructionsError};
@@ -71,7 +71,7 @@ pub use scoring::{
 };
 pub use session::{
     Audience, BringBack, CallReply, Caller, Checkpoint, Clock, FAILED_STEP_FILE, FailedStep, JournalEntry,
-    Outcome, Request, RunFiles, RunFolder, Session, monotonic,
+    Outcome, PlanAdvance, PlanRun, Request, RunFiles, RunFolder, Session, monotonic,
 };
 pub use spec::{
     Controller, EpisodeSpec, KeyedSeed, MomentStart, OwnRobot, PhaseStart, RobotFile, SceneFile, Start,

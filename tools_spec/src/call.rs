@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value, json};
 
 use crate::error::SpecError;
-use crate::list::{ActCall, EPISODE_TOOLS, LookCall, ToolCall, every_tool_spec};
+use crate::list::{ActCall, EPISODE_TOOLS, LookCall, PlanCall, ToolCall, every_tool_spec};
 use crate::parts::{Driving, Formats, Wording};
 use crate::schema::{ToolSpec, body_schema, plain_schema};
 use crate::strict_value::StrictValue;
 use crate::tool::{Tool, parse_args};
-use crate::tools::{Expectation, Observation, Observe, PlannedCommand, SendPlan, StartEpisode};
+use crate::tools::{Expectation, Observation, Observe, PlannedCommand, SendPlan, StartEpisode, WalkTo};
 
 /// A call on an episode. It serialises to what [`Call::parse`] reads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -178,15 +178,15 @@ impl SendPlan {
             let mut args = Value::Object(command.arguments.clone());
             let with_all = beside::<WithAll>(SendPlan::NAME, &mut args, &WithAll::FIELDS)
                 .map_err(|error| refused(error.to_string()))?;
-            match ToolCall::parse(&command.tool, args) {
-                Ok(ToolCall::Act(call)) => Ok(PlanStep {
-                    call,
-                    expects: command.expects.clone().unwrap_or_default(),
-                    short: with_all.short.unwrap_or(false),
-                }),
-                Ok(other) => Err(refused(format!("{} is no command", other.name()))),
-                Err(error) => Err(refused(error.to_string())),
-            }
+            let call = match ToolCall::parse(&command.tool, args) {
+                Ok(ToolCall::Act(call)) => PlannedCall::Act(call),
+                Ok(ToolCall::Plan(PlanCall::WalkTo(walk))) => PlannedCall::WalkTo(walk),
+                Ok(other) => return Err(refused(format!("{} is no command", other.name()))),
+                Err(error) => return Err(refused(error.to_string())),
+            };
+            let (expects, short) =
+                (command.expects.clone().unwrap_or_default(), with_all.short.unwrap_or(false));
+            Ok(PlanStep { call, expects, until: command.until, short })
         };
         self.commands.iter().enumerate().map(call).collect()
     }
@@ -195,12 +195,23 @@ impl SendPlan {
 /// One command of a plan, read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanStep {
-    /// What is commanded.
-    pub call: ActCall,
-    /// What is expected of the robots afterwards.
+    /// The command.
+    pub call: PlannedCall,
+    /// Conditions that have to hold after it.
     pub expects: Expectation,
-    /// Whether its reply is to be short, where it is the last one that is carried out.
+    /// True where it ends as soon as they hold.
+    pub until: bool,
+    /// True for a short reply, where it is the last command that is carried out.
     pub short: bool,
+}
+
+/// A call that a plan may hold.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PlannedCall {
+    /// One command.
+    Act(ActCall),
+    /// A walk to a place, which is several.
+    WalkTo(WalkTo),
 }
 
 /// Reads the arguments of `start_episode`, and by whom the episode is to be driven.
@@ -328,8 +339,7 @@ mod tests {
         let robots = |call: &Call| call.robots().join(" ");
         for (name, example) in ToolCall::examples().into_iter().map(|call| (call.name(), Call::from(call))) {
             assert_eq!(example.steps() > 0, ActCall::TOOLS.contains(&name), "{name}");
-            let named =
-                if ["wait", "send_plan", "get_status", "finish", "say"].contains(&name) { "" } else { "A" };
+            let named = if ["wait", "get_status", "finish", "say"].contains(&name) { "" } else { "A" };
             assert_eq!(robots(&example), named, "{name}");
         }
         let both = vec![WristMove::hold("B"), WristMove::hold("A")];

@@ -20,7 +20,7 @@ mod strict_value;
 mod tool;
 mod tools;
 
-pub use call::{Call, Look, PlanStep, parse_start};
+pub use call::{Call, Look, PlanStep, PlannedCall, parse_start};
 pub use error::SpecError;
 pub use list::{
     ActCall, EPISODE_TOOLS, LookCall, LookReply, ManageCall, ManageReply, PlanCall, TalkCall, TalkReply,
@@ -63,9 +63,7 @@ pub fn episode_tool_specs(
     let wording = wording.into();
     let specs = call::specs_for_programs(wording).into_iter();
     let told = |spec: &ToolSpec| !spec.full_only || wording.assistance == Assistance::Full;
-    // Where robots have operators, plans of one would hold up the others.
-    let whose =
-        |spec: &ToolSpec| if talk { !PlanCall::TOOLS.contains(&spec.name) } else { !spec.for_operators };
+    let whose = |spec: &ToolSpec| talk || !spec.for_operators;
     let offered = specs.filter(|spec| spec.on_episode && told(spec) && whose(spec));
     offered.map(|spec| spec.of_episode(id, robots, most_steps)).collect()
 }

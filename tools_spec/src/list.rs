@@ -42,10 +42,11 @@ macro_rules! tools {
             specs.filter(|spec| !spec.full_only || wording.assistance == Assistance::Full).collect()
         }
 
-        /// The tools of an operator who may talk to others: every tool but plans, which would hold up the others.
+        /// The tools of an operator who may talk: those of every policy, and those for talking.
         pub fn operator_tool_specs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
-            let specs = every_tool_spec(wording.into()).into_iter();
-            specs.filter(|spec| !is_plan(spec.name)).collect()
+            let wording = wording.into();
+            let specs = every_tool_spec(wording).into_iter();
+            specs.filter(|spec| !spec.full_only || wording.assistance == Assistance::Full).collect()
         }
 
         /// Every tool, whoever is offered it.
@@ -242,11 +243,6 @@ tools! {
     Talk(TalkCall) -> each TalkReply for operators {
         Say,
     }
-}
-
-/// Whether a tool carries out several commands.
-fn is_plan(name: &str) -> bool {
-    PlanCall::TOOLS.contains(&name)
 }
 
 #[cfg(test)]

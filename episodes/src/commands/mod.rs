@@ -6,7 +6,7 @@
 
 mod called;
 mod check_reach;
-mod columns;
+pub(crate) mod columns;
 mod footing;
 mod motion;
 mod move_wrists;
@@ -30,6 +30,7 @@ use tandem_tools_spec::{ActCall, JointChunk, PoseFrame, WalkMove, WristMove};
 use crate::EpisodeError;
 use crate::protocol::Rules;
 use move_wrists::WristTrajectory;
+pub(crate) use move_wrists::wrist_targets;
 use send_joint_chunk::JointTrajectory;
 use walk::WalkTrajectory;
 

@@ -247,6 +247,11 @@ impl Motion {
         &self.state
     }
 
+    /// Joint targets of waist, arms and hands in radians.
+    pub fn upper_rad(&self) -> &[f64; UPPER_JOINTS] {
+        &self.state.upper_rad
+    }
+
     pub fn set_state(&mut self, state: MotionState) {
         self.state = state;
     }
@@ -365,8 +370,8 @@ impl Motion {
         self.state.aims = Sides::both(Aim::Joints);
     }
 
-    pub(super) fn turn_waist(&mut self, yaw_rad: f64) {
-        self.state.upper_rad[columns::waist().start] = yaw_rad;
+    pub(super) fn turn_waist(&mut self, column: usize, target_rad: f64) {
+        self.state.upper_rad[column] = target_rad;
     }
 
     pub(super) fn set_fingers(&mut self, side: Side, fingers_rad: &[f64; HAND_JOINTS]) {

@@ -14,10 +14,10 @@ const BENT_KNEES: &str = " A robot walks with bent knees: while it steps its pel
     commanded, and rises to that height when it stands. What its hands hold sinks and rises along.";
 
 const PARTNERS: &str = "The pelvis frames of different robots are unrelated. To relate two of them, find the same two points, well \
-    apart, with query_depth of both robots: robots stand upright, so a turn about z and a shift take the points of the one to \
-    those of the other.";
+    apart, with query_depth of both robots: robots stand upright to within a few degrees, so a turn about z and a shift take the points of \
+    the one to those of the other.";
 
-const PARTNERS_MOVE: &str = " pelvis_in_start keeps that valid while robots move.";
+const PARTNERS_MOVE: &str = " In frame \"level\" they are upright exactly, and pelvis_in_start keeps the relation valid while robots move.";
 
 const ODOMETRY: &str = "pelvis_in_start is where a robot's own IMU and joints have it: the pose of its pelvis in a frame that lies on \
     the floor under where the pelvis was when the episode began, z up, x where the robot faced. It drifts by up to 1 % of the way \
@@ -77,6 +77,28 @@ const WALKING: &str = "A robot that is told to walk gains way after 0.3 to 0.5 s
     hands or a partner pull it, drifts and sinks by 10 cm. Then free what pulls: loosen wrist targets, give way with compliance_n_s_m, or \
     walk the way it is pulled. Arms that reach more than 0.35 m ahead make a robot step, too: walk nearer instead, or ask for stand_fast.";
 
+const TEAMWORK: &str = "Each robot has an operator of its own; your tools see and move your robot alone. Time passes only while every operator \
+    has a command, and the shortest ends the step: a longer one stops with stop_reason \"partner_done\", so repeat it. `partners` in a reply says \
+    what the others' robots did. When your part is done call finish: your robot then holds still, and the others play on.";
+
+const TALKING: &str = " `say` reaches the others with their next reply, where `heard` has it. Agree on a few words at once and use them when they \
+    are true, for example IN PLACE, HOLDING, FREE; give places in a frame that you share, for example one robot's start frame (`room` says how \
+    robots begin to each other).";
+
+/// Text for policies that have plans.
+const WAITING: &str = " To wait for a partner, send a plan of one `wait` of up to 500 steps with `until` and a condition, for example \
+    {\"heard\": true}, {\"touching\": true}, {\"force_above_n\": 5} or {\"phase_reached\": \"p1\"}: it is answered once, and the partner's commands \
+    go on meanwhile.";
+
+/// Returns the part of an operator's brief about partners; `may_talk` is true if they may exchange
+/// messages.
+pub fn teamwork(assistance: Assistance, may_talk: bool) -> String {
+    let waiting = if assistance == Assistance::Full { WAITING } else { "" };
+    // Without messages there is nothing to hear.
+    let waiting = if may_talk { waiting.into() } else { waiting.replace("{\"heard\": true}, ", "") };
+    [TEAMWORK, if may_talk { TALKING } else { "" }, &waiting].concat()
+}
+
 /// Returns the brief of an episode in its wording, for robots that follow base commands within `limits`.
 pub fn brief(wording: Wording, limits: &BaseLimits) -> Brief {
     let Wording { assistance, hints } = wording;
@@ -87,6 +109,7 @@ pub fn brief(wording: Wording, limits: &BaseLimits) -> Brief {
         frames: [FRAMES, if squats { BENT_KNEES } else { "" }, if is_full { NAMED_FRAMES } else { "" }]
             .concat(),
         partners: [PARTNERS, if is_full { PARTNERS_MOVE } else { "" }].concat(),
+        teamwork: None,
         odometry: is_full.then(|| ODOMETRY.into()),
         camera: CAMERA.into(),
         hands: HANDS.into(),

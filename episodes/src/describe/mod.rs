@@ -4,7 +4,7 @@ mod brief;
 mod grips;
 mod room;
 
-pub use brief::brief;
+pub use brief::{brief, teamwork};
 #[cfg(test)]
 pub use grips::grips;
 pub use room::room;

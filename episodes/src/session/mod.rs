@@ -25,6 +25,7 @@ use failure::Rewind;
 pub use journal::JournalEntry;
 use journal::{Journal, KeptRequest};
 use onlookers::Spectators;
+pub use plan::{PlanAdvance, PlanRun};
 pub use replay::BringBack;
 pub(crate) use replay::Replay;
 use run_files::moment;

@@ -58,7 +58,7 @@ impl Answer {
             ToolReply::Manage(ManageReply::GetStatus(status)) | ToolReply::Talk(TalkReply::Say(status)) => {
                 status.fallen.retain(|entry| entry.robot == robot)
             }
-            // Looks are asked of the own robot alone, operators have no plans, and a result is of all.
+            // Looks are asked of the own robot alone, a plan's commands are answered so already, and a result is of all.
             ToolReply::Look(_) | ToolReply::Plan(_) | ToolReply::Manage(ManageReply::Finish(_)) => {}
         }
         self

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use serde_json::Value;
-use tandem_episodes::EpisodeError;
+use tandem_episodes::{EpisodeError, teamwork};
 use tandem_tools_spec::{
     Briefing, Call, EPISODE_TOOLS, EpisodeEntry, ManageReply, Note, Operators, ResultReply, SpecError,
     StatusReply, TalkCall, ToolCall, ToolReply,
@@ -192,7 +192,11 @@ impl HostedEpisode {
         self.admit(who)?;
         let briefing = self.thread.briefing().await?;
         Ok(match who {
-            Caller::Operator { robot, .. } => briefing.for_robot(robot),
+            Caller::Operator { robot, .. } => {
+                let mut briefing = briefing.for_robot(robot);
+                briefing.brief.teamwork = Some(teamwork(self.thread.spec().assistance, self.may_talk()));
+                briefing
+            }
             Caller::Host => briefing,
         })
     }

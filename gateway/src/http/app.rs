@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Instant};
 
 use serde_json::Value;
 use tandem_tools_spec::{
-    EPISODE_TOOLS, ListTasks, PlanCall, StartEpisode, Tool as _, ToolSpec, operator_tool_specs, tool_specs,
+    EPISODE_TOOLS, ListTasks, StartEpisode, Tool as _, ToolSpec, operator_tool_specs, tool_specs,
 };
 
 use tokio::sync::Semaphore;
@@ -56,8 +56,8 @@ impl AppState {
             false => tool_specs(self.settings.wording()),
         };
         if let Caller::Operator { .. } = caller {
-            // An operator's episode goes on already, and no other can be begun; a plan would hold up the others.
-            specs.retain(|spec| spec.name != StartEpisode::NAME && !PlanCall::TOOLS.contains(&spec.name));
+            // An operator's episode goes on already, and no other can be begun.
+            specs.retain(|spec| spec.name != StartEpisode::NAME);
         }
         specs
     }

@@ -5,14 +5,13 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// The rules an episode is run under.
+/// Rules of an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Protocol {
-    /// For agents that think between commands: at most 25 steps a command, 6000 steps of which 300 are an initial hold,
-    /// and 1800 s of the policy's own time, or what the server gives: budget.wall_clock_left_s says it.
+    /// For agents that think between commands: at most 25 steps a command.
     Agentic,
-    /// For learned policies: at most 50 steps a command, and the task's own number of steps.
+    /// For learned policies: at most 50 steps a command.
     Benchmark,
 }
 

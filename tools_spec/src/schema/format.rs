@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use super::spec::ToolSpec;
+use super::strict::SHORT;
 
 /// Whose form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,27 +67,56 @@ impl ToolSpec {
         })
     }
 
-    /// No output schema: clients drop the pictures of tools that declare one.
+    /// A host that leaves `short` out gets the short reply, which the server's instructions say once. Has no output schema, since clients drop the pictures of tools that declare one, and only the annotations that are not
+    /// MCP's defaults: a list of tools is read by a model in every conversation.
     fn of_mcp(&self) -> Value {
+        let mut schema = Value::Object(self.lenient_schema());
+        slim(&mut schema);
+        if let Some(short) = schema.get_mut("properties").and_then(|properties| properties.get_mut(SHORT)) {
+            *short = json!({ "type": "boolean" });
+        }
+        let annotations = match (self.read_only, self.idempotent) {
+            (true, _) => json!({ "readOnlyHint": true }),
+            (false, true) => json!({ "destructiveHint": false, "idempotentHint": true }),
+            (false, false) => json!({ "destructiveHint": false }),
+        };
         json!({
             "name": self.name,
-            "title": self.title(),
             "description": self.description,
-            "inputSchema": self.lenient_schema(),
-            "annotations": {
-                "title": self.title(),
-                "readOnlyHint": self.read_only,
-                "destructiveHint": false,
-                "idempotentHint": self.idempotent,
-                "openWorldHint": false,
-            },
+            "inputSchema": schema,
+            "annotations": annotations,
         })
     }
+}
 
-    /// The name as people write it: `move_wrists` is "Move wrists".
-    fn title(&self) -> String {
-        let words = self.name.replace('_', " ");
-        let (first, rest) = words.split_at(words.len().min(1));
-        first.to_uppercase() + rest
+/// Required fields whose names say what they are.
+const PLAIN_NAMES: [&str; 3] = ["episode_id", "robot", "robots"];
+
+/// Drops what names say and what the server checks by itself: defaults, and that no other fields are known.
+fn slim(schema: &mut Value) {
+    match schema {
+        Value::Array(items) => items.iter_mut().for_each(slim),
+        Value::Object(object) => {
+            object.remove("default");
+            if object.get("additionalProperties").is_some_and(Value::is_boolean) {
+                object.remove("additionalProperties");
+            }
+            if object.get("required").and_then(Value::as_array).is_some_and(Vec::is_empty) {
+                object.remove("required");
+            }
+            let required = object.get("required").cloned().unwrap_or_default();
+            let is_plain = |name: &str| {
+                PLAIN_NAMES.contains(&name)
+                    && required.as_array().is_some_and(|all| all.contains(&name.into()))
+            };
+            if let Some(Value::Object(properties)) = object.get_mut("properties") {
+                let plain = properties.iter_mut().filter(|(name, _)| is_plain(name));
+                plain.filter_map(|(_, property)| property.as_object_mut()).for_each(|property| {
+                    property.remove("description");
+                });
+            }
+            object.values_mut().for_each(slim);
+        }
+        _ => {}
     }
 }

@@ -59,6 +59,9 @@ fn the_choice_beside_null(property: &Value) -> Option<Value> {
     let is_null = |choice: &&Value| choice["type"] == "null";
     choices.iter().find(is_null)?;
     let mut choice = choices.iter().find(|choice| !is_null(choice))?.clone();
+    if let Some(Value::Array(values)) = choice.get_mut("enum") {
+        values.retain(|value| !value.is_null());
+    }
     let texts = [property, &choice].map(|described| described["description"].as_str());
     let text = texts.into_iter().flatten().collect::<Vec<_>>().join(" ");
     choice["description"] = text.replace("Null:", "Left out:").replace(" or null:", " or left out:").into();

@@ -4,7 +4,7 @@ use schemars::{JsonSchema, generate::SchemaSettings};
 use serde_json::{Map, Value};
 
 use crate::limits::bound_numbers;
-use crate::parts::{Assistance, Hints, Wording};
+use crate::parts::{Assistance, Wording};
 
 /// The schema of `T` as it is, for replies: nothing has to be strict about what the server itself sends.
 pub fn plain_schema<T: JsonSchema>() -> Value {
@@ -12,8 +12,7 @@ pub fn plain_schema<T: JsonSchema>() -> Value {
     settings.into_generator().into_root_schema_for::<T>().to_value()
 }
 
-/// The schema of `T` as arguments, with its hints at the end of what they belong to, or without them; where a policy is told less,
-/// a text that it has for that takes the place of the description.
+/// Returns the schema of `T` as arguments. Where a policy is told less, the text that a description has for that takes its place.
 pub fn argument_schema<T: JsonSchema>(wording: Wording) -> Value {
     let mut schema = plain_schema::<T>();
     word(&mut schema, wording);
@@ -37,13 +36,10 @@ pub fn word(schema: &mut Value, wording: Wording) {
                 true => object.remove(name)?.as_str().map(str::to_owned),
                 false => None,
             };
-            let (hint, of_paper) = (text_of("hint"), text_of("paper"));
+            let of_paper = text_of("paper");
             if let Some(Value::String(text)) = object.get_mut("description") {
                 if let (Some(of_paper), Assistance::Paper) = (of_paper, wording.assistance) {
                     *text = of_paper;
-                }
-                if let (Some(hint), Hints::On) = (hint, wording.hints) {
-                    *text = format!("{text} {hint}");
                 }
             }
             object.values_mut().for_each(|value| word(value, wording));

@@ -48,7 +48,7 @@ pub fn strict_schema<T: JsonSchema>(wording: Wording, defaults: bool) -> (String
 
 /// The field by which every tool is asked for a short reply, and what it says.
 pub const SHORT: &str = "short";
-pub const SHORTLY: &str = "True: a shorter reply, without what is as it should be.";
+pub const SHORTLY: &str = "True: a shorter reply, without what is as expected.";
 
 /// Adds the field by which a tool is asked for a short reply. Strict hosts limit how many fields may be null, so it may not.
 pub fn require_short(schema: &mut Map<String, Value>, default: bool) {
@@ -66,7 +66,7 @@ pub fn require_short(schema: &mut Map<String, Value>, default: bool) {
 
 /// Adds the handle that stands in the path over REST and among the arguments everywhere else.
 pub fn require_episode_id(schema: &mut Map<String, Value>) {
-    let handle = json!({ "type": "string", "description": "The episode, as start_episode returned it." });
+    let handle = json!({ "type": "string", "description": "The episode." });
     if let Some(Value::Object(properties)) = schema.get_mut("properties") {
         properties.shift_insert(0, "episode_id".into(), handle);
     }

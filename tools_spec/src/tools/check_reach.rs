@@ -8,32 +8,29 @@ use crate::limits;
 use crate::parts::PoseFrame;
 use crate::tool::Tool;
 
-/// Ask whether a robot's wrists could reach poses from where it stands, using the arms that are given a pose and the waist.
-/// Nothing moves and no steps are spent. Poses are of the wrist links (`left_wrist_yaw_link`, `right_wrist_yaw_link`) in the robot's pelvis
-/// frame: x forward, y left, z up, metres.
+/// Ask whether wrists could reach poses from where the robot stands, by the waist and the arms that are
+/// given a pose. Nothing moves; costs no steps. Poses are as in move_wrists.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(extend("allOf" = limits::at_least_one(&POSES)))]
 #[serde(deny_unknown_fields)]
 pub struct CheckReach {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
-    /// Left wrist position [x, y, z] in metres, as [0.30, 0.20, 0.10]. Null: where it is to be now, or, without an
-    /// orientation either, this arm keeps its joints.
+    /// Left wrist [x, y, z]. Null: the present target.
     pub left_position_m: Option<[f64; 3]>,
-    /// Left wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null: as it is to be now.
+    /// Left wrist orientation.
     #[schemars(extend("contains" = limits::direction()))]
     pub left_quaternion_wxyz: Option<[f64; 4]>,
-    /// Right wrist position [x, y, z] in metres, as [0.30, -0.20, 0.10]. Null: where it is to be now, or, without an
-    /// orientation either, this arm keeps its joints.
+    /// Right wrist.
     pub right_position_m: Option<[f64; 3]>,
-    /// Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. Null: as it is to be now.
+    /// Right wrist orientation.
     #[schemars(extend("contains" = limits::direction()))]
     pub right_quaternion_wxyz: Option<[f64; 4]>,
-    /// The frame of the poses: "pelvis", "level" or "start". Null: "pelvis".
+    /// Frame of the poses.
     #[schemars(extend("full_only" = true, "default" = PoseFrame::Pelvis))]
     pub frame: Option<PoseFrame>,
-    /// True: with the waist as it is, as move_wrists reaches with keep_waist. Null: false.
+    /// True: with the waist as it is.
     #[schemars(extend("full_only" = true, "default" = false))]
     pub keep_waist: Option<bool>,
 }

@@ -9,8 +9,7 @@ use serde_json::{Map, Value};
 use crate::parts::{AgentEnding, Assistance, Disclosure, ModelEnding, Protocol, Usage};
 use crate::tool::Tool;
 
-/// End the episode and get its result. Call it when the task is done or cannot be done any more. After that no
-/// command is executed; observe, get_robot_state, get_status and finish still answer.
+/// End the episode and get its result. After that no command is executed; reads still answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Finish {}

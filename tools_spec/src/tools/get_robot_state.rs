@@ -7,15 +7,15 @@ use crate::limits;
 use crate::parts::{BaseCommand, JointValues, Pose, PoseFrame};
 use crate::tool::Tool;
 
-/// Read one robot's proprioception: 43 joint angles, velocities and torques by name, both wrist poses in the pelvis
-/// frame, which way is down, how far the robot has gone, and the base command in force. Costs no steps; physics stands still.
-/// Also answers after the episode has ended.
+/// Read one robot's proprioception without an image: wrist poses in the pelvis frame, which way is down,
+/// odometry, the base command in force and, unless `short`, 43 joint angles, velocities and torques. Costs
+/// no steps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(extend("paper" = "Read one robot's proprioception: 43 joint angles by name, both wrist poses in the pelvis frame, and the \
-    base command in force. Costs no steps; physics stands still. Also answers after the episode has ended."))]
+    base command in force. Costs no steps."))]
 #[serde(deny_unknown_fields)]
 pub struct GetRobotState {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
 }

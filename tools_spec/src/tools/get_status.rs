@@ -7,14 +7,13 @@ use super::finish::EndReason;
 use crate::parts::{Assistance, Budget, Disclosure, NextPhase, PhaseReached, Protocol, RobotFallen};
 use crate::tool::Tool;
 
-/// Ask where the episode stands: time, phases reached, who has fallen, and the budget left. Costs no steps; physics stands
-/// still. Also answers after the episode has ended.
+/// Ask how the episode is going: time, phases reached, fallen robots, and the budget left. Costs no steps.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[schemars(extend("paper" = "Ask where the episode stands: time, the budget left, and once it has ended the phases that were reached. \
-    Costs no steps; physics stands still. Also answers after the episode has ended."))]
+#[schemars(extend("paper" = "Ask how the episode is going: time, the budget left, and once it has ended the phases that were reached. \
+    Costs no steps."))]
 #[serde(deny_unknown_fields)]
 pub struct GetStatus {
-    /// True: also what the next phase still lacks, part by part, as it is measured.
+    /// True: also what the next phase lacks, part by part, as measured.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[schemars(extend("full_only" = true, "default" = false))]
     pub explain: bool,

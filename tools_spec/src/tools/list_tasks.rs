@@ -7,14 +7,14 @@ use super::start_episode::{Instruction, PhaseInfo};
 use crate::parts::{BaseLimits, Protocol};
 use crate::tool::{Route, Tool};
 
-/// List the tasks that start_episode can start: their instructions, the phases they are scored by, and the budgets of
-/// each protocol; and how fast and how low the robots can move.
+/// List the tasks that start_episode can start: their instructions, the phases they are scored by, the
+/// budgets of each protocol, and the robots' limits.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(extend("paper" = "List the tasks that start_episode can start: their instructions and the budgets of each protocol; and how \
     fast and how low the robots can move."))]
 #[serde(deny_unknown_fields)]
 pub struct ListTasks {
-    /// True: of each task its id and what has to be done alone; start_episode tells the rest.
+    /// True: only each task's id and instruction; start_episode tells the rest.
     #[serde(default)]
     pub short: bool,
 }

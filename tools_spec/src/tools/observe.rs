@@ -9,23 +9,22 @@ use crate::limits;
 use crate::parts::{CameraArrays, Png, Pose, PoseFrame};
 use crate::tool::Tool;
 
-/// Look through the robots' own head cameras and read their proprioception. Returns for each robot the same numbers as
-/// get_robot_state, the calibration of its camera, and one PNG image of 320x240 pixels. Costs no steps; physics stands
-/// still. Also answers after the episode has ended.
+/// Look through head cameras: returns one PNG image of 320x240 pixels for each robot, its camera's
+/// calibration and the numbers of get_robot_state. Costs no steps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Observe {
-    /// The robots to look through, as ["A", "B"]. Null: all of them.
+    /// Robots, for example ["A", "B"]. Null: all.
     #[schemars(
         length(min = 1, max = limits::ROBOT_NAMES.len()),
         inner(regex(pattern = limits::ROBOT_PATTERN)),
         extend("uniqueItems" = true)
     )]
     pub robots: Option<Vec<String>>,
-    /// True: without joint angles, velocities and torques, most of the text. False or null: with them.
-    #[schemars(extend("paper" = "True: without joint angles, most of the text. False or null: with them.", "default" = false))]
+    /// True: without joint angles, velocities and torques, most of the text.
+    #[schemars(extend("paper" = "True: without joint angles, most of the text.", "default" = false))]
     pub short: Option<bool>,
-    /// The frame of the wrists, and of the camera's pose beside that in the pelvis frame: "pelvis", "level" or "start". Null: "pelvis".
+    /// Frame of the wrists and, beside the pelvis frame, of the camera.
     #[schemars(extend("full_only" = true, "default" = PoseFrame::Pelvis))]
     pub frame: Option<PoseFrame>,
 }

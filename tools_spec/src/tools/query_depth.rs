@@ -9,32 +9,29 @@ use crate::limits;
 use crate::parts::{PixelRegion, PoseFrame};
 use crate::tool::Tool;
 
-/// Measure where what a robot's head camera sees is, at pixels named one by one or as a region: at most 4096 of them either way. Returns
-/// a row [u, v, x, y, z] for each pixel: the 3-D point in the robot's pelvis frame, the frame that wrist targets are given in. A pixel
-/// sees a surface, so the middle of an object lies a little behind the point. Costs no steps; physics stands still.
+/// Measure the points that a robot's head camera sees at up to 4096 pixels, listed or filling a region.
+/// Returns a row [u, v, x, y, z] for each, in the pelvis frame as wrist targets. A pixel sees a surface;
+/// the middle of an object is a little behind it. Costs no steps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(extend("oneOf" = limits::one_of(&[("pixels", "array"), ("region", "object"), ("surface", "object")])))]
 #[serde(deny_unknown_fields)]
 pub struct QueryDepth {
-    /// The robot whose camera measures, as "A".
+    /// The robot, for example "A".
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
-    /// Pixels as [u, v]: column 0 to 319 from the left, row 0 to 239 from the top, at most 4096 of them.
-    /// Example: [[160, 120], [170, 120]]. Null: those of `region`.
+    /// Pixels [u, v], column 0 to 319 from the left, row 0 to 239 from the top.
     #[schemars(length(min = 1, max = limits::MAX_PIXELS), extend("items" = limits::pixel()))]
     pub pixels: Option<Vec<[i64; 2]>>,
-    /// Pixels of a rectangle, row by row, at most 4096 of them. Null: those of `pixels`.
+    /// Pixels of a rectangle, row by row.
     pub region: Option<PixelRegion>,
-    /// True: also the plane in `region`, the straight edges at which it ends there, and the corners where they meet, fitted to every pixel
-    /// of it.
+    /// True: also the largest plane in `region`, its straight edges and their corners.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[schemars(extend("full_only" = true, "default" = false))]
     pub fit: bool,
-    /// A surface to find, whose middle, size, corners and, where it is upright and round, axis are told in place of points: give pixel,
-    /// [u, v] of a place on it, for the patch of its colour and the whole thing, or color, as "red", for the nearest three of that colour.
+    /// Returns middle, size, corners and, of an upright round thing, axis of a surface in place of points.
     #[schemars(extend("full_only" = true))]
     pub surface: Option<SurfaceQuery>,
-    /// The frame of the points: "pelvis", "level" or "start". Null: "pelvis".
+    /// Frame of the points.
     #[schemars(extend("full_only" = true, "default" = PoseFrame::Pelvis))]
     pub frame: Option<PoseFrame>,
 }
@@ -89,15 +86,15 @@ impl Tool for QueryDepth {
     }
 }
 
-/// A surface in a picture: what is joined to a pixel, or the nearest of a colour.
+/// Either a pixel or a color.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("oneOf" = limits::one_of(&[("pixel", "array"), ("color", "string")])))]
 pub struct SurfaceQuery {
-    /// A pixel on it, as [160, 120]. Null: the nearest of `color`.
+    /// A pixel on it: for the patch of its colour and the whole thing.
     #[schemars(extend("prefixItems" = limits::pixel_range()))]
     pub pixel: Option<[i64; 2]>,
-    /// Its colour. Null: that of `pixel`.
+    /// Its colour: for the nearest three.
     pub color: Option<Color>,
 }
 

@@ -23,12 +23,13 @@ pub fn action_row_layout() -> String {
     blocks.map(|(block, columns)| format!("{block} {columns}")).collect::<Vec<_>>().join(", ")
 }
 
-/// Send joint targets for one or more robots, one row per control step of 20 ms. Rows of all named robots run side by
-/// side, so each robot needs the same number of rows: 1 up to the budget's steps_per_command. Robots that are not named hold still. Targets beyond a joint's limits are clamped and reported.
+/// Send joint targets, one row per control step of 20 ms. Rows of all named robots run side by side, so
+/// each needs the same number: 1 up to the budget's steps_per_command. Other robots hold still. Targets
+/// beyond joint limits are clamped and reported.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SendJointChunk {
-    /// One entry per robot that is to move; each robot at most once.
+    /// One entry per robot that moves.
     #[schemars(
         length(min = 1, max = limits::ROBOT_NAMES.len()),
         extend("not" = limits::a_robot_twice(), "most_steps" = "equal_rows")
@@ -36,17 +37,16 @@ pub struct SendJointChunk {
     pub robots: Vec<JointChunk>,
 }
 
-/// The rows of one robot.
+/// One robot's rows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JointChunk {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
-    /// Rows of 35 numbers each, as many as every other robot has. A row: joint targets in radians for left_arm 7, right_arm 7, left_hand 7, right_hand 7, waist 3 (yaw,
-    /// roll, pitch), then the base command: vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m. An arm is shoulder_pitch,
-    /// shoulder_roll, shoulder_yaw, elbow, wrist_roll, wrist_pitch, wrist_yaw; a hand is thumb_0, thumb_1, thumb_2,
-    /// middle_0, middle_1, index_0, index_1.
+    /// Rows of 35 numbers: joint targets in radians for left_arm 7, right_arm 7, left_hand 7, right_hand 7,
+    /// waist 3, then vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m. start_episode names the columns
+    /// unless its reply is short.
     #[schemars(length(min = 1), inner(length(equal = ACTION_ROW_LEN)), extend("most_steps" = "maxItems"))]
     pub rows: Vec<Vec<f64>>,
 }

@@ -7,63 +7,90 @@ use serde_json::{Map, Value, json};
 use crate::checks;
 use crate::parts::CommandReply;
 use crate::tool::Tool;
-use crate::tools::{MoveWrists, SendJointChunk, Wait, Walk};
+use crate::tools::{MoveWrists, SendJointChunk, Wait, Walk, WalkTo};
 
-/// The most commands of a plan.
+/// Commands of one plan.
 const MAX_COMMANDS: usize = 20;
+/// Control steps of a command that goes on until something is so: ten seconds.
+const MAX_UNTIL_STEPS: u32 = 500;
 
-/// Carry out up to 20 commands one after another, each as if it had been called by itself: with its own steps, recorded and counted as a
-/// tool call. The plan stops after the first command after which something that it `expects` is not so. The reply is that of the last command
-/// carried out, with how many were and why no more. If any command could not be carried out, none is.
+/// Carry out up to 20 commands in order, each with its own steps and counted as a tool call, until one's
+/// `expects` does not hold. With `until`, a command lasts until it does: lower a hand until it touches,
+/// wait until a phase is reached. Returns the last command's reply, how many were carried out, and why no
+/// more. If one is invalid, none is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SendPlan {
-    /// The commands, at most 20.
+    /// The commands in order.
     #[schemars(length(min = 1, max = MAX_COMMANDS))]
     pub commands: Vec<PlannedCommand>,
 }
 
-/// One command of a plan.
+/// One command.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlannedCommand {
-    /// "move_wrists", "walk", "wait" or "send_joint_chunk".
+    /// Its tool.
     #[schemars(extend("enum" = SendPlan::COMMANDS))]
     pub tool: String,
-    /// The arguments of that tool, without episode_id.
+    /// Arguments of that tool, without episode_id.
     pub arguments: Map<String, Value>,
-    /// What has to be so afterwards for the plan to go on. Null: nothing.
+    /// Conditions that have to hold after it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expects: Option<Expectation>,
+    /// True: it ends as soon as its `expects` hold, and the plan stops if they do not within its `steps`,
+    /// here up to 500. For move_wrists, walk and wait.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[schemars(extend("default" = false))]
+    pub until: bool,
 }
 
-/// What is expected of the robots that a command named, or of all after `wait`, once it is done. What is null is not looked at.
+/// Conditions on the robots that the command names, or all after `wait`.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Expectation {
-    /// Whether every wrist that has a target has arrived there.
+    /// Every wrist with a target has arrived.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arrived: Option<bool>,
-    /// Whether a wrist is blocked or out of reach.
+    /// A wrist is blocked or out of reach.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blocked: Option<bool>,
-    /// That a hand feels more than as many newtons.
+    /// A hand presses on something.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub touching: Option<bool>,
+    /// A hand holds something between thumb and fingers.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub holding: Option<bool>,
+    /// A hand feels more than this force in newtons.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_above_n: Option<f64>,
-    /// That no hand feels more than as many newtons.
+    /// No hand feels more.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_below_n: Option<f64>,
-    /// That this phase has been reached, as "p1".
+    /// This phase has been reached, for example "p1".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub phase_reached: Option<String>,
-    /// Whether a robot steps, or settles after it was told to walk.
+    /// A robot steps, or settles after a walk.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_stepping: Option<bool>,
+    /// Another operator has said something since the plan began.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heard: Option<bool>,
+}
+
+impl Expectation {
+    /// True where no condition is given.
+    pub fn is_empty(&self) -> bool {
+        *self == Expectation::default()
+    }
 }
 
 impl SendPlan {
-    /// The tools that a plan may name: every one that commands.
-    pub const COMMANDS: [&str; 4] = [MoveWrists::NAME, Walk::NAME, SendJointChunk::NAME, Wait::NAME];
+    /// Tools that a plan may name: every command, and walks to a place.
+    pub const COMMANDS: [&str; 5] =
+        [MoveWrists::NAME, Walk::NAME, SendJointChunk::NAME, Wait::NAME, WalkTo::NAME];
+    /// Commands that may go on until something is so.
+    const UNTIL_COMMANDS: [&str; 3] = [MoveWrists::NAME, Walk::NAME, Wait::NAME];
 
     /// Returns what messages call the command at `index`.
     pub fn place(&self, index: usize) -> String {
@@ -85,6 +112,7 @@ impl Tool for SendPlan {
             tool: tool.into(),
             arguments: object(arguments),
             expects,
+            until: false,
         };
         let arrived = Expectation { arrived: Some(true), ..Expectation::default() };
         let reach = command(
@@ -94,6 +122,11 @@ impl Tool for SendPlan {
         );
         let wait = command(Wait::NAME, json!({ "steps": 10 }), Some(arrived));
         SendPlan { commands: vec![reach, wait] }
+    }
+
+    fn robots(&self) -> Vec<&str> {
+        let named = self.commands.iter().filter_map(|command| command.arguments.get("robots")?.as_array());
+        named.flatten().filter_map(|entry| entry.get("robot")?.as_str()).collect()
     }
 
     fn validate(&self) -> Result<(), String> {
@@ -110,14 +143,38 @@ impl Tool for SendPlan {
                 checks::finite(&format!("{}: expects.{name}", self.place(index)), force_n.as_slice())?;
             }
         }
-        let names = self.commands.iter().map(|command| command.tool.as_str()).enumerate();
-        match names.into_iter().find(|(_, name)| !SendPlan::COMMANDS.contains(name)) {
-            Some((index, name)) => Err(format!(
-                "{}: {name:?} is no command; have: {}",
-                self.place(index),
-                SendPlan::COMMANDS.join(", ")
-            )),
-            None => Ok(()),
+        let named = self.commands.iter().enumerate();
+        named
+            .map(|(index, command)| {
+                command.check_name().map_err(|why| format!("{}: {why}", self.place(index)))
+            })
+            .collect()
+    }
+}
+
+impl PlannedCommand {
+    fn check_name(&self) -> Result<(), String> {
+        let name = self.tool.as_str();
+        if !SendPlan::COMMANDS.contains(&name) {
+            return Err(format!("{name:?} is no command; have: {}", SendPlan::COMMANDS.join(", ")));
+        }
+        if !self.until {
+            return Ok(());
+        }
+        if !SendPlan::UNTIL_COMMANDS.contains(&name) {
+            return Err(format!(
+                "{name} cannot have `until`; these can: {}",
+                SendPlan::UNTIL_COMMANDS.join(", ")
+            ));
+        }
+        if self.expects.as_ref().is_none_or(Expectation::is_empty) {
+            return Err("`until` needs a condition in `expects`, for example {\"touching\": true}".into());
+        }
+        match self.arguments.get("steps").and_then(Value::as_u64) {
+            Some(steps) if steps > u64::from(MAX_UNTIL_STEPS) => {
+                Err(format!("steps is {steps}; with `until` give at most {MAX_UNTIL_STEPS}"))
+            }
+            _ => Ok(()),
         }
     }
 }

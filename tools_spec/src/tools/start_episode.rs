@@ -8,18 +8,18 @@ use super::get_status::StatusReply;
 use crate::parts::{BaseLimits, OperatorToken, Protocol};
 use crate::tool::{Route, Tool};
 
-/// Start an episode of a task. Returns episode_id, which every other tool needs, the instruction, a brief on frames, cameras
-/// and hands, the robots with their joints and limits, and the budget. The same task, seed and commands always give the same episode. Physics stands
-/// still between calls.
+/// Start an episode of a task. Returns the episode_id that other tools need, the instruction, a brief on
+/// frames, cameras and hands, the robots and the budget. Task, seed and commands decide all that happens.
+/// Physics stands still between calls.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StartEpisode {
-    /// The id of a task from list_tasks, as "handover".
+    /// Id of a task from list_tasks, for example "handover".
     pub task: String,
-    /// Decides where the objects stand: 0 to 4294967295. Results are reported on the seeds that list_tasks names.
+    /// Decides where the objects are: 0 to 4294967295.
     #[schemars(range(max = u32::MAX))]
     pub seed: u32,
-    /// The rules: "agentic" for agents that think between commands, "benchmark" for learned policies. Null: "agentic".
+    /// The rules. Null: "agentic".
     pub protocol: Option<Protocol>,
     /// True: without the lists of joints and columns that only send_joint_chunk needs.
     #[serde(default)]
@@ -172,6 +172,9 @@ pub struct Brief {
     pub frames: String,
     /// How the frames of different robots are related.
     pub partners: String,
+    /// How an operator plays with partners; left out where one policy directs all robots.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub teamwork: Option<String>,
     /// What is known of a robot's own way; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub odometry: Option<String>,
@@ -193,9 +196,10 @@ pub struct Brief {
 impl Brief {
     /// All of it, a line each.
     pub fn lines(&self) -> Vec<String> {
-        let Brief { frames, partners, odometry, camera, hands, walking, grasping, grips } = self;
+        let Brief { frames, partners, teamwork, odometry, camera, hands, walking, grasping, grips } = self;
         let told = [frames, partners]
             .into_iter()
+            .chain(teamwork)
             .chain(odometry)
             .chain([camera, hands])
             .chain(walking)

@@ -7,12 +7,12 @@ use crate::checks;
 use crate::parts::CommandReply;
 use crate::tool::Tool;
 
-/// Let all robots hold their targets for a number of control steps of 20 ms: for a hand to arrive, for an object to come to
-/// rest. The reply reports on every robot. Wrist targets of the last command stay fixed in the world, or carried, as they were given.
+/// Let all robots hold their targets for a number of control steps of 20 ms. The reply reports on every
+/// robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wait {
-    /// Control steps of 20 ms: 1 up to the budget's steps_per_command.
+    /// Control steps: 1 up to the budget's steps_per_command.
     #[schemars(range(min = 1), extend("most_steps" = "maximum"))]
     pub steps: u32,
 }

@@ -8,41 +8,40 @@ use crate::limits;
 use crate::parts::CommandReply;
 use crate::tool::Tool;
 
-/// Walk, turn, change the pelvis height or look around with one or more robots for a number of control steps of 20 ms, while their arms
-/// and hands keep their joints and so go along. Velocities are in the robot's own frame and apply during this command only;
-/// the height persists.
+/// Walk, turn, change the pelvis height or look around for a number of control steps of 20 ms. Arms and
+/// hands keep their joints and go along. Velocities are in the robot's own frame and apply during this
+/// command; the height persists.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Walk {
-    /// Control steps of 20 ms: 1 up to the budget's steps_per_command.
+    /// Control steps: 1 up to the budget's steps_per_command.
     #[schemars(range(min = 1), extend("most_steps" = "maximum"))]
     pub steps: u32,
-    /// One entry per robot that is to move; each robot at most once. Robots that are not named hold still.
+    /// One entry per robot that moves. Others hold still.
     #[schemars(length(min = 1, max = limits::ROBOT_NAMES.len()), extend("not" = limits::a_robot_twice()))]
     pub robots: Vec<WalkMove>,
 }
 
-/// What one robot's base is to do. start_episode names the range of each field; values beyond it are clamped and reported.
+/// Values beyond the ranges that start_episode gives are clamped and reported.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("not" = limits::all_of(&[("waist_yaw_rad", "number"), ("look_at_m", "array")])))]
 pub struct WalkMove {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
-    /// Forward velocity in metres per second, as 0.3.
+    /// Forward velocity, for example 0.3.
     pub vx_m_s: f64,
-    /// Velocity to the left in metres per second.
+    /// Velocity to the left.
     pub vy_m_s: f64,
-    /// Turning rate in radians per second, counter-clockwise seen from above.
+    /// Turning rate, counter-clockwise from above.
     pub yaw_rate_rad_s: f64,
-    /// Height of the pelvis above the floor in metres, for a robot that stands; while it steps it may be lower.
-    /// Null: the target stays.
+    /// Height above the floor of a robot that stands. Null: unchanged.
     pub pelvis_height_m: Option<f64>,
-    /// Where the waist is to turn, in radians to the left, at 1 rad/s at most: head and arms turn with it. 0 is straight ahead. Null: it
-    /// stays.
+    /// Waist angle to the left of straight ahead: head and arms turn along, at 1 rad/s. Null: unchanged.
     pub waist_yaw_rad: Option<f64>,
-    /// A point to turn the head to by the waist, [x, y, z] in the pelvis frame, in place of waist_yaw_rad. Null: none.
+    /// Point [x, y, z] in the pelvis frame to look at: the waist turns and, as far as the picture needs,
+    /// bends. In place of waist_yaw_rad.
     pub look_at_m: Option<[f64; 3]>,
 }
 

@@ -13,51 +13,49 @@ const MAX_STEPS: u32 = 1500;
 /// The most waypoints of a robot.
 const MAX_WAYPOINTS: usize = 10;
 
-/// Walk to places in the start frame, looking at odometry on the way: arms keep their joints and go along, or push and carry with `carry`.
-/// It is carried out as short commands, each recorded and counted as a tool call, until every robot stands within 1.5 cm and 1.5 degrees of
-/// its place, one gets no nearer, or the steps are used up. It walks straight and looks at nothing: go round what stands in the way by
-/// `waypoints`.
+/// Walk to places in the start frame by odometry; arms go along, or push and carry with `carry`. Short
+/// commands, each counted as a tool call, take every robot to within 1.5 cm and 1.5 degrees of its place,
+/// unless one gets no nearer or the steps are used up. It does not look: go round obstacles by `waypoints`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WalkTo {
-    /// The most control steps of 20 ms to take, up to 1500. A way takes about 120, and 250 a metre and 150 a quarter turn; where robots carry, 450 a metre.
+    /// Most control steps, up to 1500: about 120 and 250 a metre and 150 a quarter turn; with `carry` 450 a
+    /// metre.
     #[schemars(range(min = 1, max = MAX_STEPS))]
     pub steps: u32,
-    /// One entry per robot that is to walk; each robot at most once. Robots that are not named hold still.
+    /// One entry per robot that walks.
     #[schemars(length(min = 1, max = limits::ROBOT_NAMES.len()), extend("not" = limits::a_robot_twice()))]
     pub robots: Vec<Destination>,
 }
 
-/// Where one robot's pelvis is to come to rest.
+/// A place to come to rest at.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Destination {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
-    /// [x, y] in metres in the robot's own start frame, as pelvis_in_start has it.
+    /// [x, y] in the robot's own start frame, as pelvis_in_start.
     pub to_m: [f64; 2],
-    /// Which way it is to face, in radians counter-clockwise from how it faced at the start. Null: as it faces now, or at the last waypoint.
+    /// Final heading, counter-clockwise from the one at the start. Null: unchanged.
     pub heading_rad: Option<f64>,
-    /// Places to go by on the way, in order, without a stop. Robots of one call that carry have as many waypoints as each other, and go by
-    /// them together. Null: none.
+    /// Places to pass in order, without a stop. Robots that carry together need equally many.
     #[schemars(length(max = MAX_WAYPOINTS))]
     pub waypoints: Option<Vec<Waypoint>>,
-    /// True: it pushes or carries what its hands hold. Wrists stay where they are to it and as high over the floor though its pelvis sinks
-    /// as it walks, and lead it by what it lags. Robots of one call that carry go at one pace of 0.2 m/s and give way to each other
-    /// (compliance_n_s_m 250), so that several carry one load: give each its place in its own start frame. All slow down and stop where one
-    /// lags by 18 cm, is turned away by 0.2 rad, or a wrist is out of reach. Null: false.
+    /// True: to push or carry, wrists keep their places to the robot and their height. Robots that carry in
+    /// one call go together at 0.2 m/s and give way to each other (compliance_n_s_m 250); all stop where
+    /// one lags by 18 cm, is turned away by 0.2 rad, or a wrist is out of reach.
     #[schemars(extend("default" = false))]
     pub carry: Option<bool>,
 }
 
-/// A place that a robot's pelvis is to go by, within 10 cm or so.
+/// A place to pass within 10 cm.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Waypoint {
-    /// [x, y] in metres in the robot's own start frame.
+    /// [x, y] in the start frame.
     pub at_m: [f64; 2],
-    /// Which way it is to face there, as the place's. Null: as before.
+    /// Heading there. Null: unchanged.
     pub heading_rad: Option<f64>,
 }
 

@@ -37,12 +37,6 @@ fn differing(one: Vec<ToolSpec>, other: Vec<ToolSpec>) -> Value {
     other.into_iter().filter(|other| !one.contains(other)).map(|other| json!(other)).collect()
 }
 
-/// What hints say is kept apart: with them only the texts differ.
-#[test]
-fn tools_without_hints() {
-    check("without_hints", &differing(tool_specs(Hints::On), tool_specs(Hints::Off)));
-}
-
 /// What is told under `paper` is said in other texts.
 #[test]
 fn tools_of_paper() {

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 use tandem_tools_spec::{
-    ActCall, EPISODE_TOOLS, Hints, LookCall, PlanCall, SendPlan, TalkCall, ToolCall, episode_tool_specs,
+    ActCall, EPISODE_TOOLS, Hints, LookCall, SendPlan, TalkCall, ToolCall, episode_tool_specs,
     operator_tool_specs, tool_specs,
 };
 
@@ -76,12 +76,13 @@ fn schemas_are_strict() {
 fn the_two_lists_name_the_same_tools() {
     let specs = operator_tool_specs(Hints::On);
     let on_episode: Vec<&str> = specs.iter().filter(|spec| spec.on_episode).map(|spec| spec.name).collect();
-    let others: Vec<&str> =
-        EPISODE_TOOLS.iter().copied().filter(|tool| !PlanCall::TOOLS.contains(tool)).collect();
-    assert_eq!(on_episode, others, "a plan would hold up the other operators");
-    let of_all = tool_specs(Hints::On);
-    assert!(PlanCall::TOOLS.iter().all(|tool| of_all.iter().any(|spec| spec.name == *tool)));
-    assert_eq!(SendPlan::COMMANDS, ActCall::TOOLS);
+    assert_eq!(on_episode, EPISODE_TOOLS, "operators who talk are offered every tool");
+    let talks: Vec<&str> = TalkCall::TOOLS.to_vec();
+    let of_all: Vec<&str> =
+        tool_specs(Hints::On).iter().filter(|spec| spec.on_episode).map(|spec| spec.name).collect();
+    assert_eq!([of_all, talks].concat(), EPISODE_TOOLS, "others cannot talk");
+    let (commands, walk) = SendPlan::COMMANDS.split_at(ActCall::TOOLS.len());
+    assert_eq!((commands, walk), (ActCall::TOOLS, &["walk_to"][..]));
 }
 
 #[test]

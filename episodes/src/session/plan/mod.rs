@@ -1,116 +1,111 @@
-//! Several commands by one call. Each is made, counted and recorded by itself, so that a recording holds nothing of plans.
+//! Plans: several commands in one call. Each command is made, counted and recorded by itself, so a
+//! recording contains no plans.
+//!
+//! A [`PlanRun`] returns the next command and receives its reply. It serves both a plan of the policy of
+//! all robots, and one of an operator whose commands pass through the team's rounds.
 
 mod carry;
+mod commands;
+mod expectation;
+mod pieces;
 mod walk_to;
 mod way;
 
 use tandem_tools_spec::{
-    ActCall, BaseState, CommandReply, Expectation, Formats, HandReport, HandState, PlanCall, PlanReply,
-    PlanStep, RobotReport, SendPlan, SpecError, StopReason, Tool as _, ToolCall, ToolReply,
+    ActCall, Call, CommandReply, Formats, PlanCall, PlanReply, SendPlan, SpecError, StopReason, Tool as _,
+    ToolCall, ToolReply,
 };
 
 use super::Session;
+use super::journal::KeptRequest;
 use super::told::shorten_report;
 use crate::EpisodeError;
-use crate::commands::{Called, Command};
+use crate::commands::{Called, OperatorCall};
 use crate::output::OutputError;
 use crate::recording::CallerRecord;
-use crate::scoring::Phase;
+use carry::CarryPlan;
+use commands::CommandList;
+use walk_to::WalkPlan;
 
-/// What has been carried out of a plan.
-#[derive(Default)]
+/// A plan in execution.
+#[derive(Debug)]
+pub struct PlanRun {
+    stage: PlanStage,
+    progress: PlanProgress,
+    /// True once another operator has sent a message.
+    heard: bool,
+    /// Robot of the plan's operator; `None` for the policy of all robots.
+    operator: Option<String>,
+}
+
+/// Next step of a plan.
+#[derive(Debug)]
+pub enum PlanAdvance {
+    /// The next command; its reply is passed to [`PlanRun::take`].
+    Make(ActCall),
+    /// The end, with the reason if the plan stopped early.
+    Done(Option<String>),
+}
+
+#[derive(Debug)]
+enum PlanStage {
+    Commands(CommandList),
+    Walk(WalkPlan),
+    Carry(CarryPlan),
+}
+
+/// The executed part of a plan.
+#[derive(Debug, Default)]
 struct PlanProgress {
     commands: u32,
     executed_steps: u32,
     last: Option<CommandReply>,
-    /// Whether the last reply was asked for as a short one.
+    /// True if the last reply is to be short.
     is_short: bool,
 }
 
-impl Session {
-    /// Carries out a plan, or refuses all of it.
-    pub(super) fn plan(&mut self, caller: CallerRecord, plan: &PlanCall) -> Result<PlanReply, EpisodeError> {
-        let call = ToolCall::Plan(plan.clone());
-        let called = Called::from(call.clone());
-        let allowed = self.allow(&called).and_then(|_| self.expect_underway());
-        let checked = allowed.and_then(|()| match plan {
-            PlanCall::SendPlan(plan) => self.check_commands(plan),
-            PlanCall::WalkTo(walk) => self.check_destinations(walk),
-        });
-        if let Err(refusal) = checked {
-            self.refuse(caller, &called, &refusal);
-            return Err(refusal);
-        }
-        self.count_request();
-        self.planning = true;
-        let reply = match plan {
-            PlanCall::SendPlan(plan) => self.carry_out_commands(caller, plan),
-            PlanCall::WalkTo(walk) => self.walk_to(caller, walk),
-        };
-        self.planning = false;
-        self.tell_plan(caller, &call, &reply)?;
-        if self.ended.is_some() {
-            self.settle();
-        }
-        reply
-    }
-
-    /// Tells the plan behind its commands, for who reads what was asked.
-    fn tell_plan(
-        &mut self,
-        caller: CallerRecord,
-        call: &ToolCall,
-        reply: &Result<PlanReply, EpisodeError>,
-    ) -> Result<(), EpisodeError> {
-        let arguments = serde_json::to_string(call).map_err(OutputError::from)?;
-        let told = match reply {
-            Ok(reply) => Ok(serde_json::to_string(reply).map_err(OutputError::from)?),
-            Err(refusal) => Err(refusal.to_string()),
-        };
-        let told = told.as_deref().map_err(String::as_str);
-        self.tell_beside(caller.operator(), call.name(), &arguments, told);
-        Ok(())
-    }
-
-    fn check_commands(&self, plan: &SendPlan) -> Result<(), EpisodeError> {
-        for (index, PlanStep { call, expects, .. }) in plan.calls()?.iter().enumerate() {
-            Command::read(call, &self.rules, &self.motions)?;
-            let phases = self.spec().task.phases.iter().enumerate();
-            let numbered = phases.map(|(number, phase)| (Phase::number(number), phase.id));
-            let is_known = |name: &String| numbered.clone().any(|(number, id)| *name == number || name == id);
-            if let Some(name) = expects.phase_reached.as_ref().filter(|name| !is_known(name)) {
-                let have: Vec<String> =
-                    numbered.clone().map(|(number, id)| format!("{number} ({id})")).collect();
-                let reason =
-                    format!("{}: there is no phase {name:?}; have: {}", plan.place(index), have.join(", "));
-                return Err(SpecError::Invalid { tool: SendPlan::NAME, reason }.into());
+impl PlanRun {
+    /// Returns the next command of the plan.
+    pub fn advance(&mut self, session: &Session) -> PlanAdvance {
+        let last = self.progress.last.as_ref();
+        match &mut self.stage {
+            PlanStage::Commands(list) => {
+                let next = list.advance(session, last, self.heard);
+                self.progress.is_short = list.is_short();
+                next
             }
+            PlanStage::Walk(walk) => walk.advance(session, last),
+            PlanStage::Carry(carry) => carry.advance(session, last),
         }
-        Ok(())
     }
 
-    fn carry_out_commands(
-        &mut self,
-        caller: CallerRecord,
-        plan: &SendPlan,
-    ) -> Result<PlanReply, EpisodeError> {
-        let mut progress = PlanProgress::default();
-        for (index, PlanStep { call, expects, short }) in plan.calls()?.into_iter().enumerate() {
-            progress.is_short = short;
-            let why = match self.make_planned(caller, call, &mut progress)? {
-                Ok(reply) => unexpected(&expects, reply),
-                Err(why) => Some(why),
-            };
-            if let Some(why) = why {
-                return self.plan_reply(progress, Some(format!("after {}: {why}", plan.place(index))));
-            }
+    /// Processes the reply to the last command. Returns the reason why the plan stops, if the episode has
+    /// ended.
+    pub fn take(&mut self, reply: CommandReply) -> Option<String> {
+        self.progress.commands += 1;
+        self.progress.executed_steps += reply.executed_steps;
+        let stop = reply.stop_reason;
+        self.progress.last = Some(reply);
+        match stop {
+            StopReason::StepsDone | StopReason::PartnerDone => None,
+            StopReason::TaskComplete => Some("the task is complete".into()),
+            StopReason::StepBudgetExhausted => Some("the episode's steps are used up".into()),
         }
-        self.plan_reply(progress, None)
     }
 
-    /// The reply to a plan of which at least one command has been made, and why no more were.
-    fn plan_reply(&self, progress: PlanProgress, stopped: Option<String>) -> Result<PlanReply, EpisodeError> {
-        let PlanProgress { commands, executed_steps, last, is_short } = progress;
+    /// Notes a message from another operator.
+    pub fn hear(&mut self) {
+        self.heard = true;
+    }
+
+    /// Returns true while no command has been executed.
+    pub fn is_untouched(&self) -> bool {
+        self.progress.commands == 0
+    }
+
+    /// Returns the reply to a plan with at least one executed command.
+    fn reply(self, tool_calls: u32, stopped: Option<String>) -> Result<PlanReply, EpisodeError> {
+        let PlanProgress { commands, executed_steps, last, is_short } = self.progress;
         let mut last = last.ok_or_else(|| SpecError::Invalid {
             tool: SendPlan::NAME,
             reason: "no command was made; give at least one".into(),
@@ -118,97 +113,110 @@ impl Session {
         if is_short {
             shorten_report(&mut last);
         }
-        Ok(PlanReply { commands, tool_calls: self.tool_calls, executed_steps, stopped, last })
+        Ok(PlanReply { commands, tool_calls, executed_steps, stopped, last })
+    }
+}
+
+impl Session {
+    /// Executes a plan of the policy of all robots, or refuses it as a whole.
+    pub(super) fn plan(&mut self, caller: CallerRecord, plan: &PlanCall) -> Result<PlanReply, EpisodeError> {
+        let call = ToolCall::Plan(plan.clone());
+        let run = self.begin_or_refuse(caller, &Called::from(call.clone()), plan)?;
+        self.count_request();
+        self.planning = true;
+        let reply = self.carry_out_plan(caller, run);
+        self.planning = false;
+        self.tell_plan(caller.operator(), &call, reply.as_ref())?;
+        if self.ended.is_some() {
+            self.settle();
+        }
+        reply
     }
 
-    /// Makes one command of a plan. What keeps the first from being made refuses the plan; later, and where the episode ends, it is why
-    /// the plan goes no further.
-    fn make_planned<'a>(
+    /// Starts a plan of an operator, whose commands are executed together with those of the others. A
+    /// refusal is counted and recorded like that of any call.
+    pub fn begin_plan(&mut self, operator: &OperatorCall, plan: &PlanCall) -> Result<PlanRun, EpisodeError> {
+        let arrival = self.arrival(|| KeptRequest::command(operator));
+        let caller = CallerRecord::Operator(operator.robot());
+        let called = Called::Together(vec![operator.clone()]);
+        match self.begin_or_refuse(caller, &called, plan) {
+            Ok(run) => Ok(PlanRun { operator: Some(operator.robot().into()), ..run }),
+            Err(refusal) => {
+                self.write_down(arrival);
+                Err(refusal)
+            }
+        }
+    }
+
+    /// Returns the reply to an operator's finished plan, and shows it to viewers.
+    pub fn end_plan(
+        &mut self,
+        call: &Call,
+        run: PlanRun,
+        stopped: Option<String>,
+    ) -> Result<PlanReply, EpisodeError> {
+        let operator = run.operator.clone();
+        let reply = run.reply(self.tool_calls, stopped);
+        self.tell_plan(operator.as_deref(), &call.tool, reply.as_ref())?;
+        reply
+    }
+
+    fn begin_or_refuse(
         &mut self,
         caller: CallerRecord,
-        call: ActCall,
-        progress: &'a mut PlanProgress,
-    ) -> Result<Result<&'a CommandReply, String>, EpisodeError> {
-        let made = self.make(caller, &Called::from(ToolCall::Act(call)));
-        let reply = match made.and_then(|answer| answer.reply(&Formats::default())) {
-            Ok(ToolReply::Act(reply)) => reply,
-            Ok(other) => return Ok(Err(format!("{other:?} is no reply to a command"))),
-            Err(error) if progress.last.is_none() => return Err(error),
-            Err(error) => return Ok(Err(error.to_string())),
+        called: &Called,
+        plan: &PlanCall,
+    ) -> Result<PlanRun, EpisodeError> {
+        let allowed = self.allow(called).and_then(|_| self.expect_underway());
+        let begun = allowed.and_then(|()| match plan {
+            PlanCall::SendPlan(plan) => self.command_list(plan, caller.operator()).map(PlanStage::Commands),
+            PlanCall::WalkTo(walk) => self.walk_stage(walk),
+        });
+        match begun {
+            Ok(stage) => {
+                Ok(PlanRun { stage, progress: PlanProgress::default(), heard: false, operator: None })
+            }
+            Err(refusal) => {
+                self.refuse(caller, called, &refusal);
+                Err(refusal)
+            }
+        }
+    }
+
+    fn carry_out_plan(&mut self, caller: CallerRecord, mut run: PlanRun) -> Result<PlanReply, EpisodeError> {
+        loop {
+            let call = match run.advance(self) {
+                PlanAdvance::Make(call) => call,
+                PlanAdvance::Done(stopped) => return run.reply(self.tool_calls, stopped),
+            };
+            let made = self.make(caller, &Called::from(ToolCall::Act(call)));
+            let stopped = match made.and_then(|answer| answer.reply(&Formats::default())) {
+                Ok(ToolReply::Act(reply)) => run.take(reply),
+                Ok(other) => Some(format!("{other:?} is no reply to a command")),
+                // An error in the first command refuses the plan.
+                Err(error) if run.is_untouched() => return Err(error),
+                Err(error) => Some(error.to_string()),
+            };
+            if stopped.is_some() {
+                return run.reply(self.tool_calls, stopped);
+            }
+        }
+    }
+
+    /// Records the plan after its commands, for readers of the requests.
+    fn tell_plan(
+        &mut self,
+        operator: Option<&str>,
+        call: &ToolCall,
+        reply: Result<&PlanReply, &EpisodeError>,
+    ) -> Result<(), EpisodeError> {
+        let arguments = serde_json::to_string(call).map_err(OutputError::from)?;
+        let told = match reply {
+            Ok(reply) => Ok(serde_json::to_string(reply).map_err(OutputError::from)?),
+            Err(refusal) => Err(refusal.to_string()),
         };
-        progress.commands += 1;
-        progress.executed_steps += reply.executed_steps;
-        let stop = reply.stop_reason;
-        let reply = progress.last.insert(reply);
-        Ok(match stop {
-            StopReason::StepsDone | StopReason::PartnerDone => Ok(reply),
-            StopReason::TaskComplete => Err("the task is complete".into()),
-            StopReason::StepBudgetExhausted => Err("the episode's steps are used up".into()),
-        })
+        let told = told.as_deref().map_err(String::as_str);
+        self.tell_beside(operator, call.name(), &arguments, told);
+        Ok(())
     }
-}
-
-impl PlanProgress {
-    /// Control steps so far.
-    fn executed_steps(&self) -> u32 {
-        self.executed_steps
-    }
-}
-
-/// What of `expected` is not so after a command; `None` if all is.
-fn unexpected(expected: &Expectation, reply: &CommandReply) -> Option<String> {
-    let Expectation { arrived, blocked, force_above_n, force_below_n, phase_reached, base_stepping } =
-        expected;
-    let hands = || reply.robots.iter().flat_map(hands_of);
-    let under_way =
-        hands().find(|(_, hand)| !matches!(hand.state, Some(HandState::Arrived | HandState::Idle)));
-    let stopped =
-        hands().find(|(_, hand)| matches!(hand.state, Some(HandState::Blocked | HandState::OutOfReach)));
-    let steps = reply.robots.iter().find(|robot| {
-        robot.base.and_then(|base| base.state).is_some_and(|state| state != BaseState::Standing)
-    });
-    let force_n = |hand: &HandReport| {
-        hand.force_n.map_or(0.0, |force_n| force_n.iter().map(|part| part * part).sum::<f64>().sqrt())
-    };
-    let most_n = hands().map(|(_, hand)| force_n(hand)).fold(0.0, f64::max);
-    let differs = |name: &str, wanted: &Option<bool>, is: bool, who: Option<String>| {
-        let wanted = wanted.filter(|wanted| *wanted != is)?;
-        Some(format!(
-            "{name} is {is}, not {wanted}{}",
-            who.map(|who| format!(" ({who})")).unwrap_or_default()
-        ))
-    };
-    let told = |(name, hand): (String, &HandReport)| {
-        format!("{name} is {:.3} m off", hand.position_error_m.unwrap_or_default())
-    };
-    differs("arrived", arrived, under_way.is_none(), under_way.map(told))
-        .or_else(|| differs("blocked", blocked, stopped.is_some(), stopped.map(told)))
-        .or_else(|| {
-            differs("base_stepping", base_stepping, steps.is_some(), steps.map(|robot| robot.robot.clone()))
-        })
-        .or_else(|| {
-            force_above_n
-                .filter(|least_n| most_n <= *least_n)
-                .map(|least_n| format!("hands feel {most_n:.1} N at most, not above {least_n}"))
-        })
-        .or_else(|| {
-            force_below_n
-                .filter(|limit_n| most_n > *limit_n)
-                .map(|limit_n| format!("a hand feels {most_n:.1} N, above {limit_n}"))
-        })
-        .or_else(|| {
-            let phase = phase_reached.as_ref()?;
-            let is_reached =
-                reply.phases.iter().any(|reached| reached.number == *phase || reached.id == *phase);
-            (!is_reached)
-                .then(|| format!("{phase} has not been reached; get_status with explain says what it lacks"))
-        })
-}
-
-/// Both hands of a robot, each with what it is called.
-fn hands_of(report: &RobotReport) -> [(String, &HandReport); 2] {
-    [
-        (format!("{}'s left wrist", report.robot), &report.left),
-        (format!("{}'s right wrist", report.robot), &report.right),
-    ]
 }

@@ -1,130 +1,147 @@
-//! `walk_to`: a row of short walks, each told anew from where the robot's own odometry has it, and short ones
-//! for what is missing once it stands.
+//! `walk_to`: a sequence of short walks, each computed from the robot's odometry, and corrections from
+//! its standing place at the end.
 
 use std::collections::VecDeque;
 
 use nalgebra::Vector2;
-use tandem_tools_spec::{
-    ActCall, BaseState, CommandReply, Destination, PlanReply, Wait, Walk, WalkMove, WalkTo,
-};
+use tandem_tools_spec::{ActCall, BaseState, CommandReply, Destination, Wait, Walk, WalkMove, WalkTo};
 
-use super::PlanProgress;
 use super::way::{Corrections, Missing, Stand, WALK_STEPS};
+use super::{PlanAdvance, PlanStage};
 use crate::EpisodeError;
 use crate::commands;
-use crate::recording::CallerRecord;
 use crate::session::Session;
 
-/// Speed by what is missing, and the most of it: ahead, back, to the sides; turning.
+/// Gain from displacement to speed, and limits of the speed: ahead and back, to the sides, turning.
 const GAIN_1_S: f64 = 0.7;
 const AHEAD_M_S: f64 = 0.3;
 const ASIDE_M_S: f64 = 0.2;
 const TURN_RAD_S: f64 = 0.4;
-/// A robot this near to its place is let come to rest; it coasts a little. A waypoint is passed from farther
-/// off.
+/// Distance and angle to its place at which a robot is stopped, since it coasts a little; and the larger
+/// distance at which a waypoint counts as passed.
 const NEAR_M: f64 = 0.03;
 const NEAR_RAD: f64 = 0.04;
 const PASSED_M: f64 = 0.1;
-/// One that stands this near has arrived, and is sent once more until it is a little nearer.
+/// Tolerances of a standing robot: within the first it has arrived, but corrections continue until the
+/// second.
 pub const THERE_M: f64 = 0.015;
 pub const THERE_RAD: f64 = 0.026;
 pub const WELL_M: f64 = 0.013;
 pub const WELL_RAD: f64 = 0.023;
-/// How often a robot that has come to rest is sent once more, by a pulse where it is this near.
+/// Maximum number of further attempts after the first rest, and the tolerance within which a single pulse
+/// is used.
 pub const ATTEMPTS: u32 = 5;
 const PULSE_M: f64 = 0.1;
 const PULSE_RAD: f64 = 0.15;
-/// Commands for which all have stood: by then nothing sways any more.
+/// Number of commands with all robots standing, after which their sway has ended.
 pub const CALM_COMMANDS: u32 = 2;
-/// A robot that has not come nearer by this much in so many walks is held up.
+/// Minimum approach within this many walks; with less, the robot is blocked.
 const NEARER_M: f64 = 0.03;
 const PATIENCE_WALKS: u32 = 12;
 
-/// How a robot is to move next.
+/// Next motion of a robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum WalkerStage {
     Walks,
-    /// It is to make up by one short walk for what is missing where it stands.
+    /// A short walk from its standing place to its goal.
     Corrects,
     Rests,
 }
 
-/// One robot on its way.
+/// A walking robot.
+#[derive(Debug)]
 struct Walker {
     name: String,
     robot: usize,
-    /// Where it is to go by and, at last, to come to rest.
+    /// Remaining waypoints, and the destination as the last.
     places: VecDeque<Stand>,
     stage: WalkerStage,
-    /// Where it was half a cycle ago, if it walked then.
+    /// Position half a gait cycle ago, if the robot walked then.
     before_m: Option<Vector2<f64>>,
-    /// The nearest that it has been, and walks since then.
+    /// Smallest distance to the goal, and the number of walks since then.
     nearest_m: f64,
     walks: u32,
     corrections: Corrections,
 }
 
-impl Session {
-    pub(super) fn check_destinations(&self, walk: &WalkTo) -> Result<(), EpisodeError> {
-        walk.robots.iter().try_for_each(|entry| commands::find(&entry.robot, &self.motions).map(drop))
+/// Robots that walk, each to a place of its own.
+#[derive(Debug)]
+pub struct WalkPlan {
+    walkers: Vec<Walker>,
+    /// Remaining control steps.
+    left_steps: u32,
+    /// Number of further attempts after rest.
+    attempts: u32,
+    /// Number of consecutive commands with all robots standing.
+    calm: u32,
+    /// True if the last command was a walk.
+    walks: bool,
+}
+
+impl WalkPlan {
+    /// Returns the next command after the reply to the previous one.
+    pub fn advance(&mut self, session: &Session, last: Option<&CommandReply>) -> PlanAdvance {
+        if let Some(done) = last.and_then(|reply| self.after(session, reply)) {
+            return done;
+        }
+        if self.left_steps == 0 {
+            let why = format!("the steps are used up; {}", session.how_far(&self.walkers));
+            return PlanAdvance::Done(Some(why));
+        }
+        let steps = self.left_steps.min(WALK_STEPS);
+        let moves: Vec<WalkMove> =
+            self.walkers.iter_mut().filter_map(|walker| session.next_walk(walker)).collect();
+        self.walks = !moves.is_empty();
+        PlanAdvance::Make(match self.walks {
+            true => ActCall::Walk(Walk { steps, robots: moves }),
+            false => ActCall::Wait(Wait { steps }),
+        })
     }
 
-    /// Walks until every robot stands at its place.
-    pub(super) fn walk_to(&mut self, caller: CallerRecord, walk: &WalkTo) -> Result<PlanReply, EpisodeError> {
+    /// Processes the reply to a command. Returns the end of the plan if it was the last.
+    fn after(&mut self, session: &Session, reply: &CommandReply) -> Option<PlanAdvance> {
+        self.left_steps = self.left_steps.saturating_sub(reply.executed_steps);
+        let stopped = |why: String| Some(PlanAdvance::Done(Some(why)));
+        if reply.fallen.iter().any(|robot| robot.fallen) {
+            return stopped("a robot has fallen".into());
+        }
+        if let Some(walker) = self.walkers.iter().find(|walker| walker.walks > PATIENCE_WALKS) {
+            let (name, far) = (&walker.name, session.how_far(&self.walkers));
+            return stopped(format!("{name} gets no nearer: something is in its way or holds it; {far}"));
+        }
+        self.calm = if self.walks || !all_stand(reply) { 0 } else { self.calm + 1 };
+        if self.calm < CALM_COMMANDS {
+            return None;
+        }
+        let off: Vec<Missing> = self.walkers.iter().map(|walker| session.missing_of(walker)).collect();
+        let all_within = |most_m, most_rad| off.iter().all(|off| off.is_within(most_m, most_rad));
+        if all_within(WELL_M, WELL_RAD) {
+            return Some(PlanAdvance::Done(None));
+        }
+        if self.attempts == ATTEMPTS {
+            let why = (!all_within(THERE_M, THERE_RAD))
+                .then(|| format!("it came no nearer than this; {}", session.how_far(&self.walkers)));
+            return Some(PlanAdvance::Done(why));
+        }
+        self.attempts += 1;
+        self.walkers.iter_mut().zip(&off).for_each(|(walker, off)| walker.try_again(off));
+        None
+    }
+}
+
+impl Session {
+    /// Starts a walk.
+    ///
+    /// # Errors
+    ///
+    /// A robot that the episode does not have.
+    pub(super) fn walk_stage(&self, walk: &WalkTo) -> Result<PlanStage, EpisodeError> {
         if walk.robots.iter().any(|entry| entry.carry == Some(true)) {
-            return self.carry_to(caller, walk);
+            return self.carry_plan(walk).map(PlanStage::Carry);
         }
-        let walkers = walk.robots.iter().map(|entry| self.walker(entry));
-        let mut walkers: Vec<Walker> = walkers.collect::<Result<_, _>>()?;
-        let mut progress = PlanProgress::default();
-        let (mut attempts, mut calm) = (0, 0);
-        loop {
-            let left = walk.steps.saturating_sub(progress.executed_steps());
-            if left == 0 {
-                let why = format!("the steps are used up; {}", self.how_far(&walkers));
-                return self.plan_reply(progress, Some(why));
-            }
-            let steps = left.min(WALK_STEPS);
-            let moves: Vec<WalkMove> =
-                walkers.iter_mut().filter_map(|walker| self.next_walk(walker)).collect();
-            let walks = !moves.is_empty();
-            let call = if walks {
-                ActCall::Walk(Walk { steps, robots: moves })
-            } else {
-                ActCall::Wait(Wait { steps })
-            };
-            let stands = match self.make_planned(caller, call, &mut progress)? {
-                Err(why) => return self.plan_reply(progress, Some(why)),
-                Ok(reply) if reply.fallen.iter().any(|robot| robot.fallen) => {
-                    return self.plan_reply(progress, Some("a robot has fallen".into()));
-                }
-                Ok(reply) => all_stand(reply),
-            };
-            if let Some(walker) = walkers.iter().find(|walker| walker.walks > PATIENCE_WALKS) {
-                let name = walker.name.clone();
-                let why = format!(
-                    "{name} gets no nearer: something is in its way or holds it; {}",
-                    self.how_far(&walkers)
-                );
-                return self.plan_reply(progress, Some(why));
-            }
-            calm = if walks || !stands { 0 } else { calm + 1 };
-            if calm < CALM_COMMANDS {
-                continue;
-            }
-            let off: Vec<Missing> = walkers.iter().map(|walker| self.missing_of(walker)).collect();
-            let all_within = |most_m, most_rad| off.iter().all(|off| off.is_within(most_m, most_rad));
-            if all_within(WELL_M, WELL_RAD) {
-                return self.plan_reply(progress, None);
-            }
-            if attempts == ATTEMPTS {
-                let why = (!all_within(THERE_M, THERE_RAD))
-                    .then(|| format!("it came no nearer than this; {}", self.how_far(&walkers)));
-                return self.plan_reply(progress, why);
-            }
-            attempts += 1;
-            walkers.iter_mut().zip(&off).for_each(|(walker, off)| walker.try_again(off));
-        }
+        let walkers = walk.robots.iter().map(|entry| self.walker(entry)).collect::<Result<_, _>>()?;
+        let left_steps = walk.steps;
+        Ok(PlanStage::Walk(WalkPlan { walkers, left_steps, attempts: 0, calm: 0, walks: false }))
     }
 
     fn walker(&self, entry: &Destination) -> Result<Walker, EpisodeError> {
@@ -141,7 +158,7 @@ impl Session {
         })
     }
 
-    /// Where a robot's odometry has it.
+    /// Returns the place of a robot by its odometry.
     pub(super) fn stands_at(&self, robot: usize) -> Stand {
         Stand::of(&self.present.robots[robot].sensed.start_from_pelvis)
     }
@@ -151,7 +168,7 @@ impl Session {
         now.missing_to(walker.places.back().unwrap_or(&now))
     }
 
-    /// How a robot is to walk next; `None` where it is to come to rest.
+    /// Returns the next walk of a robot; `None` if it is to stop.
     fn next_walk(&self, walker: &mut Walker) -> Option<WalkMove> {
         let now = self.stands_at(walker.robot);
         match walker.stage {
@@ -183,7 +200,7 @@ impl Session {
             walker.walks += 1;
         }
         let wanted_m_s = GAIN_1_S * off.way_m;
-        // The same part of every speed, so that the way stays straight.
+        // All speeds are scaled equally, so that the path stays straight.
         let most = (wanted_m_s.x.abs() / AHEAD_M_S).max(wanted_m_s.y.abs() / ASIDE_M_S).max(1.0);
         let turning_rad_s = (GAIN_1_S * off.turn_rad).clamp(-TURN_RAD_S, TURN_RAD_S);
         Some(walker.walk([wanted_m_s.x / most, wanted_m_s.y / most, turning_rad_s]))
@@ -195,14 +212,14 @@ impl Session {
     }
 }
 
-/// Whether no robot of the reply steps, as far as that is told.
+/// Returns true if no robot in the reply steps; robots without a base state do not count.
 pub fn all_stand(reply: &CommandReply) -> bool {
     let states = reply.robots.iter().map(|robot| robot.base.and_then(|base| base.state));
     states.flatten().all(|state| state == BaseState::Standing)
 }
 
 impl Walker {
-    /// Is sent once more from where it stands, if it is `off` its place.
+    /// Starts another attempt from the standing place, unless the robot is close enough to its goal.
     fn try_again(&mut self, off: &Missing) {
         (self.before_m, self.walks, self.nearest_m) = (None, 0, f64::INFINITY);
         self.stage = if off.is_within(WELL_M, WELL_RAD) {

@@ -343,4 +343,16 @@ fn a_robot_looks_where_it_is_told_to() {
     let report = command(&mut session, look(None, Some(-9.0)).into()).robots.remove(0);
     assert_eq!(report.waist_joints_clamped, ["waist_yaw_joint"]);
     assert_eq!(report.base.unwrap().state, Some(BaseState::Standing), "it turns on the spot");
+    // A near low point enters the image by a bend, and a far high one by standing upright again.
+    let pitch_rad = |session: &mut Session| {
+        wait(session, 25);
+        state(session, "A").joint_positions_rad.get("waist_pitch_joint").unwrap()
+    };
+    command(&mut session, look(Some([0.5, 0.0, -0.6]), None).into());
+    let bent_rad = pitch_rad(&mut session);
+    assert!((0.25..0.47).contains(&bent_rad), "{bent_rad}");
+    let report = command(&mut session, look(Some([3.0, 0.0, 0.4]), None).into()).robots.remove(0);
+    let upright_rad = pitch_rad(&mut session);
+    assert!(upright_rad.abs() < 0.03, "{upright_rad}");
+    assert!(!report.base.unwrap().stepped, "it looks on the spot");
 }

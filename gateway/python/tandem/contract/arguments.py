@@ -49,70 +49,70 @@ Color: TypeAlias = Literal[
 
 @dataclass(frozen=True)
 class Destination:
-    """Where one robot's pelvis is to come to rest."""
+    """A place to come to rest at."""
 
     robot: str
-    """The robot, as "A"."""
+    """The robot, for example "A"."""
 
     to_m: Numbers
-    """[x, y] in metres in the robot's own start frame, as pelvis_in_start has it."""
+    """[x, y] in the robot's own start frame, as pelvis_in_start."""
 
     heading_rad: float | None = None
-    """Which way it is to face, in radians counter-clockwise from how it faced at the start. None: as it faces now,
-    or at the last waypoint.
-    """
+    """Final heading, counter-clockwise from the one at the start. None: unchanged."""
 
     waypoints: Sequence[Waypoint] | None = None
-    """Places to go by on the way, in order, without a stop. Robots of one call that carry have as many waypoints
-    as each other, and go by them together. None: none.
-    """
+    """Places to pass in order, without a stop. Robots that carry together need equally many."""
 
     carry: bool | None = None
-    """True: it pushes or carries what its hands hold. Wrists stay where they are to it and as high over the floor
-    though its pelvis sinks as it walks, and lead it by what it lags. Robots of one call that carry go at one
-    pace of 0.2 m/s and give way to each other (compliance_n_s_m 250), so that several carry one load: give each
-    its place in its own start frame. All slow down and stop where one lags by 18 cm, is turned away by 0.2 rad,
-    or a wrist is out of reach. None: false.
+    """True: to push or carry, wrists keep their places to the robot and their height. Robots that carry in one
+    call go together at 0.2 m/s and give way to each other (compliance_n_s_m 250); all stop where one lags by 18
+    cm, is turned away by 0.2 rad, or a wrist is out of reach.
     """
 
 
 @dataclass(frozen=True)
 class Expectation:
-    """What is expected of the robots that a command named, or of all after `wait`, once it is done. What is null
-    is not looked at.
-    """
+    """Conditions on the robots that the command names, or all after `wait`."""
 
     arrived: bool | None = None
-    """Whether every wrist that has a target has arrived there."""
+    """Every wrist with a target has arrived."""
 
     blocked: bool | None = None
-    """Whether a wrist is blocked or out of reach."""
+    """A wrist is blocked or out of reach."""
+
+    touching: bool | None = None
+    """A hand presses on something."""
+
+    holding: bool | None = None
+    """A hand holds something between thumb and fingers."""
 
     force_above_n: float | None = None
-    """That a hand feels more than as many newtons."""
+    """A hand feels more than this force in newtons."""
 
     force_below_n: float | None = None
-    """That no hand feels more than as many newtons."""
+    """No hand feels more."""
 
     phase_reached: str | None = None
-    """That this phase has been reached, as "p1"."""
+    """This phase has been reached, for example "p1"."""
 
     base_stepping: bool | None = None
-    """Whether a robot steps, or settles after it was told to walk."""
+    """A robot steps, or settles after a walk."""
+
+    heard: bool | None = None
+    """Another operator has said something since the plan began."""
 
 
 @dataclass(frozen=True)
 class JointChunk:
-    """The rows of one robot."""
+    """One robot's rows."""
 
     robot: str
-    """The robot, as "A"."""
+    """The robot, for example "A"."""
 
     rows: Numbers
-    """Rows of 35 numbers each, as many as every other robot has. A row: joint targets in radians for left_arm 7,
-    right_arm 7, left_hand 7, right_hand 7, waist 3 (yaw, roll, pitch), then the base command: vx_m_s, vy_m_s,
-    yaw_rate_rad_s, pelvis_height_m. An arm is shoulder_pitch, shoulder_roll, shoulder_yaw, elbow, wrist_roll,
-    wrist_pitch, wrist_yaw; a hand is thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1.
+    """Rows of 35 numbers: joint targets in radians for left_arm 7, right_arm 7, left_hand 7, right_hand 7, waist
+    3, then vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m. start_episode names the columns unless its reply is
+    short.
     """
 
 
@@ -132,168 +132,137 @@ class PixelRegion:
 
 @dataclass(frozen=True)
 class PlannedCommand:
-    """One command of a plan."""
+    """One command."""
 
     tool: str
-    """"move_wrists", "walk", "wait" or "send_joint_chunk"."""
+    """Its tool."""
 
     arguments: Any
-    """The arguments of that tool, without episode_id."""
+    """Arguments of that tool, without episode_id."""
 
     expects: Expectation | None = None
-    """What has to be so afterwards for the plan to go on. None: nothing."""
+    """Conditions that have to hold after it."""
+
+    until: bool | None = None
+    """True: it ends as soon as its `expects` hold, and the plan stops if they do not within its `steps`, here up
+    to 500. For move_wrists, walk and wait.
+    """
 
 
 @dataclass(frozen=True)
 class SurfaceQuery:
-    """A surface in a picture: what is joined to a pixel, or the nearest of a colour."""
+    """Either a pixel or a color."""
 
     pixel: Numbers | None = None
-    """A pixel on it, as [160, 120]. None: the nearest of `color`."""
+    """A pixel on it: for the patch of its colour and the whole thing."""
 
     color: Color | None = None
-    """Its colour. None: that of `pixel`."""
+    """Its colour: for the nearest three."""
 
 
 @dataclass(frozen=True)
 class WalkMove:
-    """What one robot's base is to do. start_episode names the range of each field; values beyond it are clamped
-    and reported.
-    """
+    """Values beyond the ranges that start_episode gives are clamped and reported."""
 
     robot: str
-    """The robot, as "A"."""
+    """The robot, for example "A"."""
 
     vx_m_s: float
-    """Forward velocity in metres per second, as 0.3."""
+    """Forward velocity, for example 0.3."""
 
     vy_m_s: float
-    """Velocity to the left in metres per second."""
+    """Velocity to the left."""
 
     yaw_rate_rad_s: float
-    """Turning rate in radians per second, counter-clockwise seen from above."""
+    """Turning rate, counter-clockwise from above."""
 
     pelvis_height_m: float | None = None
-    """Height of the pelvis above the floor in metres, for a robot that stands; while it steps it may be lower.
-    None: the target stays.
-    """
+    """Height above the floor of a robot that stands. None: unchanged."""
 
     waist_yaw_rad: float | None = None
-    """Where the waist is to turn, in radians to the left, at 1 rad/s at most: head and arms turn with it. 0 is
-    straight ahead. None: it stays.
-    """
+    """Waist angle to the left of straight ahead: head and arms turn along, at 1 rad/s. None: unchanged."""
 
     look_at_m: Numbers | None = None
-    """A point to turn the head to by the waist, [x, y, z] in the pelvis frame, in place of waist_yaw_rad. None:
-    none.
+    """Point [x, y, z] in the pelvis frame to look at: the waist turns and, as far as the picture needs, bends. In
+    place of waist_yaw_rad.
     """
 
 
 @dataclass(frozen=True)
 class Waypoint:
-    """A place that a robot's pelvis is to go by, within 10 cm or so."""
+    """A place to pass within 10 cm."""
 
     at_m: Numbers
-    """[x, y] in metres in the robot's own start frame."""
+    """[x, y] in the start frame."""
 
     heading_rad: float | None = None
-    """Which way it is to face there, as the place's. None: as before."""
+    """Heading there. None: unchanged."""
 
 
 @dataclass(frozen=True)
 class WristMove:
-    """What one robot is to do. Wrist poses are of the links `left_wrist_yaw_link` and `right_wrist_yaw_link` in
-    the robot's own pelvis frame as it is when the command begins: x forward, y left, z up, metres. From then on
-    they are fixed in the world: a robot that walks or sways does not take its hands along, unless `carried` is
-    true. The fingers point along a wrist's x axis; the right palm faces along its y axis, the left palm against
-    it, so that with [1, 0, 0, 0] the fingers point forward and the palms face each other. A hand closes on what
-    lies 0.12 m along x and 0.055 m before its palm. To grasp an upright bottle from the side with [1, 0, 0, 0],
-    open the thumb, bring the right wrist to [-0.12, -0.135, 0] from the bottle's axis, then to [-0.12, -0.055,
-    0], palm first, then close the fingers.
+    """Wrist poses are of the links `left_wrist_yaw_link` and `right_wrist_yaw_link` in the pelvis frame at the
+    start of the command (x forward, y left, z up, metres), and then fixed in the world unless `carried`.
+    Fingers point along a wrist's x; the right palm faces along its y, the left palm against it. A hand closes
+    on what is 0.12 m along x and 0.055 m before its palm.
     """
 
     robot: str
-    """The robot, as "A"."""
+    """The robot, for example "A"."""
 
     left_position_m: Numbers | None = None
-    """Left wrist position [x, y, z] in metres, as [0.30, 0.20, 0.10]. None: it stays where it is to be; without an
-    orientation either, the arm keeps its joints.
-    """
+    """Left wrist [x, y, z], for example [0.30, 0.20, 0.10]. None: unchanged."""
 
     left_quaternion_wxyz: Numbers | None = None
-    """Left wrist orientation [w, x, y, z], as [1, 0, 0, 0]. None: it stays as it is to be turned; without a
-    position either, the arm keeps its joints.
-    """
+    """Left wrist orientation; [1, 0, 0, 0]: fingers forward, palm inwards. None: unchanged."""
 
     right_position_m: Numbers | None = None
-    """Right wrist position [x, y, z] in metres, as [0.30, -0.20, 0.10]. None: it stays where it is to be; without
-    an orientation either, the arm keeps its joints.
-    """
+    """Right wrist, for example [0.30, -0.20, 0.10]."""
 
     right_quaternion_wxyz: Numbers | None = None
-    """Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. None: it stays as it is to be turned; without a
-    position either, the arm keeps its joints.
-    """
+    """Right wrist orientation."""
 
     frame: PoseFrame | None = None
-    """The frame of the wrist poses of this entry: "pelvis"; "level", upright in the pelvis; or "start", which
-    stays in the room while the robot moves: in it a target may be sent again and again without moving with a
-    pelvis that was pushed. None: "pelvis".
+    """Frame of the poses. "level": the pelvis frame, but upright; "start": fixed in the room, for targets that are
+    repeated while the pelvis moves.
     """
 
     carried: bool | None = None
-    """True: the wrist targets move with the pelvis from the command's beginning on, as a robot that carries
-    something wants it. False or null: they are fixed in the world.
-    """
+    """True: targets move with the pelvis, to carry something."""
 
     keep_waist: bool | None = None
-    """True: the waist stays as it is and the arms alone reach, so that the camera keeps its view; until the next
-    command for this robot. False or null: the waist turns and leans where the arms do not suffice.
-    """
+    """True: the waist and so the camera stay; arms alone reach."""
 
     stand_fast: bool | None = None
-    """True: hands stop, as "out_of_reach", before they are so far ahead that the robot would have to step
-    (check_reach: needs_a_step); until the next command for this robot. False or null: it steps.
-    """
+    """True: hands stop, "out_of_reach", before the robot would have to step."""
 
     compliance_n_s_m: float | None = None
-    """How both hands give way to what pulls or pushes them along the way that the robot faces, as a partner at the
-    other end of a load does: at 1 m/s under as many newtons, up to 6 cm. 250 suits two robots that walk with a
-    load; at least 50. None: hands keep to their targets.
+    """Hands give way to pulls and pushes forward or back: at 1 m/s under this force in newtons, up to 6 cm. At
+    least 50; 250 to carry together.
     """
 
     side_compliance_n_s_m: float | None = None
-    """How both hands together give way to what pulls or pushes them to the robot's left or right, as a partner who
-    sways does: at 1 m/s under as many newtons, up to 6 cm; at least 50. None: not to the sides.
-    """
+    """The same to the sides."""
 
     turn_compliance_n_m_s_rad: float | None = None
-    """How both hands together give way to what turns them about the vertical through the middle between the
-    wrists: at 1 rad/s under as many newton metres, up to 0.15 rad; at least 5. None: they do not turn.
-    """
+    """The same about the vertical between the wrists: at 1 rad/s under this torque in N m. At least 5."""
 
     left_fingers_rad: Numbers | None = None
-    """Left finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1].
-    Positive angles close thumb_1 and thumb_2, negative ones middle and index. None: the target stays. Closed
-    around a bottle: [0, 0.75, 0.8, -1.1, -1.3, -1.1, -1.3]; open: [0, -0.3, 0, 0, 0, 0, 0].
+    """Left fingers [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1]: positive angles close
+    thumb_1 and thumb_2, negative ones middle and index. None: unchanged.
     """
 
     right_fingers_rad: Numbers | None = None
-    """Right finger joint angles in radians: [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1].
-    Negative angles close thumb_1 and thumb_2, positive ones middle and index. None: the target stays. Closed
-    around a bottle: [0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3]; open: [0, 0.3, 0, 0, 0, 0, 0].
-    """
+    """Right fingers, with opposite signs."""
 
     vx_m_s: float | None = None
-    """Forward velocity in metres per second during this command. None: 0."""
+    """Forward velocity during this command."""
 
     vy_m_s: float | None = None
-    """Velocity to the left in metres per second during this command. None: 0."""
+    """Velocity to the left."""
 
     yaw_rate_rad_s: float | None = None
-    """Turning rate in radians per second during this command, counter-clockwise seen from above. None: 0."""
+    """Turning rate, counter-clockwise from above."""
 
     pelvis_height_m: float | None = None
-    """Height of the pelvis above the floor in metres, for a robot that stands; while it steps it may be lower.
-    None: the target stays.
-    """
+    """Height above the floor of a robot that stands. None: unchanged."""

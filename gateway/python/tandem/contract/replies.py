@@ -39,7 +39,7 @@ Protocol: TypeAlias = Literal[
     "agentic",
     "benchmark",
 ]
-"""The rules an episode is run under."""
+"""Rules of an episode."""
 
 
 @dataclass(frozen=True)

@@ -38,11 +38,11 @@ class Tools(ABC):
         self,
         robot: str,
     ) -> RobotState:
-        """Read one robot's proprioception: 43 joint angles, velocities and torques by name, both wrist poses in
-        the pelvis frame, which way is down, how far the robot has gone, and the base command in force. Costs no
-        steps; physics stands still. Also answers after the episode has ended.
+        """Read one robot's proprioception without an image: wrist poses in the pelvis frame, which way is down,
+        odometry, the base command in force and, unless `short`, 43 joint angles, velocities and torques. Costs
+        no steps.
 
-        robot: The robot, as "A".
+        robot: The robot, for example "A".
         """
         arguments: dict[str, Any] = {
             "robot": robot,
@@ -59,21 +59,16 @@ class Tools(ABC):
         surface: SurfaceQuery | None = None,
         frame: PoseFrame | None = None,
     ) -> DepthReply:
-        """Measure where what a robot's head camera sees is, at pixels named one by one or as a region: at most
-        4096 of them either way. Returns a row [u, v, x, y, z] for each pixel: the 3-D point in the robot's
-        pelvis frame, the frame that wrist targets are given in. A pixel sees a surface, so the middle of an
-        object lies a little behind the point. Costs no steps; physics stands still.
+        """Measure the points that a robot's head camera sees at up to 4096 pixels, listed or filling a region.
+        Returns a row [u, v, x, y, z] for each, in the pelvis frame as wrist targets. A pixel sees a surface;
+        the middle of an object is a little behind it. Costs no steps.
 
-        robot: The robot whose camera measures, as "A".
-        pixels: Pixels as [u, v]: column 0 to 319 from the left, row 0 to 239 from the top, at most 4096 of them.
-            Example: [[160, 120], [170, 120]]. None: those of `region`.
-        region: Pixels of a rectangle, row by row, at most 4096 of them. None: those of `pixels`.
-        fit: True: also the plane in `region`, the straight edges at which it ends there, and the corners where they
-            meet, fitted to every pixel of it.
-        surface: A surface to find, whose middle, size, corners and, where it is upright and round, axis are told in
-            place of points: give pixel, [u, v] of a place on it, for the patch of its colour and the whole thing, or
-            color, as "red", for the nearest three of that colour.
-        frame: The frame of the points: "pelvis", "level" or "start". None: "pelvis".
+        robot: The robot, for example "A".
+        pixels: Pixels [u, v], column 0 to 319 from the left, row 0 to 239 from the top.
+        region: Pixels of a rectangle, row by row.
+        fit: True: also the largest plane in `region`, its straight edges and their corners.
+        surface: Returns middle, size, corners and, of an upright round thing, axis of a surface in place of points.
+        frame: Frame of the points.
         """
         arguments: dict[str, Any] = {
             "robot": robot,
@@ -96,20 +91,16 @@ class Tools(ABC):
         frame: PoseFrame | None = None,
         keep_waist: bool | None = None,
     ) -> ReachReply:
-        """Ask whether a robot's wrists could reach poses from where it stands, using the arms that are given a
-        pose and the waist. Nothing moves and no steps are spent. Poses are of the wrist links
-        (`left_wrist_yaw_link`, `right_wrist_yaw_link`) in the robot's pelvis frame: x forward, y left, z up,
-        metres.
+        """Ask whether wrists could reach poses from where the robot stands, by the waist and the arms that are
+        given a pose. Nothing moves; costs no steps. Poses are as in move_wrists.
 
-        robot: The robot, as "A".
-        left_position_m: Left wrist position [x, y, z] in metres, as [0.30, 0.20, 0.10]. None: where it is to be now,
-            or, without an orientation either, this arm keeps its joints.
-        left_quaternion_wxyz: Left wrist orientation [w, x, y, z], as [1, 0, 0, 0]. None: as it is to be now.
-        right_position_m: Right wrist position [x, y, z] in metres, as [0.30, -0.20, 0.10]. None: where it is to be
-            now, or, without an orientation either, this arm keeps its joints.
-        right_quaternion_wxyz: Right wrist orientation [w, x, y, z], as [1, 0, 0, 0]. None: as it is to be now.
-        frame: The frame of the poses: "pelvis", "level" or "start". None: "pelvis".
-        keep_waist: True: with the waist as it is, as move_wrists reaches with keep_waist. None: false.
+        robot: The robot, for example "A".
+        left_position_m: Left wrist [x, y, z]. None: the present target.
+        left_quaternion_wxyz: Left wrist orientation.
+        right_position_m: Right wrist.
+        right_quaternion_wxyz: Right wrist orientation.
+        frame: Frame of the poses.
+        keep_waist: True: with the waist as it is.
         """
         arguments: dict[str, Any] = {
             "robot": robot,
@@ -127,14 +118,13 @@ class Tools(ABC):
         steps: int,
         robots: Sequence[WristMove],
     ) -> CommandReply:
-        """Move wrists, fingers and base of one or more robots for a number of control steps of 20 ms. Inverse
-        kinematics turns wrist poses into arm and waist joints. Robots that are not named hold still; a hand
-        without a wrist target keeps its arm's joints, and fingers that are not given keep theirs. The reply
-        says of each wrist and its fingers whether they have arrived, are moving (repeat the command or call
-        wait), are blocked by load or contact, or are out of reach.
+        """Move wrists, fingers and base for a number of control steps of 20 ms; inverse kinematics finds arm and
+        waist joints. Robots that are not named hold still; arms and fingers without targets keep their joints.
+        The reply says whether each wrist has arrived, is moving (repeat or wait), is blocked by load or
+        contact, or is out of reach.
 
-        steps: Control steps of 20 ms: 1 up to the budget's steps_per_command.
-        robots: One entry per robot that is to move; each robot at most once.
+        steps: Control steps: 1 up to the budget's steps_per_command.
+        robots: One entry per robot that moves.
         """
         arguments: dict[str, Any] = {
             "steps": steps,
@@ -147,12 +137,12 @@ class Tools(ABC):
         steps: int,
         robots: Sequence[WalkMove],
     ) -> CommandReply:
-        """Walk, turn, change the pelvis height or look around with one or more robots for a number of control
-        steps of 20 ms, while their arms and hands keep their joints and so go along. Velocities are in the
-        robot's own frame and apply during this command only; the height persists.
+        """Walk, turn, change the pelvis height or look around for a number of control steps of 20 ms. Arms and
+        hands keep their joints and go along. Velocities are in the robot's own frame and apply during this
+        command; the height persists.
 
-        steps: Control steps of 20 ms: 1 up to the budget's steps_per_command.
-        robots: One entry per robot that is to move; each robot at most once. Robots that are not named hold still.
+        steps: Control steps: 1 up to the budget's steps_per_command.
+        robots: One entry per robot that moves. Others hold still.
         """
         arguments: dict[str, Any] = {
             "steps": steps,
@@ -164,11 +154,11 @@ class Tools(ABC):
         self,
         robots: Sequence[JointChunk],
     ) -> CommandReply:
-        """Send joint targets for one or more robots, one row per control step of 20 ms. Rows of all named robots
-        run side by side, so each robot needs the same number of rows: 1 up to the budget's steps_per_command.
-        Robots that are not named hold still. Targets beyond a joint's limits are clamped and reported.
+        """Send joint targets, one row per control step of 20 ms. Rows of all named robots run side by side, so
+        each needs the same number: 1 up to the budget's steps_per_command. Other robots hold still. Targets
+        beyond joint limits are clamped and reported.
 
-        robots: One entry per robot that is to move; each robot at most once.
+        robots: One entry per robot that moves.
         """
         arguments: dict[str, Any] = {
             "robots": robots,
@@ -179,11 +169,10 @@ class Tools(ABC):
         self,
         steps: int,
     ) -> CommandReply:
-        """Let all robots hold their targets for a number of control steps of 20 ms: for a hand to arrive, for an
-        object to come to rest. The reply reports on every robot. Wrist targets of the last command stay fixed
-        in the world, or carried, as they were given.
+        """Let all robots hold their targets for a number of control steps of 20 ms. The reply reports on every
+        robot.
 
-        steps: Control steps of 20 ms: 1 up to the budget's steps_per_command.
+        steps: Control steps: 1 up to the budget's steps_per_command.
         """
         arguments: dict[str, Any] = {
             "steps": steps,
@@ -194,12 +183,12 @@ class Tools(ABC):
         self,
         commands: Sequence[PlannedCommand],
     ) -> PlanReply:
-        """Carry out up to 20 commands one after another, each as if it had been called by itself: with its own
-        steps, recorded and counted as a tool call. The plan stops after the first command after which something
-        that it `expects` is not so. The reply is that of the last command carried out, with how many were and
-        why no more. If any command could not be carried out, none is.
+        """Carry out up to 20 commands in order, each with its own steps and counted as a tool call, until one's
+        `expects` does not hold. With `until`, a command lasts until it does: lower a hand until it touches,
+        wait until a phase is reached. Returns the last command's reply, how many were carried out, and why no
+        more. If one is invalid, none is.
 
-        commands: The commands, at most 20.
+        commands: The commands in order.
         """
         arguments: dict[str, Any] = {
             "commands": commands,
@@ -211,15 +200,13 @@ class Tools(ABC):
         steps: int,
         robots: Sequence[Destination],
     ) -> PlanReply:
-        """Walk to places in the start frame, looking at odometry on the way: arms keep their joints and go along,
-        or push and carry with `carry`. It is carried out as short commands, each recorded and counted as a tool
-        call, until every robot stands within 1.5 cm and 1.5 degrees of its place, one gets no nearer, or the
-        steps are used up. It walks straight and looks at nothing: go round what stands in the way by
-        `waypoints`.
+        """Walk to places in the start frame by odometry; arms go along, or push and carry with `carry`. Short
+        commands, each counted as a tool call, take every robot to within 1.5 cm and 1.5 degrees of its place,
+        unless one gets no nearer or the steps are used up. It does not look: go round obstacles by `waypoints`.
 
-        steps: The most control steps of 20 ms to take, up to 1500. A way takes about 120, and 250 a metre and 150 a
-            quarter turn; where robots carry, 450 a metre.
-        robots: One entry per robot that is to walk; each robot at most once. Robots that are not named hold still.
+        steps: Most control steps, up to 1500: about 120 and 250 a metre and 150 a quarter turn; with `carry` 450 a
+            metre.
+        robots: One entry per robot that walks.
         """
         arguments: dict[str, Any] = {
             "steps": steps,
@@ -232,10 +219,9 @@ class Tools(ABC):
         *,
         explain: bool | None = None,
     ) -> StatusReply:
-        """Ask where the episode stands: time, phases reached, who has fallen, and the budget left. Costs no steps;
-        physics stands still. Also answers after the episode has ended.
+        """Ask how the episode is going: time, phases reached, fallen robots, and the budget left. Costs no steps.
 
-        explain: True: also what the next phase still lacks, part by part, as it is measured.
+        explain: True: also what the next phase lacks, part by part, as measured.
         """
         arguments: dict[str, Any] = {
             "explain": explain,
@@ -245,7 +231,5 @@ class Tools(ABC):
     def finish(
         self,
     ) -> ResultReply:
-        """End the episode and get its result. Call it when the task is done or cannot be done any more. After that
-        no command is executed; observe, get_robot_state, get_status and finish still answer.
-        """
+        """End the episode and get its result. After that no command is executed; reads still answer."""
         return ResultReply.of(self.call("finish", {}))

@@ -14,10 +14,12 @@ use std::{
 };
 
 use tandem_episodes::{
-    Clock, EpisodeSpec, Facts, JournalEntry, OperatorCall, OperatorCommand, Picture, RunFolder, Session,
-    TeamObservation, monotonic,
+    Clock, EpisodeSpec, Facts, JournalEntry, OperatorCall, OperatorCommand, Picture, PlanAdvance, PlanRun,
+    RunFolder, Session, TeamObservation, monotonic,
 };
-use tandem_tools_spec::{Briefing, Call, EndReason, ExtraInformation, Note, Observe, ResultReply, ToolCall};
+use tandem_tools_spec::{
+    Briefing, Call, EndReason, ExtraInformation, Note, Observe, PlanCall, PlanReply, ResultReply, ToolCall,
+};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc, oneshot};
 
 use super::{
@@ -371,17 +373,41 @@ impl EpisodeThread {
         &self,
         work: impl FnOnce(&mut Session) -> Result<T, HostingError> + Send + 'static,
     ) -> Result<T, HostingError> {
-        let (reply, answer) = oneshot::channel::<Result<T, HostingError>>();
-        self.send(Job::Work(Box::new(move |on| {
-            let done = on.and_then(|(session, status)| {
-                let done = session.run(work).flatten();
-                status.update(session);
-                done
-            });
-            // Who asked may have gone.
-            let _ = reply.send(done);
-        })))?;
+        let (reply, answer) = oneshot::channel();
+        self.send(work_job(work, reply))?;
         answer.blocking_recv().map_err(|_| HostingError::EpisodeStopped)?
+    }
+
+    /// Does something with the session in its turn.
+    async fn work<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&mut Session) -> Result<T, HostingError> + Send + 'static,
+    ) -> Result<T, HostingError> {
+        self.do_job_in_turn(|reply| work_job(work, reply)).await
+    }
+
+    /// Begins a plan of the operator `own`, which is refused if one of its commands could not be carried out.
+    pub async fn begin_plan(&self, own: OperatorCall, plan: PlanCall) -> Result<PlanRun, HostingError> {
+        self.work(move |session| Ok(session.begin_plan(&own, &plan)?)).await
+    }
+
+    /// Returns the plan with its next command.
+    pub async fn advance_plan(&self, mut run: PlanRun) -> Result<(PlanRun, PlanAdvance), HostingError> {
+        self.work(move |session| {
+            let next = run.advance(session);
+            Ok((run, next))
+        })
+        .await
+    }
+
+    /// Returns the reply to an operator's plan that goes no further, and the step that the episode is at.
+    pub async fn end_plan(
+        &self,
+        call: Call,
+        run: PlanRun,
+        stopped: Option<String>,
+    ) -> Result<(PlanReply, u32), HostingError> {
+        self.work(move |session| Ok((session.end_plan(&call, run, stopped)?, session.env_steps()))).await
     }
 
     /// Has the thread do a job, however many wait.
@@ -428,4 +454,20 @@ impl EpisodeThread {
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     // Nothing panics while it holds the lock.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Makes a job of `work`, the outcome of which goes to `reply`.
+fn work_job<T: Send + 'static>(
+    work: impl FnOnce(&mut Session) -> Result<T, HostingError> + Send + 'static,
+    reply: ReplySender<T>,
+) -> Job {
+    Job::Work(Box::new(move |on| {
+        let done = on.and_then(|(session, status)| {
+            let done = session.run(work).flatten();
+            status.update(session);
+            done
+        });
+        // The caller may have gone.
+        let _ = reply.send(done);
+    }))
 }

@@ -9,6 +9,7 @@ mod collection;
 mod driving;
 mod one_robot;
 mod partner;
+mod planning;
 mod round;
 
 use std::{
@@ -21,8 +22,8 @@ use std::{
 
 use tandem_episodes::{EpisodeError, OperatorCall, stress::Silence};
 use tandem_tools_spec::{
-    Call, Driving, Finish, GetStatus, Heard, ManageCall, OperatorToken, Partner, PartnerDid, SpecError,
-    TalkCall, ToolCall,
+    Call, Driving, Finish, GetStatus, Heard, ManageCall, OperatorToken, Partner, PartnerDid, TalkCall,
+    ToolCall,
 };
 use tokio::sync::{Semaphore, SemaphorePermit, oneshot};
 
@@ -62,6 +63,8 @@ struct Wheels {
     partners: Vec<Option<PartnerKind>>,
     /// By seat: the partner that drove when the server before this one ended, until it is seated again.
     left: Vec<Option<PartnerKind>>,
+    /// By seat: plans under way.
+    plans: Vec<u32>,
 }
 
 /// Who drives which robot.
@@ -110,7 +113,9 @@ impl Team {
         let patience = Duration::from_secs_f64(driving.patience_s());
         let (none, under_way) = (seats.iter().map(|_| None).collect(), vec![None; seats.len()]);
         let (partners, left) = (vec![None; seats.len()], vec![None; seats.len()]);
-        let wheels = Mutex::new(Wheels { seats: none, under_way, partners, left, ..Wheels::default() });
+        let plans = vec![0; seats.len()];
+        let wheels =
+            Mutex::new(Wheels { seats: none, under_way, partners, left, plans, ..Wheels::default() });
         Ok(Team { seats, patience, talk: driving.talk == Some(true), silence, round, wheels })
     }
 
@@ -178,12 +183,7 @@ impl Team {
                 let words = Heard { from: robot.into(), text: say.text.clone() };
                 self.say(episode, seat, call, words, keyed).await
             }
-            ToolCall::Plan(_) => Err(EpisodeError::from(SpecError::Invalid {
-                    tool: call.call().name(),
-                    reason: "every robot of this episode has its operator, and a plan of one would hold up the others; command one by one"
-                        .into(),
-                })
-                .into()),
+            ToolCall::Plan(_) => self.plan(episode, seat, call, keyed).await,
             ToolCall::Manage(ManageCall::Finish(_)) => self.finish(episode, seat, keyed).await,
             ToolCall::Look(_) | ToolCall::Manage(ManageCall::GetStatus(_)) => {
                 let _place = self.take_place(robot)?;
@@ -288,10 +288,13 @@ impl Team {
         }
     }
 
-    /// Whether a command by who has `seat` goes on where that of a partner was shorter.
+    /// True where a command by the operator on `seat` goes on after a shorter one of a partner: beside people, partners of this process
+    /// and plans, whose commands are short.
     fn goes_on(&self, seat: usize) -> bool {
         let wheels = self.wheels();
-        wheels.partners[seat].is_some() || wheels.seats.iter().any(Option::is_some)
+        wheels.partners[seat].is_some()
+            || wheels.seats.iter().any(Option::is_some)
+            || wheels.plans.iter().any(|plans| *plans > 0)
     }
 
     /// Takes a command, and answers when the step has been made.

@@ -3,6 +3,7 @@
 
 mod envelope;
 mod prompt;
+mod resources;
 
 use std::sync::Arc;
 
@@ -17,7 +18,8 @@ use rmcp::{
     model::{
         CallToolRequestParams, CallToolResponse, CallToolResult, ContentBlock, DiscoverResult,
         GetPromptRequestParams, GetPromptResponse, Implementation, InitializeRequestParams, InitializeResult,
-        ListPromptsResult, ListToolsResult, PaginatedRequestParams, ServerCapabilities, ServerConfig, Tool,
+        ListPromptsResult, ListResourcesResult, ListToolsResult, PaginatedRequestParams,
+        ReadResourceRequestParams, ReadResourceResponse, ServerCapabilities, ServerConfig, Tool,
     },
     service::RequestContext,
     transport::streamable_http_server::{
@@ -41,7 +43,7 @@ use crate::hosting::{Answer, Caller, HostingError, RefusedCall};
 /// What the library wants to be accepted; the answers are JSON.
 const ACCEPTED: &str = "application/json, text/event-stream";
 
-/// What a host tells its model about the server as a whole: only what `caller` can do.
+/// Returns what a host tells its model about the server as a whole: only what `caller` can do.
 fn instructions(caller: &Caller) -> String {
     let begin = match caller {
         Caller::Host => "Call list_tasks, then start_episode, then look".into(),
@@ -52,7 +54,8 @@ fn instructions(caller: &Caller) -> String {
     };
     format!(
         "Simulated humanoids that must work together. {begin} with observe and act with move_wrists, walk, send_joint_chunk or wait \
-         until the task is done, then call finish. Physics stands still between calls."
+         until the task is done, then call finish. Physics stands still between calls. Replies are short; `short: false` gives \
+         the whole one."
     )
 }
 
@@ -78,9 +81,11 @@ struct McpServer {
 
 impl ServerHandler for McpServer {
     fn get_info(&self) -> ServerConfig {
-        ServerConfig::new(ServerCapabilities::builder().enable_tools().enable_prompts().build())
-            .with_server_info(Implementation::new("tandem", env!("CARGO_PKG_VERSION")))
-            .with_instructions(instructions(&Caller::Host))
+        ServerConfig::new(
+            ServerCapabilities::builder().enable_tools().enable_prompts().enable_resources().build(),
+        )
+        .with_server_info(Implementation::new("tandem", env!("CARGO_PKG_VERSION")))
+        .with_instructions(instructions(&Caller::Host))
     }
 
     async fn initialize(
@@ -90,12 +95,12 @@ impl ServerHandler for McpServer {
     ) -> Result<InitializeResult, ErrorData> {
         context.peer.set_peer_info(request.clone());
         let server = self.negotiate_initialize(&request)?;
-        Ok(server.with_instructions(instructions(caller_of(&context).unwrap_or(&Caller::Host))))
+        Ok(server.with_instructions(self.instructions(caller_of(&context).unwrap_or(&Caller::Host)).await))
     }
 
     async fn discover(&self, context: RequestContext<RoleServer>) -> Result<DiscoverResult, ErrorData> {
         let caller = caller_of(&context).unwrap_or(&Caller::Host);
-        let server = self.get_info().with_instructions(instructions(caller));
+        let server = self.get_info().with_instructions(self.instructions(caller).await);
         Ok(DiscoverResult::from_server_info(self.supported_protocol_versions().into_owned(), server))
     }
 
@@ -130,6 +135,24 @@ impl ServerHandler for McpServer {
         Ok(prompt::prompt(&request.name, arguments, list, self.app.settings.wording(), caller)?.into())
     }
 
+    async fn list_resources(
+        &self,
+        _: Option<PaginatedRequestParams>,
+        context: RequestContext<RoleServer>,
+    ) -> Result<ListResourcesResult, ErrorData> {
+        let caller = caller_of(&context).unwrap_or(&Caller::Host);
+        Ok(ListResourcesResult::with_all_items(resources::resources(caller)))
+    }
+
+    async fn read_resource(
+        &self,
+        request: ReadResourceRequestParams,
+        context: RequestContext<RoleServer>,
+    ) -> Result<ReadResourceResponse, ErrorData> {
+        let caller = caller_of(&context).unwrap_or(&Caller::Host);
+        Ok(resources::read(&self.app, caller, &request.uri).await?.into())
+    }
+
     async fn call_tool(
         &self,
         request: CallToolRequestParams,
@@ -141,7 +164,10 @@ impl ServerHandler for McpServer {
             let text = format!("no tool {:?}; have: {}", request.name, have.join(", "));
             return Err(ErrorData::invalid_params(text, None));
         }
-        let args = Value::Object(request.arguments.unwrap_or_default());
+        let mut args = request.arguments.unwrap_or_default();
+        // A model reads every reply, so that a short one is the default, as the instructions say.
+        args.entry("short").or_insert(true.into());
+        let args = Value::Object(args);
         let episode = args["episode_id"].as_str().map(str::to_owned);
         let called = match duplicate_field(&context) {
             Some(DuplicateField(reason)) => Err(ApiError::MalformedJson(reason.clone())),
@@ -163,6 +189,17 @@ impl ServerHandler for McpServer {
 }
 
 impl McpServer {
+    /// Returns the instructions for `caller`. An operator's have its part of the task and how to play with partners, since a model may see
+    /// nothing else of the briefing.
+    async fn instructions(&self, caller: &Caller) -> String {
+        let begin = instructions(caller);
+        let Caller::Operator { episode, .. } = caller else { return begin };
+        let Ok(briefing) = self.app.table.briefing(episode, caller).await else { return begin };
+        let own = briefing.instructions.into_iter().map(|entry| format!(" Your part: {}", entry.instruction));
+        let teamwork = briefing.brief.teamwork.map(|text| format!(" {text}"));
+        [begin].into_iter().chain(own).chain(teamwork).collect()
+    }
+
     async fn call(&self, caller: &Caller, name: &str, args: Value) -> Result<Vec<ContentBlock>, ApiError> {
         match name {
             ListTasks::NAME => {

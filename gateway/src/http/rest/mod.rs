@@ -15,8 +15,8 @@ use axum::{
 use serde::Deserialize;
 use serde_json::{Value, json};
 use tandem_tools_spec::{
-    Call, EpisodeToolSpec, Format, Note, PlanCall, ResultReply, StartEpisode, TaskList, Tool as _,
-    episode_tool_specs, parse_start,
+    Call, EpisodeToolSpec, Format, Note, ResultReply, StartEpisode, TaskList, Tool as _, episode_tool_specs,
+    parse_start,
 };
 
 use super::{
@@ -103,12 +103,7 @@ async fn episode_tools(
     episode.admit(&caller)?;
     let (wording, talk) = (app.settings.wording(), app.table.may_talk(&caller));
     let thread = &episode.thread;
-    let mut specs = episode_tool_specs(wording, &id, thread.robots(), thread.steps_per_command(), talk);
-    if let Caller::Operator { .. } = caller {
-        // A plan would hold up the others.
-        specs.retain(|tool| !PlanCall::TOOLS.contains(&tool.spec.name));
-    }
-    Ok(Json(specs))
+    Ok(Json(episode_tool_specs(wording, &id, thread.robots(), thread.steps_per_command(), talk)))
 }
 
 async fn openapi(State(app): State<AppState>, Extension(caller): Extension<Caller>) -> Json<Value> {

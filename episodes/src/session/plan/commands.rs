@@ -1,0 +1,168 @@
+//! `send_plan`: commands in sequence. Each runs until its steps are done, or until its expectation holds.
+
+use tandem_tools_spec::{CommandReply, PlanStep, PlannedCall, SendPlan, SpecError, Tool as _};
+
+use super::expectation::unexpected;
+use super::pieces::Pieces;
+use super::{PlanAdvance, PlanStage};
+use crate::EpisodeError;
+use crate::commands::Command;
+use crate::scoring::Phase;
+use crate::session::Session;
+
+/// The commands of a plan, with its progress.
+#[derive(Debug)]
+pub struct CommandList {
+    steps: Vec<PlanStep>,
+    index: usize,
+    current: Option<CurrentCommand>,
+}
+
+/// The current command.
+#[derive(Debug)]
+enum CurrentCommand {
+    Whole,
+    Until(Pieces),
+    Walk(Box<PlanStage>),
+}
+
+impl Session {
+    /// Reads a plan.
+    ///
+    /// # Errors
+    ///
+    /// A command that cannot be executed; the plan is then refused as a whole.
+    pub(super) fn command_list(
+        &self,
+        plan: &SendPlan,
+        operator: Option<&str>,
+    ) -> Result<CommandList, EpisodeError> {
+        let steps = plan.calls()?;
+        for (index, step) in steps.iter().enumerate() {
+            let refused = |reason: String| SpecError::Invalid {
+                tool: SendPlan::NAME,
+                reason: format!("{}: {reason}", plan.place(index)),
+            };
+            match &step.call {
+                PlannedCall::Act(call) if step.until => {
+                    Pieces::new(call, self).map(drop)?;
+                }
+                PlannedCall::Act(call) => drop(Command::read(call, &self.rules, &self.motions)?),
+                PlannedCall::WalkTo(walk) => drop(self.walk_stage(walk)?),
+            }
+            self.check_phase(step).map_err(refused)?;
+            if step.expects.heard.is_some() && operator.is_none() {
+                return Err(refused("`heard` is for operators, each of whom has a robot".into()).into());
+            }
+        }
+        Ok(CommandList { steps, index: 0, current: None })
+    }
+
+    fn check_phase(&self, step: &PlanStep) -> Result<(), String> {
+        let phases = self.spec().task.phases.iter().enumerate();
+        let numbered: Vec<_> = phases.map(|(number, phase)| (Phase::number(number), phase.id)).collect();
+        let is_known = |name: &&String| numbered.iter().any(|(number, id)| number == *name || id == *name);
+        match step.expects.phase_reached.as_ref().filter(|name| !is_known(name)) {
+            Some(name) => {
+                let have: Vec<String> =
+                    numbered.iter().map(|(number, id)| format!("{number} ({id})")).collect();
+                Err(format!("there is no phase {name:?}; have: {}", have.join(", ")))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+impl CommandList {
+    /// Returns the next command after the reply to the previous one.
+    pub fn advance(&mut self, session: &Session, last: Option<&CommandReply>, heard: bool) -> PlanAdvance {
+        loop {
+            let Some(step) = self.steps.get(self.index) else { return PlanAdvance::Done(None) };
+            let stopped = match (self.current.take(), last) {
+                (Some(current), Some(reply)) => match current.go_on(session, step, reply, heard) {
+                    CommandProgress::Make(call, current) => {
+                        self.current = Some(current);
+                        return PlanAdvance::Make(call);
+                    }
+                    CommandProgress::Over(stopped) => stopped,
+                },
+                _ => match CurrentCommand::begin(session, step) {
+                    Ok((call, current)) => {
+                        self.current = Some(current);
+                        return PlanAdvance::Make(call);
+                    }
+                    Err(stopped) => Some(stopped),
+                },
+            };
+            if let Some(why) = stopped {
+                let place = format!("command {} of {}", self.index + 1, self.steps.len());
+                return PlanAdvance::Done(Some(format!("after {place}: {why}")));
+            }
+            self.index += 1;
+        }
+    }
+
+    /// Returns true if the last command asks for a short reply.
+    pub fn is_short(&self) -> bool {
+        self.steps.get(self.index).or(self.steps.last()).is_some_and(|step| step.short)
+    }
+}
+
+/// Next step of a command after a reply.
+enum CommandProgress {
+    Make(tandem_tools_spec::ActCall, CurrentCommand),
+    /// The end of the command; with a reason, the plan stops.
+    Over(Option<String>),
+}
+
+impl CurrentCommand {
+    fn begin(
+        session: &Session,
+        step: &PlanStep,
+    ) -> Result<(tandem_tools_spec::ActCall, CurrentCommand), String> {
+        match &step.call {
+            PlannedCall::Act(call) if !step.until => Ok((call.clone(), CurrentCommand::Whole)),
+            PlannedCall::Act(call) => {
+                let mut pieces = Pieces::new(call, session).map_err(|error| error.to_string())?;
+                let first = pieces.next_piece().ok_or("it has no steps")?;
+                Ok((first, CurrentCommand::Until(pieces)))
+            }
+            PlannedCall::WalkTo(walk) => {
+                let mut stage = session.walk_stage(walk).map_err(|error| error.to_string())?;
+                match stage.walk_on(session, None) {
+                    PlanAdvance::Make(call) => Ok((call, CurrentCommand::Walk(stage.into()))),
+                    PlanAdvance::Done(why) => Err(why.unwrap_or_else(|| "it has no steps".into())),
+                }
+            }
+        }
+    }
+
+    fn go_on(self, session: &Session, step: &PlanStep, reply: &CommandReply, heard: bool) -> CommandProgress {
+        let missing = || unexpected(&step.expects, reply, heard);
+        match self {
+            CurrentCommand::Whole => CommandProgress::Over(missing()),
+            CurrentCommand::Until(mut pieces) => match missing() {
+                None => CommandProgress::Over(None),
+                Some(why) => match pieces.next_piece() {
+                    Some(call) => CommandProgress::Make(call, CurrentCommand::Until(pieces)),
+                    None => CommandProgress::Over(Some(format!("its steps are done and {why}"))),
+                },
+            },
+            CurrentCommand::Walk(mut stage) => match stage.walk_on(session, Some(reply)) {
+                PlanAdvance::Make(call) => CommandProgress::Make(call, CurrentCommand::Walk(stage)),
+                PlanAdvance::Done(stopped) => CommandProgress::Over(stopped.or_else(missing)),
+            },
+        }
+    }
+}
+
+impl PlanStage {
+    /// Returns the next command of a walk. Lists of commands are not nested.
+    fn walk_on(&mut self, session: &Session, last: Option<&CommandReply>) -> PlanAdvance {
+        match self {
+            PlanStage::Walk(walk) => walk.advance(session, last),
+            PlanStage::Carry(carry) => carry.advance(session, last),
+            PlanStage::Commands(_) => PlanAdvance::Done(None),
+        }
+    }
+}

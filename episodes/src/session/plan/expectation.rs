@@ -1,0 +1,67 @@
+//! Conditions of plans on the reply to a command.
+
+use tandem_tools_spec::{
+    BaseState, CommandReply, Expectation, Grip, HandReport, HandState, RobotReport, Touch,
+};
+
+/// Returns the first condition of `expected` that does not hold after a command, in words; `None` if all hold.
+pub fn unexpected(expected: &Expectation, reply: &CommandReply, heard: bool) -> Option<String> {
+    let hands: Vec<(String, &HandReport)> = reply.robots.iter().flat_map(hands_of).collect();
+    let find = |is: fn(&HandReport) -> bool| hands.iter().find(|(_, hand)| is(hand));
+    let under_way = find(|hand| !matches!(hand.state, Some(HandState::Arrived | HandState::Idle)));
+    let stopped = find(|hand| matches!(hand.state, Some(HandState::Blocked | HandState::OutOfReach)));
+    let touches = find(|hand| !hand.presses.is_empty() || hand.touches == Some(Touch::Something));
+    let holds = find(|hand| hand.grip == Some(Grip::TwoSided));
+    let steps = reply.robots.iter().find(|robot| {
+        robot.base.and_then(|base| base.state).is_some_and(|state| state != BaseState::Standing)
+    });
+    let off = |(name, hand): &(String, &HandReport)| {
+        format!("{name} is {:.3} m off", hand.position_error_m.unwrap_or_default())
+    };
+    let name = |(name, _): &(String, &HandReport)| name.clone();
+    differs("arrived", expected.arrived, under_way.is_none(), under_way.map(off))
+        .or_else(|| differs("blocked", expected.blocked, stopped.is_some(), stopped.map(off)))
+        .or_else(|| differs("touching", expected.touching, touches.is_some(), touches.map(name)))
+        .or_else(|| differs("holding", expected.holding, holds.is_some(), holds.map(name)))
+        .or_else(|| {
+            let robot = steps.map(|robot| robot.robot.clone());
+            differs("base_stepping", expected.base_stepping, steps.is_some(), robot)
+        })
+        .or_else(|| differs("heard", expected.heard, heard, None))
+        .or_else(|| force_differs(expected, &hands))
+        .or_else(|| phase_missing(expected, reply))
+}
+
+fn differs(name: &str, wanted: Option<bool>, is: bool, which: Option<String>) -> Option<String> {
+    let wanted = wanted.filter(|wanted| *wanted != is)?;
+    Some(format!(
+        "{name} is {is}, not {wanted}{}",
+        which.map(|which| format!(" ({which})")).unwrap_or_default()
+    ))
+}
+
+fn force_differs(expected: &Expectation, hands: &[(String, &HandReport)]) -> Option<String> {
+    let force_n = |hand: &HandReport| {
+        hand.force_n.map_or(0.0, |force_n| force_n.iter().map(|part| part * part).sum::<f64>().sqrt())
+    };
+    let max_n = hands.iter().map(|(_, hand)| force_n(hand)).fold(0.0, f64::max);
+    let above = expected.force_above_n.filter(|least_n| max_n <= *least_n);
+    let below = expected.force_below_n.filter(|limit_n| max_n > *limit_n);
+    above
+        .map(|least_n| format!("hands feel {max_n:.1} N at most, not above {least_n}"))
+        .or_else(|| below.map(|limit_n| format!("a hand feels {max_n:.1} N, above {limit_n}")))
+}
+
+fn phase_missing(expected: &Expectation, reply: &CommandReply) -> Option<String> {
+    let phase = expected.phase_reached.as_ref()?;
+    let is_reached = reply.phases.iter().any(|reached| reached.number == *phase || reached.id == *phase);
+    (!is_reached).then(|| format!("{phase} has not been reached; get_status with explain says what it lacks"))
+}
+
+/// Returns both hands of a robot with their names.
+fn hands_of(report: &RobotReport) -> [(String, &HandReport); 2] {
+    [
+        (format!("{}'s left wrist", report.robot), &report.left),
+        (format!("{}'s right wrist", report.robot), &report.right),
+    ]
+}

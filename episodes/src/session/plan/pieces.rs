@@ -1,0 +1,139 @@
+//! A command that runs until a condition holds, split into commands of a tenth of a second.
+
+use nalgebra::Isometry3;
+use tandem_sim::{HAND_JOINTS, Side, Sides};
+use tandem_tools_spec::{ActCall, MoveWrists, PoseFrame, SpecError, Tool as _, Wait, Walk, WristMove};
+
+use crate::EpisodeError;
+use crate::commands::{self, Command, columns, wrist_targets};
+use crate::session::Session;
+
+/// Control steps of a piece, after each of which the conditions are checked.
+const PIECE_STEPS: u32 = 5;
+
+/// A command in pieces.
+#[derive(Debug)]
+pub struct Pieces {
+    steps: u32,
+    done: u32,
+    kind: PieceKind,
+}
+
+#[derive(Debug)]
+enum PieceKind {
+    Wait,
+    Walk(Walk),
+    Wrists(Vec<WristWay>),
+}
+
+/// Trajectory of one robot's wrists and fingers, split into the pieces.
+#[derive(Debug)]
+struct WristWay {
+    /// The original move, with poses in `frame`.
+    entry: WristMove,
+    /// Start and end of each wrist with a target.
+    wrists: Sides<Option<[Isometry3<f64>; 2]>>,
+    fingers_rad: Sides<Option<[[f64; HAND_JOINTS]; 2]>>,
+}
+
+impl Pieces {
+    /// Reads the command.
+    ///
+    /// # Errors
+    ///
+    /// A piece that cannot be executed.
+    pub fn new(call: &ActCall, session: &Session) -> Result<Pieces, EpisodeError> {
+        let kind = match call {
+            ActCall::Wait(_) => PieceKind::Wait,
+            ActCall::Walk(walk) => PieceKind::Walk(walk.clone()),
+            ActCall::MoveWrists(wrists) => {
+                let ways = wrists.robots.iter().map(|entry| WristWay::new(entry, session));
+                PieceKind::Wrists(ways.collect::<Result<_, _>>()?)
+            }
+            ActCall::SendJointChunk(_) => {
+                let reason = "its rows are what it does; leave `until` out".into();
+                return Err(
+                    SpecError::Invalid { tool: tandem_tools_spec::SendJointChunk::NAME, reason }.into()
+                );
+            }
+        };
+        let mut pieces = Pieces { steps: call.steps(), done: 0, kind };
+        if let Some(first) = pieces.next_piece() {
+            Command::read(&first, &session.rules, &session.motions)?;
+        }
+        Ok(Pieces { done: 0, ..pieces })
+    }
+
+    /// Returns the next piece; `None` once the command's steps are done.
+    pub fn next_piece(&mut self) -> Option<ActCall> {
+        let steps = (self.steps - self.done).min(PIECE_STEPS);
+        if steps == 0 {
+            return None;
+        }
+        self.done += steps;
+        let share = f64::from(self.done) / f64::from(self.steps);
+        Some(match &self.kind {
+            PieceKind::Wait => ActCall::Wait(Wait { steps }),
+            PieceKind::Walk(walk) => ActCall::Walk(Walk { steps, ..walk.clone() }),
+            PieceKind::Wrists(ways) => {
+                let robots = ways.iter().map(|way| way.until(share)).collect();
+                ActCall::MoveWrists(MoveWrists { steps, robots })
+            }
+        })
+    }
+}
+
+impl WristWay {
+    fn new(entry: &WristMove, session: &Session) -> Result<WristWay, EpisodeError> {
+        let motion = &session.motions[commands::find(&entry.robot, &session.motions)?];
+        // Carried hands move with the pelvis; others stay in the room.
+        let frame = match entry.carried {
+            Some(true) => PoseFrame::Pelvis,
+            Some(false) | None => PoseFrame::Start,
+        };
+        let halves = Sides {
+            left: (entry.left_position_m, entry.left_quaternion_wxyz),
+            right: (entry.right_position_m, entry.right_quaternion_wxyz),
+        };
+        let frame_from_pelvis = motion.pelvis_from(frame).inverse();
+        let targets = wrist_targets(halves, entry.frame.unwrap_or_default(), motion);
+        let from = motion.told_wrists();
+        let wrists = Sides::from_fn(|side| {
+            targets[side].map(|target| [frame_from_pelvis * from[side], frame_from_pelvis * target])
+        });
+        let present_rad = |side: Side| {
+            let hand = &motion.upper_rad()[columns::hand(side)];
+            std::array::from_fn(|finger| hand[finger])
+        };
+        let fingers_rad = Sides {
+            left: entry.left_fingers_rad.map(|to| [present_rad(Side::Left), to]),
+            right: entry.right_fingers_rad.map(|to| [present_rad(Side::Right), to]),
+        };
+        Ok(WristWay { entry: WristMove { frame: Some(frame), ..entry.clone() }, wrists, fingers_rad })
+    }
+
+    /// Returns the move to this fraction of the trajectory.
+    fn until(&self, share: f64) -> WristMove {
+        let wrist = |side: Side| {
+            self.wrists[side].map(|[from, to]| from.try_lerp_slerp(&to, share, 1e-9).unwrap_or(to))
+        };
+        let position_m = |side: Side| wrist(side).map(|wrist| wrist.translation.vector.into());
+        let quaternion_wxyz = |side: Side| {
+            wrist(side).map(|Isometry3 { rotation, .. }| [rotation.w, rotation.i, rotation.j, rotation.k])
+        };
+        let fingers_rad = |side: Side| {
+            self.fingers_rad[side].map(|[from, to]| {
+                std::array::from_fn(|finger| from[finger] + share * (to[finger] - from[finger]))
+            })
+        };
+        WristMove {
+            left_position_m: position_m(Side::Left),
+            left_quaternion_wxyz: quaternion_wxyz(Side::Left),
+            right_position_m: position_m(Side::Right),
+            right_quaternion_wxyz: quaternion_wxyz(Side::Right),
+            left_fingers_rad: fingers_rad(Side::Left),
+            right_fingers_rad: fingers_rad(Side::Right),
+            ..self.entry.clone()
+        }
+    }
+}
