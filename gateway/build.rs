@@ -1,4 +1,4 @@
-//! Tells the program what compiled it, for `tandem bench`.
+//! Passes the compiler's version to the program, for `tandem bench`.
 
 use std::{env, process::Command};
 

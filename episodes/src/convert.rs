@@ -1,15 +1,16 @@
-//! The one place where wire types become simulator or kinematics types, and back.
+//! Conversions between wire types and simulator or kinematics types.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use tandem_sim::{BaseCommand, BaseLimits, Pose, Rotation, Vector};
 use tandem_tools_spec as wire;
 
-/// Wire arrays to a rigid transform; the quaternion's norm has been checked to be positive.
+/// Converts wire arrays to a rigid transform. The caller has checked that the quaternion's norm is
+/// positive.
 pub fn isometry(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::from(position_m), unit_quaternion(quaternion_wxyz))
 }
 
-/// A wire array to a rotation; its norm has been checked to be positive.
+/// Converts a wire array to a rotation. The caller has checked that the quaternion's norm is positive.
 pub fn unit_quaternion([w, i, j, k]: [f64; 4]) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k))
 }
@@ -27,12 +28,13 @@ pub fn isometry_to_sim(pose: &Isometry3<f64>) -> Pose {
     )
 }
 
-/// Six decimals, for programs.
+/// Converts a pose to its wire form with six decimals, for programs.
 pub fn wire_pose(pose: &Isometry3<f64>) -> wire::Pose {
     pose_to(6, pose)
 }
 
-/// Millimetres and thousandths, for language models: no hand is steered more finely, and each further digit costs them tokens.
+/// Converts a pose to its wire form with three decimals (millimetres), for language models. No hand is
+/// steered more finely, and each further digit costs tokens.
 pub fn coarse_pose(pose: &Isometry3<f64>) -> wire::Pose {
     pose_to(3, pose)
 }
@@ -45,17 +47,17 @@ fn pose_to(decimals: i32, pose: &Isometry3<f64>) -> wire::Pose {
     }
 }
 
-/// Millimetres and milliradians.
+/// Rounds to three decimals: millimetres and milliradians.
 pub fn coarse(value: f64) -> f64 {
     rounded_to(3, value)
 }
 
-/// Zero has no sign here: `-0.0` would look like a finding.
+/// Rounds to six decimals. Zero has no sign: `-0.0` would look like a finding.
 pub fn rounded(value: f64) -> f64 {
     rounded_to(6, value)
 }
 
-/// Fewer decimals, for what is estimated or measured coarsely.
+/// Rounds to `decimals` decimals, for values that are estimated or measured coarsely.
 pub fn rounded_to(decimals: i32, value: f64) -> f64 {
     let scale = 10f64.powi(decimals);
     (value * scale).round() / scale + 0.0
@@ -88,7 +90,8 @@ pub fn wire_limits(limits: &BaseLimits) -> wire::BaseLimits {
     }
 }
 
-/// OpenCV's camera axes (x right, y down, z forward) for a camera given in MuJoCo's (x right, y up, looking along -z).
+/// Converts a camera pose from MuJoCo's axes (x right, y up, looking along -z) to OpenCV's (x right, y
+/// down, z forward).
 pub fn opencv_axes(pelvis_from_camera: &Pose) -> Pose {
     *pelvis_from_camera * Pose::from_rotation(Rotation::from_rotation_x(std::f32::consts::PI))
 }

@@ -1,10 +1,12 @@
-//! Why an episode refuses a call. None of these changes the world, but for a physics that diverged, which ends the episode.
+//! Errors of an episode's calls. A refused call leaves the world unchanged. Only diverged physics ends the
+//! episode.
 
 use std::path::PathBuf;
 
 use tandem_tools_spec::{Color, EndReason, Refusal, RefusalClass, ResultReply, SpecError, SurfaceQuery};
 
-/// The text says what would work, because its reader is often a language model.
+/// Reason why an episode refuses a call. The text says what would work, because its reader is often a
+/// language model.
 #[derive(Debug, thiserror::Error)]
 pub enum EpisodeError {
     #[error("no task {id:?}; have: {}", .have.join(", "))]
@@ -30,13 +32,13 @@ pub enum EpisodeError {
     #[error("{}; look with observe, and give a pixel that is on it", no_surface(query, seen))]
     NoSurface {
         query: SurfaceQuery,
-        /// The colours of which there is something.
+        /// Colours that are visible in part.
         seen: Vec<Color>,
     },
     #[error("the episode has ended ({}); observe, get_robot_state, get_status and finish still answer; start_episode begins another", reason_text(*.reason))]
     Ended {
         reason: EndReason,
-        /// As the policy is told it.
+        /// The result, in the form that the policy sees.
         result: Box<ResultReply>,
     },
     #[error(transparent)]
@@ -69,7 +71,7 @@ pub enum EpisodeError {
 }
 
 impl EpisodeError {
-    /// What this error is to its caller.
+    /// Maps this error to the refusal that its caller receives.
     pub const fn refusal(&self) -> Refusal {
         use RefusalClass::{Conflict, Invalid, NotFound};
         match self {
@@ -116,7 +118,7 @@ impl From<RobotError> for EpisodeError {
     }
 }
 
-/// Why an episode cannot have its robots.
+/// Reason why an episode cannot use its robots.
 #[derive(Debug, thiserror::Error)]
 pub enum RobotError {
     #[error(transparent)]
@@ -135,7 +137,7 @@ pub enum RobotError {
     Controller { robot: String, what: String },
 }
 
-/// Why a task cannot take place in a scene.
+/// Reason why a task cannot take place in a scene.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     #[error(transparent)]
@@ -174,7 +176,7 @@ pub enum SceneError {
     Diverged { path: PathBuf, trial_s: f64, source: tandem_sim::dynamics::Diverged },
 }
 
-/// Why a checkpoint cannot be gone on from.
+/// Reason why an episode cannot resume from a checkpoint.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
     #[error("cannot read the checkpoint {}: {source}", path.display())]

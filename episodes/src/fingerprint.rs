@@ -1,4 +1,5 @@
-//! Which program this is. Two builds of one version may differ in physics, so what one has begun another must not go on with.
+//! The identity of this build. Two builds of one version may differ in physics, so one build must not
+//! continue what another began.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -7,22 +8,26 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use xxhash_rust::xxh3::Xxh3;
 
-/// A program is tens of megabytes, so it is read in parts.
+/// Bytes read at a time: a program is tens of megabytes.
 const PART_BYTES: usize = 64 << 10;
 
-/// Where the program's own file is, where that is not the file that the system runs.
+/// Path of the program's own file, if it is not the file that the system runs.
 static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
 
-/// For a host that has loaded the program as a library: the library's file is what tells builds apart, and not the host's. The first
-/// path stays.
+/// Names the file that identifies the program, for a host that has loaded it as a library. The library's
+/// file distinguishes builds, and the host's does not. Later calls have no effect.
 pub fn name_program(path: PathBuf) {
     PROGRAM.get_or_init(|| path);
 }
 
-/// Version and hash of the program's own file, as it was when first asked for.
+/// Returns the version and the hash of the program's own file. The hash is computed on the first call.
+///
+/// # Errors
+///
+/// If the file cannot be read.
 pub fn build() -> io::Result<&'static str> {
     static BUILD: OnceLock<String> = OnceLock::new();
-    /// Who comes while the file is being read waits for what comes of it.
+    /// Lock that makes concurrent callers wait for the first one's hash.
     static READING: Mutex<()> = Mutex::new(());
     let _reading = READING.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(build) = BUILD.get() {

@@ -1,4 +1,5 @@
-//! Instructions from a file, in place of the tasks' own words: other languages, other styles, a benchmark's exact wording.
+//! Instructions from a file, in place of the tasks' own wording: other languages, other styles, a
+//! benchmark's exact wording.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,8 +14,12 @@ use crate::tasks::TaskSet;
 use crate::words::OwnWords;
 
 /// Instructions by task id, as JSON:
-/// `{"handover": {"joint": "what all robots do", "robots": {"A": "what A does", "B": "what B does"}}}`.
-/// What the file leaves out keeps the task's own words.
+///
+/// ```json
+/// {"handover": {"joint": "what all robots do", "robots": {"A": "what A does", "B": "what B does"}}}
+/// ```
+///
+/// A text that is missing in the file keeps the task's own wording.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(transparent)]
 pub struct Instructions(BTreeMap<String, TaskInstructions>);
@@ -27,7 +32,7 @@ struct TaskInstructions {
     robots: BTreeMap<String, String>,
 }
 
-/// Why a file of instructions cannot be used.
+/// Reason why a file of instructions cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum InstructionsError {
     #[error("cannot read the instructions {path}: {source}")]
@@ -45,7 +50,12 @@ pub enum InstructionsError {
 }
 
 impl Instructions {
-    /// Reads a file and checks that its tasks are among these, and its robots among theirs.
+    /// Reads a file of instructions and checks that its tasks are in `tasks` and its robots are in their
+    /// tasks.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be read or parsed, has an empty text, or names an unknown task or robot.
     pub fn read(path: &Path, tasks: &TaskSet) -> Result<Instructions, InstructionsError> {
         let text = read_text(path, MAX_TEXT_BYTES)
             .map_err(|source| InstructionsError::Read { path: path.into(), source })?;
@@ -65,7 +75,7 @@ impl Instructions {
         Ok(instructions)
     }
 
-    /// Where words are missing: in a text, in what is said of a task, or in the whole.
+    /// Returns the place of the first empty text, task or file; `None` if nothing is empty.
     fn empty_place(&self) -> Option<String> {
         if self.0.is_empty() {
             return Some("the file".into());
@@ -81,19 +91,19 @@ impl Instructions {
         })
     }
 
-    /// What is said of `task` in place of its own words, if anything is.
+    /// Returns the file's wording of `task`; `None` if the file does not name it.
     pub fn own_words(&self, task: &str) -> Option<OwnWords> {
         let TaskInstructions { joint, robots } = self.0.get(task)?.clone();
         Some(OwnWords::of(joint, robots))
     }
 
-    /// Whether it says nothing of any task.
+    /// Returns `true` if the file names no task.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// The reply to `list_tasks` with these tasks in these words, and as they are told under `stress`, where robots follow base commands
-    /// within `limits`.
+    /// Returns the reply to `list_tasks` for these tasks in this file's wording, under `stress`. `limits`
+    /// are those of the robots' base commands.
     pub fn task_list(&self, tasks: &TaskSet, stress: Option<Stress>, limits: &BaseLimits) -> TaskList {
         let mut list = task_list(tasks, stress, limits);
         for task in &mut list.tasks {

@@ -1,4 +1,5 @@
-//! Episodes: tasks and their phases, budgets, grasp detection, and the session that runs tool calls on a world.
+//! Episodes: tasks and their phases, budgets, grasp detection, and the session that runs tool calls on a
+//! world.
 //!
 //! A [`Session`] is one episode. It answers tool calls, and its result says which phases they reached:
 //!

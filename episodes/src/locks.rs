@@ -1,4 +1,5 @@
-//! Locks on files, so that two processes never write the same thing. A lock ends with the process that holds it, however that ends.
+//! File locks, so that two processes never write the same file. A lock ends with the process that holds it,
+//! however that process ends.
 
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
@@ -6,18 +7,18 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 
-/// Error number of systems whose file system has no locks, as NFS without its lock daemon.
+/// Error number of file systems without locks, for example NFS without its lock daemon.
 const ENOLCK: i32 = if cfg!(target_os = "linux") { 37 } else { 77 };
 
-/// Time between two attempts of a wait.
+/// Interval between two attempts of a wait.
 const RETRY_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Who else may hold the same lock.
+/// Kind of a lock: exclusive or shared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LockKind {
-    /// Nobody.
+    /// At most one holder.
     Exclusive,
-    /// Whoever asks for a shared one.
+    /// Any number of holders of shared locks.
     Shared,
 }
 
@@ -25,22 +26,27 @@ pub enum LockKind {
 #[derive(Debug)]
 pub enum Locking {
     Locked(FileLock),
-    /// Another process, or another thread of this one, holds it.
+    /// Another process, or another thread of this one, holds the lock.
     Held,
     /// The file system has no locks, so nobody can hold one.
     Unsupported,
 }
 
-/// A lock on a file, which ends when this is dropped.
+/// A lock on a file. Dropping it releases the lock.
 #[derive(Debug)]
 pub struct FileLock {
     file: File,
-    /// The file to remove at the end, where it is there for the lock alone.
+    /// Path of a lock file to remove on release; `None` if the file has another purpose.
     remove: Option<PathBuf>,
 }
 
 impl FileLock {
-    /// Attempts to lock the file at `path`, which is made if it is missing and keeps its content.
+    /// Attempts to lock the file at `path`. Creates the file if it is missing; an existing file keeps its
+    /// content.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be opened, or locking fails for another reason.
     pub fn attempt(path: &Path, kind: LockKind) -> io::Result<Locking> {
         loop {
             let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path)?;
@@ -49,7 +55,8 @@ impl FileLock {
                 LockKind::Shared => file.try_lock_shared(),
             };
             match locked {
-                // Whoever held it may have removed or renamed the file since it was opened: then it is no longer this one.
+                // A former holder may have removed or renamed the file since it was opened: then it is no
+                // longer this one.
                 Ok(()) if is_at(&file, path)? => {
                     return Ok(Locking::Locked(FileLock { file, remove: None }));
                 }
@@ -61,8 +68,12 @@ impl FileLock {
         }
     }
 
-    /// Waits for an exclusive lock on the file at `path`, as long as `waits` says; `None` where the file system has no locks, or the wait
-    /// is over.
+    /// Waits for an exclusive lock on the file at `path` while `waits` returns `true`. Returns `None` if the
+    /// file system has no locks or the wait has ended.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be opened, or locking fails for another reason.
     pub fn wait(path: &Path, waits: impl Fn() -> bool) -> io::Result<Option<FileLock>> {
         loop {
             match FileLock::attempt(path, LockKind::Exclusive)? {
@@ -74,13 +85,13 @@ impl FileLock {
         }
     }
 
-    /// Removes the file at the end. It has to be an exclusive lock.
+    /// Removes the file on release. The lock must be exclusive.
     pub fn removing(mut self, path: &Path) -> FileLock {
         self.remove = Some(path.into());
         self
     }
 
-    /// The locked file.
+    /// Returns the locked file.
     pub fn file(&self) -> &File {
         &self.file
     }
@@ -89,18 +100,18 @@ impl FileLock {
 impl Drop for FileLock {
     fn drop(&mut self) {
         if let Some(path) = &self.remove {
-            // What stays is an empty file, which the next lock takes.
+            // If this fails, an empty file remains, and the next lock takes it.
             let _ = fs::remove_file(path);
         }
     }
 }
 
-/// Whether an error of a lock says that the file system has none, and not that another holds it.
+/// Returns `true` for the errors of a file system without locks, and false for those of a lock that is held.
 fn is_unsupported(error: &io::Error) -> bool {
     error.kind() == io::ErrorKind::Unsupported || error.raw_os_error() == Some(ENOLCK)
 }
 
-/// Whether `file` is the one at `path` now.
+/// Returns `true` if `file` is the one at `path` now.
 #[cfg(unix)]
 fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     use std::os::unix::fs::MetadataExt;
@@ -112,7 +123,7 @@ fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
-/// Other systems do not remove or rename a file that is open.
+/// Returns `true`: other systems do not remove or rename a file that is open.
 #[cfg(not(unix))]
 fn is_at(_: &File, _: &Path) -> io::Result<bool> {
     Ok(true)

@@ -1,11 +1,11 @@
-//! Statistics of episodes: exact and score intervals of rates, of means of rates, and of the difference
-//! between two policies on the same episodes.
+//! Uncertainty of counts of episodes: exact and score intervals of rates and of means of rates. There are
+//! also intervals of the difference between two policies on the same episodes.
 
 use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
 
-/// Half of the probability outside a 95 % interval.
+/// Half of the probability outside an interval of 95 %.
 const TAIL: f64 = 0.025;
-/// Quantile of the standard normal distribution at `1 - TAIL`.
+/// Quantile of the normal distribution with that probability above it.
 const Z: f64 = 1.959_963_984_540_054;
 
 /// Number of successes among trials.
@@ -22,8 +22,8 @@ impl Count {
     }
 }
 
-/// Returns the exact 95 % interval of a rate (Clopper and Pearson, 1934). Its limits are quantiles of
-/// beta distributions.
+/// Returns the exact 95 % interval of a rate (Clopper and Pearson, 1934): the limits are quantiles of beta
+/// distributions.
 pub fn clopper_pearson(count: Count) -> [f64; 2] {
     let (k, n) = (count.successes as f64, count.trials as f64);
     let quantile = |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |beta| beta.inverse_cdf(p));
@@ -41,8 +41,9 @@ pub fn wilson(count: Count) -> [f64; 2] {
     [-1.0, 1.0].map(|sign| ((middle + sign * reach) / (1.0 + Z * Z / n)).clamp(0.0, 1.0))
 }
 
-/// Returns the unweighted mean of rates and an interval of it; `None` without any trials. The distances
-/// of the exact limits from their rates are added in quadrature (Zou and Donner, 2008).
+/// Returns the mean of rates that each count the same, and its interval (Zou and Donner, 2008). The
+/// distances of the exact limits from their own rates are added as squares. Returns `None` without any
+/// trials.
 pub fn mean_share(counts: &[Count]) -> Option<(f64, [f64; 2])> {
     let known: Vec<(f64, [f64; 2])> =
         counts.iter().filter_map(|count| Some((count.share()?, clopper_pearson(*count)))).collect();
@@ -54,7 +55,7 @@ pub fn mean_share(counts: &[Count]) -> Option<(f64, [f64; 2])> {
     (!known.is_empty()).then(|| (mean, [mean - reach(0), mean + reach(1)]))
 }
 
-/// Outcomes of two policies on the same episodes, counted.
+/// Counts of paired outcomes of two policies on the same episodes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Pairs {
     pub both: usize,
@@ -82,19 +83,19 @@ impl Pairs {
     }
 }
 
-/// Returns the p-value of the discordant episodes if both policies are equally good: two-sided, exact
-/// (McNemar, 1947).
+/// Returns the two-sided exact p-value of equal success (McNemar, 1947). It is the probability of so uneven
+/// a split, or a more uneven one, among the episodes in which only one policy succeeds.
 pub fn mcnemar(pairs: Pairs) -> f64 {
     let (fewer, discordant) = (pairs.first_only.min(pairs.second_only), pairs.first_only + pairs.second_only);
     let tail = Binomial::new(0.5, discordant as u64).map_or(1.0, |split| split.cdf(fewer as u64));
     (2.0 * tail).min(1.0)
 }
 
-/// Returns the 95 % interval of [`Pairs::difference_share`] (Newcombe, 1998, method 10), from the score
-/// limits of both rates and their correlation. With rates p1 and p2, limits [l1, u1] and [l2, u2], and
-/// correlation phi:
-///   lower = p2 - p1 - sqrt((p2 - l2)^2 - 2 phi (p2 - l2) (u1 - p1) + (u1 - p1)^2).
-/// The upper limit follows with u2 and l1.
+/// Returns the 95 % interval of [`Pairs::difference_share`] (Newcombe, 1998, the tenth of its methods).
+/// It combines the score limits of both rates and their correlation.
+/// For p1, p2 with limits [l1, u1], [l2, u2] and correlation phi,
+///   lower = p2 - p1 - sqrt((p2 - l2)^2 - 2 phi (p2 - l2) (u1 - p1) + (u1 - p1)^2),
+/// and the upper limit adds the root with the other limits.
 pub fn newcombe(pairs: Pairs) -> Option<[f64; 2]> {
     let (first, second) = (pairs.first(), pairs.second());
     let (p1, p2) = (first.share()?, second.share()?);
@@ -105,7 +106,7 @@ pub fn newcombe(pairs: Pairs) -> Option<[f64; 2]> {
     Some([difference - reach(p2 - l2, u1 - p1), difference + reach(u2 - p2, p1 - l1)])
 }
 
-/// Returns the correlation of two binary outcomes, corrected for continuity where it is positive.
+/// Returns the correlation of two binary outcomes, corrected for continuity if it is positive.
 fn correlation(pairs: Pairs) -> f64 {
     let [a, b, c, d] = [pairs.both, pairs.first_only, pairs.second_only, pairs.neither].map(|n| n as f64);
     let margins = (a + b) * (c + d) * (a + c) * (b + d);

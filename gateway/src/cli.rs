@@ -1,4 +1,4 @@
-//! The command line: which subcommands there are.
+//! The command line: its subcommands.
 
 use clap::builder::StyledStr;
 use clap::error::{ContextKind, ContextValue};
@@ -15,12 +15,12 @@ use crate::commands::{
 #[derive(Debug, Parser)]
 #[command(name = "tandem", version)]
 pub struct Cli {
-    /// What to do.
+    /// Subcommand to run.
     #[command(subcommand)]
     command: CliCommand,
 }
 
-/// What `tandem` can do. The help text of each is the doc comment of its flags.
+/// Subcommands of `tandem`. The help text of each is the doc comment of its flags.
 #[derive(Debug, Subcommand)]
 enum CliCommand {
     Serve(serve::ServeArgs),
@@ -42,7 +42,7 @@ enum CliCommand {
 }
 
 impl Cli {
-    /// What the command line of the process says; where it makes no sense, says why and ends the process.
+    /// Parses the command line of the process. An invalid one prints an error and ends the process.
     pub fn read() -> Cli {
         Cli::try_parse().unwrap_or_else(|error| with_advice(error).exit())
     }
@@ -70,7 +70,7 @@ impl Cli {
     }
 }
 
-/// A mistake with the flag in it that other servers have in its place.
+/// Adds advice to an error that names another server's flag.
 fn with_advice(mut error: clap::Error) -> clap::Error {
     if error.get(ContextKind::InvalidArg) == Some(&ContextValue::String("--port".into())) {
         let advice = StyledStr::from("the port is a part of --listen, as in --listen 127.0.0.1:8701");

@@ -1,7 +1,7 @@
-//! Tandem's gateway: episodes of the simulator behind HTTP, and the command line around it.
+//! Tandem's gateway: episodes of the simulator behind HTTP, and the command line.
 //!
-//! One request: [`http`] reads it, [`hosting`] finds the episode and hands the typed call to the thread that owns its
-//! world, and `http/problem` turns every refusal into RFC 9457 problem details.
+//! The path of a request: [`http`] parses it. [`hosting`] finds the episode and passes the typed call to
+//! the thread that owns its world. `http/problem` turns every refusal into RFC 9457 problem details.
 
 pub mod cli;
 pub mod commands;

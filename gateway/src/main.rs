@@ -1,4 +1,4 @@
-//! The binary `tandem`: reads the command line and runs the subcommand that it names.
+//! The binary `tandem`: parses the command line and runs its subcommand.
 
 use std::process::ExitCode;
 
@@ -6,14 +6,14 @@ use mimalloc::MiMalloc;
 use tandem::cli::Cli;
 use tandem_episodes::printable;
 
-/// Allocator of the binary. Calls beside thousands of held episodes are faster than with the C library's few
-/// heaps; fifty episodes take 0.5 GB, and with huge pages 1.3.
+/// Allocator of the binary. With thousands of held episodes, calls are faster than with the C library's
+/// few heaps. Fifty episodes take 0.5 GB, and 1.3 GB with huge pages.
 #[global_allocator]
 static ALLOCATOR: MiMalloc = MiMalloc;
 
 fn main() -> ExitCode {
     Cli::read().run().unwrap_or_else(|error| {
-        // Errors quote files and servers of others.
+        // Errors quote text from files and foreign servers.
         eprintln!("tandem: {}", printable(&error.to_string()));
         ExitCode::FAILURE
     })

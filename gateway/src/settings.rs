@@ -1,4 +1,4 @@
-//! Settings: flags first, then environment (`TANDEM_*`), then a TOML file, then defaults.
+//! Settings. Flags precede the environment (`TANDEM_*`), then a TOML file, then defaults.
 
 mod durability;
 mod error;
@@ -30,126 +30,136 @@ pub use durability::Durability;
 pub use error::SettingsError;
 pub use tls::{Certificate, TlsError};
 
-/// One source of settings; what it leaves out comes from the next. The doc comments are the help text.
+/// One source of settings; missing ones come from the next source. The doc comments are help texts.
 #[derive(Debug, Clone, Default, PartialEq, Args, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Layer {
     /// Address to serve on [default: 127.0.0.1:8700].
     #[arg(long, env = "TANDEM_LISTEN", value_name = "ADDRESS:PORT")]
     pub listen: Option<SocketAddr>,
-    /// Further names that the server is reached by, separated by commas; a request for another host is refused
-    /// [default: the address of --listen and localhost].
+    /// Additional names of the server, separated by commas; requests for other hosts are refused [default:
+    /// the address of --listen and localhost].
     #[arg(long, env = "TANDEM_ALLOWED_HOST", value_name = "NAMES", value_delimiter = ',')]
     pub allowed_host: Option<Vec<String>>,
-    /// File with a certificate in PEM form, with which HTTPS is served in place of HTTP, as headsets want it; needs --tls-key
+    /// PEM file with a certificate, to serve HTTPS instead of HTTP, as headsets require; needs --tls-key
     /// [default: none].
     #[arg(long, env = "TANDEM_TLS_CERT", value_name = "FILE")]
     pub tls_cert: Option<PathBuf>,
-    /// File with the certificate's private key in PEM form [default: none].
+    /// PEM file with the certificate's private key [default: none].
     #[arg(long, env = "TANDEM_TLS_KEY", value_name = "FILE")]
     pub tls_key: Option<PathBuf>,
-    /// File with the token that every request has to send, as `Authorization: Bearer TOKEN`; or give the token itself in the
-    /// environment, as TANDEM_TOKEN. An address that other machines reach is refused without [default: none].
+    /// File with the token that every request has to send as `Authorization: Bearer TOKEN`; the environment
+    /// variable TANDEM_TOKEN can hold the token itself. Required if other machines can reach the address
+    /// [default: none].
     #[arg(long, env = "TANDEM_TOKEN_FILE", value_name = "FILE")]
     pub token_file: Option<PathBuf>,
-    /// The token itself: never a flag, which the list of processes would show, nor a line of a file with other settings.
+    /// The token itself. It is never a flag, which the process list would show, nor a line of the
+    /// settings file.
     #[arg(skip)]
     #[serde(skip)]
     pub token: Option<Token>,
-    /// Folder that recordings are written to, one folder per episode [default: runs].
+    /// Folder for recordings, one folder per episode [default: runs].
     #[arg(long, env = "TANDEM_RUNS", value_name = "DIR")]
     pub runs: Option<PathBuf>,
-    /// When recordings can be read: under way, or only after the end, which keeps them in memory until then
-    /// [default: live].
+    /// Time from which recordings are readable: during the episode, or only after it, which keeps them in
+    /// memory until then [default: live].
     #[arg(long, env = "TANDEM_RECORD")]
     pub record: Option<Record>,
-    /// JSON file with instructions in place of the tasks' own: {"handover": {"joint": "...", "robots": {"A": "..."}}}.
+    /// JSON file with instructions in place of the tasks' own: {"handover": {"joint": "...", "robots": {"A":
+    /// "..."}}}.
     #[arg(long, env = "TANDEM_INSTRUCTIONS", value_name = "FILE")]
     pub instructions: Option<PathBuf>,
-    /// MJCF file of a scene in place of the tasks' own; its site `task` says where.
+    /// MJCF file of a scene in place of the tasks' own; its site `task` marks the origin of tasks.
     #[arg(long, env = "TANDEM_SCENE", value_name = "FILE")]
     pub scene: Option<PathBuf>,
-    /// File that describes the robots in place of the embedded one: MJCF that names joints as the embedded robot's does, or a TOML file
-    /// that says of another MJCF which of its joints are which [default: a Unitree G1 with Dex3-1 hands].
+    /// File with a robot in place of the embedded one: MJCF with the embedded robot's joint names, or a TOML
+    /// file that maps the joints of another MJCF [default: a Unitree G1 with Dex3-1 hands].
     #[arg(long, env = "TANDEM_ROBOT", value_name = "FILE")]
     pub robot: Option<PathBuf>,
-    /// TOML files with tasks of your own, separated by commas; one that is called as a built-in task takes its place.
+    /// TOML files with your own tasks, separated by commas; a task with the name of a built-in one replaces
+    /// it.
     #[arg(long, env = "TANDEM_TASK_FILE", value_name = "FILES", value_delimiter = ',')]
     pub task_file: Option<Vec<PathBuf>>,
-    /// ONNX file with a velocity policy for the G1 in place of our own base controller; looped:FILE puts a loop over the robot's place around it.
+    /// ONNX file with a velocity policy for the G1 in place of the built-in base controller; looped:FILE adds
+    /// a position loop around it.
     #[arg(long, env = "TANDEM_LOCOMOTION", value_name = "FILE")]
     pub locomotion: Option<PathBuf>,
-    /// Where robots have their own state from: an estimator over what they sense, or the simulator, which no real robot has
-    /// [default: estimator].
+    /// Source of the robots' own state: an estimator on their sensors, or the simulator, which no real robot
+    /// has [default: estimator].
     #[arg(long, env = "TANDEM_STATE_ESTIMATE", value_name = "SOURCE", value_parser = one_of(StateSource::ALL, StateSource::name))]
     pub state_estimate: Option<StateSource>,
-    /// What robots sense: everything exactly, or with noise, bias and latency as a G1 does [default: ideal].
+    /// Sensor model of the robots: exact, or with the noise, bias and latency of a G1 [default: ideal].
     #[arg(long, env = "TANDEM_SENSORS", value_name = "NAME", value_parser = one_of(SensorModel::ALL, SensorModel::name))]
     pub sensors: Option<SensorModel>,
-    /// What goes wrong in every episode: one axis of what `evaluate` lays over episodes; results name it [default: nothing].
+    /// Disturbance in every episode: one of the stress axes of `evaluate`; results name it [default:
+    /// nothing].
     #[arg(long, env = "TANDEM_STRESS", value_name = "AXIS", value_parser = one_of(StressAxis::ALL, StressAxis::name))]
     pub stress: Option<StressAxis>,
-    /// How much of it, from 1 to 3 [default: 1].
+    /// Level of the stress, from 1 to 3 [default: 1].
     #[arg(long, env = "TANDEM_LEVEL", value_name = "LEVEL")]
     pub level: Option<StressLevel>,
-    /// Who draws pictures: a graphics processor, the embedded renderer, or whichever is there [default: auto].
+    /// Renderer of images: the GPU, the embedded CPU renderer, or whichever is available [default: auto].
     #[arg(long, env = "TANDEM_RENDERER", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
     pub renderer: Option<RendererKind>,
-    /// What policies are told: `paper` what the benchmark tells its agents, and success at the end; `full` all that robots sense,
-    /// phases as they are reached, and how to grasp [default: full].
+    /// Information for policies: `paper` as in the benchmark, with success reported at the end; `full` with
+    /// all sensor values, phases as they are reached, and hints on grasping [default: full].
     #[arg(long, env = "TANDEM_ASSISTANCE", value_name = "WHAT", value_parser = one_of(Assistance::ALL, Assistance::name))]
     pub assistance: Option<Assistance>,
-    /// For experiments: what is told of phases, whatever the assistance has: `live` tells them in every reply and ends an episode on
-    /// success, `end` tells them at the end, `never` only in the files; neither of these two ends an episode on success.
+    /// For experiments: disclosure of phases, independent of the assistance: `live` in every reply, `end` at
+    /// the end, `never` only in files; only with `live` does success end the episode.
     #[arg(long, hide = true, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = one_of(Disclosure::ALL, Disclosure::name))]
     pub disclosure: Option<Disclosure>,
-    /// For experiments: whether texts say how to grasp, whatever the assistance has.
+    /// For experiments: hints on grasping in texts, independent of the assistance.
     #[arg(long, hide = true, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = one_of(Hints::ALL, Hints::name))]
     pub hints: Option<Hints>,
-    /// How long a policy may think in an episode, for those that wait for slow models; results name it [default: as the protocol has it].
+    /// Limit on a policy's thinking time in an episode, for slow models; results name it [default: that of
+    /// the protocol].
     #[arg(long, env = "TANDEM_THINKING_LIMIT", value_name = "SECONDS")]
     pub thinking_limit: Option<u32>,
-    /// Episodes that may be held at once; each costs a thread and about 7 MB, beside 40 MB that they share [default: 8].
+    /// Maximum number of episodes held at once; each takes a thread and about 7 MB, plus 40 MB shared by all
+    /// [default: 8].
     #[arg(long, env = "TANDEM_MAX_EPISODES", value_name = "N")]
     pub max_episodes: Option<u32>,
-    /// Largest request body that is read [default: 2000000].
+    /// Maximum size of a request body in bytes [default: 2000000].
     #[arg(long, env = "TANDEM_MAX_BODY_BYTES", value_name = "BYTES")]
     pub max_body_bytes: Option<usize>,
-    /// Longest that the header of a request may take to arrive, and its body as well [default: 30].
+    /// Time limit for the arrival of a request's header, and the same for its body [default: 30].
     #[arg(long, env = "TANDEM_REQUEST_TIMEOUT", value_name = "SECONDS")]
     pub request_timeout: Option<u32>,
-    /// Requests that may be under way at once; further ones get 503 [default: 256].
+    /// Maximum number of concurrent requests; further ones get 503 [default: 256].
     #[arg(long, env = "TANDEM_MAX_REQUESTS", value_name = "N")]
     pub max_requests: Option<usize>,
-    /// Requests that one address may send per second; further ones get 429 [default: any number].
+    /// Maximum number of requests per second from one address; further ones get 429 [default: unlimited].
     #[arg(long, env = "TANDEM_RATE_LIMIT", value_name = "N")]
     pub rate_limit: Option<u32>,
-    /// An episode without a call for so long is ended and gives its place back [default: 900].
+    /// Time without a call after which an episode is ended and its place is free [default: 900].
     #[arg(long, env = "TANDEM_IDLE_TIMEOUT", value_name = "SECONDS")]
     pub idle_timeout: Option<u32>,
-    /// Longest that closing the episodes may take when the server stops [default: 30].
+    /// Time limit for closing the episodes when the server stops [default: 30].
     #[arg(long, env = "TANDEM_STOP_TIMEOUT", value_name = "SECONDS")]
     pub stop_timeout: Option<u32>,
-    /// How safe a call is before it is answered: "system" outlives the process, "disk" a power cut, too [default: system].
+    /// Durability of a call before it is answered: "system" survives the end of the process, "disk" also a
+    /// power cut [default: system].
     #[arg(long, env = "TANDEM_DURABLE", value_name = "HOW")]
     pub durable: Option<Durability>,
-    /// Where other servers on the same folder of runs, and clients that they send here, find this one [default: the address].
+    /// URL of this server for other servers on the same runs folder, and for clients that they redirect here
+    /// [default: the address].
     #[arg(long, env = "TANDEM_ADVERTISE", value_name = "URL")]
     pub advertise: Option<String>,
 }
 
-/// When recordings can be read.
+/// Time from which recordings are readable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Record {
-    /// Under way, as `episode.mcap.partial`.
+    /// During the episode, as `episode.mcap.partial`.
     Live,
-    /// After the end of the episode.
+    /// After the episode.
     After,
 }
 
 impl Layer {
-    /// How many episodes may be held at once, where nobody says it.
+    /// Default number of episodes that may be held at once.
     pub const MAX_EPISODES: u32 = 8;
 
     fn or(self, next: Layer) -> Layer {
@@ -188,12 +198,12 @@ impl Layer {
         }
     }
 
-    /// These settings, and from the file at `config` what they leave out.
+    /// Returns these settings, with missing ones from the file at `config`.
     pub fn over_file(self, config: &Path) -> Result<Layer, SettingsError> {
         Ok(self.or(read_layer(config)?))
     }
 
-    /// Refuses numbers and names that no server could be used with.
+    /// Refuses values with which no server could be used.
     pub fn check(&self) -> Result<(), SettingsError> {
         let numbers = [
             ("thinking_limit", self.thinking_limit.map(u64::from), "3600"),
@@ -219,12 +229,12 @@ impl Layer {
         }
     }
 
-    /// Address to serve on.
+    /// Returns the address to serve on.
     pub fn address(&self) -> SocketAddr {
         self.listen.unwrap_or(SocketAddr::from(([127, 0, 0, 1], 8700)))
     }
 
-    /// The token that is given; none is needed where no other machine reaches the address.
+    /// Returns the given token. None is needed if only this machine can reach the address.
     pub fn find_token(&self) -> Result<Option<Token>, SettingsError> {
         let token = match (&self.token_file, &self.token) {
             (Some(_), Some(_)) => return Err(SettingsError::TwoTokens),
@@ -241,39 +251,39 @@ impl Layer {
         Ok(token)
     }
 
-    /// What HTTPS is served with, if it is.
+    /// Returns the certificate for HTTPS, if there is one.
     pub fn certificate(&self) -> Result<Option<Certificate>, TlsError> {
         Certificate::of(self.tls_cert.as_deref(), self.tls_key.as_deref())
     }
 
-    /// Folder that recordings are written to.
+    /// Returns the folder for recordings.
     pub fn runs_folder(&self) -> PathBuf {
         self.runs.clone().unwrap_or_else(|| "runs".into())
     }
 
-    /// The benchmark's tasks, and those of files.
+    /// Reads the task files, and adds them to the benchmark's tasks.
     pub fn read_tasks(&self) -> Result<TaskSet, SettingsError> {
         let files = self.task_file.iter().flatten();
         Ok(TaskSet::with_files(files.map(|path| read_task_file(path)).collect::<Result<_, _>>()?))
     }
 
-    /// The instructions of the file, which may name these tasks, or the tasks' own.
+    /// Reads the instructions from the file for these tasks. Without a file, the tasks' own apply.
     pub fn read_instructions(&self, tasks: &TaskSet) -> Result<Instructions, InstructionsError> {
         let path = self.instructions.as_deref();
         path.map_or_else(|| Ok(Instructions::default()), |path| Instructions::read(path, tasks))
     }
 
-    /// The robots.
+    /// Reads the robots' description.
     pub fn read_robot(&self) -> Result<RobotFile, SimError> {
         read_robot(self.robot.as_deref())
     }
 
-    /// The base controller; its file is not read yet.
+    /// Returns the base controller; its file is not read yet.
     pub fn controller(&self) -> Controller {
         Controller::from_file(self.locomotion.as_deref())
     }
 
-    /// What robots know of themselves.
+    /// Returns the robots' sensing of their own state.
     pub fn sensing(&self) -> Sensing {
         Sensing {
             state_estimate: self.state_estimate.unwrap_or_default(),
@@ -281,18 +291,18 @@ impl Layer {
         }
     }
 
-    /// What goes wrong in every episode.
+    /// Returns the stress of every episode, if any.
     pub fn stress(&self) -> Option<Stress> {
         self.stress.map(|axis| Stress { axis, level: self.level.unwrap_or(StressLevel::One) })
     }
 
-    /// Who draws pictures.
+    /// Returns the renderer.
     pub fn renderer(&self) -> RendererKind {
         self.renderer.unwrap_or_default()
     }
 }
 
-/// Whether a text is the name of a host alone, as requests name it before the port.
+/// Returns true if a text is a host name without a port.
 fn is_host(name: &str) -> bool {
     let part = |part: &str| {
         !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte))
@@ -300,74 +310,74 @@ fn is_host(name: &str) -> bool {
     name.split('.').all(part) || name.parse::<IpAddr>().is_ok()
 }
 
-/// Every setting, resolved.
+/// All settings, resolved.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// Address to serve on; port 0 takes a free one.
+    /// Address to serve on; port 0 picks a free one.
     pub listen: SocketAddr,
-    /// Names that the server is reached by, besides its address and localhost.
+    /// Names of the server besides its address and localhost.
     pub allowed_hosts: Vec<String>,
-    /// What HTTPS is served with; HTTP is served without.
+    /// Certificate for HTTPS; `None` for plain HTTP.
     pub certificate: Option<Certificate>,
-    /// What every request has to send.
+    /// Token that every request needs.
     pub token: Option<Token>,
-    /// Folder that recordings are written to, one folder per episode.
+    /// Folder for recordings, one folder per episode.
     pub runs: PathBuf,
-    /// When recordings can be read.
+    /// Time from which recordings are readable.
     pub record: Visibility,
-    /// What there is to play.
+    /// Tasks that can be played.
     pub tasks: TaskSet,
     /// Instructions in place of the tasks' own.
     pub instructions: Instructions,
-    /// The scene in place of the tasks' own.
+    /// Scene in place of the tasks' own.
     pub scene: Option<SceneFile>,
-    /// What describes the robots.
+    /// Description of the robots.
     pub robot: RobotFile,
     /// The base controller of every robot.
     pub locomotion: Controller,
-    /// What robots know of themselves.
+    /// The robots' sensing of their own state.
     pub sensing: Sensing,
-    /// What goes wrong in every episode.
+    /// Stress of every episode.
     pub stress: Option<Stress>,
-    /// What that controller follows.
+    /// Velocity limits of that controller.
     pub base_limits: BaseLimits,
-    /// Who draws pictures.
+    /// Renderer of camera images.
     pub renderer: RendererKind,
-    /// How much policies are told.
+    /// Amount of information that policies get.
     pub assistance: Assistance,
-    /// What they are told about their success.
+    /// Disclosure of success to policies.
     pub disclosure: Disclosure,
-    /// Whether they are told how to grasp.
+    /// Hints on grasping in policies' texts.
     pub hints: Hints,
-    /// How long policies may think, if not as long as the protocol has it, in seconds.
+    /// Limit on thinking time in seconds; `None` for the protocol's own.
     pub thinking_limit_s: Option<u32>,
-    /// Episodes that may be held at once.
+    /// Maximum number of episodes held at once.
     pub max_episodes: u32,
-    /// Largest request body that is read.
+    /// Maximum size of a request body in bytes.
     pub max_body_bytes: usize,
-    /// Longest that a header may take to arrive, and a body as well.
+    /// Time limit for a header, and for a body as well.
     pub request_timeout: Duration,
-    /// Requests that may be under way at once.
+    /// Maximum number of concurrent requests.
     pub max_requests: usize,
-    /// Requests that one address may send per second, if there is a limit.
+    /// Maximum number of requests per second of one address, if limited.
     pub rate_limit: Option<u32>,
-    /// How long after its last call an episode is taken for abandoned.
+    /// Time after its last call when an episode counts as abandoned.
     pub idle_timeout: Duration,
-    /// Longest that closing the episodes may take at the end.
+    /// Time limit for closing the episodes at shutdown.
     pub stop_timeout: Duration,
-    /// How safe a call is before it is answered.
+    /// Durability of a call before it is answered.
     pub durability: Durability,
-    /// Where others find the server, if not at its address.
+    /// URL for other servers, if it differs from the address.
     pub advertised_url: Option<String>,
 }
 
 impl Settings {
-    /// Which texts policies read.
+    /// Returns the choice of texts for policies.
     pub fn wording(&self) -> Wording {
         Wording { assistance: self.assistance, hints: self.hints }
     }
 
-    /// The episode that these settings make of a start.
+    /// Returns the specification of an episode with these settings.
     pub fn spec(&self, start: &StartEpisode) -> Result<EpisodeSpec, EpisodeError> {
         let protocol = start.protocol.unwrap_or(Protocol::Agentic);
         Ok(EpisodeSpec {
@@ -386,7 +396,8 @@ impl Settings {
         })
     }
 
-    /// Fills what `flags` (and the environment, which clap reads) leave out from the file at `config`, then from defaults.
+    /// Fills settings missing in `flags` (which include the environment) from the file at `config`, then
+    /// from defaults.
     pub fn resolve(flags: Layer, config: Option<&Path>) -> Result<Arc<Settings>, SettingsError> {
         let file = match config {
             Some(path) => read_layer(path)?,
@@ -440,7 +451,7 @@ impl Settings {
     }
 }
 
-/// Parses a flag whose value is one of `all` by its name; `--help` and the error for a wrong name list the names.
+/// Parses a flag whose value is the name of one of `all`. `--help` and errors list the names.
 pub fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
     all: [T; N],
     name: fn(T) -> &'static str,
@@ -456,7 +467,7 @@ fn read_layer(path: &Path) -> Result<Layer, SettingsError> {
     toml::from_str(&text).map_err(|source| SettingsError::Parse { path: path.into(), source })
 }
 
-/// Reads a task's file and tries the task: what may be meant so is logged.
+/// Reads a task's file and tries the task. Problems that may be intended are logged.
 pub fn read_task_file(path: &Path) -> Result<&'static Task, SettingsError> {
     let task = read_task(path)?;
     let check = check_task(task, &[FIRST_SEED], None)
@@ -465,17 +476,17 @@ pub fn read_task_file(path: &Path) -> Result<&'static Task, SettingsError> {
     Ok(task)
 }
 
-/// A task is tried with it.
+/// Seed of the trial.
 const FIRST_SEED: u32 = 0;
 
-/// Reads a scene, and logs what of its file does not happen quite as in MuJoCo.
+/// Reads a scene, and logs where its file deviates from MuJoCo.
 pub fn read_scene(path: &Path) -> Result<SceneFile, SimError> {
     let (scene, approximations) = SceneFile::with_approximations(path)?;
     approximations.iter().for_each(|line| tracing::warn!("not quite as in MuJoCo: {line}"));
     Ok(scene)
 }
 
-/// Reads the robot of a file, or takes the embedded one, and logs what of the file does not happen quite as in MuJoCo.
+/// Reads the robot from a file, or returns the embedded one. Logs where the file deviates from MuJoCo.
 pub fn read_robot(path: Option<&Path>) -> Result<RobotFile, SimError> {
     let Some(path) = path else { return Ok(RobotFile::default()) };
     let (robot, approximations) = RobotFile::with_approximations(path)?;

@@ -1,4 +1,5 @@
-//! Bearer tokens, which only permitted callers know. They are compared in constant time, and never printed.
+//! Bearer tokens, which only permitted callers know. They are compared in constant time and never
+//! printed.
 
 use std::{
     env,
@@ -11,47 +12,47 @@ use std::{
 use subtle::{Choice, ConstantTimeEq};
 use tandem_episodes::read_text;
 
-/// The most bytes of a token.
+/// Maximum length of a token in bytes.
 const MAX_LENGTH: usize = 256;
 
-/// The most bytes of a file with a token.
+/// Maximum size of a token file in bytes.
 const MAX_FILE_BYTES: u64 = 64 << 10;
 
-/// A shorter one could be guessed.
+/// Minimum length in bytes; a shorter token could be guessed.
 const MIN_LENGTH: usize = 16;
 
-/// How many random bytes a generated token has: 160 bits.
+/// Number of random bytes in a generated token: 160 bits.
 const RANDOM_BYTES: usize = 20;
 
-/// A token, padded with zeros, which no token contains.
+/// A token, padded with zeros, which tokens never contain.
 #[derive(Clone)]
 pub struct Token([u8; MAX_LENGTH]);
 
-/// Why something is no token.
+/// Reason why a token cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum TokenError {
     /// The file cannot be read.
     #[error("cannot read the token in {}: {source}", .path.display())]
     Read {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: io::Error,
     },
-    /// It does not have the form of a token.
+    /// The text does not have the form of a token.
     #[error(
         "the token of {place} has to be {MIN_LENGTH} to {MAX_LENGTH} letters, digits and signs without spaces; `openssl rand -hex 32` makes one"
     )]
     Form {
-        /// Where it came from.
+        /// Source of the text.
         place: String,
     },
-    /// A setting is there and says nothing: whoever has given it takes the server for closed.
+    /// A setting is empty, so the user would wrongly expect a protected server.
     #[error(
         "{setting} is set and empty; give a token by it (`openssl rand -hex 32` makes one), or unset it for a server without"
     )]
     Empty {
-        /// What is empty.
+        /// Name of the setting.
         setting: &'static str,
     },
     /// The system has no random numbers.
@@ -59,11 +60,11 @@ pub enum TokenError {
     Random(getrandom::Error),
 }
 
-/// The environment's variable with the server's token.
+/// Environment variable with the server's token.
 const TOKEN_VARIABLE: &str = "TANDEM_TOKEN";
 
 impl Token {
-    /// The token in the environment's variable `TANDEM_TOKEN`, if it is set.
+    /// Reads the token from the environment variable `TANDEM_TOKEN`, if it is set.
     pub fn from_environment() -> Result<Option<Token>, TokenError> {
         env::var_os(TOKEN_VARIABLE).map(|text| Token::from_variable(&text)).transpose()
     }
@@ -72,11 +73,11 @@ impl Token {
         if text.is_empty() {
             return Err(TokenError::Empty { setting: TOKEN_VARIABLE });
         }
-        // Bytes that are no UTF-8 become characters that no token has, and are refused.
+        // Invalid UTF-8 becomes characters that no token has, so it is refused.
         Token::parse(&text.to_string_lossy(), TOKEN_VARIABLE)
     }
 
-    /// The token in a file, without the white space around it.
+    /// Reads the token from a file, without surrounding white space.
     pub fn read(path: &Path) -> Result<Token, TokenError> {
         let text = read_text(path, MAX_FILE_BYTES)
             .map_err(|source| TokenError::Read { path: path.into(), source })?;
@@ -86,7 +87,7 @@ impl Token {
         Token::parse(text.trim(), &path.display().to_string())
     }
 
-    /// The token `text`, which was given in `place`.
+    /// Parses the token `text`, which was given in `place`.
     pub fn parse(text: &str, place: &str) -> Result<Token, TokenError> {
         if text.len() < MIN_LENGTH || !is_well_formed(text) {
             return Err(TokenError::Form { place: place.into() });
@@ -94,19 +95,19 @@ impl Token {
         Ok(padded(text))
     }
 
-    /// A new random token, and its text for its owner.
+    /// Generates a random token. Returns it with its text for the owner.
     pub fn random() -> Result<(Token, String), TokenError> {
         let mut bytes = [0; RANDOM_BYTES];
         getrandom::fill(&mut bytes).map_err(TokenError::Random)?;
         let text = bytes.iter().fold(String::new(), |mut text, byte| {
-            // Writing to a text cannot fail.
+            // Writing to a string cannot fail.
             let _ = write!(text, "{byte:02x}");
             text
         });
         Ok((padded(&text), text))
     }
 
-    /// Whether `text` is this token; the comparison takes the same time whatever the text is.
+    /// Returns true if `text` is this token. The comparison takes the same time for any text.
     pub fn matches(&self, text: &str) -> bool {
         let fits = Choice::from(u8::from(is_well_formed(text)));
         let given = if is_well_formed(text) { padded(text) } else { Token([0; MAX_LENGTH]) };

@@ -1,24 +1,26 @@
-//! From numbers to what robots are asked to do.
+//! Conversion of numeric actions to the robots' commands.
 
 use tandem_sim::{BaseLimits, RobotModel, UPPER};
 use tandem_tools_spec::{
     ACTION_ROW_LEN, ActCall, BASE_COLUMNS, JointChunk, MoveWrists, SendJointChunk, WristMove,
 };
 
-/// Numbers of a wrist's pose: x, y, z (m), then w, x, y, z.
+/// Number of values of a wrist's pose: x, y, z (m), then w, x, y, z.
 const POSE: usize = 7;
 const FINGERS: usize = 7;
 const WRIST_ROW_LEN: usize = 2 * POSE + 2 * FINGERS + 4;
-/// No hand of a robot that stands is farther from its pelvis, and no joint of its fingers turns farther.
+/// Limit of a wrist's distance from the pelvis, and of a finger joint's angle (`FINGER_RAD`). No hand of a
+/// standing robot reaches farther.
 const REACH_M: f32 = 1.0;
 const FINGER_RAD: f32 = 2.0;
 
-/// What a row of an action means.
+/// Meaning of an action's row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ActionKind {
     /// A row of `send_joint_chunk`: 31 joint targets and the base command.
     Joints,
-    /// Both wrists' poses in the pelvis frame, both hands' fingers, and the base command: what `move_wrists` takes for one control step.
+    /// The input of `move_wrists` for one control step: both wrists' poses in the pelvis frame, both hands'
+    /// fingers, and the base command.
     Wrists,
 }
 
@@ -32,7 +34,7 @@ impl ActionKind {
         }
     }
 
-    /// Numbers of a robot's row.
+    /// Returns the number of columns of a robot's row.
     pub fn columns(self) -> usize {
         match self {
             ActionKind::Joints => ACTION_ROW_LEN,
@@ -40,7 +42,7 @@ impl ActionKind {
         }
     }
 
-    /// The least and the most that each number of a robot's row can usefully be.
+    /// Returns the lower and upper limit of each number of a robot's row.
     pub fn limits(self, model: &RobotModel, base: &BaseLimits) -> Vec<[f32; 2]> {
         let BaseLimits { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m } = *base;
         let mut limits: Vec<[f32; 2]> = match self {
@@ -59,7 +61,7 @@ impl ActionKind {
         limits
     }
 
-    /// What a world is asked to do in one control step: a row each robot.
+    /// Returns the call of one control step from a world's rows, one for each robot.
     pub fn call<'a>(self, robots: impl Iterator<Item = &'a str>, row: &[f32]) -> ActCall {
         let rows = robots.zip(row.chunks_exact(self.columns()));
         match self {
@@ -78,7 +80,7 @@ impl ActionKind {
     }
 }
 
-/// Names of the columns of [`ActionKind::Wrists`].
+/// Returns the names of the columns of [`ActionKind::Wrists`].
 pub fn wrist_columns() -> Vec<String> {
     let sides = ["left", "right"];
     let pose = sides.iter().flat_map(|side| {

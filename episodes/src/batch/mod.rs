@@ -1,4 +1,5 @@
-//! Worlds of one task that take their steps together, as learners want them: a call a batch, numbers in and numbers out.
+//! Batches for learners: worlds of one task that step together, one call for all, with numbers in and
+//! numbers out.
 
 mod actions;
 mod parallel;
@@ -19,12 +20,12 @@ use crate::{EpisodeError, Session};
 use parallel::Threads;
 use world::{BatchWorld, SeenStep, SeenWorld};
 
-/// Numbers of a robot's state: its joints' angles (rad), then the base command in force.
+/// Number of values of a robot's state: its joints' angles (rad), then the base command in force.
 pub const STATE_COLUMNS: usize = JOINTS + 4;
-/// A picture of a robot's own camera, where nothing else is asked for.
+/// Default size of an image from a robot's own camera.
 pub const PICTURE_PX: [u32; 2] = [320, 240];
 
-/// Why a batch takes no step.
+/// Reason why a batch takes no step.
 #[derive(Debug, thiserror::Error)]
 pub enum BatchError {
     #[error("world {world} has no episode under way; reset it first")]
@@ -37,30 +38,30 @@ pub enum BatchError {
     Episode(#[from] EpisodeError),
 }
 
-/// What a batch is.
+/// Specification of a batch.
 #[derive(Clone, Debug)]
 pub struct BatchSpec {
-    /// Every episode, but for its seed.
+    /// Spec of every episode, except for its seed.
     pub episode: EpisodeSpec,
     pub worlds: usize,
-    /// Worlds step on so many threads.
+    /// Number of threads that step the worlds.
     pub threads: usize,
     pub actions: ActionKind,
     pub reward: RewardKind,
-    /// Width and height of what each robot's camera sees; `None` where nobody looks.
+    /// Width and height of each robot's camera image; `None` for no images.
     pub pictures_px: Option<[u32; 2]>,
-    /// Where every episode leaves a folder of its own, if they are recorded.
+    /// Folder with a folder for every recorded episode; `None` if they are not recorded.
     pub record: Option<PathBuf>,
 }
 
-/// When the next episode of a world begins whose last one is over.
+/// Start of the next episode in a world whose last one is over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Autoreset {
     /// In place of the step after the last.
     NextStep,
     /// In the last step itself.
     SameStep,
-    /// When it is reset, and not before.
+    /// Only when the world is reset.
     Disabled,
 }
 
@@ -76,37 +77,38 @@ impl Autoreset {
     }
 }
 
-/// Where what is seen is written: world after world, and robot after robot in each.
+/// Arrays for the observations: world after world, and robot after robot in each.
 #[derive(Default)]
 pub struct SeenArrays<'a> {
-    /// [`STATE_COLUMNS`] a robot.
+    /// [`STATE_COLUMNS`] numbers for each robot.
     pub state_rows: &'a mut [f32],
-    /// Height by width by red, green, blue a robot; empty where nobody looks.
+    /// Height by width by red, green, blue for each robot; empty for no images.
     pub pictures: &'a mut [u8],
 }
 
-/// How a batch takes a step.
+/// A step of a batch.
 #[derive(Clone, Copy, Debug)]
 pub struct BatchStep<'a> {
     /// World after world, robot after robot, columns of the action.
     pub action_rows: &'a [f32],
     pub autoreset: Autoreset,
-    /// Whether the policy looks: pictures of other steps are drawn only where an episode begins or is over.
+    /// True if the policy observes this step. Images of other steps are rendered only where an episode
+    /// begins or is over.
     pub looks: bool,
 }
 
-/// Worlds that take their steps together.
+/// Worlds that step together.
 pub struct Batch {
     spec: Arc<BatchSpec>,
     worlds: Arc<[Mutex<BatchWorld>]>,
     threads: Threads,
 }
 
-/// What a step came to in each world that took one.
+/// Outcome of a step in each world that took one.
 type Steps = Vec<Option<Result<SeenStep, BatchError>>>;
 
 impl Batch {
-    /// Worlds in which nothing has begun.
+    /// Creates worlds without episodes.
     pub fn new(spec: BatchSpec) -> Batch {
         let worlds = (0..spec.worlds).map(|index| Mutex::new(BatchWorld::new(index, spec.worlds))).collect();
         let threads = Threads::start(spec.threads.min(spec.worlds));
@@ -117,8 +119,12 @@ impl Batch {
         &self.spec
     }
 
-    /// Begins an episode in each world that has an entry: with the seed that it says, or with that of the world's next round. What the
-    /// episodes of a round are does not depend on how many began by themselves in the last one.
+    /// Begins an episode in each world that has an entry: with the given seed, or with that of the world's
+    /// next round. The episodes of a round do not depend on how many began automatically in the last one.
+    ///
+    /// # Errors
+    ///
+    /// If an episode cannot be started or recorded.
     pub fn reset(
         &mut self,
         seeds: &[Option<Option<u32>>],
@@ -130,8 +136,13 @@ impl Batch {
         outcomes.into_iter().map(Option::transpose).collect()
     }
 
-    /// One control step of each world, or the beginning of its next episode. `last` is where the last of an episode is written
-    /// whose world begins anew in the same step. Either all actions are in order, or no world steps.
+    /// Takes one control step in each world, or begins its next episode. `last` receives the final
+    /// observation of an episode whose world begins anew in the same step. If any action is invalid, no
+    /// world steps.
+    ///
+    /// # Errors
+    ///
+    /// If an action is invalid, or a world has no episode under way.
     pub fn step(
         &mut self,
         step: BatchStep,
@@ -145,7 +156,7 @@ impl Batch {
         self.write(steps, seen, last).into_iter().flatten().collect()
     }
 
-    /// Has every world do something.
+    /// Runs `work` on every world.
     fn each(
         &self,
         work: impl Fn(usize, &mut BatchWorld, &BatchSpec) -> Option<Result<SeenStep, BatchError>>
@@ -157,7 +168,7 @@ impl Batch {
         self.threads.map(worlds.len(), move |index| work(index, &mut held(&worlds[index]), &spec))
     }
 
-    /// Writes what is seen, and tells what steps came to.
+    /// Writes the observations, and returns the outcomes of the steps.
     fn write(
         &self,
         mut steps: Steps,
@@ -179,7 +190,7 @@ impl Batch {
         steps.into_iter().zip(places).map(write).collect()
     }
 
-    /// Draws the pictures of all worlds that have left theirs to be drawn together.
+    /// Renders the images of all worlds that have deferred them, together.
     fn draw_undrawn(&self, steps: &mut Steps) {
         let Some(size_px) = self.spec.pictures_px else { return };
         let mut worlds: Vec<_> = self.worlds.iter().map(held).collect();
@@ -197,7 +208,7 @@ impl Batch {
         }
     }
 
-    /// What each world is asked to do, all of it checked.
+    /// Returns the checked call of each world.
     fn calls(&self, step: &BatchStep) -> Result<Vec<ToolCall>, BatchError> {
         if let Some(world) = self.worlds.iter().position(|world| !held(world).takes(step.autoreset)) {
             return Err(BatchError::NotBegun { world });
@@ -213,7 +224,11 @@ impl Batch {
         asked.collect()
     }
 
-    /// What the robots of a world see in pictures of this size.
+    /// Renders the images of a world's robots in this size.
+    ///
+    /// # Errors
+    ///
+    /// If there is no such world, or it has no episode under way.
     pub fn draw(&mut self, world: usize, size_px: [u32; 2]) -> Result<Vec<u8>, BatchError> {
         self.ask(world, |session| {
             let robots = session.spec().task.robots.len();
@@ -221,7 +236,11 @@ impl Batch {
         })
     }
 
-    /// The state of a world, as [`Session::state_hash`].
+    /// Returns the hash of a world's state; see [`Session::state_hash`].
+    ///
+    /// # Errors
+    ///
+    /// If there is no such world, or it has no episode under way.
     pub fn state_hash(&mut self, world: usize) -> Result<String, BatchError> {
         self.ask(world, |session| session.state_hash())
     }
@@ -233,32 +252,32 @@ impl Batch {
     }
 }
 
-/// Recordings are whole, whatever keeps their episodes from being played to the end.
+/// Closes all recordings, so that they are whole even if their episodes are not played to the end.
 impl Drop for Batch {
     fn drop(&mut self) {
         self.worlds.iter().for_each(|world| held(world).close());
     }
 }
 
-/// A world that has panicked has no session, see [`BatchWorld::session`].
+/// Locks a world. A world that has panicked has no session, see [`BatchWorld::session`].
 fn held(world: &Mutex<BatchWorld>) -> MutexGuard<'_, BatchWorld> {
     world.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl<'a> SeenArrays<'a> {
-    /// Where nobody looks.
+    /// Returns arrays without images.
     pub fn of_states(state_rows: &'a mut [f32]) -> SeenArrays<'a> {
         SeenArrays { state_rows, pictures: &mut [] }
     }
 
-    /// The part of each of so many worlds; where nothing is to be written, it is empty.
+    /// Splits the arrays into one part for each world; the parts of an empty array are empty.
     fn split(self, worlds: usize) -> impl Iterator<Item = SeenArrays<'a>> {
         let state_rows = parts(self.state_rows, worlds);
         let pictures = parts(self.pictures, worlds);
         state_rows.zip(pictures).map(|(state_rows, pictures)| SeenArrays { state_rows, pictures })
     }
 
-    /// Writes what is seen of a world to its part.
+    /// Writes the observation of a world to its part.
     fn write(self, seen: &SeenWorld) {
         self.state_rows.iter_mut().zip(&seen.state_rows).for_each(|(place, number)| *place = *number);
         let each = seen.pictures.first().map_or(1, Vec::len);

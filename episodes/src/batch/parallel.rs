@@ -7,21 +7,21 @@ use std::sync::mpsc::{Receiver, RecvError, Sender, TryRecvError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Who has nothing to do looks for work so long before it sleeps: to wake a thread takes a tenth of what a world's step takes, and whoever
-/// steps worlds asks for the next step soon after the last.
+/// Time for which an idle thread polls for work before it sleeps. Waking a thread takes a tenth of a
+/// world's step, and the caller requests the next step soon after the last.
 const AWAKE: Duration = Duration::from_micros(200);
 
-/// Threads that work side by side with the one that asks them to, as long as this lives. They know nothing of a process that was forked
-/// from theirs: there nothing is to be asked of them.
+/// Threads that work alongside the calling one for the lifetime of this value. They do not exist in a
+/// forked child process, which must not use this value.
 pub struct Threads {
     helpers: Vec<Sender<Round>>,
 }
 
-/// What all threads do together, each by its number.
+/// Work of all threads together, each by its number.
 type Round = Arc<dyn Fn(usize) + Send + Sync>;
 
 impl Threads {
-    /// So many threads, the caller's among them; fewer where the system has no more.
+    /// Starts the threads; their number includes the caller's. There are fewer if the system refuses more.
     pub fn start(threads: usize) -> Threads {
         let helper = |thread| {
             let (rounds, asked) = channel::<Round>();
@@ -36,8 +36,9 @@ impl Threads {
         Threads { helpers: (1..threads).filter_map(helper).collect() }
     }
 
-    /// What so many jobs come to. A thread begins with jobs that were its own in the last round, too, and has them in its caches; one
-    /// that is done goes on with those of others, because worlds differ in what a step costs.
+    /// Runs jobs and returns their results. A thread begins with the jobs that it also had in the last
+    /// round, whose data are in its caches. When it is done it takes over jobs of other threads, because
+    /// worlds differ in the cost of a step.
     pub fn map<R: Send + 'static>(
         &self,
         jobs: usize,
@@ -53,13 +54,13 @@ impl Threads {
             let own = thread * jobs / threads..(thread + 1) * jobs / threads;
             for job in own.chain((0..jobs).rev()) {
                 if !begun[job].swap(true, Ordering::Relaxed) {
-                    // Nobody listens any more where another job has panicked.
+                    // The receiver is gone if another job has panicked.
                     let _ = done.send((job, catch_unwind(AssertUnwindSafe(|| work(job)))));
                 }
             }
         });
         for helper in &self.helpers {
-            // One that is gone is not missed: every thread does what is left.
+            // A missing thread does no harm: every thread does what is left.
             let _ = helper.send(round.clone());
         }
         round(0);
@@ -67,7 +68,7 @@ impl Threads {
     }
 }
 
-/// The results of so many jobs, as soon as all are there; what a job has panicked with goes on in the caller.
+/// Returns the results of all jobs in their order. Resumes a job's panic in the caller.
 fn in_order<R>(jobs: usize, results: &Receiver<(usize, thread::Result<R>)>) -> Vec<R> {
     let mut found: Vec<Option<R>> = (0..jobs).map(|_| None).collect();
     for _ in 0..jobs {
@@ -77,14 +78,14 @@ fn in_order<R>(jobs: usize, results: &Receiver<(usize, thread::Result<R>)>) -> V
     found.into_iter().flatten().collect()
 }
 
-/// What comes next, awake for a while and then asleep.
+/// Receives the next message: first by polling, then asleep.
 fn next<T>(inbox: &Receiver<T>) -> Result<T, RecvError> {
     let begin = Instant::now();
     while begin.elapsed() < AWAKE {
         match inbox.try_recv() {
             Ok(next) => return Ok(next),
             Err(TryRecvError::Disconnected) => return Err(RecvError),
-            // On a busy machine somebody else has use for the core.
+            // On a busy machine, another thread may use the core.
             Err(TryRecvError::Empty) => thread::yield_now(),
         }
     }

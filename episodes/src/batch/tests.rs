@@ -20,7 +20,7 @@ fn spec(reward: RewardKind) -> BatchSpec {
     }
 }
 
-/// Robots that keep their upper bodies at zero and stand.
+/// Returns actions of robots that keep their upper bodies at zero and stand.
 fn standing(worlds: usize) -> Vec<f32> {
     let mut row = [0.0; 35];
     row[34] = 0.74;
@@ -92,7 +92,7 @@ fn an_episode_that_begins_in_the_same_step_leaves_its_last_state() {
     let (mut seen, mut last) = (states(1), states(1));
     batch.reset(&[Some(Some(2000))], SeenArrays::of_states(&mut seen)).unwrap();
     let begin = seen.clone();
-    // What nothing keeps on its feet.
+    // An action with which no robot keeps its balance.
     let mut row = [0.0; 35];
     (row[28], row[30]) = (2.0, 0.5);
     row[31..].copy_from_slice(&[-0.4, 0.4, 0.6, 0.4]);
@@ -118,7 +118,7 @@ fn an_episode_that_begins_in_the_same_step_leaves_its_last_state() {
     assert_eq!((next[0].env_steps, next[0].seed), (1, 2001));
 }
 
-/// A graphics processor, where this build and the machine have one, draws what all worlds see together.
+/// A GPU, if this build and the machine have one, renders the images of all worlds together.
 #[test]
 fn pictures_are_drawn_where_the_policy_looks() {
     for renderer in [RendererKind::Cpu, RendererKind::Gpu] {
@@ -214,7 +214,7 @@ fn wrists_go_where_a_row_says() {
     let wrist = batch.ask(0, wrist).unwrap();
     // Arms that are flung forward make a robot step, and wrists sway with its pelvis.
     assert!((wrist - tandem_sim::Vector::new(0.25, -0.25, 0.10)).length() < 0.08, "{wrist}");
-    // Rewards add up to what has been come by since the beginning: the hands have come nearer to the bottle.
+    // Rewards add up to the progress since the beginning: the hands have come nearer to the bottle.
     let begin = Session::start(&EpisodeSpec { seed: 2000, ..batch.spec().episode.clone() }, None).unwrap();
     let now = batch.ask(0, |session| session.progress()).unwrap();
     assert!((now - begin.progress() - progress).abs() < 1e-6 && progress > 0.01, "{now} {progress}");

@@ -10,15 +10,16 @@ use crate::Session;
 use crate::commands::base_row;
 use crate::spec::EpisodeSpec;
 
-/// Where a world begins that nobody gave a seed: with the first of those that are neither reported nor held out.
+/// Default seed of the first world: the first seed that is neither reported nor held out.
 const FIRST_SEED: u32 = 2000;
 
-/// What a step is rewarded with.
+/// Reward of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RewardKind {
-    /// 1 for each phase that it reaches.
+    /// 1 for each phase that the step reaches.
     Sparse,
-    /// What it adds to the task's progress: phases reached, and how near the next one is, from 0 to 1.
+    /// The step's increase of the task's progress: phases reached, and the nearness of the next one, from 0
+    /// to 1.
     Dense,
 }
 
@@ -33,60 +34,60 @@ impl RewardKind {
     }
 }
 
-/// What a step came to in one world, or the beginning of an episode there.
+/// Outcome of a step in one world, or of the beginning of an episode there.
 #[derive(Clone, Debug, Default)]
 pub struct WorldStep {
     pub reward: f64,
-    /// Whether the last phase has been reached, or a robot has fallen.
+    /// True if the last phase has been reached, or a robot has fallen.
     pub terminated: bool,
-    /// Whether the budget has run out, or the simulator has failed.
+    /// True if the budget has run out, or the simulator has failed.
     pub truncated: bool,
-    /// How many phases have been reached.
+    /// Number of phases that have been reached.
     pub phases: usize,
     pub fallen: Vec<bool>,
     /// Control steps of the episode.
     pub env_steps: u32,
     /// The episode's seed.
     pub seed: u32,
-    /// The seed of the episode that has begun behind it, in the same step.
+    /// Seed of the next episode, if it has begun in the same step.
     pub next_seed: Option<u32>,
-    /// How the simulator failed, if it did.
+    /// Text of the simulator's failure; `None` without one.
     pub failure: Option<String>,
-    /// Share of the episode's joint targets that lay beyond the joints' limits.
+    /// Share of the episode's joint targets that were beyond the joints' limits.
     pub joints_clamped_share: f64,
 }
 
-/// What is seen of a world; nothing of one that has panicked.
+/// Observation of a world; empty for a world that has panicked.
 #[derive(Default)]
 pub struct SeenWorld {
-    /// [`STATE_COLUMNS`] a robot.
+    /// [`STATE_COLUMNS`] numbers for each robot.
     pub state_rows: Vec<f32>,
-    /// One a robot, where they have been drawn.
+    /// One image for each robot, if they have been rendered.
     pub pictures: Vec<Vec<u8>>,
 }
 
-/// What a step came to, and what is seen then.
+/// Outcome of a step, and the observation after it.
 pub struct SeenStep {
     pub outcome: WorldStep,
     pub seen: SeenWorld,
-    /// The last of the episode, where the next one has begun in the same step.
+    /// Final observation of the episode, if the next one has begun in the same step.
     pub last: Option<SeenWorld>,
-    /// Whether pictures are still to be drawn, with those of other worlds.
+    /// True if images are still to be rendered, together with those of other worlds.
     pub undrawn: bool,
 }
 
-/// Episode after episode.
+/// A world of a batch, with one episode after another.
 pub struct BatchWorld {
     index: usize,
-    /// By so much the seeds of a world's episodes lie apart: as many as there are worlds.
+    /// Difference between the seeds of a world's successive episodes: the number of worlds.
     stride: u32,
-    /// The seed that this round began with; `None` before the first.
+    /// Seed with which this round began; `None` before the first.
     round_seed: Option<u32>,
-    /// Episodes of this round that have begun.
+    /// Number of this round's episodes that have begun.
     episodes: u32,
-    /// `None` before the first, and after a panic.
+    /// `None` before the first episode, and after a panic.
     pub session: Option<Session>,
-    /// Whether the episode is over.
+    /// True once the episode is over.
     pub over: bool,
     progress: f64,
 }
@@ -97,12 +98,12 @@ impl BatchWorld {
         BatchWorld { index, stride, round_seed: None, episodes: 0, session: None, over: false, progress: 0.0 }
     }
 
-    /// Whether a step is in order, where worlds are reset like this.
+    /// Returns `true` if the world can take a step under this kind of reset.
     pub fn takes(&self, autoreset: Autoreset) -> bool {
         if self.over { autoreset != Autoreset::Disabled } else { self.session.is_some() }
     }
 
-    /// Begins a round: with this seed, or with the one after that of the last round.
+    /// Begins a round with this seed, or with the one after that of the last round.
     pub fn reset(&mut self, spec: &BatchSpec, seed: Option<u32>) -> Result<SeenStep, BatchError> {
         let next = match self.round_seed {
             Some(last) => last.wrapping_add(self.stride),
@@ -113,7 +114,8 @@ impl BatchWorld {
         self.begin(spec)
     }
 
-    /// Begins the next episode of the round. Its seed is the index's: no episode begins elsewhere because another one ended sooner.
+    /// Begins the next episode of the round. Its seed depends on its index alone: that another episode
+    /// ended sooner does not change it.
     fn begin(&mut self, spec: &BatchSpec) -> Result<SeenStep, BatchError> {
         let round_seed = self.round_seed.unwrap_or(FIRST_SEED);
         let seed = round_seed.wrapping_add(self.stride.wrapping_mul(self.episodes));
@@ -122,7 +124,7 @@ impl BatchWorld {
         let folder = spec.record.as_ref().map(|record| self.folder(record, &episode));
         let session = Session::start(&episode, folder.as_deref())?;
         if let Some(reason) = session.recording_failed() {
-            // Whoever wants a recording has no use for the episode.
+            // A caller that wants a recording has no use for an unrecorded episode.
             return Err(BatchError::NotRecorded { seed, reason: reason.into() });
         }
         let session = self.session.insert(session);
@@ -137,7 +139,7 @@ impl BatchWorld {
         Ok(look(spec, session, outcome, true))
     }
 
-    /// One control step, or the beginning of the next episode.
+    /// Takes one control step, or begins the next episode.
     pub fn step(
         &mut self,
         spec: &BatchSpec,
@@ -155,7 +157,7 @@ impl BatchWorld {
             None => SeenStep { outcome, seen: SeenWorld::default(), last: None, undrawn: false },
         };
         if self.over && autoreset == Autoreset::SameStep {
-            // An episode's last pictures cannot wait: its world goes.
+            // An episode's last images cannot be deferred: its world is about to be replaced.
             if let Some(session) = self.session.as_mut().filter(|_| step.undrawn) {
                 step.seen.pictures = draw(spec, session);
             }
@@ -166,7 +168,8 @@ impl BatchWorld {
         Ok(step)
     }
 
-    /// One control step, and what it came to. What goes wrong in a world is told of this world alone.
+    /// Takes one control step and returns its outcome. An error in a world is reported for this world
+    /// alone.
     fn advance(&mut self, spec: &BatchSpec, call: &ToolCall) -> WorldStep {
         let Some(session) = &mut self.session else { return WorldStep::default() };
         let (seed, before) = (session.spec().seed, session.reached_phases());
@@ -207,7 +210,7 @@ impl BatchWorld {
         }
     }
 
-    /// A folder that no other episode has.
+    /// Returns a folder that no other episode has.
     fn folder(&self, record: &Path, episode: &EpisodeSpec) -> PathBuf {
         let name = format!("{}-world{}-seed{}", episode.task.id, self.index, episode.seed);
         let again = (2..).map(|time| record.join(format!("{name}-{time}")));
@@ -223,8 +226,8 @@ impl BatchWorld {
     }
 }
 
-/// What is seen of a world after a step; pictures only where they are to be drawn, and not yet if they are better drawn together with those
-/// of other worlds.
+/// Returns the observation of a world after a step. Images are rendered only if `draws` is true, and
+/// deferred if they are better rendered together with those of other worlds.
 fn look(spec: &BatchSpec, session: &mut Session, outcome: WorldStep, draws: bool) -> SeenStep {
     let mut state_rows = Vec::with_capacity(session.present().robots.len() * STATE_COLUMNS);
     for robot in &session.present().robots {
@@ -237,7 +240,7 @@ fn look(spec: &BatchSpec, session: &mut Session, outcome: WorldStep, draws: bool
     SeenStep { outcome, seen: SeenWorld { state_rows, pictures }, last: None, undrawn }
 }
 
-/// Draws what the robots of a world see.
+/// Renders the images of a world's robots.
 fn draw(spec: &BatchSpec, session: &mut Session) -> Vec<Vec<u8>> {
     let Some(size_px) = spec.pictures_px else { return Vec::new() };
     (0..session.present().robots.len()).map(|robot| session.eye(robot, size_px)).collect()

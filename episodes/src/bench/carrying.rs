@@ -1,7 +1,7 @@
 //! Two robots that carry a bar between them: cases of the bench of base controllers that need hands.
 //!
-//! They take the bar from its stand by the skills of the experts, lift it, and walk it along the case's way side by side.
-//! Nothing joins them but what their fingers hold.
+//! They take the bar from its stand with the skills of the experts, lift it, and walk it along the case's
+//! way side by side. The grip of their fingers is their only connection.
 
 use std::cell::Cell;
 use std::f32::consts::FRAC_PI_2;
@@ -23,7 +23,7 @@ use crate::scoring::{A, B, Facts, Grip};
 use crate::spec::{Controller, EpisodeSpec, RobotFile};
 use crate::tasks::{Task, embedded_task};
 
-/// A way of the bar.
+/// A case: a way of the bar.
 pub struct CarryingCase {
     pub name: &'static str,
     legs: &'static [PathLeg],
@@ -31,9 +31,9 @@ pub struct CarryingCase {
 
 /// Part of a way, from rest to rest.
 struct PathLeg {
-    /// Distances ahead and to the left, as the robots look at the beginning.
+    /// Distances ahead and to the left, relative to the robots' initial heading.
     by_m: [f32; 2],
-    /// How far the bar turns about its middle.
+    /// Rotation of the bar about its middle.
     turn_rad: f32,
 }
 
@@ -48,14 +48,14 @@ const fn straight(ahead_m: f32, left_m: f32) -> PathLeg {
     PathLeg { by_m: [ahead_m, left_m], turn_rad: 0.0 }
 }
 
-/// Robots stand so far to the left and right of the bar's middle.
+/// Distance of the robots to the left and right of the bar's middle.
 const APART_M: f32 = 0.65;
 const LIFT_M: f32 = 0.1;
 const PACE_M_S: f32 = 0.2;
-/// A way is looked at in so many points a leg.
+/// Number of points per leg at which a way is sampled.
 const WAY_POINTS: usize = 200;
 
-/// Two robots and a bar.
+/// Task of two robots and a bar.
 pub(super) static TASK: LazyLock<&'static Task> =
     LazyLock::new(|| embedded_task("carry_bar.toml", include_str!("tasks/carry_bar.toml")));
 
@@ -82,20 +82,21 @@ pub fn run(
     })
 }
 
-/// What came of a bar that was carried to the end of its way.
+/// Result for a bar that was carried to the end of its way.
 struct CarryResult {
-    /// The heading error of the robot that ends up the most turned.
+    /// Heading error of the robot with the largest one.
     heading_error_deg: f32,
-    /// How far the bar's middle is from the end of its way, and the farthest that it was from the way itself.
+    /// Distance of the bar's middle from the end of its way; `off_way_m` is its largest distance from the
+    /// way itself.
     final_drift_m: f32,
     off_way_m: f32,
-    /// The most that the bar was ever tilted.
+    /// Largest tilt of the bar.
     tilt_deg: f32,
-    /// The mean power of a robot.
+    /// Mean power of a robot.
     power_w: f32,
 }
 
-/// One seed; `None` if a robot fell, or hands lost the bar for good.
+/// Plays one seed; `None` if a robot fell, or hands lost the bar for good.
 fn trial(
     case: &CarryingCase,
     robot: &RobotFile,
@@ -123,7 +124,7 @@ fn trial(
     Ok(aloft.get().filter(|_| held).map(|start| measure(case, &start, &logged.log)))
 }
 
-/// Takes the bar, lifts it, from when on it is logged, and carries it.
+/// Takes the bar, lifts it, and carries it. The bar is logged from the lift on.
 fn carry(
     case: &CarryingCase,
     episode: &mut dyn PrivilegedEpisode,
@@ -149,12 +150,12 @@ fn carry(
 }
 
 impl PathLeg {
-    /// How far the robots go.
+    /// Returns the distance that the robots walk.
     fn length_m(&self) -> f32 {
         Vector::from([self.by_m[0], self.by_m[1], 0.0]).length() + self.turn_rad.abs() * APART_M
     }
 
-    /// The bar when this share of the leg has been gone.
+    /// Returns the bar's pose after this share of the leg.
     fn at(&self, from: &Pose, share: f32) -> Pose {
         let by_m = Vector::new(self.by_m[0], self.by_m[1], 0.0) * share;
         let turned = Rotation::from_rotation_z(self.turn_rad * share);
@@ -162,14 +163,14 @@ impl PathLeg {
     }
 }
 
-/// What there was after one command.
+/// State after one command.
 struct LogEntry {
     bar: Pose,
     pelvises: Vec<Pose>,
     power_w: f32,
 }
 
-/// An episode that logs what happens while the bar is aloft.
+/// An episode that logs the state while the bar is aloft.
 struct LoggedEpisode<'a> {
     episode: InProcess,
     aloft: &'a Cell<Option<Pose>>,

@@ -1,4 +1,5 @@
-//! How fast environments of learners step: batches of two and three robots that stand, without pictures, against the core alone.
+//! Speed of environments for learners: batches of two and three standing robots, without images, compared
+//! with the core alone.
 
 use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
@@ -19,45 +20,50 @@ use crate::tasks::{self, Task};
 
 const WORLDS: usize = 8;
 const ROUNDS: usize = 5;
-/// Steps in which robots come to rest, and those that are timed.
+/// Steps in which robots come to rest; `STEPS` are the timed ones.
 const SETTLING_STEPS: u32 = 25;
 const STEPS: u32 = 75;
 const FIRST_SEED: u32 = 2000;
 
-/// All cases.
+/// Results of all cases.
 #[derive(Clone, Debug, Serialize)]
 pub struct EnvReport {
     pub cases: Vec<EnvCase>,
 }
 
-/// Environments of one task on so many threads.
+/// Environments of one task on `threads` threads.
 #[derive(Clone, Debug, Serialize)]
 pub struct EnvCase {
     pub task: &'static str,
     pub robots: usize,
     pub worlds: usize,
     pub threads: usize,
-    /// Steps of environments, of all worlds together.
+    /// Steps of environments per second, of all worlds together.
     pub steps_per_s: Spread,
-    /// Control steps of such worlds one after another on one thread, with physics, sensing and balance, and nothing around them.
+    /// Control steps per second of such worlds in turn on one thread, with physics, sensing and balance,
+    /// and nothing around them.
     pub core_steps_per_s: Spread,
-    /// The first over the second, each measured right after the other.
+    /// Ratio of the first to the second, each measured right after the other.
     pub of_core: Spread,
-    /// Processor time of the core's step over that of the environment's, which says on a busy machine, too, what is around the core;
-    /// on one thread alone.
+    /// Ratio of the core's processor time per step to the environment's, on one thread only. It shows the
+    /// overhead around the core on a busy machine, too.
     pub busy_of_core: Option<Spread>,
-    /// What the beginning of an episode takes, on one thread.
+    /// Time for the beginning of an episode, on one thread.
     pub reset_ms: Spread,
 }
 
-/// Times every case; `done` hears of each as it ends.
+/// Times every case; calls `done` after each.
+///
+/// # Errors
+///
+/// If a world cannot be built or stepped.
 pub fn env(mut done: impl FnMut(&EnvCase)) -> Result<EnvReport, BenchError> {
     let most = available_parallelism().map_or(1, usize::from).min(WORLDS);
     let mut threads = vec![1];
     threads.extend((most > 1).then_some(2));
     threads.extend((most > 2).then_some(most));
     let mut cases = Vec::new();
-    // The first task is of two robots, the last of three.
+    // The first task has two robots, the last three.
     for task in [tasks::cohub().first(), tasks::cohub().last()].into_iter().flatten().copied() {
         for threads in threads.iter().copied() {
             let case = measure(task, threads)?;
@@ -98,13 +104,13 @@ fn measure(task: &'static Task, threads: usize) -> Result<EnvCase, BenchError> {
     })
 }
 
-/// How fast steps were made, and how long this thread was busy with all of them.
+/// Rate of steps, and processor time of this thread for all of them.
 struct Pace {
     steps_per_s: f64,
     busy_s: f64,
 }
 
-/// Takes both times.
+/// Stopwatch for both times.
 struct Stopwatch {
     started: Instant,
     busy: Duration,
@@ -116,7 +122,7 @@ impl Stopwatch {
         Stopwatch { started, busy: busy_since(started) }
     }
 
-    /// The pace of so many steps of every world.
+    /// Returns the pace of this number of steps of every world.
     fn pace(&self, steps: u32) -> Pace {
         let elapsed_s = self.started.elapsed().as_secs_f64();
         let busy_s = (busy_since(self.started) - self.busy).as_secs_f64();
@@ -124,7 +130,7 @@ impl Stopwatch {
     }
 }
 
-/// The worlds of these episodes under their rest commands, taking turns as those of a batch do.
+/// Times the worlds of these episodes under their rest commands. They take turns as those of a batch do.
 fn core_pace(episode: &EpisodeSpec) -> Result<Pace, BenchError> {
     let begin = |seed: usize| -> Result<(World, Vec<RobotCommand>), BenchError> {
         let seed = FIRST_SEED + seed as u32;
@@ -147,7 +153,8 @@ fn core_pace(episode: &EpisodeSpec) -> Result<Pace, BenchError> {
     run(STEPS)
 }
 
-/// The same as environments: how long an episode takes to begin, and steps per second.
+/// Times the same worlds as environments. Returns the time for the beginning of an episode, and the pace of
+/// the steps.
 fn batch_pace(episode: &EpisodeSpec, threads: usize) -> Result<(f64, Pace), BenchError> {
     let world = build(episode).map_err(Box::new)?.world;
     let row = |robot: usize| {

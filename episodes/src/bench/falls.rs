@@ -1,4 +1,4 @@
-//! The bench of falls: robots that stagger through the worlds of the tasks, and what else makes them fall.
+//! Bench of falls: robots that stagger through the worlds of the tasks, and other causes of falls.
 
 use tandem_sim::bench::{
     FALL_CASES, FallCase, FallPlace, FallTrial, FallsCase, FallsReport, is_asked, over_seeds,
@@ -10,11 +10,15 @@ use crate::session::build;
 use crate::spec::EpisodeSpec;
 use crate::tasks;
 
-/// Seeds from here on, which no table of results reports.
+/// First seed; no table of results reports the seeds from here on.
 const FIRST_SEED: u32 = 2000;
 
-/// Plays so many episodes, as evenly as it goes, of the cases whose names contain one of the words of `filter`, separated by
-/// commas; calls `done` after each case.
+/// Plays `episodes` episodes, spread evenly over the cases whose names contain one of the words of
+/// `filter`, separated by commas. Calls `done` after each case.
+///
+/// # Errors
+///
+/// If no case matches `filter`, or a world cannot be built.
 pub fn falls(
     episodes: usize,
     filter: &str,
@@ -46,7 +50,8 @@ pub fn falls(
     Ok(report)
 }
 
-/// One episode of a case; those in the worlds of tasks go through all tasks, each case from another one on.
+/// Plays one episode of a case. Those in the worlds of tasks go through all tasks, each case from another
+/// one on.
 fn trial(case: &FallCase, number: usize, seed: u32) -> Result<FallTrial, BenchError> {
     let episode = seed - FIRST_SEED;
     let (mut world, budget_steps, place) = match case.place {
@@ -75,7 +80,8 @@ mod tests {
         assert!(refusal(0, "door").contains("at least 1"));
     }
 
-    /// Four episodes of every case, those in tasks over whole budgets. `tandem bench falls --episodes 1000` plays more.
+    /// Four episodes of every case, those in tasks over whole budgets. `tandem bench falls --episodes 1000`
+    /// plays more.
     #[test]
     fn falls_stay_finite_slow_shallow_and_make_no_energy() {
         let report = falls(60, "", |case| println!("{case}")).expect("worlds");
@@ -87,9 +93,10 @@ mod tests {
         }
     }
 
-    /// The first did work where the solver's sweeps had not settled, 25.8 J of 190 J; in the three after it a crushed finger left
-    /// its range by up to 0.46 rad. In the last, waist and shoulder swing an arm that whips wrist and finger to twice and thrice the
-    /// speeds of their motors, the tip to 26.8 m/s where motors brake with no more than they can push.
+    /// In the first, the solver did work, 25.8 J of 190 J, because its sweeps had not settled. In the next
+    /// three, a crushed finger left its range by up to 0.46 rad. In the last, waist and shoulder swing an
+    /// arm that whips wrist and finger to two and three times the speeds of their motors. The tip reached
+    /// 26.8 m/s when motors braked with no more than their pushing force.
     #[test]
     fn hard_falls_keep_to_the_limits() {
         let hard = [

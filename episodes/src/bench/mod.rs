@@ -1,4 +1,4 @@
-//! Parts of Tandem measured on their own, on the robot that the episodes use.
+//! Benchmarks of Tandem's parts on their own, with the robot that the episodes use.
 
 mod carrying;
 mod env;
@@ -28,12 +28,12 @@ use crate::commands;
 use crate::players::PlayerError;
 use crate::spec::{Controller, RobotFile};
 
-/// Targets drawn where no file gives any.
+/// Number of targets that are drawn if no file gives any.
 const SAMPLED_TARGETS: usize = 200;
 const SAMPLE_SEED: u64 = 1;
 const WRISTS: [&str; 2] = ["left_wrist_yaw_link", "right_wrist_yaw_link"];
 
-/// Why the measurement cannot be made.
+/// Reason why the measurement cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum BenchError {
     #[error("cannot read the targets {path}: {source}")]
@@ -54,8 +54,13 @@ pub enum BenchError {
     NoEpisodes,
 }
 
-/// Plays the cases whose names contain one of the words of `filter`, separated by commas, on these seeds, robots on their own first, then
-/// two that carry something between them, if they have fingers; calls `done` after each case.
+/// Plays the cases whose names contain one of the words of `filter`, separated by commas, on these seeds.
+/// Single robots come first, then two that carry something between them, if they have fingers. Calls `done`
+/// after each case.
+///
+/// # Errors
+///
+/// If a file cannot be read, or a world cannot be built.
 pub fn locomotion(
     robot: &RobotFile,
     controller: &Controller,
@@ -86,12 +91,12 @@ pub fn locomotion(
     Ok(report)
 }
 
-/// Times physics steps of one to three robots; `done` hears of each case as it ends.
+/// Times physics steps of one to three robots; calls `done` after each case.
 pub fn physics(done: impl FnMut(&PhysicsCase)) -> Result<PhysicsReport, BenchError> {
     Ok(bench::physics(done)?)
 }
 
-/// Times pictures of the kitchen; `done` hears of each set as it ends.
+/// Times images of the kitchen; calls `done` after each set.
 pub fn pictures(
     renderer: RendererKind,
     done: impl FnMut(&PicturesCase),
@@ -100,6 +105,10 @@ pub fn pictures(
 }
 
 /// Solves the targets of a file, or 200 that are drawn from the robot's own joint ranges.
+///
+/// # Errors
+///
+/// If the targets cannot be read, or the model cannot be used.
 pub fn ik(targets: Option<&Path>) -> Result<IkReport, BenchError> {
     let whole = Model::from_mjcf(assets::robot(assets::DEFAULT_ROBOT)?)?;
     let set = match targets {

@@ -1,4 +1,4 @@
-//! Robots that are sent to places by `walk_to`, with empty hands or as a team with a load: cases of the bench
+//! Robots that walk to places by `walk_to`, with empty hands or as a team with a load: cases of the bench
 //! of base controllers.
 
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -19,29 +19,30 @@ use crate::players::{InProcess, PlayerError};
 use crate::spec::{Controller, EpisodeSpec, RobotFile};
 use crate::tasks::{Task, embedded_task};
 
-/// A robot alone on a floor.
+/// Task of a robot alone on a floor.
 static TASK: LazyLock<&'static Task> =
     LazyLock::new(|| embedded_task("place.toml", include_str!("tasks/place.toml")));
 
-/// One after another, each from where the last ended.
+/// Number of successive places, each relative to the end of the last walk.
 const PLACES: usize = 3;
-/// How far places are from one another, and how far a robot or a team turns between them.
+/// Range of the distance between places; `TURN_RAD` and `CARRIED_TURN_RAD` limit the turn of a robot and of
+/// a team.
 const AWAY_M: [f32; 2] = [0.05, 0.6];
 const TURN_RAD: f32 = FRAC_PI_2;
 const CARRIED_TURN_RAD: f32 = 0.3;
 const MAX_STEPS: u32 = 1500;
 
-/// What came of a robot's or a team's calls: the worst of all.
+/// Worst figures over the calls of a robot or a team.
 #[derive(Clone, Debug, Default)]
 struct PlaceResult {
-    /// How far a pelvis came to rest from its place, and how far it is turned from there.
+    /// Final distance of a pelvis from its place; `off_rad` is its heading error.
     off_m: f64,
     off_rad: f64,
-    /// How far wrists were, after a call, from where they were to their pelvis before the first; horizontally.
+    /// Horizontal displacement of wrists relative to their pelvis, after a call, against before the first.
     squeezed_m: f64,
 }
 
-/// Plays the cases whose names `filter` asks for on these seeds.
+/// Plays the cases whose names match `filter` on these seeds.
 pub fn run(
     robot: &RobotFile,
     controller: &Controller,
@@ -82,7 +83,7 @@ pub fn run(
     Ok(())
 }
 
-/// One seed; `None` if a robot fell, or the team did not come to hold its load.
+/// Plays one seed; `None` if a robot fell, or the team did not come to hold its load.
 fn trial(spec: &EpisodeSpec, load: Option<&SharedLoad>) -> Result<Option<PlaceResult>, BenchError> {
     let session = Session::start(spec, None).map_err(Box::new)?;
     let mut episode = InProcess::new(session);
@@ -123,7 +124,7 @@ fn trial(spec: &EpisodeSpec, load: Option<&SharedLoad>) -> Result<Option<PlaceRe
     Ok(Some(result))
 }
 
-/// Where pelves are to be once everything is moved by this, turned about the middle of the team.
+/// Returns the goals of the pelvises for a displacement, and a turn about the middle of the team.
 fn goals(session: &Session, team: &[usize], by_m: Vector3<f64>, turn_rad: f64) -> Vec<Isometry3<f64>> {
     let at: Vec<Isometry3<f64>> = team.iter().map(|robot| upright(&pelvis(session, *robot))).collect();
     let middle_m = at.iter().map(|at| at.translation.vector).sum::<Vector3<f64>>() / at.len() as f64;
@@ -132,7 +133,7 @@ fn goals(session: &Session, team: &[usize], by_m: Vector3<f64>, turn_rad: f64) -
     at.iter().map(|at| moved * at).collect()
 }
 
-/// Sends each robot to its place, told in its own start frame as its odometry has it.
+/// Sends each robot to its place, given in its own start frame according to its odometry.
 fn send(
     session: &mut Session,
     team: &[usize],
@@ -187,8 +188,8 @@ fn upright(pose: &Isometry3<f64>) -> Isometry3<f64> {
 mod tests {
     use super::*;
 
-    /// Plays a case on three seeds: nobody falls, and every pelvis comes to rest within `off_m` and 1.5 degrees
-    /// of its place.
+    /// Plays a case on three seeds: no robot falls, and every pelvis comes to rest within `off_m` and 1.5
+    /// degrees of its place.
     fn comes_to_its_place(filter: &str, off_m: f32, squeezed_m: f32) {
         let mut played = 0;
         let mut check = |report: CaseReport| {

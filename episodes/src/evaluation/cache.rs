@@ -1,4 +1,5 @@
-//! Single episodes: each is cached in a file of its own, and taken from there by the next run if it is the same.
+//! Cache of single episodes: each is stored in a file of its own. The next run takes it from there if it is
+//! the same.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -15,30 +16,31 @@ use crate::results::{Attempt, PlayedEpisode, RESULT_FILE, episode_note, failures
 use crate::spec::{EpisodeSpec, Start};
 use crate::{CheckpointError, EpisodeError};
 
-/// What became of an episode of the plan.
+/// Outcome of a planned episode.
 pub enum PlannedOutcome {
-    /// An earlier run has played it. Boxed, because the last is small.
+    /// An earlier run has played it. Boxed, because the last variant is small.
     Kept(Box<PlayedEpisode>),
     Played(Box<PlayedEpisode>),
-    /// It could not be begun, and why.
+    /// It could not be started, with the reason.
     LeftOut(String),
     /// Another process plays it.
     Elsewhere,
 }
 
-/// The folder of single episodes, and what has to agree for one of them to be taken instead of played.
+/// The folder of single episodes, and the properties that must agree for an episode to be reused.
 #[derive(Clone)]
 pub struct EpisodeCache<'a> {
     pub plan: &'a EvaluationPlan<'a>,
     pub folder: PathBuf,
     pub locomotion: String,
     pub build: &'static str,
-    /// The builds whose results are taken.
+    /// Builds whose results are reused.
     pub builds: Vec<String>,
 }
 
 impl EpisodeCache<'_> {
-    /// The episode as it is kept, or played now, unless another process plays it.
+    /// Returns the episode from the cache, or plays it now. If another process plays it, returns
+    /// [`PlannedOutcome::Elsewhere`].
     pub fn load_or_play(&self, spec: &EpisodeSpec) -> Result<PlannedOutcome, EvaluationError> {
         if let Some(kept) = self.load_kept(spec)? {
             return Ok(kept);
@@ -53,7 +55,7 @@ impl EpisodeCache<'_> {
         self.load_or_play_alone(spec)
     }
 
-    /// As [`EpisodeCache::load_or_play`], once no other process plays it.
+    /// Waits until no other process plays the episode, then does what [`EpisodeCache::load_or_play`] does.
     pub fn wait_and_play(&self, spec: &EpisodeSpec) -> Result<PlannedOutcome, EvaluationError> {
         let path = self.lock_path(spec);
         let lock = FileLock::wait(&path, || !self.plan.player.is_interrupted());
@@ -61,7 +63,7 @@ impl EpisodeCache<'_> {
         self.load_or_play_alone(spec)
     }
 
-    /// The lock of whoever plays the episode.
+    /// Returns the path of the lock that a process holds while it plays the episode.
     fn lock_path(&self, spec: &EpisodeSpec) -> PathBuf {
         self.folder.join(format!("{}.lock", name(spec)))
     }
@@ -72,14 +74,14 @@ impl EpisodeCache<'_> {
     }
 
     fn load_or_play_alone(&self, spec: &EpisodeSpec) -> Result<PlannedOutcome, EvaluationError> {
-        // Another process may have played it since it was looked for.
+        // Another process may have played it since the last look.
         if let Some(kept) = self.load_kept(spec)? {
             return Ok(kept);
         }
         let attempts = self.earlier(spec).map(PlayedEpisode::into_attempts).unwrap_or_default();
         let folder = self.folder.join(name(spec));
         if self.plan.record {
-            // Until the recording is whole, no result says that it is.
+            // Until the recording is whole, no result may claim that it is.
             forget_result(&folder)?;
         }
         let KeptFiles { pages, .. } = self.plan.files;
@@ -91,7 +93,7 @@ impl EpisodeCache<'_> {
             Err(PlayError::Episode(EpisodeError::Checkpoint(CheckpointError::NoPhase { .. }))) => {
                 Ok(PlannedOutcome::LeftOut("its demonstration did not come so far".into()))
             }
-            // The world came apart before the policy could do anything; others may hold.
+            // The world failed before the policy could act. Other episodes may still work.
             Err(PlayError::Episode(error @ EpisodeError::Diverged { .. })) => {
                 Ok(PlannedOutcome::LeftOut(format!("the simulator failed before the policy's turn: {error}")))
             }
@@ -104,7 +106,8 @@ impl EpisodeCache<'_> {
         }
     }
 
-    /// An earlier run's episode, if it is this one and counts: a file that is torn, renamed or from other rules counts as missing.
+    /// Returns an earlier run's episode, if it is this one and counts. A file that is damaged, renamed or
+    /// from other rules counts as missing.
     pub fn load(&self, spec: &EpisodeSpec) -> Option<PlayedEpisode> {
         let cached = self.earlier(spec)?;
         let is_whole = self.is_not_kept(&cached)
@@ -112,7 +115,7 @@ impl EpisodeCache<'_> {
         (is_whole && cached.counts()).then_some(cached)
     }
 
-    /// What an earlier run has left of this episode, whether it counts or is played again.
+    /// Returns an earlier run's result of this episode, whether it counts or is played again.
     fn earlier(&self, spec: &EpisodeSpec) -> Option<PlayedEpisode> {
         let cached: PlayedEpisode = serde_json::from_slice(&self.read(spec)?).ok()?;
         let by = (&cached.policy, cached.locomotion.as_str());
@@ -124,7 +127,7 @@ impl EpisodeCache<'_> {
         same.then_some(PlayedEpisode { keep_failed, ..cached })
     }
 
-    /// Whether there is a result of the episode that this build does not understand.
+    /// Returns `true` if the episode has a result that this build cannot parse.
     pub fn is_unreadable(&self, spec: &EpisodeSpec) -> bool {
         self.read(spec).is_some_and(|bytes| serde_json::from_slice::<PlayedEpisode>(&bytes).is_err())
     }
@@ -133,17 +136,18 @@ impl EpisodeCache<'_> {
         std::fs::read(self.folder.join(format!("{}.json", name(spec)))).ok()
     }
 
-    /// Whether a result is of a policy that failed itself, and has been played again as often as is asked for.
+    /// Returns `true` if the policy itself failed, and the episode has been retried as often as the plan
+    /// says.
     fn keeps_failure(&self, result: &ResultReply, attempts: &[Attempt]) -> bool {
         result.ended == EndReason::PolicyFailed && failures_of_policy(attempts) >= self.plan.retries as usize
     }
 
-    /// Whether no recording of an episode is wanted, since it failed.
+    /// Returns `true` if the plan drops the recording of this episode because it failed.
     fn is_not_kept(&self, played: &PlayedEpisode) -> bool {
         self.plan.files.only_successful && !played.succeeded()
     }
 
-    /// Has the file of a kept episode say how it counts now.
+    /// Updates the file of a cached episode with how it counts now.
     fn keep(&self, spec: &EpisodeSpec, kept: PlayedEpisode) -> Result<PlayedEpisode, EvaluationError> {
         match kept.keep_failed {
             true => self.write(spec, kept),
@@ -151,12 +155,12 @@ impl EpisodeCache<'_> {
         }
     }
 
-    /// Where the episode is recorded, if it is.
+    /// Returns the folder of the episode's recording; `None` if it is not recorded.
     fn recording(&self, spec: &EpisodeSpec) -> Option<PathBuf> {
         self.plan.record.then(|| self.folder.join(name(spec)))
     }
 
-    /// Writes what an episode came to after these attempts.
+    /// Stores the outcome of an episode after these earlier attempts.
     fn store(
         &self,
         spec: &EpisodeSpec,
@@ -172,7 +176,8 @@ impl EpisodeCache<'_> {
             spec: spec.clone(),
             locomotion: self.locomotion.clone(),
             build: self.build.into(),
-            // What a policy says of a simulator that failed is less than the simulator says.
+            // After a failure of the simulator, the simulator's own text is more informative than the
+            // policy's.
             note: stopped
                 .filter(|_| result.simulator_failure.is_none())
                 .or_else(|| episode_note(&result, spec.start_phase())),
@@ -195,7 +200,8 @@ impl EpisodeCache<'_> {
     }
 }
 
-/// Whether the recording in `folder` is whole, and of the episode that came to `result`. Its `result.json` is written last.
+/// Returns `true` if the recording in `folder` is whole, and belongs to the episode with this result. Its
+/// `result.json` is written last.
 fn is_recorded(folder: &Path, result: &ResultReply) -> bool {
     let bytes = std::fs::read(folder.join(RESULT_FILE)).unwrap_or_default();
     let recorded = serde_json::from_slice::<ResultReply>(&bytes);
@@ -221,7 +227,7 @@ fn unrecorded(spec: &EpisodeSpec, reason: String) -> EvaluationError {
     EvaluationError::Recording { task: spec.task.id, seed: spec.seed, reason }
 }
 
-/// What the episode's file and folder are called.
+/// Returns the name of the episode's file and folder.
 fn name(spec: &EpisodeSpec) -> String {
     let (task, seed) = (spec.task.id, spec.seed);
     match &spec.start {

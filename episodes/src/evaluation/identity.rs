@@ -1,4 +1,5 @@
-//! The identity of a run: who plays which episodes by which rules on which build, as `run.json` has it. One folder holds one run.
+//! Identity of a run, stored in `run.json`: its policy, episodes, rules and build. One folder holds one
+//! run.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -15,7 +16,7 @@ use crate::tasks::Task;
 /// Largest number of differences that an error names.
 const MAX_DIFFERENCES: usize = 6;
 
-/// Longest part of a folder's name that is the policy's, in characters.
+/// Longest part of a folder's name that comes from the policy's name, in characters.
 const MAX_NAME_CHARS: usize = 40;
 
 /// Fields of a spec that differ between the episodes of a run.
@@ -26,17 +27,18 @@ const OF_SINGLE_EPISODES: [&str; 4] = ["task", "seed", "start", "instructions"];
 pub struct RunIdentity {
     #[serde(flatten)]
     pub policy: PolicyCard,
-    /// Name of the base controller, which tells files of different content apart.
+    /// Name of the base controller; files of different content have different names.
     pub controller: String,
     /// The spec that all its episodes share.
     pub rules: Value,
-    /// Its tasks by id, each with the file or the words in place of the built-in ones.
+    /// Its tasks by id, each with its source: built in, or the hashes of a task file and of an instructions
+    /// file.
     pub tasks: BTreeMap<String, String>,
     pub seeds: SeedList,
-    /// Where its episodes begin, if not at their tasks' own beginnings.
+    /// Starts of its episodes; `None` for the tasks' own beginnings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub starts: Option<Value>,
-    /// The builds that have played it, the last one last.
+    /// Builds that have played it, the most recent last.
     pub builds: Vec<String>,
 }
 
@@ -46,7 +48,7 @@ pub struct RunIdentity {
 pub struct SeedList(pub BTreeSet<u32>);
 
 impl RunIdentity {
-    /// The run that plays `plan` on `build`, whose base controller has this name.
+    /// Returns the identity of the run that plays `plan` on `build`, whose base controller has this name.
     pub fn of_plan(plan: &EvaluationPlan, controller: &str, build: &str) -> RunIdentity {
         let seed = plan.seeds.first().copied().unwrap_or_default();
         let planned = |task: &'static Task| plan.spec(task, seed, Start::Task);
@@ -85,7 +87,8 @@ impl RunIdentity {
         .read_back()
     }
 
-    /// The run of one episode, of which nothing else is known: builds before this one wrote no `run.json`.
+    /// Returns the identity of a run of which only one episode is known: earlier builds wrote no
+    /// `run.json`.
     pub fn of_episode(played: &PlayedEpisode) -> RunIdentity {
         let spec = &played.spec;
         RunIdentity {
@@ -100,18 +103,20 @@ impl RunIdentity {
         .read_back()
     }
 
-    /// Numbers may lose a bit on their way through text, so that only what was read is compared with what was read.
+    /// Writes the identity to text and reads it back. Numbers may lose a bit in text, so only parsed values
+    /// are compared with parsed values.
     fn read_back(self) -> RunIdentity {
         let read = serde_json::to_string(&self).and_then(|text| serde_json::from_str(&text));
         read.unwrap_or(self)
     }
 
-    /// The build that played it last.
+    /// Returns the build that played it last.
     pub fn build(&self) -> &str {
         self.builds.last().map_or("", String::as_str)
     }
 
-    /// Where the run `now` is another than this one, a line each. The build is left out; tasks and seeds may have been added.
+    /// Returns the differences between this run and the run `now`, a line each. The build is left out;
+    /// tasks and seeds may have been added.
     pub fn differences(&self, now: &RunIdentity) -> Vec<String> {
         let (was, is) = (self.leaves(), now.leaves());
         let names: BTreeSet<&String> = was.keys().chain(is.keys()).collect();
@@ -136,7 +141,7 @@ impl RunIdentity {
         found
     }
 
-    /// Whether the run `now` has the same episodes, and more.
+    /// Returns `true` if the run `now` has the same episodes, and more.
     pub fn grows_to(&self, now: &RunIdentity) -> bool {
         self.tasks.len() < now.tasks.len() || self.seeds.0.len() < now.seeds.0.len()
     }
@@ -149,7 +154,7 @@ impl RunIdentity {
         self.tasks.iter().map(name).collect::<Vec<_>>().join(", ")
     }
 
-    /// Every value of it by its path, but for tasks, seeds and builds.
+    /// Returns every value by its path, except for tasks, seeds and builds.
     fn leaves(&self) -> BTreeMap<String, String> {
         let RunIdentity { policy, controller, rules, tasks: _, seeds: _, starts, builds: _ } = self;
         let mut found = BTreeMap::new();
@@ -160,7 +165,7 @@ impl RunIdentity {
         found
     }
 
-    /// Name of a folder for this run, on whichever build: `expert-benchmark-0123abcd`.
+    /// Returns the name of a folder for this run, independent of the build: `expert-benchmark-0123abcd`.
     pub fn folder_name(&self) -> String {
         let all = format!("{:?}", (self.leaves(), &self.tasks, &self.seeds));
         let protocol = self.rules["protocol"].as_str().unwrap_or("run");
@@ -168,7 +173,8 @@ impl RunIdentity {
     }
 }
 
-/// Default folder of the run that plays `plan` as the policy called `name`, in the folder `runs`.
+/// Returns the default folder of the run that plays `plan` as the policy called `name`, in the folder
+/// `runs`.
 pub fn default_folder(plan: &EvaluationPlan, name: Option<&str>, runs: &Path) -> std::path::PathBuf {
     // Two files with one name would share a default, and the second would be refused there.
     let controller = json!(plan.locomotion).to_string();
@@ -179,7 +185,7 @@ pub fn default_folder(plan: &EvaluationPlan, name: Option<&str>, runs: &Path) ->
     runs.join(identity.folder_name())
 }
 
-/// What a task is told and made of, where nothing else takes its place.
+/// Source of a task that is not replaced by a file.
 const BUILT_IN: &str = "built in";
 
 fn words(spec: &EpisodeSpec) -> String {
@@ -194,7 +200,7 @@ fn rules(spec: &EpisodeSpec) -> Value {
     if let Value::Object(fields) = &mut rules {
         fields.retain(|name, _| !OF_SINGLE_EPISODES.contains(&name.as_str()));
         if let Some(Value::Object(keyed)) = fields.get_mut("keyed_seed") {
-            // What the key draws is of single episodes, too.
+            // The seed drawn by the key belongs to single episodes, too.
             keyed.retain(|name, _| name != "drawn");
         }
     }
@@ -219,7 +225,7 @@ fn collect(path: &str, value: &Value, found: &mut BTreeMap<String, String>) {
     }
 }
 
-/// A policy's name as a part of a folder's name.
+/// Converts a policy's name to a part of a folder's name.
 fn plain(name: &str) -> String {
     let mut plain = String::new();
     for letter in name.chars() {

@@ -1,4 +1,4 @@
-//! Episodes over seeds: plays them in parallel worlds, keeps each result, and counts.
+//! Evaluations: plays episodes over seeds in parallel worlds, stores each result, and counts.
 
 mod cache;
 mod identity;
@@ -27,7 +27,7 @@ pub use retry::{FailedEpisode, failed_episodes};
 pub use run_folder::{OtherRun, is_being_played};
 pub use summary::{Evaluation, TaskSummary};
 
-/// Why an evaluation stopped. Episodes that were played are cached, and the next run goes on from there.
+/// Reason why an evaluation stopped. Played episodes are cached, and the next run continues from there.
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluationError {
     #[error(transparent)]
@@ -59,7 +59,8 @@ pub enum EvaluationError {
 }
 
 impl EvaluationError {
-    /// The error as it is told when of so many `planned` episodes the next run finds `kept`.
+    /// Returns the error with the number of planned episodes, and of those that the next run finds in the
+    /// cache.
     fn after(self, kept: usize, planned: usize) -> EvaluationError {
         match self {
             EvaluationError::PolicyAbsent { reason, .. } => {
@@ -83,18 +84,22 @@ impl From<OtherRun> for EvaluationError {
     }
 }
 
-/// What became of one episode of the plan.
+/// Outcome of one episode of the plan, for progress reports.
 #[derive(Clone, Copy, Debug)]
 pub enum EpisodeEvent<'a> {
     /// An earlier run has played it.
     Kept(&'a PlayedEpisode),
     Played(&'a PlayedEpisode),
-    /// It could not be begun.
+    /// It could not be started.
     LeftOut,
 }
 
-/// Plays what `folder` does not hold yet of the plan's share, writes `results.json` there, and calls `progress` after each
-/// episode of it.
+/// Plays the episodes of the plan's share that `folder` does not hold yet, and writes `results.json` there.
+/// Calls `progress` after each episode of the share.
+///
+/// # Errors
+///
+/// If the folder holds another run, cannot be written, or an episode cannot be played.
 pub fn evaluate(
     plan: &EvaluationPlan,
     folder: &Path,
@@ -103,33 +108,34 @@ pub fn evaluate(
     EvaluationRun::begin(plan, folder)?.play(progress)
 }
 
-/// An evaluation whose folder is found to be its own, and in which this process plays.
+/// An evaluation in its own folder, in which this process plays.
 pub struct EvaluationRun<'a> {
     folder: &'a Path,
     place: EvaluationFolder,
     cache: EpisodeCache<'a>,
     work: Vec<EpisodeSpec>,
-    /// Those that nobody has demonstrated.
+    /// Episodes without a demonstration.
     undemonstrated: Vec<String>,
 }
 
-/// What a run has before it plays.
+/// State of a run before it plays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KeptEpisodes {
-    /// Episodes that are kept.
+    /// Number of cached episodes.
     pub kept: usize,
-    /// How many of them another build has played.
+    /// Number of cached episodes that another build has played.
     pub of_other_builds: usize,
     pub to_play: usize,
-    /// How many of these have a result that this build cannot read, and that it replaces.
+    /// Number of episodes to play whose result this build cannot read, and which it replaces.
     pub unreadable: usize,
 }
 
 impl<'a> EvaluationRun<'a> {
-    /// Makes `folder` that of the run, or finds that it is.
+    /// Creates the run in `folder`, or continues it there.
     ///
     /// # Errors
-    /// Returns [`EvaluationError::OtherRun`] where it holds another run, of which nothing is touched.
+    ///
+    /// Returns [`EvaluationError::OtherRun`] if the folder holds another run, of which nothing is touched.
     pub fn begin(plan: &'a EvaluationPlan, folder: &'a Path) -> Result<EvaluationRun<'a>, EvaluationError> {
         let build = fingerprint::build().map_err(EpisodeError::Build)?;
         let locomotion = plan.locomotion.load().map_err(EpisodeError::from)?.name();
@@ -141,12 +147,12 @@ impl<'a> EvaluationRun<'a> {
         Ok(EvaluationRun { folder, place, cache, work, undemonstrated })
     }
 
-    /// Whether two processes in this folder would not notice each other.
+    /// Returns `true` if two processes in this folder would not notice each other.
     pub fn is_without_locks(&self) -> bool {
         self.place.without_locks
     }
 
-    /// What is kept, and what there is to play.
+    /// Returns the numbers of cached episodes and of episodes to play.
     pub fn kept(&self) -> KeptEpisodes {
         let found: Vec<PlayedEpisode> = self.work.iter().filter_map(|spec| self.cache.load(spec)).collect();
         let of_other_builds = found.iter().filter(|played| played.build != self.cache.build).count();
@@ -159,13 +165,18 @@ impl<'a> EvaluationRun<'a> {
         }
     }
 
-    /// What is kept by now, counted.
+    /// Returns the summary of the episodes that are cached at present.
     pub fn so_far(&self) -> Evaluation {
         let episodes = self.work.iter().filter_map(|spec| self.cache.load(spec)).collect();
         summary::summarise(&self.cache, episodes, self.undemonstrated.clone())
     }
 
-    /// Plays what is not kept yet, writes `results.json`, and calls `progress` after each episode.
+    /// Plays the episodes that are not cached yet, writes `results.json`, and calls `progress` after each
+    /// episode.
+    ///
+    /// # Errors
+    ///
+    /// If an episode or a file fails. Cached episodes are kept.
     pub fn play(&self, progress: &(dyn Fn(EpisodeEvent) + Sync)) -> Result<Evaluation, EvaluationError> {
         let shard = self.cache.plan.shard;
         let planned =
@@ -185,7 +196,7 @@ impl<'a> EvaluationRun<'a> {
     }
 }
 
-/// Shares may lie in one folder.
+/// Returns the name of a share's results file: shares may use one folder.
 fn results_name(shard: Shard) -> String {
     match shard {
         Shard::WHOLE => "results.json".into(),

@@ -1,4 +1,4 @@
-//! What to play: which episodes there are, and which of them are this process's share.
+//! Plan of an evaluation: its episodes, and this process's share of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -17,57 +17,59 @@ use crate::stress::Stress;
 use crate::tasks::Task;
 use crate::variation::Variation;
 
-/// What to play.
+/// The plan of an evaluation.
 #[derive(Clone, Debug)]
 pub struct EvaluationPlan<'a> {
-    /// Who plays.
+    /// The policy that plays.
     pub player: &'a dyn Policy,
     pub protocol: Protocol,
     /// The scene, in place of the tasks' own.
     pub scene: Option<SceneFile>,
     pub robot: RobotFile,
     pub locomotion: Controller,
-    /// What robots know of themselves.
+    /// Knowledge of the robots about themselves.
     pub sensing: Sensing,
     pub renderer: RendererKind,
-    /// How much policies are told.
+    /// Level of assistance to policies.
     pub assistance: Assistance,
-    /// What they are told about their success, and whether success ends an episode.
+    /// Feedback to policies about their success, and whether success ends an episode.
     pub disclosure: Disclosure,
-    /// Whether they are told how to grasp.
+    /// Hints to policies on how to grasp.
     pub hints: Hints,
-    /// Words in place of the tasks' own.
+    /// Instructions in place of the tasks' own.
     pub instructions: Instructions,
-    /// In what episodes vary beyond the benchmark.
+    /// Variation of the episodes beyond the benchmark.
     pub variation: Variation,
-    /// What goes wrong in them.
+    /// Stress on the episodes.
     pub stress: Option<Stress>,
-    /// How long a policy may think in an episode, if not as long as the protocol has it.
+    /// Limit of a policy's thinking time in an episode; `None` for the protocol's own.
     pub thinking_limit_s: Option<u32>,
     pub tasks: Vec<&'static Task>,
     pub seeds: Vec<u32>,
     pub starts: Starts,
     pub shard: Shard,
-    /// Worlds that run side by side, each on a thread of its own.
+    /// Number of worlds that run in parallel, each on a thread of its own.
     pub jobs: usize,
-    /// Record every episode in a folder of its own (`episode.mcap`, `strip.png`, `report.html`).
+    /// True if every episode is recorded in a folder of its own (`episode.mcap`, `strip.png`,
+    /// `report.html`).
     pub record: bool,
-    /// Which of these files stay.
+    /// The files among these that are kept.
     pub files: KeptFiles,
-    /// How often an episode in which the policy itself failed is played again, by one run after another, before it counts as a failure.
+    /// Number of retries of an episode in which the policy itself failed, over all runs. After them, it
+    /// counts as a failure.
     pub retries: u32,
-    /// What draws worlds for seeds that are public, if anything does.
+    /// Key that draws worlds for public seeds; `None` if the seeds are used as they are.
     pub seed_key: Option<SeedKey>,
-    /// What becomes of a run that the folder holds already.
+    /// Treatment of a run that the folder already holds.
     pub existing: ExistingRun,
 }
 
-/// What an evaluator's key makes of the seeds of a plan.
+/// Seeds drawn by an evaluator's key.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeedKey {
-    /// Names the key in results and tells nothing of it.
+    /// Fingerprint that identifies the key in results without revealing it.
     pub fingerprint: String,
-    /// What it draws for each seed.
+    /// Drawn seed for each seed.
     pub drawn: BTreeMap<u32, u32>,
 }
 
@@ -78,24 +80,24 @@ impl SeedKey {
     }
 }
 
-/// What becomes of a run that a folder holds already. The same run goes on in any case.
+/// Treatment of a run that a folder already holds. The same run continues in any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ExistingRun {
     /// Another run is left as it is, and the evaluation refused.
     #[default]
     Refuse,
-    /// The same run of another build goes on with this build; what it holds is kept.
+    /// The same run of another build continues with this build, and keeps its episodes.
     ResumeWithNewBuild,
     /// It is deleted.
     Overwrite,
 }
 
-/// What is kept of episodes that are recorded; by default everything.
+/// Files that are kept of recorded episodes; by default all.
 #[derive(Clone, Copy, Debug)]
 pub struct KeptFiles {
-    /// Whether each has `strip.png` and `report.html`.
+    /// True if each episode gets `strip.png` and `report.html`.
     pub pages: bool,
-    /// Whether of an episode that failed nothing is kept but what it came to.
+    /// True if only the result is kept of an episode that failed.
     pub only_successful: bool,
 }
 
@@ -105,25 +107,28 @@ impl Default for KeptFiles {
     }
 }
 
-/// Where the episodes begin.
+/// Starts of the episodes.
 #[derive(Clone, Debug)]
 pub enum Starts {
     /// They begin at the task's own beginning, and every phase counts.
     Task,
-    /// Each begins where one of these phases began in a demonstration of the same task and seed, and that phase alone counts.
+    /// Each begins where one of these phases began in a demonstration of the same task and seed, and that
+    /// phase alone counts.
     Phases {
-        /// What `tandem collect` or `tandem serve` wrote.
+        /// Folder that `tandem collect` or `tandem serve` wrote.
         demonstrations: PathBuf,
-        /// Numbers or ids, as `p2` or `transfer`; a task without such a phase has no episode of it.
+        /// Numbers or ids, for example `p2` or `transfer`; a task without such a phase has no episode of
+        /// it.
         phases: Vec<String>,
-        /// Begins in the training demonstrations, whose seeds replace the plan's.
+        /// True if episodes begin in the training demonstrations, whose seeds replace the plan's.
         training: bool,
     },
-    /// Each begins some seconds before the moment at which one of these went wrong, in its world; tasks and seeds are theirs.
+    /// Each begins `before_s` seconds before the failure of one of these episodes, in its world. Tasks and
+    /// seeds are those of the failed episodes.
     Moments { failed: Vec<FailedEpisode>, before_s: u32 },
 }
 
-/// The share of one process: every episode whose number leaves this remainder.
+/// The share of one process: every episode whose number divided by `of` leaves the remainder `index`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     pub index: usize,
@@ -131,15 +136,15 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// The share of a process that plays everything.
+    /// Share of a process that plays everything.
     pub const WHOLE: Shard = Shard { index: 0, of: 1 };
 }
 
 impl EvaluationPlan<'_> {
-    /// How often an episode is played again by default.
+    /// Default number of retries of an episode.
     pub const DEFAULT_RETRIES: u32 = 2;
 
-    /// One of the episodes to play.
+    /// Returns the spec of one of the episodes.
     pub fn spec(&self, task: &'static Task, seed: u32, start: Start) -> EpisodeSpec {
         EpisodeSpec {
             robot: self.robot.clone(),
@@ -160,7 +165,8 @@ impl EvaluationPlan<'_> {
         .keyed(self.seed_key.as_ref().and_then(|key| key.of(seed)))
     }
 
-    /// One that begins again where a recorded one had not gone wrong yet: its world, under this plan's rules.
+    /// Returns the spec of an episode that begins before a recorded one failed: its world, under this
+    /// plan's rules.
     fn again(&self, failed: &FailedEpisode, before_s: u32) -> EpisodeSpec {
         let FailedEpisode { spec, recording, .. } = failed;
         let control_step = failed.step_before(before_s);
@@ -181,17 +187,18 @@ impl EvaluationPlan<'_> {
         .keyed(spec.keyed_seed.clone())
     }
 
-    /// What in its episodes is not as the benchmark has it.
+    /// Returns the departures of its episodes from the benchmark.
     pub fn departures(&self) -> Vec<String> {
         self.named(EpisodeSpec::departures)
     }
 
-    /// What in its episodes is not as Tandem usually has it.
+    /// Returns the departures of its episodes from Tandem's defaults.
     pub fn peculiarities(&self) -> Vec<String> {
         self.named(EpisodeSpec::peculiarities)
     }
 
-    /// What is named of its episodes: the same in all of them, but for the files of tasks, for words, and for what has been begun again.
+    /// Collects `of` over its episodes. The result is the same for all of them, except for task files,
+    /// instructions, and retried moments.
     fn named(&self, of: fn(&EpisodeSpec) -> Vec<String>) -> Vec<String> {
         let specs: Vec<EpisodeSpec> = match &self.starts {
             Starts::Task | Starts::Phases { .. } => {
@@ -211,7 +218,7 @@ impl EvaluationPlan<'_> {
         found
     }
 
-    /// This share of the episodes, and which of it are left out because nobody has demonstrated them.
+    /// Returns this share of the episodes, and those of it that are left out for lack of a demonstration.
     pub fn episodes(&self) -> (Vec<EpisodeSpec>, Vec<String>) {
         let (mut found, mut left_out) = (Vec::new(), Vec::new());
         let is_own = |number: &usize| number % self.shard.of == self.shard.index;
@@ -242,7 +249,7 @@ impl EvaluationPlan<'_> {
         (found, left_out)
     }
 
-    /// The seeds that are played of `task`.
+    /// Returns the seeds of `task` that are played.
     fn seeds_of(&self, task: &Task) -> Vec<u32> {
         match &self.starts {
             Starts::Phases { demonstrations, training: true, .. } => training_seeds(demonstrations, task),
@@ -250,7 +257,7 @@ impl EvaluationPlan<'_> {
         }
     }
 
-    /// Numbers of the phases that episodes of `task` begin at; `None` for its own beginning.
+    /// Returns the numbers of the phases at which episodes of `task` begin; `None` for its own beginning.
     fn starts_of(&self, task: &Task) -> Vec<Option<String>> {
         match &self.starts {
             Starts::Task | Starts::Moments { .. } => vec![None],
@@ -266,19 +273,20 @@ impl EvaluationPlan<'_> {
     }
 }
 
-/// Number of training demonstrations of a task: the benchmark's, and that of the split by `tandem export`.
+/// Largest number of training demonstrations of a task: that of the benchmark, and of the split by `tandem
+/// export`.
 const MAX_TRAINING_DEMONSTRATIONS: usize = 50;
 
-/// Folders of a task's demonstrations, each with the prefix of their names before the seed.
+/// Returns the folders of a task's demonstrations, each with the prefix of their names before the seed.
 ///
-/// `collect` and `serve` write them so.
+/// `collect` and `serve` write them in this layout.
 fn demonstration_folders(folder: &Path, task: &Task) -> [(PathBuf, String); 3] {
     let id = task.id;
     let (collected, served) = (format!("{id}-"), format!("{id}-seed"));
     [(folder.join("episodes"), collected.clone()), (folder.into(), collected), (folder.into(), served)]
 }
 
-/// The recording of a task and seed.
+/// Returns the recording of a task and seed.
 fn demonstration(folder: &Path, task: &Task, seed: u32) -> Option<PathBuf> {
     let recordings = demonstration_folders(folder, task)
         .map(|(folder, begins)| folder.join(format!("{begins}{seed}")).join(Recorder::FILE_NAME));

@@ -1,4 +1,4 @@
-//! How many episodes an evaluation is to have, and how it goes on, for whoever looks on.
+//! Number of planned episodes of an evaluation, and its state, for other processes that display them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,36 +8,36 @@ use serde::{Deserialize, Serialize};
 use super::{EvaluationError, Shard};
 use crate::output::write_whole;
 
-/// What the file is called where one process plays everything, and what it begins with where each plays a share.
+/// Name of the file if one process plays everything; `SHARE` is its prefix if each process plays a share.
 const WHOLE: &str = "planned.json";
 const SHARE: &str = "planned-";
 
-/// How many episodes a share of an evaluation has, and how it goes on.
+/// Number of episodes of a share of an evaluation, and its state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlannedEpisodes {
     pub episodes: usize,
-    /// How many of them could not be begun; known at the end.
+    /// Number of episodes that could not be started; known at the end.
     #[serde(default)]
     pub left_out: usize,
-    /// Unknown of what earlier builds wrote.
+    /// `None` in files of earlier builds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state: Option<RunState>,
 }
 
-/// How an evaluation goes on.
+/// State of an evaluation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RunState {
-    /// It is played; or its process is gone, and nobody could say so.
+    /// It is being played, or its process was killed before it could write another state.
     Playing,
-    /// It has come to its end.
+    /// It has ended.
     Complete,
     /// An error has stopped it.
     Stopped,
 }
 
 impl PlannedEpisodes {
-    /// Writes it into the folder of the evaluation.
+    /// Writes the file into the folder of the evaluation.
     pub(super) fn write(self, folder: &Path, shard: Shard) -> Result<(), EvaluationError> {
         let name = match shard {
             Shard::WHOLE => WHOLE.into(),
@@ -46,7 +46,8 @@ impl PlannedEpisodes {
         Ok(write_whole(&folder.join(name), serde_json::to_string(&self)?.as_bytes())?)
     }
 
-    /// All shares of an evaluation that have begun as one; `None` where no share has said anything.
+    /// Reads all shares of an evaluation that have begun, combined into one; `None` if no share has written
+    /// a file.
     pub fn read_all(folder: &Path) -> Option<PlannedEpisodes> {
         let read = |path: PathBuf| serde_json::from_slice::<PlannedEpisodes>(&fs::read(path).ok()?).ok();
         if let Some(whole) = read(folder.join(WHOLE)) {
@@ -57,7 +58,7 @@ impl PlannedEpisodes {
         shares.filter_map(|file| read(file.path())).reduce(PlannedEpisodes::with)
     }
 
-    /// Two shares as one. It is played as long as one of them is.
+    /// Combines two shares. The result is being played as long as one of them is.
     fn with(self, other: PlannedEpisodes) -> PlannedEpisodes {
         let state = match (self.state, other.state) {
             (Some(RunState::Complete), Some(RunState::Complete)) => Some(RunState::Complete),
@@ -75,7 +76,7 @@ impl PlannedEpisodes {
     }
 }
 
-/// Whether an evaluation has written the file of this name to say how many episodes it plans.
+/// Returns `true` if an evaluation uses this file name for its planned episodes.
 pub(super) fn is_planned_file(name: &str) -> bool {
     name == WHOLE || (name.starts_with(SHARE) && name.ends_with(".json"))
 }

@@ -1,4 +1,4 @@
-//! Episodes that went wrong, to be begun again a little before that.
+//! Failed episodes that are retried from shortly before their failure.
 
 use std::path::{Path, PathBuf};
 
@@ -8,24 +8,29 @@ use crate::recording::Recording;
 use crate::reports::{LoadError, load, moment_of_failure};
 use crate::spec::EpisodeSpec;
 
-/// An episode that failed, and when it went wrong.
+/// An episode that failed, and the time of its failure.
 #[derive(Clone, Debug)]
 pub struct FailedEpisode {
     pub spec: EpisodeSpec,
-    /// Its `episode.mcap`.
+    /// Path of its `episode.mcap`.
     pub recording: PathBuf,
-    /// Simulated time at which it went wrong.
+    /// Simulated time of the failure.
     pub time_s: f64,
 }
 
 impl FailedEpisode {
-    /// The world's control step that is so many seconds before the episode went wrong.
+    /// Returns the world's control step `before_s` seconds before the failure.
     pub fn step_before(&self, before_s: u32) -> u64 {
         ((self.time_s - f64::from(before_s)).max(0.0) * CONTROL_HZ).round() as u64
     }
 }
 
-/// The episodes in `folder` that failed and were recorded, and which others failed, and why they cannot be begun again.
+/// Returns the recorded episodes in `folder` that failed, and the reasons why other failed ones cannot be
+/// retried.
+///
+/// # Errors
+///
+/// If the folder cannot be loaded.
 pub fn failed_episodes(folder: &Path) -> Result<(Vec<FailedEpisode>, Vec<String>), LoadError> {
     let loaded = load(&[folder.to_owned()])?;
     let (mut failed, mut left_out): (Vec<FailedEpisode>, _) = (Vec::new(), loaded.skipped);
@@ -41,7 +46,7 @@ pub fn failed_episodes(folder: &Path) -> Result<(Vec<FailedEpisode>, Vec<String>
             leave_out("another failure of the same task, seed and stress is begun again");
             continue;
         }
-        // Whoever begins again may be in another folder.
+        // The retry may run in another working directory.
         let recording = std::path::absolute(path).unwrap_or_else(|_| path.clone());
         match Recording::read(&recording).and_then(|read| moment_of_failure(&read)) {
             Ok((time_s, _)) => failed.push(FailedEpisode { spec: spec.clone(), recording, time_s }),
@@ -51,7 +56,8 @@ pub fn failed_episodes(folder: &Path) -> Result<(Vec<FailedEpisode>, Vec<String>
     Ok((failed, left_out))
 }
 
-/// What an episode's file and folder are called that begins again: failures of one seed may differ in their stress.
+/// Returns the name of a retried episode's file and folder. Failures of one seed may differ in their
+/// stress.
 pub(super) fn again_name(spec: &EpisodeSpec) -> String {
     let stress = spec.stress.map(|stress| format!("-{stress}")).unwrap_or_default();
     format!("{}-{}{stress}-again", spec.task.id, spec.seed)

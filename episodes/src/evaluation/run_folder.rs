@@ -1,4 +1,4 @@
-//! The folder of a run: whose it is, and who plays in it at present.
+//! Folder of a run: its identity, and the processes that play in it at present.
 
 use std::fmt;
 use std::fs;
@@ -17,37 +17,37 @@ use crate::results::{EPISODES, PlayedEpisode, STRESS};
 /// The file with the run's identity.
 const IDENTITY_FILE: &str = "run.json";
 
-/// The file that every process locks while it plays episodes of the run, shared with the others.
+/// The file that every process locks, shared with the others, while it plays episodes of the run.
 const PRESENCE_FILE: &str = "run.lock";
 
 /// The file that is locked while the identity is read and written.
 const IDENTITY_LOCK_FILE: &str = "run.json.lock";
 
-/// How often a lock is asked for that others hold for a moment.
+/// Largest number of attempts at a lock that others hold for a moment.
 const MAX_ATTEMPTS: u32 = 40;
 const RETRY_INTERVAL: Duration = Duration::from_millis(50);
 
 /// The folder of a run in which this process plays.
 #[derive(Debug)]
 pub struct EvaluationFolder {
-    /// The builds whose results are kept there.
+    /// Builds whose results are kept there.
     pub builds: Vec<String>,
-    /// Whether the file system has no locks, so that nobody notices another process in the same folder.
+    /// True if the file system has no locks, so that processes in the same folder do not notice each other.
     pub without_locks: bool,
     _presence: Option<FileLock>,
 }
 
-/// Another run than the one that was to be played, and how to go on.
+/// A different run in the folder, and the ways to continue.
 #[derive(Debug)]
 pub struct OtherRun {
     pub folder: PathBuf,
-    /// Where it differs, a line each.
+    /// Differences between the runs, a line each.
     pub differences: Vec<String>,
-    /// Episodes that are kept there.
+    /// Number of episodes in the folder.
     pub kept: usize,
-    /// Whether nothing but the build differs.
+    /// True if only the build differs.
     pub only_build: bool,
-    /// Whether nothing but tasks and seeds differs.
+    /// True if only tasks and seeds differ.
     pub only_episodes: bool,
 }
 
@@ -75,7 +75,7 @@ impl fmt::Display for OtherRun {
 }
 
 impl EvaluationFolder {
-    /// Makes the folder that of the run `now`, or finds that it is; refuses where it is another's.
+    /// Creates the run `now` in the folder, or continues it. Fails if the folder belongs to another run.
     pub fn open(
         folder: &Path,
         now: &RunIdentity,
@@ -107,7 +107,8 @@ impl EvaluationFolder {
     }
 }
 
-/// Whether a process plays in `folder`; `None` where the file system cannot tell.
+/// Returns `true` if a process plays in `folder`; `None` if the file system cannot report it, or the lock
+/// file is missing.
 pub fn is_being_played(folder: &Path) -> Option<bool> {
     let path = folder.join(PRESENCE_FILE);
     if !path.exists() {
@@ -120,7 +121,7 @@ pub fn is_being_played(folder: &Path) -> Option<bool> {
     }
 }
 
-/// Attempts to take a lock that others hold for a moment only; held for longer, it is held.
+/// Attempts several times to take a lock that others hold for a moment only.
 fn take(path: &Path, kind: LockKind) -> io::Result<Locking> {
     let attempts = if kind == LockKind::Shared { MAX_ATTEMPTS } else { 2 };
     for _ in 1..attempts {
@@ -132,7 +133,8 @@ fn take(path: &Path, kind: LockKind) -> io::Result<Locking> {
     FileLock::attempt(path, kind)
 }
 
-/// Compares the run `now` with the one that the folder holds, writes what becomes of it, and returns the builds whose results are kept.
+/// Compares the run `now` with the one in the folder, and writes the resulting identity. Returns the builds
+/// whose results are kept.
 fn settle(
     folder: &Path,
     now: &RunIdentity,
@@ -167,7 +169,7 @@ fn settle(
     }
     let is_replaced = !differences.is_empty();
     if is_replaced {
-        // What holds no episode is nobody's.
+        // A folder without episodes has no owner.
         if !kept.is_empty() || !alone {
             let kept = kept.len();
             let folder = folder.into();
@@ -186,7 +188,7 @@ fn settle(
     Ok(builds)
 }
 
-/// The identity of the run that the folder says that it holds.
+/// Returns the identity of the run that the folder declares.
 fn read(folder: &Path) -> Result<Option<RunIdentity>, EvaluationError> {
     let path = folder.join(IDENTITY_FILE);
     match fs::read(&path) {
@@ -198,7 +200,7 @@ fn read(folder: &Path) -> Result<Option<RunIdentity>, EvaluationError> {
     }
 }
 
-/// The files of single episodes.
+/// Returns the files of single episodes.
 fn episodes_in(folder: &Path) -> Vec<PathBuf> {
     let files = fs::read_dir(folder.join(EPISODES)).into_iter().flatten().flatten().map(|entry| entry.path());
     let mut files: Vec<PathBuf> =
@@ -211,7 +213,7 @@ fn read_episode(path: &Path) -> Option<PlayedEpisode> {
     serde_json::from_slice(&fs::read(path).ok()?).ok()
 }
 
-/// Deletes what a run has written into its folder. A folder that holds no run is left alone.
+/// Deletes the files of a run from its folder. A folder that holds no run is left alone.
 fn clear(folder: &Path) -> io::Result<()> {
     if !folder.join(IDENTITY_FILE).exists()
         && !episodes_in(folder).iter().any(|path| read_episode(path).is_some())

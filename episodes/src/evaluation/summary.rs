@@ -1,4 +1,4 @@
-//! How the episodes went: counts per task, and the intervals that counts of this size leave open.
+//! Summary of episodes: counts per task, and the phase-level rates.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,26 +9,26 @@ use tandem_tools_spec::{Assistance, Protocol};
 use super::cache::EpisodeCache;
 use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, named, shown_in};
 
-/// How a task went over its seeds.
+/// Counts of a task over its seeds.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct TaskSummary {
-    /// Those that count: what follows is of them.
+    /// Number of episodes that count. All other counts, except the last two, refer to them.
     pub episodes: usize,
     pub p1: usize,
     pub p2: usize,
     pub p3: usize,
     pub falls: u32,
     pub mean_env_steps: f64,
-    /// Those that do not count, because the policy itself failed.
+    /// Episodes that do not count, because the policy itself failed.
     pub policy_failed: usize,
-    /// Those that do not count, because the simulator failed.
+    /// Episodes that do not count, because the simulator failed.
     pub simulator_failed: usize,
 }
 
 /// The content of `results.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Evaluation {
-    /// Who played.
+    /// The policy.
     #[serde(flatten)]
     pub policy: PolicyCard,
     pub protocol: Protocol,
@@ -36,31 +36,31 @@ pub struct Evaluation {
     #[serde(flatten)]
     pub sensing: Sensing,
     pub assistance: Assistance,
-    /// What was not as the benchmark has it.
+    /// Departures from the benchmark.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub departures: Vec<String>,
-    /// What of it is not as Tandem usually has it, as stands behind the policy's name.
+    /// Departures from Tandem's defaults, for display after the policy's name.
     #[serde(skip)]
     pub peculiarities: Vec<String>,
-    /// What the policy was shown in any episode that the benchmark's own policies are not.
+    /// Extra information that the policy was shown in any episode, beyond the benchmark's own policies.
     #[serde(skip_serializing_if = "BTreeSet::is_empty")]
     pub extra_information: BTreeSet<String>,
-    /// How the episodes went that began at their task's beginning.
+    /// Summary of the episodes that began at their task's beginning, by task.
     pub tasks: BTreeMap<String, TaskSummary>,
-    /// How those went that began at a phase.
+    /// Summary of the episodes that began at a phase.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub phase_level: Option<PhaseLevel>,
-    /// Episodes that could not be begun, and why.
+    /// Episodes that could not be started, with the reasons.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub left_out: Vec<String>,
-    /// How many of them other builds have played, by build.
+    /// Number of episodes that other builds have played, by build.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub other_builds: BTreeMap<String, usize>,
     pub episodes: Vec<PlayedEpisode>,
 }
 
 impl Evaluation {
-    /// The policy's name with what has to be known beside it, as reports have it.
+    /// Returns the policy's name with its extra information and departures, as in reports.
     pub fn full_name(&self) -> String {
         let shown = shown_in(self.episodes.iter());
         named(&named(&self.policy.name, &shown), &self.peculiarities)
@@ -109,7 +109,7 @@ pub fn summarise(cache: &EpisodeCache, episodes: Vec<PlayedEpisode>, left_out: V
     }
 }
 
-/// Those of all episodes, and those of what the policy asked for in any of them.
+/// Returns the departures of all episodes, including those that the policy requested in any of them.
 fn departures(cache: &EpisodeCache, episodes: &[PlayedEpisode]) -> Vec<String> {
     let mut found = cache.plan.departures();
     for departure in episodes.iter().flat_map(|played| &played.result.departures) {

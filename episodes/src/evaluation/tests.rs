@@ -1,4 +1,4 @@
-//! Which episodes are cached, what is noted, and how they are counted.
+//! Tests of the cache, the notes and the counts.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -41,7 +41,7 @@ pub(super) fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) 
     }
 }
 
-/// An episode that was played under `cache`'s rules.
+/// Returns an episode that was played under `cache`'s rules.
 pub(super) fn played(cache: &EpisodeCache, spec: &EpisodeSpec) -> PlayedEpisode {
     PlayedEpisode {
         policy: cache.plan.player.card(),
@@ -66,13 +66,13 @@ fn the_first_phase_that_was_missed_is_noted() {
     assert_eq!(second.as_deref(), Some("p2 was not reached in 812 steps"));
     assert_eq!(note([Some(4.2), Some(5.0), Some(6.0)]), None);
 
-    // Where one phase counts, no other is missed.
+    // If one phase counts, no other is missed.
     let times = [Some(4.2), Some(5.0), None].into_iter().enumerate();
     let result = result("handover", 7, times.map(|(i, time_s)| (Phase::number(i), time_s)).collect());
     assert_eq!(missed_phase_note(&result, Some(1)), None);
     assert_eq!(missed_phase_note(&result, Some(2)).as_deref(), Some("p3 was not reached in 812 steps"));
 
-    // Where the simulator failed, that is what there is to say.
+    // If the simulator failed, the note says that.
     assert_eq!(episode_note(&result, Some(2)), missed_phase_note(&result, Some(2)));
     let failed = ResultReply { simulator_failure: Some("in step 813, physics diverged".into()), ..result };
     assert_eq!(
@@ -277,7 +277,7 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
         assert_eq!(kept_after(&serde_json::to_string(&other).unwrap()), None, "another {what}");
     }
 
-    // One that was played without a recording is no demonstration.
+    // An episode that was played without a recording is no demonstration.
     let recorded = EvaluationPlan { record: true, ..plan.clone() };
     let collector = EpisodeCache { plan: &recorded, ..cache };
     std::fs::write(folder.path().join("pouring-7.json"), &text).unwrap();
@@ -293,7 +293,6 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     assert_eq!(collector.load(&spec), Some(same));
 }
 
-/// What an episode came to whose policy, or whose simulator, failed after it had reached `reached` phases of three.
 /// A policy that plays nothing.
 #[derive(Debug)]
 struct Unplayable(fn() -> PlayError);
@@ -326,7 +325,8 @@ impl Policy for FailingPolicy {
     }
 }
 
-/// Whoever fails itself when it is about to lose is played again as often as is asked for, and every attempt stays.
+/// A policy that fails itself whenever it is about to lose is retried as often as the plan says, and every
+/// attempt is kept.
 #[test]
 fn a_policy_that_fails_itself_again_and_again_has_failed() {
     let folder = tempfile::tempdir().unwrap();
@@ -372,8 +372,7 @@ fn what_was_played_before_is_kept_where_no_other_episode_can_be() {
         }
         workers::play_all(&cache, &work, &mut left_out, &|_| {}).map(|episodes| (episodes.len(), left_out))
     };
-    // The first episode finds nobody; what comes after it was played by an earlier run.
-    // A player that knows a task not at all plays none of its episodes.
+    // A player that does not know a task plays none of its episodes.
     let player = players::find("no_words").unwrap();
     let refused = player.play_episode(
         &EpisodeSpec::new(tasks::find("handover").unwrap(), 1, Protocol::Benchmark),
@@ -419,7 +418,7 @@ fn what_failed_itself_is_counted_apart_and_played_again() {
         (EndReason::Finished, 2),
         (EndReason::PolicyFailed, 2),
         (EndReason::SimulatorFailed, 1),
-        // What was reached before it failed was reached.
+        // A phase that was reached before the failure stays reached.
         (EndReason::PolicyFailed, 3),
         (EndReason::Abandoned, 0),
     ];

@@ -1,4 +1,5 @@
-//! Worlds side by side, each on a thread of its own; the first failure stops the others after their present episode.
+//! Parallel worlds, each on a thread of its own. The first failure stops the others after their present
+//! episode.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, mpsc};
@@ -8,7 +9,8 @@ use super::{EpisodeEvent, EvaluationError};
 use crate::results::PlayedEpisode;
 use crate::spec::EpisodeSpec;
 
-/// Every episode of `work`, cached or played, in its order; those that could not be begun are added to `left_out`.
+/// Plays or loads every episode of `work`, and returns them in its order. Episodes that could not be
+/// started are added to `left_out`.
 pub fn play_all(
     cache: &EpisodeCache,
     work: &[EpisodeSpec],
@@ -17,7 +19,7 @@ pub fn play_all(
 ) -> Result<Vec<PlayedEpisode>, EvaluationError> {
     let next = AtomicUsize::new(0);
     let failure = Mutex::new(None);
-    // What other processes play is come to last, when they have most likely finished it.
+    // Episodes of other processes are taken up last, when they are most likely finished.
     let elsewhere = Mutex::new(Vec::new());
     let (done, played) = mpsc::channel();
     let mut outcomes: Vec<(usize, PlannedOutcome)> = std::thread::scope(|scope| {
@@ -49,7 +51,7 @@ pub fn play_all(
         played.iter().inspect(|(_, outcome)| progress(outcome.into())).collect()
     });
     if let Some(error) = lock(&failure).take() {
-        // As the next run will find it: also what lies there from before, and was not come to.
+        // Count what the next run will find, including earlier episodes that were not reached.
         let kept = work.iter().filter(|spec| cache.load(spec).is_some()).count();
         return Err(error.after(kept, work.len()));
     }
@@ -58,7 +60,7 @@ pub fn play_all(
     for (number, outcome) in outcomes {
         match outcome {
             PlannedOutcome::Kept(played) | PlannedOutcome::Played(played) => episodes.push(*played),
-            // Who waits for an episode plays it, or finds it played.
+            // The thread that waits for an episode plays it, or finds it played.
             PlannedOutcome::Elsewhere => {}
             PlannedOutcome::LeftOut(reason) => {
                 let EpisodeSpec { task, seed, .. } = &work[number];
@@ -69,7 +71,7 @@ pub fn play_all(
     Ok(episodes)
 }
 
-/// The episodes that no thread has begun yet.
+/// Queue of the episodes that no thread has begun yet.
 #[derive(Clone, Copy)]
 struct Queue<'a> {
     next: &'a AtomicUsize,
@@ -78,7 +80,7 @@ struct Queue<'a> {
 }
 
 impl Queue<'_> {
-    /// Number of the next episode, and whether to wait for another process that plays it.
+    /// Returns the number of the next episode, and whether to wait for another process that plays it.
     fn next(self) -> Option<(usize, bool)> {
         let number = self.next.fetch_add(1, Ordering::Relaxed);
         if number < self.episodes {
@@ -91,7 +93,7 @@ impl Queue<'_> {
         lock(self.elsewhere).push(number);
     }
 
-    /// Has nobody begin another episode.
+    /// Empties the queue, so that no thread begins another episode.
     fn stop(self) {
         self.next.store(self.episodes, Ordering::Relaxed);
         lock(self.elsewhere).clear();

@@ -1,9 +1,10 @@
-//! Pages of HTML: what they have in common, and how text is put into them.
+//! HTML pages: their common frame, and the escaping of text.
 
-/// The look of every page, in light and in dark, from a telephone's width on. It loads nothing.
+/// Style of every page, in light and in dark, from a phone's width on. It loads nothing.
 const STYLE: &str = include_str!("page.css");
 
-/// A page that needs nothing else: no script, no font, no picture from elsewhere. `title` is text, `body` is HTML.
+/// Returns a self-contained page: no script, no font, no image from elsewhere. `title` is text, `body` is
+/// HTML.
 pub fn page(title: &str, body: &str) -> String {
     let title = escape(title);
     format!(
@@ -26,7 +27,7 @@ pub fn page(title: &str, body: &str) -> String {
     )
 }
 
-/// Text as it may stand in HTML, in attributes too.
+/// Escapes text for HTML, including attributes.
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
@@ -52,7 +53,7 @@ mod tests {
         assert!(page("a<b>", "").contains("<title>a&lt;b&gt;</title>"));
     }
 
-    /// At 400 pixels, which are 25 rem, nothing may be wider than the page unless it is scrolled on its own.
+    /// At 400 pixels, which are 25 rem, nothing may be wider than the page unless it scrolls on its own.
     #[test]
     fn nothing_has_a_width_that_a_telephone_has_not() {
         let narrow_rem = 25.0;
@@ -87,7 +88,7 @@ mod tests {
         }
     }
 
-    /// Properties and their values.
+    /// Returns the properties of the style sheet and their values.
     fn declarations() -> impl Iterator<Item = (&'static str, &'static str)> {
         let lines = STYLE.split(['{', '}', ';']);
         lines

@@ -1,5 +1,5 @@
-//! Repeats what the robots of a recorded episode were told, from where this one starts in it: on the build that recorded it
-//! every phase is reached as it was then, which is the most that a start leaves possible.
+//! Replay of a recorded episode's commands from a phase's start. On the build that made the recording, it
+//! reaches every phase as recorded, the most that any player can reach from that start.
 
 use tandem_sim::Step;
 use tandem_tools_spec::{JointChunk, SendJointChunk};
@@ -9,7 +9,7 @@ use crate::commands::base_row;
 use crate::recording::{Recording, RecordingError};
 use crate::spec::{EpisodeSpec, PhaseStart, Start};
 
-/// Sends recorded action rows.
+/// A player that sends recorded action rows.
 pub struct Demonstration {
     spec: EpisodeSpec,
 }
@@ -19,7 +19,7 @@ impl Demonstration {
         Demonstration { spec: spec.clone() }
     }
 
-    /// The recorded steps after the start.
+    /// Returns the recorded steps after the start.
     fn steps(&self) -> Result<Vec<Step>, PlayerError> {
         let unreadable = |error: RecordingError| PlayerError::GaveUp(error.to_string());
         let Start::Phase(PhaseStart { recording, phase }) = &self.spec.start else {
@@ -47,7 +47,7 @@ impl Player for Demonstration {
     }
 }
 
-/// What robot number `robot` was told for `step`.
+/// Returns the action row of robot number `robot` in `step`.
 pub fn action(step: &Step, robot: usize) -> Vec<f64> {
     let command = &step.robots[robot].command;
     command.upper_rad.into_iter().chain(base_row(&command.base)).map(f64::from).collect()

@@ -1,14 +1,14 @@
-//! Nobody: robots hold still. What a task lets this player reach is no achievement.
+//! A player whose robots hold still. A phase that it reaches is no achievement.
 
 use tandem_tools_spec::Wait;
 
 use super::{Episode, Player, PlayerError};
 use crate::tasks::Task;
 
-/// The agentic protocol allows no more.
+/// Control steps of one command, the most that the agentic protocol allows.
 const STEPS_PER_COMMAND: u32 = 25;
 
-/// Waits for as long as the benchmark protocol lasts.
+/// A player that waits for as long as the benchmark protocol lasts.
 pub struct Idle {
     commands: u32,
 }

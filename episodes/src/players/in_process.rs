@@ -1,4 +1,4 @@
-//! An episode in this process, as a player meets it.
+//! An episode in this process, in the form that players use.
 
 use tandem_tools_spec::{ExtraInformation, Observe, Tool as _, ToolCall, ToolReply};
 
@@ -10,17 +10,17 @@ use crate::{EpisodeError, Session};
 /// An episode in this process.
 pub struct InProcess {
     pub session: Session,
-    /// The number of phases after which the episode is over for the player, whatever is left of it.
+    /// Number of phases after which the episode is over for the player, even if the session goes on.
     until: usize,
 }
 
 impl InProcess {
-    /// An episode that is played to its end.
+    /// Creates an episode that is played to its end.
     pub fn new(session: Session) -> InProcess {
         InProcess { session, until: usize::MAX }
     }
 
-    /// An episode that is played until `phases` phases have been reached.
+    /// Creates an episode that is played until `phases` phases have been reached.
     pub fn until(phases: usize, session: Session) -> InProcess {
         InProcess { session, until: phases }
     }

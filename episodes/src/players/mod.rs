@@ -1,5 +1,5 @@
-//! Who acts in an episode. A player makes tool calls; those that solve a task by knowing what only the simulator knows say
-//! so in their type, and nobody else can be handed it.
+//! Players that act in an episode by tool calls. A player that solves a task through knowledge that only
+//! the simulator has is a [`PrivilegedPlayer`]; no other type receives that knowledge.
 //!
 //! To add a player: one file or folder here and its line in [`ALL`].
 
@@ -26,39 +26,41 @@ pub trait Episode {
     fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError>;
 }
 
-/// An episode that also shows what no policy is told.
+/// An episode that also shows facts that no policy sees.
 pub trait PrivilegedEpisode: Episode {
     fn facts(&mut self) -> Result<Facts, PlayerError>;
 }
 
-/// An episode in the caller's own process, which shows views as they were drawn.
+/// An episode in the caller's own process, which shows images as rendered.
 pub trait LocalEpisode: Episode {
-    /// What a call of `observe` shows, as it was drawn, with nothing withheld; of what the benchmark's own policies are not shown, the
-    /// policy itself is `shown` this.
+    /// Returns what a call of `observe` shows, as rendered, with nothing withheld. `shown` is the extra
+    /// information that the policy receives beyond the benchmark's own policies.
     fn observe(
         &mut self,
         observe: &Observe,
         shown: &[ExtraInformation],
     ) -> Result<TeamObservation, PlayerError>;
 
-    /// Carries out what a policy decided. Nothing is withheld from the reply, which the policy itself is not shown.
+    /// Executes a call that a policy decided on. Nothing is withheld from the reply, which the policy
+    /// itself does not see.
     fn carry_out(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError>;
 
-    /// The room, seen from where no robot stands: more than a policy has, and results say so.
+    /// Returns an image of the room from a third-person view. A policy that sees it has extra information,
+    /// and its results record that.
     fn third_person(&mut self) -> Result<Picture, PlayerError>;
 }
 
-/// Plays one episode to its end by tool calls alone; made anew for each episode.
+/// A player that plays one episode to its end by tool calls alone; created anew for each episode.
 pub trait Player {
     fn play(&mut self, episode: &mut dyn Episode) -> Result<(), PlayerError>;
 }
 
-/// Plays one episode to its end with knowledge of the facts; made anew for each episode.
+/// A player that plays one episode to its end with knowledge of the facts; created anew for each episode.
 pub trait PrivilegedPlayer {
     fn play(&mut self, episode: &mut dyn PrivilegedEpisode) -> Result<(), PlayerError>;
 }
 
-/// Why a player stopped before the episode's end.
+/// Reason why a player stopped before the episode's end.
 #[derive(Debug, thiserror::Error)]
 pub enum PlayerError {
     #[error("no player {name:?}; have: {}", .have.join(", "))]
@@ -75,7 +77,7 @@ pub enum PlayerError {
     Call { tool: &'static str, reason: String },
     #[error("{0}")]
     GaveUp(String),
-    /// The policy itself failed, as one whose server is gone: what it would have done nobody knows.
+    /// The policy itself failed, for example because its server is gone: its further actions are unknown.
     #[error("{0}")]
     Failed(String),
 }
@@ -88,7 +90,7 @@ pub struct PlayerEntry {
     make: PlayerFactory,
 }
 
-/// How a player is made for an episode.
+/// Constructor of a player for an episode.
 #[derive(Debug)]
 enum PlayerFactory {
     Player(fn(&EpisodeSpec) -> Result<Box<dyn Player>, PlayerError>),
@@ -119,7 +121,11 @@ pub static ALL: &[PlayerEntry] = &[
     },
 ];
 
-/// The player called `name`.
+/// Returns the player called `name`.
+///
+/// # Errors
+///
+/// If there is none; the error lists the players.
 pub fn find(name: &str) -> Result<&'static PlayerEntry, PlayerError> {
     ALL.iter().find(|entry| entry.name == name).ok_or_else(|| PlayerError::UnknownPlayer {
         name: name.into(),
@@ -127,13 +133,17 @@ pub fn find(name: &str) -> Result<&'static PlayerEntry, PlayerError> {
     })
 }
 
-/// The player that plays a task by itself: its expert, or nobody where none knows it.
+/// Returns the player for a task without another policy: its expert, or the idle player if it has none.
 pub fn expert_or_nobody(task: &'static Task) -> Result<&'static PlayerEntry, PlayerError> {
     find(if experts::solves(task) { "expert" } else { "idle" })
 }
 
 impl PlayerEntry {
-    /// Whether it can play such an episode; why not, if it cannot.
+    /// Checks that the player can play such an episode.
+    ///
+    /// # Errors
+    ///
+    /// The reason if it cannot.
     pub fn check(&self, spec: &EpisodeSpec) -> Result<(), PlayerError> {
         match self.make {
             PlayerFactory::Player(make) => make(spec).map(drop),
@@ -141,7 +151,8 @@ impl PlayerEntry {
         }
     }
 
-    /// Plays the episode `spec`. That it ends under way is no error: the last phase may have been reached.
+    /// Plays the episode `spec`. An episode that ends under way is no error: the last phase may have been
+    /// reached.
     pub fn play(&self, spec: &EpisodeSpec, episode: &mut dyn PrivilegedEpisode) -> Result<(), PlayerError> {
         let outcome = match self.make {
             PlayerFactory::Player(make) => make(spec)?.play(episode),

@@ -1,5 +1,5 @@
-//! Replays the action rows of a demonstration of one seed in episodes of other seeds, without a look: what comes of that needs no
-//! eyes, and a policy that does not get farther has shown none.
+//! Replay of a demonstration's action rows in episodes of other seeds, without observations. Its results
+//! need no perception, and a policy that gets no farther has shown none.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,27 +20,28 @@ use crate::scoring::Phase;
 use crate::spec::{EpisodeSpec, Start};
 use crate::tasks::{self, Task};
 
-/// Of every task so many demonstrations are taken: the second is for the seed of the first.
+/// Number of demonstrations per task: the second serves the seed of the first.
 const PER_TASK: usize = 2;
 
-/// Sends the rows of recorded demonstrations to their end, and then the last one until nothing can change any more.
+/// A policy that sends the rows of recorded demonstrations to their end, and then repeats the last row
+/// until nothing can change any more.
 #[derive(Debug)]
 pub struct OpenLoop {
     demonstrations: Vec<RecordedRows>,
 }
 
-/// What the robots of one recorded episode were told.
+/// Action rows of one recorded episode.
 #[derive(Debug)]
 struct RecordedRows {
     task: &'static Task,
     seed: u32,
     /// Hash of the file.
     xxh3: String,
-    /// Of each control step, a row for each robot.
+    /// Rows of each control step, one for each robot.
     step_rows: Vec<Vec<Vec<f64>>>,
 }
 
-/// Why nothing can be replayed.
+/// Reason why nothing can be replayed.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenLoopError {
     #[error(transparent)]
@@ -54,7 +55,12 @@ pub enum OpenLoopError {
 }
 
 impl OpenLoop {
-    /// Reads a recording, or of every task the first that succeeded of a folder as `collect` writes it.
+    /// Reads a recording, or the first successful recordings of every task in a folder that `collect`
+    /// wrote.
+    ///
+    /// # Errors
+    ///
+    /// If the path cannot be read, has no recording of an episode, or has one that begins at a checkpoint.
     pub fn read(path: &Path) -> Result<OpenLoop, OpenLoopError> {
         if !path.is_dir() {
             return Ok(OpenLoop { demonstrations: vec![RecordedRows::read(path)?.0] });
@@ -68,7 +74,7 @@ impl OpenLoop {
                 }
                 chosen.push(RecordedRows::read(&path)?);
             }
-            // Those that failed come last, in case there is nothing better.
+            // Failed recordings come last, in case there is nothing better.
             chosen.sort_by_key(|(_, succeeded)| !succeeded);
             demonstrations.extend(chosen.into_iter().take(PER_TASK).map(|(rows, _)| rows));
         }
@@ -78,7 +84,7 @@ impl OpenLoop {
         }
     }
 
-    /// What to replay in an episode: never what was recorded under its own seed.
+    /// Returns the rows to replay in an episode, never those recorded under its own seed.
     fn rows(&self, spec: &EpisodeSpec) -> Result<&RecordedRows, PlayError> {
         let of_task = self.demonstrations.iter().filter(|rows| rows.task == spec.task);
         let mut others = of_task.clone().filter(|rows| rows.seed != spec.seed);
@@ -104,7 +110,7 @@ impl Policy for OpenLoop {
     }
 }
 
-/// The recordings of a task in a folder as `collect` or `serve` write it, by seed.
+/// Returns the recordings of a task by seed, in a folder that `collect` or `serve` wrote.
 fn recordings(folder: &Path, task: &Task) -> Result<BTreeMap<u32, PathBuf>, OpenLoopError> {
     let kept = folder.join(EPISODES);
     let folder = if kept.is_dir() { &kept } else { folder };
@@ -124,7 +130,7 @@ fn recordings(folder: &Path, task: &Task) -> Result<BTreeMap<u32, PathBuf>, Open
 }
 
 impl RecordedRows {
-    /// The rows of a recording, and whether its episode succeeded.
+    /// Reads the rows of a recording, and whether its episode succeeded.
     fn read(path: &Path) -> Result<(RecordedRows, bool), OpenLoopError> {
         let bytes = read_bytes(path, MAX_RECORDING_BYTES)
             .map_err(|source| RecordingError::Read { path: path.into(), source })?;
@@ -134,7 +140,8 @@ impl RecordedRows {
         if *start != Start::Task {
             return Err(OpenLoopError::BeginsLater(path.into()));
         }
-        // The state that it begins with, and the time that robots stood before the policy's turn, are no steps of the policy.
+        // The initial state, and the time that robots stood before the policy's turn, are no steps of the
+        // policy.
         let before = 1 + rules(*protocol, task).initial_hold_steps as usize;
         let robots = task.robots.len();
         let row = |step: Result<tandem_sim::Step, RecordingError>| {
@@ -150,7 +157,7 @@ impl RecordedRows {
         Ok((RecordedRows { task, seed: *seed, xxh3, step_rows: steps }, succeeded))
     }
 
-    /// Until the episode ends, or all phases have been reached.
+    /// Plays until the episode ends, or all phases have been reached.
     fn play(&self, episode: &mut InProcess) -> Result<(), PlayerError> {
         let most = rules(episode.session.spec().protocol, self.task).steps_per_command as usize;
         let Some(last) = self.step_rows.last() else { return Ok(()) };

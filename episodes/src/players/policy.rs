@@ -1,4 +1,4 @@
-//! Whoever plays the episodes of an evaluation: a player of [`super::ALL`], or a policy that lives elsewhere.
+//! Policies that play the episodes of an evaluation: a player of [`super::ALL`], or an external policy.
 
 use std::any::Any;
 use std::fmt::{self, Debug};
@@ -13,29 +13,29 @@ use crate::results::PolicyCard;
 use crate::spec::EpisodeSpec;
 use crate::{EpisodeError, RunFolder, Session, monotonic};
 
-/// Plays episodes, several of them side by side.
+/// A policy that plays episodes, several of them side by side.
 pub trait Policy: Debug + Send + Sync {
-    /// What results say of it.
+    /// Returns the description that results include.
     fn card(&self) -> PolicyCard;
 
     /// Plays `spec` from its start to its result.
     fn play_episode(&self, spec: &EpisodeSpec, output: EpisodeOutput) -> Result<PlayOutcome, PlayError>;
 
-    /// What it waits for at present, before an episode can begin.
+    /// Returns what the policy is waiting for before an episode can begin; `None` if it is not waiting.
     fn waiting(&self) -> Option<PolicyWait> {
         None
     }
 
-    /// Whether its user wants it to end.
+    /// Returns `true` if the policy's user wants it to end.
     fn is_interrupted(&self) -> bool {
         false
     }
 }
 
-/// What a policy waits for, and how long it has.
+/// A wait of a policy, and its duration.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PolicyWait {
-    /// As the addresses of its servers.
+    /// The target, for example the addresses of its servers.
     pub target: String,
     pub lasted: Duration,
 }
@@ -46,51 +46,51 @@ impl fmt::Display for PolicyWait {
     }
 }
 
-/// Where an episode leaves its files.
+/// Output of an episode's files.
 #[derive(Clone, Copy, Debug)]
 pub struct EpisodeOutput<'a> {
-    /// The episode's own folder; nobody has made it yet.
+    /// The episode's own folder, which does not exist yet.
     pub folder: &'a Path,
-    /// Whether the episode is to be recorded there.
+    /// True if the episode is to be recorded there.
     pub record: bool,
-    /// Whether a recorded episode also gets a strip of pictures and a page.
+    /// True if a recorded episode also gets a strip of images and a page.
     pub pages: bool,
 }
 
 impl<'a> EpisodeOutput<'a> {
-    /// Where the episode is recorded, if it is.
+    /// Returns the folder of the recording; `None` if the episode is not recorded.
     pub fn recording(self) -> Option<&'a Path> {
         self.record.then_some(self.folder)
     }
 
-    /// The same, with what is to be written there.
+    /// Returns the run folder of the recording, with its pages option.
     fn run_folder(self) -> Option<RunFolder> {
         self.recording().map(|folder| RunFolder { pages: self.pages, ..RunFolder::from(folder) })
     }
 }
 
-/// What came of an episode that a policy played.
+/// Outcome of an episode that a policy played.
 #[derive(Debug)]
 pub struct PlayOutcome {
     pub result: ResultReply,
-    /// How long it thought.
+    /// The policy's thinking time.
     pub thought: Duration,
-    /// What stopped it before the episode's end, if anything did.
+    /// Reason why it stopped before the episode's end; `None` if it did not.
     pub stopped: Option<String>,
 }
 
-/// Why an episode has no result.
+/// Reason why an episode has no result.
 #[derive(Debug, thiserror::Error)]
 pub enum PlayError {
     #[error(transparent)]
     Episode(#[from] EpisodeError),
-    /// The policy was not ready, and nothing was played; another time it may be.
+    /// The policy was not ready, and nothing was played; a later attempt may succeed.
     #[error("{0}")]
     NotReady(String),
-    /// Nobody is there who could play this episode, or any other.
+    /// No policy is there that could play this episode, or any other.
     #[error("{0}")]
     Absent(String),
-    /// The episode was played, and what came of it is lost.
+    /// The episode was played, and its outcome is lost.
     #[error("{0}")]
     Lost(String),
 }
@@ -106,8 +106,8 @@ impl Policy for PlayerEntry {
     }
 }
 
-/// Plays `spec` in this process: `act` makes the calls. That the episode ends under way is no error, and a panic is a failure of
-/// the policy, which ends this episode and no other.
+/// Plays `spec` in this process: `act` makes the calls. An episode that ends under way is no error. A panic
+/// is a failure of the policy, which ends this episode and no other.
 pub fn play_in_process(
     spec: &EpisodeSpec,
     output: EpisodeOutput,
@@ -119,7 +119,7 @@ pub fn play_in_process(
         None => InProcess::new(session),
     };
     let acted = match episode.session.recording_failed() {
-        // Whoever wants a recording has no use for the episode.
+        // A caller that wants a recording has no use for an unrecorded episode.
         Some(reason) => Err(PlayerError::GaveUp(reason.into())),
         None => catch_unwind(AssertUnwindSafe(|| act(&mut episode))).unwrap_or_else(|panic| {
             Err(PlayerError::Failed(format!("it panicked: {}", panic_text(&*panic))))
@@ -138,7 +138,7 @@ pub fn play_in_process(
     Ok(PlayOutcome { result: episode.session.close(), thought, stopped })
 }
 
-/// What a panic says of itself.
+/// Returns the message of a panic.
 fn panic_text(panic: &(dyn Any + Send)) -> &str {
     let literal = || panic.downcast_ref::<&str>().copied();
     panic.downcast_ref::<String>().map(String::as_str).or_else(literal).unwrap_or("without a word")

@@ -1,12 +1,12 @@
-//! A whole recording in memory, of which every byte has been checked.
+//! A whole recording in memory, every byte of which has been checked.
 //!
-//! | bytes | held to |
+//! | bytes | checked against |
 //! |---|---|
-//! | the marks at both ends, opcode and length of the footer | what they have to be |
-//! | header, metadata, message indexes, lengths | the checksum of the data section, with which the data end |
-//! | chunks, attachments, metadata | that, and first their own, which says where |
+//! | the marks at both ends, opcode and length of the footer | their fixed values |
+//! | header, metadata, message indexes, lengths | the checksum of the data section, at the end of the data |
+//! | chunks, attachments, metadata | the same, and first their own, which locates the damage |
 //! | the summary, and the rest of the footer | the checksum in the footer |
-//! | the checksums | those of the bytes that they are of |
+//! | the checksums | the checksums calculated from the bytes that they cover |
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,20 +16,21 @@ use mcap::records::{Record, op};
 use super::damage::{Damage, Fault, FilePart};
 use super::data_section::{AttachmentPlace, ChunkPlace, DataPart, DataSection, WithoutChecksum, is_covered};
 
-/// Content of a footer: where the summary and its offsets begin, and their checksum.
+/// Length of a footer's content: the offsets of the summary and of its offset section, and their checksum.
 const FOOTER_BYTES: usize = 2 * size_of::<u64>() + size_of::<u32>();
 /// Opcode and length, with which a footer begins.
 const FOOTER_RECORD: [u8; 9] = [op::FOOTER, FOOTER_BYTES as u8, 0, 0, 0, 0, 0, 0, 0];
 
-/// Most bytes of one topic's messages that are read. What policies were asked and answered in a long episode is a tenth of that.
+/// Largest size of one topic's messages that are read. The requests and replies of a long episode take a
+/// tenth of that.
 const MAX_TOPIC_BYTES: usize = 1 << 30;
-/// Most channels of a file. Ours have less than a hundred.
+/// Largest number of channels in a file. Tandem's recordings have less than a hundred.
 const MAX_CHANNELS: usize = 4096;
 
 /// The texts of a metadata record.
 pub type Entries = BTreeMap<String, String>;
 
-/// A recording, and what is where in it.
+/// A checked recording, with the positions of its parts.
 pub struct CheckedFile {
     bytes: Vec<u8>,
     chunks: Vec<ChunkPlace>,
@@ -41,7 +42,7 @@ pub struct CheckedFile {
 }
 
 impl CheckedFile {
-    /// Checks every byte.
+    /// Checks every byte of a file.
     pub fn new(bytes: Vec<u8>) -> Result<CheckedFile, Damage> {
         let mut data = DataSection::begin(&bytes)?;
         let (mut chunks, mut attachments) = (Vec::new(), Vec::new());
@@ -70,23 +71,23 @@ impl CheckedFile {
         Ok(CheckedFile { bytes, chunks, attachments, metadata, channels, uncovered })
     }
 
-    /// What no checksum covers; empty of what Tandem wrote.
+    /// Returns the parts that no checksum covers; empty for files that Tandem wrote.
     pub fn uncovered(&self) -> &[String] {
         &self.uncovered
     }
 
-    /// The metadata record called `name`.
+    /// Returns the metadata record called `name`.
     pub fn metadata(&self, name: &str) -> Option<&Entries> {
         self.metadata.get(name)
     }
 
-    /// The attachment called `name`, and its bytes.
+    /// Returns the attachment called `name`, and its bytes.
     pub fn attachment(&self, name: &str) -> Option<(&AttachmentPlace, &[u8])> {
         let place = self.attachments.iter().find(|place| place.name == name)?;
         Some((place, &self.bytes[place.data.clone()]))
     }
 
-    /// The messages of a topic, each as `read` makes it of its time in nanoseconds and its content.
+    /// Returns the messages of a topic; `read` converts each from its time in nanoseconds and its content.
     pub fn messages<T>(
         &self,
         topic: &str,
@@ -121,7 +122,8 @@ impl CheckedFile {
     }
 }
 
-/// Whether a checksum covers everything from `start`, where the data have ended, to the mark at the end of the file.
+/// Checks the bytes from `start`, the end of the data, to the mark at the end of the file. Returns `true` if
+/// a checksum covers them.
 fn check_summary(bytes: &[u8], start: usize, own: bool) -> Result<bool, Damage> {
     let footer = FilePart::Record(op::FOOTER);
     let offset = bytes.len().saturating_sub(FOOTER_RECORD.len() + FOOTER_BYTES + MAGIC.len());
@@ -140,7 +142,7 @@ fn check_summary(bytes: &[u8], start: usize, own: bool) -> Result<bool, Damage> 
     is_covered(saved, summed, own).map_err(|fault| fault.of(FilePart::Summary, start))
 }
 
-/// In words, what no checksum covers.
+/// Describes the parts that no checksum covers.
 fn uncovered(data: bool, summary: bool, without: WithoutChecksum) -> Vec<String> {
     let WithoutChecksum { chunks, attachments, metadata } = without;
     let of_data = [

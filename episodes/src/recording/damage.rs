@@ -1,27 +1,27 @@
-//! Where a recording is not as it was written.
+//! Damage in a recording: its place and its kind.
 
 use std::fmt;
 
 use mcap::records::op;
 
-/// A part of the file that does not hold what was written.
+/// A damaged part of a recording.
 #[derive(Debug, thiserror::Error)]
 #[error("{part} at byte {offset}: {fault}")]
 pub struct Damage {
     pub part: FilePart,
-    /// Where the part begins.
+    /// Position of the part's first byte.
     pub offset: usize,
     pub fault: Fault,
 }
 
 impl Damage {
-    /// Whether not even the first bytes are those of such a file.
+    /// Returns `true` if not even the first bytes are those of an MCAP file.
     pub fn is_of_another_format(&self) -> bool {
         self.part == FilePart::Magic && self.offset == 0
     }
 }
 
-/// What of the file it is.
+/// A part of the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FilePart {
     /// The first eight bytes, or the last.
@@ -29,13 +29,13 @@ pub enum FilePart {
     /// Everything up to the summary.
     DataSection,
     Summary,
-    /// Numbered from 1.
+    /// A chunk, numbered from 1.
     Chunk(usize),
-    /// By its opcode.
+    /// A record, by its opcode.
     Record(u8),
 }
 
-/// What is wrong with it.
+/// The kind of damage.
 #[derive(Debug, thiserror::Error)]
 pub enum Fault {
     #[error("the file ends within it")]
@@ -63,7 +63,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// The fault as that of `part`, which begins at `offset`.
+    /// Returns the damage of `part`, which begins at `offset`, by this fault.
     pub fn of(self, part: FilePart, offset: usize) -> Damage {
         Damage { part, offset, fault: self }
     }

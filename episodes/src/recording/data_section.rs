@@ -1,10 +1,11 @@
-//! Goes over the data of a recording, record by record, and checks each before anything is made of it: no length is believed
-//! that the file does not have, nothing is decompressed into more than it can hold, and what has a checksum is held to it.
+//! Reading of a recording's data section, record by record. Each record is checked before use: a length
+//! must fit in the file, decompression is bounded, and checksums are compared where there are any.
 //!
-//! The library that writes recordings can read them, too: its `sans_io::LinearReader` limits the length of
-//! records and checks checksums. It takes a checksum of 0 for none, even where Tandem always writes one. It
-//! says neither where damage is nor where the bytes of chunks and attachments are, which are opened later. Here
-//! it could replace `frame` and `take_record` alone, at the price of another copy of the file.
+//! The library that writes recordings can also read them: its `sans_io::LinearReader` limits the length of
+//! records and checks checksums. It takes a checksum of 0 for a missing one, even in files by Tandem, which
+//! always writes one. It reports neither the position of damage nor the positions of the bytes of chunks
+//! and attachments, which are opened later. Here it could replace only `frame` and `take_record`, at the
+//! price of another copy of the file.
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::{self, Read};
@@ -16,41 +17,44 @@ use mcap::records::{Metadata, Record, op};
 use super::damage::{Damage, Fault, FilePart};
 use super::metadata;
 
-/// No bytes in LZ4's format hold more than so many times themselves.
+/// Upper limit of the expansion factor of LZ4's format.
 const LZ4_MOST_EXPANSION: u64 = 255;
-/// Nor in Zstandard's: a block of at most 128 KiB takes three bytes and one that is repeated.
+/// Upper limit for Zstandard's format: a block of at most 128 KiB takes three bytes and one that is
+/// repeated.
 const ZSTD_MOST_EXPANSION: u64 = (128 << 10) / 4;
 
-/// Most bytes that a chunk holds once it is decompressed. Ours have 256 KiB and one message more.
+/// Largest size of a decompressed chunk. Tandem's chunks have 256 KiB and one message more.
 const MAX_CHUNK_BYTES: u64 = 256 << 20;
-/// Most bytes that all chunks hold.
+/// Largest size of all chunks together, decompressed.
 const MAX_RECORDS_BYTES: u64 = 16 << 30;
 
-/// What every recording of ours says of who wrote it, with a version behind. These have all checksums.
+/// Prefix of the library name in the header of every recording by Tandem, followed by a version. These
+/// recordings have all checksums.
 pub const LIBRARY: &str = "tandem ";
 
-/// An opcode and a length.
+/// Length of an opcode and a length field.
 const FRAME_BYTES: usize = 1 + size_of::<u64>();
 
 /// The data of a recording, from its first byte to the end of the data.
 pub struct DataSection<'a> {
     bytes: &'a [u8],
     position: usize,
-    /// Whether Tandem wrote it.
+    /// True if Tandem wrote the file.
     own: bool,
     chunks: usize,
-    /// Bytes of all chunks so far, decompressed.
+    /// Bytes of all chunks up to the present position, decompressed.
     records_bytes: u64,
-    /// The number that the next message of each channel has to have.
+    /// Expected sequence number of the next message of each channel.
     sequences: HashMap<u16, u32>,
-    /// What the message indexes behind the last chunk have to say: time and place of each message, by channel.
+    /// Expected content of the message indexes after the last chunk: time and offset of each message, by
+    /// channel.
     indexes: BTreeMap<u16, Vec<(u64, u64)>>,
-    /// The checksum that the data end with, once they have.
+    /// Checksum at the end of the data; `None` until it has been read.
     saved_checksum: Option<u32>,
     pub without_checksum: WithoutChecksum,
 }
 
-/// How many parts have no checksum of their own.
+/// Number of parts without a checksum of their own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WithoutChecksum {
     pub chunks: usize,
@@ -58,14 +62,14 @@ pub struct WithoutChecksum {
     pub metadata: usize,
 }
 
-/// What of the data is read back.
+/// A part of the data that is read back.
 pub enum DataPart {
     Chunk(ChunkPlace, ChunkRecords),
     Attachment(AttachmentPlace),
     Metadata(Metadata),
 }
 
-/// Where a chunk is.
+/// Position of a chunk.
 #[derive(Clone, Debug)]
 pub struct ChunkPlace {
     number: usize,
@@ -73,7 +77,7 @@ pub struct ChunkPlace {
     content: Range<usize>,
 }
 
-/// An attachment, and where its bytes are.
+/// An attachment, and the position of its bytes.
 #[derive(Clone, Debug)]
 pub struct AttachmentPlace {
     pub log_time: u64,
@@ -111,7 +115,8 @@ impl<'a> DataSection<'a> {
         Ok(data)
     }
 
-    /// The next part, checked as far as it has a checksum of its own; `None` where the data, or the file, end.
+    /// Returns the next part, checked against its own checksum if it has one. Returns `None` at the end of
+    /// the data or of the file.
     pub fn next_part(&mut self) -> Result<Option<DataPart>, Damage> {
         while self.saved_checksum.is_none() {
             let offset = self.position;
@@ -124,7 +129,8 @@ impl<'a> DataSection<'a> {
         Ok(None)
     }
 
-    /// Whether a checksum covers everything up to here, which has to be the end of the data.
+    /// Checks the data up to the present position, which must be the end of the data. Returns `true` if a
+    /// checksum covers them.
     pub fn check_end(&self) -> Result<bool, Damage> {
         let saved = self
             .saved_checksum
@@ -133,17 +139,17 @@ impl<'a> DataSection<'a> {
         self.is_covered(saved, data).map_err(|fault| fault.of(FilePart::DataSection, 0))
     }
 
-    /// Whether Tandem wrote the file.
+    /// Returns `true` if Tandem wrote the file.
     pub fn is_own(&self) -> bool {
         self.own
     }
 
-    /// How far it has come.
+    /// Returns the position that has been reached.
     pub fn position(&self) -> usize {
         self.position
     }
 
-    /// Opcode and content of the record that is next; `None` at the end of the file.
+    /// Returns the opcode and the content of the next record; `None` at the end of the file.
     fn take_record(&mut self) -> Result<Option<(u8, Range<usize>)>, Damage> {
         let offset = self.position;
         let Some(opcode) = self.bytes.get(offset) else { return Ok(None) };
@@ -152,7 +158,7 @@ impl<'a> DataSection<'a> {
         Ok(Some((*opcode, content)))
     }
 
-    /// What the next record is.
+    /// Returns the kind of the next record.
     fn part(&self, opcode: u8) -> FilePart {
         match opcode {
             op::CHUNK => FilePart::Chunk(self.chunks + 1),
@@ -187,12 +193,12 @@ impl<'a> DataSection<'a> {
                 self.saved_checksum = Some(u32::from_le_bytes(saved));
                 Ok(None)
             }
-            // Everything else stands within chunks, or behind the data.
+            // All other records are within chunks, or after the data.
             _ => Err(Fault::Unexpected),
         }
     }
 
-    /// Decompresses a chunk, and holds its messages to their numbers: none may be missing.
+    /// Decompresses a chunk, and checks the sequence numbers of its messages: none may be missing.
     fn read_chunk(&mut self, content: &[u8]) -> Result<ChunkRecords, Fault> {
         let (saved, records) = decompress(content)?;
         if !self.is_covered(saved, &records.bytes)? {
@@ -241,7 +247,7 @@ impl<'a> DataSection<'a> {
         Ok(AttachmentPlace { log_time, create_time, name, media_type, data })
     }
 
-    /// An index says no more than the chunk before it, so it is compared with that.
+    /// Compares a message index with the chunk before it, about which it has no further information.
     fn compare_index(&mut self, content: &[u8]) -> Result<(), Fault> {
         let Record::MessageIndex(index) = parse(op::MESSAGE_INDEX, content)? else {
             return Err(Fault::Unexpected);
@@ -260,7 +266,8 @@ impl<'a> DataSection<'a> {
     }
 }
 
-/// Whether a checksum covers `bytes`. Other programs than ours may leave it out, which is written as 0.
+/// Checks `bytes` against a saved checksum. Returns `false` if there is none: programs other than Tandem may
+/// leave it out, which is written as 0.
 pub fn is_covered(saved: u32, bytes: &[u8], own: bool) -> Result<bool, Fault> {
     match crc32fast::hash(bytes) {
         calculated if calculated == saved => Ok(true),
@@ -269,7 +276,7 @@ pub fn is_covered(saved: u32, bytes: &[u8], own: bool) -> Result<bool, Fault> {
     }
 }
 
-/// Where the content is of the record at `offset`; `None` if `bytes` end within.
+/// Returns the range of the content of the record at `offset`; `None` if `bytes` end within it.
 fn frame(bytes: &[u8], offset: usize) -> Option<Range<usize>> {
     let start = offset.checked_add(FRAME_BYTES)?;
     let length = bytes.get(offset + 1..start)?;
@@ -278,19 +285,19 @@ fn frame(bytes: &[u8], offset: usize) -> Option<Range<usize>> {
     (end <= bytes.len()).then_some(start..end)
 }
 
-/// The library that a header names.
+/// Returns the library name of a header.
 fn read_header(content: &[u8]) -> Result<String, Fault> {
     let Record::Header(header) = parse(op::HEADER, content)? else { return Err(Fault::Unexpected) };
     expect_length(content, text_bytes(&header.profile) + text_bytes(&header.library))?;
     Ok(header.library)
 }
 
-/// Bytes of a text with its length before it.
+/// Returns the length of a text together with the length field before it.
 fn text_bytes(text: &str) -> usize {
     size_of::<u32>() + text.len()
 }
 
-/// The fields of a record have to fill it.
+/// Checks that the fields of a record fill it exactly.
 fn expect_length(content: &[u8], fields: usize) -> Result<(), Fault> {
     match content.len() {
         has if has == fields => Ok(()),
@@ -298,24 +305,24 @@ fn expect_length(content: &[u8], fields: usize) -> Result<(), Fault> {
     }
 }
 
-/// Reads a record, which the library does with care.
+/// Parses a record with the library's parser, which checks its lengths.
 fn parse(opcode: u8, content: &[u8]) -> Result<Record<'_>, Fault> {
     mcap::parse_record(opcode, content).map_err(Fault::Content)
 }
 
-/// What a chunk holds, decompressed.
+/// The decompressed content of a chunk.
 pub struct ChunkRecords {
     bytes: Vec<u8>,
 }
 
 impl ChunkRecords {
-    /// Schemas, channels and messages, each with where it begins.
+    /// Iterates over schemas, channels and messages, each with its offset.
     pub fn iter(&self) -> impl Iterator<Item = Result<(usize, Record<'_>), Fault>> {
         let mut position = 0;
         std::iter::from_fn(move || {
             let offset = position;
             let opcode = *self.bytes.get(offset)?;
-            // Of what cannot be framed, nothing behind it can be either.
+            // If a record cannot be framed, the records after it cannot be framed either.
             position = self.bytes.len();
             let record = match (opcode, frame(&self.bytes, offset)) {
                 (op::SCHEMA | op::CHANNEL | op::MESSAGE, Some(content)) => {
@@ -331,7 +338,7 @@ impl ChunkRecords {
 }
 
 impl ChunkPlace {
-    /// Decompresses once more what has been checked.
+    /// Decompresses the checked chunk once more.
     pub fn open(&self, bytes: &[u8]) -> Result<ChunkRecords, Damage> {
         let opened = decompress(&bytes[self.content.clone()]);
         opened.map(|(_, records)| records).map_err(|fault| self.damaged(fault))
@@ -342,11 +349,12 @@ impl ChunkPlace {
     }
 }
 
-/// The saved checksum of a chunk, and what it holds.
+/// Returns the saved checksum of a chunk, and its content.
 fn decompress(content: &[u8]) -> Result<(u32, ChunkRecords), Fault> {
     let Record::Chunk { header, data } = parse(op::CHUNK, content)? else { return Err(Fault::Unexpected) };
     let (compressed, uncompressed) = (data.len(), header.uncompressed_size);
-    // Two times, two sizes and a checksum; then the name of the compression, and the data.
+    // The fixed fields: two times, two sizes and a checksum. The name of the compression and the data
+    // follow.
     let fixed = 4 * size_of::<u64>() + size_of::<u32>();
     expect_length(content, fixed + text_bytes(&header.compression) + compressed)?;
     let bytes = match header.compression.as_str() {
@@ -370,7 +378,7 @@ fn decompress(content: &[u8]) -> Result<(u32, ChunkRecords), Fault> {
     Ok((header.uncompressed_crc, ChunkRecords { bytes }))
 }
 
-/// What a decoder gives, and of more than is expected one byte more: that is one too many.
+/// Reads a decoder's output, at most one byte more than expected: that byte is enough to detect an excess.
 fn read_all(decoder: io::Result<impl Read>, expected: u64) -> Result<Vec<u8>, Fault> {
     let mut bytes = Vec::new();
     let decoder = decoder.map_err(Fault::Decompress)?;
@@ -378,7 +386,7 @@ fn read_all(decoder: io::Result<impl Read>, expected: u64) -> Result<Vec<u8>, Fa
     Ok(bytes)
 }
 
-/// Reads the fields of a record one after the other.
+/// Reader of a record's fields, one after the other.
 struct Fields<'a> {
     bytes: &'a [u8],
     position: usize,

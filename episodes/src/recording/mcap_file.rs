@@ -1,5 +1,5 @@
-//! An MCAP file with typed topics, under another name until it is complete; and where its bytes go: to a file that others
-//! can read under way, or nowhere before the end.
+//! An MCAP file with typed topics, under another name until it is complete. Its bytes go to a file that
+//! others can read under way, or to memory until the end.
 
 use std::{
     collections::BTreeMap,
@@ -19,14 +19,14 @@ use super::{data_section::LIBRARY, metadata};
 use crate::locks::{FileLock, LockKind, Locking};
 use crate::output::{OutputError, partial_path, put_in_place, write_whole};
 
-/// A chunk is compressed as one, in buffers that every recording under way has.
+/// Size of a chunk. A chunk is compressed as one, in buffers that every open recording has.
 const CHUNK_BYTES: u64 = 256 << 10;
 
 /// A file that is being written.
 pub struct McapFile {
     writer: mcap::Writer<RecordingStore>,
     path: PathBuf,
-    /// Reused between messages.
+    /// Buffer that messages share.
     buffer: Vec<u8>,
 }
 
@@ -38,7 +38,7 @@ pub struct Topic<M> {
 }
 
 impl McapFile {
-    /// Begins what will be `path`, in an existing folder.
+    /// Begins the file that will be `path`, in an existing folder.
     pub fn create(path: &Path, visibility: Visibility) -> Result<McapFile, OutputError> {
         let store = RecordingStore::create(path, visibility)
             .map_err(|source| OutputError::Io { path: path.into(), source })?;
@@ -46,7 +46,7 @@ impl McapFile {
         Ok(McapFile { writer, path: path.into(), buffer: Vec::new() })
     }
 
-    /// Opens a topic. `metadata` describes the channel, as the names of an array's columns.
+    /// Opens a topic. `metadata` describes the channel, for example the names of an array's columns.
     pub fn topic<M: Encode>(
         &mut self,
         topic: &str,
@@ -86,7 +86,8 @@ impl McapFile {
         written.map_err(|e| self.failed(e))
     }
 
-    /// Hands the system everything that has been written, as whole chunks: it outlives the process, and can be read.
+    /// Hands everything that has been written to the system, in whole chunks. It then survives the process
+    /// and can be read.
     pub fn flush(&mut self) -> Result<(), OutputError> {
         self.writer.flush().map_err(|e| self.failed(e))
     }
@@ -97,7 +98,7 @@ impl McapFile {
         self.writer.write_metadata(&record).map_err(|e| self.failed(e))
     }
 
-    /// Appends a file of its own, as it is.
+    /// Attaches the bytes of a separate file, unchanged.
     pub fn attach(&mut self, name: &str, time_s: f64, bytes: &[u8]) -> Result<(), OutputError> {
         let time_ns = time_ns(time_s);
         let attached = self.writer.attach(&Attachment {
@@ -123,19 +124,19 @@ impl McapFile {
     }
 }
 
-/// Writes chunks as wholes, so that no flush ends in the middle of one.
+/// Creates a writer of whole chunks, so that no flush ends in the middle of one.
 pub fn writer(store: RecordingStore) -> Result<mcap::Writer<RecordingStore>, mcap::McapError> {
     mcap::WriteOptions::new()
         .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
         .compression(Some(mcap::Compression::Zstd))
-        // On the thread that writes.
+        // The thread that writes also compresses.
         .compression_threads(0)
         .disable_seeking(true)
         .chunk_size(Some(CHUNK_BYTES))
         .create(store)
 }
 
-/// MCAP counts time in nanoseconds.
+/// Converts a time to nanoseconds, the unit of MCAP.
 pub fn time_ns(time_s: f64) -> u64 {
     (time_s * 1e9).round() as u64
 }
@@ -144,20 +145,20 @@ fn string_map(entries: &[(&str, &str)]) -> BTreeMap<String, String> {
     entries.iter().map(|(key, value)| (key.to_string(), value.to_string())).collect()
 }
 
-/// When a recording can be read.
+/// The time from which a recording can be read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Visibility {
-    /// It can be read under way, as `episode.mcap.partial`.
+    /// Readable under way, as `episode.mcap.partial`.
     #[default]
     Live,
-    /// It can be read after the end. Nobody sees meanwhile what policies are not told, and a process that is killed leaves
-    /// nothing.
+    /// Readable after the end. Until then nobody sees data that is withheld from policies, and a killed
+    /// process leaves nothing.
     After,
 }
 
-/// What has been written since the last flush, and where it goes then. A flush is one write to the system, so that what lies
-/// on the disk ends where a flush ended.
+/// Bytes written since the last flush, and the sink of the next flush. A flush is one write to the system,
+/// so the file on disk always ends where a flush ended.
 pub struct RecordingStore {
     pending: Vec<u8>,
     flushed_bytes: u64,
@@ -170,12 +171,14 @@ enum Sink {
         partial: PathBuf,
     },
     Memory,
-    /// A flush has failed. Nothing more is written: what lies on the disk ends where the last one ended.
+    /// A flush has failed. Nothing more is written: the file on disk ends where the last successful flush
+    /// ended.
     Failed,
 }
 
 impl RecordingStore {
-    /// A store for what will be `path` when it is complete. A file of that partial name is overwritten, unless it is being written.
+    /// Creates a store for the file that will be `path` when it is complete. An existing file of its
+    /// partial name is overwritten, unless another writer holds it.
     pub fn create(path: &Path, visibility: Visibility) -> io::Result<RecordingStore> {
         let sink = match visibility {
             Visibility::Live => {
@@ -187,7 +190,7 @@ impl RecordingStore {
         Ok(RecordingStore { pending: Vec::new(), flushed_bytes: 0, sink })
     }
 
-    /// What has not been flushed; of a store that others cannot read under way, everything.
+    /// Returns the bytes that have not been flushed. For a store in memory, these are all bytes.
     pub fn pending(&self) -> &[u8] {
         &self.pending
     }
@@ -204,16 +207,17 @@ impl RecordingStore {
     }
 }
 
-/// The empty file that will be `path`, which nobody else writes, and its name until then.
+/// Opens the empty file that will be `path`, locked against other writers. Returns it with its name until
+/// then.
 fn open_partial(path: &Path) -> io::Result<(File, PathBuf)> {
     let partial = partial_path(path);
-    // Where a lock keeps others from reading, too, none is taken.
+    // No lock on systems where it would also keep others from reading.
     if !cfg!(unix) {
         return Ok((File::create(&partial)?, partial));
     }
     match FileLock::attempt(&partial, LockKind::Exclusive)? {
         Locking::Locked(lock) => {
-            // The lock is that of the opened file, which both handles are.
+            // The lock belongs to the opened file, which both handles share.
             let file = lock.file().try_clone()?;
             file.set_len(0)?;
             Ok((file, partial))
@@ -229,9 +233,9 @@ fn open_partial(path: &Path) -> io::Result<(File, PathBuf)> {
     }
 }
 
-/// Cuts off what was written of a flush that failed; a file without anything before it goes.
+/// Truncates what a failed flush has written. Removes a file that has nothing before it.
 fn leave(file: &File, partial: &Path, flushed_bytes: u64) {
-    // Where that fails, too, what can be read of the file is the same.
+    // If that fails, too, the readable part of the file is the same.
     let _ = match flushed_bytes {
         0 => fs::remove_file(partial),
         flushed_bytes => file.set_len(flushed_bytes),
@@ -262,13 +266,13 @@ impl Write for RecordingStore {
         }
         self.flushed_bytes += self.pending.len() as u64;
         self.pending.clear();
-        // The scene's shapes and the pictures of a reply are megabytes, and come seldom.
+        // The scene's shapes and the images of a reply are megabytes, and are rare.
         self.pending.shrink_to(CHUNK_BYTES as usize);
         written
     }
 }
 
-/// MCAP's writer asks where it is; it is told not to go back.
+/// Reports the position to MCAP's writer, which is configured never to seek back.
 impl Seek for RecordingStore {
     fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
         match position {
@@ -278,7 +282,7 @@ impl Seek for RecordingStore {
     }
 }
 
-/// A recording that is dropped before its end stays readable to where it stopped.
+/// Flushes a recording that is dropped before its end, so that it stays readable up to there.
 impl Drop for RecordingStore {
     fn drop(&mut self) {
         let _ = self.flush();

@@ -1,5 +1,6 @@
-//! Records of metadata that are read back, their entries, and the checksum that each has among them: the format gives it none
-//! before the whole file is written, and what a killed process leaves has to be told from what a bad disk has made of it.
+//! Metadata records that are read back, with their entries. Each has its checksum as an entry, because the
+//! format provides none before the whole file is written. The remains of a killed process can thus be
+//! distinguished from damage by a bad disk.
 
 use std::collections::BTreeMap;
 
@@ -17,14 +18,15 @@ pub const RESULT: &str = "result";
 /// Entry with the CRC-32 of the record's name and other entries, as eight hexadecimal digits.
 const CHECKSUM: &str = "crc32";
 
-/// A record with its checksum.
+/// Returns a record with its checksum.
 pub fn with_checksum(name: &str, mut metadata: BTreeMap<String, String>) -> Metadata {
     let checksum = checksum(name, &metadata);
     metadata.insert(CHECKSUM.into(), format!("{checksum:08x}"));
     Metadata { name: name.into(), metadata }
 }
 
-/// Whether a checksum covers the record; recordings of earlier versions have none.
+/// Checks a record against its checksum. Returns `false` if it has none, as in recordings of earlier
+/// versions.
 pub fn is_covered(record: &Metadata) -> Result<bool, Fault> {
     let Some(saved) = record.metadata.get(CHECKSUM) else { return Ok(false) };
     let calculated = checksum(&record.name, &record.metadata);
@@ -35,7 +37,8 @@ pub fn is_covered(record: &Metadata) -> Result<bool, Fault> {
     Err(Fault::Checksum { saved, calculated })
 }
 
-/// Of every text with its length before it, so that no two records are told by the same bytes.
+/// Returns the checksum of a record's texts, each preceded by its length, so that different records never
+/// have the same bytes.
 fn checksum(name: &str, entries: &BTreeMap<String, String>) -> u32 {
     let entries = entries.iter().filter(|(key, _)| *key != CHECKSUM);
     let texts = std::iter::once(name).chain(entries.flat_map(|(key, value)| [key.as_str(), value.as_str()]));

@@ -1,17 +1,19 @@
-//! Recordings: an episode as MCAP with Foxglove's well-known schemas, so that it can be watched and plotted in Foxglove, and
-//! read back step by step.
+//! Recordings: an episode as MCAP with Foxglove's well-known schemas. It can be watched and plotted in
+//! Foxglove, and read back step by step.
 //!
-//! Log times are simulated time. Frames: `world`, `A/pelvis` and every other link of robot A as `A/<link>`, its camera as
-//! `A/egocentric`, objects by name. Numbers that have no well-known schema are JSON with a JSON Schema. `/steps` holds each
-//! [`tandem_sim::Step`] as it was, bit for bit, from the state before the first one on; everything else is for people.
+//! Log times are simulated time. Frames: `world`, `A/pelvis` and every other link of robot A as `A/<link>`,
+//! its camera as `A/egocentric`, objects by name. Numbers that have no well-known schema are JSON with a
+//! JSON Schema. `/steps` holds each [`tandem_sim::Step`] bit for bit, including the state before the first
+//! one; everything else is for people.
 //!
-//! All that a replay needs is there: what the episode is, the build, each tool call with what the policy's clock was
-//! charged, the hash of the whole state after every step, and as attachments checkpoints of where the policy took over and
-//! where every later phase begins.
+//! The file has all that a replay needs. It includes the episode's spec and build, each tool call with the
+//! time charged to the policy's clock, and the hash of the whole state after every step. Its attachments
+//! are checkpoints of the policy's start and of the beginning of every later phase.
 //!
-//! The file is `episode.mcap.partial` until [`Recorder::finish`] renames it, so an `episode.mcap` is always complete. A
-//! recorder that is dropped earlier still writes the index; one whose process is killed leaves whole chunks without an index,
-//! which [`recover`] adds. Whoever reads a recording has every byte of it checked first ([`Recording::read`]).
+//! The file is `episode.mcap.partial` until [`Recorder::finish`] renames it, so an `episode.mcap` is always
+//! complete. A recorder that is dropped earlier still writes the index. One whose process is killed leaves
+//! whole chunks without an index, which [`recover`] adds. A reader checks every byte first
+//! ([`Recording::read`]).
 
 mod checked_file;
 mod damage;
@@ -39,10 +41,10 @@ pub use topics::notes::NoteMessage;
 pub use transcript::TranscriptEntry;
 pub use write::{Recorder, RecordingHeader};
 
-/// What the checkpoint is called that an episode began with, where that is not its task's own beginning.
+/// Name of the checkpoint with which an episode began, unless it began at its task's own beginning.
 pub const BEGIN: &str = "begin";
 
-/// Name of the attachment that is the checkpoint of a phase's beginning, or of [`BEGIN`].
+/// Returns the name of the attachment with the checkpoint of a phase's beginning, or of [`BEGIN`].
 fn checkpoint_name(of: &str) -> String {
     format!("{of}.checkpoint")
 }

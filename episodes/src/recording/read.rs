@@ -1,4 +1,5 @@
-//! Reads a recording back: what the episode was, every step bit for bit, phases and tool calls; and scores it again.
+//! Reading of recordings: the episode's spec, every step bit for bit, phases and tool calls; and scoring
+//! them again.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -22,7 +23,7 @@ use crate::results::RESULT_FILE;
 use crate::scoring::{ScoreMemory, Scores, StepScore};
 use crate::spec::EpisodeSpec;
 
-/// Largest recording that is read. Those with pictures of a long episode have some hundred megabytes.
+/// Largest recording that is read. Those of long episodes with images have several hundred megabytes.
 pub const MAX_RECORDING_BYTES: u64 = 4 << 30;
 
 /// A recording in memory.
@@ -30,43 +31,43 @@ pub struct Recording {
     path: PathBuf,
     file: CheckedFile,
     pub spec: EpisodeSpec,
-    /// Which base controller the robots had; the name tells files of different content apart.
+    /// Name of the robots' base controller; files of different content have different names.
     pub locomotion: String,
-    /// Which build of Tandem played it.
+    /// Build of Tandem that played the episode.
     pub build: String,
-    /// `None` where the episode was interrupted.
+    /// `None` if the episode was interrupted.
     pub result: Option<ResultReply>,
     scores: ScoreMemory,
 }
 
-/// A tool call as it was made, and its answer.
+/// A recorded tool call and its reply.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedCall {
-    /// When it was answered.
+    /// Simulated time of the reply.
     pub time_s: f64,
-    /// How long the policy had thought by then since the episode began.
+    /// The policy's thinking time since the episode began.
     pub thought: Duration,
     pub tool: String,
     pub arguments: Value,
-    /// The robot whose operator made it; `None` where one policy directed all.
+    /// The robot whose operator made the call; `None` if one policy directed all robots.
     pub operator: Option<String>,
-    /// Of what the benchmark's own policies are not shown, what a policy that was asked in the simulator's process was shown;
-    /// `None` where the policy was shown the whole reply.
+    /// Extra information that a policy in the simulator's process was shown, beyond the benchmark's own
+    /// policies. `None` if the policy was shown the whole reply.
     pub shown: Option<Vec<ExtraInformation>>,
-    /// The reply as JSON, without pictures; or the text of the problem.
+    /// The reply as JSON, without images; or the text of the problem.
     pub outcome: Result<String, String>,
 }
 
-/// A checkpoint of the episode, as its recording holds it.
+/// A checkpoint of the episode in its recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedCheckpoint {
-    /// The simulated time at which it was made.
+    /// Simulated time of the checkpoint.
     pub time_s: f64,
-    /// What [`crate::Checkpoint`] reads.
+    /// Content that [`crate::Checkpoint`] reads.
     pub bytes: Vec<u8>,
 }
 
-/// Why a recording cannot be read.
+/// Reason why a recording cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
     #[error("cannot read the recording {}: {source}", path.display())]
@@ -94,8 +95,12 @@ impl From<RobotError> for RecordingError {
 }
 
 impl Recording {
-    /// Reads a file, or the one in an episode's folder, checks every byte of it, and that it is a recording of an episode. Steps are
-    /// read as they are asked for.
+    /// Reads a file, or the one in an episode's folder. Checks every byte of it, and that it is a recording
+    /// of an episode. Steps are decoded when they are requested.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be read, is damaged, or is no recording of an episode.
     pub fn read(path: &Path) -> Result<Recording, RecordingError> {
         let inside = path.join(Recorder::FILE_NAME);
         let path = if inside.is_file() { &inside } else { path };
@@ -104,7 +109,7 @@ impl Recording {
         Recording::from_bytes(path, bytes)
     }
 
-    /// As [`Recording::read`], of what `path` holds.
+    /// Reads the content `bytes` of `path`, as [`Recording::read`] does.
     pub fn from_bytes(path: &Path, bytes: Vec<u8>) -> Result<Recording, RecordingError> {
         let file = CheckedFile::new(bytes)
             .map_err(|source| RecordingError::Damaged { path: path.into(), source: source.into() })?;
@@ -114,7 +119,8 @@ impl Recording {
         let entry = |name: &str| episode.get(name).ok_or_else(|| missing(name));
         let step = |source: StepError| RecordingError::Step { path: path.into(), source };
         let mut scores = BASE64_STANDARD.decode(entry(metadata::SCORES)?).map_err(|e| step(e.into()))?;
-        // Whether the phase has been spoiled comes last, and earlier versions did not write it; a byte too many is left.
+        // The flag of a spoiled phase comes last, and earlier versions did not write it. A surplus byte is
+        // ignored.
         scores.push(0);
         let result = file.metadata(metadata::RESULT).and_then(|entries| entries.get(RESULT_FILE));
         Ok(Recording {
@@ -128,12 +134,12 @@ impl Recording {
         })
     }
 
-    /// What of the file no checksum covers; empty of what Tandem wrote.
+    /// Returns the parts of the file that no checksum covers; empty for files that Tandem wrote.
     pub fn uncovered(&self) -> &[String] {
         self.file.uncovered()
     }
 
-    /// Makes sure that all that a replay needs can be read.
+    /// Checks that all data for a replay can be read.
     pub(super) fn check_replayable(&self) -> Result<(), RecordingError> {
         let what = topics::STEPS.to_string();
         let first = self.steps().next();
@@ -145,13 +151,13 @@ impl Recording {
         self.phases().map(drop)
     }
 
-    /// The state before the first step, then every step.
+    /// Returns the state before the first step, then every step.
     pub fn steps(&self) -> impl Iterator<Item = Result<Step, RecordingError>> {
         let mut decoder = StepDecoder::default();
         self.step_rows().map(move |row| decoder.decode(&row?).map_err(|source| self.no_step(source)))
     }
 
-    /// The number and the state hash of every step, that before the first one included.
+    /// Returns the number and the state hash of every step, including the state before the first one.
     pub fn state_hashes(&self) -> impl Iterator<Item = Result<(u64, String), RecordingError>> {
         self.step_rows().map(|row| state_of(&row?).map_err(|source| self.no_step(source)))
     }
@@ -168,18 +174,22 @@ impl Recording {
         RecordingError::Damaged { path: self.path.clone(), source: source.into() }
     }
 
-    /// The checkpoint of `what`: a phase's beginning, or `BEGIN`; `None` where there is none.
+    /// Returns the checkpoint of a phase's beginning, or of `BEGIN`; `None` if there is none.
     pub fn checkpoint(&self, what: &str) -> Option<RecordedCheckpoint> {
         let (place, bytes) = self.file.attachment(&checkpoint_name(what))?;
         Some(RecordedCheckpoint { time_s: place.log_time as f64 / 1e9, bytes: bytes.to_vec() })
     }
 
-    /// Where it was read from.
+    /// Returns the path from which the recording was read.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The phases that the episode reached.
+    /// Returns the phases that the episode reached.
+    ///
+    /// # Errors
+    ///
+    /// If a message cannot be read.
     pub fn phases(&self) -> Result<Vec<PhaseReached>, RecordingError> {
         let phase = |message: Result<(f64, PhaseMessage), RecordingError>| {
             let (_, PhaseMessage { id, number, time_s }) = message?;
@@ -188,7 +198,11 @@ impl Recording {
         self.messages(topics::PHASES).map(phase).collect()
     }
 
-    /// The tool calls of the episode, in their order: those that count, which a replay makes again.
+    /// Returns the tool calls of the episode in their order: those that count, which a replay makes again.
+    ///
+    /// # Errors
+    ///
+    /// If a message cannot be read.
     pub fn tool_calls(&self) -> Result<Vec<RecordedCall>, RecordingError> {
         let call = |message: Result<(f64, ToolCallMessage), RecordingError>| {
             let (time_s, message) = message?;
@@ -206,24 +220,28 @@ impl Recording {
         self.call_messages().filter(counted).map(call).collect()
     }
 
-    /// All that was asked, what does not count included, with the time of each.
+    /// Returns all calls with their times, including those that do not count.
     pub(super) fn call_messages(
         &self,
     ) -> impl Iterator<Item = Result<(f64, ToolCallMessage), RecordingError>> {
         self.messages(topics::TOOL_CALLS)
     }
 
-    /// Every note, with its time.
+    /// Returns every note, with its time.
     pub(super) fn notes(&self) -> Result<Vec<(f64, NoteMessage)>, RecordingError> {
         self.messages(topics::NOTES).collect()
     }
 
-    /// Scores the recorded steps by the task's conditions as this build has them.
+    /// Scores the recorded steps by this build's conditions of the task.
+    ///
+    /// # Errors
+    ///
+    /// If a step cannot be read, or the recording belongs to another task.
     pub fn score(&self) -> Result<Scores, RecordingError> {
         self.score_with(|_| {})
     }
 
-    /// As [`Recording::score`], and lets `look` see every step's score.
+    /// Scores the recorded steps as [`Recording::score`] does, and passes every step's score to `look`.
     pub fn score_with(&self, mut look: impl FnMut(&StepScore)) -> Result<Scores, RecordingError> {
         let mut steps = self.steps();
         let missing = || RecordingError::Missing { path: self.path.clone(), what: topics::STEPS.into() };
@@ -246,7 +264,7 @@ impl Recording {
         Ok(scores)
     }
 
-    /// Makes sure that a step has the robots of the task, each with so many links.
+    /// Checks that a step has the robots of the task, each with `links` links.
     pub(crate) fn check_fit(&self, step: &Step, links: usize) -> Result<(), RecordingError> {
         let task = self.spec.task;
         let robots = &step.robots;
@@ -262,7 +280,7 @@ impl Recording {
         RecordingError::OtherTask { path: self.path.clone(), what, task: self.spec.task.id }
     }
 
-    /// The JSON messages of a topic, with the simulated time of each.
+    /// Returns the JSON messages of a topic, each with its simulated time.
     fn messages<T: DeserializeOwned>(
         &self,
         topic: &str,
@@ -279,7 +297,7 @@ impl Recording {
     }
 }
 
-/// How what is whole of a recording may become a recording.
+/// Suggests how to make a recording of the undamaged part of a file.
 fn hint(path: &Path, damage: &Damage) -> String {
     match path.extension() {
         _ if damage.is_of_another_format() => "it is no MCAP file; give an episode.mcap".into(),

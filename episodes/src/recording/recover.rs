@@ -1,4 +1,4 @@
-//! Makes a whole recording of what an interrupted episode left, or of what a bad disk left of a recording.
+//! Recovery of a whole recording from the remains of an interrupted episode or of a damaged file.
 
 use std::path::{Path, PathBuf};
 
@@ -12,28 +12,29 @@ use super::mcap_file::{RecordingStore, Visibility, writer};
 use super::read::{MAX_RECORDING_BYTES, Recording, RecordingError};
 use crate::output::{OutputError, write_whole_as};
 
-/// What could be read, and where it is now.
+/// Outcome of a recovery.
 #[derive(Debug)]
 pub struct Recovered {
     pub path: PathBuf,
     pub messages: u64,
     /// Simulated time of the last message.
     pub last_s: f64,
-    /// `None` where nothing was.
+    /// `None` if nothing was left out.
     pub left_out: Option<LeftOut>,
-    /// How many metadata records no checksum covers, as in what earlier versions left: they are taken as they are.
+    /// Number of metadata records that no checksum covers, for example those of earlier versions. They are
+    /// taken as they are.
     pub unchecked_metadata: usize,
 }
 
-/// What was left out: everything from the first part on that is not as it was written.
+/// The omitted end of a file, from the first damaged part on.
 #[derive(Debug)]
 pub struct LeftOut {
     pub damage: Damage,
-    /// From there to the end of the file.
+    /// Length from there to the end of the file.
     pub bytes: usize,
 }
 
-/// Why nothing was recovered.
+/// Reason why nothing was recovered.
 #[derive(Debug, thiserror::Error)]
 pub enum RecoverError {
     #[error("{} does not end in .partial; what does not is complete, or is no recording", .0.display())]
@@ -51,7 +52,7 @@ pub enum RecoverError {
 }
 
 impl RecoverError {
-    /// Who is here has been told to recover already.
+    /// Creates the error without a hint to recover: the caller is already recovering.
     fn too_little(partial: &Path, source: RecordingError) -> RecoverError {
         let reason = match source {
             RecordingError::Damaged { source, .. } => source.to_string(),
@@ -61,8 +62,12 @@ impl RecoverError {
     }
 }
 
-/// Writes every message, attachment and all metadata of `FILE.partial` up to the first part that is not as it was written to
-/// `FILE`, with an index. What is read stays as it is, and what is written can be replayed, or nothing is.
+/// Writes the messages, attachments and metadata of `FILE.partial` up to the first damaged part to `FILE`,
+/// with an index. The source stays as it is. The result can be replayed, or nothing is written.
+///
+/// # Errors
+///
+/// If the name does not end in `.partial`, `FILE` exists, or nothing that can be replayed is left.
 pub fn recover(partial: &Path) -> Result<Recovered, RecoverError> {
     let path = match partial.extension() {
         Some(extension) if extension == "partial" => partial.with_extension(""),
@@ -79,7 +84,7 @@ pub fn recover(partial: &Path) -> Result<Recovered, RecoverError> {
     let damage = loop {
         match data.next_part() {
             Ok(Some(part)) => copy.add(part, &bytes)?,
-            // What follows the data is made anew.
+            // The writer creates anew what follows the data.
             Ok(None) => break None,
             Err(damage) => break Some(damage),
         }
@@ -97,7 +102,7 @@ pub fn recover(partial: &Path) -> Result<Recovered, RecoverError> {
     Ok(Recovered { path, messages, last_s, left_out, unchecked_metadata })
 }
 
-/// The whole recording, on its way.
+/// The whole recording while it is being written.
 struct RecoveredFile {
     path: PathBuf,
     writer: mcap::Writer<RecordingStore>,
@@ -107,18 +112,18 @@ struct RecoveredFile {
 
 impl RecoveredFile {
     fn create(path: &Path) -> Result<RecoveredFile, OutputError> {
-        // Nothing is left behind where nothing can be recovered.
+        // In memory, so that nothing is left behind if nothing can be recovered.
         let store = RecordingStore::create(path, Visibility::After)
             .map_err(|source| OutputError::Io { path: path.into(), source })?;
         let writer = writer(store).map_err(|source| OutputError::of_recording(path, source))?;
         Ok(RecoveredFile { path: path.into(), writer, messages: 0, last_ns: 0 })
     }
 
-    /// Adds a part of the file that has `bytes`.
+    /// Adds a part of the file with the content `bytes`.
     fn add(&mut self, part: DataPart, bytes: &[u8]) -> Result<(), OutputError> {
         let written = match part {
             DataPart::Chunk(_, records) => {
-                // The chunk has been checked, so that all its records can be read.
+                // The chunk has been checked, so all its records can be read.
                 records.iter().flatten().try_for_each(|(_, record)| self.add_record(record))
             }
             DataPart::Metadata(metadata) => self.writer.write_metadata(&metadata),
@@ -150,7 +155,7 @@ impl RecoveredFile {
                 self.last_ns = header.log_time;
                 self.writer.write_to_known_channel(&header, &data)
             }
-            // A chunk has nothing else.
+            // A chunk has no other records.
             _ => Ok(()),
         }
     }
@@ -162,7 +167,7 @@ impl RecoveredFile {
         Recording::from_bytes(partial, store.pending().to_vec())
             .and_then(|recording| recording.check_replayable())
             .map_err(|source| RecoverError::too_little(partial, source))?;
-        // What is read has the name that files have while they are written.
+        // The partial name is that of the source, so a third one serves meanwhile.
         write_whole_as(&partial.with_extension("recovering"), &self.path, store.pending())?;
         Ok(self.path)
     }

@@ -58,14 +58,14 @@ fn sheet(robot: &Robot) -> RobotSheet {
     RobotSheet { name: robot.name.clone(), model: robot.model.clone(), base_limits: robot.base_limits() }
 }
 
-/// What robot A sees and senses.
+/// Returns the observation of robot A.
 fn seen(world: &World) -> TeamObservation {
     let sheets: Vec<RobotSheet> = world.robots().iter().map(sheet).collect();
     let mut observer = Observer::new(&EpisodeSpec { renderer: RendererKind::Cpu, ..spec() }, world);
     observer.observe(&world.present().into(), &[0], &sheets.iter().collect::<Vec<_>>(), Detail::Full)
 }
 
-/// A recorder, and what scores the world's one object.
+/// Returns a recorder, and the scores of the world's one object.
 fn recorder(folder: &Path, world: &World) -> (Recorder, Scores) {
     let start = world.present();
     let scores = Scores::new(
@@ -106,7 +106,7 @@ fn record_step(recorder: &mut Recorder, scores: &mut Scores, world: &mut World, 
     recorder.step(&step, &[], world.state_hash(), &scores.update(&step).facts, budget).unwrap();
 }
 
-/// Records `STEPS` steps, a phase, a refused call and an observation with a picture.
+/// Records `STEPS` steps, a phase, a refused call and an observation with an image.
 fn record(folder: &Path) -> (World, PathBuf) {
     let mut world = world();
     let (mut recorder, mut scores) = recorder(folder, &world);
@@ -248,7 +248,7 @@ fn a_recording_reads_back() {
     assert_eq!(look.pictures, [ShownPicture { robot: "A".into(), width: 320, height: 240 }]);
 }
 
-/// The chain of recorded frames puts wrists and camera where the world measured them.
+/// Checks that the chain of recorded frames puts wrists and camera where the world measured them.
 fn wrists_follow_from_transforms(world: &World, recorded: &FrameTransforms) {
     let pose = |child: &str| {
         let mut frame = child;
@@ -291,7 +291,7 @@ fn metadata(bytes: &[u8]) -> BTreeMap<String, BTreeMap<String, String>> {
     summary.metadata_indexes.iter().map(read).map(|m| (m.name, m.metadata)).collect()
 }
 
-/// Foxglove's reader of JSON Schema wants one plain type per field and follows no references.
+/// Foxglove's reader of JSON Schema needs one plain type per field and follows no references.
 #[test]
 fn json_schemas_are_flat() {
     let folder = tempfile::tempdir().unwrap();
@@ -367,7 +367,7 @@ fn the_scene_shows_every_drawn_geom() {
     assert_ne!(colours("A/"), colours("B/"), "partners differ in colour");
 }
 
-/// Every text of a JSON value.
+/// Collects every text of a JSON value.
 fn texts(value: &serde_json::Value, found: &mut Vec<String>) {
     match value {
         serde_json::Value::String(text) => found.push(text.clone()),
@@ -377,7 +377,7 @@ fn texts(value: &serde_json::Value, found: &mut Vec<String>) {
     }
 }
 
-/// The layout that the book has people open in Foxglove shows what recordings hold.
+/// The layout that the book has people open in Foxglove only names what recordings contain.
 #[test]
 fn the_layout_names_topics_and_fields_that_there_are() {
     let folder = tempfile::tempdir().unwrap();
@@ -390,7 +390,7 @@ fn the_layout_names_topics_and_fields_that_there_are() {
     let paths: Vec<&String> = named.iter().filter(|text| text.starts_with('/')).collect();
     assert!(paths.len() > 15, "{paths:?}");
     for path in paths {
-        // Robots' topics are alike, and only A's camera has taken a picture here.
+        // Robots' topics are alike, and only A's camera has taken an image here.
         let of_a = path.replacen("/B/", "/A/", 1).replacen("/C/", "/A/", 1);
         let (topic, field) = of_a.split_once('.').unwrap_or((&of_a, ""));
         let channel = summary.channels.values().find(|channel| channel.topic == topic);
@@ -407,7 +407,7 @@ fn the_layout_names_topics_and_fields_that_there_are() {
     }
 }
 
-/// Pictures that wait take memory, so the episode waits before there are many.
+/// Pending images take memory, so the episode waits before there are many.
 #[test]
 fn few_pictures_wait_for_the_recorder() {
     let folder = tempfile::tempdir().unwrap();

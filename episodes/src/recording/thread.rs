@@ -1,4 +1,4 @@
-//! A recorder on a thread of its own, so that an episode does not wait while what it left behind is encoded and compressed.
+//! A recorder on a thread of its own, so that an episode does not wait for encoding and compression.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
@@ -10,21 +10,23 @@ use std::{io, iter, mem};
 use super::write::Recorder;
 use crate::output::OutputError;
 
-/// What comes within this time is appended in one go and handed to the system; a process that is killed loses about so much of
-/// what was said. Being woken for every step or call would take a core from who waits for the answer.
+/// Time within which appends are gathered before they are handed to the system in one go. A killed process
+/// loses about this much. Waking the thread for every step or call would take a core from the client that
+/// waits for the reply.
 const GATHERED: Duration = Duration::from_millis(250);
 
-/// Appends that may wait before the episode waits for the recorder.
+/// Largest number of pending appends before the episode waits for the recorder.
 const WAITING_APPENDS: usize = 250;
 
-/// So many steps are handed to the system in one go: fewer would be chunks that compress badly.
+/// Steps that are handed to the system in one go: fewer would make chunks that compress badly.
 const GATHERED_STEPS: usize = 12;
 
-/// The most steps that a process which is killed loses: with so many the episode waits until the system has them.
+/// Largest number of steps that a killed process loses. At this number, the episode waits until the system
+/// has them.
 const UNWRITTEN_STEPS: usize = 25;
 
-/// Pictures wait as they were drawn, a quarter of a megabyte each, and are encoded by the recorder. From so many on it gathers no
-/// longer, and from so many on the episode waits for it.
+/// Number of pending images from which the recorder stops gathering; at `WAITING_PICTURES` the episode
+/// waits for it. Images wait unencoded, a quarter of a megabyte each; the recorder encodes them.
 const GATHERED_PICTURES: usize = 4;
 const WAITING_PICTURES: usize = 16;
 
@@ -32,15 +34,16 @@ const PANICKED: &str = "the recorder panicked";
 
 type Write = Box<dyn FnOnce(&mut Recorder) -> Result<(), OutputError> + Send>;
 
-/// What the recorder is asked for.
+/// A request to the recorder.
 enum Append {
     Step(Write),
     Other(Write),
-    /// Everything so far is to be on its way to the disk when the sender is gone; nothing is ever sent.
+    /// Writes out everything before it. The sender is dropped once that is done or has failed; nothing is
+    /// ever sent.
     Flush(SyncSender<()>),
 }
 
-/// Appends to a recording one after the other, behind the caller's back.
+/// Recorder that appends to a recording in the background, one append after the other.
 pub struct RecorderThread {
     /// `None` once it is stopped.
     appends: Option<SyncSender<Append>>,
@@ -51,7 +54,8 @@ pub struct RecorderThread {
     /// Steps that the system does not have yet.
     unwritten_steps: Arc<AtomicUsize>,
     hurry: Arc<AtomicBool>,
-    /// True while the episode is brought back: a journal has its calls, so that steps may be written late.
+    /// True while the episode is restored from a journal. The journal has its calls, so its steps may be
+    /// written late.
     catches_up: bool,
 }
 
@@ -86,12 +90,12 @@ impl RecorderThread {
         self.catches_up = catches_up;
     }
 
-    /// Appends after everything that was appended before, some time soon.
+    /// Appends something after all earlier appends, within a short time.
     pub fn append(&self, append: impl FnOnce(&mut Recorder) -> Result<(), OutputError> + Send + 'static) {
         self.send(Append::Other(Box::new(append)));
     }
 
-    /// As [`RecorderThread::append`], of a control step.
+    /// Appends a control step, as [`RecorderThread::append`] does.
     pub fn append_step(
         &self,
         append: impl FnOnce(&mut Recorder) -> Result<(), OutputError> + Send + 'static,
@@ -101,7 +105,8 @@ impl RecorderThread {
         self.keep_up(count, GATHERED_STEPS, UNWRITTEN_STEPS);
     }
 
-    /// Wakes the recorder from `gathered` on, and lets the episode wait for it from `waiting` on.
+    /// Wakes the recorder from `gathered` pending items on, and makes the episode wait for it from
+    /// `waiting` on.
     fn keep_up(&self, count: usize, gathered: usize, waiting: usize) {
         if count >= waiting && !self.catches_up {
             self.flush();
@@ -120,12 +125,12 @@ impl RecorderThread {
             sent => sent.is_ok(),
         };
         if !sent {
-            // Where it has failed, it has said why.
+            // If it has failed, it has already reported the reason.
             self.failed.get_or_init(|| PANICKED.into());
         }
     }
 
-    /// As [`RecorderThread::append`], of something that holds so many pictures.
+    /// Appends something with this number of images, as [`RecorderThread::append`] does.
     pub fn append_pictures(
         &self,
         pictures: usize,
@@ -144,16 +149,16 @@ impl RecorderThread {
         self.keep_up(count, GATHERED_PICTURES, WAITING_PICTURES);
     }
 
-    /// Waits until the system has everything that was appended so far, or one of it has failed.
+    /// Waits until the system has everything that was appended before, or an append has failed.
     pub fn flush(&self) {
         let (flushed, wait) = sync_channel::<()>(0);
         self.send(Append::Flush(flushed));
         self.wake();
-        // It ends when the other side is gone, be it by a failure before.
+        // The wait ends when the other side is gone, possibly because of an earlier failure.
         let _ = wait.recv();
     }
 
-    /// Gathers no longer.
+    /// Wakes the thread, so that it stops gathering.
     fn wake(&self) {
         if let Some(thread) = &self.thread {
             self.hurry.store(true, Ordering::Release);
@@ -161,7 +166,7 @@ impl RecorderThread {
         }
     }
 
-    /// The first failure of what has been appended so far.
+    /// Returns the first failure up to now.
     pub fn failed(&self) -> Option<&str> {
         self.failed.get().map(String::as_str)
     }
@@ -178,31 +183,32 @@ impl RecorderThread {
     }
 }
 
-/// A recording that is dropped before its end is readable to where it stopped by then.
+/// Waits for the thread, so that a recording that is dropped before its end is readable up to there.
 impl Drop for RecorderThread {
     fn drop(&mut self) {
         self.stop();
     }
 }
 
-/// What runs on the recorder's thread.
+/// State of the recorder's thread.
 struct Appender {
     recorder: Recorder,
     failed: Arc<OnceLock<String>>,
     unwritten_steps: Arc<AtomicUsize>,
     /// Steps since the last flush.
     gathered_steps: usize,
-    /// Whether it has been woken. It also parks while it waits for an append, and being woken from that leaves no trace.
+    /// Set when the thread is woken. The thread also parks while it waits for an append, and a wake-up from
+    /// that leaves no trace.
     hurry: Arc<AtomicBool>,
 }
 
 impl Appender {
-    /// Returns the recorder when nobody is left who appends, or nothing at its first failure.
+    /// Runs until all senders are gone, and returns the recorder. Returns `None` at its first failure.
     fn run(mut self, inbox: &Receiver<Append>) -> Option<Recorder> {
         while let Ok(first) = inbox.recv() {
             if !matches!(first, Append::Flush(_)) && !self.hurry.swap(false, Ordering::AcqRel) {
                 park_timeout(GATHERED);
-                // What it was woken for has been sent before, and is taken up now.
+                // The append that caused the wake-up was sent before it, and is taken up now.
                 self.hurry.swap(false, Ordering::AcqRel);
             }
             let mut appends = iter::once(first).chain(inbox.try_iter());
@@ -213,7 +219,7 @@ impl Appender {
         Some(self.recorder)
     }
 
-    /// Whether all is well.
+    /// Executes an append. Returns `false` once something has failed.
     fn append(&mut self, append: Append) -> bool {
         match append {
             Append::Step(write) => {
@@ -225,7 +231,7 @@ impl Appender {
                 let outcome = write(&mut self.recorder);
                 self.note(outcome)
             }
-            // Whoever waits hears of a failure.
+            // Dropping the sender also ends the wait after a failure.
             Append::Flush(flushed) => {
                 let is_well = self.flush();
                 drop(flushed);

@@ -1,17 +1,17 @@
-//! What was asked, answered and said in an episode, one after the other.
+//! Transcripts: the calls, replies and notes of an episode in their order.
 
 use super::read::{Recording, RecordingError};
 use super::topics::messages::ToolCallMessage;
 use super::topics::notes::NoteMessage;
 
-/// One thing that was asked or said.
+/// A call or a note.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "most of them are calls")]
 pub enum TranscriptEntry {
-    /// A call. Those that count are numbered from 1.
+    /// A call. Calls that count are numbered from 1.
     Call {
         number: Option<u32>,
-        /// When it was answered.
+        /// Simulated time of the reply.
         time_s: f64,
         call: ToolCallMessage,
     },
@@ -22,7 +22,12 @@ pub enum TranscriptEntry {
 }
 
 impl Recording {
-    /// Every call, refused ones and those that do not count included, and every note, in the order in which they came.
+    /// Returns every call and every note in their order, including refused calls and those that do not
+    /// count.
+    ///
+    /// # Errors
+    ///
+    /// If a message cannot be read.
     pub fn transcript(&self) -> Result<Vec<TranscriptEntry>, RecordingError> {
         let mut notes = self.notes()?.into_iter().peekable();
         let (mut entries, mut count) = (Vec::new(), 0);

@@ -1,4 +1,4 @@
-//! Writes a recording while the episode runs.
+//! Writing of a recording while the episode runs.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -22,32 +22,33 @@ use crate::results::RESULT_FILE;
 use crate::scoring::{Facts, ScoreMemory};
 use crate::spec::EpisodeSpec;
 
-/// Poses of links follow from joint states, which every step has; they are for those who look, and are the most bytes of a recording.
+/// Interval in steps between transforms. The poses of links follow from the joint states of every step.
+/// Transforms are for display, and take the most bytes of a recording.
 const TRANSFORMS_EVERY: u64 = 5;
 
-/// What is known of an episode before its first step.
+/// Description of an episode before its first step.
 pub struct RecordingHeader {
     pub spec: EpisodeSpec,
-    /// Which base controller the robots have; the name tells files of different content apart.
+    /// Name of the robots' base controller; files of different content have different names.
     pub locomotion: String,
-    /// Who draws its pictures, and on what device.
+    /// Renderer of the images, and its device.
     pub renderer: String,
-    /// Which build of Tandem plays it.
+    /// Build of Tandem that plays the episode.
     pub build: String,
     /// The robots, in their order in the world.
     pub robots: Vec<RobotSheet>,
-    /// What scoring remembers where the recording begins.
+    /// State of the scoring at the start of the recording.
     pub scores: ScoreMemory,
-    /// Whether what robots do is not always what they are told.
+    /// True if robots do not always execute the policy's commands.
     pub executes_otherwise: bool,
 }
 
-/// A recording under way.
+/// A recording that is being written.
 pub struct Recorder {
     file: McapFile,
     /// Simulated time at which the recording begins.
     start_s: f64,
-    /// When the last step ended.
+    /// Simulated time at the end of the last step.
     last_s: f64,
     robots: Vec<RobotSheet>,
     robot_topics: Vec<RobotTopics>,
@@ -64,8 +65,12 @@ pub struct Recorder {
 impl Recorder {
     pub const FILE_NAME: &str = "episode.mcap";
 
-    /// Opens a recording in an existing run folder and writes what the episode is, what its robots look like, and `start`,
-    /// the state before the first step that will be recorded.
+    /// Opens a recording in an existing run folder. Writes the episode's description, the robots' shapes,
+    /// and `start`, the state before the first recorded step.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be created or written.
     pub fn create(
         folder: &Path,
         visibility: Visibility,
@@ -101,7 +106,8 @@ impl Recorder {
         Ok(recorder)
     }
 
-    /// Adds shapes that are drawn in frame `frame` from the start: `world` for the room, an object's name for an object.
+    /// Adds shapes that are drawn in frame `frame` from the start: `world` for the room, an object's name
+    /// for an object.
     pub fn draw(&mut self, frame: &str, geoms: &[Geom]) -> Result<(), OutputError> {
         let entity = scene::entity(frame, geoms, |geom| geom.rgba);
         self.file.write(
@@ -122,8 +128,8 @@ impl Recorder {
         self.file.write(&mut self.scene, self.start_s, &SceneUpdate { entities, deletions: vec![] })
     }
 
-    /// Appends one control step, of which scoring sees `facts`, and the hash of the whole state that it left. `executed` is what robots
-    /// did in it, where that may be something else than they were told.
+    /// Appends one control step with the scoring's `facts`, and the hash of the whole state after it.
+    /// `executed` are the commands that the robots executed, which may differ from the policy's.
     pub fn step(
         &mut self,
         step: &Step,
@@ -154,13 +160,13 @@ impl Recorder {
         self.file.write(&mut self.phases, phase.time_s, &Json::from(phase))
     }
 
-    /// Attaches a checkpoint of the episode as it stands at `time_s`.
+    /// Attaches a checkpoint of the episode at `time_s`.
     pub fn checkpoint(&mut self, name: &str, time_s: f64, bytes: &[u8]) -> Result<(), OutputError> {
         self.file.attach(&checkpoint_name(name), time_s, bytes)
     }
 
-    /// Appends a tool call and its answer. Pictures of the answer go to the topics of their robots' cameras, one for each
-    /// state.
+    /// Appends a tool call and its reply. Images of the reply go to the topics of their robots' cameras,
+    /// one for each state.
     pub fn tool_call(&mut self, record: ToolCallRecord) -> Result<(), OutputError> {
         let ToolCallRecord { time_s, message, pictures } = record;
         self.file.write(&mut self.tool_calls, time_s, &Json(message))?;
@@ -173,7 +179,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Appends a note of this time.
+    /// Appends a note at this time.
     pub fn note(&mut self, time_s: f64, note: NoteMessage) -> Result<(), OutputError> {
         self.file.write(&mut self.notes, time_s, &Json(note))
     }
@@ -184,13 +190,17 @@ impl Recorder {
     }
 
     /// Writes the result and the index, and gives the file its name.
+    ///
+    /// # Errors
+    ///
+    /// If the file cannot be written.
     pub fn finish(mut self, result: &ResultReply) -> Result<PathBuf, OutputError> {
         self.file.metadata(metadata::RESULT, &[(RESULT_FILE, &serde_json::to_string(result)?)])?;
         self.file.finish()
     }
 }
 
-/// The episode in one value for programs, and in single words for people.
+/// Writes the episode's description: one value for programs, and single texts for people.
 fn write_header(file: &mut McapFile, header: &RecordingHeader) -> Result<(), OutputError> {
     let names: Vec<&str> = header.robots.iter().map(|robot| robot.name.as_str()).collect();
     let words = header.spec.task_words();

@@ -1,5 +1,5 @@
-//! A finished episode for who looks at it in a page: its scene, what happened when, and its steps as a scrubber shows them. Nothing is
-//! simulated.
+//! A finished episode for display in a page: its scene, its events in time, and its steps for a scrubber.
+//! Nothing is simulated.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -17,21 +17,25 @@ use crate::recording::{Recording, TranscriptEntry};
 use crate::session::build;
 use crate::spec::EpisodeSpec;
 
-/// Every how many control steps one is shown: ten a second, between which a page draws what lies between.
+/// Control steps per displayed step: ten are shown a second, and the page interpolates between them.
 const STEPS_PER_FRAME: usize = 5;
 
-/// A recording that is looked at.
+/// A recording for display.
 pub struct RecordedEpisode {
     spec: EpisodeSpec,
     scene: LiveScene,
     steps: Vec<Step>,
-    /// Those that a policy was shown pictures of.
+    /// Steps of which a policy was shown images.
     looked: Vec<Step>,
     message: Arc<[u8]>,
 }
 
 impl RecordedEpisode {
     /// Reads the recording at `path`.
+    ///
+    /// # Errors
+    ///
+    /// If it cannot be read or its world cannot be built.
     pub fn read(path: &Path) -> Result<RecordedEpisode, ReplayError> {
         let recording = Recording::read(path)?;
         let built = build(&recording.spec)?;
@@ -65,19 +69,20 @@ impl RecordedEpisode {
         Ok(RecordedEpisode { spec: recording.spec, scene, steps, looked, message })
     }
 
-    /// What was played.
+    /// Returns the spec of the episode.
     pub fn spec(&self) -> &EpisodeSpec {
         &self.spec
     }
 
-    /// The message that a page draws all of it from: that of the scene with the calls, the phases and the result in its head, and every
-    /// step's at its end.
+    /// Returns the message from which a page draws the episode. Its head has the scene, the calls, the
+    /// phases and the result; the steps follow at its end.
     pub fn message(&self) -> Arc<[u8]> {
         self.message.clone()
     }
 
-    /// What robot `name` saw in the step that is nearest to `time_s`, of those that are shown and those that a policy was shown pictures
-    /// of, as a PNG file; `None` if there is no such robot or step.
+    /// Returns the image of robot `name` as a PNG file, in the step nearest to `time_s`. Candidates are the
+    /// displayed steps, and those of which a policy was shown images. Returns `None` if there is no such
+    /// robot or step.
     pub fn picture(&self, time_s: f64, name: &str) -> Option<Result<Vec<u8>, PictureError>> {
         let away = |step: &&Step| (step.time_s - time_s).abs();
         let step =
@@ -85,7 +90,7 @@ impl RecordedEpisode {
         self.scene.picture(step, name)
     }
 
-    /// The names of the robots.
+    /// Returns the names of the robots.
     pub fn robots(&self) -> impl Iterator<Item = &str> {
         self.scene.robots()
     }
@@ -98,7 +103,7 @@ fn shown(motions: &[Motion], step: &Step) -> LiveStep {
     LiveStep::new(step.clone().into(), told.collect(), None)
 }
 
-/// The step of which a policy was shown pictures.
+/// Returns the step of which a policy was shown images.
 fn looked_at(entry: &TranscriptEntry) -> Option<u64> {
     match entry {
         TranscriptEntry::Call { call, .. } => (!call.pictures.is_empty()).then_some(call.control_step),

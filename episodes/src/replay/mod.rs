@@ -1,4 +1,4 @@
-//! Recordings brought back: simulated again and compared step by step, or drawn again by any camera.
+//! Replays of recordings: simulated again and compared step by step, or rendered again by any camera.
 
 mod look_back;
 mod phase_trace;
@@ -17,7 +17,7 @@ pub use video::{ShortFilm, VideoError, VideoFormat, film, short_film};
 use crate::EpisodeError;
 use crate::recording::RecordingError;
 
-/// Why a recording cannot be played again.
+/// Reason why a recording cannot be replayed.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     #[error(transparent)]

@@ -1,4 +1,4 @@
-//! Why a phase was not reached: what its conditions ask for, and how far a recorded episode came to it.
+//! Diagnosis of a missed phase: its conditions, and how near a recorded episode came to them.
 
 use tandem_sim::CONTROL_HZ;
 
@@ -14,14 +14,14 @@ pub struct PhaseTrace {
     pub id: &'static str,
     pub from_s: f64,
     pub to_s: f64,
-    /// How near it came, from 0 to 1, and when.
+    /// Greatest nearness, from 0 to 1, and its time.
     pub nearest: Moment<f32>,
-    /// When the phase counts as reached.
+    /// Description of when the phase counts as reached.
     pub description: &'static str,
     pub conditions: Vec<ConditionTrace>,
 }
 
-/// The best of something, and when it was so.
+/// The best value of a quantity, and its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment<T> {
     pub best: T,
@@ -32,45 +32,45 @@ pub struct Moment<T> {
 #[derive(Debug)]
 pub struct ConditionTrace {
     pub setting: PhaseSetting,
-    /// How long it has to hold without a break.
+    /// Duration for which it has to hold without a break.
     pub for_s: f64,
-    /// All of its parts at once.
+    /// Record of all its parts at once.
     pub held: Held,
     pub parts: Vec<PartTrace>,
-    /// The most parts that held at once.
+    /// Largest number of parts that held at once.
     pub most_at_once: Moment<usize>,
 }
 
-/// Something that has to hold for a condition to hold.
+/// A part of a condition; all parts have to hold.
 #[derive(Debug)]
 pub struct PartTrace {
     /// Line and column in the task's file.
     pub place: [usize; 2],
-    /// As it is written there.
+    /// The text in that file.
     pub text: String,
     pub held: Held,
-    /// How near it came, if it never held and that is a number.
+    /// Its closest value, if it never held and has a numeric one.
     pub nearest: Option<Moment<Closest>>,
 }
 
-/// How near something came to holding.
+/// Measure of how near something came to holding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Closest {
     /// Both sides of a comparison.
     Sides([f64; 2]),
-    /// From 0 to 1, as of a hand that comes to what it is to hold.
+    /// A share from 0 to 1, for example of a hand that approaches an object to hold it.
     Share(f32),
 }
 
-/// When something held.
+/// Record of when something held.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Held {
-    /// In how many of the steps, and how many there were.
+    /// Number of steps in which it held; `of` is the number of all steps.
     pub steps: u32,
     pub of: u32,
-    /// When it first did.
+    /// Time at which it first held.
     pub first_s: Option<f64>,
-    /// The most steps without a break.
+    /// Largest number of steps without a break.
     pub longest: u32,
     present: u32,
 }
@@ -86,19 +86,25 @@ impl Held {
         }
     }
 
-    /// In seconds, in all.
+    /// Returns the total duration in seconds.
     pub fn total_s(&self) -> f64 {
         f64::from(self.steps) / CONTROL_HZ
     }
 
-    /// In seconds without a break: from the first of its steps to the last, as durations are counted.
+    /// Returns the longest duration without a break in seconds, from the first of its steps to the last, as
+    /// durations are counted.
     pub fn longest_s(&self) -> f64 {
         f64::from(self.longest.saturating_sub(1)) / CONTROL_HZ
     }
 }
 
 impl PhaseTrace {
-    /// Of the phase that would have been next when the recording ends; `None` if the last one was reached.
+    /// Traces the phase that would have been next when the recording ends; `None` if the last one was
+    /// reached.
+    ///
+    /// # Errors
+    ///
+    /// If the recording cannot be read.
     pub fn of(recording: &Recording) -> Result<Option<PhaseTrace>, RecordingError> {
         let task = recording.spec.task;
         let reached = recording.phases()?;

@@ -1,8 +1,10 @@
-//! A recording as pictures and depth of every camera: the second stage of a pipeline that records states first.
+//! Colour and depth images of every camera from a recording: the second stage of a pipeline that records
+//! states first.
 //!
-//! Files: `CAMERA/rgb/STEP.png`, 8 bits a channel; `CAMERA/depth/STEP.png`, 16 bits, millimetres along the optical axis, 0 where
-//! nothing is or it is further than 65.535 m; `pictures.json`, which says what is drawn and with which intrinsics; and
-//! `poses.json`, where each camera was at each picture. Every file is whole or not there, so a run that was stopped goes on.
+//! Files: `CAMERA/rgb/STEP.png`, 8 bits per channel; `CAMERA/depth/STEP.png`, 16 bits, millimetres along
+//! the optical axis, 0 for no surface or more than 65.535 m. `pictures.json` has the episode's spec and the
+//! intrinsics; `poses.json` has the pose of each camera at each image. Every file is whole or absent, so a
+//! run that was stopped can continue.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -23,20 +25,20 @@ use crate::recording::Recording;
 use crate::spec::EpisodeSpec;
 use crate::tasks::Task;
 
-/// What to draw.
+/// Plan of the images to render.
 #[derive(Clone, Debug)]
 pub struct PicturesPlan {
-    /// Pictures a second of each camera.
+    /// Images per second of each camera.
     pub rate_hz: u32,
-    /// Size of every camera's pictures, where it is not to be the camera's own.
+    /// Size of every camera's images; `None` for the camera's own.
     pub size: Option<PictureSize>,
-    /// Threads that draw.
+    /// Number of rendering threads.
     pub jobs: usize,
-    /// Names of the cameras; without any, all of the task's.
+    /// Names of the cameras; empty for all of the task's.
     pub cameras: Vec<String>,
-    /// Whether depth is drawn, too.
+    /// True if depth is rendered, too.
     pub depth: bool,
-    /// Who draws, where it is not to be who drew the episode.
+    /// The renderer; `None` for the one of the recorded episode.
     pub renderer: Option<RendererKind>,
 }
 
@@ -47,7 +49,7 @@ impl Default for PicturesPlan {
 }
 
 impl PicturesPlan {
-    /// The cameras of a task's episodes that are drawn.
+    /// Returns the task's cameras that are rendered.
     fn views(&self, task: &Task) -> Result<Vec<EpisodeCamera>, PicturesError> {
         match &self.cameras[..] {
             [] => Ok(EpisodeCamera::all(task)),
@@ -58,24 +60,24 @@ impl PicturesPlan {
         }
     }
 
-    /// What is drawn, by whom it is to be drawn.
+    /// Returns the spec of the recording with the plan's renderer.
     fn spec(&self, recording: &Recording) -> EpisodeSpec {
         let spec = recording.spec.clone();
         EpisodeSpec { renderer: self.renderer.unwrap_or(spec.renderer), ..spec }
     }
 }
 
-/// What has been drawn.
+/// Counts of rendered images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DrawnPictures {
-    /// Moments at which every camera has a picture.
+    /// Moments at which every camera has an image.
     pub moments: usize,
-    /// How many of these an earlier run had drawn.
+    /// Number of moments that an earlier run had rendered.
     pub already_drawn: usize,
     pub cameras: usize,
 }
 
-/// Why pictures are missing. What was drawn is kept, and the next run goes on from there.
+/// Reason why images are missing. Rendered images are kept, and the next run continues from there.
 #[derive(Debug, thiserror::Error)]
 pub enum PicturesError {
     #[error("{} holds pictures of another recording, rate or size; give another folder", .0.display())]
@@ -100,10 +102,10 @@ impl From<ReplayError> for PicturesError {
 #[derive(PartialEq, Serialize, Deserialize)]
 struct Manifest {
     spec: EpisodeSpec,
-    /// Hash of the state that the episode ended in, or of its last recorded one.
+    /// Hash of the state in which the episode ended, or of its last recorded state.
     state_hash: String,
     rate_hz: u32,
-    /// Where depth is drawn, too.
+    /// Depth unit; `None` without depth images.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     depth_unit_m: Option<f64>,
     cameras: Vec<CameraEntry>,
@@ -120,7 +122,7 @@ struct CameraEntry {
     cy: f32,
 }
 
-/// Where a camera was, an entry of `poses.json`: x right, y down, z along the optical axis, as OpenCV has it.
+/// Pose of a camera, an entry of `poses.json`: x right, y down, z along the optical axis, as in OpenCV.
 #[derive(Serialize)]
 struct CameraPose {
     control_step: u64,
@@ -133,7 +135,11 @@ struct CameraPose {
 const MANIFEST: &str = "pictures.json";
 const POSES: &str = "poses.json";
 
-/// Draws what `folder` does not hold yet, on several threads.
+/// Renders the images that `folder` does not hold yet, on several threads.
+///
+/// # Errors
+///
+/// If the folder holds other images, a camera is unknown, or an image cannot be rendered or written.
 pub fn draw_all(
     recording: &Recording,
     plan: &PicturesPlan,
@@ -171,7 +177,7 @@ pub fn draw_all(
         for _ in 0..plan.jobs.max(1) {
             scope.spawn(|| {
                 if let Err(error) = work() {
-                    // Nobody else begins another moment.
+                    // No other thread begins another moment.
                     next.store(steps.len(), Ordering::Relaxed);
                     failure.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
                 }
@@ -188,7 +194,7 @@ pub fn draw_all(
     }
 }
 
-/// The steps that are drawn.
+/// Returns the steps that are rendered.
 fn moments(recording: &Recording, rate_hz: u32) -> Result<Vec<Step>, ReplayError> {
     let mut moments = Vec::new();
     for (index, step) in recording.steps().enumerate() {
@@ -200,7 +206,7 @@ fn moments(recording: &Recording, rate_hz: u32) -> Result<Vec<Step>, ReplayError
     Ok(moments)
 }
 
-/// Makes the folders, and sees to it that what lies there already is of the same kind.
+/// Creates the folders, and checks that the images already there are of the same kind.
 fn prepare(
     recording: &Recording,
     plan: &PicturesPlan,

@@ -1,4 +1,4 @@
-//! The cameras of a recorded episode, and pictures drawn from its steps: nothing is simulated.
+//! Cameras of a recorded episode, and images of its steps. Nothing is simulated.
 
 use tandem_sim::Step;
 use tandem_sim::render::{Camera, Frame};
@@ -17,7 +17,7 @@ pub enum EpisodeCamera {
     Egocentric(usize),
 }
 
-/// Width and height of a picture in pixels.
+/// Width and height of an image in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PictureSize {
     pub width: u32,
@@ -25,13 +25,13 @@ pub struct PictureSize {
 }
 
 impl EpisodeCamera {
-    /// Every camera of the task's episodes.
+    /// Returns every camera of the task's episodes.
     pub fn all(task: &Task) -> Vec<EpisodeCamera> {
         let heads = (0..task.robots.len()).map(EpisodeCamera::Egocentric);
         std::iter::once(EpisodeCamera::ThirdPerson).chain(heads).collect()
     }
 
-    /// `third_person`, or the robot's name.
+    /// Returns the camera's name: `third_person`, or the robot's name.
     pub fn name(self, task: &Task) -> &'static str {
         match self {
             EpisodeCamera::ThirdPerson => "third_person",
@@ -39,7 +39,11 @@ impl EpisodeCamera {
         }
     }
 
-    /// The camera called `name`; its error says which there are.
+    /// Returns the camera called `name`.
+    ///
+    /// # Errors
+    ///
+    /// If there is none; the text lists the cameras.
     pub fn find(name: &str, task: &Task) -> Result<EpisodeCamera, String> {
         let all = EpisodeCamera::all(task);
         let have: Vec<&str> = all.iter().map(|view| view.name(task)).collect();
@@ -50,18 +54,23 @@ impl EpisodeCamera {
     }
 }
 
-/// Draws the steps of one episode.
+/// Renderer of the steps of one episode.
 pub struct EpisodeRenderer {
     observer: Observer,
 }
 
 impl EpisodeRenderer {
-    /// Draws the episode `spec`, whose world is built for it and stays at rest.
+    /// Creates the renderer of the episode `spec`. The world is built for it and stays at rest.
+    ///
+    /// # Errors
+    ///
+    /// If the world cannot be built.
     pub fn of(spec: &EpisodeSpec) -> Result<EpisodeRenderer, EpisodeError> {
         Ok(EpisodeRenderer { observer: Observer::new(spec, &build(spec)?.world) })
     }
 
-    /// The camera after `step`, with pictures of another size if one is given: as high an angle, more or less wide.
+    /// Returns the camera after `step`, with the given image size or its own. The vertical angle stays the
+    /// same, and the horizontal one follows the shape.
     pub fn camera(&self, view: EpisodeCamera, step: &Step, size: Option<PictureSize>) -> Camera {
         let camera = match view {
             EpisodeCamera::ThirdPerson => self.observer.cameras.third_person(),
@@ -73,8 +82,9 @@ impl EpisodeRenderer {
         }
     }
 
-    /// What a camera sees after `step`, in its own size or in another, without depth. A size of the same shape that is no larger is
-    /// what a policy is shown that asks for it: the camera's own picture, scaled.
+    /// Returns the image of a camera after `step`, in its own size or in another, without depth. A size of
+    /// the same shape that is no larger gives the camera's own image, scaled. That is what a policy sees
+    /// that requests this size.
     pub fn colours(&mut self, view: EpisodeCamera, step: &Step, size: Option<PictureSize>) -> Picture {
         let own = self.camera(view, step, None);
         let scaled = size.filter(|size| {
@@ -94,7 +104,7 @@ impl EpisodeRenderer {
         }
     }
 
-    /// What `camera` sees after `step`.
+    /// Renders the view of `camera` after `step`.
     pub fn draw(&mut self, step: &Step, camera: &Camera) -> Frame {
         self.observer.render(step, camera)
     }

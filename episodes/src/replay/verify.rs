@@ -1,4 +1,4 @@
-//! Simulates a recorded episode again, and compares the state after every step.
+//! Verification of a recording: simulates the episode again, and compares the state after every step.
 
 use std::collections::BTreeSet;
 
@@ -11,26 +11,26 @@ use crate::fingerprint;
 use crate::recording::{BEGIN, RecordedCall, Recording, state_hash_text};
 use crate::session::Replay;
 
-/// What came of simulating a recording again.
+/// Outcome of simulating a recording again.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verification {
-    /// Steps whose states are the recorded ones, that before the first one included.
+    /// Steps whose states equal the recorded ones, including the state before the first one.
     pub steps: usize,
     pub calls: usize,
-    /// Steps at the end of an interrupted recording that belong to a call of which it has no answer.
+    /// Steps at the end of an interrupted recording that belong to a call without a recorded reply.
     pub unanswered_steps: usize,
-    /// The build that recorded it, where that is another: builds may differ in their physics.
+    /// The build that recorded the episode, if it is another: builds may differ in their physics.
     pub other_build: Option<String>,
     pub outcome: Verdict,
 }
 
-/// How what was simulated compares with what was recorded.
+/// Comparison of the simulation with the recording.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Verdict {
     /// Every state, the result, and the phases scored from the recorded steps agree.
     Same,
     State(Difference),
-    /// The states agree and the result does not: what of it differs, as recorded and as it is.
+    /// The states agree and the results do not: the differing part, as recorded and as simulated.
     Result {
         what: &'static str,
         recorded: String,
@@ -42,7 +42,7 @@ pub enum Verdict {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Difference {
     pub control_step: u64,
-    /// Recorded and simulated state hash; `None` where there is no such step.
+    /// Recorded and simulated state hash; `None` if there is no such step.
     pub recorded: Option<String>,
     pub again: Option<String>,
     /// Number, from 1, and tool of the call that made the step; `None` before the first call.
@@ -50,6 +50,11 @@ pub struct Difference {
 }
 
 /// Simulates the episode of `recording` again.
+///
+/// # Errors
+///
+/// If the recording cannot be read, its episode cannot be started, or it has a call that this build does
+/// not know.
 pub fn verify(recording: &Recording) -> Result<Verification, ReplayError> {
     let this = fingerprint::build().map_err(EpisodeError::Build)?;
     let begin = recording.checkpoint(BEGIN);
@@ -57,7 +62,7 @@ pub fn verify(recording: &Recording) -> Result<Verification, ReplayError> {
     let mut comparison =
         HashComparison { recorded: recording.state_hashes().collect::<Result<_, _>>()?, steps: 0 };
     let calls = recording.tool_calls()?;
-    // A recording may have been cut before its first call, within the hold that an episode begins with.
+    // A recording may have been cut before its first call, within the hold at the episode's start.
     let cut = recording.result.is_none() && calls.is_empty();
     let begun = comparison.compare(replay.take_hashes()).filter(|found| !cut || found.recorded.is_some());
     let mut difference = begun.map(|found| (None, found));
@@ -67,7 +72,7 @@ pub fn verify(recording: &Recording) -> Result<Verification, ReplayError> {
         }
         let again = |error: EpisodeError| ReplayError::Call { number: index + 1, source: error.into() };
         let parsed = Called::parse(&call.tool, call.arguments.clone()).map_err(again)?;
-        // A call that was refused is refused again, and what it says is not compared.
+        // A call that was refused is refused again, and the texts are not compared.
         let _ = replay.call(&parsed, call.thought, call.shown.as_deref());
         difference = comparison.compare(replay.take_hashes()).map(|found| (Some((index, call)), found));
     }
@@ -91,13 +96,13 @@ pub fn verify(recording: &Recording) -> Result<Verification, ReplayError> {
     })
 }
 
-/// Recorded states, and how many of them have been compared and were the same.
+/// Recorded states, and the number of them that have been compared and agreed.
 struct HashComparison {
     recorded: Vec<(u64, String)>,
     steps: usize,
 }
 
-/// A difference that belongs to no call yet.
+/// A difference that has not been assigned to a call yet.
 struct StateMismatch {
     control_step: u64,
     recorded: Option<String>,
@@ -105,7 +110,7 @@ struct StateMismatch {
 }
 
 impl HashComparison {
-    /// Compares the states that follow; the first difference, if there is one.
+    /// Compares the states that follow. Returns the first difference; `None` if there is none.
     fn compare(&mut self, again: Vec<u64>) -> Option<StateMismatch> {
         for hash in again {
             let again = state_hash_text(hash);
@@ -124,7 +129,7 @@ impl HashComparison {
         None
     }
 
-    /// The first recorded state that was not simulated again.
+    /// Returns the first recorded state that was not simulated again.
     fn missing(&self) -> Option<StateMismatch> {
         let (control_step, recorded) = self.recorded.get(self.steps)?;
         Some(StateMismatch { control_step: *control_step, recorded: Some(recorded.clone()), again: None })
@@ -147,8 +152,9 @@ fn text_of(hash: &Option<String>) -> String {
     hash.clone().unwrap_or_default()
 }
 
-/// The recorded result against the one of the simulation, and against the phases scored from the recorded steps. Another build may
-/// not have named what this one does.
+/// Compares the recorded result with the simulated one, and with the phases scored from the recorded steps.
+/// Departures and extra information are compared for the same build only, because another build may have
+/// named fewer.
 fn compare_results(
     recording: &Recording,
     recorded: &ResultReply,

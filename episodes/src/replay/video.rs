@@ -1,4 +1,4 @@
-//! A recording as a film of one camera.
+//! Video of a recording from one camera.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -15,7 +15,7 @@ use super::{EpisodeCamera, EpisodeRenderer, PictureSize, ReplayError};
 use crate::output::{OutputError, partial_path, put_in_place, webp, write_whole};
 use crate::recording::Recording;
 
-/// What kind of film; the file's extension says it.
+/// Format of a video, by the file's extension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum VideoFormat {
     Webp,
@@ -23,7 +23,7 @@ pub enum VideoFormat {
     Mp4,
 }
 
-/// Why there is no film.
+/// Reason why a video cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub enum VideoError {
     #[error("{} is no film that can be made; give a file that ends in .webp, .gif or .mp4", .0.display())]
@@ -49,7 +49,7 @@ impl From<ReplayError> for VideoError {
 }
 
 impl VideoFormat {
-    /// What the file's extension asks for.
+    /// Returns the format for the file's extension.
     pub fn of(path: &Path) -> Result<VideoFormat, VideoError> {
         match path.extension().and_then(|extension| extension.to_str()) {
             Some("webp") => Ok(VideoFormat::Webp),
@@ -60,7 +60,11 @@ impl VideoFormat {
     }
 }
 
-/// Films a whole recording at `rate_hz` pictures a second, as fast as it was, and returns how many pictures that is.
+/// Renders a whole recording at `rate_hz` frames a second, in real time. Returns the number of frames.
+///
+/// # Errors
+///
+/// If the format is unknown, the recording cannot be replayed, or the video cannot be written.
 pub fn film(
     recording: &Recording,
     view: EpisodeCamera,
@@ -92,21 +96,25 @@ pub fn film(
     Ok(pictures)
 }
 
-/// A film for a page: so many pictures at most, whatever the episode's length, so that it plays for seconds and has a quarter of a
-/// megabyte at most.
+/// A short video for a page, with at most `SHORT_PICTURES` frames for any length of episode. It plays for
+/// seconds and has at most a quarter of a megabyte.
 pub struct ShortFilm {
     pub webp: Vec<u8>,
-    /// How much faster it plays than the episode was.
+    /// Ratio of the video's speed to the episode's.
     pub speed_ratio: f64,
 }
 
 const SHORT_PICTURES: usize = 60;
 const SHORT_RATE_HZ: u32 = 10;
 const SHORT_SIZE: PictureSize = PictureSize { width: 320, height: 240 };
-/// How long its last picture stays.
+/// Duration of the last frame.
 const SHORT_END_MS: i32 = 1500;
 
-/// Films a whole recording from the side, as a [`ShortFilm`].
+/// Renders a whole recording from the third-person camera, as a [`ShortFilm`].
+///
+/// # Errors
+///
+/// If the recording cannot be replayed, or the video cannot be encoded.
 pub fn short_film(recording: &Recording) -> Result<ShortFilm, VideoError> {
     let mut scene = EpisodeRenderer::of(&recording.spec).map_err(ReplayError::from)?;
     let failed = |error| webp_failed(recording.path(), error);
@@ -127,23 +135,23 @@ pub fn short_film(recording: &Recording) -> Result<ShortFilm, VideoError> {
     Ok(ShortFilm { webp, speed_ratio: stride as f64 * f64::from(SHORT_RATE_HZ) / CONTROL_HZ })
 }
 
-/// Which step, counted from the recording's first, picture number `picture` shows.
+/// Returns the index of the step, from the recording's first, that frame number `picture` shows.
 pub fn step_of_picture(picture: usize, rate_hz: u32) -> usize {
     (picture as f64 * CONTROL_HZ / f64::from(rate_hz)).round() as usize
 }
 
-/// A film under way.
+/// A video that is being written.
 enum FilmWriter {
     Webp(Box<Encoder>),
     Gif { encoder: Box<GifEncoder<BufWriter<File>>>, file: File },
     Mp4(Child),
 }
 
-/// The speed of the GIF encoder, from 1, the slowest, to 30.
+/// Speed of the GIF encoder, from 1, the slowest, to 30.
 const GIF_SPEED: i32 = 10;
 
 impl FilmWriter {
-    /// Begins a film with pictures of the size of `frame`.
+    /// Begins a video with frames of the size of `frame`.
     fn begin(
         format: VideoFormat,
         frame: &Frame,
@@ -179,7 +187,7 @@ impl FilmWriter {
             }
             FilmWriter::Mp4(child) => {
                 if let Some(pipe) = &mut child.stdin {
-                    // A pipe that is closed early has its reason in what ffmpeg says at the end.
+                    // If ffmpeg closes the pipe early, its messages at the end give the reason.
                     let _ = pipe.write_all(&frame.rgb);
                 }
                 Ok(())
@@ -213,11 +221,11 @@ impl FilmWriter {
     }
 }
 
-/// An ffmpeg that takes raw pictures and writes what every player plays.
+/// Starts an ffmpeg that reads raw frames and writes a video that every player supports.
 fn ffmpeg([width, height]: [u32; 2], rate_hz: u32, path: &Path) -> Result<Child, VideoError> {
     let (size, rate) = (format!("{width}x{height}"), rate_hz.to_string());
     let takes = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", &size, "-r", &rate, "-i", "-"];
-    // Players want an even number of pixels each way, and the index in front.
+    // Players need an even number of pixels each way, and the index in front.
     let even = "pad=ceil(iw/2)*2:ceil(ih/2)*2";
     let writes = ["-vf", even, "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4"];
     let ffmpeg = Command::new("ffmpeg")

@@ -1,4 +1,4 @@
-//! What episodes came to, as files and as counts.
+//! Results of episodes, as files and as counts.
 
 mod phase_level;
 
@@ -15,10 +15,14 @@ use crate::output::{OutputError, write_whole};
 use crate::scoring::Phase;
 use crate::spec::EpisodeSpec;
 
-/// The result's name in a run folder.
+/// Name of the result in a run folder.
 pub const RESULT_FILE: &str = "result.json";
 
 /// Writes `result.json` into a run folder. A reader sees the old file or the new one, never a part.
+///
+/// # Errors
+///
+/// If the file cannot be written.
 pub fn write_result(result: &ResultReply, folder: &Path) -> Result<PathBuf, OutputError> {
     let mut text = serde_json::to_string_pretty(result)?;
     text.push('\n');
@@ -27,40 +31,41 @@ pub fn write_result(result: &ResultReply, folder: &Path) -> Result<PathBuf, Outp
     Ok(path)
 }
 
-/// What results call nobody, who holds still.
+/// Name in results of the player that holds still.
 pub const IDLE: &str = "idle";
 
-/// What results call the policy that replays a demonstration without a look.
+/// Name in results of the policy that replays a demonstration without observations.
 pub const OPEN_LOOP: &str = "open-loop";
 
 /// Folder of single episodes in the folder of an evaluation.
 pub const EPISODES: &str = "episodes";
 
-/// Folder of what was played under stress in the folder of an evaluation: the folders of further evaluations.
+/// Folder of the evaluations under stress in the folder of an evaluation.
 pub const STRESS: &str = "stress";
 
-/// One episode that was played, as it is kept in a file of its own.
+/// One played episode, as stored in a file of its own.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlayedEpisode {
-    /// Who played.
+    /// The policy.
     #[serde(flatten)]
     pub policy: PolicyCard,
     pub spec: EpisodeSpec,
-    /// Which base controller the robots had; the name tells files of different content apart.
+    /// Name of the robots' base controller; files of different content have different names.
     pub locomotion: String,
-    /// Version and fingerprint of the program; what another build played is played again.
+    /// Version and fingerprint of the program. An episode of another build is played again.
     pub build: String,
     #[serde(flatten)]
     pub result: ResultReply,
-    /// How long the policy thought.
+    /// The policy's thinking time.
     #[serde(default)]
     pub thought_s: f64,
-    /// Why the episode fell short: what stopped the policy, or the first phase that was missed.
+    /// Reason why the episode fell short: what stopped the policy, or the first missed phase.
     pub note: Option<String>,
-    /// Whether it counts as a failure of the policy that the policy itself failed: it has been played again as often as was asked for.
+    /// True if a failure of the policy itself counts as a failed episode, because the episode has been
+    /// retried as often as requested.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub keep_failed: bool,
-    /// The earlier attempts at this episode, which did not count; the oldest first.
+    /// Earlier attempts at this episode, which did not count; the oldest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub attempts: Vec<Attempt>,
 }
@@ -74,12 +79,13 @@ pub struct Attempt {
     pub tool_calls: u32,
     pub thought_s: f64,
     pub note: Option<String>,
-    /// What notes say that it took.
+    /// Usage that the notes report.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub usage: Option<Usage>,
 }
 
-/// Why an episode says nothing of how far its policy gets. It is listed apart from failures, and played again by the next run.
+/// Reason why an episode says nothing about its policy's performance. It is listed apart from failures, and
+/// played again by the next run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Exclusion {
@@ -88,7 +94,7 @@ pub enum Exclusion {
 }
 
 impl Exclusion {
-    /// As tables have it.
+    /// Returns the name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Exclusion::PolicyFailed => "policy failed",
@@ -98,7 +104,7 @@ impl Exclusion {
 }
 
 impl PlayedEpisode {
-    /// Every attempt at the episode, the one that stands here as the last.
+    /// Returns every attempt at the episode, this one as the last.
     pub fn into_attempts(self) -> Vec<Attempt> {
         let PlayedEpisode { result, thought_s, note, mut attempts, .. } = self;
         let ResultReply { ended, phases, env_steps, tool_calls, usage, .. } = result;
@@ -106,17 +112,19 @@ impl PlayedEpisode {
         attempts
     }
 
-    /// Index of the phase that it began at and that alone counts; `None` where it began at the task's beginning.
+    /// Returns the index of the phase that the episode began at and that alone counts; `None` if it began
+    /// at the task's beginning.
     pub fn start_phase(&self) -> Option<usize> {
         self.spec.start_phase()
     }
 
-    /// Whether phase number `phase`, from 0, was reached.
+    /// Returns `true` if phase number `phase`, from 0, was reached.
     pub fn reached(&self, phase: usize) -> bool {
         self.result.phases.reached_s(&Phase::number(phase)).is_some()
     }
 
-    /// What the policy was shown that the benchmark's own policies are not, without what its assistance says already.
+    /// Returns the extra information beyond the benchmark's own policies, without the part that the
+    /// assistance level implies.
     fn shown(&self) -> impl Iterator<Item = &String> {
         let is_said = |what: &&String| {
             let of_full = ExtraInformation::ALL.into_iter().filter(|kind| kind.is_of_full_assistance());
@@ -126,12 +134,13 @@ impl PlayedEpisode {
         asked.iter().chain(self.result.extra_information.iter().filter(move |what| !is_said(what)))
     }
 
-    /// Whether the phase that counts was reached: the one that the episode began at, or the last.
+    /// Returns `true` if the phase that counts was reached: the one that the episode began at, or the last.
     pub fn succeeded(&self) -> bool {
         self.reached(self.start_phase().unwrap_or(self.spec.task.phases.len() - 1))
     }
 
-    /// Why the episode does not count, if it does not. What was reached before something failed stays reached.
+    /// Returns the reason why the episode does not count; `None` if it counts. Phases reached before a
+    /// failure stay reached.
     pub fn exclusion(&self) -> Option<Exclusion> {
         let failed = match self.result.ended {
             EndReason::PolicyFailed if self.keep_failed => None,
@@ -146,64 +155,65 @@ impl PlayedEpisode {
         failed.filter(|_| !self.succeeded())
     }
 
-    /// Whether the episode counts in rates and averages.
+    /// Returns `true` if the episode counts in rates and averages.
     pub fn counts(&self) -> bool {
         self.exclusion().is_none()
     }
 }
 
-/// How many of these attempts ended because the policy itself failed.
+/// Returns the number of these attempts that ended because the policy itself failed.
 pub fn failures_of_policy(attempts: &[Attempt]) -> usize {
     attempts.iter().filter(|attempt| attempt.ended == EndReason::PolicyFailed).count()
 }
 
-/// What results say of a policy. Episodes of policies with different cards are never taken for each other.
+/// Description of a policy in results. Episodes of policies with different cards are never mixed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PolicyCard {
-    /// What results call it.
+    /// The policy's name in results.
     #[serde(rename = "policy")]
     pub name: String,
-    /// How it is reached and driven, as far as its name does not say it.
+    /// Settings of how it is reached and driven that its name does not express.
     #[serde(rename = "policy_settings", default, skip_serializing_if = "Option::is_none")]
     pub settings: Option<Value>,
-    /// What it asks to be shown that the benchmark's own policies are not. A result, which stands beside it in files, says by the
-    /// plain name what was shown.
+    /// Extra information that the policy requests beyond the benchmark's own policies. The result, in the
+    /// same JSON object, lists under the plain name the information that was shown.
     #[serde(rename = "policy_extra_information", default, skip_serializing_if = "Vec::is_empty")]
     pub extra_information: Vec<String>,
 }
 
 impl PolicyCard {
-    /// The name, and what the policy is shown beyond what others see.
+    /// Returns the name, followed by the extra information that the policy is shown.
     pub fn full_name(&self) -> String {
         named(&self.name, &self.extra_information)
     }
 }
 
-/// A policy's name with what has to be known beside it.
+/// Returns a policy's name followed by the attributes that belong with it.
 pub fn named(policy: &str, beside: &[String]) -> String {
     std::iter::once(policy.to_owned()).chain(beside.iter().map(|what| format!(" + {what}"))).collect()
 }
 
-/// What the policy of these episodes was shown in any of them that the benchmark's own policies are not, as stands behind its name.
+/// Returns the extra information that the policy was shown in any of these episodes, for display after its
+/// name.
 pub fn shown_in<'a>(episodes: impl Iterator<Item = &'a PlayedEpisode>) -> Vec<String> {
     let shown: BTreeSet<&String> = episodes.flat_map(PlayedEpisode::shown).collect();
     shown.into_iter().cloned().collect()
 }
 
 impl From<&str> for PolicyCard {
-    /// A policy of which nothing but the name is known.
+    /// Creates the card of a policy known by name only.
     fn from(name: &str) -> PolicyCard {
         PolicyCard { name: name.into(), ..PolicyCard::default() }
     }
 }
 
-/// How the simulator failed, or else the first phase that was not reached.
+/// Returns the simulator's failure, or else the first phase that was not reached.
 pub fn episode_note(result: &ResultReply, counts: Option<usize>) -> Option<String> {
     let failed = result.simulator_failure.as_ref().map(|failure| format!("the simulator failed {failure}"));
     failed.or_else(|| missed_phase_note(result, counts))
 }
 
-/// The first phase that was not reached; where one phase counts, that one.
+/// Returns a note on the first phase that was not reached; if one phase counts, on that one.
 pub fn missed_phase_note(result: &ResultReply, counts: Option<usize>) -> Option<String> {
     let counted = |index: usize| counts.is_none_or(|only| only == index);
     let phases = result.phases.0.iter().enumerate();
@@ -269,7 +279,7 @@ mod tests {
         assert_eq!(names, ["result.json"], "no partial file stays behind");
     }
 
-    /// A policy's card and its result stand in one object.
+    /// A policy's card and its result are in one JSON object.
     #[test]
     fn what_a_policy_asks_for_and_what_it_was_shown_are_kept_apart() {
         let mut result = result(None);

@@ -1,5 +1,5 @@
-//! Every phase on its own: how often it was reached by episodes that began where it begins. What went wrong earlier in a task
-//! has no part in it, so phases that need several robots can be compared with those that do not.
+//! Phase-level rates: how often each phase was reached by episodes that began at it. Earlier failures in a
+//! task have no effect on them, so phases that need several robots can be compared with those that do not.
 
 use std::collections::BTreeMap;
 
@@ -9,15 +9,15 @@ use super::PlayedEpisode;
 use crate::scoring::Phase;
 use crate::tasks;
 
-/// The rates of all phases that were begun at.
+/// The rates of all phases at which episodes began.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseLevel {
     /// The rates in the order of the tasks and their phases.
     pub phases: Vec<PhaseRate>,
-    /// Means over the tasks of two robots, as the benchmark has them.
+    /// Means over the tasks of two robots, as in the benchmark.
     #[serde(flatten)]
     pub two_robots: PhaseMeans,
-    /// Means over the tasks of three robots, where any was played.
+    /// Means over the tasks of three robots; `None` if none was played.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub three_robots: Option<PhaseMeans>,
 }
@@ -25,11 +25,11 @@ pub struct PhaseLevel {
 /// Means of phases' rates; every phase counts the same, however many episodes it has.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseMeans {
-    /// Mean of the rates of phases that one robot works on at a time; `None` where there is none.
+    /// Mean of the rates of phases that one robot works on at a time; `None` if there is none.
     pub non_collaborative_share: Option<f64>,
     /// Mean of the rates of phases on which robots work together.
     pub collaborative_share: Option<f64>,
-    /// How much lower the second is, as a share of the first.
+    /// Relative drop from the first mean to the second, as a share of the first.
     pub drop_share: Option<f64>,
 }
 
@@ -37,11 +37,11 @@ pub struct PhaseMeans {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseRate {
     pub task: &'static str,
-    /// How many robots the task is for.
+    /// Number of robots of the task.
     pub robots: usize,
-    /// The phase's id, as `transfer`.
+    /// The phase's id, for example `transfer`.
     pub id: &'static str,
-    /// The phase's number, as `p2`.
+    /// The phase's number, for example `p2`.
     pub number: String,
     pub collaborative: bool,
     pub episodes: usize,
@@ -55,7 +55,7 @@ impl PhaseRate {
 }
 
 impl PhaseLevel {
-    /// Counts the episodes that began at a phase and count; `None` where none did.
+    /// Counts the episodes that began at a phase and count; `None` if there are none.
     pub fn of<'a>(episodes: impl Iterator<Item = &'a PlayedEpisode>) -> Option<PhaseLevel> {
         let mut counts: BTreeMap<(usize, usize), [usize; 2]> = BTreeMap::new();
         let counted: Vec<&PlayedEpisode> = episodes.filter(|played| played.counts()).collect();
@@ -88,7 +88,7 @@ impl PhaseLevel {
         (!phases.is_empty()).then_some(PhaseLevel { phases, two_robots, three_robots })
     }
 
-    /// The means by number of robots, where there are any.
+    /// Returns the means by number of robots that were played.
     pub fn means(&self) -> Vec<(usize, &PhaseMeans)> {
         let two = self.phases.iter().any(|rate| rate.robots == 2).then_some((2, &self.two_robots));
         two.into_iter().chain(self.three_robots.iter().map(|means| (3, means))).collect()

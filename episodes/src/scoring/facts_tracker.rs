@@ -1,4 +1,4 @@
-//! Follows an episode step by step, and says what scoring and experts may know of it.
+//! Tracker of an episode's facts, step by step, for scoring and experts.
 
 use std::sync::Arc;
 
@@ -8,16 +8,16 @@ use tandem_sim::{ObjectFile, ObjectModel, RobotModel, SimError, Step};
 use super::facts::{Facts, ObjectFacts, RobotFacts};
 use super::grasps::ObjectGrasps;
 
-/// What is known of every object by the steps seen so far.
+/// Knowledge of every object from the steps up to now.
 #[derive(Clone, Debug)]
 pub struct FactsTracker {
-    /// The model of each object, as its file has it.
+    /// The model of each object from its file.
     models: Vec<Arc<ObjectModel>>,
     robot: Arc<RobotModel>,
     memory: Vec<ObjectMemory>,
 }
 
-/// What has to be remembered of one object between control steps: grasps, and where it began.
+/// Memory of one object between control steps: its grasps, and its height at the start.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ObjectMemory {
     name: String,
@@ -26,15 +26,15 @@ pub struct ObjectMemory {
 }
 
 impl ObjectMemory {
-    /// The object's name.
+    /// Returns the object's name.
     pub fn name(&self) -> &str {
         &self.name
     }
 }
 
 impl FactsTracker {
-    /// Begins to watch `objects`, given by name and file, and what moves on them, and robots of a model, with the state before the
-    /// first control step.
+    /// Begins to track `objects`, given by name and file, their moving parts, and robots of a model.
+    /// `start` is the state before the first control step.
     pub fn new<'a>(
         objects: impl Iterator<Item = (&'a str, ObjectFile)>,
         robot: &Arc<RobotModel>,
@@ -55,14 +55,14 @@ impl FactsTracker {
         Ok(tracker)
     }
 
-    /// Looks at the control step that follows the last one.
+    /// Updates the tracker with the control step that follows the last one.
     pub fn update(&mut self, step: &Step) {
         for object in &mut self.memory {
             object.grasps.update(step);
         }
     }
 
-    /// The facts after `step`, the last one that was looked at.
+    /// Returns the facts after `step`, which must be the last one of an update.
     pub fn facts(&self, step: &Step) -> Facts {
         let robots = step.robots.iter().map(|robot| RobotFacts {
             model: self.robot.clone(),
@@ -95,7 +95,7 @@ impl FactsTracker {
         &self.memory
     }
 
-    /// Whether a memory is of the same objects and of as many robots.
+    /// Returns `true` if a memory belongs to the same objects and the same number of robots.
     pub fn fits(&self, memory: &[ObjectMemory]) -> bool {
         let is_same = |(own, other): (&ObjectMemory, &ObjectMemory)| {
             own.name == other.name && own.grasps.is_alike(&other.grasps)
@@ -103,7 +103,7 @@ impl FactsTracker {
         self.memory.len() == memory.len() && self.memory.iter().zip(memory).all(is_same)
     }
 
-    /// Goes back to an earlier [`FactsTracker::memory`] of the same objects.
+    /// Restores an earlier [`FactsTracker::memory`] of the same objects.
     pub fn set_memory(&mut self, memory: Vec<ObjectMemory>) {
         self.memory = memory;
     }

@@ -1,18 +1,21 @@
-//! Who holds what, by contact alone: a hand holds an object while its thumb presses against its fingers or its palm.
+//! Grasp detection by contact alone: a hand holds an object while its thumb presses against its fingers or
+//! its palm.
 
 use serde::{Deserialize, Serialize};
 use tandem_sim::{HandContacts, Side, Sides, Step, Vector};
 
 use super::Grip;
 
-/// Each of two opposed parts of a hand must press at least this hard for a hold to begin. A 0.5 kg bottle held at
-/// friction 0.8 needs 3 N from either side, a resting finger presses less than half a newton.
+/// Least force of each of two opposed parts of a hand for a hold to begin. A 0.5 kg bottle held at friction
+/// 0.8 needs 3 N from either side, and a resting finger presses with less than 0.5 N.
 pub const HOLD_BEGINS_N: f32 = 1.5;
-/// A hold ends when the pressure falls below this; lower than the above, so that a hand in motion does not flicker.
+/// Force below which a hold ends. It is lower than `HOLD_BEGINS_N`, so that a hand in motion does not
+/// flicker.
 pub const HOLD_ENDS_N: f32 = 0.5;
-/// Presses count as opposed if the angle between them is at least 120 degrees.
+/// Cosine of the angle, 120 degrees, from which presses count as opposed.
 const OPPOSED_COSINE: f32 = -0.5;
-/// How many control steps in a row the evidence must last before a hold begins or ends: 60 ms.
+/// Number of successive control steps, 60 ms, for which the evidence must last before a hold begins or
+/// ends.
 pub const STEPS_TO_CHANGE: u32 = 3;
 
 /// The detector of one hand and one object.
@@ -20,12 +23,12 @@ pub const STEPS_TO_CHANGE: u32 = 3;
 pub struct GraspDetector {
     holding: bool,
     touching: bool,
-    /// Control steps in a row that spoke for the opposite of `holding`.
+    /// Successive control steps with evidence against `holding`.
     steps_against: u32,
 }
 
 impl GraspDetector {
-    /// Looks at the contacts of one control step.
+    /// Updates the detector with the contacts of one control step.
     pub fn update(&mut self, contacts: &HandContacts) {
         let threshold_n = if self.holding { HOLD_ENDS_N } else { HOLD_BEGINS_N };
         let pressed = opposed_press_n(contacts) >= threshold_n;
@@ -47,7 +50,8 @@ impl GraspDetector {
     }
 }
 
-/// The smaller of two opposed presses, thumb against fingers or thumb against palm; 0 where nothing is opposed.
+/// Returns the smaller of two opposed presses, thumb against fingers or thumb against palm; 0 if none are
+/// opposed.
 fn opposed_press_n(contacts: &HandContacts) -> f32 {
     let opposed = |other: Vector| {
         let (thumb_n, other_n) = (contacts.thumb_n.length(), other.length());
@@ -76,19 +80,19 @@ impl ObjectGrasps {
         }
     }
 
-    /// Whether another memory is of the same object and of as many robots.
+    /// Returns `true` if another memory belongs to the same object and the same number of robots.
     pub fn is_alike(&self, other: &ObjectGrasps) -> bool {
         self.object == other.object && self.detectors.len() == other.detectors.len()
     }
 
-    /// Looks at the touches of one control step.
+    /// Updates the detectors with the touches of one control step.
     pub fn update(&mut self, step: &Step) {
         for (robot, hands) in self.detectors.iter_mut().enumerate() {
             for side in Side::BOTH {
                 hands[side].update(&step.contacts(robot, side, &self.object));
             }
         }
-        // A hand that lost touch for a moment holds on.
+        // A hand that has lost touch for a moment still holds.
         let hands_off = self.grips().iter().all(|hands| *hands == Sides::both(Grip::Off));
         let off = hands_off && !step.is_touched(&self.object);
         self.untouched_steps = if off { self.untouched_steps.saturating_add(1) } else { 0 };
@@ -103,7 +107,7 @@ impl ObjectGrasps {
     }
 }
 
-/// Presses on both sides of every threshold, and how long they last.
+/// Presses on both sides of every threshold, and their durations.
 #[cfg(test)]
 mod tests {
     use tandem_sim::{BodyTouch, ObjectState, ObjectStep, Pose};
@@ -114,7 +118,7 @@ mod tests {
         HandContacts { thumb_n, fingers_n, palm_n }
     }
 
-    /// Thumb and fingers on opposite sides, each pressing with `force_n`.
+    /// Returns contacts of thumb and fingers on opposite sides, each pressing with `force_n`.
     fn pinch(force_n: f32) -> HandContacts {
         contacts(Vector::Y * force_n, Vector::Y * -force_n, Vector::ZERO)
     }
@@ -164,7 +168,7 @@ mod tests {
         let mut grasps = ObjectGrasps::new("bottle", 2);
         (0..10).for_each(|_| grasps.update(&step(Vec::new())));
         assert!((grasps.untouched_s() - 0.2).abs() < 1e-9);
-        // A forearm or a foot, as no hand touches it.
+        // Touch by a forearm or a foot, without a hand.
         grasps.update(&step(vec![BodyTouch { object: 0, robot: 1 }]));
         assert_eq!((grasps.untouched_s(), grasps.grips()), (0.0, vec![Sides::both(Grip::Off); 2]));
         grasps.update(&step(Vec::new()));

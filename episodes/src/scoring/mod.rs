@@ -1,4 +1,5 @@
-//! Scoring: what a control step shows of who holds what, and which phases that reaches. It reads steps and knows no task.
+//! Scoring: the holds in each control step, and the phases reached by them. It reads steps and knows no
+//! task.
 
 mod facts;
 mod facts_tracker;

@@ -1,36 +1,37 @@
-//! How near a phase is, from 0 to 1: what dense rewards for learners are made of. A part of it is 1 where the phase's own condition on it
-//! holds, and grows on the way there. Results and phases know nothing of it.
+//! Nearness of a phase, from 0 to 1, the basis of dense rewards for learners. A part of it is 1 if the
+//! phase's own condition on it holds, and grows on the way there. It affects neither results nor phases.
 
 use tandem_sim::{Pose, Side, Vector};
 
 use super::placement::{RELEASE_S, STILL_M_S, STILL_RAD_S, UPRIGHT_RAD};
 use super::{Facts, Grip};
 
-/// A hand that is farther than this from an object has not begun to come to it.
+/// Distance of a hand from an object beyond which it has not begun to approach.
 const FAR_M: f32 = 1.5;
-/// An object that leans more than this has fallen over.
+/// Tilt beyond which an object has fallen over.
 const FALLEN_OVER_RAD: f32 = 1.0;
-/// The middle of what a hand closes on, in the frame of the wrist: before the palm, which faces left on the right hand.
+/// Middle of a hand's grasp in the frame of the wrist, ahead and inward. It is in front of the palm, which
+/// faces left on the right hand.
 const GRASP_IN_WRIST_M: [f32; 2] = [0.12, 0.055];
-/// What a hand has come by when it touches an object, of what it has when it holds it.
+/// Nearness of a hand that touches an object; a hand that holds it has 1.
 const TOUCHING: f32 = 0.75;
 
-/// The mean of the parts of a condition.
+/// Returns the mean of the parts of a condition.
 pub fn all(values: &[f32]) -> f32 {
     values.iter().sum::<f32>() / values.len() as f32
 }
 
-/// 1 for what holds.
+/// Returns 1 if the condition holds, and 0 otherwise.
 pub fn is(condition: bool) -> f32 {
     f32::from(u8::from(condition))
 }
 
-/// How far `value` has come on its way from one to another.
+/// Returns the share of the way from one value to another that `value` has come.
 pub fn come(value: f32, from_value: f32, to_value: f32) -> f32 {
     ((value - from_value) / (to_value - from_value)).clamp(0.0, 1.0)
 }
 
-/// How far a hand has come to holding `object`: half the way is coming to the box around it.
+/// Returns how near a hand is to holding `object`: the first half is the approach to the box around it.
 pub fn grip(f: &Facts, robot: usize, side: Side, object: &str) -> f32 {
     match f.object(object).hands[robot][side] {
         Grip::Holding => 1.0,
@@ -39,21 +40,21 @@ pub fn grip(f: &Facts, robot: usize, side: Side, object: &str) -> f32 {
     }
 }
 
-/// How far these robots have come to holding `object`, each with the hand that is nearer to it.
+/// Returns how near these robots are to holding `object`, each with its nearer hand.
 pub fn grips(f: &Facts, robots: &[usize], object: &str) -> f32 {
     let nearer =
         |robot: &usize| Side::BOTH.map(|side| grip(f, *robot, side, object)).into_iter().fold(0.0, f32::max);
     all(&robots.iter().map(nearer).collect::<Vec<_>>())
 }
 
-/// How far `object` has come to standing upright and still with every robot off it.
+/// Returns how near `object` is to standing upright and still with every robot off it.
 pub fn standing(f: &Facts, object: &str) -> f32 {
     let is_still = f.speed_m_s(object) <= STILL_M_S && f.turn_rate_rad_s(object) <= STILL_RAD_S;
     let released = f.untouched_s(object) >= RELEASE_S;
     all(&[come(f.tilt_rad(object), FALLEN_OVER_RAD, UPRIGHT_RAD), is(is_still), is(released)])
 }
 
-/// From what a hand closes on to the box around `object`.
+/// Returns the distance from the middle of a hand's grasp to the box around `object`.
 fn from_hand_m(f: &Facts, robot: usize, side: Side, object: &str) -> f32 {
     let [ahead_m, inward_m] = GRASP_IN_WRIST_M;
     let inward_m = match side {

@@ -1,17 +1,17 @@
-//! What the tasks share about putting things down.
+//! Conditions on placed objects that tasks share.
 
 use crate::scoring::Facts;
 
-/// How long no part of a robot may have touched an object before it counts as released.
+/// Time without touch by any part of a robot after which an object counts as released.
 pub const RELEASE_S: f64 = 0.2;
-/// A placed object stands this nearly upright.
+/// Largest tilt of a placed object.
 pub const UPRIGHT_RAD: f32 = 15.0 * std::f32::consts::PI / 180.0;
-/// A placed object moves no faster than this.
+/// Largest speed of a placed object.
 pub const STILL_M_S: f32 = 0.05;
-/// A placed object turns no faster than this.
+/// Largest angular speed of a placed object.
 pub const STILL_RAD_S: f32 = 0.15;
 
-/// Every part of every robot has been off `object` for 0.2 s, and it stands upright and still.
+/// Returns `true` if no robot has touched `object` for 0.2 s, and it is upright and still.
 pub fn stands_released(f: &Facts, object: &str) -> bool {
     f.untouched_s(object) >= RELEASE_S
         && f.tilt_rad(object) <= UPRIGHT_RAD
@@ -19,19 +19,19 @@ pub fn stands_released(f: &Facts, object: &str) -> bool {
         && f.turn_rate_rad_s(object) <= STILL_RAD_S
 }
 
-/// `object` is within `half_m` of `target` on each axis of the world.
+/// Returns `true` if `object` is within `half_m` of `target` on each axis of the world.
 pub fn within_box(f: &Facts, object: &str, target: &str, half_m: f32) -> bool {
     let apart = f.position_m(object) - f.position_m(target);
     apart.abs().max_element() <= half_m
 }
 
-/// `object` is within `half_m` of `target` on both horizontal axes of the world.
+/// Returns `true` if `object` is within `half_m` of `target` on both horizontal axes of the world.
 pub fn above_box(f: &Facts, object: &str, target: &str, half_m: f32) -> bool {
     let apart = f.position_m(object) - f.position_m(target);
     apart.truncate().abs().max_element() <= half_m
 }
 
-/// The origin of `object` is as high as it was when it stood at the beginning, to `within_m` either way.
+/// Returns `true` if the origin of `object` is within `within_m` of its initial height.
 pub fn stands_as_high(f: &Facts, object: &str, within_m: f32) -> bool {
     f.lift_m(object).abs() <= within_m
 }
@@ -43,7 +43,8 @@ pub mod sides {
 
     use crate::scoring::{Facts, ObjectFacts};
 
-    /// `placed` a little inside and a little outside of how slow `object` has to be, and of how long robots have to be off it.
+    /// Returns facts a little inside and a little outside of the limits of speed, angular speed and release
+    /// time for `object`.
     pub fn still_and_released(placed: &Facts, object: &str) -> [(&'static str, Facts, Facts); 3] {
         let changed = |change: &dyn Fn(&mut ObjectFacts)| {
             let mut facts = placed.clone();

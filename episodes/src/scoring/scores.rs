@@ -1,4 +1,5 @@
-//! The score of one episode: grasps, facts and phases, step by step. An episode under way and its recording are scored alike.
+//! Score of one episode: grasps, facts and phases, step by step. A live episode and its recording are
+//! scored alike.
 
 use std::sync::Arc;
 
@@ -9,30 +10,30 @@ use super::facts_tracker::{FactsTracker, ObjectMemory};
 use super::phases::{PhaseMemory, PhaseTracker};
 use super::{Facts, Phase};
 
-/// How far an episode has come.
+/// Scoring state of an episode.
 #[derive(Clone, Debug)]
 pub struct Scores {
     tracker: FactsTracker,
     phases: PhaseTracker,
 }
 
-/// What [`Scores`] remember between control steps.
+/// Memory of [`Scores`] between control steps.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ScoreMemory {
     objects: Vec<ObjectMemory>,
     phases: PhaseMemory,
 }
 
-/// What one control step shows.
+/// Score of one control step.
 pub struct StepScore {
     pub facts: Facts,
-    /// Whether it reached a phase.
+    /// True if the step reached a phase.
     pub reached: bool,
 }
 
 impl Scores {
-    /// Begins to score `phases`, which may ask for `objects`, given by name and file, and for robots of this model, with the
-    /// state before the first control step.
+    /// Begins to score `phases` with the state before the first control step. Their conditions may refer to
+    /// `objects`, given by name and file, and to robots of this model.
     pub fn new<'a>(
         phases: &'static [Phase],
         objects: impl Iterator<Item = (&'a str, ObjectFile)>,
@@ -42,12 +43,12 @@ impl Scores {
         Ok(Scores { tracker: FactsTracker::new(objects, robot, start)?, phases: PhaseTracker::new(phases) })
     }
 
-    /// Whether a step has all objects that phases may ask for.
+    /// Returns `true` if a step has all objects that the phases' conditions may refer to.
     pub fn sees(&self, step: &Step) -> bool {
         self.tracker.memory().iter().all(|object| step.object(object.name()).is_some())
     }
 
-    /// Looks at the control step that follows the last one.
+    /// Scores the control step that follows the last one.
     pub fn update(&mut self, step: &Step) -> StepScore {
         self.tracker.update(step);
         let facts = self.tracker.facts(step);
@@ -55,17 +56,18 @@ impl Scores {
         StepScore { facts, reached }
     }
 
-    /// The facts after `step`, the last one that was looked at.
+    /// Returns the facts after `step`, which must be the last scored step.
     pub fn facts(&self, step: &Step) -> Facts {
         self.tracker.facts(step)
     }
 
-    /// The phases reached so far, in order, with the simulated time of each.
+    /// Returns the phases reached up to now, in order, with the simulated time of each.
     pub fn reached(&self) -> impl Iterator<Item = (&'static Phase, f64)> {
         self.phases.reached()
     }
 
-    /// The phases reached, and how near the next one is, after `step`, the last one that was looked at.
+    /// Returns the number of phases reached, plus the nearness of the next one. `step` must be the last
+    /// scored step.
     pub fn progress(&self, step: &Step) -> f64 {
         self.phases.progress(&self.facts(step))
     }
@@ -75,7 +77,7 @@ impl Scores {
         self.phases.memory()
     }
 
-    /// Whether the last phase has been reached.
+    /// Returns `true` if the last phase has been reached.
     pub fn complete(&self) -> bool {
         self.phases.complete()
     }
@@ -84,7 +86,8 @@ impl Scores {
         ScoreMemory { objects: self.tracker.memory().to_vec(), phases: self.phases.memory().clone() }
     }
 
-    /// Goes back to an earlier [`Scores::memory`] of the same phases and objects. Returns false, and goes nowhere, where it is of others.
+    /// Restores an earlier [`Scores::memory`] of the same phases and objects. Returns `false`, and changes
+    /// nothing, if it belongs to others.
     #[must_use]
     pub fn set_memory(&mut self, memory: ScoreMemory) -> bool {
         if !self.tracker.fits(&memory.objects) || !self.phases.fits(&memory.phases) {

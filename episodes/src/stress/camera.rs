@@ -1,5 +1,6 @@
-//! The camera in each head looks from elsewhere than the robot knows, as after a knock, and not quite sharply. What robots are told of
-//! it is what their file says: depth is where the camera is, and points are as far off as it is.
+//! Camera stress: each head camera is displaced, as after a knock, and slightly blurred. Robots still
+//! receive the pose from their file. Depth is measured from the displaced camera, so points are off by the
+//! same displacement.
 
 use tandem_sim::render::LensFlaw;
 use tandem_sim::{Pose, Rotation, SplitMix64, Vector};
@@ -8,19 +9,19 @@ use super::{StressAxis, StressLevel, random};
 
 const SHIFT_M: [f32; 3] = [0.01, 0.02, 0.04];
 const TURN_DEG: [f32; 3] = [1.5, 3.0, 6.0];
-/// Of pictures that are 320 pixels wide.
+/// Blur of images that are 320 pixels wide.
 const BLUR_PX: [f32; 3] = [0.7, 1.2, 2.0];
 
 pub fn lens(level: StressLevel, seed: u32, robot: usize) -> LensFlaw {
     let mut random = random(StressAxis::Camera, seed, robot);
     let towards = direction(&mut random);
-    // Not back into the head: a camera looks along -z.
+    // A camera looks along -z, so this never moves it back into the head.
     let shift_m = towards.with_z(-towards.z.abs()) * level.of(SHIFT_M);
     let turn = Rotation::from_axis_angle(direction(&mut random), level.of(TURN_DEG).to_radians());
     LensFlaw { camera_from_lens: Pose::from_parts(shift_m, turn), blur_px: level.of(BLUR_PX) }
 }
 
-/// A unit vector, of all directions alike.
+/// Draws a unit vector, with all directions equally likely.
 fn direction(random: &mut SplitMix64) -> Vector {
     Vector::new(random.normal(), random.normal(), random.normal()).normalize()
 }

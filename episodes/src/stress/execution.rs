@@ -1,4 +1,5 @@
-//! What robots do that are told something: late, as a partner that fails, and with slow noise, where an episode asks for any of these.
+//! Execution of commands that differs from the policy's: late commands, a failing partner, and slow noise,
+//! if an episode asks for any of these.
 
 use std::collections::VecDeque;
 
@@ -9,36 +10,38 @@ use super::partner::FailingPartner;
 use super::{Stress, StressAxis, latency};
 use crate::variation::Disturbance;
 
-/// How far a joint's target moves in a control step, at most, until a robot has caught up with what it is told: 2 rad/s.
+/// Largest change of a joint's target in a control step, 2 rad/s, until a robot has caught up with its
+/// commands.
 const CATCH_UP_RAD: f32 = 0.04;
 
-/// What robots do of what they are told.
+/// Execution of the policy's commands by the robots.
 #[derive(Clone, Debug)]
 pub struct Execution {
-    /// By how many control steps commands are late, by robot.
+    /// Delay of commands in control steps, by robot.
     late_steps: Vec<usize>,
     partner: Option<FailingPartner>,
     disturbance: Option<Disturbance>,
-    /// When the policy takes over.
+    /// Time at which the policy takes over.
     begin_s: f64,
-    /// What robots do before anything has reached them.
+    /// Commands before the first one has arrived.
     rest: Vec<RobotCommand>,
     memory: ExecutionMemory,
 }
 
-/// What has to be remembered of the steps before.
+/// Memory of earlier steps.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct ExecutionMemory {
-    /// What robots were told, as far back as anything is late.
+    /// The policy's commands, as far back as any delay reaches.
     told: VecDeque<Vec<RobotCommand>>,
-    /// What they did in the last step, noise left out.
+    /// Executed commands of the last step, without noise.
     done: Vec<RobotCommand>,
-    /// Whether a partner that failed has not caught up yet.
+    /// True while a partner that failed has not caught up yet.
     is_behind: bool,
 }
 
 impl Execution {
-    /// `None` where robots do what they are told. They are at `rest` at first, and their policy takes over at `begin_s`.
+    /// Creates the execution of an episode; `None` if robots do exactly as commanded. They are at `rest` at
+    /// first, and their policy takes over at `begin_s`.
     pub fn of(
         stress: Option<Stress>,
         disturbance: Option<Disturbance>,
@@ -58,7 +61,8 @@ impl Execution {
         changes.then_some(Execution { late_steps, partner, disturbance, begin_s, rest, memory })
     }
 
-    /// What robots do in the control step that begins at `time_s` and for which they are told `told`.
+    /// Returns the executed commands of the control step that begins at `time_s`, for the policy's commands
+    /// `told`.
     pub fn execute<'a>(
         &mut self,
         time_s: f64,
@@ -90,7 +94,7 @@ impl Execution {
         }
     }
 
-    /// What of all that robots were told has reached them by now.
+    /// Returns the commands that have reached the robots by now.
     fn arrived(&mut self, told: &[RobotCommand]) -> Vec<RobotCommand> {
         let farthest = self.late_steps.iter().copied().max().unwrap_or_default();
         if farthest == 0 {
@@ -117,7 +121,7 @@ impl Execution {
     }
 }
 
-/// A step from what a robot did to what it wants to do, no joint faster than it may.
+/// Returns a step from the last executed command towards the wanted one, with limited joint speeds.
 fn towards(before: &RobotCommand, wanted: &RobotCommand) -> RobotCommand {
     let upper_rad: [f32; UPPER_JOINTS] = std::array::from_fn(|column| {
         let (from_rad, to_rad) = (before.upper_rad[column], wanted.upper_rad[column]);
@@ -146,13 +150,13 @@ mod tests {
         pelvis_height_m: [0.5, 0.75],
     };
 
-    /// All upper joints at one angle.
+    /// Returns a command with all upper joints at one angle.
     fn command(angle_rad: f32) -> RobotCommand {
         let base = BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m: 0.7 };
         RobotCommand { upper_rad: [angle_rad; UPPER_JOINTS], base }
     }
 
-    /// What two robots do in so many steps that are told to move slowly, both alike.
+    /// Returns the executed commands of two robots over `steps` steps, both commanded the same slow motion.
     fn played(axis: StressAxis, level: StressLevel, seed: u32, steps: usize) -> Vec<[RobotCommand; 2]> {
         let model = crate::spec::RobotFile::default().model().unwrap();
         let stress = Some(Stress { axis, level });
@@ -181,7 +185,8 @@ mod tests {
         assert!(Execution::of(None, None, 3, 0.0, vec![command(0.0); 2]).is_none());
     }
 
-    /// Of the steps of twenty seconds, in how many one robot does something else than it is told; the other does all as told.
+    /// Returns the number of steps out of 20 s in which one robot deviates from its commands. The other
+    /// robot must always follow them.
     fn strayed(level: StressLevel, seed: u32) -> (usize, Vec<[RobotCommand; 2]>) {
         let done = played(StressAxis::Partner, level, seed, 1000);
         let astray = |robot: usize| {
@@ -243,7 +248,7 @@ mod tests {
         let walks = away[first..].iter().take_while(|done| done.base.vx_m_s != 0.0).count();
         assert!((99..=101).contains(&walks), "{walks} steps");
         assert!((away[first].base.vx_m_s.hypot(away[first].base.vy_m_s) - 0.25).abs() < 1e-5);
-        // Fingers open, arms and waist do as they are told.
+        // Fingers open, and arms and waist follow their commands.
         let (first, open) = failing("drops what it holds", StressLevel::Two);
         let (fingers, arm) = (open[first + 20].upper_rad[14], open[first + 20].upper_rad[0]);
         assert!(fingers == 0.0 && arm == told_rad(first + 20), "{fingers} {arm}");

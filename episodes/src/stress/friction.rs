@@ -1,12 +1,13 @@
-//! Objects are slippery: their surfaces leave only a share of the friction with hands, with each other and with what they stand on, as
-//! where they are wet or greasy. The soles of robots hold as ever.
+//! Friction stress: objects are slippery, as if wet or greasy. Their friction with hands, with each other
+//! and with their supports is reduced to a share. The soles of robots are unchanged.
 
 use tandem_sim::World;
 
 use super::StressLevel;
 use crate::tasks::Task;
 
-/// What is left. Rubber pads on dry wood or steel have 0.8, and wet ones about half of it.
+/// Remaining share of friction. Rubber pads on dry wood or steel have a coefficient of 0.8, and wet ones
+/// about half of it.
 const LEFT: [f64; 3] = [0.85, 0.7, 0.55];
 
 pub fn alter(world: &mut World, task: &Task, level: StressLevel) {

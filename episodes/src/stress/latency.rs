@@ -1,11 +1,11 @@
-//! What robots are told reaches them late, all of them alike.
+//! Latency stress: commands reach all robots late, with the same delay.
 
 use super::StressLevel;
 
-/// Control steps of 20 ms: 40, 100 and 200 ms.
+/// Delays in control steps of 20 ms: 40, 100 and 200 ms.
 const STEPS: [usize; 3] = [2, 5, 10];
 
-/// By how many control steps a command is late.
+/// Returns the delay of commands in control steps.
 pub fn steps(level: StressLevel) -> usize {
     level.of(STEPS)
 }

@@ -1,5 +1,6 @@
-//! Things stand farther from where they usually are, which is `--spread` by another name, and things stand about that nobody needs:
-//! vessels on the tables, boxes on the floor. They are objects like all others, and stand beside the ways of hands and loads.
+//! Layout stress: the seed moves objects farther, like `--spread`, and the world has distractors: vessels
+//! on the tables, boxes on the floor. Distractors are objects like all others, and are placed beside the
+//! ways of hands and loads.
 
 use std::f32::consts::TAU;
 use std::sync::OnceLock;
@@ -15,12 +16,12 @@ pub fn spread(level: StressLevel) -> Spread {
     level.of([Spread::Double, Spread::Triple, Spread::Quadruple])
 }
 
-/// How many things stand about.
+/// Returns the number of distractors.
 pub fn count(level: StressLevel) -> usize {
     level.of([1, 2, 3])
 }
 
-/// Files of objects that may stand about: those that no task takes for a goal, and that stand by themselves.
+/// Files of possible distractors: objects that no task uses as a goal, and that stand by themselves.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Distractors {
@@ -35,24 +36,24 @@ fn files() -> &'static Distractors {
     })
 }
 
-/// A support is under an object if its top is so near the object's lowest point.
+/// Largest distance between an object's lowest point and the top of its support.
 const CONTACT_M: f32 = 0.015;
-/// Free room beside what stands about, and above the support.
+/// Free space beside a distractor; `ABOVE_M` is that above the support.
 const BESIDE_M: f32 = 0.03;
 const ABOVE_M: f32 = 0.01;
-/// Attempts for each thing.
+/// Number of placement attempts for each distractor.
 const DRAWS: usize = 400;
 
-/// How near to what counts a thing may stand on one kind of support.
+/// Least distances of a distractor on one kind of support from relevant things.
 struct Clearance {
-    /// Middle to middle, less both radii.
+    /// Distance from middle to middle, minus both radii.
     object_m: f32,
-    /// Of the lines between things, along which they are carried.
+    /// Distance from the lines between objects, along which they are carried.
     way_m: f32,
     robot_m: f32,
-    /// Of the lines from robots to things.
+    /// Distance from the lines from robots to objects.
     reach_m: f32,
-    /// From the task's middle.
+    /// Largest distance from the task's middle.
     farthest_m: f32,
 }
 
@@ -61,7 +62,7 @@ const TABLE: Clearance =
 const FLOOR: Clearance =
     Clearance { object_m: 0.40, way_m: 0.8, robot_m: 0.9, reach_m: 0.6, farthest_m: 2.2 };
 
-/// What a thing may stand on: a rectangle that lies level.
+/// A support for distractors: a level rectangle.
 struct Support {
     top_m: f32,
     middle_m: [f32; 2],
@@ -70,7 +71,8 @@ struct Support {
     is_floor: bool,
 }
 
-/// The distractors of an episode of `task` in `world`, which has everything else: as many as there is room for.
+/// Returns the distractors of an episode of `task` in `world`, which has everything else. There are at most
+/// `most`, fewer if there is no room.
 pub fn distractors(
     most: usize,
     seed: u32,
@@ -84,14 +86,14 @@ pub fn distractors(
     let mut placed: Vec<(ObjectPlacement, [f32; 2], f32)> = Vec::new();
     for number in 0..most {
         let mut random = random(StressAxis::Layout, seed, number);
-        // The floor where no table has room.
+        // The floor serves if no table has room.
         let kinds_of_support = [&tables[..], &floor].into_iter().filter(|supports| !supports.is_empty());
         let found = kinds_of_support.flat_map(|supports| [supports; DRAWS]).find_map(|supports| {
             let support = &supports[pick(&mut random, supports.len())];
             let file = kind(support, task, &mut random)?;
             let at_m = support.point(&mut random);
             let turn_rad = random.uniform([0.0, TAU]);
-            // Most fall out here, and files are only read of the others.
+            // Most draws fail here, and files are only read for the others.
             if places.are_near(at_m, 0.0, support.clearance()) {
                 return None;
             }
@@ -118,7 +120,7 @@ pub fn distractors(
     Ok(placed.into_iter().map(|(placement, ..)| placement).collect())
 }
 
-/// Where everything of the task is, seen from above.
+/// Positions of the task's objects and robots, seen from above.
 struct Places {
     objects_m: Vec<([f32; 2], f32)>,
     /// Lowest points of the objects.
@@ -156,7 +158,8 @@ impl Places {
         Ok(Places { middle_m: [mean(0), mean(1)], objects_m, bases_m, robots_m })
     }
 
-    /// Whether something of this radius would stand too near to what counts, or so far off that nobody sees it.
+    /// Returns `true` if something of this radius would be too near to a relevant thing, or too far from the
+    /// task's middle.
     fn are_near(&self, at_m: [f32; 2], radius_m: f32, clearance: &Clearance) -> bool {
         let Clearance { object_m, way_m, robot_m, reach_m, farthest_m } = clearance;
         let objects = || self.objects_m.iter().map(|(at_m, _)| *at_m);
@@ -176,7 +179,7 @@ impl Places {
     }
 }
 
-/// What the task's objects stand on above the floor.
+/// Returns the supports of the task's objects above the floor.
 fn tables(world: &World, places: &Places) -> Vec<Support> {
     let tables = world.room().iter().filter_map(table).filter(|table| {
         let under = |base_m: &f32| (base_m - table.top_m).abs() < CONTACT_M;
@@ -185,7 +188,7 @@ fn tables(world: &World, places: &Places) -> Vec<Support> {
     tables.collect()
 }
 
-/// The top of a box that stands level.
+/// Returns the top of a box, if it is level.
 fn table(geom: &Geom) -> Option<Support> {
     let Primitive::Box { half_extents_m } = geom.primitive else { return None };
     let Pose { translation, rotation, .. } = geom.body_from_geom;
@@ -213,7 +216,7 @@ impl Support {
         [self.middle_m[0] + cosine * x_m - sine * y_m, self.middle_m[1] + sine * x_m + cosine * y_m]
     }
 
-    /// Whether something of this radius does not stand over the edge.
+    /// Returns `true` if something of this radius fits on the support without overhang.
     fn holds(&self, at_m: [f32; 2], radius_m: f32) -> bool {
         let [x_m, y_m] = [at_m[0] - self.middle_m[0], at_m[1] - self.middle_m[1]];
         let (sine, cosine) = self.yaw_rad.sin_cos();
@@ -222,7 +225,8 @@ impl Support {
     }
 }
 
-/// A file of what may stand there; a task's own are left out, so that its words mean one thing.
+/// Draws a file for a distractor on this support. The task's own objects are excluded, so that its
+/// instructions stay unambiguous.
 fn kind(support: &Support, task: &Task, random: &mut SplitMix64) -> Option<&'static str> {
     let kinds = if support.is_floor { &files().on_floors } else { &files().on_tables };
     let own = |file: &str| task.objects.iter().any(|spot| spot.file == file);
@@ -234,7 +238,7 @@ fn pick(random: &mut SplitMix64, count: usize) -> usize {
     (random.uniform([0.0, count as f32]) as usize).min(count - 1)
 }
 
-/// An object's model, and half of how far it reaches along each axis about its middle.
+/// Returns an object's model, and half of its extent along each axis about its middle.
 fn measured(file: &str) -> Option<(ObjectModel, Vector)> {
     let model = ObjectModel::parts(&file.into(), file).ok()?.swap_remove(0).model;
     let reach_m = |direction: Vector| model.reach_m(&Pose::IDENTITY, direction);
@@ -250,7 +254,7 @@ fn distance_m(a_m: [f32; 2], b_m: [f32; 2]) -> f32 {
     (a_m[0] - b_m[0]).hypot(a_m[1] - b_m[1])
 }
 
-/// How far a point is from the line between two others.
+/// Returns the distance of a point from the line segment between two others.
 fn from_line_m(at_m: [f32; 2], from_m: [f32; 2], to_m: [f32; 2]) -> f32 {
     let [dx_m, dy_m] = [to_m[0] - from_m[0], to_m[1] - from_m[1]];
     let square = dx_m * dx_m + dy_m * dy_m;

@@ -1,15 +1,15 @@
-//! The sun stands elsewhere, is stronger or weaker, warmer or colder, and so is the sky.
+//! Light stress: the sun is elsewhere, stronger or weaker, and warmer or colder, and so is the sky.
 
 use tandem_sim::Vector;
 use tandem_sim::render::Light;
 
 use super::{StressAxis, StressLevel, random};
 
-/// How much stronger or weaker the sun and the sky are.
+/// Relative change of the strength of sun and sky.
 const STRENGTH: [f32; 3] = [0.25, 0.45, 0.65];
-/// How much more red and less blue there is, or the other way about.
+/// Relative shift between red and blue.
 const WARMTH: [f32; 3] = [0.08, 0.16, 0.28];
-/// How far the sun has gone about the vertical, and how far down.
+/// Rotation of the sun about the vertical; `LOWER_DEG` is the loss of elevation.
 const TURN_DEG: [f32; 3] = [40.0, 80.0, 140.0];
 const LOWER_DEG: [f32; 3] = [6.0, 14.0, 26.0];
 

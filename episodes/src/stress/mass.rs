@@ -1,11 +1,11 @@
-//! Objects are heavier or lighter than their files have them, each as the seed says.
+//! Mass stress: objects are heavier or lighter than in their files; the seed decides for each.
 
 use tandem_sim::World;
 
 use super::{StressAxis, StressLevel, random};
 use crate::tasks::Task;
 
-/// So many times as heavy, or so many times as light.
+/// Factor by which an object is heavier, or lighter.
 const TIMES: [f64; 3] = [1.25, 1.5, 2.0];
 
 pub fn alter(world: &mut World, task: &Task, level: StressLevel, seed: u32) {
@@ -14,7 +14,7 @@ pub fn alter(world: &mut World, task: &Task, level: StressLevel, seed: u32) {
     }
 }
 
-/// How many times as heavy the object of this number is.
+/// Returns the factor on the mass of the object with this number.
 fn times(level: StressLevel, seed: u32, object: usize) -> f64 {
     let heavier = random(StressAxis::Mass, seed, object).uniform([0.0, 1.0]) < 0.5;
     let times = level.of(TIMES);

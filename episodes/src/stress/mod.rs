@@ -1,8 +1,8 @@
-//! What may be laid over an episode to see what is left of a policy when things go wrong: one axis a file. Each is a function of seed and
-//! level alone, laid over the same episode that the plain run plays, so that both can be compared seed by seed. What a robot or an object
-//! feels of it is a force or a property that a world could have.
+//! Stress on episodes, to measure the robustness of policies: one axis per file. Each is a function of seed
+//! and level alone, applied to the episode of the plain run. The two can therefore be compared seed by
+//! seed. Its effects on robots and objects are forces or properties that a real world could have.
 //!
-//! To add an axis: one file here, its name in [`StressAxis`], and where it acts.
+//! To add an axis: one file here, its name in [`StressAxis`], and the place where it acts.
 
 mod camera;
 mod execution;
@@ -31,7 +31,7 @@ pub use layout::distractors;
 pub use partner::Silence;
 pub use words::{reworded, reworded_tasks};
 
-/// What goes wrong.
+/// The kind of stress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StressAxis {
@@ -80,7 +80,7 @@ impl StressAxis {
     }
 }
 
-/// How much of it: 1, 2 or 3.
+/// The level of stress: 1, 2 or 3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "u8", into = "u8")]
 pub enum StressLevel {
@@ -100,7 +100,7 @@ impl StressLevel {
         }
     }
 
-    /// The value of this level.
+    /// Returns the value of this level.
     fn of<T>(self, [one, two, three]: [T; 3]) -> T {
         match self {
             StressLevel::One => one,
@@ -136,14 +136,14 @@ impl FromStr for StressLevel {
     }
 }
 
-/// What is laid over an episode.
+/// The stress on an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Stress {
     pub axis: StressAxis,
     pub level: StressLevel,
 }
 
-/// As results and folders have it: `camera-2`.
+/// Formats the stress as in results and folders: `camera-2`.
 impl fmt::Display for Stress {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{}-{}", self.axis.name(), self.level.number())
@@ -151,28 +151,29 @@ impl fmt::Display for Stress {
 }
 
 impl Stress {
-    /// The level, if this is the axis.
+    /// Returns the level, if this is the axis.
     fn on(self, axis: StressAxis) -> Option<StressLevel> {
         (self.axis == axis).then_some(self.level)
     }
 
-    /// How far the seed moves things, at least as far as it does without.
+    /// Returns the spread of the objects, at least that of the plain run.
     pub fn spread(self, plain: Spread) -> Spread {
         self.on(StressAxis::Layout).map_or(plain, |level| plain.max(layout::spread(level)))
     }
 
-    /// What robots sense, in place of what they sense without.
+    /// Returns the sensing under stress, in place of the plain one.
     pub fn sensing(self, plain: Sensing) -> Sensing {
         let on = self.on(StressAxis::Sensors);
         on.map_or(plain, |level| Sensing { sensors: sensors::model(level), ..plain })
     }
 
-    /// How many things stand about that the task has no use for.
+    /// Returns the number of distractors.
     pub fn distractors(self) -> usize {
         self.on(StressAxis::Layout).map_or(0, layout::count)
     }
 
-    /// Changes what a world of `task` is made of, before its first step. Its policy takes over after `hold_steps`.
+    /// Changes the physical properties of a world of `task` before its first step. The policy takes over
+    /// after `hold_steps`.
     pub fn alter(self, world: &mut World, task: &Task, seed: u32, hold_steps: u32) {
         match self.axis {
             StressAxis::Mass => mass::alter(world, task, self.level, seed),
@@ -191,18 +192,19 @@ impl Stress {
         }
     }
 
-    /// Which robot keeps what it has to say to itself, if one does.
+    /// Returns the robot whose messages are suppressed; `None` if there is none.
     pub fn silence(self, seed: u32, robots: usize) -> Option<Silence> {
         self.on(StressAxis::Partner).and_then(|level| Silence::of(level, seed, robots))
     }
 
-    /// What of the axis a seed has, as "drops what it holds", where seeds take turns.
+    /// Returns the variant of the axis that a seed has, for example "drops what it holds"; `None` for axes
+    /// without variants.
     pub fn kind(self, seed: u32) -> Option<&'static str> {
         self.on(StressAxis::Partner).map(|_| partner::kind(seed))
     }
 }
 
-/// What there is to draw of a world.
+/// Returns the scenery of a world for rendering.
 pub fn scenery(stress: Option<Stress>, seed: u32, world: &World) -> Scenery {
     let mut scenery = Scenery::of(world);
     match stress {
@@ -213,7 +215,7 @@ pub fn scenery(stress: Option<Stress>, seed: u32, world: &World) -> Scenery {
     scenery
 }
 
-/// The cameras of a world.
+/// Returns the cameras of a world.
 pub fn cameras(stress: Option<Stress>, seed: u32, world: &World) -> Cameras {
     let mut cameras = Cameras::of(world);
     if let Some(level) = stress.and_then(|stress| stress.on(StressAxis::Camera)) {
@@ -224,21 +226,21 @@ pub fn cameras(stress: Option<Stress>, seed: u32, world: &World) -> Cameras {
     cameras
 }
 
-/// The words in which the policies of an episode are told its task.
+/// Returns the instructions that the policies of an episode receive.
 pub fn task_words(stress: Option<Stress>, task: &'static Task) -> TaskWords {
     let reworded =
         stress.and_then(|stress| stress.on(StressAxis::Words)).and_then(|level| reworded(task, level));
     reworded.unwrap_or_else(|| TaskWords::of(task))
 }
 
-/// Whether an episode of `task` can be laid under `stress`: a task has other words only where its file gives some.
+/// Returns `true` if `stress` can be applied to `task`. Reworded instructions exist only for some tasks.
 pub fn is_possible(stress: Option<Stress>, task: &'static Task) -> bool {
     let words = stress.and_then(|stress| stress.on(StressAxis::Words));
     words.is_none_or(|level| reworded(task, level).is_some())
 }
 
-/// Numbers that belong to an axis under a seed; `part` tells robots, objects or times apart. Levels share them, so that a higher one is
-/// the same farther.
+/// Returns a random stream of an axis under a seed; `part` separates robots, objects or times. Levels share
+/// the stream, so that a higher level is the same effect, but stronger.
 fn random(axis: StressAxis, seed: u32, part: usize) -> SplitMix64 {
     const STREAM: u64 = 0x7374_7265_7373_0000;
     SplitMix64(STREAM ^ (u64::from(seed) | (axis as u64 + 1) << 32 | (part as u64 + 1) << 40))

@@ -1,5 +1,6 @@
-//! One robot of the team does not do its part: by the seed it freezes, reacts late, walks off, drops what it holds, or says nothing. What
-//! is done to its commands is done between what it is told and what it does, as by a machine that fails.
+//! Partner stress: one robot of the team fails. By the seed it freezes, reacts late, walks off, drops what
+//! it holds, or says nothing. The failure acts between its commands and their execution, like a technical
+//! fault.
 
 use std::f32::consts::TAU;
 
@@ -7,22 +8,24 @@ use tandem_sim::{ARM_JOINTS, BaseCommand, BaseLimits, HAND_JOINTS, RobotCommand}
 
 use super::{StressAxis, StressLevel, random};
 
-/// How long it freezes.
+/// Duration of a freeze.
 const FREEZE_S: [f64; 3] = [1.0, 2.0, 4.0];
-/// Control steps by which it reacts late: 0.3, 0.6 and 1.2 s.
+/// Delay of commands in control steps: 0.3, 0.6 and 1.2 s.
 const LATE_STEPS: [usize; 3] = [15, 30, 60];
-/// How long it walks off, and how fast.
+/// Duration of a walk-off; `WALK_M_S` is its speed.
 const WALK_S: [f64; 3] = [1.0, 2.0, 3.0];
 const WALK_M_S: f32 = 0.25;
-/// How long its hands are open.
+/// Duration for which its hands are open.
 const OPEN_S: [f64; 3] = [0.4, 0.8, 1.6];
-/// Of so many things that it says, one is heard; of the third level none.
+/// Denominator of the share of its messages that are delivered: one in two, one in four, and at the third
+/// level none.
 const HEARD_OF: [Option<u32>; 3] = [Some(2), Some(4), None];
-/// It happens once in each of these, early enough for the longest.
+/// Period of the failures; each begins within the first `LATEST_S` seconds of a period, early enough for
+/// the longest.
 const EVERY_S: f64 = 10.0;
 const LATEST_S: f32 = 5.5;
 
-/// What it does wrong.
+/// The kind of failure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Failing {
     Freezes,
@@ -32,11 +35,11 @@ enum Failing {
     SaysNothing,
 }
 
-/// Seeds take turns.
+/// Kinds of failure, which seeds take in turn.
 const FAILINGS: [Failing; 5] =
     [Failing::Freezes, Failing::ReactsLate, Failing::WalksOff, Failing::Drops, Failing::SaysNothing];
 
-/// The robot that fails, and how.
+/// The robot that fails, and its kind of failure.
 #[derive(Clone, Copy, Debug)]
 pub struct FailingPartner {
     pub robot: usize,
@@ -51,13 +54,13 @@ impl FailingPartner {
         FailingPartner { robot: drawn.min(robots - 1), failing: failing(seed), level, seed }
     }
 
-    /// By how many control steps its commands are late.
+    /// Returns the delay of its commands in control steps.
     pub fn late_steps(&self) -> usize {
         if self.failing == Failing::ReactsLate { self.level.of(LATE_STEPS) } else { 0 }
     }
 
-    /// What it does that is told `told` when its policy has had it for `time_s`, where that is something else; it did `before` in the
-    /// step before.
+    /// Returns the command that it executes instead of `told`, `time_s` after its policy took over; `None`
+    /// if it executes `told`. `before` is the command of the step before.
     pub fn overrides(
         &self,
         time_s: f64,
@@ -91,7 +94,7 @@ impl FailingPartner {
         }
     }
 
-    /// When what happens about this time begins, and which way the robot goes.
+    /// Returns the start of the failure near this time, and the direction in which the robot walks.
     fn event(&self, time_s: f64) -> (f64, f32) {
         let number = (time_s / EVERY_S).floor().max(0.0);
         let mut random = random(StressAxis::Partner, self.seed, 1 + number as usize);
@@ -104,7 +107,7 @@ fn still(base: BaseCommand) -> BaseCommand {
     BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, ..base }
 }
 
-/// What the partner does wrong under a seed.
+/// Returns the partner's kind of failure under a seed.
 pub fn kind(seed: u32) -> &'static str {
     match failing(seed) {
         Failing::Freezes => "freezes",
@@ -119,7 +122,7 @@ fn failing(seed: u32) -> Failing {
     FAILINGS[seed as usize % FAILINGS.len()]
 }
 
-/// A robot whose words do not all reach the others.
+/// A robot whose messages do not all reach the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Silence {
     pub robot: usize,
@@ -133,7 +136,7 @@ impl Silence {
         (partner.failing == Failing::SaysNothing).then_some(silence)
     }
 
-    /// Whether the others hear what this robot says after having said `said` things before.
+    /// Returns `true` if the message that this robot sends after `said` earlier ones is delivered.
     pub fn lets_hear(&self, robot: usize, said: u32) -> bool {
         robot != self.robot || self.heard_of.is_some_and(|of| said.is_multiple_of(of))
     }

@@ -1,5 +1,5 @@
-//! Somebody pushes one of the robots at its chest, once in every ten seconds: at a time, on a robot and from a side that the seed draws. The
-//! force is one that acts from outside, as the bench of the base controller applies it.
+//! Push stress: one of the robots is pushed at its chest once in every ten seconds. The seed draws the
+//! time, the robot and the direction. The force is external, as in the bench of the base controller.
 
 use std::f32::consts::TAU;
 
@@ -8,13 +8,13 @@ use tandem_sim::{PlannedPush, Vector};
 use super::{StressAxis, StressLevel, random};
 
 const FORCE_N: [f32; 3] = [20.0, 40.0, 60.0];
-/// Half a second.
+/// Duration of a push: half a second.
 const PUSH_STEPS: u64 = 25;
-/// One push in each of these.
+/// Period of the pushes.
 const EVERY_STEPS: u64 = 500;
-/// More than any budget: an hour.
+/// Number of planned pushes. They last for an hour, more than any budget.
 const PUSHES: u64 = 360;
-/// Of the robot's file, and a point of it: the middle of the chest.
+/// Link of the robot's file that is pushed; `POINT_M` is the middle of the chest in its frame.
 const LINK: &str = "torso_link";
 const POINT_M: Vector = Vector::new(0.0, 0.0, 0.1);
 

@@ -1,4 +1,4 @@
-//! Robots sense with noise, bias and latency: as a real G1 does, then with twice and four times its noise and bias.
+//! Sensor stress: noise, bias and latency as on a real G1, then twice and four times its noise and bias.
 
 use tandem_sim::SensorModel;
 

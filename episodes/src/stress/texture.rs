@@ -1,21 +1,21 @@
-//! The room has other colours and patterns, and objects are lighter or darker. Their hues stay, since instructions name them, and robots
-//! are as they are.
+//! Texture stress: the room has other colours and patterns, and objects are lighter or darker. Their hues
+//! stay, since instructions name them, and robots are unchanged.
 
 use tandem_sim::render::{Carrier, Part, Pattern, Scenery};
 
 use super::{StressAxis, StressLevel, random};
 
-/// How far the room's colours go towards others.
+/// Share of the way from the room's colours to new ones.
 const NEW_COLOUR: [f32; 3] = [0.3, 0.6, 0.9];
-/// In what share of its materials the pattern is another, too.
+/// Share of the room's materials that also have a new pattern.
 const NEW_PATTERN: [f32; 3] = [0.3, 0.6, 0.9];
-/// How much lighter or darker objects are.
+/// Relative change of the objects' brightness.
 const OBJECT_SHADE: [f32; 3] = [0.1, 0.2, 0.3];
-/// The colours of a checker, and how they differ.
+/// Brightness of a checker's dark squares relative to its light ones.
 const CHECKER_DARK: f32 = 0.6;
 
 pub fn repaint(scenery: &mut Scenery, level: StressLevel, seed: u32) {
-    // What was painted alike still is.
+    // Parts of one colour keep one colour.
     let mut paints: Vec<[f32; 3]> = Vec::new();
     for part in &mut scenery.parts {
         let paint = match paints.iter().position(|known| *known == part.rgb) {

@@ -1,5 +1,5 @@
-//! The same task in other words: nearer to what people say, then shorter, then in a roundabout way. Nothing is left out that the task's
-//! own words say of what is to be done, with which hand and by whom.
+//! Wording stress: the same task, more colloquial, then shorter, then roundabout. Rewordings keep all
+//! information on the actions, the hands and the robots that carry them out.
 
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -9,7 +9,7 @@ use serde::Deserialize;
 use super::StressLevel;
 use crate::tasks::{Task, TaskWords, tandem_plus};
 
-/// The re-wordings of one task, by level.
+/// The rewordings of one task, by level.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Rewording {
@@ -22,13 +22,14 @@ fn rewordings() -> &'static BTreeMap<String, Rewording> {
     READ.get_or_init(|| serde_json::from_str(include_str!("words.json")).expect("the file is tested"))
 }
 
-/// The tasks of the binary that there are other words for.
+/// Returns the built-in tasks that have rewordings.
 pub fn reworded_tasks() -> impl Iterator<Item = &'static str> {
     let plus = tandem_plus().iter().filter(|task| reworded(task, StressLevel::One).is_some());
     rewordings().keys().map(String::as_str).chain(plus.map(|task| task.id))
 }
 
-/// A task in other words: those of its file, or those that are kept of the benchmark's; `None` where nobody has worded it in others.
+/// Returns the reworded instructions of a task, from its file or from those of the benchmark; `None` if
+/// there are none.
 pub fn reworded(task: &Task, level: StressLevel) -> Option<TaskWords> {
     if !task.is_benchmark() {
         return task.rewordings.as_ref().map(|levels| level.of(levels.each_ref()).clone());
@@ -47,7 +48,7 @@ mod tests {
     use super::*;
     use crate::tasks;
 
-    /// The share of the words of `own` that are not in `other`.
+    /// Returns the share of the words of `other` that are not in `own`.
     fn new_share(own: &str, other: &str) -> f64 {
         let words = |text: &str| -> BTreeSet<String> {
             let letters = |c: char| !c.is_alphanumeric();

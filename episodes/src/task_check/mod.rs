@@ -1,5 +1,6 @@
-//! Tries a task before anybody plays it: its world is built and stands for some seconds in which nobody acts. Whatever falls, and every
-//! phase that is reached so, is named; and each camera's first picture is drawn.
+//! Trial of a task before anyone plays it: its world is built and runs for some seconds without any action.
+//! The check names everything that falls and every phase that is reached, and renders the first image of
+//! each camera.
 
 use std::path::{Path, PathBuf};
 
@@ -14,23 +15,25 @@ use crate::session::{Built, build};
 use crate::spec::EpisodeSpec;
 use crate::tasks::{Task, TaskWords};
 
-/// So long nobody acts: more than anything takes to fall from a table, and than is waited for until a thing counts as released.
+/// Length of the trial. It is longer than any fall from a table, and than the time after which an object
+/// counts as released.
 const TRIAL_STEPS: u32 = 100;
-/// What moves less stays where it was put.
+/// Distance within which an object counts as staying in place.
 const STAYS_M: f32 = 0.03;
-/// Below this, robots stand on the floor.
+/// Height below which robots stand on the floor.
 const FEET_M: f32 = 0.08;
-/// What turns less stays as it was put.
+/// Angle within which an object counts as keeping its orientation.
 const STAYS_RAD: f32 = 0.1;
 
-/// What was seen of a task in which nobody acts.
+/// Findings on a task in which nobody acts.
 #[derive(Debug, Default)]
 pub struct TaskCheck {
-    /// What does not stay where the task puts it, a line each, as it was with the first seed with which it does not.
+    /// Objects and robots that do not stay where the task puts them, a line each, for the first seed that
+    /// shows it.
     pub falls: Vec<String>,
-    /// What may be meant so, a line each.
+    /// Observations that may be intended, a line each.
     pub notes: Vec<String>,
-    /// The pictures that were drawn.
+    /// Paths of the rendered images.
     pub pictures: Vec<PathBuf>,
 }
 
@@ -51,7 +54,11 @@ pub enum TaskCheckError {
     Output(#[from] OutputError),
 }
 
-/// Tries a task with each of these seeds, and draws the start of the first into a folder, if one is given.
+/// Checks a task with each of these seeds. Renders the start of the first into `folder`, if one is given.
+///
+/// # Errors
+///
+/// If an episode cannot be started or fails.
 pub fn check_task(
     task: &'static Task,
     seeds: &[u32],
@@ -73,7 +80,8 @@ pub fn check_task(
     Ok(check)
 }
 
-/// For each thing that does not stay where it is put, how that was the first time, and with how many seeds it was so.
+/// Things that do not stay where they are put: the name, the description of the first case, and the number
+/// of seeds.
 #[derive(Default)]
 struct Falls(Vec<(&'static str, String, usize)>);
 
@@ -93,7 +101,7 @@ impl Falls {
         };
         self.0.into_iter().map(line).collect()
     }
-    /// Names what has not stayed where it was put.
+    /// Finds everything that has not stayed where it was put.
     fn find(
         &mut self,
         task: &Task,
@@ -150,7 +158,7 @@ impl Falls {
     }
 }
 
-/// What was in a robot's way first.
+/// Describes the first obstacle of a robot.
 fn told_press(press: &RobotPress) -> String {
     let RobotPress { link, on, at_m } = press;
     let on = on.as_ref().map_or("the room".into(), |on| format!("{on:?}"));
@@ -186,7 +194,7 @@ impl TaskCheck {
         Ok(())
     }
 
-    /// Notes what a robot's operator reads of what the seed chooses though its own instruction holds that back.
+    /// Notes the seed's choices that a robot's operator reads although its own instruction holds them back.
     fn note_secrets(&mut self, task: &Task) {
         let Some(ways) = task.variants.get() else { return };
         let chosen =
@@ -217,7 +225,7 @@ impl TaskCheck {
         self.note_rewordings(ways, [&told, &kept]);
     }
 
-    /// Notes re-wordings that tell other robots than the task's own words what the seed chooses.
+    /// Notes rewordings that reveal the seed's choices to other robots than the task's own wording does.
     fn note_rewordings(&mut self, ways: &[&'static Task], [told, kept]: [&[usize]; 2]) {
         let words = |way: &'static Task| way.rewordings.as_ref();
         let levels = words(ways[0]).map_or(0, |levels| levels.len());
@@ -238,7 +246,7 @@ impl TaskCheck {
         }
     }
 
-    /// Notes conditions of later phases that hold before anybody has acted.
+    /// Notes conditions of later phases that hold before any action.
     fn note_what_holds(&mut self, task: &Task, facts: &Facts) {
         for (index, phase) in task.phases.iter().enumerate().skip(1) {
             let note = format!(
@@ -268,7 +276,7 @@ impl TaskCheck {
     }
 }
 
-/// Whether a phase would be reached at once, were it next.
+/// Returns `true` if a phase would be reached at once, were it next.
 fn holds(done: &Done, facts: &Facts) -> bool {
     match done {
         Done::When(condition) => condition.holds(facts),

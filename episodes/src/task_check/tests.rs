@@ -1,10 +1,10 @@
-//! Tasks that stand, fall, and are done by nobody.
+//! Tasks that stand, that fall, and that are complete without any action.
 
 use super::*;
 use crate::tasks::TaskSource;
 use crate::tasks::task_of;
 
-/// A box on the floor, one robot, and phases of these conditions.
+/// Returns a task with a box on the floor, one robot, and phases of these conditions.
 fn task(z_m: f32, conditions: [&str; 2]) -> &'static Task {
     let [first, second] = conditions;
     let text = format!(
@@ -110,7 +110,7 @@ done = '"{{way}}" == "left" ? time_s() > 100 : time_s() > 200'
     let [joint, phase] = &told[..] else { panic!("{told:?}") };
     assert!(joint.contains("own instruction of B") && joint.contains("give shared_instruction"), "{joint}");
     assert!(phase.contains("the description of p1 gone"), "{phase}");
-    // In other words, too.
+    // The same applies to rewordings.
     let words = |to_a: &str, to_b: &str| {
         let words = format!(
             "[[rewordings]]\ninstruction = \"Off to the {{way}}.\"\nshared_instruction = \"Off as A says.\"\n\

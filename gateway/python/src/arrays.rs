@@ -1,4 +1,4 @@
-//! Numbers of a robot as rows of an array, and the names of their columns.
+//! Values of a robot as rows of an array, and the names of their columns.
 
 use numpy::ndarray::{Dim, Dimension, IntoDimension};
 use numpy::{Element, PyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
@@ -7,7 +7,7 @@ use tandem_episodes::joint_names;
 use tandem_sim::{Pose, RobotCommand, RobotStep, UPPER, Vector};
 use tandem_tools_spec::{Assistance, BASE_COLUMNS};
 
-/// A picture's colours: height by width by red, green, blue.
+/// Colours of an image: height by width by red, green, blue.
 pub type Colours<'py> = Bound<'py, PyArray3<u8>>;
 /// Distances along the optical axis: height by width, in metres.
 pub type Depths<'py> = Bound<'py, PyArray2<f32>>;
@@ -15,7 +15,7 @@ pub type Depths<'py> = Bound<'py, PyArray2<f32>>;
 /// Components of a pose.
 const POSE: [&str; 7] = ["x_m", "y_m", "z_m", "qw", "qx", "qy", "qz"];
 
-/// Names of the columns of [`state_row`].
+/// Returns the names of the columns of [`state_row`].
 pub fn state_names(assistance: Assistance) -> Vec<String> {
     let joints = |unit: &'static str| joint_names().map(|joint| format!("{joint}_{unit}"));
     let pose = |of: &'static str| POSE.map(|part| format!("{of}_{part}"));
@@ -37,7 +37,7 @@ pub fn state_names(assistance: Assistance) -> Vec<String> {
     names
 }
 
-/// What a robot senses, as far as the assistance tells it.
+/// Appends a robot's sensed state to `row`, as far as the assistance includes it.
 pub fn state_row(robot: &RobotStep, assistance: Assistance, row: &mut Vec<f32>) {
     let RobotStep { sensed, truth, command, .. } = robot;
     row.extend(sensed.joints.q_rad);
@@ -57,7 +57,7 @@ pub fn state_row(robot: &RobotStep, assistance: Assistance, row: &mut Vec<f32>) 
     }
 }
 
-/// A pose as x, y, z in m and w, x, y, z.
+/// Returns a pose as x, y, z in m and w, x, y, z.
 pub fn pose_row(pose: &Pose) -> [f32; 7] {
     let (t, r) = (pose.translation, pose.rotation);
     [t.x, t.y, t.z, r.w, r.x, r.y, r.z]
@@ -67,7 +67,7 @@ pub fn vector_row(vector: Vector) -> [f32; 3] {
     [vector.x, vector.y, vector.z]
 }
 
-/// A command as a row of `send_joint_chunk`.
+/// Returns a command as a row of `send_joint_chunk`.
 pub fn action_row(command: &RobotCommand) -> impl Iterator<Item = f32> {
     command.upper_rad.into_iter().chain(base_row(command))
 }
@@ -77,7 +77,7 @@ fn base_row(command: &RobotCommand) -> [f32; 4] {
     [base.vx_m_s, base.vy_m_s, base.yaw_rate_rad_s, base.pelvis_height_m]
 }
 
-/// Names of the columns of an action row.
+/// Returns the names of the columns of an action row.
 #[pyfunction]
 pub fn action_columns() -> Vec<String> {
     let names = joint_names();
@@ -85,13 +85,13 @@ pub fn action_columns() -> Vec<String> {
     joints.chain(BASE_COLUMNS.map(String::from)).collect()
 }
 
-/// Names of the columns of a state that is told in full.
+/// Returns the names of the columns of a full state.
 #[pyfunction]
 pub fn state_columns() -> Vec<String> {
     state_names(Assistance::Full)
 }
 
-/// Numbers as an array of this shape, copied once.
+/// Creates an array of this shape from the numbers, which are copied once.
 pub fn shaped<'py, T: Element, const N: usize>(
     py: Python<'py>,
     numbers: &[T],

@@ -22,7 +22,8 @@ use tandem_tools_spec::{
 use crate::arrays::{Colours, Depths, shaped, state_names, state_row};
 use crate::refusal::{failed, forked, refused};
 
-/// An episode from its start to its result. It may be used from any thread; calls of several come one after another.
+/// An episode from its start to its result. It may be used from any thread; concurrent calls are
+/// serialized.
 #[pyclass(frozen, name = "Episode", module = "tandem._native")]
 pub struct NativeEpisode {
     held: Mutex<Held>,
@@ -30,25 +31,26 @@ pub struct NativeEpisode {
     course: Course,
     assistance: Assistance,
     disclosure: Disclosure,
-    /// The process that made it: one that is forked has neither the threads nor the files of its parent.
+    /// Id of the process that made it. A forked process has neither the threads nor the files of its
+    /// parent.
     process: u32,
-    /// Whether somebody wants the policy to stop, who cannot reach its thread.
+    /// Set once the policy has to stop, from a thread other than the policy's.
     interrupted: Arc<AtomicBool>,
 }
 
-/// Whether an episode may go back to an earlier moment.
+/// Purpose of an episode, which decides whether it may go back to an earlier moment.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Course {
-    /// It is the caller's own.
+    /// The caller's own episode, which may.
     Free,
-    /// A recording is made of it.
+    /// A recorded episode.
     Recorded,
-    /// An evaluation scores how it is played, at the first attempt.
+    /// An episode that an evaluation scores at the first attempt.
     Scored,
 }
 
 impl Course {
-    /// Why the episode goes forward only, if it does.
+    /// Returns the reason why the episode only goes forward, if it does.
     fn forward_only(self) -> Option<&'static str> {
         match self {
             Course::Free => None,
@@ -63,27 +65,28 @@ impl Course {
     }
 }
 
-/// What there is of an episode.
+/// State of an episode.
 enum Held {
     Open(Box<PanicGuard>),
-    /// Its result, as far as there is one.
+    /// Its result, if there is one.
     Closed(Option<Box<ResultReply>>),
 }
 
-/// Where an episode stands, to go back to.
+/// Snapshot of an episode, to which it can return.
 #[pyclass(frozen, module = "tandem._native")]
 pub struct Snapshot {
     checkpoint: Checkpoint,
 }
 
-/// What a step came to: steps executed, why it stopped, simulated time, numbers of phases, who has fallen, and whether that was the end.
+/// Outcome of a step: executed steps, stop reason, simulated time, numbers of phases, fallen robots, and
+/// true at the end.
 type Stepped = (u32, String, f64, Vec<String>, Vec<bool>, bool);
 
-/// States and calibrations as JSON, and each robot's view.
+/// States and calibrations as JSON, and each robot's images.
 type Seen<'py> = (String, Vec<(Colours<'py>, Option<Depths<'py>>)>);
 
 impl NativeEpisode {
-    /// An episode that has begun.
+    /// Wraps an episode that has begun.
     pub fn of(session: Session, course: Course) -> NativeEpisode {
         let robots = session.spec().task.robots.iter().map(|robot| robot.name.to_owned()).collect();
         let EpisodeSpec { assistance, disclosure, .. } = *session.spec();
@@ -99,13 +102,13 @@ impl NativeEpisode {
         }
     }
 
-    /// The same episode, whose calls raise KeyboardInterrupt from when `interrupted` is set.
+    /// Makes calls of the episode raise KeyboardInterrupt once `interrupted` is set.
     pub fn until(mut self, interrupted: Arc<AtomicBool>) -> NativeEpisode {
         self.interrupted = interrupted;
         self
     }
 
-    /// How long the policy has thought, up to its last call.
+    /// Returns the policy's thinking time up to its last call.
     pub fn thought(&self) -> Duration {
         match &*self.held() {
             Held::Open(guard) => guard.thought().unwrap_or_default(),
@@ -117,7 +120,7 @@ impl NativeEpisode {
         self.held.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Refuses what is asked in a process that was forked.
+    /// Refuses requests in a forked process.
     fn check_process(&self, py: Python) -> PyResult<()> {
         match process::id() == self.process {
             true => Ok(()),
@@ -125,7 +128,7 @@ impl NativeEpisode {
         }
     }
 
-    /// Has the session do something; Python's other threads run meanwhile.
+    /// Runs `work` on the session. Python's other threads run meanwhile.
     fn work<T: Send>(
         &self,
         py: Python,
@@ -142,13 +145,13 @@ impl NativeEpisode {
         worked.map_err(|error| refused(py, &error))
     }
 
-    /// Ends the episode, for a reason if there is one, and closes its recording. The result stays.
+    /// Ends the episode, for a given reason if there is one, and closes its recording. The result stays.
     pub fn end(&self, reason: Option<EndReason>) -> Result<ResultReply, HostingError> {
         let mut held = self.held();
         let result = match std::mem::replace(&mut *held, Held::Closed(None)) {
             Held::Open(mut guard) => {
                 if let Some(reason) = reason {
-                    // One that has panicked has ended already.
+                    // An episode that has panicked has ended already.
                     let _ = guard.run(|session| session.end(reason));
                 }
                 guard.close().map(Box::new)
@@ -162,8 +165,8 @@ impl NativeEpisode {
 
 #[pymethods]
 impl NativeEpisode {
-    /// Starts an episode: `start` has the arguments of start_episode, `settings` those of a server, both as JSON. Returns it with its
-    /// briefing.
+    /// Starts an episode. `start` has the arguments of start_episode and `settings` those of a server,
+    /// both as JSON. Returns the episode with its briefing.
     #[staticmethod]
     fn start(
         py: Python,
@@ -180,7 +183,7 @@ impl NativeEpisode {
         Ok((NativeEpisode::of(session, course), briefing))
     }
 
-    /// Names of the robots, in order.
+    /// Returns the names of the robots, in order.
     #[getter]
     fn robots(&self) -> Vec<String> {
         self.robots.clone()
@@ -195,7 +198,8 @@ impl NativeEpisode {
         })
     }
 
-    /// Looks. Returns states and calibrations as JSON, and for each robot colours and, where it is asked for, depth.
+    /// Observes. Returns states and calibrations as JSON, and for each robot the colours and, on request,
+    /// the depth.
     #[pyo3(signature = (arguments, depth))]
     fn observe<'py>(&self, py: Python<'py>, arguments: &str, depth: bool) -> PyResult<Seen<'py>> {
         let formats =
@@ -215,7 +219,7 @@ impl NativeEpisode {
         Ok((json!({ "time_s": seen.time_s, "states": states, "cameras": cameras }).to_string(), views))
     }
 
-    /// What each robot senses, a row each.
+    /// Returns the sensed state, a row for each robot.
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let numbers = self.work(py, |session| {
             let (assistance, step) = session.read_states()?;
@@ -226,12 +230,12 @@ impl NativeEpisode {
         shaped(py, &numbers, [self.robots.len(), numbers.len() / self.robots.len()])
     }
 
-    /// Names of the columns of the state.
+    /// Returns the names of the columns of the state.
     fn state_columns(&self, py: Python) -> PyResult<Vec<String>> {
         self.work(py, |session| Ok(state_names(session.spec().assistance)))
     }
 
-    /// Sends rows of every robot: robots by steps by columns.
+    /// Executes rows of every robot: robots by steps by columns.
     fn step(&self, py: Python, rows: PyReadonlyArray3<'_, f32>) -> PyResult<Stepped> {
         let rows = rows.as_array();
         let chunk = |(robot, rows): (&String, numpy::ndarray::ArrayView2<f32>)| JointChunk {
@@ -260,7 +264,7 @@ impl NativeEpisode {
         Ok((executed_steps, reason, time_s, phases, fallen, ended))
     }
 
-    /// Where the episode stands.
+    /// Takes a snapshot of the episode.
     fn snapshot(&self, py: Python) -> PyResult<Snapshot> {
         if let (Course::Scored, Some(way)) = (self.course, self.course.forward_only()) {
             return Err(failed(py, &way));
@@ -268,7 +272,7 @@ impl NativeEpisode {
         self.work(py, |session| session.checkpoint()).map(|checkpoint| Snapshot { checkpoint })
     }
 
-    /// Goes back, or on, to where a snapshot was taken.
+    /// Moves the episode to the moment of a snapshot, back or forward.
     fn restore(&self, py: Python, snapshot: &Snapshot) -> PyResult<()> {
         if let Some(way) = self.course.forward_only() {
             return Err(failed(py, &way));
@@ -276,7 +280,7 @@ impl NativeEpisode {
         self.work(py, |session| session.resume(&snapshot.checkpoint))
     }
 
-    /// Equal for equal physical states, 16 hexadecimal digits.
+    /// Returns 16 hexadecimal digits that are equal for equal physical states.
     fn state_hash(&self, py: Python) -> PyResult<String> {
         if self.course == Course::Scored && self.assistance == Assistance::Paper {
             let way = "an evaluation scores this episode and tells its policy no hash; results.json has that of its end";
@@ -285,7 +289,7 @@ impl NativeEpisode {
         self.work(py, |session| Ok(session.state_hash()))
     }
 
-    /// Why the episode has ended, as the contract calls it, if it has.
+    /// Returns the end reason by the contract's name, if the episode has ended.
     fn ended(&self, py: Python) -> PyResult<Option<String>> {
         Ok(py.detach(|| match &*self.held() {
             Held::Open(guard) => guard.ended().map(name_of),
@@ -293,21 +297,23 @@ impl NativeEpisode {
         }))
     }
 
-    /// Ends the episode, closes its recording, and returns the result as JSON; again and again the same.
+    /// Ends the episode, closes its recording, and returns the result as JSON. Repeated calls return the
+    /// same.
     fn close(&self, py: Python) -> PyResult<String> {
         self.check_process(py)?;
         let result = py.detach(|| self.end(None)).map_err(|error| refused(py, &error))?;
-        // An episode of the caller's own has no secrets.
+        // The caller's own episode has no secrets.
         let told = if self.course == Course::Scored { result.disclosed(self.disclosure) } else { result };
         Ok(json!(told).to_string())
     }
 }
 
-/// An episode that nobody closes leaves its files whole. In a process that was forked it is left as it is: its files are the parent's.
+/// Closes the episode, so that its files are whole. In a forked process it is leaked, because its files
+/// are the parent's.
 impl Drop for NativeEpisode {
     fn drop(&mut self) {
         if process::id() == self.process {
-            // There is a result, or there is nobody left to tell.
+            // There may be no caller left to receive an error.
             let _ = self.end(None);
         } else if let Ok(held) = self.held.get_mut() {
             std::mem::forget(std::mem::replace(held, Held::Closed(None)));
@@ -317,13 +323,13 @@ impl Drop for NativeEpisode {
 
 #[pymethods]
 impl Snapshot {
-    /// The snapshot as a file of it would be; the same build reads it again.
+    /// Returns the snapshot in the format of its file. The same build can read it.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
         let bytes = py.detach(|| self.checkpoint.to_bytes()).map_err(|error| refused(py, &error.into()))?;
         Ok(PyBytes::new(py, &bytes))
     }
 
-    /// Reads what `to_bytes` gave.
+    /// Reads the output of `to_bytes`.
     #[staticmethod]
     fn from_bytes(py: Python, bytes: &[u8]) -> PyResult<Snapshot> {
         let read = py.detach(|| Checkpoint::from_bytes(bytes, Path::new("snapshot")));
@@ -331,7 +337,7 @@ impl Snapshot {
     }
 }
 
-/// Why an episode does not begin.
+/// Reason why an episode does not begin.
 enum StartProblem {
     Refused(HostingError),
     Settings(String),
@@ -359,7 +365,7 @@ fn begin(start: &str, settings: &str, folder: Option<&Path>) -> Result<(Session,
     Ok((session, briefing))
 }
 
-/// What the package has written as JSON.
+/// Parses JSON that the package has written.
 fn read(json: &str) -> Value {
     serde_json::from_str(json).unwrap_or_default()
 }

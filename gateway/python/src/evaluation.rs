@@ -1,4 +1,4 @@
-//! Evaluations that Python asks for.
+//! Evaluations that Python requests.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,15 +20,19 @@ use tandem_tools_spec::Protocol;
 use crate::players::{PlayedBy, PythonPolicy};
 use crate::refusal::failed;
 
-/// How often the evaluation looks whether the user wants it to end.
+/// Interval between two checks for a signal.
 const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Plays episodes by `play`, which is called with each episode and its briefing as JSON, and returns what came of it as JSON. Without
-/// it, the player that is called `name` plays; where `play` has episodes played `elsewhere`, it is called with task, seed and a function
-/// that says whether the user wants it to end, and returns whether it was played, and then the episode as JSON with the files of its
-/// recording, or else why not. What `out` holds already is not played again. `progress` is called with every episode's result as JSON,
-/// and whether it was played now. `existing_run` says what becomes of another run in `out`: `refuse`, `resume_with_new_build` or `overwrite`.
-/// `seed_key` is the file with an evaluator's key.
+/// Plays episodes by `play` and returns the evaluation as JSON.
+///
+/// `play` is called with each episode and its briefing as JSON. Without it, the player called `name`
+/// plays. If `play` has episodes played `elsewhere`, it is called with task, seed and a function that
+/// returns true once the user wants to stop. It returns true and the episode as JSON with the files of
+/// its recording, or false and the reason.
+///
+/// Existing results in `out` are not played again. `progress` is called with every episode's result as
+/// JSON, and true if it was played now. `existing_run` is the treatment of another run in `out`:
+/// `refuse`, `resume_with_new_build` or `overwrite`. `seed_key` is the file with an evaluator's key.
 #[pyfunction]
 #[pyo3(signature = (play, name, settings, protocol, tasks, seeds, jobs, record, out, progress, elsewhere, existing_run, seed_key))]
 #[allow(clippy::too_many_arguments, reason = "the package calls it, by names")]
@@ -56,7 +60,7 @@ pub fn evaluate(
     play_all(py, &plan, &out, progress.as_ref(), &player.interrupted)
 }
 
-/// The folder that demonstrations have without another, in the folder `runs`.
+/// Returns the default folder of demonstrations, in the folder `runs`.
 #[pyfunction]
 pub fn demonstrations_folder(
     py: Python,
@@ -73,7 +77,7 @@ pub fn demonstrations_folder(
     Ok(evaluation::default_folder(&plan, Some("demonstrations"), Path::new("runs")))
 }
 
-/// What is played, one episode after the other and without recordings.
+/// Returns the plan for these episodes, which are played in sequence and without recordings.
 fn plan_of<'a>(
     py: Python,
     player: &'a PythonPolicy,
@@ -126,7 +130,8 @@ fn existing(py: Python, name: &str) -> PyResult<ExistingRun> {
     }
 }
 
-/// Plays on threads of their own, while this one hears signals: Python handles them on its main thread alone.
+/// Plays on separate threads, while this one handles signals, because Python handles them only on its
+/// main thread.
 fn play_all(
     py: Python,
     plan: &EvaluationPlan,
@@ -135,12 +140,13 @@ fn play_all(
     interrupted: &AtomicBool,
 ) -> PyResult<String> {
     let (done, outcome) = channel();
-    // Only this thread ever waits; Python's lock is given back meanwhile, and what does that has to be shareable.
+    // Only this thread ever waits. Python's lock is released meanwhile, which requires a shareable
+    // receiver.
     let outcome = Mutex::new(outcome);
     std::thread::scope(|scope| {
         scope.spawn(|| {
             let tell = |event: EpisodeEvent| tell(progress, event);
-            // Who would hear it waits for this thread.
+            // The receiver waits for this thread.
             let _ = done.send(evaluation::evaluate(plan, out, &tell));
         });
         let mut signal = None;
@@ -166,7 +172,7 @@ fn play_all(
     })
 }
 
-/// Tells who looks on of an episode. What goes wrong with that does not concern the evaluation.
+/// Reports an episode to the progress callback. Its errors do not affect the evaluation.
 fn tell(progress: Option<&Py<PyAny>>, event: EpisodeEvent) {
     let (played, now): (&PlayedEpisode, bool) = match event {
         EpisodeEvent::Kept(played) => (played, false),

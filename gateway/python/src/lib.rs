@@ -1,8 +1,9 @@
-//! The native module of the Python package `tandem`: episodes in the caller's own process, recordings, evaluations, and the whole
-//! command line. What Python code sees is the typed package around it, in `gateway/python/tandem`.
+//! The native module of the Python package `tandem`: episodes in the caller's own process, recordings,
+//! evaluations, and the whole command line. Python code uses the typed package around it, in
+//! `gateway/python/tandem`.
 //!
-//! Replies cross over as the JSON that HTTP carries, numbers of every step as arrays. Python's lock is free while physics and
-//! drawing run.
+//! Replies are passed as the JSON that HTTP carries, values of every step as arrays. Python's lock is
+//! released during physics and rendering.
 
 mod arrays;
 mod episode;
@@ -13,7 +14,7 @@ mod recording;
 mod refusal;
 mod worlds;
 
-/// What the package is built on.
+/// The native part of the package `tandem`.
 #[pyo3::pymodule]
 mod _native {
     use std::path::PathBuf;
@@ -33,7 +34,8 @@ mod _native {
     #[pymodule_export]
     use crate::worlds::{NativeWorlds, row_columns};
 
-    /// Episodes, recordings and checkpoints name the build that made them: this library, and not Python's own program.
+    /// Sets the path of this library as the build that made episodes, recordings and checkpoints, instead
+    /// of the Python interpreter.
     #[pyfunction]
     fn loaded_from(path: PathBuf) {
         tandem_episodes::name_program(path);

@@ -1,4 +1,4 @@
-//! Who plays the episodes of an evaluation that Python asks for.
+//! Players of the episodes of an evaluation that Python requests.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -19,19 +19,19 @@ use tandem_tools_spec::{EndReason, ToolCall, ToolReply};
 
 use crate::episode::{Course, NativeEpisode};
 
-/// A policy, by what Python says of it.
+/// A policy as Python describes it.
 #[derive(Debug)]
 pub struct PythonPolicy {
     pub name: String,
     pub by: PlayedBy,
-    /// Whether the user wants it to end.
+    /// Set once the user wants it to end.
     pub interrupted: Arc<AtomicBool>,
 }
 
-/// Who makes the calls.
+/// Source of the calls.
 #[derive(Debug)]
 pub enum PlayedBy {
-    /// A player that Tandem has.
+    /// A built-in player.
     BuiltIn(&'static PlayerEntry),
     /// A callable that is given each episode and its briefing as JSON.
     Callable(Py<PyAny>),
@@ -40,7 +40,8 @@ pub enum PlayedBy {
 }
 
 impl PlayedBy {
-    /// The callable `play`, which has episodes played `elsewhere`, or plays them; without one, the player that is called `name`.
+    /// Chooses the callable `play`, which has episodes played `elsewhere` or plays them itself. Without
+    /// one, chooses the player called `name`.
     pub fn new(play: Option<Py<PyAny>>, name: &str, elsewhere: bool) -> Result<PlayedBy, PlayerError> {
         Ok(match play {
             None => PlayedBy::BuiltIn(players::find(name)?),
@@ -105,7 +106,7 @@ impl PythonPolicy {
         let (episode, stopped) = Python::attach(|py| self.call(py, play, episode, briefing))
             .map_err(|error| PlayError::Absent(error.to_string()))?;
         if self.is_interrupted() {
-            // It does not count, and its recording is whole all the same.
+            // The episode does not count, but its recording is whole.
             let _ = episode.get().end(Some(EndReason::Abandoned));
             return Err(PlayError::Absent("interrupted".into()));
         }
@@ -115,7 +116,7 @@ impl PythonPolicy {
         Ok(PlayOutcome { result, thought, stopped })
     }
 
-    /// Lets the callable play. Returns the episode, and what the callable raised, if it did.
+    /// Lets the callable play. Returns the episode and the exception that the callable raised, if any.
     fn call(
         &self,
         py: Python,
@@ -127,7 +128,7 @@ impl PythonPolicy {
         let over = py.import("tandem.errors")?.getattr("EpisodeEnded")?;
         match play.call1(py, (episode.clone_ref(py), briefing)) {
             Ok(_) => Ok((episode, None)),
-            // That it ends under way is no failure: the last phase may have been reached.
+            // An end during the play is no failure, because the last phase may have been reached.
             Err(error) if error.is_instance(py, &over) => Ok((episode, None)),
             Err(error) if error.is_instance_of::<PyKeyboardInterrupt>(py) => {
                 self.interrupted.store(true, Ordering::Relaxed);
@@ -189,12 +190,12 @@ impl PythonPolicy {
     }
 }
 
-/// What to do where machines differ.
+/// Advice for machines with different builds.
 const SAME_WHEEL: &str = "install the same wheel on every machine";
 
-/// What came of an episode that another process was to play.
+/// Outcome of an episode that another process was to play.
 enum Elsewhere {
-    /// The episode as its file would have it, and the files of its recording.
+    /// The episode in the format of its file, and the files of its recording.
     Played {
         played: String,
         files: Vec<(String, Vec<u8>)>,
@@ -204,7 +205,7 @@ enum Elsewhere {
     },
 }
 
-/// Writes the files of a recording, the result last, by which the recording is known to be whole.
+/// Writes the files of a recording. The result comes last, because it marks the recording as complete.
 fn keep(folder: &Path, mut files: Vec<(String, Vec<u8>)>) -> Result<(), String> {
     create_private_folder(folder).map_err(|error| format!("cannot make {}: {error}", folder.display()))?;
     files.sort_by_key(|(name, _)| name == RESULT_FILE);
@@ -214,7 +215,7 @@ fn keep(folder: &Path, mut files: Vec<(String, Vec<u8>)>) -> Result<(), String> 
     Ok(())
 }
 
-/// An episode whose calls end when the user wants that.
+/// An episode whose calls end once the user interrupts.
 struct Interruptible<'a, E> {
     episode: &'a mut E,
     interrupted: &'a AtomicBool,

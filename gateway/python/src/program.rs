@@ -14,14 +14,15 @@ use tandem_episodes::task_list;
 
 use crate::refusal::failed;
 
-/// Runs the command line with these arguments, the program's name first, and returns its exit code.
+/// Runs the command line with these arguments, which begin with the program's name, and returns its exit
+/// code.
 #[pyfunction]
 pub fn run_command_line(py: Python, arguments: Vec<String>) -> u8 {
     py.detach(|| {
         let cli = match Cli::try_parse_from(arguments) {
             Ok(cli) => cli,
             Err(asked) => {
-                // Nobody reads what it says: the code says the same.
+                // If the message cannot be printed, the exit code still reports the error.
                 let _ = asked.print();
                 return u8::try_from(asked.exit_code()).unwrap_or(1);
             }
@@ -36,7 +37,7 @@ pub fn run_command_line(py: Python, arguments: Vec<String>) -> u8 {
     })
 }
 
-/// Runs a command that a function of the package stands for; its error is an exception.
+/// Runs a command for a function of the package. Its error becomes an exception.
 #[pyfunction]
 pub fn write_report(py: Python, arguments: Vec<String>) -> PyResult<()> {
     let run = || -> Result<(), String> {
@@ -46,13 +47,14 @@ pub fn write_report(py: Python, arguments: Vec<String>) -> PyResult<()> {
     py.detach(run).map_err(|text| failed(py, &text))
 }
 
-/// Number of processors that this process may use: a container's quota counts, and not its machine's cores.
+/// Returns the number of processors that this process may use. A container's quota counts, not its
+/// machine's cores.
 #[pyfunction]
 pub fn available_processors() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// The tasks, as JSON.
+/// Returns the tasks as JSON.
 #[pyfunction]
 pub fn list_tasks(py: Python) -> PyResult<String> {
     let settings = Settings::resolve(Layer::default(), None).map_err(|error| failed(py, &error))?;
@@ -68,7 +70,7 @@ pub struct NativeServer {
 
 #[pymethods]
 impl NativeServer {
-    /// Begins to serve with these settings, as JSON.
+    /// Starts to serve with these settings, given as JSON.
     #[staticmethod]
     fn start(py: Python, settings: &str) -> PyResult<NativeServer> {
         let start = || -> Result<Server, String> {
@@ -82,13 +84,13 @@ impl NativeServer {
         Ok(NativeServer { running: Mutex::new(Some(server)), url })
     }
 
-    /// Where it is reached.
+    /// Returns the URL of the server.
     #[getter]
     fn url(&self) -> &str {
         &self.url
     }
 
-    /// Finishes calls under way and closes every recording. Returns the episodes that did not end in time.
+    /// Finishes pending calls and closes every recording. Returns the episodes that did not end in time.
     fn stop(&self, py: Python) -> Vec<String> {
         py.detach(|| {
             let running = self.running.lock().unwrap_or_else(PoisonError::into_inner).take();

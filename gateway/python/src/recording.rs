@@ -1,4 +1,4 @@
-//! Recordings as arrays, and pictures of their steps drawn again.
+//! Recordings as arrays, with images of their steps rendered again.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -22,13 +22,13 @@ use crate::refusal::{failed, refused};
 pub struct NativeRecording {
     recording: Recording,
     steps: Vec<Step>,
-    /// Made when the first picture is asked for.
+    /// Created when the first image is requested.
     renderer: Mutex<Option<EpisodeRenderer>>,
 }
 
 #[pymethods]
 impl NativeRecording {
-    /// Reads a file, every byte of which is checked.
+    /// Reads a file and checks every byte.
     #[staticmethod]
     fn read(py: Python, path: PathBuf) -> PyResult<NativeRecording> {
         let read = || {
@@ -39,8 +39,8 @@ impl NativeRecording {
         py.detach(read).map_err(|error: RecordingError| failed(py, &error))
     }
 
-    /// What the episode was, its build and controller, its result, its phases, the names of its objects and cameras, and its calls,
-    /// as JSON.
+    /// Returns the description of the recording as JSON: episode, build, controller, result, phases,
+    /// names of objects and cameras, and calls.
     fn about(&self, py: Python) -> PyResult<String> {
         let Recording { spec, locomotion, build, result, .. } = &self.recording;
         let calls = self.recording.tool_calls().map_err(|error| failed(py, &error))?;
@@ -75,19 +75,20 @@ impl NativeRecording {
         Ok(about.to_string())
     }
 
-    /// Hash of every state, that before the first step included.
+    /// Returns the hash of every state, including the one before the first step.
     fn state_hashes(&self, py: Python) -> PyResult<Vec<String>> {
         let hashes = self.recording.state_hashes().map(|hash| hash.map(|(_, hash)| hash));
         hashes.collect::<Result<_, _>>().map_err(|error| failed(py, &error))
     }
 
-    /// All numbers of all steps by name; the first entry is the state before the first step.
+    /// Returns the values of all steps by name. The first entry is the state before the first step.
     fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let columns = py.detach(|| Columns::of(&self.steps));
         columns.arrays(py)
     }
 
-    /// How each hand of each robot grips each object at every step: 0 not at all, 1 touching, 2 holding, as the scorer sees it.
+    /// Returns the grip of each hand of each robot on each object at every step, as the scorer sees it: 0
+    /// none, 1 touching, 2 holding.
     fn grips<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray4<u8>>> {
         let grips = py.detach(|| self.all_grips()).map_err(|error| failed(py, &error))?;
         let (robots, objects) =
@@ -95,7 +96,8 @@ impl NativeRecording {
         shaped(py, &grips, [self.steps.len(), robots, 2, objects])
     }
 
-    /// Colours and depth that a camera sees after a step, in its own size or in another, width by height.
+    /// Renders the colours and depth of a camera after a step, in its own size or in another, width by
+    /// height.
     fn picture<'py>(
         &self,
         py: Python<'py>,
@@ -112,7 +114,7 @@ impl NativeRecording {
         Ok((shaped(py, &rgb, [height, width, 3])?, shaped(py, &depth_m, [height, width])?))
     }
 
-    /// The colours alone, as a policy is shown them that asks for this size.
+    /// Renders only the colours, as a policy gets them that requests this size.
     fn colours<'py>(
         &self,
         py: Python<'py>,
@@ -128,7 +130,7 @@ impl NativeRecording {
 }
 
 impl NativeRecording {
-    /// What is drawn of a step.
+    /// Renders a step with `draw`.
     fn drawn<T: Send>(
         &self,
         py: Python,
@@ -155,7 +157,8 @@ impl NativeRecording {
         drawn.map_err(|error: tandem_episodes::EpisodeError| refused(py, &error.into()))
     }
 
-    /// Steps by robots by left and right by objects. Before the first step nothing is gripped.
+    /// Returns grips by step, robot, left and right hand, and object. Before the first step nothing is
+    /// gripped.
     fn all_grips(&self) -> Result<Vec<u8>, RecordingError> {
         let Some(start) = self.steps.first() else { return Ok(Vec::new()) };
         let spec = &self.recording.spec;
@@ -180,7 +183,7 @@ impl NativeRecording {
     }
 }
 
-/// Numbers of all steps, one after another.
+/// Values of all steps, one step after another.
 #[derive(Default)]
 struct Columns {
     shape: (usize, usize, usize),
@@ -261,5 +264,5 @@ impl Columns {
     }
 }
 
-/// Thumb, fingers and palm of a hand, three numbers each.
+/// Number of contact force values of a hand: three each for thumb, fingers and palm.
 const HAND_NUMBERS: usize = 9;

@@ -1,4 +1,5 @@
-//! Refusals as Python's exceptions: the class by the kind of refusal, the text what the server would have said.
+//! Refusals as Python exceptions: the kind of refusal decides the class, and the text is that of the
+//! server.
 
 use std::fmt::Display;
 
@@ -6,7 +7,7 @@ use pyo3::prelude::*;
 use tandem::hosting::HostingError;
 use tandem_tools_spec::Refusal;
 
-/// The exception for a refusal of an episode.
+/// Returns the exception for a refusal of an episode.
 pub fn refused(py: Python, error: &HostingError) -> PyErr {
     let Refusal { kind, title, hint, .. } = error.refusal();
     let detail = match hint {
@@ -16,17 +17,17 @@ pub fn refused(py: Python, error: &HostingError) -> PyErr {
     raised(py, (kind, title, detail))
 }
 
-/// The exception for anything else that cannot be done, which has no kind.
+/// Returns the exception for any other failure, which has no kind.
 pub fn failed(py: Python, error: &dyn Display) -> PyErr {
     raised(py, ("failed", "Failed", error.to_string()))
 }
 
-/// Why nothing is done in another process than the one that made it.
+/// Returns the error message for use in a forked process.
 pub fn forked(maker: u32) -> String {
     format!("this was made in process {maker}, of which this one is a fork; make another one here")
 }
 
-/// The package has the classes, because callers over HTTP get the same.
+/// Creates the exception. Its class is from the package, because callers over HTTP get the same classes.
 fn raised(py: Python, (kind, title, detail): (&str, &str, String)) -> PyErr {
     let made = py
         .import("tandem.errors")

@@ -1,4 +1,4 @@
-//! Many worlds of one task that step together: what environments of learners are made of.
+//! Many worlds of one task that step together, for learning environments.
 
 use std::path::PathBuf;
 use std::process;
@@ -18,19 +18,21 @@ use tandem_tools_spec::{Protocol, StartEpisode};
 use crate::arrays::{action_columns, shaped};
 use crate::refusal::{failed, forked, refused};
 
-/// Worlds of one task. It may be used from any thread; calls of several come one after another.
+/// Worlds of one task. They may be used from any thread; concurrent calls are serialized.
 #[pyclass(frozen, name = "Worlds", module = "tandem._native")]
 pub struct NativeWorlds {
     batch: Mutex<Option<Batch>>,
-    /// The process that made it: what has been forked has neither the threads nor the files of its parent.
+    /// Id of the process that made it. A forked process has neither the threads nor the files of its
+    /// parent.
     process: u32,
     worlds: usize,
     robots: usize,
     limits: Vec<[f32; 2]>,
 }
 
-/// By world: reward, terminated, truncated, phases, fallen (by robot), steps, the episode's seed, that of the one that has begun behind it
-/// or -1. Then worlds in which the simulator failed, and how.
+/// Outcomes by world: reward, terminated, truncated, phases, fallen (by robot), steps, the episode's
+/// seed, and the seed of the next episode if it has begun, or -1. Then the worlds in which the simulator
+/// failed, and how.
 type Outcomes<'py> = (
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<bool>>,
@@ -44,12 +46,13 @@ type Outcomes<'py> = (
     Bound<'py, PyArray1<f64>>,
 );
 
-/// Where what is seen is written: worlds by robots by columns, and worlds by robots by height by width by red, green, blue.
+/// Output arrays of observations: worlds by robots by columns, and worlds by robots by height by width by
+/// red, green, blue.
 type Seen<'py> = (PyReadwriteArray3<'py, f32>, Option<PyReadwriteArray5<'py, u8>>);
 
 #[pymethods]
 impl NativeWorlds {
-    /// Makes worlds in which nothing has begun. Threads: 0 for as many as there are cores.
+    /// Creates worlds without episodes. With `threads` = 0 there are as many threads as cores.
     #[new]
     #[pyo3(signature = (task, settings, worlds, threads, actions, reward, pictures, record))]
     #[allow(clippy::too_many_arguments)]
@@ -82,13 +85,14 @@ impl NativeWorlds {
         Ok(NativeWorlds { batch, process: process::id(), worlds, robots, limits })
     }
 
-    /// The least and the most of each number of a robot's row.
+    /// Returns the minimum and maximum of each value of a robot's row.
     fn action_limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let numbers: Vec<f32> = self.limits.concat();
         shaped(py, &numbers, [self.limits.len(), 2])
     }
 
-    /// Begins an episode in each chosen world, with the seed that is not negative, or that of the next round.
+    /// Begins an episode in each chosen world, with its seed, or with that of the next round if the seed
+    /// is negative.
     fn reset<'py>(
         &self,
         py: Python<'py>,
@@ -108,7 +112,7 @@ impl NativeWorlds {
         self.outcomes(py, begun)
     }
 
-    /// One control step of each world: worlds by robots by columns.
+    /// Executes one control step of each world: worlds by robots by columns.
     fn step<'py>(
         &self,
         py: Python<'py>,
@@ -139,14 +143,14 @@ impl NativeWorlds {
         self.outcomes(py, stepped)
     }
 
-    /// What the robots of a world see: robots by height by width by red, green, blue.
+    /// Renders the images of a world's robots: robots by height by width by red, green, blue.
     fn draw<'py>(&self, py: Python<'py>, world: usize, size: [u32; 2]) -> PyResult<Bound<'py, PyArray4<u8>>> {
         let pixels = self.work(py, |batch| batch.draw(world, size))?;
         let [width, height] = size.map(|length| length as usize);
         shaped(py, &pixels, [self.robots, height, width, 3])
     }
 
-    /// Equal for equal physical states of a world, 16 hexadecimal digits.
+    /// Returns 16 hexadecimal digits that are equal for equal physical states of a world.
     fn state_hash(&self, py: Python, world: usize) -> PyResult<String> {
         self.work(py, |batch| batch.state_hash(world))
     }
@@ -166,7 +170,7 @@ impl NativeWorlds {
         self.batch.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Has the worlds do something; Python's other threads run meanwhile.
+    /// Runs `work` on the worlds. Python's other threads run meanwhile.
     fn work<T: Send>(
         &self,
         py: Python,
@@ -183,7 +187,7 @@ impl NativeWorlds {
         }
     }
 
-    /// The arrays that are written, if they are large enough.
+    /// Returns the output arrays if they are large enough.
     fn seen<'a>(
         &self,
         py: Python,
@@ -229,7 +233,7 @@ impl NativeWorlds {
     }
 }
 
-/// In a process that was forked the worlds are left as they are: their files are the parent's.
+/// Leaks the worlds in a forked process, because their files are the parent's.
 impl Drop for NativeWorlds {
     fn drop(&mut self) {
         if process::id() != self.process {
@@ -238,7 +242,7 @@ impl Drop for NativeWorlds {
     }
 }
 
-/// Names of the columns of an action.
+/// Returns the names of the columns of an action.
 #[pyfunction]
 pub fn row_columns(actions: &str) -> Vec<String> {
     if actions == ActionKind::Wrists.name() { wrist_columns() } else { action_columns() }

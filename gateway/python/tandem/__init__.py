@@ -1,4 +1,4 @@
-"""Two or three simulated humanoids that have to work together.
+"""Simulation of two or three humanoids that have to work together.
 
     import tandem
 
@@ -7,8 +7,8 @@
         reply = episode.wait(25)
         result = episode.finish()
 
-Units are SI; quaternions are w, x, y, z; poses are in a robot's own pelvis frame (x forward, y left, z up) where nothing else
-is said. One control step is 20 ms.
+Units are SI; quaternions are w, x, y, z; poses are in a robot's own pelvis frame (x forward, y left, z up) unless
+noted otherwise. One control step is 20 ms.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""An episode as its caller meets it, in this process or on a server."""
+"""The interface of an episode, in this process or on a server."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from .contract.tools import Tools
 from .errors import TandemError
 
 Renderer: TypeAlias = Literal["auto", "cpu", "gpu"]
-"""Who draws: a graphics processor, the embedded renderer, or whichever is there."""
+"""Renderer of images: the GPU, the embedded CPU renderer, or whichever is available."""
 
 StateEstimate: TypeAlias = Literal["estimator", "truth"]
-"""Where robots have their own state from: an estimator over what they sense, or the simulator."""
+"""Source of the robots' own state: an estimator on their sensors, or the simulator."""
 
 Sensors: TypeAlias = Literal["ideal", "g1"]
-"""What robots sense: everything exactly, or with noise, bias and latency as a G1 does."""
+"""Sensor model of the robots: exact, or with the noise, bias and latency of a G1."""
 
 StressAxis: TypeAlias = Literal[
     "camera", "light", "texture", "layout", "mass", "friction", "sensors", "latency", "push", "words", "partner"
 ]
-"""What goes wrong in an episode."""
+"""Disturbance in an episode."""
 
 StressLevel: TypeAlias = Literal[1, 2, 3]
-"""How much of it."""
+"""Level of the stress."""
 
 Self = TypeVar("Self", bound="BaseEpisode")
 T = TypeVar("T")
@@ -44,79 +44,80 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Observation:
-    """What robots see and sense at one moment."""
+    """Images and states of the robots at one moment."""
 
     time_s: float
     """Simulated seconds since the episode began."""
 
     states: tuple[RobotState, ...]
-    """What each robot senses of itself."""
+    """Sensed state of each robot."""
 
     cameras: tuple[CameraCalibration, ...]
-    """The calibration of each robot's camera."""
+    """Calibration of each robot's camera."""
 
     rgb: dict[str, NDArray[np.uint8]]
-    """By robot: what its camera sees; height by width by red, green, blue (sRGB), from the top left pixel."""
+    """Camera image by robot: height by width by red, green, blue (sRGB), from the top left pixel."""
 
     depth_m: dict[str, NDArray[np.float32]]
-    """By robot: distance along the optical axis in metres, height by width, infinite where nothing is; empty where it was
-    not asked for.
+    """Depth image by robot: distance along the optical axis in metres, height by width. It is infinite without a
+    surface. Empty if depth was not requested.
     """
 
 
 @dataclass(frozen=True)
 class Stepped:
-    """What rows of joint targets came to."""
+    """Outcome of rows of joint targets."""
 
     executed_steps: int
-    """Control steps of 20 ms that were executed."""
+    """Number of executed control steps of 20 ms."""
 
     stop_reason: StopReason
-    """Why no more were."""
+    """Reason why execution stopped."""
 
     time_s: float
     """Simulated seconds since the episode began."""
 
     phases: tuple[str, ...]
-    """Numbers of the phases reached so far, as "p1", where the episode's assistance tells them."""
+    """Numbers of the phases reached up to now, for example "p1", if the episode's assistance includes them."""
 
     fallen: tuple[bool, ...]
-    """By robot, whether it has fallen; empty where the assistance is "paper"."""
+    """True for each robot that has fallen; empty under the assistance "paper"."""
 
     ended: bool
-    """Whether the episode has ended."""
+    """True once the episode has ended."""
 
 
 class BaseEpisode(Tools):
-    """One episode: `start` it, call its tools, and leave it by `finish`, or by the end of a `with` block.
+    """One episode: `start` it, call its tools, and leave it with `finish` or at the end of a `with` block.
 
-    Frames: poses of wrists and cameras are in the robot's own pelvis frame, x forward, y left, z up. Units are SI: metres,
-    radians, seconds, newtons; quaternions are w, x, y, z. A control step is 20 ms; physics stands still between calls.
+    Poses of wrists and cameras are in the robot's own pelvis frame, x forward, y left, z up. Units are SI: metres,
+    radians, seconds, newtons; quaternions are w, x, y, z. A control step is 20 ms; physics stands still between
+    calls.
     """
 
     task: str
-    """The task's id."""
+    """Id of the task."""
 
     seed: int | None
-    """Decides where the objects stand. None where an evaluation does not tell it, as under the assistance "paper"."""
+    """Seed of the objects' poses. None if an evaluation hides it, as under the assistance "paper"."""
 
     protocol: Protocol
-    """The rules: "agentic" for agents that think between commands, "benchmark" for learned policies."""
+    """Rules of play: "agentic" for agents that think between commands, "benchmark" for learned policies."""
 
     _briefing: Briefing | None = None
 
     @abstractmethod
     def start(self) -> Briefing:
-        """Makes the world, at the task's beginning, and returns what a policy has to know. Again: begins anew."""
+        """Creates the world at the beginning of the task and returns the briefing. A repeated call starts over."""
 
     @property
     def briefing(self) -> Briefing:
-        """What the start has told."""
+        """Briefing from the start."""
         return begun(self._briefing)
 
     @property
     def robots(self) -> tuple[str, ...]:
-        """Names of the robots, as ("A", "B"); arrays have a row for each, in this order."""
+        """Names of the robots, for example ("A", "B"); arrays have a row for each, in this order."""
         return tuple(robot.robot for robot in self.briefing.robots)
 
     @property
@@ -125,8 +126,10 @@ class BaseEpisode(Tools):
         return tuple(self.briefing.action_row)
 
     def explain(self) -> tuple[str, ...]:
-        """Says what the next phase still lacks, one sentence each, as the simulator measures it. Empty where phases are not
-        told, and after the last. Refused where the assistance is "paper"; results name it as `phase_conditions`.
+        """Returns the unmet conditions of the next phase, one sentence each, as the simulator measures them.
+
+        The result is empty without disclosure of phases, and after the last phase. It is refused under the
+        assistance "paper". Results name it as `phase_conditions`.
         """
         following = self.get_status(explain=True).next_phase
         return () if following is None else tuple(following.lacks)
@@ -138,25 +141,29 @@ class BaseEpisode(Tools):
 
     @abstractmethod
     def state(self) -> NDArray[np.float32]:
-        """What the robots sense, robots by `state_columns`, as numbers: of 43 joints angle, velocity and torque, then both
-        wrists' poses in the pelvis frame, the direction of gravity there, the pelvis in the frame in which the robot
-        started, the base command in force, and whether it has fallen (1 or 0). Where the assistance is "paper", without
-        velocities, torques, gravity, pelvis and fall. Costs no steps.
+        """Returns the sensed state as numbers, robots by `state_columns`, without using steps.
+
+        The columns are: angle, velocity and torque of 43 joints; the poses of both wrists in the pelvis frame; the
+        direction of gravity there; the pelvis in the frame in which the robot started; the base command in force;
+        and 1 if the robot has fallen, else 0. Under the assistance "paper" there are no velocities, torques,
+        gravity, pelvis and fall.
         """
 
     @abstractmethod
     def step(self, rows: ArrayLike) -> Stepped:
-        """Sends rows of joint targets and base commands to all robots, one row a control step, as `send_joint_chunk` does.
+        """Sends rows of joint targets and base commands to all robots, one row per control step, as
+        `send_joint_chunk` does.
 
-        rows: Robots by 35 for one step, or robots by steps by 35; at most 25 steps in the agentic protocol, 50 in the
-            benchmark protocol. Columns are `action_columns`; targets beyond a limit are moved there.
+        rows: Robots by 35 for one step, or robots by steps by 35; at most 25 steps in the agentic protocol, 50 in
+            the benchmark protocol. Columns are `action_columns`; targets beyond a limit are clamped.
         """
 
     @abstractmethod
     def observe(self, robots: Sequence[str] | None = None, *, short: bool | None = None, depth: bool = False) -> Observation:
-        """Looks through the robots' head cameras, 320 by 240 pixels, and reads what they sense. Costs no steps.
+        """Returns images of the robots' head cameras, 320 by 240 pixels, and the robots' states, without using
+        steps.
 
-        robots: Those to look through. None: all of them.
+        robots: Robots to include. None: all of them.
         short: True: without joint angles, velocities and torques.
         depth: True: with depth at every pixel, which only the benchmark protocol allows.
         """
@@ -174,18 +181,18 @@ class BaseEpisode(Tools):
 
 
 def begun(part: T | None) -> T:
-    """What an episode has from its start on."""
+    """Returns a part that an episode has from its start on. Raises TandemError before the start."""
     if part is None:
         raise TandemError("the episode has not begun; call start() first, or use it in a `with` block")
     return part
 
 
 ROW_COLUMNS = 35
-"""Columns of a row for `step`."""
+"""Number of columns of a row for `step`."""
 
 
 def chunk_of(rows: ArrayLike, robots: int) -> NDArray[np.float32]:
-    """Rows as robots by steps by columns."""
+    """Returns rows as robots by steps by columns."""
     given = np.ascontiguousarray(rows, dtype=np.float32)
     array = given[:, np.newaxis, :] if given.ndim == 2 else given
     if array.ndim != 3 or array.shape[0] != robots or array.shape[2] != ROW_COLUMNS:
@@ -194,7 +201,7 @@ def chunk_of(rows: ArrayLike, robots: int) -> NDArray[np.float32]:
 
 
 def integer(value: SupportsIndex, what: str) -> int:
-    """A whole number, NumPy's included, as Python's own."""
+    """Converts a whole number, including NumPy's, to Python's own type."""
     try:
         return index(value)
     except TypeError as error:
@@ -202,7 +209,7 @@ def integer(value: SupportsIndex, what: str) -> int:
 
 
 def settings_json(**settings: Any) -> str:
-    """Settings that are given, as the native module reads them."""
+    """Returns the given settings as JSON for the native module."""
     given = {name: str(value) if isinstance(value, Path) else value for name, value in settings.items()}
     return json.dumps({name: value for name, value in given.items() if value is not None})
 

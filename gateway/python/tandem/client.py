@@ -1,4 +1,4 @@
-"""Episodes on a server, by the same calls as those in this process."""
+"""Episodes on a server, with the same interface as those in this process."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ from .errors import TandemError, Unreachable, of_kind
 _KIND = "urn:tandem:problem:"
 
 DEFAULT_TIMEOUT_S = 720.0
-"""Longer than a call is held: an operator's waits up to 600 s for its partners."""
+"""Default timeout; it exceeds the longest call, because an operator's call waits up to 600 s for its partners."""
 
 RESTART_S = 10.0
-"""For so long a server may be away that has answered before: it is started again, or another takes its place."""
+"""Time for which a server that has answered before may be away while it is restarted or replaced."""
 
 _BETWEEN = (502, 503, 504)
-"""What load balancers answer while a server is away."""
+"""Status codes of load balancers while a server is away."""
 
 
 class Client:
-    """A server that `tandem serve` or `tandem.serve()` has started. A client is for one thread.
+    """Client of a server that `tandem serve` or `tandem.serve()` has started. A client is for one thread.
 
-    url: Where it is, as "http://127.0.0.1:8700".
-    token: What the server wants every request to send. None: that of the environment's TANDEM_TOKEN, if there is one.
-    timeout_s: The longest that an answer may take; operators' calls are held for up to 600 s.
+    url: URL of the server, for example "http://127.0.0.1:8700".
+    token: Token that the server requires. None: that of the environment variable TANDEM_TOKEN, if it is set.
+    timeout_s: Time limit for an answer; operators' calls may take up to 600 s.
     """
 
     def __init__(self, url: str, *, token: str | None = None, timeout_s: float = DEFAULT_TIMEOUT_S) -> None:
@@ -60,23 +60,24 @@ class Client:
         self._token = token or os.environ.get("TANDEM_TOKEN")
 
     def tasks(self) -> TaskList:
-        """The tasks, their phases and budgets, and what robots can do."""
+        """Returns the tasks, their phases and budgets, and the robots' limits."""
         return TaskList.of(self.request("GET", "/v1/tasks"))
 
     def episode(self, task: str, seed: int = 0, *, protocol: Protocol = "agentic") -> RemoteEpisode:
-        """An episode on this server; its assistance, renderer and sensors are the server's, which records it.
+        """Creates an episode on this server; its assistance, renderer and sensors are the server's, which records
+        it.
 
-        task: A task's id, as "handover".
-        seed: Decides where the objects stand: 0 to 4294967295.
-        protocol: The rules: "agentic" for agents that think between commands, "benchmark" for learned policies.
+        task: Id of a task, for example "handover".
+        seed: Seed of the objects' poses: 0 to 4294967295.
+        protocol: Rules of play: "agentic" for agents that think between commands, "benchmark" for learned policies.
         """
         return RemoteEpisode(self, task, seed, protocol)
 
     def request(self, method: str, path: str, body: Mapping[str, Json] | None = None, *, key: str | None = None) -> Any:
-        """Sends a request and returns its answer as JSON has it; None where there is none.
+        """Sends a request and returns its answer as parsed JSON; None for an empty one.
 
-        key: The request's Idempotency-Key, by which the server carries it out once, however often it is sent. None: a new one,
-            for those that may have one.
+        key: Idempotency-Key of the request, which makes the server execute it once, however often it is sent. None:
+            a new key, for requests that support one.
         """
         headers = {"content-type": "application/json"}
         if self._token:
@@ -103,8 +104,10 @@ class Client:
         raise of_kind(kind, str(answer.get("title", status)), detail, float(retry) if retry else None)
 
     def _exchange(self, method: str, path: str, text: str | None, headers: dict[str, str]) -> tuple[HTTPResponse, bytes]:
-        """Sends a request over the kept connection, or over a new one where that is gone, and reads the answer. A server
-        that has answered before may be away for a while; then only a request is sent again that is carried out once.
+        """Sends a request over the kept connection, or over a new one if that is gone, and reads the answer.
+
+        A server that has answered before may be away for a while. Then only a request that is executed once is sent
+        again.
         """
         may_repeat = method == "GET" or "idempotency-key" in headers
         deadline_s = time.monotonic() + (RESTART_S if self._has_answered and may_repeat else 0.0)
@@ -127,7 +130,7 @@ class Client:
             pause_s = min(2 * pause_s + 0.05, 1.0)
 
     def _follow(self, method: str, path: str, text: str | None, headers: dict[str, str]) -> tuple[HTTPResponse, bytes]:
-        """Sends a request, and where another server plays the episode, to that one."""
+        """Sends a request, and follows a redirect to the server that plays the episode."""
         response, content = self._send(self._connection, method, path, text, headers)
         location = urlsplit(response.getheader("location") or "")
         if response.status != 307 or location.hostname is None:
@@ -149,8 +152,8 @@ class Client:
         return response, response.read()
 
     def _is_kept(self) -> bool:
-        """Whether there is a connection still. A server that has closed it, while a model was thinking or because it was
-        started again, has left an end to read.
+        """Returns true if the connection is still open. A server may have closed it while a model was thinking or
+        because of a restart; the end of the stream is then readable.
         """
         sock = self._connection.sock
         if sock is None:
@@ -194,7 +197,7 @@ class RemoteEpisode(BaseEpisode):
 
     @property
     def episode_id(self) -> str:
-        """What the server calls it, and the folder of its recording."""
+        """Id of the episode on the server, which is also the name of its recording's folder."""
         return begun(self._id)
 
     def call(self, tool: str, arguments: Mapping[str, Json]) -> Any:
@@ -249,12 +252,12 @@ class RemoteEpisode(BaseEpisode):
 
 
 def _has_keys(path: str) -> bool:
-    """Whether requests to a path may have a key, by which the server carries them out once."""
+    """Returns true if requests to a path may have a key with which the server executes them once."""
     return path == "/v1/episodes" or "/tools/" in path or path.endswith("/notes")
 
 
 def _row_of(state: RobotState) -> dict[str, float]:
-    """The numbers of a state by the names that an episode in this process gives them."""
+    """Returns the values of a state by the names that an episode in this process uses."""
     row = {f"{joint}_rad": angle for joint, angle in (state.joint_positions_rad or {}).items()}
     row |= {f"{joint}_rad_s": rate for joint, rate in (state.joint_velocities_rad_s or {}).items()}
     row |= {f"{joint}_n_m": torque for joint, torque in (state.joint_torques_n_m or {}).items()}

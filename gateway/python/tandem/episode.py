@@ -36,22 +36,22 @@ from .errors import TandemError
 
 
 class Episode(BaseEpisode):
-    """One episode in this process. Python's other threads run while physics and drawing do.
+    """One episode in this process. Python's other threads run during physics and rendering.
 
-    task: A task's id, as "handover"; `tandem.tasks()` lists them.
-    seed: Decides where the objects stand: 0 to 4294967295.
-    protocol: The rules: "agentic" for agents that think between commands, "benchmark" for learned policies.
-    assistance: How much is told: "full" all that robots sense, phases as they are reached and how to grasp; "paper" what
-        the benchmark tells its agents.
+    task: Id of a task, for example "handover"; `tandem.tasks()` lists them.
+    seed: Seed of the objects' poses: 0 to 4294967295.
+    protocol: Rules of play: "agentic" for agents that think between commands, "benchmark" for learned policies.
+    assistance: Information for the policy: "full" with all sensor values, phases as they are reached and hints on
+        grasping; "paper" as in the benchmark.
     record: Folder for `episode.mcap`, `result.json`, `strip.png` and `report.html`. None: nothing is written.
-    renderer: Who draws.
-    state_estimate: Where robots have their own state from.
-    sensors: What robots sense.
-    stress: What goes wrong; results name it.
-    level: How much of it; 1 where nothing is said.
+    renderer: Renderer of images.
+    state_estimate: Source of the robots' own state.
+    sensors: Sensor model of the robots.
+    stress: Disturbance; results name it.
+    level: Level of the stress; 1 by default.
     scene: MJCF file of a scene in place of the task's own.
-    robot: File that describes the robots in place of the embedded one.
-    task_file: TOML file with a task of your own, whose id `task` is.
+    robot: File with a robot in place of the embedded one.
+    task_file: TOML file with your own task, whose id `task` is.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class Episode(BaseEpisode):
 
     @classmethod
     def _begun(cls, native: _native.Episode, briefing: str) -> Episode:
-        """The episode that somebody else has started."""
+        """Wraps an episode that has been started already."""
         told = Briefing.of(json.loads(briefing))
         status = told.status
         episode = cls(status.task, protocol=status.protocol, assistance=status.assistance)
@@ -147,23 +147,23 @@ class Episode(BaseEpisode):
         return Stepped(steps, cast(StopReason, reason), time_s, tuple(phases), tuple(fallen), ended)
 
     def snapshot(self) -> Snapshot:
-        """Returns the state of the episode, with what its policy has used of its budget. A scored episode has none."""
+        """Returns the state of the episode, including the used budget of its policy. Refused for a scored episode."""
         return self._begun_native.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Takes the episode to where a snapshot was taken of it, or of another one of the same task, seed and settings. A
-        recorded episode goes forward only, and so does one that an evaluation scores.
+        """Moves the episode to a snapshot of it, or of another one of the same task, seed and settings. Refused for
+        a recorded or scored episode, which only goes forward.
         """
         self._begun_native.restore(snapshot)
 
     @property
     def state_hash(self) -> str:
-        """16 hexadecimal digits, equal for equal physical states of the same build."""
+        """Hash of 16 hexadecimal digits that is equal for equal physical states of the same build."""
         return self._begun_native.state_hash()
 
     @property
     def ended(self) -> EndReason | None:
-        """Why the episode has ended; None while it goes on."""
+        """Reason why the episode has ended; None while it goes on."""
         return cast(EndReason | None, self._begun_native.ended())
 
     def close(self) -> ResultReply:

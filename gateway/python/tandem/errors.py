@@ -1,10 +1,10 @@
-"""What goes wrong, as exceptions; the text of each says what would work."""
+"""Exceptions; the text of each says what would work."""
 
 from __future__ import annotations
 
 
 class TandemError(Exception):
-    """Something cannot be done, and the text says what would work."""
+    """An operation is not possible; the text says what would work."""
 
 
 class Unreachable(TandemError):
@@ -12,12 +12,12 @@ class Unreachable(TandemError):
 
 
 class Refused(TandemError):
-    """An episode or a server refuses what it is asked.
+    """An episode or a server refuses a request.
 
-    kind: A stable name for the kind of refusal, as "unknown-robot".
+    kind: Stable name of the kind of refusal, for example "unknown-robot".
     title: The kind in words.
-    detail: What was wrong with this call, and what would work; it is the exception's text.
-    retry_after_s: Seconds after which the same request may work; None: it will be refused again.
+    detail: Problem of this call and what would work; it is the exception's text.
+    retry_after_s: Seconds after which the same request may work. None: it will be refused again.
     """
 
     def __init__(self, kind: str, title: str, detail: str, retry_after_s: float | None = None) -> None:
@@ -32,11 +32,11 @@ class Refused(TandemError):
 
 
 class EpisodeEnded(Refused):
-    """The episode has ended, and no command is executed any more."""
+    """The episode has ended and executes no more commands."""
 
 
 class SimulatorFailed(Refused):
-    """The simulator failed in this episode, which has ended; its recording holds what went before."""
+    """The simulator failed in this episode, which has ended; its recording has everything before that."""
 
 
 _CLASSES: dict[str, type[Refused]] = {
@@ -48,7 +48,7 @@ _CLASSES: dict[str, type[Refused]] = {
 
 
 def of_kind(kind: str, title: str, detail: str, retry_after_s: float | None = None) -> TandemError:
-    """The exception for a refusal of this kind."""
+    """Returns the exception for a refusal of this kind."""
     if kind == "failed":
         return TandemError(detail)
     return _CLASSES.get(kind, Refused)(kind, title, detail, retry_after_s)

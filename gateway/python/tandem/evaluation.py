@@ -1,4 +1,4 @@
-"""Many episodes: played by a Python callable, counted, told."""
+"""Evaluation over many episodes: playing with a Python callable, counting and reporting."""
 
 from __future__ import annotations
 
@@ -29,128 +29,136 @@ if TYPE_CHECKING:
 
 
 def tasks() -> TaskList:
-    """The tasks, their phases and budgets, and what robots can do."""
+    """Returns the tasks, their phases and budgets, and the robots' limits."""
     return TaskList.of(json.loads(_native.list_tasks()))
 
 
 @dataclass(frozen=True)
 class TaskSummary:
-    """What the episodes of one task came to."""
+    """Results of the episodes of one task."""
 
     episodes: int
-    """Episodes that count."""
+    """Number of counted episodes."""
 
     p1: int
-    """How many of them reached the first phase."""
+    """Number of them that reached the first phase."""
 
     p2: int
-    """How many of them reached the second phase."""
+    """Number of them that reached the second phase."""
 
     p3: int
-    """How many of them reached the third phase."""
+    """Number of them that reached the third phase."""
 
     falls: int
-    """Robots that fell."""
+    """Number of robots that fell."""
 
     mean_env_steps: float
-    """Control steps of 20 ms, on average."""
+    """Mean number of control steps of 20 ms."""
 
     policy_failed: int
-    """Episodes that do not count, because the policy raised an exception."""
+    """Number of episodes that are not counted because the policy raised an exception."""
 
     simulator_failed: int
-    """Episodes that do not count, because the simulator failed."""
+    """Number of episodes that are not counted because the simulator failed."""
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What a policy came to."""
+    """Results of a policy."""
 
     tasks: dict[str, TaskSummary]
-    """By the task's id."""
+    """Summaries by task id."""
 
     results: tuple[ResultReply, ...]
-    """Every episode's result, by task, then seed."""
+    """Result of every episode, by task, then seed."""
 
     notes: tuple[str | None, ...]
-    """By episode, why it fell short: what stopped the policy, as the traceback of an exception, or the first phase that was
-    missed; None of a success.
+    """Reason why each episode fell short: what stopped the policy, such as the traceback of an exception, or the
+    first phase that was missed. None for a success.
     """
 
     left_out: tuple[str, ...]
-    """Episodes that could not be begun, and why. The next evaluation into the same folder plays them."""
+    """Episodes that could not be started, with the reasons. The next evaluation into the same folder plays them."""
 
     folder: Path | None
-    """Where `results.json` and the episodes lie; None where they were not kept."""
+    """Folder of `results.json` and the episodes; None if they were not kept."""
 
     raw: dict[str, Any]
-    """All of it, as `results.json` has it."""
+    """Full contents of `results.json`."""
 
 
 class EvaluationSettings(TypedDict, total=False):
-    """What evaluations have in common, wherever they are played."""
+    """Common settings of evaluations, wherever they are played."""
 
     name: str | None
-    """What results call the policy; without it, the callable's own name."""
+    """Name of the policy in results; by default the callable's own name."""
 
     protocol: Protocol
-    """The rules: "agentic", which is the default, or "benchmark"."""
+    """Rules of play: "agentic", which is the default, or "benchmark"."""
 
     assistance: Assistance
-    """How much the policy is told; results say which behind its name. The default is "paper", for `collect` "full"."""
+    """Information for the policy; results add it to the policy's name. The default is "paper", and "full" for
+    `collect`.
+    """
 
     instructions: str | PathLike[str] | None
-    """JSON file with instructions in place of the tasks' own; results name them behind the policy's name."""
+    """JSON file with instructions in place of the tasks' own; results add it to the policy's name."""
 
     out: str | PathLike[str] | None
-    """Folder for the results, of this run alone: what it holds of this policy's name, settings and build is not played again,
-    so give another name or folder where the policy has changed; another run there is left as it is, and an error. Without
-    it, nothing is kept.
+    """Folder for the results of this run only. Without it, nothing is kept.
+
+    Existing results of this policy's name, settings and build are not played again. So give another name or folder
+    after a change of the policy. Another run in the folder is left as it is and raises an error.
     """
 
     overwrite: bool
-    """Whether another run that lies there is deleted. It is left as it is otherwise, and an error says what differs."""
+    """True to delete another run in the folder. By default it is left as it is, and an error describes the
+    difference.
+    """
 
     resume_with_new_build: bool
-    """Whether the same run of another build of Tandem goes on: what that has played is kept, and only the rest is played."""
+    """True to continue a run of another build of Tandem: its episodes are kept, and only the missing ones are
+    played.
+    """
 
     record: bool
-    """Whether every episode is recorded there."""
+    """True to record every episode in the folder."""
 
     progress: Callable[[ResultReply], object] | None
     """Called after each episode with its result."""
 
     renderer: Renderer
-    """Who draws."""
+    """Renderer of images."""
 
     state_estimate: StateEstimate
-    """Where robots have their own state from."""
+    """Source of the robots' own state."""
 
     sensors: Sensors
-    """What robots sense."""
+    """Sensor model of the robots."""
 
     stress: StressAxis
-    """What goes wrong in every episode; results name it behind the policy's name."""
+    """Disturbance in every episode; results add it to the policy's name."""
 
     level: StressLevel
-    """How much of it; 1 where nothing is said."""
+    """Level of the stress; 1 by default."""
 
     scene: str | PathLike[str] | None
     """MJCF file of a scene in place of the tasks' own."""
     robot: str | PathLike[str] | None
-    """File that describes the robots in place of the embedded one."""
+    """File with a robot in place of the embedded one."""
 
     task_file: str | PathLike[str] | None
-    """TOML file with a task of your own, which `tasks` may name."""
+    """TOML file with your own task, which `tasks` may name."""
 
     seed_key: str | PathLike[str] | None
-    """File with a key of yours, by which what the seeds mean is drawn, as `--seed-key` has it: nobody without it can simulate
-    an episode in advance. Results name the key by its fingerprint. Without it, a seed means the same everywhere.
+    """File with your own secret key, as in `--seed-key`. It changes the meaning of seeds, so that no one without it
+    can simulate an episode in advance. Results name the key's fingerprint. Without a key, a seed means the same
+    everywhere.
     """
 
 
 Policy: TypeAlias = Callable[[Episode], object] | Literal["expert", "idle"]
-"""Who plays: a callable, which is given each episode as it begins, or a player that Tandem has, by name."""
+"""Player: a callable, which is given each episode after its start, or the name of a built-in player."""
 
 
 def evaluate(
@@ -160,19 +168,19 @@ def evaluate(
     jobs: int = 1,
     **settings: Unpack[EvaluationSettings],
 ) -> Evaluation:
-    """Plays every seed of every task, and counts what came of it, as `tandem evaluate` does.
+    """Plays every seed of every task and counts the results, as `tandem evaluate` does.
 
-    policy: Called with each episode, which has begun; it plays until it is done or the episode has ended. An exception of its
-        own ends this episode and no other, and the episode does not count; the first one is printed, and where the first three
-        episodes end by the same, the evaluation ends. That the episode has ended is no exception. "expert" is
-        the task's scripted expert, which sees object poses; "idle" holds still.
+    policy: Called with each episode after its start; it plays until it is done or the episode has ended. Its
+        exceptions end only the current episode, which is not counted. The first one is printed, and if the first
+        three episodes end with the same one, the evaluation ends. The end of an episode is not such an exception.
+        "expert" is the task's scripted expert, which sees object poses; "idle" holds still.
     tasks: A task's id, or several; "all" for the benchmark's ten, "tandem+" for that suite.
     seeds: A seed, or several.
-    jobs: Episodes that run side by side, each on a thread of its own, on which the policy is called. Physics and drawing
-        run at the same time; Python code of policies does not.
-    settings: `name`, `protocol`, `assistance`, `instructions`, `out`, `overwrite`, `resume_with_new_build`, `record`,
-        `progress`, `renderer`, `state_estimate`, `sensors`, `stress`, `level`, `scene`, `robot`, `task_file`,
-        `seed_key`: see `EvaluationSettings`.
+    jobs: Number of parallel episodes, each on its own thread, on which the policy is called. Physics and rendering
+        run in parallel; Python code of policies does not.
+    settings: `name`, `protocol`, `assistance`, `instructions`, `out`, `overwrite`, `resume_with_new_build`,
+        `record`, `progress`, `renderer`, `state_estimate`, `sensors`, `stress`, `level`, `scene`, `robot`,
+        `task_file`, `seed_key`: see `EvaluationSettings`.
     """
     plan = Plan.of(policy, tasks, seeds, settings)
     return plan.evaluated(lambda folder: plan.play(folder, jobs))
@@ -184,16 +192,16 @@ def collect(
     jobs: int = 1,
     **settings: Unpack[EvaluationSettings],
 ) -> Evaluation:
-    """Records demonstrations of the experts, as `tandem collect` does: a folder for each episode, in the folder `episodes` of
-    `out`, which where nothing else is given is one in runs/, with a name made of all that they are.
+    """Records demonstrations of the experts, as `tandem collect` does, in a folder for each episode. These folders
+    are in the folder `episodes` of `out`. By default, `out` is a folder in runs/ that is named after all settings.
     """
-    # Both are gone through twice.
+    # Both are iterated twice.
     tasks, seeds = task_ids(tasks), seed_list(seeds)
     return evaluate("expert", tasks, seeds, jobs, **demonstrations(tasks, seeds, settings))
 
 
 def demonstrations(tasks: list[str], seeds: list[int], settings: EvaluationSettings) -> EvaluationSettings:
-    """The settings with which demonstrations are recorded."""
+    """Returns the settings for recording demonstrations."""
     whole: EvaluationSettings = {"assistance": "full", **settings, "record": True}
     if whole.get("out") is None:
         plan = Plan.of("expert", tasks, seeds, whole)
@@ -203,26 +211,26 @@ def demonstrations(tasks: list[str], seeds: list[int], settings: EvaluationSetti
 
 @dataclass(frozen=True)
 class Plan:
-    """What an evaluation plays. Another process can play a part of it."""
+    """Episodes of an evaluation. Another process can play a part of them."""
 
     policy: Policy
     name: str
     world: str
-    """Settings of episodes, as the native module reads them."""
+    """Settings of episodes as JSON for the native module."""
     protocol: Protocol
     tasks: list[str]
     seeds: list[int]
     record: bool
     existing: Literal["refuse", "resume_with_new_build", "overwrite"] = "refuse"
-    """What becomes of another run in the folder."""
+    """Treatment of another run in the folder."""
     seed_key: Path | None = None
-    """File with the key that draws what the seeds mean."""
+    """File with the key that changes the meaning of seeds."""
     out: Path | None = None
     progress: Callable[[ResultReply], object] | None = None
 
     @staticmethod
     def of(policy: Policy, tasks: str | Iterable[str], seeds: int | Iterable[int], settings: EvaluationSettings) -> Plan:
-        """The plan of an evaluation's arguments."""
+        """Creates the plan from an evaluation's arguments."""
         unknown = settings.keys() - EvaluationSettings.__annotations__.keys()
         if unknown:
             have = ", ".join(EvaluationSettings.__annotations__)
@@ -261,11 +269,12 @@ class Plan:
         )
 
     def part(self, task: str, seed: int) -> Plan:
-        """One episode of it, for another process."""
+        """Returns the plan of one episode, for another process."""
         return replace(self, tasks=[task], seeds=[seed], out=None, progress=None)
 
     def play(self, folder: Path, jobs: int = 1) -> dict[str, Any]:
-        """Plays what the folder does not hold, in this process, and returns what `results.json` has then."""
+        """Plays the missing episodes of the folder in this process, and returns the new contents of `results.json`.
+        """
         policy = self.policy
         if isinstance(policy, str):
             return self._run(None, folder, jobs)
@@ -278,7 +287,7 @@ class Plan:
             raise TandemError(watched.broken) from error
 
     def play_elsewhere(self, ask: Elsewhere, folder: Path, jobs: int) -> dict[str, Any]:
-        """As `play`, but `ask` has each of `jobs` episodes at once played by another process."""
+        """Does the same as `play`, but `ask` has each of `jobs` parallel episodes played by another process."""
         return self._run(ask, folder, jobs, elsewhere=True)
 
     def _run(self, play: Callable[..., Any] | None, folder: Path, jobs: int, elsewhere: bool = False) -> dict[str, Any]:
@@ -306,7 +315,7 @@ class Plan:
         return json.loads(answer)
 
     def evaluated(self, play: Callable[[Path], dict[str, Any]]) -> Evaluation:
-        """Has `play` fill the folder of the results, or one that is not kept."""
+        """Lets `play` fill the folder of the results, or a temporary one."""
         if self.out is not None:
             return _evaluation(play(self.out), self.out)
         with TemporaryDirectory(prefix="tandem-") as folder:
@@ -316,11 +325,11 @@ class Plan:
 MAX_SEEDS = 100_000
 
 MAX_EQUAL_FAILURES = 3
-"""First episodes that fail alike, after which no further one is begun."""
+"""Number of first episodes with the same failure after which no further one is started."""
 
 
 class _WatchedPolicy:
-    """A policy whose first failure is told at once, and which is not called any more where it cannot play at all."""
+    """A policy whose first failure is printed at once, and which is not called any more if it cannot play at all."""
 
     def __init__(self, policy: Callable[[Episode], object]) -> None:
         self._policy = policy
@@ -328,7 +337,7 @@ class _WatchedPolicy:
         self._failures: list[str] = []
         self._has_played = False
         self.broken: str | None = None
-        """Why it is not called any more."""
+        """Reason why it is not called any more."""
 
     def play(self, native: _native.Episode, briefing: str) -> None:
         """Lets the policy play an episode."""
@@ -354,15 +363,15 @@ class _WatchedPolicy:
                     "the evaluation again: what was played is kept"
                 )
         if is_broken:
-            # An evaluation ends by this, and no other episode is begun.
+            # This ends the evaluation before it starts another episode.
             raise KeyboardInterrupt from error
 
 
 Played: TypeAlias = tuple[Literal[True], tuple[str, list[tuple[str, bytes]]]] | tuple[Literal[False], str]
-"""An episode as JSON with the files of its recording, or why it was not played."""
+"""True and an episode as JSON with the files of its recording, or false and the reason why it was not played."""
 
 Elsewhere: TypeAlias = Callable[[str, int, Callable[[], bool]], Played]
-"""Has the episode of a task and a seed played; the last argument says whether the user wants all of it to end."""
+"""Plays the episode of a task and a seed; the last argument returns true once the user wants to stop."""
 
 
 def _existing(settings: EvaluationSettings) -> Literal["refuse", "resume_with_new_build", "overwrite"]:
@@ -373,7 +382,7 @@ def _existing(settings: EvaluationSettings) -> Literal["refuse", "resume_with_ne
 
 
 def task_ids(named: str | Iterable[str]) -> list[str]:
-    """The ids of tasks that are named one by one, or by their suite."""
+    """Returns the ids of tasks that are named individually, or by their suite."""
     if not isinstance(named, str):
         return list(named)
     suite = None if named == "all" else named
@@ -381,8 +390,8 @@ def task_ids(named: str | Iterable[str]) -> list[str]:
 
 
 def seed_list(given: int | Iterable[int]) -> list[int]:
-    """One seed, or several, as a list."""
-    # An array of NumPy's has `__index__`, too.
+    """Returns one seed, or several, as a list."""
+    # NumPy arrays also have `__index__`.
     several = [given] if isinstance(given, int | np.integer) else given
     seeds = [integer(seed, "a seed") for seed in islice(several, MAX_SEEDS + 1)]
     if len(seeds) > MAX_SEEDS:
@@ -410,10 +419,11 @@ def report(
     format: Literal["html", "md", "csv", "json", "tex"] = "html",
     out: str | PathLike[str] | None = None,
 ) -> Path:
-    """Writes a report on what `evaluate`, `tandem evaluate`, `tandem collect` or servers have left, and returns where it is.
+    """Writes a report on the results of `evaluate`, `tandem evaluate`, `tandem collect` or servers, and returns its
+    path.
 
-    folders: One or several; what they hold of one policy is joined.
-    format: A page that needs nothing else, Markdown, a line for each rate, all figures, or tables for LaTeX.
+    folders: One or several; results of one policy are joined.
+    format: A self-contained page, Markdown, a line for each rate, all figures, or tables for LaTeX.
     out: File to write. None: report.FORMAT in the first folder.
     """
     several = [folders] if isinstance(folders, str | PathLike) else list(folders)

@@ -1,4 +1,4 @@
-"""A learned policy of this process, served for `tandem evaluate --policy act:...` to ask."""
+"""Server for a learned policy of this process, for `tandem evaluate --policy act:...`."""
 
 from __future__ import annotations
 
@@ -20,20 +20,22 @@ from numpy.typing import NDArray
 from .errors import TandemError
 
 Infer: TypeAlias = Callable[[dict[str, Any], dict[str, Any]], Mapping[str, Any]]
-"""Takes what a policy map sends, arrays as NumPy's, and the episode's own memory; gives arrays by the map's keys of actions."""
+"""Policy function: takes the inputs of a policy map, with NumPy arrays, and the episode's memory. Returns arrays by
+the map's action keys.
+"""
 
 MOMENT = "moment"
-"""Under this key, or one that begins so, a map sends `["episode", "step", "reset"]`."""
+"""Key, or prefix of it, under which a map sends `["episode", "step", "reset"]`."""
 
 MAX_PRINTED = 20
-"""Different tracebacks that are printed."""
+"""Maximum number of different tracebacks to print."""
 
 REMEMBERED = 256
-"""So many episodes have a memory, those that were asked for last."""
+"""Maximum number of episodes with a memory; the ones used longest ago are dropped."""
 
 
 class PolicyServer:
-    """A policy that is served. It ends with a `with` block, or by `stop`."""
+    """A running policy server. It ends with a `with` block, or by `stop`."""
 
     def __init__(self, server: ThreadingHTTPServer, paths: list[str]) -> None:
         self._server = server
@@ -43,18 +45,18 @@ class PolicyServer:
 
     @property
     def url(self) -> str:
-        """What `--policy` of `tandem evaluate` takes: "act:http://127.0.0.1:8001/act", or an address for each robot."""
+        """Value for `--policy` of `tandem evaluate`: "act:http://127.0.0.1:8001/act", or a URL for each robot."""
         host, port = str(self._server.server_address[0]), self._server.server_address[1]
         return "act:" + ",".join(f"http://{host}:{port}/{path}" for path in self._paths)
 
     def wait(self) -> None:
-        """Returns when the server has ended."""
+        """Waits until the server has ended."""
         while self._thread.is_alive():
-            # A wait without an end would not hear Ctrl-C everywhere.
+            # On some platforms, a wait without a timeout would ignore Ctrl-C.
             self._thread.join(0.5)
 
     def stop(self) -> None:
-        """Answers nobody any more."""
+        """Stops the server."""
         self._server.shutdown()
         self._server.server_close()
         self._thread.join()
@@ -67,16 +69,16 @@ class PolicyServer:
 
 
 def serve_policy(infer: Infer | Mapping[str, Infer], *, host: str = "127.0.0.1", port: int = 0) -> PolicyServer:
-    """Begins to serve a policy to `tandem evaluate --policy act:...`, and returns at once. Requests are answered one after the
-    other.
+    """Starts a server for `tandem evaluate --policy act:...`, and returns at once. Requests are answered one after
+    another.
 
-    infer: Called with what the policy map sends, by its keys, and with a dictionary that is empty at an episode's first request
-        and the policy's own until it ends; returns arrays by the map's keys of actions. Episodes, also several at once, have
-        dictionaries of their own where the map has `"moment" = ["episode", "step", "reset"]` among its states; elsewhere every
-        request has an empty one. Of a mapping, each robot's policy is served at an address of its own, for maps whose scope is
-        local.
-    host: Address to listen at.
-    port: Port; 0 takes a free one.
+    infer: Called with the inputs of the policy map, by key, and with the policy's memory; returns arrays by the
+        map's action keys. The memory is a dictionary that is empty at an episode's first request and kept until the
+        episode ends. Each episode has its own dictionary if the map has `"moment" = ["episode", "step", "reset"]`
+        among its states; otherwise every request has an empty one. With a mapping, each robot's policy is served at
+        its own address, for maps with local scope.
+    host: Address to listen on.
+    port: Port; 0 picks a free one.
     """
     policies = {"act": infer} if callable(infer) else dict(infer)
     if not policies:
@@ -86,12 +88,12 @@ def serve_policy(infer: Infer | Mapping[str, Infer], *, host: str = "127.0.0.1",
 
 
 class _Answering:
-    """Policies by the paths they are asked at, and what they remember of episodes."""
+    """Policies by path, and their memories of episodes."""
 
     def __init__(self, policies: dict[str, Infer]) -> None:
         self._policies = policies
         self._memories: OrderedDict[tuple[str, int], dict[str, Any]] = OrderedDict()
-        # A policy is one model, which answers one request after the other.
+        # A policy is one model, which answers one request at a time.
         self._one_by_one = threading.Lock()
         self._printed: set[str] = set()
 
@@ -105,7 +107,7 @@ class _Answering:
         return json.dumps({key: np.asarray(value, np.float64).tolist() for key, value in reply.items()}).encode()
 
     def print_once(self, error: Exception) -> None:
-        """Prints what a policy has raised, each thing once."""
+        """Prints an exception of a policy, each different one once."""
         told = f"{type(error).__name__}: {error}"
         if told not in self._printed and len(self._printed) < MAX_PRINTED:
             self._printed.add(told)
@@ -126,7 +128,7 @@ class _Answering:
 
 
 def _from_json(entry: dict[str, Any]) -> Any:
-    """Arrays as the package json_numpy writes them, which may be written into."""
+    """Converts arrays in the format of the package json_numpy; they are writable."""
     if "__numpy__" not in entry:
         return entry
     flat: NDArray[Any] = np.frombuffer(base64.b64decode(entry["__numpy__"]), entry["dtype"])
@@ -136,7 +138,7 @@ def _from_json(entry: dict[str, Any]) -> Any:
 def _handler(answering: _Answering) -> type[BaseHTTPRequestHandler]:
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
-        # The body of an answer would wait 40 ms for its head to be acknowledged.
+        # Otherwise the body of an answer would wait 40 ms for the acknowledgement of its header.
         disable_nagle_algorithm = True
 
         def do_POST(self) -> None:
@@ -148,7 +150,8 @@ def _handler(answering: _Answering) -> type[BaseHTTPRequestHandler]:
             except (json.JSONDecodeError, binascii.Error) as error:
                 status, answer = 400, f"no observation as json_numpy writes it: {error}".encode()
             except Exception as error:
-                # What a policy raises is told to who asked, who says it in the episode's result, and here to who can mend it.
+                # A policy's exception is sent to the evaluation, which reports it in the result, and printed here
+                # for the policy's author.
                 answering.print_once(error)
                 status, answer = 500, f"{type(error).__name__}: {error}".encode()
             self.send_response(status)
@@ -158,6 +161,6 @@ def _handler(answering: _Answering) -> type[BaseHTTPRequestHandler]:
             self.wfile.write(answer)
 
         def log_message(self, format: str, *args: object) -> None:
-            """Says nothing of requests."""
+            """Suppresses the log of requests."""
 
     return Handler

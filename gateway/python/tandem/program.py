@@ -1,4 +1,4 @@
-"""The whole program `tandem`, within Python."""
+"""The whole program `tandem` inside Python."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from . import _native
 def main(arguments: list[str] | None = None) -> int:
     """Runs a command as the program `tandem` does, and returns its exit code.
 
-    arguments: What stands behind the program's name, as ["demo", "--seeds", "3"]. None: those of this process.
+    arguments: Arguments after the program's name, for example ["demo", "--seeds", "3"]. None: those of this
+        process.
     """
     given = sys.argv[1:] if arguments is None else arguments
     if threading.current_thread() is threading.main_thread():
-        # Python would only note the signal, and hear of it when the command is done.
+        # Python would only record the signal and handle it after the command.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     # Language models are played by this interpreter, which has the package.
     os.environ.setdefault("TANDEM_PYTHON", sys.executable)
@@ -26,5 +27,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def command_line() -> None:
-    """The script `tandem`."""
+    """Entry point of the script `tandem`."""
     sys.exit(main())

@@ -1,4 +1,5 @@
-"""Evaluations on a cluster of Ray: every episode is a task, and results lie in one folder, as if one machine had played them.
+"""Evaluations on a Ray cluster: every episode is a Ray task, and all results are in one folder, as if one machine
+had played them.
 
     import ray, tandem.ray
 
@@ -6,8 +7,8 @@
     tandem.ray.evaluate(policy, "all", range(1, 101), out="runs/mine", protocol="benchmark")
     tandem.report("runs/mine")
 
-Every machine needs the same wheel, and what the policy imports. The folder is on the machine that calls; recordings come to it
-through Ray's object store.
+Every machine needs the same wheel and the policy's imports. The folder is on the calling machine; recordings are
+sent to it through Ray's object store.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ except ModuleNotFoundError as missing:
     raise ModuleNotFoundError("Ray is not installed; pip install './gateway/python[ray]' adds it", name="ray") from missing
 
 _LOOK_S = 0.2
-"""How often it is looked whether the user wants the evaluation to end."""
+"""Interval between two checks whether the user wants to stop."""
 
 _LOST = (
     ray.exceptions.WorkerCrashedError,
@@ -41,7 +42,7 @@ _LOST = (
     ray.exceptions.OutOfMemoryError,
     ray.exceptions.ObjectLostError,
 )
-"""What ends one episode's task for good, when it has been tried often enough, and no other's."""
+"""Errors that end only the task of one episode, after all retries."""
 
 _COLOURS = "\x1b\\[[0-9;]*m"
 
@@ -56,16 +57,17 @@ def evaluate(
     task_options: Mapping[str, Any] | None = None,
     **settings: Unpack[EvaluationSettings],
 ) -> Evaluation:
-    """As `tandem.evaluate`, with the same results and hashes, by the processes of a cluster.
+    """Does the same as `tandem.evaluate`, with the same results and hashes, in the processes of a cluster.
 
-    policy: As there. A process unpickles it once and calls it for one episode after the other, so what it loads at its first
-        call stays loaded.
-    jobs: Episodes that are under way at once. None: as many as the cluster has processors for as this begins.
-    retries: How often an episode is played anew whose process or machine was lost. One that is lost more often is named in
-        `left_out`, and played by the next evaluation into the same folder.
-    task_options: What an episode's task is to Ray, as {"num_cpus": 2} or {"num_gpus": 0.25}; one processor otherwise.
-    settings: As there. A `scene`, `robot`, `task_file`, `instructions` or `seed_key` has to lie at the same path on every
-        machine.
+    policy: As in `tandem.evaluate`. A process unpickles it once and calls it for one episode after another, so data
+        loaded in its first call stays loaded.
+    jobs: Number of parallel episodes. None: the number of processors of the cluster at the start.
+    retries: Number of retries of an episode whose process or machine was lost. After that, the episode is listed in
+        `left_out`, and the next evaluation into the same folder plays it.
+    task_options: Ray options of an episode's task, for example {"num_cpus": 2} or {"num_gpus": 0.25}; one processor
+        by default.
+    settings: As in `tandem.evaluate`. A `scene`, `robot`, `task_file`, `instructions` or `seed_key` has to be at
+        the same path on every machine.
     """
     plan = Plan.of(policy, tasks, seeds, settings)
     options: dict[str, Any] = {"num_cpus": 1, "max_retries": retries, **(task_options or {})}
@@ -101,21 +103,23 @@ def collect(
     task_options: Mapping[str, Any] | None = None,
     **settings: Unpack[EvaluationSettings],
 ) -> Evaluation:
-    """As `tandem.collect`, by the processes of a cluster; see `evaluate`."""
+    """Does the same as `tandem.collect`, in the processes of a cluster; see `evaluate`."""
     tasks, seeds = task_ids(tasks), seed_list(seeds)
     whole = demonstrations(tasks, seeds, settings)
     return evaluate("expert", tasks, seeds, jobs, retries=retries, task_options=task_options, **whole)
 
 
 def _player(plan: Plan) -> Callable[[str, int], Played]:
-    """What a process of the cluster does for an episode. The plan goes with the function, which every process reads once."""
+    """Returns the function with which a process of the cluster plays an episode. It includes the plan, which every
+    process reads once.
+    """
     shared = plan.part("", 0)
 
     def play(task: str, seed: int) -> Played:
         with TemporaryDirectory(prefix="tandem-") as folder:
             raw = shared.part(task, seed).play(Path(folder))
             if not raw["episodes"]:
-                # The evaluation that asks says itself of which episode it speaks.
+                # The calling evaluation adds the name of the episode itself.
                 return False, raw["left_out"][0].partition(": ")[2]
             recording = Path(folder) / "episodes" / f"{task}-{seed}"
             files = [(path.name, path.read_bytes()) for path in sorted(recording.iterdir())] if shared.record else []

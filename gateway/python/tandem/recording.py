@@ -19,46 +19,46 @@ from .contract.result import ResultReply
 
 @dataclass(frozen=True)
 class RecordedCall:
-    """A tool call as it was made, and its answer."""
+    """A tool call and its answer."""
 
     time_s: float
-    """Simulated time at which it was answered."""
+    """Simulated time of the answer."""
 
     thought_s: float
-    """Seconds that the policy had thought by then."""
+    """The policy's thinking time up to then, in seconds."""
 
     tool: str
-    """The tool's name."""
+    """Name of the tool."""
 
     arguments: Any
-    """Its arguments, as JSON has them; of operators' commands together, each one's."""
+    """Arguments as parsed JSON; for combined commands of operators, those of each."""
 
     operator: str | None
-    """The robot whose operator made it; None where one policy directed all."""
+    """Robot whose operator made it; None if one policy controlled all robots."""
 
     reply: Any
-    """The reply as JSON has it, without pictures; None where the call was refused."""
+    """Reply as parsed JSON, without images; None if the call was refused."""
 
     problem: str | None
-    """Why it was refused; None where it was not."""
+    """Reason for a refusal; None without one."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """What a camera sees."""
+    """Image of a camera."""
 
     rgb: NDArray[np.uint8]
     """Height by width by red, green, blue (sRGB), from the top left pixel."""
 
     depth_m: NDArray[np.float32]
-    """Distance along the optical axis in metres, height by width; infinite where nothing is."""
+    """Distance along the optical axis in metres, height by width; infinite without a surface."""
 
 
 class Recording:
-    """An `episode.mcap`, every byte of which is checked. Entry 0 of every array is the state before the first step; entry i
-    is that after step i. It holds what no policy is told: places in the world, contacts, falls.
+    """An `episode.mcap`, every byte of which is checked. Entry 0 of every array is the state before the first step;
+    entry i is that after step i. It includes privileged information: poses in the world, contacts, falls.
 
-    path: The file, or the folder that it is in.
+    path: The file, or its folder.
     """
 
     def __init__(self, path: str | PathLike[str]) -> None:
@@ -69,49 +69,49 @@ class Recording:
 
     @property
     def spec(self) -> dict[str, Any]:
-        """What made the episode what it is: task, seed, protocol, and every setting."""
+        """Specification of the episode: task, seed, protocol, and every setting."""
         return self._about["spec"]
 
     @property
     def task(self) -> str:
-        """The task's id."""
+        """Id of the task."""
         named = self.spec["task"]
-        # Of a task of a file the specification holds all of the file.
+        # For a task from a file, the specification has the whole file.
         return named if isinstance(named, str) else named["id"]
 
     @property
     def seed(self) -> int:
-        """The seed."""
+        """Seed of the episode."""
         return self.spec["seed"]
 
     @property
     def build(self) -> str:
-        """Which build of Tandem played it."""
+        """Build of Tandem that played it."""
         return self._about["build"]
 
     @cached_property
     def result(self) -> ResultReply | None:
-        """What it came to; None where the episode was interrupted."""
+        """Result; None if the episode was interrupted."""
         return None if (result := self._about["result"]) is None else ResultReply.of(result)
 
     @cached_property
     def phases(self) -> tuple[PhaseReached, ...]:
-        """The phases that were reached."""
+        """Phases that were reached."""
         return tuple(PhaseReached.of(phase) for phase in self._about["phases"])
 
     @cached_property
     def calls(self) -> tuple[RecordedCall, ...]:
-        """The tool calls, in their order."""
+        """Tool calls, in order."""
         return tuple(RecordedCall(**call) for call in self._about["calls"])
 
     @property
     def instruction(self) -> str:
-        """What is to be done, in the words that a policy of all robots is told."""
+        """Joint instruction, in the words for a policy of all robots."""
         return self._about["instruction"]
 
     @property
     def instructions(self) -> dict[str, str]:
-        """What each robot is to do, in the words that its own policy is told."""
+        """Instruction of each robot, in the words for its own policy."""
         return self._about["instructions"]
 
     @property
@@ -126,7 +126,7 @@ class Recording:
 
     @property
     def cameras(self) -> tuple[str, ...]:
-        """Names of the cameras that `picture` takes: "third_person", and each robot's own by the robot's name."""
+        """Names of the cameras for `picture`: "third_person", and each robot's own by the robot's name."""
         return tuple(self._about["cameras"])
 
     @property
@@ -150,22 +150,22 @@ class Recording:
 
     @property
     def q_rad(self) -> NDArray[np.float32]:
-        """Joint angles that robots sense, in radians, steps by robots by 43."""
+        """Sensed joint angles in radians, steps by robots by 43."""
         return self._arrays["q_rad"]
 
     @property
     def qd_rad_s(self) -> NDArray[np.float32]:
-        """Joint velocities that robots sense, in radians per second, steps by robots by 43."""
+        """Sensed joint velocities in radians per second, steps by robots by 43."""
         return self._arrays["qd_rad_s"]
 
     @property
     def torque_n_m(self) -> NDArray[np.float32]:
-        """Joint torques that robots sense, in newton metres, steps by robots by 43."""
+        """Sensed joint torques in newton metres, steps by robots by 43."""
         return self._arrays["torque_n_m"]
 
     @property
     def actions(self) -> NDArray[np.float32]:
-        """What robots were told for each step, steps by robots by 35: joint targets in radians, then the base command."""
+        """Commands for each step, steps by robots by 35: joint targets in radians, then the base command."""
         return self._arrays["actions"]
 
     @property
@@ -175,7 +175,9 @@ class Recording:
 
     @property
     def pelvis_in_start(self) -> NDArray[np.float32]:
-        """Poses of the pelves by the robots' own odometry, in the frame in which each started, steps by robots by 7."""
+        """Poses of the pelves by the robots' own odometry, in the frame in which each started, steps by robots by
+        7.
+        """
         return self._arrays["pelvis_in_start"]
 
     @property
@@ -190,14 +192,14 @@ class Recording:
 
     @property
     def hand_force_n(self) -> NDArray[np.float32]:
-        """External force on left and right hand as the robot estimates it, in newtons, turned into the world, steps by
-        robots by 2 by 3.
+        """External force on left and right hand as the robot estimates it, in newtons, rotated to the world frame:
+        steps by robots by 2 by 3.
         """
         return self._arrays["hand_force_n"]
 
     @property
     def fallen(self) -> NDArray[np.bool_]:
-        """Who has fallen, steps by robots."""
+        """True for fallen robots, steps by robots."""
         return self._arrays["fallen"]
 
     @property
@@ -207,15 +209,15 @@ class Recording:
 
     @property
     def contact_force_n(self) -> NDArray[np.float32]:
-        """Normal forces that hands exert on objects, in newtons, in the world, steps by robots by 2 (left, right) by objects
-        by 3 (thumb, fingers, palm) by 3; zero where they do not touch.
+        """Normal forces of hands on objects in newtons, in the world frame: steps by robots by 2 (left, right) by
+        objects by 3 (thumb, fingers, palm) by 3. Zero without contact.
         """
         return self._arrays["contact_force_n"]
 
     @cached_property
     def grips(self) -> NDArray[np.uint8]:
-        """How hands grip objects, as the episode is scored, steps by robots by 2 (left, right) by objects: 0 not at all, 1
-        touching, 2 holding.
+        """Grips of hands on objects, as the episode is scored, steps by robots by 2 (left, right) by objects: 0
+        none, 1 touching, 2 holding.
         """
         return self._native.grips()
 
@@ -225,11 +227,11 @@ class Recording:
         return tuple(self._native.state_hashes())
 
     def __len__(self) -> int:
-        """Entries of the arrays: one more than steps."""
+        """Returns the number of entries of the arrays: one more than steps."""
         return len(self.time_s)
 
     def picture(self, camera: str, step: int, *, size: tuple[int, int] | None = None) -> Picture:
-        """Draws what a camera saw.
+        """Renders a camera's image.
 
         camera: One of `cameras`.
         step: Index into the arrays; negative ones count from the end.
@@ -239,8 +241,8 @@ class Recording:
         return Picture(rgb, depth_m)
 
     def colours(self, camera: str, step: int, *, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
-        """Draws what a camera saw, without depth, as a policy is shown it that asks for this size: a smaller picture of the
-        same shape is the camera's own, scaled.
+        """Renders a camera's image without depth, as a policy gets it that requests this size. A smaller image with
+        the same aspect ratio is scaled from the camera's own.
 
         camera: One of `cameras`.
         step: Index into the arrays; negative ones count from the end.

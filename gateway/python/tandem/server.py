@@ -12,18 +12,20 @@ from .contract.replies import Assistance
 
 
 class Server:
-    """A server in the background: REST and MCP, as `tandem serve` has them. It ends with a `with` block, or by `stop`."""
+    """A server in the background, with REST and MCP as in `tandem serve`. It ends with a `with` block, or by
+    `stop`.
+    """
 
     def __init__(self, native: _native.Server) -> None:
         self._native = native
 
     @property
     def url(self) -> str:
-        """Where it is reached, as "http://127.0.0.1:8700"."""
+        """URL of the server, for example "http://127.0.0.1:8700"."""
         return self._native.url
 
     def stop(self) -> list[str]:
-        """Finishes calls under way and closes every recording. Returns the episodes that could not be ended in time."""
+        """Finishes pending calls and closes every recording. Returns the episodes that could not be ended in time."""
         return self._native.stop()
 
     def __enter__(self) -> Server:
@@ -49,21 +51,22 @@ def serve(
     max_episodes: int = 8,
     token_file: str | PathLike[str] | None = None,
 ) -> Server:
-    """Begins to serve episodes over HTTP, and returns at once.
+    """Starts to serve episodes over HTTP, and returns at once.
 
-    listen: Address and port; port 0 takes a free one.
-    runs: Folder that recordings are written to, one folder an episode.
-    assistance: How much policies are told.
-    renderer: Who draws.
-    state_estimate: Where robots have their own state from.
-    sensors: What robots sense.
-    stress: What goes wrong; results name it.
-    level: How much of it; 1 where nothing is said.
+    listen: Address and port; port 0 picks a free one.
+    runs: Folder for recordings, one folder per episode.
+    assistance: Information for policies.
+    renderer: Renderer of images.
+    state_estimate: Source of the robots' own state.
+    sensors: Sensor model of the robots.
+    stress: Disturbance; results name it.
+    level: Level of the stress; 1 by default.
     scene: MJCF file of a scene in place of the tasks' own.
-    robot: File that describes the robots in place of the embedded one.
-    task_file: TOML file with a task of your own, beside the built-in ones.
-    max_episodes: Episodes that may be held at once.
-    token_file: File with the token that every request has to send; an address that other machines reach needs one.
+    robot: File with a robot in place of the embedded one.
+    task_file: TOML file with your own task, in addition to the built-in ones.
+    max_episodes: Maximum number of episodes held at once.
+    token_file: File with the token that every request has to send. Required if other machines can reach the
+        address.
     """
     settings = settings_json(
         listen=listen,

@@ -1,4 +1,5 @@
-//! `tandem agent`: a language model plays episodes on a server in this process, and what it says and does is printed.
+//! `tandem agent`: a language model plays episodes on a server in this process; its messages and calls
+//! are printed.
 
 use std::{
     fs, io,
@@ -31,23 +32,24 @@ use crate::{
     token::Token,
 };
 
-/// Has the system pick a free port.
+/// Port number that makes the system pick a free port.
 const FREE_PORT: u16 = 0;
 
-/// How long a model may take for an episode, where nobody says otherwise.
+/// Default time limit of a model for an episode.
 const LIMIT_S: u32 = 3600;
 
-/// No process has this number.
+/// Placeholder for no child process; no process has this id.
 const NO_CHILD: u32 = 0;
 
-/// What shells report of a process that SIGINT has ended.
+/// Exit status that shells report for a process that SIGINT has ended.
 const INTERRUPTED: i32 = 130;
 
-/// The file in an episode's folder in which Python keeps by which flags it was begun.
+/// File in an episode's folder to which Python writes the flags of the run.
 const AGENT_FILE: &str = "agent.json";
 
-/// Have a language model play a task, by any endpoint that speaks OpenAI's or Anthropic's formats. Python plays: pip install
-/// './gateway/python[agents]' in a checkout of the repository. Keys are read from the environment: OPENAI_API_KEY, ANTHROPIC_API_KEY.
+/// Let a language model play a task through any endpoint with OpenAI's or Anthropic's formats. This needs the
+/// Python package: pip install './gateway/python[agents]' in a checkout of the repository. API keys are read
+/// from the environment: OPENAI_API_KEY, ANTHROPIC_API_KEY.
 #[allow(
     rustdoc::broken_intra_doc_links,
     reason = "the command line's help names an extra of the wheel, and no link"
@@ -59,46 +61,46 @@ pub struct AgentArgs {
     given: GivenFlags,
     #[command(flatten)]
     agent: AgentFlags,
-    /// The id of the task [default: that of --task-file, or else handover].
+    /// Id of the task [default: that of --task-file, or else handover].
     #[arg(long, value_name = "TASK")]
     task: Option<String>,
     /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
     #[arg(long, alias = "seed", default_value = "0", value_name = "SEEDS")]
     seeds: Seeds,
-    /// What the model is told, as for `serve`.
+    /// Information for the model, as in `serve`.
     #[arg(long, env = "TANDEM_ASSISTANCE", value_name = "WHAT", value_parser = one_of(Assistance::ALL, Assistance::name),
           default_value = Assistance::Full.name())]
     assistance: Assistance,
-    /// A model for each robot, which sees and commands that robot alone.
+    /// Use one model per robot, which sees and commands only that robot.
     #[arg(long)]
     per_robot: bool,
-    /// With --per-robot: let the models talk to each other by the tool say.
+    /// With --per-robot: let the models talk to each other with the tool `say`.
     #[arg(long, requires = "per_robot")]
     talk: bool,
-    /// Folder that recordings are written to, one folder per episode.
+    /// Folder for recordings, one folder per episode.
     #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
     runs: PathBuf,
-    /// Resume the episode of this folder, for example runs/handover-seed0, whose agent was killed, instead of a new one.
-    /// Limits, prices and --base-url may be given anew; everything else is as it was.
+    /// Resume the episode in this folder, for example runs/handover-seed0, after its agent was killed. Only
+    /// limits, prices and --base-url can be changed.
     #[arg(long, value_name = "FOLDER")]
     resume: Option<PathBuf>,
     #[command(flatten)]
     world: WorldFlags,
 }
 
-/// What is read here of [`AGENT_FILE`].
+/// Part of [`AGENT_FILE`] that is read here.
 #[derive(Debug, Deserialize)]
 struct AgentFile {
     flags: ServerFlags,
 }
 
-/// The flags of an episode that concern its server.
+/// Flags of an episode that concern its server.
 #[derive(Debug, Deserialize)]
 struct ServerFlags {
     assistance: Assistance,
 }
 
-/// Plays every seed, or goes on with an episode. The program fails where the model's endpoint gives no answer.
+/// Plays every seed, or resumes an episode. The program fails if the model's endpoint gives no answer.
 pub fn run(args: AgentArgs) -> CommandResult {
     log_to_stderr(LevelFilter::WARN);
     match &args.resume {
@@ -131,8 +133,8 @@ fn play(args: AgentArgs) -> CommandResult {
     play_each(&agent, settings, &text, plays.collect())
 }
 
-/// Goes on with the episode of `folder`, which a server over the folder of all runs brings back. Python refuses flags
-/// that do not fit, before there is a server.
+/// Resumes the episode of `folder`, which a server on the folder of all runs brings back. Python refuses
+/// incompatible flags before the server starts.
 fn resume(folder: &Path, given: &GivenFlags) -> CommandResult {
     let agent = PythonModule::new(PythonPart::Agent, resumed_arguments(given))?;
     let folder = folder.canonicalize()?;
@@ -143,19 +145,19 @@ fn resume(folder: &Path, given: &GivenFlags) -> CommandResult {
     play_each(&agent, Settings::resolve(on_this_machine(layer, token), None)?, &text, vec![Vec::new()])
 }
 
-/// Settings of a server that nobody else reaches.
+/// Settings of a server that only this machine can reach.
 fn on_this_machine(layer: Layer, token: Token) -> Layer {
     Layer { listen: Some((Ipv4Addr::LOCALHOST, FREE_PORT).into()), token: Some(token), ..layer }
 }
 
-/// The flags of the world that are given, as Python keeps them.
+/// Returns the given flags of the world in the form in which Python keeps them.
 fn world_flags(given: &GivenFlags) -> Value {
     let flags = given.of::<WorldFlags>().into_iter();
     flags.map(|(flag, value)| (flag.replace('-', "_"), Value::from(value))).collect::<Map<_, _>>().into()
 }
 
-/// The arguments for Python where an episode is resumed: the flags that are given, without defaults, which may differ
-/// from the episode's.
+/// Returns the arguments for Python when an episode is resumed: only the flags that are given, because
+/// defaults may differ from the episode's.
 fn resumed_arguments(given: &GivenFlags) -> Vec<String> {
     let world = given.of::<WorldFlags>();
     let own = given.of::<AgentArgs>().into_iter().filter(|flag| !world.contains(flag));
@@ -167,7 +169,7 @@ fn resumed_arguments(given: &GivenFlags) -> Vec<String> {
     own.chain([format!("--server-flags={}", world_flags(given))]).collect()
 }
 
-/// Has Python play one episode after another on a server in this process, each with its own arguments.
+/// Lets Python play one episode after another on a server in this process, each with its own arguments.
 fn play_each(
     agent: &PythonModule,
     settings: Arc<Settings>,
@@ -213,8 +215,8 @@ fn exit_code(is_success: bool) -> ExitCode {
     }
 }
 
-/// Has the first signal that would end this process ask the child that runs then to end its episode; a second one does not wait
-/// for that.
+/// Forwards the first signal that would end this process to the running child, which then ends its
+/// episode. A second signal ends this process at once.
 fn hand_on_signals(child: Arc<AtomicU32>) {
     thread::spawn(move || -> io::Result<()> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
@@ -229,7 +231,7 @@ fn hand_on_signals(child: Arc<AtomicU32>) {
 fn ask_to_end(id: u32) {
     use rustix::process::{Pid, Signal, kill_process};
     if let Some(pid) = id.try_into().ok().and_then(Pid::from_raw) {
-        // The call fails where the child is gone, which is what is wanted.
+        // The call fails if the child has ended, which is fine.
         let _ = kill_process(pid, Signal::TERM);
     }
 }

@@ -1,4 +1,5 @@
-//! `tandem demo`: the gateway in this process, and the scripted expert that plays the Handover task over real HTTP.
+//! `tandem demo`: the gateway in this process, and the scripted expert that plays the Handover task over
+//! real HTTP.
 
 use std::{
     error::Error,
@@ -31,20 +32,20 @@ use crate::{
 };
 
 pub(super) const TASK: &str = "handover";
-/// Has the system pick a free port.
+/// Port number that makes the system pick a free port.
 const FREE_PORT: u16 = 0;
 
-/// How many of a hundred episodes have to reach the last phase.
+/// Percentage of episodes that have to reach the last phase.
 const PASS_PERCENT: usize = 80;
 
-/// Play the Handover task by a scripted expert over real HTTP, and write what happened. With --task-file that task is played; where no
-/// expert knows it, nobody acts.
+/// Play the Handover task with its scripted expert over real HTTP, and record it. --task-file replaces the
+/// task; without an expert for it, the robots do nothing.
 #[derive(Debug, clap::Args)]
 pub struct DemoArgs {
     /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
     #[arg(long, alias = "seed", default_value = "0", value_name = "SEEDS")]
     seeds: Seeds,
-    /// Folder that the results are written to, one folder per episode.
+    /// Folder for results, one folder per episode.
     #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
     runs: PathBuf,
     #[command(flatten)]
@@ -62,7 +63,7 @@ pub fn run(args: DemoArgs) -> CommandResult {
     Ok(if recorded && (!known || passed(&results)) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Plays every seed in turn on a server with these flags, recorded under `runs`, and prints what came of it.
+/// Plays every seed in turn on a server with these flags, recorded under `runs`, and prints the results.
 pub fn play_all(runs: &Path, seeds: Seeds, flags: Layer) -> Result<Vec<ResultReply>, Box<dyn Error>> {
     let flags = Layer {
         listen: Some(SocketAddr::from((Ipv4Addr::LOCALHOST, FREE_PORT))),
@@ -81,7 +82,7 @@ pub fn play_all(runs: &Path, seeds: Seeds, flags: Layer) -> Result<Vec<ResultRep
     Ok(results)
 }
 
-/// Whether the last phase was reached on 80 % of the episodes; of a single one, whether it was reached.
+/// Returns true if 80 % of the episodes reached the last phase. A single episode has to reach it.
 pub fn passed(results: &[ResultReply]) -> bool {
     count_last_phase(results) * 100 >= results.len() * PASS_PERCENT
 }
@@ -135,7 +136,8 @@ fn print_result(task: &Task, result: &ResultReply, folder: &Path) {
     }
 }
 
-/// The expert's episode: the expert acts over HTTP like any policy, and reads the true state in this process.
+/// The expert's episode: the expert acts over HTTP like any policy, and reads the true state in this
+/// process.
 struct OverHttp {
     http: HttpEpisode,
     thread: Arc<EpisodeThread>,
@@ -160,7 +162,7 @@ impl PrivilegedEpisode for OverHttp {
     }
 }
 
-/// A progress bar that counts phases, because nobody knows beforehand how many steps a phase takes.
+/// A progress bar that counts phases, because the number of steps of a phase is not known beforehand.
 struct Progress {
     bar: ProgressBar,
 }

@@ -1,4 +1,4 @@
-//! `tandem export`: data sets of recordings, which the Python package writes.
+//! `tandem export`: data sets from recordings, which the Python package writes.
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -7,7 +7,7 @@ use clap::Subcommand;
 use super::CommandResult;
 use crate::drivers::{PythonModule, PythonPart};
 
-/// Make data sets of recordings, for those who train policies. Python writes them: pip install
+/// Convert recordings to data sets for training policies. This needs the Python package: pip install
 /// './gateway/python[lerobot]' in a checkout of the repository.
 #[allow(
     rustdoc::broken_intra_doc_links,
@@ -19,17 +19,17 @@ pub struct ExportArgs {
     format: ExportFormat,
 }
 
-/// The formats.
+/// Formats of data sets.
 #[derive(Debug, Subcommand)]
 enum ExportFormat {
     Lerobot(LerobotArgs),
 }
 
-/// Write what LeRobot reads. What an interrupted run has done is kept, and OUT is there once it is whole; of several tasks, a data
-/// set for each in OUT.
+/// Write a LeRobot data set. An interrupted run is continued, and OUT appears once it is complete; several
+/// tasks become one data set each in OUT.
 #[derive(Debug, clap::Args)]
 struct LerobotArgs {
-    /// A recording, or a folder that is searched for them.
+    /// A recording, or a folder to search for recordings.
     #[arg(value_name = "RUNS")]
     runs: PathBuf,
     /// Folder of the data set.
@@ -38,40 +38,42 @@ struct LerobotArgs {
     /// Version of LeRobot's format.
     #[arg(long, value_name = "VERSION", default_value = "v3", value_parser = ["v3", "v2"])]
     format: String,
-    /// An episode for each recording, with all robots' columns, or one for each robot of it, with its own.
+    /// One episode per recording with all robots' columns, or one per robot with its own columns.
     #[arg(long, value_name = "VIEW", default_value = "joint", value_parser = ["joint", "robot"])]
     view: String,
-    /// What sees: `egocentric` (the cameras of all robots' heads), `third_person`, robots' names, separated by commas; or `none`.
+    /// Cameras: `egocentric` (the head cameras of all robots), `third_person` or robots' names, separated by
+    /// commas; or `none`.
     #[arg(long, value_name = "CAMERAS", default_value = "egocentric")]
     cameras: String,
-    /// Pictures as films, or as PNG files within the tables.
+    /// Images as videos, or as PNG files in the tables.
     #[arg(long, value_name = "KIND", default_value = "video", value_parser = ["video", "png"])]
     images: String,
-    /// What films are written with: H.264, which is written and read faster, or AV1, as LeRobot writes them itself.
+    /// Video codec: H.264, which is faster to write and read, or AV1, which LeRobot itself uses.
     #[arg(long, value_name = "CODEC", default_value = "h264", value_parser = ["h264", "av1"])]
     codec: String,
-    /// Depth beside the pictures, as LeRobot stores it since 0.6: films of 12 bits in HEVC, or TIFF files within the tables.
+    /// Write depth beside the images in the format of LeRobot 0.6 or later: 12-bit HEVC videos, or TIFF files
+    /// in the tables.
     #[arg(long)]
     depth: bool,
-    /// Size of the pictures.
+    /// Size of the images.
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "320x240")]
     size: String,
-    /// Rows a second.
+    /// Rows per second.
     #[arg(long, value_name = "HZ", default_value = "10", value_parser = ["50", "25", "10"])]
     rate: String,
-    /// Only episodes that reached their last phase.
+    /// Convert only episodes that reached their last phase.
     #[arg(long)]
     only_successful: bool,
-    /// Only episodes in whose folder a file `good` lies.
+    /// Convert only episodes with a file `good` in their folder.
     #[arg(long)]
     only_good: bool,
-    /// Recordings that are read and drawn side by side [default: the machine's cores].
+    /// Number of recordings to convert in parallel [default: the machine's cores].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
 }
 
 impl LerobotArgs {
-    /// The arguments for Python, which has the same.
+    /// Returns the arguments for Python, whose flags are the same.
     fn arguments(&self) -> Vec<String> {
         let LerobotArgs { runs, out, format, view, cameras, images, codec, size, rate, .. } = self;
         let texts = [
@@ -97,7 +99,7 @@ impl LerobotArgs {
     }
 }
 
-/// Has Python write it.
+/// Lets Python write the data set.
 pub fn run(args: ExportArgs) -> CommandResult {
     let ExportFormat::Lerobot(args) = args.format;
     let module = PythonModule::new(PythonPart::Export, args.arguments())?;

@@ -18,24 +18,26 @@ use super::{
     flags::{LocomotionFlag, SensingFlags},
 };
 
-/// The base controller.
+/// Measure the base controller.
 #[derive(Debug, clap::Args)]
 pub struct LocomotionArgs {
-    /// What to do with it.
+    /// Part to run.
     #[command(subcommand)]
     part: LocomotionPart,
 }
 
 #[derive(Debug, Subcommand)]
 enum LocomotionPart {
-    /// Stand, walk, squat, carry, be pulled and pushed, two robots carry a bar; report survival, errors and power per case.
+    /// Let robots stand, walk, squat, carry, be pulled and pushed, and let two carry a bar; report survival,
+    /// errors and power per case.
     Bench {
         #[command(flatten)]
         locomotion: LocomotionFlag,
         #[command(flatten)]
         sensing: SensingFlags,
-        /// The robot: `g1_dex3` with the effort limits of Unitree's MJCF, or `g1_dex3_urdf_efforts` with those of its URDF, which has 35 N m
-        /// in place of 50 at ankles, waist roll and waist pitch; or a file that describes another, as for `serve`.
+        /// Robot: `g1_dex3` with the effort limits of Unitree's MJCF, `g1_dex3_urdf_efforts` with those of
+        /// its URDF (35 N m instead of 50 at ankles, waist roll and waist pitch), or a file with another
+        /// robot, as in `serve`.
         #[arg(long, value_name = "NAME|FILE", default_value = DEFAULT_ROBOT)]
         robot: String,
         /// Cases whose names contain one of these words, separated by commas.
@@ -50,7 +52,7 @@ enum LocomotionPart {
     },
 }
 
-/// Plays the cases, prints a line per case as it ends and one of what was measured, and writes JSON where it is asked for.
+/// Plays the cases, prints a line per case as it ends and a summary, and writes JSON if a file is named.
 pub fn run(args: LocomotionArgs) -> CommandResult {
     let LocomotionPart::Bench { locomotion, sensing, robot, cases, seeds, json } = args.part;
     let robot = match ROBOTS.contains(&robot.as_str()) {

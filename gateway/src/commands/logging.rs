@@ -1,4 +1,4 @@
-//! The log, which subcommands write to stderr.
+//! The log of subcommands, which goes to stderr.
 
 use std::io::IsTerminal;
 
@@ -8,7 +8,7 @@ use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 
-/// How lines are written.
+/// Format of log lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum LogFormat {
     /// For people.
@@ -17,17 +17,18 @@ pub enum LogFormat {
     Json,
 }
 
-/// Logs to stderr. The environment's `TANDEM_LOG` sets what is logged, as `warn` or `tandem=warn`; without it, `default` and above.
+/// Logs to stderr. The environment variable `TANDEM_LOG` sets the filter, for example `warn` or
+/// `tandem=warn`. Without it, `default` and more severe levels are logged.
 pub fn log_to_stderr(default: LevelFilter) {
     install(Targets::new().with_default(default), LogFormat::Text);
 }
 
-/// Logs what a server does, as [`log_to_stderr`] does, with lines in the form of `format`.
+/// Logs the work of a server as [`log_to_stderr`] does, with lines in the given `format`.
 pub fn log_server(default: LevelFilter, format: LogFormat) {
     install(Targets::new().with_default(default), format);
 }
 
-/// Logs an evaluation, as [`log_to_stderr`] does; the servers on which programs play log nothing but warnings.
+/// Logs an evaluation as [`log_to_stderr`] does. The servers on which programs play only log warnings.
 pub fn log_evaluation() {
     let quiet = ["tandem::http", "tandem::hosting"].map(|target| (target, LevelFilter::WARN));
     install(Targets::new().with_default(LevelFilter::INFO).with_targets(quiet), LogFormat::Text);
@@ -42,6 +43,6 @@ fn install(default: Targets, format: LogFormat) {
     };
     // The MCP library logs three lines for each line of this program.
     let usual = default.with_target("rmcp", LevelFilter::WARN);
-    // Who runs several commands in one process, as a Python program may, has the log of the first one.
+    // If one process runs several commands, as a Python program may, the log of the first one stays.
     let _ = tracing_subscriber::registry().with(wanted.unwrap_or(usual)).with(lines).try_init();
 }

@@ -1,4 +1,5 @@
-//! What `tandem` can do: one file or folder per subcommand, each with its flags and its `run`; what several share is in `flags`.
+//! The subcommands of `tandem`: one file or folder for each, with its flags and its `run`. Shared flags
+//! are in `flags`.
 
 pub mod about;
 pub mod agent;
@@ -27,10 +28,10 @@ use tandem_episodes::{printable, shell_word};
 
 pub use flags::{Seeds, read_seed_key};
 
-/// What a subcommand ends with: an error is printed and is a failure, too.
+/// Result of a subcommand. An error is printed and makes the program fail.
 pub type CommandResult = Result<ExitCode, Box<dyn Error>>;
 
-/// The command line of this process for a shell, without what starts the program.
+/// Returns the command line of this process for a shell, without the program's own path.
 fn command_to_go_on() -> String {
     let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
     let words: Vec<String> = words.skip_while(|word| word != "evaluate" && word != "collect").collect();
@@ -40,13 +41,14 @@ fn command_to_go_on() -> String {
     }
 }
 
-/// The command that goes on with what this one has begun, of which nothing is to be deleted.
+/// Returns the command that continues what this one has begun, without the flag that deletes results.
 fn going_on(words: &[String]) -> String {
     let kept = words.iter().filter(|word| *word != "--overwrite").map(|word| shell_word(word));
     std::iter::once("tandem".into()).chain(kept).collect::<Vec<_>>().join(" ")
 }
 
-/// Prints a text that other programs may read, without what a terminal would obey. One that has read enough and has gone is no error.
+/// Prints a text that other programs may read, without terminal control characters. A reader that has
+/// closed the pipe is no error.
 fn print(text: &str) -> io::Result<()> {
     let mut out = io::stdout().lock();
     match out.write_all(printable(text).as_bytes()).and_then(|()| out.flush()) {

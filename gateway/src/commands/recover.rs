@@ -6,15 +6,16 @@ use tandem_episodes::LeftOut;
 
 use super::CommandResult;
 
-/// Make a whole recording of one that was interrupted: FILE.mcap of FILE.mcap.partial.
+/// Recover an interrupted recording: FILE.mcap from FILE.mcap.partial.
 #[derive(Debug, clap::Args)]
 pub struct RecoverArgs {
-    /// What the interrupted episode left, as runs/handover-seed0/episode.mcap.partial. It stays as it is.
+    /// Partial recording of an interrupted episode, for example runs/handover-seed0/episode.mcap.partial. It
+    /// is not changed.
     #[arg(value_name = "FILE")]
     partial: PathBuf,
 }
 
-/// Recovers, and says how much there was.
+/// Recovers the recording, and prints how much it has.
 pub fn run(args: RecoverArgs) -> CommandResult {
     let recovered = tandem_episodes::recover(&args.partial)?;
     println!(

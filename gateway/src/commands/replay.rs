@@ -1,4 +1,4 @@
-//! `tandem replay`: recordings simulated again, filmed, or drawn with depth.
+//! `tandem replay`: recordings simulated again, filmed, or rendered with depth.
 
 mod phases;
 
@@ -19,44 +19,47 @@ use tandem_tools_spec::ResultReply;
 use super::CommandResult;
 use crate::settings::one_of;
 
-/// Play recordings again: say what they hold, verify them, film them, or draw what every camera saw with depth.
+/// Replay recordings: describe, verify or film them, or render the images and depth of every camera.
 #[derive(Debug, clap::Args)]
 pub struct ReplayArgs {
-    /// Recordings, as runs/handover-seed0/episode.mcap, or their folders, or the failed_step.checkpoint beside one.
+    /// Recordings, for example runs/handover-seed0/episode.mcap, or their folders, or the
+    /// failed_step.checkpoint beside one.
     #[arg(value_name = "FILES", required = true)]
     recordings: Vec<PathBuf>,
-    /// Simulate again and compare the state after every step, result and phases; names the first step that differs.
+    /// Simulate again and compare the state after every step, the result and the phases; report the first
+    /// step that differs.
     #[arg(long)]
     verify: bool,
-    /// Say of the first phase that was not reached which parts of its conditions held, when, and how near the others came.
+    /// For the first phase that was not reached, report which parts of its conditions held, when, and how
+    /// close the others came.
     #[arg(long)]
     phases: bool,
-    /// Film of one recording: FILE.webp, FILE.gif, or where an ffmpeg is installed FILE.mp4.
+    /// Video of one recording: FILE.webp, FILE.gif, or with ffmpeg installed FILE.mp4.
     #[arg(long, value_name = "FILE")]
     video: Option<PathBuf>,
-    /// What films: `third_person`, or a robot's name.
+    /// Camera of the video: `third_person`, or a robot's name.
     #[arg(long, value_name = "CAMERA", default_value = "third_person")]
     camera: String,
-    /// Folder for pictures and depth of every camera; of several recordings, a folder in it for each. Goes on where an
-    /// interrupted run stopped.
+    /// Folder for the images and depth of every camera; several recordings have a subfolder each. An
+    /// interrupted run is continued.
     #[arg(long, value_name = "DIR")]
     render: Option<PathBuf>,
-    /// Pictures a second, of simulated time.
+    /// Images per second of simulated time.
     #[arg(long, value_name = "HZ", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=50))]
     rate: u32,
-    /// Size of the pictures, as 640x480 [default: the camera's own].
+    /// Size of the images, for example 640x480 [default: the camera's own].
     #[arg(long, value_name = "WIDTHxHEIGHT")]
     size: Option<SizeFlag>,
     /// Cameras of --render, separated by commas: third_person or robots' names [default: all].
     #[arg(long, value_name = "CAMERAS", value_delimiter = ',', requires = "render")]
     cameras: Vec<String>,
-    /// With --render: pictures alone, in half the time.
+    /// With --render: write only images, in half the time.
     #[arg(long, requires = "render")]
     no_depth: bool,
-    /// Who draws the pictures of --render [default: who drew the episode].
+    /// Renderer for --render [default: that of the episode].
     #[arg(long, value_name = "NAME", requires = "render", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
     renderer: Option<RendererKind>,
-    /// Threads that draw.
+    /// Number of rendering threads.
     #[arg(long, default_value_t = 1, value_name = "N")]
     jobs: usize,
 }
@@ -81,7 +84,7 @@ impl FromStr for SizeFlag {
     }
 }
 
-/// Does with each recording what the flags say; without any flag, prints what it holds.
+/// Processes each recording as the flags say. Without any flag, prints its contents.
 pub fn run(args: ReplayArgs) -> CommandResult {
     if args.video.is_some() && args.recordings.len() > 1 {
         return Err("--video films one recording; give one".into());
@@ -121,7 +124,8 @@ pub fn run(args: ReplayArgs) -> CommandResult {
     Ok(if all_same { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Says in which step the simulator failed; with `--verify`, makes that step again. Returns whether it fails as it did.
+/// Reports the step in which the simulator failed. With `--verify`, repeats that step and returns true if
+/// it fails in the same way.
 fn failed_step(path: &Path, args: &ReplayArgs) -> Result<bool, Box<dyn std::error::Error>> {
     if args.video.is_some() || args.render.is_some() {
         return Err(format!(
@@ -174,7 +178,7 @@ fn describe(recording: &Recording) {
     }
 }
 
-/// What its policy was told, and what is not as Tandem usually has it.
+/// Lists the assistance of the policy, and deviations from Tandem's defaults.
 fn told(spec: &EpisodeSpec, result: Option<&ResultReply>) -> String {
     let shown = result.map_or(&[][..], |result| &result.extra_information[..]);
     let assistance = format!("assistance: {}", spec.assistance);
@@ -183,7 +187,7 @@ fn told(spec: &EpisodeSpec, result: Option<&ResultReply>) -> String {
     [assistance.clone()].into_iter().chain(besides).collect::<Vec<_>>().join(", ")
 }
 
-/// Prints how the recording compares, and returns whether it is the same.
+/// Prints the result of the comparison, and returns true if both are the same.
 fn print_verified(verified: &Verification) -> bool {
     if let Some(build) = &verified.other_build {
         println!(
@@ -221,7 +225,8 @@ fn print_verified(verified: &Verification) -> bool {
     }
 }
 
-/// The folder for the pictures of one recording. Of several recordings each has its own, named as the folder that it lies in.
+/// Returns the folder for the images of one recording. With several recordings, each has its own, named
+/// like the recording's folder.
 fn folder_for(folder: &Path, recording: &Path, recordings: usize) -> PathBuf {
     let own = recording.parent().and_then(Path::file_name);
     match (recordings, own) {

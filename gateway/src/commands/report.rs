@@ -1,4 +1,4 @@
-//! `tandem report`: what episodes came to, for people and for programs.
+//! `tandem report`: results of episodes, for people and for programs.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -13,19 +13,21 @@ use tandem_episodes::{Recording, printable, write_whole};
 use super::CommandResult;
 use crate::settings::one_of;
 
-/// Report on episodes: rates with intervals, averages, effort, failures, and policies compared on the same seeds.
+/// Report on episodes: rates with intervals, averages, effort, failures, and policies compared on the same
+/// seeds.
 #[derive(Debug, clap::Args)]
 pub struct ReportArgs {
-    /// Folders that `evaluate`, `collect` or `serve` wrote; what they hold of one policy is joined.
+    /// Folders written by `evaluate`, `collect` or `serve`; results of one policy are joined.
     #[arg(value_name = "DIR", required = true)]
     folders: Vec<PathBuf>,
-    /// What to write: a page that needs nothing else, Markdown, a line for each rate, all figures, or tables for LaTeX.
+    /// Format of the report: a self-contained page, Markdown, a line for each rate, all figures, or tables
+    /// for LaTeX.
     #[arg(long, default_value = ReportFormat::Html.name(), value_parser = one_of(ReportFormat::ALL, ReportFormat::name))]
     format: ReportFormat,
     /// File to write [default: report.FORMAT in the first folder].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Failures to show pictures and moments of, where episodes were recorded.
+    /// Maximum number of failures to show with images and moments, if episodes were recorded.
     #[arg(long, value_name = "N", default_value_t = 12)]
     failures: usize,
 }
@@ -63,7 +65,7 @@ pub fn run(args: ReportArgs) -> CommandResult {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Films an episode; what cannot be filmed says so in its place, and the rest of the report is none the worse.
+/// Films an episode. If that fails, the report has the reason in its place.
 fn film(place: FilmPlace) -> Film {
     let content = place.episode.clone().and_then(|FilmedEpisode { recording, .. }| {
         let read = Recording::read(&recording).map_err(|error| error.to_string())?;

@@ -20,13 +20,13 @@ use crate::{
 /// Serve episodes over HTTP until SIGINT or SIGTERM.
 #[derive(Debug, clap::Args)]
 pub struct ServeArgs {
-    /// TOML file with any of the settings below; flags and environment come first.
+    /// TOML file with any of the settings below; flags and the environment take precedence.
     #[arg(long, env = "TANDEM_CONFIG", value_name = "FILE")]
     pub(super) config: Option<PathBuf>,
-    /// Log for people, or one JSON object per line.
+    /// Log format: text for people, or one JSON object per line.
     #[arg(long, env = "TANDEM_LOG_FORMAT", value_name = "FORMAT", default_value = "text")]
     log_format: LogFormat,
-    /// Who may drive beside people.
+    /// Policy that can drive beside people.
     #[command(flatten)]
     partner: PartnerFlags,
     /// Settings given as flags or environment.
@@ -34,7 +34,7 @@ pub struct ServeArgs {
     pub(super) flags: Layer,
 }
 
-/// Serves.
+/// Serves until a signal ends the process.
 pub fn run(args: ServeArgs) -> CommandResult {
     share_heaps();
     log_server(LevelFilter::INFO, args.log_format);
@@ -43,16 +43,18 @@ pub fn run(args: ServeArgs) -> CommandResult {
     try_runs_folder(&settings.runs)?;
     let server =
         Server::start_for(settings, Guests { partner: args.partner.policy()?, ..Guests::default() })?;
-    // Not in the log, which others may read.
-    // Output that cannot be written, as on a full disk, is no reason not to serve.
+    // The links are secret, so they are not logged. If they cannot be printed, for example on a full
+    // disk, the server runs all the same.
     let _ = print(&format!("watch at {}\noperate at {}\n", server.watch_link(), server.operate_link()));
     let left = server.run_until_signal();
     Ok(if left.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Limits the C library's heaps to the number of processors; the wheel's threads use them, the binary's do not.
-/// By itself the library has eight times as many, and in each one stays in use what lies between the leftovers
-/// of episodes that have ended or sleep: gigabytes with thousands of them.
+/// Limits the C library's heaps to the number of processors. The wheel's threads use them; the binary's
+/// do not.
+///
+/// The default is eight times as many. Each heap keeps the memory between the remains of episodes that
+/// have ended or sleep: gigabytes with thousands of them.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 fn share_heaps() {
     let heaps = std::thread::available_parallelism()

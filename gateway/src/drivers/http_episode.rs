@@ -1,4 +1,4 @@
-//! A client of one episode over HTTP, as a policy written in Rust would use it.
+//! An HTTP client for one episode, for policies written in Rust.
 
 use std::{
     fmt::Write,
@@ -13,10 +13,11 @@ use tandem_episodes::players::{Episode, PlayerError};
 use tandem_tools_spec::{Driving, ProblemBody, ResultReply, StartEpisode, StartReply, ToolCall, ToolReply};
 use ureq::{Agent, http::Response};
 
-/// Longer than any call is held: that of an operator waits up to 600 s for its partners.
+/// Timeout of a request. It exceeds the longest call: an operator's call waits up to 600 s for its
+/// partners.
 const TIMEOUT: Duration = Duration::from_secs(720);
 
-/// By this, a request that is sent again is carried out once.
+/// Header with the idempotency key, so that a repeated request is executed once.
 const KEY: &str = "idempotency-key";
 
 /// An episode on a server.
@@ -26,7 +27,7 @@ pub struct HttpEpisode {
     url: String,
 }
 
-/// The body of a start.
+/// Request body of a start.
 #[derive(Debug, Serialize)]
 struct StartBody<'a> {
     #[serde(flatten)]
@@ -35,16 +36,16 @@ struct StartBody<'a> {
     driving: &'a Driving,
 }
 
-/// Why a call over HTTP has no reply.
+/// Reason why a call over HTTP has no reply.
 #[derive(Debug, thiserror::Error)]
 pub enum HttpError {
-    /// The server refused, and said why.
+    /// The server refused the call and gave a reason.
     #[error("{}", .0.detail)]
     Refused(Box<ProblemBody>),
-    /// The server was not reached, or what it sent is no JSON.
+    /// The server was not reached, or its response is not JSON.
     #[error("no reply over HTTP: {0}")]
     Transport(#[from] ureq::Error),
-    /// The reply is not what the contract says.
+    /// The reply violates the contract.
     #[error("a reply that the contract does not know: {0}")]
     Contract(#[from] serde_json::Error),
 }
@@ -55,8 +56,10 @@ impl HttpEpisode {
         HttpEpisode::start_driven(address, args, &Driving::default())
     }
 
-    /// Starts an episode as [`HttpEpisode::start`] does, driven as `driving` says. Where each robot has an operator of its own, the
-    /// reply has what each of them needs, and the client that is returned with it can end the episode but not play it.
+    /// Starts an episode as [`HttpEpisode::start`] does, with the given `driving`.
+    ///
+    /// If each robot has its own operator, the reply includes the operators' tokens. The returned client
+    /// can then end the episode, but not play it.
     pub fn start_driven(
         address: SocketAddr,
         args: &StartEpisode,
@@ -64,9 +67,9 @@ impl HttpEpisode {
     ) -> Result<(HttpEpisode, StartReply), HttpError> {
         let agent = Agent::config_builder()
             .http_status_as_error(false)
-            // The server is near, whatever proxy leads elsewhere.
+            // The server is nearby, so no proxy is used.
             .proxy(None)
-            // A limit on the whole call would have ureq look up the address of each on a thread of its own.
+            // With a limit on the whole call, ureq would resolve every address on a thread of its own.
             .timeout_recv_response(Some(TIMEOUT))
             .timeout_recv_body(Some(TIMEOUT))
             .build()
@@ -95,7 +98,8 @@ impl Episode for HttpEpisode {
     }
 }
 
-/// Posts a request, and again where its connection breaks: its key has it carried out once.
+/// Posts a request and repeats it if the connection breaks. Its idempotency key makes the server execute
+/// it once.
 fn post(agent: &Agent, url: &str, body: &impl Serialize) -> Result<Value, HttpError> {
     let key = new_key();
     let send = || agent.post(url).header(KEY, &key).send_json(body);
@@ -105,7 +109,7 @@ fn post(agent: &Agent, url: &str, body: &impl Serialize) -> Result<Value, HttpEr
     }
 }
 
-/// Whether a connection is gone that was there.
+/// Returns true if an existing connection has broken.
 fn is_broken(error: &io::Error) -> bool {
     matches!(
         error.kind(),
@@ -116,7 +120,7 @@ fn is_broken(error: &io::Error) -> bool {
     )
 }
 
-/// A key that no other request has.
+/// Returns a key that no other request has.
 fn new_key() -> String {
     let mut bytes = [0; 16];
     if getrandom::fill(&mut bytes).is_err() {
@@ -124,7 +128,7 @@ fn new_key() -> String {
         return format!("{}", now.as_nanos());
     }
     bytes.iter().fold(String::new(), |mut text, byte| {
-        // Writing to a text cannot fail.
+        // Writing to a string cannot fail.
         let _ = write!(text, "{byte:02x}");
         text
     })

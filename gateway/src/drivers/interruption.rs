@@ -1,20 +1,22 @@
-//! Signals that end this process while an evaluation is played: what is to be said is said, and programs end first.
+//! Handling of signals that end this process during an evaluation: a last message is printed and programs
+//! are stopped first.
 
 use std::thread;
 
 use super::program::end_all_programs;
 use crate::http::shutdown_signal;
 
-/// Exit status that shells report of a process that SIGINT has ended.
+/// Exit status that shells report for a process that SIGINT has ended.
 const INTERRUPTED: i32 = 130;
 
-/// Does `work`. A signal that ends the process in the middle of it has `say` speak, and the programs of policies end, before it does.
+/// Runs `work`. If a signal ends the process meanwhile, calls `say` and stops the policies' programs
+/// first.
 pub fn with_last_words<T>(say: impl Fn() + Sync, work: impl FnOnce() -> T) -> T {
     let (working, done) = tokio::sync::oneshot::channel::<()>();
     thread::scope(|scope| {
         let say = &say;
         scope.spawn(move || {
-            // Without a runtime, signals do what they do to any process.
+            // Without a runtime, signals keep their default effect.
             let Ok(runtime) = tokio::runtime::Builder::new_current_thread().enable_all().build() else {
                 return;
             };

@@ -1,4 +1,4 @@
-//! Policies that are not in the episode's process: how they reach it, or it them.
+//! Policies outside the episode's process, and the ways in which they connect to it.
 
 mod http_episode;
 mod interruption;
@@ -32,8 +32,8 @@ fn remove_old_result(path: &Path) -> Result<(), PlayError> {
     }
 }
 
-/// The result of an episode that has been closed, in whatever way a program has ended it. It is the server's own: what lies in the
-/// episode's folder a program may have written.
+/// Returns the result of an episode that a program has closed in any way. It is the server's own result,
+/// because a program may have written to the episode's folder.
 fn own_result(episode: &EpisodeThread) -> Result<ResultReply, PlayError> {
     let result = episode.result().cloned();
     result.ok_or_else(|| PlayError::Lost("no result: the episode was not closed in time".into()))

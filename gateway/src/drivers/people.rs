@@ -1,5 +1,7 @@
-//! People as a policy: they drive the robots of one episode after another in browsers, on a server that is theirs, and say of each
-//! whether it was good. Those that somebody marks bad are put aside.
+//! People as a policy: they drive the robots of one episode after another in browsers, on a server of
+//! their own.
+//!
+//! They mark every episode as good or bad, and bad ones are moved to a separate folder.
 
 use std::{
     fs, io,
@@ -26,15 +28,16 @@ use crate::{
     token::Token,
 };
 
-/// How often it is looked whether an episode has ended.
+/// Interval between two checks whether an episode has ended.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
-/// How long the others wait for somebody who is away: the longest that there is.
+/// Time that the others wait for a person who is away: the maximum.
 const PATIENCE_S: f64 = 600.0;
 
-/// What lies in the folder of an episode that everybody marked good, as `tandem export lerobot --only-good` wants it.
+/// Marker file in the folder of an episode that everybody marked good, for `tandem export lerobot
+/// --only-good`.
 const GOOD_FILE: &str = "good";
-/// What lies in the folder of one that was put aside, and who marked it so.
+/// File in the folder of a bad episode that names the people who marked it so.
 const BAD_FILE: &str = "bad";
 
 /// People who drive the robots of a collection.
@@ -42,16 +45,17 @@ const BAD_FILE: &str = "bad";
 pub struct People {
     server: Server,
     collection: Arc<Collection>,
-    /// The episodes to play, by task and seed.
+    /// Episodes to play, by task and seed.
     planned: Vec<(&'static str, u32)>,
-    /// Where episodes are put that somebody marked bad.
+    /// Folder of the episodes that were marked bad.
     aside: PathBuf,
     base_url: String,
     host_token: String,
 }
 
 impl People {
-    /// Serves `robots` to one person each, for the `planned` episodes; those that somebody marks bad are put into `aside`.
+    /// Starts a server with one seat for each of `robots`, for the `planned` episodes. Bad ones are moved
+    /// to `aside`.
     pub fn start(
         settings: Settings,
         robots: &[&str],
@@ -71,31 +75,32 @@ impl People {
         Ok(People { server, collection, planned, aside, base_url, host_token })
     }
 
-    /// A link for each person, with the robot that it drives.
+    /// Returns a link for each person, with the robot that the person drives.
     pub fn links(&self) -> Vec<(&str, String)> {
         let links = self.collection.operators();
         let link = |robot, token| operator_link(&self.base_url, Some(robot), token);
         links.map(|seat| (seat.robot.as_str(), link(&seat.robot, &seat.token))).collect()
     }
 
-    /// The link of a page with all links, for whoever runs the collection.
+    /// Returns the link of a page with all links, for the user who runs the collection.
     pub fn overview_link(&self) -> String {
         operator_link(&self.base_url, None, &self.host_token)
     }
 
-    /// The link by which others look on.
+    /// Returns the link for watchers.
     pub fn watch_link(&self) -> &str {
         self.server.watch_link()
     }
 
-    /// Tells people that nothing is left to play, and returns when their pages have had time to ask.
+    /// Announces the end of the collection, and returns after the pages have had time to fetch it.
     pub fn dismiss(self) {
         self.collection.end();
         thread::sleep(Duration::from_secs(3));
         self.server.stop();
     }
 
-    /// Puts an episode aside that the people of the robots `by` marked bad, and says so.
+    /// Moves an episode that the people of the robots `by` marked bad, and returns the reason as an
+    /// error.
     fn put_aside(&self, folder: &Path, by: &[&str]) -> Result<PlayError, PlayError> {
         let failed = |error| lost("an episode that was marked bad cannot be put aside", error);
         fs::create_dir_all(&self.aside).map_err(failed)?;
@@ -124,7 +129,7 @@ impl Policy for People {
 
     fn play_episode(&self, spec: &EpisodeSpec, output: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
         let folder = output.folder;
-        // What an interrupted run has left is not of this episode.
+        // Files of an interrupted run do not belong to this episode.
         for file in [tandem_episodes::RESULT_FILE, GOOD_FILE] {
             remove_old_result(&folder.join(file))?;
         }
@@ -159,7 +164,8 @@ impl Policy for People {
     }
 }
 
-/// How others reach a server at `address`: by the name that it was given, or the address that this machine has towards others.
+/// Returns the URL of a server at `address`: with its configured name, or with this machine's address in
+/// the network.
 fn base_url(scheme: &str, address: SocketAddr, name: Option<&str>) -> String {
     let port = address.port();
     if let Some(name) = name {
@@ -172,10 +178,11 @@ fn base_url(scheme: &str, address: SocketAddr, name: Option<&str>) -> String {
     format!("{scheme}://{}", SocketAddr::new(ip, port))
 }
 
-/// The address of this machine from which it would reach others. Nothing is sent: connecting a UDP socket chooses the address alone.
+/// Returns the address of this machine in the network. Nothing is sent: connecting a UDP socket only
+/// chooses the address.
 fn own_address() -> Option<IpAddr> {
     let socket = UdpSocket::bind("0.0.0.0:0").ok()?;
-    // An address that is for documents, and that nobody has.
+    // An address that is reserved for documentation.
     socket.connect("192.0.2.1:9").ok()?;
     socket.local_addr().ok().map(|address| address.ip())
 }

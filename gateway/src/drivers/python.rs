@@ -1,13 +1,15 @@
-//! What the Python package has and this program has not, started as any program is: the tool loop of language models, because the
-//! official SDKs of the models' makers are Python's, and data sets, because the libraries of their formats are.
+//! Parts that only the Python package has, started as separate programs.
+//!
+//! One is the tool loop of language models, because the vendors' official SDKs are in Python. The other
+//! is data sets, because the libraries of their formats are.
 
 use std::{env, io, process::Command};
 
-/// The environment's variable with the interpreter that has the package; the command of a wheel is its own.
+/// Environment variable that names the interpreter with the package. The command of a wheel sets its own.
 const PYTHON_VARIABLE: &str = "TANDEM_PYTHON";
 const PYTHON: &str = "python3";
 
-/// Has the module only say what it would miss.
+/// Flag that makes the module only check its requirements.
 const CHECK: &str = "--check";
 
 /// A part of the package.
@@ -19,36 +21,36 @@ pub enum PythonPart {
     Export,
 }
 
-/// Why Python does not do its part.
+/// Reason why the Python part cannot run.
 #[derive(Debug, thiserror::Error)]
 pub enum PythonError {
-    /// There is no interpreter.
+    /// The interpreter cannot be started.
     #[error(
         "{} by Python, and {python} cannot be started ({source}); install Python 3.10 or later and \
          pip install './gateway/python[{}]' in a checkout of the repository, or name an interpreter that has it by {PYTHON_VARIABLE}",
         part.what(), part.extra()
     )]
     NoPython {
-        /// What was asked for.
+        /// Requested part.
         part: PythonPart,
-        /// What was tried.
+        /// Interpreter that was tried.
         python: String,
-        /// What the system said.
+        /// Error of the system.
         source: io::Error,
     },
-    /// The interpreter has no such package.
+    /// The interpreter does not have the package.
     #[error(
         "{} by Python's package, which {python} does not have; pip install './gateway/python[{}]' in a checkout of the \
          repository, or name an interpreter that has it by {PYTHON_VARIABLE}",
         part.what(), part.extra()
     )]
     NoPackage {
-        /// What was asked for.
+        /// Requested part.
         part: PythonPart,
-        /// What was tried.
+        /// Interpreter that was tried.
         python: String,
     },
-    /// The module says what it misses.
+    /// The module reports a missing requirement.
     #[error("{0}")]
     Refused(String),
 }
@@ -69,7 +71,7 @@ impl PythonPart {
         }
     }
 
-    /// The extra of the wheel with what it needs.
+    /// Returns the extra of the wheel that the part needs.
     fn extra(self) -> &'static str {
         match self {
             PythonPart::Agent => "agents",
@@ -84,7 +86,7 @@ impl PythonPart {
         }
     }
 
-    /// What the module's own errors begin with.
+    /// Returns the prefix of the module's own error messages.
     fn command(self) -> &'static str {
         match self {
             PythonPart::Agent => "tandem agent: ",
@@ -94,7 +96,8 @@ impl PythonPart {
 }
 
 impl PythonModule {
-    /// The module with these arguments, if it can be started with them: its package is there, and what that needs.
+    /// Creates the module with these arguments, after checking that its package and requirements are
+    /// there.
     pub fn new(part: PythonPart, arguments: Vec<String>) -> Result<PythonModule, PythonError> {
         let python = env::var(PYTHON_VARIABLE).ok().filter(|python| !python.is_empty());
         let module = PythonModule { python: python.unwrap_or_else(|| PYTHON.into()), part, arguments };
@@ -121,14 +124,14 @@ impl PythonModule {
         }))
     }
 
-    /// The command that does it, with further arguments in front of its own.
+    /// Returns the command for it, with `further` arguments before its own.
     pub fn command(&self, further: &[&str]) -> Command {
         let mut command = Command::new(&self.python);
         command.args(["-m", self.part.module()]).args(further).args(&self.arguments);
         command
     }
 
-    /// The command that does it, for a shell.
+    /// Returns the command line for a shell.
     pub fn shell_line(&self) -> String {
         let words = [self.python.as_str(), "-m", self.part.module()].into_iter();
         let words = words.chain(self.arguments.iter().map(String::as_str));
@@ -136,7 +139,7 @@ impl PythonModule {
     }
 }
 
-/// A word that a shell takes as it is.
+/// Quotes a word for a shell.
 fn quoted(word: &str) -> String {
     format!("'{}'", word.replace('\'', r"'\''"))
 }

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use tandem_episodes::{DEFAULT_ROBOT, embedded_robot};
 
-/// The embedded robot with one absurd joint: standing still it does nothing, and to move it takes more torque than numbers
-/// of single precision can say.
+/// Writes the embedded robot with one absurd joint. The joint does nothing while the robot stands still;
+/// moving it takes a torque beyond single precision.
 pub fn write_absurd_robot(path: &Path) {
     let sound = embedded_robot(DEFAULT_ROBOT).unwrap();
     let elbow = sound.lines().find(|line| line.contains(r#"<position name="right_elbow_joint""#)).unwrap();

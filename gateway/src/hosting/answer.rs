@@ -1,38 +1,39 @@
-//! What a call on an episode is answered with, and one that was refused on its way there.
+//! Answers to calls on an episode, and calls that were refused before they reached it.
 
 use serde::Serialize;
 use tandem_episodes::{CallReply, Session};
 use tandem_tools_spec::{Call, Heard, ManageReply, Observation, Partner, StopReason, TalkReply, ToolReply};
 
-/// A tool's reply, and what has to be said with every reply.
+/// A tool's reply with the information that goes with every reply.
 #[derive(Debug, Serialize)]
 pub struct Answer {
     /// The reply.
     #[serde(flatten)]
     pub reply: ToolReply,
-    /// Control steps executed so far, the initial hold included: what a caller may expect the episode to stand at. Left out of a
-    /// result, which says it itself.
+    /// Control steps executed up to now, including the initial hold. Left out of a result, which has its
+    /// own step count.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub step: Option<u32>,
-    /// What was seen after a command that asked for it.
+    /// Observation after a command that asked for one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub observation: Option<Observation>,
-    /// What the robots of the other operators did meanwhile.
+    /// Behaviour of the other operators' robots during the command.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub partners: Vec<Partner>,
-    /// What the other operators have said.
+    /// Messages from the other operators.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub heard: Vec<Heard>,
-    /// Why the recording is not complete; left out where it is, and where the reply itself says it.
+    /// Reason why the recording is incomplete. Left out when it is complete, and when the reply itself
+    /// has the reason.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recording_failed: Option<String>,
-    /// Whether the operator has left an episode that others still play: its end is not known yet.
+    /// True once the operator has left an episode that others still play; its result is not known yet.
     #[serde(skip)]
     pub others_play_on: bool,
 }
 
 impl Answer {
-    /// The answer of `session` with `reply`.
+    /// Wraps `reply`, a reply of `session`.
     pub fn new(reply: CallReply, session: &Session) -> Answer {
         let CallReply { reply, observation } = reply;
         let is_result = matches!(reply, ToolReply::Manage(ManageReply::Finish(_)));
@@ -48,7 +49,7 @@ impl Answer {
         }
     }
 
-    /// The answer without what it says of other robots than `robot`.
+    /// Removes the entries of all robots but `robot`.
     pub fn of_own_robot(mut self, robot: &str) -> Answer {
         match &mut self.reply {
             ToolReply::Act(reply) => {
@@ -64,7 +65,7 @@ impl Answer {
         self
     }
 
-    /// The control steps of a command that was cut off by a partner's.
+    /// Returns the executed control steps of a command that a partner's command cut off.
     pub fn cut_off_steps(&self) -> Option<u32> {
         match &self.reply {
             ToolReply::Act(reply) if reply.stop_reason == StopReason::PartnerDone => {
@@ -78,7 +79,7 @@ impl Answer {
         }
     }
 
-    /// The answer to a whole command, to whose last part this is one.
+    /// Combines this answer, which is for the last part of a command, with the earlier parts.
     pub fn after(mut self, steps_before: u32, heard_before: Vec<Heard>) -> Answer {
         if let ToolReply::Act(reply) = &mut self.reply {
             reply.executed_steps += steps_before;
@@ -87,7 +88,7 @@ impl Answer {
         Answer { heard, ..self }
     }
 
-    /// The answer to a command of `asked_steps`, of which fewer were executed where a partner's was shorter.
+    /// Reports a command of `asked_steps` as cut off by a partner if fewer steps were executed.
     pub fn cut_off_after(mut self, asked_steps: u32) -> Answer {
         if let ToolReply::Act(reply) = &mut self.reply
             && reply.stop_reason == StopReason::StepsDone
@@ -99,25 +100,25 @@ impl Answer {
     }
 }
 
-/// A call that was refused before it reached its episode, as it came.
+/// A call that was refused before it reached its episode, in the form in which it arrived.
 #[derive(Debug, Clone)]
 pub struct RefusedCall {
-    /// What may be a tool's name.
+    /// Tool name as received; it may be no tool's name.
     pub tool: String,
-    /// What may be JSON.
+    /// Arguments as received; they may be no JSON.
     pub arguments: String,
-    /// Why it was refused.
+    /// Reason for the refusal.
     pub problem: String,
 }
 
 impl RefusedCall {
-    /// A call that may yet be refused.
+    /// Copies a call that may be refused later; the reason is still empty.
     pub fn of(call: &Call) -> RefusedCall {
         let arguments = serde_json::to_string(call).unwrap_or_default();
         RefusedCall { tool: call.name().into(), arguments, problem: String::new() }
     }
 
-    /// The call with why it was refused.
+    /// Sets the reason for the refusal.
     pub fn because(self, refusal: &impl ToString) -> RefusedCall {
         RefusedCall { problem: refusal.to_string(), ..self }
     }

@@ -1,5 +1,7 @@
-//! Episodes of a server that has gone, or of others on the same folder of runs: found by their journals, and
-//! held asleep until they are asked for something. Those that nobody asks for long are put to sleep here, too.
+//! Episodes of a server that has ended, or of other servers on the same runs folder.
+//!
+//! They are found by their journals and sleep until a request needs them. Episodes that stay idle for
+//! long are put to sleep here as well.
 
 use std::{
     fs,
@@ -19,15 +21,16 @@ use super::{
     team::Team,
 };
 
-/// Number of episodes that stay awake, however long nobody asks them for anything. Each has some megabytes.
+/// Maximum number of episodes kept awake, regardless of how long they have been idle. Each takes some
+/// megabytes.
 const MAX_AWAKE: usize = 96;
 
-/// An episode may be put aside after a second for so many control steps, which is ten times what bringing it
-/// back takes.
+/// An episode may be put to sleep after one idle second for each of these control steps. That is ten
+/// times as long as bringing it back takes.
 const STEPS_PER_IDLE_S: u32 = 300;
 
 impl EpisodeTable {
-    /// From now on keeps journals in `journals`, and holds the episodes of a server that has gone.
+    /// Starts to keep journals in `journals`, and holds the episodes of a server that has ended.
     pub fn keep_journals(&self, journals: LiveFolder) {
         let ids = journals.ids();
         if self.journals.set(journals).is_err() {
@@ -44,13 +47,18 @@ impl EpisodeTable {
         }
     }
 
-    /// Whether another server plays the episode `id`.
+    /// Returns true if another server plays the episode `id`.
     fn is_elsewhere(&self, id: &str) -> bool {
         let Some(journals) = self.journals.get() else { return false };
         journals.journal(id).is_some_and(|path| Lease::is_elsewhere(&path, &journals.url))
     }
 
-    /// The episode `id`, played by this server, wherever it has been before.
+    /// Returns the episode `id` after making sure that this server plays it.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the episode is unknown, if another server plays it, or if it cannot be brought
+    /// back.
     pub async fn awake(self: &Arc<Self>, id: &str) -> Result<HostedEpisode, HostingError> {
         let hosted = match self.hosted(id) {
             Ok(hosted) => hosted,
@@ -68,7 +76,7 @@ impl EpisodeTable {
         there.map(|()| hosted)
     }
 
-    /// As [`EpisodeTable::operator`], of every server on the folder of runs.
+    /// Does the same as [`EpisodeTable::operator`], for all servers on the runs folder.
     pub async fn operator_anywhere(self: &Arc<Self>, text: &str) -> Option<Caller> {
         if let Some(found) = self.operator(text) {
             return Some(found);
@@ -78,8 +86,8 @@ impl EpisodeTable {
         spawn_blocking(move || table.operator_elsewhere(&text)).await.ok()?
     }
 
-    /// Finds the operator with this token of an episode that is not held here. Each journal's heading is read
-    /// once, however many tokens are tried, and every token is compared.
+    /// Finds the operator with this token among the episodes that are not held here. Each journal's
+    /// heading is read once, however many tokens are tried. Every token is compared.
     fn operator_elsewhere(&self, text: &str) -> Option<Caller> {
         let journals = self.journals.get()?;
         let ids = journals.ids();
@@ -136,14 +144,14 @@ impl EpisodeTable {
             self.starts.keep(key, (args, heading.driving), Ok(heading.start));
         }
         match self.hold(hosted.clone()) {
-            // Somebody else has been quicker.
+            // Another caller was quicker.
             Err(HostingError::HeldAlready { .. }) => self.hosted(id),
             held => held.map(|()| hosted),
         }
     }
 
-    /// Ends the episodes that nobody plays any more, and puts aside those that nobody misses. Seats
-    /// the partners again that drove on the server before. To be called every now and then, where futures run.
+    /// Ends abandoned episodes and puts idle ones to sleep. Also reconnects the partners that drove on
+    /// the server before this one. Call it periodically from within the async runtime.
     pub fn tidy_up(&self) {
         let episodes = self.all();
         for episode in &episodes {
@@ -166,8 +174,8 @@ impl EpisodeTable {
         }
     }
 
-    /// Shows other servers that this one still plays its episodes, and forgets those that they have taken or
-    /// ended. To be called every few seconds.
+    /// Forgets the sleeping episodes that other servers have taken over or ended. Call it every few
+    /// seconds.
     pub fn look_around(&self) {
         let Some(journals) = self.journals.get() else { return };
         for episode in self.all() {
@@ -181,16 +189,16 @@ impl EpisodeTable {
     }
 }
 
-/// The operators of the episode `id`, as its journal has them.
+/// Reads the operators of the episode `id` from its journal.
 fn team_of(journals: &LiveFolder, id: &str) -> Option<Team> {
     let heading = JournalReader::open(&journals.journal(id)?).ok()?.heading;
     Team::of(&heading.start.operators, &heading.driving, None).ok()
 }
 
-/// Makes a recording that can be read of one that was left under way.
+/// Turns a recording that was left unfinished into a readable one.
 fn make_whole(journal: &Path, folder: &RunFolder, url: &str) {
     let partial = partial_path(&folder.path.join(Recorder::FILE_NAME));
-    // Nobody else is to do the same.
+    // The lease keeps other servers from doing the same.
     let Ok(Leasing::Taken(_lease)) = Lease::take(journal, url) else { return };
     if fs::exists(&partial).unwrap_or(false)
         && let Err(error) = recover(&partial)

@@ -1,4 +1,4 @@
-//! Why the host of episodes refuses.
+//! Refusals of the host of episodes.
 
 use std::{io, path::PathBuf, sync::Arc};
 
@@ -7,65 +7,66 @@ use tandem_tools_spec::{Refusal, RefusalClass};
 
 use crate::token::TokenError;
 
-/// Refusals of the host, and those of the episode that it passes on.
+/// Refusals of the host, and refusals of the episode that it passes on.
 #[derive(Debug, thiserror::Error)]
 pub enum HostingError {
-    /// The episode refused.
+    /// The episode refused the call.
     #[error(transparent)]
     Episode(#[from] EpisodeError),
-    /// No such episode. Which there are is their callers' business.
+    /// The episode does not exist. Existing ones are not listed, because only their callers may know
+    /// them.
     #[error("no episode {id:?}")]
     UnknownEpisode {
-        /// What was asked for.
+        /// Requested id.
         id: String,
     },
-    /// Every place for an episode is taken.
+    /// All places for episodes are taken.
     #[error("all {limit} places for episodes are taken")]
     TooManyEpisodes {
-        /// How many places there are.
+        /// Number of places.
         limit: u32,
     },
-    /// Too many calls wait for one episode.
+    /// Too many calls are waiting for one episode.
     #[error("{limit} calls already wait for this episode; call again when one of them has answered")]
     TooManyWaiting {
-        /// How many may wait.
+        /// Maximum number of waiting calls.
         limit: usize,
     },
-    /// The server is going down.
+    /// The server is shutting down.
     #[error("the server is shutting down and takes no new episodes; try again when it is back")]
     ShuttingDown,
     /// Another episode has this id.
     #[error("an episode {id:?} is held already")]
     HeldAlready {
-        /// The id of both.
+        /// Id of both.
         id: String,
     },
-    /// Another server on the same folder of runs plays the episode.
+    /// Another server on the same runs folder plays the episode.
     #[error("episode {id:?} is played by {url:?}; ask there")]
     HeldElsewhere {
-        /// What was asked for.
+        /// Requested id.
         id: String,
-        /// Where it is played.
+        /// URL of the server that plays it.
         url: String,
     },
-    /// The episode was begun by another build, which alone brings it to the same state.
+    /// The episode was begun by another build; only that build restores the same state.
     #[error(
         "this episode was begun by build {made_by} of the server and this is {this}, which would not bring it to the same state; start that build on the same runs folder to go on, or DELETE the episode; what was recorded is in {}", .folder.display()
     )]
     OtherBuild {
-        /// The build that began it.
+        /// Build that began the episode.
         made_by: String,
-        /// This one.
+        /// Build of this server.
         this: &'static str,
-        /// Where it is recorded.
+        /// Folder of the recording.
         folder: PathBuf,
     },
     /// The journal from which the episode is to be brought back cannot be read or written.
     #[error("the journal {}: {source}", .path.display())]
     Journal {
-        /// The file.
+        /// Path of the journal.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: io::Error,
     },
     /// The episode was closed meanwhile.
@@ -76,7 +77,7 @@ pub enum HostingError {
         "the simulator failed in this episode and the episode ends here; its recording holds what went before"
     )]
     EpisodePanicked,
-    /// The operator has commanded already.
+    /// The operator has already given its command for this step.
     #[error(
         "robot {robot:?} has its command for this step already; its reply comes when {}",
         waiting_text(.waits_for)
@@ -84,19 +85,19 @@ pub enum HostingError {
     DoubleCommand {
         /// The operator's robot.
         robot: String,
-        /// The robots whose operators have not commanded yet.
+        /// Robots whose operators have not commanded yet.
         waits_for: Vec<String>,
     },
-    /// The operator has let the others' patience run out, and does not know it yet.
+    /// The operator's command timed out, and it has not been notified yet.
     #[error(
         "robot {robot:?} was held still from step {from_step} to {to_step}, because the others' patience ran out before a command came; look again, then command"
     )]
     LateCommand {
         /// The operator's robot.
         robot: String,
-        /// Where it was held first.
+        /// First step of the hold.
         from_step: u32,
-        /// Where it was held last, which is now.
+        /// Last step of the hold, which is the current one.
         to_step: u32,
     },
     /// The operator has called finish.
@@ -107,73 +108,73 @@ pub enum HostingError {
         /// The operator's robot.
         robot: String,
     },
-    /// A call on an episode whose robots have operators, by none of them.
+    /// A call came without an operator's token, but each robot of the episode has an operator.
     #[error(
         "each robot of this episode is driven by its own operator; send its token, which the start of the episode returned, as Authorization: Bearer TOKEN"
     )]
     NeedsOperator,
-    /// A request of an operator that concerns more than its robot.
+    /// An operator's request concerns more than its robot.
     #[error(
         "an operator looks through its robot and commands it; this request is for who started the episode"
     )]
     HostsBusiness,
-    /// Somebody else is to drive one robot of an episode whose robots one policy directs.
+    /// One policy controls all robots, so no other driver can take one of them.
     #[error(
         "one policy directs all robots of this episode; start one and add \"operators\": \"per_robot\" for somebody else to drive one of them"
     )]
     OnePolicy,
-    /// A client would start an episode where an evaluation in this process has the only one.
+    /// A client tried to start an episode, but an evaluation in this process holds the only one.
     #[error(
         "this server holds the one episode that an evaluation scores, and starts no other; play the one that your brief and the environment's TANDEM_EPISODE name"
     )]
     OneEpisode,
-    /// A program of this process would drive in a person's place.
+    /// A program of this process was to replace a person in a collection.
     #[error(
         "in a collection people drive, and nobody else in their place; demonstrations of the expert are tandem collect's without --operators"
     )]
     PeopleDrive,
-    /// Nobody here can drive a robot of this task.
+    /// No expert here can drive a robot of this task.
     #[error("{0}")]
     NoExpert(#[source] PlayerError),
     /// No policy can drive a robot here.
     #[error("{reason}")]
     NoPolicy {
-        /// What is missing.
+        /// Missing part.
         reason: String,
     },
-    /// Nobody may talk here.
+    /// Talking is not enabled here.
     #[error(
         "nobody hears you: operators talk in an episode that was started with operators \"per_robot\" and talk true"
     )]
     NoTalk,
-    /// Somebody has not heard what was said before.
+    /// A recipient has too many unread messages.
     #[error(
         "robot {robot:?} has {unheard} messages that its operator has not heard yet; say more after its next call"
     )]
     TooMuchSaid {
-        /// The robot of who does not listen.
+        /// Recipient's robot.
         robot: String,
-        /// How many wait.
+        /// Number of unread messages.
         unheard: usize,
     },
-    /// The key of a request that was another one.
+    /// The idempotency key belongs to a different request.
     #[error(
         "this Idempotency-Key came with another request before; a key stands for one request, so take a new one for each"
     )]
     KeyUsed,
-    /// No token for an operator.
+    /// No token could be made for an operator.
     #[error(transparent)]
     Token(#[from] TokenError),
-    /// A refusal of several callers at once.
+    /// A refusal that several callers share.
     #[error(transparent)]
     Shared(Arc<HostingError>),
-    /// The system gives no thread for the world.
+    /// The system could not start a thread for the world.
     #[error("no thread for an episode: {0}")]
     Thread(#[source] io::Error),
 }
 
 impl HostingError {
-    /// What this error is to its caller.
+    /// Returns the refusal that the caller receives.
     pub fn refusal(&self) -> Refusal {
         use RefusalClass::{
             Conflict, Elsewhere, Failed, Forbidden, Gone, Invalid, NotFound, TooMany, Unavailable,
@@ -234,7 +235,8 @@ impl HostingError {
         }
     }
 
-    /// Whether operators' turns were in the way, so that the call has not reached the episode.
+    /// Returns true if the turns of the operators blocked the call, so that it has not reached the
+    /// episode.
     pub fn is_of_the_team(&self) -> bool {
         match self {
             HostingError::DoubleCommand { .. }
@@ -268,7 +270,7 @@ impl HostingError {
         }
     }
 
-    /// Whether the episode is another server's, or nobody's any more.
+    /// Returns true if another server has the episode, or if it no longer exists.
     pub fn is_elsewhere(&self) -> bool {
         match self {
             HostingError::HeldElsewhere { .. } | HostingError::UnknownEpisode { .. } => true,
@@ -277,7 +279,7 @@ impl HostingError {
         }
     }
 
-    /// Whether another build alone can go on with the episode.
+    /// Returns true if only another build can continue the episode.
     pub fn is_of_other_build(&self) -> bool {
         match self {
             HostingError::OtherBuild { .. } => true,
@@ -286,7 +288,7 @@ impl HostingError {
         }
     }
 
-    /// Where the episode is played, if another server plays it.
+    /// Returns the URL of the other server that plays the episode, if one does.
     pub fn elsewhere(&self) -> Option<&str> {
         match self {
             HostingError::HeldElsewhere { url, .. } => Some(url),
@@ -295,7 +297,7 @@ impl HostingError {
         }
     }
 
-    /// Whether the same request will be refused again.
+    /// Returns true if the same request will be refused again.
     pub fn is_final(&self) -> bool {
         self.refusal().retry_after_s.is_none()
     }

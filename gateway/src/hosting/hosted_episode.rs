@@ -1,4 +1,5 @@
-//! An episode as callers meet it: driven by one policy or by an operator for each robot, with replies that may be asked for again.
+//! An episode as callers see it: driven by one policy or by an operator per robot, with an idempotency
+//! cache of replies.
 
 use std::sync::Arc;
 
@@ -17,22 +18,22 @@ use super::{
     team::Team,
 };
 
-/// Who calls, as its token says.
+/// The caller, identified by its token.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Caller {
-    /// Who may use the server: starts episodes, and drives those that one policy directs.
+    /// The host's client. It may start episodes and drives those that one policy controls.
     Host,
     /// The operator of one robot.
     Operator {
-        /// The episode.
+        /// Id of the episode.
         episode: String,
-        /// The robot, as "A".
+        /// Name of the robot, for example "A".
         robot: String,
     },
 }
 
 impl Caller {
-    /// The robot that it drives alone.
+    /// Returns the only robot that the caller drives; `None` for the host.
     pub fn robot(&self) -> Option<&str> {
         match self {
             Caller::Host => None,
@@ -50,24 +51,24 @@ pub struct HostedEpisode {
     beside: Arc<Beside>,
 }
 
-/// What a server knows of an episode beside its world.
+/// State that a server keeps of an episode besides its world.
 #[derive(Debug, Default)]
 pub struct Beside {
-    /// The operators, where each robot has one.
+    /// Operators of the robots; `None` if one policy controls all robots.
     team: Option<Arc<Team>>,
-    /// Replies that may be asked for again.
+    /// Replies that may be requested again.
     replies: Arc<IdempotencyCache<Call, SharedAnswer>>,
     notes: IdempotencyCache<Note, SharedNote>,
 }
 
-/// What came of a call, for as many as want to know.
+/// Outcome of a call, shared by its callers.
 type SharedAnswer = Result<Arc<Answer>, Arc<HostingError>>;
 
-/// What came of a note, for as many as want to know.
+/// Outcome of a note, shared by its callers.
 type SharedNote = Result<(), Arc<HostingError>>;
 
 impl Beside {
-    /// What is known of an episode that `team` drives, or else one policy.
+    /// Creates the state for an episode that `team` drives, or one policy if there is none.
     pub fn new(team: Option<Team>) -> Beside {
         Beside { team: team.map(Arc::new), ..Beside::default() }
     }
@@ -76,7 +77,7 @@ impl Beside {
 impl HostMemory for Beside {
     fn memory(&self) -> Value {
         let operators = self.team.as_ref().map(|team| team.memory());
-        // Texts and numbers can always be written.
+        // Strings and numbers always serialize.
         serde_json::to_value(operators).unwrap_or_default()
     }
 
@@ -100,7 +101,7 @@ impl HostMemory for Beside {
     }
 
     fn let_go(&self) {
-        // What is left of them would keep all memory around it in use.
+        // Remaining entries would keep their memory in use.
         self.replies.clear();
         self.notes.clear();
     }
@@ -111,22 +112,22 @@ impl HostMemory for Beside {
 }
 
 impl HostedEpisode {
-    /// The episode `id`, of which the server knows `beside`.
+    /// Creates the episode `id` with the server's state `beside`.
     pub fn new(id: &str, thread: Arc<EpisodeThread>, beside: Arc<Beside>) -> HostedEpisode {
         HostedEpisode { id: id.into(), thread, beside }
     }
 
-    /// The operators, where each robot has one.
+    /// Returns the operators; `None` if one policy controls all robots.
     pub fn team(&self) -> Option<&Arc<Team>> {
         self.beside.team.as_ref()
     }
 
-    /// What the episode is called.
+    /// Returns the id of the episode.
     pub fn id(&self) -> &str {
         &self.id
     }
 
-    /// Answers a call; with a key, once for this key and caller.
+    /// Answers a call. With a key, the call runs once for this key and caller.
     pub async fn call(
         &self,
         who: &Caller,
@@ -141,7 +142,7 @@ impl HostedEpisode {
         let key = own_key(robot.as_deref(), key);
         let (episode, asked) = (self.clone(), call.clone());
         let keyed = Keyed { key: key.clone(), request: call.clone() };
-        // On the heap: it is handed on several times, and has kilobytes.
+        // Boxed, because it takes kilobytes and is moved several times.
         let work = Box::pin(async move {
             episode.answer(robot, asked, Some(keyed)).await.map(Arc::new).map_err(Arc::new)
         });
@@ -150,7 +151,8 @@ impl HostedEpisode {
         Ok(IdempotentReply { reply: reply.map_err(HostingError::Shared)?, replayed })
     }
 
-    /// Keeps a note of who started the episode, or of an operator; with a key, once for this key and caller.
+    /// Records a note of the host's client or of an operator. With a key, it is recorded once for this
+    /// key and caller.
     pub async fn note(&self, who: &Caller, note: Note, key: Option<&str>) -> Result<(), HostingError> {
         let Some(key) = key.map(|key| own_key(who.robot(), key)) else {
             return self.keep_note(who, note, None).await;
@@ -169,12 +171,12 @@ impl HostedEpisode {
         self.thread.note(who.robot(), note, key).await
     }
 
-    /// Keeps a call of `who` that was refused before it reached the episode.
+    /// Records a call of `who` that was refused before it reached the episode.
     pub async fn refused(&self, who: &Caller, call: RefusedCall) {
         self.thread.refused(who.robot(), call).await;
     }
 
-    /// Where the episode stands, for who looks on: asking is no call.
+    /// Returns the state of the episode for a watcher; it does not count as a call.
     pub async fn status(&self, who: &Caller) -> Result<Answer, HostingError> {
         let mut answer = self.thread.status().await?;
         if let Caller::Operator { .. } = who
@@ -187,7 +189,7 @@ impl HostedEpisode {
         Ok(answer)
     }
 
-    /// What `who` has to know to begin.
+    /// Returns the briefing for `who`.
     pub async fn briefing(&self, who: &Caller) -> Result<Briefing, HostingError> {
         self.admit(who)?;
         let briefing = self.thread.briefing().await?;
@@ -201,12 +203,12 @@ impl HostedEpisode {
         })
     }
 
-    /// Its line in the list of episodes, as far as its policies are told.
+    /// Returns its entry in the list of episodes, without information that is hidden from policies.
     pub fn told_entry(&self) -> EpisodeEntry {
         EpisodeEntry { seed: self.thread.spec().told_seed(), ..self.entry() }
     }
 
-    /// The whole of it. Its thread is not asked, which may be at work.
+    /// Returns the complete entry. Does not wait for the thread, which may be busy.
     pub fn entry(&self) -> EpisodeEntry {
         let spec = self.thread.spec();
         EpisodeEntry {
@@ -220,12 +222,12 @@ impl HostedEpisode {
         }
     }
 
-    /// Whether operators may talk.
+    /// Returns true if operators may talk.
     pub fn may_talk(&self) -> bool {
         self.team().is_some_and(|team| team.may_talk())
     }
 
-    /// Refuses a tool that `who` is not offered, whatever its arguments are.
+    /// Refuses a tool that is not available to `who`, whatever its arguments are.
     pub fn check_offered(&self, who: &Caller, tool: &str) -> Result<(), HostingError> {
         let is_operator = matches!(who, Caller::Operator { .. });
         let for_talk = |tool: &str| TalkCall::TOOLS.contains(&tool);
@@ -240,12 +242,13 @@ impl HostedEpisode {
         Err(EpisodeError::from(SpecError::UnknownTool { name: tool.into(), have }).into())
     }
 
-    /// Ends the episode, as [`EpisodeThread::close`] does; operators who wait for each other are told.
+    /// Ends the episode as [`EpisodeThread::close`] does, and notifies operators that wait for each
+    /// other.
     pub async fn close(&self) -> Result<ResultReply, HostingError> {
         self.close_for(false).await
     }
 
-    /// As [`HostedEpisode::close`], where it is to go on when it is brought back if `keep` says so.
+    /// Closes the episode. If `keep` is set, the episode goes on when it is brought back.
     pub async fn close_for(&self, keep: bool) -> Result<ResultReply, HostingError> {
         let result = if keep { self.thread.leave().await } else { self.thread.close().await };
         if let Some(team) = self.team() {
@@ -254,7 +257,7 @@ impl HostedEpisode {
         result
     }
 
-    /// Whether `who` may know of this episode.
+    /// Refuses a caller that may not know of this episode.
     pub fn admit(&self, who: &Caller) -> Result<(), HostingError> {
         match who {
             Caller::Operator { episode, .. } if *episode != self.id => {
@@ -264,7 +267,7 @@ impl HostedEpisode {
         }
     }
 
-    /// The robot that `who` drives; `None` where one policy directs all.
+    /// Returns the robot that `who` drives; `None` if one policy controls all robots.
     fn robot_of(&self, who: &Caller) -> Result<Option<String>, HostingError> {
         self.admit(who)?;
         match (who, self.team()) {
@@ -299,8 +302,8 @@ impl HostedEpisode {
     }
 }
 
-/// The key under which an operator's request is kept: keys of different operators have nothing to do with each
-/// other.
+/// Returns the key under which an operator's request is kept. Keys of different operators are
+/// independent.
 fn own_key(robot: Option<&str>, key: &str) -> String {
     format!("{}:{key}", robot.unwrap_or_default())
 }

@@ -1,4 +1,5 @@
-//! Replies by idempotency key, so that a caller who never saw one can ask again without anything being done twice.
+//! The idempotency cache: replies by key, so that a caller that missed a reply can repeat its request
+//! without repeating the action.
 
 use std::{
     collections::VecDeque,
@@ -9,7 +10,7 @@ use tokio::sync::watch;
 
 use super::HostingError;
 
-/// How many replies are kept; with pictures, one may have a megabyte.
+/// Number of replies that are kept; a reply with images may take a megabyte.
 const CAPACITY: usize = 16;
 
 /// Replies `R` to requests `Q`, by the key that came with each.
@@ -25,12 +26,12 @@ struct Entry<Q, R> {
     reply: watch::Receiver<Option<R>>,
 }
 
-/// A reply, and whether it had been made before.
+/// A reply, and whether an earlier request produced it.
 #[derive(Debug, PartialEq)]
 pub struct IdempotentReply<R> {
-    /// The reply.
+    /// The reply itself.
     pub reply: R,
-    /// Whether an earlier request with the same key has had it.
+    /// True if an earlier request with the same key received it.
     pub replayed: bool,
 }
 
@@ -41,8 +42,15 @@ impl<Q, R> Default for IdempotencyCache<Q, R> {
 }
 
 impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> IdempotencyCache<Q, R> {
-    /// Lets `work` make the reply to `request`, once for a key: who asks again with the key gets that reply, or waits for it. A
-    /// reply that is not `lasting` is forgotten, so that asking again tries again. The work goes on if its caller leaves.
+    /// Runs `work` once per key to make the reply to `request`. Later requests with the key get the same
+    /// reply or wait for it.
+    ///
+    /// A reply that is not `lasting` is forgotten, so that a repeated request tries again. The work
+    /// continues if its caller leaves.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if the key came with a different request before, or if the work panicked.
     pub async fn once(
         &self,
         key: &str,
@@ -52,7 +60,7 @@ impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> IdempotencyCache<Q,
     ) -> Result<IdempotentReply<R>, HostingError> {
         let (mut reply, replayed) = self.find_or_begin(key, request, work)?;
         let made = reply.wait_for(Option::is_some).await.map(|made| made.clone());
-        // A work that panicked made no reply, and says so as an episode that stopped under way.
+        // Work that panicked made no reply. It is reported as an episode that stopped.
         let Ok(Some(made)) = made else {
             self.forget(key);
             return Err(HostingError::EpisodeStopped);
@@ -63,7 +71,7 @@ impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> IdempotencyCache<Q,
         Ok(IdempotentReply { reply: made, replayed })
     }
 
-    /// Where the reply comes, and whether the work on it had begun before.
+    /// Returns a receiver of the reply, and true if the work on it had begun before.
     fn find_or_begin(
         &self,
         key: &str,
@@ -88,7 +96,7 @@ impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> IdempotencyCache<Q,
         Ok((reply, false))
     }
 
-    /// Keeps a reply that has been made elsewhere.
+    /// Keeps a reply that was made elsewhere.
     pub fn keep(&self, key: String, request: Q, reply: R) {
         let (_, reply) = watch::channel(Some(reply));
         let mut entries = self.lock();
@@ -99,7 +107,7 @@ impl<Q: PartialEq + Clone, R: Clone + Send + Sync + 'static> IdempotencyCache<Q,
         }
     }
 
-    /// Forgets every reply that has been made.
+    /// Forgets every finished reply.
     pub fn clear(&self) {
         let mut entries = self.lock();
         entries.retain(|entry| entry.reply.borrow().is_none());
@@ -125,7 +133,7 @@ mod tests {
 
     use super::*;
 
-    /// Each work counts on and replies with the count.
+    /// A test double that increments a counter and replies with it.
     struct Counting {
         cache: IdempotencyCache<&'static str, u32>,
         count: Arc<AtomicU32>,

@@ -1,5 +1,5 @@
-//! The episodes that a server holds: their table, the thread of each, and the folder that each is recorded into.
-//! Nothing here knows how callers reach it.
+//! The episodes that a server holds: their table, their threads and their recording folders. Independent
+//! of the protocol by which callers reach it.
 
 #[cfg(test)]
 mod absurd_robot;

@@ -1,4 +1,4 @@
-//! One folder per episode under the runs folder. The folder's name is the episode's id.
+//! One folder per episode in the runs folder. The folder's name is the episode's id.
 
 use std::{
     collections::BTreeSet,
@@ -14,8 +14,12 @@ use tandem_episodes::{EpisodeSpec, create_new_private_folder, create_private_fol
 
 use crate::token::{Token, TokenError};
 
-/// Makes the folder of all runs, where it is not there, and writes something into it, which is removed again; the folder stays. The
-/// error says what would have worked.
+/// Checks that the runs folder is writable. Creates it if necessary, and writes and removes a probe file;
+/// the folder stays.
+///
+/// # Errors
+///
+/// The message says how to make the folder usable.
 pub fn try_runs_folder(runs: &Path) -> Result<(), String> {
     let probe = runs.join(format!(".probe-{}", std::process::id()));
     let tried = create_private_folder(runs).and_then(|()| fs::write(&probe, "probe"));
@@ -26,17 +30,18 @@ pub fn try_runs_folder(runs: &Path) -> Result<(), String> {
     })
 }
 
-/// As [`try_runs_folder`]; nothing of the trial is left behind.
+/// Does the same as [`try_runs_folder`], but leaves nothing behind.
 pub fn look_at_runs_folder(runs: &Path) -> Result<(), String> {
     let named = runs.ancestors().filter(|path| !path.as_os_str().is_empty());
     let missing: Vec<&Path> = named.take_while(|path| !path.exists()).collect();
     let tried = try_runs_folder(runs);
-    // A folder that was made for this is removed again, unless somebody has put something in.
+    // Folders created for the check are removed again, unless they are no longer empty.
     let _ = missing.into_iter().try_for_each(fs::remove_dir);
     tried
 }
 
-/// The name of an episode, which its callers know: task and seed, or where the assistance tells no seed a random text in its place.
+/// Returns the public name of an episode: its task and its seed, or a random text in place of a hidden
+/// seed.
 pub fn episode_name(spec: &EpisodeSpec) -> Result<String, TokenError> {
     let task = spec.task.id;
     Ok(match spec.told_seed() {
@@ -45,21 +50,25 @@ pub fn episode_name(spec: &EpisodeSpec) -> Result<String, TokenError> {
     })
 }
 
-/// How long the random part of a name is.
+/// Length of the random part of a name.
 const RANDOM_NAME_CHARS: usize = 10;
 
-/// Names and makes the folders of one server.
+/// Names and creates the folders of one server.
 #[derive(Debug, Default)]
 pub struct RunFolders {
-    /// Names of episodes that got a folder. It may be gone again, as where nothing could be written into it.
+    /// Names of episodes that got a folder. The folder may be gone again, for example if nothing could be
+    /// written into it.
     given: Mutex<BTreeSet<String>>,
-    /// Episodes that got no folder.
+    /// Number of episodes that got no folder.
     without: AtomicU32,
 }
 
 impl RunFolders {
-    /// Makes a new folder for an episode that is called `base`: `handover-seed0`, and where that is taken `handover-seed0-2`, `-3`, ... Where
-    /// none can be made, as on a full disk, the episode has a name all the same; its recording fails, and says why.
+    /// Creates a new folder for an episode called `base`: `handover-seed0`, or `handover-seed0-2`, `-3`,
+    /// ... if the name is taken.
+    ///
+    /// If no folder can be created, for example on a full disk, the episode still gets a name. Its
+    /// recording then fails with the reason.
     pub fn create(&self, runs: &Path, base: &str) -> (String, PathBuf) {
         if let Ok(Some(made)) = create_private_folder(runs).and_then(|()| self.first_free(runs, base)) {
             return made;

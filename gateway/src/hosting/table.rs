@@ -38,46 +38,47 @@ pub struct EpisodeTable {
     pub(super) metrics: Arc<Metrics>,
     folders: RunFolders,
     purpose: Purpose,
-    /// Where the journals are of episodes that outlive the server, if any do.
+    /// Folder of the journals, if episodes outlive the server.
     pub(super) journals: OnceLock<LiveFolder>,
-    /// The operators of episodes that other servers play, by episode.
+    /// Operators of the episodes that other servers play, by episode id.
     pub(super) others: Mutex<BTreeMap<String, Team>>,
     partner: Option<Arc<dyn PartnerPolicy>>,
 }
 
-/// Purpose of a server, and the policy that people may have drive beside them.
+/// Purpose of a server, and the policy that can drive beside people.
 #[derive(Debug, Default)]
 pub struct Guests {
-    /// Decides who starts episodes and drives their robots.
+    /// Purpose of the server, which decides who starts episodes and drives their robots.
     pub purpose: Purpose,
-    /// Policy that drives a robot when people ask for one; no page can name another.
+    /// Policy that drives a robot on request of a person; pages cannot name another one.
     pub partner: Option<Arc<dyn PartnerPolicy>>,
 }
 
 /// The purpose of a server. It decides who starts episodes, and who may drive their robots.
 #[derive(Debug, Clone, Default)]
 pub enum Purpose {
-    /// Clients start episodes and choose who drives.
+    /// Clients start episodes and choose the drivers.
     #[default]
     Clients,
-    /// An evaluation in this process has episodes scored. Clients play them, start none, and have nobody drive in their place.
+    /// An evaluation in this process has episodes scored. Clients play them, but cannot start any or let
+    /// others drive.
     Evaluation,
     /// People play the episodes that a collection in this process starts.
     Collection(Arc<Collection>),
 }
 
-/// What came of a start, for as many as want to know.
+/// Outcome of a start, shared by its callers.
 type SharedStart = Result<StartReply, Arc<HostingError>>;
 
 #[derive(Debug, Default)]
 struct HeldEpisodes {
     episodes: BTreeMap<String, HostedEpisode>,
-    /// Whether the server goes down, and no episode is added any more.
+    /// True while the server shuts down; no episode is added any more.
     closing: bool,
 }
 
 impl EpisodeTable {
-    /// An empty table with as many places, words and robots as `settings` say.
+    /// Creates an empty table with the places, instructions and robots of `settings`.
     pub fn new(settings: Arc<Settings>) -> EpisodeTable {
         EpisodeTable {
             held: Mutex::default(),
@@ -93,30 +94,34 @@ impl EpisodeTable {
         }
     }
 
-    /// As [`EpisodeTable::new`], for `guests`.
+    /// Does the same as [`EpisodeTable::new`], for `guests`.
     pub fn for_guests(settings: Arc<Settings>, guests: Guests) -> EpisodeTable {
         let Guests { purpose, partner } = guests;
         EpisodeTable { purpose, partner, ..EpisodeTable::new(settings) }
     }
 
-    /// Returns the policy that people may have drive beside them.
+    /// Returns the policy that can drive beside people.
+    ///
+    /// # Errors
+    ///
+    /// Returns [`HostingError::NoPolicy`] if the server was started without one.
     pub fn partner(&self) -> Result<Arc<dyn PartnerPolicy>, HostingError> {
         let reason =
             "no policy may drive here; start the server with --partner, as act:http://127.0.0.1:8500/act";
         self.partner.clone().ok_or_else(|| HostingError::NoPolicy { reason: reason.into() })
     }
 
-    /// Whether an evaluation in this process has its episodes scored.
+    /// Returns true if an evaluation in this process has its episodes scored.
     pub fn is_evaluation(&self) -> bool {
         matches!(self.purpose, Purpose::Evaluation)
     }
 
-    /// Whether clients start episodes here, who may come back to them.
+    /// Returns true if clients start episodes here and may come back to them.
     pub fn serves_clients(&self) -> bool {
         matches!(self.purpose, Purpose::Clients)
     }
 
-    /// Those who play one episode after another here.
+    /// Returns the collection whose people play one episode after another here.
     pub fn collection(&self) -> Option<&Collection> {
         match &self.purpose {
             Purpose::Collection(collection) => Some(collection),
@@ -124,7 +129,7 @@ impl EpisodeTable {
         }
     }
 
-    /// Refuses an episode that a client would start where it may not.
+    /// Refuses the start of an episode by a client during an evaluation.
     fn check_starts(&self) -> Result<(), HostingError> {
         match self.purpose {
             Purpose::Evaluation => Err(HostingError::OneEpisode),
@@ -132,12 +137,12 @@ impl EpisodeTable {
         }
     }
 
-    /// What has been counted.
+    /// Returns the metrics.
     pub fn metrics(&self) -> &Arc<Metrics> {
         &self.metrics
     }
 
-    /// As [`EpisodeTable::start_driven`], once for a key.
+    /// Does the same as [`EpisodeTable::start_driven`], once for each key.
     pub async fn start_once(
         self: &Arc<Self>,
         args: StartEpisode,
@@ -152,12 +157,12 @@ impl EpisodeTable {
         Ok(IdempotentReply { reply: reply.map_err(HostingError::Shared)?, replayed })
     }
 
-    /// Starts an episode in which one policy directs all robots.
+    /// Starts an episode in which one policy controls all robots.
     pub async fn start(&self, args: StartEpisode) -> Result<StartReply, HostingError> {
         self.start_driven(args, Driving::default()).await
     }
 
-    /// Starts an episode. Where every place is taken, an episode that has ended makes room.
+    /// Starts an episode. If every place is taken, an ended episode makes room.
     pub async fn start_driven(
         &self,
         args: StartEpisode,
@@ -180,13 +185,13 @@ impl EpisodeTable {
         Ok(StartReply { briefing, ..reply })
     }
 
-    /// As [`EpisodeTable::start_driven`], of an episode that is not as this server's are.
+    /// Starts an episode whose specification differs from the server's settings.
     pub async fn start_spec(&self, spec: EpisodeSpec, driving: &Driving) -> Result<StartReply, HostingError> {
         self.check_starts()?;
         self.start_kept(spec, driving, None).await
     }
 
-    /// Starts an episode that a server which is started again brings back; `key` is that of the start.
+    /// Starts an episode that a restarted server brings back; `key` belongs to the start.
     async fn start_kept(
         &self,
         spec: EpisodeSpec,
@@ -203,7 +208,7 @@ impl EpisodeTable {
             let heading = Heading::new(build, spec, self.settings.record, driving, start.clone(), key);
             episode.begin_journal(heading).await?;
             if self.settings.advertised_url.is_some() {
-                // Whichever server is asked for it first plays it.
+                // The server that receives the first request for it plays it.
                 episode.put_aside();
             }
         }
@@ -249,7 +254,7 @@ impl EpisodeTable {
         Ok((episode, StartReply { episode_id: id.into(), idle_limit_s, operators, briefing }))
     }
 
-    /// What an episode is played in here.
+    /// Returns the environment in which an episode is played here.
     pub(super) fn surroundings(
         &self,
         folder: RunFolder,
@@ -260,8 +265,8 @@ impl EpisodeTable {
         Surroundings { folder, place, metrics: self.metrics.clone(), memory, journals }
     }
 
-    /// The reply to `list_tasks`, with this server's limit of thinking where it has one, and without what its policies are
-    /// not told.
+    /// Returns the reply to `list_tasks`, with this server's limit on thinking time and without what is
+    /// hidden from its policies.
     pub fn task_list(&self) -> TaskList {
         let Settings { tasks, stress, base_limits, instructions, .. } = &*self.settings;
         let mut list = instructions.task_list(tasks, *stress, base_limits);
@@ -270,24 +275,25 @@ impl EpisodeTable {
             protocols.for_each(|info| info.wall_clock_s = Some(limit_s.into()));
         }
         match self.settings.assistance {
-            // How the score is counted is no part of the task.
+            // How the score is counted is not part of the task.
             Assistance::Paper => list.tasks.iter_mut().for_each(|task| task.phases.clear()),
             Assistance::Full => {}
         }
         list
     }
 
-    /// The thread of the episode `id`.
+    /// Returns the thread of the episode `id`.
     pub fn get(&self, id: &str) -> Result<Arc<EpisodeThread>, HostingError> {
         self.hosted(id).map(|hosted| hosted.thread)
     }
 
-    /// The episode `id`.
+    /// Returns the episode `id`.
     pub fn hosted(&self, id: &str) -> Result<HostedEpisode, HostingError> {
         self.lock().episodes.get(id).cloned().ok_or_else(|| unknown(id))
     }
 
-    /// An operator's episode, wherever it has been before, its team, and the operator's robot.
+    /// Returns an operator's episode, its team and the operator's robot. Brings the episode back if
+    /// necessary.
     pub async fn own_robot<'a>(
         self: &Arc<Self>,
         caller: &'a Caller,
@@ -298,8 +304,8 @@ impl EpisodeTable {
         Ok((hosted, team, robot))
     }
 
-    /// Checks that `who` may replace operators by the expert or a policy of this process. The episode's starter
-    /// may.
+    /// Checks that `who` may replace operators by the expert or a policy of this process. Only the client
+    /// that starts episodes may.
     pub fn check_stand_in(&self, who: &Caller) -> Result<(), HostingError> {
         match (&self.purpose, who) {
             (Purpose::Evaluation, _) => Err(HostingError::OneEpisode),
@@ -309,31 +315,31 @@ impl EpisodeTable {
         }
     }
 
-    /// The episode `id`, wherever it has been before, and its operators.
+    /// Returns the episode `id` and its operators. Brings the episode back if necessary.
     pub async fn team(self: &Arc<Self>, id: &str) -> Result<(HostedEpisode, Arc<Team>), HostingError> {
         let hosted = self.awake(id).await?;
         let team = hosted.team().cloned().ok_or(HostingError::OnePolicy)?;
         Ok((hosted, team))
     }
 
-    /// What `who` has to know to play the episode `id`, in this server's words.
+    /// Returns the briefing of the episode `id` for `who`, with this server's instructions.
     pub async fn briefing(&self, id: &str, who: &Caller) -> Result<Briefing, HostingError> {
         self.hosted(id)?.briefing(who).await
     }
 
-    /// The episodes that `who` may know of, by id.
+    /// Lists the episodes that `who` may know of, by id.
     pub fn list(&self, who: &Caller) -> EpisodeList {
         let held = self.lock();
         let known = held.episodes.values().filter(|episode| episode.admit(who).is_ok());
         EpisodeList { episodes: known.map(HostedEpisode::told_entry).collect() }
     }
 
-    /// All episodes, for those who watch.
+    /// Lists all episodes for watchers.
     pub fn watched(&self) -> EpisodeList {
         EpisodeList { episodes: self.lock().episodes.values().map(HostedEpisode::entry).collect() }
     }
 
-    /// Whether `who` is an operator who may talk to others.
+    /// Returns true if `who` is an operator that may talk to others.
     pub fn may_talk(&self, who: &Caller) -> bool {
         match who {
             Caller::Operator { episode, .. } => self.hosted(episode).is_ok_and(|hosted| hosted.may_talk()),
@@ -341,8 +347,9 @@ impl EpisodeTable {
         }
     }
 
-    /// The operator whose token `text` is. Every token of every episode is compared. Between two episodes of a collection, its people are
-    /// operators of none, whose id is empty.
+    /// Returns the operator with the token `text`. Every token of every episode is compared.
+    ///
+    /// Between two episodes, the people of a collection are operators of an episode with an empty id.
     pub fn operator(&self, text: &str) -> Option<Caller> {
         let seat = self.collection().and_then(|collection| collection.robot_of(text));
         let seat = seat.map(|robot| Caller::Operator { episode: String::new(), robot: robot.into() });
@@ -357,7 +364,7 @@ impl EpisodeTable {
     pub async fn remove(&self, id: &str) -> Result<ResultReply, HostingError> {
         let episode = self.lock().episodes.remove(id).ok_or_else(|| unknown(id))?;
         let result = match episode.close().await {
-            // It cannot be played to its end here; its recording is what there is of it.
+            // This build cannot play it to its end, so only its recording remains.
             Err(error) if error.is_of_other_build() => {
                 let journal = self.journals.get().and_then(|journals| journals.journal(id));
                 if let Some(Err(error)) = journal.map(fs::remove_file) {
@@ -371,34 +378,36 @@ impl EpisodeTable {
         Ok(result.disclosed(self.settings.disclosure))
     }
 
-    /// Forgets the episode `id`, which is somebody else's now.
+    /// Forgets the episode `id`, which another server has taken over.
     pub(super) fn forget(&self, id: &str) {
         self.lock().episodes.remove(id);
     }
 
-    /// All that are held.
+    /// Returns all episodes that are held.
     pub(super) fn all(&self) -> Vec<HostedEpisode> {
         self.lock().episodes.values().cloned().collect()
     }
 
-    /// How many episodes are held.
+    /// Returns the number of episodes that are held.
     pub fn len(&self) -> usize {
         self.lock().episodes.len()
     }
 
-    /// Whether no episode is held.
+    /// Returns true if no episode is held.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// How many of them go on.
+    /// Returns the number of episodes that have not ended.
     pub fn running(&self) -> usize {
         self.lock().episodes.values().filter(|episode| !episode.thread.ended()).count()
     }
 
-    /// Takes no more episodes, ends those that are held after the calls already waiting, and returns when every
-    /// file is closed, or after `limit`. What was not closed by then is returned by name. Those that `keep`
-    /// says, and those that sleep, go on where they are brought back.
+    /// Takes no more episodes, ends those that are held after the calls already waiting, and closes every
+    /// file.
+    ///
+    /// Returns when all are closed or after `limit`, with the names of those that were not closed by
+    /// then. With `keep`, episodes go on when they are brought back; sleeping episodes always do.
     pub async fn close_all(&self, limit: Duration, keep: bool) -> Vec<String> {
         let deadline = Instant::now() + limit;
         let episodes = {
@@ -418,7 +427,7 @@ impl EpisodeTable {
             });
         }
         let mut left: Vec<String> = closings.join_all().await.into_iter().flatten().collect();
-        // Also waits for episodes that are just starting, and for those whose client left during the start.
+        // Also waits for episodes that are starting, including those whose client has left.
         let places = self.settings.max_episodes;
         if timeout_at(deadline, self.places.acquire_many(places)).await.is_err() {
             let starting = (places as usize).saturating_sub(self.places.available_permits() + left.len());
@@ -427,13 +436,13 @@ impl EpisodeTable {
         left
     }
 
-    /// Holds an episode that one policy directs.
+    /// Holds an episode that one policy controls.
     #[cfg(test)]
     pub(crate) fn insert(&self, id: &str, episode: Arc<EpisodeThread>) -> Result<(), HostingError> {
         self.hold(HostedEpisode::new(id, episode, Arc::default()))
     }
 
-    /// Holds an episode, unless the table is closing or holds one of that id, which stays.
+    /// Holds an episode, unless the table is closing or holds one with that id, which stays.
     pub(super) fn hold(&self, episode: HostedEpisode) -> Result<(), HostingError> {
         let mut held = self.lock();
         if held.closing {
@@ -454,7 +463,7 @@ impl EpisodeTable {
             return Ok(place);
         }
         if let Some(ended) = self.remove_one_that_has_ended() {
-            // Its own result is not this caller's business.
+            // Its result is not for this caller.
             let _ = ended.end_for_good().await;
         }
         let limit = self.settings.max_episodes;
@@ -469,7 +478,7 @@ impl EpisodeTable {
     }
 
     fn lock(&self) -> MutexGuard<'_, HeldEpisodes> {
-        // Nothing panics while it holds the lock; were it so, the map itself would still be whole.
+        // Nothing panics while it holds the lock. Even then, the map itself would be whole.
         self.held.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 }
@@ -478,7 +487,7 @@ pub(super) fn unknown(id: &str) -> HostingError {
     HostingError::UnknownEpisode { id: id.into() }
 }
 
-/// Whose words do not reach the others in an episode of `spec`.
+/// Returns the loss of messages between operators that the stress of `spec` prescribes, if any.
 pub(super) fn silence(spec: &EpisodeSpec) -> Option<Silence> {
     spec.stress.and_then(|stress| stress.silence(spec.world_seed(), spec.task.robots.len()))
 }

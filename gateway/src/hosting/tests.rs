@@ -1,4 +1,5 @@
-//! Episodes that go wrong: each ends alone, and leaves a recording that can be read. Their clocks are the tests' own hands.
+//! Tests of episodes that fail: each ends alone and leaves a readable recording. The tests set the
+//! clocks.
 
 use std::{
     path::Path,
@@ -19,7 +20,7 @@ use crate::settings::{Durability, Layer, Settings};
 
 const IDLE: Duration = Duration::from_secs(900);
 
-/// An episode that is recorded in `folder`, of which nothing else is known.
+/// Returns the surroundings of an episode that is recorded in `folder` and has no other state.
 pub fn alone(folder: &Path, place: OwnedSemaphorePermit) -> Surroundings {
     let memory = Arc::new(Beside::default());
     Surroundings { folder: folder.into(), place, metrics: Arc::default(), memory, journals: None }
@@ -45,7 +46,7 @@ async fn status(episode: &EpisodeThread) -> StatusReply {
     }
 }
 
-/// A clock that stands at a time that is set from outside, in seconds.
+/// Creates a clock whose time is set from outside, in seconds.
 fn hands() -> (Arc<AtomicU64>, Clock) {
     let hands_s = Arc::new(AtomicU64::new(0));
     let read = hands_s.clone();
@@ -77,7 +78,7 @@ async fn a_panic_ends_its_own_episode_and_no_other() {
     let broken = Arc::new(AtomicBool::new(false));
     let (breaks, readings) = (broken.clone(), AtomicU64::new(0));
     let clock: Clock = Box::new(move || {
-        // Once: closing the episode asks for the time, too.
+        // It panics once, because closing the episode also reads the clock.
         assert!(!breaks.swap(false, Relaxed), "the clock is broken");
         Duration::from_millis(readings.fetch_add(1, Relaxed))
     });
@@ -134,7 +135,7 @@ async fn closing_ends_in_time_and_says_what_it_left() {
     let hanging = hangs.clone();
     let clock: Clock = Box::new(move || {
         if hanging.load(Relaxed) {
-            // Until the test lets go of the other end.
+            // Blocks until the test drops the other end.
             let _ = stuck.recv();
         }
         Duration::ZERO
@@ -159,7 +160,7 @@ async fn closing_ends_in_time_and_says_what_it_left() {
     late.close().await.unwrap();
 }
 
-/// Who asks a sleeping episode for something notices nothing but the time that it takes.
+/// A request to a sleeping episode differs from others only in its duration.
 #[tokio::test]
 async fn an_episode_that_was_put_aside_is_as_it_was() {
     let runs = tempfile::tempdir().unwrap();

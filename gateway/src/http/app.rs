@@ -1,4 +1,5 @@
-//! What every handler needs: the episodes and the settings, and calls of tools counted and timed, whichever protocol they come by.
+//! State that every handler needs: the episodes and the settings. Tool calls are counted and timed here,
+//! for all protocols.
 
 use std::{sync::Arc, time::Instant};
 
@@ -21,27 +22,27 @@ use crate::{
 /// The version of this program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// The server as its handlers see it.
+/// State of the server for its handlers.
 #[derive(Debug, Clone)]
 pub struct AppState {
     /// The episodes that are held.
     pub table: Arc<EpisodeTable>,
-    /// What the server was told.
+    /// Settings of the server.
     pub settings: Arc<Settings>,
-    /// Who may watch.
+    /// Key that watchers need.
     pub watch_key: WatchKey,
-    /// Places for those who watch.
+    /// Places for watchers.
     pub watchers: Arc<Semaphore>,
-    /// Reads the recordings that are watched.
+    /// Reader of recordings for watchers.
     pub recordings: RecordingReader,
-    /// Reads those of which films are made, which takes longer.
+    /// Reader of recordings for films, which take longer.
     pub films: RecordingReader,
-    /// The evaluations in the runs folder, as they were when they were listed last.
+    /// Evaluations in the runs folder, as of their last listing.
     pub evaluations: KnownEvaluations,
 }
 
 impl AppState {
-    /// A server that holds no episode yet.
+    /// Creates the state of a server that holds no episode yet.
     pub fn new(table: Arc<EpisodeTable>, settings: Arc<Settings>, watch_key: WatchKey) -> AppState {
         let watchers = Arc::new(Semaphore::new(MAX_WATCHERS));
         let (recordings, films) = (RecordingReader::start(), RecordingReader::start());
@@ -49,7 +50,7 @@ impl AppState {
         AppState { table, settings, watch_key, watchers, recordings, films, evaluations }
     }
 
-    /// The tools that `caller` may be offered: talking is for operators who may.
+    /// Returns the tools that `caller` may use. Talking is only for operators that may talk.
     pub fn tool_specs(&self, caller: &Caller) -> Vec<ToolSpec> {
         let mut specs = match self.table.may_talk(caller) {
             true => operator_tool_specs(self.settings.wording()),
@@ -62,13 +63,13 @@ impl AppState {
         specs
     }
 
-    /// The REST interface as `caller` may use it.
+    /// Returns the description of the REST interface for `caller`.
     pub fn openapi(&self, caller: &Caller) -> Value {
         tandem_tools_spec::openapi(VERSION, self.settings.wording(), self.table.may_talk(caller))
     }
 }
 
-/// Answers a call of the tool `name` by `work`, and counts it with its status and the time it took.
+/// Runs `work` to answer a call of the tool `name`, and records its status and duration.
 pub async fn counted<T>(
     app: &AppState,
     name: &str,
@@ -81,12 +82,14 @@ pub async fn counted<T>(
     answer
 }
 
-/// The tool called `name`. Only names of tools are counted: callers could make up any number of others.
+/// Returns the tool called `name`. Only known names are counted, because callers could invent any number
+/// of others.
 fn known(name: &str) -> Option<&'static str> {
     every_tool().into_iter().find(|tool| *tool == name)
 }
 
-/// The names of all tools: those that need no episode, those of every episode, and those that only some episodes have.
+/// Returns the names of all tools: those without an episode, those of every episode, and those that only
+/// some episodes have.
 pub fn every_tool() -> Vec<&'static str> {
     [ListTasks::NAME, StartEpisode::NAME].into_iter().chain(EPISODE_TOOLS.iter().copied()).collect()
 }

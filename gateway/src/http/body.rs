@@ -1,4 +1,4 @@
-//! Reads request bodies: one object in JSON or MessagePack, in which no object names a field twice.
+//! Parsing of request bodies: one object in JSON or MessagePack, in which no object has duplicate fields.
 
 use std::fmt;
 
@@ -10,7 +10,7 @@ use serde_json::{Map, Number, Value};
 
 use super::problem::ApiError;
 
-/// The JSON object in `body`; no body stands for an object without fields.
+/// Parses the JSON object in `body`. An empty body is an object without fields.
 pub fn json_object(body: &[u8]) -> Result<Value, ApiError> {
     if body.is_empty() {
         return Ok(Value::Object(Map::new()));
@@ -20,10 +20,10 @@ pub fn json_object(body: &[u8]) -> Result<Value, ApiError> {
     object(value)
 }
 
-/// How deep arrays and maps may be nested: as deep as serde_json reads JSON.
+/// Maximum nesting of arrays and maps, the same as in serde_json.
 const MAX_DEPTH: usize = 128;
 
-/// The MessagePack map in `body`; no body stands for a map without fields.
+/// Parses the MessagePack map in `body`. An empty body is a map without fields.
 pub fn msgpack_object(body: &[u8]) -> Result<Value, ApiError> {
     if body.is_empty() {
         return Ok(Value::Object(Map::new()));
@@ -51,13 +51,13 @@ fn object(value: Value) -> Result<Value, ApiError> {
     }
 }
 
-/// Refuses JSON in which an object names a field twice, and what is no JSON.
+/// Refuses invalid JSON and JSON with duplicate fields in an object.
 pub fn check_unique_fields(body: &[u8]) -> Result<(), String> {
     let read: Result<UniqueFields, _> = serde_json::from_slice(body);
     read.map(drop).map_err(|error| error.to_string())
 }
 
-/// JSON in which no object names a field twice: readers of JSON differ in which of the two values they take.
+/// JSON without duplicate fields, because parsers differ in which of the two values they take.
 struct UniqueFields(Value);
 
 impl<'de> Deserialize<'de> for UniqueFields {
@@ -87,7 +87,7 @@ impl<'de> Visitor<'de> for UniqueFieldsVisitor {
         Ok(Value::Null)
     }
 
-    // What MessagePack calls nil.
+    // MessagePack calls this nil.
     fn visit_none<E>(self) -> Result<Value, E> {
         Ok(Value::Null)
     }

@@ -1,4 +1,4 @@
-//! JSON and MessagePack: the format that a request's body is read in, and that of its reply.
+//! JSON and MessagePack: the formats of request bodies and replies.
 
 use axum::{
     extract::FromRequestParts,
@@ -13,10 +13,10 @@ use super::{
     problem::ApiError,
 };
 
-/// The media types of MessagePack: the registered one, and one that was used before.
+/// Media types of MessagePack: the registered one, and an older one.
 const MSGPACK: [&str; 2] = ["application/msgpack", "application/x-msgpack"];
 
-/// The format of a request's body, and that of its reply.
+/// Formats of a request's body and of its reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Encoding {
     body: BodyFormat,
@@ -29,7 +29,7 @@ enum BodyFormat {
     Msgpack,
 }
 
-/// Whether bodies of this media type can be read.
+/// Returns true if bodies of this media type can be read.
 pub fn is_read(content_type: &str) -> bool {
     is(content_type, "application/json") || is_msgpack(content_type)
 }
@@ -48,7 +48,7 @@ impl Encoding {
         let text = |name| headers.get(name).and_then(|value| value.to_str().ok()).unwrap_or_default();
         let format = |msgpack: bool| if msgpack { BodyFormat::Msgpack } else { BodyFormat::Json };
         let body = format(is_msgpack(text(header::CONTENT_TYPE)));
-        // A caller that accepts both gets its reply in the form of its request.
+        // A caller that accepts both gets its reply in the format of its request.
         let accepted = text(header::ACCEPT);
         let (json, msgpack) = accepted.split(',').fold((false, false), |(json, msgpack), one| {
             (json || is(one, "application/json"), msgpack || is_msgpack(one))
@@ -57,7 +57,7 @@ impl Encoding {
         Encoding { body, reply }
     }
 
-    /// Reads a body; none stands for an object without fields.
+    /// Parses a body. An empty one is an object without fields.
     pub fn read(self, body: &[u8]) -> Result<Value, ApiError> {
         match self.body {
             BodyFormat::Json => json_object(body),
@@ -65,7 +65,7 @@ impl Encoding {
         }
     }
 
-    /// Writes a reply.
+    /// Serializes a reply.
     pub fn write(self, status: StatusCode, reply: &impl Serialize) -> Result<Response, ApiError> {
         let (kind, bytes) = match self.reply {
             BodyFormat::Json => (

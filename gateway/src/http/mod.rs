@@ -1,4 +1,4 @@
-//! Episodes over HTTP: REST under `/v1`, MCP at `/mcp`, and problem details for whatever is refused.
+//! Episodes over HTTP: REST under `/v1`, MCP at `/mcp`, and problem details for every refusal.
 
 mod app;
 mod body;

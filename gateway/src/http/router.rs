@@ -1,4 +1,5 @@
-//! The whole service: REST and MCP behind the gate, every request logged, and every refusal described and counted.
+//! The whole service: REST and MCP behind the gate. Every request is logged, and every refusal is
+//! described and counted.
 
 use axum::{
     Router,
@@ -20,9 +21,9 @@ use super::{
     rest,
 };
 
-/// The whole service.
+/// Builds the router of the whole service.
 pub fn router(app: AppState, gate: Gate, limits: Limits) -> Router {
-    // Nobody drives the robots of an episode that is scored but its policy.
+    // In an evaluation, only the policy drives the robots.
     let operating = if app.table.is_evaluation() { Router::new() } else { pages::operate::router() };
     let routed = rest::router()
         .merge(pages::router())
@@ -36,11 +37,12 @@ pub fn router(app: AppState, gate: Gate, limits: Limits) -> Router {
         .layer(middleware::from_fn_with_state(gate, gate::pass))
         .layer(middleware::from_fn_with_state(app.clone(), log_and_describe))
         .with_state(app.clone());
-    // Around all of it: what axum itself adds to an answer, as the methods of a path, would say which paths there are.
+    // This layer is outermost, because axum's own additions to an answer, such as the methods of a path,
+    // would reveal which paths exist.
     Router::new()
         .fallback_service(routed)
         .layer(middleware::from_fn_with_state(app.clone(), tokens::identify))
-        // Before it, so that nobody tries tokens faster than requests are let in.
+        // The rate limit comes first, so that tokens cannot be tried faster than requests are admitted.
         .layer(middleware::from_fn_with_state(limits, limits::pass_rate))
         .layer(middleware::from_fn_with_state(app, count_refusal))
 }
@@ -60,7 +62,7 @@ fn refused_route(app: &AppState, method: Method, uri: Uri, other_method: bool) -
     ApiError::NoRoute { method: method.to_string(), path: uri.path().into(), have, other_method }
 }
 
-/// Counts what is refused, wherever that was.
+/// Counts every refusal, whichever layer it comes from.
 async fn count_refusal(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let response = next.run(request).await;
     if let Some(RefusalKind(kind)) = response.extensions().get() {
@@ -69,8 +71,11 @@ async fn count_refusal(State(app): State<AppState>, request: Request, next: Next
     response
 }
 
-/// Logs every request, and turns refusals of axum's own (as of a path that is not UTF-8) into problem details. Of what
-/// a caller wrote, the log has the route, and the episode where there is such an episode: whatever else there is may be a secret.
+/// Logs every request, and turns axum's own refusals into problem details, for example for a path that is
+/// not UTF-8.
+///
+/// Of the caller's text, the log has only the route and the id of an existing episode, because anything
+/// else may be a secret.
 async fn log_and_describe(State(app): State<AppState>, request: Request, next: Next) -> Response {
     let method = request.method().clone();
     let route = request.extensions().get::<MatchedPath>().map_or("none", MatchedPath::as_str).to_owned();
@@ -97,7 +102,7 @@ async fn log_and_describe(State(app): State<AppState>, request: Request, next: N
     response
 }
 
-/// What a path names as the episode.
+/// Returns the episode id in a path.
 fn episode_of(path: &str) -> Option<&str> {
     path.strip_prefix("/v1/episodes/")?.split('/').next()
 }

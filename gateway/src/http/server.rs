@@ -1,4 +1,4 @@
-//! The server: binds, serves, and closes every recording before it stops.
+//! The server: it binds, serves, and closes every recording before it stops.
 
 use std::{io, net::SocketAddr, sync::Arc, time::Duration};
 
@@ -22,22 +22,24 @@ use crate::{
     settings::Settings,
 };
 
-/// How many threads serve requests: these only parse, wait and answer, because the worlds have threads of their own.
+/// Number of threads for requests. They only parse, wait and answer, because the worlds have threads of
+/// their own.
 const HTTP_THREADS: usize = 2;
 
-/// Connections of one address that may always wait for a request, however few requests may be under way.
+/// Minimum number of connections of one address that may wait for a request, whatever the limit on
+/// requests is.
 const MIN_WAITING_PER_ADDRESS: usize = 64;
 
-/// How long requests that are still arriving at the end may take.
+/// Time that requests may take to arrive at shutdown.
 const REQUEST_GRACE: Duration = Duration::from_secs(5);
 
-/// How often the server looks for episodes whose policies make no more calls.
+/// Interval between two searches for abandoned episodes.
 const TIDY_INTERVAL: Duration = Duration::from_secs(1);
 
-/// Of so many of these times, in one it looks for what other servers do on the same runs.
+/// Number of these intervals per check of the other servers on the same runs folder.
 const TICKS_PER_LOOK: u64 = 10;
 
-/// A running server. Dropping it stops it at once; [`Server::stop`] lets calls under way finish.
+/// A running server. Dropping it stops it at once; [`Server::stop`] lets pending calls finish.
 #[derive(Debug)]
 pub struct Server {
     runtime: Runtime,
@@ -55,7 +57,7 @@ impl Server {
         Server::start_for(settings, Guests::default())
     }
 
-    /// As [`Server::start`], for `guests`.
+    /// Does the same as [`Server::start`], for `guests`.
     pub fn start_for(settings: Arc<Settings>, guests: Guests) -> io::Result<Server> {
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(HTTP_THREADS)
@@ -101,17 +103,17 @@ impl Server {
         Ok(Server { runtime, address, watch_link, table, stop, served, settings })
     }
 
-    /// The address that it serves on.
+    /// Returns the address on which it serves.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// The link by which people watch. Who has it sees all, so it is for no log and no policy.
+    /// Returns the watch link. It grants full view, so it must not be logged or given to policies.
     pub fn watch_link(&self) -> &str {
         &self.watch_link
     }
 
-    /// Where people start episodes whose robots they drive.
+    /// Returns the link of the page on which people start episodes and drive robots.
     pub fn operate_link(&self) -> String {
         let (origin, _) = self.watch_link.split_once(WATCH).unwrap_or((&self.watch_link, ""));
         format!("{origin}{OPERATE}")
@@ -134,13 +136,15 @@ impl Server {
         self.runtime.block_on(self.table.remove(id)).map(drop)
     }
 
-    /// The episodes, for experts and scoring in this process.
+    /// Returns the table of episodes, for experts and scoring in this process.
     pub fn table(&self) -> &Arc<EpisodeTable> {
         &self.table
     }
 
-    /// Serves until it is asked to end, then stops as [`Server::stop`] does. Episodes under way go on when the
-    /// next server on the same runs brings them back, unless somebody has ended this one from a keyboard.
+    /// Serves until a shutdown signal, then stops as [`Server::stop`] does.
+    ///
+    /// Running episodes go on when the next server on the same runs folder brings them back, unless the
+    /// signal came from the keyboard.
     pub fn run_until_signal(self) -> Vec<String> {
         let keep = self.runtime.block_on(shutdown_signal()) == ShutdownSignal::Terminate;
         tracing::info!("shutting down; calls under way finish first, a second signal ends at once");
@@ -151,13 +155,14 @@ impl Server {
         self.stop_for(keep)
     }
 
-    /// Takes no more requests, finishes the calls under way, and returns when every recording is closed, or after the time
-    /// that the settings allow; what was not closed by then is logged, and returned.
+    /// Takes no more requests, finishes pending calls and closes every recording. Returns after at most
+    /// the time that the settings allow. Episodes that were not closed by then are logged and returned.
     pub fn stop(self) -> Vec<String> {
         self.stop_for(false)
     }
 
-    /// As [`Server::stop`]; episodes under way go on when the next server on the same runs brings them back.
+    /// Does the same as [`Server::stop`], but running episodes go on when the next server on the same
+    /// runs folder brings them back.
     pub fn stop_keeping(self) -> Vec<String> {
         self.stop_for(true)
     }
@@ -170,7 +175,8 @@ impl Server {
             if !left.is_empty() {
                 tracing::error!(left = left.join(", "), "ending without these, which did not end in time");
             }
-            // A client that never finishes its request must not keep the process alive; the recordings are closed by now.
+            // A client that never finishes its request must not keep the process alive; the recordings
+            // are closed by now.
             if tokio::time::timeout(REQUEST_GRACE, served).await.is_err() {
                 tracing::warn!("a request was cut off");
             }
@@ -190,16 +196,16 @@ async fn look_after(table: Arc<EpisodeTable>) {
     }
 }
 
-/// Who has asked this process to end.
+/// Source of the request to end this process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ShutdownSignal {
-    /// Somebody at the keyboard, by SIGINT.
+    /// The keyboard, by SIGINT.
     Interrupt,
-    /// Whoever looks after the process, by SIGTERM, or the terminal that is closed, by SIGHUP.
+    /// A supervisor, by SIGTERM, or a closed terminal, by SIGHUP.
     Terminate,
 }
 
-/// Waits until this process is asked to end.
+/// Waits for a request to end this process.
 #[cfg(unix)]
 pub async fn shutdown_signal() -> ShutdownSignal {
     use tokio::signal::unix::{SignalKind, signal};
@@ -213,7 +219,7 @@ pub async fn shutdown_signal() -> ShutdownSignal {
         }
     };
     let hang_up = async {
-        // Whoever started the process by nohup wants it to outlive its terminal.
+        // A process started by nohup is meant to outlive its terminal.
         match is_hangup_ignored() {
             false => match signal(SignalKind::hangup()) {
                 Ok(mut signals) => drop(signals.recv().await),
@@ -229,7 +235,8 @@ pub async fn shutdown_signal() -> ShutdownSignal {
     }
 }
 
-/// Whether the process was started with SIGHUP ignored, as it was before anybody listened for it.
+/// Returns true if the process was started with SIGHUP ignored. The first call must precede the signal
+/// handler.
 #[cfg(unix)]
 fn is_hangup_ignored() -> bool {
     use std::sync::OnceLock;
@@ -242,7 +249,7 @@ fn is_hangup_ignored() -> bool {
     })
 }
 
-/// Waits until this process is asked to end.
+/// Waits for a request to end this process.
 #[cfg(not(unix))]
 pub async fn shutdown_signal() -> ShutdownSignal {
     let _ = tokio::signal::ctrl_c().await;

@@ -1,4 +1,4 @@
-//! An episode whose physics diverges, driven over HTTP beside one that is sound.
+//! Test of an episode whose physics diverges, driven over HTTP beside a sound one.
 
 use std::{path::Path, sync::Arc};
 
@@ -15,7 +15,7 @@ use crate::{
     settings::{Layer, Settings},
 };
 
-/// Has `server` hold an episode of Handover with the robots of a file, which no caller can ask for.
+/// Makes `server` hold a Handover episode with the robots of a file, which no caller can request.
 fn hold(server: &Server, id: &str, robot: &Path, folder: &Path) {
     let handover = tasks::find("handover").unwrap();
     let spec = EpisodeSpec {

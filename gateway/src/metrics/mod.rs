@@ -1,4 +1,4 @@
-//! What a server has done, counted, in the text format that Prometheus reads.
+//! Counters of a server, in the text format of Prometheus.
 
 mod page;
 
@@ -22,55 +22,56 @@ pub struct Metrics {
 #[derive(Debug, Default)]
 struct Counts {
     started: u64,
-    /// Episodes that have ended, by the reason.
+    /// Number of ended episodes by reason.
     ended: BTreeMap<String, u64>,
-    /// Calls, by tool and HTTP status.
+    /// Number of calls by tool and HTTP status.
     calls: BTreeMap<(&'static str, u16), u64>,
-    /// Times of answers, by tool.
+    /// Response times by tool.
     answered: BTreeMap<&'static str, Histogram>,
-    /// Refusals, by the kind of problem.
+    /// Number of refusals by the kind of problem.
     refused: BTreeMap<String, u64>,
     physics: Duration,
     control_steps: u64,
 }
 
 impl Metrics {
-    /// An episode has begun.
+    /// Counts an episode that has begun.
     pub fn episode_started(&self) {
         self.lock().started += 1;
     }
 
-    /// An episode has ended.
+    /// Counts an episode that has ended.
     pub fn episode_ended(&self, reason: EndReason) {
         let name = serde_json::json!(reason).as_str().unwrap_or_default().to_owned();
         *self.lock().ended.entry(name).or_default() += 1;
     }
 
-    /// A call was answered, by a reply or a refusal, after the time `took`.
+    /// Counts a call that was answered or refused after the time `took`.
     pub fn call_answered(&self, tool: &'static str, status: u16, took: Duration) {
         let mut counts = self.lock();
         *counts.calls.entry((tool, status)).or_default() += 1;
         counts.answered.entry(tool).or_default().add(took);
     }
 
-    /// A request was refused with a problem of this kind.
+    /// Counts a request that was refused with this kind of problem.
     pub fn request_refused(&self, problem: &str) {
         *self.lock().refused.entry(problem.to_owned()).or_default() += 1;
     }
 
-    /// An episode went on by `control_steps`, for which physics took the time `physics`.
+    /// Counts `control_steps` simulated steps, which took the time `physics`.
     pub fn simulated(&self, control_steps: u64, physics: Duration) {
         let mut counts = self.lock();
         counts.control_steps += control_steps;
         counts.physics += physics;
     }
 
-    /// Time that physics has taken, of all episodes together.
+    /// Returns the physics time of all episodes together.
     pub fn physics(&self) -> Duration {
         self.lock().physics
     }
 
-    /// All counts as Prometheus reads them; `held` episodes are held at present, of which `running` go on.
+    /// Returns all counts in the format of Prometheus. `held` episodes are held at present, of which
+    /// `running` have not ended.
     pub fn page(&self, held: usize, running: usize) -> String {
         let counts = self.lock();
         let mut page = MetricsPage::default();

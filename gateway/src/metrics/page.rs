@@ -1,27 +1,27 @@
-//! The text format of Prometheus, version 0.0.4, and the histograms that stand in it.
+//! The text format of Prometheus, version 0.0.4, and its histograms.
 
 use std::{
     fmt::{Display, Write},
     time::Duration,
 };
 
-/// A page that is being written.
+/// A page under construction.
 #[derive(Debug, Default)]
 pub struct MetricsPage {
     text: String,
 }
 
 impl MetricsPage {
-    /// The media type.
+    /// Media type of the page.
     pub const CONTENT_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
 
-    /// A number that goes up and down.
+    /// Adds a gauge, a number that goes up and down.
     pub fn gauge(&mut self, name: &str, help: &str, value: impl Display) {
         self.head(name, help, "gauge");
         self.line(format_args!("{name} {value}"));
     }
 
-    /// Numbers that only grow, by label.
+    /// Adds a counter by label; its numbers only grow.
     pub fn counter<L: Display, V: Display>(
         &mut self,
         name: &str,
@@ -34,7 +34,7 @@ impl MetricsPage {
         }
     }
 
-    /// Durations, by label.
+    /// Adds histograms of durations by label.
     pub fn histograms<'a>(
         &mut self,
         name: &str,
@@ -53,7 +53,7 @@ impl MetricsPage {
         }
     }
 
-    /// The whole page.
+    /// Returns the whole page.
     pub fn text(self) -> String {
         self.text
     }
@@ -63,18 +63,19 @@ impl MetricsPage {
     }
 
     fn line(&mut self, line: impl Display) {
-        // Writing to a text does not fail.
+        // Writing to a string cannot fail.
         let _ = writeln!(self.text, "{line}");
     }
 }
 
-/// Upper ends of the buckets, in seconds: calls without physics take less than a millisecond, commands and pictures a few hundred.
+/// Upper bounds of the buckets in seconds. Calls without physics take less than a millisecond, commands
+/// and images a few hundred.
 const BOUNDS_S: [f64; 12] = [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0];
 
 /// Durations, counted in buckets.
 #[derive(Debug, Default)]
 pub struct Histogram {
-    /// How many durations fell into each bucket; the last counts those above every bound.
+    /// Number of durations per bucket; the last counts those above every bound.
     counts: [u64; BOUNDS_S.len() + 1],
     sum: Duration,
 }
@@ -87,7 +88,7 @@ impl Histogram {
         self.sum += took;
     }
 
-    /// How many durations are at most as long as each bound; the last counts all.
+    /// Returns, for each bound, the number of durations up to it; the last is the number of all.
     fn cumulative(&self) -> [u64; BOUNDS_S.len() + 1] {
         let mut sum = 0;
         self.counts.map(|count| {
@@ -96,7 +97,7 @@ impl Histogram {
         })
     }
 
-    /// The sum of all durations.
+    /// Returns the sum of all durations.
     fn sum(&self) -> Duration {
         self.sum
     }

@@ -1,14 +1,14 @@
-//! How safe a call is before it is answered.
+//! Durability of a call before it is answered.
 
 use serde::Deserialize;
 
-/// How far a call has to be on its way to the disk before its answer leaves.
+/// Durability that a call needs before its answer is sent.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Durability {
-    /// With the operating system: it outlives the process, however that ends.
+    /// In the operating system: survives any end of the process.
     #[default]
     System,
-    /// On the disk: it outlives a power cut, too.
+    /// On the disk: also survives a power cut.
     Disk,
 }

@@ -1,4 +1,4 @@
-//! Why settings cannot be resolved.
+//! Errors in settings.
 
 use std::{net::SocketAddr, path::PathBuf};
 
@@ -7,15 +7,15 @@ use tandem_episodes::{InstructionsError, RobotError, SimError, TaskCheckError, T
 use super::tls::TlsError;
 use crate::token::TokenError;
 
-/// Why settings cannot be resolved.
+/// Reason why settings cannot be resolved.
 #[derive(Debug, thiserror::Error)]
 pub enum SettingsError {
     /// The file cannot be read.
     #[error("cannot read the settings file {path}: {source}")]
     Read {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// The token cannot be used.
@@ -32,29 +32,29 @@ pub enum SettingsError {
         "other machines reach {listen}; give a token that every request has to send, by --token-file FILE or in TANDEM_TOKEN (`openssl rand -hex 32` makes one), or listen on 127.0.0.1"
     )]
     Open {
-        /// The address to serve on.
+        /// Address to serve on.
         listen: SocketAddr,
     },
-    /// A limit that lets nothing through.
+    /// A limit is zero.
     #[error("{setting} is 0, and the server could not be used; give at least 1, as {example}")]
     Zero {
-        /// As files call it.
+        /// Name of the setting in files.
         setting: &'static str,
-        /// A number that works.
+        /// Example of a valid number.
         example: &'static str,
     },
-    /// A level of nothing.
+    /// A stress level is given without a stress axis.
     #[error("a level says how much of what goes wrong; give stress, too, as camera, or leave level out")]
     LevelAlone,
-    /// Two settings say in what words tasks are told.
+    /// Two settings change the wording of tasks.
     #[error("the stress words tells tasks in other words, and so does instructions; give one of them")]
     TwoWordings,
-    /// What the server is to be reached by is no name.
+    /// An allowed host is not a host name.
     #[error(
         "allowed_host {name:?} is no name of a host; give it alone, as lab.example, without http:// and port"
     )]
     NoHost {
-        /// What was given.
+        /// Given text.
         name: String,
     },
     /// The file with instructions cannot be used.
@@ -63,12 +63,12 @@ pub enum SettingsError {
     /// A task's file cannot be used.
     #[error(transparent)]
     TaskFile(#[from] TaskFileError),
-    /// A task of a file is well written, and cannot be played.
+    /// A task of a file is valid, but cannot be played.
     #[error("{path}: {source}")]
     Task {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What happens.
+        /// Failure of the trial.
         source: Box<TaskCheckError>,
     },
     /// The scene, the robot, the base controller or the renderer cannot be used.
@@ -77,12 +77,12 @@ pub enum SettingsError {
     /// The robot has changed since it was read.
     #[error(transparent)]
     Robot(#[from] RobotError),
-    /// The file is no TOML, or holds a setting that does not exist.
+    /// The file is not valid TOML, or has an unknown setting.
     #[error("{path}: {source}")]
     Parse {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Where and what.
+        /// Error with its position.
         source: toml::de::Error,
     },
 }

@@ -1,4 +1,4 @@
-//! Which source of settings comes first, and what is refused.
+//! Tests of the precedence of settings and of invalid ones.
 
 use super::*;
 

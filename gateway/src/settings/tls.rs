@@ -1,4 +1,4 @@
-//! The certificate that HTTPS is served with. Headsets give WebXR only to pages of HTTPS, and to those of the machine itself.
+//! The certificate for HTTPS. Headsets allow WebXR only on HTTPS pages and on pages of the device itself.
 
 use std::{
     fmt,
@@ -17,7 +17,7 @@ use tokio_rustls::rustls::{
     version::TLS13,
 };
 
-/// How a certificate is made for a server that is reached as `lab.example`.
+/// Advice on creating a certificate, for a server called `lab.example`.
 const MAKES_ONE: &str = "`openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -nodes -days 365 -subj /CN=lab.example \
      -addext subjectAltName=DNS:lab.example -keyout key.pem -out cert.pem` makes both";
 
@@ -25,45 +25,45 @@ const MAKES_ONE: &str = "`openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curv
 #[derive(Clone)]
 pub struct Certificate(pub Arc<ServerConfig>);
 
-/// Why HTTPS cannot be served.
+/// Reason why HTTPS cannot be served.
 #[derive(Debug, thiserror::Error)]
 pub enum TlsError {
-    /// One of the two files is not named.
+    /// Only one of the two files is given.
     #[error("HTTPS needs a certificate and its key; give {missing} FILE, too; {MAKES_ONE}")]
     Half {
-        /// The flag that is missing.
+        /// Name of the missing flag.
         missing: &'static str,
     },
     /// A file cannot be read, or is not in PEM form.
     #[error("cannot read {what} in {}: {source}; {MAKES_ONE}", .path.display())]
     Unreadable {
-        /// What the file should hold.
+        /// Expected content.
         what: &'static str,
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Error of the parser.
         source: pem::Error,
     },
-    /// A file in PEM form holds no certificate.
+    /// A PEM file has no certificate.
     #[error("{} holds no certificate; {MAKES_ONE}", .path.display())]
     NoCertificate {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
     },
-    /// The two do not belong together, or cannot be used.
+    /// The certificate and the key do not match, or cannot be used.
     #[error("the key in {} is not that of the certificate in {}: {source}; {MAKES_ONE}", .key.display(), .certificate.display())]
     Mismatch {
-        /// The certificate's file.
+        /// Path of the certificate.
         certificate: PathBuf,
-        /// The key's file.
+        /// Path of the key.
         key: PathBuf,
-        /// What is wrong.
+        /// Error of the TLS library.
         source: rustls::Error,
     },
 }
 
 impl Certificate {
-    /// Reads a certificate, with those that vouch for it after it, and its key; both files are named, or neither.
+    /// Reads a certificate chain and its key. Both files have to be given, or neither.
     pub fn of(certificate: Option<&Path>, key: Option<&Path>) -> Result<Option<Certificate>, TlsError> {
         match (certificate, key) {
             (Some(certificate), Some(key)) => Certificate::read(certificate, key).map(Some),

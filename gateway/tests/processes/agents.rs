@@ -1,5 +1,5 @@
-//! Language models, which Python plays: what is said where it cannot, and how it is started. A script stands for it here; the package's
-//! own tests have the loop.
+//! Tests of language models, which Python plays: the errors if it cannot, and its start. A script
+//! replaces Python here; the package's own tests cover the loop.
 
 use std::{
     fs,
@@ -18,7 +18,7 @@ fn tandem(python: &Path, arguments: &[&str]) -> (Output, String) {
     (output, printed.concat())
 }
 
-/// An interpreter that does `what` in place of the loop, unless it is only asked whether it could.
+/// Creates an interpreter that runs `what` in place of the loop, or `when_checked` if it is only checked.
 #[cfg(unix)]
 fn interpreter(folder: &Path, when_checked: &str, what: &str) -> std::path::PathBuf {
     use std::os::unix::fs::PermissionsExt;

@@ -1,4 +1,4 @@
-//! What the program says of itself, and which settings it refuses to serve with.
+//! Tests of the program's own information, and of settings that it refuses to serve with.
 
 use std::{
     fs,
@@ -21,7 +21,7 @@ fn told(output: Output) -> String {
     told
 }
 
-/// What a program that failed has written to standard error.
+/// Returns the standard error of a program that failed.
 #[track_caller]
 fn refused(output: Output) -> String {
     let text = String::from_utf8_lossy(&output.stderr).into_owned();

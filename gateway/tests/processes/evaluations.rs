@@ -1,4 +1,4 @@
-//! What `evaluate` prints of policies that are not there, that crash, and that are played again.
+//! Tests of the output of `evaluate` for policies that are absent, that crash, and that are played again.
 
 use std::process::{Command, Output};
 

@@ -1,4 +1,4 @@
-//! The log as JSON, one object per line.
+//! Test of the log as JSON, one object per line.
 
 use std::{
     io::{BufRead, BufReader},
@@ -29,7 +29,7 @@ fn every_line_about_an_episode_names_it() {
         .expect("the program starts");
     let mut server = Running(server);
     let lines = BufReader::new(server.0.stderr.take().expect("its log")).lines().map_while(Result::ok);
-    // Drivers of graphics processors may write lines before.
+    // GPU drivers may write lines before.
     let lines = lines.skip_while(|line| !line.starts_with('{'));
     let mut lines = lines.map(|line| serde_json::from_str::<Value>(&line).expect("a line of JSON"));
     let serving = |line: Value| Some(line["message"].as_str()?.split_once("serving on ")?.1.to_owned());

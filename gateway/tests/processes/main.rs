@@ -1,4 +1,5 @@
-//! The program in a process of its own: stopped, killed, resumed, on a full disk, what it logs, and what it says of itself.
+//! Tests of the program in a process of its own: stopped, killed, resumed, on a full disk, with its log
+//! and its information about itself.
 
 mod agents;
 mod command_line;

@@ -1,4 +1,4 @@
-//! `tandem collect --operators`: people who play one episode after another by one link each, here as programs that do nothing but finish.
+//! Tests of `tandem collect --operators`. The people are programs here that only finish their episodes.
 
 use std::{
     fs,
@@ -11,11 +11,11 @@ use std::{
 
 use serde_json::{Value, json};
 
-/// A collection in a process of its own, and what it printed of its links.
+/// A collection in a process of its own, with its printed links.
 struct Collecting {
     process: Child,
     base: String,
-    /// The tokens of A and B, and of whoever runs it.
+    /// Tokens of A, of B and of the host.
     tokens: [String; 3],
 }
 
@@ -34,7 +34,7 @@ impl Collecting {
             (base.to_owned(), fragment.rsplit_once("token=").unwrap().1.to_owned())
         };
         let [(base, a), (_, b), (_, host)] = ["robot A", "robot B", "all links"].map(&mut link);
-        // What it prints later is read, so that it can go on.
+        // Later output is read, so that the process does not block.
         thread::spawn(move || lines.for_each(drop));
         Collecting { process, base, tokens: [a, b, host] }
     }
@@ -61,7 +61,7 @@ impl Collecting {
         }
     }
 
-    /// Both finish the episode that is played, and mark it. Returns its seed.
+    /// Finishes and marks the current episode for both people. Returns its seed.
     fn play(&self, marks: [bool; 2]) -> u64 {
         let progress = self.wait_for("playing");
         let finish =

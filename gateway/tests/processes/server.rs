@@ -12,7 +12,7 @@ use std::{
 use serde_json::Value;
 use ureq::Agent;
 
-/// How long a server may take to end.
+/// Time limit for the end of a server.
 const END_TIMEOUT: Duration = Duration::from_secs(90);
 
 /// A running process, killed when it is dropped.
@@ -23,12 +23,13 @@ pub struct Server {
 }
 
 impl Server {
-    /// Serves on a free port and records into `runs`.
+    /// Starts a server on a free port that records into `runs`.
     pub fn start(runs: &Path) -> Server {
         Server::run(Command::new(env!("CARGO_BIN_EXE_tandem")), runs)
     }
 
-    /// Starts a server as [`Server::start`] does, by a command that runs `tandem` with the arguments that follow it.
+    /// Starts a server as [`Server::start`] does, with a command that runs `tandem` with the arguments
+    /// after it.
     pub fn run(mut program: Command, runs: &Path) -> Server {
         let flags = ["serve", "--listen", "127.0.0.1:0", "--runs"];
         let mut child =
@@ -36,13 +37,13 @@ impl Server {
         let mut log = BufReader::new(child.stderr.take().expect("its log")).lines().map_while(Result::ok);
         let serving = |line: String| Some(line.split_once("http://")?.1.trim().to_owned());
         let address = log.find_map(serving).expect("the log says where it serves");
-        // The log is read to its end, because the program would wait for its reader.
+        // The log is read to its end, because a full pipe would block the program.
         thread::spawn(move || log.for_each(drop));
         let agent = Agent::config_builder().http_status_as_error(false).build().new_agent();
         Server { child, url: format!("http://{address}"), agent }
     }
 
-    /// The answer to a call, or `None` where the server went away meanwhile.
+    /// Returns the answer to a call, or `None` if the server has gone meanwhile.
     pub fn post(&self, path: &str, body: &Value) -> Option<Value> {
         let request = self.agent.post(format!("{}{path}", self.url));
         // MCP requires this header, and REST accepts it.
@@ -51,7 +52,7 @@ impl Server {
         response.body_mut().read_json().ok()
     }
 
-    /// The answer to a call of a tool, which has to come.
+    /// Calls a tool and returns the answer. Panics without one.
     #[track_caller]
     pub fn tool(&self, id: &str, tool: &str, args: &Value) -> Value {
         self.post(&format!("/v1/episodes/{id}/tools/{tool}"), args).expect("an answer")
@@ -82,7 +83,7 @@ impl Drop for Server {
     }
 }
 
-/// Every partial file of the run folders in `runs`.
+/// Returns every partial file of the run folders in `runs`.
 pub fn partials(runs: &Path) -> Vec<PathBuf> {
     let entries = |folder: &Path| {
         let entries = fs::read_dir(folder).into_iter().flatten();
@@ -92,18 +93,18 @@ pub fn partials(runs: &Path) -> Vec<PathBuf> {
     files.filter(|path| path.extension().is_some_and(|extension| extension == "partial")).collect()
 }
 
-/// Random delays that are the same in every run (Knuth's MMIX generator).
+/// A generator of random delays that are the same in every run (Knuth's MMIX generator).
 pub struct Delays(pub u64);
 
 impl Delays {
-    /// A delay below `most_ms`.
+    /// Returns a delay below `most_ms`.
     pub fn next(&mut self, most_ms: u64) -> Duration {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         Duration::from_millis((self.0 >> 33) % most_ms)
     }
 }
 
-/// Whether this process, and with it what it starts, ignores hangups, for example under `nohup`.
+/// Returns true if this process and its children ignore hangups, for example under `nohup`.
 pub fn hangups_are_ignored() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

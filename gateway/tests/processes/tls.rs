@@ -1,4 +1,4 @@
-//! HTTPS, with a certificate that is made for the test.
+//! Tests of HTTPS, with a certificate that is made for the test.
 
 use std::{
     io::{BufRead, BufReader, Read, Write},
@@ -54,7 +54,7 @@ impl Encrypted {
         }
     }
 
-    /// The answer to a request without a body.
+    /// Returns the answer to a request without a body.
     fn ask(&self, request: &str, headers: &[(&str, &str)]) -> String {
         let connection = ClientConnection::new(self.client.clone(), "127.0.0.1".try_into().unwrap()).unwrap();
         let stream = TcpStream::connect(&self.address).unwrap();
@@ -69,7 +69,7 @@ impl Drop for Encrypted {
     }
 }
 
-/// A client that trusts one certificate.
+/// Returns a client that trusts one certificate.
 fn trusting(certificate: &CertificateDer<'static>) -> Arc<ClientConfig> {
     let mut roots = RootCertStore::empty();
     roots.add(certificate.clone()).unwrap();
@@ -119,7 +119,8 @@ fn files_that_are_no_certificate_and_its_key_are_refused_at_launch() {
     assert!(missing.contains("the certificate in cert.pem"), "{missing}");
 }
 
-/// What a policy's server sees of a client, and what `tandem evaluate` says when it is answered by an error.
+/// Authorization that a policy's server received, and the output of `tandem evaluate` after the server's
+/// error.
 struct Asked {
     authorization: String,
     said: String,
@@ -128,7 +129,8 @@ struct Asked {
 /// A connection of a policy's server.
 type Secured = StreamOwned<ServerConnection, TcpStream>;
 
-/// Has a policy be asked at an encrypted server, which `serve` answers, by an evaluation that trusts it or does not.
+/// Runs an evaluation with a policy at an encrypted server, which `serve` answers. `trusts` decides if
+/// the evaluation trusts the server.
 fn ask_policy(protocol: &str, scheme: &str, trusts: bool, serve: fn(Secured) -> String) -> Asked {
     let place = tempfile::tempdir().unwrap();
     let made = rcgen::generate_simple_self_signed(["127.0.0.1".to_owned()]).unwrap();
@@ -156,7 +158,7 @@ fn ask_policy(protocol: &str, scheme: &str, trusts: bool, serve: fn(Secured) -> 
             }
         }
     });
-    // It takes connections and answers nothing: what is on this machine is reached without it.
+    // A proxy that accepts connections and answers nothing; local servers must be reached without it.
     let silent = TcpListener::bind("127.0.0.1:0").unwrap();
     let proxy = format!("http://{}", silent.local_addr().unwrap());
     let mut program = Command::new(env!("CARGO_BIN_EXE_tandem"));
@@ -185,7 +187,7 @@ fn ask_policy(protocol: &str, scheme: &str, trusts: bool, serve: fn(Secured) -> 
     Asked { authorization: told.try_recv().unwrap_or_default(), said }
 }
 
-/// openpi's server: who it is, then an error.
+/// Serves openpi's protocol: the metadata, then an error.
 #[expect(clippy::result_large_err, reason = "tungstenite's callback has this type")]
 fn serve_openpi(stream: Secured) -> String {
     let mut authorization = String::new();
@@ -201,7 +203,7 @@ fn serve_openpi(stream: Secured) -> String {
     authorization
 }
 
-/// `/act`: an error.
+/// Serves `/act` with an error.
 fn serve_act(stream: Secured) -> String {
     let mut reader = BufReader::new(stream);
     let (mut authorization, mut length) = (String::new(), 0);

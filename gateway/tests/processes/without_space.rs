@@ -1,4 +1,4 @@
-//! A full disk: files may not grow beyond a limit that the system holds.
+//! Tests of a full disk, simulated with a limit of the system on the size of files.
 
 use std::{
     fs,
@@ -12,7 +12,8 @@ use serde_json::{Value, json};
 
 use crate::Server;
 
-/// The program, whose files may each have at most so many blocks of 512 or 1024 bytes, depending on the shell's unit.
+/// Returns a command for the program, whose files are limited to `blocks` blocks of 512 or 1024 bytes,
+/// depending on the shell.
 fn limited(blocks: u32) -> Command {
     let mut limited = Command::new("sh");
     let program = env!("CARGO_BIN_EXE_tandem");
@@ -21,7 +22,7 @@ fn limited(blocks: u32) -> Command {
     limited
 }
 
-/// A server with room for the beginning of an episode.
+/// Starts a server with room for the beginning of an episode.
 fn small(runs: &Path) -> Server {
     Server::run(limited(512), runs)
 }
@@ -66,7 +67,7 @@ fn an_episode_goes_on_when_its_recording_cannot() {
     let written = std::fs::read_to_string(runs.path().join(&id).join("result.json")).expect("result.json");
     assert_eq!(serde_json::from_str::<Value>(&written).expect("JSON"), result);
 
-    // What was recorded before is whole.
+    // The part recorded before is intact.
     let partial = runs.path().join(&id).join("episode.mcap.partial");
     let tandem = || Command::new(env!("CARGO_BIN_EXE_tandem"));
     let recovered = ran(tandem(), &["recover"], &partial);
@@ -80,7 +81,7 @@ fn an_episode_goes_on_when_its_recording_cannot() {
 fn the_start_and_refusals_say_that_the_recording_has_failed() {
     let runs = tempfile::tempdir().expect("a temporary folder");
     let server = small(runs.path());
-    // The initial hold is recorded, and its recording does not fit on this disk.
+    // The recording of the initial hold does not fit on this disk.
     let (id, started) = start(&server, "agentic");
     let failed = &started["recording_failed"];
     assert!(says_why(failed), "{failed}");
@@ -105,7 +106,7 @@ fn the_start_and_refusals_say_that_the_recording_has_failed() {
     assert_eq!(&server.tool(&id, "wait", &json!({ "steps": 1 }))["recording_failed"], failed);
 }
 
-/// Every file in a folder, and below it.
+/// Returns every file in a folder and its subfolders.
 fn files(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
     let mut names: Vec<String> = entries
@@ -140,7 +141,7 @@ fn an_episode_begins_where_its_folder_cannot_be_made() {
     let runs = place.path().join("runs");
     fs::create_dir(&runs).expect("a folder");
     let server = Server::start(&runs);
-    // The disk breaks after the launch.
+    // The disk fails after the launch.
     fs::remove_dir_all(&runs).expect("an empty folder");
     fs::write(&runs, "no folder").expect("a file");
     for number in 1..=2 {
@@ -189,7 +190,7 @@ fn an_evaluation_stops_at_what_cannot_be_recorded_and_keeps_what_was_played() {
         ["evaluate", "--policy", "expert", "--tasks", "handover", "--seeds", "0..2", "--jobs", "1"];
     let episodes = place.path().join("episodes");
     fs::create_dir(&episodes).expect("a folder");
-    // Where the second episode is to be recorded there is a file.
+    // A file blocks the folder of the second episode.
     fs::write(episodes.join("handover-1"), "no folder").expect("a file");
     let flags: Vec<&str> = evaluate.into_iter().chain(["--record", "--out"]).collect();
     let stopped = ran(Command::new(env!("CARGO_BIN_EXE_tandem")), &flags, place.path());

@@ -1,4 +1,4 @@
-//! Disturbances of a team that holds something and is told to stand.
+//! Disturbances of a team that holds something and is commanded to stand.
 
 use std::f32::consts::PI;
 
@@ -7,13 +7,15 @@ use tandem_sim::body::{
 };
 use tandem_sim::{CONTROL_HZ, RobotCommand, Side, SplitMix64};
 
-/// Offset of the targets of arms, waist and fingers. Nothing corrects it, because no robot knows where the load or the others are.
+/// Offset of the targets of arms, waist and fingers. Nothing corrects it, because no robot knows the pose
+/// of the load or of the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum ArmDisturbance {
     None,
-    /// To both shoulders' pitch of every robot within a second, rad: below zero hands press towards what is before them.
+    /// Offset of both shoulders' pitch of every robot, reached within a second, rad. With negative values,
+    /// hands press towards the load in front of them.
     Shoulders(f32),
-    /// The same, with the other sign for every second robot: all hands move the load one way.
+    /// The same, with the opposite sign for every second robot: all hands move the load in one direction.
     OneWay(f32),
     /// Normal noise of this deviation (rad) on arms and waist, drawn anew five times a second.
     Noise(f32),
@@ -21,11 +23,11 @@ pub(super) enum ArmDisturbance {
     LastOpens,
 }
 
-/// Targets move from where they are to where the disturbance takes them within this time.
+/// Time within which targets move to their disturbed values.
 const COMES_S: f32 = 1.0;
 const NOISE_STEPS: u32 = 10;
 
-/// One disturbance under way.
+/// State of one disturbance.
 pub(super) struct Disturber {
     disturbance: ArmDisturbance,
     random: SplitMix64,
@@ -38,7 +40,8 @@ impl Disturber {
         Disturber { disturbance, random: SplitMix64(seed.into()), noise_rad }
     }
 
-    /// Changes the commands of the team for one control step, the first being 0; `team` are their places in `commands`.
+    /// Disturbs the commands of the team for one control step, the first being 0. `team` has the robots'
+    /// indices in `commands`.
     pub(super) fn disturb(&mut self, control_step: u32, team: &[usize], commands: &mut [RobotCommand]) {
         let share = (control_step as f32 / (COMES_S * CONTROL_HZ as f32)).min(1.0);
         for (place, robot) in team.iter().enumerate() {
@@ -76,7 +79,7 @@ fn pitch_shoulders(upper_rad: &mut [f32; UPPER_JOINTS], by_rad: f32) {
     }
 }
 
-/// Normal noise on arms and waist.
+/// Draws normal noise on arms and waist.
 fn noise(deviation_rad: f32, random: &mut SplitMix64) -> [f32; UPPER_JOINTS] {
     let mut noise_rad = [0.0; UPPER_JOINTS];
     let arms = Side::BOTH.into_iter().flat_map(|side| ARM_COLUMNS[side]..ARM_COLUMNS[side] + ARM_JOINTS);

@@ -1,4 +1,4 @@
-//! Shared loads of the bench, and how teams take them.
+//! Shared loads of the bench, and the way in which teams take them.
 
 use std::f32::consts::PI;
 
@@ -12,16 +12,17 @@ use crate::players::{InProcess, PlayerError};
 use crate::scoring::{A, B, C};
 use crate::tasks::{self, Task};
 
-/// Something that a team holds, and the task from whose start the team takes it.
+/// An object that a team holds. The team takes it from the start of the task that has the object.
 pub(in crate::bench) struct SharedLoad {
     pub name: &'static str,
     pub object: &'static str,
-    /// Robot, its two places on the object, and which way it faces in the object's frame.
+    /// Robot, its two places on the object, and its heading in the object's frame.
     holders: &'static [(usize, [&'static str; 2], f32)],
     hold: &'static Hold,
-    /// True where hands reach out while their robots walk to the object, for example to the legs of a table.
+    /// True if hands reach out while their robots walk to the object, for example to the legs of a table.
     reaching: bool,
-    /// Pelvis over the floor while the object is taken and while it is held; `None` leaves it as it is.
+    /// Height of the pelvis over the floor while the object is taken, and while it is held; `None` leaves
+    /// it as it is.
     pelvis_m: Option<[f32; 2]>,
     lift_m: f32,
     /// Displacement of the object when it is carried: x and y in the world frame.
@@ -98,17 +99,17 @@ impl SharedLoad {
         tasks::cohub().iter().copied().find(has_it).unwrap_or(*carrying::TASK)
     }
 
-    /// Number of robots that hold it.
+    /// Returns the number of robots that hold the object.
     pub(in crate::bench) fn team_size(&self) -> usize {
         self.holders.len()
     }
 
-    /// The robots that hold it.
+    /// Returns the robots that hold the object.
     pub(in crate::bench) fn team(&self) -> impl Iterator<Item = usize> {
         self.holders.iter().map(|(robot, ..)| *robot)
     }
 
-    /// Takes the object and lifts it; if `carried`, goes a little way with it.
+    /// Takes the object and lifts it; if `carried`, walks a short way with it.
     pub(in crate::bench) fn take(&self, episode: &mut InProcess, carried: bool) -> Result<(), PlayerError> {
         self.with_team(episode, |commander, team| {
             if !carried {
@@ -124,7 +125,7 @@ impl SharedLoad {
         })
     }
 
-    /// Takes the object, lifts it, and goes on as `then` says.
+    /// Takes the object, lifts it, and calls `then`.
     pub(in crate::bench) fn with_team(
         &self,
         episode: &mut InProcess,

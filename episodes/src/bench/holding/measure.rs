@@ -1,38 +1,39 @@
-//! Drift of a team that was told to stand, and of its load.
+//! Drift of a team that was commanded to stand, and of its load.
 
 use std::collections::VecDeque;
 
 use tandem_sim::{CONTROL_HZ, Step, Vector};
 
-/// Figures of a team of which nobody fell.
+/// Figures of a team without a fall.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct HoldResult {
-    /// The farthest that a pelvis ever was from where it was when the team was told to stand, or to set down; horizontal.
+    /// Largest horizontal distance of a pelvis from its place at the command to stand, or to set down.
     pub drift_m: f32,
-    /// The same from where it was [`RESTS_AFTER_S`] later.
+    /// The same, from its place [`RESTS_AFTER_S`] later.
     pub late_drift_m: f32,
-    /// The same of the object where it is held, in the mean of each second.
+    /// The same for the point at which the object is held, averaged over each second.
     pub load_drift_m: f32,
-    /// When the last robot stood for good.
+    /// Time at which the last robot stood for good.
     pub standing_after_s: f32,
-    /// The most that the object's vertical axis ever was tilted.
+    /// Largest tilt of the object's vertical axis.
     pub tilt_deg: f32,
     /// Mean mechanical power of a robot.
     pub power_w: f32,
 }
 
-/// Robots that walked come to rest within this time.
+/// Time within which walking robots come to rest.
 const RESTS_AFTER_S: f32 = 1.5;
 const MEAN_STEPS: usize = CONTROL_HZ as usize;
 
-/// Adds up what happens, control step by control step.
+/// Accumulator of the figures, control step by control step.
 pub(super) struct HoldMeasure<'a> {
     object: &'a str,
     team: &'a [usize],
     steps: u32,
     began_m: Vec<Vector>,
     rested_m: Vec<Vector>,
-    /// The middle of the wrists when the team is told to stand, in the object's frame: below it, a table swings.
+    /// Middle of the wrists at the command to stand, in the object's frame. Points below it would also
+    /// measure a table's swing.
     held_in_object_m: Vector,
     load_m: VecDeque<Vector>,
     load_rested_m: Option<Vector>,
@@ -41,8 +42,8 @@ pub(super) struct HoldMeasure<'a> {
 }
 
 impl<'a> HoldMeasure<'a> {
-    /// From the step at which the team is told to stand; `began_m` are the places of pelvises to measure drift from, if they are
-    /// others.
+    /// Begins at the step of the command to stand. `began_m` are the places of the pelvises from which
+    /// drift is measured, if they differ from those of `begin`.
     pub(super) fn new(
         begin: &Step,
         object: &'a str,
@@ -120,7 +121,7 @@ fn pelvises_m(step: &Step, team: &[usize]) -> Vec<Vector> {
     team.iter().map(|robot| step.robots[*robot].truth.world_from_pelvis().translation).collect()
 }
 
-/// The farthest of these points from its partner among the others, horizontally.
+/// Returns the largest horizontal distance of these points from their partners.
 fn farthest_m(at_m: &[Vector], from_m: &[Vector]) -> f32 {
     at_m.iter().zip(from_m).map(|(at, from)| (*at - *from).truncate().length()).fold(0.0, f32::max)
 }

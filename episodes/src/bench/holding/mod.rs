@@ -1,7 +1,8 @@
-//! Teams that hold something between them and are told to stand: cases of the bench of base controllers that need hands.
+//! Teams that hold something between them and are commanded to stand: cases of the bench of base
+//! controllers that need hands.
 //!
-//! They take an object as the experts do, lift it and, in some cases, go a little way with it. Then all bases are told to stand
-//! and all arms to stay as they are, but for what the case adds.
+//! They take an object as the experts do, lift it and, in some cases, walk a short way with it. Then all
+//! bases are commanded to stand and all arms to stay as they are, except for the case's disturbance.
 
 mod disturbance;
 pub(super) mod loads;
@@ -23,31 +24,32 @@ use disturbance::{ArmDisturbance, Disturber};
 use loads::{BAR, BASKET, LEGS, ROUND_TABLE, SharedLoad, TABLE};
 use measure::{HoldMeasure, HoldResult};
 
-/// What a team does before it is told to stand.
+/// The team's action before the command to stand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Before {
     Lifts,
-    /// Lifts the object and goes a little way with it: the team is told to stand while it walks.
+    /// Lifts the object and walks a short way with it: the team is commanded to stand while it walks.
     Carries,
-    /// The targets of the first robot's hands end up lower by this.
+    /// Lowers the targets of the first robot's hands by this distance.
     LowersOne(f32),
-    /// Sets the object down, with targets lower than where it comes to stand by this.
+    /// Sets the object down, with targets below its resting height by this distance.
     SetsDown(f32),
 }
 
-/// What one team holds, how, and how heavy it is.
+/// A team's load, its action, and the load's mass.
 #[derive(Clone, Copy)]
 struct Setup {
     load: &'static SharedLoad,
     before: Before,
-    /// `None`: as heavy as its file has it.
+    /// `None` for the mass in the object's file.
     robot_share_kg: Option<f32>,
 }
 
 const HOLDS_S: f32 = 6.0;
 const LOWERING_S: f32 = 1.0;
 
-/// Setups and what is tried in each: a name's end, and what happens. One team's episode up to the moment serves all of them.
+/// Returns the setups, and the cases of each: the end of its name, and the disturbance. One episode of a
+/// team up to the command serves all of them.
 fn setups() -> Vec<(Setup, Vec<(&'static str, ArmDisturbance)>)> {
     use ArmDisturbance::{LastOpens, Noise, None as Undisturbed, OneWay, Shoulders};
     let mut setups = Vec::new();
@@ -84,7 +86,7 @@ fn setups() -> Vec<(Setup, Vec<(&'static str, ArmDisturbance)>)> {
     setups
 }
 
-/// Plays the cases whose names `filter` asks for on these seeds.
+/// Plays the cases whose names match `filter` on these seeds.
 pub fn run(
     robot: &RobotFile,
     controller: &Controller,
@@ -143,8 +145,8 @@ impl Setup {
         })
     }
 
-    /// What came of each disturbance, all from the same moment; `None` for a team that fell, or did not come to hold the
-    /// object.
+    /// Returns the result of each disturbance, all from the same moment. It is `None` for a team that fell,
+    /// or did not come to hold the object.
     fn trials(
         &self,
         spec: &EpisodeSpec,
@@ -181,7 +183,8 @@ impl Setup {
         Ok(outcomes)
     }
 
-    /// Comes to the moment at which the team is told to stand; gives where pelvises were when it began to set the object down.
+    /// Plays up to the command to stand. Returns the places of the pelvises when the team began to set the
+    /// object down; `None` if it did not.
     fn begin(&self, episode: &mut InProcess, team: &[usize]) -> Result<Option<Vec<Vector>>, PlayerError> {
         match self.before {
             Before::Lifts => self.load.take(episode, false)?,
@@ -214,7 +217,7 @@ impl Setup {
     }
 }
 
-/// What all robots were told last, with their bases told to stand.
+/// Returns the last commands of all robots, with their bases commanded to stand.
 fn standing(session: &Session) -> Vec<RobotCommand> {
     let stand = |command: RobotCommand| RobotCommand {
         base: BaseCommand::standing(command.base.pelvis_height_m),
@@ -227,12 +230,13 @@ fn standing(session: &Session) -> Vec<RobotCommand> {
 mod tests {
     use super::*;
 
-    /// The farthest that pelves and loads may go once a team has had 1.5 s to stop, and when the last robot stands.
+    /// Limits: the drift of pelvises and of loads once a team has had 1.5 s to stop, and the time until the
+    /// last robot stands.
     const MAX_SWAY_M: f32 = 0.03;
     const MAX_LOAD_DRIFT_M: f32 = 0.02;
     const MAX_STANDING_AFTER_S: f32 = 1.5;
 
-    /// Plays these cases on three seeds and holds each to the limits.
+    /// Plays these cases on three seeds and checks each against the limits.
     fn comes_to_rest(filter: &str) {
         let mut played = 0;
         let mut check = |report: CaseReport| {

@@ -1,4 +1,4 @@
-//! Whose a folder is, what is kept in it, and who plays in it.
+//! Ownership of a folder, the episodes in it, and the processes that play in it.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -13,7 +13,7 @@ use crate::results::PolicyCard;
 use crate::tasks;
 use crate::variation::Variation;
 
-/// The run of `plan` in `folder`, in which the first `count` of its episodes have been played.
+/// Returns the run of `plan` in `folder`, with the first `count` of its episodes played.
 fn with_episodes<'a>(plan: &'a EvaluationPlan, folder: &'a Path, count: usize) -> EvaluationRun<'a> {
     let run = EvaluationRun::begin(plan, folder).unwrap();
     for spec in &run.work[..count] {
@@ -66,7 +66,7 @@ fn another_run_is_refused_with_what_differs_and_left_as_it_is() {
     assert!(told.contains("further ones, which are added to it (--shard I/N"), "{told}");
     assert_eq!(std::fs::read(folder.path().join("episodes/handover-1.json")).unwrap(), before);
 
-    // The same one goes on, and one with more of the same.
+    // The same run continues, and so does one with more of the same.
     let kept = |plan: &EvaluationPlan| {
         let KeptEpisodes { kept, to_play, .. } = EvaluationRun::begin(plan, folder.path()).unwrap().kept();
         (kept, to_play)
@@ -90,7 +90,7 @@ fn what_a_build_before_there_was_an_identity_has_played_is_not_replaced_by_anoth
     assert_eq!(EvaluationRun::begin(&own, folder.path()).unwrap().kept().kept, 2);
     assert!(folder.path().join("run.json").exists());
 
-    // Where nothing was played there is nothing to lose.
+    // A folder without episodes can be taken over without loss.
     let empty = tempfile::tempdir().unwrap();
     drop(EvaluationRun::begin(&own, empty.path()).unwrap());
     assert_eq!(EvaluationRun::begin(&idle, empty.path()).unwrap().kept().to_play, 3);
@@ -126,7 +126,7 @@ fn results_of_another_build_are_kept_and_marked() {
     assert_eq!(run.kept(), kept);
     assert_eq!(run.so_far().other_builds, [("0.0.1+older".to_owned(), 1)].into());
     drop(run);
-    // From now on it is a run of this build, which knows of the other.
+    // From now on it is a run of this build, which lists the other.
     assert_eq!(EvaluationRun::begin(&own, folder.path()).unwrap().kept(), kept);
 }
 
@@ -147,7 +147,7 @@ fn a_run_is_deleted_where_that_is_asked_for_and_nobody_plays_it() {
     assert!(!folder.path().join("episodes/handover-1.json").exists());
     assert!(folder.path().join("notes.txt").exists());
 
-    // What was never a run is not deleted.
+    // A folder that was never a run is not deleted.
     let foreign = tempfile::tempdir().unwrap();
     std::fs::create_dir(foreign.path().join("episodes")).unwrap();
     std::fs::write(foreign.path().join("episodes/Cargo.toml"), "").unwrap();
@@ -155,7 +155,7 @@ fn a_run_is_deleted_where_that_is_asked_for_and_nobody_plays_it() {
     assert!(foreign.path().join("episodes/Cargo.toml").exists());
 }
 
-/// A policy that counts what it plays.
+/// A policy that counts the episodes that it plays.
 #[derive(Debug, Default)]
 struct CountingPolicy(AtomicUsize);
 
@@ -166,7 +166,7 @@ impl Policy for CountingPolicy {
 
     fn play_episode(&self, spec: &EpisodeSpec, _: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
         self.0.fetch_add(1, Ordering::Relaxed);
-        // Long enough for the others to come by.
+        // Long enough for the others to reach this episode.
         std::thread::sleep(Duration::from_millis(20));
         let result = result(spec.task.id, spec.seed, vec![("p1".into(), Some(4.2))]);
         Ok(PlayOutcome { result, thought: Default::default(), stopped: None })

@@ -1,4 +1,5 @@
-//! BigTable: three robots take the edge with both hands, lift, carry the table straight to the disc in step, set down and let go.
+//! The BigTable expert: three robots take the edge with both hands, lift, and carry the table straight to
+//! the disc in step. They set it down there and let go.
 
 use std::f32::consts::PI;
 
@@ -9,7 +10,7 @@ use crate::players::PlayerError;
 use crate::scoring::{A, B, C};
 
 const LIFT_M: f32 = 0.07;
-/// Pelvises over the floor: palms that lie on the top are then at elbow height.
+/// Height of the pelvises over the floor: palms on the table top are then at elbow height.
 const PELVIS_M: f32 = 0.75;
 const PACE_M_S: f32 = 0.21;
 
@@ -29,7 +30,7 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     team.gather(commander)?;
     grasp_compliantly(commander, &grasps)?;
     team.lift(commander, LIFT_M)?;
-    // Which way it is turned there does not matter.
+    // The table's heading at the disc does not matter.
     let heading = upright(&team.object(commander)?).rotation;
     let place = Pose::from_parts(commander.facts()?.position_m("goal_disc"), heading);
     team.carry_to(commander, &place, PACE_M_S)?;

@@ -1,5 +1,5 @@
-//! CartService: A takes the trolley's bar and pushes it to the mark. Meanwhile B walks up; it lifts the bottle out of its
-//! ring, steps back, turns to the table and stands the bottle on the patch.
+//! The CartService expert: A takes the trolley's bar and pushes it to the mark. Meanwhile B walks up, lifts
+//! the bottle out of its ring, steps back, turns to the table and puts the bottle on the patch.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -14,22 +14,24 @@ use crate::scoring::{A, B};
 
 const PUSH_M_S: f32 = 0.24;
 const WALK_M_S: f32 = 0.35;
-/// B takes a trolley that has been this near to the mark, once it is slower than this.
+/// Distance from the mark within which the trolley has to come before B takes the bottle. It must also be
+/// slower than `STANDS_M_S`.
 const CAME_M: f32 = 0.3;
 const STANDS_M_S: f32 = 0.03;
-/// A waits for that, too, for so many commands at most.
+/// Number of commands that A waits at most for the trolley to stand.
 const MAX_STOPPING_BEATS: u32 = 20;
-/// How fast B walks with the bottle in its hand.
+/// Speed at which B walks with the bottle in its hand.
 const CARRY_M_S: f32 = 0.25;
-/// While B walks its pelvis is up to 12 cm lower than where it stands, and the bottle with it: it has to clear the table all the same.
+/// Height by which B lifts the bottle. While B walks, its pelvis and the bottle are up to 12 cm lower than
+/// at rest. The bottle still has to clear the table.
 const LIFT_M: f32 = 0.26;
-/// How far B steps back from the trolley before it turns.
+/// Distance that B steps back from the trolley before it turns.
 const BACK_M: f32 = 0.30;
 const OVER_PATCH_M: f32 = 0.10;
 const AT_HAND: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
-/// How near to the way back is near enough; B already turns on it.
+/// Tolerance on the way back, where B already turns.
 const ON_THE_WAY: Tolerance = Tolerance { off_m: 0.10, off_rad: 0.8 };
-/// A bottle that is let go of falls so far.
+/// Height over the patch at which B lets go of the bottle.
 const DROP_M: f32 = 0.003;
 
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
@@ -38,7 +40,7 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     in_parallel(commander, vec![trolley, bottle])
 }
 
-/// A pushes the trolley to the mark and leaves it there.
+/// Pushes the trolley to the mark and leaves it there; A's script.
 fn park(commander: &mut Commander) -> Result<(), PlayerError> {
     let grasps = HandGrasp::with_both_hands(A, "service_trolley", ["left", "right"], -FRAC_PI_2, &Hold::BAR);
     let mut team = CarryTeam::new(commander, &grasps)?;
@@ -47,7 +49,7 @@ fn park(commander: &mut Commander) -> Result<(), PlayerError> {
     team.measure(commander)?;
     let mark = commander.facts()?.object("parking_mark").pose_in_world;
     team.carry_to(commander, &mark, PUSH_M_S)?;
-    // What is let go of while it rolls rolls on.
+    // A trolley that is released while it rolls keeps rolling.
     for _ in 0..MAX_STOPPING_BEATS {
         if commander.facts()?.speed_m_s("service_trolley") < STANDS_M_S {
             break;
@@ -57,7 +59,7 @@ fn park(commander: &mut Commander) -> Result<(), PlayerError> {
     let_go(commander, &grasps)
 }
 
-/// B walks to where it will find the bottle, and serves it once the trolley stands.
+/// Walks to the bottle's future place and serves the bottle once the trolley stands; B's script.
 fn serve(commander: &mut Commander) -> Result<(), PlayerError> {
     let facts = commander.facts()?;
     let ring_m = facts.position_m("parking_mark") + facts.site("service_trolley", "ring").position_m();
@@ -93,7 +95,7 @@ fn serve(commander: &mut Commander) -> Result<(), PlayerError> {
     commander.perform(1.0, &[grasp.open()])
 }
 
-/// B waits until the trolley has come to the mark and stands.
+/// Holds B still until the trolley has come to the mark and stands.
 fn await_trolley(commander: &mut Commander) -> Result<(), PlayerError> {
     let mut came = false;
     loop {

@@ -1,4 +1,5 @@
-//! CoCarry: both robots take the rim, lift, side-step to the other shelf in step, set down and let go.
+//! The CoCarry expert: both robots take the rim, lift, side-step to the other shelf in step, set down and
+//! let go.
 
 use std::f32::consts::PI;
 

@@ -1,4 +1,5 @@
-//! CoPouring: both robots lay a hand on the bar at their end, lift, and turn the tub about the bars over the crate.
+//! The CoPouring expert: both robots put a hand on the bar at their end, lift, and turn the tub about the
+//! bars over the crate.
 
 use std::f32::consts::PI;
 
@@ -8,11 +9,12 @@ use super::skills::{Commander, HandGrasp, Hold, move_together, take_together, wr
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
-/// Closed a little further than round a bottle.
+/// Closure of the fingers, a little more than round a bottle.
 const CLOSURE: f32 = 1.15;
 
 const LIFT_M: f32 = 0.12;
-/// While it tips, the tub moves sideways until its lip is over the crate, and along the bars to the crate's middle.
+/// Sideways motion of the tub while it tips, which brings its lip over the crate. It also moves along the
+/// bars to the crate's middle.
 const OVER_CRATE_M: f32 = 0.18;
 const TIP_RAD: f32 = 1.25;
 
@@ -24,7 +26,7 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     take_together(commander, &grasps)?;
     let facts = commander.facts()?;
     let start = facts.object("tub").pose_in_world;
-    // The bars are the axis: hands turn, and move little.
+    // The bars are the axis, so the hands turn and move little.
     let bars = Vector::new(0.0, 0.0, facts.site("tub", "bar_a").position_m().z);
     let along_m = facts.position_m("crate").x - start.translation.x;
     let tub_at = |lift_m: f32, over: f32, tip_rad: f32| {

@@ -1,4 +1,5 @@
-//! FrameHang: each robot takes one side of the frame, both lift it before the peg, push the loop over it and lower.
+//! The FrameHang expert: each robot takes one side of the frame. Both lift it in front of the peg, push the
+//! loop over it and lower.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -10,7 +11,7 @@ use super::skills::{
 use crate::players::PlayerError;
 use crate::scoring::{A, B, Facts};
 
-/// The upright moulding, 50 x 40 mm, with the palm on its outside.
+/// Hold of the upright moulding, 50 x 40 mm, with the palm on its outside.
 const MOULDING: Hold = Hold {
     turned_rad: [0.0; 3],
     place_in_wrist_m: Vector::new(0.112, 0.045, 0.0),
@@ -18,20 +19,24 @@ const MOULDING: Hold = Hold {
     ..Hold::BAR
 };
 
-/// Where the loop's middle is relative to the peg's tip: before the tip, past it, and resting on the peg.
+/// Position of the loop's middle relative to the peg's tip: in front of the tip, past it, and resting on
+/// the peg.
 const BEFORE_M: Vector = Vector::new(0.0, -0.045, 0.004);
 const PAST_M: Vector = Vector::new(0.0, 0.040, 0.002);
 const RESTING_M: Vector = Vector::new(0.0, 0.045, -0.034);
 const LEG_S: f32 = 0.3;
-/// A frame that missed the peg, or leans by more than this on it, is taken off and hung anew.
+/// Number of attempts. A frame that missed the peg, or leans by more than `ASKEW_RAD` on it, is taken off
+/// and hung again.
 const TRIES: u32 = 3;
 const ASKEW_RAD: f32 = 0.2;
-/// Fingers open as far as the wall behind the frame lets them, then the hands go outwards and back.
+/// Closure of fingers that open as far as the wall behind the frame lets them. The hands then move outwards
+/// and back.
 const LOOSE: f32 = 0.35;
 const OUTWARDS_M: f32 = 0.13;
 const BACK_M: f32 = 0.14;
 
-/// A frame that both hold already is not taken again; one whose loop is over the peg is only let down.
+/// Hangs the frame. A frame that both robots already hold is not grasped again, and one whose loop is over
+/// the peg is only lowered.
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     let grasp = |robot, side, place| HandGrasp {
         robot,
@@ -74,7 +79,7 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
             }
             give_way(commander, false);
         }
-        // Off again the way it came, and once more with the grips as they are now.
+        // Take it off the way it came, and try once more with the grips as they are now.
         let missed = commander.facts()?.object("frame").pose_in_world;
         let above_m = Vector::new(missed.translation.x, missed.translation.y, past.translation.z);
         let above = Pose::from_translation(above_m);
@@ -84,15 +89,16 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     Err(PlayerError::GaveUp("the frame does not hang straight on the peg".into()))
 }
 
-/// Peg and wall stop a frame that is let down before its hands are where they are told to be: those who hold it there would push
-/// themselves off their feet.
+/// Makes the hands of both robots compliant, or stiff again. The peg and the wall stop a frame before its
+/// hands reach their goals, and robots with stiff hands would push themselves off their feet.
 fn give_way(commander: &mut Commander, give_way: bool) {
     for robot in [A, B] {
         commander.set_compliance(robot, give_way.then_some(COMPLIANCE_N_S_M));
     }
 }
 
-/// Once let go of, a frame that hangs askew stays so: no hand has room behind it to take it again.
+/// Returns `true` if the frame hangs straight on the peg. A frame that hangs askew when it is released stays
+/// so, because no hand has room behind it to take it again.
 fn is_straight_on_peg(facts: &Facts) -> bool {
     facts.threads("wall_peg", ["root", "tip"], "frame", "loop") && facts.tilt_rad("frame") < ASKEW_RAD
 }
@@ -116,6 +122,6 @@ fn let_go(commander: &mut Commander, grasps: &[HandGrasp]) -> Result<(), PlayerE
         }
         commander.perform(0.9, &moves)?;
     }
-    // It still swings a little.
+    // The frame still swings a little.
     commander.perform(3.0, &grasps.iter().map(HandGrasp::open).collect::<Vec<_>>())
 }

@@ -1,4 +1,5 @@
-//! Handover: A lifts the bottle by its lower half, B takes it by the upper half and puts it on the pad.
+//! The Handover expert: A lifts the bottle by its lower half, B takes it by the upper half and puts it on
+//! the pad.
 
 use std::f32::consts::PI;
 
@@ -8,17 +9,18 @@ use super::skills::{Commander, CylinderGrasp, hand_over, pick_up, release, stand
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
-/// One hand above the other on the straight part of the bottle, 20 cm long; a hand is 9 cm wide.
+/// Grasp of the giver. The hands are one above the other on the straight part of the bottle, which is 20 cm
+/// long; a hand is 9 cm wide.
 const GIVER: CylinderGrasp =
     CylinderGrasp { robot: A, side: Side::Right, object: "bottle", grip: "grip_low", heading_rad: 0.0 };
 const TAKER: CylinderGrasp =
     CylinderGrasp { robot: B, side: Side::Right, object: "bottle", grip: "grip_high", heading_rad: PI };
 
-/// Where the bottle changes hands: between the robots, above the counter.
+/// Place where the bottle changes hands: between the robots, above the counter.
 const MEETING_M: Vector = Vector::new(0.36, -0.06, 0.92);
 const LIFT_M: Vector = Vector::new(0.0, 0.0, 0.10);
 
-/// Whoever has the bottle already has done what comes before.
+/// Hands the bottle over. The steps before the robot's hold are skipped if a robot already has the bottle.
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     if !TAKER.holds(commander)? {
         if !GIVER.holds(commander)? {

@@ -1,9 +1,9 @@
 //! Experts: scripts that solve the tasks, as proof that scene, physics, phases and tools fit together.
 //!
-//! An expert sees the [`crate::Facts`], which no policy does; that is its only privilege. It acts through the same tool
-//! calls as everybody, and each call is charged to the episode's budget.
+//! An expert sees the [`crate::Facts`], which no policy does; that is its only privilege. It acts through
+//! the same tool calls as any other player, and each call is charged to the episode's budget.
 //!
-//! To add an expert: one file here, named as its task, and its line in `ALL`; what several use is in `skills`.
+//! To add an expert: one file here with the task's name, and its line in `ALL`. Shared code is in `skills`.
 
 mod big_table;
 mod cart_service;
@@ -23,10 +23,10 @@ use crate::spec::EpisodeSpec;
 use crate::tasks::{self, ObjectSpot, Task, TaskSet};
 use skills::{Commander, Variety};
 
-/// What tells the seed of guesses from the episode's own.
+/// Constant that separates the seed of guesses from the episode's own.
 const GUESSES: u32 = 0x6775_6573;
 
-/// Performs a task to its end.
+/// Script that performs a task to its end.
 type ExpertScript = fn(&mut Commander) -> Result<(), PlayerError>;
 
 const ALL: &[(&str, ExpertScript)] = &[
@@ -42,7 +42,7 @@ const ALL: &[(&str, ExpertScript)] = &[
     ("big_table", big_table::perform),
 ];
 
-/// The tasks of the benchmark that have an expert, in their order.
+/// Returns the benchmark's tasks that have an expert, in their order.
 pub fn solved() -> impl Iterator<Item = &'static Task> {
     tasks::cohub().iter().copied().filter(|task| Expert::of(task).is_ok())
 }
@@ -51,12 +51,17 @@ pub fn solved() -> impl Iterator<Item = &'static Task> {
 pub struct Expert {
     task: &'static Task,
     script: ExpertScript,
-    /// How its demonstration differs from the plain one, if it does.
+    /// Variation of the demonstration; `None` for the plain one.
     variety: Option<Variety>,
 }
 
 impl Expert {
-    /// The expert of `task`; of a file that is called as one of the program's own tasks, if it has what that has.
+    /// Returns the expert of `task`. A task from a file gets the expert of the built-in task with the same
+    /// id if it has the same robots and objects.
+    ///
+    /// # Errors
+    ///
+    /// If no expert knows the task.
     pub fn of(task: &'static Task) -> Result<Expert, PlayerError> {
         let known = ALL.iter().chain(plus::ALL);
         match known.clone().find(|(id, _)| *id == task.id && has_what_it_needs(task)) {
@@ -68,12 +73,13 @@ impl Expert {
     }
 }
 
-/// Whether there is an expert of `task`.
+/// Returns `true` if there is an expert of `task`.
 pub fn solves(task: &'static Task) -> bool {
     Expert::of(task).is_ok()
 }
 
-/// Whether the robots and objects that an expert asks for by name are those of the program's own task.
+/// Returns `true` if `task` has the robots and objects of the built-in task with its id, which its expert
+/// asks for by name.
 fn has_what_it_needs(task: &Task) -> bool {
     let Ok(own) = TaskSet::default().find(task.id) else { return false };
     let has = |spot: &ObjectSpot| {
@@ -83,19 +89,24 @@ fn has_what_it_needs(task: &Task) -> bool {
     task.robots.len() == own.robots.len() && own.objects.iter().all(has)
 }
 
-/// The task as robots that tell each other nothing take it to be: what the seed has chosen is guessed.
+/// Returns the task with a guess in place of the seed's choices, for robots that do not communicate.
 pub fn guessed(spec: &EpisodeSpec) -> &'static Task {
     spec.task.under(spec.world_seed() ^ GUESSES)
 }
 
 impl Expert {
-    /// The expert of an episode, who demonstrates as its spec says.
+    /// Returns the expert of an episode, with the variety that its spec asks for.
     pub fn for_episode(spec: &EpisodeSpec) -> Result<Expert, PlayerError> {
         let variety = Variety::new(spec.variation.variety, spec.world_seed());
         Ok(Expert { variety, ..Expert::of(spec.task)? })
     }
 
-    /// The same, where robots tell each other nothing: it takes another draw of the same choices for what the seed has chosen.
+    /// Returns the expert of an episode whose robots do not communicate: another draw replaces the seed's
+    /// choices.
+    ///
+    /// # Errors
+    ///
+    /// If the task has no expert, or the seed chooses nothing in it.
     pub fn without_words(spec: &EpisodeSpec) -> Result<Expert, PlayerError> {
         match spec.task.has_choices() {
             true => Ok(Expert { task: guessed(spec), ..Expert::for_episode(spec)? }),

@@ -1,6 +1,6 @@
-//! MoveHouse: A walks to the door, presses its lever, pushes the door open along its swing and stands aside in
-//! the other room. Meanwhile B and C lift the table; they follow A through the doorway in step and set it down
-//! on the marks.
+//! The MoveHouse expert: A walks to the door, presses its lever, pushes the door open along its swing and
+//! steps aside in the other room. Meanwhile B and C lift the table; they follow A through the doorway in
+//! step and set it down on the marks.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -14,39 +14,41 @@ use crate::players::PlayerError;
 use crate::scoring::{A, B, C, Facts};
 
 const LIFT_M: f32 = 0.07;
-/// Pelvis over the floor while robots take the legs and set them down, and while they stand with the table aloft. As they walk, it is
-/// under 0.68 m whatever is commanded.
+/// Height of the pelvises over the floor while the robots take the legs and set them down. `TALL_M` is the
+/// height while they hold the table aloft. A walking robot's pelvis is below 0.68 m whatever is commanded.
 const BENT_M: f32 = 0.64;
 const TALL_M: f32 = 0.70;
 const PACE_M_S: f32 = 0.27;
-/// How far it is, in a fist with its palm down, from the wrist to what presses, and to the fist's front.
+/// Distance, in a fist with its palm down, from the wrist to the part that presses; `FRONT_M` is that to
+/// the fist's front.
 const PRESSING_M: f32 = 0.115;
 const FRONT_M: f32 = 0.16;
-/// The fist is made behind the lever and above it; then the wrist is as high above the lever's end, and is pressed farther
-/// and farther until the bolt has been drawn.
+/// Distance behind the lever at which the fist closes. The wrist then rises `ABOVE_LEVER_M` over the
+/// lever's end and goes down by the steps of `DOWN_M` until the bolt is drawn.
 const BACK_M: f32 = 0.10;
 const ABOVE_LEVER_M: f32 = 0.11;
 const DOWN_M: [f32; 4] = [-0.02, -0.05, -0.08, -0.11];
-/// The bolt reaches 20 mm into its hole.
+/// Travel of a drawn bolt. The bolt reaches 20 mm into its hole.
 const DRAWN_M: f32 = 0.022;
-/// The leaf, seen by the one who pushes: where its face is, and how far from the hinge it is pushed, first beside the
-/// lever, then farther in, so that the robot passes through the middle of the doorway.
+/// Position of the leaf's face, towards the robot that pushes, and distances from the hinge at which it
+/// pushes. The first is beside the lever. The last is farther in, so that the robot passes through the
+/// middle of the doorway.
 const FACE_X_M: f32 = -0.045;
 const FIRST_RADIUS_M: f32 = 0.785;
 const LAST_RADIUS_M: f32 = 0.50;
 const MOVED_IN_RAD: f32 = 0.6;
 const OPEN_RAD: f32 = 1.53;
-/// The front's goal is so far beyond the face: that is what pushes.
+/// Distance of the fist's goal beyond the face, which makes it push.
 const PRESS_M: f32 = 0.02;
 const PUSH_M_S: f32 = 0.26;
-/// The robot turns by this part of the leaf's angle.
+/// Ratio of the robot's turn to the leaf's angle.
 const TURN_RATIO: f32 = 0.6;
-/// How far ahead of the robot, and how far to its right, it pushes.
+/// Distances ahead of the robot and to its right at which it pushes.
 const AHEAD_M: f32 = 0.45;
 const RIGHT_M: f32 = 0.10;
-/// A still corrects its place for so long at the end of the swing.
+/// Time for which A still corrects its place at the end of the swing.
 const OPENED_S: f32 = 0.4;
-/// B stays so far behind A, until A is beside the way.
+/// Distance that B keeps behind A until A is out of the way.
 const APART_M: f32 = 0.75;
 const BESIDE_Y_M: f32 = -0.75;
 /// Position of A while it presses the lever, door frame.
@@ -63,14 +65,14 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     in_parallel(commander, vec![door, table])
 }
 
-/// A opens the door and stands aside.
+/// Opens the door and steps aside; A's script.
 fn clear_the_way(commander: &mut Commander) -> Result<(), PlayerError> {
     open_door(commander)?;
     let door = commander.facts()?.object("lever_door").pose_in_world;
     walk_to(commander, &[WalkGoal { robot: A, to: place(door * ASIDE_M, FRAC_PI_2), pace_m_s: WALK_M_S }])
 }
 
-/// B and C take the table, follow A through the doorway, and set it down on its marks.
+/// Takes the table, follows A through the doorway and sets it down on its marks; the script of B and C.
 fn carry_table(commander: &mut Commander) -> Result<(), PlayerError> {
     let [b_left, b_right] =
         HandGrasp::with_both_hands(B, "console_table", ["b_left", "b_right"], PI, &Hold::LEG);
@@ -79,7 +81,7 @@ fn carry_table(commander: &mut Commander) -> Result<(), PlayerError> {
     let grasps = [b_left, b_right, c_left, c_right];
     let mut team = CarryTeam::new(commander, &grasps)?;
     set_heights(commander, BENT_M);
-    // Thighs meet legs behind which robots do not stand in the middle, and where they have come too near.
+    // A walking robot's thighs meet the legs if the robot is off the middle behind them or too near.
     team.gather_reaching(commander)?;
     grasp_reached(commander, &grasps)?;
     // Two robots that lift with stiff hands lean back against each other's pull, and stagger.
@@ -96,19 +98,20 @@ fn carry_table(commander: &mut Commander) -> Result<(), PlayerError> {
     team.carry_where_free(commander, &marks, PACE_M_S, &free_m)?;
     set_heights(commander, BENT_M);
     team.set_down(commander, &marks)?;
-    // The squares are small, and hands that gave way now would shift the table as they open.
+    // The squares are small, and compliant hands would shift the table as they open.
     team.give_way(commander, false);
     let_go(commander, &grasps)
 }
 
-/// How high the pelvises of B and C are from now on.
+/// Sets the pelvis heights of B and C from their next commands on.
 fn set_heights(commander: &mut Commander, height_m: f32) {
     for robot in [B, C] {
         commander.set_height(robot, height_m);
     }
 }
 
-/// Opens the door: A walks up to the lever, presses it with its right fist and follows the leaf on its swing.
+/// Opens the door: A walks up to the lever, presses it with its right fist and follows the leaf on its
+/// swing.
 fn open_door(commander: &mut Commander) -> Result<(), PlayerError> {
     let leaf = commander.facts()?.object("lever_door leaf").pose_in_world;
     let pressed_m = press_lever(commander)?;
@@ -158,7 +161,8 @@ fn fist_at(end_m: Vector, back_m: f32, above_m: f32) -> HandMove {
     HandMove::reach(A, Side::Right, Pose::from_parts(wrist_m, Rotation::from_rotation_x(-FRAC_PI_2)))
 }
 
-/// Where A stands, and its right wrist at a height, to push the leaf that was shut at `shut` to an angle.
+/// Returns A's place on the floor and its right wrist at `height_m` that push the leaf, shut at `shut`, to
+/// an angle.
 fn push(shut: &Pose, angle_rad: f32, height_m: f32) -> (Pose, Pose) {
     let share = (angle_rad / MOVED_IN_RAD).min(1.0);
     let radius_m = FIRST_RADIUS_M + (LAST_RADIUS_M - FIRST_RADIUS_M) * share;

@@ -1,4 +1,5 @@
-//! Pouring: both lift their vessels, A turns the cup about its lip above the mouth of B's glass.
+//! The Pouring expert: both lift their vessels, and A turns the cup about its lip above the mouth of B's
+//! glass.
 
 use std::f32::consts::PI;
 
@@ -8,28 +9,29 @@ use super::skills::{Commander, CylinderGrasp, HandMove, pick_up_all};
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
-/// Both vessels are held by their lower part; a hand is 9 cm wide and stays clear of the table.
+/// Grasp of the cup. Both vessels are held by their lower part; a hand is 9 cm wide and stays clear of the
+/// table.
 const CUP: CylinderGrasp =
     CylinderGrasp { robot: A, side: Side::Right, object: "cup", grip: "grip", heading_rad: 0.0 };
 const GLASS: CylinderGrasp =
     CylinderGrasp { robot: B, side: Side::Right, object: "glass", grip: "grip", heading_rad: PI };
 
-/// Hands go aside so far above where they take hold.
+/// Height above the grips at which hands move aside.
 const OVER_M: f32 = 0.2;
-/// Where B holds the glass: between the robots, just above the table.
+/// Place where B holds the glass: between the robots, just above the table.
 const GLASS_PLACE_M: Vector = Vector::new(0.40, 0.0, 0.86);
-/// Lip above mouth while pouring, and how much further off the cup is while it stands upright.
+/// Offset of the lip above the mouth while pouring; `BEFORE_TIPPING_M` is added while the cup is upright.
 const ABOVE_MOUTH_M: Vector = Vector::new(0.0, 0.0, 0.03);
 const BEFORE_TIPPING_M: Vector = Vector::new(0.0, -0.04, 0.10);
 const TIP_RAD: f32 = 2.0;
-/// A marble that stays in the cup is poured again, tipped by this much more, up to what a wrist can do.
+/// Further tip for a marble that stays in the cup, up to `DEEPEST_RAD`, the limit of the wrist.
 const MORE_RAD: f32 = 0.2;
 const DEEPEST_RAD: f32 = 2.6;
-/// The tip is played in this many straight moves.
+/// Number of straight moves that make up the tip.
 const TIP_MOVES: u32 = 8;
 const TIP_MOVE_S: f32 = 0.3;
 
-/// Vessels that are held already have been lifted.
+/// Pours the marble. Vessels that are already held have been lifted.
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     if !(CUP.holds(commander)? && GLASS.holds(commander)?) {
         lift(commander)?;
@@ -41,7 +43,8 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
 }
 
 fn lift(commander: &mut Commander) -> Result<(), PlayerError> {
-    // Hands begin before the vessels, and fingers on their way down would knock over one that stands near.
+    // Hands begin in front of the vessels, and fingers on their way down would knock over a vessel that is
+    // near.
     let over = [CUP.beside(commander, OVER_M)?, GLASS.beside(commander, OVER_M)?];
     commander.perform(0.5, &over)?;
     pick_up_all(commander, &[CUP, GLASS])?;
@@ -64,8 +67,8 @@ fn pour_until_it_is_in(commander: &mut Commander) -> Result<(), PlayerError> {
         if facts.inside_vessel("marble", "glass") {
             return Ok(());
         }
-        // On worktop and floor a marble of glass rolls on: where it misses, it is off the worktop within two seconds and comes
-        // to rest on the floor, where no hand reaches.
+        // A glass marble rolls on over worktop and floor. If it misses, it is off the worktop within two
+        // seconds and ends up on the floor, where no hand reaches.
         if !facts.inside_vessel("marble", "cup") {
             return Err(PlayerError::GaveUp("the marble fell beside the glass".into()));
         }
@@ -75,7 +78,7 @@ fn pour_until_it_is_in(commander: &mut Commander) -> Result<(), PlayerError> {
     }
 }
 
-/// Tips the cup by `tip_rad`, its lip over the glass wherever that is by then.
+/// Tips the cup by `tip_rad`, with its lip over the glass as the glass moves.
 fn pour(commander: &mut Commander, tip_rad: f32) -> Result<(), PlayerError> {
     for part in 1..=TIP_MOVES {
         let glass = commander.facts()?.object("glass").pose_in_world;
@@ -85,8 +88,8 @@ fn pour(commander: &mut Commander, tip_rad: f32) -> Result<(), PlayerError> {
     Ok(())
 }
 
-/// Wrist motion that puts the cup, tipped by `tilt_rad`, with its lip above the mouth of the glass. The cup is tipped to
-/// +y, away from the palm.
+/// Returns the wrist motion that puts the cup, tipped by `tilt_rad`, with its lip above the mouth of the
+/// glass. The cup is tipped to +y, away from the palm.
 fn cup_at(commander: &mut Commander, world_from_glass: Pose, tilt_rad: f32) -> Result<HandMove, PlayerError> {
     let facts = commander.facts()?;
     let [mouth_m, lip_m] =

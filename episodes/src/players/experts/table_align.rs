@@ -1,5 +1,5 @@
-//! TableAlign: both robots take the edges, lift, carry the table down the room while they turn it by a quarter, come at the
-//! chair from before it and from one side, set down and let go.
+//! The TableAlign expert: both robots take the edges, lift, and carry the table down the room while they
+//! turn it by a quarter. They come at the chair from its front and from one side, set down and let go.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -10,11 +10,12 @@ use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
 const LIFT_M: f32 = 0.07;
-/// Pelvises over the floor: palms that lie on the top are then at elbow height.
+/// Height of the pelvises over the floor: palms on the table top are then at elbow height.
 const PELVIS_M: f32 = 0.75;
-/// Of the robot that has farthest to walk.
+/// Pace of the robot that has farthest to walk.
 const PACE_M_S: f32 = 0.29;
-/// The table's middle in the chair's frame: where the turn ends, clear of the chair, and where it is set down.
+/// Position of the table's middle in the chair's frame at the end of the turn, clear of the chair;
+/// `AT_CHAIR_M` is where it is set down.
 const BEFORE_CHAIR_M: Vector = Vector::new(0.52, -0.30, 0.0);
 const AT_CHAIR_M: Vector = Vector::new(0.40, 0.0, 0.0);
 

@@ -1,5 +1,5 @@
-//! TrashCollection: A bends its knees, takes the bin by the rim of its sides and holds it at the end of the bench, over which B
-//! sweeps the bottle with the back of its left hand.
+//! The TrashCollection expert: A bends its knees, takes the bin by the rim of its sides and holds it at the
+//! end of the bench. B sweeps the bottle over the bench with the back of its left hand.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -11,21 +11,23 @@ use super::skills::{
 use crate::players::PlayerError;
 use crate::scoring::{A, B};
 
-/// Pelvis over the floor while A takes the bin, and while it stands with it. As it walks, that is under 0.68 m whatever is commanded.
+/// Height of the pelvis over the floor while A takes the bin; `TALL_M` is that while it stands with it. A
+/// walking robot's pelvis is below 0.68 m whatever is commanded.
 const BENT_M: f32 = 0.68;
 const TALL_M: f32 = 0.72;
-/// The rim of the bin is then a little lower than the bench's top.
+/// Lift after which the bin's rim is a little lower than the bench's top.
 const LIFT_M: f32 = 0.055;
 const PACE_M_S: f32 = 0.28;
-/// Where the left wrist is from the middle of the bottle: the bottle rolls before the middle of the hand's back.
+/// Offset of the left wrist from the middle of the bottle, which rolls in front of the middle of the hand's
+/// back.
 const BEHIND_BOTTLE_M: Vector = Vector::new(-0.12, -0.075, 0.022);
 const ABOVE_M: f32 = 0.14;
-/// The hand stops here, short of the end of the bench; the bottle rolls on.
+/// Position at which the hand stops, short of the end of the bench; the bottle rolls on.
 const END_Y_M: f32 = -0.05;
 const SWEEP_M_S: f32 = 0.35;
-/// The bottle rolls aside by about so much on its way.
+/// Approximate distance that the bottle rolls aside on its way.
 const ROLLS_ASIDE_M: f32 = 0.05;
-/// What lies lower than this has fallen off the bench.
+/// Height below which an object has fallen off the bench.
 const OFF_BENCH_M: f32 = 0.7;
 const TRIES: u32 = 3;
 
@@ -39,7 +41,7 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
         if facts.inside_box("pet_bottle", "bin", "inside") {
             return Ok(());
         }
-        // Nobody reaches for what lies on the floor.
+        // No robot reaches for an object on the floor.
         if facts.position_m("pet_bottle").z < OFF_BENCH_M {
             break;
         }
@@ -48,7 +50,7 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     Err(PlayerError::GaveUp("the bottle did not fall into the bin".into()))
 }
 
-/// A takes the bin to the end of the bench, before the bottle, wherever that lies across it.
+/// Takes the bin to the end of the bench, in front of the bottle's position across the bench; A's script.
 fn bring_bin(commander: &mut Commander) -> Result<(), PlayerError> {
     let grasps = HandGrasp::with_both_hands(A, "bin", ["left", "right"], -FRAC_PI_2, &Hold::WALL);
     let mut team = CarryTeam::new(commander, &grasps)?;
@@ -63,14 +65,14 @@ fn bring_bin(commander: &mut Commander) -> Result<(), PlayerError> {
     team.carry_to(commander, &Pose::from_translation(end_m), PACE_M_S)
 }
 
-/// Brings the hand over the place behind the bottle, wherever that is on the bench. A hand that waits beside the bottle touches it, and
-/// it rolls away.
+/// Brings the hand over the place behind the bottle, wherever the bottle is on the bench. A hand that waits
+/// beside the bottle touches it, and the bottle rolls away.
 fn hover_behind_bottle(commander: &mut Commander) -> Result<(), PlayerError> {
     let behind_m = commander.facts()?.position_m("pet_bottle") + BEHIND_BOTTLE_M;
     commander.perform(1.2, &[reach(behind_m + Vector::Z * ABOVE_M)])
 }
 
-/// Puts the hand down there, and sweeps the bottle to the end of the bench.
+/// Lowers the hand behind the bottle, and sweeps the bottle to the end of the bench.
 fn sweep(commander: &mut Commander) -> Result<(), PlayerError> {
     let behind_m = commander.facts()?.position_m("pet_bottle") + BEHIND_BOTTLE_M;
     commander.perform(0.7, &[reach(behind_m)])?;

@@ -1,5 +1,5 @@
-//! Messages that have no well-known schema: flat JSON objects, because Foxglove's plots address numbers by field name and
-//! its schema reader takes neither references nor nullable types.
+//! Messages that have no well-known schema. They are flat JSON objects, because Foxglove's plots address
+//! numbers by field name and its schema reader supports neither references nor nullable types.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -42,22 +42,23 @@ impl<T: JsonMessage> Encode for Json<T> {
     }
 }
 
-/// How the hash of a state is written.
+/// Formats the hash of a state.
 pub fn state_hash_text(state_hash: u64) -> String {
     format!("{state_hash:016x}")
 }
 
-/// Everything that a control step left behind, as recordings of earlier versions have it; [`super::steps`] has it now.
+/// A control step as in recordings of earlier versions; [`super::steps`] replaces it.
 #[derive(Deserialize)]
 pub struct StepMessage {
     control_step: u64,
-    /// Of everything that decides the future, more than the step shows; 16 hexadecimal digits.
+    /// Hash of everything that determines the future, which is more than the step shows; 16 hexadecimal
+    /// digits.
     state_hash: String,
     /// [`Step`] in postcard's encoding, base64.
     postcard: String,
 }
 
-/// Why a message holds no [`Step`].
+/// Reason why a message has no readable [`Step`].
 #[derive(Debug, thiserror::Error)]
 pub enum StepError {
     #[error("no base64: {0}")]
@@ -77,7 +78,7 @@ impl StepMessage {
         Ok(postcard::from_bytes(&BASE64_STANDARD.decode(&self.postcard)?)?)
     }
 
-    /// Number of the step, and hash of the state that it left.
+    /// Returns the number of the step, and the hash of the state after it.
     pub fn state(self) -> (u64, String) {
         (self.control_step, self.state_hash)
     }
@@ -121,7 +122,8 @@ impl From<&RobotCommand> for Json<BaseCommandMessage> {
     }
 }
 
-/// What a robot's hands feel and hold: forces of the world on them (world frame), estimated from the arms' torques.
+/// What a robot's hands feel and hold: forces of the world on them (world frame), estimated from the arms'
+/// torques.
 #[derive(Serialize, JsonSchema)]
 #[schemars(rename = "Hands")]
 pub struct HandsMessage {
@@ -138,7 +140,8 @@ impl JsonMessage for HandsMessage {
 }
 
 impl HandsMessage {
-    /// The hands of robot number `robot`, which moved as `moved` where scoring sees `facts`.
+    /// Returns the message on the hands of robot number `robot`, from its step `moved` and the scoring's
+    /// `facts`.
     pub fn of(moved: &RobotStep, robot: usize, facts: &Facts) -> Json<HandsMessage> {
         let felt_n = moved.hand_force_in_world_n().map(|force_n| force_n.to_array());
         let named = |side: Side, wanted: Grip| {
@@ -196,7 +199,7 @@ impl From<&Budget> for Json<BudgetMessage> {
     }
 }
 
-/// How a tool call came out.
+/// Outcome of a tool call.
 pub enum CallOutcome<'a> {
     Reply(&'a ToolReply),
     Observation(&'a TeamObservation),
@@ -205,7 +208,7 @@ pub enum CallOutcome<'a> {
 }
 
 impl<'a> CallOutcome<'a> {
-    /// How a call came out that was answered so.
+    /// Returns the outcome of a call with this answer.
     pub fn of<T, E: ToString>(answer: &'a Result<T, E>) -> CallOutcome<'a>
     where
         &'a T: Into<CallOutcome<'a>>,
@@ -213,17 +216,17 @@ impl<'a> CallOutcome<'a> {
         answer.as_ref().map_or_else(CallOutcome::refused, Into::into)
     }
 
-    /// The call was refused, or failed.
+    /// Returns the outcome of a call that was refused or failed.
     pub fn refused(error: &impl ToString) -> CallOutcome<'a> {
         CallOutcome::Problem(error.to_string())
     }
 
-    /// Whether the call was answered.
+    /// Returns `true` if the call was answered.
     pub fn is_ok(&self) -> bool {
         !matches!(self, CallOutcome::Problem(_))
     }
 
-    /// As text. Pictures have topics of their own and would make this one unreadable.
+    /// Returns the outcome as text. Images have topics of their own and would make this one unreadable.
     fn text(&self) -> Result<String, serde_json::Error> {
         match self {
             CallOutcome::Reply(reply) => serde_json::to_string(reply),
@@ -239,7 +242,7 @@ impl<'a> CallOutcome<'a> {
         }
     }
 
-    /// The pictures that were seen, by robot.
+    /// Returns the images of an observation, by robot.
     fn pictures(&self) -> Vec<(String, Arc<Picture>)> {
         match self {
             CallOutcome::Observation(seen) => {
@@ -257,20 +260,20 @@ impl<'a> From<&'a TeamObservation> for CallOutcome<'a> {
     }
 }
 
-/// Who made a call, and what it showed.
+/// Origin of a call, and the information that it was shown.
 #[derive(Clone, Copy)]
 pub enum CallerRecord<'a> {
     /// The policy that directs all robots. It is shown the reply.
     Policy,
-    /// The operator of this robot, who is shown the reply.
+    /// The operator of this robot, which is shown the reply.
     Operator(&'a str),
-    /// Who carries out what a policy in this process decides. Of what the benchmark's own policies are not shown, the policy
-    /// itself is shown this of every robot that was looked at.
+    /// A caller that executes the decisions of a policy in this process. The policy itself is shown this
+    /// extra information of every observed robot, beyond the benchmark's own policies.
     InProcess(&'a [ExtraInformation]),
 }
 
 impl<'a> CallerRecord<'a> {
-    /// The robot whose operator called.
+    /// Returns the robot whose operator made the call.
     pub fn operator(self) -> Option<&'a str> {
         match self {
             CallerRecord::Operator(robot) => Some(robot),
@@ -278,7 +281,7 @@ impl<'a> CallerRecord<'a> {
         }
     }
 
-    /// See [`RecordedCall::shown`](crate::RecordedCall).
+    /// Returns the extra information that was shown; see [`RecordedCall::shown`](crate::RecordedCall).
     fn shown(self) -> Option<&'a [ExtraInformation]> {
         match self {
             CallerRecord::Policy | CallerRecord::Operator(_) => None,
@@ -287,13 +290,13 @@ impl<'a> CallerRecord<'a> {
     }
 }
 
-/// When something was asked or said in an episode.
+/// Moment of a call or note in an episode.
 #[derive(Clone, Copy, Debug)]
 pub struct CallMoment {
     pub time_s: f64,
-    /// How many control steps had been made.
+    /// Number of control steps before it.
     pub control_step: u64,
-    /// How long the policy had thought by then since the episode began.
+    /// The policy's thinking time since the episode began.
     pub thought: Duration,
 }
 
@@ -303,28 +306,30 @@ impl CallMoment {
     }
 }
 
-/// The longest arguments that are kept of a call which was refused before it reached the episode: a caller may send anything.
+/// Longest recorded arguments of a call that was refused before it reached the episode: a caller may send
+/// anything.
 const MAX_UNREAD_BYTES: usize = 10_000;
-/// The same of a tool's name that may be none.
+/// Longest recorded name of a tool that may not exist.
 const MAX_NAME_BYTES: usize = 100;
 
-/// The beginning of a text that is too long.
+/// Returns the beginning of a text that is too long; `None` if it is short enough.
 fn beginning(text: &str, most_bytes: usize) -> Option<&str> {
     let cut = (text.len() > most_bytes).then(|| text.floor_char_boundary(most_bytes))?;
     Some(&text[..cut])
 }
 
-/// A tool call as it is recorded: the call with its answer, and the pictures of that, which have topics of their own.
+/// A tool call as it is recorded: the call with its reply, and the reply's images, which have topics of
+/// their own.
 pub struct ToolCallRecord {
-    /// When it was answered.
+    /// Simulated time of the reply.
     pub time_s: f64,
     pub message: ToolCallMessage,
-    /// What was seen, with the name of the robot that saw it.
+    /// Images that were shown, with the name of the robot that saw them.
     pub pictures: Vec<(String, Arc<Picture>)>,
 }
 
 impl ToolCallRecord {
-    /// What was called by whom, and how it came out.
+    /// Creates the record of a call, its caller and its outcome.
     pub fn new(
         at: CallMoment,
         caller: CallerRecord,
@@ -352,7 +357,8 @@ impl ToolCallRecord {
         Ok(ToolCallRecord { time_s: at.time_s, message, pictures })
     }
 
-    /// What is no call of the episode: refused before it got there, with arguments as they came, or a plan.
+    /// Creates the record of something that is no call of the episode: a plan, or a call that was refused
+    /// before it arrived, with its raw arguments.
     pub fn beside(
         at: CallMoment,
         caller: CallerRecord,

@@ -1,4 +1,4 @@
-//! What each topic of a recording holds.
+//! The topics of a recording.
 
 pub mod messages;
 pub mod notes;

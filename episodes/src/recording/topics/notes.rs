@@ -1,4 +1,4 @@
-//! What whoever plays says of its play, as recordings hold it.
+//! Notes of the player on its play, as recordings hold them.
 
 use std::time::Duration;
 
@@ -57,7 +57,7 @@ impl JsonMessage for NoteMessage {
 }
 
 impl NoteMessage {
-    /// The note `note` of this moment, when `/tool_calls` had so many messages.
+    /// Creates the message of a note at this moment, when `/tool_calls` had `calls_before` messages.
     pub fn new(at: CallMoment, calls_before: u32, note: Note) -> NoteMessage {
         let Note { text, kind, robot, tokens, usd, model, seconds, ending } = note;
         let counted = |of: fn(&TokenCount) -> u32| tokens.as_ref().map(of);
@@ -78,7 +78,7 @@ impl NoteMessage {
         }
     }
 
-    /// How long the policy had thought by then.
+    /// Returns the policy's thinking time before the note.
     pub fn thought(&self) -> Duration {
         Duration::from_nanos(self.thought_ns)
     }

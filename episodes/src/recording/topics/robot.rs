@@ -1,4 +1,4 @@
-//! The topics of one robot: what its joints do, what it was told, what its hands feel and what its camera saw.
+//! The topics of one robot: joint states, commands, hand forces and camera images.
 
 use foxglove::messages::{CameraCalibration, CompressedImage, JointState, JointStates};
 use tandem_sim::{RobotCommand, RobotModel, RobotSensed, RobotStep, mjcf::MjcfCamera, render::Intrinsics};
@@ -20,18 +20,18 @@ const EFFORT_DIGITS: u8 = 10;
 pub struct RobotTopics {
     joint_states: Topic<JointStates>,
     action: Topic<Json<ActionMessage>>,
-    /// Where what a robot does is not what it is told.
+    /// Executed commands, if they may differ from the policy's; `None` otherwise.
     executed: Option<Topic<Json<ActionMessage>>>,
     base_command: Topic<Json<BaseCommandMessage>>,
     hands: Topic<Json<HandsMessage>>,
-    /// Opened by the first picture.
+    /// Opened by the first image.
     camera: Option<CameraTopics>,
 }
 
 struct CameraTopics {
     image: Topic<CompressedImage>,
     calibration: Topic<CameraCalibration>,
-    /// When the last picture was taken.
+    /// Time of the last image.
     last_s: f64,
 }
 
@@ -55,7 +55,7 @@ impl RobotTopics {
         })
     }
 
-    /// Appends what robot number `index`, described by `robot`, did in the control step that ended at `time_s`.
+    /// Appends the control step of robot number `index`, described by `robot`, that ended at `time_s`.
     pub fn step(
         &mut self,
         file: &mut McapFile,
@@ -72,7 +72,8 @@ impl RobotTopics {
         file.write(&mut self.hands, time_s, &HandsMessage::of(step, index, facts))
     }
 
-    /// Appends what the robot did in the control step that ended at `time_s`, where that may be something else than it was told.
+    /// Appends the command that the robot executed in the control step that ended at `time_s`, if executed
+    /// commands have a topic.
     pub fn executed(
         &mut self,
         file: &mut McapFile,
@@ -85,8 +86,8 @@ impl RobotTopics {
         }
     }
 
-    /// Appends a picture seen through the robot's head camera, unless there is one of this moment: physics stands still between
-    /// commands, and so do pictures.
+    /// Appends an image from the robot's head camera, unless there is already one of this moment. Between
+    /// commands the simulation pauses, so images do not change.
     pub fn picture(
         &mut self,
         file: &mut McapFile,

@@ -1,4 +1,5 @@
-//! Shapes as Foxglove's scene entities. Each is sent once in the frame it belongs to; the transforms move it.
+//! Shapes as Foxglove's scene entities. Each is sent once in the frame it belongs to; the transforms move
+//! it.
 
 use foxglove::messages::{
     Color, CubePrimitive, CylinderPrimitive, Point3, Pose as FoxglovePose, SceneEntity, SpherePrimitive,
@@ -12,11 +13,12 @@ use tandem_sim::{
 
 use super::transforms::{quaternion, timestamp, vector3};
 
-/// A plane without extent is drawn as a square of this size.
+/// Side of the square as which a plane without extent is drawn.
 const ENDLESS_PLANE_M: f32 = 20.0;
 const PLANE_THICKNESS_M: f32 = 0.001;
 
-/// What can be seen of a body, in the body's frame. `recolour` may give a geom another colour than its file's.
+/// Returns the visible shapes of a body, in the body's frame. `recolour` may give a geom another colour
+/// than its file's.
 pub fn entity(frame: &str, geoms: &[Geom], recolour: impl Fn(&Geom) -> [f32; 4]) -> SceneEntity {
     let mut entity = SceneEntity {
         timestamp: Some(timestamp(0.0)),

@@ -1,5 +1,6 @@
-//! Steps as they are recorded: every number bit for bit, written as what it differs by from what the steps before let expect, and the
-//! bytes of all differences sorted by how much they weigh, so that those that are mostly zero stand together.
+//! Encoding of recorded steps, bit for bit. Each number is written as its difference from a prediction by
+//! the steps before. The bytes of all differences are sorted by significance, so that those that are mostly
+//! zero are together.
 
 use std::collections::VecDeque;
 
@@ -11,18 +12,20 @@ use tandem_sim::Step;
 use super::messages::{StepError, StepMessage, state_hash_text};
 use crate::output::OutputError;
 
-/// What a message begins with. Recordings of earlier versions have JSON there, which begins with a brace.
+/// First byte of a message with differences. Messages of earlier versions are JSON, which begins with a
+/// brace.
 const DIFFERENCES: u8 = 1;
 const PLAIN: u8 = 2;
 const JSON: u8 = b'{';
-/// Kind, number of the step, hash of the state.
+/// Length of kind, number of the step, and hash of the state.
 const HEADER_BYTES: usize = 1 + 2 * size_of::<u64>();
-/// So many steps before tell what to expect of the next.
+/// Number of earlier steps that predict the next.
 const REMEMBERED: usize = 3;
-/// A step of a higher number is written plainly: as a number of variable length it could be taken for a word of four bytes.
+/// Step number from which steps are written plainly: as a number of variable length it could be taken for a
+/// word of four bytes.
 const MAX_STEPS: u64 = 1 << 21;
 
-/// What a reader who does not know Tandem is told of these messages.
+/// Description of these messages for readers that do not know Tandem.
 const DESCRIPTION: &str = "A control step of Tandem. Little endian: u8 kind (1: differences, 2: plain), u64 control_step, u64 state_hash; \
     then the step in postcard's encoding. Of kind 1 all its words of four bytes stand apart: u32 count, then count bytes of bits \
     24-31 of each word's difference, of 16-23, of 8-15, of 0-7; then all other bytes.";
@@ -47,14 +50,15 @@ impl Encode for StepRow {
     }
 }
 
-/// The words of the steps before, the latest first: each as an unsigned number that is the larger the larger the float is.
+/// The words of the steps before, the latest first. Each is an unsigned number that grows with the float.
 #[derive(Default)]
 struct StepMemory {
     before: VecDeque<Vec<u32>>,
 }
 
 impl StepMemory {
-    /// What word number `index` is expected to be: as it was, or gone on as it went, whichever would have been nearer the last time.
+    /// Predicts word number `index`: either unchanged, or continued at its last rate. The choice is the one
+    /// that was better the last time.
     fn expected(&self, index: usize) -> u32 {
         let at = |back: usize| self.before.get(back).and_then(|words| words.get(index)).copied();
         match (at(0), at(1), at(2)) {
@@ -75,7 +79,7 @@ impl StepMemory {
     }
 }
 
-/// The bits of a float as a number that grows with the float, and back.
+/// Converts the bits of a float to a number that grows with the float; `from_ordered` is the inverse.
 fn ordered(bits: u32) -> u32 {
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }
@@ -84,7 +88,7 @@ fn from_ordered(number: u32) -> u32 {
     if number >> 31 == 1 { number & !(1 << 31) } else { !number }
 }
 
-/// Small differences of either sign as small numbers, and back.
+/// Maps small differences of either sign to small numbers; `from_zigzag` is the inverse.
 fn zigzag(difference: u32) -> u32 {
     (difference << 1) ^ (difference.cast_signed() >> 31).cast_unsigned()
 }
@@ -93,14 +97,14 @@ fn from_zigzag(number: u32) -> u32 {
     (number >> 1) ^ (number & 1).wrapping_neg()
 }
 
-/// Writes steps one after the other.
+/// Encoder of steps, one after the other.
 #[derive(Default)]
 pub struct StepEncoder {
     memory: StepMemory,
 }
 
 impl StepEncoder {
-    /// The message of the step that follows those before.
+    /// Encodes the step that follows those before.
     pub fn encode(&mut self, step: &Step, state_hash: u64) -> Result<StepRow, OutputError> {
         let failed = |source: postcard::Error| OutputError::Encode(source.into());
         let plain = step.control_step >= MAX_STEPS;
@@ -126,16 +130,16 @@ impl StepEncoder {
     }
 }
 
-/// Reads steps one after the other, from the first on.
+/// Decoder of steps, one after the other, from the first on.
 #[derive(Default)]
 pub struct StepDecoder {
     memory: StepMemory,
-    /// Whether a step before could not be read, without which no other can.
+    /// Set once a step could not be read; no later step can be decoded without it.
     lost: bool,
 }
 
 impl StepDecoder {
-    /// The step of the next message.
+    /// Decodes the step of the next message.
     pub fn decode(&mut self, row: &[u8]) -> Result<Step, StepError> {
         if self.lost {
             return Err(StepError::Lost);
@@ -173,7 +177,7 @@ impl StepDecoder {
     }
 }
 
-/// Number of a step and hash of the state that it left, as text.
+/// Returns the number of a step and the hash of the state after it, as text.
 pub fn state_of(row: &[u8]) -> Result<(u64, String), StepError> {
     if row.first() == Some(&JSON) {
         return Ok(serde_json::from_slice::<StepMessage>(row)?.state());
@@ -183,7 +187,7 @@ pub fn state_of(row: &[u8]) -> Result<(u64, String), StepError> {
     Ok((step, state_hash_text(hash)))
 }
 
-/// Postcard's bytes, words of four apart from all others.
+/// Postcard's bytes, with words of four bytes apart from all others.
 #[derive(Default)]
 struct Split {
     words: Vec<u32>,
@@ -211,7 +215,7 @@ impl ser_flavors::Flavor for Split {
     }
 }
 
-/// The same, to read.
+/// The same as [`Split`], for reading.
 struct Joined<'a> {
     words: &'a [u8],
     rest: &'a [u8],
@@ -259,7 +263,7 @@ mod tests {
         assert_eq!([0, 1, 1u32.wrapping_neg()].map(zigzag), [0, 2, 1]);
     }
 
-    /// Steps of a world at rest whose numbers, and how many there are, are changed.
+    /// Returns steps of a world at rest, with varied numbers and varied counts of them.
     fn steps() -> Vec<Step> {
         let spec = crate::EpisodeSpec::new(
             crate::tasks::find("pouring").unwrap(),
@@ -282,7 +286,7 @@ mod tests {
                 for (index, angle_rad) in step.robots[0].sensed.joints.q_rad.iter_mut().enumerate() {
                     *angle_rad += (number as f32 * 0.1 + index as f32).sin() * 0.3;
                 }
-                // Hands come and go, and so do numbers.
+                // The number of touching hands varies, and so do the numbers.
                 step.touches = (0..(number % 3) as usize).map(touch).collect();
                 step.objects[0].name = if number == 5 { "four".into() } else { "fivea".into() };
                 step

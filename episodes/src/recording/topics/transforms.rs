@@ -7,7 +7,7 @@ use crate::commands::RobotSheet;
 use crate::convert::opencv_axes;
 use crate::recording::mcap_file::time_ns;
 
-/// The frame that everything else hangs on.
+/// Root frame of all others.
 pub const WORLD: &str = "world";
 /// Name of a robot's camera frame after the robot's own name.
 pub const EGOCENTRIC: &str = "egocentric";
@@ -17,12 +17,12 @@ const POSITION_DIGITS: u8 = 17;
 /// Binary digits of a quaternion's parts: 2 urad.
 const ROTATION_DIGITS: u8 = 20;
 
-/// Frame of a robot's link or camera.
+/// Returns the frame name of a robot's link or camera.
 pub fn robot_frame(robot: &str, part: &str) -> String {
     format!("{robot}/{part}")
 }
 
-/// All frames at one step.
+/// Returns all frames at one step.
 pub fn transforms(robots: &[RobotSheet], step: &Step) -> FrameTransforms {
     let timestamp = timestamp(step.time_s);
     let frame = |parent: String, child: String, parent_from_child: Pose| FrameTransform {
@@ -50,7 +50,8 @@ pub fn transforms(robots: &[RobotSheet], step: &Step) -> FrameTransforms {
     FrameTransforms { transforms }
 }
 
-/// Pose of every jointed link in its parent, from the measured joint angles: multibody joints do not drift.
+/// Returns the pose of every jointed link in its parent, from the measured joint angles: multibody joints
+/// do not drift.
 fn link_poses<'a>(
     model: &'a RobotModel,
     sensed: &'a RobotSensed,
@@ -61,8 +62,8 @@ fn link_poses<'a>(
     })
 }
 
-/// A number for those who look: the nearest multiple of `2^-binary_digits`. What compresses badly are the digits behind it, which no
-/// sensor has; steps hold every bit.
+/// Rounds a number for display to the nearest multiple of `2^-binary_digits`. The digits behind it compress
+/// badly, and no sensor has them; steps hold every bit.
 pub fn rounded(value: f32, binary_digits: u8) -> f64 {
     let ones = f64::from(1u32 << binary_digits);
     (f64::from(value) * ones).round() / ones

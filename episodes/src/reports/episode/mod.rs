@@ -1,4 +1,4 @@
-//! What an episode leaves for people to look at: a page and a strip of pictures.
+//! Output of an episode for people: a page and a strip of images.
 
 pub mod moments;
 mod page;

@@ -1,4 +1,4 @@
-//! Key moments of an episode: what happened when, and what cameras saw of it.
+//! Key moments of an episode: events, their times, and camera images of them.
 
 use base64::{Engine, prelude::BASE64_STANDARD};
 
@@ -7,21 +7,23 @@ use crate::html::escape;
 /// One moment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KeyMoment {
-    /// What happened, and when.
+    /// The event, and its time.
     pub caption: [String; 2],
-    /// Third person, then each robot's view.
+    /// Third-person view, then each robot's view.
     pub views: Vec<LabelledPicture>,
 }
 
-/// One picture and whose it is.
+/// An image and its label.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelledPicture {
     pub label: String,
-    /// The picture as a file, PNG or WebP: many times smaller than its pixels, which would wait until the episode's end.
+    /// The image as a PNG or WebP file: many times smaller than its pixels, which would take memory until
+    /// the episode's end.
     pub file: Vec<u8>,
 }
 
-/// Moments side by side as far as there is room, each with its texts and its pictures; the pictures are part of the page.
+/// Renders the moments side by side as far as there is room, each with its texts and its images, which are
+/// embedded in the page.
 pub fn html(moments: &[KeyMoment], class: &str) -> String {
     let mut figures = String::new();
     for KeyMoment { caption: [what, when], views } in moments {
@@ -38,7 +40,7 @@ pub fn html(moments: &[KeyMoment], class: &str) -> String {
     format!(r#"<div class="{class}">{figures}</div>"#)
 }
 
-/// A picture that is part of the page; `alt` is HTML.
+/// Returns an embedded image; `alt` is HTML.
 pub fn picture(file: &[u8], alt: &str) -> String {
     let kind = if file.starts_with(b"RIFF") { "webp" } else { "png" };
     format!(

@@ -1,4 +1,4 @@
-//! `report.html`: one episode on one page that needs nothing else.
+//! The self-contained page of one episode, `report.html`.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,7 @@ use crate::tasks::Task;
 /// The page's name in a run folder.
 pub const PAGE_FILE: &str = "report.html";
 
-/// Answered and refused calls by tool.
+/// Counts of answered and refused calls by tool.
 #[derive(Debug, Default)]
 pub struct CallCounts(BTreeMap<&'static str, [u32; 2]>);
 
@@ -24,7 +24,7 @@ impl CallCounts {
     }
 }
 
-/// What the operator of a robot said to the others, and when.
+/// A message from the operator of a robot to the others, and its time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SaidWords {
     pub time_s: f64,
@@ -32,18 +32,18 @@ pub struct SaidWords {
     pub text: String,
 }
 
-/// What the page tells.
+/// Content of the page.
 pub struct EpisodePage<'a> {
     pub task: &'a Task,
-    /// What robots were told together.
+    /// The joint instruction.
     pub instruction: &'a str,
     pub result: &'a ResultReply,
     pub calls: &'a CallCounts,
-    /// In the order in which it was said.
+    /// Messages, in the order in which they were sent.
     pub said: &'a [SaidWords],
-    /// Simulated time at which it began: later than 0 where it began at a phase of another episode.
+    /// Simulated time at which the episode began, more than 0 if it began at a phase of another episode.
     pub begin_s: f64,
-    /// What it was allowed.
+    /// Limits of the episode.
     pub rules: Rules,
     /// The budget after the last control step; `None` if there was none.
     pub budget_left: Option<Budget>,
@@ -51,7 +51,7 @@ pub struct EpisodePage<'a> {
 }
 
 impl EpisodePage<'_> {
-    /// The page.
+    /// Renders the page.
     pub fn html(&self) -> String {
         let seed = self.result.seed.map(|seed| format!(", seed {seed}")).unwrap_or_default();
         let title = format!("{}{seed}", self.task.id);
@@ -111,7 +111,8 @@ impl EpisodePage<'_> {
         format!(r#"<span class="{class}">{reached} of {phases} phases reached.</span> {why}"#)
     }
 
-    /// How the play of models ended, with their own words, where the end of the episode does not say it.
+    /// Returns the models' reasons for ending their play, with their own words. `None` if the end of the
+    /// episode already says it.
     fn model_endings(&self) -> Option<String> {
         let endings = self.result.usage.iter().flat_map(Usage::own_endings);
         let told = endings.map(|ended| match ended.text.is_empty() {
@@ -140,7 +141,7 @@ impl EpisodePage<'_> {
         facts.map(|(name, value)| format!("<div><dt>{name}</dt><dd>{value}</dd></div>")).concat()
     }
 
-    /// One segment per phase that was reached, as long as it took, and the rest of the episode.
+    /// Renders one segment per reached phase, proportional to its duration, and the rest of the episode.
     fn timeline(&self) -> String {
         let mut segments = String::new();
         let mut from_s = self.begin_s;
@@ -206,7 +207,7 @@ impl EpisodePage<'_> {
         format!(r#"<table class="words">{rows}</table>"#)
     }
 
-    /// Nothing where nobody spoke.
+    /// Renders the messages; empty if there are none.
     fn said(&self) -> String {
         if self.said.is_empty() {
             return String::new();

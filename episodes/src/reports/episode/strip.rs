@@ -1,5 +1,5 @@
-//! A picture strip: one column per key moment, third person above, the robots' own views below. It carries its texts twice: drawn,
-//! for who opens the file, and as they are, for pages that are made of it.
+//! Image strips: one column per key moment, the third-person view above, the robots' own views below. A
+//! strip carries its texts twice: drawn, for display of the file, and as metadata, for pages made from it.
 
 use std::fs::File;
 use std::io::{self, BufReader};
@@ -26,7 +26,7 @@ const GAP: usize = 6;
 const CAPTION_HEIGHT: usize = 48;
 /// The distance from the top of one line of text to the next.
 const LINE_HEIGHT: usize = 21;
-/// A row of pictures has its label above it.
+/// Height of a row: the label, and the image below it.
 const ROW_HEIGHT: usize = LINE_HEIGHT + CELL_HEIGHT + GAP;
 const TEXT_TOP: usize = 4;
 const GLYPH: usize = 8;
@@ -42,7 +42,7 @@ struct ColumnTexts {
     labels: Vec<String>,
 }
 
-/// The strip as a PNG file.
+/// Encodes the strip as a PNG file.
 pub fn png(moments: &[KeyMoment]) -> Result<Vec<u8>, PictureError> {
     let canvas = compose(moments)?;
     let column = |moment: &KeyMoment| ColumnTexts {
@@ -64,8 +64,9 @@ fn encode(canvas: &Canvas, texts: &str) -> Result<Vec<u8>, png::EncodingError> {
     Ok(bytes)
 }
 
-/// The moments of a strip that was written earlier, as small pictures `scale_ratio` as large. A picture without texts, such as a strip of
-/// an earlier build, is one moment of which nothing is said; `None` where there is no picture.
+/// Reads the moments of an earlier strip as small images, scaled by `scale_ratio`. An image without texts,
+/// such as a strip of an earlier build, is one moment without a caption. Returns `None` if there is no
+/// image.
 pub fn read(path: &Path, scale_ratio: f64) -> Option<Vec<KeyMoment>> {
     let strip = image::open(path).ok()?.into_rgb8();
     let Some(columns) = texts(path).filter(|columns| fits(&strip, columns)) else {
@@ -84,20 +85,20 @@ pub fn read(path: &Path, scale_ratio: f64) -> Option<Vec<KeyMoment>> {
     columns.into_iter().enumerate().map(moment).collect()
 }
 
-/// `None` where the file has none.
+/// Reads the texts in a strip's file; `None` if there are none.
 fn texts(path: &Path) -> Option<Vec<ColumnTexts>> {
     let reader = png::Decoder::new(BufReader::new(File::open(path).ok()?)).read_info().ok()?;
     let found = reader.info().utf8_text.iter().find(|text| text.keyword == TEXTS)?;
     serde_json::from_str(&found.get_text().ok()?).ok()
 }
 
-/// Whether a picture has room for all that is said of it.
+/// Returns `true` if the image has exactly the size for these texts.
 fn fits(strip: &RgbImage, columns: &[ColumnTexts]) -> bool {
     let rows = columns.iter().map(|column| column.labels.len()).max().unwrap_or(0);
     (strip.width() as usize, strip.height() as usize) == size(columns.len(), rows)
 }
 
-/// A picture of its own, as WebP.
+/// Scales an image down and encodes it as WebP.
 fn small(picture: &RgbImage, scale_ratio: f64) -> Option<Vec<u8>> {
     let [width, height] =
         [picture.width(), picture.height()].map(|px| (f64::from(px) * scale_ratio).round().max(1.0) as u32);
@@ -105,7 +106,7 @@ fn small(picture: &RgbImage, scale_ratio: f64) -> Option<Vec<u8>> {
     webp::picture(width, height, small.as_raw()).ok()
 }
 
-/// Width and height of so many columns and rows.
+/// Returns width and height of a strip with these numbers of columns and rows.
 fn size(columns: usize, rows: usize) -> (usize, usize) {
     (column_x(columns), CAPTION_HEIGHT + rows * ROW_HEIGHT)
 }
@@ -114,7 +115,7 @@ fn column_x(column: usize) -> usize {
     GAP + column * (CELL_WIDTH + GAP)
 }
 
-/// The top of a row's pictures.
+/// Returns the top of a row's images.
 fn picture_y(row: usize) -> usize {
     CAPTION_HEIGHT + row * ROW_HEIGHT + LINE_HEIGHT
 }
@@ -150,7 +151,7 @@ impl Canvas {
         self.rgb.len() / (self.width * 3)
     }
 
-    /// Pictures have the size of a cell.
+    /// Draws an image of the size of a cell.
     fn draw(&mut self, x: usize, y: usize, picture: &RgbImage) {
         let row_bytes = picture.width() as usize * 3;
         for (row, pixels) in picture.as_raw().chunks_exact(row_bytes).enumerate() {
@@ -159,7 +160,7 @@ impl Canvas {
         }
     }
 
-    /// Writes ASCII; other characters leave a gap, and what does not fit a cell is cut off.
+    /// Writes ASCII. Other characters leave a gap, and text beyond the width of a cell is cut off.
     fn write(&mut self, x: usize, y: usize, text: &str, ink: [u8; 3]) {
         const GLYPH_WIDTH: usize = GLYPH * TEXT_SCALE;
         for (index, character) in text.chars().take(CELL_WIDTH / GLYPH_WIDTH).enumerate() {
@@ -174,7 +175,7 @@ impl Canvas {
     }
 }
 
-/// Where the strip puts its pictures and its words, and that both are found again.
+/// Placement of images and texts in the strip, and reading them back.
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -203,7 +204,7 @@ mod tests {
         let pixel = |x: usize, y: usize| &canvas.rgb[(y * canvas.width + x) * 3..][..3];
         for (column, colours) in COLUMNS.iter().enumerate() {
             for (row, colour) in colours.iter().enumerate() {
-                // No word stands on a picture.
+                // No text is on an image.
                 for (x, y) in [(0, 0), (CELL_WIDTH / 2, CELL_HEIGHT / 2), (CELL_WIDTH - 1, CELL_HEIGHT - 1)] {
                     assert_eq!(pixel(column_x(column) + x, picture_y(row) + y), colour);
                 }
@@ -247,7 +248,7 @@ mod tests {
                 assert!(near, "{middle:?} for {colour:?}");
             }
         }
-        // A picture of which nothing is said is shown as it is.
+        // An image without texts is shown as it is.
         RgbImage::new(80, 40).save(&path).unwrap();
         let moments = read(&path, 0.25).unwrap();
         assert_eq!((moments.len(), moments[0].views.len(), &*moments[0].caption[0]), (1, 1, ""));

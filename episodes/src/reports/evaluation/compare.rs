@@ -1,4 +1,4 @@
-//! Two policies on the same tasks and seeds: what one reached and the other did not.
+//! Comparison of two policies on the same tasks and seeds.
 
 use std::collections::BTreeMap;
 
@@ -24,20 +24,20 @@ pub struct Comparison {
 pub struct PairedRow {
     /// `None` for all tasks together.
     pub task: Option<&'static str>,
-    /// The phase's number, as `p2`.
+    /// The phase's number, for example `p2`.
     pub phase: String,
-    /// Whether it is the task's last.
+    /// True if it is the task's last phase.
     pub last: bool,
     pub pairs: Pairs,
-    /// Rate of the second less that of the first.
+    /// Rate of the second policy minus that of the first.
     pub difference_share: f64,
-    /// Newcombe's, 95 %.
+    /// Newcombe's 95 % interval of the difference.
     pub interval_share: [f64; 2],
     /// McNemar's exact test, two-sided.
     pub mcnemar_p_value: f64,
 }
 
-/// Episodes by task, with the hash of its file, seed and where they began; of several the first.
+/// Episodes by task, hash of its file, seed and start phase; the first of several.
 type Episodes<'a> = BTreeMap<(&'static str, Option<&'static str>, u32, Option<usize>), &'a PlayedEpisode>;
 
 impl Comparison {
@@ -70,7 +70,8 @@ fn episodes<'a>(group: &'a PolicyGroup) -> Episodes<'a> {
     found
 }
 
-/// `None` where the two have no such episode in common. An episode that began at a phase counts for that phase alone.
+/// Returns the row of a phase; `None` if the two policies share no such episode. An episode that began at a
+/// phase counts for that phase alone.
 fn row(
     task: Option<&'static str>,
     phase: usize,

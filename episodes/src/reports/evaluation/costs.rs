@@ -1,4 +1,5 @@
-//! What episodes cost: steps, calls and thinking, and where notes say it, tokens, price and time of models.
+//! Costs of episodes: steps, calls and thinking time, and, if notes report them, tokens, price and time of
+//! models.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,7 +8,7 @@ use tandem_tools_spec::{AgentEnding, Usage};
 
 use crate::results::PlayedEpisode;
 
-/// What whole episodes cost.
+/// Costs of whole episodes.
 #[derive(Debug, Serialize)]
 pub struct EpisodeCosts {
     pub steps: ValueRange,
@@ -15,7 +16,7 @@ pub struct EpisodeCosts {
     pub thought: ValueRange,
 }
 
-/// The range of some numbers, and the middle one.
+/// Minimum, median and maximum of some values.
 #[derive(Debug, Serialize)]
 pub struct ValueRange {
     pub min: f64,
@@ -23,27 +24,27 @@ pub struct ValueRange {
     pub max: f64,
 }
 
-/// What the notes of a policy's whole episodes say that models took, each an episode's sum.
+/// Model costs from the notes of a policy's whole episodes, each an episode's sum.
 #[derive(Debug, Serialize)]
 pub struct ModelCosts {
-    /// Episodes that have notes.
+    /// Number of episodes that have notes.
     pub episodes: usize,
-    /// Tokens that were read, those from a cache included.
+    /// Tokens that were read, including those from a cache.
     pub input_tokens: ValueRange,
     pub output_tokens: ValueRange,
-    /// Of all tokens that were read, which share came from a cache; `None` where none were read.
+    /// Share of the read tokens that came from a cache; `None` if none were read.
     pub cached_share: Option<f64>,
-    /// `None`, as the next two, where no note says it.
+    /// Price; `None`, like the next two, if no note reports it.
     pub usd: Option<ValueRange>,
-    /// What all of them cost.
+    /// Price of all episodes.
     pub total_usd: Option<f64>,
-    /// How long models took.
+    /// Time that models took.
     pub model_time: Option<ValueRange>,
     pub models: BTreeSet<String>,
 }
 
 impl ModelCosts {
-    /// `None` where no episode has notes.
+    /// Sums up the notes of these episodes; `None` if none has notes.
     pub fn of(episodes: &[&PlayedEpisode]) -> Option<ModelCosts> {
         let used: Vec<&Usage> = episodes.iter().filter_map(|played| played.result.usage.as_ref()).collect();
         let range = |of: fn(&Usage) -> Option<f64>| {
@@ -65,29 +66,29 @@ impl ModelCosts {
     }
 }
 
-/// What was asked of models: for episodes that count, and for those that do not, which cost as much.
+/// Model costs of episodes that count, and of those that do not, which cost as much.
 #[derive(Debug, Serialize)]
 pub struct AskedCosts {
     pub counted: CostSum,
     pub not_counted: CostSum,
-    /// How the play of models ended, by episode and model, whether the episode counts or not.
+    /// Number of endings of the play of models, by episode and model, whether the episode counts or not.
     pub endings: BTreeMap<AgentEnding, usize>,
 }
 
-/// What the notes of some episodes add up to.
+/// Sum of the notes of some episodes.
 #[derive(Debug, Default, Serialize)]
 pub struct CostSum {
-    /// Episodes that have notes.
+    /// Number of episodes that have notes.
     pub episodes: usize,
-    /// Tokens that were read, those from a cache included.
+    /// Tokens that were read, including those from a cache.
     pub input_tokens: u64,
     pub output_tokens: u64,
-    /// `None` where no note says it.
+    /// `None` if no note reports it.
     pub usd: Option<f64>,
 }
 
 impl AskedCosts {
-    /// `None` where no episode has notes.
+    /// Sums up the notes of these episodes; `None` if none has notes.
     pub fn of(counted: &[&PlayedEpisode], not_counted: &[&PlayedEpisode]) -> Option<AskedCosts> {
         let mut endings = BTreeMap::new();
         let usages = counted.iter().chain(not_counted).filter_map(|played| played.result.usage.as_ref());
@@ -115,7 +116,7 @@ impl CostSum {
 }
 
 impl EpisodeCosts {
-    /// `None` of no episodes.
+    /// Returns the costs of these episodes; `None` if there are none.
     pub fn of(episodes: &[&PlayedEpisode]) -> Option<EpisodeCosts> {
         let spread = |of: fn(&PlayedEpisode) -> f64| {
             ValueRange::of(episodes.iter().map(|played| of(played)).collect())
@@ -129,7 +130,7 @@ impl EpisodeCosts {
 }
 
 impl ValueRange {
-    /// `None` of no values.
+    /// Returns the range of these values; `None` if there are none.
     pub fn of(mut values: Vec<f64>) -> Option<ValueRange> {
         values.sort_by(f64::total_cmp);
         let (min, max) = (*values.first()?, *values.last()?);
@@ -172,7 +173,7 @@ mod tests {
         }
     }
 
-    /// An expert that says nothing of models, beside an agent of which half of the episodes have notes.
+    /// Compares an expert without notes with an agent of which half of the episodes have notes.
     #[test]
     fn agents_are_compared_by_what_their_notes_say() {
         let mut episodes = nine_six_three("agent");

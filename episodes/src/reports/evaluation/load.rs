@@ -1,4 +1,4 @@
-//! Finds the episodes in folders: single results as `evaluate` and `collect` keep them, and recordings as `serve` leaves them.
+//! Loading of episodes from folders: single results by `evaluate` and `collect`, and recordings by `serve`.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -11,16 +11,17 @@ use crate::results::{EPISODES, PlayedEpisode, STRESS, episode_note};
 #[derive(Clone, Debug)]
 pub struct FoundEpisode {
     pub played: PlayedEpisode,
-    /// Its picture strip, where it was recorded.
+    /// Path of its image strip; `None` if it was not recorded.
     pub strip: Option<PathBuf>,
-    /// Its recording, where there is one.
+    /// Path of its recording; `None` if there is none.
     pub recording: Option<PathBuf>,
-    /// Its folder below the runs folder, which is taken to be that which holds the reported one, or is itself reported.
+    /// Its folder relative to the runs folder. The runs folder is assumed to be the parent of the reported
+    /// folder, or the reported folder itself.
     pub run: String,
 }
 
 impl FoundEpisode {
-    /// An episode with what its run folder holds, if there is one.
+    /// Creates an episode, with the files of its run folder.
     fn new(played: PlayedEpisode, folder: &Path, runs: &Path) -> FoundEpisode {
         let file = |name: &str| Some(folder.join(name)).filter(|path| path.exists());
         let absolute = folder.canonicalize().unwrap_or_else(|_| folder.into());
@@ -29,15 +30,15 @@ impl FoundEpisode {
     }
 }
 
-/// What folders hold.
+/// Content of the loaded folders.
 #[derive(Clone, Debug, Default)]
 pub struct LoadedEpisodes {
     pub episodes: Vec<FoundEpisode>,
-    /// Files that are no episodes, and why.
+    /// Files that are no episodes, with the reasons.
     pub skipped: Vec<String>,
 }
 
-/// Why there is nothing to report on.
+/// Reason why there is nothing to report on.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     #[error("cannot read {}: {source}", path.display())]
@@ -46,7 +47,11 @@ pub enum LoadError {
     Nothing(PathBuf),
 }
 
-/// Every episode of every folder, each once.
+/// Loads every episode of every folder, each once.
+///
+/// # Errors
+///
+/// If a folder cannot be read or has no episodes.
 pub fn load(folders: &[PathBuf]) -> Result<LoadedEpisodes, LoadError> {
     let mut loaded = LoadedEpisodes::default();
     for folder in folders {
@@ -57,7 +62,7 @@ pub fn load(folders: &[PathBuf]) -> Result<LoadedEpisodes, LoadError> {
         }
         let stressed = folder.join(STRESS);
         if stressed.is_dir() {
-            // What `evaluate --stress` wrote beside the plain run, an axis and level a folder.
+            // Output of `evaluate --stress` beside the plain run, a folder per axis and level.
             for plan in entries(&stressed)?.into_iter().filter(|plan| plan.join(EPISODES).is_dir()) {
                 load_results(&plan.join(EPISODES), folder, &mut loaded)?;
             }
@@ -72,7 +77,7 @@ pub fn load(folders: &[PathBuf]) -> Result<LoadedEpisodes, LoadError> {
 }
 
 impl LoadedEpisodes {
-    /// Folders may overlap.
+    /// Adds an episode unless it is already there: folders may overlap.
     fn add(&mut self, found: FoundEpisode) {
         if !self.episodes.iter().any(|known| known.played == found.played) {
             self.episodes.push(found);
@@ -80,7 +85,7 @@ impl LoadedEpisodes {
     }
 }
 
-/// Results of single episodes of the evaluation in `evaluation`, each in a file.
+/// Loads the results of single episodes of the evaluation in `evaluation`, each in a file.
 fn load_results(folder: &Path, evaluation: &Path, loaded: &mut LoadedEpisodes) -> Result<(), LoadError> {
     let absolute = evaluation.canonicalize().unwrap_or_else(|_| evaluation.into());
     let runs = absolute.parent().unwrap_or(&absolute);
@@ -94,7 +99,8 @@ fn load_results(folder: &Path, evaluation: &Path, loaded: &mut LoadedEpisodes) -
     Ok(())
 }
 
-/// Recordings of a server, each in a folder; the policy is called as the folder that they lie in.
+/// Loads the recordings of a server, each in a folder. The policy's name is that of the folder which
+/// contains them.
 fn load_recordings(folder: &Path, loaded: &mut LoadedEpisodes) -> Result<(), LoadError> {
     let absolute = folder.canonicalize().unwrap_or_else(|_| folder.into());
     let policy = absolute.file_name().map_or("policy".into(), |name| name.to_string_lossy().into_owned());
@@ -127,7 +133,7 @@ fn recorded(path: &Path, policy: &str) -> Result<PlayedEpisode, String> {
     })
 }
 
-/// What a folder holds, by name.
+/// Returns the entries of a folder, by name.
 fn entries(folder: &Path) -> Result<Vec<PathBuf>, LoadError> {
     let failed = |source| LoadError::Read { path: folder.into(), source };
     let entries = std::fs::read_dir(folder).map_err(failed)?;

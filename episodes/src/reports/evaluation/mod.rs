@@ -1,5 +1,5 @@
-//! What episodes that were played come to: rates with what they leave open, averages, effort, why episodes failed, and how two
-//! policies compare on the same seeds; as one page that needs nothing else, or as text.
+//! Reports on played episodes: rates with intervals, averages, effort, causes of failures, and comparisons
+//! of policies on the same seeds. A report is a self-contained page, or text.
 
 mod compare;
 mod costs;
@@ -36,27 +36,27 @@ pub use stress::{AxisLoss, PairedLoss, StressReport, StressRow};
 pub(crate) use went_wrong::moment_of_failure;
 pub use went_wrong::{FailureMoment, failure_moments};
 
-/// Everything that a report says in words and numbers.
+/// Content of a report, without images.
 #[derive(Debug, Serialize)]
 pub struct EvaluationReport {
     /// The policies in the order in which they were found.
     pub policies: Vec<PolicyReport>,
     /// Each policy against the first.
     pub comparisons: Vec<Comparison>,
-    /// What is left of policies that were played under stress, too.
+    /// Results of policies that were also played under stress.
     pub stress: Vec<StressReport>,
-    /// What of these tasks needs no eyes.
+    /// Floors of these tasks without perception.
     pub floors: Vec<TaskFloor>,
-    /// What was published of the same tasks in another simulator.
+    /// Published rates of the same tasks in another simulator.
     pub published: Vec<PublishedRates>,
     pub published_averages: Vec<PublishedAverages>,
-    /// Where recorded failures went wrong, as far as somebody has looked.
+    /// Moments at which recorded failures went wrong, up to a limit on their number.
     pub failure_moments: Vec<FailureMoment>,
-    /// Files that are no episodes, and why.
+    /// Files that are no episodes, with the reasons.
     pub skipped: Vec<String>,
 }
 
-/// How a report is written.
+/// Format of a report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReportFormat {
     Html,
@@ -75,7 +75,7 @@ impl ReportFormat {
         ReportFormat::Tex,
     ];
 
-    /// What the file's extension is.
+    /// Returns the file extension of the format.
     pub fn name(self) -> &'static str {
         match self {
             ReportFormat::Html => "html",
@@ -88,11 +88,11 @@ impl ReportFormat {
 }
 
 impl EvaluationReport {
-    /// Counts what was found.
+    /// Evaluates the loaded episodes.
     pub fn of(loaded: &LoadedEpisodes) -> EvaluationReport {
         let all = || loaded.episodes.iter();
         let plain = all().filter(|found| found.played.spec.stress.is_none());
-        // What is played under stress alone is told as any other.
+        // If all episodes are under stress, they are reported like plain ones.
         let groups = match plain.clone().next() {
             Some(_) => policy::groups(plain),
             None => policy::groups(all()),
@@ -115,7 +115,7 @@ impl EvaluationReport {
         }
     }
 
-    /// The report; a page shows `pictures`, too.
+    /// Writes the report; `pictures` are for pages only.
     pub fn write(
         &self,
         format: ReportFormat,

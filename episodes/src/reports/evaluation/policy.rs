@@ -1,4 +1,4 @@
-//! How far one policy got: rates of phases, averages, effort, and why episodes failed.
+//! Results of one policy: rates of phases, averages, effort, and causes of failures.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,46 +15,47 @@ use crate::scoring::Phase;
 use crate::statistics::Count;
 use crate::tasks::{self, Task};
 
-/// One policy, under one set of rules and on one build.
+/// Episodes of one policy, under one set of rules and on one build.
 pub struct PolicyGroup<'a> {
     pub name: String,
-    /// Those that count.
+    /// Episodes that count.
     pub episodes: Vec<&'a FoundEpisode>,
-    /// Those that do not, and that have not been played again.
+    /// Episodes that do not count and have not been played again.
     pub excluded: Vec<&'a PlayedEpisode>,
-    /// Those that do not, and that have been played again elsewhere.
+    /// Episodes that do not count and have been played again elsewhere.
     pub superseded: Vec<&'a PlayedEpisode>,
 }
 
-/// How far its episodes got, and at what cost.
+/// Results and costs of a policy's episodes.
 #[derive(Debug, Serialize)]
 pub struct PolicyReport {
     pub name: String,
-    /// Where it was reached, if it is a server.
+    /// Address of a policy server; `None` for other policies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub address: Option<String>,
     pub protocol: &'static str,
     pub locomotion: String,
     pub build: String,
-    /// Those that count: what is not said of the excluded ones is of these.
+    /// Number of episodes that count. Figures refer to these, unless they are on excluded ones.
     pub episodes: usize,
     pub falls: u32,
     /// The tasks that were played, in the order of the list of tasks.
     pub tasks: Vec<TaskReport>,
     /// Averages over the tasks of two robots, and over those of three.
     pub averages: Vec<TaskAverage>,
-    /// Of the tasks of two robots, as the benchmark has it, then of those of three; each where it was played.
+    /// Rates by collaboration over the tasks of two robots, as in the benchmark, then over those of three;
+    /// each if it was played.
     pub together: Vec<ByCollaboration>,
-    /// Every phase on its own, where episodes began at phases.
+    /// Rates of single phases; `None` if no episodes began at phases.
     pub phase_level: Option<PhaseLevel>,
-    /// What it was shown that the benchmark's own policies are not.
+    /// Extra information that it was shown beyond the benchmark's own policies.
     pub shown: Vec<ShownReport>,
     pub reasons: Vec<FailureReason>,
-    /// Episodes that say nothing of how far the policy gets.
+    /// Episodes that say nothing about the policy's performance.
     pub excluded: Vec<ExcludedEpisodes>,
     /// Episodes that were played more than once, because earlier attempts did not count.
     pub played_again: Vec<RepeatedEpisode>,
-    /// What was asked of models in all, where notes say it.
+    /// Total model costs; `None` if no notes report them.
     pub asked: Option<AskedCosts>,
 }
 
@@ -63,14 +64,14 @@ pub struct PolicyReport {
 pub struct TaskReport {
     pub task: &'static str,
     pub robots: usize,
-    /// Those that began at the task's own beginning.
+    /// Number of episodes that began at the task's own beginning.
     pub episodes: usize,
     pub phases: Vec<PhaseReport>,
     pub effort: Option<EpisodeCosts>,
-    /// What models took, where notes say it.
+    /// Model costs; `None` if no notes report them.
     pub models: Option<ModelCosts>,
     pub falls: u32,
-    /// Mean share of the joint targets that lay beyond the joints' limits; nothing where none did.
+    /// Mean share of the joint targets beyond the joints' limits; `None` if there were none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joints_clamped_share: Option<f64>,
 }
@@ -78,16 +79,16 @@ pub struct TaskReport {
 /// One phase of a task.
 #[derive(Debug, Serialize)]
 pub struct PhaseReport {
-    /// The phase's id, as `transfer`.
+    /// The phase's id, for example `transfer`.
     pub id: &'static str,
-    /// The phase's number, as `p2`.
+    /// The phase's number, for example `p2`.
     pub number: String,
     pub collaborative: bool,
-    /// The rate of all episodes.
+    /// Rate among all episodes.
     pub cumulative: Option<Rate>,
-    /// The rate of those that reached the phase before it.
+    /// Rate among the episodes that reached the phase before it.
     pub conditional: Option<Rate>,
-    /// The rate of those that began where it begins.
+    /// Rate among the episodes that began at it.
     pub from_its_beginning: Option<Rate>,
 }
 
@@ -99,8 +100,8 @@ pub struct TaskAverage {
     pub phases: Vec<Option<MeanRate>>,
 }
 
-/// Phases on which robots work together against those on which they do not, of the tasks of one number of robots: means of conditional
-/// rates.
+/// Mean conditional rates of phases on which robots work together, and of the others, over the tasks of one
+/// number of robots.
 #[derive(Debug, Serialize)]
 pub struct ByCollaboration {
     pub robots: usize,
@@ -111,15 +112,15 @@ pub struct ByCollaboration {
 /// One kind of information that the benchmark's own policies are not shown.
 #[derive(Debug, Serialize)]
 pub struct ShownReport {
-    /// As results have it, as `odometry`.
+    /// The name in results, for example `odometry`.
     pub what: String,
-    /// In how many of the episodes that count.
+    /// Number of counted episodes that showed it.
     pub episodes: usize,
-    /// How many replies showed it, by the robot that it is of.
+    /// Number of replies that showed it, by the robot concerned.
     pub replies: BTreeMap<String, u32>,
 }
 
-/// Why some episodes failed.
+/// A cause of failed episodes.
 #[derive(Debug, Serialize)]
 pub struct FailureReason {
     pub task: &'static str,
@@ -143,13 +144,13 @@ pub struct ExcludedEpisodes {
 pub struct RepeatedEpisode {
     pub task: &'static str,
     pub seed: u32,
-    /// Why each earlier attempt failed, the oldest first.
+    /// Causes of the earlier attempts' failures, the oldest first.
     pub earlier: Vec<String>,
-    /// What came of the last one.
+    /// Outcome of the last attempt.
     pub last: String,
 }
 
-/// Policies in the order in which they were found, with names that tell them apart.
+/// Groups episodes by policy, in the order in which they were found, with distinct names.
 pub fn groups<'a>(episodes: impl Iterator<Item = &'a FoundEpisode>) -> Vec<PolicyGroup<'a>> {
     let mut groups: Vec<(Vec<String>, Vec<&FoundEpisode>)> = Vec::new();
     for found in episodes {
@@ -190,7 +191,8 @@ impl<'a> PolicyGroup<'a> {
     }
 }
 
-/// What has to agree for episodes to be of one policy: its name first, then all that may tell namesakes apart.
+/// Returns the properties that episodes of one policy share: its name first, then all that may distinguish
+/// policies of the same name.
 pub fn rules_of(played: &PlayedEpisode) -> Vec<String> {
     let spec = &played.spec;
     let short = played.build.chars().rev().take(6).collect::<Vec<_>>();
@@ -209,7 +211,8 @@ pub fn rules_of(played: &PlayedEpisode) -> Vec<String> {
     ]
 }
 
-/// The name of a policy without the addresses that it is reached at, as `openpi` of `openpi:ws://host:8000`, and these.
+/// Splits the addresses off a policy's name, for example `openpi` and the address of
+/// `openpi:ws://host:8000`.
 fn split_address(name: &str) -> (&str, Option<&str>) {
     let parts = name.split_once(':').filter(|(_, address)| {
         let scheme = address.split_once("://").map_or("", |(scheme, _)| scheme);
@@ -218,7 +221,7 @@ fn split_address(name: &str) -> (&str, Option<&str>) {
     parts.map_or((name, None), |(name, address)| (name, Some(address)))
 }
 
-/// A short name for how a policy was driven.
+/// Returns a short name for a policy's settings.
 fn settings_of(card: &PolicyCard) -> String {
     let text = card.settings.as_ref().map(Value::to_string).unwrap_or_default();
     format!("settings {:06x}", xxh3_64(text.as_bytes()) & 0xff_ffff)
@@ -258,7 +261,7 @@ impl PolicyReport {
 }
 
 impl TaskReport {
-    /// `None` where the task was not played.
+    /// Creates the report of a task; `None` if it was not played.
     fn of(task: &'static Task, played: &[&PlayedEpisode]) -> Option<TaskReport> {
         let of_task: Vec<&PlayedEpisode> =
             played.iter().copied().filter(|one| one.spec.task == task).collect();
@@ -289,7 +292,8 @@ impl TaskReport {
     }
 }
 
-/// Mean share of the joint targets of these episodes that lay beyond the joints' limits; `None` where none did.
+/// Returns the mean share of the joint targets of these episodes beyond the joints' limits; `None` if there
+/// were none.
 fn mean_clamped_share(episodes: &[&PlayedEpisode]) -> Option<f64> {
     let shares: Vec<f64> =
         episodes.iter().map(|one| one.result.joints_clamped_share.unwrap_or_default()).collect();
@@ -314,7 +318,7 @@ fn averages(tasks: &[TaskReport]) -> Vec<TaskAverage> {
 }
 
 impl ByCollaboration {
-    /// `None` where no phase of such a task has a conditional rate.
+    /// Creates the means; `None` if no phase of such a task has a conditional rate.
     fn of(tasks: &[TaskReport], robots: usize) -> Option<ByCollaboration> {
         let mean = |together: bool| {
             let phases = tasks.iter().filter(|task| task.robots == robots).flat_map(|task| &task.phases);
@@ -369,7 +373,8 @@ fn reasons(episodes: &[&PlayedEpisode]) -> Vec<FailureReason> {
     reasons
 }
 
-/// So many failures at most of those that are `wanted`, with their policies, by turns from every policy and task.
+/// Returns at most `most` failures for which `wanted` returns `true`, with their policies, in turns from
+/// every policy and task.
 pub fn failed_by_turns(
     loaded: &LoadedEpisodes,
     most: usize,
@@ -395,7 +400,7 @@ pub fn failed_by_turns(
     order.into_iter().map(|index| all[index].clone()).collect()
 }
 
-/// The episodes of a policy that count and failed.
+/// Returns the episodes of a policy that count and failed.
 pub fn failed<'a>(group: &PolicyGroup<'a>) -> Vec<&'a FoundEpisode> {
     group.episodes.iter().copied().filter(|found| !found.played.succeeded()).collect()
 }
@@ -416,7 +421,8 @@ fn excluded(episodes: &[&PlayedEpisode]) -> Vec<ExcludedEpisodes> {
     listed
 }
 
-/// Whoever fails itself when it is about to lose, and wins another time, is seen here.
+/// Lists the episodes that were played again. This reveals a policy that fails itself when it is about to
+/// lose, and wins another time.
 fn played_again(group: &PolicyGroup) -> Vec<RepeatedEpisode> {
     let counted = group.episodes.iter().map(|found| &found.played);
     let repeated = counted.chain(group.excluded.iter().copied()).filter_map(|played| {
@@ -447,14 +453,15 @@ fn played_again(group: &PolicyGroup) -> Vec<RepeatedEpisode> {
     repeated.collect()
 }
 
-/// Number of the first phase that counts and was not reached.
+/// Returns the number of the first phase that counts and was not reached.
 pub fn first_missed_phase(played: &PlayedEpisode) -> String {
     let counts = |phase: &usize| played.start_phase().is_none_or(|only| only == *phase);
     let mut phases = (0..played.spec.task.phases.len()).filter(counts);
     phases.find(|phase| !played.reached(*phase)).map(Phase::number).unwrap_or_default()
 }
 
-/// What the policy said when it gave up, or why the episode ended; and who fell.
+/// Returns the policy's own reason, or else the reason why the episode ended, followed by the number of
+/// falls.
 pub fn failure_cause(played: &PlayedEpisode) -> String {
     let ended = match played.result.ended {
         EndReason::TaskComplete => "the task was completed",

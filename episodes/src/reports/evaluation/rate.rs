@@ -1,21 +1,21 @@
-//! Rates and means of rates, with what they leave open, and how they are written.
+//! Rates and means of rates, with their intervals, and their formatting.
 
 use serde::Serialize;
 
 use crate::statistics::{Count, clopper_pearson, mean_share};
 
-/// Successes of trials, of which there is at least one.
+/// Rate of success of at least one trial.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Rate {
     pub successes: usize,
     pub trials: usize,
     pub share: f64,
-    /// Exact, 95 %.
+    /// Exact 95 % interval.
     pub interval_share: [f64; 2],
 }
 
 impl Rate {
-    /// `None` without trials.
+    /// Returns the rate; `None` without trials.
     pub fn of(count: Count) -> Option<Rate> {
         let Count { successes, trials } = count;
         Some(Rate { successes, trials, share: count.share()?, interval_share: clopper_pearson(count) })
@@ -25,12 +25,12 @@ impl Rate {
         Count { successes: self.successes, trials: self.trials }
     }
 
-    /// The rate and its interval in percent, as `97.5 [93.2, 99.5]`.
+    /// Formats the rate and its interval in percent, for example `97.5 [93.2, 99.5]`.
     pub fn text(self) -> String {
         with_interval(self.share, self.interval_share)
     }
 
-    /// The counts, as `39/40`.
+    /// Formats the counts, for example `39/40`.
     pub fn fraction(self) -> String {
         format!("{}/{}", self.successes, self.trials)
     }
@@ -41,19 +41,19 @@ impl Rate {
 pub struct MeanRate {
     pub counts: Vec<Count>,
     pub mean_share: f64,
-    /// 95 %.
+    /// 95 % interval.
     pub interval_share: [f64; 2],
 }
 
 impl MeanRate {
-    /// The mean of those rates that have trials; `None` where none has.
+    /// Returns the mean of the rates that have trials; `None` if none has.
     pub fn of(counts: impl Iterator<Item = Count>) -> Option<MeanRate> {
         let counts: Vec<Count> = counts.filter(|count| count.trials > 0).collect();
         let (mean_share, interval_share) = mean_share(&counts)?;
         Some(MeanRate { counts, mean_share, interval_share })
     }
 
-    /// The mean and its interval in percent; see [`Rate::text`].
+    /// Formats the mean and its interval in percent; see [`Rate::text`].
     pub fn text(&self) -> String {
         with_interval(self.mean_share, self.interval_share)
     }
@@ -63,10 +63,10 @@ fn with_interval(share: f64, [low_share, high_share]: [f64; 2]) -> String {
     format!("{} [{}, {}]", percent(share), percent(low_share), percent(high_share))
 }
 
-/// A share in percent with one decimal, which is left out where it is zero.
+/// Formats a share in percent with one decimal, which is left out if it is zero.
 pub fn percent(share: f64) -> String {
     let text = format!("{:.1}", 100.0 * share);
-    // What rounds to zero has no sign.
+    // A value that rounds to zero has no sign.
     let text = if text == "-0.0" { "0.0" } else { text.as_str() };
     text.strip_suffix(".0").unwrap_or(text).to_owned()
 }

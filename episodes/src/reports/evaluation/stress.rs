@@ -1,4 +1,5 @@
-//! What is left of a policy when things go wrong: rates under stress beside those of the same seeds without, and what hurts most.
+//! Robustness of policies: rates under stress beside those of the same seeds without, and the most harmful
+//! axis.
 
 use std::collections::BTreeMap;
 
@@ -15,17 +16,17 @@ use crate::statistics::{Count, Pairs, mcnemar, newcombe};
 use crate::stress::{Stress, StressAxis};
 use crate::tasks::{self, Task};
 
-/// One policy under stress. Rates are of the last phase.
+/// Results of one policy under stress. Rates refer to the last phase.
 #[derive(Debug, Serialize)]
 pub struct StressReport {
-    /// The policy, as it is called without stress.
+    /// The policy's name without stress.
     pub policy: String,
     pub protocol: &'static str,
-    /// Its rate without stress; `None` where nothing was played without.
+    /// Its rate without stress; `None` if no such episode was played.
     pub plain: Option<Rate>,
     /// All tasks together, by axis and level; then each task.
     pub rows: Vec<StressRow>,
-    /// The axis that takes most off the rate, in the mean of the levels that were played.
+    /// The axis with the largest loss of rate, averaged over the played levels.
     pub hurts_most: Option<AxisLoss>,
 }
 
@@ -36,28 +37,28 @@ pub struct StressRow {
     pub task: Option<&'static str>,
     pub axis: StressAxis,
     pub level: u8,
-    /// What of the axis these episodes have, as "drops what it holds", where seeds take turns.
+    /// Variant of the axis, for example "drops what it holds"; `None` if the axis has none.
     pub kind: Option<&'static str>,
     pub rate: Rate,
     pub falls: u32,
-    /// Against the same tasks and seeds without stress; `None` where these were not played.
+    /// Comparison with the same tasks and seeds without stress; `None` if these were not played.
     pub paired: Option<PairedLoss>,
 }
 
 /// Rates of the same episodes with and without stress.
 #[derive(Debug, Serialize)]
 pub struct PairedLoss {
-    /// The first without, the second with it.
+    /// Pairs of outcomes, the first without stress, the second with it.
     pub pairs: Pairs,
-    /// The rate under stress less that without.
+    /// Rate under stress minus rate without.
     pub difference_share: f64,
-    /// Newcombe's, 95 %.
+    /// Newcombe's 95 % interval of the difference.
     pub interval_share: [f64; 2],
     /// McNemar's exact test, two-sided.
     pub mcnemar_p_value: f64,
 }
 
-/// What an axis takes off.
+/// Loss of rate on an axis.
 #[derive(Debug, Serialize)]
 pub struct AxisLoss {
     pub axis: StressAxis,
@@ -68,7 +69,7 @@ pub struct AxisLoss {
 /// A task, the hash of its file, and a seed.
 type EpisodeKey = (&'static str, Option<&'static str>, u32);
 
-/// The policies that were played under stress, in the order in which they were found.
+/// Reports on the policies that were played under stress, in the order in which they were found.
 pub fn stress_reports<'a>(episodes: impl Iterator<Item = &'a FoundEpisode> + Clone) -> Vec<StressReport> {
     let mut policies: Vec<(Vec<String>, Vec<&PlayedEpisode>)> = Vec::new();
     let whole = episodes.clone().map(|found| &found.played).filter(|played| played.spec.start == Start::Task);
@@ -90,7 +91,7 @@ pub fn stress_reports<'a>(episodes: impl Iterator<Item = &'a FoundEpisode> + Clo
     reports.filter(|report| !report.rows.is_empty()).collect()
 }
 
-/// What has to agree for episodes to be of one policy, whatever stress is laid over them.
+/// Returns the properties that episodes of one policy share under any stress.
 fn without_stress(played: &PlayedEpisode) -> Vec<String> {
     match played.spec.stress {
         None => rules_of(played),
@@ -149,7 +150,7 @@ impl StressReport {
         }
     }
 
-    /// The rows of all tasks together, every kind of an axis in one.
+    /// Returns the rows of all tasks together, with the variants of an axis combined.
     pub fn overall(&self) -> impl Iterator<Item = &StressRow> {
         self.rows.iter().filter(|row| row.task.is_none() && row.kind.is_none())
     }
@@ -166,7 +167,7 @@ fn rate<'a>(episodes: impl Iterator<Item = &'a PlayedEpisode>) -> Option<Rate> {
 }
 
 impl StressRow {
-    /// `None` without episodes.
+    /// Creates a row; `None` without episodes.
     fn of(
         task: Option<&'static Task>,
         kind: Option<&'static str>,
@@ -197,7 +198,7 @@ impl StressRow {
 }
 
 impl PairedLoss {
-    /// `None` without pairs.
+    /// Returns the comparison; `None` without pairs.
     fn of(pairs: Pairs) -> Option<PairedLoss> {
         Some(PairedLoss {
             difference_share: pairs.difference_share()?,
@@ -207,14 +208,14 @@ impl PairedLoss {
         })
     }
 
-    /// The difference and its interval in points.
+    /// Formats the difference and its interval in points.
     pub fn text(&self) -> String {
         let [low, high] = self.interval_share.map(signed);
         format!("{} [{low}, {high}]", signed(self.difference_share))
     }
 }
 
-/// The axis with the greatest mean loss; `None` where none loses anything.
+/// Returns the axis with the largest mean loss; `None` if no axis has a loss.
 fn hurts_most(rows: &[StressRow]) -> Option<AxisLoss> {
     let losses = StressAxis::ALL.into_iter().filter_map(|axis| {
         let of_axis = rows.iter().filter(|row| row.axis == axis && row.task.is_none() && row.kind.is_none());
@@ -226,7 +227,7 @@ fn hurts_most(rows: &[StressRow]) -> Option<AxisLoss> {
     losses.min_by(|one, other| one.difference_share.total_cmp(&other.difference_share))
 }
 
-/// The tables of one policy: all tasks together, then task by task.
+/// Returns the tables of one policy: all tasks together, then task by task.
 pub fn tables(report: &StressReport) -> [Table; 2] {
     [overall_table(report), task_table(report)]
 }
@@ -300,7 +301,7 @@ fn task_table(report: &StressReport) -> Table {
     table
 }
 
-/// A line for each rate of each task, as the CSV's other lines are.
+/// Returns a line for each rate of each task, in the format of the CSV's other lines.
 pub fn csv_lines(report: &StressReport, quoted: &dyn Fn(&str) -> String) -> Vec<String> {
     let line = |row: &StressRow| {
         let task = tasks::cohub().iter().copied().find(|task| Some(task.id) == row.task)?;
@@ -322,7 +323,8 @@ mod tests {
     use crate::reports::evaluation::{EvaluationReport, ReportFormat, ReportPictures, load};
     use crate::stress::StressLevel;
 
-    /// Twenty seeds of Handover without stress, of which 18 succeed, and under two axes at two levels.
+    /// Returns a report on twenty seeds of Handover without stress, of which 18 succeed, and under two axes
+    /// at two levels.
     fn under_stress() -> EvaluationReport {
         let task = tasks::find("handover").unwrap();
         let episode = |stress: Option<(StressAxis, StressLevel)>, seed: u32, succeeds: bool| {
@@ -352,16 +354,16 @@ mod tests {
         let paired = push.paired.as_ref().unwrap();
         let expected = Pairs { both: 6, first_only: 12, second_only: 0, neither: 2 };
         assert_eq!((push.rate.fraction(), paired.pairs), ("6/20".into(), expected));
-        // Twelve heads of twelve.
+        // Equivalent to twelve heads in twelve tosses.
         assert!((paired.mcnemar_p_value - 2.0 / 4096.0).abs() < 1e-9);
         let most = stress.hurts_most.as_ref().unwrap();
         assert_eq!((most.axis, percent(most.difference_share)), (StressAxis::Push, "-35".into()));
-        // Seeds take turns in what a partner does.
+        // Seeds take turns among a partner's kinds of failure.
         let kinds = stress.rows.iter().filter(|row| row.kind.is_some());
         assert_eq!(kinds.map(|row| row.rate.trials).collect::<Vec<_>>(), [4; 5]);
     }
 
-    /// As `evaluate --stress` writes them: an evaluation in the folder of the plain one.
+    /// Folder layout of `evaluate --stress`: an evaluation in the folder of the plain one.
     #[test]
     fn what_lies_in_the_folder_of_the_plain_run_is_found() {
         let folder = tempfile::tempdir().unwrap();
@@ -377,7 +379,7 @@ mod tests {
         let [stress] = &report.stress[..] else { panic!("{:?}", report.stress) };
         let paired = stress.overall().next().unwrap().paired.as_ref().unwrap();
         assert_eq!((report.policies[0].episodes, paired.pairs.both), (1, 1));
-        // The folder of one axis and level alone is told as any other.
+        // The folder of one axis and level alone is reported like any other.
         let alone = EvaluationReport::of(&load(&[folder.path().join("stress/push-1")]).unwrap());
         assert_eq!(alone.policies[0].name, "agent + stress: push-1");
     }

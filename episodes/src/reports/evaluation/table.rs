@@ -1,21 +1,21 @@
-//! What a table of a report is, and how its figures are written.
+//! Tables of a report, and the formatting of their figures.
 
 use super::rate::percent;
 
-/// Words in rows and columns.
+/// A table of texts.
 pub struct Table {
     pub title: String,
-    /// What has to be known to read it.
+    /// Explanation of the table.
     pub note: String,
     pub head: Vec<String>,
     pub rows: Vec<Vec<String>>,
-    /// Columns from this one on hold figures.
+    /// Index of the first column of figures.
     pub figures_from: usize,
-    /// Where the last cell of each row leads, in a table whose rows lead somewhere.
+    /// Link targets of the last cell of each row; empty for a table without links.
     pub links: Vec<String>,
 }
 
-/// What there is nothing to say of.
+/// Text of a cell without a value.
 pub const NONE: &str = "-";
 
 impl Table {
@@ -32,13 +32,13 @@ impl Table {
     }
 }
 
-/// A share in percent, with its sign.
+/// Formats a share in percent, with its sign.
 pub fn signed(share: f64) -> String {
     let text = percent(share);
     if share > 0.0 && text != "0" { format!("+{text}") } else { text }
 }
 
-/// A p value.
+/// Formats a p value.
 pub fn p_text(p_value: f64) -> String {
     if p_value < 0.0001 { "< 0.0001".into() } else { format!("{p_value:.4}") }
 }

@@ -1,4 +1,4 @@
-//! The report's tables, made once for every way of writing them.
+//! The report's tables, built once for all formats.
 
 mod models;
 
@@ -14,7 +14,7 @@ use crate::results::named;
 use crate::statistics::Count;
 use models::{agents, asked, endings};
 
-/// Every table that has rows.
+/// Returns every table that has rows.
 pub fn all(report: &EvaluationReport) -> Vec<Table> {
     let policies = &report.policies;
     let mut tables: Vec<Table> = policies.iter().map(rates).collect();
@@ -39,7 +39,7 @@ pub fn all(report: &EvaluationReport) -> Vec<Table> {
     tables
 }
 
-/// What a policy asks of joints that they cannot do.
+/// Lists the joint targets beyond the joints' limits.
 fn clamped(policies: &[PolicyReport]) -> Table {
     let mut table = Table::new(
         "Joint targets beyond limits",
@@ -107,7 +107,7 @@ fn floors(floors: &[TaskFloor]) -> Table {
     table
 }
 
-/// The task, with what is not as the benchmark has it.
+/// Returns the task, with its departures from the benchmark.
 fn task_of(floor: &TaskFloor) -> String {
     named(floor.task, &floor.departures)
 }
@@ -349,7 +349,7 @@ fn paired_row(row: &PairedRow) -> Vec<String> {
     words.into_iter().chain(counts.map(|count| count.to_string())).chain(figures).collect()
 }
 
-/// A row for each method, and a column for each task that was played.
+/// Returns a row for each method, and a column for each task that was played.
 pub fn published(rows: &[PublishedRates]) -> Table {
     let mut table = Table::new(
         "Published, on another scale",
@@ -382,7 +382,7 @@ pub fn published(rows: &[PublishedRates]) -> Table {
     table
 }
 
-/// The published averages, which are shown only beside our own.
+/// Lists the published averages, which are shown only beside Tandem's own.
 fn published_together(report: &EvaluationReport) -> Table {
     let mut table = Table::new(
         "Published from the phases' beginnings, on another scale",

@@ -1,4 +1,4 @@
-//! What a report counts, joins, compares and says.
+//! Counts, groups, comparisons and texts of a report.
 
 mod films;
 
@@ -11,7 +11,7 @@ use crate::results::PlayedEpisode;
 use crate::spec::{EpisodeSpec, PhaseStart, Start};
 use crate::tasks::{self, Task};
 
-/// An episode that reached the first `phases` phases.
+/// Returns an episode that reached the first `phases` phases.
 pub fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> PlayedEpisode {
     let reached = |index: usize| (index < phases).then_some(4.0 * (index as f64 + 1.0));
     let times = (0..task.phases.len()).map(|index| (crate::Phase::number(index), reached(index)));
@@ -50,7 +50,7 @@ pub fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Pl
     }
 }
 
-/// Ten episodes of Handover, of which nine, six and three reach its phases.
+/// Returns ten episodes of Handover, of which nine, six and three reach its phases.
 pub fn nine_six_three(policy: &str) -> Vec<PlayedEpisode> {
     let task = tasks::find("handover").unwrap();
     let reached = [3, 3, 3, 2, 2, 2, 1, 1, 1, 0];
@@ -141,7 +141,7 @@ fn averages_are_by_number_of_robots() {
 fn policies_are_compared_on_the_seeds_that_both_played() {
     let mut episodes = nine_six_three("one");
     let handover = tasks::find("handover").unwrap();
-    // Seed 0 worse, seeds 3 to 8 better, and one that the first did not play.
+    // Seed 0 is worse, seeds 3 to 8 are better, and the first policy did not play the last one.
     let others = [(0, 2), (1, 3), (3, 3), (4, 3), (5, 3), (6, 3), (7, 3), (8, 3), (9, 0), (70, 3)];
     episodes.extend(others.map(|(seed, phases)| played("other", handover, seed, phases)));
     let report = EvaluationReport::of(&found(episodes));
@@ -163,7 +163,7 @@ fn namesakes_are_told_apart_by_what_differs() {
     assert_eq!(names, ["agent (benchmark)", "agent (agentic)"]);
 }
 
-/// What is not as the benchmark has it stands behind the policy's name, however a report is written.
+/// Departures from the benchmark follow the policy's name in every format.
 #[test]
 fn departures_stand_behind_the_name() {
     let [one, mut other] = [nine_six_three("agent"), nine_six_three("agent")];
@@ -193,7 +193,8 @@ fn joint_targets_beyond_limits_are_told_where_there_were_some() {
     assert!(text(&episodes).contains("| agent | handover | 34 |"), "{}", text(&episodes));
 }
 
-/// What a policy was shown in some of its episodes is named and counted, and makes no other policy of it.
+/// Extra information that a policy was shown in some of its episodes is named and counted. It does not make
+/// another policy of it.
 #[test]
 fn what_was_shown_beyond_the_benchmark_is_told() {
     let mut episodes = nine_six_three("agent");
@@ -208,7 +209,7 @@ fn what_was_shown_beyond_the_benchmark_is_told() {
     episodes.push(told_all);
     let report = EvaluationReport::of(&found(episodes));
     let names: Vec<&str> = report.policies.iter().map(|policy| policy.name.as_str()).collect();
-    // That `full` tells odometry need not be said beside it.
+    // The level `full` includes odometry, which is not repeated beside it.
     assert_eq!(names, ["agent + pixel_depth", "other + depth_images + assistance: full"]);
     let shown = |policy: &PolicyReport| -> Vec<(String, usize, Vec<u32>)> {
         let shown = policy.shown.iter();
@@ -223,7 +224,7 @@ fn what_was_shown_beyond_the_benchmark_is_told() {
     assert!(page.contains("Shown beyond the benchmark") && page.contains("A 6, B 2"), "{page}");
 }
 
-/// Tasks of three robots have means of their own, in every form.
+/// Tasks of three robots have means of their own, in every format.
 #[test]
 fn means_of_phases_are_by_number_of_robots() {
     let begun = |task: &str, seed: u32, phase: usize, phases: usize| {
@@ -258,7 +259,7 @@ fn means_of_phases_are_by_number_of_robots() {
     }
 }
 
-/// Every format, of a policy whose name has to be escaped everywhere.
+/// Every format, for a policy whose name has to be escaped everywhere.
 #[test]
 fn reports_quote_what_they_are_told() {
     let mut episodes = nine_six_three("a<b>&\"|_,%");
@@ -307,7 +308,7 @@ fn reports_quote_what_they_are_told() {
     assert_eq!(json["policies"][0]["tasks"][0]["phases"][1]["cumulative"]["successes"], 6);
 }
 
-/// Who crashes when it is about to lose, and wins the next time, leaves a trace.
+/// A policy that crashes when it is about to lose, and wins the next time, is listed.
 #[test]
 fn an_episode_that_was_played_again_is_listed() {
     let handover = tasks::find("handover").unwrap();
@@ -317,7 +318,7 @@ fn an_episode_that_was_played_again_is_listed() {
         played
     };
     let mut episodes = nine_six_three("one");
-    // One was played again in another folder, one in the same, and one as often as was asked for.
+    // One was played again in another folder, one in the same, and one as often as the limit allows.
     episodes[0].attempts = failed(0, "no plan").into_attempts();
     episodes.push(failed(3, "crash"));
     let attempts = failed(21, "no plan").into_attempts();
@@ -396,7 +397,7 @@ fn results_of_earlier_versions_are_read() {
         None,
         "it is written only where it is set"
     );
-    // They say of disclosure and hints alone what policies were told, or nothing.
+    // In these files, disclosure and hints alone describe the information for policies, or nothing does.
     let spec = old["spec"].as_object_mut().unwrap();
     assert!(spec.remove("assistance").is_some() && spec.remove("hints").is_some());
     spec.insert("disclosure".into(), "end".into());
@@ -444,7 +445,7 @@ fn failures_are_shown_by_turns() {
     );
 }
 
-/// The name of a server is a word; where it is reached stands beside it.
+/// The name of a server is a word; its address is given beside it.
 #[test]
 fn addresses_are_a_detail() {
     let check = |names: &[&str], titles: &[&str], addresses: &[Option<&str>]| {

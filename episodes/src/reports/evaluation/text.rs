@@ -1,4 +1,4 @@
-//! Reports without pictures: Markdown, CSV with a line for each rate, and tables for LaTeX.
+//! Reports without images: Markdown, CSV with a line for each rate, and tables for LaTeX.
 
 use super::costs::ValueRange;
 use super::policy::TaskReport;
@@ -28,7 +28,7 @@ pub fn markdown(report: &EvaluationReport) -> String {
     text
 }
 
-/// The rows, with what they lead to as Markdown has it.
+/// Returns the rows, with their links in Markdown.
 fn linked_rows(table: &Table) -> Vec<Vec<String>> {
     let mut rows = table.rows.clone();
     for (row, to) in rows.iter_mut().zip(&table.links) {
@@ -43,7 +43,7 @@ fn escape_pipe(cell: &str) -> String {
     cell.replace('|', "\\|").replace('\n', " ")
 }
 
-/// A line for each rate of each phase, for whoever counts on.
+/// Returns a line for each rate of each phase, for further computation.
 pub fn csv(report: &EvaluationReport) -> String {
     let mut text = String::from(
         "policy,protocol,task,robots,phase_number,phase_id,collaborative,rate,successes,trials,share,low_share,high_share,\
@@ -74,7 +74,7 @@ pub fn csv(report: &EvaluationReport) -> String {
     text
 }
 
-/// What the task's whole episodes took; empty where nothing says it.
+/// Returns the costs of the task's whole episodes; cells without a value are empty.
 fn csv_costs(task: &TaskReport) -> String {
     let (effort, models) = (task.effort.as_ref(), task.models.as_ref());
     let ranges: [Option<&ValueRange>; 6] = [
@@ -88,7 +88,7 @@ fn csv_costs(task: &TaskReport) -> String {
     ranges.map(|range| range.map_or(String::new(), |range| range.median_value.to_string())).join(",")
 }
 
-/// A cell of CSV, quoted as RFC 4180 has it.
+/// Quotes a cell of CSV according to RFC 4180.
 fn quoted(cell: &str) -> String {
     match cell.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", cell.replace('"', "\"\"")),
@@ -96,7 +96,7 @@ fn quoted(cell: &str) -> String {
     }
 }
 
-/// The tables for LaTeX, which need the package `booktabs`.
+/// Returns the tables for LaTeX, which need the package `booktabs`.
 pub fn tex(report: &EvaluationReport) -> String {
     let mut text = String::from("% Needs \\usepackage{booktabs}.\n");
     text.extend(all(report).iter().map(tex_table));

@@ -1,4 +1,5 @@
-//! Where recorded episodes went wrong: the moment to look at first, and the address of the page that shows it.
+//! Failure moments of recorded episodes: the moment to look at first, and the address of the page that
+//! shows it.
 
 use serde::Serialize;
 
@@ -7,9 +8,9 @@ use super::policy::{failed_by_turns, first_missed_phase};
 use crate::recording::{Recording, RecordingError};
 use crate::scoring::{Facts, Grip};
 
-/// Where `tandem serve` is, unless it is told to be elsewhere.
+/// Default address of `tandem serve`.
 const SERVED_AT: &str = "http://127.0.0.1:8700";
-/// What falls so fast, and in no hand, has been dropped; what is set down is slower.
+/// Falling speed from which an object in no hand counts as dropped; an object that is set down is slower.
 const DROPPED_M_S: f32 = 0.8;
 
 /// The moment at which an episode went wrong.
@@ -20,21 +21,21 @@ pub struct FailureMoment {
     pub seed: u32,
     /// Number of the first phase that counts and was not reached.
     pub phase: String,
-    /// As "A fell".
+    /// Description, for example "A fell".
     pub what: String,
     /// Simulated time.
     pub time_s: f64,
-    /// The page that shows it, on a server whose runs folder has the recording.
+    /// Address of the page that shows it, on a server whose runs folder has the recording.
     pub watch: String,
 }
 
-/// The moments of so many failures at most that were recorded, by turns from every policy and task.
+/// Returns the moments of at most `most` recorded failures, in turns from every policy and task.
 pub fn failure_moments(loaded: &LoadedEpisodes, most: usize) -> Vec<FailureMoment> {
     let failures = failed_by_turns(loaded, most, |found| found.recording.is_some());
     failures.into_iter().filter_map(|(policy, found)| moment(&policy, found)).collect()
 }
 
-/// `None` where the recording cannot be read.
+/// Returns the moment of a failure; `None` if the recording cannot be read.
 fn moment(policy: &str, found: &FoundEpisode) -> Option<FailureMoment> {
     let recording = Recording::read(found.recording.as_deref()?).ok()?;
     let (time_s, what) = moment_of_failure(&recording).ok()?;
@@ -50,7 +51,8 @@ fn moment(policy: &str, found: &FoundEpisode) -> Option<FailureMoment> {
     })
 }
 
-/// The first fall of a robot or the first drop of an object after the last phase that was reached; where there was none, the end.
+/// Returns the first fall of a robot or drop of an object after the last reached phase, or else the end of
+/// the recording.
 pub(crate) fn moment_of_failure(recording: &Recording) -> Result<(f64, String), RecordingError> {
     let mut watcher = Watcher::default();
     let names: Vec<&str> = recording.spec.task.robots.iter().map(|robot| robot.name).collect();
@@ -61,10 +63,10 @@ pub(crate) fn moment_of_failure(recording: &Recording) -> Result<(f64, String), 
 #[derive(Default)]
 struct Watcher {
     last_s: f64,
-    /// When each object was held last.
+    /// Time at which each object was last held.
     held_s: Vec<Option<f64>>,
     fallen: Vec<bool>,
-    /// What went wrong first since the last phase.
+    /// The first failure since the last phase.
     found: Option<(f64, String)>,
 }
 
@@ -72,7 +74,7 @@ impl Watcher {
     fn look(&mut self, facts: &Facts, reached: bool, names: &[&str]) {
         self.last_s = facts.time_s;
         if reached {
-            // Whoever has fallen lies there still, but what was dropped has been made good.
+            // A reached phase makes good a drop, but not a fall.
             self.found = self.found.take().filter(|(_, what)| what.ends_with("fell"));
         }
         self.held_s.resize(facts.objects.len(), None);
@@ -97,7 +99,7 @@ impl Watcher {
     }
 }
 
-/// The page of a run at a moment, a little before which its reader wants to begin.
+/// Returns the address of a run's page, slightly before a moment.
 fn watch_address(run: &str, time_s: f64) -> String {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.~/".contains(&byte);
     let run: String = run
@@ -113,10 +115,10 @@ mod tests {
     use crate::scoring::{A, B};
     use crate::tasks;
 
-    /// Seconds, whether a phase was reached, and what was so.
+    /// Time in seconds, whether a phase was reached, and the change of the facts.
     type WatchedMoment = (f64, bool, fn(Facts) -> Facts);
 
-    /// What is found of these moments.
+    /// Returns the failure that is found in these moments.
     fn found(moments: &[WatchedMoment]) -> Option<(f64, String)> {
         let rest = Facts::at_rest(tasks::find("handover").unwrap());
         let mut watcher = Watcher::default();
@@ -158,7 +160,7 @@ mod tests {
             found(&[&made_good[..], &[(7.0, false, fallen), (8.0, true, fallen)]].concat()),
             some(7.0, "B fell")
         );
-        // What no hand held falls for other reasons.
+        // An object that no hand held falls for other reasons.
         assert_eq!(found(&[(1.0, false, falls)]), None);
     }
 

@@ -1,4 +1,4 @@
-//! Worlds for tests, put together by hand, and the quantities of such worlds.
+//! Worlds for tests, constructed by hand, and the quantities of such worlds.
 
 use std::sync::LazyLock;
 
@@ -8,11 +8,12 @@ use super::*;
 use crate::spec::RobotFile;
 use crate::tasks::{self, RobotSpot, Task};
 
-/// The robot that stands in all of them.
+/// Model of the robots in all of them.
 static ROBOT: LazyLock<Arc<RobotModel>> = LazyLock::new(|| RobotFile::default().model().unwrap());
 
 impl Facts {
-    /// Every robot and object at its spot, at rest, and no object touched since the episode began 10 s ago.
+    /// Returns the facts with every robot and object at its spot, at rest, and no object touched since the
+    /// episode began 10 s ago.
     pub fn at_rest(task: &Task) -> Facts {
         let robot = |spot: &RobotSpot| RobotFacts {
             model: ROBOT.clone(),
@@ -48,13 +49,13 @@ impl Facts {
         }
     }
 
-    /// The same facts, but these robots hold `object`, each with both hands.
+    /// Returns the same facts, except that these robots hold `object`, each with both hands.
     pub fn held_by(self, robots: &[usize], object: &str) -> Facts {
         let hands = robots.iter().flat_map(|robot| Side::BOTH.map(|side| (*robot, side)));
         hands.fold(self, |facts, (robot, side)| facts.grip(robot, side, object, Grip::Holding))
     }
 
-    /// The same facts, but a robot has stepped elsewhere, as it is.
+    /// Returns the same facts, except that a robot has moved, with its posture unchanged.
     pub fn with_robot_moved(mut self, robot: usize, by_m: Vector) -> Facts {
         let robot = &mut self.robots[robot];
         robot.pelvis_in_world.translation += by_m;
@@ -85,7 +86,7 @@ impl Facts {
     }
 }
 
-/// The links of a robot that stands as its file has it, with its soles on the floor.
+/// Returns the link poses of a robot in its file's rest posture, with its soles on the floor.
 fn standing([x_m, y_m]: [f32; 2], yaw_rad: f32) -> Vec<Pose> {
     let q_rad: Vec<f32> = ROBOT.joints.iter().map(|joint| joint.rest_rad).collect();
     let heading = Rotation::from_rotation_z(yaw_rad);
@@ -124,7 +125,7 @@ fn bodies_reach_as_far_as_their_shapes() {
     assert!(close(rest.lowest_m("bottle"), 0.8) && close(rest.highest_m("bottle"), 1.1));
     let tilted = rest.clone().turned("bottle", Vector::Y, std::f32::consts::FRAC_PI_2);
     assert!(close(tilted.lowest_m("bottle"), 0.765) && close(tilted.clearance_m("bottle"), -0.035));
-    // A stands at 0 and looks along x; its soles are on the floor, and what is foremost of it are the fingers.
+    // A is at 0 and looks along x. Its soles are on the floor, and its fingers are the foremost part.
     assert!(close(rest.robot_reach_m(A, Vector::NEG_Z), 0.0));
     let back_m = rest.robot_reach_m(A, Vector::NEG_X);
     let front_m = rest.robot_reach_m(A, Vector::X);

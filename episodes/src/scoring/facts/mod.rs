@@ -1,4 +1,4 @@
-//! What scoring and the experts may know about the world. None of it is served to a policy.
+//! Facts about the world for scoring and experts. No policy receives them.
 
 use std::sync::Arc;
 
@@ -32,8 +32,8 @@ pub struct RobotFacts {
     pub world_from_link: Vec<Pose>,
     pub pelvis_in_world: Pose,
     pub wrist_in_pelvis: Sides<Pose>,
-    /// Force of the world on each palm, in the world's frame; estimated from the arm's own torques. A hand that
-    /// holds 0.5 kg still feels -4.9 N along z; one in quick motion feels its own inertia, too.
+    /// Force of the world on each palm, in the world's frame, estimated from the arm's own torques. A hand
+    /// that holds 0.5 kg reads -4.9 N along z; one in quick motion also reads its own inertia.
     pub hand_force_n: Sides<Vector>,
     pub fallen: bool,
 }
@@ -42,86 +42,89 @@ pub struct RobotFacts {
 #[derive(Clone, Debug)]
 pub struct ObjectFacts {
     pub name: String,
-    /// Its shapes, and the points and regions that its file gives a name to.
+    /// Its shapes, and the points and regions that its file names.
     pub model: Arc<ObjectModel>,
     pub pose_in_world: Pose,
     pub velocity_m_s: Vector,
     pub angular_velocity_rad_s: Vector,
     /// Height of the object's origin above the floor when the episode began.
     pub rest_height_m: f32,
-    /// How each robot's hands grip it.
+    /// Grip of each robot's hands on it.
     pub hands: Vec<Sides<Grip>>,
-    /// How long no part of any robot has touched it.
+    /// Time for which no part of any robot has touched it.
     pub untouched_s: f64,
 }
 
-/// What a hand does to an object.
+/// Contact of a hand with an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Grip {
     /// No contact at all.
     Off,
     /// Contact, but not from two sides.
     Touching,
-    /// The grasp detector is satisfied.
+    /// A hold according to the grasp detector.
     Holding,
 }
 
 impl Facts {
-    /// Whether this hand of this robot holds `object`.
+    /// Returns `true` if this hand of this robot holds `object`.
     pub fn holds(&self, robot: usize, side: Side, object: &str) -> bool {
         self.object(object).hands[robot][side] == Grip::Holding
     }
 
-    /// Whether any hand of this robot holds `object`.
+    /// Returns `true` if any hand of this robot holds `object`.
     pub fn holds_any(&self, robot: usize, object: &str) -> bool {
         self.object(object).hands[robot].iter().any(|grip| *grip == Grip::Holding)
     }
 
-    /// Whether neither hand of this robot touches `object`.
+    /// Returns `true` if neither hand of this robot touches `object`.
     pub fn hands_off(&self, robot: usize, object: &str) -> bool {
         self.object(object).hands[robot] == Sides::both(Grip::Off)
     }
 
-    /// How long no part of any robot has touched `object`.
+    /// Returns the time for which no part of any robot has touched `object`.
     pub fn untouched_s(&self, object: &str) -> f64 {
         self.object(object).untouched_s
     }
 
-    /// How far the origin of `object` is above where it rested when the episode began.
+    /// Returns the height of the origin of `object` above its rest height at the start of the episode.
     pub fn lift_m(&self, object: &str) -> f32 {
         let object = self.object(object);
         object.pose_in_world.translation.z - object.rest_height_m
     }
 
-    /// How far the lowest point of `object` is above where its origin rested when the episode began: for what stood upright,
-    /// how far all of it is off what it stood on.
+    /// Returns the height of the lowest point of `object` above the rest height of its origin at the start
+    /// of the episode. For an object that stood upright, this is the clearance of all of it over its
+    /// support.
     pub fn clearance_m(&self, object: &str) -> f32 {
         self.lowest_m(object) - self.object(object).rest_height_m
     }
 
-    /// Height above the floor of the lowest point of `object`.
+    /// Returns the height above the floor of the lowest point of `object`.
     pub fn lowest_m(&self, object: &str) -> f32 {
         -self.reach_m(object, Vector::NEG_Z)
     }
 
-    /// Height above the floor of the highest point of `object`.
+    /// Returns the height above the floor of the highest point of `object`.
     pub fn highest_m(&self, object: &str) -> f32 {
         self.reach_m(object, Vector::Z)
     }
 
-    /// How far `object` reaches along a direction of the world, a unit vector, from the world's origin.
+    /// Returns the extent of `object` along a direction of the world, a unit vector, from the world's
+    /// origin.
     pub fn reach_m(&self, object: &str, direction: Vector) -> f32 {
         let object = self.object(object);
         object.model.reach_m(&object.pose_in_world, direction)
     }
 
-    /// How far a robot reaches along a direction of the world, a unit vector, from the world's origin.
+    /// Returns the extent of a robot along a direction of the world, a unit vector, from the world's
+    /// origin.
     pub fn robot_reach_m(&self, robot: usize, direction: Vector) -> f32 {
         let robot = &self.robots[robot];
         robot.model.reach_m(&robot.world_from_link, direction)
     }
 
-    /// Angle between the z axis of `object` and the world's.
+    /// Returns the angle between the z axis of `object` and the world's.
     pub fn tilt_rad(&self, object: &str) -> f32 {
         let up_in_world = self.object(object).pose_in_world.rotation * Vector::Z;
         up_in_world.angle_between(Vector::Z)
@@ -135,57 +138,59 @@ impl Facts {
         self.object(object).angular_velocity_rad_s.length()
     }
 
-    /// Whether each of these robots holds `object` with a hand.
+    /// Returns `true` if each of these robots holds `object` with a hand.
     pub fn held_by_all(&self, robots: &[usize], object: &str) -> bool {
         robots.iter().all(|robot| self.holds_any(*robot, object))
     }
 
-    /// Distance on the floor between the origins of two objects.
+    /// Returns the horizontal distance between the origins of two objects.
     pub fn apart_m(&self, object: &str, other: &str) -> f32 {
         (self.position_m(object) - self.position_m(other)).truncate().length()
     }
 
-    /// Position of the origin of `object` in the frame of another.
+    /// Returns the position of the origin of `object` in the frame of another.
     pub fn seen_from_m(&self, frame: &str, object: &str) -> Vector {
         self.object(frame).pose_in_world.inverse() * self.position_m(object)
     }
 
-    /// How far `object` is turned about the vertical against another, from -pi to pi.
+    /// Returns the rotation of `object` about the vertical relative to another, from -pi to pi.
     pub fn turned_rad(&self, frame: &str, object: &str) -> f32 {
         let [frame, object] = [frame, object].map(|name| self.object(name).pose_in_world.rotation);
         let x = frame.inverse() * (object * Vector::X);
         x.y.atan2(x.x)
     }
 
-    /// World position of the origin of `object`.
+    /// Returns the world position of the origin of `object`.
     pub fn position_m(&self, object: &str) -> Vector {
         self.object(object).pose_in_world.translation
     }
 
-    /// World position of a point fixed to `object`, given in its frame.
+    /// Returns the world position of a point fixed to `object`, given in its frame.
     pub fn point_m(&self, object: &str, point_in_object_m: Vector) -> Vector {
         self.object(object).pose_in_world * point_in_object_m
     }
 
-    /// World position of a site of `object`.
+    /// Returns the world position of a site of `object`.
     pub fn site_m(&self, object: &str, site: &str) -> Vector {
         self.point_m(object, self.site(object, site).position_m())
     }
 
-    /// Whether the origin of `object` is between the walls of `vessel` and over its floor, as its shapes have them.
+    /// Returns `true` if the origin of `object` is between the walls of `vessel` and over its floor,
+    /// according to its shapes.
     pub fn inside_vessel(&self, object: &str, vessel: &str) -> bool {
         let vessel = self.object(vessel);
         vessel.model.encloses(vessel.pose_in_world.inverse() * self.position_m(object))
     }
 
-    /// Whether the origin of `object` is inside a site of `container` that is a box.
+    /// Returns `true` if the origin of `object` is inside a box site of `container`.
     pub fn inside_box(&self, object: &str, container: &str, site: &str) -> bool {
         let [low_m, high_m] = self.site(container, site).corners_m();
         let local = self.object(container).pose_in_world.inverse() * self.position_m(object);
         local.cmpge(low_m).all() && local.cmple(high_m).all()
     }
 
-    /// Whether a site of `object` that is a box is, seen along z of `target`, wholly within a site of that which is one, too.
+    /// Returns `true` if a box site of `object` is, seen along z of `target`, wholly within a box site of
+    /// `target`.
     pub fn within_mark(&self, object: &str, site: &str, target: &str, mark: &str) -> bool {
         let (site, mark) = (self.site(object, site), self.site(target, mark));
         let target_from_object =
@@ -198,7 +203,8 @@ impl Facts {
         (beside_m.abs() + half_m).truncate().cmple(mark.size_m.truncate()).all()
     }
 
-    /// Whether a rod of `object`, from one site to another, passes through a ring of `carrier`: a site with its axis along y.
+    /// Returns `true` if a rod of `object`, from one site to another, passes through a ring of `carrier`, a
+    /// site with its axis along y.
     pub fn threads(&self, object: &str, ends: [&str; 2], carrier: &str, ring: &str) -> bool {
         let ring = self.site(carrier, ring);
         let carrier_from_object =
@@ -212,7 +218,11 @@ impl Facts {
         crossing.x.hypot(crossing.z) <= ring.radius_m()
     }
 
-    /// A site of `object`. Objects' files name their sites, so one that is not there is a mistake in task or file.
+    /// Returns a site of `object`.
+    ///
+    /// # Panics
+    ///
+    /// If the object's file has no such site, which is a mistake in the task or the file.
     pub fn site(&self, object: &str, name: &str) -> &Site {
         match self.object(object).model.site(name) {
             Some(site) => site,
@@ -222,7 +232,11 @@ impl Facts {
         }
     }
 
-    /// Tasks name their own objects, so a name that is not there is a mistake in the task's file.
+    /// Returns the facts of an object.
+    ///
+    /// # Panics
+    ///
+    /// If the task has no such object, which is a mistake in the task's file.
     pub fn object(&self, name: &str) -> &ObjectFacts {
         match self.objects.iter().find(|object| object.name == name) {
             Some(object) => object,

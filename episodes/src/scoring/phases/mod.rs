@@ -1,4 +1,5 @@
-//! Which phases have been reached, and when. A phase is looked at only once its predecessors have been reached.
+//! Phases of an episode and the times at which they are reached. A phase is evaluated only once its
+//! predecessors have been reached.
 
 use std::fmt;
 use std::sync::Arc;
@@ -7,12 +8,12 @@ use serde::{Deserialize, Serialize};
 
 use super::Facts;
 
-/// Something that holds at a control step, or does not.
+/// A condition that holds or does not hold at a control step.
 pub type Condition = Arc<dyn Predicate>;
 
 /// An expression over the facts of a control step.
 pub trait Predicate: Send + Sync {
-    /// Returns whether it holds at this control step.
+    /// Returns `true` if it holds at this control step.
     fn holds(&self, facts: &Facts) -> bool;
 }
 
@@ -22,43 +23,47 @@ impl<F: Fn(&Facts) -> bool + Send + Sync> Predicate for F {
     }
 }
 
-/// Returns how far something has come, from 0 to 1.
+/// Function that returns how near something is, from 0 to 1.
 pub type Nearness = Arc<dyn Fn(&Facts) -> f32 + Send + Sync>;
 
 /// One scored phase.
 #[derive(Clone)]
 pub struct Phase {
     pub id: &'static str,
-    /// When the phase counts as reached, for people and policies.
+    /// Description of when the phase counts as reached, for people and policies.
     pub description: &'static str,
-    /// Whether more than one robot has to work on it.
+    /// True if more than one robot has to work on it.
     pub collaborative: bool,
     pub done: Done,
-    /// How near the phase is, from 0 to 1, once its predecessors have been reached: dense rewards for learners, and nothing else, are made
-    /// of it.
+    /// Nearness of the phase, from 0 to 1, once its predecessors have been reached. It is used for dense
+    /// rewards of learners only.
     pub nearness: Nearness,
 }
 
-/// When a phase is reached. Conditions see one control step at a time; what has to happen in sequence says so here.
+/// Rule for reaching a phase. Conditions see one control step at a time; sequences in time are expressed
+/// here.
 #[derive(Clone)]
 pub enum Done {
     /// It is reached as soon as the condition holds.
     When(Condition),
-    /// It is reached when `then` holds after `first` held; a step at which `broken` holds in between asks for `first` again.
+    /// It is reached when `then` holds after `first` held. A step at which `broken` holds in between
+    /// requires `first` again.
     Sequence { first: Condition, then: Condition, broken: Option<Condition> },
-    /// It is reached when `condition` has held without a break for `for_s`, and `at_end` holds then too.
+    /// It is reached when `condition` has held without a break for `for_s`, and `at_end` holds at that
+    /// time, too.
     Lasting { condition: Condition, for_s: f64, at_end: Option<Condition> },
     /// It is reached when every one of these has been passed, in any order.
     Milestones(Vec<Milestone>),
-    /// It is reached as `done` says, unless `spoiled` has held at any step since the phase before was reached.
+    /// It is reached by the rule `done`, unless `spoiled` has held at any step since the previous phase was
+    /// reached.
     Unless { spoiled: Condition, done: Box<Done> },
 }
 
-/// One of several things that have to happen once.
+/// One of several conditions that each have to hold once.
 #[derive(Clone)]
 pub struct Milestone {
     pub condition: Condition,
-    /// How long it has to hold without a break.
+    /// Duration for which it has to hold without a break.
     pub for_s: f64,
 }
 
@@ -69,7 +74,7 @@ impl fmt::Debug for Phase {
 }
 
 impl Phase {
-    /// What results call phase number `index`: `p1` for the first.
+    /// Returns the name of phase number `index` in results: `p1` for the first.
     pub fn number(index: usize) -> String {
         format!("p{}", index + 1)
     }
@@ -82,25 +87,25 @@ pub struct PhaseTracker {
     memory: PhaseMemory,
 }
 
-/// What a [`PhaseTracker`] remembers between control steps.
+/// Memory of a [`PhaseTracker`] between control steps.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct PhaseMemory {
-    /// When each phase was reached, in simulated seconds.
+    /// Time at which each phase was reached, in simulated seconds.
     reached_s: Vec<f64>,
-    /// Whether the `first` of the present phase's sequence has held, unbroken.
+    /// True if the `first` of the present phase's sequence has held, unbroken.
     underway: bool,
-    /// Since when the present phase's lasting condition has held, in simulated seconds.
+    /// Time since which the present phase's lasting condition has held, in simulated seconds.
     since_s: Option<f64>,
     /// The milestones of the present phase that have been begun.
     milestones: Vec<MilestoneMemory>,
-    /// Whether the present phase has been spoiled.
+    /// True if the present phase has been spoiled.
     spoiled: bool,
 }
 
-/// How far a milestone is.
+/// State of a milestone.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct MilestoneMemory {
-    /// Since when its condition has held, in simulated seconds.
+    /// Time since which its condition has held, in simulated seconds.
     since_s: Option<f64>,
     passed: bool,
 }
@@ -114,17 +119,17 @@ impl PhaseTracker {
         &self.memory
     }
 
-    /// Whether a memory can be of these phases.
+    /// Returns `true` if a memory can belong to these phases.
     pub fn fits(&self, memory: &PhaseMemory) -> bool {
         memory.reached_s.len() <= self.phases.len()
     }
 
-    /// Goes back to an earlier [`PhaseTracker::memory`] of the same phases.
+    /// Restores an earlier [`PhaseTracker::memory`] of the same phases.
     pub fn set_memory(&mut self, memory: PhaseMemory) {
         self.memory = memory;
     }
 
-    /// Looks at one control step; true if it reached a phase.
+    /// Evaluates one control step. Returns `true` if it reached a phase.
     pub fn update(&mut self, facts: &Facts) -> bool {
         let memory = &mut self.memory;
         let before = memory.reached_s.len();
@@ -141,42 +146,42 @@ impl PhaseTracker {
         memory.reached_s.len() > before
     }
 
-    /// The phases reached so far, in order, with the time of each.
+    /// Returns the phases reached up to now, in order, with the time of each.
     pub fn reached(&self) -> impl Iterator<Item = (&'static Phase, f64)> {
         self.phases.iter().zip(self.memory.reached_s.iter().copied())
     }
 
-    /// The phases reached, and how near the next one is.
+    /// Returns the number of phases reached, plus the nearness of the next one.
     pub fn progress(&self, facts: &Facts) -> f64 {
         let reached = self.memory.reached_s.len();
         let next = self.phases.get(reached).map_or(0.0, |phase| (phase.nearness)(facts));
         reached as f64 + f64::from(next)
     }
 
-    /// Whether the last phase has been reached.
+    /// Returns `true` if the last phase has been reached.
     pub fn complete(&self) -> bool {
         self.memory.reached_s.len() == self.phases.len()
     }
 }
 
 impl PhaseMemory {
-    /// Returns whether the next phase is a sequence whose `first` has held, unbroken.
+    /// Returns `true` if the next phase is a sequence whose `first` has held, unbroken.
     pub fn underway(&self) -> bool {
         self.underway
     }
 
-    /// Returns whether the next phase has been spoiled.
+    /// Returns `true` if the next phase has been spoiled.
     pub fn spoiled(&self) -> bool {
         self.spoiled
     }
 
-    /// Returns since when the next phase's lasting condition has held, in simulated seconds.
+    /// Returns the time since which the next phase's lasting condition has held, in simulated seconds.
     pub fn since_s(&self) -> Option<f64> {
         self.since_s
     }
 
-    /// Returns since when the condition of milestone `index` of the next phase has held, in simulated
-    /// seconds, and whether it is passed.
+    /// Returns the time since which the condition of milestone `index` of the next phase has held, in
+    /// simulated seconds, and whether it has been passed.
     pub fn milestone(&self, index: usize) -> (Option<f64>, bool) {
         self.milestones.get(index).map_or((None, false), |memory| (memory.since_s, memory.passed))
     }
@@ -209,7 +214,8 @@ impl PhaseMemory {
     }
 }
 
-/// Whether `condition` has held without a break for `for_s`; `since_s` remembers since when.
+/// Returns `true` if `condition` has held without a break for `for_s`; `since_s` stores the time since which
+/// it has held.
 fn lasted(since_s: &mut Option<f64>, condition: &Condition, for_s: f64, facts: &Facts) -> bool {
     *since_s = condition.holds(facts).then(|| since_s.unwrap_or(facts.time_s));
     // Times are sums of control steps; half of one keeps rounding out.

@@ -10,7 +10,7 @@ use crate::{
     tasks::{self, Task},
 };
 
-/// What a control step of Handover shows: who holds the bottle, and where it is.
+/// State of the bottle in a control step of Handover: the robots that hold it, or its place.
 #[derive(Clone, Copy, Debug)]
 enum BottleState {
     Rests,
@@ -37,7 +37,7 @@ fn facts(state: BottleState) -> Facts {
     facts
 }
 
-/// Phases reached after each of the states.
+/// Returns the number of phases reached after each of the states.
 fn play(states: &[BottleState]) -> Vec<usize> {
     let mut tracker = PhaseTracker::new(tasks::find("handover").unwrap().phases);
     let step = |state: &BottleState| {
@@ -52,25 +52,26 @@ fn order_is_enforced_and_sequences_are_unbroken() {
     let (by_a, by_both, by_b, by_nobody) = (Aloft(&[A]), Aloft(&[A, B]), Aloft(&[B]), Aloft(&[]));
     for (states, reached) in [
         (&[Rests, by_a, by_both, by_b, OnTarget][..], &[0, 1, 1, 2, 3][..]),
-        // The right final pose alone is nothing, nor is a transfer without A's lift.
+        // The right final pose alone is not enough, nor is a transfer without A's lift.
         (&[OnTarget, OnTarget], &[0, 0]),
         (&[by_b, OnTarget], &[0, 0]),
         (&[by_a, OnTarget, by_b, OnTarget], &[1, 1, 1, 1]),
         // A throw: they never held it together.
         (&[by_a, by_nobody, by_b, OnTarget], &[1, 1, 1, 1]),
-        // They held it together, dropped it, and B picked it up: together again is asked for.
+        // They held it together, dropped it, and B picked it up: they have to hold it together again.
         (&[by_a, by_both, by_nobody, by_b, OnTarget], &[1, 1, 1, 1, 1]),
         (&[by_a, by_both, by_nobody, by_b, by_both, by_b, OnTarget], &[1, 1, 1, 1, 1, 2, 3]),
         // A takes it back in between, which is no release.
         (&[by_a, by_both, by_a, by_both, by_b, OnTarget], &[1, 1, 1, 1, 2, 3]),
-        // What has been reached stays reached.
+        // A phase that has been reached stays reached.
         (&[by_a, Rests, by_both, by_b, by_nobody, OnTarget, Rests], &[1, 1, 1, 2, 2, 3, 3]),
     ] {
         assert_eq!(play(states), reached, "{states:?}");
     }
 }
 
-/// Pouring's last phase, one step of 20 ms at a time: whether the marble is in the glass, and how high the glass is.
+/// Pouring's last phase, one step of 20 ms at a time: whether the marble is in the glass, and the height of
+/// the glass.
 #[test]
 fn a_lasting_condition_needs_its_whole_time_without_a_break() {
     const IN: (bool, f32) = (true, 0.1);
@@ -106,12 +107,12 @@ fn a_lasting_condition_needs_its_whole_time_without_a_break() {
     }
 }
 
-/// Objects of `task` where they belong in the end, put there by nobody.
+/// Returns facts with the objects of `task` in their final places, without any robot's action.
 fn objects_in_place(task: &'static Task) -> Facts {
     let apples = ["apple_1", "apple_2", "apple_3", "apple_4", "apple_5", "apple_6"];
     let at = |x_m: f32, y_m: f32, z_m: f32| Pose::from_translation(Vector::new(x_m, y_m, z_m));
     let turned = |by_rad: f32| Pose::from_rotation(Rotation::from_rotation_z(by_rad));
-    // Object, another one, and where the first belongs in the other's frame.
+    // Object, another one, and the first one's place in the other's frame.
     let moves: Vec<(&str, &str, Pose)> = match task.id {
         "handover" => vec![("bottle", "target_pad", at(0.0, 0.0, 0.0))],
         "pouring" => vec![("marble", "glass", at(0.0, 0.0, 0.02))],
@@ -150,7 +151,7 @@ fn the_right_final_pose_alone_is_never_a_success() {
     }
 }
 
-/// MoveHouse's first phase, one step of 20 ms at a time: whether the table is lifted, and how far the door is open.
+/// MoveHouse's first phase, one step of 20 ms at a time: whether the table is lifted, and the door's angle.
 #[test]
 fn milestones_are_passed_in_any_order_and_stay_passed() {
     const NOTHING: (bool, f32) = (false, 0.0);
@@ -165,7 +166,7 @@ fn milestones_are_passed_in_any_order_and_stay_passed() {
         }
         facts
     };
-    // Half a second are 25 steps, from the first of 26 to the last.
+    // Half a second is 25 steps, from the first of 26 to the last.
     for (runs, expected) in [
         (&[(LIFTED, 1), (OPEN, 25)][..], 0),
         (&[(LIFTED, 1), (OPEN, 26)], 1),
@@ -223,7 +224,7 @@ fn a_spoiled_phase_stays_out_of_reach_and_spoils_no_other() {
     };
     assert_eq!(reached(vec![guarded()], &[Rests, Aloft(&[A])]), 1);
     assert_eq!(reached(vec![guarded()], &[Rests, Aloft(&[B]), Rests, Aloft(&[A])]), 0);
-    // What was done before the phase was next does not count against it.
+    // Actions before the phase was next do not count against it.
     let rests: Condition = Arc::new(|facts: &Facts| facts.lift_m("bottle") < 0.01);
     assert_eq!(reached(vec![phase(Done::When(rests)), guarded()], &[Aloft(&[B]), Rests, Aloft(&[A])]), 2);
 }

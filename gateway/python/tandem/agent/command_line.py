@@ -1,4 +1,4 @@
-"""`python -m tandem.agent`: a model plays an episode. `tandem agent` and `--policy agent:` start it so, too."""
+"""`python -m tandem.agent`: a model plays an episode. `tandem agent` and `--policy agent:` also start it."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ DEFAULTS: dict[str, Any] = {
     "api": "openai",
     "context_tokens": 100_000,
     "max_calls": 500,
-    # `tandem evaluate` stops a program after an hour; a model that is at it for so long finishes before.
+    # `tandem evaluate` stops a program after an hour; a model that takes this long finishes before.
     "max_seconds": 3300.0,
     "seed": 0,
     "assistance": "full",
     "per_robot": False,
     "talk": False,
 }
-"""Flags that have a value where neither the command line nor what is resumed says one."""
+"""Defaults for flags that neither the command line nor the resumed episode sets."""
 
 MAY_CHANGE = (
     "base_url",
@@ -46,19 +46,19 @@ MAY_CHANGE = (
     "usd_per_million_output",
     "usd_per_million_cached",
 )
-"""Flags that --resume takes anew: where the endpoint is, and what the model may use up."""
+"""Flags that may change with --resume: the endpoint's address and the limits."""
 
 NOT_KEPT = ("resume", "runs", "url", "server_flags", "check")
-"""Flags that say nothing of the play."""
+"""Flags that do not affect the play."""
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 INTERRUPTED = 130
-"""What shells report of a process that SIGINT has ended."""
+"""Exit status that shells report for a process that SIGINT has ended."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """The flags. Those of `tandem agent` that say which model plays are the same."""
+    """Returns the parser of the flags. The flags for the model are the same as in `tandem agent`."""
     flags = argparse.ArgumentParser(
         prog="python -m tandem.agent",
         description="Have a language model play an episode: the one that TANDEM_URL and TANDEM_EPISODE name, or, with --task, "
@@ -123,14 +123,14 @@ def parser() -> argparse.ArgumentParser:
         help="in place of a new episode: go on with that of this folder, where its agent was killed; of the flags, limits, "
         "prices and the endpoint's address may be given anew, and all others are as before",
     )
-    # What `tandem agent` was told of its server.
+    # Flags that `tandem agent` was given for its server.
     flags.add_argument("--server-flags", type=_object, default={}, help=argparse.SUPPRESS)
     flags.add_argument("--check", action="store_true", help=argparse.SUPPRESS)
     return flags
 
 
 def settings_of(given: argparse.Namespace) -> AgentSettings:
-    """The agent that these flags name."""
+    """Creates the agent's settings from the flags."""
     prices = (given.usd_per_million_input, given.usd_per_million_output)
     if prices[0] is None or prices[1] is None:
         if prices != (None, None) or given.usd_per_million_cached is not None:
@@ -144,14 +144,14 @@ def settings_of(given: argparse.Namespace) -> AgentSettings:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the command and returns its exit code: 1 where the model or the server gave no answer."""
+    """Runs the command and returns its exit code: 1 if the model or the server gave no answer."""
     given = parser().parse_args(arguments)
     _keep_loopback_off_proxies()
     try:
         episode = None if given.resume is None else _resumed(given)
         flags = _flags(given) if episode is None else {**episode.flags, **_given(given)}
         settings = settings_of(argparse.Namespace(**flags))
-        # What is missing is said before an episode begins.
+        # Missing requirements are reported before an episode begins.
         open_model(settings, "")
         if given.check:
             return 0
@@ -166,19 +166,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _given(given: argparse.Namespace) -> dict[str, Any]:
-    """The flags that are given, of those that say something of the play."""
+    """Returns the given flags that affect the play."""
     return {name: value for name, value in vars(given).items() if value is not None and name not in NOT_KEPT}
 
 
 def _flags(given: argparse.Namespace) -> dict[str, Any]:
-    """The flags of a new play, each with its value."""
+    """Returns the flags of a new play with their values."""
     if given.model is None:
         raise TandemError("no model; give --model NAME, or --resume FOLDER to go on with an episode")
     return {**{name: value for name, value in vars(given).items() if name not in NOT_KEPT}, **DEFAULTS, **_given(given)}
 
 
 def _resumed(given: argparse.Namespace) -> EpisodeFile:
-    """The episode that is to be resumed. Refuses flags by which it would be another one."""
+    """Reads the episode to resume. Refuses flags that would change it."""
     episode = EpisodeFile.read(given.resume)
     kept = {**episode.flags, **episode.server_flags, "runs": str(given.resume.resolve().parent)}
     told = {**_given(given), **given.server_flags}
@@ -227,7 +227,7 @@ def _resume(given: argparse.Namespace, episode: EpisodeFile, settings: AgentSett
 
 
 def _keep_loopback_off_proxies() -> None:
-    """Has the SDKs reach endpoints on this machine directly, whatever proxy leads elsewhere."""
+    """Makes the SDKs reach endpoints on this machine directly, without a proxy."""
     known = os.environ.get("no_proxy") or os.environ.get("NO_PROXY") or ""
     hosts = [*filter(None, (host.strip() for host in known.split(","))), *LOOPBACK]
     for name in ("NO_PROXY", "no_proxy"):
@@ -236,7 +236,7 @@ def _keep_loopback_off_proxies() -> None:
 
 @contextmanager
 def _interruptible() -> Generator[None, None, None]:
-    """Has the first SIGINT or SIGTERM end what is done, so that episodes are ended, and no other disturb that."""
+    """Turns the first SIGINT or SIGTERM into KeyboardInterrupt, so that episodes are ended. Ignores further ones."""
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         for each in signals:

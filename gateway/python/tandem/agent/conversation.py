@@ -1,4 +1,4 @@
-"""What is said between a model, the episode and us, in no API's form."""
+"""The conversation between a model, the episode and the agent, independent of any API."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ Ending: TypeAlias = Literal[
     "context",
     "endpoint",
 ]
-"""How a model's play ends, as results have it."""
+"""Ending of a model's play, as named in results."""
 
 
 @dataclass(frozen=True)
 class Stopped:
-    """Why a model plays no longer, where the episode's own end does not say it."""
+    """Reason why a model stops, unless the episode itself has ended."""
 
     ending: Ending
     text: str
-    """The model's words, as of a refusal, or those of its endpoint, or which limit was reached."""
+    """Text of the model (for example a refusal) or of its endpoint, or the limit that was reached."""
 
     @property
     def told(self) -> str:
-        """What whoever looks on is told."""
+        """Text for watchers."""
         said = _SAID.get(self.ending)
         return self.text if said is None else f"{said}: {self.text}" if self.text else said
 
@@ -43,12 +43,12 @@ _SAID: dict[str, str] = {
     "context": "the conversation became too long for the model",
     "endpoint": "the model's endpoint gave no reply",
 }
-"""What the text of an ending does not say itself."""
+"""Explanations of endings that are missing in their texts."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """What a robot's camera saw, as a PNG file."""
+    """Image of a robot's camera, as a PNG file."""
 
     robot: str
     time_s: float
@@ -56,23 +56,23 @@ class Picture:
 
     @property
     def caption(self) -> str:
-        """What the model is told beside it."""
+        """Caption of the image for the model."""
         return f"Camera of {self.robot} at {self.time_s:.2f} s:"
 
 
 @dataclass(frozen=True)
 class Call:
-    """A tool that the model calls."""
+    """A tool call of the model."""
 
     call_id: str
     tool: str
     arguments: str
-    """JSON, as the model wrote it."""
+    """Arguments as JSON, as the model wrote it."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What came of a call."""
+    """Answer to a call."""
 
     call: Call
     text: str
@@ -82,60 +82,60 @@ class Answer:
 
 @dataclass(frozen=True)
 class Usage:
-    """The tokens of one request."""
+    """Token counts of one request."""
 
     input: int
-    """All that was read, from a cache or not."""
+    """Input tokens, cached or not."""
 
     output: int
-    """All that was written, thoughts included."""
+    """Output tokens, reasoning included."""
 
     cached: int = 0
-    """Of `input`, what was read from a cache."""
+    """Part of `input` that was read from a cache."""
 
     cache_written: int = 0
-    """Of `input`, what was written to a cache at a price of its own."""
+    """Part of `input` that was written to a cache at its own price."""
 
 
 @dataclass(frozen=True)
 class Told:
-    """What we tell the model."""
+    """Message of the agent to the model."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class Reply:
-    """What the model said."""
+    """Reply of the model."""
 
     words: str
     thoughts: str
     calls: tuple[Call, ...]
     usage: Usage | None
-    """None where the endpoint does not count."""
+    """Token counts; None if the endpoint does not report them."""
 
     as_sent: Any
-    """The reply in its API's own form, which wants it back so."""
+    """The reply in its API's own form, in which it is sent back."""
 
     cut: bool = False
-    """Whether it was cut off at the most tokens that a reply may have."""
+    """True if the reply was cut off at the token limit."""
 
     refusal: str | None = None
-    """The words of a model that refuses; None where it does not."""
+    """Text of a refusal; None if the model did not refuse."""
 
     filtered: bool = False
-    """Whether a filter of the endpoint held it back."""
+    """True if a filter of the endpoint withheld the reply."""
 
 
 @dataclass(frozen=True)
 class Answers:
-    """What came of a reply's calls, in their order."""
+    """Answers to a reply's calls, in order."""
 
     answers: tuple[Answer, ...]
 
 
 def listed(value: Any) -> list[Any]:
-    """What JSON has as a list, which may be missing."""
+    """Returns a JSON list, or an empty one if it is missing."""
     return list(value) if value else []
 
 

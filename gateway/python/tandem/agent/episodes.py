@@ -1,4 +1,4 @@
-"""Episodes that are joined, and episodes of one's own: one model for all robots, or one for each."""
+"""Episodes that the agent joins or starts itself, with one model for all robots or one per robot."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .settings import AgentSettings
 
 @dataclass(frozen=True)
 class Hosting:
-    """An episode to begin."""
+    """Arguments of an episode to start."""
 
     task: str
     seed: int
@@ -35,23 +35,23 @@ class Hosting:
 
 @dataclass(frozen=True)
 class Keeping:
-    """By which flags a play is begun, and where that is kept, so that it can be resumed."""
+    """Flags of a play and the folder where they are kept, so that the play can be resumed."""
 
     runs: Path | None
-    """The server's folder of recordings. None: it is not known, and nothing is kept."""
+    """The server's folder of recordings. None: unknown, and nothing is kept."""
 
     flags: dict[str, Any]
     server_flags: dict[str, str]
 
 
 def play_joined(client: Client, episode_id: str, robot: str | None, settings: AgentSettings) -> Played:
-    """Plays an episode that somebody else has begun and ends."""
+    """Plays an episode that another program has started and will end."""
     seat = Seat(client, episode_id, robot)
     return _play(seat, str(seat.briefing["status"]["task"]), settings, Journal())
 
 
 def play_own(url: str, hosting: Hosting, settings: AgentSettings, keeping: Keeping) -> dict[str, Any]:
-    """Begins an episode on a server, plays it, ends it, and returns its result."""
+    """Starts an episode on a server, plays it, ends it, and returns its result."""
     host = Client(url)
     body: dict[str, Any] = {"task": hosting.task, "seed": hosting.seed}
     if hosting.per_robot:
@@ -67,10 +67,10 @@ def play_own(url: str, hosting: Hosting, settings: AgentSettings, keeping: Keepi
 
 
 def resume(url: str, folder: Path, episode: EpisodeFile, settings: AgentSettings) -> dict[str, Any]:
-    """Goes on with an episode that an agent has left, unless it has ended, and returns its result."""
+    """Resumes an episode that an agent has left, unless it has ended, and returns its result."""
     host = Client(url)
     with ExitStack() as stack:
-        # Those of another process are refused before anything is done.
+        # Journals that another process holds are refused before anything is done.
         journals = _open(folder, episode, stack)
         result = _ended(host, folder, episode)
         if result is None:
@@ -82,7 +82,7 @@ def resume(url: str, folder: Path, episode: EpisodeFile, settings: AgentSettings
 
 
 def _ended(host: Client, folder: Path, episode: EpisodeFile) -> dict[str, Any] | None:
-    """The result of an episode that has ended; None: it goes on."""
+    """Returns the result of an episode that has ended; None while it goes on."""
     path = f"/v1/episodes/{episode.episode_id}"
     try:
         goes_on = host.request("GET", path)["ended"] is None
@@ -100,7 +100,7 @@ def _ended(host: Client, folder: Path, episode: EpisodeFile) -> dict[str, Any] |
 
 
 def _print_result(result: dict[str, Any]) -> None:
-    """Prints how an episode ended, in a line."""
+    """Prints the end of an episode in a line."""
     phases = ", ".join(f"{number} {_when(time_s)}" for number, time_s in result["phases"].items())
     print(
         f"{result['ended']}: {phases}; {result['env_steps']} steps, {result['tool_calls']} calls, {result['falls']} falls",
@@ -109,12 +109,12 @@ def _print_result(result: dict[str, Any]) -> None:
 
 
 def _robots(episode: EpisodeFile) -> list[str | None]:
-    """The robot that each model directs; None: it directs all."""
+    """Returns the robot of each model; None for a model that controls all robots."""
     return [each["robot"] for each in episode.operators] or [None]
 
 
 def _open_new(runs: Path | None, episode: EpisodeFile, stack: ExitStack) -> list[Journal]:
-    """Writes down what an episode is resumed by, and begins a journal for each model. On failure nothing is kept."""
+    """Writes the data for resuming an episode, and begins a journal for each model. On failure nothing is kept."""
     if runs is not None:
         folder = runs / episode.episode_id
         try:
@@ -151,7 +151,7 @@ def _take_seat(client: Client, episode_id: str, robot: str | None, journal: Jour
 
 def _play(seat: Seat, task: str, settings: AgentSettings, journal: Journal) -> Played:
     show = _printer(seat.robot)
-    # Episodes of one task begin alike.
+    # Episodes of the same task begin with the same text.
     model = open_model(settings, f"tandem-{task}")
     begun = journal.begun
     if begun is None:
@@ -163,7 +163,9 @@ def _play(seat: Seat, task: str, settings: AgentSettings, journal: Journal) -> P
 
 
 def _play_each(url: str, episode: EpisodeFile, settings: AgentSettings, journals: Sequence[Journal]) -> None:
-    """One model for each robot, side by side. Where one fails the others play on, and the failure is raised at the end."""
+    """Plays with one model per robot in parallel. If one fails, the others play on, and the failure is raised at
+    the end.
+    """
     failures: list[BaseException] = []
 
     def operate(robot: str, token: str, journal: Journal) -> None:
@@ -199,5 +201,5 @@ def _printer(robot: str | None) -> Printer:
 
 
 def printable(text: str) -> str:
-    """A text as a terminal may show it: what a model writes cannot move its cursor or change its colours."""
+    """Makes a text safe for a terminal: a model's output cannot move the cursor or change colours."""
     return "".join(each if each in "\n\t" or category(each) != "Cc" else "\ufffd" for each in text)

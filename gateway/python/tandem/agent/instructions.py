@@ -1,4 +1,4 @@
-"""What a model is told before it begins."""
+"""Instructions for a model before it begins."""
 
 from __future__ import annotations
 
@@ -30,7 +30,9 @@ TOGETHER = "A command is executed when every robot has one, and the shortest end
 
 
 def instructions(seat: Seat) -> str:
-    """The task, the rules and what there is to know, as paragraphs. They stay the same through an episode, and are cached."""
+    """Returns the task, the rules and the briefing as paragraphs. They stay the same through an episode and are
+    cached.
+    """
     told = seat.briefing
     names = [robot["robot"] for robot in told["robots"]]
     own = names if seat.robot is None else [seat.robot]

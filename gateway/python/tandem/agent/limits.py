@@ -1,4 +1,4 @@
-"""What a model has used up, and when it has to stop."""
+"""A model's usage and its limits."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .settings import Limits, Prices
 
 
 class Ledger:
-    """Counts what a model uses in one episode."""
+    """Counts a model's usage in one episode."""
 
     def __init__(self, limits: Limits, prices: Prices | None, clock: Callable[[], float] = time.monotonic) -> None:
         self.limits = limits
@@ -23,7 +23,7 @@ class Ledger:
         self._began_s = clock()
 
     def price(self, usage: Usage) -> float | None:
-        """Returns the price of a request in US dollars, where prices are given."""
+        """Returns the price of a request in US dollars, if prices are given."""
         return None if self.prices is None else self.prices.usd(usage)
 
     def add(self, usage: Usage, usd: float | None) -> None:
@@ -38,15 +38,17 @@ class Ledger:
 
     @property
     def seconds(self) -> float:
-        """How long the agent has been at it."""
+        """Playing time of the agent in seconds."""
         return self._clock() - self._began_s
 
     def take_up(self, seconds: float) -> None:
-        """Goes on after so many seconds; the time since then is not counted."""
+        """Continues after `seconds` of earlier play; the time since then is not counted."""
         self._began_s = self._clock() - seconds
 
     def reason_to_stop(self) -> Stopped | None:
-        """Why no further request may be made. One more is taken to cost as much as the last: conversations grow."""
+        """Returns the reason why no further request may be made. A request is assumed to cost as much as the last
+        one, because conversations grow.
+        """
         limits, tokens = self.limits, self.input + self.output
         if limits.tokens is not None and tokens + self._last_tokens > limits.tokens:
             text = f"{tokens} tokens were used, and the next reply would pass --max-tokens-total {limits.tokens}"
@@ -61,7 +63,7 @@ class Ledger:
         return None
 
     def summary(self) -> str:
-        """What was used, in a line."""
+        """Returns the usage in a line."""
         told = f"{self.calls} calls, {self.requests} replies"
         told = f"{told}, {self.input} tokens read ({self.cached} cached), {self.output} written"
         price = "" if self.prices is None else f", {self.usd:.4f} US dollars"

@@ -1,4 +1,4 @@
-"""The loop: the model is asked, its calls are made, and it is told what came of them, until the episode is over."""
+"""The main loop: it asks the model, makes the model's calls and returns the answers, until the episode is over."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from .seat import Note, Seat
 from .settings import AgentSettings
 
 MAX_SILENT_TURNS = 2
-"""Replies without a call, one after another, after which the episode is finished."""
+"""Number of consecutive replies without a call after which the episode is finished."""
 
 MAX_CUTS = 4
-"""How often a conversation is halved that an endpoint finds too long, before that is the end."""
+"""Maximum number of times a conversation is halved that an endpoint finds too long."""
 
 SHOWN_CHARACTERS = 200
 
@@ -31,18 +31,18 @@ Printer = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Played:
-    """How a model played."""
+    """Outcome of a model's play."""
 
     ledger: Ledger
     stopped: Stopped | None
-    """Why we finished the episode in its place; None: it did so itself, or the episode ended."""
+    """Reason why the agent finished the episode. None: the model did so itself, or the episode ended."""
 
 
 class Player:
-    """A model at an episode.
+    """A model that plays an episode.
 
-    begun: What the model is told before it begins.
-    journal: Keeps what happens. Where it holds what earlier processes have done, the play goes on after that.
+    begun: The first event, with the model's instructions.
+    journal: Journal of the events. If it has events of earlier processes, the play continues after them.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Player:
         self._show = show
         self._begun = begun
         self._journal = journal
-        # For endpoints that do not count.
+        # Estimate for endpoints that do not report token counts.
         texts = [begun.instructions, *(f"{tool.description}{json.dumps(tool.schema)}" for tool in begun.tools)]
         self._begun_tokens = sum(len(text) for text in texts) // CHARACTERS_A_TOKEN
         self._progress = Progress(settings, OPENING)
@@ -77,7 +77,8 @@ class Player:
         try:
             stopped = self._play()
         except EndpointError as error:
-            # That the endpoint is broken is no end of the model's, and is raised; whoever reads the episode is told.
+            # A broken endpoint is not an ending of the model, so the error is raised. It is noted for readers of
+            # the recording.
             with suppress(TandemError):
                 self._end(Stopped("context" if isinstance(error, TooLong) else "endpoint", without_keys(str(error))))
             raise
@@ -88,7 +89,7 @@ class Player:
         return Played(self._ledger, stopped)
 
     def _take_up(self) -> None:
-        """Says in the recording that another process goes on with the conversation."""
+        """Notes in the recording that another process resumes the conversation."""
         resumed = Resumed()
         self._record(resumed)
         done = f"after {self._ledger.requests} replies and {self._ledger.calls} calls"
@@ -111,7 +112,7 @@ class Player:
         return stopped
 
     def _heed(self, replied: Replied) -> Stopped | None:
-        """Does what a reply asks for, unless it is done already. Returns why the model stops, if it does."""
+        """Executes a reply, except what is already done. Returns the reason why the model stops, if it does."""
         if not self._progress.noted:
             self._tell(replied)
             self._record(Noted())
@@ -129,13 +130,13 @@ class Player:
         return None
 
     def _end(self, stopped: Stopped) -> None:
-        """Says how the model's play ends, to whoever looks on and to the server."""
+        """Reports the ending of the model's play to watchers and to the server."""
         self._show(f"stopped: {stopped.told}")
         note = Note(stopped.text, "note", self._seat.robot, model=self._settings.model, ending=stopped.ending)
         self._seat.note(note, self._key(stopped.ending))
 
     def _ask(self) -> Replied:
-        """Asks the model, with less of the conversation where it is too long for it, and counts what that took."""
+        """Asks the model, with a shorter conversation if it is too long, and counts the usage."""
         began_s = time.monotonic()
         memory = self._progress.memory
         for _ in range(MAX_CUTS):
@@ -161,7 +162,7 @@ class Player:
         return replied
 
     def _tell(self, replied: Replied) -> None:
-        """Shows the model's words, and hands them to the server with what they cost."""
+        """Shows the model's text, and sends it to the server with its cost."""
         reply, usage, usd, number = replied.reply, replied.usage, replied.usd, self._ledger.requests
         price = "" if usd is None else f", {usd:.4f} US dollars"
         counted = f"{usage.input} tokens read ({usage.cached} cached), {usage.output} written{price}"
@@ -174,12 +175,12 @@ class Player:
             self._show(f"says: {reply.words}")
         tokens = {"input": usage.input, "output": usage.output, "cached": usage.cached}
         told_tokens = tokens if reply.usage is not None else None
-        # Without words it says what was used alone.
+        # A note without text only reports the usage.
         note = Note(reply.words, "message", robot, told_tokens, usd, model, round(replied.model_s, 3))
         self._seat.note(note, self._key(f"{number}-message"))
 
     def _answer(self, reply: Reply) -> None:
-        """Makes the calls of a reply that are not answered yet, in their order, as many as may be made."""
+        """Makes the unanswered calls of a reply in order, within the limit."""
         number = self._ledger.requests
         for index, call in list(enumerate(reply.calls))[len(self._progress.answered) :]:
             most = self._ledger.limits.calls
@@ -201,7 +202,7 @@ class Player:
         self._record(Answered(answer, called, self._seat.over, self._seat.phases, self._ledger.seconds))
 
     def _record(self, event: Event) -> None:
-        """Writes an event down, and has it change the state."""
+        """Writes an event and applies it to the state."""
         self._journal.write(event)
         self._progress.apply(event)
 

@@ -1,4 +1,4 @@
-"""The conversation as the model is shown it, cut where it grows too long."""
+"""The conversation as sent to the model, shortened when it grows too long."""
 
 from __future__ import annotations
 
@@ -9,18 +9,20 @@ from dataclasses import replace
 from .conversation import Answer, Answers, Reply, Told, Turn
 
 MAX_PICTURES = 20
-"""Pictures that are shown; of more, the latest half stays. Each cut has the endpoint read anew what it had cached."""
+"""Maximum number of images. Beyond it, only the latest half of this number stays, because each cut makes the
+endpoint read its cached input again.
+"""
 
 CHARACTERS_A_TOKEN = 4
 PICTURE_TOKENS = 300
-"""Rough measures, for endpoints that do not count, and for what part of a conversation a turn is."""
+"""Rough estimates, for endpoints without token counts and for the relative size of turns."""
 
 LISTED_CALLS = 40
 LISTED_CHARACTERS = 160
 
 
 class Memory:
-    """What the model remembers: our first words, and the latest turns."""
+    """The model's memory: the agent's opening, and the latest turns."""
 
     def __init__(self, opening: str, most_pictures: int = MAX_PICTURES) -> None:
         self._opening = opening
@@ -30,7 +32,7 @@ class Memory:
 
     @property
     def turns(self) -> Sequence[Turn]:
-        """The conversation, which we begin."""
+        """The conversation, beginning with the agent's opening."""
         opening = self._opening
         if self._listed:
             told = "\n".join(self._listed[-LISTED_CALLS:])
@@ -38,14 +40,16 @@ class Memory:
         return [Told(opening), *self._turns]
 
     def add(self, turn: Turn) -> None:
-        """Remembers a turn. Pictures go in halves, so that a cache is of use between two cuts."""
+        """Adds a turn. Images are dropped in halves, so that a cache is useful between two cuts."""
         self._turns.append(turn)
         if _count_pictures(self._turns) > self._most_pictures:
             self._turns = _forget_pictures(self._turns, self._most_pictures // 2)
 
     def halve(self) -> bool:
-        """Forgets the older half of the turns but for a list of their calls. False: there is nothing to forget."""
-        # A reply and what it was answered belong together; the latest such pair stays.
+        """Drops the older half of the turns, except for a list of their calls. Returns False if there is nothing to
+        drop.
+        """
+        # A reply and its answers belong together; the latest such pair stays.
         starts = [index for index, turn in enumerate(self._turns) if isinstance(turn, Reply)]
         sizes = [estimate(turn) for turn in self._turns]
         later = [index for index in starts[1:] if sum(sizes[index:]) * 2 <= sum(sizes)]
@@ -57,12 +61,12 @@ class Memory:
         return cut > 0
 
     def estimate(self) -> int:
-        """Roughly how many tokens the turns are."""
+        """Estimates the number of tokens of all turns."""
         return sum(estimate(turn) for turn in self.turns)
 
 
 def estimate(turn: Turn) -> int:
-    """Roughly how many tokens a turn is."""
+    """Estimates the number of tokens of a turn."""
     match turn:
         case Told(text):
             return len(text) // CHARACTERS_A_TOKEN
@@ -75,7 +79,7 @@ def estimate(turn: Turn) -> int:
 
 
 def _forget_pictures(turns: Sequence[Turn], keep: int) -> list[Turn]:
-    """The turns with the latest `keep` pictures, and a line of text in place of each older one."""
+    """Keeps the latest `keep` images, and replaces each older one by a line of text."""
     left = keep
     newest_first: list[Turn] = []
     for turn in reversed(turns):
@@ -94,7 +98,7 @@ def _forget_pictures(turns: Sequence[Turn], keep: int) -> list[Turn]:
 
 
 def _count_pictures(turns: Sequence[Turn]) -> int:
-    """How many pictures the turns show."""
+    """Counts the images in the turns."""
     return sum(len(answer.pictures) for turn in turns if isinstance(turn, Answers) for answer in turn.answers)
 
 

@@ -1,4 +1,4 @@
-"""A place at an episode: what the model is told of it, what it may call, and where its words are kept."""
+"""A seat at an episode: the model's briefing, its tools, and the record of its notes."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from .conversation import Answer, Call, Ending, Picture, listed
 from .tools import Tool, offered
 
 MAX_ANSWER_CHARACTERS = 60_000
-"""Of a longer reply the model is shown the beginning."""
+"""Maximum length of a reply for the model; the rest is cut off."""
 
 MAX_NOTE_CHARACTERS = 50_000
 MAX_NAME_CHARACTERS = 200
-"""What the server takes of a note's words, and of the model's name."""
+"""Limits of the server on a note's text and on the model's name."""
 
 LONGEST_WAIT_S = 30.0
 BUSY_TRIES = 5
-"""How long and how often a server that is asked too much is waited for."""
+"""Longest wait and number of tries for a server that is too busy."""
 
 _OVER = ("task_complete", "step_budget_exhausted")
 
 
 @dataclass(frozen=True)
 class Note:
-    """The model's words and what they cost, as the server keeps them."""
+    """The model's text and its cost, in the server's form."""
 
     text: str
     kind: str
-    """"thought", "message" or "note"."""
+    """One of "thought", "message" and "note"."""
 
     robot: str | None
     tokens: dict[str, int] | None = None
@@ -42,14 +42,14 @@ class Note:
     model: str | None = None
     seconds: float | None = None
     ending: Ending | None = None
-    """How the model's play ends with it; None: it goes on."""
+    """Ending of the model's play with this note; None while it goes on."""
 
 
 class Seat:
-    """One episode on a server, for whoever directs all robots, or one of them.
+    """One episode on a server, for a client that controls all robots or one of them.
 
-    robot: The robot that is directed, where it is one alone; the client's token is then its operator's.
-    tools: The tools that it is offered. None: the server is asked.
+    robot: The only robot that is controlled; the client's token is then its operator's. None: all robots.
+    tools: Tools of the model. None: those that the server offers.
     """
 
     def __init__(self, client: Client, episode_id: str, robot: str | None = None, tools: Sequence[Tool] | None = None) -> None:
@@ -59,18 +59,18 @@ class Seat:
         self.tools: tuple[Tool, ...] = offered(client, episode_id) if tools is None else tuple(tools)
         self.over = False
         self.phases: tuple[str, ...] = ()
-        """Those reached so far, as the latest reply that tells them has them."""
+        """Phases reached up to now, from the latest reply that has them."""
         self._keeps_notes = True
 
     @cached_property
     def briefing(self) -> dict[str, Any]:
-        """What there is to know of the episode."""
+        """Briefing of the episode."""
         return self.client.request("GET", f"/v1/episodes/{self.episode_id}/briefing")
 
     def call(self, call: Call, key: str) -> Answer:
-        """Calls a tool as the model wants it. A refusal is an answer, too, which says what would have worked.
+        """Makes a tool call of the model. A refusal is also an answer, and says what would have worked.
 
-        key: The call's Idempotency-Key.
+        key: Idempotency-Key of the call.
         """
         tool = next((tool for tool in self.tools if tool.name == call.tool), None)
         if tool is None:
@@ -125,11 +125,11 @@ class Seat:
             self.call(Call("", "finish", "{}"), key)
 
     def note(self, note: Note, key: str) -> None:
-        """Hands the model's words to the server, which keeps them once for a key."""
+        """Sends the model's text to the server, which records it once per key."""
         if not self._keeps_notes:
             return
         try:
-            # An older server knows nothing of endings.
+            # Older servers do not support endings.
             said = {name: value for name, value in asdict(note).items() if name != "ending" or value is not None}
             body = {
                 **said,
@@ -138,23 +138,23 @@ class Seat:
             }
             self.client.request("POST", f"/v1/episodes/{self.episode_id}/notes", body, key=key)
         except Refused as refused:
-            # Words are not worth an episode: an older server keeps none, and one that has ended keeps no more.
+            # A failed note must not end the play. Older servers take no notes, and neither do ended episodes.
             self._keeps_notes = refused.kind not in ("no-route", "ended")
 
 
 def _parts(reply: dict[str, Any]) -> list[dict[str, Any]]:
-    """A reply, and within one to several commands that to the last of them."""
+    """Returns a reply, and for several commands also the reply to the last one."""
     last = reply.get("last")
     return [reply, cast("dict[str, Any]", last)] if isinstance(last, dict) else [reply]
 
 
 def _is_last(reply: dict[str, Any]) -> bool:
-    """Whether a reply is the last of its episode."""
+    """Returns true if a reply is the last of its episode."""
     return reply.get("stop_reason") in _OVER or reply.get("ended") is not None
 
 
 def _take_pictures(reply: dict[str, Any]) -> tuple[Picture, ...]:
-    """Takes the pictures out of a reply of the server, where it shows something itself or at the end of a command."""
+    """Takes the images out of a server's reply, from its own fields and from its observation."""
     seen = [reply, reply.get("observation")]
     return tuple(picture for part in seen if isinstance(part, dict) for picture in _take_own(cast("dict[str, Any]", part)))
 

@@ -1,4 +1,4 @@
-"""Which model plays, and what it may use up."""
+"""Choice of the model, and its limits."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from ..errors import TandemError
 from .conversation import Usage
 
 Api: TypeAlias = Literal["openai", "openai-chat", "anthropic"]
-"""OpenAI's Responses, its Chat Completions, or Anthropic's Messages: the names that `GET /v1/tools?format=` has."""
+"""OpenAI's Responses, its Chat Completions, or Anthropic's Messages, by their names in `GET /v1/tools?format=`."""
 
 APIS: tuple[Api, ...] = get_args(Api)
 
 CACHE_WRITE_FACTOR = 1.25
-"""What a token costs that is written to a cache, in tokens that are only read. Anthropic and OpenAI ask so much."""
+"""Price of a token written to a cache, relative to an input token. Anthropic and OpenAI charge this much."""
 
 
 @dataclass(frozen=True)
 class Prices:
-    """US dollars for a million tokens."""
+    """Prices in US dollars per million tokens."""
 
     input: float
     output: float
     cached: float | None = None
-    """Of input that comes from a cache. None: as other input."""
+    """Price of cached input. None: the same as other input."""
 
     def usd(self, usage: Usage) -> float:
-        """What a request cost."""
+        """Returns the price of a request."""
         cached = self.input if self.cached is None else self.cached
         fresh = usage.input - usage.cached - usage.cache_written
         reading = fresh * self.input + usage.cached * cached + usage.cache_written * self.input * CACHE_WRITE_FACTOR
@@ -37,33 +37,33 @@ class Prices:
 
 @dataclass(frozen=True)
 class Limits:
-    """What a model may use up in one episode; None: any amount."""
+    """Limits of a model in one episode; None means unlimited."""
 
     tokens: int | None = None
-    """Read and written, cached ones included."""
+    """Input and output tokens, cached ones included."""
 
     usd: float | None = None
     calls: int | None = None
-    """Calls of tools."""
+    """Number of tool calls."""
 
     seconds: float | None = None
-    """Since the agent began."""
+    """Seconds since the agent began."""
 
 
 KEPT_FIELDS = ("model", "messages", "input", "instructions", "system", "tools", "stream")
 SECRET_FIELDS = ("api_key", "authorization")
-"""Fields of a request that --extra-body may not have: they are the agent's, or would be written down."""
+"""Fields of a request that --extra-body may not have, because they are the agent's or would be written to a file."""
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """How replies are sampled; None: as the endpoint does by itself."""
+    """Sampling parameters; None means the endpoint's default."""
 
     temperature: float | None = None
     top_p: float | None = None
     seed: int | None = None
     extra_body: dict[str, Any] | None = None
-    """Further fields of each request, as the endpoint wants them."""
+    """Additional fields of each request to the endpoint."""
 
     def __post_init__(self) -> None:
         for name in self.extra_body or {}:
@@ -72,12 +72,14 @@ class Sampling:
 
     @property
     def told(self) -> dict[str, Any]:
-        """What is set, as recordings have it."""
+        """Parameters that are set, in the form for recordings."""
         fields = {"temperature": self.temperature, "top_p": self.top_p, "seed": self.seed, "extra_body": self.extra_body}
         return {name: value for name, value in fields.items() if value is not None}
 
     def fields(self, api: Api) -> dict[str, Any]:
-        """What requests have of it, as the SDKs take it. A field that the endpoint does not know is refused, not left out."""
+        """Returns the parameters for requests, in the SDKs' form. A field that the API does not support is refused,
+        not dropped.
+        """
         if self.seed is not None and api != "openai-chat":
             raise TandemError(f"the API {api} takes no --sampling-seed; leave it out, or use --api openai-chat")
         return self.told
@@ -90,13 +92,13 @@ class AgentSettings:
     model: str
     api: Api = "openai"
     base_url: str | None = None
-    """Where the endpoint is. None: where the SDK has it, by its environment variable or by default."""
+    """URL of the endpoint. None: the SDK's, from its environment variable or its default."""
 
     effort: str | None = None
-    """How much the model thinks, in its API's own words. None: as it does by itself."""
+    """Reasoning effort in the API's terms. None: the model's default."""
 
     context_tokens: int = 100_000
-    """The longest conversation; of a longer one the oldest half becomes a list of its calls."""
+    """Maximum length of the conversation in tokens; the oldest half of a longer one becomes a list of its calls."""
 
     limits: Limits = field(default_factory=Limits)
     prices: Prices | None = None
@@ -111,7 +113,7 @@ class AgentSettings:
 
 
 def check_base_url(url: str) -> None:
-    """Refuses what is no address, and one with a key in it, which would be written down."""
+    """Refuses an invalid URL, and one with a key in it, because the URL would be written to a file."""
     parts = urlsplit(url)
     if parts.scheme not in ("http", "https") or not parts.hostname:
         raise TandemError(f"{url!r} is no address of an endpoint; give one as http://127.0.0.1:11434/v1")

@@ -1,4 +1,4 @@
-"""The tools of an episode as each API wants them."""
+"""The tools of an episode in the form of each API."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ class Tool:
     schema: dict[str, Any]
 
     def takes(self, argument: str) -> bool:
-        """Whether there is an argument of this name."""
+        """Returns true if there is an argument of this name."""
         return argument in self.schema.get("properties", {})
 
 
 def offered(client: Client, episode_id: str) -> tuple[Tool, ...]:
-    """The tools of this episode for this caller. Their schemas are those for MCP, the shortest: what a model leaves out is left
-    out, and the server's refusals say what schemas do not.
+    """Returns the tools of this episode for this caller. The schemas are those for MCP, which are the shortest.
+    Optional arguments may be left out, and the server's refusals explain what schemas do not.
     """
     names = {str(tool["name"]) for tool in client.request("GET", f"/v1/episodes/{episode_id}/tools")}
     specs = client.request("GET", "/v1/tools?format=mcp")
@@ -34,7 +34,7 @@ def offered(client: Client, episode_id: str) -> tuple[Tool, ...]:
 
 
 def _tool(spec: dict[str, Any]) -> Tool:
-    """A tool without the episode among its arguments: the model plays one."""
+    """Returns a tool without its episode argument, because the model plays one episode."""
     schema = dict(spec["inputSchema"])
     schema["properties"] = {name: field for name, field in schema.get("properties", {}).items() if name != EPISODE_ID}
     schema["required"] = [name for name in schema.get("required", []) if name != EPISODE_ID]
@@ -47,17 +47,17 @@ def _tool(spec: dict[str, Any]) -> Tool:
 
 
 def for_chat(tools: Sequence[Tool]) -> list[dict[str, Any]]:
-    """For OpenAI's Chat Completions."""
+    """Returns the tools for OpenAI's Chat Completions."""
     return [{"type": "function", "function": _function(tool)} for tool in tools]
 
 
 def for_responses(tools: Sequence[Tool]) -> list[dict[str, Any]]:
-    """For OpenAI's Responses, which would be strict by themselves."""
+    """Returns the tools for OpenAI's Responses, which would be strict by default."""
     return [{"type": "function", **_function(tool), "strict": False} for tool in tools]
 
 
 def for_messages(tools: Sequence[Tool]) -> list[dict[str, Any]]:
-    """For Anthropic's Messages."""
+    """Returns the tools for Anthropic's Messages."""
     return [{"name": tool.name, "description": tool.description, "input_schema": tool.schema} for tool in tools]
 
 

@@ -6,9 +6,10 @@
     with load("runs/pouring/policy").serve() as server:
         print(server.url)
 
-Two kinds, both of which look at each robot's picture through an eye of their own, and tell a second of actions at once: `chunk`
-tells one, `flow` draws one of those that demonstrations had (flow matching). They need PyTorch,
-pyarrow and PyAV: `pip install './gateway/python[baselines]'` in a checkout of the repository.
+There are two kinds, `chunk` and `flow`. Both encode each robot's image with a network of its own, and predict a
+second of actions at once. `chunk` predicts one chunk of actions; `flow` samples one from the distribution of the
+demonstrations (flow matching). They need PyTorch, pyarrow and PyAV: `pip install './gateway/python[baselines]'` in
+a checkout of the repository.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ __all__ = ["Baseline", "PolicyKind", "Scope", "Sharing", "TrainingSettings", "lo
 
 
 def __getattr__(name: str) -> object:
-    """What needs PyTorch is loaded when it is asked for."""
+    """Loads a module that needs PyTorch when it is first used."""
     if name in ("Baseline", "load"):
         from . import policy
 

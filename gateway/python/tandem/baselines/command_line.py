@@ -1,4 +1,4 @@
-"""`python -m tandem.baselines`: train, serve, or all of it for one task."""
+"""`python -m tandem.baselines`: trains or serves a policy, or runs the whole recipe of a task."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from .recipe import Recipe, execute_rows, run_recipe, training_steps
 from .settings import PolicyKind, Scope, Sharing, TrainingSettings
 
 INTERRUPTED = 130
-"""What shells report of a process that SIGINT has ended."""
+"""Exit status that shells report for a process that SIGINT has ended."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """The flags."""
+    """Returns the parser of the flags."""
     flags = argparse.ArgumentParser(prog="python -m tandem.baselines", description="Policies that learn from demonstrations.")
     commands = flags.add_subparsers(dest="command", required=True)
     train = commands.add_parser("train", help="train a policy from a data set; a run that was stopped goes on")
@@ -72,7 +72,7 @@ def _settings(given: argparse.Namespace, task: str) -> TrainingSettings:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command and returns its exit code."""
     given = parser().parse_args(arguments)
-    # Threads of PyTorch that wait for each other leave the core to whoever needs it, as the worlds of an evaluation.
+    # Waiting threads of PyTorch release their core to other work, such as the worlds of an evaluation.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     try:
         library("torch", "policies are trained and played by PyTorch", "baselines")

@@ -1,4 +1,4 @@
-"""A data set of `tandem export lerobot` as arrays to learn from."""
+"""A data set of `tandem export lerobot` as arrays for training."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ PELVES = f"{PRIVILEGED}pelvis_in_world"
 OBJECTS = f"{PRIVILEGED}objects_in_world"
 
 ACTIONS = 35
-"""Numbers that a robot is told."""
+"""Number of columns of a robot's action."""
 
 BASE = 4
-"""The last of them: velocities of the base, and the pelvis' height."""
+"""Number of columns of the base command, which come last: base velocities, and the height of the pelvis."""
 
 JOINTS = 43
-"""Joint angles that a robot senses."""
+"""Number of sensed joint angles of a robot."""
 
 STATES = JOINTS + BASE + 1
-"""What a robot tells its policy: joint angles, the base command in force, and how long the episode has lasted."""
+"""Number of inputs from a robot's state: joint angles, the base command in force, and the time since the start."""
 
 CLOCK_S = 20.0
-"""A unit of the clock, so that an episode lasts about one."""
+"""Unit of the clock in seconds, chosen so that an episode lasts about one unit."""
 
 
 @dataclass(frozen=True)
@@ -44,36 +44,37 @@ class Demonstrations:
     objects: tuple[str, ...]
     rate_hz: int
     size: tuple[int, int]
-    """Width and height of the pictures."""
+    """Width and height of the images."""
 
     pictures: NDArray[np.uint8]
-    """Moments by robots by height by width by 3."""
+    """Images: moments by robots by height by width by 3."""
 
     states: NDArray[np.float32]
-    """Moments by robots by `STATES`."""
+    """States: moments by robots by `STATES`."""
 
     chunks: NDArray[np.float32]
-    """What was told from each moment on, moments by rows by robots by 35; the last row goes on after the end."""
+    """Actions from each moment on: moments by rows by robots by 35. The last row is repeated after the end."""
 
     told: NDArray[np.bool_]
-    """Which of these rows were told, moments by rows. Nothing is learned from those after the end: a policy that learned to
-    hold still then would let go of what it puts down, and never draw its hands back."""
+    """True for rows that were commanded, moments by rows. Rows after the end are not learned. A policy that learned
+    to hold still then would release what it puts down, and never draw its hands back.
+    """
 
     objects_in_pelvis_m: NDArray[np.float32]
-    """Moments by robots by objects by 3: what no policy gets, for the second task."""
+    """Moments by robots by objects by 3: the target of the second task, which policies do not get as input."""
 
     validated: NDArray[np.bool_]
-    """Which moments are of the data set's episodes for validation."""
+    """True for moments of the data set's validation episodes."""
 
     def __len__(self) -> int:
         return len(self.states)
 
 
 def read(data_set: Path, chunk_rows: int, every: int) -> Demonstrations:
-    """Reads a data set of the joint view, version 3, with the robots' own pictures.
+    """Reads a data set of the joint view, version 3, with the robots' own images.
 
-    chunk_rows: Rows of actions that go with each moment.
-    every: Each so manieth row becomes a moment.
+    chunk_rows: Rows of actions for each moment.
+    every: One row in `every` becomes a moment.
     """
     info, about = (_json(data_set / f"meta/{name}.json") for name in ("info", "tandem"))
     settings = about["plan"]["settings"]
@@ -107,7 +108,7 @@ def read(data_set: Path, chunk_rows: int, every: int) -> Demonstrations:
 
 
 def task_of(data_set: Path) -> str:
-    """The task's id."""
+    """Returns the task's id."""
     return _json(data_set / "meta/tandem.json")["task"]
 
 
@@ -125,12 +126,12 @@ def _tables(data_set: Path, names: tuple[str, ...]) -> Iterator[Any]:
 
 
 def _columns(data_set: Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
-    """Columns of all rows as arrays."""
+    """Returns columns of all rows as arrays."""
     parts: dict[str, list[NDArray[Any]]] = {name: [] for name in names}
     for table in _tables(data_set, names):
         for name in names:
             column = table[name].combine_chunks()
-            # Lists of a fixed length, or one number a row.
+            # Lists of a fixed length, or one number per row.
             flat = column.flatten() if column.type.num_fields else column
             values: NDArray[Any] = flat.to_numpy(zero_copy_only=False)
             parts[name].append(np.reshape(values, (len(column), -1)) if column.type.num_fields else values)
@@ -138,14 +139,16 @@ def _columns(data_set: Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
 
 
 def _places(episodes: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Which row of its episode each row is, and how many follow."""
+    """Returns the index of each row in its episode, and the number of rows after it."""
     lengths = np.unique(episodes, return_counts=True)[1]
     number = np.concatenate([np.arange(length, dtype=np.int64) for length in lengths])
     return number, np.repeat(lengths, lengths) - 1 - number
 
 
 def _states(joints: NDArray[Any], actions: NDArray[np.float32], number: NDArray[np.int64], rate_hz: int) -> NDArray[np.float32]:
-    """Rows by robots by `STATES`. The base command in force is what the row before told; at the beginning, to stand."""
+    """Returns rows by robots by `STATES`. The base command in force is that of the previous row; at the beginning,
+    it is standing.
+    """
     rows, robots = actions.shape[:2]
     base = np.roll(actions[..., -BASE:], 1, axis=0)
     first = np.flatnonzero(number == 0)
@@ -157,13 +160,13 @@ def _states(joints: NDArray[Any], actions: NDArray[np.float32], number: NDArray[
 
 
 def _in_pelvis(columns: dict[str, NDArray[Any]], robots: int, objects: int) -> NDArray[np.float32]:
-    """Where objects are in the frames of the pelves: R^T (p - o). Rows by robots by objects by 3."""
+    """Returns the positions of objects in the pelvis frames, R^T (p - o): rows by robots by objects by 3."""
     rows = len(columns[STATE])
     pelves = np.reshape(columns[PELVES], (rows, robots, len(POSE))).astype(np.float64)
     places = np.reshape(columns[OBJECTS], (rows, objects, len(POSE)))[..., :3].astype(np.float64)
     w, axis = pelves[..., None, 3:4], pelves[..., None, 4:]
     offset = places[:, None] - pelves[..., None, :3]
-    # By the inverse of the unit quaternion (w, v): p - 2 w (v x p) + 2 v x (v x p).
+    # Rotation by the inverse of the unit quaternion (w, v): p - 2 w (v x p) + 2 v x (v x p).
     once = np.cross(axis, offset)
     return (offset - 2 * w * once + 2 * np.cross(axis, once)).astype(np.float32)
 
@@ -174,7 +177,7 @@ def _is_in(span: str, episodes: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 def _pictures(data_set: Path, features: dict[str, Any], keys: list[str], kept: NDArray[Any]) -> NDArray[np.uint8]:
-    """The pictures of the rows that are kept, rows by cameras by height by width by 3."""
+    """Returns the images of the kept rows: rows by cameras by height by width by 3."""
     height, width = features[keys[0]]["shape"][:2]
     found = np.empty((len(kept), len(keys), height, width, 3), np.uint8)
     place = {int(row): number for number, row in enumerate(kept)}
@@ -190,7 +193,7 @@ def _pictures(data_set: Path, features: dict[str, Any], keys: list[str], kept: N
 
 
 def _films(data_set: Path, key: str) -> Iterator[Any]:
-    """Frames of all films of a camera: one for each row, in their order."""
+    """Yields the frames of all videos of a camera: one per row, in order."""
     av = library("av")
     for path in sorted(data_set.glob(f"videos/{key}/chunk-*/file-*.mp4")):
         with av.open(str(path)) as container:

@@ -1,6 +1,6 @@
 # pyright: basic, reportMissingImports=false
-# PyTorch is an extra, which is not installed everywhere where types are checked, and its types are partly unknown.
-"""One network that learns: its samples, scales, steps and averaged weights."""
+# PyTorch is an extra that is not installed everywhere, and its types are partly unknown.
+"""Training of one network: its samples, scales, steps and averaged weights."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from .settings import TrainingSettings
 from .views import View
 
 WARM_UP = 100
-"""Steps until the learning rate is at its highest."""
+"""Number of steps until the learning rate reaches its maximum."""
 
 LARGEST_GRADIENT = 10.0
 
 MIN_DEVIATIONS = {"states": 0.05, "chunks": 0.05, "objects": 0.02}
-"""What hardly moves is not blown up when it is normalised."""
+"""Lower limits of standard deviations, so that normalisation does not amplify nearly constant inputs."""
 
 BASE_NOISE = (0.03, 0.03, 0.03, 0.01)
-"""Deviations of noise on the base command that is shown, in its own units."""
+"""Standard deviations of the noise on the base command input, in its own units."""
 
 
 def scaled(values: Tensor, scale: Sequence[Tensor]) -> Tensor:
@@ -41,7 +41,7 @@ def unscaled(values: Tensor, scale: Sequence[Tensor]) -> Tensor:
 
 
 class Learner:
-    """A network, and the moments that it learns from, seen as each of its views has them."""
+    """A network with its training samples, one per moment and view."""
 
     def __init__(
         self, demonstrations: Demonstrations, views: tuple[View, ...], settings: TrainingSettings, number: int, device: str
@@ -72,9 +72,9 @@ class Learner:
         self._optimizer = torch.optim.AdamW(self.network.parameters(), weight_decay=settings.weight_decay, fused=True)
 
     def step(self, step: int) -> tuple[float, float]:
-        """One step of the optimiser. Returns what the actions and the second task cost."""
+        """Takes one step of the optimiser. Returns the losses of the actions and of the second task."""
         settings = self.settings
-        # Each step has a generator of its own, so that a run goes on after a checkpoint as it would have without.
+        # Each step has its own generator, so that a run from a checkpoint equals an uninterrupted one.
         generator = torch.Generator().manual_seed(self._seed * 1_000_003 + step)
         samples = len(self._learned) * len(self.views)
         chosen = torch.randint(samples, (settings.batch,), generator=generator)
@@ -96,8 +96,9 @@ class Learner:
 
     @torch.no_grad()
     def validate(self) -> tuple[float, float]:
-        """Mean errors of the averaged weights on the episodes for validation: of actions, in their own units, and of objects'
-        coordinates in metres. NaN where there are none."""
+        """Returns the mean errors of the averaged weights on the validation episodes: of actions in their own
+        units, and of objects' coordinates in metres. NaN without validation episodes.
+        """
         if not len(self._validated):
             return math.nan, math.nan
         own = {name: value.clone() for name, value in self.network.state_dict().items()}
@@ -131,7 +132,7 @@ class Learner:
         self._optimizer.load_state_dict(checkpoint["optimizer"])
 
     def trained(self) -> dict[str, Any]:
-        """What plays."""
+        """Returns the part of the state that is needed to play."""
         return {
             "views": [[list(view.inputs), list(view.outputs)] for view in self.views],
             "weights": {name: value.cpu() for name, value in self.averaged.items()},
@@ -146,13 +147,14 @@ class Learner:
         return self.network.loss(known, chunks, told, generator), functional.l1_loss(places, objects)
 
     def _look(self, moments: Tensor, views: Tensor, generator: torch.Generator | None) -> tuple[Tensor, Tensor]:
-        # Robots first, so that the pictures of each lie together.
+        # Robots come first, so that the images of each are contiguous.
         pictures = self._pictures[moments, self._inputs[views].T].to(self._device)
         states = self._values["states"][moments[:, None], self._inputs[views]]
         if generator is None:
             seen = as_seen(pictures)
         else:
-            # Colour, brightness and contrast vary; no shifts, since a place in the picture is what is learned.
+            # Colour, brightness and contrast vary. There are no shifts, because the network learns positions in the
+            # image.
             each = (*pictures.shape[:2], 1, 1)
             colours = 1 + 0.2 * (torch.rand((*each, 3), generator=generator) - 0.5)
             gain = colours * (1 + 0.3 * (torch.rand((*each, 1), generator=generator) - 0.5))
@@ -167,17 +169,17 @@ class Learner:
         return self._values[name][moments[:, None], self._inputs[views]].to(self._device)
 
     def _of_outputs(self, moments: Tensor, views: Tensor) -> Tensor:
-        """Batch by rows by outputs by 35."""
+        """Returns target chunks: batch by rows by outputs by 35."""
         return self._values["chunks"][moments[:, None], :, self._outputs[views]].transpose(1, 2).to(self._device)
 
     def _scale_of(self, name: str) -> list[Tensor]:
         return [part.to(self._device) for part in self.scales[name]]
 
     def _scale(self, name: str) -> tuple[Tensor, Tensor]:
-        """Mean and deviation over what is learned from, over all views together: robots by columns."""
+        """Returns mean and standard deviation of the training data, over all views together: robots by columns."""
         robots = self._outputs if name == "chunks" else self._inputs
         values = self._values[name][self._learned]
-        # Robots stand before the last axis.
+        # Robots are the second last axis.
         seen = torch.cat([values[..., list(chosen), :] for chosen in robots.tolist()])
         axes = tuple(range(seen.dim() - 2))
         return seen.mean(axes), seen.std(axes).clamp(min=MIN_DEVIATIONS[name])

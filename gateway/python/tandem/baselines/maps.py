@@ -1,4 +1,4 @@
-"""The policy map by which `tandem evaluate` asks a baseline."""
+"""The policy map with which `tandem evaluate` queries a baseline."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from .settings import TrainingSettings
 
 MAP_FILE = "map.toml"
 
-# Of a global scope one answer moves all robots, whatever networks it comes of.
+# With a global scope one answer moves all robots, whichever networks it comes from.
 GLOBAL = """preset = "openpi"
 scope = "global"
 answer = "all"
@@ -35,12 +35,12 @@ between = "interpolate"
 
 
 def map_text(settings: TrainingSettings, size: tuple[int, int], rate_hz: int) -> str:
-    """The map of a policy that was trained with these settings, on pictures of this size, at this rate."""
+    """Returns the map of a policy with these settings, image size and rate."""
     scope, suffix = (GLOBAL, "_{robot}") if settings.scope == "global" else (LOCAL, "")
     rows, execute = settings.chunk_rows, settings.execute_rows
     return scope + KEYS.format(suffix=suffix, width=size[0], height=size[1], rows=rows, execute=execute, rate_hz=rate_hz)
 
 
 def key(name: str, robot: str, scope: str) -> str:
-    """A key of the map, as it is sent for a robot."""
+    """Returns a key of the map as sent for a robot."""
     return f"{name}_{robot}" if scope == "global" else name

@@ -1,6 +1,6 @@
 # pyright: basic, reportMissingImports=false
-# PyTorch is an extra, which is not installed everywhere where types are checked, and its types are partly unknown.
-"""From pictures and states to chunks of actions."""
+# PyTorch is an extra that is not installed everywhere, and its types are partly unknown.
+"""Networks from images and states to chunks of actions."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .data import ACTIONS, STATES
 from .settings import TrainingSettings
 
 FLOW_STEPS = 10
-"""Steps of Euler's method from noise to actions."""
+"""Number of Euler steps from noise to actions."""
 
 
 @cache
 def multiplies_halves(device: torch.device) -> bool:
-    """Whether bfloat16 is multiplied by instructions of its own. Where it is not, it takes longer than float32."""
+    """Returns true if the device multiplies bfloat16 natively. Otherwise bfloat16 is slower than float32."""
     if device.type == "cuda":
         return torch.cuda.is_bf16_supported(including_emulation=False)
     told: dict[str, Any] = getattr(torch.cpu, "get_capabilities", dict)()
@@ -31,10 +31,11 @@ def multiplies_halves(device: torch.device) -> bool:
 def as_seen(
     pictures: Tensor, gain: Tensor | float = 1.0, offset: Tensor | float = 0.0, kind: torch.dtype = torch.float32
 ) -> Tensor:
-    """Pictures of bytes, ... by height by width by 3, as eyes take them: ... by 3 by height by width in -1..1.
+    """Converts byte images, ... by height by width by 3, to the input of eyes: ... by 3 by height by width in
+    -1..1.
 
-    gain, offset: Of a picture's colours in 0..1, ... by 1 by 1 by 3.
-    kind: Of the numbers.
+    gain, offset: Factors and offsets of an image's colours in 0..1, ... by 1 by 1 by 3.
+    kind: Type of the result.
     """
     height, width, colours = pictures.shape[-3:]
 
@@ -42,18 +43,18 @@ def as_seen(
         whole = torch.as_tensor(values, device=pictures.device).expand(*pictures.shape[:-3], 1, width, colours)
         return whole.reshape(*pictures.shape[:-3], 1, width * colours).to(kind)
 
-    # In rows of all their colours, the processor's vectors are full.
+    # Rows with all their colours fill the processor's vector registers.
     rows = pictures.reshape(*pictures.shape[:-3], height, width * colours).to(kind)
     seen = torch.addcmul(of_rows(2 * offset - 1), rows, of_rows(2 / 255 * gain)).clamp_(-1, 1)
     return seen.view(pictures.shape).movedim(-1, -3)
 
 
 class Eye(nn.Module):
-    """A picture, batch by 3 by height by width in -1..1, to features, batch by `width`.
+    """Image encoder from images, batch by 3 by height by width in -1..1, to features, batch by `width`.
 
-    Keypoints by spatial softmax (Levine et al. 2016): of each of k maps, where its softmax has its mean; and a coarse look at
-    all maps. A pixel of a small picture is 6 mm of a table: no layer but the first takes pixels together, and nothing is
-    normalised over pictures.
+    Keypoints by spatial softmax (Levine et al. 2016): the mean of the softmax of each of k maps, and a coarse view
+    of all maps. A pixel of a small image covers 6 mm of a table. So only the first layer has a stride, and nothing
+    is normalised over images.
     """
 
     def __init__(self, keypoints: int) -> None:
@@ -79,7 +80,7 @@ class Eye(nn.Module):
     def forward(self, pictures: Tensor) -> Tensor:
         with torch.autocast(pictures.device.type, torch.bfloat16, enabled=pictures.dtype == torch.bfloat16):
             maps = self.convolutions(pictures.contiguous(memory_format=torch.channels_last))
-        # Places in the picture need all of a float32.
+        # Positions in the image need the precision of float32.
         maps = maps.to(torch.float32, memory_format=torch.contiguous_format)
         height, width = maps.shape[-2:]
         weights = functional.softmax(maps.flatten(2), dim=-1)
@@ -89,7 +90,9 @@ class Eye(nn.Module):
 
 
 class PolicyNetwork(nn.Module):
-    """What `inputs` robots see and sense, to chunks of what `outputs` robots are told. All numbers are normalised."""
+    """Network from images and states of `inputs` robots to chunks of actions of `outputs` robots. All values are
+    normalised.
+    """
 
     def __init__(self, settings: TrainingSettings, inputs: int, outputs: int, objects: int) -> None:
         super().__init__()
@@ -107,19 +110,23 @@ class PolicyNetwork(nn.Module):
         self.head = Flow(hidden, target) if self.is_flow else nn.Linear(hidden, target)
 
     def look(self, pictures: Tensor, states: Tensor) -> tuple[Tensor, Tensor]:
-        """pictures: batch by inputs by 3 by height by width; states: batch by inputs by `STATES`. Returns what the head needs,
-        batch by `hidden`, and where the objects are, batch by inputs by 3 times objects."""
+        """Encodes images (batch by inputs by 3 by height by width) and states (batch by inputs by `STATES`).
+        Returns the head's input, batch by `hidden`, and the objects' positions, batch by inputs by 3 times objects.
+        """
         seen = [eye(pictures[:, number]) for number, eye in enumerate(self.eyes)]
         places = [tell(features) for tell, features in zip(self.objects, seen, strict=True)]
         known = self.trunk(torch.cat([*seen, *places, self.state(states.flatten(1))], dim=1))
         return known, torch.stack(places, dim=1)
 
     def loss(self, known: Tensor, chunks: Tensor, told: Tensor, generator: torch.Generator) -> Tensor:
-        """How far what it tells is from `chunks`, batch by rows by outputs by 35, in rows that were told, batch by rows."""
+        """Returns the error against `chunks`, batch by rows by outputs by 35, in rows that were commanded, batch by
+        rows.
+        """
         target = chunks.flatten(1)
         if isinstance(self.head, Flow):
-            # Flow matching (Lipman et al. 2023) on straight ways, x = (1 - t) noise + t chunk. The head tells the chunk, not
-            # the velocity chunk - noise, for which all of the noise would have to pass through its hidden layers.
+            # Flow matching (Lipman et al. 2023) on straight paths, x = (1 - t) noise + t chunk. The head predicts
+            # the chunk, not the velocity chunk - noise, because all of the noise would have to pass through its
+            # hidden layers.
             noise = torch.randn(target.shape, generator=generator).to(target.device)
             time = torch.rand(len(target), 1, generator=generator).to(target.device)
             errors = (self.head(known, (1 - time) * noise + time * target, time) - target).square()
@@ -129,20 +136,21 @@ class PolicyNetwork(nn.Module):
         return (of_rows * told).sum() / told.sum()
 
     def act(self, known: Tensor, noise: Tensor | None = None) -> Tensor:
-        """What the robots are told, batch by rows by outputs by 35. `noise`, batch by the product of these, is what a flow
-        begins from; None: zeros, the likeliest."""
+        """Returns actions, batch by rows by outputs by 35. `noise`, batch by the product of these, is the start of
+        a flow. None: zeros, the most likely start.
+        """
         if not isinstance(self.head, Flow):
             return self.head(known).view(-1, *self.chunk_shape)
         chunk = known.new_zeros(len(known), math.prod(self.chunk_shape)) if noise is None else noise
         for step in range(FLOW_STEPS):
             time = known.new_full((len(known), 1), step / FLOW_STEPS)
-            # The velocity is (chunk told - x) / (1 - t), of which a step takes 1 / FLOW_STEPS.
+            # The velocity is (predicted chunk - x) / (1 - t), of which a step takes 1 / FLOW_STEPS.
             chunk = chunk + (self.head(known, chunk, time) - chunk) / (FLOW_STEPS - step)
         return chunk.view(-1, *self.chunk_shape)
 
 
 class Flow(nn.Module):
-    """From a point on the way between noise and a chunk of actions, at a time of 0..1, to the chunk."""
+    """Network from a point on the path between noise and a chunk of actions, at a time in 0..1, to the chunk."""
 
     def __init__(self, hidden: int, target: int) -> None:
         super().__init__()

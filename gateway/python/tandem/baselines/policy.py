@@ -1,6 +1,6 @@
 # pyright: basic, reportMissingImports=false
-# PyTorch is an extra, which is not installed everywhere where types are checked, and its types are partly unknown.
-"""A trained policy, as it plays."""
+# PyTorch is an extra that is not installed everywhere, and its types are partly unknown.
+"""A trained policy for playing."""
 
 from __future__ import annotations
 
@@ -26,16 +26,17 @@ CONTROL_HZ = 50
 
 
 VELOCITIES = slice(ACTIONS - BASE, ACTIONS - 1)
-"""Of a row: forwards, to the left, and turning."""
+"""Columns of a row with the base velocities: forwards, to the left, and turning."""
 
 STILL_M_S = 0.03
 STILL_RAD_S = 0.05
-"""Base velocities below these are told as none: a regression hardly ever tells exactly that, and a robot that is told to walk,
-be it ever so slowly, steps with bent knees. Of what experts tell robots that walk, 0.3 % is as slow."""
+"""Thresholds below which base velocities become zero. A regression hardly ever predicts exactly zero, and a robot
+that walks however slowly steps with bent knees. Experts command velocities this slow in 0.3 % of walking.
+"""
 
 
 def stood_still(rows: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Rows of actions, ... by 35, in which robots stand where they were told to walk as slowly as that."""
+    """Sets velocities below the thresholds to zero in rows of actions, ... by 35, so that robots stand there."""
     velocities = rows[..., VELOCITIES]
     still = np.hypot(velocities[..., 0], velocities[..., 1]) < STILL_M_S
     still &= np.abs(velocities[..., 2]) < STILL_RAD_S
@@ -44,7 +45,7 @@ def stood_still(rows: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def load(folder: str | PathLike[str], threads: int | None = None) -> Baseline:
-    """Loads what `train` wrote. PyTorch computes on so many threads from then on, if that is given."""
+    """Loads the output of `train`. If `threads` is given, PyTorch uses that number of threads from then on."""
     if threads is not None:
         torch.set_num_threads(threads)
     path = Path(folder) / POLICY_FILE
@@ -73,18 +74,19 @@ class Baseline:
                 self._answers[outputs] = (network, inputs, one["scales"])
 
     def serve(self, host: str = "127.0.0.1", port: int = 0) -> PolicyServer:
-        """Begins to serve it, and returns at once."""
+        """Starts a server for the policy, and returns at once."""
         if self.settings.scope == "global":
             return serve_policy(self._infer_for(range(len(self.robots))), host=host, port=port)
         own = {robot: self._infer_for([number]) for number, robot in enumerate(self.robots)}
         return serve_policy(own, host=host, port=port)
 
     def act(self, pictures: NDArray[np.uint8], states: NDArray[np.float32], robots: Sequence[int]) -> NDArray[np.float32]:
-        """What robots are told.
+        """Returns the actions of robots: rows by robots by 35.
 
-        pictures: Of each of `robots`, height by width by 3.
-        states: Of each of them, 43 joint angles, the base command in force and the time since the episode began over 20 s.
-        robots: Whose they are, as indices. Returns rows by robots by 35.
+        pictures: Image of each of `robots`, height by width by 3.
+        states: State of each of them: 43 joint angles, the base command in force and the time since the start over
+            20 s.
+        robots: Indices of the robots.
         """
         chunks = np.empty((self.settings.chunk_rows, len(robots), 35), np.float32)
         place = {robot: number for number, robot in enumerate(robots)}

@@ -1,4 +1,4 @@
-"""All of it for one task, on a laptop: demonstrations, data set, policy, evaluations and report."""
+"""The whole recipe of a task, on a laptop: demonstrations, data set, policy, evaluations and report."""
 
 from __future__ import annotations
 
@@ -16,39 +16,42 @@ from .maps import MAP_FILE
 from .settings import TrainingSettings
 
 DISTURB = 1.0
-"""How much demonstrations are disturbed: a policy needs to have seen how it goes on from beside the way."""
+"""Level of disturbance of demonstrations, because a policy needs examples of recovery from deviations."""
 
 SIZE = "160x120"
 RATE_HZ = 10
 
 SOONER = {"trash_collection": 2}
-"""Tasks whose policies are asked again after so many rows, and not after half a second, since a walk to a small thing goes on
-being corrected."""
+"""Rows of an answer to execute in tasks that need fewer than the default half second, because a walk to a small
+object needs frequent corrections.
+"""
 
 LONGER = ("trash_collection", "co_carry", "table_align", "move_house", "cart_service", "big_table")
-"""Tasks in which robots walk: their demonstrations are longer, and hands have to meet what the last step leaves."""
+"""Tasks in which robots walk. Their demonstrations are longer, and hands have to reach objects from the place where
+the last step ends.
+"""
 
 LONGER_STEPS = 12000
 
 WIDE = 2
-"""How many times as far as the benchmark's randomisation things are moved where that shows what a policy sees."""
+"""Range of object poses, as a multiple of the benchmark's, that shows if a policy uses its images."""
 
 WIDER = {"handover": 4, "co_pouring": 4, "co_carry": 4}
-"""Tasks that one demonstration, replayed blindly, solves too often even then."""
+"""Larger ranges for tasks that one demonstration, replayed blindly, solves too often at `WIDE`."""
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """What is made and played."""
+    """Amounts of data, evaluation and parallelism."""
 
     demonstrations: str = "2000-2249"
-    """Seeds of the demonstrations, of which those are kept that succeed."""
+    """Seeds of the demonstrations; only successful ones are kept."""
 
     seeds: str = "1-100"
     """Seeds of the evaluations."""
 
     jobs: int | None = None
-    """Worlds side by side, and threads of PyTorch. None: the machine's cores."""
+    """Number of parallel worlds and of PyTorch threads. None: the number of cores."""
 
 
 def run_recipe(
@@ -59,14 +62,14 @@ def run_recipe(
     *,
     tell: Callable[[str], None] = print,
 ) -> Path:
-    """Makes everything that is not there yet, command by command, and returns the report, which has the folder's other
-    policies, too. What was interrupted goes on.
+    """Makes all missing parts, command by command, and returns the report, which includes the folder's other
+    policies. An interrupted recipe is continued.
 
-    task: The task's id.
-    out: Folder for all of it.
-    settings: How the policy is trained.
-    recipe: How much.
-    tell: Called with each command, and with what training says.
+    task: Id of the task.
+    out: Folder for all parts.
+    settings: Settings of the training.
+    recipe: Amounts of data and evaluation.
+    tell: Called with each command, and with the output of the training.
     """
     from .policy import load
     from .training import train
@@ -85,7 +88,7 @@ def run_recipe(
         if status != 0:
             raise TandemError(f"tandem {words[0]} failed, with status {status}; the same command goes on")
 
-    # An episode that does not end with its success shows how hands are drawn back from what they have put down.
+    # An episode that does not end on success shows how hands are drawn back from objects that were put down.
     disturbed = ["--disturb", f"{DISTURB:g}", "--disclosure", "end", "--only-successful", "--no-reports"]
     spread = ["--spread", str(wide_spread(task))]
     seeds = ["--seeds", recipe.demonstrations]
@@ -104,15 +107,17 @@ def run_recipe(
 
 
 def wide_spread(task: str) -> int:
-    """How many times as far as the benchmark's randomisation things are moved in demonstrations, and in a second evaluation."""
+    """Returns the range of object poses in demonstrations and in a second evaluation, as a multiple of the
+    benchmark's.
+    """
     return WIDER.get(task, WIDE)
 
 
 def execute_rows(task: str) -> int:
-    """How many rows of an answer are executed before a policy of this task is asked again."""
+    """Returns the number of rows of an answer to execute before a policy of this task is queried again."""
     return SOONER.get(task, TrainingSettings.execute_rows)
 
 
 def training_steps(task: str) -> int:
-    """How many steps of training a policy of this task gets."""
+    """Returns the number of training steps for a policy of this task."""
     return LONGER_STEPS if task in LONGER else TrainingSettings.steps

@@ -1,4 +1,4 @@
-"""What a training run is told."""
+"""Settings of a training run."""
 
 from __future__ import annotations
 
@@ -14,58 +14,60 @@ Sharing: TypeAlias = Literal["shared", "separate"]
 
 @dataclass(frozen=True)
 class TrainingSettings:
-    """Everything that a policy's weights come of, beside its data and the number of threads."""
+    """All settings that determine a policy's weights, besides its data and the number of threads."""
 
     kind: PolicyKind = "chunk"
-    """"chunk" tells one chunk of actions; "flow" draws one, by flow matching."""
+    """Kind of policy: "chunk" predicts one chunk of actions; "flow" samples one, by flow matching."""
 
     scope: Scope = "global"
-    """"global": what all robots see and sense is shown to the policy; "local": only what the commanded robot does."""
+    """Scope: with "global", the policy gets images and states of all robots; with "local", only those of the
+    commanded robot.
+    """
 
     sharing: Sharing = "shared"
-    """"shared": one set of weights for all robots; "separate": one for each."""
+    """Sharing of weights: "shared" is one set for all robots; "separate" is one set for each."""
 
     steps: int = 5000
-    """Steps of the optimiser."""
+    """Number of steps of the optimiser."""
 
     batch: int = 32
-    """Moments a step."""
+    """Number of moments per step."""
 
     chunk_rows: int = 10
-    """Rows of actions that an answer has, at the data set's rate."""
+    """Number of action rows in an answer, at the data set's rate."""
 
     execute_rows: int = 5
-    """How many of these are executed before the policy is asked again."""
+    """Number of these rows that are executed before the policy is queried again."""
 
     every: int = 2
-    """Each so manieth row of the data set is a moment that is learned from."""
+    """One row in `every` of the data set is a training moment."""
 
     hidden: int = 512
-    """Width of the layers between eyes and actions."""
+    """Width of the layers between image encoders and actions."""
 
     keypoints: int = 32
-    """Points of a picture that an eye follows."""
+    """Number of keypoints of an image encoder."""
 
     learning_rate: float = 1e-3
-    """At its highest."""
+    """Maximum learning rate."""
 
     weight_decay: float = 1e-3
-    """AdamW's."""
+    """Weight decay of AdamW."""
 
     auxiliary: float = 0.3
-    """Weight of the second task: to tell from a picture where the objects are, before the robot's pelvis. 0: none."""
+    """Weight of the second task: predicting the objects' positions in the pelvis frame from an image. 0: none."""
 
     joint_noise_rad: float = 0.02
-    """Deviation of noise on the joint angles that are learned from."""
+    """Standard deviation of noise on the joint angles in training."""
 
     clock_noise_s: float = 0.4
-    """Deviation of noise on the time since the episode began."""
+    """Standard deviation of noise on the time since the episode began."""
 
     averaging: float = 0.995
-    """Of weights over steps (EMA), which are what plays."""
+    """Factor of the exponential moving average of weights; the averaged weights are the ones that play."""
 
     seed: int = 0
-    """Weights, order of the moments and noise come of it."""
+    """Seed of the weights, the order of the moments and the noise."""
 
     def __post_init__(self) -> None:
         for name, kind in (("kind", PolicyKind), ("scope", Scope), ("sharing", Sharing)):
@@ -78,5 +80,5 @@ class TrainingSettings:
             raise TandemError(f"an answer has {self.chunk_rows} rows, of which {self.execute_rows} cannot be executed")
 
     def as_json(self) -> dict[str, Any]:
-        """As a file keeps it."""
+        """Returns the settings in the form for files."""
         return asdict(self)

@@ -1,6 +1,6 @@
 # pyright: basic, reportMissingImports=false
-# PyTorch is an extra, which is not installed everywhere where types are checked, and its types are partly unknown.
-"""A training run: the same data, settings and number of threads give the same weights, stopped in between or not."""
+# PyTorch is an extra that is not installed everywhere, and its types are partly unknown.
+"""A training run. The same data, settings and number of threads give the same weights, even with interruptions."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ CURVE_HEADER = "step,processor_s,actions_loss,objects_loss,validation_actions,va
 
 REPORT_EVERY = 100
 VALIDATE_EVERY = 500
-"""Steps between two looks at the episodes for validation, and between checkpoints."""
+"""Number of steps between two validations, and between checkpoints."""
 
 
 def train(
@@ -39,15 +39,16 @@ def train(
     device: str = "cpu",
     tell: Callable[[str], None] = print,
 ) -> Path:
-    """Trains a policy and returns its folder: weights, the policy map by which `tandem evaluate` asks it, the curve. A run that
-    was stopped goes on from its last checkpoint; one that is whole is left as it is.
+    """Trains a policy and returns its folder with the weights, the policy map for `tandem evaluate` and the
+    learning curve. An interrupted run continues from its last checkpoint; a complete one is left unchanged.
 
-    data_set: Folder that `tandem export lerobot` wrote, of version 3 and view joint.
+    data_set: Folder from `tandem export lerobot`, of version 3 and view joint.
     out: Folder of the policy.
-    settings: Everything that the weights come of, beside data and threads.
-    threads: Of PyTorch. None: as many as there are processors for this process, a container's quota included.
-    device: Where PyTorch computes.
-    tell: Called with a line now and then.
+    settings: Settings that determine the weights, besides data and threads.
+    threads: Number of PyTorch threads. None: the number of processors of this process, limited by a container's
+        quota.
+    device: PyTorch device.
+    tell: Called with lines of progress.
     """
     settings, folder = settings or TrainingSettings(), Path(out)
     torch.set_num_threads(threads or min(torch.get_num_threads(), _native.available_processors()))
@@ -93,7 +94,7 @@ def _about(demonstrations: Demonstrations, settings: TrainingSettings) -> dict[s
 
 
 class _Run:
-    """Steps of all networks in turn, with checkpoints and a curve."""
+    """Steps of all networks in turn, with checkpoints and a learning curve."""
 
     def __init__(
         self,
@@ -109,7 +110,9 @@ class _Run:
         self._processor_s = 0.0
 
     def go(self) -> float:
-        """Takes the steps that are left. Returns the processor time of all, those of an interrupted run included."""
+        """Takes the remaining steps. Returns the processor time of all steps, including those of an interrupted
+        run.
+        """
         self._resume()
         begin_s = time.process_time() - self._processor_s
         while self._step < self._settings.steps:

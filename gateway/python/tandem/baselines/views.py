@@ -1,4 +1,6 @@
-"""Which networks a policy has, what each is shown and tells: the four ways of the benchmark's study of multi-agent design."""
+"""Networks of a policy with their inputs and outputs: the four designs of the benchmark's study of multi-agent
+policies.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +11,16 @@ from .settings import Scope, Sharing
 
 @dataclass(frozen=True)
 class View:
-    """Whose pictures and states a network is shown, and whose actions it tells, as indices of robots."""
+    """Robots whose images and states a network gets, and robots whose actions it predicts, as indices."""
 
     inputs: tuple[int, ...]
     outputs: tuple[int, ...]
 
 
 def views(scope: Scope, sharing: Sharing, robots: int) -> tuple[tuple[View, ...], ...]:
-    """The views of each network. A shared one of local scope learns from every robot's view, and is not told whose it is."""
+    """Returns the views of each network. A shared network of local scope learns from every robot's view without its
+    identity.
+    """
     everyone = tuple(range(robots))
     if scope == "global":
         told = (everyone,) if sharing == "shared" else tuple((robot,) for robot in everyone)

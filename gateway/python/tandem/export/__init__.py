@@ -1,10 +1,10 @@
-"""Data sets of recordings, for those who train policies: `tandem export`.
+"""Data sets for training policies, made from recordings: `tandem export`.
 
     from tandem.export import ExportSettings, export_lerobot
 
     export_lerobot("runs/demonstrations", "data/handover", ExportSettings(rate_hz=10))
 
-It needs what `pip install './gateway/python[lerobot]'` adds: pyarrow, and PyAV with its encoders.
+It needs the packages of `pip install './gateway/python[lerobot]'`: pyarrow, and PyAV with its encoders.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What the rows of a data set hold of a recording.
+"""Columns of a data set's rows.
 
-A row is a moment: what robots sensed then, and what they were told until the next row. Columns whose names begin with
-`privileged` are what no policy gets; LeRobot's policies read `observation` and `action` alone.
+A row is a moment: the robots' sensed state at that time, and their commands until the next row. Columns whose names
+begin with `privileged` are not available to policies; LeRobot's policies only read `observation` and `action`.
 """
 
 from __future__ import annotations
@@ -29,36 +29,36 @@ BASE_VELOCITIES = ("vx_m_s", "vy_m_s", "yaw_rate_rad_s")
 
 @dataclass(frozen=True)
 class Column:
-    """Numbers of all rows: rows by names, or one number a row where there are no names."""
+    """Values of all rows: rows by names, or one number per row without names."""
 
     values: NDArray[Any]
     names: tuple[str, ...] | None
 
     def feature(self) -> dict[str, Any]:
-        """As `meta/info.json` describes it."""
+        """Returns the column in the form of `meta/info.json`."""
         names = None if self.names is None else list(self.names)
         return {"dtype": str(self.values.dtype), "shape": [1 if names is None else len(names)], "names": names}
 
 
 @dataclass(frozen=True)
 class View:
-    """What one episode of a data set is of a recording."""
+    """Part of a recording that becomes one episode of a data set."""
 
     robots: tuple[int, ...]
-    """Whose columns it has, as indices."""
+    """Indices of the robots whose columns it has."""
 
     name: str | None
-    """The robot's, where it is of one."""
+    """Name of the robot in an episode of a single one, else None."""
 
     task: str
-    """What is to be done, in words."""
+    """Instruction of the episode."""
 
     cameras: dict[str, str]
-    """Names of its picture columns, and the cameras."""
+    """Names of its image columns, and their cameras."""
 
 
 def views(recording: Recording, settings: ExportSettings) -> tuple[View, ...]:
-    """The episodes that a recording becomes."""
+    """Returns the episodes that a recording becomes."""
     robots, cameras = recording.robots, settings.cameras_of(recording.robots)
     if settings.view == "joint":
         named = {IMAGES + (camera if camera == THIRD_PERSON else f"{camera}_egocentric"): camera for camera in cameras}
@@ -79,13 +79,13 @@ def views(recording: Recording, settings: ExportSettings) -> tuple[View, ...]:
 
 
 def moments(recording: Recording, settings: ExportSettings) -> NDArray[np.int64]:
-    """The steps that rows are of: all that something was told after."""
+    """Returns the steps of the rows: every `stride`-th one that a command follows."""
     return np.arange(0, len(recording) - 1, settings.stride)
 
 
 def told(recording: Recording, rows: NDArray[np.int64], stride: int) -> NDArray[np.float32]:
-    """The action of each row, as a policy map reads a chunk at this rate: joint targets and the pelvis' height that are to be
-    reached when the next row begins, and the mean velocity of the base until then.
+    """Returns the action of each row, in the meaning of a policy map's chunk at this rate. Joint targets and the
+    pelvis height are those for the beginning of the next row, and the base velocity is the mean until then.
     """
     last = len(recording) - 1
     actions = recording.actions[np.minimum(rows + stride, last)]
@@ -96,11 +96,11 @@ def told(recording: Recording, rows: NDArray[np.int64], stride: int) -> NDArray[
 
 
 def columns(recording: Recording, view: View, rows: NDArray[np.int64], stride: int) -> dict[str, Column]:
-    """The columns of an episode, but for its pictures."""
+    """Returns the columns of an episode, except its images."""
     robots = [recording.robots[index] for index in view.robots]
 
     def of_robots(values: NDArray[Any], *parts: tuple[str, ...]) -> Column:
-        """Robots by parts, one after another."""
+        """Returns a column of robots by parts, flattened."""
         names = [() if view.name is not None else (robot,) for robot in robots]
         for part in parts:
             names = [(*name, word) for name in names for word in part]
@@ -117,7 +117,7 @@ def columns(recording: Recording, view: View, rows: NDArray[np.int64], stride: i
     joints = tuple(f"{name}_rad" for name in recording.joints)
     reached_s = [phase.time_s for phase in recording.phases]
     time_s = recording.time_s[rows]
-    # Just in time counts: a phase is told with the time of the step that reaches it.
+    # A phase counts as reached in the step that reaches it.
     phases = np.searchsorted(np.asarray(reached_s), time_s + 1e-6, side="right").astype(np.int64)
     success = np.full(len(rows), is_successful(recording))
     of_joints = {"velocity_rad_s": recording.qd_rad_s, "torque_n_m": recording.torque_n_m}
@@ -141,6 +141,6 @@ def columns(recording: Recording, view: View, rows: NDArray[np.int64], stride: i
 
 
 def is_successful(recording: Recording) -> bool:
-    """Whether the last phase was reached."""
+    """Returns true if the last phase was reached."""
     result = recording.result
     return result is not None and all(time_s is not None for time_s in result.phases.values())

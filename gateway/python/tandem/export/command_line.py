@@ -1,4 +1,4 @@
-"""`python -m tandem.export`: what `tandem export` starts."""
+"""`python -m tandem.export`, which `tandem export` starts."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from .lerobot import export_lerobot
 from .settings import RATES_HZ, ExportSettings, library
 
 INTERRUPTED = 130
-"""What shells report of a process that SIGINT has ended."""
+"""Exit status that shells report for a process that SIGINT has ended."""
 
 
 def parser() -> argparse.ArgumentParser:
-    """The flags, which are those of `tandem export`; that says what each is for."""
+    """Returns the parser of the flags. They are those of `tandem export`, whose help explains them."""
     flags = argparse.ArgumentParser(prog="tandem export", description="Make data sets of recordings; see tandem export --help.")
     flags.add_argument("--check", action="store_true", help=argparse.SUPPRESS)
     formats = flags.add_subparsers(dest="kind", required=True)
@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def settings_of(given: argparse.Namespace) -> ExportSettings:
-    """What the flags say."""
+    """Creates the settings from the flags."""
     sides = given.size.split("x")
     if len(sides) != 2 or not all(side.isdigit() for side in sides):
         raise TandemError("no size; give width and height in pixels, as 320x240")

@@ -1,4 +1,4 @@
-"""Recordings to a data set of LeRobot's: found, drawn side by side, put together."""
+"""Conversion of recordings to a LeRobot data set: searching, rendering in parallel, and joining."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ ABOUT_FILE = "meta/tandem.json"
 PLAN_FILE = "plan.json"
 
 _NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)
-"""What file systems say that have no locks."""
+"""Errors of file systems without locks."""
 
 TRAINED = 50
 VALIDATED = 10
@@ -43,16 +43,16 @@ class Exported:
     """A data set."""
 
     folder: Path
-    """Where it is."""
+    """Folder of the data set."""
 
     task: str
-    """The task's id."""
+    """Id of the task."""
 
     episodes: int
-    """How many episodes it has."""
+    """Number of episodes."""
 
     rows: int
-    """How many rows they have together."""
+    """Number of rows of all episodes together."""
 
 
 @dataclass(frozen=True)
@@ -79,16 +79,16 @@ def export_lerobot(
     jobs: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Exported]:
-    """Writes the recordings in a folder as a data set, or a data set for each task in a folder of its own. What an interrupted
-    export has done is kept, and a data set is there once it is whole.
+    """Writes the recordings in a folder as a data set, or as one data set per task in its own folder. An
+    interrupted export is continued, and a data set appears once it is complete.
 
-    runs: A recording, or a folder that is searched for them; those in it are taken in the order of their names.
-    out: The data set's folder.
-    settings: What it has of them.
+    runs: A recording, or a folder to search for recordings; those in it are taken in the order of their names.
+    out: Folder of the data set.
+    settings: Settings of the data set.
     only_successful: Leaves out episodes that did not reach their last phase.
-    only_good: Leaves out episodes in whose folder no file `good` lies.
-    jobs: Recordings that are read and drawn side by side. None: one a core.
-    progress: Called with the number of recordings that are done, and of all.
+    only_good: Leaves out episodes without a file `good` in their folder.
+    jobs: Number of recordings to convert in parallel. None: one per core.
+    progress: Called with the number of finished recordings, and of all.
     """
     settings = settings or ExportSettings()
     for name in ("pyarrow", "av"):
@@ -121,7 +121,7 @@ def export_lerobot(
 
 
 def find(root: Path) -> list[Path]:
-    """The recordings in a folder, by their names, numbers in these as numbers."""
+    """Finds the recordings in a folder, sorted by name with numbers in numeric order."""
     if root.is_file():
         return [root]
 
@@ -136,11 +136,11 @@ def find(root: Path) -> list[Path]:
 
 
 def _below(root: Path) -> list[Path]:
-    """Every recording once. Links are followed, because a folder of links is how one chooses recordings; no folder is entered
-    twice.
+    """Lists every recording once. Links are followed, because a folder of links is a way to select recordings. No
+    folder is entered twice.
     """
     found: dict[str, Path] = {}
-    # What is there under its own name goes before links to it.
+    # Files under their own names precede links to them.
     for follows in (False, True):
         entered: set[str] = set()
         for folder, inner, files in os.walk(root, followlinks=follows):
@@ -200,7 +200,9 @@ def _export(
 
 
 def splits(recordings: int, a_recording: int) -> dict[str, str]:
-    """The first 50 episodes are for training, the next 10 for validation; each of these is `a_recording` of the data set's."""
+    """Returns the splits: the first 50 recordings for training, the next 10 for validation. Each recording has
+    `a_recording` episodes in the data set.
+    """
     ends = {"train": min(TRAINED, recordings), "val": min(TRAINED + VALIDATED, recordings), "rest": recordings}
     found: dict[str, str] = {}
     begin = 0
@@ -212,7 +214,7 @@ def splits(recordings: int, a_recording: int) -> dict[str, str]:
 
 
 def _there(out: Path, plan: dict[str, Any]) -> dict[str, Any] | None:
-    """What is said of the data set that is there already, if it is this one."""
+    """Returns the description of an existing data set if it is the same one."""
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
         return None
     try:
@@ -240,7 +242,7 @@ def _alone(work: Path) -> Generator[None, None, None]:
         except BlockingIOError as error:
             raise TandemError(f"another export writes to {work} now; wait for it") from error
         except OSError as error:
-            # Nobody can hold a lock where the file system has none.
+            # Locking is impossible on a file system without locks.
             if error.errno not in _NO_LOCKS:
                 raise
         yield
@@ -282,7 +284,7 @@ def _check_alike(parts: Sequence[Part]) -> None:
 def _write_about(
     whole: Path, plan: dict[str, Any], sources: Sequence[Source], parts: Sequence[Part], names: dict[str, str]
 ) -> None:
-    """What the data set is made of, for readers and for the next export."""
+    """Writes the description of the data set, for readers and for the next export."""
     rows = sum(part.length for part in parts)
     builds = sorted({source.build for source in sources})
     recordings = [
@@ -326,7 +328,7 @@ def _write_about(
 
 
 def _played(spec: dict[str, Any]) -> str:
-    """How episodes were played, in words. What is disturbed is said in the card's last paragraph."""
+    """Describes how episodes were played. Disturbances are described in the last paragraph of the card."""
     variation = ", ".join(f"{name} {value:g}" for name, value in spec.get("variation", {}).items())
     return f"{spec['protocol']} protocol, sensors {spec['sensing']['sensors']}" + (f", {variation}" if variation else "")
 

@@ -1,4 +1,4 @@
-"""An episode of a data set as files of its own: what a run that is interrupted has already done."""
+"""Episodes of a data set as separate files, which keep the work of an interrupted run."""
 
 from __future__ import annotations
 
@@ -21,46 +21,46 @@ PART_FILE = "part.json"
 
 
 class Stopped(Exception):
-    """Somebody has interrupted the export."""
+    """The user has interrupted the export."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """An episode that is whole."""
+    """A complete episode."""
 
     folder: Path
     about: dict[str, Any]
 
     @property
     def length(self) -> int:
-        """How many rows it has."""
+        """Number of rows."""
         return self.about["length"]
 
     @property
     def features(self) -> dict[str, Any]:
-        """Its columns, as `meta/info.json` describes them."""
+        """Its columns in the form of `meta/info.json`."""
         return self.about["features"]
 
     @property
     def rows_file(self) -> Path:
-        """Its columns, but for those that number rows and episodes."""
+        """File with its columns, except for the numbers of rows and episodes."""
         return self.folder / ROWS_FILE
 
     def film(self, key: str) -> Path:
-        """Its film of a camera."""
+        """Returns its video of a camera."""
         return self.folder / f"{key}.mp4"
 
     def counted(self, key: str) -> Levels:
-        """What was counted of a camera's pictures."""
+        """Returns the histograms of a camera's images."""
         return counted(self.about["counted"][key], self.features[key])
 
 
 def make_parts(path: Path, source: str, folder: Path, settings: ExportSettings, stop: threading.Event) -> list[Part]:
-    """The episodes that a recording becomes, drawn and written where they are not there yet.
+    """Returns the episodes that a recording becomes. Missing ones are rendered and written.
 
     path: The recording.
-    source: What the data set calls it.
-    folder: Where parts lie; this recording's have its name.
+    source: Name of the recording in the data set.
+    folder: Folder of the parts of this recording.
     """
     recording: Recording | None = None
     names = part_names(folder)
@@ -75,19 +75,19 @@ def make_parts(path: Path, source: str, folder: Path, settings: ExportSettings, 
             own.mkdir(parents=True, exist_ok=True)
             _make(recording, views(recording, settings)[index], source, own, settings, stop)
         parts.append(Part(own, json.loads((own / PART_FILE).read_text(encoding="utf-8"))))
-    # Later runs need not read the recording to know how many there are.
+    # Later runs get the number of episodes without reading the recording.
     write_whole(folder / "parts.json", json.dumps(names))
     return parts
 
 
 def part_names(folder: Path) -> list[str] | None:
-    """The names of a recording's episodes, if all of them are there."""
+    """Returns the names of a recording's episodes if all of them exist."""
     path = folder / "parts.json"
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Writes a file that is there as a whole, or not at all."""
+    """Writes a file either completely or not at all."""
     partial = path.with_name(path.name + ".partial")
     partial.write_text(text, encoding="utf-8")
     partial.replace(path)
@@ -103,7 +103,7 @@ def _make(recording: Recording, view: View, source: str, folder: Path, settings:
     for number, step in enumerate(rows.tolist()):
         if stop.is_set():
             raise Stopped
-        # All cameras of a moment one after another: they share its shadows.
+        # All cameras of a moment are rendered one after another, because they share its shadows.
         for column in seen:
             column.add(recording, step, is_counted=number in looked_at)
     for column in seen:
@@ -134,7 +134,7 @@ def _write_rows(path: Path, held: dict[str, Column], files: dict[str, list[bytes
     arrays: dict[str, Any] = {}
     for key, column in held.items():
         flat = pa.array(np.ravel(column.values))
-        # One name is one number a row, which LeRobot keeps as such.
+        # A single name means one number per row, which LeRobot stores as a scalar.
         listed = column.names is not None and len(column.names) > 1
         arrays[key] = pa.FixedSizeListArray.from_arrays(flat, len(column.names or ())) if listed else flat
     for key, pictures in files.items():
@@ -145,6 +145,6 @@ def _write_rows(path: Path, held: dict[str, Column], files: dict[str, list[bytes
 
 
 def picture_type() -> Any:
-    """How Hugging Face's `datasets` keep a picture."""
+    """Returns the type of an image in Hugging Face's `datasets`."""
     pa = library("pyarrow")
     return pa.struct([("bytes", pa.binary()), ("path", pa.string())])

@@ -1,4 +1,4 @@
-"""What an export is told."""
+"""Settings of an export."""
 
 from __future__ import annotations
 
@@ -25,31 +25,35 @@ SIDES_PX = range(16, 3841)
 
 @dataclass(frozen=True)
 class ExportSettings:
-    """What a data set has of recordings."""
+    """Contents and format of a data set."""
 
     version: Version = "v3"
     """Version of LeRobot's format."""
 
     view: View = "joint"
-    """"joint": an episode for each recording, with all robots' columns; "robot": one for each robot of it, with its own."""
+    """View of a recording: "joint" is one episode with all robots' columns; "robot" is one per robot with its own
+    columns.
+    """
 
     cameras: tuple[str, ...] = (EGOCENTRIC,)
-    """"egocentric" for the cameras of all robots' heads, "third_person", or names of robots; none: no pictures."""
+    """Cameras: "egocentric" for the head cameras of all robots, "third_person", or names of robots; empty for no
+    images.
+    """
 
     images: Images = "video"
-    """Pictures as films, or as PNG files within the tables."""
+    """Images as videos, or as PNG files in the tables."""
 
     codec: Codec = "h264"
-    """What films are written with: H.264, which is written and read faster, or AV1, as LeRobot writes them itself."""
+    """Video codec: H.264, which is faster to write and read, or AV1, which LeRobot itself uses."""
 
     depth: bool = False
-    """Depth beside the pictures of every camera, as LeRobot stores it since 0.6."""
+    """True to write depth beside the images of every camera, in the format of LeRobot 0.6 or later."""
 
     size: tuple[int, int] = (320, 240)
-    """Width and height of pictures in pixels."""
+    """Width and height of images in pixels."""
 
     rate_hz: int = 10
-    """Rows a second: 50, 25 or 10."""
+    """Rows per second: 50, 25 or 10."""
 
     def __post_init__(self) -> None:
         for name, kind in (("version", Version), ("view", View), ("images", Images), ("codec", Codec)):
@@ -68,15 +72,15 @@ class ExportSettings:
 
     @property
     def stride(self) -> int:
-        """Control steps from one row to the next."""
+        """Number of control steps per row."""
         return CONTROL_HZ // self.rate_hz
 
     def as_json(self) -> dict[str, Any]:
-        """As a file keeps it."""
+        """Returns the settings in the form for files."""
         return {**asdict(self), "cameras": list(self.cameras), "size": list(self.size)}
 
     def cameras_of(self, robots: Sequence[str]) -> tuple[str, ...]:
-        """The cameras of a recording with these robots, as `Recording.picture` calls them."""
+        """Returns the cameras for a recording with these robots, by their names in `Recording.picture`."""
         chosen: list[str] = []
         for name in self.cameras:
             if name not in (EGOCENTRIC, THIRD_PERSON, *robots):
@@ -86,9 +90,9 @@ class ExportSettings:
 
 
 def library(name: str, what: str = "data sets are written by pyarrow and PyAV", extra: str = "lerobot") -> Any:
-    """A library of an extra, loaded when it is needed: the rest of the package does without.
+    """Imports a library of an extra when it is needed; the rest of the package works without it.
 
-    what: What it is for, in the words of the error.
+    what: Purpose of the library, for the error message.
     """
     try:
         return import_module(name)

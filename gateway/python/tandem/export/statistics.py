@@ -1,5 +1,5 @@
-"""Statistics of columns and pictures, with LeRobot's names. They are exact, where LeRobot itself takes quantiles from
-histograms, and means of episodes' quantiles for a whole data set.
+"""Statistics of columns and images, with LeRobot's names. They are exact. LeRobot itself takes quantiles from
+histograms, and averages episodes' quantiles for a whole data set.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Statistics = dict[str, Any]
 
 
 def of_numbers(values: NDArray[Any]) -> Statistics:
-    """Statistics of each column of an array."""
+    """Returns the statistics of each column of an array."""
     numbers = np.reshape(np.asarray(values, np.float64), (len(values), -1))
     found: Statistics = {
         "min": numbers.min(axis=0).tolist(),
@@ -40,18 +40,18 @@ def of_numbers(values: NDArray[Any]) -> Statistics:
 
 
 def sampled(pictures: int) -> set[int]:
-    """The pictures of an episode whose colours are counted: as many as LeRobot takes."""
+    """Returns the images of an episode whose colours are counted, in the same number as in LeRobot."""
     fewest = min(FEWEST_SAMPLES, pictures)
     count = max(fewest, min(int(pictures**SAMPLED_POWER), MAX_SAMPLES))
     return set(np.round(np.linspace(0, pictures - 1, count)).astype(int).tolist())
 
 
 class Levels:
-    """How often each level of each channel occurs in pictures."""
+    """Histograms of the levels of each channel in images."""
 
     channels: ClassVar[int]
     values: ClassVar[NDArray[np.float64]]
-    """What levels stand for."""
+    """Values of the levels."""
 
     def __init__(self, pictures: int = 0, levels: Sequence[Sequence[int]] | None = None) -> None:
         self.pictures = pictures
@@ -59,7 +59,9 @@ class Levels:
         self.levels = np.zeros(shape, np.int64) if levels is None else np.asarray(levels, np.int64)
 
     def add(self, pixels: NDArray[Any]) -> None:
-        """Counts a picture, height by width by channels if there are several, or every so manieth pixel of a large one."""
+        """Counts an image, height by width by channels if there are several. Only every n-th pixel of a large image
+        is counted.
+        """
         height, width = pixels.shape[:2]
         if max(width, height) >= LARGEST_SIDE_PX:
             factor = max(width, height) // SAMPLED_SIDE_PX
@@ -73,7 +75,7 @@ class Levels:
         return type(self)(self.pictures + other.pictures, (self.levels + other.levels).tolist())
 
     def statistics(self) -> Statistics:
-        """Statistics of each channel in the shape of pictures: channels by one by one."""
+        """Returns the statistics of each channel in the shape of images: channels by one by one."""
         counted, level = self.levels, self.values
         total = counted.sum(axis=1)
         mean = counted @ level / total
@@ -95,7 +97,7 @@ class Levels:
 
 
 class Colours(Levels):
-    """Red, green and blue, from 0 to 1."""
+    """Histograms of red, green and blue, from 0 to 1."""
 
     channels = 3
     values = np.arange(256) / 255

@@ -1,4 +1,4 @@
-"""Version 2.1 of LeRobot's format: files of their own for each episode."""
+"""Version 2.1 of LeRobot's format, with separate files for each episode."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def write_v2(out: Path, parts: Sequence[Part], splits: dict[str, str], settings:
 
 
 def _made(out: Path, pattern: str, episode: int, key: str = "") -> Path:
-    """A file's path, whose folder is there."""
+    """Returns a file's path after creating its folder."""
     name = pattern.format(episode_chunk=episode // FILES_A_CHUNK, episode_index=episode, video_key=key)
     path = out / name
     path.parent.mkdir(parents=True, exist_ok=True)

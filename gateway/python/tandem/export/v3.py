@@ -1,4 +1,4 @@
-"""Version 3.0 of LeRobot's format: files that hold many episodes each."""
+"""Version 3.0 of LeRobot's format, with many episodes per file."""
 
 from __future__ import annotations
 
@@ -87,26 +87,26 @@ def write_v3(out: Path, parts: Sequence[Part], splits: dict[str, str], settings:
 
 
 def films_of(features: dict[str, Any]) -> list[str]:
-    """The columns that are films."""
+    """Returns the columns that are videos."""
     return [key for key, feature in features.items() if feature["dtype"] == "video"]
 
 
 def described_film(feature: dict[str, Any], path: Path, rate_hz: int) -> dict[str, Any]:
-    """A column of films with what one of them, and only that, says."""
+    """Returns a video column with the entries that only a video file has."""
     return feature | {"info": film_info(path, rate_hz) | feature.get("info", {})}
 
 
 def place(files: int) -> dict[str, int]:
-    """Chunk and number of the file before which there are so many."""
+    """Returns chunk and index of the file that follows `files` others."""
     return {"chunk_index": files // FILES_A_CHUNK, "file_index": files % FILES_A_CHUNK}
 
 
 def numbered(part: Part, number: int, first: int, task: int, rate_hz: int) -> Any:
-    """The rows of an episode, with the columns that number them.
+    """Returns the rows of an episode, with the columns that number them.
 
-    number: The episode's.
-    first: How many rows are before it.
-    task: The number of its task.
+    number: Number of the episode.
+    first: Number of rows before it.
+    task: Number of its task.
     """
     pa, pq = library("pyarrow"), library("pyarrow.parquet")
     rows = pq.read_table(part.rows_file)
@@ -127,7 +127,7 @@ def numbered(part: Part, number: int, first: int, task: int, rate_hz: int) -> An
 
 
 def _described(feature: dict[str, Any]) -> dict[str, Any]:
-    """A column as Hugging Face's `datasets` describe it."""
+    """Returns a column in the form of Hugging Face's `datasets`."""
     if feature["dtype"] == "image":
         return {"_type": "Image"}
     value = {"dtype": feature["dtype"], "_type": "Value"}
@@ -160,7 +160,7 @@ def _write_data(
 
 
 def _write_films(out: Path, key: str, parts: Sequence[Part], episodes: list[dict[str, Any]], settings: ExportSettings) -> Path:
-    """Writes a camera's films, and returns the first."""
+    """Writes a camera's videos, and returns the first."""
     groups: list[list[int]] = [[]]
     filled = 0
     for number, part in enumerate(parts):
@@ -185,13 +185,13 @@ def _write_films(out: Path, key: str, parts: Sequence[Part], episodes: list[dict
 
 
 def part_statistics(part: Part, table: Any) -> dict[str, Statistics]:
-    """Statistics of an episode's columns."""
+    """Returns the statistics of an episode's columns."""
     found = {key: part.counted(key).statistics() for key in part.about["counted"]}
     return found | {key: of_numbers(numbers_of(table, key)) for key in table.column_names if key not in found}
 
 
 def numbers_of(table: Any, key: str) -> Any:
-    """A column of a table as an array, rows by numbers."""
+    """Returns a column of a table as an array, rows by numbers."""
     column = table[key].combine_chunks()
     flat = column.flatten() if hasattr(column, "flatten") else column
     return flat.to_numpy(zero_copy_only=False).reshape(len(table), -1)
@@ -225,7 +225,7 @@ def _write_episodes(out: Path, episodes: list[dict[str, Any]]) -> None:
 
 
 def write_tasks(path: Path, tasks: list[str]) -> None:
-    """Writes the tasks as pandas writes a table that is indexed by their words."""
+    """Writes the tasks as pandas writes a table with the instructions as its index."""
     pa, pq = library("pyarrow"), library("pyarrow.parquet")
     path.parent.mkdir(parents=True, exist_ok=True)
     table = pa.table({"task_index": pa.array(range(len(tasks)), pa.int64()), "task": pa.array(tasks, pa.string())})

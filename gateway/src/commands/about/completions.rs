@@ -1,4 +1,4 @@
-//! `tandem completions`: what a shell has to know to complete command lines.
+//! `tandem completions`: the completion script for a shell.
 
 use std::process::ExitCode;
 
@@ -6,15 +6,15 @@ use clap_complete::Shell;
 
 use crate::commands::{CommandResult, print};
 
-/// Print what a shell has to know to complete the command line.
+/// Print a completion script for a shell.
 #[derive(Debug, clap::Args)]
 pub struct CompletionsArgs {
-    /// The shell.
+    /// Shell to complete for.
     #[arg(value_name = "SHELL")]
     shell: Shell,
 }
 
-/// Prints the completions of `command`.
+/// Prints the completion script of `command`.
 pub fn run(args: &CompletionsArgs, mut command: clap::Command) -> CommandResult {
     let (name, mut script) = (command.get_name().to_owned(), Vec::new());
     clap_complete::generate(args.shell, &mut command, name, &mut script);

@@ -1,4 +1,4 @@
-//! What the program says of itself: its tasks, its manual pages, and what shells complete.
+//! Information about the program itself: tasks, manual pages and shell completions.
 
 pub mod completions;
 pub mod man;

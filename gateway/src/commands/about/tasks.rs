@@ -1,4 +1,4 @@
-//! `tandem tasks`: what there is to play; `tandem tasks check`: whether a task of one's own can be played.
+//! `tandem tasks`: the list of tasks; `tandem tasks check`: validation of the user's own task.
 
 use std::{
     fmt::Write,
@@ -16,7 +16,8 @@ use crate::commands::{CommandResult, Seeds, print};
 #[derive(Debug, clap::Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct TasksArgs {
-    /// As JSON, as `GET /v1/tasks` has it: with the robots' instructions, the budgets and the limits of the base command.
+    /// Print JSON as in `GET /v1/tasks`, including the robots' instructions, the budgets and the limits of
+    /// the base command.
     #[arg(long)]
     json: bool,
     #[command(subcommand)]
@@ -28,8 +29,8 @@ enum TasksAction {
     Check(CheckArgs),
 }
 
-/// Check a task's file: every mistake with its line and column, what falls while nobody acts, and a picture of the start from every
-/// camera.
+/// Check a task's file: every mistake with its line and column, everything that falls without any action, and
+/// an image of the start from every camera.
 #[derive(Debug, clap::Args)]
 struct CheckArgs {
     /// TOML file with the task.
@@ -38,12 +39,12 @@ struct CheckArgs {
     /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
     #[arg(long, value_name = "SEEDS", default_value = "0-4")]
     seeds: Seeds,
-    /// Folder for the pictures [default: runs/tasks and the task's id].
+    /// Folder for the images [default: runs/tasks and the task's id].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
-/// Prints the tasks as `list_tasks` has them, or what was found in a file.
+/// Prints the tasks in the form of `list_tasks`, or the findings for a file.
 pub fn run(args: TasksArgs) -> CommandResult {
     if let Some(TasksAction::Check(args)) = args.action {
         return check(args);
@@ -58,7 +59,7 @@ pub fn run(args: TasksArgs) -> CommandResult {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The program fails if something falls.
+/// Checks a file. The program fails if something falls.
 fn check(args: CheckArgs) -> CommandResult {
     let task = read_task(&args.file)?;
     let own = tandem_episodes::task_list(
@@ -96,7 +97,7 @@ fn check(args: CheckArgs) -> CommandResult {
 fn told(list: &TaskList) -> String {
     let mut text = String::new();
     let mut suite = list.tasks.first().and_then(|task| task.suite.as_ref());
-    // Writing to a text cannot fail.
+    // Writing to a string cannot fail.
     for task in &list.tasks {
         if task.suite.as_ref() != suite {
             suite = task.suite.as_ref();

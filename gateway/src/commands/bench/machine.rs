@@ -1,25 +1,25 @@
-//! The machine that a figure was measured on.
+//! The machine on which a figure was measured.
 
 use std::{env::consts, fs, path::Path, thread::available_parallelism};
 
 use serde::Serialize;
 
-/// Facts about this machine and this program. What the system does not say is `None`.
+/// Facts about this machine and this program. Unknown facts are `None`.
 #[derive(Debug, Serialize)]
 pub struct Machine {
     cpu: Option<String>,
     cores: Option<usize>,
-    /// The names of the system and of its kernel.
+    /// Names of the system and of its kernel.
     os: String,
     architecture: &'static str,
     tandem: &'static str,
     rustc: &'static str,
     profile: &'static str,
-    /// Load averages of the last 1, 5 and 15 minutes: times measured on a loaded machine are longer.
+    /// Load averages of the last 1, 5 and 15 minutes; times on a loaded machine are longer.
     load_values: Option<[f64; 3]>,
 }
 
-/// A report with the machine that it was measured on.
+/// A report with the machine on which it was measured.
 #[derive(Debug, Serialize)]
 pub struct WithMachine<R> {
     machine: Machine,
@@ -28,21 +28,21 @@ pub struct WithMachine<R> {
 }
 
 impl<R> WithMachine<R> {
-    /// Adds this machine, and its load at present, to `report`.
+    /// Adds this machine and its present load to `report`.
     pub fn here(report: R) -> WithMachine<R> {
         WithMachine { machine: Machine::here(), report }
     }
 }
 
 impl<R: Serialize> WithMachine<R> {
-    /// Writes it as JSON.
+    /// Writes the report as JSON.
     pub fn write(&self, path: &Path) -> Result<(), Box<dyn std::error::Error>> {
         Ok(fs::write(path, serde_json::to_string_pretty(self)? + "\n")?)
     }
 }
 
 impl Machine {
-    /// The machine that this program runs on, as Linux describes it.
+    /// Describes the machine on which this program runs, as far as Linux does.
     pub fn here() -> Machine {
         let read = |path: &str| fs::read_to_string(path).unwrap_or_default();
         let name = value_of(&read("/etc/os-release"), "PRETTY_NAME", '=');
@@ -61,7 +61,7 @@ impl Machine {
     }
 }
 
-/// The value in the first line `key = "value"`, where `sign` stands between them.
+/// Returns the value in the first line `key = "value"`, with `sign` as the separator.
 fn value_of(text: &str, key: &str, sign: char) -> Option<String> {
     let line = |line: &str| {
         let (name, value) = line.split_once(sign)?;

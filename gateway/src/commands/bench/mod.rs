@@ -1,4 +1,4 @@
-//! `tandem bench`: figures that anybody can repeat.
+//! `tandem bench`: benchmarks that any user can repeat.
 
 mod machine;
 mod tools;
@@ -25,7 +25,7 @@ use tools::ToolsReport;
 /// Measure a part of Tandem on this machine.
 #[derive(Debug, clap::Args)]
 pub struct BenchArgs {
-    /// Which part.
+    /// Part to measure.
     #[command(subcommand)]
     part: BenchPart,
 }
@@ -41,60 +41,62 @@ enum BenchPart {
         #[arg(long)]
         json: bool,
     },
-    /// Calls of tools over HTTP on this machine: their time without physics, and that of `wait` against its physics.
+    /// Tool calls over HTTP on this machine: their time without physics, and that of `wait` compared with its
+    /// physics.
     Tools {
-        /// Write the figures to this file as JSON, too.
+        /// Also write the figures to this file as JSON.
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
     },
     /// Physics: time of a step of 5 ms with one to three robots that stand, walk or hold a bottle.
     Physics {
-        /// Write the cases to this file as JSON, too.
+        /// Also write the cases to this file as JSON.
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
     },
-    /// Pictures: those of both robots' eyes in one state, and the one from the room.
+    /// Rendering: the images of both robots' head cameras in one state, and the third-person image.
     Render {
-        /// Who draws: `cpu`, `gpu`, or `auto`.
+        /// Renderer: `cpu`, `gpu`, or `auto`.
         #[arg(long, default_value = "cpu", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
         renderer: RendererKind,
-        /// Write the cases to this file as JSON, too.
+        /// Also write the cases to this file as JSON.
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
     },
-    /// Environments of learners: steps per second of two and three robots without pictures, and their share of the core's own.
+    /// Learning environments: steps per second of two and three robots without images, and their ratio to the
+    /// core's own rate.
     Env {
-        /// Write the cases to this file as JSON, too.
+        /// Also write the cases to this file as JSON.
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
     },
-    /// Falls: what physics makes of robots that stagger through all tasks, are dropped and struck.
+    /// Falls: the physics of robots that stagger through all tasks, are dropped and struck.
     Falls {
-        /// How many episodes, over all cases.
+        /// Number of episodes over all cases.
         #[arg(long, default_value_t = FALLS_EPISODES, value_name = "N")]
         episodes: usize,
         /// Cases whose names contain one of these words, separated by commas.
         #[arg(long, default_value = "", value_name = "WORDS")]
         cases: String,
-        /// Write what robots alone on a floor were told, and how they fared, to this file as JSON.
+        /// Write the commands of robots alone on a floor, and their outcomes, to this file as JSON.
         #[arg(long, value_name = "FILE")]
         commands: Option<PathBuf>,
-        /// Write the cases to this file as JSON, too.
+        /// Also write the cases to this file as JSON.
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
     },
-    /// All parts one after the other, each as it is without flags.
+    /// All parts in sequence, each with its defaults.
     All {
-        /// Write everything to this file as JSON, too.
+        /// Also write everything to this file as JSON.
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
     },
 }
 
-/// Measures a part, prints a table, and returns the report as JSON.
+/// A function that measures a part, prints a table, and returns the report as JSON.
 type Measure = fn() -> Result<Value, Box<dyn Error>>;
 
-/// The parts that `bench all` measures; a new part adds its line.
+/// Parts that `bench all` measures; a new part adds its line.
 const PARTS: [(&str, Measure); 6] = [
     ("physics", || Ok(serde_json::to_value(measure_physics()?)?)),
     ("render", || Ok(serde_json::to_value(measure_pictures(RendererKind::Cpu)?)?)),
@@ -108,7 +110,7 @@ const PARTS: [(&str, Measure); 6] = [
     ("falls", || Ok(serde_json::to_value(measure_falls(FALLS_EPISODES, "")?)?)),
 ];
 
-/// Four of each case.
+/// Default number of episodes: four of each case.
 const FALLS_EPISODES: usize = 60;
 
 /// Measures a part and prints a table.
@@ -140,7 +142,7 @@ fn all(json: Option<&Path>) -> CommandResult {
     write(reports, json)
 }
 
-/// Writes a report, with the machine that it was measured on, where a file is named.
+/// Writes a report with its machine, if a file is named.
 fn write(report: impl Serialize, json: Option<&Path>) -> CommandResult {
     if let Some(path) = json {
         WithMachine::here(report).write(path)?;

@@ -1,4 +1,4 @@
-//! `tandem bench tools`: what a call costs beside its physics, over real HTTP on this machine.
+//! `tandem bench tools`: overhead of a call beside its physics, over real HTTP on this machine.
 
 use std::{
     error::Error,
@@ -16,30 +16,30 @@ use crate::{
     settings::{Layer, Settings},
 };
 
-/// How many calls of each kind are timed.
+/// Number of timed calls of each kind.
 const CALLS: usize = 2000;
-/// How many calls before them warm up.
+/// Number of warm-up calls before them.
 const WARM_UP: usize = 100;
-/// How many calls of `wait` are timed; an episode of the benchmark protocol has the steps for them.
+/// Number of timed calls of `wait`; an episode of the benchmark protocol has enough steps for them.
 const WAITS: usize = 30;
 /// Control steps of each wait.
 const STEPS: u32 = 25;
 
-/// Times of calls on one episode of two robots, which is recorded as any is.
+/// Times of calls in an episode of two robots, which is recorded as usual.
 #[derive(Debug, Serialize)]
 pub struct ToolsReport {
     /// Times of calls without physics.
     pub calls: Vec<CallTimes>,
-    /// Times of `wait`, against its physics.
+    /// Times of `wait`, compared with its physics.
     pub wait: WaitTimes,
 }
 
 /// Times of one tool, from the first byte sent to the reply read.
 #[derive(Debug, Serialize)]
 pub struct CallTimes {
-    /// The tool.
+    /// Name of the tool.
     pub tool: &'static str,
-    /// How often it was called.
+    /// Number of calls.
     pub calls: usize,
     /// Median, in milliseconds.
     pub p50_ms: f64,
@@ -52,7 +52,7 @@ pub struct CallTimes {
 pub struct WaitTimes {
     /// Control steps of each call.
     pub steps: u32,
-    /// How often it was called.
+    /// Number of calls.
     pub calls: usize,
     /// Median of the whole call, in milliseconds.
     pub call_p50_ms: f64,
@@ -118,7 +118,7 @@ fn ms(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }
 
-/// The smallest of `values` that at least `share` of them do not exceed.
+/// Returns the smallest of `values` that at least a fraction `share` of them do not exceed.
 fn percentile(values: &mut [f64], share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let rank = (share * values.len() as f64).ceil() as usize;

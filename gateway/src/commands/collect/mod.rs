@@ -20,8 +20,8 @@ use super::{
     logging::log_evaluation,
 };
 
-/// Record demonstrations of the experts, or of people who drive in browsers, as MCAP, one folder per episode. Goes on where an
-/// interrupted run stopped.
+/// Record demonstrations of the experts, or of people who drive in browsers, as MCAP files, one folder per
+/// episode. An interrupted run is continued.
 #[derive(Debug, clap::Args)]
 pub struct CollectArgs {
     #[command(flatten)]
@@ -30,26 +30,27 @@ pub struct CollectArgs {
     people: PeopleFlags,
     #[command(flatten)]
     stress: StressFlags,
-    /// How much demonstrations of the same task differ in pace, pauses and ways, and how often hands miss and come back: 0 for
-    /// not at all, to 3.
+    /// Variation between demonstrations of a task in pace, pauses and paths, and in how often hands miss and
+    /// try again: from 0 (none) to 3.
     #[arg(long, value_name = "N", default_value_t = 0, conflicts_with = "operators",
           value_parser = clap::value_parser!(u8).range(..=i64::from(Variation::MAX_VARIETY)))]
     variety: u8,
-    /// How much slow noise is added to what robots are told before they do it; 1 is 0.016 rad on the joints of arms, and 0.03 m/s
-    /// and 0.06 rad/s on a base that walks. What they were told is recorded as the action.
+    /// Level of slow noise on commands before execution; 1 is 0.016 rad on the joints of arms, and 0.03 m/s
+    /// and 0.06 rad/s on a walking base. The command without noise is recorded as the action.
     #[arg(long, value_name = "LEVEL", default_value_t = 0.0, value_parser = parse_level)]
     disturb: f32,
-    /// Keep only demonstrations that reach the last phase; of the others a result remains, and no recording.
+    /// Keep recordings only of demonstrations that reach the last phase; of the others only the result is
+    /// kept.
     #[arg(long)]
     only_successful: bool,
-    /// Write no strip of pictures and no page of each episode, which take a quarter of the space.
+    /// Write no image strip and no report page per episode, which take a quarter of the space.
     #[arg(long)]
     no_reports: bool,
     #[command(flatten)]
     run: RunFlags,
 }
 
-/// How much to disturb.
+/// Parses the level of disturbance.
 fn parse_level(text: &str) -> Result<f32, String> {
     let level = text.parse().ok().filter(|level| (0.0..=Variation::MAX_DISTURB).contains(level));
     level.ok_or_else(|| format!("no level; give 0 to {}, as 1", Variation::MAX_DISTURB))

@@ -19,40 +19,43 @@ use crate::{
     settings::{Layer, Settings},
 };
 
-/// Has the system pick a free port.
+/// Port number that makes the system pick a free port.
 const FREE_PORT: u16 = 0;
 
-/// How long an episode waits for its people to begin, and to come back.
+/// Time that an episode waits for its people to begin, and to come back.
 const IDLE_S: u32 = 3600;
 
-/// Who drives, and where they reach this machine.
+/// Flags for demonstrations of people.
 #[derive(Debug, Args)]
 pub struct PeopleFlags {
-    /// Demonstrations of so many people in place of the experts': each drives one robot in a browser, by a link that is printed.
+    /// Number of people to record in place of the experts; each drives one robot in a browser with a printed
+    /// link.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=3))]
     operators: Option<u8>,
-    /// With --operators: address to serve their pages on, as 0.0.0.0:8700 for people at other machines [default: 127.0.0.1 and a free port].
+    /// With --operators: address of their pages, for example 0.0.0.0:8700 for people at other machines
+    /// [default: 127.0.0.1 and a free port].
     #[arg(long, value_name = "ADDRESS", requires = "operators")]
     listen: Option<SocketAddr>,
-    /// With --operators: name that they reach this machine by, for the links [default: its address].
+    /// With --operators: name of this machine in the links [default: its address].
     #[arg(long, value_name = "HOST", requires = "operators")]
     allowed_host: Option<String>,
-    /// With --operators: file with a certificate in PEM form, with which their pages are HTTPS, as headsets want it; needs --tls-key
-    /// [default: none].
+    /// With --operators: PEM file with a certificate, to serve their pages with HTTPS, as headsets require;
+    /// needs --tls-key [default: none].
     #[arg(long, value_name = "FILE", requires = "operators")]
     tls_cert: Option<PathBuf>,
-    /// With --operators: file with the certificate's private key in PEM form [default: none].
+    /// With --operators: PEM file with the certificate's private key [default: none].
     #[arg(long, value_name = "FILE", requires = "operators")]
     tls_key: Option<PathBuf>,
 }
 
 impl PeopleFlags {
-    /// How many people are to drive, if any are.
+    /// Returns the number of people that are to drive, if any.
     pub fn operators(&self) -> Option<u8> {
         self.operators
     }
 
-    /// Has people play what of `plan` is not in `folder` yet. Those that somebody marks bad are put into a folder beside it.
+    /// Lets people play the episodes of `plan` that are not in `folder` yet. Bad ones are moved to a
+    /// folder beside it.
     pub fn collect(self, plan: EvaluationPlan, folder: &Path) -> Result<(), Box<dyn Error>> {
         let robots = robots_of(&plan.tasks, self.operators)?;
         let people = People::start(self.settings(&plan, folder)?, &robots, planned(&plan), aside(folder))?;
@@ -62,7 +65,7 @@ impl PeopleFlags {
         played.map(drop)
     }
 
-    /// A server for these episodes alone.
+    /// Returns the settings of a server for these episodes alone.
     fn settings(self, plan: &EvaluationPlan, folder: &Path) -> Result<Settings, Box<dyn Error>> {
         let listen = self.listen.unwrap_or(SocketAddr::from((Ipv4Addr::LOCALHOST, FREE_PORT)));
         let flags = Layer {
@@ -92,7 +95,7 @@ impl PeopleFlags {
     }
 }
 
-/// The robots of all these tasks, one for each of `operators`.
+/// Returns the robots of all these tasks, one for each of `operators`.
 fn robots_of(tasks: &[&'static Task], operators: Option<u8>) -> Result<Vec<&'static str>, String> {
     let wanted = usize::from(operators.unwrap_or_default());
     if let Some(task) = tasks.iter().find(|task| task.robots.len() != wanted) {
@@ -104,19 +107,19 @@ fn robots_of(tasks: &[&'static Task], operators: Option<u8>) -> Result<Vec<&'sta
     Ok(tasks.first().map_or_else(Vec::new, |task| task.robot_names().collect()))
 }
 
-/// The episodes of a plan, in their order.
+/// Lists the episodes of a plan, in order.
 fn planned(plan: &EvaluationPlan) -> Vec<(&'static str, u32)> {
     plan.episodes().0.iter().map(|spec| (spec.task.id, spec.seed)).collect()
 }
 
-/// Where episodes are put that somebody marks bad: beside the folder, so that no data set is made of them.
+/// Returns the folder for bad episodes. It is beside the run's folder, so that no data set includes them.
 fn aside(folder: &Path) -> PathBuf {
     let mut name = folder.file_name().map_or_else(OsString::new, OsString::from);
     name.push("-bad");
     folder.with_file_name(name)
 }
 
-/// The links, and on a terminal a QR code below each.
+/// Returns the links, each with a QR code if the output is a terminal.
 fn invitation(people: &People) -> Result<String, Box<dyn Error>> {
     let mut text = String::new();
     for (robot, link) in people.links() {

@@ -1,4 +1,5 @@
-//! What the settings name: limits, the token, the certificate, instructions, files of tasks, the base controller, the robot and the scene.
+//! Checks of the inputs that the settings name: limits, token, certificate, instructions, task files,
+//! base controller, robot and scene.
 
 use std::path::Path;
 
@@ -10,7 +11,7 @@ use crate::{
     token::Token,
 };
 
-/// Tries each thing that `layer` names.
+/// Checks each input that `layer` names.
 pub fn check(layer: &Layer, token: Result<Option<Token>, String>) -> Findings {
     let mut findings =
         vec![("limits", Finding::of(limits(layer))), ("token", Finding::of(check_token(layer, token)))];
@@ -57,7 +58,7 @@ fn check_token(layer: &Layer, token: Result<Option<Token>, String>) -> Result<St
     }
 }
 
-/// What in a robot's file is not quite as in MuJoCo, and which tasks such robots can play.
+/// Reports the approximations in a robot's file, and the tasks that such robots can play.
 fn robot(layer: &Layer, path: &Path) -> Vec<Finding> {
     let approximations = match RobotFile::with_approximations(path) {
         Ok((_, approximations)) => approximations,
@@ -65,7 +66,7 @@ fn robot(layer: &Layer, path: &Path) -> Vec<Finding> {
     };
     let mut findings: Vec<Finding> =
         approximations.iter().map(|line| Finding::Note(format!("not quite as in MuJoCo: {line}"))).collect();
-    // Whether hands and controller fit the first task tells it of all ten.
+    // The first task shows for all ten whether hands and controller fit.
     findings.push(Finding::Works(format!("{} is read", path.display())));
     if let Some(Err(error @ EpisodeError::Robot(_))) = specs(layer).next().map(|spec| trial(&spec)) {
         findings.push(Finding::Note(error.to_string()));
@@ -73,8 +74,8 @@ fn robot(layer: &Layer, path: &Path) -> Vec<Finding> {
     findings
 }
 
-/// What in a scene's file is not quite as in MuJoCo, and which tasks can be played in it. A scene is made for few of them, so it is
-/// wrong only where there is none.
+/// Reports the approximations in a scene's file, and the tasks that can be played in it. A scene is made
+/// for a few tasks, so it is only wrong if there is none.
 fn scene(layer: &Layer, path: &Path) -> Vec<Finding> {
     let approximations = match SceneFile::with_approximations(path) {
         Ok((_, approximations)) => approximations,
@@ -88,7 +89,7 @@ fn scene(layer: &Layer, path: &Path) -> Vec<Finding> {
             Ok(_) => playable.push(spec.task.id),
             Err(error) => {
                 let text = error.to_string();
-                // Without the site for the task's origin there is no place for any task.
+                // Without the site for the task's origin, no task has a place.
                 if matches!(&error, EpisodeError::Scene(scene) if matches!(**scene, SceneError::NoPlace { .. }))
                 {
                     findings.push(Finding::Wrong(format!("no task can be played: {text}")));

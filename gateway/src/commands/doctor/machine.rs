@@ -1,4 +1,4 @@
-//! What the machine can do: physics and pictures, the port, the folder of recordings, clocks and cores.
+//! Checks of the machine: physics and rendering, port, runs folder, clocks and cores.
 
 use std::{
     net::{SocketAddr, TcpListener},
@@ -13,18 +13,18 @@ use tandem_tools_spec::{Observe, ToolCall, Wait};
 use super::{Finding, Findings, trial};
 use crate::{hosting::look_at_runs_folder, settings::Layer};
 
-/// How many control steps the check of physics simulates.
+/// Number of control steps that the check of physics simulates.
 const TRIED_STEPS: u32 = 25;
-/// Below this factor, a call that simulates takes longer than the motion of its robots.
+/// Real-time factor below which a call that simulates takes longer than the motion of its robots.
 const MIN_REALTIME_FACTOR: f64 = 1.0;
-/// A clock that is set right shows no earlier time than 2026, when this program was written.
+/// Lower limit for a correct clock: the beginning of 2026, when this program was written.
 const PROGRAM_DATE: Duration = Duration::from_secs(1_767_225_600);
-/// The coarsest tick of a clock that can time calls.
+/// Maximum tick of a clock that can time calls.
 const COARSEST_TICK: Duration = Duration::from_millis(1);
-/// With fewer cores, episodes wait for each other.
+/// Minimum number of cores; with fewer, episodes wait for each other.
 const MIN_CORES: usize = 2;
 
-/// Tries the machine by an episode that can be played, if any can.
+/// Checks the machine with an episode that can be played, if there is one.
 pub fn check(layer: &Layer, spec: Option<EpisodeSpec>) -> Findings {
     let played = match &spec {
         Some(spec) => Finding::of(physics(spec)),
@@ -39,7 +39,7 @@ pub fn check(layer: &Layer, spec: Option<EpisodeSpec>) -> Findings {
     [("physics", played)].into_iter().chain(rest.map(|(what, tried)| (what, Finding::of(tried)))).collect()
 }
 
-/// Plays half a second of an episode, and draws what all robots see.
+/// Plays half a second of an episode, and renders all robots' cameras.
 fn physics(spec: &EpisodeSpec) -> Result<String, String> {
     let play = || {
         let mut session = trial(spec)?;

@@ -1,4 +1,5 @@
-//! `tandem doctor`: what of a server's settings works on this machine, and what to do about what does not.
+//! `tandem doctor`: checks which of a server's settings work on this machine, with advice on those that
+//! do not.
 
 mod given;
 mod machine;
@@ -11,37 +12,37 @@ use tandem_tools_spec::Protocol;
 use super::{CommandResult, print, serve::ServeArgs};
 use crate::{settings::Layer, token::Token};
 
-/// Say what works on this machine: all that a server's settings name, pictures, physics, the port, the folder of recordings, clocks
-/// and cores.
+/// Check this machine: the files in a server's settings, physics, rendering, the port, the runs folder,
+/// clocks and cores.
 #[derive(Debug, clap::Args)]
 pub struct DoctorArgs {
-    /// The settings of the server that is to run here.
+    /// Settings of the server that is to run here.
     #[command(flatten)]
     serve: ServeArgs,
 }
 
-/// The result of a check.
+/// Result of a check.
 #[derive(Debug, PartialEq)]
 enum Finding {
-    /// A line for people.
+    /// Success, with a description.
     Works(String),
-    /// What need not be as it is meant.
+    /// A note on something that may be unintended.
     Note(String),
-    /// What is wrong, and what to do.
+    /// A failure, with advice.
     Wrong(String),
 }
 
 impl Finding {
-    /// What works, or what is wrong.
+    /// Converts a result to a finding.
     fn of(tried: Result<String, String>) -> Finding {
         tried.map_or_else(Finding::Wrong, Finding::Works)
     }
 }
 
-/// Findings, each with what it is about.
+/// Findings, each with its subject.
 type Findings = Vec<(&'static str, Finding)>;
 
-/// Prints a line for each finding. The program fails if anything does not work.
+/// Prints a line for each finding. The program fails if there is a failure.
 pub fn run(args: DoctorArgs) -> CommandResult {
     let findings = examine(args.serve, Token::from_environment().map_err(|error| error.to_string()));
     print(&told(&findings))?;
@@ -57,16 +58,16 @@ fn told(findings: &Findings) -> String {
             Finding::Wrong(text) => ("WRONG", text),
         };
         let text = text.trim_end().replace('\n', &format!("\n{:21}", ""));
-        // Writing to a text cannot fail.
+        // Writing to a string cannot fail.
         let _ = writeln!(lines, "{what:14}{word:7}{text}");
         lines
     })
 }
 
-/// Tries everything, whatever is wrong before it.
+/// Runs all checks, even after failures.
 fn examine(args: ServeArgs, token: Result<Option<Token>, String>) -> Findings {
     let mut findings = Findings::new();
-    // As for the server: a token of the environment goes before the file's.
+    // As in the server, a token in the environment precedes that of the file.
     let flags = Layer { token: token.clone().ok().flatten(), ..args.flags };
     let layer = match &args.config {
         None => flags,
@@ -89,7 +90,7 @@ fn examine(args: ServeArgs, token: Result<Option<Token>, String>) -> Findings {
     findings
 }
 
-/// Every task as this server would play it, as far as what it is made of can be read.
+/// Returns every task with this server's settings, as far as their files can be read.
 fn specs(layer: &Layer) -> impl Iterator<Item = EpisodeSpec> {
     let scene = layer.scene.as_deref().map(SceneFile::of);
     let scene = scene.and_then(Result::ok);
@@ -105,7 +106,7 @@ fn specs(layer: &Layer) -> impl Iterator<Item = EpisodeSpec> {
     })
 }
 
-/// Builds an episode, in a scene of somebody's own after a second in which nobody acts.
+/// Builds an episode. In a custom scene this includes a second without commands.
 fn trial(spec: &EpisodeSpec) -> Result<Session, EpisodeError> {
     Session::start(spec, None)
 }

@@ -1,4 +1,4 @@
-//! Settings that would not work are found, and what would work is said.
+//! Tests that settings which would not work are found, with advice on what would work.
 
 use std::{fs, net::TcpListener, path::Path};
 
@@ -12,12 +12,12 @@ struct DoctorLine {
     args: DoctorArgs,
 }
 
-/// What is found with these flags, of the things called `what`.
+/// Returns the findings on the subject `what` with these flags.
 fn found(flags: &[&str], what: &str) -> Vec<Finding> {
     found_with(Ok(None), flags, what)
 }
 
-/// As [`found`], where the environment holds `token`.
+/// Does the same as [`found`], with `token` in the environment.
 fn found_with(token: Result<Option<Token>, String>, flags: &[&str], what: &str) -> Vec<Finding> {
     let line = DoctorLine::try_parse_from([&["doctor"], flags].concat()).unwrap();
     let findings = examine(line.args.serve, token).into_iter();
@@ -84,7 +84,7 @@ fn the_file_of_settings_and_all_that_it_names_are_tried() {
 
     let config = write("token.toml", "token_file = \"no token\"\n");
     expect_wrong(&found(&["--config", &config], "token"), &["no token"]);
-    // A server takes the environment's, too.
+    // A server also accepts the token of the environment.
     let (token, _) = Token::random().unwrap();
     assert!(matches!(found_with(Ok(Some(token)), &["--config", &config], "token")[..], [Finding::Works(_)]));
 

@@ -1,4 +1,4 @@
-//! `tandem evaluate`: how far a policy gets, over tasks and seeds.
+//! `tandem evaluate`: a policy's success over tasks and seeds.
 
 mod progress;
 mod table;
@@ -31,7 +31,7 @@ use super::{
 use crate::{drivers::with_last_words, settings::SettingsError};
 use progress::with_progress;
 
-/// Play tasks over seeds in parallel worlds and count the phases reached. Goes on where an interrupted run stopped.
+/// Play tasks over seeds in parallel worlds and count the phases reached. An interrupted run is continued.
 #[derive(Debug, clap::Args)]
 pub struct EvaluateArgs {
     #[command(flatten)]
@@ -40,32 +40,35 @@ pub struct EvaluateArgs {
     episodes: EpisodeFlags,
     #[command(flatten)]
     stress: StressPlanFlags,
-    /// Play the failures of another evaluation again, from some seconds before the moment at which each went wrong, with the whole budget
-    /// ahead: its folder, in which episodes were recorded by this build. Tasks, seeds, world and stress are theirs.
+    /// Folder of another evaluation whose failures are replayed from shortly before each failure, with the
+    /// whole budget. This build must have recorded them; tasks, seeds, world and stress are taken over.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["from", "demos", "tasks", "seeds", "spread", "scene", "task_file", "stress"])]
     retry_from: Option<PathBuf>,
-    /// How many seconds before.
+    /// Seconds before the failure at which --retry-from begins.
     #[arg(long, value_name = "SECONDS", default_value_t = 3, requires = "retry_from")]
     before: u32,
-    /// Phases to begin at, by number or id, as p2 or p1,transfer, or `all`: each episode starts where that phase began in the
-    /// demonstration of its task and seed, with the whole budget ahead, and that phase alone counts.
+    /// Phases to begin with, by number or id, for example p2 or p1,transfer, or `all`. Each episode starts
+    /// where that phase began in the demonstration of its task and seed, with the whole budget; only that
+    /// phase counts.
     #[arg(long, value_name = "PHASES", value_parser = parse_phases, requires = "demos")]
     from: Option<PhaseList>,
-    /// Folder of demonstrations, as `collect` or `serve` writes them; this build has to have recorded them.
+    /// Folder of demonstrations from `collect` or `serve`, recorded by this build.
     #[arg(long, value_name = "DIR", requires = "from")]
     demos: Option<PathBuf>,
-    /// Begin in the training demonstrations instead of those of --seeds: the first 50 of each task by seed, as the benchmark does and as
-    /// `export` splits data sets.
+    /// Begin in the training demonstrations instead of those of --seeds: the first 50 of each task by seed,
+    /// the same split as in the benchmark and in `export`.
     #[arg(long, requires = "from", conflicts_with = "seeds")]
     training_demos: bool,
-    /// Play share I of N, counted from 0, as 0/10; shares may write to one folder, and `report` joins folders.
+    /// Play share I of N, counted from 0, for example 0/10; shares may use one folder, and `report` joins
+    /// folders.
     #[arg(long, value_name = "I/N", default_value = "0/1")]
     shard: ShardFlag,
-    /// Record every episode in a folder of its own, for `replay` and for the pictures of a report.
+    /// Record every episode in its own folder, for `replay` and for the images in reports.
     #[arg(long)]
     record: bool,
-    /// How often an episode in which the policy itself failed (its program or its server crashed or was gone) is played again, by one run
-    /// after another, before it counts as a failure. Until then it is listed apart. Results keep every attempt.
+    /// Number of retries of an episode in which the policy itself failed (its program or server crashed or
+    /// was gone), by consecutive runs, before it counts as a failure. Until then it is listed separately.
+    /// Results keep every attempt.
     #[arg(long, value_name = "N", default_value_t = EvaluationPlan::DEFAULT_RETRIES)]
     retries: u32,
     /// The same as --retries 0.
@@ -75,11 +78,11 @@ pub struct EvaluateArgs {
     run: RunFlags,
 }
 
-/// Phases named on the command line.
+/// Phases on the command line.
 #[derive(Debug, Clone)]
 struct PhaseList(Vec<String>);
 
-/// The phases that `text` names: `all`, or numbers and ids separated by commas.
+/// Parses phases: `all`, or numbers and ids separated by commas.
 fn parse_phases(text: &str) -> Result<PhaseList, String> {
     let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
     match names.iter().any(String::is_empty) {
@@ -88,7 +91,7 @@ fn parse_phases(text: &str) -> Result<PhaseList, String> {
     }
 }
 
-/// The phases that are named, of which each task that is played may have some.
+/// Resolves the named phases. Each has to occur in at least one of the tasks that are played.
 fn phases_of(PhaseList(names): PhaseList, tasks: &[&'static Task]) -> Result<Vec<String>, String> {
     let most = tasks.iter().map(|task| task.phases.len()).max().unwrap_or_default();
     let numbers: Vec<String> = (0..most).map(Phase::number).collect();
@@ -174,7 +177,7 @@ fn seeds(plan: &EvaluationPlan, starts: &Starts) -> Result<Vec<u32>, String> {
     }
 }
 
-/// Refuses to tell tasks in two other wordings at once.
+/// Refuses two different rewordings of tasks at once.
 pub fn check_words(
     plan: &EvaluationPlan,
     stresses: impl IntoIterator<Item = Stress>,
@@ -186,7 +189,8 @@ pub fn check_words(
     }
 }
 
-/// What has failed in `folder`, to begin again so many seconds before; what cannot be begun again is logged.
+/// Returns starts that replay the failures in `folder`, each from `before_s` seconds before its failure.
+/// Failures that cannot be replayed are logged.
 fn begin_again(folder: &Path, before_s: u32) -> Result<Starts, Box<dyn Error>> {
     let (failed, left_out) = failed_episodes(folder)?;
     left_out.iter().for_each(|line| tracing::warn!("not begun again: {line}"));
@@ -199,7 +203,8 @@ fn begin_again(folder: &Path, before_s: u32) -> Result<Starts, Box<dyn Error>> {
     Ok(Starts::Moments { failed, before_s })
 }
 
-/// Plays `plan` into `folder`, says how it goes on, prints a table, and returns how many of the episodes count.
+/// Plays `plan` into `folder`, reports progress, prints a table, and returns how many of the episodes
+/// count.
 pub fn play_and_print(plan: &EvaluationPlan, folder: &Path) -> Result<usize, Box<dyn Error>> {
     let run = EvaluationRun::begin(plan, folder)?;
     println!("{}, in {}", in_words(run.kept()), folder.display());
@@ -216,7 +221,7 @@ pub fn play_and_print(plan: &EvaluationPlan, folder: &Path) -> Result<usize, Box
     Ok(evaluation.episodes.iter().filter(|episode| episode.counts()).count())
 }
 
-/// What a run has when it begins, as `5 kept, 25 to play`.
+/// Describes the state of a run at its start, for example `5 kept, 25 to play`.
 fn in_words(kept: KeptEpisodes) -> String {
     let KeptEpisodes { kept, of_other_builds, to_play, unreadable } = kept;
     let mut words = match (kept, of_other_builds) {
@@ -230,7 +235,7 @@ fn in_words(kept: KeptEpisodes) -> String {
     words
 }
 
-/// What is said of a run that a signal ends: what it has come to by now, and how to go on.
+/// Prints the results up to now and the command to continue, for a run that a signal ends.
 fn print_interrupted(run: &EvaluationRun) {
     let KeptEpisodes { kept, to_play, .. } = run.kept();
     println!("\ninterrupted; {kept} episodes are kept, {to_play} are left");

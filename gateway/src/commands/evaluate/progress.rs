@@ -1,4 +1,4 @@
-//! How an evaluation goes on: a bar where there is a terminal, and else a line a minute in the log.
+//! Progress of an evaluation: a bar on a terminal, or a line a minute in the log.
 
 use std::{
     sync::{Mutex, MutexGuard, mpsc},
@@ -12,17 +12,19 @@ use tandem_episodes::{
     results::PlayedEpisode,
 };
 
-/// How often it is looked whether there is something to say.
+/// Interval between two checks for pending output.
 const TICK: Duration = Duration::from_secs(1);
 
-/// How often the log says how far the evaluation is.
+/// Interval between two progress lines in the log.
 const LINE_EVERY: Duration = Duration::from_secs(60);
 
-/// When the log says first that the policy is waited for, and how often from then on; after a minute, every minute.
+/// Delays of the log lines about a wait for the policy: the first, and the interval after that. After a
+/// minute, there is one a minute.
 const WAIT_FIRST: Duration = Duration::from_secs(2);
 const WAIT_EVERY: Duration = Duration::from_secs(10);
 
-/// Does `work`, which is given what hears of each episode, and says meanwhile how far the episodes of `plan` are.
+/// Runs `work` with a callback for events of episodes, and meanwhile reports the progress of the episodes
+/// of `plan`.
 pub fn with_progress<T>(plan: &EvaluationPlan, work: impl FnOnce(&(dyn Fn(EpisodeEvent) + Sync)) -> T) -> T {
     let tally = Mutex::new(Tally { planned: plan.episodes().0.len(), ..Tally::default() });
     let lock = || -> MutexGuard<'_, Tally> {
@@ -66,23 +68,23 @@ pub fn with_progress<T>(plan: &EvaluationPlan, work: impl FnOnce(&(dyn Fn(Episod
 }
 
 fn style() -> ProgressStyle {
-    // The default is what is left of a template with a mistake in it.
+    // The default is used only if the template is invalid.
     ProgressStyle::with_template("  [{bar:30}] {pos} of {len} episodes, {elapsed}, {msg}")
         .unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
-/// Which episodes are done.
+/// Counts of the episodes that are done.
 #[derive(Debug, Default)]
 struct Tally {
     planned: usize,
-    /// Those that an earlier run has played.
+    /// Number of episodes that an earlier run has played.
     kept: usize,
-    /// Those that this run has played, or tried to.
+    /// Number of episodes that this run has played or tried to play.
     played: usize,
     left_out: usize,
-    /// Those of both runs that do not count.
+    /// Number of episodes of both runs that do not count.
     excluded: usize,
-    /// Those that count and have not succeeded.
+    /// Number of episodes that count and have not succeeded.
     failed: usize,
     last: String,
 }
@@ -112,13 +114,13 @@ impl Tally {
         self.kept + self.played + self.left_out
     }
 
-    /// How long the rest takes at the pace of this run; `None` before it has played anything.
+    /// Estimates the remaining time from the pace of this run; `None` before it has played anything.
     fn left(&self, elapsed: Duration) -> Option<Duration> {
         let left = self.planned.saturating_sub(self.done()) as f64;
         (self.played > 0).then(|| elapsed.mul_f64(left / self.played as f64))
     }
 
-    /// The line in the log.
+    /// Returns the line for the log.
     fn line(&self, elapsed: Duration) -> String {
         let counts = [
             (self.failed, "failed"),
@@ -136,7 +138,7 @@ impl Tally {
         format!("{} of {} episodes done{of_them}, {left} left, {time}", self.done(), self.planned)
     }
 
-    /// What stands beside the bar.
+    /// Returns the text beside the bar.
     fn bar_text(&self, elapsed: Duration) -> String {
         let left = self.left(elapsed).map(|time| format!("about {} left", in_words(time)));
         let last = (!self.last.is_empty()).then(|| self.last.clone());
@@ -144,7 +146,7 @@ impl Tally {
     }
 }
 
-/// A time as people say it, as `40 s`, `12 min` or `3 h 5 min`.
+/// Formats a time for people, for example `40 s`, `12 min` or `3 h 5 min`.
 fn in_words(time: Duration) -> String {
     let seconds = time.as_secs_f64().round() as u64;
     let minutes = (seconds + 30) / 60;
@@ -155,26 +157,27 @@ fn in_words(time: Duration) -> String {
     }
 }
 
-/// What the log says now.
+/// A log line that is due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum DueLine {
     Wait,
     Progress,
 }
 
-/// When the log was last told.
+/// Times of the last log lines.
 #[derive(Debug, Default)]
 struct Schedule {
-    /// How long the evaluation went on when it said how far it is.
+    /// Elapsed time at the last progress line.
     progress: Duration,
-    /// How long the policy had been waited for when that was said.
+    /// Length of the current wait at the last line about it.
     wait: Option<Duration>,
 }
 
 impl Schedule {
-    /// What has to be said when the evaluation goes on for `elapsed`, and its policy has been waited for as long as `waited`.
+    /// Returns the lines that are due after `elapsed`, when the policy has been waited for as long as
+    /// `waited`.
     fn due(&mut self, elapsed: Duration, waited: Option<Duration>) -> impl Iterator<Item = DueLine> {
-        // A wait that is shorter than it was is another.
+        // A wait that is shorter than before is a new one.
         self.wait = self.wait.filter(|told| waited.is_some_and(|waited| waited >= *told));
         let next_wait = match self.wait {
             None => WAIT_FIRST,
@@ -233,7 +236,7 @@ mod tests {
         let first: Vec<u32> = (1..=200).filter(|s| said(*s, Some(*s))).collect();
         assert_eq!(first, [2, 12, 22, 32, 42, 52, 62, 122, 182]);
         assert!(!said(201, None));
-        // The next wait is another.
+        // The next wait is a new one.
         assert_eq!((202..=220).filter(|s| said(*s, Some(*s - 201))).collect::<Vec<_>>(), [203, 213]);
     }
 

@@ -1,4 +1,4 @@
-//! What an evaluation came to, as text: rates, why episodes failed, and what does not count.
+//! Results of an evaluation as text: rates, reasons for failures, and episodes that do not count.
 
 use std::collections::BTreeMap;
 
@@ -10,10 +10,10 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{AgentEnding, Usage};
 
-/// A share of joint targets beyond limits from which on it is said.
+/// Minimum share of clamped joint targets that causes a warning.
 const CLAMPED_SHARE: f64 = 0.1;
 
-/// How many notes of a kind are printed below the table.
+/// Maximum number of notes of a kind below the table.
 const NOTES_SHOWN: usize = 20;
 
 /// Prints the tables, then notes.
@@ -41,7 +41,7 @@ pub fn print(evaluation: &Evaluation) {
     evaluation.left_out.iter().for_each(|left_out| println!("  left out: {}", printable(left_out)));
 }
 
-/// Warns of tasks in whose episodes many joint targets lay beyond the joints' limits.
+/// Warns of tasks in whose episodes many joint targets were beyond the joints' limits.
 fn print_clamped(evaluation: &Evaluation) {
     let mut shares: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for PlayedEpisode { result, .. } in &evaluation.episodes {
@@ -59,7 +59,7 @@ fn print_clamped(evaluation: &Evaluation) {
     }
 }
 
-/// What failed, and how.
+/// Describes the failure that excludes an episode.
 fn exclusion_note(episode: &PlayedEpisode) -> String {
     let what = episode.exclusion().map_or("", Exclusion::name);
     match (episode.exclusion(), &episode.note) {
@@ -69,7 +69,7 @@ fn exclusion_note(episode: &PlayedEpisode) -> String {
     }
 }
 
-/// How often an episode was played before, and what came of it.
+/// Lists the earlier attempts at an episode with their outcomes.
 fn attempts_note(episode: &PlayedEpisode) -> String {
     let earlier = episode.attempts.iter().map(|attempt| attempt.note.as_deref().unwrap_or("it failed"));
     let earlier: Vec<&str> = earlier.collect();
@@ -123,7 +123,7 @@ fn print_tasks(evaluation: &Evaluation) {
     println!("rates in %, with exact 95 % intervals (Clopper-Pearson)");
 }
 
-/// Prints how the play of language models ended, and what all of it cost.
+/// Prints how the play of language models ended, and the total cost.
 fn print_endings(evaluation: &Evaluation) {
     let usages: Vec<&Usage> =
         evaluation.episodes.iter().filter_map(|played| played.result.usage.as_ref()).collect();
@@ -150,7 +150,8 @@ fn print_endings(evaluation: &Evaluation) {
     );
 }
 
-/// Prints how often each phase was reached from its own start, and how much lower the rate of collaborative phases is.
+/// Prints how often each phase was reached from its own start, and how much lower the rate of
+/// collaborative phases is.
 fn print_phase_level(level: &PhaseLevel) {
     println!("{:14} {:>8}  {:>8}  {:^22}", "task", "from", "episodes", "reached");
     for phase in &level.phases {

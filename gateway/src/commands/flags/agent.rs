@@ -1,68 +1,73 @@
-//! The flags that say which language model plays and what it may use up: those of `python -m tandem.agent`, which reads them.
+//! The flags for the choice and the limits of a language model. They are those of `python -m
+//! tandem.agent`, which parses them.
 
 use std::iter;
 
 use clap::{CommandFactory, Parser};
 use serde_json::Value;
 
-/// Of a program's time, the part after which a model finishes by itself, in twelfths.
+/// Part of a program's time limit after which a model finishes by itself, in twelfths.
 const OWN_TWELFTHS: u32 = 11;
 
-/// Flags that are no numbers, even if they look like some.
+/// Flags whose values are strings, even if they look like numbers.
 const TEXTS: [&str; 4] = ["model", "api", "base-url", "effort"];
 
-/// How long after the model's own time it is stopped.
+/// Time after the model's own limit at which it is stopped.
 const GRACE_S: u32 = 300;
 
 /// A language model.
 #[derive(Debug, Clone, clap::Args)]
 pub struct AgentFlags {
-    /// The model's name at its endpoint.
+    /// Name of the model at its endpoint.
     #[arg(long, value_name = "NAME")]
     model: Option<String>,
-    /// What the endpoint speaks: OpenAI's Responses, its Chat Completions (Ollama, vLLM and most others), or Anthropic's Messages.
+    /// API of the endpoint: OpenAI's Responses, its Chat Completions (Ollama, vLLM and most others), or
+    /// Anthropic's Messages.
     #[arg(long, value_name = "API", default_value = "openai", value_parser = ["openai", "openai-chat", "anthropic"])]
     api: String,
-    /// Where the endpoint is, as http://127.0.0.1:11434/v1 [default: the API's maker].
+    /// URL of the endpoint, for example http://127.0.0.1:11434/v1 [default: that of the API's vendor].
     #[arg(long, value_name = "URL")]
     base_url: Option<String>,
-    /// How much the model thinks, in its API's words, as low or high [default: its own].
+    /// Reasoning effort in the API's terms, for example low or high [default: that of the model].
     #[arg(long, value_name = "WORD")]
     effort: Option<String>,
     /// Sampling temperature [default: the endpoint's].
     #[arg(long = "temperature", value_name = "T", value_parser = parse_amount)]
     temperature_value: Option<f64>,
-    /// Share of likely tokens to sample from [default: the endpoint's].
+    /// Probability mass of the tokens to sample from [default: the endpoint's].
     #[arg(long = "top-p", value_name = "P", value_parser = parse_amount)]
     top_share: Option<f64>,
-    /// Seed of the sampling, for openai-chat [default: the endpoint's].
+    /// Sampling seed, for openai-chat [default: the endpoint's].
     #[arg(long, value_name = "N")]
     sampling_seed: Option<u32>,
-    /// Further fields of each request to the endpoint, as {"top_k": 40} [default: none].
+    /// Additional fields of each request to the endpoint, for example {"top_k": 40} [default: none].
     #[arg(long, value_name = "JSON", value_parser = parse_object)]
     extra_body: Option<String>,
-    /// Longest conversation in tokens; the older half of a longer one becomes a list of calls [default: 100000].
+    /// Maximum length of the conversation in tokens; the older half of a longer one becomes a list of calls
+    /// [default: 100000].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     context_tokens: Option<u32>,
-    /// Tokens read and written in an episode, after which it is finished [default: any number].
+    /// Maximum number of input and output tokens of an episode, after which it is finished [default:
+    /// unlimited].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     max_tokens_total: Option<u64>,
-    /// US dollars spent in an episode, by the prices below, after which it is finished [default: any amount].
+    /// Maximum cost of an episode in US dollars by the prices below, after which it is finished [default:
+    /// unlimited].
     #[arg(long, value_name = "USD")]
     max_usd: Option<f64>,
-    /// Calls of tools in an episode, after which it is finished [default: 500].
+    /// Maximum number of tool calls of an episode, after which it is finished [default: 500].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     max_calls: Option<u32>,
-    /// Time for an episode, after which it is finished [default: 3300].
+    /// Maximum time of an episode, after which it is finished [default: 3300].
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
     max_seconds: Option<u32>,
-    /// Price of a million tokens that are read.
+    /// Price of a million input tokens.
     #[arg(long = "usd-per-million-input", value_name = "USD")]
     million_input_usd: Option<f64>,
-    /// Price of a million tokens that are written.
+    /// Price of a million output tokens.
     #[arg(long = "usd-per-million-output", value_name = "USD")]
     million_output_usd: Option<f64>,
-    /// Price of a million tokens that are read from a cache [default: as other tokens that are read].
+    /// Price of a million cached input tokens [default: the price of input tokens].
     #[arg(long = "usd-per-million-cached", value_name = "USD")]
     million_cached_usd: Option<f64>,
 }
@@ -80,7 +85,7 @@ fn parse_object(text: &str) -> Result<String, String> {
     }
 }
 
-/// The flags as they stand behind `agent:`.
+/// The flags after `agent:`.
 #[derive(Debug, Parser)]
 #[command(no_binary_name = true, disable_help_flag = true)]
 struct AgentOptions {
@@ -89,7 +94,8 @@ struct AgentOptions {
 }
 
 impl AgentFlags {
-    /// What stands behind `agent:` on the command line, as MODEL or MODEL?api=anthropic&max-usd=2.
+    /// Parses the text after `agent:` on the command line, for example MODEL or
+    /// MODEL?api=anthropic&max-usd=2.
     pub fn parse_policy(text: &str) -> Result<AgentFlags, String> {
         let (model, options) = text.split_once('?').unwrap_or((text, ""));
         if model.trim().is_empty() {
@@ -108,17 +114,17 @@ impl AgentFlags {
         AgentOptions::try_parse_from(arguments).map(|options| options.flags).map_err(refused)
     }
 
-    /// The model's name; empty where none is given, as by who resumes an episode.
+    /// Returns the model's name; empty if none is given, as in a resumed episode.
     pub fn model(&self) -> &str {
         self.model.as_deref().unwrap_or_default()
     }
 
-    /// How long a program may take that is given `usual_s` where nobody says otherwise.
+    /// Returns the time limit of a program whose default is `usual_s`.
     pub fn limit_s(&self, usual_s: u32) -> u32 {
         usual_s.max(self.max_seconds.map_or(0, |own_s| own_s.saturating_add(GRACE_S)))
     }
 
-    /// The arguments for Python, where the program is stopped after `limit_s`.
+    /// Returns the arguments for Python if the program is stopped after `limit_s`.
     pub fn arguments(&self, limit_s: u32) -> Vec<String> {
         let own_s = self.max_seconds.unwrap_or((limit_s / 12 * OWN_TWELFTHS).max(1));
         let own_s = ("max-seconds", Some(own_s.to_string()));
@@ -127,7 +133,7 @@ impl AgentFlags {
         given.chain([own_s]).filter_map(written).collect()
     }
 
-    /// What results keep of it.
+    /// Returns the policy's card in results.
     pub fn card(&self) -> Value {
         let read = |flag: &str, value: String| match TEXTS.contains(&flag) {
             true => Value::String(value),
@@ -138,7 +144,7 @@ impl AgentFlags {
         Value::Object(given.collect())
     }
 
-    /// Each flag with its value.
+    /// Returns each flag with its value.
     fn given(&self) -> [(&'static str, Option<String>); 16] {
         let text = |number: Option<f64>| number.map(|number| number.to_string());
         [
@@ -162,7 +168,7 @@ impl AgentFlags {
     }
 }
 
-/// The names of the flags, but for the model's.
+/// Lists the names of the flags except the model's.
 fn options_of_agents() -> String {
     let command = AgentOptions::command();
     let names = command.get_arguments().filter_map(clap::Arg::get_long).filter(|name| *name != "model");

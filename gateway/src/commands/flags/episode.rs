@@ -1,4 +1,4 @@
-//! The flags that say which episodes to play, and by robots of which kind.
+//! The flags for the choice of episodes.
 
 use std::{error::Error, ops::RangeInclusive, path::PathBuf, str::FromStr};
 
@@ -15,53 +15,58 @@ use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 use super::{WorldFlags, read_seed_key};
 use crate::settings::one_of;
 
-/// Which episodes to play.
+/// Flags for the choice of episodes.
 #[derive(Debug, Args)]
 pub struct EpisodeFlags {
-    /// Ids of built-in tasks separated by commas, or `all` for the benchmark's ten, or `tandem+` for that suite [default: none with
-    /// --task-file, and else all].
+    /// Ids of built-in tasks separated by commas, or `all` for the benchmark's ten, or `tandem+` for that
+    /// suite [default: none with --task-file, and else all].
     #[arg(long, value_name = "TASKS", value_parser = parse_tasks)]
     tasks: Option<TaskList>,
     /// One seed, or a range of seeds as 0-9 or 0..9, both ends included.
     #[arg(long, default_value = "0-9", value_name = "SEEDS")]
     seeds: Seeds,
-    /// A file with a key of yours, by which what the seeds mean is drawn: nobody without it can simulate an episode in advance. Results name
-    /// the key by its fingerprint. Without it, a seed means the same everywhere.
+    /// File with your own secret key, which changes the meaning of seeds, so that no one without it can
+    /// simulate an episode in advance. Results name the key's fingerprint. Without a key, a seed means the
+    /// same everywhere.
     #[arg(long, value_name = "FILE")]
     seed_key: Option<PathBuf>,
-    /// The rules.
+    /// Rules of play.
     #[arg(long, value_parser = one_of(Protocol::ALL, Protocol::name), default_value = Protocol::Agentic.name())]
     protocol: Protocol,
-    /// What policies are told, as for `serve` [default: paper for evaluate, full for collect].
+    /// Information for policies, as in `serve` [default: paper for evaluate, full for collect].
     #[arg(long, env = "TANDEM_ASSISTANCE", value_name = "WHAT", value_parser = one_of(Assistance::ALL, Assistance::name))]
     assistance: Option<Assistance>,
-    /// For experiments: what is told of phases, whatever the assistance has; only `live` ends an episode on success.
+    /// For experiments: disclosure of phases, independent of the assistance; only `live` ends an episode on
+    /// success.
     #[arg(long, hide = true, env = "TANDEM_DISCLOSURE", value_name = "WHEN", value_parser = one_of(Disclosure::ALL, Disclosure::name))]
     disclosure: Option<Disclosure>,
-    /// For experiments: whether texts say how to grasp, whatever the assistance has.
+    /// For experiments: hints on grasping in texts, independent of the assistance.
     #[arg(long, hide = true, env = "TANDEM_HINTS", value_name = "WHETHER", value_parser = one_of(Hints::ALL, Hints::name))]
     hints: Option<Hints>,
-    /// JSON file with instructions in place of the tasks' own, as for `serve`; results name them.
+    /// JSON file with instructions in place of the tasks' own, as in `serve`; results name them.
     #[arg(long, env = "TANDEM_INSTRUCTIONS", value_name = "FILE")]
     instructions: Option<PathBuf>,
-    /// How far the seed moves things, as a multiple of the benchmark's randomisation; above 1 it turns them, too.
+    /// Range of the randomised object poses, as a multiple of the benchmark's; above 1, objects are also
+    /// rotated.
     #[arg(long, value_name = "TIMES", value_parser = one_of(Spread::ALL, Spread::name), default_value = Spread::default().name())]
     spread: Spread,
-    /// How long a policy may think in an episode, for those that wait for slow models; results name it [default: as the protocol has it].
+    /// Limit on a policy's thinking time in an episode, for slow models; results name it [default: that of
+    /// the protocol].
     #[arg(long, env = "TANDEM_THINKING_LIMIT", value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
     thinking_limit: Option<u32>,
-    /// Worlds that run side by side.
+    /// Number of worlds that run in parallel.
     #[arg(long, default_value_t = 1, value_name = "N")]
     jobs: usize,
     #[command(flatten)]
     world: WorldFlags,
 }
 
-/// Tasks named on the command line. The name keeps clap from taking it for a flag that is given several times.
+/// Tasks on the command line. The type's name keeps clap from taking it for a flag that can be given
+/// several times.
 #[derive(Debug, Clone)]
 struct TaskList(Vec<&'static Task>);
 
-/// The built-in tasks that `text` names: `all` of the benchmark's, those of a suite, or ids separated by commas.
+/// Parses built-in tasks: `all` of the benchmark's, those of a suite, or ids separated by commas.
 fn parse_tasks(text: &str) -> Result<TaskList, String> {
     let found: Result<_, _> = match text {
         "all" => Ok(tasks::cohub().to_vec()),
@@ -75,8 +80,8 @@ fn parse_tasks(text: &str) -> Result<TaskList, String> {
     found.map(TaskList).map_err(told)
 }
 
-/// What is played: the tasks of files, and beside them the built-in ones that are named and that none of them replaces; all of these
-/// where nothing is given.
+/// Returns the tasks to play: those of files, and the named built-in ones that no file replaces. Without
+/// any, it returns all tasks of the benchmark.
 fn played(named: Option<TaskList>, of_files: Vec<&'static Task>) -> Vec<&'static Task> {
     let named = match named {
         Some(TaskList(named)) => named,
@@ -89,7 +94,7 @@ fn played(named: Option<TaskList>, of_files: Vec<&'static Task>) -> Vec<&'static
 }
 
 impl EpisodeFlags {
-    /// The plan to have `player` play these episodes, told as `assistance` says where no flag does.
+    /// Returns the plan for `player` to play these episodes; `assistance` is the default.
     pub fn plan(
         self,
         player: &dyn Policy,
@@ -139,11 +144,12 @@ impl EpisodeFlags {
     }
 }
 
-/// Seeds on the command line, in every command that takes any: `3`, or `0-9`, or `0..9`, with both ends included.
+/// Seeds on the command line, in every command that takes any: `3`, or `0-9`, or `0..9`, with both ends
+/// included.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Seeds(pub RangeInclusive<u32>);
 
-/// The most seeds of one command.
+/// Maximum number of seeds of one command.
 const MAX_SEEDS: u64 = 100_000;
 
 /// A text that names no seeds, or too many.
@@ -205,7 +211,7 @@ mod tests {
         assert!(told.contains("4294967296 seeds; give at most 100000"), "{told}");
     }
 
-    /// What a flag for seeds says of itself in each command that has one, under the command.
+    /// Collects the help text of the flag for seeds in each command that has one.
     fn help_on_seeds(command: &clap::Command, path: &str, found: &mut Vec<(String, String)>) {
         for of in command.get_subcommands() {
             let path = format!("{path} {}", of.get_name());
@@ -213,7 +219,7 @@ mod tests {
             if let Some(flag) = of.get_arguments().find(is_seeds) {
                 let name = flag.get_long().unwrap_or_default();
                 let help = flag.get_help().map(ToString::to_string).unwrap_or_default();
-                // With what else has to be given, behind a flag or in its place.
+                // Required flags are added, including one of each required group.
                 let groups = of.get_groups().filter(|group| group.is_required_set());
                 let of_groups: Vec<_> = groups.filter_map(|group| group.get_args().next()).collect();
                 let is_required =

@@ -1,16 +1,18 @@
-//! The flags that somebody has given, apart from those that have their defaults.
+//! The flags that the user has given, as opposed to defaults.
 
 use std::collections::BTreeMap;
 
 use clap::{ArgAction, ArgMatches, Args, Command, FromArgMatches, parser::ValueSource};
 
-/// The flags of a subcommand that the command line or the environment gives, by id, with their texts. It has to be the
-/// first field of the subcommand's flags: those that are read before are gone from the matches.
+/// The flags of a subcommand that come from the command line or the environment, by id, with their texts.
+///
+/// It has to be the first field of the subcommand's flags, because parsing another field removes its
+/// flags from the matches.
 #[derive(Debug)]
 pub struct GivenFlags(BTreeMap<String, Vec<String>>);
 
 impl GivenFlags {
-    /// Those that `A` has, each by its name on the command line; a switch has no value.
+    /// Returns the given flags that `A` has, each by its name on the command line. A switch has no value.
     pub fn of<A: Args>(&self) -> Vec<(String, Option<String>)> {
         let command = A::augment_args(Command::new(""));
         let given = command.get_arguments().filter_map(|argument| {

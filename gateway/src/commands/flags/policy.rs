@@ -1,4 +1,4 @@
-//! The flags that say who plays: one of the program's own players, a program, or a learned policy at a server.
+//! The flags for the choice of a policy: a built-in player, a program, or a learned policy at a server.
 
 use std::{error::Error, path::PathBuf, sync::Arc, time::Duration};
 
@@ -17,45 +17,47 @@ use crate::{
     hosting::PartnerPolicy,
 };
 
-/// The prefix of --policy that names a program.
+/// Prefix of --policy that names a program.
 const EXEC: &str = "exec:";
 
-/// The prefix of --policy that names a language model.
+/// Prefix of --policy that names a language model.
 const AGENT: &str = "agent:";
 
-/// The prefix of --policy that names recordings.
+/// Prefix of --policy that names recordings.
 const OPEN_LOOP: &str = "open-loop:";
 
-/// How long a program may run in an episode, unless a flag says otherwise.
+/// Default time limit of a program in an episode.
 const LIMIT_S: u32 = 3600;
 
-/// Who plays.
+/// Flags for the choice of a policy.
 #[derive(Debug, clap::Args)]
 pub struct PolicyFlags {
     #[arg(long, value_name = "POLICY", default_value = "expert", value_parser = parse_policy, help = help())]
     policy: PolicyChoice,
-    /// How the policy at a server is asked and understood: a preset, openpi, xpolicylab or gr00t_n17_g1, or a TOML file [default:
-    /// openpi for openpi:, xpolicylab for xpolicylab:, none for act:].
+    /// Policy map for a policy at a server: a preset (openpi, xpolicylab or gr00t_n17_g1) or a TOML file
+    /// [default: openpi for openpi:, xpolicylab for xpolicylab:, none for act:].
     #[arg(long, value_name = "NAME|FILE")]
     policy_map: Option<String>,
-    /// File with the key that the policy's server wants, which is sent as `Authorization` (openpi, xpolicylab: `Api-Key KEY`; act:
-    /// `Bearer KEY`; a key that names its scheme, as `Basic ...`, as it is), over wss:// and https:// or to this machine; or give the
-    /// key itself in the environment, as TANDEM_POLICY_KEY [default: none].
+    /// File with the key for the policy's server, sent as `Authorization` (openpi, xpolicylab: `Api-Key KEY`;
+    /// act: `Bearer KEY`; a key that names its scheme, such as `Basic ...`, unchanged), only over wss:// and
+    /// https:// or to this machine; the environment variable TANDEM_POLICY_KEY can hold the key itself
+    /// [default: none].
     #[arg(long, value_name = "FILE")]
     policy_key_file: Option<PathBuf>,
-    /// Longest that a program may run in one episode [default: 3600].
+    /// Time limit of a program in one episode [default: 3600].
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(1..))]
     policy_limit: Option<u32>,
-    /// Start one program for each robot, which sees and commands that robot alone.
+    /// Start one program per robot, which sees and commands only that robot.
     #[arg(long)]
     per_robot: bool,
-    /// With --per-robot: let the programs talk to each other by the tool say.
+    /// With --per-robot: let the programs talk to each other with the tool `say`.
     #[arg(long, requires = "per_robot")]
     talk: bool,
-    /// With --per-robot: how long the others wait for one that does not command, before its robot holds still [default: 120].
+    /// With --per-robot: time that the others wait for a missing command before its robot holds still
+    /// [default: 120].
     #[arg(long = "patience", value_name = "SECONDS", requires = "per_robot")]
     patience_s: Option<f64>,
-    /// What results and reports call the policy, where the text of --policy is no good name.
+    /// Name of the policy in results and reports, instead of the text of --policy.
     #[arg(long, value_name = "NAME")]
     policy_name: Option<String>,
 }
@@ -121,7 +123,7 @@ fn parse_urls(protocol: PolicyProtocol, urls: &str) -> Result<Vec<String>, Strin
             Some(rest) if rest.split('/').next().is_some_and(|authority| authority.contains('@')) => {
                 Err("an address takes no key; give it by --policy-key-file or TANDEM_POLICY_KEY".into())
             }
-            // No policy's server listens where the web does.
+            // The default port of the web is never that of a policy's server.
             Some(_) if plain == "ws://" && url.starts_with(plain) && port_of(url).is_none() => {
                 Err(format!("{url:?} names no port; give {protocol}:{plain}HOST:PORT"))
             }
@@ -134,14 +136,14 @@ fn parse_urls(protocol: PolicyProtocol, urls: &str) -> Result<Vec<String>, Strin
     urls.split(',').map(check).collect()
 }
 
-/// The port that an address names.
+/// Returns the port in a URL.
 fn port_of(url: &str) -> Option<u16> {
     let authority = url.split_once("://")?.1.split('/').next()?;
     authority.rsplit_once(']').map_or(authority, |(_, behind)| behind).rsplit_once(':')?.1.parse().ok()
 }
 
 impl PolicyFlags {
-    /// Makes the policy; what it needs is read, and no server is asked yet.
+    /// Creates the policy and reads its inputs. No server is contacted yet.
     pub fn policy(self) -> Result<Box<dyn Policy>, Box<dyn Error>> {
         let misplaced = |flag: &str, who: &str| Err(format!("{flag} is for {who}").into());
         let driving = self.driving()?;
@@ -207,7 +209,7 @@ impl PolicyFlags {
     }
 }
 
-/// The policy at `urls` with the map that `flag` gives, or else its protocol's own.
+/// Creates the policy at `urls` with the map that `flag` gives, or else the protocol's default.
 fn remote_policy(
     protocol: PolicyProtocol,
     urls: Vec<String>,
@@ -224,15 +226,15 @@ fn remote_policy(
 /// The flags of a policy that may drive one robot beside people.
 #[derive(Debug, Default, clap::Args)]
 pub struct PartnerFlags {
-    /// A learned policy at a server that people may have drive a robot beside them on /operate: openpi:ws://HOST:PORT,
-    /// xpolicylab:ws://HOST:PORT or act:http://HOST:PORT/act, as `evaluate --policy` takes it [default: none].
+    /// Learned policy at a server that can drive a robot beside people on /operate: openpi:ws://HOST:PORT,
+    /// xpolicylab:ws://HOST:PORT or act:http://HOST:PORT/act, as in `evaluate --policy` [default: none].
     #[arg(long, env = "TANDEM_PARTNER", value_name = "POLICY", value_parser = parse_partner)]
     partner: Option<PartnerAddress>,
-    /// How that policy is asked and understood, as `evaluate --policy-map` takes it.
+    /// Policy map of that policy, as in `evaluate --policy-map`.
     #[arg(long, env = "TANDEM_PARTNER_MAP", value_name = "NAME|FILE", requires = "partner")]
     partner_map: Option<String>,
-    /// File with the key that its server wants, as `evaluate --policy-key-file` takes it; or give the key itself in the environment, as
-    /// TANDEM_POLICY_KEY.
+    /// File with the key for its server, as in `evaluate --policy-key-file`; the environment variable
+    /// TANDEM_POLICY_KEY can hold the key itself.
     #[arg(long, env = "TANDEM_PARTNER_KEY_FILE", value_name = "FILE", requires = "partner")]
     partner_key_file: Option<PathBuf>,
 }
@@ -251,7 +253,7 @@ fn parse_partner(text: &str) -> Result<PartnerAddress, String> {
 }
 
 impl PartnerFlags {
-    /// The policy, if there is one; what it needs is read, and no server is asked yet.
+    /// Creates the policy if there is one, and reads its inputs. No server is contacted yet.
     pub fn policy(self) -> Result<Option<Arc<dyn PartnerPolicy>>, Box<dyn Error>> {
         let Some(PartnerAddress(protocol, urls)) = self.partner else { return Ok(None) };
         let policy = remote_policy(protocol, urls, self.partner_map, "--partner-map")?;
@@ -259,7 +261,7 @@ impl PartnerFlags {
     }
 }
 
-/// One of the program's own players.
+/// A built-in player.
 #[derive(Debug)]
 struct BuiltIn(&'static players::PlayerEntry);
 

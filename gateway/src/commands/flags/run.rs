@@ -1,4 +1,4 @@
-//! The flags that say where a run lies, and what becomes of one that is there already.
+//! The flags for the folder of a run, and for the treatment of an existing one.
 
 use std::path::{Path, PathBuf};
 
@@ -11,20 +11,21 @@ const RUNS: &str = "runs";
 /// The folder of a run.
 #[derive(Debug, Args)]
 pub struct RunFlags {
-    /// Folder of the run, for `results.json` and one file per episode [default: in the folder runs, a name made of policy, protocol and
-    /// everything else that makes the run what it is].
+    /// Folder of the run, for `results.json` and one file per episode [default: a folder in runs that is
+    /// named after the policy, the protocol and all other settings of the run].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Go on with the same run of another build of the program: what that has played is kept and marked, and only the rest is played.
+    /// Continue a run of another build of the program: its episodes are kept and marked, and only the missing
+    /// ones are played.
     #[arg(long)]
     resume_with_new_build: bool,
-    /// Delete the run that the folder holds, and begin anew.
+    /// Delete an existing run in the folder and start over.
     #[arg(long, conflicts_with = "resume_with_new_build")]
     overwrite: bool,
 }
 
 impl RunFlags {
-    /// What becomes of a run that the folder holds already.
+    /// Returns the treatment of an existing run in the folder.
     pub fn existing(&self) -> ExistingRun {
         match (self.overwrite, self.resume_with_new_build) {
             (true, _) => ExistingRun::Overwrite,
@@ -33,7 +34,7 @@ impl RunFlags {
         }
     }
 
-    /// The folder for `plan`, which without a flag is called as the policy is, or as `name` says.
+    /// Returns the folder for `plan`. Its default name is that of the policy, or `name`.
     pub fn folder(&self, plan: &EvaluationPlan, name: Option<&str>) -> PathBuf {
         self.out.clone().unwrap_or_else(|| default_folder(plan, name, Path::new(RUNS)))
     }

@@ -1,16 +1,18 @@
-//! The key of an evaluator, by which what seeds mean is drawn: nobody who lacks it can simulate an episode in advance.
+//! An evaluator's key for drawing the meaning of seeds. Without the key, no one can simulate an episode
+//! in advance.
 
 use std::{error::Error, fs, path::Path};
 
 use ring::hmac::{self, HMAC_SHA256};
 use tandem_episodes::evaluation::SeedKey;
 
-/// A shorter key could be guessed.
+/// Minimum length in bytes; a shorter key could be guessed.
 const MIN_KEY_BYTES: usize = 16;
 
-/// Reads the key in a file, without the white space around it, and draws what each of `seeds` means:
+/// Reads the key in a file, without surrounding white space, and draws the meaning of each of `seeds`:
 ///   drawn = first 4 bytes of HMAC-SHA256(key, "seed " + seed), little endian.
-/// The fingerprint, by which results name the key, is the HMAC of another text and tells nothing of it.
+/// The fingerprint, by which results name the key, is the HMAC of another text and reveals nothing about
+/// the key.
 pub fn read_seed_key(path: &Path, seeds: &[u32]) -> Result<SeedKey, Box<dyn Error>> {
     let shown = path.display();
     let bytes = fs::read(path).map_err(|error| format!("cannot read the seed key in {shown}: {error}"))?;

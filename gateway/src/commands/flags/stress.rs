@@ -1,50 +1,52 @@
-//! The flags that say what goes wrong in episodes.
+//! The flags for stress: disturbances in episodes.
 
 use clap::Args;
 use tandem_episodes::stress::{Stress, StressAxis, StressLevel};
 
 use crate::settings::{Layer, one_of};
 
-/// What goes wrong in every episode.
+/// Stress of every episode.
 #[derive(Debug, Args)]
 pub struct StressFlags {
-    /// What goes wrong: one axis of what `evaluate` lays over episodes; results name it.
+    /// Disturbance: one of the stress axes of `evaluate`; results name it.
     #[arg(long, env = "TANDEM_STRESS", value_name = "AXIS", value_parser = one_of(StressAxis::ALL, StressAxis::name))]
     stress: Option<StressAxis>,
-    /// How much of it, from 1 to 3 [default: 1].
+    /// Level of the stress, from 1 to 3 [default: 1].
     #[arg(long, env = "TANDEM_LEVEL", value_name = "LEVEL", requires = "stress")]
     level: Option<StressLevel>,
 }
 
 impl StressFlags {
-    /// As the spec of an episode has it.
+    /// Returns the stress for the specification of an episode.
     pub fn stress(&self) -> Option<Stress> {
         self.stress.map(|axis| Stress { axis, level: self.level.unwrap_or(StressLevel::One) })
     }
 
-    /// The same in the settings of a server.
+    /// Adds the stress to the settings of a server.
     pub fn over(self, layer: Layer) -> Layer {
         Layer { stress: self.stress, level: self.level, ..layer }
     }
 }
 
-/// What goes wrong in evaluations beside the plain one.
+/// Stress of evaluations that are played in addition to the plain one.
 #[derive(Debug, Args)]
 pub struct StressPlanFlags {
-    /// Play under stress, too: axes separated by commas, of camera, light, texture, layout, mass, friction, sensors, latency, push, words
-    /// and partner, or `all`. Each axis and level is laid over the same episodes, in a folder of its own in the folder `stress` of --out.
+    /// Also play under stress: a comma-separated list of camera, light, texture, layout, mass, friction,
+    /// sensors, latency, push, words and partner, or `all`. Each axis and level repeats the same episodes in
+    /// its own folder, in the folder `stress` of --out.
     #[arg(long, env = "TANDEM_STRESS", value_name = "AXES", value_parser = parse_axes)]
     stress: Option<Axes>,
-    /// Which levels of each axis: one, or a range as 1..3 or 1-3, both ends included [default: 1..3].
+    /// Levels of each axis: one, or a range such as 1..3 or 1-3, both ends included [default: 1..3].
     #[arg(long, env = "TANDEM_LEVEL", value_name = "LEVELS", value_parser = parse_levels, requires = "stress")]
     level: Option<Levels>,
 }
 
-/// Axes on the command line. The name keeps clap from taking it for a flag that is given several times.
+/// Axes on the command line. The type's name keeps clap from taking it for a flag that can be given
+/// several times.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Axes(Vec<StressAxis>);
 
-/// Levels on the command line; likewise.
+/// Levels on the command line. The type's name has the same reason.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Levels(Vec<StressLevel>);
 
@@ -71,7 +73,7 @@ fn parse_levels(text: &str) -> Result<Levels, String> {
 }
 
 impl StressPlanFlags {
-    /// Everything that is laid over episodes, axis by axis.
+    /// Returns all combinations of axes and levels, axis by axis.
     pub fn stresses(&self) -> Vec<Stress> {
         let levels = self.level.as_ref().map_or(&StressLevel::ALL[..], |Levels(levels)| levels);
         let axes = self.stress.iter().flat_map(|Axes(axes)| axes);

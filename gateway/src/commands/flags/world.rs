@@ -1,4 +1,4 @@
-//! The flags that say in which room, by robots of which kind, and who draws it.
+//! The flags for the scene, the robots and the renderer.
 
 use std::path::PathBuf;
 
@@ -9,24 +9,25 @@ use tandem_episodes::{
 
 use crate::settings::{Layer, SettingsError, one_of, read_robot, read_scene, read_task_file};
 
-/// What episodes are played in, the same for each of them.
+/// Scene, robots and renderer of all episodes.
 #[derive(Debug, Args)]
 pub struct WorldFlags {
-    /// MJCF file of a scene in place of the tasks' own; its site `task` says where.
+    /// MJCF file of a scene in place of the tasks' own; its site `task` marks the origin of tasks.
     #[arg(long, env = "TANDEM_SCENE", value_name = "FILE")]
     scene: Option<PathBuf>,
-    /// File that describes the robots in place of the embedded one: MJCF that names joints as the embedded robot's does, or a TOML file
-    /// that says of another MJCF which of its joints are which.
+    /// File with a robot in place of the embedded one: MJCF with the embedded robot's joint names, or a TOML
+    /// file that maps the joints of another MJCF.
     #[arg(long, env = "TANDEM_ROBOT", value_name = "FILE")]
     robot: Option<PathBuf>,
-    /// TOML files with tasks of your own, separated by commas; one that is called as a built-in task takes its place.
+    /// TOML files with your own tasks, separated by commas; a task with the name of a built-in one replaces
+    /// it.
     #[arg(long, env = "TANDEM_TASK_FILE", value_name = "FILES", value_delimiter = ',')]
     task_file: Option<Vec<PathBuf>>,
     #[command(flatten)]
     locomotion: LocomotionFlag,
     #[command(flatten)]
     sensing: SensingFlags,
-    /// Who draws pictures: a graphics processor, the embedded renderer, or whichever is there.
+    /// Renderer of images: the GPU, the embedded CPU renderer, or whichever is available.
     #[arg(long, env = "TANDEM_RENDERER", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name),
           default_value = RendererKind::default().name())]
     renderer: RendererKind,
@@ -38,32 +39,32 @@ impl WorldFlags {
         self.scene.as_deref().map(read_scene).transpose()
     }
 
-    /// Reads the robot from the file that the flag names, or takes the embedded one.
+    /// Reads the robot from the file that the flag names, or returns the embedded one.
     pub fn read_robot(&self) -> Result<RobotFile, SimError> {
         read_robot(self.robot.as_deref())
     }
 
-    /// The tasks of the files that the flag names.
+    /// Reads the tasks from the files that the flag names.
     pub fn read_task_files(&self) -> Result<Vec<&'static Task>, SettingsError> {
         self.task_file.iter().flatten().map(|path| read_task_file(path)).collect()
     }
 
-    /// Which controller the flag names; its file is not read yet.
+    /// Returns the controller that the flag names; its file is not read yet.
     pub fn controller(&self) -> Controller {
         self.locomotion.controller()
     }
 
-    /// What robots know of themselves.
+    /// Returns the robots' sensing of their own state.
     pub fn sensing(&self) -> Sensing {
         self.sensing.sensing()
     }
 
-    /// Who draws.
+    /// Returns the renderer.
     pub fn renderer(&self) -> RendererKind {
         self.renderer
     }
 
-    /// The same as settings of a server.
+    /// Converts the flags to settings of a server.
     pub fn layer(self) -> Layer {
         Layer {
             scene: self.scene,
@@ -81,33 +82,35 @@ impl WorldFlags {
 /// The base controller on the command line.
 #[derive(Debug, Args)]
 pub struct LocomotionFlag {
-    /// ONNX file with a velocity policy for the G1 in place of our own base controller; looped:FILE puts a loop over the robot's place around it.
+    /// ONNX file with a velocity policy for the G1 in place of the built-in base controller; looped:FILE adds
+    /// a position loop around it.
     #[arg(long = "locomotion", env = "TANDEM_LOCOMOTION", value_name = "FILE")]
     file: Option<PathBuf>,
 }
 
 impl LocomotionFlag {
-    /// Which controller the flag names; its file is not read yet.
+    /// Returns the controller that the flag names; its file is not read yet.
     pub fn controller(&self) -> Controller {
         Controller::from_file(self.file.as_deref())
     }
 }
 
-/// What robots know of themselves, on the command line.
+/// The robots' sensing of their own state, on the command line.
 #[derive(Debug, Args)]
 pub struct SensingFlags {
-    /// Where robots have their own state from: an estimator over what they sense, or the simulator, which no real robot has.
+    /// Source of the robots' own state: an estimator on their sensors, or the simulator, which no real robot
+    /// has.
     #[arg(long, env = "TANDEM_STATE_ESTIMATE", value_name = "SOURCE", value_parser = one_of(StateSource::ALL, StateSource::name))]
     #[arg(default_value = StateSource::default().name())]
     state_estimate: StateSource,
-    /// What robots sense: everything exactly, or with noise, bias and latency as a G1 does.
+    /// Sensor model of the robots: exact, or with the noise, bias and latency of a G1.
     #[arg(long, env = "TANDEM_SENSORS", value_name = "NAME", value_parser = one_of(SensorModel::ALL, SensorModel::name))]
     #[arg(default_value = SensorModel::default().name())]
     sensors: SensorModel,
 }
 
 impl SensingFlags {
-    /// Both as one value.
+    /// Returns both flags as one value.
     pub fn sensing(&self) -> Sensing {
         Sensing { state_estimate: self.state_estimate, sensors: self.sensors }
     }

@@ -1,4 +1,4 @@
-//! `tandem policy-map`: maps between robots and learned policies, before a policy is there.
+//! `tandem policy-map`: maps between robots and learned policies, without a policy.
 
 use std::process::ExitCode;
 
@@ -10,21 +10,21 @@ use crate::drivers::{PRESETS, PolicyMap, preset, try_map};
 /// Print a policy map to start from, or try one.
 #[derive(Debug, clap::Args)]
 pub struct PolicyMapArgs {
-    /// What to do.
+    /// Subcommand to run.
     #[command(subcommand)]
     action: MapAction,
 }
 
 #[derive(Debug, Subcommand)]
 enum MapAction {
-    /// Print a preset as TOML; that of openpi says what each line means.
+    /// Print a preset as TOML; the openpi preset explains each line.
     Show {
-        /// The preset.
+        /// Name of the preset.
         #[arg(value_name = "NAME", value_parser = PossibleValuesParser::new(PRESETS.map(|(name, _)| name)))]
         name: String,
     },
-    /// Try a map on a made-up observation and a made-up answer, with two robots and with three: say what a policy would be sent,
-    /// and what its answer would do.
+    /// Try a map on a made-up observation and answer, with two and with three robots: show the request to the
+    /// policy, and the effect of its answer.
     Check {
         /// A TOML file, or a preset.
         #[arg(value_name = "FILE")]
@@ -32,7 +32,7 @@ enum MapAction {
     },
 }
 
-/// Prints, and fails where a map cannot be followed.
+/// Prints a map or the report on one. The program fails if a map cannot be followed.
 pub fn run(args: PolicyMapArgs) -> CommandResult {
     match args.action {
         MapAction::Show { name } => print(preset(&name).unwrap_or_default())?,

@@ -1,11 +1,11 @@
-//! What `tandem replay --phases` says of the phase that an episode did not reach.
+//! Report of `tandem replay --phases` on the phase that an episode did not reach.
 
 use std::fmt::Write;
 
 use tandem_episodes::Recording;
 use tandem_episodes::replay::{Closest, ConditionTrace, Held, Moment, PartTrace, PhaseTrace};
 
-/// Lines about what the next phase asks for, each part of its conditions by its place in the task's file.
+/// Describes the conditions of the next phase, each part by its place in the task's file.
 pub fn told(recording: &Recording) -> Result<String, Box<dyn std::error::Error>> {
     let Some(trace) = PhaseTrace::of(recording)? else { return Ok("  all phases were reached\n".into()) };
     let PhaseTrace { number, id, from_s, to_s, nearest, description, conditions } = trace;
@@ -25,8 +25,8 @@ pub fn told(recording: &Recording) -> Result<String, Box<dyn std::error::Error>>
     Ok(told)
 }
 
-/// Returns a row for each part of a condition, and one for all of them at once: place, setting, when it
-/// held, text.
+/// Returns a row for each part of a condition, and one for all of them at once: place, setting, time
+/// during which it held, text.
 fn rows(condition: &ConditionTrace) -> Vec<[String; 4]> {
     let ConditionTrace { setting, for_s, held, parts, most_at_once } = condition;
     let part = |(index, part): (usize, &PartTrace)| {
@@ -49,7 +49,7 @@ fn rows(condition: &ConditionTrace) -> Vec<[String; 4]> {
     rows
 }
 
-/// How much of the time for which it has to hold it held without a break.
+/// Describes the longest uninterrupted time, if the condition has to hold for some time.
 fn without_break(held: &Held, for_s: f64) -> String {
     match for_s > 0.0 {
         true => format!("; without a break {:.2} s of {for_s}", held.longest_s()),
@@ -57,7 +57,7 @@ fn without_break(held: &Held, for_s: f64) -> String {
     }
 }
 
-/// When something held; `nearest` is said of what never did.
+/// Describes when something held; `nearest` is added if it never did.
 fn held_told(held: &Held, nearest: &str) -> String {
     match held.first_s {
         None => format!("never{nearest}"),
@@ -75,7 +75,7 @@ fn near(Moment { best, time_s }: Moment<Closest>) -> String {
     }
 }
 
-/// To a tenth of a millimetre, where it is one.
+/// Rounds to four decimals, which is a tenth of a millimetre for lengths.
 fn rounded(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }

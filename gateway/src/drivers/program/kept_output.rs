@@ -1,4 +1,4 @@
-//! What a program says, kept in files of a bounded size: a program that never stops talking fills no disk.
+//! Output of a program, kept in files of a bounded size so that a program cannot fill the disk.
 
 use std::{
     fs::File,
@@ -8,24 +8,25 @@ use std::{
     time::Duration,
 };
 
-/// The most bytes that are kept of each of a program's two outputs.
+/// Maximum number of bytes that are kept of each of a program's two outputs.
 pub const MAX_OUTPUT_BYTES: u64 = 64 << 20;
 
-/// What stands where more was said.
+/// Marker at the end of an output that was cut.
 const CUT: &[u8] = b"\n... (cut here: 64 MiB of a program's output are kept)\n";
 
-/// How long the last words may take to be written, once the program has gone. What it has left running may hold its output open.
+/// Time allowed for writing the last output after the program has ended. Its child processes may still
+/// hold the output open.
 const LAST_WORDS_WAIT: Duration = Duration::from_secs(1);
 
 /// An output that is being kept.
 pub struct KeptOutput(mpsc::Receiver<()>);
 
 impl KeptOutput {
-    /// Copies what `output` says to `file`; what is too much is read and thrown away.
+    /// Copies `output` to `file`. Output beyond the limit is read and discarded.
     pub fn start(output: impl Read + Send + 'static, file: File) -> io::Result<KeptOutput> {
         let (done, ended) = mpsc::channel();
         let copy = move || {
-            // A disk that is full keeps no words, and the program goes on all the same.
+            // A full disk loses the output, but the program continues.
             let _ = keep(output, file, MAX_OUTPUT_BYTES);
             drop(done);
         };
@@ -33,9 +34,9 @@ impl KeptOutput {
         Ok(KeptOutput(ended))
     }
 
-    /// Returns when all of it is written, or after a moment.
+    /// Waits until all of it is written, for at most `LAST_WORDS_WAIT`.
     pub fn finish(self) {
-        // The other end says nothing, and is dropped.
+        // The other end sends nothing; it is dropped at the end.
         let _ = self.0.recv_timeout(LAST_WORDS_WAIT);
     }
 }
@@ -48,7 +49,7 @@ fn keep(mut output: impl Read, mut file: impl Write, max_bytes: u64) -> io::Resu
         Ok(_) => file.write_all(CUT),
         Err(_) => Ok(()),
     };
-    // Whoever is not read from stands still.
+    // A program whose output is not read would block.
     io::copy(&mut output, &mut io::sink())?;
     written.and(kept)
 }

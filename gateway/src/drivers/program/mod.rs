@@ -1,5 +1,7 @@
-//! Agents as programs: a fresh process for each episode, or for each of its robots, which finds a server with that one episode at
-//! an address in its environment, and is stopped with all that it started when the episode or its time is over.
+//! Agents as programs: a new process for each episode, or for each of its robots.
+//!
+//! The environment of the process has the address of a server with that one episode. The process and its
+//! children are stopped when the episode or its time limit ends.
 
 mod kept_output;
 mod participant;
@@ -34,41 +36,42 @@ use participant::Participant;
 pub use process::end_all_programs;
 use process::{ProcessGroup, ProcessGroups, STDERR_FILE, STDOUT_FILE};
 
-/// How long a program may go on when its episode has ended.
+/// Time for which a program may continue after its episode has ended.
 const GRACE_PERIOD: Duration = Duration::from_secs(10);
 
-/// How often programs are looked at.
+/// Polling interval for the state of programs.
 const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// How much of a program's last words a result quotes.
+/// Maximum length of the quotation from a program's output in a result.
 const QUOTED_CHARS: usize = 300;
 const QUOTED_LINES: usize = 3;
 
-/// Where they are looked for: the end of a file, which may be of any size.
+/// Length of the end of the output file from which the quotation is taken.
 const LAST_WORDS_BYTES: u64 = 64 << 10;
 
-/// A command that plays.
+/// A command that plays episodes.
 #[derive(Debug)]
 pub struct Program {
     command: String,
-    /// What results call it, and what they keep of it.
+    /// Name and card of the policy in results.
     name: String,
     card: Value,
-    /// Whether one process directs all robots, or one each.
+    /// One process for all robots, or one per robot.
     driving: Driving,
-    /// Longest that one of its processes may run.
+    /// Maximum run time of one process.
     limit: Duration,
     settings: Arc<Settings>,
     processes: Arc<ProcessGroups>,
 }
 
 impl Program {
-    /// Episodes played by `command`, which a shell reads. A signal that ends this process ends those of the program, too.
+    /// Creates a policy that runs `command` in a shell. A signal that ends this process also ends the
+    /// program's processes.
     pub fn new(command: String, driving: Driving, limit: Duration) -> Result<Program, SettingsError> {
         let flags = Layer {
             listen: Some(([127, 0, 0, 1], 0).into()),
             max_episodes: Some(1),
-            // A program that has a shell could read files, so nothing is written where it could look while it runs.
+            // The program could read files, so nothing is written within its reach while it runs.
             record: Some(Record::After),
             ..Layer::default()
         };
@@ -79,7 +82,7 @@ impl Program {
         Ok(Program { command, name, card, driving, limit, settings, processes })
     }
 
-    /// Episodes played by a language model that results call `name`; `card` is what they keep of it.
+    /// Creates a policy that is a language model called `name` in results, with this `card`.
     pub fn agent(
         agent: &PythonModule,
         name: String,
@@ -90,7 +93,7 @@ impl Program {
         Ok(Program { name, card, ..Program::new(agent.shell_line(), driving, limit)? })
     }
 
-    /// The settings of a server for this episode alone.
+    /// Returns the settings of a server for this episode alone.
     fn settings_for(&self, spec: &EpisodeSpec, token: Token) -> Result<Arc<Settings>, PlayError> {
         Ok(Arc::new(Settings {
             token: Some(token),
@@ -107,7 +110,7 @@ impl Program {
         }))
     }
 
-    /// Starts a process for each participant and waits until all are gone. Returns how each was found.
+    /// Starts a process for each participant and waits until all have ended. Returns the exit of each.
     fn run(
         &self,
         server: &Server,
@@ -133,8 +136,8 @@ impl Program {
         Ok(found.map(|((exit, env_steps), status)| FoundProgram { exit, env_steps, status }).collect())
     }
 
-    /// Waits until all programs have ended, one of them has failed, or their time is over. Returns how each was found, and at which
-    /// control step.
+    /// Waits until all programs have ended, one of them has failed, or their time is over. Returns the
+    /// exit of each with its control step.
     fn watch(
         &self,
         groups: &mut [ProcessGroup],
@@ -148,7 +151,8 @@ impl Program {
                 if exit.is_none()
                     && let Some(well) = group.ended_well()?
                 {
-                    // Whoever is found to have ended while the episode goes on has ended before it.
+                    // A program that is found to have ended while the episode goes on has ended before
+                    // it.
                     let found = match (episode.ended(), well) {
                         (true, _) => ProgramExit::After,
                         (false, true) => ProgramExit::Left,
@@ -169,8 +173,8 @@ impl Program {
                 let env_steps = episode.env_steps();
                 let found: Vec<(ProgramExit, u32)> =
                     exits.into_iter().map(|exit| exit.unwrap_or((running, env_steps))).collect();
-                // Whoever left in order had done its part, where the others have played the episode to its end, or one of them is
-                // to blame for it.
+                // A program that left in order had done its part if the others completed the episode, or
+                // if one of them is to blame for its end.
                 let excused = episode.ended() || found.iter().any(|(exit, _)| exit.is_failure());
                 let judged = found.into_iter().map(|(exit, env_steps)| match exit {
                     ProgramExit::Left if excused => (ProgramExit::After, env_steps),
@@ -182,7 +186,7 @@ impl Program {
         }
     }
 
-    /// What is told of a program whose process left its episode early, and of what it said at last.
+    /// Returns the report on a program that left its episode early, with its last output.
     fn last_words(&self, found: &FoundProgram, so_far: &str, folder: &Path) -> Option<String> {
         let FoundProgram { exit, status, .. } = found;
         match exit {
@@ -199,7 +203,7 @@ impl Program {
         }
     }
 
-    /// What came of the episode that left `result`, whose programs were found as `ran` says.
+    /// Returns the outcome of the episode with `result`, given the exits of its programs in `ran`.
     fn outcome(
         &self,
         result: ResultReply,
@@ -232,7 +236,7 @@ impl Program {
         if result.tool_calls == 0 {
             return Err(PlayError::NotReady(stopped.unwrap_or_else(|| "the program made no call".into())));
         }
-        // A program that hangs is no better than one that is gone.
+        // A hanging program counts as a failed one.
         let ended = match result.ended {
             EndReason::Abandoned => EndReason::PolicyFailed,
             ended => ended,
@@ -285,7 +289,7 @@ impl Policy for Program {
     }
 }
 
-/// Makes the folder of an episode. A link is refused: who has put it there would choose which files are written.
+/// Creates the folder of an episode. Refuses a link, whose creator would choose which files are written.
 fn create_own_folder(folder: &Path) -> io::Result<()> {
     let is_link = fs::symlink_metadata(folder).is_ok_and(|found| found.is_symlink());
     if is_link {
@@ -295,7 +299,7 @@ fn create_own_folder(folder: &Path) -> io::Result<()> {
     create_private_folder(folder)
 }
 
-/// How a model's play ended, and what it said.
+/// Describes the end of a model's play and quotes its final text.
 fn told_ending(ended: &ModelEnding) -> String {
     let text: String = ended.text.chars().take(QUOTED_CHARS).collect();
     match text.is_empty() {
@@ -304,27 +308,27 @@ fn told_ending(ended: &ModelEnding) -> String {
     }
 }
 
-/// What was found of a program when the wait for it was over.
+/// State of a program at the end of the wait.
 struct FoundProgram {
     exit: ProgramExit,
-    /// How far the episode was.
+    /// Control steps of the episode at that time.
     env_steps: u32,
-    /// Its exit status, in words.
+    /// Exit status as text.
     status: String,
 }
 
-/// How a program was found when the wait for it was over.
+/// State of a program at the end of the wait, as far as its end is concerned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ProgramExit {
-    /// It ended when its episode had, or had no further part in it and nothing to do with its end.
+    /// The program ended after its episode, or had completed its part and did not cause the end.
     After,
-    /// It ended by itself before its episode, and says that all went well.
+    /// The program ended with status 0 before its episode ended.
     Left,
-    /// It could not be started, or it crashed, or something ended it, before its episode ended.
+    /// The program failed to start, crashed or was killed before its episode ended.
     Failed,
-    /// Its episode is over, or another program has failed, and it still runs.
+    /// The program still runs, although its episode is over or another program has failed.
     StillRunning,
-    /// It ran for longer than it may.
+    /// The program exceeded its time limit.
     TimedOut,
 }
 
@@ -337,8 +341,7 @@ impl ProgramExit {
     }
 }
 
-/// The last lines that a program has written to stderr, or else to stdout: the last of all, and of those before it what there is
-/// room for.
+/// Returns the last lines that a program has written to stderr, or else to stdout, as far as they fit.
 fn last_lines(folder: &Path) -> Option<String> {
     [STDERR_FILE, STDOUT_FILE].into_iter().find_map(|name| {
         let path = folder.join(name);
@@ -348,10 +351,10 @@ fn last_lines(folder: &Path) -> Option<String> {
         let read_from = file.metadata().ok()?.len().saturating_sub(LAST_WORDS_BYTES);
         file.seek(SeekFrom::Start(read_from)).ok()?;
         let mut bytes = Vec::new();
-        // The program may still write.
+        // The program may still be writing.
         file.take(LAST_WORDS_BYTES).read_to_end(&mut bytes).ok()?;
         let text = String::from_utf8_lossy(&bytes);
-        // Python underlines with lines that have no word.
+        // Python underlines errors with lines without words.
         let worded = text.lines().map(str::trim).filter(|line| line.contains(char::is_alphanumeric));
         let mut lines = worded.rev();
         let mut quoted: String = lines.next()?.chars().take(QUOTED_CHARS).collect();

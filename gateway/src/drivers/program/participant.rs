@@ -1,5 +1,6 @@
-//! What one of the programs of an episode is given: its folder, its environment, and its brief, which says the task and how to act
-//! in words that a language model can be given as they are.
+//! The inputs of one program of an episode: its folder, its environment and its brief.
+//!
+//! The brief describes the task and the interface in text that can be given to a language model directly.
 
 use std::{env, fs, io, path::Path};
 
@@ -10,21 +11,23 @@ use tempfile::TempDir;
 use super::process::{BRIEF_FILE, STDERR_FILE, STDOUT_FILE};
 use crate::drivers::lost;
 
-/// The file with the server's reply to the start, for programs that read JSON.
+/// File with the server's reply to the start, for programs that read JSON.
 const START_FILE: &str = "start.json";
 
-/// A program that directs all robots, or one robot.
+/// A program that controls all robots, or one robot.
 #[derive(Debug)]
 pub struct Participant<'a> {
-    /// The robot that it directs, where it directs one alone.
+    /// The robot that it controls; `None` if it controls all.
     pub robot: Option<&'a str>,
     token: &'a str,
-    /// The folder of its brief and its output while it runs. Its name says nothing, and no folder of another program or episode is beside it.
+    /// Folder of its brief and its output while it runs. The name is neutral, and the folders of other
+    /// programs and episodes are elsewhere.
     pub folder: TempDir,
 }
 
 impl<'a> Participant<'a> {
-    /// The programs of the episode `start`: one with the server's own `token`, or one for each operator.
+    /// Creates the programs of the episode `start`: one with the server's own `token`, or one for each
+    /// operator.
     pub fn all(start: &'a StartReply, token: &'a str) -> Result<Vec<Participant<'a>>, PlayError> {
         let participant = |robot: Option<&'a str>, token: &'a str| {
             let folder = private_folder().map_err(|error| lost("no folder for a program", error))?;
@@ -36,9 +39,9 @@ impl<'a> Participant<'a> {
         start.operators.iter().map(|own| participant(Some(&own.robot), &own.token)).collect()
     }
 
-    /// Writes what the program reads.
+    /// Writes the input files of the program.
     pub fn write(&self, start: &StartReply, url: &str, driving: &Driving) -> Result<(), EpisodeError> {
-        // A token is given to whom it belongs and is written to no file.
+        // A program receives only its own token, and no token is written to a file.
         let own = |robot: &str| start.briefing.clone().for_robot(robot);
         let briefing = self.robot.map_or_else(|| start.briefing.clone(), own);
         let shown = StartReply { operators: Vec::new(), briefing, ..start.clone() };
@@ -48,8 +51,8 @@ impl<'a> Participant<'a> {
         Ok(write_whole(&self.folder.path().join(START_FILE), text.as_bytes())?)
     }
 
-    /// Keeps in the folder of its episode what the program was given and what it has said, once it is gone. What it has put in the place of
-    /// one of these files, such as a link, is not followed.
+    /// Copies the program's inputs and output to the folder of its episode after its end. Links that the
+    /// program has put in place of these files are not followed.
     pub fn keep_files(&self, episode: &Path) -> io::Result<()> {
         let kept = self.robot.map_or_else(|| episode.to_owned(), |robot| episode.join(robot));
         create_private_folder(&kept)?;
@@ -66,7 +69,7 @@ impl<'a> Participant<'a> {
         Ok(())
     }
 
-    /// Variables that the program's environment has beside those of this process.
+    /// Returns the variables that are added to the program's environment.
     pub fn environment(&self, start: &StartReply, url: &str) -> Vec<(&'static str, String)> {
         let common = [
             ("TANDEM_URL", url.into()),
@@ -79,7 +82,7 @@ impl<'a> Participant<'a> {
     }
 }
 
-/// A folder that no other user may enter, which goes when it is dropped.
+/// Creates a folder that no other user may enter. It is removed when it is dropped.
 fn private_folder() -> io::Result<TempDir> {
     let mut builder = tempfile::Builder::new();
     builder.prefix("tandem-");
@@ -88,10 +91,10 @@ fn private_folder() -> io::Result<TempDir> {
     builder.tempdir()
 }
 
-/// Hosts that no proxy leads to.
+/// Hosts that are reached without a proxy.
 const LOOPBACK: [&str; 3] = ["127.0.0.1", "localhost", "::1"];
 
-/// Has programs reach the server directly, whatever proxy leads elsewhere: this machine behind what is excepted already.
+/// Returns variables that exclude this machine from proxies, in addition to existing exceptions.
 fn off_proxies() -> [(&'static str, String); 2] {
     ["NO_PROXY", "no_proxy"].map(|name| {
         let known = env::var(name).unwrap_or_default();
@@ -101,7 +104,8 @@ fn off_proxies() -> [(&'static str, String); 2] {
     })
 }
 
-/// The brief for the episode `start` on the server at `url`, whose reader directs all robots, or `robot` alone.
+/// Writes the brief for the episode `start` on the server at `url`, for a reader that controls all
+/// robots, or only `robot`.
 fn brief(start: &StartReply, url: &str, robot: Option<&str>, driving: &Driving) -> String {
     let StartReply { episode_id: id, briefing, .. } = start;
     let mut paragraphs = vec![addressee(start, robot), format!("Task: {}", briefing.instruction)];
@@ -126,7 +130,7 @@ fn brief(start: &StartReply, url: &str, robot: Option<&str>, driving: &Driving) 
     paragraphs.join("\n\n") + "\n"
 }
 
-/// Says which robots the reader directs.
+/// Describes the robots that the reader controls.
 fn addressee(start: &StartReply, robot: Option<&str>) -> String {
     let StartReply { episode_id: id, briefing, .. } = start;
     let names = briefing.robots.iter().map(|robot| robot.robot.as_str());
@@ -147,7 +151,7 @@ fn addressee(start: &StartReply, robot: Option<&str>) -> String {
     )
 }
 
-/// Says how programs that direct one robot each act together.
+/// Describes how programs that control one robot each act together.
 fn partners(driving: &Driving) -> String {
     let talk = match driving.talk {
         Some(true) => " You may talk to the others with the tool say; what they say comes with your replies.",

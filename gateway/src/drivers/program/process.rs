@@ -1,4 +1,4 @@
-//! A program and all that it starts, as one group of processes, which is stopped as one.
+//! A program and all its children as one process group, which is stopped as a whole.
 
 use std::{
     fs::File,
@@ -12,18 +12,18 @@ use std::{
 
 use super::kept_output::KeptOutput;
 
-/// The file in a program's folder with the brief, which it reads on its standard input.
+/// File with the brief in a program's folder. The program reads it on its standard input.
 pub const BRIEF_FILE: &str = "brief.txt";
 
-/// The files there that its output is written to.
+/// Files in the same folder for the program's output.
 pub const STDOUT_FILE: &str = "stdout.txt";
 pub const STDERR_FILE: &str = "stderr.txt";
 
-/// How long a group may take to end once it has been asked to.
+/// Time that a group has to end after the request to terminate.
 const TERMINATION_GRACE: Duration = Duration::from_secs(5);
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// The numbers of the groups that are running.
+/// Ids of the running process groups.
 #[derive(Debug, Default)]
 pub struct ProcessGroups(Mutex<Vec<u32>>);
 
@@ -34,19 +34,21 @@ impl ProcessGroups {
     }
 }
 
-/// A program and all that it has started. Dropping it stops them.
+/// A program with all its children. Dropping it stops them.
 pub struct ProcessGroup {
     child: Child,
-    /// Ends the group once this process is gone, however that came. `None` where it could not be started.
+    /// Process that ends the group once this process is gone for any reason; `None` if it could not be
+    /// started.
     guard: Option<Child>,
     groups: Arc<ProcessGroups>,
     outputs: Vec<KeptOutput>,
-    /// How the program ended, once the group has been stopped.
+    /// Exit status of the program, once the group has been stopped.
     status: Option<ExitStatus>,
 }
 
 impl ProcessGroup {
-    /// Starts `command` by a shell, with the brief in `folder` on its standard input and its output kept there.
+    /// Starts `command` in a shell, with the brief in `folder` on its standard input and its output kept
+    /// there.
     pub fn start(
         groups: &Arc<ProcessGroups>,
         command: &str,
@@ -64,7 +66,7 @@ impl ProcessGroup {
             .stderr(Stdio::piped());
         let files = [output(STDOUT_FILE)?, output(STDERR_FILE)?];
         in_own_group(&mut shell);
-        // A signal that comes between the start and the note of it would miss the program.
+        // The lock is held during the start, so that a signal handler cannot miss the program.
         let mut running = groups.lock();
         let child = shell.spawn()?;
         running.push(child.id());
@@ -90,12 +92,14 @@ impl ProcessGroup {
         Ok(())
     }
 
-    /// Whether the program has ended well, whatever it has left running; `None` while it runs.
+    /// Returns true if the program has ended with status 0, and `None` while it runs. Its children may
+    /// still run.
     pub fn ended_well(&mut self) -> io::Result<Option<bool>> {
         ended_well(&mut self.child)
     }
 
-    /// Asks the group to end, ends it if it does not, and says how the program ended.
+    /// Asks the group to end, kills it after a grace period, and returns the program's exit status as
+    /// text.
     pub fn stop(mut self) -> io::Result<String> {
         self.end().map(|status| status.to_string())
     }
@@ -111,7 +115,7 @@ impl ProcessGroup {
                 thread::sleep(POLL_INTERVAL);
             }
         }
-        // No other process gets the group's number before the program has been waited for.
+        // The group's id is not reused before the program has been waited for.
         let mut running = self.groups.lock();
         kill(&mut self.child);
         running.retain(|id| *id != self.child.id());
@@ -127,34 +131,35 @@ impl ProcessGroup {
 
 impl Drop for ProcessGroup {
     fn drop(&mut self) {
-        // Nobody is left to whom an error could be reported.
+        // There is no caller to whom an error could be reported.
         let _ = self.end();
     }
 }
 
-/// The groups of all policies of this process.
+/// Process groups of all policies of this process.
 static ALL: Mutex<Vec<Weak<ProcessGroups>>> = Mutex::new(Vec::new());
 
-/// Has [`end_all_programs`] end these groups, too.
+/// Registers these groups for [`end_all_programs`].
 pub fn end_with_all(groups: &Arc<ProcessGroups>) {
     let mut all = ALL.lock().unwrap_or_else(PoisonError::into_inner);
     all.retain(|known| known.strong_count() > 0);
     all.push(Arc::downgrade(groups));
 }
 
-/// Ends every program that this process has started, and lets it start no other: it is about to end itself.
+/// Ends every program that this process has started and prevents new ones, because the process is about
+/// to end.
 pub fn end_all_programs() {
     let all = ALL.lock().unwrap_or_else(PoisonError::into_inner);
     for groups in all.iter().filter_map(Weak::upgrade) {
         let running = groups.lock();
         running.iter().for_each(|id| kill_group(*id));
-        // Held to the end, so that no further group starts.
+        // The lock is never released, so that no further group starts.
         std::mem::forget(running);
         std::mem::forget(groups.clone());
     }
 }
 
-/// Lets a guard go, whose group has ended.
+/// Releases the guard of a group that has ended.
 fn dismiss(mut guard: Child) {
     if let Some(mut stdin) = guard.stdin.take() {
         // It may have been killed.
@@ -175,15 +180,16 @@ mod system {
 
     pub const SHELL: [&str; 2] = ["sh", "-c"];
 
-    /// Has the command start in a process group of its own.
+    /// Makes the command start in a process group of its own.
     pub fn in_own_group(command: &mut Command) {
         command.process_group(0);
     }
 
-    /// Waits for a line, or for the end of whoever would write it. The kernel closes the pipe of a process that is gone.
+    /// Shell script that waits for a line and kills the group if its input ends without one. The kernel
+    /// closes the pipe of a process that is gone.
     const GUARD: &str = r#"trap '' HUP INT TERM; read -r line || kill -s KILL -- "-$1""#;
 
-    /// Starts what ends the group once this process is gone.
+    /// Starts the guard, which ends the group once this process is gone.
     pub fn guard(id: u32) -> io::Result<Option<Child>> {
         let mut shell = Command::new(SHELL[0]);
         shell.args([SHELL[1], GUARD, "tandem-guard", &id.to_string()]);
@@ -192,7 +198,8 @@ mod system {
         shell.spawn().map(Some)
     }
 
-    /// Whether the child has ended with status 0; `None` while it runs. It is not waited for, so that no other process gets its number.
+    /// Returns true if the child has ended with status 0, and `None` while it runs. The child is not
+    /// reaped, so that its id is not reused.
     pub fn ended_well(child: &mut Child) -> io::Result<Option<bool>> {
         let Some(pid) = number(child.id()) else { return Ok(Some(false)) };
         let look = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
@@ -213,7 +220,7 @@ mod system {
 
     fn signal(id: u32, signal: Signal) {
         if let Some(pid) = number(id) {
-            // The call fails where no process of the group is left, which is what is wanted.
+            // The call fails if no process of the group is left, which is fine.
             let _ = kill_process_group(pid, signal);
         }
     }

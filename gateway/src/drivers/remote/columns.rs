@@ -1,4 +1,4 @@
-//! Names of columns: of the numbers that a robot senses, and of those that command it.
+//! Names of the columns of a robot's state and of its actions.
 
 use std::ops::Range;
 
@@ -10,10 +10,10 @@ use tandem_tools_spec::{ACTION_ROW_LEN, BASE_COLUMNS, ExtraInformation, Pose, Ro
 
 use super::poses::{POSE_LEN, RotationForm, pose_values};
 
-/// Some columns by one name.
+/// Some columns under one name.
 type Block = (String, Range<usize>);
 
-/// Blocks of a robot's numbers, in the order of [`state_values`], but for those of its wrists.
+/// Blocks of a robot's state, in the order of [`state_values`], except those of its wrists.
 const STATE: [(&str, Range<usize>); 14] = [
     ("left_leg", 0..6),
     ("right_leg", 6..12),
@@ -35,7 +35,7 @@ const STATE_WRISTS: [usize; 2] = [JOINTS, JOINTS + POSE_LEN];
 const STATE_GRAVITY: usize = JOINTS + 2 * POSE_LEN;
 const STATE_PELVIS: usize = STATE_GRAVITY + 3;
 const STATE_MOMENT: usize = STATE_PELVIS + 7;
-/// The base command comes last.
+/// The base command is last.
 const STATE_BASE: usize = STATE_MOMENT + 3;
 const STATE_LEN: usize = STATE_BASE + 4;
 
@@ -50,14 +50,14 @@ const ACTION: [(&str, Range<usize>); 7] = [
     ("row", 0..ACTION_ROW_LEN),
 ];
 const ACTION_BASE: usize = 31;
-/// Behind a row, a policy may tell poses of the wrists.
+/// After a row, a policy may command wrist poses.
 const ACTION_WRISTS: [usize; 2] = [ACTION_ROW_LEN, ACTION_ROW_LEN + POSE_LEN];
-/// Columns that a policy may tell.
+/// Number of columns that a policy may command.
 pub const ACTION_LEN: usize = ACTION_ROW_LEN + 2 * POSE_LEN;
 
-/// The wrists, left before right wherever there are both.
+/// Names of the wrists, left before right throughout.
 pub const WRISTS: [&str; 2] = ["left_wrist", "right_wrist"];
-/// What of a wrist can be named, after its name; a pose has its numbers in this order.
+/// Suffixes of a wrist's name for the parts of its pose, with their ranges in the pose.
 const WRIST_PARTS: [(&str, Range<usize>); 6] = [
     ("", 0..7),
     ("_position", 0..3),
@@ -67,9 +67,11 @@ const WRIST_PARTS: [(&str, Range<usize>); 6] = [
     ("_rows_6d", 17..POSE_LEN),
 ];
 
-/// All that a robot senses: joints in rad; of each wrist the pose in the pelvis frame; which way is down; the pelvis where its own
-/// odometry has it, x, y, z in m and w, x, y, z; which moment of which episode it is; the base command in force, as [`BASE_COLUMNS`] has it. `None` of a state that
-/// something is withheld from.
+/// Returns the full state of a robot, or `None` if a part of the state is withheld.
+///
+/// The order is: joints in rad; the pose of each wrist in the pelvis frame; the direction of gravity; the
+/// pelvis by the robot's own odometry (x, y, z in m and w, x, y, z); the moment of the episode; the base
+/// command in force in the order of [`BASE_COLUMNS`].
 pub fn state_values(state: &RobotState, moment: &EpisodeMoment) -> Option<Vec<f64>> {
     let joints = state.joint_positions_rad.0.iter().map(|(_, angle_rad)| *angle_rad);
     let wrists = [&state.left_wrist, &state.right_wrist].into_iter();
@@ -84,22 +86,23 @@ pub fn state_values(state: &RobotState, moment: &EpisodeMoment) -> Option<Vec<f6
     Some(sensed.chain(moment).chain(base).collect())
 }
 
-/// Which moment of which episode it is, for policies that remember, at servers that may have several episodes at once.
+/// Moment of an episode, for policies with memory at servers that may have several episodes at once.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct EpisodeMoment {
-    /// A number of the episode, above 0, that 32 bits of a float tell from every other.
+    /// Number of the episode, above 0, that a 32-bit float represents exactly.
     pub episode: u32,
     /// Control steps since the episode began.
     pub done_steps: f64,
-    /// Whether nothing was asked in this episode before.
+    /// True for the first request of the episode.
     pub is_first: bool,
 }
 
 impl EpisodeMoment {
-    /// Millions are of the task, from 1, and what is less is the seed. Those of tasks of somebody's own files come behind, by hash.
+    /// Returns the number of an episode. Millions count the task, from 1, and the rest is the seed. Tasks
+    /// from the user's own files have higher numbers by hash.
     pub fn number_of(task: &Task, seed: u32) -> u32 {
         const SEEDS: u32 = 1_000_000;
-        /// The first number that a float does not tell from the next one.
+        /// First number that a float does not distinguish from the next one.
         const END: u32 = 1 << 24;
         let built_in: Vec<&str> = tasks::built_in().map(|known| known.id).collect();
         let own_file = task.file_xxh3().filter(|_| task.suite().is_none());
@@ -108,7 +111,7 @@ impl EpisodeMoment {
             (file, _) => {
                 let first = (built_in.len() as u32 + 1) * SEEDS;
                 let hash = file.and_then(|xxh3| u64::from_str_radix(xxh3, 16).ok()).unwrap_or_default();
-                // The golden ratio spreads what follows upon each other.
+                // The golden ratio spreads consecutive seeds.
                 let spread = hash.wrapping_add(u64::from(seed).wrapping_mul(0x9e37_79b9_7f4a_7c15)) >> 20;
                 first + (spread % u64::from(END - first)) as u32
             }
@@ -116,22 +119,23 @@ impl EpisodeMoment {
     }
 }
 
-/// Numbers of the right length for [`state_values`], of a robot of which nothing is known.
+/// Returns zeros in the length of [`state_values`].
 pub fn blank_state_values() -> Vec<f64> {
     vec![0.0; STATE_LEN]
 }
 
-/// Where a wrist is sensed to be, and the pelvis by the robot's odometry: x, y, z, w, x, y, z.
+/// Returns the sensed pose of a wrist in the pelvis frame: x, y, z, w, x, y, z.
 pub fn sensed_wrist(state_values: &[f64], side: usize) -> &[f64] {
     &state_values[STATE_WRISTS[side]..][..7]
 }
 
-/// As [`sensed_wrist`], of the pelvis.
+/// Returns the pose of the pelvis by the robot's own odometry, in the same form.
 pub fn sensed_pelvis(state_values: &[f64]) -> &[f64] {
     &state_values[STATE_PELVIS..STATE_MOMENT]
 }
 
-/// The row that keeps a robot as it senses that it is: arms, hands, waist and height where they are, no walking.
+/// Returns the row that holds a robot in its sensed state: arms, hands, waist and height unchanged, no
+/// walking.
 pub fn held_row(state_values: &[f64]) -> Vec<f64> {
     let mut row = vec![0.0; ACTION_ROW_LEN];
     for (name, columns) in &ACTION {
@@ -139,51 +143,53 @@ pub fn held_row(state_values: &[f64]) -> Vec<f64> {
             row[columns.clone()].copy_from_slice(&state_values[sensed.clone()]);
         }
     }
-    // The height is all that persists of a base command.
+    // The height is the only persistent part of a base command.
     row[velocities()].fill(0.0);
     row
 }
 
-/// Columns of an action row that are velocities: nothing that a robot could be at.
+/// Returns the columns of an action row that are velocities rather than positions.
 pub fn velocities() -> Range<usize> {
     ACTION_BASE..ACTION_ROW_LEN - 1
 }
 
-/// Columns of an action row that arms and waist have, which wrists move by inverse kinematics.
+/// Returns true for a column of arms or waist, which inverse kinematics controls if wrist poses are
+/// commanded.
 pub fn is_of_arm_or_waist(column: usize) -> bool {
     let blocks = ["left_arm", "right_arm", "waist"];
     ACTION.iter().any(|(name, columns)| blocks.contains(name) && columns.contains(&column))
 }
 
-/// Columns of an action row that a hand has.
+/// Returns the columns of a hand in an action row.
 pub fn hand(side: usize) -> Range<usize> {
     ACTION[2 + side].1.clone()
 }
 
-/// Where the position of a wrist is among the columns that a policy may tell.
+/// Returns the columns of a wrist's position among those that a policy may command.
 pub fn wrist_position(side: usize) -> Range<usize> {
     ACTION_WRISTS[side]..ACTION_WRISTS[side] + 3
 }
 
-/// As [`wrist_position`], of its rotation in one form.
+/// Returns the columns of a wrist's rotation in one form.
 pub fn wrist_rotation(side: usize, form: RotationForm) -> Range<usize> {
     let before = RotationForm::ALL.into_iter().take_while(|known| *known != form);
     let from = ACTION_WRISTS[side] + 3 + before.map(RotationForm::len).sum::<usize>();
     from..from + form.len()
 }
 
-/// Which wrist's pose, or part of it, is called `name`. Joints of wrists are joints.
+/// Returns the wrist whose pose, or a part of it, is called `name`. Wrist joints count as joints.
 pub fn wrist_named(name: &str) -> Option<usize> {
     let is_of = |wrist: &str| WRIST_PARTS.iter().any(|(part, _)| name.strip_prefix(wrist) == Some(*part));
     WRISTS.iter().position(|wrist| is_of(wrist))
 }
 
-/// Which of [`state_values`] the `names` mean, in their order.
+/// Returns the indices in [`state_values`] of the columns called `names`, in their order.
 pub fn state_columns(names: &[String]) -> Result<Vec<usize>, String> {
     columns(names, &state_blocks(), &state_singles())
 }
 
-/// What of the state columns numbered `columns` the benchmark's own policies are not shown.
+/// Returns the extra information in the state columns `columns` that the benchmark's own policies do not
+/// get.
 pub fn extra_columns(columns: &[usize]) -> Vec<ExtraInformation> {
     let extra = [
         (ExtraInformation::Gravity, STATE_GRAVITY..STATE_PELVIS),
@@ -193,7 +199,8 @@ pub fn extra_columns(columns: &[usize]) -> Vec<ExtraInformation> {
     extra.into_iter().filter(|(_, of)| named(of)).map(|(what, _)| what).collect()
 }
 
-/// Which columns of those that a policy may tell the `names` mean, in their order.
+/// Returns the indices of the columns called `names` among those that a policy may command, in their
+/// order.
 pub fn action_columns(names: &[String]) -> Result<Vec<usize>, String> {
     let columns = columns(names, &action_blocks(), &action_singles())?;
     match (0..columns.len()).find(|index| columns[..*index].contains(&columns[*index])) {
@@ -202,7 +209,8 @@ pub fn action_columns(names: &[String]) -> Result<Vec<usize>, String> {
     }
 }
 
-/// What column number `column` of those that a policy may tell is called; of a wrist, the part that it belongs to.
+/// Returns the name of column number `column` that a policy may command; for a wrist, the name of the
+/// part.
 pub fn action_name(column: usize) -> String {
     let single = action_singles().into_iter().find(|(_, at)| *at == column).map(|(name, _)| name);
     let parts = || wrist_blocks(ACTION_WRISTS).into_iter().filter(|(name, _)| !WRISTS.contains(&&**name));
@@ -220,7 +228,7 @@ fn action_blocks() -> Vec<Block> {
     own.chain(wrist_blocks(ACTION_WRISTS)).collect()
 }
 
-/// Blocks of wrists whose numbers begin at `starts`.
+/// Returns the blocks of wrists whose columns begin at `starts`.
 fn wrist_blocks(starts: [usize; 2]) -> Vec<Block> {
     let of_wrist = |(wrist, start): (&str, usize)| {
         let block = |(part, columns): &(&str, Range<usize>)| {
@@ -327,7 +335,8 @@ mod tests {
 
     #[test]
     fn columns_are_those_of_the_contract() {
-        // Blocks of arms, hands and waist follow the one order in a state and the other in a row, with equal joints.
+        // The blocks of arms, hands and waist have different orders in states and rows, but the same
+        // joints.
         let action: Vec<String> = (0..ACTION_LEN).map(action_name).collect();
         assert!(action.iter().all(|name| !name.is_empty()), "{action:?}");
         assert_eq!(

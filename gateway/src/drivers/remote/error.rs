@@ -1,41 +1,43 @@
-//! Why a policy behind a socket gives no action. Each text says what came, and what would have been right.
+//! Reasons why a policy server gives no action. Each message says what was received and what was
+//! expected.
 
 use std::time::Duration;
 
 use tandem_episodes::printable;
 
-/// What went wrong with a server.
+/// A failure of a policy server.
 #[derive(Debug, thiserror::Error)]
 pub enum RemoteError {
     /// No server listens at the address yet.
     #[error("no policy answers at {url}: {reason}")]
     Unreachable { url: String, reason: String },
-    /// The server was there, and is gone.
+    /// The connection to the server has broken.
     #[error("the policy at {url} is gone: {reason}")]
     Gone { url: String, reason: String },
-    /// The server takes too long.
+    /// The server exceeds its time limit.
     #[error("the policy at {url} gave no answer within {} s", .within.as_secs_f64())]
     Slow { url: String, within: Duration },
-    /// The server says itself that it failed.
+    /// The server reports that it failed.
     #[error("the policy at {url} failed: {text}")]
     Failed { url: String, text: String },
-    /// What the server sends is not of its protocol.
+    /// The server's message violates its protocol.
     #[error("the policy at {url} sent what cannot be read: {reason}")]
     Unreadable { url: String, reason: String },
-    /// What the server sends does not fit the map.
+    /// The server's answer does not fit the map.
     #[error("the policy's answer does not fit its map: {0}")]
     Misfit(String),
 }
 
 impl RemoteError {
-    /// What to do where nobody is there who answers, now and in the next episode; `connect_s` is how long that was waited for.
+    /// Returns advice for failures that would repeat in the next episode. `connect_s` is the time limit
+    /// for connecting.
     pub fn remedy(&self, connect_s: f64) -> Option<String> {
         match self {
             RemoteError::Unreachable { .. } => Some(format!(
                 "Start its server, or name in --policy where it listens (a server that starts slowly is waited for longer with a \
                  greater connect_s in its policy map, now {connect_s} s)"
             )),
-            // No setting of a map makes a first answer come.
+            // No setting of a map makes a first answer arrive.
             RemoteError::Slow { .. } => {
                 Some("That is as long as a first answer may take; see what its server does".into())
             }
@@ -47,8 +49,8 @@ impl RemoteError {
     }
 }
 
-/// The line of a text that says most: of a Python traceback the last, of everything else the first; not too much of it. The first
-/// line of a page in HTML is a tag, so of a page it is the beginning.
+/// Returns the most informative line of a text, shortened: the last line of a Python traceback, otherwise
+/// the first. Of an HTML page it returns the beginning, because its first line is a tag.
 pub fn gist(text: &str) -> String {
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
     let line = match (text.starts_with("Traceback"), text.trim_start().starts_with('<')) {

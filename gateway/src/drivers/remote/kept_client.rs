@@ -1,5 +1,5 @@
-//! Servers that are kept alive between requests, while other policies, people or the simulator take their time: servers take a client that
-//! answers no ping for long to be gone.
+//! Connections to servers that are kept alive between requests, while other policies, people or the
+//! simulator take their time. Servers drop a client that answers no ping for long.
 
 use std::{
     sync::{Arc, Condvar, Mutex, MutexGuard, TryLockError},
@@ -9,10 +9,11 @@ use std::{
 
 use super::client::PolicyClient;
 
-/// How long a server hears nothing. Python's websockets asks after 20 s whether anybody is there, and closes after 20 s more.
+/// Maximum time without a message to the server. Python's websockets pings after 20 s and closes after
+/// another 20 s.
 const LONGEST_SILENCE: Duration = Duration::from_secs(5);
 
-/// A client whose connection lives for as long as this is held, whether anything is asked or not.
+/// A client whose connection stays alive for as long as this is held, even while it is idle.
 pub struct KeptClient {
     shared: Arc<SharedClient>,
     keeper: Option<JoinHandle<()>>,
@@ -26,7 +27,7 @@ struct SharedClient {
 
 struct UsedClient {
     client: Box<dyn PolicyClient>,
-    /// When the server last heard something.
+    /// Time of the last message to the server.
     used: Instant,
 }
 
@@ -42,12 +43,12 @@ impl KeptClient {
             Arc::new(SharedClient { client, is_dropped: Mutex::new(false), dropped: Condvar::new() });
         let kept = shared.clone();
         let keeper = thread::Builder::new().name("policy's connection".into());
-        // Where no thread is to be had, the server has to be patient.
+        // Without a thread, the server has to be patient.
         let keeper = keeper.spawn(move || kept.keep_alive(every)).ok();
         KeptClient { shared, keeper }
     }
 
-    /// Does something with the client.
+    /// Runs `work` on the client.
     pub fn with<T>(&self, work: impl FnOnce(&mut dyn PolicyClient) -> T) -> T {
         let mut used = self.shared.client.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
         let came = work(&mut *used.client);
@@ -57,7 +58,7 @@ impl KeptClient {
 }
 
 impl SharedClient {
-    /// Lets the server hear something whenever nobody has asked it for a while.
+    /// Sends a keep-alive whenever the client has been idle for `every`.
     fn keep_alive(&self, every: Duration) {
         loop {
             let waited = self.dropped.wait_timeout_while(self.is_dropped(), every, |is_dropped| !*is_dropped);
@@ -69,7 +70,7 @@ impl SharedClient {
             let mut used = match self.client.try_lock() {
                 Ok(used) => used,
                 Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
-                // It is being asked something.
+                // A request is in progress.
                 Err(TryLockError::WouldBlock) => continue,
             };
             if used.used.elapsed() >= every {
@@ -88,7 +89,7 @@ impl Drop for KeptClient {
     fn drop(&mut self) {
         *self.shared.is_dropped() = true;
         self.shared.dropped.notify_all();
-        // The connection is closed when this returns, and no later.
+        // This makes the connection close before `drop` returns.
         self.keeper.take().map(JoinHandle::join);
     }
 }
@@ -103,7 +104,7 @@ mod tests {
         values::{ReplyValue, RequestValue},
     };
 
-    /// Says when it is kept alive.
+    /// A client that reports every keep-alive.
     struct Beaten(mpsc::Sender<()>);
 
     impl PolicyClient for Beaten {
@@ -116,7 +117,7 @@ mod tests {
         }
 
         fn keep_alive(&mut self) {
-            // The test may have seen enough.
+            // The test may have ended.
             let _ = self.0.send(());
         }
     }

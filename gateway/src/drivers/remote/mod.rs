@@ -1,5 +1,5 @@
-//! Learned policies as servers: we are their client. A map says which pictures and numbers they get under which key, and which they
-//! give back.
+//! Learned policies as servers, of which Tandem is the client. A map assigns the images and values of
+//! requests and answers to keys.
 
 mod action;
 mod client;
@@ -43,27 +43,27 @@ use map::AnswerScope;
 use policy_session::PolicySession;
 use request::TaskInstructions;
 
-/// A learned policy behind one socket, or one behind a socket for each robot.
+/// A learned policy behind one socket, or behind one socket per robot.
 #[derive(Debug)]
 pub struct RemotePolicy {
     protocol: PolicyProtocol,
-    /// One for all robots, or one for each in the task's order.
+    /// One server for all robots, or one for each in the task's order.
     servers: Vec<PolicyAddress>,
     map: PolicyMap,
-    /// Since when each of the episodes that cannot begin yet has waited for the servers.
+    /// Start times of the waits of episodes that are still connecting.
     waits: Mutex<Vec<Instant>>,
-    /// How many episodes it has played whose seeds it is not told.
+    /// Number of episodes played with a hidden seed.
     untold: AtomicU32,
 }
 
 impl RemotePolicy {
-    /// The policy at `urls`, asked as `map` says.
+    /// Creates the policy at `urls`, with requests in the form of `map`.
     pub fn new(protocol: PolicyProtocol, urls: Vec<String>, map: PolicyMap) -> RemotePolicy {
         let servers = urls.into_iter().map(|url| PolicyAddress { url, key: None }).collect();
         RemotePolicy { protocol, servers, map, waits: Mutex::default(), untold: AtomicU32::default() }
     }
 
-    /// The same policy, whose servers want `key`. It is sent encrypted, and within this machine.
+    /// Sets the key that the servers require. Only encrypted or local connections may carry it.
     pub fn with_key(mut self, key: Option<PolicyKey>) -> Result<RemotePolicy, PolicyKeyError> {
         for server in &mut self.servers {
             server.key = key.clone();
@@ -72,7 +72,8 @@ impl RemotePolicy {
         Ok(self)
     }
 
-    /// The number by which the policy tells an episode from others: of its seed, or where it is told none, of how many it has played.
+    /// Returns the number that identifies an episode to the policy. It comes from the seed, or from a
+    /// counter if the seed is hidden.
     fn number_of(&self, spec: &EpisodeSpec) -> u32 {
         let number = spec.told_seed().unwrap_or_else(|| self.untold.fetch_add(1, Ordering::Relaxed));
         EpisodeMoment::number_of(spec.task, number)
@@ -87,7 +88,7 @@ impl RemotePolicy {
         self.waits.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
     }
 
-    /// Connects to the servers for an episode of this task.
+    /// Connects to the servers for an episode of `spec`.
     fn open(&self, spec: &EpisodeSpec) -> Result<PolicySession<'_>, PlayError> {
         let began = Instant::now();
         self.waits().push(began);
@@ -103,7 +104,8 @@ impl RemotePolicy {
         session.map_err(|failures| self.not_opened(&failures))
     }
 
-    /// Nothing was played. Where no server is there, there is none for any other episode.
+    /// Returns the error for an episode that was not played. A missing server affects every other episode
+    /// as well.
     fn not_opened(&self, failures: &[RemoteError]) -> PlayError {
         let reasons: Vec<String> = failures.iter().map(RemoteError::to_string).collect();
         let reasons = reasons.join("; ");
@@ -113,7 +115,7 @@ impl RemotePolicy {
         }
     }
 
-    /// Whether there are as many servers as the task and the map want.
+    /// Checks that the number of servers fits the task and the map.
     fn check(&self, task: &Task) -> Result<(), String> {
         let (servers, robots) = (self.servers.len(), task.robots.len());
         match (servers, self.map.answer) {

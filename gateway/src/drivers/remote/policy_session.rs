@@ -1,4 +1,5 @@
-//! A policy session: servers of one policy, connected for one episode. Look, ask, execute, until the episode is over.
+//! A policy session: the servers of one policy, connected for one episode. It observes, requests actions
+//! and executes them until the episode is over.
 
 use std::{
     panic::resume_unwind,
@@ -17,24 +18,28 @@ use super::{
     request::{ObservationHistory, PolicyObservation, TaskInstructions, request},
 };
 
-/// How long the first answer may take: models are compiled then. No clock of an episode runs yet.
+/// Time limit for the first answer, during which models are compiled. No clock of an episode runs yet.
 const FIRST_ANSWER: Duration = Duration::from_secs(600);
 
-/// How soon a server is tried again where nobody listens yet.
+/// Interval between attempts to connect to a server that is not listening yet.
 const RETRY_INTERVAL: Duration = Duration::from_millis(500);
 
-/// Servers of a policy, connected, each of which has answered once.
+/// Connected servers of a policy, each of which has answered once.
 pub struct PolicySession<'a> {
     plan: QueryPlan<'a>,
-    /// One for all robots, or one for each.
+    /// One client for all robots, or one for each.
     clients: Vec<KeptClient>,
-    /// The most steps of one command.
+    /// Maximum number of control steps per command.
     most_steps: usize,
 }
 
 impl<'a> PolicySession<'a> {
-    /// Connects to the servers at `addresses` side by side, waiting for those that are not there yet, and tries each with black pictures
-    /// and zeros. Says of each that fails why.
+    /// Connects to the servers at `addresses` in parallel, waiting for those that are not there yet.
+    /// Probes each with black images and zeros.
+    ///
+    /// # Errors
+    ///
+    /// Returns the failure of each server that fails.
     pub fn open(
         protocol: PolicyProtocol,
         addresses: &[PolicyAddress],
@@ -73,10 +78,10 @@ impl<'a> PolicySession<'a> {
         }
     }
 
-    /// Plays the episode of this number until it is over, or a policy fails.
+    /// Plays the episode with this number until it is over or a policy fails.
     pub fn play(&mut self, episode: &mut dyn LocalEpisode, number: u32) -> Result<(), PlayerError> {
         self.act(episode, number).map_err(|error| match error {
-            // An answer that cannot be executed is a failure of the server's, too.
+            // An answer that cannot be executed is also a failure of the server.
             PlayerError::Call { .. } => PlayerError::Failed(error.to_string()),
             error => error,
         })
@@ -103,7 +108,8 @@ impl<'a> PolicySession<'a> {
         }
     }
 
-    /// Asks for every robot: a shared policy once after the other, policies of their own at the same time.
+    /// Requests the actions of all robots: one after another from a shared policy, in parallel from
+    /// separate ones.
     fn decide(
         &mut self,
         shown: &[&PolicyObservation],
@@ -130,29 +136,29 @@ impl<'a> PolicySession<'a> {
     }
 }
 
-/// What a thread came to; a panic on it goes on here.
+/// Returns the result of a thread; its panic continues here.
 fn joined<T>(thread: ScopedJoinHandle<T>) -> T {
     thread.join().unwrap_or_else(|panic| resume_unwind(panic))
 }
 
-/// Which requests are made for which robots, as a map says.
+/// Requests and their robots, as the map defines them.
 struct QueryPlan<'a> {
     map: &'a PolicyMap,
     instructions: TaskInstructions,
 }
 
 impl QueryPlan<'_> {
-    /// How long an answer may take.
+    /// Returns the time limit for an answer.
     fn within(&self) -> Duration {
         Duration::from_secs_f64(self.map.reply_s)
     }
 
-    /// The robots of each request.
+    /// Returns the robot indices of each request.
     fn queries(&self) -> Vec<Vec<usize>> {
         self.map.queries(self.instructions.robots.len())
     }
 
-    /// Whether a server answers what its map says.
+    /// Checks that a server's answer fits the map.
     fn probe(&self, client: &mut dyn PolicyClient, robots: &[usize]) -> Result<(), RemoteError> {
         let observation = PolicyObservation::blank(self.instructions.robots.len());
         let shown = vec![&observation; self.map.history.map_or(1, |history| history.length)];
@@ -177,7 +183,7 @@ impl QueryPlan<'_> {
     }
 }
 
-/// Tries again until the deadline while nobody listens, each time with the time that is left.
+/// Retries until the deadline while no server listens, each time with the remaining time.
 fn retry_until<T>(
     deadline: Instant,
     mut attempt: impl FnMut(Duration) -> Result<T, RemoteError>,

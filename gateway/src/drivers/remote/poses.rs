@@ -1,21 +1,22 @@
-//! Poses as policies write them: a position, and a rotation in one of several forms.
+//! Poses in the forms that policies use: a position, and a rotation in one of several forms.
 
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 
-/// Below this length a vector has no direction.
+/// Length below which a vector has no direction.
 const SHORTEST: f64 = 1e-6;
 
-/// Numbers of a pose: x, y, z in m, then the rotation in each form of [`RotationForm::ALL`].
+/// Length of a pose: x, y, z in m, then the rotation in each form of [`RotationForm::ALL`].
 pub const POSE_LEN: usize = 3 + 4 + 4 + 6 + 6;
 
-/// How a rotation is written.
+/// Representation of a rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RotationForm {
-    /// w, x, y, z.
+    /// Order w, x, y, z.
     QuaternionWxyz,
-    /// x, y, z, w.
+    /// Order x, y, z, w.
     QuaternionXyzw,
-    /// The first two columns of the matrix, as in Zhou et al. 2019, "On the Continuity of Rotation Representations".
+    /// The first two columns of the matrix, as in Zhou et al. 2019, "On the Continuity of Rotation
+    /// Representations".
     Columns,
     /// The first two rows of the matrix, as `matrix_to_rotation_6d` of PyTorch3D.
     Rows,
@@ -29,7 +30,7 @@ impl RotationForm {
         RotationForm::Rows,
     ];
 
-    /// How many numbers it takes.
+    /// Returns its number of values.
     pub fn len(self) -> usize {
         match self {
             RotationForm::QuaternionWxyz | RotationForm::QuaternionXyzw => 4,
@@ -37,20 +38,20 @@ impl RotationForm {
         }
     }
 
-    /// The rotation in this form.
+    /// Writes the rotation in this form.
     fn write(self, rotation: &UnitQuaternion<f64>) -> Vec<f64> {
         let q = rotation.quaternion();
         let matrix = rotation.to_rotation_matrix();
         match self {
             RotationForm::QuaternionWxyz => vec![q.w, q.i, q.j, q.k],
             RotationForm::QuaternionXyzw => vec![q.i, q.j, q.k, q.w],
-            // A matrix lies in memory column by column.
+            // Matrices are stored column by column.
             RotationForm::Columns => matrix.matrix().iter().take(6).copied().collect(),
             RotationForm::Rows => matrix.matrix().transpose().iter().take(6).copied().collect(),
         }
     }
 
-    /// The rotation nearest to what the numbers say; `None` where they say no direction.
+    /// Returns the rotation nearest to the values, or `None` if they define no direction.
     pub fn read(self, values: &[f64]) -> Option<UnitQuaternion<f64>> {
         match (self, values) {
             (RotationForm::QuaternionWxyz, &[w, x, y, z]) | (RotationForm::QuaternionXyzw, &[x, y, z, w]) => {
@@ -63,7 +64,8 @@ impl RotationForm {
     }
 }
 
-/// Gram and Schmidt: the first vector keeps its direction, the second what is square to it, the third follows.
+/// Returns the Gram-Schmidt orthogonalization of two vectors: the first keeps its direction, the second
+/// its orthogonal part, and the third follows.
 fn matrix_of(values: &[f64]) -> Option<UnitQuaternion<f64>> {
     let &[x0, x1, x2, y0, y1, y2] = values else { return None };
     let x = Vector3::new(x0, x1, x2).try_normalize(SHORTEST)?;
@@ -73,7 +75,7 @@ fn matrix_of(values: &[f64]) -> Option<UnitQuaternion<f64>> {
     Some(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(matrix)))
 }
 
-/// A pose as a state has it: all that a policy may want of it, [`POSE_LEN`] numbers.
+/// Returns a pose with its rotation in all forms: [`POSE_LEN`] numbers.
 pub fn pose_values(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Vec<f64> {
     let rotation = RotationForm::QuaternionWxyz.read(&quaternion_wxyz).unwrap_or_default();
     let [_, derived @ ..] = RotationForm::ALL;
@@ -81,7 +83,7 @@ pub fn pose_values(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Vec<f64> 
     position_m.into_iter().chain(quaternion_wxyz).chain(derived).collect()
 }
 
-/// The pose that begins with x, y, z, w, x, y, z. One without a direction, as in a state of zeros, is not turned.
+/// Returns the pose that begins with x, y, z, w, x, y, z. A zero quaternion means no rotation.
 pub fn pose_of(values: &[f64]) -> Isometry3<f64> {
     let rotation = RotationForm::QuaternionWxyz.read(&values[3..7]).unwrap_or_default();
     Isometry3::from_parts(Translation3::new(values[0], values[1], values[2]), rotation)
@@ -98,7 +100,7 @@ mod tests {
             let written = form.write(&rotation);
             assert_eq!(written.len(), form.len());
             assert!(form.read(&written).unwrap().angle_to(&rotation) < 1e-9, "{form:?}");
-            // A network gives neither unit quaternions nor square axes.
+            // Networks return neither unit quaternions nor orthogonal axes.
             let stretched: Vec<f64> = written.iter().map(|value| value * 1.7).collect();
             assert!(form.read(&stretched).unwrap().angle_to(&rotation) < 1e-9, "{form:?}");
             assert_eq!(form.read(&vec![0.0; form.len()]), None);
@@ -119,7 +121,7 @@ mod tests {
         };
         assert_eq!(rounded(RotationForm::Columns), [0.0, 1.0, 0.0, -1.0, 0.0, 0.0]);
         assert_eq!(rounded(RotationForm::Rows), [0.0, -1.0, 0.0, 1.0, 0.0, 0.0]);
-        // What the second vector has along the first does not count.
+        // The part of the second vector along the first is ignored.
         let leaning = RotationForm::Columns.read(&[0.0, 2.0, 0.0, -1.0, 5.0, 0.0]).unwrap();
         assert!(leaning.angle_to(&quarter) < 1e-9);
         assert_eq!(RotationForm::Columns.read(&[0.0, 2.0, 0.0, 0.0, 5.0, 0.0]), None);

@@ -1,4 +1,5 @@
-//! A map tried on a made-up observation and a made-up answer: what a policy would be sent, and what its answer would do.
+//! Trial of a map with a made-up observation and answer. It reports the request that a policy would get
+//! and the effect of its answer.
 
 use std::collections::BTreeMap;
 
@@ -19,12 +20,13 @@ use super::{
     values::{ReplyValue, RequestValue},
 };
 
-/// Rows of a made-up answer where the map leaves open how many there are.
+/// Rows of a made-up answer if the map does not fix their number.
 const ROWS: usize = 10;
-/// Policies answer with 8 to 100 rows: where a map says nothing of its own, no more are taken for granted.
+/// Maximum rows of a made-up answer if the map does not fix their number; policies answer with 8 to 100
+/// rows.
 const MAX_TRIAL_ROWS: usize = 100;
 
-/// Tries `map` with as many robots as there are tasks for, and says what came of it.
+/// Tries `map` with each number of robots for which there are tasks, and returns the report.
 pub fn try_map(map: &PolicyMap) -> Result<String, RemoteError> {
     check_execute(map)?;
     let by_robots: BTreeMap<usize, &Task> =
@@ -33,18 +35,18 @@ pub fn try_map(map: &PolicyMap) -> Result<String, RemoteError> {
     Ok(trials.collect::<Result<Vec<_>, RemoteError>>()?.join("\n"))
 }
 
-/// A map with as many robots as one task has.
+/// The trial of a map for the robots of one task.
 struct MapTrial<'a> {
     map: &'a PolicyMap,
     task: &'a Task,
     instructions: TaskInstructions,
     observation: PolicyObservation,
-    /// The robots of the first request.
+    /// Robots of the first request.
     asked: Vec<usize>,
     chunks: Vec<RobotRows>,
 }
 
-/// A key, what kind of value stands under it, and what that is.
+/// A key with the type and meaning of its value.
 struct KeyLine {
     key: String,
     kind: String,
@@ -52,7 +54,7 @@ struct KeyLine {
 }
 
 impl<'a> MapTrial<'a> {
-    /// Makes up an answer to every request, and reads it as a policy's.
+    /// Makes up an answer to every request and parses it as a policy's.
     fn new(map: &'a PolicyMap, task: &'a Task) -> Result<MapTrial<'a>, RemoteError> {
         let (instructions, robots) = (instructions(task, TaskWords::of(task)), task.robots.len());
         let observation = PolicyObservation::blank(robots);
@@ -93,7 +95,7 @@ impl<'a> MapTrial<'a> {
         )
     }
 
-    /// What stands under each key of the first request.
+    /// Lists the keys of the first request with their values.
     fn request_lines(&self) -> Vec<KeyLine> {
         let robot = match self.map.answer {
             AnswerScope::One => self.asked.first().copied(),
@@ -112,7 +114,7 @@ impl<'a> MapTrial<'a> {
         lines.into_iter().map(line).collect()
     }
 
-    /// What of robots or room is sent under `key`.
+    /// Describes the value sent under `key`.
     fn sent_under(&self, key: &str, value: &RequestValue) -> String {
         let is_it = |known: &str| {
             let named = |name: &String| parts(&known.replace(ROBOT, name)) == key;
@@ -140,7 +142,7 @@ impl<'a> MapTrial<'a> {
         }
     }
 
-    /// What an answer has under `key`, and where that goes.
+    /// Describes the columns of an answer under `key` and the joints that they command.
     fn answer_lines(&self, key: &str, names: &[String]) -> Vec<KeyLine> {
         let robots: Vec<&String> = self.asked.iter().map(|robot| &self.instructions.robots[*robot]).collect();
         let rows = self.map.chunk.rows.map_or("rows".to_owned(), |rows| rows.to_string());
@@ -169,7 +171,7 @@ impl<'a> MapTrial<'a> {
         }
     }
 
-    /// What else than a target a column is.
+    /// Describes how a column is interpreted if it is not an absolute target.
     fn understood(&self, name: &str) -> String {
         let columns = action_columns(&[name.to_owned()]).unwrap_or_default();
         let delta = self.map.delta();
@@ -195,7 +197,7 @@ impl<'a> MapTrial<'a> {
         told.into()
     }
 
-    /// The calls that a made-up answer becomes.
+    /// Describes the calls that a made-up answer becomes.
     fn execution(&self) -> String {
         let rows = executed_rows(&self.chunks);
         let calls = |protocol: Protocol| {
@@ -227,7 +229,7 @@ impl<'a> MapTrial<'a> {
         )
     }
 
-    /// What the map leaves open and an answer has to have all the same.
+    /// Describes a requirement on the number of rows that the map does not state.
     fn made_up_rows(&self) -> String {
         match (self.map.chunk.rows, self.map.chunk.execute) {
             (None, Some(execute)) => {
@@ -239,7 +241,7 @@ impl<'a> MapTrial<'a> {
         }
     }
 
-    /// What no key tells.
+    /// Describes the columns that no key commands.
     fn held(&self) -> String {
         let told = self.map.told_columns();
         let blocks = ["left_arm", "right_arm", "left_hand", "right_hand", "waist", "base_command"];
@@ -265,7 +267,7 @@ impl<'a> MapTrial<'a> {
     }
 }
 
-/// Whether a made-up answer can have as many rows as the map executes of it.
+/// Checks that a made-up answer can have the number of rows that the map executes.
 fn check_execute(map: &PolicyMap) -> Result<(), RemoteError> {
     match (map.chunk.rows, map.chunk.execute) {
         (None, Some(execute)) if execute > MAX_TRIAL_ROWS => Err(RemoteError::Misfit(format!(
@@ -277,7 +279,7 @@ fn check_execute(map: &PolicyMap) -> Result<(), RemoteError> {
     }
 }
 
-/// An answer of the shape that the map expects, whose columns can be told apart: 0.01, 0.02 and so on.
+/// Makes up an answer of the expected shape with distinguishable columns: 0.01, 0.02 and so on.
 fn made_up_answer(map: &PolicyMap, instructions: &TaskInstructions, asked: &[usize]) -> ReplyValue {
     let rows = map.chunk.rows.or(map.chunk.execute).unwrap_or(ROWS);
     let mut answer = ReplyValue::Map(Vec::new());
@@ -298,7 +300,7 @@ fn made_up_answer(map: &PolicyMap, instructions: &TaskInstructions, asked: &[usi
     answer
 }
 
-/// Keys with their values, those in maps with what leads there.
+/// Lists keys with their values; keys in nested maps include their path.
 fn flatten<'a>(
     before: &str,
     entries: &'a [(String, RequestValue)],
@@ -315,7 +317,7 @@ fn flatten<'a>(
     }
 }
 
-/// A key as [`flatten`] writes it.
+/// Formats a key in the same way as [`flatten`].
 fn parts(key: &str) -> String {
     super::values::path(key).collect::<Vec<_>>().join(" > ")
 }
@@ -344,7 +346,7 @@ fn of_robot(robot: &str, robots: &[&String]) -> String {
     }
 }
 
-/// What the first robot of a command is told, without what is left open, and of rows the first.
+/// Returns the command of the first robot without empty fields, and only the first row.
 fn told_first(call: &Value) -> Value {
     let mut entry = call["robots"][0].clone();
     if let Some(fields) = entry.as_object_mut() {
@@ -400,7 +402,7 @@ mod tests {
         for (name, _) in crate::drivers::PRESETS {
             let told = try_map(&PolicyMap::find(name).unwrap()).unwrap();
             assert!(told.contains("3 robots: "), "{name}: {told}");
-            // XPolicyLab has no words for waist and base.
+            // XPolicyLab has no keys for waist and base.
             let held = told.contains("no key tells waist, base_command: held as at the start");
             assert_eq!(held, name == "xpolicylab", "{name}: {told}");
         }

@@ -1,13 +1,13 @@
-//! What goes to a policy and what comes back, before it is written as one protocol or the other wants it.
+//! Values of requests and answers, independent of the protocol.
 
-/// An array as numpy has it, C order.
+/// An array as in numpy, in C order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Array {
     pub shape: Vec<usize>,
     pub elements: Elements,
 }
 
-/// Elements of an array that goes out.
+/// Elements of an array in a request.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Elements {
     Bytes(Vec<u8>),
@@ -15,7 +15,7 @@ pub enum Elements {
 }
 
 impl Array {
-    /// Arrays of one shape along a new first axis.
+    /// Stacks arrays of one shape along a new first axis.
     pub fn stack(arrays: Vec<Array>) -> Array {
         let shape = arrays.first().map(|array| array.shape.clone()).unwrap_or_default();
         let shape = std::iter::once(arrays.len()).chain(shape).collect();
@@ -30,7 +30,7 @@ impl Array {
         Array { shape, elements: joined.unwrap_or(Elements::Floats(Vec::new())) }
     }
 
-    /// The type of the elements, by numpy's name for it.
+    /// Returns numpy's name for the type of the elements.
     pub fn dtype(&self) -> &'static str {
         match self.elements {
             Elements::Bytes(_) => "|u1",
@@ -38,7 +38,7 @@ impl Array {
         }
     }
 
-    /// The elements as they lie in memory.
+    /// Returns the elements as bytes, in little-endian order.
     pub fn bytes(&self) -> Vec<u8> {
         match &self.elements {
             Elements::Bytes(bytes) => bytes.clone(),
@@ -47,7 +47,7 @@ impl Array {
     }
 }
 
-/// What goes to a policy.
+/// A value in a request to a policy.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RequestValue {
     Map(Vec<(String, RequestValue)>),
@@ -56,13 +56,13 @@ pub enum RequestValue {
     List(Vec<RequestValue>),
 }
 
-/// Parts of a key: `video > ego_view` is `ego_view` in the map `video`.
+/// Splits a key into its parts: `video > ego_view` is `ego_view` in the map `video`.
 pub fn path(key: &str) -> impl Iterator<Item = &str> {
     key.split('>').map(str::trim).filter(|part| !part.is_empty())
 }
 
 impl RequestValue {
-    /// Puts `value` where `key` says, and makes the maps on the way.
+    /// Stores `value` under the path `key`, creating the maps on the way.
     pub fn put(&mut self, key: &str, value: RequestValue) {
         let mut at = self;
         for part in path(key) {
@@ -77,7 +77,7 @@ impl RequestValue {
     }
 }
 
-/// What a policy answers.
+/// A value in a policy's answer.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ReplyValue {
     Map(Vec<(String, ReplyValue)>),
@@ -86,17 +86,17 @@ pub enum ReplyValue {
         values: Vec<f64>,
     },
     Text(String),
-    /// What is none of these, described in words.
+    /// A value of any other type, described in words.
     Other(String),
 }
 
 impl ReplyValue {
-    /// A single number.
+    /// Wraps a single number.
     pub fn number(value: f64) -> ReplyValue {
         ReplyValue::Array { shape: Vec::new(), values: vec![value] }
     }
 
-    /// A list, which is an array if all in it are arrays of one shape.
+    /// Converts a list. It becomes an array if all items are arrays of one shape.
     pub fn list(items: Vec<ReplyValue>) -> ReplyValue {
         let (length, mut joined, mut inner) = (items.len(), Vec::new(), None);
         for item in items {
@@ -112,7 +112,11 @@ impl ReplyValue {
         ReplyValue::Array { shape, values: joined }
     }
 
-    /// An array from the bytes that numpy has of it, or what is wrong with them.
+    /// Reads an array from numpy's bytes.
+    ///
+    /// # Errors
+    ///
+    /// Returns a description of what is wrong with them.
     pub fn from_bytes(dtype: &str, shape: Vec<usize>, bytes: &[u8]) -> Result<ReplyValue, String> {
         let values: Vec<f64> = match dtype {
             "<f4" => read(bytes, |four| f32::from_le_bytes(four).into()),
@@ -129,7 +133,8 @@ impl ReplyValue {
         }
     }
 
-    /// Puts `value` where `key` says, and makes the maps on the way; in place of the whole where it names nothing.
+    /// Stores `value` under the path `key`, creating the maps on the way. An empty path replaces the
+    /// whole value.
     pub fn put(&mut self, key: &str, value: ReplyValue) {
         let mut at = self;
         for part in path(key) {
@@ -146,7 +151,7 @@ impl ReplyValue {
         *at = value;
     }
 
-    /// What `key` names; the whole where it names nothing.
+    /// Returns the value at the path `key`; an empty path means the whole value.
     pub fn at(&self, key: &str) -> Option<&ReplyValue> {
         path(key).try_fold(self, |at, part| match at {
             ReplyValue::Map(entries) => entries.iter().find(|(name, _)| name == part).map(|(_, reply)| reply),
@@ -154,7 +159,7 @@ impl ReplyValue {
         })
     }
 
-    /// Describes the value in words, for whoever has to mend a map.
+    /// Describes the value in words for the author of a map.
     pub fn describe(&self) -> String {
         match self {
             ReplyValue::Map(entries) if entries.is_empty() => "an empty map".into(),

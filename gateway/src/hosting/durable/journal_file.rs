@@ -1,6 +1,8 @@
-//! The journal of an episode as a file: a line that says what the episode is, then a line for everything that
-//! was answered at once. A line is written whole or counts for nothing, so that what was done and what was
-//! answered are never one without the other.
+//! The journal of an episode as a file: a heading line, then one line for each group of calls that were
+//! answered together.
+//!
+//! A line is either written whole or ignored. So an action and its answer are never recorded one without
+//! the other.
 
 use std::{
     error::Error,
@@ -19,43 +21,43 @@ use tandem_tools_spec::{Call, Driving, Heard, Note, Observation, Partner, StartE
 
 use crate::{hosting::Answer, settings::Durability};
 
-/// Number of the format; another one means that builds cannot read each other's lines.
+/// Version of the format. Builds with different versions cannot read each other's lines.
 const FORMAT: u32 = 1;
 
-/// Room for most lines: a robot's state and what goes with it.
+/// Initial buffer size; enough for most lines, which hold a robot's state and the request.
 const USUAL_LINE_BYTES: usize = 8 << 10;
 
-/// What an episode is, and how it was started.
+/// Description of an episode and of its start.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Heading {
     format: u32,
-    /// The build that plays it.
+    /// Build that plays the episode.
     pub build: String,
     pub spec: EpisodeSpec,
     pub visibility: Visibility,
     pub driving: Driving,
-    /// What the caller was told, tokens included.
+    /// Reply to the start, tokens included.
     pub start: StartReply,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub key: Option<StartKey>,
 }
 
-/// The idempotency key of a start, and what came with it.
+/// Idempotency key of a start and the arguments that came with it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StartKey {
     pub key: String,
     pub args: StartEpisode,
 }
 
-/// A call with a key, whose answer is kept for who asks again.
+/// A call with an idempotency key. Its answer is kept for repeated requests.
 #[derive(Debug, Clone)]
 pub struct Keyed {
     pub key: String,
     pub request: Call,
 }
 
-/// Line of a journal: requests that were answered at once, the answers and notes among them that have a key,
-/// and the host's memory where it has changed.
+/// A line of a journal: requests that were answered together, their answers and notes that have a key,
+/// and the host's memory if it has changed.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Commit {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -68,14 +70,14 @@ pub struct Commit {
     pub memory: Option<Value>,
 }
 
-/// A note that came with a key, and is kept once.
+/// A note that came with a key and is kept once.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct KeyedNote {
     pub key: String,
     pub note: Note,
 }
 
-/// An answer, and the request that it answers.
+/// An answer and the request that it answers.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct KeptAnswer {
     pub key: String,
@@ -96,7 +98,7 @@ pub struct KeptAnswer {
     others_play_on: bool,
 }
 
-/// A journal that is written.
+/// A journal that is open for writing.
 #[derive(Debug)]
 pub struct JournalFile {
     path: PathBuf,
@@ -104,11 +106,11 @@ pub struct JournalFile {
     durability: Durability,
 }
 
-/// A journal that is read, line by line.
+/// A journal that is read line by line.
 pub struct JournalReader {
     pub heading: Heading,
     lines: BufReader<File>,
-    /// How much of the file is whole lines.
+    /// Length of the whole lines read up to now.
     whole_bytes: u64,
 }
 
@@ -133,7 +135,7 @@ impl Commit {
 }
 
 impl KeptAnswer {
-    /// The answer to `keyed`, kept as it was told.
+    /// Converts the answer to `keyed` into its stored form.
     pub fn new(keyed: &Keyed, answer: &Answer) -> Result<KeptAnswer, serde_json::Error> {
         Ok(KeptAnswer {
             key: keyed.key.clone(),
@@ -149,7 +151,7 @@ impl KeptAnswer {
         })
     }
 
-    /// The request, and the answer as it was told.
+    /// Parses the request and the answer.
     pub fn read(self) -> Result<(Call, Answer), Box<dyn Error>> {
         let request = Call::parse(&self.tool, serde_json::from_str(self.arguments.get())?)?;
         let reply = request.tool.parse_reply(serde_json::from_str(self.reply.get())?)?;
@@ -159,28 +161,28 @@ impl KeptAnswer {
 }
 
 impl JournalFile {
-    /// Begins the journal at `path`.
+    /// Creates the journal at `path` and writes its heading.
     pub fn create(path: &Path, heading: &Heading, durability: Durability) -> io::Result<JournalFile> {
         let file = private_file(path)?;
         let mut journal = JournalFile { path: path.into(), file, durability };
         match journal.append(heading) {
             Ok(()) => Ok(journal),
             Err(error) => {
-                // Half a heading says nothing.
+                // Half a heading is useless.
                 let _ = journal.remove();
                 Err(error)
             }
         }
     }
 
-    /// Goes on with a journal that has been read to its end.
+    /// Continues a journal that has been read to its end.
     pub fn go_on(path: &Path, read: JournalReader, durability: Durability) -> io::Result<JournalFile> {
         let file = OpenOptions::new().append(true).open(path)?;
         file.set_len(read.whole_bytes)?;
         Ok(JournalFile { path: path.into(), file, durability })
     }
 
-    /// Writes a line more. After an error the journal is not to be used any more.
+    /// Appends a line. The journal must not be used after an error.
     pub fn append(&mut self, line: &impl Serialize) -> io::Result<()> {
         let mut bytes = Vec::with_capacity(USUAL_LINE_BYTES);
         serde_json::to_writer(&mut bytes, line)?;
@@ -192,14 +194,14 @@ impl JournalFile {
         }
     }
 
-    /// Removes it: the episode is not to be brought back.
+    /// Removes the journal, so that the episode is not brought back.
     pub fn remove(self) -> io::Result<()> {
         fs::remove_file(&self.path)
     }
 }
 
 impl JournalReader {
-    /// Reads what the episode at `path` is.
+    /// Opens the journal at `path` and reads its heading.
     pub fn open(path: &Path) -> io::Result<JournalReader> {
         let mut lines = BufReader::new(File::open(path)?);
         let (heading, bytes) = read_line::<Heading>(&mut lines)?
@@ -211,7 +213,7 @@ impl JournalReader {
         Ok(JournalReader { heading, lines, whole_bytes: bytes })
     }
 
-    /// What was answered next; none after the last line that is whole.
+    /// Returns the next commit, or `None` after the last whole line.
     pub fn next_commit(&mut self) -> io::Result<Option<Commit>> {
         let read = read_line(&mut self.lines)?;
         Ok(read.map(|(commit, bytes)| {
@@ -221,7 +223,7 @@ impl JournalReader {
     }
 }
 
-/// A new file that nobody but its owner may read: it holds tokens.
+/// Creates a file that only its owner may read, because it holds tokens.
 fn private_file(path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.write(true).create(true).truncate(true);
@@ -230,7 +232,8 @@ fn private_file(path: &Path) -> io::Result<File> {
     options.open(path)
 }
 
-/// A line that is whole, and its length.
+/// Reads a whole line and returns it with its length. Returns `None` at the end or for an incomplete
+/// line.
 fn read_line<T: for<'a> Deserialize<'a>>(lines: &mut impl BufRead) -> io::Result<Option<(T, u64)>> {
     let mut line = Vec::new();
     lines.read_until(b'\n', &mut line)?;

@@ -1,5 +1,6 @@
-//! Which server plays an episode: the one that has locked the episode's lease. Where the file system has no
-//! locks, a lease is held for as long as its owner writes it anew.
+//! Leases, which decide which server plays an episode: the one that has locked the episode's lease file.
+//!
+//! On a file system without locks, a lease is held for as long as its owner keeps renewing it.
 
 use std::{
     fs::{self, File},
@@ -13,41 +14,43 @@ use tandem_episodes::{FileLock, LockKind, Locking};
 
 use super::age;
 
-/// Without locks, the owner of a lease that is older than this is gone.
+/// Age after which the owner of a lease counts as gone. Used without file locks only.
 const STALE: Duration = Duration::from_secs(30);
 
-/// How often a lease is asked for that somebody has. One who looks at it has it for microseconds.
+/// Number of attempts to take a lease that is held. A server that only looks at it holds it for
+/// microseconds.
 const ATTEMPTS: u32 = 40;
 const ATTEMPT_INTERVAL: Duration = Duration::from_millis(1);
-/// Attempts that are left when a lease that says whose it is counts as held.
+/// Remaining attempts from which a lease with a readable owner counts as held.
 const SURE_AFTER: u32 = ATTEMPTS - 3;
 
-/// The right to play an episode, until it is dropped.
+/// The right to play an episode, held until it is dropped.
 #[derive(Debug)]
 pub struct Lease {
     path: PathBuf,
-    /// `None` where the file system has no locks.
+    /// `None` if the file system has no locks.
     lock: Option<FileLock>,
 }
 
-/// What came of an attempt to take a lease.
+/// Outcome of an attempt to take a lease.
 #[derive(Debug)]
 pub enum Leasing {
     Taken(Lease),
-    /// Another server has it, which is reached there.
+    /// Another server, reachable at `url`, holds the lease.
     Held {
-        /// As it was told to others; empty if it has said nothing yet.
+        /// URL that the owner has published; empty if it has not written it yet.
         url: String,
     },
 }
 
 impl Lease {
-    /// The lease of an episode with this journal.
+    /// Returns the path of the lease of the episode with this journal.
     fn path(journal: &Path) -> PathBuf {
         journal.with_extension("lease")
     }
 
-    /// Takes the lease of the episode with this journal for the server at `url`, unless another has it.
+    /// Takes the lease of the episode with this journal for the server at `url`, unless another server
+    /// has it.
     pub fn take(journal: &Path, url: &str) -> io::Result<Leasing> {
         let path = Lease::path(journal);
         let mut attempts = ATTEMPTS;
@@ -55,7 +58,7 @@ impl Lease {
             attempts -= 1;
             match FileLock::attempt(&path, LockKind::Exclusive)? {
                 Locking::Locked(lock) => break Some(lock.removing(&path)),
-                // It may be looked at, and one that has just been taken may not be written yet.
+                // Another server may be looking at it, and a fresh lease may have no owner written yet.
                 Locking::Held if attempts > 0 && (attempts > SURE_AFTER || owner(&path).is_empty()) => {
                     thread::sleep(ATTEMPT_INTERVAL);
                 }
@@ -73,7 +76,8 @@ impl Lease {
         Ok(Leasing::Taken(Lease { path, lock }))
     }
 
-    /// Whether another server than the one at `url` has the lease of the episode with this journal.
+    /// Returns true if a server other than the one at `url` has the lease of the episode with this
+    /// journal.
     pub fn is_elsewhere(journal: &Path, url: &str) -> bool {
         let path = Lease::path(journal);
         if !path.exists() {
@@ -86,11 +90,11 @@ impl Lease {
         }
     }
 
-    /// Shows that the owner is still there. To be called more often than every [`STALE`].
+    /// Shows that the owner is still alive. It must be called more often than every [`STALE`].
     pub fn renew(&self) {
         if self.lock.is_none() {
             let touched = File::options().write(true).open(&self.path);
-            // One that cannot be written is missed by nobody until it is stale.
+            // A failure matters only once the lease is stale.
             let _ = touched.and_then(|file| file.set_modified(SystemTime::now()));
         }
     }
@@ -104,14 +108,14 @@ impl Drop for Lease {
     }
 }
 
-/// The owner of a lease without locks, who has shown lately that it is there.
+/// Returns the owner of a lease without locks if it was renewed recently.
 fn fresh_owner(path: &Path) -> Option<String> {
     Some(owner(path)).filter(|owner| !owner.is_empty() && age(path).is_ok_and(|age| age < STALE))
 }
 
 fn owner(path: &Path) -> String {
     let mut text = String::new();
-    // Whoever has just made the file may not have written it yet.
+    // A file that has just been made may not have its owner written yet.
     let _ = File::open(path).and_then(|file| file.take(2048).read_to_string(&mut text));
     text.trim().into()
 }

@@ -1,6 +1,8 @@
-//! Episodes that outlive the process which holds them: each has a journal beside the runs, in which every call
-//! is written before its answer leaves, and a lease that says which server plays it. Whoever takes the lease
-//! plays the journal again.
+//! Episodes that outlive the process which holds them.
+//!
+//! Each has a journal beside the runs, to which every call is written before its answer is sent. Each
+//! also has a lease that names the server which plays it. The server that takes the lease replays the
+//! journal.
 
 mod journal_file;
 mod lease;
@@ -18,38 +20,38 @@ use tandem_episodes::create_private_folder;
 
 use crate::settings::Durability;
 
-/// The folder of journals in the folder of runs. What begins with a dot is no run.
+/// Folder of journals in the runs folder. A name that begins with a dot is never a run.
 const LIVE_FOLDER: &str = ".live";
 const JOURNAL_EXTENSION: &str = "jsonl";
 
-/// The journals of the servers that share a folder of runs.
+/// Journals of the servers that share a runs folder.
 #[derive(Debug, Clone)]
 pub struct LiveFolder {
     path: PathBuf,
-    /// Where the others find this server.
+    /// URL at which the other servers reach this one.
     pub url: String,
     pub durability: Durability,
 }
 
 impl LiveFolder {
-    /// The journals beside `runs`, for a server that is reached at `url`.
+    /// Describes the journals beside `runs` for a server that is reachable at `url`.
     pub fn beside(runs: &Path, url: String, durability: Durability) -> LiveFolder {
         LiveFolder { path: runs.join(LIVE_FOLDER), url, durability }
     }
 
-    /// Makes the folder, where it is not there.
+    /// Creates the folder if it does not exist.
     pub fn create(&self) -> io::Result<()> {
         create_private_folder(&self.path)
     }
 
-    /// The journal of the episode `id`. An id that is no plain name has none.
+    /// Returns the path of the journal of the episode `id`. An id that is no plain name has none.
     pub fn journal(&self, id: &str) -> Option<PathBuf> {
         let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte);
         let plain = !id.is_empty() && !id.starts_with('.') && id.bytes().all(is_plain);
         plain.then(|| self.path.join(format!("{id}.{JOURNAL_EXTENSION}")))
     }
 
-    /// The ids of all episodes that have a journal, in order.
+    /// Lists the ids of all episodes that have a journal, in order.
     pub fn ids(&self) -> Vec<String> {
         let Ok(entries) = fs::read_dir(&self.path) else { return Vec::new() };
         let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
@@ -61,8 +63,8 @@ impl LiveFolder {
     }
 }
 
-/// How long ago a file was written.
+/// Returns the time since a file was written.
 fn age(path: &Path) -> io::Result<Duration> {
-    // One of the future has been written by a clock that is ahead.
+    // A modification time in the future comes from a clock that is ahead.
     Ok(fs::metadata(path)?.modified()?.elapsed().unwrap_or_default())
 }

@@ -1,4 +1,4 @@
-//! What the thread of an episode does for somebody.
+//! Jobs for the thread of an episode.
 
 use std::{sync::Arc, time::Duration};
 
@@ -12,10 +12,10 @@ use crate::hosting::{
     durable::{Heading, Keyed},
 };
 
-/// All of it happens between two other jobs.
+/// A unit of work. No other job runs while it does.
 pub enum Job {
     Call {
-        /// The robot whose operator calls; `None` where one policy directs all.
+        /// Robot whose operator calls; `None` if one policy controls all robots.
         operator: Option<String>,
         call: Box<Call>,
         keyed: Option<Keyed>,
@@ -28,12 +28,12 @@ pub enum Job {
     },
     Together {
         commands: Vec<OperatorCommand>,
-        /// By command.
+        /// Idempotency keys, one entry for each command.
         keyed: Vec<Option<Keyed>>,
         told: Tell<Vec<Answer>>,
         reply: ReplySender<Vec<Answer>>,
     },
-    /// Keeps an answer that was made of several.
+    /// Storage of an answer that was combined from several.
     KeepAnswer {
         keyed: Keyed,
         answer: Box<Answer>,
@@ -45,7 +45,7 @@ pub enum Job {
         key: Option<String>,
         reply: ReplySender<()>,
     },
-    /// Keeps a call that was refused on its way here.
+    /// Record of a call that was refused before it arrived here.
     Refused {
         operator: Option<String>,
         call: Box<RefusedCall>,
@@ -57,7 +57,7 @@ pub enum Job {
     Briefing {
         reply: ReplySender<Briefing>,
     },
-    /// For experts, scoring and clients of policies in this process.
+    /// Used by experts, scoring and clients of policies in this process.
     Work(Work),
     EndIfAbandoned {
         idle: Duration,
@@ -66,44 +66,44 @@ pub enum Job {
         reason: EndReason,
     },
     Watch {
-        /// The operator of this robot looks on, which is recorded.
+        /// Robot whose operator watches, which is recorded.
         operator: Option<String>,
         reply: ReplySender<LiveView>,
     },
-    /// Begins the journal from which the episode can be brought back.
+    /// Start of the journal from which the episode can be brought back.
     BeginJournal {
         heading: Box<Heading>,
         reply: ReplySender<()>,
     },
-    /// Answers as soon as the episode is there.
+    /// A request that is answered as soon as the episode is awake.
     Awake {
         reply: ReplySender<()>,
     },
-    /// Puts the episode aside until the next job.
+    /// Sleep until the next job.
     Sleep,
     Close {
-        /// Whether it is to be brought back by who serves next.
+        /// True if the next server is to bring the episode back.
         keep: bool,
         reply: ReplySender<ResultReply>,
     },
 }
 
-/// A job that knows the session.
+/// A job with access to the session.
 pub type Work = Box<dyn FnOnce(WorkOn) + Send>;
 
-/// What a [`Work`] is for: the session, or why it cannot be had.
+/// Argument of a [`Work`]: the session, or the reason why there is none.
 pub type WorkOn<'a> = Result<(&'a mut PanicGuard, &'a SharedStatus), HostingError>;
 
-/// Makes of what was answered what is told, before it is written down.
+/// Conversion of an outcome into the caller's answer, before it is written to the journal.
 pub type Tell<T> = Box<dyn FnOnce(Result<T, HostingError>) -> Result<T, HostingError> + Send>;
 
 pub type ReplySender<T> = oneshot::Sender<Result<T, HostingError>>;
 
 impl Job {
-    /// Tells who waits for it that the episode cannot be had.
+    /// Replies to the waiting caller that the episode is not available.
     pub fn refuse(self, why: &Arc<HostingError>) {
         let shared = || HostingError::Shared(why.clone());
-        // Who asked may have gone.
+        // The caller may have gone.
         match self {
             Job::Call { reply, .. } | Job::KeepAnswer { reply, .. } | Job::Status { reply } => {
                 drop(reply.send(Err(shared())));

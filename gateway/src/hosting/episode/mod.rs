@@ -1,5 +1,7 @@
-//! The thread that owns one episode's world. Calls reach it through a bounded channel, each with its own reply,
-//! and a call whose caller has gone still finishes, is recorded and charged.
+//! The thread that owns the world of one episode.
+//!
+//! Calls reach it through a bounded channel, each with its own reply. A call whose caller has gone still
+//! finishes, is recorded and charged.
 
 mod job;
 mod onlookers;
@@ -36,11 +38,11 @@ use status::SharedStatus;
 pub use work::HostMemory;
 use work::{Opening, Stage};
 
-/// Calls that may wait for one episode. A policy has no use for more than one at a time; a few more are a
-/// burst.
+/// Maximum number of calls that may wait for one episode. A policy needs one at a time; a few more absorb
+/// a burst.
 pub const WAITING_CALLS: usize = 16;
 
-/// An episode. Its thread ends while it sleeps, and whatever is asked of it wakes it up. Dropping the last
+/// An episode. Its thread ends while the episode sleeps, and any request wakes it up. Dropping the last
 /// handle closes its recording.
 #[derive(Debug)]
 pub struct EpisodeThread {
@@ -48,24 +50,24 @@ pub struct EpisodeThread {
     stage: Arc<Stage>,
     robots: Vec<String>,
     steps_per_command: u32,
-    /// Those who begin to look on wait here, so that many of them take no place of calls.
+    /// Limits the watchers that are joining at once, so that they do not use up the places for calls.
     looking: Semaphore,
 }
 
-/// What an episode is played in.
+/// Environment in which an episode is played.
 #[derive(Debug)]
 pub struct Surroundings {
     pub folder: RunFolder,
-    /// One of the places for episodes, which is given back when it is closed.
+    /// One of the server's places for episodes, released when the episode is closed.
     pub place: OwnedSemaphorePermit,
     pub metrics: Arc<Metrics>,
     pub memory: Arc<dyn HostMemory>,
-    /// Where journals are, if it is to have one.
+    /// Folder of the journals; `None` for an episode without a journal.
     pub journals: Option<LiveFolder>,
 }
 
 impl EpisodeThread {
-    /// Makes the world on a thread of its own, runs the initial hold, and returns what the policy has to know.
+    /// Creates the world on a thread of its own, runs the initial hold and returns the policy's briefing.
     pub async fn start(
         id: &str,
         spec: EpisodeSpec,
@@ -74,7 +76,7 @@ impl EpisodeThread {
         EpisodeThread::start_with_clock(id, spec, surroundings, monotonic()).await
     }
 
-    /// As [`EpisodeThread::start`], with the policy's wall clock read from `clock`.
+    /// Does the same as [`EpisodeThread::start`], with the policy's wall clock read from `clock`.
     pub async fn start_with_clock(
         id: &str,
         spec: EpisodeSpec,
@@ -90,7 +92,7 @@ impl EpisodeThread {
         Ok((EpisodeThread::on(stage, jobs, &briefing), briefing))
     }
 
-    /// An episode that sleeps where `entries` of its journal have brought it, and began as `briefing` has it.
+    /// Creates an episode that sleeps after the given `entries` of its journal and began with `briefing`.
     pub fn asleep<'a>(
         id: &str,
         spec: EpisodeSpec,
@@ -100,7 +102,7 @@ impl EpisodeThread {
     ) -> EpisodeThread {
         let status = SharedStatus::asleep(entries, briefing.status.env_steps);
         let stage = Arc::new(Stage::new(id, spec, surroundings, status));
-        // Nobody receives, so that the first job wakes it up.
+        // The channel has no receiver, so the first job wakes the episode up.
         EpisodeThread::on(stage, mpsc::channel(1).0, briefing)
     }
 
@@ -114,33 +116,33 @@ impl EpisodeThread {
         }
     }
 
-    /// From now on writes what is done into a journal, from which a later process can bring the episode back.
+    /// Starts to write a journal from which a later process can bring the episode back.
     pub async fn begin_journal(&self, heading: Heading) -> Result<(), HostingError> {
         let heading = Box::new(heading);
         self.do_job_in_turn(|reply| Job::BeginJournal { heading, reply }).await
     }
 
-    /// Returns once the episode is there, wherever it has been.
+    /// Wakes the episode up if necessary and returns once it is there.
     pub async fn awake(&self) -> Result<(), HostingError> {
-        // It is not enough that somebody has woken it up: what is answered already has to be known first.
+        // Being woken up is not enough: the answers of the journal have to be restored first.
         match self.stage.status.is_there() {
             true => Ok(()),
             false => self.do_job_in_turn(|reply| Job::Awake { reply }).await,
         }
     }
 
-    /// Puts the episode aside, if it can be brought back and nobody would notice.
+    /// Puts the episode to sleep if it can be brought back and nobody would notice.
     pub fn put_aside(&self) {
         if self.may_sleep() {
             let jobs = lock(&self.jobs);
             if jobs.capacity() == jobs.max_capacity() {
-                // One that has stopped meanwhile needs no memory either.
+                // An episode that has stopped meanwhile needs no memory either.
                 let _ = jobs.try_send(Job::Sleep);
             }
         }
     }
 
-    /// Whether it could be put aside.
+    /// Returns true if the episode could be put to sleep.
     pub fn may_sleep(&self) -> bool {
         let Stage { status, feed, memory, .. } = &*self.stage;
         status.durable.load(Ordering::Relaxed)
@@ -149,23 +151,25 @@ impl EpisodeThread {
             && !memory.is_busy()
     }
 
-    /// Whether it is put aside.
+    /// Returns true if the episode sleeps.
     pub fn sleeps(&self) -> bool {
         self.stage.status.sleep().is_some()
     }
 
-    /// How long nobody has asked it for anything.
+    /// Returns the time since the last request.
     pub fn idle(&self) -> Duration {
         self.stage.status.idle()
     }
 
-    /// Runs a call of the policy that directs all robots and returns its reply.
+    /// Runs a call of the policy that controls all robots and returns its reply.
     pub async fn call(&self, tool: ToolCall) -> Result<Answer, HostingError> {
         self.ask(None, tool.into(), None, Box::new(|answer| answer)).await
     }
 
-    /// As [`EpisodeThread::call`], with all that may go with a call, and for the operator of a robot where each
-    /// has one. What `told` makes of the answer is told, and kept for a call with a key.
+    /// Runs a call with all its options, also for the operator of a single robot.
+    ///
+    /// `told` converts the answer before it is sent. The converted answer is the one kept for a call with
+    /// a key.
     pub async fn ask(
         &self,
         operator: Option<&str>,
@@ -177,30 +181,31 @@ impl EpisodeThread {
         self.do_job(|reply| Job::Call { operator, call, keyed, told, reply }).await
     }
 
-    /// Keeps an answer that was made of several for who asks again.
+    /// Keeps an answer that was combined from several for repeated requests.
     pub async fn keep_answer(&self, keyed: Keyed, answer: Answer) -> Result<Answer, HostingError> {
         let answer = Box::new(answer);
         self.do_job_in_turn(|reply| Job::KeepAnswer { keyed, answer, reply }).await
     }
 
-    /// Reads an operator's command: what cannot be executed, and what could not be seen afterwards, is refused.
+    /// Parses an operator's command. Refuses commands that cannot be executed or whose observation could
+    /// not be rendered.
     pub async fn read_command(&self, call: OperatorCall) -> Result<OperatorCommand, HostingError> {
         self.do_job(|reply| Job::ReadCommand { call: call.into(), reply }).await
     }
 
-    /// Executes commands of several operators side by side. Returns an answer for each, with what each looks at
-    /// then, as `told` has it.
+    /// Executes commands of several operators side by side. Returns one answer for each, with the
+    /// requested observation, converted by `told`.
     pub async fn together(
         &self,
         commands: Vec<(OperatorCommand, Option<Keyed>)>,
         told: Tell<Vec<Answer>>,
     ) -> Result<Vec<Answer>, HostingError> {
         let (commands, keyed) = commands.into_iter().unzip();
-        // Callers wait for it already, so it waits for its turn.
+        // Callers are waiting for it already, so it queues up.
         self.do_job_in_turn(|reply| Job::Together { commands, keyed, told, reply }).await
     }
 
-    /// Keeps a note of the policy that directs all robots, or of the operator of one.
+    /// Records a note of the policy that controls all robots, or of the operator of one.
     pub async fn note(
         &self,
         operator: Option<&str>,
@@ -211,49 +216,50 @@ impl EpisodeThread {
         self.do_job(|reply| Job::Note { operator, note, key, reply }).await
     }
 
-    /// Keeps a call that was refused before it came here, after those that its caller made before. Nobody is
-    /// told where it cannot be kept.
+    /// Records a call that was refused before it arrived here, after its caller's earlier calls. A
+    /// failure is ignored.
     pub async fn refused(&self, operator: Option<&str>, call: RefusedCall) {
         let (operator, call) = (operator.map(str::to_owned), Box::new(call));
         let _ = self.do_job_in_turn(|reply| Job::Refused { operator, call, reply }).await;
     }
 
-    /// Where the episode stands, for those who look on: asking is no call of the policy's.
+    /// Returns the state of the episode for watchers; it does not count as a call of the policy.
     pub async fn status(&self) -> Result<Answer, HostingError> {
         self.do_job(|reply| Job::Status { reply }).await
     }
 
-    /// What has to be known to begin, as it stands now.
+    /// Returns the briefing for the current state.
     pub async fn briefing(&self) -> Result<Briefing, HostingError> {
         self.do_job(|reply| Job::Briefing { reply }).await
     }
 
-    /// How the episode stands, and what happens from now on, for who looks on: no call of the policy's.
+    /// Returns the current state and a stream of the events from now on, for a watcher. It does not count
+    /// as a call of the policy.
     pub async fn watch(&self) -> Result<LiveWatch, HostingError> {
         self.watch_as(None).await
     }
 
-    /// As [`EpisodeThread::watch`], for the person who drives `robot` and is told every step. It sees what no
-    /// policy may know; that is recorded, and results name it.
+    /// Does the same as [`EpisodeThread::watch`] for the person who drives `robot` and receives every
+    /// step. That person sees privileged information, which is recorded and named in results.
     pub async fn watch_driving(&self, robot: &str) -> Result<(LiveWatch, EveryStep), HostingError> {
         Ok((self.watch_as(Some(robot.into())).await?, self.stage.feed.every_step()))
     }
 
     async fn watch_as(&self, operator: Option<String>) -> Result<LiveWatch, HostingError> {
-        // Listening comes first, so that nothing is missed between the two.
+        // Subscribing comes first, so that no event is missed in between.
         let events = self.stage.feed.subscribe().ok_or(HostingError::EpisodeStopped)?;
         let _turn = self.looking.acquire().await.map_err(|_| HostingError::EpisodeStopped)?;
         let view = self.do_job_in_turn(|reply| Job::Watch { operator, reply }).await?;
         Ok(LiveWatch { view, events })
     }
 
-    /// Where everything is and who touches what: for experts and scoring in this process, never for policies.
+    /// Returns all poses and contacts, for experts and scoring in this process and never for policies.
     pub fn facts_blocking(&self) -> Result<Facts, HostingError> {
         self.work_blocking(|session| Ok(session.facts()))
     }
 
-    /// A look through the robots, as it was drawn, for a policy that is asked from this process and `shown`
-    /// this of what policies are not shown as a rule; results name it.
+    /// Returns the robots' uncompressed images for a policy that is queried from this process. `shown`
+    /// names the extra information that policies usually do not get; results name it.
     pub fn look_blocking(
         &self,
         observe: &Observe,
@@ -263,12 +269,12 @@ impl EpisodeThread {
         self.work_blocking(move |session| Ok(session.observe(&observe, &shown)?))
     }
 
-    /// The room, seen from where no robot stands, for the same policies.
+    /// Returns the image of the third-person camera for the same policies.
     pub fn room_blocking(&self) -> Result<Picture, HostingError> {
         self.work_blocking(|session| Ok(session.third_person()))
     }
 
-    /// Ends the episode if its policy's clock has run out, or if it has made no call for as long as `idle`.
+    /// Ends the episode if its policy's clock has run out, or if it has made no call for `idle`.
     pub fn end_if_abandoned(&self, idle: Duration) {
         match self.stage.status.sleep() {
             Some(sleep) if sleep.thinking() < idle => {}
@@ -276,7 +282,8 @@ impl EpisodeThread {
             Some(_) => drop(self.send(Job::EndIfAbandoned { idle })),
             None => {
                 let jobs = lock(&self.jobs);
-                // Where something waits already, nobody is gone, and the places to wait are for calls.
+                // If calls are waiting, the caller is still there, and the places in the queue are for
+                // calls.
                 if jobs.capacity() == jobs.max_capacity() {
                     let _ = jobs.try_send(Job::EndIfAbandoned { idle });
                 }
@@ -284,8 +291,10 @@ impl EpisodeThread {
         }
     }
 
-    /// Ends the episode for a reason that lies outside it, after the calls already waiting, unless it has ended
-    /// by then. Not for threads that run futures: it waits for a place among the jobs.
+    /// Ends the episode for an external reason after the calls already waiting, unless it has ended by
+    /// then.
+    ///
+    /// It blocks while the queue is full, so it must not be called from async code.
     pub fn end_blocking(&self, reason: EndReason) {
         // An episode that has stopped meanwhile has ended.
         if let Ok(jobs) = self.sender() {
@@ -298,12 +307,12 @@ impl EpisodeThread {
         self.do_job_in_turn(|reply| Job::Close { keep: false, reply }).await
     }
 
-    /// As [`EpisodeThread::close`], of an episode that goes on where it is brought back.
+    /// Does the same as [`EpisodeThread::close`] for an episode that will be brought back.
     pub async fn leave(&self) -> Result<ResultReply, HostingError> {
         self.do_job_in_turn(|reply| Job::Close { keep: true, reply }).await
     }
 
-    /// As [`EpisodeThread::close`], of an episode that has ended and whose result nobody asks for.
+    /// Does the same as [`EpisodeThread::close`] for an ended episode whose result is not needed.
     pub async fn end_for_good(&self) -> Result<(), HostingError> {
         match self.sleeps() {
             true => self.stage.forget_journal(),
@@ -311,64 +320,65 @@ impl EpisodeThread {
         }
     }
 
-    /// Whether the episode takes no more commands.
+    /// Returns true once the episode takes no more commands.
     pub fn ended(&self) -> bool {
         self.end_reason().is_some() || (!self.sleeps() && lock(&self.jobs).is_closed())
     }
 
-    /// Why the episode takes no more commands, as far as its last call has shown.
+    /// Returns the reason why the episode has ended, as known after its last call.
     pub fn end_reason(&self) -> Option<EndReason> {
         self.stage.status.ended.get().copied()
     }
 
-    /// Control steps executed up to the last call, the initial hold included.
+    /// Returns the control steps executed up to the last call, including the initial hold.
     pub fn env_steps(&self) -> u32 {
         self.stage.status.env_steps()
     }
 
-    /// What is played.
+    /// Returns the specification of the episode.
     pub fn spec(&self) -> &EpisodeSpec {
         &self.stage.spec
     }
 
-    /// The robots of the episode, in order.
+    /// Returns the robots of the episode, in order.
     pub fn robots(&self) -> &[String] {
         &self.robots
     }
 
-    /// How long the policy has thought, up to its last call.
+    /// Returns the policy's thinking time up to its last call.
     pub fn thought(&self) -> Duration {
         self.stage.status.thought()
     }
 
-    /// What the episode came to, with nothing withheld; from when it has been closed.
+    /// Returns the unredacted result; `None` until the episode has been closed.
     pub fn result(&self) -> Option<&ResultReply> {
         self.stage.status.result.get()
     }
 
-    /// Why the recording is not complete, if it is not.
+    /// Returns the reason why the recording is incomplete, if it is.
     pub fn recording_failed(&self) -> Option<&str> {
         self.stage.status.recording_failed.get().map(String::as_str)
     }
 
-    /// The most control steps that one command may ask for.
+    /// Returns the maximum number of control steps for one command.
     pub fn steps_per_command(&self) -> u32 {
         self.steps_per_command
     }
 
-    /// Where the recording lies.
+    /// Returns the folder of the recording.
     pub fn folder(&self) -> &Path {
         &self.stage.folder.path
     }
 
-    /// Has the thread do a job, unless too many wait already.
+    /// Queues a job, unless too many are waiting already, and awaits its reply.
     async fn do_job<T>(&self, job: impl FnOnce(ReplySender<T>) -> Job) -> Result<T, HostingError> {
         let (reply, answer) = oneshot::channel();
         self.send(job(reply))?;
         answer.await.map_err(|_| HostingError::EpisodeStopped)?
     }
 
-    /// Does something with the session, unless too many wait already; for threads that run no futures.
+    /// Runs `work` on the session, unless too many jobs are waiting already. For threads outside the
+    /// async runtime.
     fn work_blocking<T: Send + 'static>(
         &self,
         work: impl FnOnce(&mut Session) -> Result<T, HostingError> + Send + 'static,
@@ -414,7 +424,7 @@ impl EpisodeThread {
     async fn do_job_in_turn<T>(&self, job: impl FnOnce(ReplySender<T>) -> Job) -> Result<T, HostingError> {
         let (reply, answer) = oneshot::channel();
         let mut job = job(reply);
-        // It may fall asleep between the two.
+        // The episode may fall asleep between the two.
         while let Err(mpsc::error::SendError(unsent)) = self.sender()?.send(job).await {
             job = unsent;
         }
@@ -433,7 +443,7 @@ impl EpisodeThread {
         }
     }
 
-    /// Where jobs go: to the thread, which is started where the episode sleeps.
+    /// Returns the queue of the thread. Starts the thread if the episode sleeps.
     fn sender(&self) -> Result<mpsc::Sender<Job>, HostingError> {
         self.stage.status.is_used();
         let mut jobs = lock(&self.jobs);

@@ -1,4 +1,5 @@
-//! Those who look on at one episode: its thread hands over what happens and waits for nobody; who is too slow misses what was longest ago.
+//! Watchers of one episode. Its thread publishes events without waiting; a watcher that is too slow
+//! misses the oldest ones.
 
 use std::{
     cell::Cell,
@@ -12,82 +13,84 @@ use std::{
 use tandem_episodes::live::{LiveEvent, LiveView, Onlookers, STEPS_PER_FRAME};
 use tokio::sync::broadcast;
 
-/// How far an onlooker may lag behind: ten simulated seconds.
+/// Number of events a watcher may lag behind: ten simulated seconds.
 const KEPT_EVENTS: usize = 256;
 
-/// Those who watch are told no more steps than one in this time, for long: a page draws no more.
+/// Long-term minimum time between two steps that watchers receive; a page does not draw more often.
 const FRAME_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Steps are told at once that are worth so many intervals, so that what an agent commands now and then is told whole, however fast
-/// it is simulated: ten simulated seconds.
+/// Lead over `FRAME_INTERVAL` up to which steps are sent at once.
+///
+/// It corresponds to ten simulated seconds, so a single command of an agent is sent whole, however fast
+/// it is simulated.
 const MAX_LEAD: Duration = Duration::from_secs(5);
 
-/// What an episode tells, for as many as listen.
+/// Events of an episode, for any number of watchers.
 #[derive(Debug)]
 pub struct LiveFeed {
     /// `None` once the episode's thread has ended.
     events: Mutex<Option<broadcast::Sender<LiveEvent>>>,
-    /// How many of them drive.
+    /// Number of watchers that drive.
     drivers: Arc<AtomicUsize>,
 }
 
-/// While it is held, every control step is told, and not only as many as are drawn.
+/// Guard that makes the feed send every control step, not only those that are drawn.
 pub struct EveryStep(Arc<AtomicUsize>);
 
-/// What an onlooker gets: how things stand, and what happens from then on.
+/// A watcher's view: the state at the beginning, and the events from then on.
 pub struct LiveWatch {
-    /// As the episode stood when the watch began.
+    /// State of the episode when the watch began.
     pub view: LiveView,
-    /// What happens then. Some of it may be in `view` already.
+    /// Events after that. Some of them may be part of `view` already.
     pub events: broadcast::Receiver<LiveEvent>,
 }
 
-/// The end of a feed that an episode's session holds.
+/// Sending end of a feed, held by the episode's session.
 pub struct FeedEnd {
     events: broadcast::Sender<LiveEvent>,
     drivers: Arc<AtomicUsize>,
     pace: Pace,
 }
 
-/// How many steps those who watch are told.
+/// Rate limit of the steps that watchers receive.
 struct Pace {
-    /// When all that was told would have been told at one step an interval.
+    /// Time at which the steps sent so far would have been sent at one step per interval.
     even_at: Cell<Instant>,
 }
 
 impl LiveFeed {
-    /// A feed to which nobody listens yet.
+    /// Creates a feed without watchers.
     pub fn new() -> LiveFeed {
         LiveFeed { events: Mutex::new(Some(broadcast::channel(KEPT_EVENTS).0)), drivers: Arc::default() }
     }
 
-    /// The end for the episode's session, unless nothing happens any more.
+    /// Returns the sending end for the episode's session, or `None` once the feed is closed.
     pub fn end(&self) -> Option<FeedEnd> {
         let events = self.events.lock().unwrap_or_else(PoisonError::into_inner).clone()?;
         let pace = Pace { even_at: Cell::new(Instant::now()) };
         Some(FeedEnd { events, drivers: self.drivers.clone(), pace })
     }
 
-    /// Whether anybody listens or drives.
+    /// Returns true if there are watchers or drivers.
     pub fn is_watched(&self) -> bool {
         let events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
         self.drivers.load(Ordering::Relaxed) > 0
             || events.as_ref().is_some_and(|events| events.receiver_count() > 0)
     }
 
-    /// Tells every step for as long as the return value is held.
+    /// Sends every step for as long as the return value is held.
     pub fn every_step(&self) -> EveryStep {
         self.drivers.fetch_add(1, Ordering::Relaxed);
         EveryStep(self.drivers.clone())
     }
 
-    /// What happens from now on, unless nothing does any more.
+    /// Returns a receiver of the events from now on, or `None` once the feed is closed.
     pub fn subscribe(&self) -> Option<broadcast::Receiver<LiveEvent>> {
         let events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
         events.as_ref().map(broadcast::Sender::subscribe)
     }
 
-    /// Nothing happens any more: who listens is told.
+    /// Closes the feed, which ends all receivers.
     pub fn close(&self) {
         self.events.lock().unwrap_or_else(PoisonError::into_inner).take();
     }
@@ -100,7 +103,7 @@ impl Drop for EveryStep {
 }
 
 impl Pace {
-    /// Whether one step more may be told at `now`.
+    /// Returns true if another step may be sent at `now`.
     fn allows(&self, now: Instant) -> bool {
         let even_at = self.even_at.get().max(now);
         let allowed = even_at.duration_since(now) < MAX_LEAD;
@@ -122,7 +125,7 @@ impl Onlookers for FeedEnd {
     }
 
     fn tell(&self, event: LiveEvent) {
-        // Where the last listener has just gone, nobody misses it.
+        // The last watcher may just have gone.
         let _ = self.events.send(event);
     }
 }
@@ -136,7 +139,7 @@ mod tests {
         let begin = Instant::now();
         let pace = Pace { even_at: Cell::new(begin) };
         let mut told = 0;
-        // 800 steps a second that could be told, for ten seconds.
+        // 800 steps a second are available for ten seconds.
         for step in 0..8000u32 {
             told += u32::from(pace.allows(begin + Duration::from_micros(1250) * step));
             if step == 200 {
@@ -144,7 +147,7 @@ mod tests {
             }
         }
         assert_eq!(told, 250 + 500);
-        // Whoever pauses is told whole again.
+        // After a pause, steps are sent in full again.
         let later = begin + Duration::from_secs(20);
         assert!((0..250).all(|_| pace.allows(later)) && !pace.allows(later));
     }

@@ -1,4 +1,5 @@
-//! A session that a panic ends, and nothing but it. What it does is counted in the metrics.
+//! The panic guard: a session that a panic ends without affecting anything else. Its work is counted in
+//! the metrics.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -11,7 +12,7 @@ use tandem_tools_spec::{EndReason, ResultReply};
 use crate::hosting::HostingError;
 use crate::metrics::Metrics;
 
-/// A session, until it has panicked.
+/// A session until it has panicked.
 pub struct PanicGuard {
     state: GuardState,
     metrics: EpisodeMetrics,
@@ -19,23 +20,29 @@ pub struct PanicGuard {
 
 enum GuardState {
     Sound(Box<Session>),
-    /// After a panic the world may be anything, and nobody looks at it again. The result is of what could be closed.
+    /// After a panic the state of the world is undefined and no longer used. The result covers what could
+    /// be closed.
     Panicked(Option<Box<ResultReply>>),
 }
 
 impl PanicGuard {
-    /// A session whose work is counted by `metrics`.
+    /// Guards a new session whose work is counted by `metrics`.
     pub fn new(session: Session, mut metrics: EpisodeMetrics) -> PanicGuard {
         metrics.begin(&session);
         PanicGuard { state: GuardState::Sound(Box::new(session)), metrics }
     }
 
-    /// A session that has begun before, and been counted as far as it has come.
+    /// Guards a session that has been brought back and counted up to its current state.
     pub fn again(session: Session, metrics: EpisodeMetrics) -> PanicGuard {
         PanicGuard { state: GuardState::Sound(Box::new(session)), metrics }
     }
 
-    /// Lets the session do `work`. A panic ends the episode: its recording is closed, and this and every later work is refused.
+    /// Runs `work` on the session.
+    ///
+    /// # Errors
+    ///
+    /// A panic ends the episode and closes its recording. This and every later call then return
+    /// [`HostingError::EpisodePanicked`].
     pub fn run<T>(&mut self, work: impl FnOnce(&mut Session) -> T) -> Result<T, HostingError> {
         let GuardState::Sound(session) = &mut self.state else { return Err(HostingError::EpisodePanicked) };
         match catch_unwind(AssertUnwindSafe(|| work(session))) {
@@ -50,7 +57,7 @@ impl PanicGuard {
         }
     }
 
-    /// Why the episode takes no more commands, if it takes none.
+    /// Returns the reason why the episode takes no more commands, or `None` while it does.
     pub fn ended(&self) -> Option<EndReason> {
         match &self.state {
             GuardState::Sound(session) => session.ended(),
@@ -58,7 +65,7 @@ impl PanicGuard {
         }
     }
 
-    /// How many control steps have been executed; none that are known after a panic.
+    /// Returns the number of executed control steps, or `None` after a panic.
     pub fn env_steps(&self) -> Option<u32> {
         match &self.state {
             GuardState::Sound(session) => Some(session.env_steps()),
@@ -66,7 +73,7 @@ impl PanicGuard {
         }
     }
 
-    /// How long the policy has thought, up to its last call; nothing that is known after a panic.
+    /// Returns the policy's thinking time up to its last call, or `None` after a panic.
     pub fn thought(&self) -> Option<Duration> {
         match &self.state {
             GuardState::Sound(session) => Some(session.thought()),
@@ -74,7 +81,7 @@ impl PanicGuard {
         }
     }
 
-    /// Why the recording is not complete, if it is not.
+    /// Returns the reason why the recording is incomplete, if it is.
     pub fn recording_failed(&self) -> Option<&str> {
         match &self.state {
             GuardState::Sound(session) => session.recording_failed(),
@@ -105,7 +112,7 @@ impl PanicGuard {
         else {
             return;
         };
-        // The broken world may panic once more under way; what is flushed by then can be read nevertheless.
+        // The broken world may panic again meanwhile. The part flushed by then stays readable.
         let why = format!("by a panic: {}", text(&*panic));
         match closed(|| session.close_failed(why)) {
             Ok(result) => self.state = GuardState::Panicked(Some(Box::new(result))),
@@ -114,7 +121,7 @@ impl PanicGuard {
     }
 }
 
-/// What the metrics have been told of one episode so far.
+/// The part of one episode that the metrics already include.
 #[derive(Debug)]
 pub struct EpisodeMetrics {
     metrics: Arc<Metrics>,
@@ -124,12 +131,12 @@ pub struct EpisodeMetrics {
 }
 
 impl EpisodeMetrics {
-    /// An episode that has not begun.
+    /// Starts counting an episode that has not begun.
     pub fn new(metrics: Arc<Metrics>) -> EpisodeMetrics {
         EpisodeMetrics { metrics, control_steps: 0, physics: Duration::ZERO, ended: false }
     }
 
-    /// An episode that has been counted as far as `session` has come.
+    /// Continues counting an episode that has been counted up to the state of `session`.
     pub fn again(metrics: Arc<Metrics>, session: &Session) -> EpisodeMetrics {
         EpisodeMetrics {
             metrics,
@@ -139,7 +146,7 @@ impl EpisodeMetrics {
         }
     }
 
-    /// The episode has begun, and may have held still for a while.
+    /// Counts the start of the episode and its initial hold.
     pub fn begin(&mut self, session: &Session) {
         self.metrics.episode_started();
         self.count(session);
@@ -156,7 +163,7 @@ impl EpisodeMetrics {
         }
     }
 
-    /// The episode has ended, which counts once.
+    /// Counts the end of the episode, once.
     pub fn end(&mut self, reason: EndReason) {
         if !self.ended {
             self.ended = true;

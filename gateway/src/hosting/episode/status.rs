@@ -1,4 +1,4 @@
-//! What the thread of an episode lets everybody know without being asked.
+//! State of an episode that is readable without a request to its thread.
 
 use std::{
     sync::{
@@ -18,29 +18,29 @@ use super::PanicGuard;
 
 #[derive(Debug)]
 pub struct SharedStatus {
-    /// Why the episode takes no more commands.
+    /// Reason why the episode takes no more commands.
     pub ended: OnceLock<EndReason>,
     env_steps: AtomicU32,
-    /// The first failure of the recording.
+    /// First failure of the recording.
     pub recording_failed: OnceLock<String>,
-    /// How long the policy has thought, in nanoseconds.
+    /// Policy's thinking time in nanoseconds.
     thought: AtomicU64,
-    /// What the episode came to, once it has been closed.
+    /// Result of the episode once it has been closed.
     pub result: OnceLock<ResultReply>,
-    /// Whether it can be brought back, and so put aside.
+    /// True if the episode can be brought back, and so put to sleep.
     pub durable: AtomicBool,
     sleep: Mutex<Option<Sleep>>,
-    /// Whether all is there that it had before it was put aside. It is woken up before that.
+    /// True once everything from before the sleep is restored. The episode is woken up before that.
     there: AtomicBool,
-    /// When it was asked for something last.
+    /// Time of the last request.
     used: Mutex<Instant>,
 }
 
-/// An episode that has been put aside.
+/// Data of a sleeping episode.
 #[derive(Debug, Clone, Copy)]
 pub struct Sleep {
     pub since: Instant,
-    /// How long the policy had been thinking by then.
+    /// Policy's thinking time when the episode fell asleep.
     pub thinking: Duration,
 }
 
@@ -61,7 +61,7 @@ impl Default for SharedStatus {
 }
 
 impl SharedStatus {
-    /// That of an episode which sleeps where `entries` have brought it.
+    /// Returns the status of an episode that sleeps after `entries` of its journal.
     pub fn asleep<'a>(entries: impl Iterator<Item = &'a JournalEntry>, hold_steps: u32) -> SharedStatus {
         let status = SharedStatus::default();
         let mut first = None;
@@ -81,7 +81,7 @@ impl SharedStatus {
         status
     }
 
-    /// Takes over how `session` stands.
+    /// Copies the state of `session`.
     pub fn update(&self, session: &PanicGuard) {
         if let Some(reason) = session.ended() {
             self.ended.get_or_init(|| reason);
@@ -101,7 +101,7 @@ impl SharedStatus {
         self.env_steps.load(Relaxed)
     }
 
-    /// At least so many control steps have been executed.
+    /// Raises the number of executed control steps to at least `env_steps`.
     pub fn reach(&self, env_steps: u32) {
         self.env_steps.fetch_max(env_steps, Relaxed);
     }
@@ -110,7 +110,7 @@ impl SharedStatus {
         Duration::from_nanos(self.thought.load(Relaxed))
     }
 
-    /// It is asked for something.
+    /// Records that a request has come.
     pub fn is_used(&self) {
         *lock(&self.used) = Instant::now();
     }
@@ -119,13 +119,13 @@ impl SharedStatus {
         lock(&self.used).elapsed()
     }
 
-    /// It is put aside, its policy having thought for so long since it was last answered.
+    /// Marks the episode as asleep; `thinking` is the time since the policy was last answered.
     pub fn fall_asleep(&self, thinking: Duration) {
         self.there.store(false, Release);
         *lock(&self.sleep) = Some(Sleep { since: Instant::now(), thinking });
     }
 
-    /// It is put aside as it was before.
+    /// Marks the episode as asleep again, as before.
     pub fn sleep_on(&self, sleep: Sleep) {
         *lock(&self.sleep) = Some(sleep);
     }
@@ -134,7 +134,7 @@ impl SharedStatus {
         *lock(&self.sleep)
     }
 
-    /// All is there that it had before it was put aside.
+    /// Marks the state from before the sleep as restored.
     pub fn is_back(&self) {
         self.there.store(true, Release);
     }
@@ -149,7 +149,7 @@ impl SharedStatus {
 }
 
 impl Sleep {
-    /// How long the policy has been thinking since it was last answered.
+    /// Returns the time since the policy was last answered.
     pub fn thinking(&self) -> Duration {
         self.thinking + self.since.elapsed()
     }

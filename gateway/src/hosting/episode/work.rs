@@ -1,4 +1,4 @@
-//! The thread of an episode at work: job after job, each written into the episode's journal before it is
+//! The main loop of an episode's thread. Each job is written to the episode's journal before it is
 //! answered.
 
 use std::{
@@ -33,25 +33,25 @@ use crate::{
     metrics::Metrics,
 };
 
-/// The contact solver keeps large temporaries on the stack.
+/// Stack size; the contact solver keeps large temporaries on the stack.
 const STACK_BYTES: usize = 8 << 20;
 
-/// What a host knows of an episode beside its world.
+/// State that a host keeps of an episode besides its world.
 pub trait HostMemory: std::fmt::Debug + Send + Sync {
-    /// What of it decides what is told later.
+    /// Returns the part of it that affects later answers.
     fn memory(&self) -> Value;
 
-    /// Takes over what was remembered elsewhere, and the answers and notes that may be asked for again.
+    /// Restores the memory of another process, and the answers and notes that may be requested again.
     fn restore(&self, memory: Option<Value>, answers: Vec<KeptAnswer>, notes: Vec<KeyedNote>);
 
-    /// Lets go of what [`HostMemory::restore`] brings again: the episode is put aside.
+    /// Drops what [`HostMemory::restore`] brings back, because the episode is put to sleep.
     fn let_go(&self);
 
-    /// Whether somebody in this process plays, who would be missed.
+    /// Returns true if a player in this process would miss the episode.
     fn is_busy(&self) -> bool;
 }
 
-/// All that a thread needs to play an episode, whichever thread it is.
+/// Data that any thread needs to play the episode.
 #[derive(Debug)]
 pub struct Stage {
     pub id: String,
@@ -60,24 +60,24 @@ pub struct Stage {
     pub metrics: Arc<Metrics>,
     pub status: SharedStatus,
     pub feed: LiveFeed,
-    /// The place that it takes among the episodes.
+    /// Place that the episode takes among the server's episodes.
     pub place: Mutex<Option<OwnedSemaphorePermit>>,
     pub memory: Arc<dyn HostMemory>,
-    /// Where its journal is, if it has one.
+    /// Folder of the journals; `None` for an episode without a journal.
     pub journals: Option<LiveFolder>,
-    /// One thread plays at a time.
+    /// Held by the thread that plays; one does at a time.
     pub turn: Mutex<()>,
 }
 
-/// How a thread comes by the session.
+/// Origin of a thread's session.
 pub enum Opening {
-    /// It begins.
+    /// The episode begins.
     New { clock: Clock, started: oneshot::Sender<Result<Briefing, EpisodeError>> },
-    /// It is brought back, its policy having thought for so long since it was last answered.
+    /// The episode is brought back; `thinking` is the time since its policy was last answered.
     Again { thinking: Duration },
 }
 
-/// A session, and the journal that it is written into.
+/// A session and the journal to which it is written.
 struct Desk<'a> {
     stage: &'a Stage,
     session: PanicGuard,
@@ -88,16 +88,16 @@ struct Desk<'a> {
 struct Log {
     file: JournalFile,
     lease: Lease,
-    /// What was remembered last.
+    /// Memory that was written last.
     memory: Value,
 }
 
-/// What an episode came to, or why that is not known.
+/// Result of an episode, or the reason why it is not known.
 type Outcome = Result<ResultReply, HostingError>;
 
-/// How it ended.
+/// Reason why the thread ended.
 enum Left {
-    /// Who asked for the end, and what they are to be told once the place is free.
+    /// The caller that asked for the end, and the reply it receives once the place is free.
     Closed(Option<(ReplySender<ResultReply>, Box<Outcome>)>),
     Asleep,
 }
@@ -106,7 +106,7 @@ enum Left {
 pub fn spawn(stage: Arc<Stage>, opening: Opening, inbox: mpsc::Receiver<Job>) -> Result<(), HostingError> {
     let name = stage.id.clone();
     let thread = move || {
-        // Every line that is logged on this thread names the episode.
+        // Every log line of this thread names the episode.
         let _named = tracing::info_span!("thread", episode = stage.id).entered();
         play(&stage, opening, inbox);
     };
@@ -119,7 +119,8 @@ fn play(stage: &Stage, opening: Opening, mut inbox: mpsc::Receiver<Job>) {
     let desk = match opening {
         Opening::New { clock, started } => match stage.begin(clock) {
             Ok((session, briefing)) => {
-                // A caller that went away during the start has dropped the inbox's other end, and work returns.
+                // A caller that went away during the start has dropped the other end of the inbox, and
+                // `work` returns.
                 let _ = started.send(Ok(briefing));
                 Desk { stage, session, log: None }
             }
@@ -142,7 +143,7 @@ fn play(stage: &Stage, opening: Opening, mut inbox: mpsc::Receiver<Job>) {
     };
     let Left::Closed(told) = desk.work(inbox) else { return };
     stage.feed.close();
-    // The place is free before the caller hears of the end, so that it can start the next episode.
+    // The place is freed before the caller receives the result, so that it can start the next episode.
     stage.place.lock().unwrap_or_else(PoisonError::into_inner).take();
     if let Some((reply, result)) = told {
         let _ = reply.send(*result);
@@ -166,7 +167,7 @@ impl Stage {
         }
     }
 
-    /// Removes the journal of an episode that sleeps, which is not to be brought back.
+    /// Removes the journal of a sleeping episode, which will not be brought back.
     pub fn forget_journal(&self) -> Result<(), HostingError> {
         let Some(path) = self.journals.as_ref().and_then(|journals| journals.journal(&self.id)) else {
             return Ok(());
@@ -196,7 +197,7 @@ impl Stage {
         Ok((self.guarded(session), briefing))
     }
 
-    /// Takes the lease, and plays the journal again.
+    /// Takes the lease and replays the journal.
     fn bring_back(&self, thinking: Duration) -> Result<Desk<'_>, HostingError> {
         let unknown = || HostingError::UnknownEpisode { id: self.id.clone() };
         let journals = self.journals.as_ref().ok_or_else(unknown)?;
@@ -220,7 +221,7 @@ impl Stage {
             notes.append(&mut noted);
             memory = remembered.or(memory);
         }
-        // What has ended and is written is not written again.
+        // A recording that is complete is not written again.
         let is_written = entries.last().is_some_and(|entry| entry.ended.is_some())
             && self.folder.path.join(RESULT_FILE).exists();
         let session = Session::bring_back(BringBack {
@@ -244,7 +245,7 @@ impl Stage {
 }
 
 impl Desk<'_> {
-    /// Does jobs until one asks for the end or for sleep, or nobody is left who could send one.
+    /// Runs jobs until one asks for the end or for sleep, or until all senders are gone.
     fn work(mut self, mut inbox: mpsc::Receiver<Job>) -> Left {
         self.stage.status.update(&self.session);
         let mut asleep = false;
@@ -253,7 +254,7 @@ impl Desk<'_> {
                 Job::Sleep if self.log.is_some() => {
                     let thinking = self.session.run(|session| session.thinking()).unwrap_or_default();
                     self.stage.status.fall_asleep(thinking);
-                    // What has come by now is done all the same; what comes later wakes it up.
+                    // Jobs that have arrived by now are still done; later ones wake the episode up.
                     inbox.close();
                     asleep = true;
                 }
@@ -265,13 +266,13 @@ impl Desk<'_> {
             self.stage.memory.let_go();
             return Left::Asleep;
         }
-        // Nobody is left who could be told.
+        // Nobody is left to receive the result.
         let _ = self.close(true);
         Left::Closed(None)
     }
 
-    /// A reply that cannot be sent means that the caller has gone. What was done stays done. The log has the
-    /// reason of what is refused and told to nobody.
+    /// Runs one job. An action stays done even if its reply cannot be sent because the caller has gone. A
+    /// refusal that has no recipient is logged.
     fn do_job(&mut self, job: Job) {
         match job {
             Job::Call { operator, call, keyed, told, reply } => {
@@ -338,12 +339,12 @@ impl Desk<'_> {
         kept
     }
 
-    /// Writes down what has been done, and what of it is answered to those who gave a key.
+    /// Writes to the journal what has been done and the answers to calls with a key.
     fn commit<'a>(&mut self, answers: impl IntoIterator<Item = (&'a Keyed, &'a Answer)>) {
         self.commit_noted(answers, None);
     }
 
-    /// As [`Desk::commit`], with a note that has been kept and came with a key.
+    /// Does the same as [`Desk::commit`], with a recorded note that came with a key.
     fn commit_noted<'a>(
         &mut self,
         answers: impl IntoIterator<Item = (&'a Keyed, &'a Answer)>,

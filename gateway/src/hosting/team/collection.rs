@@ -1,5 +1,6 @@
-//! People who play one episode after another on a server that is theirs: each has a seat whose token stays the same, and says of every
-//! episode whether it was good.
+//! A collection: people who play one episode after another on a server of their own.
+//!
+//! Each person has a seat whose token stays the same, and marks every episode as good or bad.
 
 use std::{
     fmt,
@@ -15,28 +16,28 @@ use crate::token::{Token, TokenError};
 pub struct Collection {
     seats: Vec<(Token, OperatorToken)>,
     progress: Mutex<CollectionProgress>,
-    /// Somebody has said whether the last episode was good.
+    /// Notified when a person has marked the last episode.
     marked: Condvar,
 }
 
-/// How far a collection is, as pages show it.
+/// Progress of a collection, as pages show it.
 #[derive(Debug, Clone, Serialize)]
 pub struct CollectionProgress {
-    /// What people have to do now.
+    /// Current task of the people.
     pub stage: CollectionStage,
-    /// The episode that is played, or was played last.
+    /// Episode that is played, or was played last.
     pub episode: Option<CollectedEpisode>,
-    /// How many episodes there are to be.
+    /// Number of planned episodes.
     pub planned: usize,
-    /// How many of those that were played since this server began were good.
+    /// Number of good episodes among those played since this server began.
     pub good: usize,
-    /// How many of them somebody marked bad.
+    /// Number of episodes among them that a person marked bad.
     pub bad: usize,
-    /// What each person has said of the episode, by seat.
+    /// Marks that people have given the episode, by seat.
     pub marks: Vec<Option<bool>>,
 }
 
-/// What people have to do.
+/// Current task of the people in a collection.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CollectionStage {
@@ -44,22 +45,22 @@ pub enum CollectionStage {
     Preparing,
     /// Play.
     Playing,
-    /// Say whether it was good.
+    /// Mark the episode as good or bad.
     Marking,
-    /// Go home.
+    /// The collection is complete.
     Over,
 }
 
 /// An episode of a collection.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct CollectedEpisode {
-    /// What the server calls it.
+    /// Id of the episode on the server.
     pub episode_id: String,
-    /// The task's id.
+    /// Id of the task.
     pub task: String,
-    /// The seed.
+    /// Seed of the episode.
     pub seed: u32,
-    /// Which of the planned episodes it is, counted from 1.
+    /// Number among the planned episodes, counted from 1.
     pub number: usize,
 }
 
@@ -70,7 +71,7 @@ impl fmt::Debug for Collection {
 }
 
 impl Collection {
-    /// A seat for each of `robots`, for so many episodes.
+    /// Creates a collection of `planned` episodes with a seat for each of `robots`.
     pub fn new(robots: &[&str], planned: usize) -> Result<Collection, TokenError> {
         let seat = |robot: &&str| {
             let (token, text) = Token::random()?;
@@ -88,29 +89,29 @@ impl Collection {
         Ok(Collection { seats, progress: Mutex::new(progress), marked: Condvar::new() })
     }
 
-    /// What each person needs.
+    /// Returns the tokens that people need.
     pub fn operators(&self) -> impl Iterator<Item = &OperatorToken> {
         self.seats.iter().map(|(_, operator)| operator)
     }
 
-    /// The token of the seat of `robot`.
+    /// Returns the token of the seat of `robot`.
     pub fn seat(&self, robot: &str) -> Option<(Token, String)> {
         let (token, operator) = self.seats.iter().find(|(_, operator)| operator.robot == robot)?;
         Some((token.clone(), operator.token.clone()))
     }
 
-    /// The robot whose person has the token `text`; every token is compared.
+    /// Returns the robot whose person has the token `text`. Every token is compared.
     pub fn robot_of(&self, text: &str) -> Option<&str> {
         let robots = self.seats.iter().map(|(token, seat)| (token.matches(text), seat.robot.as_str()));
         robots.fold(None, |found, (matches, robot)| if matches { Some(robot) } else { found })
     }
 
-    /// How far it is.
+    /// Returns the current progress.
     pub fn progress(&self) -> CollectionProgress {
         self.lock().clone()
     }
 
-    /// The next episode can be played.
+    /// Opens the next episode for playing.
     pub fn begin(&self, episode: CollectedEpisode) {
         let mut progress = self.lock();
         progress.stage = CollectionStage::Playing;
@@ -118,7 +119,8 @@ impl Collection {
         progress.marks.fill(None);
     }
 
-    /// The episode has ended: waits until everybody has said whether it was good, and returns the robots of those who say it was not.
+    /// Waits until everybody has marked the ended episode, and returns the robots whose people marked it
+    /// bad.
     pub fn wait_for_marks(&self) -> Vec<&str> {
         let mut progress = self.lock();
         progress.stage = CollectionStage::Marking;
@@ -135,8 +137,10 @@ impl Collection {
         bad
     }
 
-    /// The person of `robot` says whether the episode was good; what is said while none is to be marked is not kept, and answered
-    /// with false. Until everybody has spoken, minds may be changed.
+    /// Marks the episode for the person of `robot`. Returns false outside the marking stage, when marks
+    /// are not kept.
+    ///
+    /// A mark can be changed until everybody has marked.
     pub fn mark(&self, robot: &str, good: bool) -> bool {
         let seat = self.operators().position(|operator| operator.robot == robot);
         let mut progress = self.lock();
@@ -148,7 +152,7 @@ impl Collection {
         counts && seat.is_some()
     }
 
-    /// Nothing is left to play.
+    /// Ends the collection.
     pub fn end(&self) {
         self.lock().stage = CollectionStage::Over;
     }

@@ -1,10 +1,14 @@
-//! People who drive in real time. A page says up to 50 times a second where its robot's wrists, fingers and base are to be; every
-//! control step, what was said last becomes a `move_wrists` of one step by the operator of that robot, which goes through the team's
-//! rounds like any other command. So the world runs no faster than real time, and stands still while somebody is away.
+//! Teleoperation in real time by people.
 //!
-//! A log of 50 commands a second replays bit for bit, because the wall clock decides here, before a call is made, which word becomes a
-//! command, and nothing after it: the session sees whole control steps in the order of its calls, the recording holds each call with its
-//! numbers to the last bit, and replay makes the same calls again. Words that came to nothing leave no trace, in the world or the log.
+//! A page sends up to 50 setpoints a second for its robot's wrists, fingers and base. Every control step,
+//! the latest setpoint becomes a `move_wrists` of one step by the operator of that robot. It goes through
+//! the team's rounds like any other command. So the world runs no faster than real time, and pauses while
+//! a person is away.
+//!
+//! A log of 50 commands a second replays bit for bit. The wall clock only decides, before a call is made,
+//! which setpoint becomes a command. The session sees whole control steps in the order of its calls. The
+//! recording holds each call with exact numbers, and replay makes the same calls again. Setpoints that
+//! were never commanded leave no trace in the world or the log.
 
 use std::{
     sync::Arc,
@@ -21,31 +25,32 @@ use tokio::{
 use super::{Team, Wheels};
 use crate::hosting::{Answer, EpisodeThread, HostingError};
 
-/// A control step.
+/// Duration of a control step.
 const TICK: Duration = Duration::from_millis(20);
 
-/// Who has said nothing for so long is away: a page that is hidden, or a link that is cut.
+/// Silence after which a person counts as away, for example because the page is hidden or the link is
+/// cut.
 const AWAY_AFTER: Duration = Duration::from_millis(500);
 
-/// The fastest that a wrist's target moves and turns, however far away the next word has it.
+/// Maximum speed of a wrist's target per control step, however far away the next setpoint is.
 const WRIST_M_PER_STEP: f64 = 1.5 * 0.02;
 const WRIST_RAD_PER_STEP: f64 = 6.0 * 0.02;
 
-/// Answers that a page may lag behind.
+/// Number of answers that a page may lag behind.
 const KEPT_ANSWERS: usize = 64;
 
-/// What a person wants of a robot from now on.
+/// A person's current request for a robot.
 #[derive(Debug, Clone)]
 pub struct Wish {
-    /// Where it is to be.
+    /// Wrist, finger and base setpoint.
     pub wrist_move: WristMove,
-    /// Whether time may pass.
+    /// True while time may pass.
     pub go: bool,
-    /// Control steps that may pass though `go` does not say so, step by step.
+    /// Control steps that may pass while `go` is false, for single stepping.
     pub steps: u32,
 }
 
-/// A person who drives; dropping it lets the robots go.
+/// A person who drives; dropping it releases the robots.
 #[derive(Debug)]
 pub struct Driver {
     team: Arc<Team>,
@@ -53,21 +58,23 @@ pub struct Driver {
     number: u64,
 }
 
-/// Where a person drives from.
+/// Driving state of one robot.
 #[derive(Debug)]
 pub struct Wheel {
-    /// Which of the drivers that this robot has had.
+    /// Number of the driver among all that the team has had.
     number: u64,
     wish: Wish,
     said: Instant,
-    /// What it was told last.
+    /// Last setpoint that was commanded.
     last: WristMove,
     answers: mpsc::Sender<Result<Answer, HostingError>>,
 }
 
 impl Driver {
-    /// Takes the wheel of `robots`, the first of which is the person's own and the others stand still. Who drove them before does no
-    /// more: a page that was loaded again is the same person. What becomes of the commands comes by the receiver.
+    /// Takes control of `robots`. The first is the person's own; the others stand still.
+    ///
+    /// Earlier drivers of these robots lose control, because a reloaded page is the same person. The
+    /// receiver gets the answers to the commands.
     pub fn take(
         team: &Arc<Team>,
         episode: &Arc<EpisodeThread>,
@@ -90,7 +97,8 @@ impl Driver {
         Ok((Driver { team: team.clone(), seats, number }, answers))
     }
 
-    /// What the person wants from now on of its own robot; the others stand still, and time may pass for them when it may for it.
+    /// Sets the person's request for its own robot. The others stand still, and time passes for all of
+    /// them alike.
     pub fn say(&self, wish: &Wish) {
         let mut wheels = self.team.wheels();
         for (place, seat) in self.seats.iter().enumerate() {
@@ -105,7 +113,8 @@ impl Driver {
         }
     }
 
-    /// The robots that the person waits for: those of others, while its own command has been waiting for longer than a moment.
+    /// Returns the robots that the person waits for, once its own command has been waiting for longer
+    /// than `AWAY_AFTER`.
     pub fn waits_for(&self) -> Vec<String> {
         let wheels = self.team.wheels();
         let since = self.seats.first().and_then(|seat| wheels.under_way[*seat]);
@@ -125,10 +134,11 @@ impl Drop for Driver {
     }
 }
 
-/// Makes commands of what people say, a control step after another, until nobody drives any more or the episode has ended.
+/// Turns setpoints into commands, one control step after another, until nobody drives any more or the
+/// episode has ended.
 async fn turn(team: Arc<Team>, episode: Arc<EpisodeThread>) {
     let mut ticks = interval(TICK);
-    // What could not be done in time is left out, so that time never runs after itself.
+    // Ticks that were missed are skipped, so that the loop never catches up.
     ticks.set_missed_tick_behavior(MissedTickBehavior::Skip);
     loop {
         ticks.tick().await;
@@ -159,7 +169,8 @@ async fn turn(team: Arc<Team>, episode: Arc<EpisodeThread>) {
 }
 
 impl Wheels {
-    /// The seats that command now, and what: those whose last command is answered, of whom time may pass.
+    /// Returns the seats that command now, with their setpoints: those whose last command is answered and
+    /// whose time may pass.
     fn due(&mut self, now: Instant) -> Vec<(usize, WristMove)> {
         let mut found = Vec::new();
         for (seat, (wheel, under_way)) in self.seats.iter_mut().zip(&mut self.under_way).enumerate() {
@@ -178,7 +189,7 @@ impl Wheels {
     }
 }
 
-/// `wanted`, with wrists that go no further from where they were told to be last than a step allows.
+/// Limits `wanted` to wrist targets within one step's reach of the last ones.
 fn within_speed(wanted: &WristMove, last: &WristMove) -> WristMove {
     WristMove {
         left_position_m: nearer(wanted.left_position_m, last.left_position_m),

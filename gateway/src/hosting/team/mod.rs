@@ -1,9 +1,10 @@
-//! The operators of an episode in which each robot has one of its own.
+//! The operators of an episode in which each robot has its own.
 //!
-//! A step is made when every operator has commanded, or when one has and the others' patience is at its end: then the robots of
-//! those who kept silent hold still, and nobody waits for them until they call again. The shortest of the commands ends them all.
-//! The policy's clock runs until the step is made, so while at least one operator thinks. An operator's call blocks until its
-//! robot's reply is there.
+//! A step is made when every operator has commanded, or when the others' patience with the missing ones
+//! ends. Then the robots of the silent operators hold still, and nobody waits for them until they call
+//! again. The shortest of the commands ends them all. The policy's clock runs until the step is made,
+//! that is, while at least one operator thinks. An operator's call blocks until its robot's reply is
+//! there.
 
 mod collection;
 mod driving;
@@ -42,47 +43,49 @@ pub struct Team {
     seats: Vec<Seat>,
     patience: Duration,
     talk: bool,
-    /// Whose words do not all reach the others, under stress.
+    /// Message loss between operators under stress.
     silence: Option<Silence>,
     round: Mutex<Round>,
     wheels: Mutex<Wheels>,
 }
 
-/// People who drive in real time.
+/// People and partners that drive in this process.
 #[derive(Debug, Default)]
 struct Wheels {
-    /// By seat; robots of programs have none.
+    /// Driving state by seat; `None` for robots of programs.
     seats: Vec<Option<Wheel>>,
-    /// By seat: when the command was made that is not answered yet.
+    /// Time at which the pending command was made, by seat.
     under_way: Vec<Option<Instant>>,
-    /// How many drivers there have been.
+    /// Number of drivers up to now.
     drivers: u64,
-    /// Whether commands are made of what they say.
+    /// True while a task turns setpoints into commands.
     turning: bool,
-    /// By seat: whether the task's expert or a policy drives.
+    /// Expert or policy that drives, by seat.
     partners: Vec<Option<PartnerKind>>,
-    /// By seat: the partner that drove when the server before this one ended, until it is seated again.
+    /// Partner that drove when the previous server ended, by seat; `None` once it drives again.
     left: Vec<Option<PartnerKind>>,
     /// By seat: plans under way.
     plans: Vec<u32>,
 }
 
-/// Who drives which robot.
+/// The operator of one robot.
 #[derive(Debug)]
 struct Seat {
     robot: String,
     token: Token,
-    /// Places for calls that wait for the episode: a share of all, so that no operator takes those of another.
+    /// Places for calls that wait for the episode: an equal share, so that operators do not block each
+    /// other.
     places: Semaphore,
 }
 
-/// Calls that may wait for each of `operators`.
+/// Returns the number of calls that may wait for each of `operators`.
 fn own_calls(operators: usize) -> usize {
     (WAITING_CALLS / operators.max(1)).max(1)
 }
 
 impl Team {
-    /// An operator for each of `robots`, and what each needs. Who has a seat of `collection` keeps its token.
+    /// Creates an operator for each of `robots` and returns their tokens. A robot with a seat in
+    /// `collection` keeps its token.
     pub fn new<'a>(
         robots: impl Iterator<Item = &'a str>,
         driving: &Driving,
@@ -98,7 +101,7 @@ impl Team {
         Ok((Team::of(&tokens, driving, silence)?, tokens))
     }
 
-    /// The operators who have these tokens.
+    /// Restores the operators that have these tokens.
     pub fn of(
         tokens: &[OperatorToken],
         driving: &Driving,
@@ -119,7 +122,7 @@ impl Team {
         Ok(Team { seats, patience, talk: driving.talk == Some(true), silence, round, wheels })
     }
 
-    /// The robot whose operator has the token `text`; every token is compared.
+    /// Returns the robot whose operator has the token `text`. Every token is compared.
     pub fn robot_of(&self, text: &str) -> Option<&str> {
         let mut robot = None;
         for seat in &self.seats {
@@ -137,7 +140,7 @@ impl Team {
         seat.places.try_acquire().map_err(|_| HostingError::TooManyWaiting { limit })
     }
 
-    /// What of the operators is to be remembered.
+    /// Returns the part of the operators' state that has to be remembered.
     pub fn memory(&self) -> Vec<OperatorMemory> {
         let mut memory = self.round().memory();
         let wheels = self.wheels();
@@ -147,13 +150,13 @@ impl Team {
         memory
     }
 
-    /// Takes over what was remembered.
+    /// Restores what was remembered.
     pub fn restore(&self, memory: Vec<OperatorMemory>) {
         self.wheels().left = memory.iter().map(OperatorMemory::left).collect();
         self.round().restore(memory);
     }
 
-    /// Whether somebody in this process drives, or waits for others.
+    /// Returns true if somebody in this process drives, or waits for others.
     pub fn is_busy(&self) -> bool {
         let wheels = self.wheels();
         let partners = wheels.partners.iter().chain(&wheels.left);
@@ -161,7 +164,7 @@ impl Team {
         drives || self.round().may_begin()
     }
 
-    /// Whether operators may talk.
+    /// Returns true if operators may talk.
     pub fn may_talk(&self) -> bool {
         self.talk
     }
@@ -196,8 +199,8 @@ impl Team {
         }
     }
 
-    /// Has the episode answer a call of the operator on `seat`; `then` makes of the answer what this one is
-    /// told.
+    /// Has the episode answer a call of the operator on `seat`; `then` converts the answer for that
+    /// operator.
     async fn ask(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
@@ -216,7 +219,7 @@ impl Team {
         episode.ask(Some(&self.seats[seat].robot), call, keyed, Box::new(told)).await
     }
 
-    /// Lets the others hear what the operator on `seat` says.
+    /// Sends a message of the operator on `seat` to the others.
     async fn say(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
@@ -241,8 +244,10 @@ impl Team {
         .await
     }
 
-    /// Takes a command, and answers when it has been executed. Beside people who drive in real time, whose commands are of one step
-    /// each, it goes on over as many of theirs as it has steps; that of an expert or a policy always does.
+    /// Takes a command and answers when it has been executed.
+    ///
+    /// People who drive in real time command one step each. Beside them, a longer command continues over
+    /// as many of their rounds as it has steps. Commands of an expert or a policy always do.
     async fn act(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
@@ -254,7 +259,7 @@ impl Team {
             return self.act_once(episode, seat, call, keyed).await;
         }
         let (team, episode) = (self.clone(), episode.clone());
-        // What has begun is finished, whether its caller is still there or not.
+        // A command that has begun is finished even if its caller leaves.
         let going_on = tokio::spawn(async move {
             let answer = team.act_on(&episode, seat, call).await?;
             match keyed {
@@ -297,7 +302,7 @@ impl Team {
             || wheels.plans.iter().any(|plans| *plans > 0)
     }
 
-    /// Takes a command, and answers when the step has been made.
+    /// Takes a command and answers when the step has been made.
     async fn act_once(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
@@ -306,7 +311,7 @@ impl Team {
         keyed: Option<Keyed>,
     ) -> Result<Answer, HostingError> {
         self.round().admit(seat)?;
-        // What cannot be executed is refused before the others depend on it.
+        // A command that cannot be executed is refused before the others depend on it.
         let place = self.take_place(call.robot())?;
         let command = episode.read_command(call).await?;
         drop(place);
@@ -320,8 +325,8 @@ impl Team {
         answer.await.map_err(|_| HostingError::EpisodeStopped)?
     }
 
-    /// The operator leaves: the episode ends when nobody is left; until then its robot holds still, and the answer is where the
-    /// episode stands.
+    /// Lets the operator leave. The episode ends when nobody is left; until then its robot holds still,
+    /// and the answer is the episode's status.
     async fn finish(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
@@ -343,13 +348,13 @@ impl Team {
         self.ask(episode, seat, call.into(), keyed, then).await
     }
 
-    /// Nothing is executed any more: whoever waits is told so.
+    /// Stops execution; waiting operators receive an error.
     pub fn stop(&self) {
-        // Their replies end with their commands.
+        // Dropping the commands ends their replies.
         drop(self.round().begin());
     }
 
-    /// Makes the step if nobody has to be waited for, or else begins to wait.
+    /// Makes the step if no operator is awaited; otherwise starts the patience timer.
     fn go_on(self: &Arc<Self>, episode: &Arc<EpisodeThread>) {
         let mut round = self.round();
         if !round.may_begin() {
@@ -377,7 +382,7 @@ impl Team {
         tokio::spawn(async move { team.execute(&episode, pending).await });
     }
 
-    /// Makes the step, whoever of its operators is still there, and tells each what became of it.
+    /// Makes the step with the operators that have commanded, and sends each its answer.
     async fn execute(self: Arc<Self>, episode: &Arc<EpisodeThread>, pending: Vec<(usize, Pending)>) {
         let (mut replies, mut commands, mut asked) = (Vec::new(), Vec::new(), Vec::new());
         for (seat, Pending { command, keyed, reply }) in pending {
@@ -403,7 +408,7 @@ impl Team {
         match outcome {
             Ok(answers) => {
                 for (reply, answer) in replies.into_iter().zip(answers) {
-                    // A caller that has gone has its robot's step recorded all the same.
+                    // The step is recorded even if a caller has gone.
                     let _ = reply.send(Ok(answer));
                 }
             }
@@ -417,19 +422,19 @@ impl Team {
         self.go_on(episode);
     }
 
-    /// The answer as the operator on `seat` is told it.
+    /// Restricts the answer to what the operator on `seat` may see.
     fn for_seat(&self, answer: Answer, seat: usize) -> Answer {
         let heard = self.round().take_heard(seat);
         Answer { heard, ..answer.of_own_robot(&self.seats[seat].robot) }
     }
 
-    /// What the partners of `seat` did, where `did` has it of everyone.
+    /// Returns the behaviour of the partners of `seat`, out of that of all robots in `did`.
     fn partners(&self, seat: usize, did: &[PartnerDid]) -> Vec<Partner> {
         let all = self.seats.iter().zip(did).enumerate().filter(|(other, _)| *other != seat);
         all.map(|(_, (other, did))| Partner { robot: other.robot.clone(), did: *did }).collect()
     }
 
-    /// Refuses a call that names a robot which nobody drives.
+    /// Refuses a call that names an unknown robot.
     fn check_robots(&self, call: &Call) -> Result<(), EpisodeError> {
         let is_known = |robot: &str| self.seats.iter().any(|seat| seat.robot == robot);
         call.robots()

@@ -1,5 +1,7 @@
-//! One robot of an episode whose others are driven by somebody else, as it is met by who plays all of them: of what they are told, its own
-//! does its part; the others' parts take as long as they do in that play, and are theirs to do.
+//! One robot of an episode, for a player that plays all robots while others drive the rest.
+//!
+//! The robot executes its own part of each command. The parts of the other robots take as long as in that
+//! command, but their own drivers decide what they do.
 
 use std::{sync::Arc, thread, time::Duration};
 
@@ -15,10 +17,10 @@ use tokio::runtime::Handle;
 use super::{Team, round::Company};
 use crate::hosting::{EpisodeThread, HostingError};
 
-/// How often it is looked whether anybody is there again.
+/// Interval between two checks whether the other operators are back.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
-/// The robot.
+/// A robot that a player of all robots drives.
 pub struct OneRobot {
     pub team: Arc<Team>,
     pub episode: Arc<EpisodeThread>,
@@ -28,7 +30,8 @@ pub struct OneRobot {
 }
 
 impl OneRobot {
-    /// Waits until somebody is there, who does not let time pass while nobody is; false once all have finished, or it has ended.
+    /// Waits until another operator plays, because time must not pass while nobody does. Returns false
+    /// once all have finished or the episode has ended.
     pub fn has_company(&self) -> bool {
         loop {
             let company = self.team.round().company(self.seat);
@@ -41,8 +44,8 @@ impl OneRobot {
         }
     }
 
-    /// What a call of the robot's operator is answered with. One that has kept the others waiting for too long is told so once; who plays
-    /// here has no use for that, and commands all the same.
+    /// Answers a call of the robot's operator. A first [`HostingError::LateCommand`] is ignored and the
+    /// call repeated, because this player does not need the notice.
     pub fn ask(&self, call: ToolCall) -> Result<ToolReply, HostingError> {
         let ask = || -> Result<ToolReply, HostingError> {
             let asked = self.team.call(&self.episode, &self.robot, call.clone().into(), None);
@@ -58,7 +61,7 @@ impl OneRobot {
         if self.has_company() { Ok(()) } else { Err(PlayerError::EpisodeOver) }
     }
 
-    /// What of a command for all robots is for this one.
+    /// Extracts this robot's part of a command for all robots.
     fn own_part(&self, call: ToolCall) -> ToolCall {
         match call {
             ToolCall::Act(ActCall::MoveWrists(MoveWrists { steps, mut robots })) => {
@@ -77,7 +80,7 @@ impl OneRobot {
     }
 }
 
-/// What a refusal is to a player.
+/// Converts a refusal into the player's error.
 fn refused(tool: &'static str, error: HostingError) -> PlayerError {
     match error {
         HostingError::EpisodeStopped | HostingError::Episode(EpisodeError::Ended { .. }) => {

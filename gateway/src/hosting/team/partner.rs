@@ -1,7 +1,8 @@
-//! Who of this process drives one robot beside people or programs who have the others: the task's expert, or a learned policy.
+//! Partners of this process that drive one robot beside people or programs: the task's expert, or a
+//! learned policy.
 //!
-//! The expert plays its script for all robots, of which its own does its part. Where something is not done by then, the script gives up,
-//! and begins again with what is as it is.
+//! The expert plays its script for all robots, and its own robot does its part. If a step of the script
+//! does not succeed in time, the script gives up and begins again from the current state.
 
 use std::{fmt, sync::Arc, thread};
 
@@ -18,13 +19,17 @@ use crate::hosting::{EpisodeThread, HostingError};
 /// Control steps for which the robot stands before the expert's script begins again.
 const PAUSE_STEPS: u32 = 25;
 
-/// A policy elsewhere that can drive one robot of an episode: it plays all of them, and its own does its part.
+/// A remote policy that can drive one robot of an episode. It plays all robots, and its own does its
+/// part.
 pub trait PartnerPolicy: fmt::Debug + Send + Sync {
-    /// As people choose it, and recordings name it.
+    /// Returns the name by which people choose it and recordings name it.
     fn name(&self) -> String;
 
-    /// Connects for an episode of `spec`, says when that is done by `connected`, and plays until the episode is over or the policy
-    /// fails, which [`PlayerError`] says.
+    /// Connects for an episode of `spec`, calls `connected` when that is done, and plays.
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`PlayError`] if it cannot connect. The inner [`PlayerError`] says why the play ended.
     fn play(
         &self,
         spec: &EpisodeSpec,
@@ -34,8 +39,10 @@ pub trait PartnerPolicy: fmt::Debug + Send + Sync {
 }
 
 impl Team {
-    /// Has the expert of the task drive `robot` from now on, until the episode ends or everybody else has finished. It sees what no
-    /// policy may know, which is recorded, and results name it. Asking again changes nothing.
+    /// Lets the expert of the task drive `robot` until the episode ends or everybody else has finished.
+    ///
+    /// The expert uses privileged information; that is recorded, and results name it. Repeated requests
+    /// change nothing.
     pub async fn take_expert(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
@@ -56,8 +63,11 @@ impl Team {
         Ok(())
     }
 
-    /// Has `policy` drive `robot` from now on, until the episode ends or everybody else has finished; returns when it is connected. It
-    /// is shown what its map says of all robots. Asking again changes nothing while it drives; one that was lost is connected anew.
+    /// Lets `policy` drive `robot` until the episode ends or everybody else has finished. Returns when it
+    /// is connected.
+    ///
+    /// The policy receives the inputs that its map names for all robots. Repeated requests change nothing
+    /// while it drives; a lost one is connected again.
     pub async fn take_policy(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
@@ -83,8 +93,8 @@ impl Team {
         }
     }
 
-    /// Seats the partners again that drove when the server before this one ended; `policy` is the one that may
-    /// drive here.
+    /// Lets the partners drive again that drove when the previous server ended; `policy` is the one that
+    /// may drive here.
     pub async fn seat_again(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
@@ -110,12 +120,12 @@ impl Team {
         }
     }
 
-    /// Returns true while a partner is still to be seated again.
+    /// Returns true while a partner still has to be brought back.
     pub fn misses_partners(&self) -> bool {
         self.wheels().left.iter().any(Option::is_some)
     }
 
-    /// Lets nobody wait for the robot on `seat`, whose partner is lost, until somebody drives it again.
+    /// Stops waiting for the robot on `seat`, whose partner is lost, until it is driven again.
     fn lose_partner(self: &Arc<Self>, episode: &Arc<EpisodeThread>, seat: usize) {
         self.round().fall_silent(seat);
         self.wheels().partners[seat] = None;
@@ -128,7 +138,7 @@ impl Team {
     }
 }
 
-/// Plays until nobody does any more.
+/// Plays until nobody else does.
 fn play_expert(mut own: OneRobot, spec: &EpisodeSpec) {
     while own.has_company() {
         let played = Expert::for_episode(spec).and_then(|mut expert| expert.play(&mut own));
@@ -145,11 +155,12 @@ fn play_expert(mut own: OneRobot, spec: &EpisodeSpec) {
             }
         }
     }
-    // Nobody waits for it any more. Of an episode that has ended, nobody is left who could be told.
+    // The others stop waiting for it. An ended episode cannot be notified.
     let _ = own.ask(Finish {}.into());
 }
 
-/// Plays until the episode is over or the policy is lost, which is noted for who looks at the recording; it may be asked again then.
+/// Plays until the episode is over or the policy is lost. A loss is noted in the recording, and the
+/// policy may be requested again.
 fn play_policy(
     mut own: OneRobot,
     policy: &dyn PartnerPolicy,
@@ -158,14 +169,14 @@ fn play_policy(
     let mut connected = Some(connected);
     let mut answer = |came_of_it| {
         if let Some(connected) = connected.take() {
-            // Who asked may have gone.
+            // The caller may have gone.
             let _ = connected.send(came_of_it);
         }
     };
     let spec = own.episode.spec().clone();
     let (team, seat) = (own.team.clone(), own.seat);
     let mut connected = || {
-        // What has happened until now it sees when it looks.
+        // The policy's first look shows all that has happened until now.
         team.round().has_looked(seat);
         answer(Ok(()));
     };
@@ -178,7 +189,7 @@ fn play_policy(
         tracing::warn!(%error, robot = own.robot, "the policy of a robot has stopped");
         let text = format!("The policy of robot {} has stopped: {error}", own.robot);
         let note = own.episode.note(Some(&own.robot), Note { text, ..Note::default() }, None);
-        // Of an episode that has ended, nobody is left who could be told.
+        // An ended episode takes no notes.
         let _ = own.runtime.block_on(note);
         let _runtime = own.runtime.enter();
         return own.team.lose_partner(&own.episode, own.seat);

@@ -1,4 +1,4 @@
-//! Who has commanded what for the step that is made next.
+//! The state of a round: the commands that operators have given for the next step.
 
 use serde::{Deserialize, Serialize};
 use tandem_episodes::OperatorCommand;
@@ -7,16 +7,16 @@ use tokio::{sync::oneshot, task::AbortHandle};
 
 use crate::hosting::{Answer, HostingError, durable::Keyed};
 
-/// The most that waits for one operator to hear it.
+/// Maximum number of unread messages for one operator.
 const MAX_UNHEARD: usize = 32;
 
-/// The operators, by seat, as they stand before a step.
+/// The operators before a step, by seat.
 #[derive(Debug)]
 pub struct Round {
     operators: Vec<Operator>,
-    /// Counts the steps that have been made.
+    /// Number of steps that have been made.
     number: u64,
-    /// Ends the patience that is running.
+    /// Handle that stops the patience timer; `None` while none is running.
     patience: Option<AbortHandle>,
 }
 
@@ -24,10 +24,10 @@ pub struct Round {
 struct Operator {
     robot: String,
     state: OperatorState,
-    /// Steps through which its robot was held without it knowing.
+    /// First and last step through which its robot was held without its knowledge.
     missed: Option<[u32; 2]>,
     heard: Vec<Heard>,
-    /// How often it has spoken.
+    /// Number of messages it has sent.
     said: u32,
 }
 
@@ -39,7 +39,7 @@ pub enum PartnerKind {
     Policy,
 }
 
-/// What of an operator outlives the server, which commands do not that have not been executed.
+/// State of an operator that outlives the server; commands that have not been executed do not.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub struct OperatorMemory {
     silent: bool,
@@ -59,12 +59,12 @@ impl OperatorMemory {
     }
 }
 
-/// How the others stand to one operator.
+/// State of the other operators, as seen by one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Company {
-    /// Somebody plays.
+    /// At least one plays.
     There,
-    /// Nobody has commanded for longer than the others' patience.
+    /// None has commanded within the others' patience.
     Away,
     /// All have finished.
     Gone,
@@ -73,17 +73,17 @@ pub enum Company {
 #[derive(Debug)]
 enum OperatorState {
     Thinking,
-    /// Has commanded; the step is not yet made.
+    /// The operator has commanded; the step is not made yet.
     Waiting(Box<Pending>),
-    /// Its command is being executed.
+    /// The operator's command is being executed.
     Acting,
-    /// Has used up the others' patience; nobody waits for it.
+    /// The operator has used up the others' patience; they do not wait for it.
     Silent,
-    /// Has called finish.
+    /// The operator has called finish.
     Finished,
 }
 
-/// A command that the episode has read, and where its reply goes.
+/// A command that the episode has parsed, and the sender of its reply.
 #[derive(Debug)]
 pub struct Pending {
     pub command: OperatorCommand,
@@ -92,7 +92,7 @@ pub struct Pending {
 }
 
 impl Round {
-    /// The first one, of the operators of `robots`.
+    /// Creates the first round, for the operators of `robots`.
     pub fn new(robots: Vec<String>) -> Round {
         let operator = |robot| Operator {
             robot,
@@ -104,7 +104,7 @@ impl Round {
         Round { operators: robots.into_iter().map(operator).collect(), number: 0, patience: None }
     }
 
-    /// What is to be remembered, by seat.
+    /// Returns the state that has to be remembered, by seat.
     pub fn memory(&self) -> Vec<OperatorMemory> {
         let memory = |operator: &Operator| OperatorMemory {
             silent: matches!(operator.state, OperatorState::Silent),
@@ -117,13 +117,13 @@ impl Round {
         self.operators.iter().map(memory).collect()
     }
 
-    /// Takes over what was remembered.
+    /// Restores what was remembered.
     pub fn restore(&mut self, memory: Vec<OperatorMemory>) {
         for (operator, memory) in self.operators.iter_mut().zip(memory) {
             let OperatorMemory { silent, finished, missed, heard, said, partner: _ } = memory;
             (operator.missed, operator.heard, operator.said) = (missed, heard, said);
             match operator.state {
-                // It has asked again already.
+                // It has already called again.
                 OperatorState::Waiting(_) | OperatorState::Acting => {}
                 _ if finished => operator.state = OperatorState::Finished,
                 _ if silent => operator.state = OperatorState::Silent,
@@ -136,7 +136,8 @@ impl Round {
         self.number
     }
 
-    /// Whether the operator on `seat` may command now. One that kept silent is told what it missed first, once.
+    /// Checks that the operator on `seat` may command now. One that kept silent is refused once, with the
+    /// steps that it missed.
     pub fn admit(&mut self, seat: usize) -> Result<(), HostingError> {
         let waits_for = self.awaited();
         let operator = &mut self.operators[seat];
@@ -159,7 +160,7 @@ impl Round {
         self.operators[seat].state = OperatorState::Waiting(pending.into());
     }
 
-    /// The operator on `seat` has looked at how things stand.
+    /// Records that the operator on `seat` has looked at the current state.
     pub fn has_looked(&mut self, seat: usize) {
         let operator = &mut self.operators[seat];
         operator.missed = None;
@@ -180,7 +181,7 @@ impl Round {
         }
     }
 
-    /// Nobody waits any longer for the operator on `seat`, until it calls again.
+    /// Stops waiting for the operator on `seat` until it calls again.
     pub fn fall_silent(&mut self, seat: usize) {
         let state = &mut self.operators[seat].state;
         if let OperatorState::Thinking = state {
@@ -188,7 +189,7 @@ impl Round {
         }
     }
 
-    /// The operator on `seat` leaves. Returns whether others play on.
+    /// Lets the operator on `seat` leave. Returns true if others play on.
     pub fn finish(&mut self, seat: usize) -> Result<bool, HostingError> {
         let waits_for = self.awaited();
         let operator = &mut self.operators[seat];
@@ -202,14 +203,14 @@ impl Round {
             .any(|other| !matches!(other.state, OperatorState::Finished | OperatorState::Silent)))
     }
 
-    /// The robots whose operators have not commanded yet.
+    /// Returns the robots whose operators have not commanded yet.
     pub fn awaited(&self) -> Vec<String> {
         let thinking =
             self.operators.iter().filter(|operator| matches!(operator.state, OperatorState::Thinking));
         thinking.map(|operator| operator.robot.clone()).collect()
     }
 
-    /// How the operators on other seats than `seat` stand.
+    /// Returns the state of the operators on other seats than `seat`.
     pub fn company(&self, seat: usize) -> Company {
         let others = self.operators.iter().enumerate().filter(|(other, _)| *other != seat);
         let states: Vec<&OperatorState> = others.map(|(_, operator)| &operator.state).collect();
@@ -220,24 +221,24 @@ impl Round {
         if states.iter().all(away) { Company::Away } else { Company::There }
     }
 
-    /// Whether a step could be made: somebody has commanded, and none is being made.
+    /// Returns true if a step can be made: an operator has commanded, and no step is being made.
     pub fn may_begin(&self) -> bool {
         let any = |of: fn(&OperatorState) -> bool| self.operators.iter().any(|operator| of(&operator.state));
         any(|state| matches!(state, OperatorState::Waiting(_)))
             && !any(|state| matches!(state, OperatorState::Acting))
     }
 
-    /// Whether the others' patience is running.
+    /// Returns true while the patience timer runs.
     pub fn is_timed(&self) -> bool {
         self.patience.is_some()
     }
 
-    /// The others' patience begins to run; `patience` stops it.
+    /// Starts the patience timer; `patience` stops it.
     pub fn time(&mut self, patience: AbortHandle) {
         self.patience = Some(patience);
     }
 
-    /// Nobody waits any longer for those who have not commanded.
+    /// Stops waiting for all operators that have not commanded.
     pub fn lose_patience(&mut self) {
         for operator in &mut self.operators {
             if let OperatorState::Thinking = operator.state {
@@ -261,7 +262,8 @@ impl Round {
         taken
     }
 
-    /// The step has been made, which `answer` is about, or has failed. Returns what each robot did, by seat.
+    /// Ends the step, which has been made with `answer` or has failed. Returns what each robot did, by
+    /// seat.
     pub fn end(&mut self, answer: Option<&Answer>) -> Vec<PartnerDid> {
         self.number += 1;
         let made = answer.and_then(|answer| match &answer.reply {
@@ -273,7 +275,7 @@ impl Round {
         self.operators.iter_mut().map(|operator| operator.end(made)).collect()
     }
 
-    /// Refuses words that would be too many for those who are to hear them.
+    /// Refuses a message that would exceed `MAX_UNHEARD` for one of its recipients.
     pub fn check_unheard(&self, from: usize) -> Result<(), HostingError> {
         let others = self.operators.iter().enumerate().filter(|(seat, _)| *seat != from);
         match others.map(|(_, other)| other).find(|other| other.heard.len() >= MAX_UNHEARD) {
@@ -284,14 +286,14 @@ impl Round {
         }
     }
 
-    /// Counts what the operator on `seat` says, and returns how often it had spoken before.
+    /// Counts a message of the operator on `seat`, and returns the number of its earlier ones.
     pub fn count_said(&mut self, seat: usize) -> u32 {
         let said = &mut self.operators[seat].said;
         *said += 1;
         *said - 1
     }
 
-    /// Lets all but the operator on `from` hear what it said.
+    /// Delivers a message to all operators except `from`.
     pub fn spread(&mut self, from: usize, words: &Heard) {
         for (seat, operator) in self.operators.iter_mut().enumerate() {
             if seat != from {
@@ -300,14 +302,14 @@ impl Round {
         }
     }
 
-    /// What the operator on `seat` has not heard yet.
+    /// Takes the unread messages of the operator on `seat`.
     pub fn take_heard(&mut self, seat: usize) -> Vec<Heard> {
         std::mem::take(&mut self.operators[seat].heard)
     }
 }
 
 impl Operator {
-    /// The step is over, and was made from the first to the second of `made`.
+    /// Ends a step that was made from the first to the second of `made`.
     fn end(&mut self, made: Option<[u32; 2]>) -> PartnerDid {
         match self.state {
             OperatorState::Acting => {
@@ -315,7 +317,8 @@ impl Operator {
                 PartnerDid::Acted
             }
             OperatorState::Finished => PartnerDid::HeldFinished,
-            // It has looked and commanded again while the step was made; the command is for the next one.
+            // It has looked and commanded again while the step was made; the command is for the next
+            // step.
             OperatorState::Waiting(_) => PartnerDid::HeldSilent,
             OperatorState::Thinking | OperatorState::Silent => {
                 if let Some([from_step, to_step]) = made {

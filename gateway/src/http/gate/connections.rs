@@ -1,5 +1,5 @@
-//! Accepts connections and serves each until the server stops, with limits on how long a request's header may take and on how long a
-//! connection may wait for a request. Where the server has a certificate, connections are encrypted.
+//! Accepts connections and serves each until the server stops, with time limits on request headers and on
+//! idle connections. If the server has a certificate, connections are encrypted.
 
 use std::{io, sync::Arc, time::Duration};
 
@@ -26,13 +26,13 @@ use super::{
 };
 use crate::{http::problem::ApiError, settings::Certificate};
 
-/// How long to wait after the system refused a connection, as where all its file handles are taken.
+/// Delay after the system has refused a connection, for example because all file handles are in use.
 const ACCEPT_RETRY_DELAY: Duration = Duration::from_millis(200);
 
-/// The first byte of a connection with TLS: that of a record that is part of a handshake.
+/// First byte of a TLS connection: the type of a handshake record.
 const TLS_HANDSHAKE: u8 = 22;
 
-/// What serves each connection.
+/// Data needed to serve a connection.
 #[derive(Clone)]
 struct Serving {
     router: Router,
@@ -43,13 +43,13 @@ struct Serving {
 /// Limits on connections.
 #[derive(Debug, Clone, Copy)]
 pub struct ConnectionLimits {
-    /// How long a request's header may take.
+    /// Time limit for a request's header.
     pub header: Duration,
-    /// Connections of one address that may wait for a request.
+    /// Maximum number of connections of one address that wait for a request.
     pub max_waiting_per_address: usize,
 }
 
-/// Serves `router` until `stopped`, then lets the requests under way finish.
+/// Serves `router` until `stopped` completes, then lets the pending requests finish.
 pub async fn serve(
     listener: TcpListener,
     certificate: Option<Certificate>,
@@ -101,7 +101,7 @@ pub async fn serve(
 }
 
 impl Serving {
-    /// Serves a connection that is to be encrypted. Who speaks HTTP on it is told so.
+    /// Serves a connection that has to be encrypted. A client that sends plain HTTP gets an explanation.
     async fn encrypted(self, stream: TcpStream, tls: TlsAcceptor, connection: Arc<Connection>) {
         let mut stopping = self.stopping.clone();
         let begun = tokio::select! {
@@ -162,7 +162,7 @@ impl Serving {
     }
 }
 
-/// A connection as its client has begun it.
+/// A connection, by its first byte.
 enum Begun {
     Encrypted(Box<TlsStream<TcpStream>>),
     Plain(TcpStream),

@@ -1,5 +1,7 @@
-//! Which hosts and origins a request may name. Browsers let any web page send requests to this machine; pages are kept out because
-//! they cannot forge `Host` and `Origin`.
+//! Checks of the host and origin of requests.
+//!
+//! Browsers let any web page send requests to this machine. Foreign pages are kept out because they
+//! cannot forge `Host` and `Origin`.
 
 use std::{net::IpAddr, sync::Arc};
 
@@ -7,16 +9,16 @@ use axum::http::{HeaderMap, Uri, header, uri::Authority};
 
 use crate::{http::problem::ApiError, settings::Settings};
 
-/// The names and addresses that this server is reached by.
+/// Names and addresses of this server.
 #[derive(Debug, Clone)]
 pub struct OwnHosts {
     settings: Arc<Settings>,
-    /// The address that the server is bound to.
+    /// Address that the server is bound to.
     address: IpAddr,
 }
 
 impl OwnHosts {
-    /// The hosts of a server that is bound to `address`.
+    /// Returns the hosts of a server that is bound to `address`.
     pub fn new(settings: Arc<Settings>, address: IpAddr) -> OwnHosts {
         OwnHosts { settings, address }
     }
@@ -28,15 +30,17 @@ impl OwnHosts {
         if !self.contains(host) {
             return Err(ApiError::ForeignHost(host.into()));
         }
-        // Browsers say in Origin from which page a request comes; other programs send none.
+        // Browsers send the page's origin in Origin; other programs send none.
         match text(header::ORIGIN) {
             Some(origin) if !is_same_origin(origin, host) => Err(ApiError::ForeignOrigin(origin.into())),
             _ => Ok(()),
         }
     }
 
-    /// Whether `host`, with or without a port, is a name of this server. A page that has its own name point here is refused;
-    /// an address cannot be made to point elsewhere, so a server that listens on all addresses takes each.
+    /// Returns true if `host`, with or without a port, is a name of this server.
+    ///
+    /// Unknown names are refused, because a foreign page could make its own name resolve to this machine.
+    /// An address cannot be redirected, so a server that listens on all addresses accepts each.
     fn contains(&self, host: &str) -> bool {
         let Ok(authority) = host.parse::<Authority>() else { return false };
         let name = authority.host().trim_start_matches('[').trim_end_matches(']');
@@ -48,7 +52,7 @@ impl OwnHosts {
     }
 }
 
-/// Whether a page of `origin` came from `host` itself.
+/// Returns true if a page of `origin` came from `host` itself.
 fn is_same_origin(origin: &str, host: &str) -> bool {
     let authority = ["http://", "https://"].iter().find_map(|scheme| origin.strip_prefix(scheme));
     authority.is_some_and(|authority| authority.eq_ignore_ascii_case(host))

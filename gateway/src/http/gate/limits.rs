@@ -1,4 +1,4 @@
-//! How many requests may be under way at once, and how many one address may send per second.
+//! Limits on the number of concurrent requests and on the request rate of each address.
 
 use std::{
     collections::HashMap,
@@ -17,14 +17,14 @@ use tokio::sync::Semaphore;
 use super::waiting::Connection;
 use crate::{http::problem::ApiError, settings::Settings};
 
-/// How many addresses are remembered. Beyond, those are forgotten that may send at their full rate again.
+/// Maximum number of remembered addresses. Beyond it, addresses with their full allowance are forgotten.
 const MAX_ADDRESSES: usize = 1024;
 
-/// The address that a request came from.
+/// Source address of a request.
 #[derive(Debug, Clone, Copy)]
 pub struct Peer(pub IpAddr);
 
-/// Counts the requests under way, and those of each address.
+/// Counters of concurrent requests and of each address's requests.
 #[derive(Debug, Clone)]
 pub struct Limits {
     permits: Arc<Semaphore>,
@@ -33,7 +33,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The limits that `settings` set.
+    /// Creates the limits from `settings`.
     pub fn new(settings: &Settings) -> Limits {
         Limits {
             permits: Arc::new(Semaphore::new(settings.max_requests.min(Semaphore::MAX_PERMITS))),
@@ -53,7 +53,7 @@ impl Limits {
     }
 }
 
-/// Lets a request in within its address's rate, or answers when to send it again.
+/// Admits a request within its address's rate, or answers with the time of the next attempt.
 pub async fn pass_rate(State(limits): State<Limits>, request: Request, next: Next) -> Response {
     match limits.check_rate(request.extensions().get()) {
         Ok(()) => next.run(request).await,
@@ -61,8 +61,8 @@ pub async fn pass_rate(State(limits): State<Limits>, request: Request, next: Nex
     }
 }
 
-/// Gives a request one of the places, or answers when to send it again. It has arrived as a whole and its caller is known by then, so that
-/// nobody holds a place by being slow.
+/// Gives a request one of the places, or answers with the time of the next attempt. The request has
+/// arrived completely and its caller is known, so that a slow client never holds a place.
 pub async fn take_place(State(limits): State<Limits>, request: Request, next: Next) -> Response {
     let Ok(_place) = limits.permits.try_acquire() else {
         return refused(ApiError::Busy { limit: limits.most_requests });
@@ -78,11 +78,11 @@ fn refused(refusal: ApiError) -> Response {
     refusal.into_response()
 }
 
-/// How many requests each address may still send: its allowance grows evenly up to those of one second.
+/// Request allowance of each address. It grows evenly up to the number of requests of one second.
 #[derive(Debug)]
 struct Rates {
     per_second: u32,
-    /// How many requests are allowed, as of which time.
+    /// Number of allowed requests, and the time at which that was computed.
     allowances: HashMap<IpAddr, (f64, Instant)>,
 }
 
@@ -91,7 +91,7 @@ impl Rates {
         Rates { per_second, allowances: HashMap::new() }
     }
 
-    /// Whether `address` may send one more request `now`.
+    /// Returns true if `address` may send another request `now`, and counts it.
     fn take(&mut self, address: IpAddr, now: Instant) -> bool {
         let most = f64::from(self.per_second);
         let grown = |(allowed, since): (f64, Instant)| {

@@ -1,5 +1,6 @@
-//! What every request has to pass before a route sees it: the limits, a token, a host of this server, and a body of a known type. The
-//! type is checked because pages in browsers cannot call a body JSON without asking first.
+//! Checks of every request before its route: limits, token, host and media type of the body.
+//!
+//! The media type is checked because pages in browsers cannot send JSON without a preflight request.
 
 pub mod connections;
 mod hosts;
@@ -25,11 +26,11 @@ use crate::{
 };
 use hosts::OwnHosts;
 
-/// A body beyond the limit is read and thrown away up to this many times the limit, because a client that is still
-/// sending when the connection closes never sees the answer.
+/// Factor on the body limit up to which an oversized body is read and discarded. A client that is still
+/// sending when the connection closes would never see the answer.
 const DRAINED_LIMITS: usize = 16;
 
-/// Which hosts requests may be for, and how large and how slow their bodies may be.
+/// Allowed hosts, and limits on the size and duration of bodies.
 #[derive(Debug, Clone)]
 pub struct Gate {
     settings: Arc<Settings>,
@@ -37,13 +38,13 @@ pub struct Gate {
 }
 
 impl Gate {
-    /// The gate of a server that is bound to `address`.
+    /// Creates the gate of a server that is bound to `address`.
     pub fn new(settings: Arc<Settings>, address: IpAddr) -> Gate {
         Gate { hosts: OwnHosts::new(settings.clone(), address), settings }
     }
 }
 
-/// Lets a request in with its whole body, or answers why not.
+/// Admits a request with its whole body, or answers with the refusal.
 pub async fn pass(State(gate): State<Gate>, request: Request, next: Next) -> Response {
     match admit(&gate, request).await {
         Ok(request) => next.run(request).await,
@@ -80,7 +81,8 @@ async fn read_body(mut body: Body, limit_bytes: usize) -> Result<Bytes, ApiError
     Ok(kept.into())
 }
 
-/// Refuses a body whose content type is neither JSON nor MessagePack. An empty body needs no content type.
+/// Refuses a body whose content type is neither JSON nor MessagePack. An empty body needs no content
+/// type.
 fn check_content_type(headers: &HeaderMap, body: &[u8]) -> Result<(), ApiError> {
     let text = match headers.get(header::CONTENT_TYPE) {
         None if body.is_empty() => return Ok(()),

@@ -1,5 +1,6 @@
-//! Who may call: whoever has the server's token, or that of a robot's operator; where the server has none, everybody whom the gate
-//! lets through. A caller without a token learns that it needs one, and nothing else.
+//! Identification of callers by the server's token or an operator's token. A server without a token
+//! admits every request that passes the gate. A caller without a required token learns only that it needs
+//! one.
 
 use axum::{
     body::Body,
@@ -24,14 +25,14 @@ use crate::{
     },
 };
 
-/// Lets a request pass with its [`Caller`], and without the token that identified the caller.
+/// Adds the [`Caller`] to a request and removes the token from it.
 pub async fn identify(State(app): State<AppState>, mut request: Request, next: Next) -> Response {
     let watches = is_watching(request.uri().path()) && app.watch_key.opens(request.headers());
-    // The page for operators says nothing that is not in this program's sources.
+    // The operators' page has only public content.
     if operate::is_open(request.uri().path()) {
         request.headers_mut().remove(header::COOKIE);
         request.headers_mut().remove(header::AUTHORIZATION);
-        // Nobody waits for a body that no page reads.
+        // No page reads a body, so it is not awaited.
         *request.body_mut() = Body::empty();
         request.headers_mut().remove(header::CONTENT_TYPE);
         return next.run(request).await;
@@ -77,12 +78,13 @@ fn path_is(request: &Request, path: &str) -> bool {
     request.uri().path() == path
 }
 
-/// Whether a path is one for which the link opens, and no token does.
+/// Returns true for paths that require the watch link instead of a token.
 fn is_watching(path: &str) -> bool {
     path.strip_prefix(WATCH).is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
 }
 
-/// The refusal of who has no token: the same everywhere, for browsers as a page that reads the link for watching.
+/// Returns the refusal for a missing token, the same for every path. Browsers get a page that reads the
+/// watch link.
 fn refused(headers: &HeaderMap) -> Response {
     let accepts = headers.get(header::ACCEPT).and_then(|value| value.to_str().ok()).unwrap_or_default();
     match accepts.contains("text/html") {
@@ -101,12 +103,12 @@ async fn caller(app: &AppState, headers: &HeaderMap) -> Option<Caller> {
     match (&app.settings.token, token) {
         (Some(_), Some(token)) => operator.or_else(|| is_hosts(token).then_some(Caller::Host)),
         (Some(_), None) => None,
-        // Where the server has no token, a token that is no operator's is ignored.
+        // If the server has no token, unknown tokens are ignored.
         (None, _) => operator.or(Some(Caller::Host)),
     }
 }
 
-/// The token of a request that has exactly one.
+/// Returns the token of a request that has exactly one.
 fn bearer(headers: &HeaderMap) -> Option<&str> {
     let mut values = headers.get_all(header::AUTHORIZATION).iter();
     let (value, None) = (values.next()?.to_str().ok()?, values.next()) else { return None };

@@ -1,7 +1,7 @@
-//! Connections that wait for a request: how long each may, and how many of one address do.
+//! Idle connections: their time limits, and their number per address.
 //!
-//! A language model may think for minutes between two calls, so that a connection that has made a good call lives for an hour without
-//! one. All others have as long as a header may take.
+//! A language model may think for minutes between two calls. So a connection that has made a good call
+//! may stay idle for an hour. All others have the time limit of a header.
 
 use std::{
     collections::HashMap,
@@ -23,14 +23,14 @@ use tokio::{
     time,
 };
 
-/// Longest wait for the next request on a connection that has made a good call.
+/// Maximum wait for the next request on a connection that has made a good call.
 pub const MAX_TRUSTED_WAIT: Duration = Duration::from_secs(60 * 60);
 
-/// Marks the answer to a call of somebody who was known, and that was not refused.
+/// Marker on the answer to a call of an identified caller that was not refused.
 #[derive(Debug, Clone, Copy)]
 pub struct GoodCall;
 
-/// The connections that wait for a request, by address, the longest wait first.
+/// Idle connections by address, the longest wait first.
 #[derive(Debug)]
 pub struct WaitingConnections {
     max_per_address: usize,
@@ -46,7 +46,7 @@ struct WaitingEntry {
 }
 
 impl WaitingConnections {
-    /// No connection yet; of one address at most `max_per_address` wait.
+    /// Creates an empty table; at most `max_per_address` connections of one address may wait.
     pub fn new(max_per_address: usize) -> WaitingConnections {
         WaitingConnections {
             max_per_address: max_per_address.max(1),
@@ -55,7 +55,7 @@ impl WaitingConnections {
         }
     }
 
-    /// Enters a new connection from `address`, which waits for its first request.
+    /// Registers a new connection from `address`, which waits for its first request.
     pub fn enter(self: &Arc<Self>, address: IpAddr, header_limit: Duration) -> Arc<Connection> {
         let connection = Connection {
             all: self.clone(),
@@ -85,7 +85,8 @@ impl WaitingConnections {
         }
     }
 
-    /// Adds a connection; where its address has too many, the one that has waited longest is closed, those without a good call first.
+    /// Adds a connection. If its address has too many, the one with the longest wait is closed,
+    /// preferably one without a good call.
     fn add(&self, connection: &Connection) {
         let mut waiting = self.lock();
         let entries = waiting.entry(connection.address).or_default();
@@ -99,7 +100,7 @@ impl WaitingConnections {
     }
 }
 
-/// One connection, as it waits for requests and makes them.
+/// A connection with the state of its wait.
 #[derive(Debug)]
 pub struct Connection {
     all: Arc<WaitingConnections>,
@@ -111,7 +112,7 @@ pub struct Connection {
     close: Arc<Notify>,
 }
 
-/// Since when the next request is waited for.
+/// Times of the current wait for a request.
 #[derive(Debug, Clone, Copy)]
 struct RequestWait {
     since: Instant,
@@ -120,22 +121,22 @@ struct RequestWait {
 }
 
 impl Connection {
-    /// The address at its other end.
+    /// Returns the remote address.
     pub fn address(&self) -> IpAddr {
         self.address
     }
 
-    /// Returns once too many connections of its address wait, and this one has to go.
+    /// Returns once this connection has to close because too many of its address wait.
     pub async fn crowded_out(&self) {
         self.close.notified().await;
     }
 
-    /// Counts the connection as one that does not wait: its request has arrived and is let in.
+    /// Counts the connection as busy, because its request has arrived and is admitted.
     pub fn is_served(&self) {
         self.all.remove(self);
     }
 
-    /// Lets the connection live for long between requests from now on.
+    /// Allows long waits between requests from now on.
     pub fn trust(&self) {
         self.is_trusted.store(true, Ordering::Relaxed);
     }
@@ -150,12 +151,13 @@ impl Connection {
         self.all.add(self);
     }
 
-    /// Bytes have arrived.
+    /// Records that bytes have arrived.
     fn receive(&self) {
         self.lock().header_since.get_or_insert_with(Instant::now);
     }
 
-    /// The end of the wait. A connection without a good call has as long for wait and header together as another for a header.
+    /// Returns the end of the wait. A connection without a good call has one header time limit for wait
+    /// and header together.
     fn deadline(&self) -> Instant {
         let RequestWait { since, header_since } = *self.lock();
         match (self.is_trusted(), header_since) {
@@ -177,8 +179,8 @@ impl Drop for Connection {
     }
 }
 
-/// The timer by which hyper measures how long a header takes: it starts when the wait for a request begins, and ends by what the
-/// connection has done so far.
+/// hyper's timer for headers, replaced by one that respects the connection's history. It starts when the
+/// wait for a request begins.
 #[derive(Debug, Clone)]
 pub struct WaitTimer(pub Arc<Connection>);
 
@@ -194,7 +196,7 @@ impl Timer for WaitTimer {
     }
 }
 
-/// Ends when the connection has waited for too long.
+/// A future that ends when the connection has waited for too long.
 struct WaitSleep {
     connection: Arc<Connection>,
     sleep: Pin<Box<time::Sleep>>,
@@ -214,7 +216,7 @@ impl Future for WaitSleep {
 
 impl Sleep for WaitSleep {}
 
-/// A stream that notes on its connection when bytes arrive.
+/// A stream that records on its connection when bytes arrive.
 pub struct NotedStream<S> {
     pub connection: Arc<Connection>,
     pub stream: S,

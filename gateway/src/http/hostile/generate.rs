@@ -1,12 +1,12 @@
-//! Random bodies made from schemas, and random changes that make them hostile.
+//! Generation of random bodies from schemas, and of random changes that make them hostile.
 
 use serde_json::{Map, Value, json};
 
-/// Random numbers that are the same in every run (Steele, Lea and Flood 2014).
+/// A generator of random numbers that are the same in every run (Steele, Lea and Flood 2014).
 pub struct SplitMix64(pub u64);
 
 impl SplitMix64 {
-    /// A number below `end`, which is not 0.
+    /// Returns a number below `end`, which must not be 0.
     pub fn below(&mut self, end: usize) -> usize {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -14,18 +14,18 @@ impl SplitMix64 {
         ((mixed ^ (mixed >> 31)) % end as u64) as usize
     }
 
-    /// True in `percent` of a hundred cases.
+    /// Returns true with a probability of `percent` percent.
     pub fn percent(&mut self, percent: usize) -> bool {
         self.below(100) < percent
     }
 
-    /// One of `choices`.
+    /// Picks one of `choices`.
     pub fn of<'a, T>(&mut self, choices: &'a [T]) -> &'a T {
         &choices[self.below(choices.len())]
     }
 }
 
-/// A value that a schema allows, as far as this generator understands it.
+/// Returns a value that a schema allows, as far as this generator understands the schema.
 pub fn allowed(schema: &Value, random: &mut SplitMix64) -> Value {
     if let Some(choices) = schema["anyOf"].as_array().filter(|_| schema["type"].is_null()) {
         return allowed(random.of(choices), random);
@@ -72,7 +72,7 @@ fn array(schema: &Value, random: &mut SplitMix64) -> Value {
     (0..length).map(|index| allowed(item(index), random)).collect()
 }
 
-/// Puts something else in the place of one value, or of one name, below `value`.
+/// Replaces one value or one name below `value`.
 pub fn spoil(value: &mut Value, random: &mut SplitMix64) {
     let inner = match value {
         Value::Object(fields) if !fields.is_empty() && random.percent(85) => {
@@ -101,7 +101,7 @@ pub fn spoil(value: &mut Value, random: &mut SplitMix64) {
     }
 }
 
-/// A value that a hostile caller might send.
+/// Returns a value that a hostile caller might send.
 fn hostile(random: &mut SplitMix64) -> Value {
     match random.below(12) {
         0 => Value::Null,
@@ -119,7 +119,7 @@ fn hostile(random: &mut SplitMix64) -> Value {
     }
 }
 
-/// A text that a hostile caller might send.
+/// Returns a text that a hostile caller might send.
 pub fn text(random: &mut SplitMix64) -> String {
     const TEXTS: [&str; 12] = [
         "",
@@ -141,7 +141,7 @@ pub fn text(random: &mut SplitMix64) -> String {
     (*random.of(&TEXTS)).into()
 }
 
-/// A body as it may come over a wire: most are JSON, some are broken on the way.
+/// Serializes a body as it may arrive: mostly JSON, sometimes corrupted.
 pub fn bytes(value: &Value, random: &mut SplitMix64) -> Vec<u8> {
     let mut bytes = value.to_string().into_bytes();
     if random.percent(85) {

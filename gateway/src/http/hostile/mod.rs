@@ -1,4 +1,5 @@
-//! Thousands of hostile calls: a refused call changes no state, reveals nothing about the server, and ends no episode.
+//! Tests with thousands of hostile calls: a refused call changes no state, reveals nothing about the
+//! server, and ends no episode.
 
 mod generate;
 
@@ -28,7 +29,7 @@ use crate::{
 };
 use generate::{SplitMix64, allowed, bytes, spoil, text};
 
-/// A server without a network, and the one episode that it holds.
+/// A server without a network, and the only episode that it holds.
 struct Target {
     runtime: Runtime,
     router: TowerToHyperService<Router>,
@@ -38,14 +39,14 @@ struct Target {
     id: String,
 }
 
-/// What came back for a request.
+/// The response to a request.
 struct RawReply {
     status: StatusCode,
     body: Value,
 }
 
 impl RawReply {
-    /// Whether the request was refused over HTTP, by JSON-RPC, or as a tool's answer over MCP.
+    /// Returns true if the request was refused over HTTP, by JSON-RPC, or as a tool's answer over MCP.
     fn refuses(&self) -> bool {
         !self.status.is_success() || self.body["error"].is_object() || self.body["result"]["isError"] == true
     }
@@ -74,7 +75,7 @@ impl Target {
         self.id = self.runtime.block_on(self.table.start(args)).unwrap().episode_id;
     }
 
-    /// State hash and control steps of the episode, and whether it has ended.
+    /// Returns the state hash and control steps of the episode, and true if it has ended.
     fn state(&self) -> (Option<String>, u32, bool) {
         let episode = self.table.get(&self.id).unwrap();
         match self.runtime.block_on(episode.status()).unwrap().reply {
@@ -95,7 +96,7 @@ impl Target {
         })
     }
 
-    /// A random request: its path and body.
+    /// Generates a random request: its path and body.
     fn request(&self, random: &mut SplitMix64) -> (String, Vec<u8>) {
         let spec = random.of(&self.specs);
         let mut args = allowed(&spec.body_schema(50), random);
@@ -127,7 +128,7 @@ impl Target {
     }
 }
 
-/// Checks that a refusal says something, and nothing secret.
+/// Checks that a refusal has a message and reveals no secret.
 fn check_refusal(target: &Target, answer: &RawReply, sent: &str) {
     let shown = answer.body.to_string();
     assert_ne!(answer.status, StatusCode::INTERNAL_SERVER_ERROR, "{sent}: {shown}");
@@ -140,7 +141,7 @@ fn check_refusal(target: &Target, answer: &RawReply, sent: &str) {
     assert!(shown.len() < 4 * sent.len() + 4096, "{sent}: refused with {} bytes", shown.len());
 }
 
-/// Sends `calls` random requests and returns how many were refused.
+/// Sends `calls` random requests and returns the number of refusals.
 fn play(calls: usize, seed: u64) -> usize {
     let mut target = Target::new();
     let mut random = SplitMix64(seed);
@@ -160,7 +161,7 @@ fn play(calls: usize, seed: u64) -> usize {
             refused += 1;
             check_refusal(&target, &answer, &sent);
         }
-        // An episode that has ended made room for another.
+        // An ended episode has made room for another.
         if target.table.get(&target.id).is_err() {
             target.id = answer.body["episode_id"].as_str().unwrap_or(&target.id).to_owned();
             assert!(target.table.get(&target.id).is_ok(), "{sent}: the episode is gone");

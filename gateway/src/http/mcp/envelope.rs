@@ -1,5 +1,7 @@
-//! Checks the JSON-RPC 2.0 message around a call over MCP, and answers mistakes with the codes that JSON-RPC specifies: the library
-//! behind this would take some for requests that it does not know, and answer others with no JSON at all.
+//! Validation of the JSON-RPC 2.0 message around a call over MCP, with the error codes of JSON-RPC.
+//!
+//! The MCP library would take some invalid messages for unknown requests, and would answer others without
+//! JSON.
 
 use axum::{
     http::{StatusCode, header},
@@ -11,12 +13,12 @@ const PARSE_ERROR: i32 = -32700;
 const INVALID_REQUEST: i32 = -32600;
 const INVALID_PARAMS: i32 = -32602;
 
-/// Why a body is no JSON-RPC message.
+/// Reason why a body is no JSON-RPC message.
 #[derive(Debug)]
 pub struct RpcError {
     code: i32,
     message: String,
-    /// The id of the request, a text or a number, where it could be read.
+    /// Id of the request, a string or a number, if it could be read.
     id: Option<Value>,
 }
 
@@ -31,7 +33,7 @@ impl IntoResponse for RpcError {
     }
 }
 
-/// Checks that a body is one message, and that what calls a tool or asks for a prompt says which.
+/// Checks that a body is one message, and that tool calls and prompt requests name their target.
 pub fn check(body: &[u8]) -> Result<(), RpcError> {
     let refuse = |code: i32, id: Option<&Value>, message: &str| {
         Err(RpcError { code, message: message.into(), id: id.cloned() })
@@ -59,7 +61,7 @@ pub fn check(body: &[u8]) -> Result<(), RpcError> {
     }
 }
 
-/// Says what is wrong with the parameters of `method`.
+/// Checks the parameters of `method`. The error describes what is wrong.
 fn check_params(method: &str, params: Option<&Value>) -> Result<(), String> {
     let none = Map::new();
     let params = match params {

@@ -1,5 +1,5 @@
-//! The MCP route: the same tools for hosts that speak the Model Context Protocol. Every call names its episode, so the
-//! route keeps no sessions.
+//! The MCP route: the same tools for hosts that use the Model Context Protocol. Every call names its
+//! episode, so the route keeps no sessions.
 
 mod envelope;
 mod prompt;
@@ -40,14 +40,14 @@ use super::{
 };
 use crate::hosting::{Answer, Caller, HostingError, RefusedCall};
 
-/// What the library wants to be accepted; the answers are JSON.
+/// Accept header that the library requires; the answers are JSON.
 const ACCEPTED: &str = "application/json, text/event-stream";
 
 /// Returns what a host tells its model about the server as a whole: only what `caller` can do.
 fn instructions(caller: &Caller) -> String {
     let begin = match caller {
         Caller::Host => "Call list_tasks, then start_episode, then look".into(),
-        // Its episode goes on already, and no other can be begun.
+        // An operator's episode is already under way, and it cannot start another.
         Caller::Operator { episode, robot } => {
             format!("You are the operator of robot {robot} in the episode {episode}, which has begun. Look")
         }
@@ -59,7 +59,7 @@ fn instructions(caller: &Caller) -> String {
     )
 }
 
-/// The routes to nest at `/mcp`, behind the gate, which has checked `Host` and `Origin`.
+/// Returns the routes to nest at `/mcp`, behind the gate, which has checked `Host` and `Origin`.
 pub fn router(app: AppState) -> Router {
     Router::new().fallback_service(service(app)).layer(middleware::from_fn(check_body))
 }
@@ -73,7 +73,7 @@ fn service(app: AppState) -> StreamableHttpService<McpServer, NeverSessionManage
     StreamableHttpService::new(move || Ok(McpServer { app: app.clone() }), Arc::default(), config)
 }
 
-/// Answers MCP requests from the table of episodes.
+/// An MCP server that answers from the table of episodes.
 #[derive(Debug, Clone)]
 struct McpServer {
     app: AppState,
@@ -181,7 +181,8 @@ impl ServerHandler for McpServer {
         self.log_call(&request.name, episode.as_deref(), called.as_ref().err());
         let result = match called {
             Ok(content) => CallToolResult::success(content),
-            // A refusal is served as the tool's answer, which the model reads; protocol errors often stay with the host.
+            // A refusal is returned as the tool's answer, which the model reads; protocol errors often
+            // stay with the host.
             Err(error) => CallToolResult::error(refusal_blocks(&error)),
         };
         Ok(result.into())
@@ -218,9 +219,10 @@ impl McpServer {
         }
     }
 
-    /// Logs a call and counts a refusal: the log line of the HTTP request knows neither the tool nor the problem.
+    /// Logs a call and counts a refusal. The log line of the HTTP request has neither the tool nor the
+    /// problem.
     fn log_call(&self, tool: &str, episode: Option<&str>, refusal: Option<&ApiError>) {
-        // An episode that does not exist may be anything that a caller made up, and is not logged.
+        // An unknown id may be arbitrary text of the caller, so it is not logged.
         let episode = episode.filter(|id| self.app.table.get(id).is_ok());
         let problem = refusal.map(ApiError::kind);
         if let Some(kind) = problem {
@@ -241,7 +243,7 @@ impl McpServer {
         let call = Call::parse(name, args).map_err(|error| ApiError::from(error.naming_episode(named)));
         let id = match (handle, caller) {
             (Some(Value::String(id)), _) => id,
-            // An operator's token says which episode.
+            // An operator's token implies its episode.
             (None, Caller::Operator { episode, .. }) => episode.clone(),
             (None, Caller::Host) if TalkCall::TOOLS.contains(&name) => {
                 return Err(HostingError::NoTalk.into());
@@ -274,7 +276,7 @@ impl McpServer {
     }
 }
 
-/// The content of an answer: its JSON without pictures, then the pictures.
+/// Returns the content of an answer: its JSON without images, then the images.
 fn content(answer: &Answer) -> Result<Vec<ContentBlock>, ApiError> {
     let mut text = serde_json::to_value(answer).map_err(|error| ApiError::Reply(error.into()))?;
     let seen = match (&answer.reply, &answer.observation) {
@@ -298,18 +300,18 @@ fn content(answer: &Answer) -> Result<Vec<ContentBlock>, ApiError> {
     Ok(content)
 }
 
-/// The caller, as the gate has identified it.
+/// Returns the caller that the gate has identified.
 fn caller_of(context: &RequestContext<RoleServer>) -> Option<&Caller> {
     context.extensions.get::<Parts>()?.extensions.get()
 }
 
-/// Says which robot each of the following pictures is from.
+/// Names the robot of each of the following images.
 fn image_captions(images: &[CameraImage]) -> String {
     let of = |(index, image): (usize, &CameraImage)| format!(" Image {}: {}.", index + 1, image.robot);
     format!("{} images follow.{}", images.len(), images.iter().enumerate().map(of).collect::<String>())
 }
 
-/// A refusal as a model reads it.
+/// Returns a refusal as text for a model.
 fn refusal_blocks(error: &ApiError) -> Vec<ContentBlock> {
     let failed = error.recording_failed().map(|reason| format!("recording_failed: {reason}"));
     let result = error.result().and_then(|result| serde_json::to_string(result).ok());
@@ -317,11 +319,11 @@ fn refusal_blocks(error: &ApiError) -> Vec<ContentBlock> {
     [error.body().detail].into_iter().chain(failed).chain(result).map(ContentBlock::text).collect()
 }
 
-/// Says that a body names a field twice. The JSON-RPC library behind this would keep the last of the two.
+/// A duplicate field in a body. The JSON-RPC library would keep the last of the two.
 #[derive(Clone)]
 struct DuplicateField(String);
 
-/// Refuses what is no message. A body that names a field twice is noted on the request, for the answer to its call.
+/// Refuses invalid messages. A duplicate field is recorded on the request, for the answer to its call.
 async fn check_body(request: extract::Request, next: Next) -> Response {
     let (mut parts, body) = request.into_parts();
     accept_whatever_fits(&mut parts);
@@ -338,7 +340,8 @@ async fn check_body(request: extract::Request, next: Next) -> Response {
     next.run(extract::Request::from_parts(parts, bytes.into())).await
 }
 
-/// Spells out for the library behind this what a client takes that takes anything, or says nothing of it.
+/// Sets the Accept header that the library requires, for a client that accepts anything or sends no such
+/// header.
 fn accept_whatever_fits(parts: &mut Parts) {
     let accepted = parts.headers.get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());
     let ranges: Vec<&str> = accepted.flat_map(|value| value.split(',')).collect();

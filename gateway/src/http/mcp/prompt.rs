@@ -1,4 +1,5 @@
-//! The prompt that MCP hosts offer their users: all that a policy has to know about a task before it begins.
+//! The prompt that MCP hosts offer their users: the information that a policy needs about a task before
+//! it begins.
 
 use rmcp::{
     ErrorData,
@@ -11,10 +12,10 @@ use tandem_tools_spec::{
 
 use crate::hosting::Caller;
 
-/// The name of the only prompt.
+/// Name of the only prompt.
 const NAME: &str = "play_task";
 
-/// The prompts that hosts may offer.
+/// Returns the prompts that hosts may offer.
 pub fn prompts(tasks: &TaskSet) -> Vec<Prompt> {
     let argument = |name: &str, text: &str, required: bool| {
         PromptArgument::new(name).with_description(text).with_required(required)
@@ -30,7 +31,8 @@ pub fn prompts(tasks: &TaskSet) -> Vec<Prompt> {
     vec![prompt.with_title("Play a task")]
 }
 
-/// The prompt called `name` for the task, seed and protocol in `arguments`, as `caller` may follow it; `list` has the tasks.
+/// Returns the prompt called `name` for the task, seed and protocol in `arguments`, in the form for
+/// `caller`; `list` has the tasks.
 pub fn prompt(
     name: &str,
     arguments: JsonObject,
@@ -54,7 +56,7 @@ pub fn prompt(
     Ok(result)
 }
 
-/// Reads the arguments of a prompt, which are all texts; the seed becomes a number.
+/// Parses the arguments of a prompt, which are all strings. The seed becomes a number.
 fn start(mut arguments: JsonObject) -> Result<StartEpisode, String> {
     let seed = match arguments.remove("seed") {
         None => 0,
@@ -81,7 +83,7 @@ fn text(task: &TaskInfo, start: &StartEpisode, brief: &Brief, caller: &Caller) -
         Caller::Host => {
             format!("Begin with start_episode, task {}, seed {}, protocol {protocol}. ", task.id, start.seed)
         }
-        // Its episode goes on already.
+        // The episode is already under way.
         Caller::Operator { robot, .. } => format!("You are the operator of robot {robot}. "),
     };
     let paragraphs = [

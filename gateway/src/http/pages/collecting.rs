@@ -1,4 +1,4 @@
-//! What people who play one episode after another ask for: whose turn it is, and what each says of an episode that has ended.
+//! Requests of the people in a collection: its progress, and their marks for ended episodes.
 
 use axum::{
     Extension,
@@ -16,14 +16,14 @@ use crate::{
     http::{app::AppState, problem::ApiError},
 };
 
-/// What a person says of an episode.
+/// A person's mark for an episode.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Mark {
     good: bool,
 }
 
-/// What a QR code is to say.
+/// Text of a QR code.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CodeText {
@@ -34,7 +34,7 @@ fn collection(app: &AppState) -> Result<&Collection, ApiError> {
     app.table.collection().ok_or(ApiError::NoCollection)
 }
 
-/// How far the collection is; whoever runs it also gets the tokens of its people, for their links.
+/// Returns the progress of the collection. The host also gets the tokens of the people, for their links.
 pub async fn progress(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
@@ -48,7 +48,7 @@ pub async fn progress(
     Ok(([(header::CACHE_CONTROL, "no-store")], axum::Json(told)).into_response())
 }
 
-/// A person marks the episode that has ended.
+/// Records a person's mark for the ended episode.
 pub async fn mark(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
@@ -63,7 +63,7 @@ pub async fn mark(
     }
 }
 
-/// The QR code of a text, which is a body and no address, because addresses are written to logs.
+/// Renders a QR code of a text. The text is sent as a body, because URLs are logged.
 pub async fn code(body: Bytes) -> Result<Response, ApiError> {
     let CodeText { text } = read(&body)?;
     let picture = qr_svg(&text).map_err(|error| ApiError::Protocol {

@@ -1,4 +1,4 @@
-//! The socket by which a person drives: the page says what its robot is to do, and is told every control step as those are who watch.
+//! The socket for teleoperation: the page sends setpoints for its robot, and receives every control step.
 
 use std::{io, sync::Arc, time::Duration};
 
@@ -26,45 +26,47 @@ use crate::{
     http::{app::AppState, problem::ApiError},
 };
 
-/// Where the socket is.
+/// Path of the socket.
 pub const DRIVE: &str = "/operate/drive";
 
-/// Where the cookie for it is given.
+/// Path that sets the cookie for the socket.
 pub const ENTER: &str = "/operate/enter";
 
-/// What the cookies are called that hold operators' tokens, before the name of the robot.
+/// Prefix of the names of cookies with operators' tokens; the robot's name follows.
 const COOKIE: &str = "tandem_operator_";
 
-/// How often a page is told for whom its robot waits.
+/// Interval between two updates of the robots that the page's robot waits for.
 const STATUS_INTERVAL: Duration = Duration::from_millis(250);
 
-/// With every so many answers for its own robot a page gets the whole report, five times a second.
+/// Number of answers for its own robot per full report to a page, which makes five reports a second.
 const ANSWERS_PER_REPORT: usize = 10;
 
-/// The robots that a request for the socket may drive: for each a cookie has the token of its operator.
+/// Robots that a request for the socket may drive: each has its operator's token in a cookie.
 #[derive(Debug, Clone)]
 pub struct DrivenRobots(pub Vec<String>);
 
-/// What a page says.
+/// A message of a page.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Word {
-    /// As an entry of `move_wrists`, without the robot's name.
+    /// An entry of `move_wrists`, without the robot's name.
     #[serde(rename = "move")]
     wrist_move: Map<String, Value>,
-    /// Whether time may pass.
+    /// True while time may pass.
     go: bool,
-    /// Step by step: so many control steps.
+    /// Number of control steps for single stepping.
     #[serde(default)]
     steps: u32,
 }
 
-/// The token of a request for the cookie; the gate takes it from every other request.
+/// Token of a request for the cookie; the gate removes it from every other request.
 #[derive(Clone)]
 pub struct GivenToken(pub String);
 
-/// An operator gets the cookie that opens the socket: a browser sends no other header with a request for one. No script reads it, and no
-/// other site's page has it sent.
+/// Sets the cookie that opens the socket for an operator, because browsers cannot send other headers with
+/// a socket request.
+///
+/// Scripts cannot read the cookie, and pages of other sites cannot make the browser send it.
 pub async fn enter(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
@@ -77,8 +79,10 @@ pub async fn enter(
     Ok((StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie)]).into_response())
 }
 
-/// Returns the caller of a request for the socket, and all robots that it may drive: the operators of
-/// `robots=A,C` in its query whose tokens are in its cookies. They are of one episode.
+/// Returns the caller of a request for the socket, and all robots that it may drive.
+///
+/// These are the operators of `robots=A,C` in the query whose tokens are in the cookies. They must belong
+/// to one episode.
 pub async fn drivers(app: &AppState, query: &str, headers: &HeaderMap) -> Option<(Caller, DrivenRobots)> {
     let wanted = query.strip_prefix("robots=")?;
     let lines = headers.get_all(header::COOKIE).into_iter().filter_map(|line| line.to_str().ok());
@@ -99,14 +103,14 @@ pub async fn drivers(app: &AppState, query: &str, headers: &HeaderMap) -> Option
         .then(|| (first.clone(), DrivenRobots(wanted.split(',').map(str::to_owned).collect())))
 }
 
-/// Returns the operator of `robot` whose token its cookie has. Browsers send one for each; a second is not
-/// looked up.
+/// Returns the operator of `robot` that owns the token in its cookie. Browsers send one cookie per robot;
+/// a second is ignored.
 async fn driver_of(app: &AppState, robot: &str, cookies: &[(&str, &str)]) -> Option<Caller> {
     let (_, token) = cookies.iter().find(|(name, _)| name.strip_prefix(COOKIE) == Some(robot))?;
     app.table.operator_anywhere(token).await.filter(|caller| caller.robot() == Some(robot))
 }
 
-/// The socket.
+/// Serves the socket.
 pub async fn drive(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
@@ -132,7 +136,7 @@ pub async fn drive(
     })
 }
 
-/// Takes in what a page says until it has gone. What cannot be read ends it, because nobody knows what it wants.
+/// Handles the messages of a page until it has gone. An unreadable message ends the connection.
 async fn hear(reader: &mut PageReader, robot: &str, driver: &Driver) -> io::Result<()> {
     while let Some(text) = reader.text().await? {
         let Word { mut wrist_move, go, steps } = serde_json::from_str(&text)?;
@@ -143,7 +147,7 @@ async fn hear(reader: &mut PageReader, robot: &str, driver: &Driver) -> io::Resu
     Ok(())
 }
 
-/// A page that drives, as it is told what happens.
+/// The sending side of a page that drives.
 struct DriversPage {
     robot: String,
     disclosure: Disclosure,
@@ -151,7 +155,7 @@ struct DriversPage {
 }
 
 impl DriversPage {
-    /// Tells the scene, and then what happens, until nothing does any more or another page has taken the wheel.
+    /// Sends the scene and then all events, until the episode ends or another page takes over.
     async fn tell(
         &self,
         sender: &mut PageSender,
@@ -189,7 +193,7 @@ impl DriversPage {
         }
     }
 
-    /// Tells the newest of the steps that have come, and all else. A page that is slow gets what is newest.
+    /// Sends the newest of the pending steps and all other events, so that a slow page skips steps.
     async fn newest(
         &self,
         sender: &mut PageSender,
@@ -203,7 +207,7 @@ impl DriversPage {
                 Ok(LiveEvent::Step(newer)) => step = newer,
                 Ok(other) => others.push(other),
                 Err(TryRecvError::Lagged(_)) => {}
-                // That it is closed is found again.
+                // The loop above notices a closed channel.
                 Err(TryRecvError::Empty | TryRecvError::Closed) => break,
             }
         }
@@ -221,12 +225,13 @@ impl DriversPage {
                 let result = (*result).clone().disclosed(self.disclosure);
                 sender.text(json!({ "kind": "ended", "result": result }).to_string()).await
             }
-            // What its own commands came to, a page is told as any operator is.
+            // The page gets the outcome of its own commands as any operator does.
             LiveEvent::Entry(_) | LiveEvent::Phase(_) => Ok(()),
         }
     }
 
-    /// Tells what came of a command: all of it now and then, and whenever a partner speaks or is away.
+    /// Sends the answer to a command. The full report is sent at intervals, and whenever a partner speaks
+    /// or is away.
     async fn answer(
         &self,
         sender: &mut PageSender,
@@ -247,12 +252,12 @@ impl DriversPage {
     }
 }
 
-/// How many answers a page has had for its own robot. Those for robots that stand still beside it come in between, and do not count.
+/// Number of answers for the page's own robot. Answers for the other robots it drives are not counted.
 #[derive(Debug, Default)]
 struct OwnAnswers(usize);
 
 impl OwnAnswers {
-    /// Whether the page gets the whole report on the next answer.
+    /// Returns true if the page gets the full report with the next answer.
     fn is_reported(&mut self, own: bool) -> bool {
         self.0 += usize::from(own);
         own && self.0 % ANSWERS_PER_REPORT == 1

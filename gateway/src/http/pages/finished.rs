@@ -1,4 +1,4 @@
-//! Finished episodes, as the folder of runs has them: their list, a recording to scrub in, its pictures, its film and its files.
+//! Finished episodes in the runs folder: their list, a recording for playback, images, films and files.
 
 use std::{
     fs,
@@ -24,13 +24,13 @@ use crate::{
     },
 };
 
-/// How many are listed, the newest first.
+/// Maximum number of listed episodes, newest first.
 const MAX_LISTED: usize = 200;
 
-/// How deep below the runs folder episodes lie: those of an evaluation are in a folder of its folder.
+/// Depth of the search for episodes below the runs folder; an evaluation nests its own in subfolders.
 const DEPTH: usize = 4;
 
-/// What of an episode's folder may be fetched, and what it is.
+/// Files of an episode's folder that may be fetched, with their media types.
 const FILES: [(&str, &str); 4] = [
     (RECORDING, "application/octet-stream"),
     (RESULT_FILE, "application/json"),
@@ -38,7 +38,7 @@ const FILES: [(&str, &str); 4] = [
     ("report.html", "text/html; charset=utf-8"),
 ];
 
-/// The finished episodes below `runs`, the newest first, without those that are `running`.
+/// Lists the finished episodes below `runs`, newest first, without those that are `running`.
 pub fn list(runs: &Path, running: &[String]) -> Vec<Value> {
     let mut found = Vec::new();
     collect(runs, DEPTH, &mut found);
@@ -75,7 +75,8 @@ fn folder(app: &AppState, wanted: &Wanted) -> Result<PathBuf, ApiError> {
     folder_of(app, wanted.run.clone().unwrap_or_default())
 }
 
-/// The folder that a page names, which lies below the runs folder and is an episode's.
+/// Returns the folder that a page names, after checking that it is an episode's folder below the runs
+/// folder.
 pub fn folder_of(app: &AppState, run: String) -> Result<PathBuf, ApiError> {
     let named = Path::new(&run);
     let below = !run.is_empty() && named.components().all(|part| matches!(part, Component::Normal(_)));
@@ -86,14 +87,14 @@ pub fn folder_of(app: &AppState, run: String) -> Result<PathBuf, ApiError> {
     }
 }
 
-/// All that a page draws of a finished episode.
+/// Returns the data with which a page draws a finished episode.
 pub async fn run(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
     let folder = folder(&app, &wanted)?;
     let message = app.recordings.read(move |last| Ok(last.open(&folder)?.message()));
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], message.await?).into_response())
 }
 
-/// What a robot saw at a moment, as a PNG file.
+/// Renders a robot's camera image at a moment as a PNG file.
 pub async fn picture(app: AppState, wanted: Wanted) -> Result<Vec<u8>, ApiError> {
     let folder = folder(&app, &wanted)?;
     let drawn = app.recordings.read(move |last| {
@@ -107,7 +108,7 @@ pub async fn picture(app: AppState, wanted: Wanted) -> Result<Vec<u8>, ApiError>
     drawn.await
 }
 
-/// A short film of the episode.
+/// Renders a short film of the episode.
 pub async fn film(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
     let folder = folder(&app, &wanted)?;
     let made = app.films.read(move |_| {
@@ -117,7 +118,7 @@ pub async fn film(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> 
     Ok(([(header::CONTENT_TYPE, "image/webp")], made.await?.webp).into_response())
 }
 
-/// A file of the episode's folder.
+/// Returns a file of the episode's folder.
 pub async fn file(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
     let folder = folder(&app, &wanted)?;
     let asked = wanted.file.unwrap_or_default();
@@ -128,7 +129,7 @@ pub async fn file(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> 
     let bytes = read.await?;
     let headers = [
         (header::CONTENT_TYPE, kind.to_owned()),
-        // A report is a page of its own, which runs nothing.
+        // A report is a page of its own; its scripts are disabled.
         (
             header::CONTENT_SECURITY_POLICY,
             "sandbox; default-src 'none'; img-src data:; style-src 'unsafe-inline'".into(),

@@ -1,4 +1,4 @@
-//! Running episodes: their scenes, and what happens in them over a WebSocket.
+//! Running episodes: their scenes, and their events over a WebSocket.
 
 use std::{io, sync::Arc};
 
@@ -20,7 +20,7 @@ use crate::{
     http::{app::AppState, problem::ApiError, watching::MAX_WATCHERS},
 };
 
-/// What comes first in the message of a picture; that of a step begins with 1.
+/// First number in an image message; a step message begins with 1.
 const PICTURE_KIND: f32 = 2.0;
 
 fn thread(app: &AppState, wanted: &Wanted) -> Result<Arc<EpisodeThread>, ApiError> {
@@ -28,7 +28,7 @@ fn thread(app: &AppState, wanted: &Wanted) -> Result<Arc<EpisodeThread>, ApiErro
     Ok(app.table.hosted(&id).map_err(|_| HostingError::UnknownEpisode { id })?.thread)
 }
 
-/// The scene, with the calls and phases so far in its head.
+/// Returns the scene; its header has the calls and phases up to now.
 pub async fn scene(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
     let LiveWatch { view, .. } = thread(&app, &wanted)?.watch().await?;
     let message = blocking(move || {
@@ -42,7 +42,7 @@ pub async fn scene(State(app): State<AppState>, Query(wanted): Query<Wanted>) ->
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], message.await?).into_response())
 }
 
-/// What happens from now on.
+/// Streams the events from now on.
 pub async fn live(
     State(app): State<AppState>,
     Query(wanted): Query<Wanted>,
@@ -52,7 +52,7 @@ pub async fn live(
     let place = app.watchers.clone().try_acquire_owned();
     let place = place.map_err(|_| ApiError::Busy { limit: MAX_WATCHERS })?;
     let watch = thread.watch().await?;
-    // The episode must not live on because somebody watches it.
+    // A watcher must not keep the episode alive.
     drop(thread);
     upgrade(request, move |socket| serve(socket, watch, place))
 }
@@ -68,7 +68,7 @@ async fn serve(socket: PageSocket, watch: LiveWatch, _place: OwnedSemaphorePermi
     }
 }
 
-/// Tells a page what happens until nothing does any more. A page that is too slow gets what is newest.
+/// Sends the events to a page until the episode ends. A slow page skips to the newest step.
 async fn tell(sender: &mut PageSender, watch: LiveWatch) -> io::Result<()> {
     let LiveWatch { view, mut events } = watch;
     let scene = view.scene;
@@ -116,7 +116,7 @@ async fn tell_entry(sender: &mut PageSender, scene: &LiveScene, entry: Arc<LiveE
     Ok(())
 }
 
-/// What a robot sees now.
+/// Renders a robot's current camera image.
 pub async fn picture(app: AppState, wanted: Wanted) -> Result<Vec<u8>, ApiError> {
     let thread = thread(&app, &wanted)?;
     let LiveWatch { view, .. } = thread.watch().await?;

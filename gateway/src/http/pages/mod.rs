@@ -1,5 +1,5 @@
-//! Pages for people: `/watch` shows running and finished episodes. What a page draws comes as numbers over a WebSocket; script and style
-//! are in this binary, made of `gateway/web`.
+//! Web pages: `/watch` shows running and finished episodes. A page gets its data over a WebSocket; its
+//! script and style are embedded in this binary from `gateway/web`.
 
 mod collecting;
 pub mod drive;
@@ -28,17 +28,18 @@ const STYLE: &str = include_str!("../../../web/style.css");
 const SCRIPT: &str = include_str!("../../../web/dist/page.js");
 const DOOR: &str = include_str!("door.html");
 
-/// Everything comes from this server, and nothing may be sent elsewhere or put into another site's page.
+/// Content security policy: everything comes from this server, nothing may be sent elsewhere, and no
+/// other site may embed the page.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-/// Where all pages are; what is below is for who watches.
+/// Path of the pages; everything below it is for watchers.
 pub const WATCH: &str = "/watch";
 
-/// Which episode, robot and moment is asked for.
+/// Requested episode, robot and moment.
 #[derive(Debug, Deserialize)]
 struct Wanted {
-    /// An episode that is held, by its id; or one that is finished, by its folder.
+    /// A held episode by its id; `run` is the folder of a finished one.
     episode: Option<String>,
     run: Option<String>,
     robot: Option<String>,
@@ -46,7 +47,7 @@ struct Wanted {
     file: Option<String>,
 }
 
-/// The routes of the pages.
+/// Returns the routes of the pages.
 pub fn router() -> Router<AppState> {
     let inside = Router::new()
         .route("/watch/page.js", get(script))
@@ -63,7 +64,7 @@ pub fn router() -> Router<AppState> {
     inside.route(WATCH, get(page).merge(post(enter)))
 }
 
-/// Lets nobody in who has not come by the link.
+/// Admits only requests of watchers.
 async fn only_watchers(request: Request, next: Next) -> Response {
     match request.extensions().get::<Watcher>() {
         Some(Watcher) => next.run(request).await,
@@ -71,7 +72,7 @@ async fn only_watchers(request: Request, next: Next) -> Response {
     }
 }
 
-/// The page, or the door to it for who has not come by the link.
+/// Returns the page, or the page that asks for the watch link.
 async fn page(watcher: Option<Extension<Watcher>>) -> Response {
     match watcher {
         Some(_) => ([(header::CONTENT_SECURITY_POLICY, POLICY)], Html(SHELL)).into_response(),
@@ -79,7 +80,7 @@ async fn page(watcher: Option<Extension<Watcher>>) -> Response {
     }
 }
 
-/// The page that asks for the link, and reads it from its own address.
+/// Returns the page that asks for the watch link, and reads it from its own URL.
 pub fn door(status: StatusCode) -> Response {
     let mut bytes = [0u8; 16];
     if getrandom::fill(&mut bytes).is_err() {
@@ -93,7 +94,7 @@ pub fn door(status: StatusCode) -> Response {
     (status, headers, Html(DOOR.replace("NONCE", &nonce))).into_response()
 }
 
-/// Who has the key gets the cookie.
+/// Gives the cookie to a request with the key.
 async fn enter(
     State(app): State<AppState>,
     watcher: Option<Extension<Watcher>>,
@@ -114,13 +115,13 @@ async fn style() -> Response {
 fn asset(kind: &'static str, text: &'static str) -> Response {
     let headers: [(HeaderName, HeaderValue); 2] = [
         (header::CONTENT_TYPE, HeaderValue::from_static(kind)),
-        // Another build of the program has other files by the same names.
+        // Another build of the program has other files under the same names.
         (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),
     ];
     (headers, text).into_response()
 }
 
-/// Running and finished episodes, and evaluations.
+/// Lists running and finished episodes, and evaluations.
 async fn episodes(State(app): State<AppState>) -> Result<Response, ApiError> {
     let held = app.table.watched();
     let runs = app.settings.runs.clone();
@@ -134,7 +135,7 @@ async fn episodes(State(app): State<AppState>) -> Result<Response, ApiError> {
     Ok(axum::Json(told).into_response())
 }
 
-/// What a robot sees, now or at a moment of a finished episode.
+/// Returns a robot's camera image, current or at a moment of a finished episode.
 async fn camera(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
     let png = match wanted.run.is_some() {
         true => finished::picture(app, wanted).await?,
@@ -144,7 +145,7 @@ async fn camera(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Re
     Ok((headers, png).into_response())
 }
 
-/// Does what takes long on a thread that is for that.
+/// Runs slow work on a thread for blocking work.
 async fn blocking<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, ApiError> + Send + 'static,
 ) -> Result<T, ApiError> {

@@ -1,5 +1,7 @@
-//! `/operate`: a page on which a person starts an episode or drives one robot. It holds nothing but script and style, so everybody may
-//! read it; what it asks for comes by REST, with the token of a robot's operator, and by a socket.
+//! `/operate`: a page on which a person starts an episode or drives one robot.
+//!
+//! It consists only of script and style, so it is public. Its data comes by REST with the token of a
+//! robot's operator, and by a socket.
 
 use axum::{
     Extension, Json, Router,
@@ -23,12 +25,12 @@ use crate::{
     http::{app::AppState, problem::ApiError},
 };
 
-/// Where the page is.
+/// Path of the page.
 pub const OPERATE: &str = "/operate";
 
 const SHELL: &str = include_str!("../../../web/operators/page.html");
 
-/// The routes of the page.
+/// Returns the routes of the page.
 pub fn router() -> Router<AppState> {
     Router::new()
         .route(OPERATE, get(page))
@@ -43,18 +45,19 @@ pub fn router() -> Router<AppState> {
         .route(DRIVE, get(drive::drive))
 }
 
-/// The link of a person who drives `robot` in a collection, or, without one, of whoever runs it. Browsers send a fragment to nobody.
+/// Returns the link for a person who drives `robot` in a collection, or without a robot the link for its
+/// host. Browsers do not send the fragment to servers.
 pub fn operator_link(base_url: &str, robot: Option<&str>, token: &str) -> String {
     let robot = robot.map_or_else(String::new, |robot| format!("robot={robot}&"));
     format!("{base_url}{OPERATE}#collection=1&{robot}token={token}")
 }
 
-/// Whether a path is of the page, which anybody may read.
+/// Returns true for the public files of the page.
 pub fn is_open(path: &str) -> bool {
     path.strip_prefix(OPERATE).is_some_and(|rest| matches!(rest, "" | "/page.css" | "/page.js"))
 }
 
-/// The robot whose operator is replaced.
+/// Robot whose operator is replaced.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StandIn {
@@ -62,13 +65,13 @@ struct StandIn {
     robot: String,
 }
 
-/// Reads which operator is to be replaced, for the episode's starter.
+/// Parses which operator is to be replaced. Only the client that starts episodes may replace one.
 fn stand_in(app: &AppState, who: &Caller, body: &[u8]) -> Result<StandIn, ApiError> {
     app.table.check_stand_in(who)?;
     serde_json::from_slice(body).map_err(|error| ApiError::MalformedJson(error.to_string()))
 }
 
-/// Has the task's expert drive a robot from now on.
+/// Lets the task's expert drive a robot from now on.
 async fn expert(
     State(app): State<AppState>,
     Extension(who): Extension<Caller>,
@@ -80,7 +83,7 @@ async fn expert(
     Ok(StatusCode::NO_CONTENT)
 }
 
-/// Which policy may drive beside people, for who starts episodes.
+/// Names the policy that can drive beside people, for the client that starts episodes.
 async fn known_policy(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
@@ -91,7 +94,7 @@ async fn known_policy(
     }
 }
 
-/// Has the policy that this server was started with drive a robot from now on.
+/// Lets the policy with which this server was started drive a robot from now on.
 async fn policy(
     State(app): State<AppState>,
     Extension(who): Extension<Caller>,

@@ -1,16 +1,16 @@
-//! QR codes of links, for telephones and headsets: as a picture on a page, and in characters on a terminal.
+//! QR codes of links, for phones and headsets: as an image on a page, and as characters in a terminal.
 
 use qrcode::{QrCode, render::svg, render::unicode, types::QrError};
 
-/// The picture, as SVG.
+/// Renders a QR code as SVG.
 pub fn qr_svg(text: &str) -> Result<String, QrError> {
     let code = QrCode::new(text)?;
-    // A reader wants light around dark, whatever the page has.
+    // Readers need a light margin around dark modules, whatever the background of the page is.
     let colours = (svg::Color("#000"), svg::Color("#fff"));
     Ok(code.render().min_dimensions(240, 240).dark_color(colours.0).light_color(colours.1).build())
 }
 
-/// The picture in characters of half a line each, for a terminal whose ground is dark.
+/// Renders a QR code in half-line characters for a terminal with a dark background.
 pub fn qr_text(text: &str) -> Result<String, QrError> {
     let code = QrCode::new(text)?;
     let (dark, light) = (unicode::Dense1x2::Light, unicode::Dense1x2::Dark);
@@ -23,7 +23,7 @@ mod tests {
 
     const LINK: &str = "http://192.168.100.100:18700/operate#collection=1&robot=A&token=0123456789abcdef0123456789abcdef01234567";
 
-    /// The modules of a code in characters, true for dark.
+    /// Parses the modules of a code in characters; true is dark.
     fn modules(text: &str) -> Vec<Vec<bool>> {
         let halves = |line: &str| {
             let upper = line.chars().map(|char| !matches!(char, '█' | '▀')).collect::<Vec<_>>();

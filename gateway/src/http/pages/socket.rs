@@ -1,4 +1,4 @@
-//! A WebSocket as pages have it. RFC 6455; frames are tungstenite's.
+//! WebSocket connections of pages (RFC 6455), with tungstenite's frames.
 
 use std::{
     io::{self, Cursor},
@@ -28,45 +28,45 @@ use tungstenite::{
 
 use crate::http::problem::ApiError;
 
-/// A page that takes nothing for so long has gone.
+/// Time without progress after which a page counts as gone.
 const WRITE_LIMIT: Duration = Duration::from_secs(10);
 
-/// The most that a page says at once.
+/// Maximum length of a message from a page in bytes.
 const MAX_BYTES: u64 = 4096;
 
-/// The two ends of a socket.
+/// Both ends of a socket.
 pub struct PageSocket {
-    /// What the page is told by.
+    /// Sending end.
     pub sender: PageSender,
-    /// What the page says, or that it has gone.
+    /// Receiving end.
     pub reader: PageReader,
 }
 
-/// Tells a page.
+/// Sending end of a page's socket.
 #[derive(Clone)]
 pub struct PageSender(Arc<Mutex<WriteHalf<TokioIo<Upgraded>>>>);
 
-/// Hears a page, and answers its pings.
+/// Receiving end of a page's socket; it also answers pings.
 pub struct PageReader {
     half: ReadHalf<TokioIo<Upgraded>>,
-    /// By which pings are answered.
+    /// Sender for answers to pings.
     sender: PageSender,
-    /// What has come of the next frame.
+    /// Received part of the next frame.
     arrived: Vec<u8>,
 }
 
 impl PageSender {
-    /// Sends a text.
+    /// Sends a text message.
     pub async fn text(&mut self, text: String) -> io::Result<()> {
         self.send(Frame::message(text.into_bytes(), OpCode::Data(Data::Text), true)).await
     }
 
-    /// Sends bytes.
+    /// Sends a binary message.
     pub async fn bytes(&mut self, bytes: Vec<u8>) -> io::Result<()> {
         self.send(Frame::message(bytes, OpCode::Data(Data::Binary), true)).await
     }
 
-    /// Says that nothing more comes.
+    /// Sends the close frame.
     pub async fn close(mut self) -> io::Result<()> {
         self.send(Frame::close(None)).await?;
         self.0.lock().await.shutdown().await
@@ -85,12 +85,13 @@ impl PageSender {
 }
 
 impl PageReader {
-    /// Returns when the page has gone, whatever it has said until then.
+    /// Returns when the page has gone; messages before that are ignored.
     pub async fn gone(&mut self) {
         while let Ok(Some(_)) = self.text().await {}
     }
 
-    /// The next text of a page; `None` once it has gone. What is no whole text of a reasonable length ends it.
+    /// Returns the next text of a page, or `None` once it has gone. Any message but a whole text of
+    /// limited length ends the connection.
     pub async fn text(&mut self) -> io::Result<Option<String>> {
         loop {
             if let Some((opcode, bytes)) = self.frame()? {
@@ -101,7 +102,7 @@ impl PageReader {
                     OpCode::Control(Control::Ping) => self.sender.send(Frame::pong(bytes)).await?,
                     OpCode::Control(Control::Pong) => {}
                     OpCode::Control(Control::Close) => {
-                        // Whoever closes first has gone when it has heard this.
+                        // The peer that closes first has gone once it has received this.
                         let _ = self.sender.send(Frame::close(None)).await;
                         return Ok(None);
                     }
@@ -115,7 +116,7 @@ impl PageReader {
         }
     }
 
-    /// Takes a frame out of what has arrived, if a whole one has.
+    /// Takes a frame out of the received bytes, if a whole one has arrived.
     fn frame(&mut self) -> io::Result<Option<(OpCode, Vec<u8>)>> {
         let mut cursor = Cursor::new(&self.arrived[..]);
         let Some((header, length)) = FrameHeader::parse(&mut cursor).map_err(io::Error::other)? else {
@@ -136,7 +137,7 @@ impl PageReader {
     }
 }
 
-/// Answers a request for a WebSocket, and has `serve` make what serves it.
+/// Answers a request for a WebSocket and runs the future that `serve` returns.
 pub fn upgrade<Served>(
     mut request: Request,
     serve: impl FnOnce(PageSocket) -> Served + Send + 'static,
@@ -162,7 +163,7 @@ where
     Ok((StatusCode::SWITCHING_PROTOCOLS, headers).into_response())
 }
 
-/// The answer to the key of a request for a WebSocket of version 13.
+/// Returns the answer to the key of a request for a WebSocket of version 13.
 fn accept(headers: &HeaderMap) -> Option<HeaderValue> {
     let text = |name| headers.get(name).and_then(|value: &HeaderValue| value.to_str().ok());
     let wants = text(header::UPGRADE)?.eq_ignore_ascii_case("websocket");

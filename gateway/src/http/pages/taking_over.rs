@@ -1,4 +1,5 @@
-//! "Take over here": people go on with a finished episode from a moment of it, as an episode of their own.
+//! "Take over here": people continue a finished episode from one of its moments, as an episode of their
+//! own.
 
 use axum::{
     Extension,
@@ -18,10 +19,10 @@ use crate::http::{
     watching::{Host, RECORDING},
 };
 
-/// How long the others wait for somebody who is away: the longest that there is.
+/// Time that the others wait for a person who is away: the maximum.
 const PATIENCE_S: f64 = 600.0;
 
-/// From where somebody goes on.
+/// Moment from which to continue.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct TakeOver {
@@ -30,8 +31,10 @@ struct TakeOver {
     protocol: Protocol,
 }
 
-/// Starts an episode with an operator for each robot where a finished one stood at a moment, after the last call that was answered by
-/// then, and answers as every start does. Who watches sees the moment, and who may start episodes starts this one.
+/// Starts an episode from a moment of a finished one, with an operator for each robot.
+///
+/// The episode starts after the last call that was answered by that moment, and the reply is that of any
+/// start. The request needs both the watch link and the right to start episodes.
 pub async fn take_over(
     State(app): State<AppState>,
     host: Option<Extension<Host>>,
@@ -44,7 +47,7 @@ pub async fn take_over(
     let at = folder.clone();
     let recorded = app.recordings.read(move |last| Ok(last.open(&at)?.episode.spec().clone())).await?;
     let settings = &app.settings;
-    // The recording is read on a thread that may have another folder.
+    // The reading thread may have another working directory.
     let recording = std::path::absolute(folder.join(RECORDING)).unwrap_or_else(|_| folder.join(RECORDING));
     let control_step = (wanted.time_s.max(0.0) * CONTROL_HZ).round() as u64;
     let spec = EpisodeSpec {

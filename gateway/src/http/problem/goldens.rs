@@ -1,6 +1,6 @@
-//! Every refusal as its caller gets it, kept in a file: a change of code shows as a change of what is served.
+//! Goldens of all refusals as callers receive them, so that changes of code show as changes of responses.
 //!
-//! `UPDATE_EXPECT=1 cargo test --release -p tandem --lib goldens` writes the file anew.
+//! `UPDATE_EXPECT=1 cargo test --release -p tandem --lib goldens` rewrites the file.
 
 use std::{env, fs, io, path::Path, sync::Arc, time::Duration};
 

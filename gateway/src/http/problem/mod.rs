@@ -1,4 +1,5 @@
-//! Every refusal as RFC 9457 problem details. The detail says what would work; the text of a fault of the server goes to the log only.
+//! Refusals as RFC 9457 problem details. The detail says what would work; the text of a server fault is
+//! only logged.
 
 #[cfg(test)]
 mod goldens;
@@ -14,24 +15,25 @@ use tandem_tools_spec::{Format, ProblemBody, Refusal, RefusalClass, ResultReply,
 
 use crate::hosting::{EpisodeThread, HostingError};
 
-/// The media type of RFC 9457.
+/// Media type of RFC 9457.
 pub const PROBLEM_JSON: &str = "application/problem+json";
 
-/// What is served for requests that are no HTTP of ours.
+/// Status of requests that are invalid as HTTP requests to this server.
 const BAD_REQUEST: StatusCode = StatusCode::BAD_REQUEST;
 
-/// Everything a request can be refused for.
+/// Reason why a request is refused.
 #[derive(Debug, thiserror::Error)]
 pub enum ApiError {
     /// The call does not fit the contract.
     #[error(transparent)]
     Spec(#[from] SpecError),
-    /// A refusal of an episode whose recording has failed, which every answer of the episode says.
+    /// A refusal of an episode whose recording has failed; every answer of that episode reports the
+    /// failure.
     #[error("{error}")]
     RecordingFailed {
-        /// The refusal.
+        /// The refusal itself.
         error: Box<ApiError>,
-        /// Why the recording is not complete.
+        /// Reason why the recording is incomplete.
         recording_failed: String,
     },
     /// The host of the episodes, or the episode itself, refused.
@@ -40,29 +42,29 @@ pub enum ApiError {
     /// No such route, or not with this method.
     #[error("{method} {path} is not served; have: {}", .have.join(", "))]
     NoRoute {
-        /// What was asked for.
+        /// Requested method.
         method: String,
-        /// What was asked for.
+        /// Requested path.
         path: String,
-        /// The routes that are served.
+        /// Routes that are served.
         have: Vec<String>,
-        /// Whether the path is served with another method.
+        /// True if the path is served with another method.
         other_method: bool,
     },
-    /// The body names another episode than the path.
+    /// The body names an episode other than the one in the path.
     #[error(
         "the path names episode {path:?} and the body {body}; leave episode_id out of the body or make them equal"
     )]
     EpisodeMismatch {
-        /// From the path.
+        /// Id in the path.
         path: String,
-        /// From the body, as JSON.
+        /// Id in the body, as JSON.
         body: String,
     },
-    /// A call over MCP that names no episode.
+    /// A call over MCP names no episode.
     #[error("{tool} needs episode_id, a text, as start_episode returned it")]
     NoEpisodeNamed {
-        /// The tool that was called.
+        /// Name of the called tool.
         tool: String,
     },
     /// The request is for another server.
@@ -70,95 +72,95 @@ pub enum ApiError {
         "host {0:?} is not this server; use the address it prints at its start, or name the host in --allowed-host"
     )]
     ForeignHost(String),
-    /// The request comes from a web page of somebody else.
+    /// The request comes from a foreign web page.
     #[error("origin {0:?} is another site, and pages of other sites may not call; call from a program")]
     ForeignOrigin(String),
-    /// HTTP where the server speaks HTTPS.
+    /// The request is plain HTTP, but the server requires HTTPS.
     #[error("this server speaks HTTPS; ask for https:// in place of http://")]
     NotEncrypted,
-    /// The body is no JSON.
+    /// The body is not valid JSON.
     #[error("the body is no JSON: {0}; send one JSON object, with finite numbers only, as {{\"steps\": 25}}")]
     MalformedJson(String),
-    /// The body is no MessagePack.
+    /// The body is not valid MessagePack.
     #[error("the body is no MessagePack: {0}; send one map with names for keys and finite numbers only")]
     MalformedMsgpack(String),
-    /// Nothing says who calls.
+    /// The caller has no token.
     #[error("send the token as Authorization: Bearer TOKEN")]
     NoToken,
-    /// Who asks has not come by the link for watching.
+    /// The caller has no watch key.
     #[error("watching wants the link that the server printed when it started; a policy's token does not do")]
     NoWatcher,
-    /// No finished episode of that name.
+    /// There is no finished episode of that name.
     #[error("no finished episode {run:?} with that file in the runs folder; GET /watch/episodes lists them")]
     NoRun {
-        /// What was asked for.
+        /// Requested name.
         run: String,
     },
-    /// The server has no people who play one episode after another, or the caller is none of them.
+    /// The server has no collection, or the caller is not part of it.
     #[error(
         "nobody collects episodes by this server and token; tandem collect --operators N prints the links of those who do"
     )]
     NoCollection,
-    /// Somebody marks an episode while there is none to be marked.
+    /// A mark arrived while there is no episode to be marked.
     #[error("no episode is to be marked now; mark it when it has ended")]
     NothingToMark,
-    /// An idempotency key that is no text of the right length.
+    /// The idempotency key is not a text of the right length.
     #[error(
         "Idempotency-Key has to be 1 to 255 letters, digits and signs, as a UUID; a new one for each request"
     )]
     Key,
-    /// The body is JSON, but no object.
+    /// The body is JSON, but not an object.
     #[error(
         "the body is {0}; send one JSON object, as {{\"steps\": 25}}, or no body where there is nothing to say"
     )]
     NoObject(&'static str),
-    /// The body took too long.
+    /// The body took too long to arrive.
     #[error("the body did not arrive in {} s; send it again, in one go", .limit.as_secs())]
     SlowBody {
-        /// The longest that is waited.
+        /// Time limit.
         limit: Duration,
     },
-    /// The body did not arrive.
+    /// The body did not arrive completely.
     #[error("the body could not be read: {0}; send it again")]
     BrokenBody(String),
     /// The body is too large.
     #[error("the body is larger than {limit_bytes} bytes; send less, as fewer rows per send_joint_chunk")]
     BodyTooLarge {
-        /// The most that is read.
+        /// Limit in bytes.
         limit_bytes: usize,
     },
-    /// The body is said to be something else than JSON.
+    /// The content type is neither JSON nor MessagePack.
     #[error(
         "content-type {0:?} is not read; send JSON with content-type: application/json, or MessagePack with application/msgpack"
     )]
     ContentType(String),
-    /// More requests are under way than are let in at once.
+    /// Too many requests are under way.
     #[error("{limit} requests are under way, which is the most; send it again")]
     Busy {
-        /// How many may be under way.
+        /// Maximum number of concurrent requests.
         limit: usize,
     },
-    /// The caller's address sends more than its share.
+    /// The caller's address exceeds its rate.
     #[error("an address may send {per_second} requests a second; send it again, and fewer")]
     TooManyRequests {
-        /// How many it may send.
+        /// Allowed number of requests per second.
         per_second: u32,
     },
-    /// No such form of the tools' specifications.
+    /// The format of the tools' specifications is unknown.
     #[error("no format {name:?}; have: {}", Format::ALL.map(Format::name).join(", "))]
     UnknownFormat {
-        /// What was asked for.
+        /// Requested format.
         name: String,
     },
-    /// A request that axum refused before any handler saw it.
+    /// axum refused the request before any handler saw it.
     #[error("{detail}")]
     Protocol {
-        /// As axum had it.
+        /// Status from axum.
         status: StatusCode,
-        /// What axum said.
+        /// Message from axum.
         detail: String,
     },
-    /// A reply that cannot be written.
+    /// A reply could not be serialized.
     #[error("a reply cannot be written: {0}")]
     Reply(#[source] Box<dyn std::error::Error + Send + Sync>),
 }
@@ -171,27 +173,27 @@ fn result_in(error: &HostingError) -> Option<&ResultReply> {
     }
 }
 
-/// What the caller can do, where the error's own text does not say it.
+/// Returns the caller's remedy, unless the error's own text has it.
 fn hint(error: &HostingError) -> String {
     error.refusal().hint.map_or_else(String::new, |hint| format!("; {hint}"))
 }
 
-/// What a refusal is over HTTP.
+/// HTTP form of a refusal.
 #[derive(Debug, Clone, Copy)]
 struct Problem {
-    /// A stable name.
+    /// Stable name.
     kind: &'static str,
-    /// The name in words.
+    /// Title in words.
     title: &'static str,
     status: StatusCode,
     /// Seconds after which the same request may work.
     retry_after_s: Option<u16>,
-    /// Whether the text is for the log only.
+    /// True if the text is for the log only.
     internal: bool,
 }
 
 impl Problem {
-    /// A problem of HTTP itself, which has no class.
+    /// Creates a problem of HTTP itself, which has no class.
     const fn new(kind: &'static str, title: &'static str, status: StatusCode) -> Problem {
         Problem { kind, title, status, retry_after_s: None, internal: false }
     }
@@ -278,17 +280,17 @@ impl ApiError {
         }
     }
 
-    /// The status that it is served with.
+    /// Returns the HTTP status.
     pub fn status(&self) -> StatusCode {
         self.problem().status
     }
 
-    /// The kind's stable name.
+    /// Returns the kind's stable name.
     pub fn kind(&self) -> &'static str {
         self.problem().kind
     }
 
-    /// The body that this refusal is served with. What is the server's own fault is logged.
+    /// Returns the response body, and logs a fault of the server.
     pub fn body(&self) -> ProblemBody {
         let Problem { kind, title, status, internal, .. } = self.problem();
         if status.is_server_error() {
@@ -305,7 +307,7 @@ impl ApiError {
         }
     }
 
-    /// What the episode came to that has ended, which is why it refuses.
+    /// Returns the result of the episode if it refuses because it has ended.
     pub fn result(&self) -> Option<&ResultReply> {
         match self {
             ApiError::Hosting(error) => result_in(error),
@@ -314,7 +316,7 @@ impl ApiError {
         }
     }
 
-    /// The server that plays the episode, if another does.
+    /// Returns the URL of the other server that plays the episode, if one does.
     fn elsewhere(&self) -> Option<&str> {
         match self {
             ApiError::Hosting(error) => error.elsewhere(),
@@ -323,13 +325,13 @@ impl ApiError {
         }
     }
 
-    /// Why the recording of the episode that it concerns is not complete, if that has to be said.
+    /// Returns the reason why the episode's recording is incomplete, if it has to be reported.
     pub fn recording_failed(&self) -> Option<&str> {
         let ApiError::RecordingFailed { recording_failed, .. } = self else { return None };
         Some(recording_failed)
     }
 
-    /// The refusal with why the recording of `episode` is not complete, where it is not.
+    /// Adds the reason why the recording of `episode` is incomplete, if it is.
     pub fn in_episode(self, episode: &EpisodeThread) -> ApiError {
         match episode.recording_failed() {
             Some(reason) => {
@@ -340,11 +342,11 @@ impl ApiError {
     }
 }
 
-/// An extension of a response that refuses: the server that plays the episode.
+/// Response extension of a refusal: the server that plays the episode.
 #[derive(Debug, Clone)]
 pub struct Elsewhere(pub String);
 
-/// An extension of a response that refuses: the name of the problem's kind.
+/// Response extension of a refusal: the name of the problem's kind.
 #[derive(Debug, Clone, Copy)]
 pub struct RefusalKind(pub &'static str);
 
@@ -364,7 +366,7 @@ impl IntoResponse for ApiError {
         if status == StatusCode::UNAUTHORIZED {
             headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
         }
-        // What is left of the body is not read, so that no further request can come on this connection.
+        // The rest of the body is not read, so the connection cannot take another request.
         if matches!(
             status,
             StatusCode::UNAUTHORIZED | StatusCode::REQUEST_TIMEOUT | StatusCode::PAYLOAD_TOO_LARGE
@@ -399,7 +401,7 @@ mod tests {
         check(HostingError::EpisodeStopped, 410, "start another");
     }
 
-    /// What is logged while `work` is done.
+    /// Returns the log output of `work`.
     fn logged(work: impl FnOnce()) -> String {
         let lines = Arc::new(Mutex::new(Vec::new()));
         let writer = lines.clone();
@@ -421,7 +423,7 @@ mod tests {
         }
     }
 
-    /// MCP takes the body and REST the response.
+    /// MCP uses the body, and REST the response.
     #[test]
     fn our_own_faults_are_logged_once_whatever_the_caller_speaks() {
         let fault = || ApiError::from(HostingError::Thread(io::Error::other("no more threads")));

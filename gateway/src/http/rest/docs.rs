@@ -1,11 +1,11 @@
-//! `/docs`: the OpenAPI description as a page for people, without scripts.
+//! `/docs`: the OpenAPI description as a page without scripts.
 
 use std::fmt::Write;
 
 use serde_json::{Map, Value};
 use tandem_episodes::html::{self, escape};
 
-/// The page of an OpenAPI document.
+/// Renders the page of an OpenAPI document.
 pub fn page(document: &Value) -> String {
     let info = |name: &str| document["info"][name].as_str().unwrap_or_default();
     let title = format!("{} {}", info("title"), info("version"));
@@ -26,7 +26,7 @@ at <code>/mcp</code>, and as specifications for language models at <a href="/v1/
     html::page(&title, &body)
 }
 
-/// Every operation of an OpenAPI document in a line, with the first sentence of what it does.
+/// Lists every operation of an OpenAPI document in a line, with the first sentence of its description.
 pub fn brief(document: &Value) -> String {
     let mut lines = String::from(
         "What bodies and replies hold: GET /v1/openapi.json. Arguments of tools: GET /v1/tools.\n",
@@ -41,7 +41,7 @@ pub fn brief(document: &Value) -> String {
     lines
 }
 
-/// The section of one operation, folded until its reader opens it.
+/// Renders the section of one operation, which is folded at first.
 fn section(path: &str, method: &str, operation: &Value, shared: &Value) -> String {
     let id = text(&operation["operationId"]);
     let mut body = format!("<p>{}</p>\n", text(&operation["description"]));
@@ -67,7 +67,7 @@ fn parameter(parameter: &Value) -> String {
     row(&text(&parameter["name"]), &parameter["schema"], parameter, parameter["required"] == true)
 }
 
-/// The fields of an object as a table, and those of the objects in them below it.
+/// Renders the fields of an object as a table, each followed by the fields of nested objects.
 fn fields(schema: &Value) -> String {
     let schema = described(schema);
     let mut rows = String::new();
@@ -100,13 +100,13 @@ fn row(name: &str, schema: &Value, described: &Value, required: bool) -> String 
     )
 }
 
-/// The schema of a field; for one that may be null, the schema of its other values.
+/// Returns the schema of a field. For a nullable field it returns the schema of the other values.
 fn described(schema: &Value) -> &Value {
     let choices = schema["anyOf"].as_array().filter(|_| schema.get("type").is_none());
     choices.into_iter().flatten().find(|choice| choice["type"] != "null").unwrap_or(schema)
 }
 
-/// The type in words.
+/// Returns the type in words.
 fn kind(schema: &Value) -> String {
     let schema = described(schema);
     let name = |kind: &Value| match (kind.as_str(), &schema["items"]) {

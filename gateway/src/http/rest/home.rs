@@ -1,4 +1,4 @@
-//! `/`: where to go on, and the episodes, as a page for people, without scripts.
+//! `/`: links and the list of episodes, as a page without scripts.
 
 use std::fmt::Write;
 
@@ -8,7 +8,7 @@ use tandem_tools_spec::{EpisodeEntry, EpisodeList, Operators};
 
 use crate::hosting::Caller;
 
-/// The page of a server of `version` with these episodes, and what else `caller` may see.
+/// Renders the page of a server of `version` with these episodes and the links for `caller`.
 pub fn page(version: &str, list: &EpisodeList, caller: &Caller) -> String {
     let title = format!("Tandem {version}");
     let figures = match caller {
@@ -35,7 +35,7 @@ pub fn page(version: &str, list: &EpisodeList, caller: &Caller) -> String {
     html::page(&title, &body)
 }
 
-/// What a program finds first.
+/// Returns the start page for programs, as text.
 pub fn brief(version: &str) -> String {
     format!(
         "Tandem {version}: simulated humanoids that must work together.\n\
@@ -60,7 +60,8 @@ fn row(entry: &EpisodeEntry) -> String {
         Some(reason) => json!(reason).as_str().unwrap_or_default().replace('_', " "),
     };
     let (id, mut row) = (escape(episode_id), String::from("<tr>"));
-    // First, where a telephone shows it. Who has not come by the link is asked for it there. Writing to a text cannot fail.
+    // The link comes first, so that it is visible on a phone. It asks for the watch link if necessary.
+    // Writing to a string cannot fail.
     let _ = write!(row, "<td><a href=\"/watch?episode={id}\">watch</a></td>");
     let _ = write!(row, "<td><a href=\"/v1/episodes/{id}\">{id}</a></td>");
     for cell in [

@@ -1,4 +1,4 @@
-//! The header `Idempotency-Key`, with which a request may be repeated without being carried out twice.
+//! The header `Idempotency-Key`, which allows a request to be repeated without being executed twice.
 
 use axum::{
     extract::FromRequestParts,
@@ -11,10 +11,10 @@ use crate::http::problem::ApiError;
 const KEY: &str = "idempotency-key";
 const REPLAYED: &str = "idempotency-replayed";
 
-/// The most bytes of a key.
+/// Maximum length of a key in bytes.
 const LONGEST: usize = 255;
 
-/// The key of a request, if it has one.
+/// Key of a request, if it has one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct IdempotencyKey(pub Option<String>);
 
@@ -34,7 +34,7 @@ fn read(value: &HeaderValue) -> Result<String, ApiError> {
     }
 }
 
-/// Marks a reply that an earlier request with the same key has had.
+/// Marks a reply that an earlier request with the same key has received.
 pub fn mark_replayed(mut response: Response, replayed: bool) -> Response {
     if replayed {
         response.headers_mut().insert(REPLAYED, HeaderValue::from_static("true"));

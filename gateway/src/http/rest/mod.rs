@@ -1,4 +1,4 @@
-//! The REST routes: those under `/v1`, and those about the server itself.
+//! REST routes: those under `/v1`, and those about the server itself.
 
 mod docs;
 mod home;
@@ -30,7 +30,7 @@ use crate::{
 };
 use idempotency::{IdempotencyKey, mark_replayed};
 
-/// Every route: path, methods, handlers.
+/// Returns every route: path, methods, handlers.
 fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>); 14] {
     [
         ("/", &["GET"], get(home)),
@@ -40,7 +40,7 @@ fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>);
         ("/v1/tasks", &["GET"], get(tasks)),
         ("/v1/tools", &["GET"], get(tools)),
         ("/v1/openapi.json", &["GET"], get(openapi)),
-        // Where others have it.
+        // Common location on other servers.
         ("/openapi.json", &["GET"], get(openapi)),
         ("/v1/episodes", &["GET", "POST"], get(episodes).post(start)),
         ("/v1/episodes/{id}", &["GET", "DELETE"], get(status).delete(remove)),
@@ -51,12 +51,12 @@ fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>);
     ]
 }
 
-/// The routes under `/v1`, and those about the server itself.
+/// Returns the router of all routes.
 pub fn router() -> Router<AppState> {
     routes().into_iter().fold(Router::new(), |router, (path, _, handlers)| router.route(path, handlers))
 }
 
-/// Every route with its methods, as `GET /healthz`.
+/// Lists every route with its methods, for example `GET /healthz`.
 pub fn served() -> Vec<String> {
     routes().iter().map(|(path, methods, _)| format!("{} {path}", methods.join("|"))).collect()
 }
@@ -65,7 +65,7 @@ async fn health(State(app): State<AppState>) -> Json<Value> {
     Json(json!({ "status": "ok", "version": VERSION, "episodes": app.table.len() }))
 }
 
-/// The query of `GET /v1/tasks`.
+/// Query of `GET /v1/tasks`.
 #[derive(Debug, Deserialize)]
 struct TasksQuery {
     #[serde(default)]
@@ -77,7 +77,7 @@ async fn tasks(State(app): State<AppState>, Query(query): Query<TasksQuery>) -> 
     Json(if query.short { list.shortened() } else { list })
 }
 
-/// The query of `GET /v1/tools`.
+/// Query of `GET /v1/tools`.
 #[derive(Debug, Deserialize)]
 struct ToolsQuery {
     format: Option<String>,
@@ -110,7 +110,7 @@ async fn openapi(State(app): State<AppState>, Extension(caller): Extension<Calle
     Json(app.openapi(&caller))
 }
 
-/// The description of the interface as a page.
+/// Returns the description of the interface as a page.
 async fn docs(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
@@ -120,7 +120,7 @@ async fn docs(
     page(&headers, || docs::page(&document), || docs::brief(&document))
 }
 
-/// The page that a browser finds first.
+/// Returns the start page.
 async fn home(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
@@ -129,7 +129,8 @@ async fn home(
     page(&headers, || home::page(VERSION, &app.table.list(&caller), &caller), || home::brief(VERSION))
 }
 
-/// A page, which needs nothing else and may load nothing; for who does not ask for one, as language models do, the same in short as text.
+/// Returns a self-contained page. A client that does not ask for HTML, such as a language model, gets a
+/// short text instead.
 fn page(headers: &HeaderMap, html: impl Fn() -> String, text: impl Fn() -> String) -> Response {
     let vary = (header::VARY, "accept");
     let accepts = headers.get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());
@@ -226,7 +227,7 @@ async fn call(
     .await
 }
 
-/// A call that could not be read, as it came.
+/// Returns a call that could not be parsed, in its original form.
 fn refused_call(tool: &str, encoding: Encoding, body: &[u8], refusal: &ApiError) -> RefusedCall {
     let arguments = match encoding.read(body) {
         Ok(arguments) => arguments.to_string(),
@@ -235,7 +236,7 @@ fn refused_call(tool: &str, encoding: Encoding, body: &[u8], refusal: &ApiError)
     RefusedCall { tool: tool.into(), arguments, problem: refusal.to_string() }
 }
 
-/// Keeps what whoever plays says of its play.
+/// Records a note of the player.
 async fn note(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
@@ -258,7 +259,7 @@ async fn remove(
     Path(id): Path<String>,
 ) -> Result<Json<ResultReply>, ApiError> {
     match app.table.awake(&id).await {
-        // What cannot be played here can be given up all the same.
+        // An episode that cannot be played here can still be removed.
         Err(error) if error.is_of_other_build() => app.table.hosted(&id)?.admit(&caller)?,
         hosted => hosted?.admit(&caller)?,
     }
@@ -266,7 +267,8 @@ async fn remove(
     Ok(Json(app.table.remove(&id).await?))
 }
 
-/// Refuses an operator: what concerns more than its robot is for the caller who started the episode.
+/// Refuses an operator. Requests that concern more than its robot are for the client that started the
+/// episode.
 fn require_host(caller: &Caller) -> Result<(), HostingError> {
     match caller {
         Caller::Host => Ok(()),
@@ -274,7 +276,7 @@ fn require_host(caller: &Caller) -> Result<(), HostingError> {
     }
 }
 
-/// Removes `episode_id`, which clients made for MCP send among the arguments; it has to be the path's.
+/// Removes `episode_id`, which MCP clients send among the arguments. It must equal the id in the path.
 fn without_episode_id(mut args: Value, id: &str) -> Result<Value, ApiError> {
     match args.as_object_mut().and_then(|object| object.shift_remove("episode_id")) {
         Some(body) if body != id => {

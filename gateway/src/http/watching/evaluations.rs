@@ -1,4 +1,4 @@
-//! The evaluations whose folders lie below the runs folder, as they fill: another process plays them, or has played them.
+//! Evaluations in the runs folder with their progress; other processes play them.
 
 use std::{
     collections::BTreeMap,
@@ -14,46 +14,46 @@ use tandem_episodes::{
     results::{EPISODES, PlayedEpisode},
 };
 
-/// How deep below the runs folder they lie.
+/// Depth of the search below the runs folder.
 const DEPTH: usize = 3;
 
-/// Where nobody says whether an evaluation is played, one in which nothing has happened for so long has been stopped.
+/// Time without progress after which an evaluation of unknown state counts as stopped.
 const STOPPED_AFTER: Duration = Duration::from_secs(600);
 
-/// What was read of them last.
+/// Results of the last reading, by folder.
 #[derive(Debug, Clone, Default)]
 pub struct KnownEvaluations(Arc<Mutex<BTreeMap<PathBuf, (SystemTime, EvaluationCounts)>>>);
 
-/// How far an evaluation is.
+/// Counts of an evaluation's episodes.
 #[derive(Debug, Clone, Default, Serialize)]
 struct EvaluationCounts {
     policies: Vec<String>,
     tasks: Vec<String>,
     played: usize,
-    /// Those that count and reached the last phase.
+    /// Number of counted episodes that reached the last phase.
     succeeded: usize,
-    /// Those that do not count.
+    /// Number of episodes that are not counted.
     excluded: usize,
 }
 
-/// How far an evaluation is, as its card has it.
+/// Progress of an evaluation, as its card shows it.
 #[derive(Debug, Serialize)]
 pub struct EvaluationEntry {
-    /// Its folder, below the runs folder.
+    /// Its folder, relative to the runs folder.
     folder: String,
     #[serde(flatten)]
     counts: EvaluationCounts,
-    /// How many episodes there are to be; left out where nobody has said it.
+    /// Number of planned episodes; left out if it is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     planned: Option<usize>,
-    /// When an episode was played last, in seconds since 1970.
+    /// Time of the latest episode, in seconds since 1970.
     last_unix_s: u64,
-    /// Whether more are being played.
+    /// True while episodes are being played.
     runs: bool,
 }
 
 impl KnownEvaluations {
-    /// The evaluations below `runs`, that in which something happened last first.
+    /// Lists the evaluations below `runs`, those with the latest changes first.
     pub fn list(&self, runs: &Path) -> Vec<EvaluationEntry> {
         let mut folders = Vec::new();
         collect(runs, DEPTH, &mut folders);
@@ -61,7 +61,7 @@ impl KnownEvaluations {
         let mut found: Vec<(SystemTime, EvaluationEntry)> = folders
             .into_iter()
             .filter_map(|folder| {
-                // Each episode that is played is a new file there.
+                // Every played episode adds a file there.
                 let changed = fs::metadata(folder.join(EPISODES)).and_then(|found| found.modified()).ok()?;
                 let counts = match known.get(&folder) {
                     Some((then, counts)) if *then == changed => counts.clone(),
@@ -102,11 +102,11 @@ fn entry(
     Some(EvaluationEntry { folder: name, counts, planned, last_unix_s, runs })
 }
 
-/// Whether episodes are being played in an evaluation, in which something `changed` last then.
+/// Returns true while an evaluation is being played; `changed` is the time of its last change.
 fn is_played(folder: &Path, planned: PlannedEpisodes, played: usize, changed: SystemTime) -> bool {
     match (planned.state, is_being_played(folder)) {
         (Some(RunState::Complete | RunState::Stopped), _) => false,
-        // The process may be gone without having been able to say so.
+        // The process may have ended without recording it.
         (_, Some(is_played)) => is_played,
         (_, None) => {
             let lately = changed.elapsed().map_or(true, |since| since < STOPPED_AFTER);

@@ -1,6 +1,8 @@
-//! Who may watch: whoever has the link that the server printed when it started. A policy's own token does not do, because who watches sees
-//! where objects are, which no policy may know. The key is in the link's fragment, which browsers send to nobody; a page of the server
-//! sends it once and gets a cookie.
+//! The watch key: watchers need the link that the server printed when it started.
+//!
+//! A policy's own token is not enough, because watchers see where objects are, which no policy may know.
+//! The key is in the link's fragment, which browsers do not send. A page of the server sends it once and
+//! gets a cookie.
 
 use std::sync::Arc;
 
@@ -8,33 +10,33 @@ use axum::http::{HeaderMap, HeaderValue, header};
 
 use crate::token::{Token, TokenError};
 
-/// The cookie that holds the key.
+/// Name of the cookie with the key.
 const COOKIE: &str = "tandem_watch";
 
-/// The key of one server, made anew at each start.
+/// Key of one server, new at each start.
 #[derive(Clone)]
 pub struct WatchKey(Arc<(Token, String)>);
 
-/// A request that came with the key.
+/// Marker of a request that came with the watch key.
 #[derive(Debug, Clone, Copy)]
 pub struct Watcher;
 
-/// A request of who may start episodes, whatever else it came with: the link for watching is no token.
+/// Marker of a request of a client that may start episodes. The watch link is not enough for that.
 #[derive(Debug, Clone, Copy)]
 pub struct Host;
 
 impl WatchKey {
-    /// A new key.
+    /// Generates a key.
     pub fn random() -> Result<WatchKey, TokenError> {
         Token::random().map(|made| WatchKey(Arc::new(made)))
     }
 
-    /// The key for the link.
+    /// Returns the key for the link.
     pub fn text(&self) -> &str {
         &self.0.1
     }
 
-    /// Whether a request has the key: as its bearer token, or in the cookie.
+    /// Returns true if a request has the key: as its bearer token, or in the cookie.
     pub fn opens(&self, headers: &HeaderMap) -> bool {
         let lines = headers.get_all(header::COOKIE).into_iter().filter_map(|line| line.to_str().ok());
         let cookies = lines.flat_map(|line| line.split(';')).filter_map(|pair| pair.trim().split_once('='));
@@ -45,7 +47,8 @@ impl WatchKey {
         keys.fold(false, |opens, key| self.0.0.matches(key) | opens)
     }
 
-    /// The cookie for a browser that has the key: no script reads it, no other site's page has it sent, and over HTTPS it is `secure`.
+    /// Returns the cookie for a browser that has the key. Scripts cannot read it and other sites cannot
+    /// send it. It is marked `secure` over HTTPS.
     pub fn cookie(&self, secure: bool) -> Option<HeaderValue> {
         let secure = if secure { "; Secure" } else { "" };
         format!("{COOKIE}={}; Path=/watch; HttpOnly; SameSite=Strict{secure}", self.text()).parse().ok()

@@ -1,4 +1,5 @@
-//! What a server remembers for those who watch: who may, how many do, and the recording that was looked at last.
+//! State that a server keeps for watchers: their key, their number, and the recording that was viewed
+//! last.
 
 mod evaluations;
 mod key;
@@ -8,5 +9,5 @@ pub use evaluations::KnownEvaluations;
 pub use key::{Host, WatchKey, Watcher};
 pub use recording_reader::{RECORDING, RecordingReader, no_recording, unreadable};
 
-/// How many pages may watch at once.
+/// Maximum number of pages that watch at once.
 pub const MAX_WATCHERS: usize = 64;

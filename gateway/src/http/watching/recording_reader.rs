@@ -1,7 +1,7 @@
-//! The thread that reads recordings for those who look at finished episodes, and keeps the one that was looked at last.
+//! The thread that reads recordings for watchers of finished episodes. It keeps the last one in memory.
 //!
-//! A recording takes tens of megabytes while it is read, and an allocator keeps what was freed for the thread that had asked for it. Many
-//! threads that read now and then would each keep so much; one does not.
+//! A recording takes tens of megabytes while it is read, and an allocator keeps freed memory for the
+//! thread that had requested it. With many reading threads, each would keep that much.
 
 use std::{
     fmt, fs,
@@ -17,15 +17,15 @@ use tokio::sync::{mpsc, oneshot};
 
 use crate::http::problem::ApiError;
 
-/// What a recording is called in an episode's folder.
+/// Name of a recording in an episode's folder.
 pub const RECORDING: &str = "episode.mcap";
 
-/// So many may wait for their turn before others wait to be let in.
+/// Number of queued jobs beyond which callers wait.
 const WAITING: usize = 16;
 
 type ReadingJob = Box<dyn FnOnce(&mut LastOpened) + Send>;
 
-/// Has recordings read, one after another.
+/// Queue of reading jobs, which run one after another.
 #[derive(Clone)]
 pub struct RecordingReader(mpsc::Sender<ReadingJob>);
 
@@ -36,13 +36,13 @@ impl fmt::Debug for RecordingReader {
 }
 
 impl RecordingReader {
-    /// A reader that has read nothing yet. Its thread ends with the last clone.
+    /// Starts a reader. Its thread ends with the last clone.
     pub fn start() -> RecordingReader {
         let (jobs, mut inbox) = mpsc::channel::<ReadingJob>(WAITING);
         thread::spawn(move || {
             let mut last = LastOpened::default();
             while let Some(job) = inbox.blocking_recv() {
-                // Who waits for a job that panics is told that no answer came.
+                // The caller of a job that panics receives an error, because its reply is dropped.
                 if catch_unwind(AssertUnwindSafe(|| job(&mut last))).is_err() {
                     last = LastOpened::default();
                 }
@@ -51,7 +51,7 @@ impl RecordingReader {
         RecordingReader(jobs)
     }
 
-    /// Has `work` done on the thread, once it is its turn; not at all where whoever asked has gone by then.
+    /// Runs `work` on the thread when it is its turn, unless the caller has gone by then.
     pub async fn read<T: Send + 'static>(
         &self,
         work: impl FnOnce(&mut LastOpened) -> Result<T, ApiError> + Send + 'static,
@@ -67,11 +67,11 @@ impl RecordingReader {
     }
 }
 
-/// The recording that was looked at last: a page asks for many pictures of one.
+/// The recording that was viewed last, because a page requests many images of one.
 #[derive(Default)]
 pub struct LastOpened(Option<OpenedRecording>);
 
-/// A recording in memory, and which file it was read from when.
+/// A recording in memory, with its path and modification time.
 pub struct OpenedRecording {
     path: PathBuf,
     changed: SystemTime,
@@ -79,19 +79,19 @@ pub struct OpenedRecording {
 }
 
 impl OpenedRecording {
-    /// The message that pages draw it from, which all who ask for it share.
+    /// Returns the message with which pages draw it; all requests share it.
     pub fn message(&self) -> Bytes {
         Bytes::from_owner(self.episode.message())
     }
 }
 
 impl LastOpened {
-    /// The recording in an episode's folder, read only where it is another one, or has changed.
+    /// Returns the recording in an episode's folder. It is only read if it is another one or has changed.
     pub fn open(&mut self, folder: &Path) -> Result<&OpenedRecording, ApiError> {
         let path = folder.join(RECORDING);
         let changed = fs::metadata(&path).and_then(|file| file.modified());
         let changed = changed.map_err(|_| no_recording(folder))?;
-        // The one before goes first, so that there are never two.
+        // The previous one is dropped first, so that there are never two.
         let last = self.0.take().filter(|opened| opened.path == path && opened.changed == changed);
         let opened = match last {
             Some(opened) => opened,
@@ -104,12 +104,12 @@ impl LastOpened {
     }
 }
 
-/// The refusal where an episode has no such file.
+/// Returns the refusal for a missing file of an episode.
 pub fn no_recording(folder: &Path) -> ApiError {
     ApiError::NoRun { run: folder.file_name().unwrap_or_default().to_string_lossy().into_owned() }
 }
 
-/// The refusal where a recording cannot be used.
+/// Returns the refusal for an unusable recording.
 pub fn unreadable(error: &dyn std::error::Error) -> ApiError {
     let status = StatusCode::UNPROCESSABLE_ENTITY;
     ApiError::Protocol { status, detail: error.to_string() }

@@ -1,5 +1,7 @@
-//! SIGKILL at random moments of episodes: the server that is started again on the same runs goes on where they
-//! stood. No answer that was seen is lost, nothing is done twice, and every state is what it would have been.
+//! Tests of SIGKILL at random moments of episodes: a restarted server on the same runs folder continues
+//! them.
+//!
+//! No received answer is lost, no action is done twice, and every state is the same as without the kill.
 
 use std::{
     collections::BTreeMap,
@@ -15,12 +17,12 @@ use tandem_episodes::{Recorder, Recording, tasks};
 
 use crate::{Delays, Server};
 
-/// Kills of a test, of tasks in turn.
+/// Number of kills in a test, with tasks in turn.
 const KILLS: usize = 5;
-/// A kill comes at most so long after the first call.
+/// Maximum time of a kill after the first call.
 const LATEST_KILL_MS: u64 = 500;
 
-/// A server that is started again whenever it is gone.
+/// A server that is restarted whenever it is gone.
 struct Restarted<'a> {
     runs: &'a Path,
     server: Mutex<(Server, usize)>,
@@ -41,7 +43,8 @@ impl<'a> Restarted<'a> {
         assert!(Command::new("kill").args(["-KILL", &id]).status().expect("kill").success());
     }
 
-    /// The answer to a call, which is made again with the same key where the server has gone under way.
+    /// Returns the answer to a call, which is repeated with the same key if the server has gone
+    /// meanwhile.
     fn call(&self, path: &str, token: Option<&str>, key: &str, body: &Value) -> (u16, Value) {
         let agent: ureq::Agent = ureq::Agent::config_builder().http_status_as_error(false).build().into();
         loop {
@@ -67,7 +70,7 @@ impl<'a> Restarted<'a> {
     }
 }
 
-/// What a policy calls, some of it refused.
+/// Returns the calls of a policy, some of which are refused.
 fn script(robot: &str, seed: u64) -> Vec<(&'static str, Value)> {
     let walk = json!({ "steps": 12, "robots": [{ "robot": robot, "vx_m_s": 0.1, "vy_m_s": 0.05, "yaw_rate_rad_s": 0.2 }] });
     let plan = json!({ "commands": [
@@ -88,8 +91,8 @@ fn script(robot: &str, seed: u64) -> Vec<(&'static str, Value)> {
     (0..16).map(|_| pool[choose.next(pool.len() as u64).as_millis() as usize].clone()).collect()
 }
 
-/// Plays a script, during which the server is killed `kill_after` the first call. Returns the answers, and the
-/// hash of every state.
+/// Plays a script, during which the server is killed `kill_after` the first call. Returns the answers and
+/// the hash of every state.
 fn play(task: &str, seed: u64, kill_after: Option<Duration>) -> (Vec<Value>, Vec<(u64, String)>) {
     let runs = tempfile::tempdir().expect("a temporary folder");
     let server = Restarted::new(runs.path());
@@ -111,7 +114,7 @@ fn play(task: &str, seed: u64, kill_after: Option<Duration>) -> (Vec<Value>, Vec
             answers.push(server.call(&path, None, &key, &arguments).1);
         }
         if kill_after.is_some() {
-            // The last kill is waited for, so that finish comes after it.
+            // The last kill is awaited, so that finish comes after it.
             while server.address().1 == 0 {
                 thread::sleep(Duration::from_millis(20));
                 server.call(&format!("/v1/episodes/{id}/tools/get_status"), None, "status", &json!({}));
@@ -151,14 +154,14 @@ fn a_killed_server_goes_on_where_it_stood() {
     kill_and_compare(KILLS, 3100);
 }
 
-/// As many as the promise is made for.
+/// The documented number of kills.
 #[test]
 #[ignore = "ten minutes: cargo test --release -p tandem --test processes -- --ignored killed_two_hundred"]
 fn a_server_that_is_killed_two_hundred_times_goes_on_where_it_stood() {
     kill_and_compare(200, 3200);
 }
 
-/// What an operator says and does, and hears.
+/// Plays an operator that talks and acts. Returns the messages that it receives.
 fn operate(server: &Restarted, id: &str, robot: &str, token: &str, over: &AtomicBool) -> Vec<String> {
     let mut heard = Vec::new();
     let listen = |answer: &Value, heard: &mut Vec<String>| {
@@ -222,7 +225,7 @@ fn operators_go_on_and_hear_everything_once() {
     }
 }
 
-/// Whoever ends a server at its keyboard ends its episodes; a service manager does not.
+/// SIGINT from the keyboard ends the server's episodes; SIGTERM from a service manager does not.
 #[test]
 fn an_interrupt_ends_episodes_and_a_termination_does_not() {
     for (signal, goes_on) in [("-TERM", true), ("-INT", false)] {
@@ -245,7 +248,7 @@ fn an_interrupt_ends_episodes_and_a_termination_does_not() {
     }
 }
 
-/// The answer to a call at `server`, with its status and where it sends the caller; nothing is followed.
+/// Calls `server` without following redirects. Returns the status, the redirect's target and the answer.
 fn ask(server: &Server, method: &str, path: &str, body: &Value) -> (u16, String, Value) {
     let config = ureq::Agent::config_builder().http_status_as_error(false).max_redirects(0);
     let agent: ureq::Agent = config.max_redirects_will_error(false).build().into();

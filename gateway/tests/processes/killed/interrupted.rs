@@ -1,4 +1,4 @@
-//! Evaluations that signals end, that are killed with a program under way, and that meet in one folder.
+//! Tests of evaluations that signals end, that are killed while a program runs, and that share a folder.
 
 use std::{
     fs,
@@ -15,7 +15,7 @@ use tandem_episodes::Recording;
 use crate::hangups_are_ignored;
 use crate::skipped::skipped;
 
-/// How long anything may take here that is waited for.
+/// Time limit of every wait.
 const DEADLINE: Duration = Duration::from_secs(120);
 
 fn evaluate(policy: &str, seeds: &str, further: &[&str], out: &Path) -> Command {
@@ -40,7 +40,7 @@ fn kill(signal: &str, child: &Child) {
     assert!(killed.expect("kill").success());
 }
 
-/// Everything that the process writes to a pipe.
+/// Reads everything that the process writes to a pipe.
 fn text(pipe: Option<impl Read>) -> String {
     let mut text = String::new();
     pipe.expect("a pipe").read_to_string(&mut text).expect("UTF-8");
@@ -124,7 +124,7 @@ fn two_processes_in_one_folder_tear_nothing() {
     }
 }
 
-/// The defaults of two runs are two folders, and those of the same run on the same build are one.
+/// Two different runs have two default folders, and repetitions of a run on the same build share one.
 #[test]
 fn runs_have_folders_of_their_own_without_being_told() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -138,7 +138,7 @@ fn runs_have_folders_of_their_own_without_being_told() {
     assert!(first.contains("1 to play, in runs/idle-benchmark-"), "{first}");
     assert!(play("idle", "2000").contains("1 kept, 0 to play, in runs/idle-benchmark-"));
     assert!(play("idle", "2001").contains("1 to play, in runs/idle-benchmark-"));
-    // It makes no call, which changes nothing about its folder.
+    // The program makes no call, which does not affect its folder.
     assert!(play("exec:true", "2000").contains("1 to play, in runs/exec-true-benchmark-"));
     let names = fs::read_dir(folder.path().join("runs")).expect("runs").map(|entry| entry.expect("a run"));
     let mut names: Vec<String> = names.map(|run| run.file_name().to_string_lossy().into_owned()).collect();

@@ -1,4 +1,4 @@
-//! Processes that are killed or asked to end under way, and those that go on.
+//! Tests of processes that are killed or asked to end in the middle of work, and of those that resume it.
 
 mod brought_back;
 mod interrupted;

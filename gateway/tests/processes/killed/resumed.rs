@@ -1,4 +1,4 @@
-//! SIGKILL while pictures are drawn and while episodes are played: the next run does what is missing, and no more.
+//! Tests of SIGKILL during rendering and during episodes: the next run does only the missing work.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ fn tandem(arguments: &[&str]) -> Command {
     command
 }
 
-/// Runs the program to its end and returns what it printed.
+/// Runs the program to its end and returns its output.
 fn finish(arguments: &[&str]) -> String {
     let output = tandem(arguments).output().expect("the program starts");
     assert!(output.status.success(), "{output:?}");
@@ -29,7 +29,7 @@ fn start_and_kill(arguments: &[&str], delays: &mut Delays, most_ms: u64) {
     child.wait().expect("it ends");
 }
 
-/// Every complete file below `folder` with its contents.
+/// Returns every complete file below `folder` with its contents.
 fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in std::fs::read_dir(folder).into_iter().flatten().map(|entry| entry.expect("an entry")) {
@@ -48,7 +48,8 @@ fn below(files: BTreeMap<PathBuf, Vec<u8>>, folder: &Path) -> BTreeMap<PathBuf, 
     files.into_iter().map(|(path, bytes)| (name(path), bytes)).collect()
 }
 
-/// What says of each episode that it was played: its own file. Until that is there, its folder may be written again.
+/// Returns the files that mark episodes as played. Until an episode has one, its folder may be written
+/// again.
 fn played(episodes: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let all = files(episodes).into_iter();
     all.filter(|(path, _)| path.parent() == Some(episodes) && path.extension().is_some_and(|e| e == "json"))

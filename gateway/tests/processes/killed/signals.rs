@@ -1,5 +1,5 @@
-//! SIGKILL in an episode: what a policy was told a second ago is on the disk, and can be read. SIGTERM while an episode starts: the
-//! server ends and leaves no partial file.
+//! Tests of SIGKILL in an episode: answers older than a second are readable on the disk. A test of
+//! SIGTERM while an episode starts: the server ends and leaves no partial file.
 
 use std::{
     path::Path,
@@ -28,7 +28,7 @@ fn a_killed_server_leaves_every_step_that_a_policy_was_told_of_a_second_ago() {
         let said = String::from_utf8_lossy(&recovered.stdout).into_owned();
         assert!(recovered.status.success(), "{recovered:?}");
         let whole = partial.with_extension("");
-        // A kill within a write leaves a part of a chunk, which is left out.
+        // A kill during a write leaves a part of a chunk, which is left out.
         let bytes = std::fs::read(&whole).expect("the recovered file");
         let messages = MessageStream::new(&bytes).expect("MCAP").filter(Result::is_ok).count();
         assert!(said.contains(&format!("{messages} messages")), "{said}, not {messages}");
@@ -69,8 +69,8 @@ fn what_was_noted_outlives_the_server() {
     assert_eq!((note.text.as_str(), call.counted, call.ok), ("I wait first.", false, false));
 }
 
-/// Plays until the server is killed, `delay` after the episode began. Returns the control steps that answers had told of a
-/// second before.
+/// Plays until the server is killed, `delay` after the episode began. Returns the control steps that
+/// answers had reported a second before.
 fn play_and_kill(runs: &Path, seed: u32, delay: Duration) -> u64 {
     let server = Server::start(runs);
     let start = json!({ "task": "handover", "seed": seed, "protocol": "agentic" });

@@ -1,4 +1,5 @@
-//! BlindCarry: both lift the table by its legs; on its way it shifts to where the gap is, passes it, and comes back to the marks.
+//! The BlindCarry expert: both lift the table by its legs. On its way it shifts to the gap, passes it, and
+//! comes back to the marks.
 
 use std::f32::consts::PI;
 
@@ -11,12 +12,13 @@ use crate::players::experts::skills::{
 use crate::scoring::{A, B};
 
 const LIFT_M: f32 = 0.07;
-/// Pelvis over the floor while robots take the legs and set them down, and while they stand with the table aloft.
+/// Height of the pelvises over the floor while the robots take the legs and set them down; `TALL_M` is the
+/// height while they hold the table aloft.
 const BENT_M: f32 = 0.64;
 const TALL_M: f32 = 0.70;
 const PACE_M_S: f32 = 0.22;
-/// Where the middle of the table is by when it has shifted over to the gap, and from where on it shifts back: B comes to the wall, and A
-/// has left it.
+/// Position of the table's middle by which it has shifted over to the gap; from `BEHIND_WALL_X_M` on it
+/// shifts back. B reaches the wall at the first, and A has left it at the second.
 const BEFORE_WALL_X_M: f32 = -1.10;
 const BEHIND_WALL_X_M: f32 = 1.15;
 
@@ -41,12 +43,12 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     team.carry(commander, &ObjectPath { at: &at, length_m, pace_m_s: PACE_M_S, free_m: &FREE })?;
     set_heights(commander, BENT_M);
     team.set_down(commander, &marks)?;
-    // The squares are small, and hands that gave way now would shift the table as they open.
+    // The squares are small, and compliant hands would shift the table as they open.
     team.give_way(commander, false);
     let_go(commander, &grasps)
 }
 
-/// Where the table is when it has gone so far along x: over to the gap, through it, and over to the marks.
+/// Returns the table's pose after `gone_m` along x: over to the gap, through it, and over to the marks.
 fn through_gap(from: &Pose, to: &Pose, gap_m: f32, gone_m: f32) -> Pose {
     let x_m = from.translation.x + gone_m;
     let share = |begin_m: f32, end_m: f32| smooth(((x_m - begin_m) / (end_m - begin_m)).clamp(0.0, 1.0));
@@ -57,7 +59,7 @@ fn through_gap(from: &Pose, to: &Pose, gap_m: f32, gone_m: f32) -> Pose {
     place(Vector::new(x_m, y_m, from.translation.z), heading_rad)
 }
 
-/// How high both pelvises are from now on.
+/// Sets the heights of both pelvises from the next commands on.
 fn set_heights(commander: &mut Commander, height_m: f32) {
     for robot in [A, B] {
         commander.set_height(robot, height_m);

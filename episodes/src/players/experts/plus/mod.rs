@@ -1,5 +1,5 @@
-//! Experts of the suite tandem+. They know what the seed has chosen, which robots that play the task would have to tell each other; the
-//! player without words is handed another choice in its place.
+//! Experts of the suite tandem+. They know the seed's choices, which the robots of the task would have to
+//! communicate. The player `no_words` gets another draw of the choices instead.
 
 mod blind_carry;
 mod relay;

@@ -1,4 +1,5 @@
-//! Relay: A gives the bottle to B, who turns between the counters and gives it to C, who stands it on the pad that is wanted.
+//! The Relay expert: A gives the bottle to B, which turns between the counters and gives it to C, which
+//! puts it on the wanted pad.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -10,18 +11,19 @@ use crate::players::experts::skills::{
 };
 use crate::scoring::{A, B, C};
 
-/// One hand above the other on the straight part of the bottle: B's is the upper one.
+/// Grasp of the first robot. On the straight part of the bottle, one hand is above the other; B's is the
+/// upper one.
 const FIRST: CylinderGrasp =
     CylinderGrasp { robot: A, side: Side::Right, object: "bottle", grip: "grip_low", heading_rad: 0.0 };
 const LAST: CylinderGrasp =
     CylinderGrasp { robot: C, side: Side::Right, object: "bottle", grip: "grip_low", heading_rad: PI };
 const LIFT_M: Vector = Vector::new(0.0, 0.0, 0.10);
-/// Where the bottle changes hands, above each counter.
+/// Places above each counter where the bottle changes hands.
 const FIRST_MEETING_M: Vector = Vector::new(0.36, -0.06, 0.92);
 const SECOND_MEETING_M: Vector = Vector::new(1.66, -0.06, 0.92);
-/// How high the bottle is before B walks, whose pelvis sinks by up to 12 cm as it does.
+/// Place of the bottle before B walks; B's pelvis sinks by up to 12 cm as it does.
 const ALOFT_M: Vector = Vector::new(0.40, -0.06, 1.06);
-/// B steps back, turns by a quarter and by another, and walks up to the second counter.
+/// Way of B: a step back, two quarter turns, and up to the second counter.
 const WAY: [(Vector, f32, Tolerance); 3] = [
     (Vector::new(0.98, -0.10, 0.0), PI, ON_THE_WAY),
     (Vector::new(1.02, -0.05, 0.0), -FRAC_PI_2, ON_THE_WAY),
@@ -52,7 +54,7 @@ pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {
     stand_on(commander, &LAST, pad_m)
 }
 
-/// B's hand, while B faces this way.
+/// Returns the grasp of B's hand while B faces this way.
 fn between(heading_rad: f32) -> CylinderGrasp<'static> {
     CylinderGrasp { robot: B, side: Side::Right, object: "bottle", grip: "grip_high", heading_rad }
 }

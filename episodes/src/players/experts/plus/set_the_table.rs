@@ -1,9 +1,10 @@
-//! SetTheTable: each robot takes one thing after another from its sideboard, turns to the table and stands it on its place. Both work at the
-//! same time, each on its side, and begin where the idle left hand is over nothing that stands.
+//! The SetTheTable expert: each robot takes one thing after another from its sideboard, turns to the table
+//! and puts it on its place. Both work at the same time, each on its side, and begin where nothing is below
+//! the idle left hand.
 //!
-//! After each thing both hands go back to where they were at first. A hand stays where it is in the room while its robot rises from a walk,
-//! and is so much lower on the next: in the second round the idle one met the edge of the table instead of passing over it, and the robot
-//! fell.
+//! After each thing both hands return to their first poses. A hand stays where it is in the world while its
+//! robot rises from a walk, and is therefore lower on the next walk. Without the return, in the second
+//! round the idle hand met the edge of the table, and the robot fell.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -17,20 +18,23 @@ use crate::players::experts::skills::{
 use crate::scoring::{A, B};
 
 const WALK_M_S: f32 = 0.35;
-/// How fast a robot walks with something in its hand.
+/// Speed at which a robot walks with something in its hand.
 const CARRY_M_S: f32 = 0.25;
-/// While a robot walks its pelvis is up to 12 cm lower than where it stands, and what it carries with it.
+/// Lift of a held thing. While a robot walks, its pelvis and what it carries are up to 12 cm lower than at
+/// rest.
 const LIFT_M: Vector = Vector::new(0.0, 0.0, 0.26);
-/// How far a robot steps back from its sideboard before it turns, and from the table before it goes for the next thing.
+/// Distance that a robot steps back from its sideboard before it turns, and from the table before it
+/// fetches the next thing.
 const BACK_M: f32 = 0.30;
 const OVER_PLACE_M: f32 = 0.10;
-/// What is let go of falls so far.
+/// Height over its place at which a thing is released.
 const DROP_M: f32 = 0.003;
 const AT_HAND: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
-/// How near to the way back is near enough; the robot already turns on it.
+/// Tolerance on the way back, where the robot already turns.
 const ON_THE_WAY: Tolerance = Tolerance { off_m: 0.10, off_rad: 0.8 };
 
-/// One robot's part: which way it faces its sideboard and the table, and what goes on which place, in this order.
+/// One robot's part: the headings at its sideboard and at the table, and pairs of thing and place in their
+/// order.
 struct Part<'a> {
     robot: usize,
     to_sideboard_rad: f32,
@@ -73,7 +77,7 @@ impl Part<'_> {
         Ok(())
     }
 
-    /// Takes one thing to its place, and lets go of it there.
+    /// Takes one thing to its place and releases it there.
     fn serve(&self, commander: &mut Commander, thing: &str, pad: &str) -> Result<(), PlayerError> {
         let grasp = |heading_rad: f32| CylinderGrasp {
             robot: self.robot,

@@ -1,5 +1,6 @@
-//! Swap: one box goes over the shelf, then the other. Whoever has one stands it there with the right hand and takes the hand back; the
-//! partner takes it from there with the left hand and stands it on the pad.
+//! The Swap expert: one box goes over the shelf, then the other. The robot that has one puts it there with
+//! the right hand and withdraws the hand. The partner takes it from there with the left hand and puts it on
+//! the pad.
 
 use std::f32::consts::PI;
 
@@ -9,7 +10,7 @@ use crate::players::PlayerError;
 use crate::players::experts::skills::{Commander, CylinderGrasp, pick_up, stand_on};
 use crate::scoring::{A, B};
 
-/// Each box, and who has it at first.
+/// Each box, and the robot that has it at first.
 const BOXES: [(&str, usize); 2] = [("blue", A), ("orange", B)];
 const LIFT_M: Vector = Vector::new(0.0, 0.0, 0.08);
 
@@ -31,7 +32,7 @@ fn hand(robot: usize, side: Side, object: &str) -> CylinderGrasp<'_> {
     CylinderGrasp { robot, side, object, grip: "grip", heading_rad }
 }
 
-/// Takes a box, stands it on a mark, and takes the hand out of the partner's way.
+/// Takes a box, puts it on a mark, and takes the hand out of the partner's way.
 fn move_over(commander: &mut Commander, grasp: &CylinderGrasp, mark: &str) -> Result<(), PlayerError> {
     pick_up(commander, grasp, LIFT_M)?;
     let mark_m = commander.facts()?.position_m(mark);

@@ -1,5 +1,5 @@
-//! WhichOne: B fetches the bottle that is wanted from its shelf and holds it out through the hatch; A takes it by the upper half and
-//! stands it on the pad.
+//! The WhichOne expert: B fetches the wanted bottle from its shelf and holds it out through the hatch; A
+//! takes it by the upper half and puts it on the pad.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -13,19 +13,21 @@ use crate::players::experts::skills::{
 use crate::scoring::{A, B};
 
 const WALK_M_S: f32 = 0.35;
-/// How fast B walks with the bottle in its hand.
+/// Speed at which B walks with the bottle in its hand.
 const CARRY_M_S: f32 = 0.25;
-/// While B walks its pelvis is up to 12 cm lower than where it stands, and the bottle with it: it has to clear the counter all the same.
+/// Lift of the bottle. While B walks, its pelvis and the bottle are up to 12 cm lower than at rest. The
+/// bottle still has to clear the counter.
 const LIFT_M: Vector = Vector::new(0.0, 0.0, 0.26);
-/// How far B steps back from the shelf before it turns: its left hand would sweep over the bottles that stay.
+/// Step that B takes back from the shelf before it turns; nearer by, its left hand would sweep over the
+/// other bottles.
 const BACK_M: Vector = Vector::new(0.0, -0.22, 0.0);
-/// B turns here, clear of the wall beside the hatch, and then stands there at the hatch.
+/// Place where B turns, clear of the wall beside the hatch. `AT_HATCH_M` is where it then stands.
 const TURNING_M: Vector = Vector::new(1.02, -0.25, 0.0);
 const AT_HATCH_M: Vector = Vector::new(0.74, -0.12, 0.0);
 const AT_HAND: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
-/// How near to the way back is near enough; B already turns on it.
+/// Tolerance on the way back, where B already turns.
 const ON_THE_WAY: Tolerance = Tolerance { off_m: 0.10, off_rad: 0.5 };
-/// Where the bottle changes hands: in the hatch, above its counter.
+/// Place where the bottle changes hands: in the hatch, above its counter.
 const MEETING_M: Vector = Vector::new(0.36, -0.06, 0.92);
 
 pub fn perform(commander: &mut Commander) -> Result<(), PlayerError> {

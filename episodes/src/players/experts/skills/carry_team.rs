@@ -1,5 +1,5 @@
-//! Robots that carry one object together, in step: all follow one path of the object, and hands give way to the partners.
-//! One robot that carries or pushes something with both hands is the smallest team.
+//! Robots that carry one object together, in step: all follow one path of the object, and hands give way to
+//! the partners. One robot that carries or pushes something with both hands is the smallest team.
 
 use tandem_sim::{Pose, Rotation, Sides, Vector, heading_rad, wrapped_rad};
 
@@ -11,31 +11,34 @@ use super::walked_way::WalkedWay;
 use crate::players::PlayerError;
 use crate::scoring::{Facts, Grip};
 
-/// How fast robots walk to their places before anything is held. Hands that reach out correct the rest.
+/// Speed at which robots walk to their places before anything is held. Hands that reach out correct the
+/// rest.
 const APPROACH_M_S: f32 = 0.3;
 const NEAR: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.05 };
-/// How far hands give way, which two robots that walk with a load need.
+/// Compliance of the hands, which two robots need to walk with a load.
 pub const COMPLIANCE_N_S_M: f64 = 250.0;
-/// Robots still correct their places for so long once the object has arrived.
+/// Time for which robots still correct their places once the object has arrived.
 const HOLD_S: f32 = 0.4;
-/// How long robots rest: feet come together, and what pulls between the hands fades.
+/// Duration of a rest: feet come together, and the tension between the hands fades.
 const REST_S: f32 = 0.6;
-/// A hand has lost what it does not touch for so many commands; the robots then rest, and take it again no more often.
+/// Number of commands without touch after which a hand has lost the object. The robots then rest and take
+/// it again, for at most `CARRIES` attempts in all.
 const LOST_BEATS: u32 = 5;
 const CARRIES: u32 = 4;
-/// An object that is set down is pressed on the floor by so much.
+/// Depth by which an object that is set down is pressed into the floor.
 const PRESS_M: f32 = 0.004;
-/// It is set down once it is over its place within this, or has been moved there so many times.
+/// Tolerance within which the object is over its place, and is set down; after `MAX_MOVES_OVER` moves it is
+/// set down anyway.
 const OVER_M: f32 = 0.015;
 const OVER_RAD: f32 = 0.02;
 const MAX_MOVES_OVER: u32 = 3;
 
-/// Where a carried object is by the distance it has gone, and how fast it goes.
+/// Pose of a carried object by the distance that it has gone, and its pace.
 pub struct ObjectPath<'a> {
     pub at: &'a dyn Fn(f32) -> Pose,
     pub length_m: f32,
     pub pace_m_s: f32,
-    /// How much of it may have been gone by now.
+    /// Distance along the path that is free at present.
     pub free_m: &'a dyn Fn(&Facts) -> f32,
 }
 
@@ -43,14 +46,14 @@ pub struct ObjectPath<'a> {
 pub struct CarryTeam<'a> {
     grasps: &'a [HandGrasp<'a>],
     robots: Vec<usize>,
-    /// Where each robot stands, in the object's frame.
+    /// Place of each robot on the floor, in the object's frame.
     object_from_stand: Vec<Pose>,
-    /// Where each hand is, in the object's frame, since it was measured.
+    /// Pose of each hand in the object's frame, since the last measurement.
     object_from_wrist: Vec<Pose>,
 }
 
 impl<'a> CarryTeam<'a> {
-    /// Robots that have both hands in `grasps`, left first.
+    /// Creates the team of the robots that have both hands in `grasps`, left first.
     pub fn new(commander: &mut Commander, grasps: &'a [HandGrasp<'a>]) -> Result<CarryTeam<'a>, PlayerError> {
         let facts = commander.facts()?;
         let pairs = grasps.chunks_exact(2);
@@ -69,18 +72,19 @@ impl<'a> CarryTeam<'a> {
         })
     }
 
-    /// The object as it is now.
+    /// Returns the object's present pose.
     pub fn object(&self, commander: &mut Commander) -> Result<Pose, PlayerError> {
         Ok(commander.facts()?.object(self.grasps[0].object).pose_in_world)
     }
 
-    /// Robots walk to where they stand beside the object as it is now.
+    /// Walks the robots to their places beside the object as it is now.
     pub fn gather(&self, commander: &mut Commander) -> Result<(), PlayerError> {
         let walk_goals = self.walk_goals(commander)?;
         approach(commander, &walk_goals, NEAR)
     }
 
-    /// Robots walk to where they stand beside the object as it is now, and reach out to the first stops of their hands meanwhile.
+    /// Walks the robots to their places beside the object as it is now; meanwhile their hands reach out to
+    /// their first stops.
     pub fn gather_reaching(&self, commander: &mut Commander) -> Result<(), PlayerError> {
         let walk_goals = self.walk_goals(commander)?;
         let mut reaches = Vec::with_capacity(walk_goals.len());
@@ -91,7 +95,7 @@ impl<'a> CarryTeam<'a> {
         walk_reaching(commander, &walk_goals, &reaches)
     }
 
-    /// Where the robots have to walk to stand beside the object as it is now.
+    /// Returns the walk goals that put the robots beside the object as it is now.
     fn walk_goals(&self, commander: &mut Commander) -> Result<Vec<WalkGoal>, PlayerError> {
         let object = upright(&self.object(commander)?);
         let way = |(robot, stand): (&usize, &Pose)| WalkGoal {
@@ -102,7 +106,7 @@ impl<'a> CarryTeam<'a> {
         Ok(self.robots.iter().zip(&self.object_from_stand).map(way).collect())
     }
 
-    /// Remembers where in the object's frame the hands are that hold it.
+    /// Stores the poses of the holding hands in the object's frame.
     pub fn measure(&mut self, commander: &mut Commander) -> Result<(), PlayerError> {
         let object = self.object(commander)?;
         self.object_from_wrist.clear();
@@ -113,7 +117,7 @@ impl<'a> CarryTeam<'a> {
         Ok(())
     }
 
-    /// Lifts what all hands hold straight up, and measures the grips.
+    /// Lifts the object that all hands hold straight up, and measures the grips.
     pub fn lift(&mut self, commander: &mut Commander, by_m: f32) -> Result<(), PlayerError> {
         let start = self.object(commander)?;
         let raised =
@@ -123,8 +127,12 @@ impl<'a> CarryTeam<'a> {
         self.measure(commander)
     }
 
-    /// Takes the held object along a path, at the end of which it stays for a moment. Hands that lose it on the way take it
-    /// again.
+    /// Takes the held object along a path, and holds it at the end for a moment. Hands that lose it on the
+    /// way take it again.
+    ///
+    /// # Errors
+    ///
+    /// If the hands lose the object again and again.
     pub fn carry(&mut self, commander: &mut Commander, path: &ObjectPath) -> Result<(), PlayerError> {
         let ObjectPath { length_m, pace_m_s, free_m, .. } = *path;
         let pace_m_s = pace_m_s * commander.walking();
@@ -147,7 +155,8 @@ impl<'a> CarryTeam<'a> {
         Err(PlayerError::GaveUp("hands lost the load again and again".into()))
     }
 
-    /// Takes the held object through stops, world frame; `pace_m_s` is that of the robot that has farthest to walk.
+    /// Takes the held object through stops, world frame; `pace_m_s` is that of the robot that has farthest
+    /// to walk.
     pub fn carry_by(
         &mut self,
         commander: &mut Commander,
@@ -161,13 +170,14 @@ impl<'a> CarryTeam<'a> {
         self.carry(commander, &ObjectPath { at: &at, length_m: way.length_m(), pace_m_s, free_m: &FREE })
     }
 
-    /// Grasps whose hands do not even touch the object.
+    /// Returns the grasps whose hands do not even touch the object.
     fn hands_off(&self, facts: &Facts) -> impl Iterator<Item = HandGrasp<'a>> {
         let off = |grasp: &HandGrasp| facts.object(grasp.object).hands[grasp.robot][grasp.side] == Grip::Off;
         self.grasps.iter().copied().filter(off).collect::<Vec<_>>().into_iter()
     }
 
-    /// The robots stand, the hands that have lost the object take it where it is now, and all bring it back to its way.
+    /// Stops the robots, lets the hands that have lost the object take it where it is now, and brings it
+    /// back to its way.
     fn take_again(&mut self, commander: &mut Commander, on_its_way: &Pose) -> Result<(), PlayerError> {
         self.rest(commander)?;
         let lost: Vec<HandGrasp> = self.hands_off(&commander.facts()?).collect();
@@ -179,7 +189,7 @@ impl<'a> CarryTeam<'a> {
         self.measure(commander)
     }
 
-    /// Takes the held object straight over a place, as high as it is.
+    /// Takes the held object straight over a place at its present height.
     pub fn carry_to(
         &mut self,
         commander: &mut Commander,
@@ -189,7 +199,7 @@ impl<'a> CarryTeam<'a> {
         self.carry_where_free(commander, place, pace_m_s, &FREE)
     }
 
-    /// The same as [`CarryTeam::carry_to`], no farther than is free by now.
+    /// Takes the object as [`CarryTeam::carry_to`] does, but no farther than the way is free.
     pub fn carry_where_free(
         &mut self,
         commander: &mut Commander,
@@ -204,7 +214,7 @@ impl<'a> CarryTeam<'a> {
         self.carry(commander, &ObjectPath { at: &at, length_m, pace_m_s, free_m })
     }
 
-    /// How the robots stand and hold the object where it is to be.
+    /// Returns the postures of the robots and their hands for an object pose.
     fn postures(&self, world_from_object: &Pose) -> Vec<Posture> {
         let hand = |hand: usize| *world_from_object * self.object_from_wrist[hand];
         let posture = |(index, (robot, stand)): (usize, (&usize, &Pose))| Posture {
@@ -215,16 +225,16 @@ impl<'a> CarryTeam<'a> {
         self.robots.iter().zip(&self.object_from_stand).enumerate().map(posture).collect()
     }
 
-    /// All stand still with what they hold. Set down without it, a load that robots pull to and fro as they stop is dragged
-    /// along.
+    /// Holds all robots still with their load. A load that is set down without a rest is dragged along as
+    /// the robots stop.
     pub fn rest(&self, commander: &mut Commander) -> Result<(), PlayerError> {
         let still: Vec<HandMove> =
             self.grasps.iter().map(|grasp| HandMove::still(grasp.robot, grasp.side)).collect();
         commander.perform(REST_S, &still)
     }
 
-    /// Sets the object down: over its place first, for which hands must not give way, until it is seen to be there; then straight
-    /// below.
+    /// Sets the object down: first over its place with stiff hands, until it is observed there; then
+    /// straight below.
     pub fn set_down(&self, commander: &mut Commander, place: &Pose) -> Result<(), PlayerError> {
         self.give_way(commander, false);
         let mut object = self.object(commander)?;
@@ -243,7 +253,7 @@ impl<'a> CarryTeam<'a> {
         Ok(())
     }
 
-    /// Whether hands give way to partners from now on. One who has no partner gives way to nobody.
+    /// Makes the hands compliant to partners from now on, or stiff. A robot without a partner stays stiff.
     pub fn give_way(&self, commander: &mut Commander, give_way: bool) {
         let compliance_n_s_m = (give_way && self.robots.len() > 1).then_some(COMPLIANCE_N_S_M);
         for robot in &self.robots {
@@ -252,7 +262,7 @@ impl<'a> CarryTeam<'a> {
     }
 }
 
-/// Whether an object is over a place, seen from above.
+/// Returns `true` if an object is over a place, seen from above.
 fn is_over(object: &Pose, place: &Pose) -> bool {
     let off_m = (object.translation - place.translation).truncate().length();
     off_m < OVER_M && wrapped_rad(heading_rad(object) - heading_rad(place)).abs() < OVER_RAD

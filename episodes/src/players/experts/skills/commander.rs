@@ -1,4 +1,4 @@
-//! What every expert builds on: hands that move along straight lines in the world, several at once.
+//! The base of every expert: hands that move along straight lines in the world, several at once.
 
 use tandem_sim::{BaseVelocity, CONTROL_DT_S, Pose, Side, Sides, Vector};
 use tandem_tools_spec::{MoveWrists, StopReason, Tool as _, ToolReply, WristMove};
@@ -10,22 +10,22 @@ use crate::tasks::Task;
 
 /// Control steps of one command: short enough to start and stop smoothly.
 const STEPS_PER_COMMAND: u32 = 10;
-/// Control steps of one command of a robot that walks: hands that are fixed in the world fall behind one that does not say
-/// anew where they are to be.
+/// Control steps of one command of a walking robot. Hands that are fixed in the world fall behind a robot
+/// that does not command them anew often enough.
 pub const WALK_STEPS: u32 = 5;
 /// Control steps of every command while several scripts are played at once.
 pub const BEAT_STEPS: u32 = WALK_STEPS;
 
-/// Where both wrists go.
+/// Targets of both wrists.
 #[derive(Clone, Copy, Debug)]
 pub enum WristTargets {
     /// Poses in the world frame, where the wrists stay.
     InWorld(Sides<Pose>),
-    /// Poses in the pelvis frame; the wrists go along with the pelvis.
+    /// Poses in the pelvis frame; the wrists move along with the pelvis.
     InPelvis(Sides<Pose>),
 }
 
-/// What one robot does during one command; its fingers stay.
+/// Motion of one robot during one command; its fingers stay.
 #[derive(Clone, Copy, Debug)]
 pub struct RobotMove {
     pub robot: usize,
@@ -33,7 +33,7 @@ pub struct RobotMove {
     pub wrists: WristTargets,
 }
 
-/// What one hand does in a motion. What is not said stays as it is.
+/// Motion of one hand. A part that is `None` stays as it is.
 #[derive(Clone, Copy, Debug)]
 pub struct HandMove {
     pub robot: usize,
@@ -53,7 +53,7 @@ impl HandMove {
         HandMove { robot, side, world_from_wrist: None, fingers_rad: Some(fingers_rad) }
     }
 
-    /// The hand stays where it was last commanded to be.
+    /// Returns a move in which the hand stays at its last target.
     pub fn still(robot: usize, side: Side) -> HandMove {
         HandMove { robot, side, world_from_wrist: None, fingers_rad: None }
     }
@@ -63,33 +63,34 @@ impl HandMove {
     }
 }
 
-/// Where a hand was last commanded to be.
+/// Last commanded target of a hand.
 #[derive(Clone, Copy)]
 struct HandTarget {
     world_from_wrist: Pose,
-    /// `None` until fingers are commanded: they stay as they are where the episode begins, be it around something.
+    /// `None` until fingers are commanded: they stay as they are at the episode's start, be it around
+    /// something.
     fingers_rad: Option<[f32; 7]>,
 }
 
-/// What a robot was last commanded.
+/// Last commanded targets of a robot.
 #[derive(Clone)]
 pub struct CommandedTargets {
     hands: Sides<HandTarget>,
-    /// How high its pelvis is to be, where that has been said.
+    /// Commanded height of its pelvis; `None` until it is commanded.
     height_m: Option<f32>,
-    /// How its hands give way to partners.
+    /// Compliance of its hands towards partners; `None` for stiff hands.
     compliance_n_s_m: Option<f64>,
 }
 
-/// Commands the robots of an episode, and remembers what they were last commanded.
+/// Commander of an episode's robots, with their last commanded targets.
 pub struct Commander<'a> {
     task: &'static Task,
     episode: &'a mut dyn PrivilegedEpisode,
-    /// What each robot was last commanded.
+    /// Last commanded targets of each robot.
     targets: Vec<CommandedTargets>,
-    /// Whether other scripts play at the same time, so that all commands are equally long.
+    /// True while other scripts play at the same time, so that all commands are equally long.
     in_step: bool,
-    /// How this demonstration differs from the plain one, if it does.
+    /// Variation of the demonstration; `None` for the plain one.
     variety: Option<Variety>,
 }
 
@@ -111,22 +112,23 @@ impl<'a> Commander<'a> {
         Ok(Commander { task, episode, targets, in_step: false, variety: None })
     }
 
-    /// The same, whose motions differ as is drawn.
+    /// Returns the commander with the motions of `variety`.
     pub fn varied(self, variety: Option<Variety>) -> Commander<'a> {
         Commander { variety, ..self }
     }
 
-    /// How the demonstration differs, for the commanders of scripts.
+    /// Returns the demonstration's variation, for the commanders of scripts.
     pub fn variety(&self) -> Option<&Variety> {
         self.variety.as_ref()
     }
 
-    /// What share of its usual pace a robot walks at.
+    /// Returns the share of its usual pace at which a robot walks.
     pub fn walking(&self) -> f32 {
         self.variety.as_ref().map_or(1.0, Variety::walking)
     }
 
-    /// The commander of one of several scripts that are played at once, with the targets that robots had before.
+    /// Creates the commander of one of several scripts that are played at once, with the robots' earlier
+    /// targets.
     pub fn in_step(
         task: &'static Task,
         targets: Vec<CommandedTargets>,
@@ -139,12 +141,12 @@ impl<'a> Commander<'a> {
         self.task
     }
 
-    /// What robots were last commanded.
+    /// Returns the last commanded targets of all robots.
     pub fn targets(&self) -> &[CommandedTargets] {
         &self.targets
     }
 
-    /// Takes over what another commander commanded these robots.
+    /// Takes over these robots' targets from another commander.
     pub fn take_over(&mut self, robots: &[usize], targets: &[CommandedTargets]) {
         for robot in robots {
             self.targets[*robot] = targets[*robot].clone();
@@ -155,23 +157,24 @@ impl<'a> Commander<'a> {
         self.episode.facts()
     }
 
-    /// How high a robot's pelvis is to be from its next command on.
+    /// Sets the height of a robot's pelvis from its next command on.
     pub fn set_height(&mut self, robot: usize, height_m: f32) {
         self.targets[robot].height_m = Some(height_m);
     }
 
-    /// How the hands of a robot give way from its next command on.
+    /// Sets the compliance of a robot's hands from its next command on.
     pub fn set_compliance(&mut self, robot: usize, compliance_n_s_m: Option<f64>) {
         self.targets[robot].compliance_n_s_m = compliance_n_s_m;
     }
 
-    /// What the fingers of a hand are to be at from its next command on, where the move says it.
+    /// Sets the finger angles of a hand from its next command on, if the move gives them.
     pub fn set_fingers(&mut self, hand: &HandMove) {
         let target = &mut self.targets[hand.robot].hands[hand.side];
         target.fingers_rad = hand.fingers_rad.or(target.fingers_rad);
     }
 
-    /// Moves hands along straight lines for `duration_s`, starting and arriving at rest; robots not named hold still.
+    /// Moves hands along straight lines for `duration_s`, starting and arriving at rest; robots not named
+    /// hold still.
     pub fn perform(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), PlayerError> {
         let Some(mut variety) = self.variety.take() else {
             return self.travel(duration_s, moves, smooth, Vector::ZERO);
@@ -181,7 +184,8 @@ impl<'a> Commander<'a> {
         outcome
     }
 
-    /// As [`Commander::perform`], in this demonstration's way.
+    /// Performs moves as [`Commander::perform`] does, with the pauses, detours and misses of this
+    /// demonstration.
     fn perform_varied(
         &mut self,
         variety: &mut Variety,
@@ -219,12 +223,12 @@ impl<'a> Commander<'a> {
         }
     }
 
-    /// The same as [`Commander::perform`], at constant speed: one leg of a longer path.
+    /// Performs moves as [`Commander::perform`] does, but at constant speed: one leg of a longer path.
     pub fn glide(&mut self, duration_s: f32, moves: &[HandMove]) -> Result<(), PlayerError> {
         self.travel(duration_s, moves, |part| part, Vector::ZERO)
     }
 
-    /// Half way, hands are `stray_m` off their straight lines, all of them the same.
+    /// Moves hands along their lines at `pace`. Half way, all hands are `stray_m` off their straight lines.
     fn travel(
         &mut self,
         duration_s: f32,
@@ -262,14 +266,14 @@ impl<'a> Commander<'a> {
         Ok(())
     }
 
-    /// A robot keeps its targets for one short command.
+    /// Keeps a robot's targets for one short command.
     pub fn hold(&mut self, robot: usize) -> Result<(), PlayerError> {
         let facts = self.episode.facts()?;
         let robots = vec![self.wrist_move(&facts, robot)];
         self.call(BEAT_STEPS, robots)
     }
 
-    /// One command in which robots walk or stand; those that `moves` does not name hold still.
+    /// Makes one command in which robots walk or stand; those that `moves` does not name hold still.
     pub fn advance(&mut self, steps: u32, moves: &[RobotMove]) -> Result<(), PlayerError> {
         let facts = self.episode.facts()?;
         let mut robots = Vec::with_capacity(moves.len());
@@ -303,7 +307,7 @@ impl<'a> Commander<'a> {
         Ok(())
     }
 
-    /// One `move_wrists` with the present goals of all robots that `moves` name.
+    /// Makes one `move_wrists` with the present goals of all robots that `moves` name.
     fn command(&mut self, steps: u32, moves: &[HandMove]) -> Result<(), PlayerError> {
         let facts = self.episode.facts()?;
         let named = (0..self.targets.len()).filter(|robot| moves.iter().any(|hand| hand.robot == *robot));
@@ -353,7 +357,7 @@ impl<'a> Commander<'a> {
         }
     }
 
-    /// Where the wrist of a hand is now, world frame.
+    /// Returns the present pose of a hand's wrist, world frame.
     pub fn world_from_wrist(&mut self, robot: usize, side: Side) -> Result<Pose, PlayerError> {
         Ok(world_from_wrist(&self.facts()?, robot, side))
     }
@@ -364,7 +368,7 @@ fn world_from_wrist(facts: &Facts, robot: usize, side: Side) -> Pose {
     robot.pelvis_in_world * robot.wrist_in_pelvis[side]
 }
 
-/// Zero speed at both ends.
+/// Eases `share` from 0 to 1, with zero speed at both ends.
 pub fn smooth(share: f32) -> f32 {
     share * share * (3.0 - 2.0 * share)
 }

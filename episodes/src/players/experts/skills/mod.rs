@@ -1,4 +1,5 @@
-//! What several experts use: hands that move together, grasps, the shapes of a hand, walking, and carrying in step.
+//! Skills that several experts use: hands that move together, grasps, hand shapes, walking, and carrying in
+//! step.
 
 mod carry_team;
 mod commander;

@@ -1,4 +1,4 @@
-//! Scripts that are played at the same time, each by robots of its own: their commands go out as one.
+//! Scripts that are played at the same time, each by robots of its own: their commands are merged into one.
 
 use std::panic::resume_unwind;
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -10,7 +10,7 @@ use super::commander::{BEAT_STEPS, Commander};
 use crate::players::{Episode, PlayerError, PrivilegedEpisode};
 use crate::scoring::Facts;
 
-/// What some of the robots do while others do something else.
+/// Script of some of the robots, while the other robots play other scripts.
 pub struct ParallelScript<'a> {
     pub robots: &'a [usize],
     pub script: BoxedScript<'a>,
@@ -18,13 +18,13 @@ pub struct ParallelScript<'a> {
 
 type BoxedScript<'a> = Box<dyn FnOnce(&mut Commander) -> Result<(), PlayerError> + Send + 'a>;
 
-/// What a script hears once its command has been executed.
+/// Outcome that a script receives once its command has been executed.
 struct CommandOutcome {
     reply: ToolReply,
     facts: Facts,
 }
 
-/// The episode as one of the scripts meets it.
+/// The episode as one of the scripts sees it.
 struct ScriptEpisode {
     facts: Facts,
     commands: Sender<MoveWrists>,
@@ -37,7 +37,7 @@ impl Episode for ScriptEpisode {
         let ToolCall::Act(ActCall::MoveWrists(command)) = call else {
             return Err(PlayerError::Call { tool, reason: "not while others play".into() });
         };
-        // Where nobody listens any more, the others have stopped, and say why themselves.
+        // The channel is closed once the other scripts have stopped; they report the reason themselves.
         self.commands.send(command).map_err(|_| PlayerError::EpisodeOver)?;
         let CommandOutcome { reply, facts } = self.outcomes.recv().map_err(|_| PlayerError::EpisodeOver)?;
         self.facts = facts;
@@ -57,8 +57,8 @@ struct ScriptChannel {
     outcomes: Sender<CommandOutcome>,
 }
 
-/// Plays all scripts to their ends. Nothing moves before every script that still plays has said what its robots do next, so
-/// that equal beginnings have equal ends, whichever thread is faster.
+/// Plays all scripts to their ends. Nothing moves before every script that still plays has sent its next
+/// command. Equal beginnings therefore have equal ends, whichever thread is faster.
 pub fn in_parallel(commander: &mut Commander, scripts: Vec<ParallelScript>) -> Result<(), PlayerError> {
     let facts = commander.facts()?;
     thread::scope(|scope| {
@@ -88,7 +88,7 @@ pub fn in_parallel(commander: &mut Commander, scripts: Vec<ParallelScript>) -> R
     })
 }
 
-/// Makes one call of the commands of all scripts, until none has any more.
+/// Merges the commands of all scripts into one call at a time, until no script sends any more.
 fn merge_commands(commander: &mut Commander, mut channels: Vec<ScriptChannel>) -> Result<(), PlayerError> {
     loop {
         let mut robots = Vec::new();

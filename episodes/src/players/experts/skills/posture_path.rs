@@ -1,4 +1,4 @@
-//! Robots walk along a path of postures: where each stands and where its hands are, by the distance gone.
+//! Paths of postures for several robots: each robot's place and its hands, by the distance gone.
 
 use tandem_sim::{CONTROL_DT_S, Pose, Sides, heading_rad, wrapped_rad};
 
@@ -9,12 +9,12 @@ use crate::scoring::Facts;
 
 const ACCELERATION_M_S2: f32 = 0.4;
 const AT_END_M: f32 = 1e-4;
-/// The slowest that a path is followed.
+/// Least speed along a path.
 const CREEP_M_S: f32 = 0.02;
-/// What a robot's base is asked for, corrections included.
+/// Largest commanded speed of a robot's base, corrections included.
 const MAX_SPEED_M_S: f32 = 0.35;
 
-/// How one robot stands and where its hands are, world frame.
+/// Place of one robot and its hands, world frame.
 #[derive(Clone, Copy)]
 pub struct Posture {
     pub robot: usize,
@@ -22,7 +22,7 @@ pub struct Posture {
     pub wrists: Sides<Pose>,
 }
 
-/// How much of a path may have been gone where nothing is in the way: all of it.
+/// Free distance of a path without obstacles: all of it.
 pub const FREE: fn(&Facts) -> f32 = |_| f32::INFINITY;
 
 /// Postures by the distance gone.
@@ -30,28 +30,28 @@ pub struct PosturePath<'a> {
     pub at: &'a dyn Fn(f32) -> Vec<Posture>,
     pub length_m: f32,
     pub pace_m_s: f32,
-    /// How much of it may have been gone by now.
+    /// Distance along the path that is free at present.
     pub free_m: &'a dyn Fn(&Facts) -> f32,
-    /// How long robots still correct their places at the end.
+    /// Time for which robots still correct their places at the end.
     pub hold_s: f32,
 }
 
-/// How far a path was followed.
+/// Progress along a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PathProgress {
     Completed,
-    /// Something went wrong when so much of it had been gone.
+    /// Something went wrong after `gone_m`.
     Interrupted {
         gone_m: f32,
     },
 }
 
-/// The robots follow a path from its beginning to its end, from rest to rest.
+/// Follows a path from its beginning to its end, from rest to rest.
 pub fn follow(commander: &mut Commander, path: &PosturePath) -> Result<(), PlayerError> {
     follow_while(commander, path, 0.0, &mut |_| true).map(drop)
 }
 
-/// The robots follow a path from where `gone_m` of it have been gone, for as long as all is `well`; see [`follow`].
+/// Follows a path from `gone_m` on, while `well` returns `true`; see [`follow`].
 pub fn follow_while(
     commander: &mut Commander,
     path: &PosturePath,

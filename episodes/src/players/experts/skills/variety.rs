@@ -1,41 +1,42 @@
-//! How demonstrations of one task differ from each other, as people's do: in pace, in moments of waiting, in the ways hands take, and in
-//! that a hand misses now and then and comes back. All of it is drawn from the episode's seed.
+//! Variation between demonstrations of one task, similar to people's: pace, pauses, detours of the hands,
+//! and hands that miss now and then and come back. Everything is drawn from the episode's seed.
 
 use tandem_sim::{SplitMix64, Vector};
 
-/// At level 1, motions take so much less or more time than they would.
+/// Range of the relative change of a motion's duration at level 1.
 const PACE: [f32; 2] = [-0.08, 0.2];
-/// A robot walks so much slower at most.
+/// Largest relative reduction of the walking pace at level 1.
 const SLOWER: f32 = 0.12;
-/// How often a motion waits before it begins, and for how long.
+/// Probability of a pause before a motion at level 1, and the range of its duration.
 const PAUSES: f32 = 0.12;
 const PAUSE_S: [f32; 2] = [0.1, 0.5];
-/// How far a hand strays from its straight line, as a part of its way, and at most.
+/// Largest detour of a hand from its straight line at level 1, as a share of its way; `MAX_STRAY_M` is the
+/// absolute limit.
 const STRAY: f32 = 0.08;
 const MAX_STRAY_M: f32 = 0.02;
-/// How often a free hand misses on a long way, and by how much.
+/// Probability at level 1 that a free hand misses after a long way, and the range of the error.
 const MISSES: f32 = 0.12;
 const MISS_M: [f32; 2] = [0.01, 0.03];
-/// A way is long from here on: nothing that is to be grasped is as near.
+/// Least length of a long way: no object that is to be grasped is as near.
 const LONG_WAY_M: f32 = 0.12;
-/// A hand that has missed needs so long to come back.
+/// Time that a hand which has missed needs to come back.
 pub const COME_BACK_S: f32 = 0.5;
 
-/// What tells these numbers from those by which the same seed moves things.
+/// Constant that separates this random stream from the one with which the same seed places things.
 const STREAM: u64 = 0x7661_7269_6574_7931;
 
-/// Draws how this demonstration differs.
+/// Random source of a demonstration's variation.
 #[derive(Clone, Debug)]
 pub struct Variety {
     level_factor: f32,
-    /// The state of the generator.
+    /// State of the generator.
     random: u64,
-    /// Pace at which robots walk, all of this episode the same.
+    /// Share of the usual walking pace, constant over the episode.
     walking_pace: f32,
 }
 
 impl Variety {
-    /// `None` for level 0, at which nothing is drawn.
+    /// Creates the variety of a level; `None` for level 0, at which nothing is drawn.
     pub fn new(level: u8, seed: u32) -> Option<Variety> {
         if level == 0 {
             return None;
@@ -46,43 +47,44 @@ impl Variety {
         Some(variety)
     }
 
-    /// That of one of several scripts that are played at once, which has numbers of its own: which script draws first does not matter.
+    /// Returns the variety of one of several scripts that are played at once. Each has its own stream, so
+    /// the order of draws between scripts does not matter.
     pub fn of_script(&self, script: usize) -> Variety {
         let mut own = self.clone();
         own.random ^= (script as u64 + 1) << 40;
         own
     }
 
-    /// What share of its usual pace a robot walks at.
+    /// Returns the share of its usual pace at which a robot walks.
     pub fn walking(&self) -> f32 {
         self.walking_pace
     }
 
-    /// How long a motion takes that would take `duration_s`.
+    /// Draws the duration of a motion whose plain duration is `duration_s`.
     pub fn duration_s(&mut self, duration_s: f32) -> f32 {
         duration_s * (1.0 + self.draw(PACE.map(|limit| limit * self.level_factor)))
     }
 
-    /// How long a robot waits before it begins to move.
+    /// Draws the pause before a motion.
     pub fn pause_s(&mut self) -> f32 {
         let pause_s = self.draw(PAUSE_S);
         if self.happens(PAUSES) { pause_s } else { 0.0 }
     }
 
-    /// How far hands are off their straight line half way along `way_m`, never below it.
+    /// Draws the offset of the hands from their straight line half way along `way_m`, never below it.
     pub fn stray_m(&mut self, way_m: f32) -> Vector {
         let most_m = (STRAY * way_m).min(MAX_STRAY_M) * self.level_factor;
         self.aside_m(most_m)
     }
 
-    /// By how much free hands miss at the end of `way_m`, if they do.
+    /// Draws the error of free hands at the end of `way_m`; `None` if they do not miss.
     pub fn miss_m(&mut self, way_m: f32) -> Option<Vector> {
         let off_m = self.draw(MISS_M);
         let aside_m = self.aside_m(off_m);
         (self.happens(MISSES) && way_m > LONG_WAY_M).then_some(aside_m)
     }
 
-    /// Up to so far to any side and up.
+    /// Draws an offset of up to `most_m` to each side and up.
     fn aside_m(&mut self, most_m: f32) -> Vector {
         let [x, y, z] = [[-1.0, 1.0], [-1.0, 1.0], [0.0, 1.0]].map(|range| self.draw(range));
         Vector::new(x, y, z) * most_m

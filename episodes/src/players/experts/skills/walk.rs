@@ -1,4 +1,4 @@
-//! Places on the floor, where robots stand and which way they look; and walking to them, several robots at once.
+//! Places on the floor with headings, and walking to them, several robots at once.
 
 use std::collections::VecDeque;
 use std::ops::RangeInclusive;
@@ -8,51 +8,51 @@ use tandem_sim::{BaseVelocity, CONTROL_DT_S, Pose, Rotation, Side, Sides, Vector
 use super::commander::{Commander, HandMove, RobotMove, WALK_STEPS, WristTargets, smooth};
 use crate::players::PlayerError;
 
-/// Velocity for each metre that a robot is off its place, and turning for each radian.
+/// Gain from a position error to a velocity, and from a heading error to a turning rate.
 const GAIN_1_S: f32 = 1.0;
-/// A place is reached within this.
+/// Tolerance within which a place is reached.
 const CLOSE: Tolerance = Tolerance { off_m: 0.02, off_rad: 0.04 };
-/// One who stands is not asked to walk again within this.
+/// Tolerance within which a standing robot does not have to walk again.
 const AT_REST: Tolerance = Tolerance { off_m: 0.03, off_rad: 0.04 };
 const TRIES: u32 = 3;
-/// A robot that has not come to rest by then stands close enough, or never will.
+/// Longest time of a walk. A robot that has not come to rest by then is close enough, or never will be.
 const LONGEST_S: f32 = 20.0;
-/// Feet come together, and what sways comes to rest.
+/// Number of commands for feet to come together and swaying to stop.
 const SETTLE_COMMANDS: u32 = 6;
-/// Commands in which a robot takes a step with either foot.
+/// Number of commands in which a robot takes a step with either foot.
 const TWO_STEPS_COMMANDS: usize = 6;
-/// Where a robot has what its right hand takes: ahead of the pelvis, and to the right.
+/// Position of a point that the right hand takes: ahead of the pelvis, and to the right.
 const AT_HAND_M: Vector = Vector::new(0.40, -0.10, 0.0);
-/// How long hands take to reach out.
+/// Time that hands take to reach out.
 const REACH_S: f32 = 1.5;
-/// Hands that have reached out correct the rest.
+/// Longest time of a walk with hands that reach out; they correct the rest.
 const LONGEST_REACHING_S: f32 = 4.0;
 
-/// Where a robot is to walk.
+/// Goal of a robot's walk.
 #[derive(Clone, Copy)]
 pub struct WalkGoal {
     pub robot: usize,
-    /// World frame; its height does not matter.
+    /// World frame; the height is ignored.
     pub to: Pose,
-    /// No faster than this.
+    /// Largest speed.
     pub pace_m_s: f32,
 }
 
-/// How near to a place is near enough.
+/// Distance and angle within which a robot counts as at its place.
 #[derive(Clone, Copy)]
 pub struct Tolerance {
     pub off_m: f32,
     pub off_rad: f32,
 }
 
-/// What a place that itself moves does meanwhile, world frame.
+/// Velocity of a place that itself moves, world frame.
 #[derive(Clone, Copy, Default)]
 pub struct TargetVelocity {
     pub velocity_m_s: Vector,
     pub turning_rad_s: f32,
 }
 
-/// How a robot whose pelvis is at `at` walks to stay at, or come to, a place.
+/// Returns the base velocity with which a robot whose pelvis is at `at` comes to a place and stays with it.
 pub fn steer(at: &Pose, to: &Pose, drift: TargetVelocity, pace_m_s: f32) -> BaseVelocity {
     let mut off_m = to.translation - at.translation;
     off_m.z = 0.0;
@@ -66,8 +66,8 @@ pub fn steer(at: &Pose, to: &Pose, drift: TargetVelocity, pace_m_s: f32) -> Base
     }
 }
 
-/// Brings robots near their places, hands kept as they are relative to the body, without waiting for them to come to rest. Who has come
-/// near stands while the others still walk.
+/// Brings robots near their places, without waiting for them to come to rest. Their hands stay as they are
+/// relative to the body. A robot that has come near stops while the others still walk.
 pub fn approach(commander: &mut Commander, goals: &[WalkGoal], within: Tolerance) -> Result<(), PlayerError> {
     let mut hands = Vec::with_capacity(goals.len());
     for goal in goals {
@@ -90,7 +90,7 @@ pub fn approach(commander: &mut Commander, goals: &[WalkGoal], within: Tolerance
     Ok(())
 }
 
-/// Brings robots to their places, hands kept as they are relative to the body. The others hold still.
+/// Brings robots to their places, with hands as they are relative to the body. The others hold still.
 pub fn walk_to(commander: &mut Commander, goals: &[WalkGoal]) -> Result<(), PlayerError> {
     let mut hands = Vec::with_capacity(goals.len());
     for goal in goals {
@@ -99,9 +99,10 @@ pub fn walk_to(commander: &mut Commander, goals: &[WalkGoal]) -> Result<(), Play
     arrive(commander, goals, 0.0..=LONGEST_S, &|_| hands.clone())
 }
 
-/// Brings robots to their places while their hands reach out: each pair of `reaches` are the hands of the robot of the goal beside it. One
-/// who stands already when both arms go out takes a step after them, for they weigh ahead; one who walks meanwhile stands in its place
-/// with its arms out.
+/// Brings robots to their places while their hands reach out. Each pair in `reaches` belongs to the robot
+/// of the goal with the same index. A robot that already stands when its arms go out takes a step
+/// afterwards, because the arms shift its weight forward. One that walks meanwhile stops at its place with
+/// its arms out.
 pub fn walk_reaching(
     commander: &mut Commander,
     goals: &[WalkGoal],
@@ -128,8 +129,8 @@ pub fn walk_reaching(
     })
 }
 
-/// Walks robots to their places with their hands where `hands` has them so many seconds after they set out. Each stops where it is there,
-/// and no sooner than after so long.
+/// Walks robots to their places; `hands` gives the wrist targets by the time since the start. Each robot
+/// stops once it has arrived, but not before the start of `time_s`.
 fn arrive(
     commander: &mut Commander,
     goals: &[WalkGoal],
@@ -159,7 +160,7 @@ fn arrive(
             let still = vec![BaseVelocity::STILL; goals.len()];
             commander.advance(WALK_STEPS, &moves(goals, &hands(gone_s), &still))?;
         }
-        // Where a robot came by with a sway, it does not come to rest.
+        // A robot that was in place only through its sway does not come to rest there.
         let now = pelvises(commander, goals)?;
         resting = goals.iter().zip(&now).map(|(goal, at)| is_there(at, goal, AT_REST)).collect();
         if !resting.contains(&false) || gone_s >= *time_s.end() {
@@ -169,15 +170,15 @@ fn arrive(
     Ok(())
 }
 
-/// Where robots were at their last commands. A pelvis sways by 3 cm to each side from step to step, so that it passes its place over and
-/// over; in the mean over two steps a robot is there or is not.
+/// Recent positions of the robots. A pelvis sways by 3 cm to each side from step to step, so that it passes
+/// its place repeatedly. The mean over two steps decides whether a robot is there.
 #[derive(Default)]
 struct Sway {
     recent: VecDeque<Vec<Pose>>,
 }
 
 impl Sway {
-    /// Where the robots are in the mean, which are `now` there.
+    /// Returns the mean of the robots' recent poses, including `now`.
     fn mean(&mut self, now: Vec<Pose>) -> Vec<Pose> {
         let robots = now.len();
         self.recent.push_back(now);
@@ -196,7 +197,7 @@ impl Sway {
         (0..robots).map(mean).collect()
     }
 
-    /// Whether a mean says where robots are: those who stand do not sway.
+    /// Returns `true` if the mean is meaningful: over two steps, or for a single pose, before any sway.
     fn is_told(&self) -> bool {
         [1, TWO_STEPS_COMMANDS].contains(&self.recent.len())
     }
@@ -207,7 +208,7 @@ fn pelvises(commander: &mut Commander, goals: &[WalkGoal]) -> Result<Vec<Pose>, 
     Ok(goals.iter().map(|goal| facts.robots[goal.robot].pelvis_in_world).collect())
 }
 
-/// How robots walk to their places from where they are, at such a share of their pace.
+/// Returns the base velocities with which robots walk to their places, at this share of their pace.
 fn steered(now: &[Pose], goals: &[WalkGoal], pace_share: f32) -> Vec<BaseVelocity> {
     let walk = |(at, goal): (&Pose, &WalkGoal)| {
         steer(at, &goal.to, TargetVelocity::default(), goal.pace_m_s * pace_share)
@@ -215,7 +216,7 @@ fn steered(now: &[Pose], goals: &[WalkGoal], pace_share: f32) -> Vec<BaseVelocit
     now.iter().zip(goals).map(walk).collect()
 }
 
-/// The same velocities, but those of the robots that stand.
+/// Returns the velocities with those of standing robots set to zero.
 fn standing(mut velocities: Vec<BaseVelocity>, stand: &[bool]) -> Vec<BaseVelocity> {
     for (velocity, _) in velocities.iter_mut().zip(stand).filter(|(_, stands)| **stands) {
         *velocity = BaseVelocity::STILL;
@@ -237,12 +238,12 @@ fn is_there(at: &Pose, goal: &WalkGoal, within: Tolerance) -> bool {
     off_m < within.off_m && wrapped_rad(heading_rad(&goal.to) - heading_rad(at)).abs() < within.off_rad
 }
 
-/// The same place and heading, without any tilt.
+/// Returns the same place and heading, without any tilt.
 pub fn upright(pose: &Pose) -> Pose {
     Pose::from_parts(pose.translation, Rotation::from_rotation_z(heading_rad(pose)))
 }
 
-/// A place and a heading.
+/// Returns the pose of a place and a heading.
 pub fn place(position_m: Vector, heading_rad: f32) -> Pose {
     Pose::from_parts(position_m, Rotation::from_rotation_z(heading_rad))
 }
@@ -252,7 +253,7 @@ pub fn at_height(place: &Pose, height_m: f32) -> Pose {
     Pose::from_parts(place.translation.with_z(height_m), place.rotation)
 }
 
-/// Where a robot stands to have `point_m` before its right hand.
+/// Returns the place of a robot that has `point_m` in front of its right hand.
 pub fn at_hand(point_m: Vector, heading_rad: f32) -> Pose {
     let facing = place(Vector::ZERO, heading_rad);
     place(point_m - facing * AT_HAND_M, heading_rad)

@@ -1,12 +1,12 @@
-//! The way of an object that several robots carry, by how far the robot walks that has farthest to go: where the object turns, those at
-//! its ends walk farther than its middle does.
+//! The way of an object that several robots carry, measured by the robot that has farthest to walk. When
+//! the object turns, robots at its ends walk farther than its middle moves.
 
 use tandem_sim::Pose;
 
-/// Pieces in which a stretch between two stops is measured.
+/// Number of pieces in which a stretch between two stops is measured.
 const PIECES: usize = 16;
 
-/// Straight from stop to stop, turning evenly meanwhile.
+/// A way that is straight from stop to stop, with an even turn along each stretch.
 pub struct WalkedWay {
     stretches: Vec<Stretch>,
 }
@@ -24,7 +24,8 @@ impl Stretch {
 }
 
 impl WalkedWay {
-    /// Through `stops` of the object, world frame, by robots that stand at `object_from_stand`, in the object's frame.
+    /// Creates the way through `stops` of the object, world frame. The robots stand at `object_from_stand`,
+    /// in the object's frame.
     pub fn new(stops: &[Pose], object_from_stand: &[Pose]) -> WalkedWay {
         let stretch = |ends: &[Pose]| {
             let mut stretch = Stretch { from: ends[0], to: ends[1], length_m: 0.0 };
@@ -38,12 +39,12 @@ impl WalkedWay {
         WalkedWay { stretches: stops.windows(2).map(stretch).collect() }
     }
 
-    /// How far the robot walks that has farthest to go.
+    /// Returns the distance of the robot that has farthest to walk.
     pub fn length_m(&self) -> f32 {
         self.stretches.iter().map(|stretch| stretch.length_m).sum()
     }
 
-    /// Where the object is once so much has been gone.
+    /// Returns the object's pose after `gone_m`.
     pub fn at(&self, gone_m: f32) -> Pose {
         let mut left_m = gone_m;
         for stretch in &self.stretches {
@@ -65,7 +66,8 @@ mod tests {
     use super::*;
     use crate::players::experts::skills::place;
 
-    /// Robots 1 m ahead of the object's middle and 0.5 m behind it, which turns by a quarter, and then goes 2 m ahead.
+    /// Robots are 1 m ahead of the object's middle and 0.5 m behind it. The object turns by a quarter, and
+    /// then goes 2 m ahead.
     #[test]
     fn a_way_is_as_long_as_that_of_the_robot_with_farthest_to_go() {
         let ahead_m = |x_m: f32| place(Vector::X * x_m, 0.0);

@@ -1,4 +1,4 @@
-//! What the page says of an episode, and what it keeps out.
+//! Texts that the page has to show, and to leave out.
 
 use tandem_tools_spec::{Assistance, PhaseTimes, Protocol};
 
@@ -97,7 +97,7 @@ fn pages_tell_what_happened() {
             r#"<code>move_wrists</code></td><td class="number">2</td><td class="number">1</td>"#,
             r#"<td class="number">1.50 s</td><td>A</td><td class="long">the &lt;red&gt; one</td>"#,
             "data:image/png;base64,cG5n",
-            // What a picture shows is text.
+            // The texts of an image are escaped.
             r#"<p>p1 &lt;grasp&gt; <span class="soft">4.0 s</span></p>"#,
             "<figcaption>what A sees</figcaption>",
             r#"alt="what A sees, p1 &lt;grasp&gt; 4.0 s""#,
@@ -109,7 +109,7 @@ fn pages_tell_what_happened() {
         &["3 of 3 phases reached", "500 of 1000", "<span>0 s</span><span>10.00 s</span>"],
         &["not reached", "Policy's own time", "initial hold"],
     );
-    // What was reached before it began is not part of it.
+    // A phase that was reached before the start is not part of it.
     check(
         &page_from(6.5, [Some(4.0), Some(8.5), None], Protocol::Benchmark),
         &[
@@ -128,7 +128,7 @@ fn pages_load_nothing_and_escape_what_they_quote() {
     assert!(!page.contains("<link") && !page.contains("url(") && !page.contains("src=\"http"));
 }
 
-/// What is long stands in cells that become lines of their own where there is no room for columns.
+/// Cells with long texts become lines of their own where there is no room for columns.
 #[test]
 fn no_table_of_words_needs_more_room_than_a_telephone_has() {
     let page = page([Some(4.0), None, None], Protocol::Agentic);

@@ -1,5 +1,5 @@
-//! What needs no eyes: how far robots get that stand still, and that replay a demonstration of another seed without a look. A policy
-//! whose rate is not above that has not shown that it looks at anything.
+//! Floors: success of policies without perception, which hold still, or replay a demonstration of another
+//! seed. A policy whose rate is not higher has not shown that it uses its observations.
 
 use std::collections::BTreeSet;
 
@@ -14,41 +14,42 @@ use crate::statistics::Count;
 use crate::tasks::{self, Spread};
 use crate::variation::Variation;
 
-/// Measured before, for reports that have no such policy beside.
+/// Earlier measurements, for reports that include no such policy.
 const SHIPPED: &str = include_str!("floors.csv");
 
-/// Who looks at nothing.
+/// Policies without perception.
 const PLAYERS: [&str; 2] = [IDLE, OPEN_LOOP];
 
-/// Above this, a rate of the whole task says little of what a policy sees.
+/// Rate of the whole task above which it says little about a policy's perception.
 const HIGH_SHARE: f64 = 0.5;
 
 /// The floor of one task.
 #[derive(Debug, Serialize)]
 pub struct TaskFloor {
     pub task: &'static str,
-    /// What of its episodes is not as the benchmark has it, but for what policies are told.
+    /// Departures of its episodes from the benchmark, without those on information for policies.
     pub departures: Vec<String>,
     pub players: Vec<FloorRate>,
-    /// Whether any of them solves the task in more than half of the episodes.
+    /// True if any of the players solves the task in more than half of the episodes.
     pub is_high: bool,
 }
 
-/// How far a policy got that looks at nothing.
+/// Rates of a policy without perception.
 #[derive(Clone, Debug, Serialize)]
 pub struct FloorRate {
     pub player: &'static str,
     pub protocol: String,
-    /// Where the figure is from: the report's own episodes, or seeds and build of earlier ones.
+    /// Source of the figures: the report's own episodes, or seeds and build of earlier ones.
     pub measured: String,
-    /// Cumulative, by phase.
+    /// Cumulative rates, by phase.
     pub phases: Vec<Rate>,
 }
 
-/// Where floors are measured, or wanted.
+/// Task and departures for which a floor is measured or needed.
 type FloorKey = (&'static str, Vec<String>);
 
-/// The floors of all tasks that were played, in the order of the list of tasks; none where nobody knows one.
+/// Returns the floors of all played tasks in the order of the list of tasks, without tasks whose floor is
+/// unknown.
 pub fn floors(groups: &[PolicyGroup], policies: &[PolicyReport]) -> Vec<TaskFloor> {
     let places: BTreeSet<FloorKey> =
         groups.iter().flat_map(|group| &group.episodes).map(|found| place(&found.played)).collect();
@@ -82,7 +83,8 @@ pub fn floors(groups: &[PolicyGroup], policies: &[PolicyReport]) -> Vec<TaskFloo
     floors
 }
 
-/// In which task and what circumstances an episode was played. What its policy is told moves nobody who hears nothing.
+/// Returns the task and the departures of an episode. Information for policies is ignored, because it does
+/// not affect a policy without perception.
 fn place(played: &PlayedEpisode) -> FloorKey {
     let spec = EpisodeSpec { instructions: None, ..played.spec.clone() }.assisted(Assistance::Paper);
     (spec.task.id, spec.peculiarities())
@@ -98,7 +100,7 @@ fn plays_as(group: &PolicyGroup, player: &str) -> bool {
 }
 
 impl FloorRate {
-    /// `None` where the policy has played no whole episode of the task.
+    /// Returns the rates of a player in this report; `None` if it has played no whole episode of the task.
     fn beside(player: &'static str, task: &str, policy: &PolicyReport) -> Option<FloorRate> {
         let of_task = policy.tasks.iter().find(|of| of.task == task)?;
         let rates: Option<Vec<Rate>> =
@@ -112,7 +114,7 @@ impl FloorRate {
     }
 }
 
-/// What was measured before, and where.
+/// Returns the earlier measurements, with their tasks and departures.
 fn shipped() -> Vec<(FloorKey, FloorRate)> {
     SHIPPED.lines().skip(1).filter_map(shipped_row).collect()
 }
@@ -148,7 +150,7 @@ mod tests {
     use crate::results::PolicyCard;
     use crate::tasks::Task;
 
-    /// Who replays a demonstration without a look.
+    /// Returns an episode of the player that replays a demonstration without observations.
     fn blind(task: &'static Task, seed: u32, phases: usize) -> PlayedEpisode {
         let settings = Some(serde_json::json!({ OPEN_LOOP: ["handover 2000 0123456789abcdef"] }));
         let played = played(OPEN_LOOP, task, seed, phases);
@@ -172,7 +174,7 @@ mod tests {
         assert!(text.contains("## The floor") && text.contains("It is above 50 % of handover:"), "{text}");
         assert!(text.contains("60 [26.2, 87.8] 6/10"), "{text}");
 
-        // A floor is that of the place that was played in: with things spread wider, another.
+        // A floor belongs to its task and departures: a wider spread has another one.
         let spec = |played: &PlayedEpisode| EpisodeSpec {
             variation: Variation { spread: Spread::Double, ..Variation::default() },
             ..played.spec.clone()

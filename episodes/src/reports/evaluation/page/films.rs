@@ -1,4 +1,5 @@
-//! Of each task a film of an episode that succeeded and one of an episode that failed, or why there is none.
+//! Videos of each task: one of a successful episode and one of a failed one, or the reason why there is
+//! none.
 
 use std::path::PathBuf;
 
@@ -8,31 +9,31 @@ use crate::reports::evaluation::load::{FoundEpisode, LoadedEpisodes};
 use crate::reports::evaluation::policy::{failure_cause, groups};
 use crate::tasks;
 
-/// The place of a film on the page.
+/// The place of a video on the page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmPlace {
     pub task: &'static str,
-    /// Whether it is the one of an episode that succeeded.
+    /// True for the video of a successful episode.
     pub success: bool,
-    /// The episode to film, or why there is none.
+    /// The episode to show, or the reason why there is none.
     pub episode: Result<FilmedEpisode, String>,
 }
 
-/// An episode of which there is a recording.
+/// An episode that has a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmedEpisode {
     pub policy: String,
     pub seed: u32,
-    /// Why it failed, if it did.
+    /// Reason of its failure; `None` if it succeeded.
     pub why: Option<String>,
     pub recording: PathBuf,
 }
 
-/// A film in its place.
+/// A video in its place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     pub place: FilmPlace,
-    /// The film, or why there is none.
+    /// The video, or the reason why there is none.
     pub content: Result<FilmContent, String>,
 }
 
@@ -42,7 +43,8 @@ pub struct FilmContent {
     pub speed_ratio: f64,
 }
 
-/// Two places for each task that was played; in each, the first episode of the first policy that has one and its recording.
+/// Returns two places for each played task. Each has the first recorded episode of the first policy that
+/// has one.
 pub fn film_places(loaded: &LoadedEpisodes) -> Vec<FilmPlace> {
     let groups = groups(loaded.episodes.iter());
     let episodes: Vec<(&str, &FoundEpisode)> = groups
@@ -85,7 +87,7 @@ fn choose<'a>(
     })
 }
 
-/// The films as a part of the page; nothing where there are none.
+/// Renders the videos as a part of the page; empty if there are none.
 pub fn html(films: &[Film]) -> String {
     if films.is_empty() {
         return String::new();

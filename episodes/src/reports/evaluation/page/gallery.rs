@@ -1,4 +1,4 @@
-//! Failures with their key moments, as small pictures.
+//! Gallery of failures with their key moments, as small images.
 
 use crate::html::escape;
 use crate::reports::episode::{KeyMoment, moments, strip};
@@ -17,15 +17,14 @@ pub struct Failure {
     /// Number of the first phase that counts and was not reached.
     pub phase: String,
     pub why: String,
-    /// None where its strip cannot be read.
+    /// Key moments; empty if the strip cannot be read.
     pub moments: Vec<KeyMoment>,
 }
 
-/// Pictures of a strip are 400 pixels wide; on the page they need no more than this.
+/// Scale of the strip's images, which are 400 pixels wide, on the page.
 const SCALE: f64 = 0.5;
 
-/// The failures that have a picture, `most` of them at most, by turns from every policy and task; those without one are
-/// left out.
+/// Returns at most `most` failures that have images, in turns from every policy and task.
 pub fn gallery(loaded: &LoadedEpisodes, most: usize) -> Vec<Failure> {
     let pictured = failed_by_turns(loaded, most, |found| found.strip.is_some()).into_iter();
     let pictured = pictured.map(|(policy, found)| {
@@ -35,7 +34,7 @@ pub fn gallery(loaded: &LoadedEpisodes, most: usize) -> Vec<Failure> {
     pictured.collect()
 }
 
-/// How many failures have a picture.
+/// Returns the number of failures that have images.
 pub fn pictured_failures(loaded: &LoadedEpisodes) -> usize {
     let failures = groups(loaded.episodes.iter());
     failures.iter().flat_map(failed).filter(|found| found.strip.is_some()).count()
@@ -53,7 +52,7 @@ fn failure(policy: &str, found: &FoundEpisode) -> Failure {
     }
 }
 
-/// Failures with their key moments, as a part of the page.
+/// Renders failures with their key moments as a part of the page.
 pub fn html(pictures: &ReportPictures, policies: &[PolicyReport]) -> String {
     let failures = &pictures.failures;
     let failed: usize =

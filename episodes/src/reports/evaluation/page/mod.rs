@@ -1,4 +1,4 @@
-//! The report as one page that needs nothing else: no script, no font, no picture from elsewhere.
+//! The report as one self-contained page: no script, no font, no image from elsewhere.
 
 pub mod films;
 pub mod gallery;
@@ -16,16 +16,16 @@ use films::Film;
 use gallery::Failure;
 use plot::{SERIES, task_plot};
 
-/// What a page shows beside words and figures.
+/// Images and videos of a page.
 #[derive(Clone, Debug, Default)]
 pub struct ReportPictures {
     pub films: Vec<Film>,
     pub failures: Vec<Failure>,
-    /// How many failures have a picture, shown or not.
+    /// Number of failures that have images, shown or not.
     pub pictured_failures: usize,
 }
 
-/// The page.
+/// Renders the page.
 pub fn html(report: &EvaluationReport, pictures: &ReportPictures) -> String {
     let policies = &report.policies;
     let names: Vec<&str> = policies.iter().map(|policy| policy.name.as_str()).collect();
@@ -56,7 +56,7 @@ pub fn html(report: &EvaluationReport, pictures: &ReportPictures) -> String {
     html::page(&format!("Tandem: {title}"), &body)
 }
 
-/// The names in a sentence, as "a, b and c".
+/// Joins the names in a sentence, for example "a, b and c".
 fn in_words(names: &[&str]) -> String {
     match names.split_last() {
         Some((last, others)) if !others.is_empty() => format!("{} and {last}", others.join(", ")),
@@ -64,7 +64,7 @@ fn in_words(names: &[&str]) -> String {
     }
 }
 
-/// A text as HTML, in which what stands between backticks is what one types.
+/// Converts a text to HTML, with code for the parts between backticks.
 fn marked(text: &str) -> String {
     let part = |(index, part): (usize, &str)| match index % 2 {
         0 => escape(part),
@@ -73,7 +73,7 @@ fn marked(text: &str) -> String {
     text.split('`').enumerate().map(part).collect()
 }
 
-/// How many episodes were played of what.
+/// Describes the number of episodes and their tasks.
 fn played(episodes: usize, tasks: &[&str]) -> String {
     let counted = if episodes == 1 { "1 episode".to_owned() } else { format!("{episodes} episodes") };
     match tasks {
@@ -82,7 +82,7 @@ fn played(episodes: usize, tasks: &[&str]) -> String {
     }
 }
 
-/// The tasks that any policy has played, in the order of the list of tasks, then those of files.
+/// Returns the tasks that any policy has played, in the order of the list of tasks, then those of files.
 fn tasks(report: &EvaluationReport) -> Vec<&'static str> {
     let played = || report.policies.iter().flat_map(|policy| &policy.tasks).map(|task| task.task);
     let known = crate::tasks::cohub().iter().copied().map(|task| task.id);
@@ -95,7 +95,7 @@ fn tasks(report: &EvaluationReport) -> Vec<&'static str> {
     found
 }
 
-/// A policy at a glance: whole tasks by number of robots, phases by who works on them, rules and build.
+/// Renders a policy's summary: whole tasks by number of robots, phases by collaboration, rules and build.
 fn card(index: usize, policy: &PolicyReport) -> String {
     let mut facts: Vec<(String, String)> = Vec::new();
     for average in &policy.averages {
@@ -103,7 +103,7 @@ fn card(index: usize, policy: &PolicyReport) -> String {
             facts.push((format!("Tasks of {} robots, %", average.robots), mean.text()));
         }
     }
-    // The benchmark's means are of tasks of two robots, which need not be said of them.
+    // The benchmark's means are over tasks of two robots, so two need not be mentioned.
     let apart = |robots: usize| if robots == 2 { String::new() } else { format!(", {robots} robots") };
     for means in &policy.together {
         let phases = [("alone", &means.alone), ("together", &means.together)];
@@ -137,7 +137,7 @@ fn card(index: usize, policy: &PolicyReport) -> String {
     )
 }
 
-/// What marks and colours mean.
+/// Renders the legend of marks and colours.
 fn legend(policies: &[PolicyReport]) -> String {
     let begun = policies.iter().any(|policy| policy.phase_level.is_some());
     let mut marks = String::new();
@@ -167,7 +167,7 @@ fn table(table: &Table) -> String {
     };
     let head: String = table.head.iter().enumerate().map(|of| cell("th", of)).collect();
     let mut rows = String::new();
-    // What stands in the first columns above need not be said again.
+    // First columns with the same text as in the row above are not repeated.
     let same = |index: usize| {
         let above = index.checked_sub(1).map_or(&[][..], |above| &table.rows[above][..table.figures_from]);
         let same = table.rows[index].iter().zip(above).take_while(|(one, other)| one == other).count();

@@ -1,16 +1,17 @@
-//! Rates of one task's phases as a drawing: a mark for each rate on a line from 0 to 100 %, and its interval.
+//! Plot of the rates of one task's phases: a mark for each rate on a line from 0 to 100 %, and its
+//! interval.
 
 use crate::html::escape;
 use crate::reports::evaluation::policy::{PhaseReport, PolicyReport};
 use crate::reports::evaluation::rate::Rate;
 
-/// Colours there are; more policies share them.
+/// Number of colours; more policies share them.
 pub const SERIES: usize = 6;
 
-/// Draws a mark about a point.
+/// Function that draws a mark about a point.
 type Mark = fn(f64, f64) -> String;
 
-/// A mark for each kind of rate, and what it means.
+/// A mark for each kind of rate, and its meaning.
 pub const MARKS: [(Mark, &str); 3] = [
     (disc, "cumulative: of all episodes"),
     (diamond, "conditional: of those that reached the phase before"),
@@ -18,7 +19,7 @@ pub const MARKS: [(Mark, &str); 3] = [
 ];
 
 const WIDTH_PX: f64 = 360.0;
-/// Where 0 and 100 % are.
+/// Position of 0 %; `RIGHT_PX` is that of 100 %.
 const LEFT_PX: f64 = 8.0;
 const RIGHT_PX: f64 = 296.0;
 const HEADING_PX: f64 = 22.0;
@@ -26,7 +27,7 @@ const LANE_PX: f64 = 13.0;
 const GAP_PX: f64 = 5.0;
 const AXIS_PX: f64 = 20.0;
 
-/// A card with the drawing of one task.
+/// Renders a card with the plot of one task.
 pub fn task_plot(task: &str, policies: &[PolicyReport]) -> String {
     let played: Vec<(usize, &[PhaseReport])> = policies
         .iter()
@@ -73,7 +74,7 @@ fn heading(phase: &PhaseReport, y_px: f64) -> String {
     )
 }
 
-/// The rates that there are of a phase, each with its mark and its words.
+/// Returns the known rates of a phase, each with its mark and its description.
 fn lanes(policy: &str, phase: &PhaseReport) -> Vec<(Mark, String, Rate)> {
     let rates = [phase.cumulative, phase.conditional, phase.from_its_beginning];
     // The first phase has no phase before it.
@@ -105,7 +106,7 @@ fn x_px(share: f64) -> f64 {
     LEFT_PX + share * (RIGHT_PX - LEFT_PX)
 }
 
-/// Lines and numbers from 0 to 100 %, down to `bottom_px`.
+/// Renders lines and numbers from 0 to 100 %, down to `bottom_px`.
 fn axis(bottom_px: f64) -> String {
     let tick = |percent: u32| {
         let x_px = x_px(f64::from(percent) / 100.0);

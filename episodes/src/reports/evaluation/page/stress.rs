@@ -1,4 +1,5 @@
-//! Rates under stress as a drawing: for each axis a bar for each level, with its interval, and a line where the rate is without stress.
+//! Plot of rates under stress: for each axis a bar for each level, with its interval, and a line at the
+//! rate without stress.
 
 use crate::html::escape;
 use crate::reports::evaluation::rate::percent;
@@ -6,7 +7,7 @@ use crate::reports::evaluation::stress::{StressReport, StressRow};
 use crate::stress::StressAxis;
 
 const WIDTH_PX: f64 = 640.0;
-/// Names of axes end, and 0 and 100 % are here.
+/// End of the axes' names, and position of 0 %; `RIGHT_PX` is that of 100 %.
 const LEFT_PX: f64 = 78.0;
 const RIGHT_PX: f64 = 560.0;
 const TOP_PX: f64 = 18.0;
@@ -14,7 +15,7 @@ const LANE_PX: f64 = 12.0;
 const GAP_PX: f64 = 8.0;
 const AXIS_PX: f64 = 20.0;
 
-/// The part of the page that is about stress; empty where there is none.
+/// Renders the part of the page on stress; empty if there is none.
 pub fn html(reports: &[StressReport]) -> String {
     let cards: String = reports.iter().map(card).collect();
     match cards.is_empty() {
@@ -68,7 +69,7 @@ fn card(report: &StressReport) -> String {
     )
 }
 
-/// A bar from 0 to the rate, the fainter the lower its level, with the interval on it.
+/// Renders a bar from 0 to the rate, fainter for lower levels, with the interval on it.
 fn bar(row: &StressRow, y_px: f64) -> String {
     let label = format!(
         "{}, level {}: {} %, {}{}",
@@ -97,7 +98,7 @@ fn x_px(share: f64) -> f64 {
     LEFT_PX + share * (RIGHT_PX - LEFT_PX)
 }
 
-/// Lines and numbers from 0 to 100 %, down to `bottom_px`.
+/// Renders lines and numbers from 0 to 100 %, down to `bottom_px`.
 fn axis_lines(bottom_px: f64) -> String {
     let tick = |percent: u32| {
         let x_px = x_px(f64::from(percent) / 100.0);

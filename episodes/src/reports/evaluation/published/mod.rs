@@ -1,5 +1,5 @@
-//! What was published of the benchmark's tasks, in another simulator with other robots' controllers: for orientation, not for
-//! comparison. Facts and figures only.
+//! Published figures of the benchmark's tasks, from another simulator with other robot controllers: for
+//! orientation, not for comparison. They are facts and figures only.
 
 use serde::Serialize;
 
@@ -12,11 +12,11 @@ pub struct PublishedRates {
     pub method: String,
     pub task: String,
     pub episodes: usize,
-    /// Cumulative, by phase.
+    /// Cumulative rates, by phase.
     pub phases_share: Vec<f64>,
 }
 
-/// Means of one method over phases that were each begun at.
+/// Means of one method over phases at which episodes began.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PublishedAverages {
     pub method: String,
@@ -24,7 +24,7 @@ pub struct PublishedAverages {
     pub collaborative_share: f64,
 }
 
-/// The published rates by method, then by task.
+/// Returns the published rates by method, then by task.
 pub fn rows() -> Vec<PublishedRates> {
     let row = |line: &str| {
         let mut cells = line.split(',');
@@ -35,7 +35,7 @@ pub fn rows() -> Vec<PublishedRates> {
     PHASES.lines().skip(1).filter_map(row).collect()
 }
 
-/// The published averages by method.
+/// Returns the published averages by method.
 pub fn averages() -> Vec<PublishedAverages> {
     let row = |line: &str| {
         let (method, rest) = line.split_once(',')?;
@@ -45,7 +45,7 @@ pub fn averages() -> Vec<PublishedAverages> {
     PHASE_LEVEL.lines().skip(1).filter_map(row).collect()
 }
 
-/// Cells that are percent.
+/// Converts cells in percent to shares.
 fn shares<'a>(cells: impl Iterator<Item = &'a str>) -> Option<Vec<f64>> {
     cells.map(|cell| cell.parse::<f64>().ok().map(|percent| percent / 100.0)).collect()
 }

@@ -1,11 +1,11 @@
-//! Tables of language models: what they were asked, what it cost, and how their play ended.
+//! Tables of language models: requests, costs, and endings of their play.
 
 use super::super::costs::{CostSum, ValueRange};
 use super::super::policy::{PolicyReport, TaskReport};
 use super::super::rate::percent;
 use super::super::table::{NONE, Table};
 
-/// Policies side by side, task by task, where any of them has notes.
+/// Compares policies task by task; only tasks with notes of any policy have rows.
 pub fn agents(policies: &[PolicyReport]) -> Table {
     let mut table = Table::new(
         "Agents",
@@ -39,7 +39,7 @@ pub fn agents(policies: &[PolicyReport]) -> Table {
     table
 }
 
-/// Returns the row of one task; `None` where no episode began at the task's beginning.
+/// Returns the row of one task; `None` if no episode began at the task's beginning.
 fn agents_row(policy: &PolicyReport, task: &TaskReport) -> Option<Vec<String>> {
     let effort = task.effort.as_ref()?;
     let success = task.phases.last()?.cumulative?;
@@ -68,7 +68,7 @@ fn agents_row(policy: &PolicyReport, task: &TaskReport) -> Option<Vec<String>> {
     ])
 }
 
-/// Sums of what models were asked.
+/// Sums up the requests to models.
 pub fn asked(policies: &[PolicyReport]) -> Table {
     let mut table = Table::new(
         "All that models were asked",
@@ -104,7 +104,7 @@ pub fn asked(policies: &[PolicyReport]) -> Table {
     table
 }
 
-/// Endings of the play of models, with their episodes.
+/// Lists endings of the play of models, with their episodes.
 pub fn endings(policies: &[PolicyReport]) -> Table {
     let mut table = Table::new(
         "How the play of models ended",

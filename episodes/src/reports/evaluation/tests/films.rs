@@ -1,14 +1,14 @@
-//! Films of a report.
+//! Videos of a report.
 
 use super::*;
 
-/// Each task has two films, or says why it has not.
+/// Each task has two videos, or the reason why it has none.
 #[test]
 fn films_are_of_one_success_and_one_failure() {
     let mut loaded = found(nine_six_three("agent"));
     let succeeding = tasks::find("pouring").unwrap();
     loaded.episodes.extend(found(vec![played("agent", succeeding, 4, succeeding.phases.len())]).episodes);
-    // Seeds 0 to 2 of Handover succeeded; of them, and of those that failed, the first was not recorded.
+    // Seeds 0 to 2 of Handover succeeded. The first of these, and of the failed ones, was not recorded.
     for (index, recorded) in [(1, "one"), (2, "two"), (4, "four")] {
         loaded.episodes[index].recording = Some(recorded.into());
     }

@@ -1,4 +1,4 @@
-"""One adapter for each wire format, over the official SDKs, which retry, wait and keep the formats current."""
+"""One adapter per wire format, built on the official SDKs, which retry, wait and keep the formats current."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""OpenAI's Chat Completions, which Ollama, vLLM and most other servers of models speak, too."""
+"""OpenAI's Chat Completions, which Ollama, vLLM and most other model servers also offer."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from ..tools import Tool, for_chat
 from .endpoint import EndpointError, OptionalFields, import_sdk, open_client, request, understood
 
 RETURNED = ("reasoning_content", "reasoning_details")
-"""Thoughts that some servers want back with the calls that they led to, by the names that they give them."""
+"""Reasoning fields that some servers want back with the calls, by the servers' names for them."""
 
 NOTHING = "(no words)"
-"""What stands for a reply without words: endpoints want some."""
+"""Placeholder for a reply without text, because endpoints require some."""
 
 
 class ChatModel:
@@ -29,7 +29,7 @@ class ChatModel:
         self._optional = OptionalFields(RETURNED, prompt_cache_key=cache_key, reasoning_effort=settings.effort)
 
     def ask(self, instructions: str, tools: Sequence[Tool], turns: Sequence[Turn]) -> Reply:
-        """See Model."""
+        """Implements `Model.ask`."""
 
         def send(**optional: Any) -> Any:
             messages = [{"role": "system", "content": instructions}]
@@ -52,7 +52,7 @@ def _messages(turn: Turn, returned: Collection[str]) -> list[dict[str, Any]]:
             return [{name: value for name, value in turn.as_sent.items() if name not in RETURNED or name in returned}]
         case Answers(answers):
             told = [{"role": "tool", "tool_call_id": answer.call.call_id, "content": answer.text} for answer in answers]
-            # Answers are text alone here, so that pictures follow as ours.
+            # Answers are text only in this API, so images follow in a message of the user.
             shown = [part for answer in answers for picture in answer.pictures for part in _picture(picture)]
             return [*told, {"role": "user", "content": shown}] if shown else told
 
@@ -83,13 +83,13 @@ def _reply(completion: Any, turn: int) -> Reply:
 
 
 def _text(arguments: Any) -> str:
-    """Arguments as JSON; some servers give the object itself."""
+    """Returns arguments as JSON; some servers send the object itself."""
     return arguments or "{}" if isinstance(arguments, str) else json.dumps(arguments or {})
 
 
 def _sent(call: Call, raw: Any) -> dict[str, Any]:
-    """A call as it is shown to the model again, with whatever its server has put beside it. Templates of local models read the
-    arguments, which have to be JSON.
+    """Returns a call in the form for later requests, with all extra fields of its server. The arguments have to be
+    JSON, because templates of local models parse them.
     """
     arguments = call.arguments if _is_object(call.arguments) else "{}"
     function = {"name": call.tool, "arguments": arguments}

@@ -1,4 +1,4 @@
-"""What the adapters have in common: clients with their keys, fields that an endpoint may not know, and what goes wrong."""
+"""Common parts of the adapters: clients with their keys, optional fields, and errors."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from ..tools import Tool
 INSTALL = "pip install './gateway/python[agents]' in a checkout of the repository"
 
 RETRIES = 6
-"""How often an SDK asks again, with its own growing waits: about half a minute of 429 and 500 is waited out."""
+"""Number of retries of an SDK, with its own growing delays. They cover about half a minute of 429 and 500."""
 
 NO_KEY = "none"
-"""Endpoints of one's own, as Ollama and vLLM, want no key; the SDKs want one all the same."""
+"""Placeholder key: local endpoints such as Ollama and vLLM need none, but the SDKs require one."""
 
 _MOST_CHARACTERS = 500
 _REFUSED = (400, 422)
@@ -50,12 +50,12 @@ class Model(Protocol):
     """A model that calls tools."""
 
     def ask(self, instructions: str, tools: Sequence[Tool], turns: Sequence[Turn]) -> Reply:
-        """Shows the model the conversation and returns what it says. Raises EndpointError."""
+        """Sends the conversation to the model and returns its reply. Raises EndpointError."""
         ...
 
 
 def import_sdk(name: str) -> Any:
-    """The SDK of this name."""
+    """Imports the SDK of this name."""
     try:
         return importlib.import_module(name)
     except ImportError as error:
@@ -63,7 +63,7 @@ def import_sdk(name: str) -> Any:
 
 
 def open_client(sdk: Any, make: Callable[..., Any], settings: AgentSettings, key_variables: Sequence[str]) -> Any:
-    """A client of an SDK, with the key of its environment variable."""
+    """Creates a client of an SDK, with the key from its environment variable."""
     options: dict[str, Any] = {"max_retries": RETRIES}
     if settings.base_url is not None:
         options["base_url"] = settings.base_url
@@ -80,10 +80,10 @@ def open_client(sdk: Any, make: Callable[..., Any], settings: AgentSettings, key
 
 
 class OptionalFields:
-    """Fields of a request that do it good, and that not every endpoint knows: one that refuses a field by its name is asked
-    without it from then on.
+    """Optional fields of a request, which not every endpoint supports. A field that an endpoint refuses by name is
+    left out from then on.
 
-    returned: Fields of the model's replies that are sent back, as some models want them.
+    returned: Fields of the model's replies that are sent back, as some models require.
     """
 
     def __init__(self, returned: Sequence[str] = (), **fields: Any) -> None:
@@ -91,7 +91,7 @@ class OptionalFields:
         self.returned = set(returned)
 
     def drop_named(self, text: str) -> bool:
-        """Leaves out what a refusal names. Returns whether it named any."""
+        """Drops the fields that a refusal names. Returns true if it named any."""
         named = [name for name in self.fields if name in text]
         for name in named:
             del self.fields[name]
@@ -101,7 +101,7 @@ class OptionalFields:
 
 
 def request(sdk: Any, settings: AgentSettings, optional: OptionalFields, send: Callable[..., Any]) -> Any:
-    """Sends a request, and again without what the endpoint does not know."""
+    """Sends a request, and repeats it without the fields that the endpoint does not support."""
     while True:
         try:
             reply = send(**optional.fields)
@@ -121,13 +121,13 @@ def request(sdk: Any, settings: AgentSettings, optional: OptionalFields, send: C
         except EndpointError:
             raise
         except Exception as error:
-            # What is no JSON, or is cut off under way, some versions of the SDKs pass on as they find it.
+            # Some versions of the SDKs pass invalid or truncated JSON on without an error of their own.
             text = f"{_where(settings)} answers nothing that the API {settings.api} knows: {type(error).__name__}: {error}"
             raise EndpointError(without_keys(text[:_MOST_CHARACTERS])) from None
 
 
 def understood(settings: AgentSettings, read: Callable[[], Reply]) -> Reply:
-    """A reply as it is read from an answer, which may lack what the API promises."""
+    """Reads a reply from an answer, in which fields promised by the API may be missing."""
     try:
         return read()
     except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
@@ -150,7 +150,7 @@ def _where(settings: AgentSettings) -> str:
 
 
 def without_keys(text: str) -> str:
-    """The text without any key that it quotes, as refusals of a wrong key do."""
+    """Removes all keys from a text, because refusals of a wrong key quote it."""
     for variable in ("OPENAI_API_KEY", "OPENAI_ADMIN_KEY", "ANTHROPIC_API_KEY", "ANTHROPIC_AUTH_TOKEN", "TANDEM_TOKEN"):
         key = os.environ.get(variable)
         if key and key != NO_KEY:

@@ -13,11 +13,11 @@ from .chat import NOTHING
 from .endpoint import OptionalFields, import_sdk, open_client, request, understood
 
 REPLY_TOKENS = 16_000
-"""The most that a reply may have, thoughts included, which this API wants to be told."""
+"""Maximum number of tokens of a reply, reasoning included; this API requires a limit."""
 
 CACHED = {"cache_control": {"type": "ephemeral"}}
-"""Marks up to where the endpoint is to keep what it reads. Four marks are allowed: tools, instructions, and the latest two of
-our turns, of which the earlier is what the last request has left there.
+"""Cache marker: the endpoint caches everything up to it. Four are allowed: tools, instructions, and the latest two
+of our turns. The earlier of the two turns is the one that the last request has cached.
 """
 CACHED_TURNS = 2
 
@@ -37,7 +37,7 @@ class MessagesModel:
         )
 
     def ask(self, instructions: str, tools: Sequence[Tool], turns: Sequence[Turn]) -> Reply:
-        """See Model."""
+        """Implements `Model.ask`."""
         offered = for_messages(tools)
         offered[-1] |= CACHED
         messages = [_message(turn) for turn in turns]

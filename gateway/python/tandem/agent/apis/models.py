@@ -1,4 +1,4 @@
-"""Which adapter speaks to an endpoint."""
+"""Choice of the adapter for an endpoint."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from .responses import ResponsesModel
 
 
 def open_model(settings: AgentSettings, cache_key: str) -> Model:
-    """The model of these settings; nothing is asked yet.
+    """Creates the model of these settings; no request is made yet.
 
-    cache_key: What conversations have in common that begin alike, for endpoints that keep what they have read by it.
+    cache_key: Common key of conversations with the same beginning, for endpoints that cache by it.
     """
     match settings.api:
         case "openai":

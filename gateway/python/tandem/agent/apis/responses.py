@@ -13,7 +13,9 @@ from .endpoint import EndpointError, OptionalFields, import_sdk, open_client, re
 
 
 class ResponsesModel:
-    """A model behind Responses. Nothing is kept there: all of the conversation is sent, with thoughts as they were given."""
+    """A model behind Responses. Nothing is stored there: the whole conversation is sent, with reasoning as
+    received.
+    """
 
     def __init__(self, settings: AgentSettings, cache_key: str) -> None:
         self._sdk = import_sdk("openai")
@@ -28,7 +30,7 @@ class ResponsesModel:
         )
 
     def ask(self, instructions: str, tools: Sequence[Tool], turns: Sequence[Turn]) -> Reply:
-        """See Model."""
+        """Implements `Model.ask`."""
         items = [item for turn in turns for item in _items(turn)]
 
         def send(**optional: Any) -> Any:
@@ -79,7 +81,7 @@ def _reply(response: Any) -> Reply:
             calls.append(Call(item.call_id, item.name, item.arguments or "{}"))
         if item.type == "reasoning":
             thoughts += [str(part.text) for part in listed(item.summary) + listed(getattr(item, "content", None))]
-            # Thoughts that are not kept there can only be sent back whole.
+            # Reasoning that is not stored there can only be sent back in its encrypted form.
             if not item.encrypted_content:
                 continue
         as_sent.append(item.model_dump(exclude_none=True, mode="json"))

@@ -1,4 +1,4 @@
-"""What an agent writes down as it plays, so that a play that broke off can be taken up again."""
+"""Journal of an agent's play, from which an interrupted play can be resumed."""
 
 from __future__ import annotations
 

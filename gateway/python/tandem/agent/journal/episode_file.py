@@ -1,4 +1,4 @@
-"""The file of an episode that an agent has begun: its flags, its id and its operators."""
+"""File of an episode that an agent has started: its flags, its id and its operators."""
 
 from __future__ import annotations
 
@@ -15,24 +15,26 @@ FILE = "agent.json"
 RESULT_FILE = "result.json"
 
 FORMAT = 1
-"""Goes up with every change of what is written here or in a conversation's file."""
+"""Version of this file and of the conversation files; every change increases it."""
 
 _MODE = 0o600
 
 
 @dataclass(frozen=True)
 class EpisodeFile:
-    """The contents of `agent.json` in an episode's folder. Only its owner may read it: it has operators' tokens."""
+    """Contents of `agent.json` in an episode's folder. Only its owner may read it, because it has operators'
+    tokens.
+    """
 
     episode_id: str
     flags: dict[str, Any]
-    """The flags by which it was begun, defaults included."""
+    """Flags of the play, defaults included."""
 
     server_flags: dict[str, str]
-    """Those of `tandem agent` that concern its server, as they were given."""
+    """Flags of `tandem agent` that concern its server, as given."""
 
     operators: tuple[dict[str, str], ...] = ()
-    """Robot and token of each operator, where each robot has a model of its own."""
+    """Robot and token of each operator, if each robot has its own model."""
 
     def write(self, folder: Path) -> None:
         """Writes the file, whole or not at all. Raises OSError."""
@@ -45,7 +47,7 @@ class EpisodeFile:
 
     @staticmethod
     def remove(folder: Path) -> None:
-        """Removes the file, so that nothing is resumed by it."""
+        """Removes the file, so that the play cannot be resumed."""
         (folder / FILE).unlink(missing_ok=True)
 
     @staticmethod
@@ -74,12 +76,12 @@ class EpisodeFile:
 
 
 def conversation_path(folder: Path, robot: str | None) -> Path:
-    """Returns the file of a conversation: that of one robot's model, or of the one that directs all."""
+    """Returns the file of a conversation: that of one robot's model, or of the model that controls all."""
     return folder / ("agent.jsonl" if robot is None else f"agent-{robot}.jsonl")
 
 
 def read_result(folder: Path) -> dict[str, Any] | None:
-    """Reads the result of an episode that has ended; None: it has not."""
+    """Reads the result of an episode; returns None if it has not ended."""
     try:
         return cast("dict[str, Any]", json.loads((folder / RESULT_FILE).read_text(encoding="utf-8")))
     except (OSError, ValueError):
@@ -87,6 +89,6 @@ def read_result(folder: Path) -> dict[str, Any] | None:
 
 
 def _others(runs: Path) -> str:
-    """Names the folders beside in which a play can be resumed."""
+    """Names the neighbouring folders in which a play can be resumed."""
     folders = sorted(str(path.parent) for path in runs.glob(f"*/{FILE}") if not (path.parent / RESULT_FILE).exists())
     return f"; have: {', '.join(folders)}" if folders else ", as runs/handover-seed0"

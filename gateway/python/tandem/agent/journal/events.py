@@ -1,4 +1,4 @@
-"""Events of a conversation, each a line of JSON. Playing them again gives the same conversation."""
+"""Events of a conversation, each a line of JSON. Replaying them gives the same conversation."""
 
 from __future__ import annotations
 
@@ -16,36 +16,36 @@ class Begun:
     """The conversation begins."""
 
     conversation: str
-    """Its random name, which Idempotency-Keys are made of."""
+    """Random name of the conversation, used in Idempotency-Keys."""
 
     instructions: str
     tools: tuple[Tool, ...]
     pid: int = field(default_factory=os.getpid)
-    """The process that plays."""
+    """Id of the process that plays."""
 
 
 @dataclass(frozen=True)
 class Replied:
-    """The model replied. The reply is written down before anything is done about it."""
+    """The model replied. The reply is written before anything is done about it."""
 
     reply: Reply
     usage: Usage
-    """As the endpoint counts, or else an estimate."""
+    """Token counts from the endpoint, or an estimate."""
 
     usd: float | None
     model_s: float
-    """How long the model took."""
+    """Response time of the model."""
 
     halves: bool
-    """Whether the conversation had become too long, so that its older half is left out before this reply."""
+    """True if the conversation had become too long, so that its older half is dropped before this reply."""
 
     seconds: float
-    """The agent's time so far, without that between two processes."""
+    """The agent's time up to now, without gaps between processes."""
 
 
 @dataclass(frozen=True)
 class Noted:
-    """The server has the notes on the latest reply."""
+    """The server has recorded the notes on the latest reply."""
 
 
 @dataclass(frozen=True)
@@ -54,10 +54,10 @@ class Answered:
 
     answer: Answer
     called: bool
-    """False: the call was not made, as after the last that may be."""
+    """False if the call was not made, for example after the last allowed one."""
 
     over: bool
-    """Whether the episode is over for this model."""
+    """True once the episode is over for this model."""
 
     phases: tuple[str, ...]
     seconds: float
@@ -65,12 +65,12 @@ class Answered:
 
 @dataclass(frozen=True)
 class Halved:
-    """The endpoint found the conversation too long, and its older half was left out."""
+    """The endpoint found the conversation too long, and its older half was dropped."""
 
 
 @dataclass(frozen=True)
 class Resumed:
-    """Another process takes the conversation up."""
+    """Another process resumes the conversation."""
 
     at: str = field(default_factory=lambda: datetime.now(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"))
     pid: int = field(default_factory=os.getpid)
@@ -78,7 +78,7 @@ class Resumed:
 
 @dataclass(frozen=True)
 class Ended:
-    """The model plays no longer."""
+    """The model's play has ended."""
 
 
 Event: TypeAlias = Begun | Replied | Noted | Answered | Told | Halved | Resumed | Ended
@@ -96,12 +96,12 @@ _NAMES: dict[type[Event], str] = {
 
 
 def written(event: Event) -> dict[str, Any]:
-    """Returns an event as JSON has it."""
+    """Returns an event in its JSON form."""
     return {"event": _NAMES[type(event)], **asdict(event)}
 
 
 def read(line: dict[str, Any]) -> Event:
-    """Reads an event. Raises KeyError, TypeError or ValueError where a line is none."""
+    """Parses an event. Raises KeyError, TypeError or ValueError if a line is none."""
     fields = {name: value for name, value in line.items() if name != "event"}
     match line["event"]:
         case "begun":

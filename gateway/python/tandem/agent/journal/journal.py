@@ -11,9 +11,9 @@ from .line_file import LineFile
 
 
 class Journal:
-    """The events of a conversation, those of earlier processes first.
+    """The events of a conversation, beginning with those of earlier processes.
 
-    lines: The file that they are written to. None: they are kept nowhere, and nothing can be resumed.
+    lines: File for the events. None: they are not kept, and the play cannot be resumed.
     """
 
     def __init__(self, lines: LineFile | None = None) -> None:
@@ -23,13 +23,13 @@ class Journal:
 
     @property
     def begun(self) -> Begun | None:
-        """How the conversation began; None: it has not."""
+        """First event of the conversation; None if it has not begun."""
         first = self.earlier[0] if self.earlier else None
         return first if isinstance(first, Begun) else None
 
     def write(self, event: Event) -> None:
-        """Writes an event down. Where that fails, the model plays on, and nobody can resume the play: a
-        conversation with a gap would be another one.
+        """Writes an event. If that fails, the model plays on, but the play cannot be resumed, because a
+        conversation with a gap would be a different one.
         """
         if self._lines is None:
             return

@@ -1,4 +1,4 @@
-"""A file of lines of JSON that a process writes alone, of which SIGKILL leaves whole lines."""
+"""A file of JSON lines with a single writer; after SIGKILL its lines are still whole."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MODE = 0o600
 
 
 class LineFile:
-    """The file, which is made where it is not there, and locked until this process ends."""
+    """The file, which is created if necessary and locked until this process ends."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -32,7 +32,7 @@ class LineFile:
                 raise TandemError(f"{path} is another process's{_of(path)}; wait until that has ended, or end it") from None
 
     def read(self) -> list[Any]:
-        """Returns the whole lines. What a process that was killed has written of another one is cut off."""
+        """Returns the whole lines. An incomplete line of a killed process is cut off."""
         content = self.path.read_bytes()
         whole = content.rfind(b"\n") + 1
         os.ftruncate(self._file, whole)
@@ -42,18 +42,18 @@ class LineFile:
             raise TandemError(f"{self.path} holds what is no JSON ({error}); play the task anew, without --resume") from error
 
     def append(self, value: Any) -> None:
-        """Writes a line, which is the system's from then on. Raises OSError."""
+        """Writes a line, which the operating system then has. Raises OSError."""
         left = memoryview(f"{json.dumps(value, separators=(',', ':'))}\n".encode())
         while left:
             left = left[os.write(self._file, left) :]
 
     def close(self) -> None:
-        """Gives the file up to others."""
+        """Closes the file and releases its lock."""
         os.close(self._file)
 
 
 def _of(path: Path) -> str:
-    """Names the process that wrote a file last, as far as its lines say it."""
+    """Names the process that wrote a file last, if its lines include it."""
     pids = [pid for line in path.read_bytes().splitlines() if (pid := _pid(line)) is not None]
     return f" ({pids[-1]})" if pids else ""
 

@@ -1,4 +1,4 @@
-"""The state of a conversation, as its events have made it."""
+"""State of a conversation after its events."""
 
 from __future__ import annotations
 
@@ -10,35 +10,35 @@ from .events import Answered, Begun, Ended, Event, Halved, Noted, Replied, Resum
 
 
 class Progress:
-    """Memory and usage of a model, and what remains to be done about its latest reply. All of it changes by events
-    alone, so that those of a file lead where they led before.
+    """Memory and usage of a model, and the open work on its latest reply. Only events change it, so that replaying
+    a file restores the same state.
     """
 
     def __init__(self, settings: AgentSettings, opening: str) -> None:
         self.memory = Memory(opening)
         self.ledger = Ledger(settings.limits, settings.prices)
         self.pending: Replied | None = None
-        """The latest reply, until its calls are answered or the model is told something."""
+        """Latest reply, until its calls are answered or the model gets a message."""
 
         self.answered: list[Answer] = []
-        """The answers to the calls of that reply so far."""
+        """Answers to the calls of that reply up to now."""
 
         self.noted = False
-        """Whether the server has the notes on that reply."""
+        """True once the server has the notes on that reply."""
 
         self.silent = 0
-        """Replies without a call, one after another, up to the latest."""
+        """Number of consecutive replies without a call, up to the latest."""
 
         self.over = False
         self.phases: tuple[str, ...] = ()
         self.processes = 1
-        """How many processes have played."""
+        """Number of processes that have played."""
 
         self.seconds = 0.0
-        """The agent's time up to the latest event that says it."""
+        """The agent's time up to the latest event that has it."""
 
     def apply(self, event: Event) -> None:
-        """Has an event change the state."""
+        """Applies an event to the state."""
         match event:
             case Replied():
                 self._apply_reply(event)

@@ -1,1 +1,1 @@
-"""What cameras see, as a data set has it: films, or files within the table; colours, and depth."""
+"""Camera images in the form for data sets: videos, or files in the tables; colours and depth."""

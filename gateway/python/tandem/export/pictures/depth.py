@@ -1,4 +1,4 @@
-"""Depth as LeRobot stores it since 0.6: in 12 bits, whose steps are smaller where things are near."""
+"""Depth in the format of LeRobot 0.6 or later: 12 bits, with smaller steps at short distances."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ NEAREST_M = 0.01
 FARTHEST_M = 10.0
 SHIFT_M = 3.5
 CODES = 4096
-"""LeRobot's own range and steps: of 1.2 mm near the camera and 4.4 mm at the far end. What is farther is told as that."""
+"""LeRobot's own range and steps: 1.2 mm near the camera and 4.4 mm at the far end. Greater distances are clamped."""
 
 LOG_NEAREST = math.log(NEAREST_M + SHIFT_M)
 LOG_RANGE = math.log(FARTHEST_M + SHIFT_M) - LOG_NEAREST
@@ -28,7 +28,9 @@ ENCODING = Encoding(
 )
 
 FEATURE: dict[str, Any] = {"is_depth_map": True, "depth_unit": "mm"}
-"""What `meta/info.json` says of depth beside what it says of pictures. The unit is that of statistics and of TIFF files."""
+"""Entries of depth in `meta/info.json`, in addition to those of images. The unit is that of statistics and of TIFF
+files.
+"""
 
 FILM_FEATURE: dict[str, Any] = FEATURE | {
     "video.depth_min": NEAREST_M,
@@ -36,28 +38,28 @@ FILM_FEATURE: dict[str, Any] = FEATURE | {
     "video.shift": SHIFT_M,
     "video.use_log": True,
 }
-"""By which readers find metres again."""
+"""Parameters with which readers convert codes to metres."""
 
 
 def codes(depth_m: NDArray[np.float32]) -> NDArray[np.uint16]:
-    """Depth, height by width in metres, as films hold it."""
+    """Converts depth, height by width in metres, to the codes in videos."""
     share = (np.log(depth_m.clip(NEAREST_M, FARTHEST_M) + SHIFT_M) - LOG_NEAREST) / LOG_RANGE
     return np.rint(share * (CODES - 1)).astype(np.uint16)
 
 
 def metres(codes: NDArray[Any]) -> NDArray[np.float64]:
-    """The depth that codes stand for."""
+    """Converts codes to depth in metres."""
     return np.exp(LOG_NEAREST + codes / (CODES - 1) * LOG_RANGE) - SHIFT_M
 
 
 def tiff(depth_m: NDArray[np.float32]) -> bytes:
-    """A TIFF file of whole millimetres in 16 bits, in the same range."""
+    """Returns a TIFF file of whole millimetres in 16 bits, in the same range."""
     millimetres = np.rint(depth_m.clip(NEAREST_M, FARTHEST_M) * 1000).astype(np.uint16)
     return still(millimetres, "tiff", "gray16le", {"compression_algo": "deflate"})
 
 
 class Depths(Levels):
-    """How often each depth occurs."""
+    """Histogram of depths."""
 
     channels = 1
     values = metres(np.arange(CODES)) * 1000

@@ -1,4 +1,4 @@
-"""Pictures straight into an encoder."""
+"""Encoding of images."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from ..settings import Codec, library
 Pixels = NDArray[np.uint8] | NDArray[np.uint16]
 
 KEY_FRAME_EVERY = 2
-"""As LeRobot writes films: any picture is found by decoding two."""
+"""Key frame interval of LeRobot's videos; decoding two frames finds any image."""
 
 
 @dataclass(frozen=True)
 class Encoding:
-    """How films are written. A thread for each recording has the cores busy already; and pictures follow each other as they
-    are shown, so that films can be put behind one another.
+    """Parameters of a video encoder. It uses one thread, because a thread for each recording keeps the cores busy.
+    Frames are encoded in display order, so that videos can be joined.
     """
 
     encoder: str
     options: dict[str, str]
     given: str = "rgb24"
-    """What pictures are before they are encoded, as FFmpeg calls it."""
+    """FFmpeg's pixel format of the input."""
 
     pixels: str = "yuv420p"
-    """What they are then."""
+    """FFmpeg's pixel format of the video."""
 
 
 ENCODINGS: dict[Codec, Encoding] = {
@@ -43,10 +43,10 @@ ENCODINGS: dict[Codec, Encoding] = {
 
 
 class Film:
-    """A film under way; what is at `path` in the end is whole."""
+    """A video that is being written. The file at `path` appears when it is complete."""
 
     def __init__(self, path: Path, size: tuple[int, int], rate_hz: int, encoding: Encoding) -> None:
-        # The encoder of AV1 tells its settings to everybody's terminal.
+        # The AV1 encoder would otherwise print its settings.
         os.environ.setdefault("SVT_LOG", "1")
         self._av = library("av")
         self._path, self._partial = path, path.with_suffix(".partial")
@@ -60,21 +60,21 @@ class Film:
         self._stream.pix_fmt = encoding.pixels
 
     def add(self, pixels: Pixels) -> None:
-        """Writes the next picture."""
+        """Writes the next image."""
         frame = self._av.VideoFrame.from_ndarray(pixels, format=self._given)
         frame.pts, frame.time_base = self._pictures, self._time_base
         self._pictures += 1
         self._container.mux(self._stream.encode(frame))
 
     def finish(self) -> None:
-        """Writes the end, and puts the film where it belongs."""
+        """Completes the video and moves it to its path."""
         self._container.mux(self._stream.encode(None))
         self._container.close()
         self._partial.replace(self._path)
 
 
 def join_films(path: Path, parts: list[tuple[Path, int]], rate_hz: int) -> None:
-    """Writes a film of several, each with its number of pictures, one behind the other; nothing is encoded again."""
+    """Joins videos, each given with its number of images, without encoding them again."""
     av = library("av")
     before = 0
     with av.open(str(path), "w", format="mp4", options={"movflags": "+faststart"}) as film:
@@ -100,7 +100,7 @@ def join_films(path: Path, parts: list[tuple[Path, int]], rate_hz: int) -> None:
 
 
 def film_info(path: Path, rate_hz: int) -> dict[str, Any]:
-    """What `meta/info.json` says of films as this one."""
+    """Returns the description of a video for `meta/info.json`."""
     av = library("av")
     with av.open(str(path)) as film:
         stream = film.streams.video[0]
@@ -118,13 +118,13 @@ def film_info(path: Path, rate_hz: int) -> dict[str, Any]:
 
 
 def png(pixels: NDArray[np.uint8]) -> bytes:
-    """A PNG file."""
-    # A third of the time that FFmpeg's own level takes, for an eighth more bytes.
+    """Returns a PNG file."""
+    # This level takes a third of the time of FFmpeg's default, for an eighth more bytes.
     return still(pixels, "png", "rgb24", {"compression_level": "1"})
 
 
 def still(pixels: Pixels, encoder: str, pixel_format: str, options: dict[str, str]) -> bytes:
-    """A file of one picture, by FFmpeg's names."""
+    """Encodes a file of one image; encoder and pixel format have FFmpeg's names."""
     av = library("av")
     codec = av.CodecContext.create(encoder, "w")
     codec.height, codec.width = pixels.shape[:2]

@@ -1,4 +1,4 @@
-"""Columns of what cameras see, under way: films, or files within the table."""
+"""Image columns that are being written: videos, or files in the table."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from . import depth
 from .encoding import ENCODINGS, Film, Pixels, png
 
 DEPTH = "_depth"
-"""What a camera's column of depth is called beside that of its colours, as LeRobot does."""
+"""Suffix of a depth column's name, as in LeRobot."""
 
 
 class Shown:
-    """A camera's colours, or its depth."""
+    """Colours or depth of a camera."""
 
     def __init__(self, key: str, camera: str, folder: Path, settings: ExportSettings, *, is_depth: bool) -> None:
-        """folder: Where the film comes to lie."""
+        """Creates the column, with its video in `folder`."""
         self.key = key
         self._camera, self._size, self._is_depth = camera, settings.size, is_depth
         self.counted: Levels = depth.Depths() if is_depth else Colours()
@@ -33,7 +33,7 @@ class Shown:
             self.files = []
 
     def feature(self) -> dict[str, Any]:
-        """As `meta/info.json` describes it, but for what only the film says."""
+        """The column in the form of `meta/info.json`, without the entries that only the video has."""
         width, height = self._size
         kind = "image" if self._film is None else "video"
         described: dict[str, Any] = {
@@ -46,7 +46,7 @@ class Shown:
         return described
 
     def add(self, recording: Recording, step: int, *, is_counted: bool) -> None:
-        """Draws and writes the next picture."""
+        """Renders and writes the next image."""
         pixels: Pixels
         if self._is_depth:
             depth_m = recording.picture(self._camera, step, size=self._size).depth_m
@@ -63,13 +63,13 @@ class Shown:
             self.counted.add(pixels)
 
     def finish(self) -> None:
-        """Writes the film's end."""
+        """Completes the video."""
         if self._film is not None:
             self._film.finish()
 
 
 def shown(view: View, folder: Path, settings: ExportSettings) -> list[Shown]:
-    """What an episode has of its cameras."""
+    """Returns the image columns of an episode."""
     kinds = (False, True) if settings.depth else (False,)
     return [
         Shown(key + DEPTH * is_depth, camera, folder, settings, is_depth=is_depth)
@@ -79,10 +79,10 @@ def shown(view: View, folder: Path, settings: ExportSettings) -> list[Shown]:
 
 
 def counted(about: dict[str, Any], feature: dict[str, Any]) -> Levels:
-    """What was counted of a column's pictures.
+    """Returns the histograms of a column's images.
 
-    about: As a part's file holds it.
-    feature: The column, as `meta/info.json` describes it.
+    about: Entry in a part's file.
+    feature: The column in the form of `meta/info.json`.
     """
     kind = depth.Depths if feature.get("info", {}).get("is_depth_map") else Colours
     return kind(about["pictures"], about["levels"])

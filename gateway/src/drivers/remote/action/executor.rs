@@ -1,4 +1,5 @@
-//! Carries out what policies tell robots, by the commands that everybody has: `send_joint_chunk`, or `move_wrists` for poses.
+//! Executes the actions of policies with the public commands: `send_joint_chunk`, or `move_wrists` for
+//! poses.
 
 use std::{iter, ops::Range};
 
@@ -20,35 +21,35 @@ use crate::drivers::remote::{
     request::{PolicyObservation, withheld},
 };
 
-/// Tells robots what policies decided, and remembers where that left them.
+/// Executor of a policy's actions, which keeps track of the robots' state.
 pub struct Executor<'a> {
     map: &'a PolicyMap,
-    /// The most steps of one command.
+    /// Maximum number of control steps per command.
     most_steps: usize,
-    /// The row that each robot was last told, in the task's order.
+    /// Last commanded row of each robot, in the task's order.
     last_rows: Vec<Vec<f64>>,
-    /// Where each robot's pelvis stands by its own odometry.
+    /// Pose of each robot's pelvis in the start frame, by its own odometry.
     start_from_pelvis: Vec<Isometry3<f64>>,
 }
 
-/// A command that is not made yet: where pelvises stand when it begins decides what wrists are told.
+/// A command that is not made yet. Its wrist targets depend on the pelvis poses at its beginning.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlannedCommand {
     Joints(SendJointChunk),
-    /// Every robot goes to its row of this number.
+    /// Every robot moves to its row with this index.
     Wrists {
         row: usize,
         steps: u32,
     },
 }
 
-/// How many rows of each robot are executed: as many as every robot has.
+/// Returns the number of rows to execute: the length of the shortest chunk.
 pub fn executed_rows(chunks: &[RobotRows]) -> usize {
     chunks.iter().map(|chunk| chunk.rows.len()).min().unwrap_or_default()
 }
 
 impl<'a> Executor<'a> {
-    /// Robots that are as they were `observed` to be and were told nothing yet.
+    /// Creates an executor for robots in the `observed` state that have no command yet.
     pub fn new(map: &'a PolicyMap, most_steps: usize, observed: &PolicyObservation) -> Executor<'a> {
         let last_rows = observed.robots.iter().map(|robot| held_row(&robot.state_values)).collect();
         let mut executor =
@@ -57,13 +58,13 @@ impl<'a> Executor<'a> {
         executor
     }
 
-    /// Takes up where robots are.
+    /// Updates the pelvis poses.
     pub fn sense(&mut self, observed: &PolicyObservation) {
         let pelvises = observed.robots.iter().map(|robot| pose_of(sensed_pelvis(&robot.state_values)));
         self.start_from_pelvis = pelvises.collect();
     }
 
-    /// Carries out the rows with the numbers `rows` of `chunks`, which are in the task's order.
+    /// Executes the rows with the indices `rows` of `chunks`, which are in the task's order.
     pub fn execute(
         &mut self,
         episode: &mut dyn LocalEpisode,
@@ -84,7 +85,7 @@ impl<'a> Executor<'a> {
         Ok(())
     }
 
-    /// The commands that carry out the rows with the numbers `rows`, none longer than the protocol allows.
+    /// Returns the commands for the rows with the indices `rows`, none longer than the protocol allows.
     pub fn commands(&self, chunks: &[RobotRows], rows: Range<usize>) -> Vec<PlannedCommand> {
         let mut spans = spans(executed_rows(chunks), self.map.rate_hz());
         spans.retain(|span| rows.contains(&span.row));
@@ -127,7 +128,7 @@ impl<'a> Executor<'a> {
         (0..steps).step_by(self.most_steps).map(command).collect()
     }
 
-    /// The call that a command of [`Executor::commands`] is now.
+    /// Converts a command of [`Executor::commands`] to a call for the current state.
     pub fn call(&self, planned: PlannedCommand, chunks: &[RobotRows]) -> ToolCall {
         match planned {
             PlannedCommand::Joints(command) => command.into(),

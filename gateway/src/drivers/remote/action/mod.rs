@@ -1,4 +1,4 @@
-//! From a policy's reply to what robots are told: checked against its map before a robot moves.
+//! Conversion of a policy's reply to commands; the reply is checked against the map before a robot moves.
 
 mod executor;
 mod spans;
@@ -19,34 +19,36 @@ use super::{
     values::ReplyValue,
 };
 
-/// What one robot is told: rows at the map's rate.
+/// Actions of one robot: rows at the map's rate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RobotRows {
     pub robot: String,
     pub rows: Vec<ActionRow>,
 }
 
-/// What one robot is told at one moment, with nothing left that depends on where it was.
+/// Action of one robot at one time step, independent of its state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ActionRow {
-    /// As `send_joint_chunk` has it; of a robot that is told wrist poses, arms and waist do not count.
+    /// Row of `send_joint_chunk`. Arms and waist are ignored if the robot follows wrist poses.
     pub row: Vec<f64>,
-    /// Left and right.
+    /// Left and right wrist.
     pub wrists: [WristTarget; 2],
 }
 
-/// Some columns of every row of one robot, as they stand in a reply.
+/// Some columns of every row of one robot in a reply.
 struct ColumnBlock<'a> {
     key: String,
     columns: Vec<usize>,
-    /// Numbers by row; of each, those from `from` on are this robot's.
+    /// Values by row. In each row, this robot's values begin at `from`.
     values: &'a [f64],
     from: usize,
     width: usize,
 }
 
-/// The rows of the robots with the indices `robots`, for which `answer` came; columns that their policy leaves out are taken
-/// from `held_rows`, and differences are added to what was `observed`.
+/// Parses the reply `answer` into the rows of the robots with the indices `robots`.
+///
+/// Columns that the policy does not command are taken from `held_rows`, and differences are added to the
+/// `observed` state.
 pub fn chunks(
     map: &PolicyMap,
     instructions: &TaskInstructions,
@@ -67,7 +69,8 @@ pub fn chunks(
     Ok(found)
 }
 
-/// What the answer has for the robot called `name`, the one at `place` of the `robots` that it moves.
+/// Finds the columns for the robot called `name`, which is number `place` of the `robots` that the answer
+/// moves.
 fn parts<'a>(
     map: &PolicyMap,
     answer: &'a ReplyValue,
@@ -79,7 +82,7 @@ fn parts<'a>(
     for (key, names) in &map.action {
         // The map was checked when it was read.
         let columns = action_columns(names).unwrap_or_default();
-        // Without a robot's name in the key, the columns of all robots stand side by side.
+        // Without a robot's name in the key, the columns of all robots are side by side.
         let apart = key.contains(ROBOT) || map.answer == AnswerScope::One;
         let (width, from) = match apart {
             true => (columns.len(), 0),
@@ -92,7 +95,7 @@ fn parts<'a>(
     Ok(parts)
 }
 
-/// Every column that a policy may tell, in as many rows as are executed.
+/// Joins the parts to rows of all columns that a policy may command, for the rows that are executed.
 fn joined(map: &PolicyMap, parts: &[ColumnBlock], held_row: &[f64]) -> Result<Vec<Vec<f64>>, RemoteError> {
     let Some(first) = parts.first() else { return Ok(Vec::new()) };
     let rows = first.values.len() / first.width;
@@ -123,7 +126,8 @@ fn joined(map: &PolicyMap, parts: &[ColumnBlock], held_row: &[f64]) -> Result<Ve
     Ok((0..executed).map(row).collect())
 }
 
-/// What the columns `told_values` in row number `row` ask of a robot that was observed to be at `state_values`.
+/// Converts the values `told_values` of row number `row` to an action for a robot in the state
+/// `state_values`.
 fn action_row(
     map: &PolicyMap,
     told_values: &[f64],
@@ -160,7 +164,7 @@ fn action_row(
     }
 }
 
-/// No joint turns and no robot walks as far; a policy whose numbers are larger has other units or has lost its session.
+/// Limit on the magnitude of values. Larger ones mean that the policy uses other units or has diverged.
 const LARGEST_VALUE: f64 = 1000.0;
 
 #[cfg(test)]
@@ -214,7 +218,7 @@ mod tests {
         assert_eq!((whole[0].rows[0].row[1], whole[0].rows[1].row[0]), (0.01, 0.35));
         let first = read(&map("[chunk]\nrows = 50\nexecute = 20"), &answer, &[1]).unwrap();
         assert_eq!(first[0].rows, whole[0].rows[..20]);
-        // A batch of one, and one row alone.
+        // Both a batch of one and a single row are accepted.
         assert_eq!(read(&map(""), &keyed(&[("actions", array(&[1, 50, 35]))]), &[1]).unwrap(), whole);
         assert_eq!(read(&map(""), &keyed(&[("actions", array(&[35]))]), &[0]).unwrap()[0].rows.len(), 1);
     }
@@ -301,7 +305,7 @@ mod tests {
         observed.robots[1].state_values[15] = 0.5;
         *observed.robots[1].state_values.last_mut().unwrap() = 0.7;
         let rows = &read_at(&own, &keyed(&[("a", array(&[2, 11]))]), &[1], &observed).unwrap()[0].rows;
-        // The first joint of the arm, the waist as it is told, the height, and what is held.
+        // The first joint of the arm, the waist as commanded, the height, and a held joint.
         let row = &rows[1].row;
         assert_eq!((row[0], row[28], row[7]), (0.5 + 0.11, 0.18, 8.0));
         assert!((row[34] - (0.7 + 0.21)).abs() < 1e-12, "{row:?}");

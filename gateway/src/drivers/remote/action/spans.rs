@@ -5,15 +5,17 @@ use tandem_episodes::CONTROL_HZ;
 use super::ActionRow;
 use crate::drivers::remote::{columns::velocities, map::Between};
 
-/// A row with the control steps in which robots are on their way to it.
+/// A row with the number of control steps in which robots move to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RowSpan {
     pub row: usize,
     pub steps: u32,
 }
 
-/// When rows at `rate_hz` are executed: row number i has been reached at (i + 1) / rate. Of several rows within one control step the
-/// last counts; rows that are too short for any make one.
+/// Returns the spans of `rows` rows at `rate_hz`. Row i is reached at (i + 1) / rate.
+///
+/// If several rows fall within one control step, the last counts. Rows that are too short for a control
+/// step make one.
 pub fn spans(rows: usize, rate_hz: f64) -> Vec<RowSpan> {
     let reached_at = |row: usize| ((row + 1) as f64 * CONTROL_HZ / rate_hz).round() as u32;
     let (mut spans, mut begins) = (Vec::with_capacity(rows), 0);
@@ -31,7 +33,8 @@ pub fn spans(rows: usize, rate_hz: f64) -> Vec<RowSpan> {
     spans
 }
 
-/// Rows of `send_joint_chunk`, one a control step, for a robot that was last told `from_row`.
+/// Converts rows to those of `send_joint_chunk`, one per control step, for a robot whose last command was
+/// `from_row`.
 pub fn control_rows(
     rows: &[ActionRow],
     spans: &[RowSpan],
@@ -53,11 +56,12 @@ pub fn control_rows(
     control_rows
 }
 
-/// The row after `share` of the way; velocities are the goal's from the beginning, for they are no places.
+/// Interpolates between two rows at the fraction `share`. Velocities are those of the goal throughout,
+/// because they are not positions.
 fn between_rows(before_row: &[f64], goal_row: &[f64], share: f64) -> Vec<f64> {
     let value = |(column, (before, goal)): (usize, (&f64, &f64))| match velocities().contains(&column) {
         true => *goal,
-        // The goal itself to the last bit.
+        // Returns the goal exactly, to the last bit.
         false if share == 1.0 => *goal,
         false => before + (goal - before) * share,
     };
@@ -78,7 +82,7 @@ mod tests {
         assert_eq!(spanned(3, 50.0), [(0, 1), (1, 1), (2, 1)]);
         assert_eq!(spanned(4, 15.0), [(0, 3), (1, 4), (2, 3), (3, 3)]);
         assert_eq!(spanned(2, 2.0), [(0, 25), (1, 25)]);
-        // Of two rows in a control step the later one counts.
+        // If two rows fall in one control step, the later one counts.
         assert_eq!(spanned(4, 100.0), [(1, 1), (3, 1)]);
         assert_eq!(spanned(2, 1000.0), [(1, 1)], "at least one step, so that time goes on");
         let total: u32 = spans(150, 15.0).iter().map(|span| span.steps).sum();
@@ -95,7 +99,7 @@ mod tests {
         };
         assert_eq!(played(Between::Interpolate, 0), [0.5, 1.0, 1.5, 2.0]);
         assert_eq!(played(Between::Hold, 0), [1.0, 1.0, 2.0, 2.0]);
-        // Velocities are no places; the height is one.
+        // Velocities are not positions; the height is one.
         assert_eq!(played(Between::Interpolate, 31), [1.0, 1.0, 2.0, 2.0]);
         assert_eq!(played(Between::Interpolate, 34), [0.5, 1.0, 1.5, 2.0]);
     }

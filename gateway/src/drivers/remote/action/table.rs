@@ -2,7 +2,7 @@
 
 use crate::drivers::remote::{error::RemoteError, values::ReplyValue};
 
-/// The numbers under `key`, which have to be rows of `width` numbers.
+/// Returns the numbers under `key`, which must be rows of `width` numbers.
 pub fn find<'a>(
     answer: &'a ReplyValue,
     key: &str,

@@ -1,4 +1,4 @@
-//! Poses of wrists, from how a policy tells them to the frame that they are executed in.
+//! Conversion of wrist poses from a policy's frame to the frame in which they are executed.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use tandem_tools_spec::WristMove;
@@ -10,7 +10,7 @@ use crate::drivers::remote::{
     poses::RotationForm,
 };
 
-/// Where a wrist is to be: both halves, one, or none.
+/// Target of a wrist: position, rotation, both or none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WristTarget {
     pub position_m: Option<Vector3<f64>>,
@@ -18,7 +18,7 @@ pub struct WristTarget {
 }
 
 impl WristTarget {
-    /// What the columns `told_values` say of a wrist, of which a policy tells `told_columns`.
+    /// Reads the target of a wrist from `told_values`, where the policy commands `told_columns`.
     pub fn read(told_values: &[f64], told_columns: &[usize], side: usize) -> Result<WristTarget, String> {
         let position = wrist_position(side);
         let position_m = told_columns
@@ -36,7 +36,8 @@ impl WristTarget {
         Ok(WristTarget { position_m, rotation: rotation.transpose()? })
     }
 
-    /// The target in the frame that it is executed in: the start frame where hands are to stay in the world, else the pelvis.
+    /// Converts the target to its execution frame: the start frame if hands stay fixed in the world, else
+    /// the pelvis frame.
     pub fn resolved(
         self,
         frame: WristFrame,
@@ -53,7 +54,7 @@ impl WristTarget {
         }
     }
 
-    /// From `pose`, moved and turned along and about the axes of the pose's frame.
+    /// Applies this difference to `pose`, along and about the axes of the frame of the pose.
     fn beside(self, pose: &Isometry3<f64>) -> WristTarget {
         WristTarget {
             position_m: self.position_m.map(|step_m| pose.translation.vector + step_m),
@@ -61,7 +62,8 @@ impl WristTarget {
         }
     }
 
-    /// What is told in the frame that `pose` is the pose of, in the frame that it is told in.
+    /// Transforms the target from the frame whose pose is `pose` to the frame in which that pose is
+    /// given.
     fn moved(self, pose: &Isometry3<f64>) -> WristTarget {
         WristTarget {
             position_m: self.position_m.map(|position_m| (pose * Point3::from(position_m)).coords),
@@ -70,8 +72,8 @@ impl WristTarget {
     }
 }
 
-/// What `move_wrists` asks of a robot whose pelvis stands at `start_from_pelvis`. Of the columns of hands, those of `told_columns`
-/// count.
+/// Returns the `move_wrists` entry for a robot whose pelvis is at `start_from_pelvis`. Of the hand
+/// columns, only those in `told_columns` are used.
 pub fn wrist_move(
     robot: &str,
     told: &ActionRow,
@@ -123,7 +125,8 @@ mod tests {
         UnitQuaternion::from_scaled_axis(axis * FRAC_PI_2)
     }
 
-    /// A pelvis two metres ahead that has turned left, and a wrist before it whose fingers point down.
+    /// Returns the poses of a wrist in the pelvis frame and of the pelvis. The pelvis is two metres ahead
+    /// and has turned left. The wrist is in front of it, and its fingers point down.
     fn poses() -> (Isometry3<f64>, Isometry3<f64>) {
         let pelvis_from_wrist =
             Isometry3::from_parts(Translation3::new(0.3, 0.2, 0.1), quarter(Vector3::y()));
@@ -132,7 +135,7 @@ mod tests {
         (pelvis_from_wrist, start_from_pelvis)
     }
 
-    /// Where a step of 10 cm along x goes, in the pelvis frame, by the command.
+    /// Returns the wrist target of the command for a step of 10 cm along x.
     fn goes(frame: WristFrame, is_delta: bool) -> ([f64; 3], [f64; 4], bool) {
         let (pelvis_from_wrist, start_from_pelvis) = poses();
         let told =
@@ -155,7 +158,7 @@ mod tests {
         let (x, y, z) = (quarter(Vector3::x()), quarter(Vector3::y()), quarter(Vector3::z()));
         assert_eq!(goes(WristFrame::Pelvis, false), ([0.1, 0.0, 0.0], turned(x), true));
         assert_eq!(goes(WristFrame::Pelvis, true), ([0.4, 0.2, 0.1], turned(x * y), true));
-        // The robot has turned left: what lies 10 cm ahead of where it started is behind its right shoulder.
+        // The robot has turned left, so a point 10 cm ahead of its start is behind its right shoulder.
         assert_eq!(goes(WristFrame::Start, false), ([0.0, 1.9, -0.8], turned(z.inverse() * x), false));
         assert_eq!(goes(WristFrame::Start, true), ([0.3, 0.1, 0.1], turned(z.inverse() * x * z * y), false));
         // The fingers point down, and so does the wrist's x axis.

@@ -1,4 +1,5 @@
-//! `/act`: a request is one POST of JSON, with arrays as the Python package `json_numpy` writes them.
+//! The `/act` protocol: each request is one POST of JSON, with arrays in the format of the Python package
+//! `json_numpy`.
 
 use std::{io, time::Duration};
 
@@ -12,27 +13,27 @@ use crate::drivers::remote::{
     values::{ReplyValue, RequestValue},
 };
 
-/// What addresses of such servers begin with: those of encrypted ones last.
+/// URL schemes of such servers; the encrypted one is last.
 pub const SCHEMES: [&str; 2] = ["http://", "https://"];
 
-/// How the key is given.
+/// Authorization scheme of the key.
 const KEY_SCHEME: &str = "Bearer";
 
-/// Answers beyond this are not read.
+/// Maximum size of an answer in bytes.
 const LARGEST_ANSWER_BYTES: u64 = 64 << 20;
 
-/// The policy at one address.
+/// Client of the policy at one address.
 pub struct Act {
     url: String,
     key: Option<PolicyKey>,
     agent: Agent,
-    /// How long it may take to find the server, until it has been found.
+    /// Time limit for finding the server; `None` once it has been found.
     connect_within: Option<Duration>,
 }
 
 impl Act {
     pub fn new(address: &PolicyAddress, connect_within: Duration) -> Act {
-        // Another address than the one that was named is asked by nobody.
+        // Redirects are refused, so that only the named address receives requests.
         let mut config = Agent::config_builder().http_status_as_error(false).max_redirects(0);
         if address.is_encrypted() {
             config = config.tls_config(for_requests());
@@ -68,7 +69,7 @@ impl Act {
     }
 }
 
-/// Whether nobody was reached, of all that may go wrong on the way.
+/// Returns true if the server was not reached at all.
 fn is_unreachable(error: &io::Error) -> bool {
     matches!(
         error.kind(),
@@ -106,7 +107,7 @@ impl PolicyClient for Act {
         reply.map_err(|reason| RemoteError::Unreadable { url: self.url.clone(), reason })
     }
 
-    /// Each request stands for itself.
+    /// Does nothing: requests are independent.
     fn begin_trial(&mut self, _within: Duration) -> Result<(), RemoteError> {
         Ok(())
     }
@@ -114,7 +115,8 @@ impl PolicyClient for Act {
     fn keep_alive(&mut self) {}
 }
 
-/// As JSON, with arrays as the Python package `json_numpy` writes them: `{"__numpy__": base64, "dtype": "<f4", "shape": [2, 3]}`.
+/// Converts to JSON, with arrays in the format of `json_numpy`: `{"__numpy__": base64, "dtype": "<f4",
+/// "shape": [2, 3]}`.
 fn to_json(request: &RequestValue) -> Value {
     match request {
         RequestValue::Map(entries) => {
@@ -130,7 +132,7 @@ fn to_json(request: &RequestValue) -> Value {
     }
 }
 
-/// Reads JSON; lists of numbers are arrays, too.
+/// Reads JSON. Lists of numbers become arrays, too.
 fn from_json(value: Value) -> Result<ReplyValue, String> {
     match value {
         Value::Object(object) if object.contains_key("__numpy__") => {
@@ -147,7 +149,7 @@ fn from_json(value: Value) -> Result<ReplyValue, String> {
         Value::Array(items) => {
             items.into_iter().map(from_json).collect::<Result<_, _>>().map(ReplyValue::list)
         }
-        // Python writes NaN as no JSON; `null` is what others make of it.
+        // Python writes NaN, which is not JSON; other writers use `null` for it.
         Value::Null => Ok(ReplyValue::number(f64::NAN)),
         Value::Number(number) => Ok(ReplyValue::number(number.as_f64().unwrap_or(f64::NAN))),
         Value::String(text) => Ok(ReplyValue::Text(text)),

@@ -1,4 +1,4 @@
-//! Where a policy's server is, and the key that it wants.
+//! Address of a policy's server and the key that it requires.
 
 use std::{
     env, fmt,
@@ -8,60 +8,60 @@ use std::{
 
 use tungstenite::http::HeaderValue;
 
-/// The environment's variable with the key.
+/// Environment variable with the key.
 const KEY_VARIABLE: &str = "TANDEM_POLICY_KEY";
 
-/// The most bytes of a file with a key.
+/// Maximum size of a key file in bytes.
 const MAX_KEY_BYTES: u64 = 8 << 10;
 
 /// A server of a policy.
 #[derive(Clone, Debug)]
 pub struct PolicyAddress {
-    /// The address, with its scheme.
+    /// URL with its scheme.
     pub url: String,
-    /// The key that requests have to have.
+    /// Key that requests need; `None` if the server requires none.
     pub key: Option<PolicyKey>,
 }
 
-/// A key that servers of policies want. It is never printed.
+/// A key that a policy's server requires. It is never printed.
 #[derive(Clone)]
 pub struct PolicyKey(HeaderValue);
 
-/// Why there is no key.
+/// Reason why a key cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum PolicyKeyError {
     /// The file cannot be read.
     #[error("cannot read the policy's key in {}: {source}", .path.display())]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// The text is no key.
+    /// The text is not a valid key.
     #[error(
         "the policy's key of {place} has to be one line of letters, digits and signs; unset it for a server that wants none"
     )]
     Form {
-        /// Where it came from.
+        /// Source of the key.
         place: String,
     },
-    /// A key would be sent so that others can read it.
+    /// The key would be sent unencrypted.
     #[error(
         "a key would go unencrypted to {url}; give {protocol}:{encrypted}HOST, or unset {KEY_VARIABLE} for a server that wants none"
     )]
     Unencrypted {
-        /// Where to.
+        /// URL of the server.
         url: String,
-        /// How it is spoken to.
+        /// Name of the protocol.
         protocol: &'static str,
-        /// What addresses of encrypted servers begin with.
+        /// URL scheme of encrypted servers.
         encrypted: &'static str,
     },
 }
 
 impl PolicyKey {
-    /// The key in `file`, or else that of the environment's `TANDEM_POLICY_KEY`, if there is one.
+    /// Reads the key from `file`, or else from the environment variable `TANDEM_POLICY_KEY` if it is set.
     pub fn find(file: Option<&Path>) -> Result<Option<PolicyKey>, PolicyKeyError> {
         if let Some(path) = file {
             let unreadable = |source| PolicyKeyError::Unreadable { path: path.into(), source };
@@ -80,14 +80,15 @@ impl PolicyKey {
         Ok(PolicyKey(value))
     }
 
-    /// The value of the header `Authorization`: the key behind `scheme`, or as it is where it names a scheme itself.
+    /// Returns the value of the header `Authorization`: the key after `scheme`, or the key alone if it
+    /// names a scheme itself.
     pub fn authorization(&self, scheme: &str) -> HeaderValue {
         let text = self.0.to_str().unwrap_or_default();
         let whole = match text.contains(' ') {
             true => text.to_owned(),
             false => format!("{scheme} {text}"),
         };
-        // The key is a value, so this is one, too.
+        // The key is a valid header value, so this is one, too.
         let mut value = HeaderValue::from_str(&whole).unwrap_or_else(|_| self.0.clone());
         value.set_sensitive(true);
         value
@@ -101,13 +102,13 @@ impl fmt::Debug for PolicyKey {
 }
 
 impl PolicyAddress {
-    /// The host and port behind the scheme.
+    /// Returns the host and port after the scheme.
     pub fn authority(&self) -> &str {
         let rest = self.url.split_once("://").map_or(self.url.as_str(), |(_, rest)| rest);
         rest.split(['/', '?', '#']).next().unwrap_or_default()
     }
 
-    /// The host alone, without the brackets of IPv6.
+    /// Returns the host alone, without the brackets of IPv6.
     pub fn host(&self) -> &str {
         let authority = self.authority();
         match authority.strip_prefix('[').and_then(|rest| rest.split_once(']')) {
@@ -116,21 +117,21 @@ impl PolicyAddress {
         }
     }
 
-    /// The port, where the address has one.
+    /// Returns the port if the address has one.
     pub fn port(&self) -> Option<u16> {
         let authority = self.authority();
         let behind = authority.rsplit_once(']').map_or(authority, |(_, behind)| behind);
         behind.rsplit_once(':')?.1.parse().ok()
     }
 
-    /// Whether it is on this machine.
+    /// Returns true if the server is on this machine.
     pub fn is_loopback(&self) -> bool {
         let host = self.host();
         host.eq_ignore_ascii_case("localhost")
             || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
     }
 
-    /// Whether connections are encrypted.
+    /// Returns true if connections are encrypted.
     pub fn is_encrypted(&self) -> bool {
         matches!(self.url.split_once("://"), Some(("wss" | "https", _)))
     }

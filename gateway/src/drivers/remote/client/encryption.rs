@@ -1,4 +1,4 @@
-//! Encrypted connections to policies' servers. They have to show a certificate that this machine trusts.
+//! Encrypted connections to policies' servers. A server must have a certificate that this machine trusts.
 
 use std::{io, sync::Arc};
 
@@ -8,11 +8,11 @@ use tokio_rustls::rustls::{
 };
 use ureq::tls::{Certificate, RootCerts, TlsConfig};
 
-/// What to do where a machine trusts nobody.
+/// Error message for a machine without trusted certificates.
 const TRUSTS_NOBODY: &str = "this machine has no certificates of authorities that it trusts; install ca-certificates, or name a file \
      with the server's own in SSL_CERT_FILE";
 
-/// Returns the encrypted end of a connection to `host`.
+/// Creates the client end of an encrypted connection to `host`.
 pub fn encrypted(host: &str) -> io::Result<ClientConnection> {
     let mut roots = RootCertStore::empty();
     roots.add_parsable_certificates(load_native_certs().certs);
@@ -28,7 +28,7 @@ pub fn encrypted(host: &str) -> io::Result<ClientConnection> {
     ClientConnection::new(Arc::new(config), name).map_err(io::Error::other)
 }
 
-/// Returns the same for requests over HTTPS.
+/// Returns the TLS configuration for requests over HTTPS.
 pub fn for_requests() -> TlsConfig {
     let found = load_native_certs().certs;
     let roots = found.iter().map(|certificate| Certificate::from_der(certificate).to_owned());

@@ -1,4 +1,4 @@
-//! A WebSocket to a policy's server, on which nothing takes longer than it may.
+//! A WebSocket to a policy's server, with a time limit on every operation.
 
 use std::{
     io::{self, Read, Write},
@@ -15,13 +15,13 @@ use tungstenite::{
 use super::{PolicyAddress, encryption::encrypted};
 use crate::drivers::remote::error::{RemoteError, gist};
 
-/// What addresses of such servers begin with: those of encrypted ones last.
+/// URL schemes of such servers; the encrypted one is last.
 pub const SCHEMES: [&str; 2] = ["ws://", "wss://"];
 
-/// How the key is given, as openpi's client gives it.
+/// Authorization scheme of the key, the same as in openpi's client.
 const KEY_SCHEME: &str = "Api-Key";
 
-/// The ports of addresses that name none.
+/// Default port.
 const PORT: u16 = 80;
 const ENCRYPTED_PORT: u16 = 443;
 
@@ -31,14 +31,15 @@ pub struct PolicySocket {
     socket: WebSocket<PolicyStream>,
 }
 
-/// What a server sends of its own.
+/// A message of the server.
 pub enum Frame {
     Bytes(Vec<u8>),
     Text(String),
 }
 
 impl PolicySocket {
-    /// Connects to a server that has to be found within `connect_within`, and may be busy with somebody else until `within`.
+    /// Connects to a server. It must be reachable within `connect_within`, but may be busy with another
+    /// client until `within`.
     pub fn connect(
         address: &PolicyAddress,
         connect_within: Duration,
@@ -52,7 +53,7 @@ impl PolicySocket {
         stream.plain().deadline = Instant::now() + within;
         let page = stream.page();
         let (socket, _) = tungstenite::client(request, stream).map_err(|error| match error {
-            // A proxy's page of an error, or another server than a policy's.
+            // This is a proxy's error page, or a server of another kind.
             HandshakeError::Failure(Error::Http(response)) => {
                 let status = response.status();
                 let begun = response.into_body().unwrap_or_default();
@@ -69,13 +70,14 @@ impl PolicySocket {
         &self.url
     }
 
-    /// Sends a binary message, after which the server has until `within` to answer.
+    /// Sends a binary message. The server then has `within` to answer.
     pub fn send(&mut self, bytes: Vec<u8>, within: Duration) -> Result<(), RemoteError> {
         self.socket.get_mut().plain().deadline = Instant::now() + within;
         self.socket.send(Message::binary(bytes)).map_err(|error| self.failed(error, within))
     }
 
-    /// What comes next, before the deadline of what was sent last; `within` is how long that was.
+    /// Receives the next message before the deadline of the last request; `within` is the length of its
+    /// time limit.
     pub fn hear(&mut self, within: Duration) -> Result<Frame, RemoteError> {
         loop {
             match self.socket.read().map_err(|error| self.failed(error, within))? {
@@ -87,13 +89,13 @@ impl PolicySocket {
                     });
                     return Err(RemoteError::Gone { url: self.url.clone(), reason });
                 }
-                // Answered by the library.
+                // The library answers these.
                 Message::Ping(_) | Message::Pong(_) | Message::Frame(_) => {}
             }
         }
     }
 
-    /// Answers a server that asks whether anybody is there still. What else goes wrong shows with the next request.
+    /// Answers pings of the server. Other failures show with the next request.
     pub fn answer_pings(&mut self) {
         self.socket.get_mut().plain().deadline = Instant::now() + PING_WAIT;
         let _ = self.hear(PING_WAIT);
@@ -116,7 +118,7 @@ impl PolicySocket {
     }
 }
 
-/// The request for a socket, with the key that the server wants.
+/// Builds the WebSocket request, with the key that the server requires.
 fn request(address: &PolicyAddress) -> Result<Request, Error> {
     let mut request = address.url.as_str().into_client_request()?;
     if let Some(key) = &address.key {
@@ -125,13 +127,13 @@ fn request(address: &PolicyAddress) -> Result<Request, Error> {
     Ok(request)
 }
 
-/// The server at `url` takes connections and says nothing.
+/// Returns the error for a server at `url` that accepts connections but sends nothing.
 pub fn silent(url: &str, within: Duration) -> RemoteError {
     let reason = format!("it says nothing within {} s of the connection", within.as_secs_f64());
     RemoteError::Unreachable { url: url.into(), reason }
 }
 
-/// The beginning of a page of which `begun` came with its header, as far as it comes soon.
+/// Returns the beginning of a page, of which `begun` came with its header. Waits briefly for the rest.
 fn page_text(mut begun: Vec<u8>, stream: io::Result<TcpStream>) -> String {
     if begun.is_empty()
         && let Ok(mut stream) = stream
@@ -144,13 +146,13 @@ fn page_text(mut begun: Vec<u8>, stream: io::Result<TcpStream>) -> String {
     String::from_utf8_lossy(&begun).into_owned()
 }
 
-/// How long an address is tried at least.
+/// Minimum time for trying an address.
 const SHORTEST_TRIAL: Duration = Duration::from_millis(10);
 
-/// How long a ping that has come takes to be read and answered.
+/// Time for reading and answering a ping that has arrived.
 const PING_WAIT: Duration = Duration::from_millis(20);
 
-/// How long the text of a page may follow its header.
+/// Maximum delay of a page's text after its header.
 const PAGE_WAIT: Duration = Duration::from_secs(1);
 
 fn is_late(error: &io::Error) -> bool {
@@ -182,7 +184,7 @@ impl PolicyStream {
         }
     }
 
-    /// Where the rest of a page can be read; of an encrypted one, nowhere.
+    /// Returns the stream for reading the rest of a page. Not supported for encrypted connections.
     fn page(&self) -> io::Result<TcpStream> {
         match self {
             PolicyStream::Plain(stream) => stream.stream.try_clone(),
@@ -216,7 +218,7 @@ impl Write for PolicyStream {
     }
 }
 
-/// A connection on which nothing takes longer than until a deadline, however small the pieces are in which it comes.
+/// A connection on which every operation ends by a deadline, even if data arrives in small pieces.
 struct DeadlineStream {
     stream: TcpStream,
     deadline: Instant,
@@ -229,7 +231,7 @@ impl DeadlineStream {
         let deadline = Instant::now() + within;
         let mut addresses = (address.host(), port).to_socket_addrs()?;
         while let Some(address) = addresses.next() {
-            // Each has its share of what is left, which must not be nothing.
+            // Each address gets its share of the remaining time, which must not be zero.
             let left = deadline.saturating_duration_since(Instant::now());
             let share = left / (addresses.len() as u32 + 1);
             match TcpStream::connect_timeout(&address, share.max(SHORTEST_TRIAL)) {
@@ -243,7 +245,7 @@ impl DeadlineStream {
         Err(failure)
     }
 
-    /// What is left; no time at all is a time that nothing takes, which the system would take for any time.
+    /// Returns the remaining time. Zero is an error, because the system would treat it as no limit.
     fn left(&self) -> io::Result<Option<Duration>> {
         match self.deadline.saturating_duration_since(Instant::now()) {
             Duration::ZERO => Err(io::ErrorKind::TimedOut.into()),

@@ -19,24 +19,28 @@ use super::{
 
 /// A connection to one policy server.
 pub trait PolicyClient: Send {
-    /// The answer to a request, if it comes in time.
+    /// Sends a request and returns the answer.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if there is no valid answer within `within`.
     fn ask(&mut self, request: &RequestValue, within: Duration) -> Result<ReplyValue, RemoteError>;
 
-    /// What was asked before is over: the policy begins anew, where its protocol has a word for that.
+    /// Begins a new trial. The policy resets its state if its protocol supports that.
     fn begin_trial(&mut self, within: Duration) -> Result<(), RemoteError>;
 
-    /// Tells a server that has not been asked for a while that somebody is there still.
+    /// Keeps the connection to an idle server alive.
     fn keep_alive(&mut self);
 }
 
-/// How a server is spoken to.
+/// Protocol of a policy server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PolicyProtocol {
-    /// msgpack with numpy arrays over WebSocket, as openpi's server and client.
+    /// msgpack with numpy arrays over WebSocket, as in openpi's server and client.
     Openpi,
-    /// JSON with numpy arrays over HTTP, as the `/act` of OpenVLA and others.
+    /// JSON with numpy arrays over HTTP, as in the `/act` of OpenVLA and others.
     Act,
-    /// Frames of msgpack over WebSocket, as XPolicyLab's servers.
+    /// Frames of msgpack over WebSocket, as in XPolicyLab's servers.
     XPolicyLab,
 }
 
@@ -44,7 +48,7 @@ impl PolicyProtocol {
     pub const ALL: [PolicyProtocol; 3] =
         [PolicyProtocol::Openpi, PolicyProtocol::Act, PolicyProtocol::XPolicyLab];
 
-    /// As the command line calls it.
+    /// Returns its name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             PolicyProtocol::Openpi => "openpi",
@@ -53,7 +57,7 @@ impl PolicyProtocol {
         }
     }
 
-    /// What its addresses begin with: those of encrypted servers last.
+    /// Returns its URL schemes; the encrypted one is last.
     pub fn schemes(self) -> [&'static str; 2] {
         match self {
             PolicyProtocol::Openpi | PolicyProtocol::XPolicyLab => link::SCHEMES,
@@ -61,7 +65,7 @@ impl PolicyProtocol {
         }
     }
 
-    /// Refuses to send a key where others could read it: to another machine, unencrypted.
+    /// Refuses to send a key unencrypted to another machine.
     pub fn check_key(self, address: &PolicyAddress) -> Result<(), PolicyKeyError> {
         if address.key.is_none() || address.is_encrypted() || address.is_loopback() {
             return Ok(());
@@ -70,7 +74,7 @@ impl PolicyProtocol {
         Err(PolicyKeyError::Unencrypted { url: address.url.clone(), protocol: self.name(), encrypted })
     }
 
-    /// The preset that is meant where no map is given.
+    /// Returns the default preset, used if no map is given.
     pub fn preset(self) -> Option<&'static str> {
         match self {
             PolicyProtocol::Openpi | PolicyProtocol::XPolicyLab => Some(self.name()),
@@ -78,8 +82,10 @@ impl PolicyProtocol {
         }
     }
 
-    /// A client of the server at `address` for an episode of `task`. The server has to be found within `connect_within`; it may be busy
-    /// then, and has `reply_within` to say who it is, or as long as to be found if that is longer.
+    /// Opens a client of the server at `address` for an episode of `task`.
+    ///
+    /// The server must be reachable within `connect_within`. It may be busy then, and has the longer of
+    /// `connect_within` and `reply_within` for its first message.
     pub fn open(
         self,
         address: &PolicyAddress,

@@ -1,32 +1,32 @@
-//! msgpack with numpy's arrays in it, in the two ways in which policies' servers write these.
+//! msgpack with numpy arrays, in the two dialects that policies' servers use.
 
 use rmpv::{Value, decode, encode};
 
 use crate::drivers::remote::values::{Array, ReplyValue, RequestValue};
 
-/// How an array is written: a map whose keys are bytes.
+/// Encoding of an array; both are maps whose keys are bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dialect {
-    /// `__ndarray__`, `data`, `dtype`, `shape`, as openpi-client's own `msgpack_numpy`.
+    /// `__ndarray__`, `data`, `dtype`, `shape`, as in openpi-client's own `msgpack_numpy`.
     Openpi,
-    /// `nd`, `type`, `kind`, `shape`, `data`, as the package msgpack-numpy.
+    /// `nd`, `type`, `kind`, `shape`, `data`, as in the package msgpack-numpy.
     MsgpackNumpy,
 }
 
-/// A request as it goes out.
+/// Encodes a request.
 pub fn written(request: &RequestValue, dialect: Dialect) -> Vec<u8> {
     bytes_of(&request_value(request, dialect))
 }
 
-/// A value as it goes out.
+/// Encodes a value.
 pub fn bytes_of(value: &Value) -> Vec<u8> {
     let mut bytes = Vec::new();
-    // Nothing fails to be written into memory.
+    // Writing into memory cannot fail.
     let _ = encode::write_value(&mut bytes, value);
     bytes
 }
 
-/// A request as a value that may stand in another.
+/// Converts a request to a value that can be part of another one.
 pub fn request_value(request: &RequestValue, dialect: Dialect) -> Value {
     let value = |request| request_value(request, dialect);
     match request {
@@ -60,12 +60,12 @@ fn ndarray(array: &Array, dialect: Dialect) -> Value {
     })
 }
 
-/// Reads an answer; lists of numbers are arrays, too.
+/// Reads an answer. Lists of numbers become arrays, too.
 pub fn read_reply(bytes: &[u8]) -> Result<ReplyValue, String> {
     reply_value(read(bytes)?)
 }
 
-/// Reads one value that is all there is.
+/// Reads exactly one value.
 pub fn read(mut bytes: &[u8]) -> Result<Value, String> {
     let value = decode::read_value(&mut bytes).map_err(|error| format!("no msgpack: {error}"))?;
     match bytes.is_empty() {
@@ -74,7 +74,7 @@ pub fn read(mut bytes: &[u8]) -> Result<Value, String> {
     }
 }
 
-/// A value with the arrays of either dialect.
+/// Converts a value with arrays of either dialect.
 pub fn reply_value(value: Value) -> Result<ReplyValue, String> {
     if let Some(number) = value.as_f64() {
         return Ok(ReplyValue::number(number));
@@ -89,7 +89,7 @@ pub fn reply_value(value: Value) -> Result<ReplyValue, String> {
     }
 }
 
-/// The value under `key`, which is written as text or as bytes.
+/// Returns the value under `key`, which is encoded as text or as bytes.
 pub fn entry<'a>(entries: &'a [(Value, Value)], key: &str) -> Option<&'a Value> {
     entries.iter().find(|(name, _)| name.as_slice() == Some(key.as_bytes())).map(|(_, value)| value)
 }
@@ -97,7 +97,7 @@ pub fn entry<'a>(entries: &'a [(Value, Value)], key: &str) -> Option<&'a Value> 
 fn of_map(entries: Vec<(Value, Value)>) -> Result<ReplyValue, String> {
     let find = |name: &str| entry(&entries, name);
     let array = |dtype: &str| {
-        // A number that numpy has packed has no shape.
+        // A packed numpy scalar has no shape.
         let shape = find("shape").and_then(Value::as_array).into_iter().flatten();
         let shape: Option<Vec<usize>> = shape.map(|side| side.as_u64()?.try_into().ok()).collect();
         let dtype = find(dtype).and_then(text).unwrap_or_default();
@@ -120,7 +120,7 @@ fn of_map(entries: Vec<(Value, Value)>) -> Result<ReplyValue, String> {
     named.collect::<Result<_, String>>().map(ReplyValue::Map)
 }
 
-/// A text, written as text or as bytes.
+/// Returns a string that is encoded as text or as bytes.
 pub fn text(value: &Value) -> Option<String> {
     Some(std::str::from_utf8(value.as_slice()?).ok()?.to_owned())
 }
@@ -175,7 +175,8 @@ mod tests {
         assert_eq!(read_reply(b"\xc3").map(|reply| reply.describe()), Ok("a boolean".into()));
     }
 
-    /// `msgpack.packb(x, default=msgpack_numpy.encode)` of msgpack-numpy 0.4.8, x = {"a": np.float32([[1.5, -2]]), "n": np.float32(3)}.
+    /// The bytes of `msgpack.packb(x, default=msgpack_numpy.encode)` of msgpack-numpy 0.4.8, where x =
+    /// {"a": np.float32([[1.5, -2]]), "n": np.float32(3)}.
     const KNOWN_PACKAGE: &[u8] = b"\x82\xa1a\x85\xc4\x02nd\xc3\xc4\x04type\xa3<f4\xc4\x04kind\xc4\x00\xc4\x05shape\x92\x01\x02\
         \xc4\x04data\xc4\x08\x00\x00\xc0?\x00\x00\x00\xc0\xa1n\x83\xc4\x02nd\xc2\xc4\x04type\xa3<f4\xc4\x04data\
         \xc4\x04\x00\x00@@";
@@ -193,7 +194,7 @@ mod tests {
         let bytes = written(&request, Dialect::MsgpackNumpy);
         let length = bytes.len();
         assert_eq!(bytes[1..], KNOWN_PACKAGE[1..length], "all but how many entries there are");
-        // Objects are pickled, which nobody here reads.
+        // Arrays of objects are pickled, which is not supported.
         let pickled = [&KNOWN_PACKAGE[..15], b"\xa2|O", &KNOWN_PACKAGE[19..]].concat();
         assert!(read_reply(&pickled).unwrap_err().contains("dtype \"|O\""), "{pickled:?}");
     }

@@ -1,4 +1,5 @@
-//! openpi's protocol: over WebSocket the server says who it is, then answers one binary message with another; a text is its error.
+//! openpi's protocol over WebSocket: the server sends its metadata, then answers each binary message with
+//! another. A text message is its error.
 
 use std::time::Duration;
 
@@ -18,13 +19,13 @@ pub struct Openpi {
 }
 
 impl Openpi {
-    /// Connects, and hears who the server is.
+    /// Connects and receives the server's metadata.
     pub fn connect(
         address: &PolicyAddress,
         connect_within: Duration,
         reply_within: Duration,
     ) -> Result<Openpi, RemoteError> {
-        // A server that answers somebody else may shake no hands meanwhile.
+        // A server that is answering another client may delay the handshake.
         let within = connect_within.max(reply_within);
         let mut link = Openpi { socket: PolicySocket::connect(address, connect_within, within)? };
         let metadata = link.hear(within).map_err(|error| match error {
@@ -55,7 +56,7 @@ impl PolicyClient for Openpi {
         self.hear(within)
     }
 
-    /// A connection is an episode; the server is not told more.
+    /// Does nothing: a connection is an episode, and the protocol has no reset.
     fn begin_trial(&mut self, _within: Duration) -> Result<(), RemoteError> {
         Ok(())
     }
@@ -75,7 +76,7 @@ mod tests {
 
     #[test]
     fn a_server_that_says_nothing_is_not_there() {
-        // The system takes connections; nobody hears them.
+        // The system accepts connections; no program answers them.
         let silent = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         let url = format!("ws://{}", silent.local_addr().unwrap());
         let address = PolicyAddress { url, key: None };

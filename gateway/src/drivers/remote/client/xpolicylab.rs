@@ -1,5 +1,7 @@
-//! XPolicyLab's protocol: frames of msgpack over WebSocket, each answered by one with the same `message_id`. A server has one model,
-//! which `reset` makes begin anew, for whoever asks.
+//! XPolicyLab's protocol: frames of msgpack over WebSocket, each answered by one with the same
+//! `message_id`.
+//!
+//! A server has one model, which any client can restart with `reset`.
 
 use std::{
     fmt::Write,
@@ -18,26 +20,26 @@ use crate::drivers::remote::{
     values::{ReplyValue, RequestValue},
 };
 
-/// How long a server may take for the words of which nothing depends: that an episode is over, and that somebody is there.
+/// Time limit for messages whose answer does not matter: the end of an episode, and heartbeats.
 const COURTESY: Duration = Duration::from_secs(2);
 
-/// What observations are, by XPolicyLab's name for it.
+/// Format of the observations, by XPolicyLab's name for it.
 const DATA_FORMAT: &str = "v1.0";
 
 /// A connection to one server.
 pub struct XPolicyLab {
     socket: PolicySocket,
-    /// Nobody else's on any server: a server answers a message whose name it knows as it did then.
+    /// Unique id of this client. A server repeats its old answer to a message id that it knows.
     evaluation: String,
-    /// The task.
+    /// Name of the task.
     case: String,
     messages: u64,
     trials: u64,
-    /// Requests in the trial that is open.
+    /// Number of requests in the open trial; `None` if no trial is open.
     trial: Option<u64>,
 }
 
-/// What is asked.
+/// Type of a request.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Request {
     Hello,
@@ -62,7 +64,7 @@ impl Request {
         }
     }
 
-    /// What its answer is called.
+    /// Returns the message type of its answer.
     fn answer(self) -> String {
         match self {
             Request::Reset | Request::Infer => format!("{}_result", self.name()),
@@ -72,7 +74,7 @@ impl Request {
 }
 
 impl XPolicyLab {
-    /// Connects, says hello and for which task, and begins a trial.
+    /// Connects, sends the hello and the task, and begins a trial.
     pub fn connect(
         address: &PolicyAddress,
         task: &str,
@@ -84,14 +86,14 @@ impl XPolicyLab {
         getrandom::fill(&mut name)
             .map_err(|error| RemoteError::Unreachable { url: url.into(), reason: error.to_string() })?;
         let evaluation = name.iter().fold("tandem-".to_owned(), |mut text, byte| {
-            // Writing to a text cannot fail.
+            // Writing to a string cannot fail.
             let _ = write!(text, "{byte:02x}");
             text
         });
         let socket = PolicySocket::connect(address, connect_within, within)?;
         let case = task.to_owned();
         let mut link = XPolicyLab { socket, evaluation, case, messages: 0, trials: 0, trial: None };
-        // Who does not know these words does not answer them.
+        // A server of another protocol does not answer these messages.
         link.request(Request::Hello, Vec::new(), within).map_err(|error| match error {
             RemoteError::Slow { .. } => silent(url, within),
             error => error,
@@ -102,7 +104,7 @@ impl XPolicyLab {
         Ok(link)
     }
 
-    /// The payload of the answer to a request.
+    /// Sends a request and returns the payload of its answer.
     fn request(
         &mut self,
         request: Request,
@@ -119,7 +121,7 @@ impl XPolicyLab {
         loop {
             let bytes = match self.socket.hear(within)? {
                 Frame::Bytes(bytes) => bytes,
-                // XPolicyLab has no use for texts.
+                // XPolicyLab does not use text messages.
                 Frame::Text(_) => continue,
             };
             let answer = read(&bytes).map_err(|reason| self.socket.unreadable(reason))?;
@@ -129,7 +131,7 @@ impl XPolicyLab {
                 return Err(self.socket.unreadable(reason));
             };
             if found("message_id").and_then(text).as_deref() != Some(&id) {
-                // To a request that nobody waits for any more.
+                // The answer belongs to a request that is no longer pending.
                 continue;
             }
             let payload = found("payload").cloned().unwrap_or(Value::Nil);
@@ -161,7 +163,7 @@ impl XPolicyLab {
         ])
     }
 
-    /// The trial that is open, or was last.
+    /// Returns the id of the open trial, or of the last one.
     fn trial_id(&self) -> String {
         format!("{}-{}", self.case, self.trials)
     }
@@ -192,7 +194,8 @@ impl PolicyClient for XPolicyLab {
                 actions(payload).map_err(|reason| self.socket.unreadable(reason))
             }
             Err(error) => {
-                // Whoever does not answer this does not hear that the trial is over, either.
+                // A server that does not answer this request would not receive the end of the trial,
+                // either.
                 if !matches!(error, RemoteError::Failed { .. }) {
                     self.trial = None;
                 }
@@ -210,21 +213,21 @@ impl PolicyClient for XPolicyLab {
     }
 
     fn keep_alive(&mut self) {
-        // If nobody is there any more, the next request says so. A ping of the server's is answered on the way.
+        // If the server is gone, the next request fails. A ping of the server is answered here as well.
         let _ = self.request(Request::Heartbeat, Vec::new(), COURTESY);
     }
 }
 
 impl Drop for XPolicyLab {
     fn drop(&mut self) {
-        // The episode is over whether or not the server hears it.
+        // The episode is over even if the server does not receive this.
         if self.trial.is_some() && self.end_trial(COURTESY).is_ok() {
             let _ = self.request(Request::Close, Vec::new(), COURTESY);
         }
     }
 }
 
-/// What a server says of its failure.
+/// Returns the server's description of its failure.
 fn complaint(payload: &Value) -> String {
     let found = |key: &str| payload.as_map().and_then(|entries| entry(entries, key)).and_then(text);
     let code = found("code").unwrap_or_else(|| "error".into());
@@ -234,8 +237,8 @@ fn complaint(payload: &Value) -> String {
     }
 }
 
-/// An answer as maps are written for it: `actions` is one map of arrays, each with a row for every action, where the server sends a list
-/// of maps, one for every action, or a single map.
+/// Converts an answer to the form that maps expect: `actions` becomes one map of arrays, each with a row
+/// per action. The server sends a list of maps, one per action, or a single map.
 fn actions(payload: Value) -> Result<ReplyValue, String> {
     let Value::Map(entries) = payload else {
         return Err(format!("expected a payload; came a {}", kind(&payload)));
@@ -251,7 +254,7 @@ fn actions(payload: Value) -> Result<ReplyValue, String> {
     Ok(ReplyValue::Map(vec![("actions".into(), told)]))
 }
 
-/// Maps of one row each as one map of columns of rows.
+/// Converts maps of one row each to one map of columns of rows.
 fn by_key(rows: Vec<Value>) -> Result<ReplyValue, String> {
     let mut columns: Vec<(String, Vec<ReplyValue>)> = Vec::new();
     for (number, row) in rows.into_iter().enumerate() {
@@ -275,7 +278,8 @@ fn by_key(rows: Vec<Value>) -> Result<ReplyValue, String> {
 
 const SECONDS_PER_DAY: u64 = 86_400;
 
-/// A time as ISO 8601 has it, in UTC. Days to a date: Hinnant, "chrono-compatible low-level date algorithms", 2013.
+/// Formats a time as ISO 8601 in UTC. Conversion of days to a date: Hinnant, "chrono-compatible low-level
+/// date algorithms", 2013.
 fn utc_text(at: SystemTime) -> String {
     let since_s = at.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs());
     let (days, in_day) = (since_s / SECONDS_PER_DAY + 719_468, since_s % SECONDS_PER_DAY);

@@ -1,4 +1,4 @@
-//! Whether a map can be followed, and if not, what would be right.
+//! Validation of a map, with advice on what would be right.
 
 use std::collections::BTreeSet;
 
@@ -14,20 +14,21 @@ use crate::drivers::remote::{
     values::path,
 };
 
-/// The longest side of a picture that a policy is shown.
+/// Maximum side of an image for a policy.
 const LONGEST_SIDE_PX: u32 = 4096;
-/// A row of wrist poses is one command, which has 25 control steps at most: half a second.
+/// Range of rates. A row of wrist poses is one command, which has at most 25 control steps, or half a
+/// second.
 const RATES_HZ: [f64; 2] = [2.0, 1000.0];
 const LONGEST_HISTORY: usize = 32;
-/// More than three minutes of rows at 50 a second.
+/// Maximum number of rows: more than three minutes at 50 rows per second.
 const MAX_ROWS: usize = 10_000;
 const MAX_LEADING_AXES: usize = 8;
-/// How long a policy may be waited for: up to a day. An answer takes some time.
+/// Maximum time to wait for a policy: a day.
 const LONGEST_S: f64 = 86400.0;
 const SHORTEST_REPLY_S: f64 = 0.001;
 
 impl PolicyMap {
-    /// Whether it can be followed.
+    /// Checks that the map can be followed.
     pub(super) fn check(&self) -> Result<(), String> {
         for names in self.state.values() {
             state_columns(names)?;
@@ -65,7 +66,7 @@ impl PolicyMap {
         check_paths(&self.action.keys().collect::<Vec<_>>())
     }
 
-    /// The columns that are told; none of them by two keys.
+    /// Returns the columns that the policy commands. Refuses a column under two keys.
     fn check_action(&self) -> Result<Vec<usize>, String> {
         let all: Vec<String> = self.action.values().flatten().cloned().collect();
         let told = action_columns(&all)?;
@@ -75,7 +76,8 @@ impl PolicyMap {
         }
     }
 
-    /// Inverse kinematics moves arms and waist to where wrists are to be: nobody else may.
+    /// Refuses commands for arms and waist beside wrist poses, because inverse kinematics controls them
+    /// then.
     fn check_wrists(&self, told: &[usize]) -> Result<(), String> {
         for (side, wrist) in WRISTS.iter().enumerate() {
             let forms = RotationForm::ALL.into_iter().map(|form| wrist_rotation(side, form).start);
@@ -109,7 +111,7 @@ impl PolicyMap {
         WRISTS.into_iter().enumerate().filter(|(side, _)| is_told(*side)).map(|(_, wrist)| wrist).collect()
     }
 
-    /// Only what is told, and what a robot can be at, can be a difference.
+    /// Checks that differences are only used for columns that are commanded and that are positions.
     fn check_delta(&self, told: &[usize]) -> Result<(), String> {
         let wrists = self.told_wrists(told);
         for name in &self.chunk.delta {
@@ -176,7 +178,7 @@ impl PolicyMap {
         }
     }
 
-    /// One answer for all robots is asked with keys for all robots.
+    /// Checks that the keys of one answer for all robots name every robot.
     fn check_keys(&self) -> Result<(), String> {
         if self.answer == AnswerScope::One {
             return Ok(());
@@ -193,7 +195,7 @@ impl PolicyMap {
     }
 }
 
-/// Under one key stands one thing: none leads through another, nor to the same place, for any robot.
+/// Checks that no key leads through another or to the same place, for any robot.
 fn check_paths(keys: &[&String]) -> Result<(), String> {
     let robots: BTreeSet<&str> =
         tasks::cohub().iter().copied().flat_map(|task| task.robots).map(|robot| robot.name).collect();

@@ -1,4 +1,5 @@
-//! Which numbers and pictures go under which key to a policy, and which come back: a small TOML file, or a preset.
+//! Policy maps: which values and images a policy gets under which key, and which it returns. A map is a
+//! small TOML file or a preset.
 
 mod check;
 
@@ -14,75 +15,75 @@ use tandem_tools_spec::{ACTION_ROW_LEN, ExtraInformation};
 
 use super::columns::{WRISTS, action_columns, extra_columns, state_columns};
 
-/// Maps that the program carries, by name; each is written out and explained in its file.
+/// Built-in maps by name; each file is written out in full and explained.
 pub const PRESETS: [(&str, &str); 3] = [
     ("openpi", include_str!("presets/openpi.toml")),
     ("xpolicylab", include_str!("presets/xpolicylab.toml")),
     ("gr00t_n17_g1", include_str!("presets/gr00t_n17_g1.toml")),
 ];
 
-/// What stands for a robot's name in a key.
+/// Placeholder for a robot's name in a key.
 pub const ROBOT: &str = "{robot}";
 
-/// How a policy is asked and understood.
+/// Inputs and outputs of a policy.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PolicyMap {
     pub scope: Scope,
     pub answer: AnswerScope,
     pub instruction: Words,
-    /// Axes of length 1 before those of pictures and states.
+    /// Number of leading axes of length 1 on images and states.
     pub leading_axes: usize,
-    /// How long a server may take to be there.
+    /// Time limit for connecting to a server, in seconds.
     pub connect_s: f64,
-    /// How long an answer may take; the first of an episode may take longer.
+    /// Time limit for an answer, in seconds; the first of an episode may take longer.
     pub reply_s: f64,
     pub images: BTreeMap<String, ImageKey>,
     pub state: BTreeMap<String, Vec<String>>,
     pub prompt: BTreeMap<String, PromptForm>,
     pub action: BTreeMap<String, Vec<String>>,
     pub chunk: Chunk,
-    /// Left out where a policy is shown the present alone.
+    /// History of observations; left out if a policy only gets the present one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub history: Option<HistorySpan>,
 }
 
-/// Which robots' views and joints a policy is shown.
+/// Robots whose images and joints a policy gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scope {
-    /// Those of the robot that it is asked for.
+    /// Only the robot of the request.
     Local,
-    /// Those of all robots, under keys with their names.
+    /// All robots, under keys with their names.
     Global,
 }
 
-/// Which robots an answer moves.
+/// Robots that an answer moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AnswerScope {
-    /// The robot that it was asked for.
+    /// The robot of the request.
     One,
-    /// Every robot.
+    /// All robots.
     All,
 }
 
-/// What a policy is told to do.
+/// Instruction that a policy gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Words {
     /// The robot's part of the task.
     Robot,
-    /// The task of all robots.
+    /// The task of all robots together.
     Joint,
 }
 
-/// Where and how a picture goes.
+/// Source and form of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImageKey {
     pub camera: CameraName,
-    /// Width and height in pixels; left out for the camera's own.
+    /// Width and height in pixels; left out for the size of the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size: Option<[u32; 2]>,
     #[serde(default)]
@@ -91,16 +92,16 @@ pub struct ImageKey {
     pub layout: Layout,
 }
 
-/// Which camera a picture comes from.
+/// Camera of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CameraName {
     Egocentric,
-    /// More than robots see.
+    /// A view that robots themselves do not have.
     ThirdPerson,
 }
 
-/// How the instruction is written.
+/// Encoding of the instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PromptForm {
@@ -108,20 +109,20 @@ pub enum PromptForm {
     List,
 }
 
-/// How a picture gets to another size.
+/// Method of resizing an image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fit {
-    /// The whole picture as large as fits, in the middle of black, as `resize_with_pad` of openpi-client.
+    /// The whole image as large as fits, centred on black, as in `resize_with_pad` of openpi-client.
     #[default]
     Pad,
-    /// Stretched to the new size, whatever becomes of its shape.
+    /// Stretched to the new size, regardless of the aspect ratio.
     Stretch,
-    /// The largest part of the right shape, from the middle.
+    /// The largest centred part with the right aspect ratio.
     Crop,
 }
 
-/// The order of a picture's elements.
+/// Order of an image's axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Layout {
@@ -132,70 +133,70 @@ pub enum Layout {
     Chw,
 }
 
-/// How the rows of an answer are understood and executed.
+/// Interpretation and execution of the rows of an answer.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Chunk {
-    /// How many there have to be.
+    /// Required number of rows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rows: Option<usize>,
-    /// How many of them are executed, from the first.
+    /// Number of rows to execute, from the first.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub execute: Option<usize>,
-    /// How many make a second; left out: one a control step.
+    /// Rows per second; if left out, one per control step.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
     #[serde(default, skip_serializing_if = "is_default")]
     pub between: Between,
-    /// Columns that are differences to what was observed when the policy was asked.
+    /// Columns that are differences to the state at the time of the request.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub delta: Vec<String>,
     #[serde(default, skip_serializing_if = "is_default")]
     pub wrist_frame: WristFrame,
 }
 
-/// What robots are told in the control steps that one row lasts.
+/// Commands within the control steps that one row lasts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Between {
-    /// To go evenly from the row before to this one. Velocities change at once.
+    /// Linear interpolation from the previous row to this one. Velocities change at once.
     #[default]
     Interpolate,
-    /// This row in every one of them.
+    /// This row in every step.
     Hold,
 }
 
-/// In whose axes poses of wrists are told.
+/// Frame in which wrist poses are given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum WristFrame {
-    /// The pelvis: hands go where it goes.
+    /// The pelvis frame: hands move with the pelvis.
     #[default]
     Pelvis,
-    /// Where the robot stood at the episode's start, by its own odometry: hands stay in the world.
+    /// Pose of the robot at the episode's start, by its own odometry: hands stay fixed in the world.
     Start,
-    /// The wrist itself as it was observed; such poses are always differences. Hands stay in the world.
+    /// The observed wrist frame itself; such poses are always differences. Hands stay fixed in the world.
     Wrist,
 }
 
-/// How much of the past a policy is shown.
+/// Extent of the history that a policy gets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HistorySpan {
-    /// How many observations, the present one included.
+    /// Number of observations, including the present one.
     pub length: usize,
-    /// How many rows are executed between two of them.
+    /// Number of rows executed between two of them.
     #[serde(default = "one")]
     pub stride: usize,
     #[serde(default)]
     pub form: HistoryForm,
 }
 
-/// How observations of several moments are put together, the oldest first.
+/// Combination of the observations of several moments, oldest first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum HistoryForm {
-    /// Arrays with an axis of moments, behind the leading axes.
+    /// Arrays with an axis of moments, after the leading axes.
     #[default]
     Stack,
     /// Lists of arrays.
@@ -210,7 +211,7 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 
-/// What of an answer is a difference to what was observed.
+/// Columns of an answer that are differences to the observed state.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DeltaColumns {
     /// Columns of an action row.
@@ -219,7 +220,7 @@ pub struct DeltaColumns {
     pub wrists: [bool; 2],
 }
 
-/// Why a map cannot be used.
+/// Reason why a map cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum MapError {
     #[error(
@@ -240,8 +241,10 @@ fn preset_names() -> String {
 }
 
 impl PolicyMap {
-    /// The preset called `name`, or the map in the file of that name. A file may begin with `preset = "NAME"`; what it gives then
-    /// replaces what the preset has, tables as a whole.
+    /// Returns the preset called `name`, or reads the map from the file of that name.
+    ///
+    /// A file may begin with `preset = "NAME"`. Its own entries then replace those of the preset, whole
+    /// tables at a time.
     pub fn find(name: &str) -> Result<PolicyMap, MapError> {
         let path = Path::new(name);
         let text = match preset(name) {
@@ -267,12 +270,12 @@ impl PolicyMap {
         whole.try_into().map_err(unreadable)
     }
 
-    /// How many rows of an answer make a second.
+    /// Returns the rows per second of an answer.
     pub fn rate_hz(&self) -> f64 {
         self.chunk.rate_hz.unwrap_or(CONTROL_HZ)
     }
 
-    /// What of an answer is a difference. The map was checked when it was read.
+    /// Returns the columns of an answer that are differences. The map was checked when it was read.
     pub fn delta(&self) -> DeltaColumns {
         let is_wrist = |name: &&String| WRISTS.contains(&name.as_str());
         let (wrists, others): (Vec<&String>, Vec<&String>) = self.chunk.delta.iter().partition(is_wrist);
@@ -283,7 +286,7 @@ impl PolicyMap {
         }
     }
 
-    /// The robots of each request, where there are `robots`.
+    /// Returns the robot indices of each request, for a task with `robots` robots.
     pub fn queries(&self, robots: usize) -> Vec<Vec<usize>> {
         match self.answer {
             AnswerScope::One => (0..robots).map(|robot| vec![robot]).collect(),
@@ -291,22 +294,23 @@ impl PolicyMap {
         }
     }
 
-    /// Whether robots are told where their wrists are to be.
+    /// Returns true if the policy commands wrist poses.
     pub fn moves_wrists(&self) -> bool {
         self.told_columns().iter().any(|column| *column >= ACTION_ROW_LEN)
     }
 
-    /// The columns that an answer tells, in no order.
+    /// Returns the columns that an answer commands, in no particular order.
     pub fn told_columns(&self) -> Vec<usize> {
         let all: Vec<String> = self.action.values().flatten().cloned().collect();
         action_columns(&all).unwrap_or_default()
     }
 
-    /// What a policy is shown that the benchmark's own policies are not. The map was checked when it was read.
+    /// Returns the extra information that the policy gets and the benchmark's own policies do not. The
+    /// map was checked when it was read.
     pub fn shown(&self) -> Vec<ExtraInformation> {
         let names: Vec<String> = self.state.values().flatten().cloned().collect();
         let mut shown = extra_columns(&state_columns(&names).unwrap_or_default());
-        // Whoever tells poses in the start frame has to know where the robot is in it.
+        // A policy that gives poses in the start frame needs the robot's pose in it.
         if self.chunk.wrist_frame == WristFrame::Start && !shown.contains(&ExtraInformation::Odometry) {
             shown.push(ExtraInformation::Odometry);
         }
@@ -315,7 +319,8 @@ impl PolicyMap {
         shown
     }
 
-    /// As [`PolicyMap::shown`], by name, and what else a policy is told of its episode that the benchmark's are not.
+    /// Returns the names of [`PolicyMap::shown`] and of other episode data that the benchmark's policies
+    /// do not get.
     pub fn extra_information(&self) -> Vec<String> {
         let of_moment = [("episode", "episode number"), ("step", "clock")];
         let is_named = |column: &str| self.state.values().flatten().any(|name| name == column);
@@ -324,13 +329,13 @@ impl PolicyMap {
         shown.chain(of_moment.map(|(_, what)| what.to_owned())).collect()
     }
 
-    /// Whether the camera that sees all robots is shown.
+    /// Returns true if the policy gets the third-person image.
     pub fn shows_third_person(&self) -> bool {
         self.images.values().any(|image| image.camera == CameraName::ThirdPerson)
     }
 }
 
-/// The file of the preset called `name`.
+/// Returns the file of the preset called `name`.
 pub fn preset(name: &str) -> Option<&'static str> {
     PRESETS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }
@@ -339,7 +344,7 @@ pub fn preset(name: &str) -> Option<&'static str> {
 mod tests {
     use super::*;
 
-    /// The map of a file that holds this.
+    /// Reads the map from a file with this text.
     pub(super) fn read(text: &str) -> Result<PolicyMap, MapError> {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
@@ -362,7 +367,7 @@ mod tests {
         for (name, _) in PRESETS {
             let map = PolicyMap::find(name).unwrap();
             let told: usize = map.action.values().map(|names| action_columns(names).unwrap().len()).sum();
-            // XPolicyLab has no words for waist and base.
+            // XPolicyLab has no keys for waist and base.
             let all = if name == "xpolicylab" { 28 } else { 35 };
             assert_eq!((told, map.extra_information()), (all, Vec::new()), "{name}");
         }

@@ -1,4 +1,4 @@
-//! What was observed so far, as far as a policy is shown it.
+//! The history of observations that a policy gets.
 
 use std::collections::VecDeque;
 
@@ -8,23 +8,23 @@ use tandem_tools_spec::ExtraInformation;
 use super::PolicyObservation;
 use crate::drivers::remote::{columns::EpisodeMoment, map::PolicyMap};
 
-/// The observations of an episode that a policy may still be shown.
+/// Observations of an episode that a policy may still need.
 pub struct ObservationHistory {
-    /// How many a policy is shown, and how many rows lie between two of them.
+    /// Number of observations for a policy, and number of rows between two of them.
     length: usize,
     stride: usize,
-    /// What of an observation the benchmark's own policies are not shown.
+    /// Extra information in the observations that the benchmark's own policies do not get.
     shown: Vec<ExtraInformation>,
     episode: u32,
-    /// The latest, and the number of rows that were executed before it.
+    /// Latest observation, and the number of rows executed before it.
     present: PolicyObservation,
     present_rows: usize,
-    /// Earlier ones with theirs, the oldest first.
+    /// Earlier observations with their row numbers, oldest first.
     past: VecDeque<(usize, PolicyObservation)>,
 }
 
 impl ObservationHistory {
-    /// The first look at the episode of this number.
+    /// Takes the first observation of the episode with this number.
     pub fn begin(
         map: &PolicyMap,
         episode: &mut dyn LocalEpisode,
@@ -45,12 +45,12 @@ impl ObservationHistory {
         })
     }
 
-    /// What robots see and feel now.
+    /// Returns the latest observation.
     pub fn present(&self) -> &PolicyObservation {
         &self.present
     }
 
-    /// Looks at the episode, of which `rows` rows have been executed now.
+    /// Observes the episode after `rows` executed rows.
     pub fn look(&mut self, episode: &mut dyn LocalEpisode, rows: usize) -> Result<(), PlayerError> {
         let moment = EpisodeMoment { episode: self.episode, done_steps: 0.0, is_first: false };
         let observation = PolicyObservation::take(episode, &self.shown, moment)?;
@@ -62,7 +62,7 @@ impl ObservationHistory {
         let before = std::mem::replace(&mut self.present, observation);
         self.past.push_back((self.present_rows, before));
         self.present_rows = rows;
-        // Of those that are too old, the youngest stands for moments at which nobody looked.
+        // The latest of the outdated observations is kept for moments without one.
         let oldest = rows.saturating_sub((self.length - 1) * self.stride);
         while self.length == 1 && !self.past.is_empty()
             || self.past.get(1).is_some_and(|(at, _)| *at <= oldest)
@@ -71,14 +71,15 @@ impl ObservationHistory {
         }
     }
 
-    /// The numbers of rows, above `from` and below `to`, after which there has to be a look so that a request after `to` rows
-    /// has its history.
+    /// Returns the row numbers, above `from` and below `to`, after which observations are needed so that
+    /// a request after `to` rows has its history.
     pub fn looks_between(&self, from: usize, to: usize) -> Vec<usize> {
         let past = (1..self.length).rev().filter_map(|back| to.checked_sub(back * self.stride));
         past.filter(|rows| *rows > from).collect()
     }
 
-    /// What a policy is shown now, the oldest first. Before the first look, it was as then.
+    /// Returns the observations for the policy, oldest first. The first one also fills the time before
+    /// it.
     pub fn shown(&self) -> Vec<&PolicyObservation> {
         let at = |back: usize| {
             let wanted = self.present_rows.saturating_sub(back * self.stride);
@@ -93,7 +94,7 @@ impl ObservationHistory {
 mod tests {
     use super::*;
 
-    /// An observation whose first number is how many rows were executed before.
+    /// Returns an observation whose first value is the number of rows executed before.
     fn observation(rows: usize) -> PolicyObservation {
         let mut observation = PolicyObservation::blank(1);
         observation.robots[0].state_values[0] = rows as f64;
@@ -124,7 +125,8 @@ mod tests {
         assert_eq!(three.looks_between(0, 10), [2, 6]);
         assert_eq!(after(&mut three, &[2, 6, 10]), [2.0, 6.0, 10.0]);
         assert_eq!(three.past.len(), 2, "older ones are forgotten");
-        // A chunk that is shorter than the history, and whose ends do not fall together: the last look before.
+        // The chunk is shorter than the history and its ends do not line up, so the last earlier
+        // observation is used.
         assert!(three.looks_between(10, 13).is_empty());
         assert_eq!(after(&mut three, &[13]), [2.0, 6.0, 13.0]);
         let mut one = history(1, 1);

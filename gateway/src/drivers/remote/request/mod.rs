@@ -1,4 +1,4 @@
-//! What a policy is asked: pictures, states and words under the keys of its map.
+//! Requests to a policy: images, states and text under the keys of its map.
 
 mod history;
 mod observation;
@@ -15,20 +15,21 @@ use super::{
     values::{Array, Elements, RequestValue},
 };
 
-/// The instructions of a task, as policies are given them.
+/// The instructions of a task in the form for policies.
 #[derive(Clone, Debug)]
 pub struct TaskInstructions {
     /// The task's id.
     pub task: String,
     /// Names of the robots, in the task's order.
     pub robots: Vec<String>,
-    /// What each robot has to do.
+    /// Instruction of each robot.
     pub per_robot: Vec<String>,
-    /// What they have to do together.
+    /// Joint instruction of all robots.
     pub joint: String,
 }
 
-/// The request for robot number `robot`, or for all of them, by what was observed, the oldest first.
+/// Builds the request for robot number `robot`, or for all robots if it is `None`, from observations with
+/// the oldest first.
 pub fn request(
     map: &PolicyMap,
     instructions: &TaskInstructions,
@@ -47,7 +48,7 @@ pub fn request(
             CameraName::ThirdPerson => {
                 let seen: Vec<&Picture> =
                     shown.iter().filter_map(|moment| moment.third_person.as_deref()).collect();
-                // Elsewhere no picture was taken.
+                // Otherwise no image was taken.
                 if !seen.is_empty() {
                     let seen = seen.into_iter().map(|picture| pixels(picture, image));
                     request.put(key, over_time(seen.collect(), map));
@@ -77,7 +78,8 @@ pub fn request(
     request
 }
 
-/// Keys with the robots whose inputs stand under them: the robot whose name is in its key, else the one that the request is for.
+/// Returns keys with the robots whose inputs they hold: the robot named in the key, else the one of the
+/// request.
 fn of_robots(
     key: &str,
     map: &PolicyMap,
@@ -101,7 +103,7 @@ fn floats(state_values: &[f64], columns: &[usize]) -> Array {
     Array { shape: vec![columns.len()], elements: Elements::Floats(floats) }
 }
 
-/// What a policy is shown under one key: an array for each moment, put together as the map says.
+/// Combines the arrays of all moments under one key in the form of the map.
 fn over_time(moments: Vec<Array>, map: &PolicyMap) -> RequestValue {
     let with_leading_axes = |array: Array| {
         let leading = std::iter::repeat_n(1, map.leading_axes);
@@ -110,7 +112,7 @@ fn over_time(moments: Vec<Array>, map: &PolicyMap) -> RequestValue {
     match map.history.map(|history| history.form) {
         Some(HistoryForm::List) => RequestValue::List(moments.into_iter().map(with_leading_axes).collect()),
         Some(HistoryForm::Stack) => with_leading_axes(Array::stack(moments)),
-        // The present alone.
+        // Only the present observation.
         None => moments.into_iter().next_back().map_or(RequestValue::List(Vec::new()), with_leading_axes),
     }
 }
@@ -129,7 +131,7 @@ mod tests {
         }
     }
 
-    /// Keys with shapes, or texts, maps flattened.
+    /// Lists keys with shapes or texts, with maps flattened.
     fn outline(request: &RequestValue) -> Vec<String> {
         match request {
             RequestValue::Map(entries) => entries

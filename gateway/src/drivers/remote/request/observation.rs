@@ -1,4 +1,4 @@
-//! What a policy may be shown of one moment.
+//! Observation of one moment, as far as a policy may get it.
 
 use std::sync::Arc;
 
@@ -10,36 +10,37 @@ use tandem_tools_spec::{ExtraInformation, Observe, Tool as _};
 
 use crate::drivers::remote::columns::{EpisodeMoment, blank_state_values, held_row, state_values};
 
-/// What a policy may be shown of one moment.
+/// Observation of all robots at one moment.
 #[derive(Clone)]
 pub struct PolicyObservation {
-    /// One for each robot, in the task's order.
+    /// One entry per robot, in the task's order.
     pub robots: Vec<RobotInputs>,
-    /// The room, where the policy is shown it.
+    /// Third-person image, if the policy gets it.
     pub third_person: Option<Arc<Picture>>,
 }
 
-/// What one robot sees and senses.
+/// Image and state of one robot.
 #[derive(Clone)]
 pub struct RobotInputs {
     pub picture: Arc<Picture>,
-    /// Numbers in the order of [`state_values`].
+    /// State in the order of [`state_values`].
     pub state_values: Vec<f64>,
 }
 
-/// The error of a reply without what robots know of themselves, which nothing made up takes the place of.
+/// Returns the error for a reply without the robot's own state, which no placeholder can replace.
 pub fn withheld(tool: &'static str) -> PlayerError {
     let reason = "the reply withholds gravity or odometry, which who asks a policy has to have".into();
     PlayerError::Call { tool, reason }
 }
 
-/// Size of pictures that nobody has taken.
+/// Size of blank images.
 const WIDTH_PX: u32 = 320;
 const HEIGHT_PX: u32 = 240;
 
 impl PolicyObservation {
-    /// Looks through all robots, and at the room where that is wanted; of what the benchmark's own policies are not shown, the
-    /// policy is `shown` this.
+    /// Observes all robots, and the third-person view if it is part of `shown`.
+    ///
+    /// `shown` names the extra information for the policy that the benchmark's own policies do not get.
     pub fn take(
         episode: &mut dyn LocalEpisode,
         shown: &[ExtraInformation],
@@ -57,12 +58,12 @@ impl PolicyObservation {
         Ok(PolicyObservation { robots, third_person })
     }
 
-    /// For each robot, the action row that keeps it as it is.
+    /// Returns, for each robot, the action row that holds its state.
     pub fn held_rows(&self) -> Vec<Vec<f64>> {
         self.robots.iter().map(|robot| held_row(&robot.state_values)).collect()
     }
 
-    /// Black pictures and zeros, of the right sizes, to try a policy with before an episode begins.
+    /// Returns black images and zeros of the right sizes, to probe a policy before an episode begins.
     pub fn blank(robots: usize) -> PolicyObservation {
         let black = vec![0; (3 * WIDTH_PX * HEIGHT_PX) as usize];
         let picture = Arc::new(Picture::new(WIDTH_PX, HEIGHT_PX, black));

@@ -1,4 +1,4 @@
-//! Pictures in the size and order that a policy wants.
+//! Images in the size and axis order that a policy expects.
 
 use image::{RgbImage, imageops};
 use tandem_episodes::Picture;
@@ -8,7 +8,7 @@ use crate::drivers::remote::{
     values::{Array, Elements},
 };
 
-/// The picture in the size that is wanted, as an array of bytes.
+/// Returns the image in the requested size, as an array of bytes.
 pub fn array(picture: &Picture, size_px: [u32; 2], fit: Fit, layout: Layout) -> Array {
     if [picture.width, picture.height] == size_px {
         return arranged(picture.rgb().to_vec(), size_px, layout);
@@ -16,7 +16,7 @@ pub fn array(picture: &Picture, size_px: [u32; 2], fit: Fit, layout: Layout) -> 
     arranged(fitted(picture, size_px, fit).into_raw(), size_px, layout)
 }
 
-/// The picture in another size.
+/// Resizes the image.
 fn fitted(picture: &Picture, [width, height]: [u32; 2], fit: Fit) -> RgbImage {
     match fit {
         Fit::Stretch => picture.scaled([width, height]),
@@ -41,13 +41,13 @@ fn fitted(picture: &Picture, [width, height]: [u32; 2], fit: Fit) -> RgbImage {
     }
 }
 
-/// How many times smaller each side becomes.
+/// Returns the reduction factor of each side.
 fn shrinking(picture: &Picture, size_px: [u32; 2]) -> [f64; 2] {
     let [width, height] = size_px.map(f64::from);
     [f64::from(picture.width) / width, f64::from(picture.height) / height]
 }
 
-/// Bytes that lie row by row, colours last, in the order that is wanted.
+/// Converts bytes in row-major order with colours last to the requested axis order.
 fn arranged(rgb: Vec<u8>, [width, height]: [u32; 2], layout: Layout) -> Array {
     let [width, height] = [width as usize, height as usize];
     match layout {
@@ -72,7 +72,7 @@ mod tests {
     const BLUE: Rgb<u8> = Rgb([0, 0, 200]);
     const BLACK: Rgb<u8> = Rgb([0, 0, 0]);
 
-    /// Left half red, right half blue.
+    /// Returns an image whose left half is red and whose right half is blue.
     fn halves() -> Picture {
         let image = RgbImage::from_fn(320, 240, |u, _| if u < 160 { RED } else { BLUE });
         Picture::new(320, 240, image.into_raw())
@@ -93,7 +93,7 @@ mod tests {
         assert_eq!(seen(Fit::Pad), [BLACK, RED, BLUE, BLACK]);
         assert_eq!(seen(Fit::Stretch), [RED, RED, BLUE, BLUE]);
         assert_eq!(seen(Fit::Crop), [RED, RED, BLUE, BLUE]);
-        // A quarter less high than wide: 224 by 168, with 28 black rows above and below.
+        // The height is three quarters of the width: 224 by 168, with 28 black rows above and below.
         let padded = fit_to_square(Fit::Pad);
         let rows = (0..224).filter(|v| *padded.get_pixel(5, *v) == RED).count();
         assert_eq!((rows, *padded.get_pixel(5, 27), *padded.get_pixel(5, 28)), (168, BLACK, RED));

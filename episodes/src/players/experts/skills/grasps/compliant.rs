@@ -1,4 +1,5 @@
-//! Taking and letting go of what partners hold, too: hands give way to what they feel, so that nobody is pulled.
+//! Compliant grasp and release of objects that partners hold, too: hands give way to the forces that they
+//! feel, so that no robot is pulled.
 
 use tandem_sim::Vector;
 
@@ -8,35 +9,36 @@ use crate::players::experts::skills::commander::{Commander, HandMove};
 use crate::scoring::{Facts, Grip};
 
 const ATTEMPTS: usize = 4;
-/// How long hands take to their first stop, to the next, and from the last to where they close.
+/// Time that hands take to their first stop, to the next, and from the last to where they close.
 const TO_FIRST_STOP_S: f32 = 0.9;
 const BETWEEN_STOPS_S: f32 = 0.6;
 const FROM_LAST_STOP_S: f32 = 0.5;
-/// They come to rest before they close: what a wrist is off then, its goal makes up for.
+/// Time to come to rest before hands close: the goals then make up for the wrists' remaining error.
 const SETTLE_S: f32 = 0.2;
-/// How long they take to leave, all stops together.
+/// Time that hands take to leave, all stops together.
 const LEAVE_S: f32 = 1.2;
-/// One step of a soft grasp; fingers close over the first of them.
+/// Duration of one step of a soft grasp; fingers close over the first `CLOSING_GIVES` steps.
 const GIVE_S: f32 = 0.1;
 const GIVES: usize = 16;
 const CLOSING_GIVES: usize = 6;
-/// A wrist gives way by a metre for so many newtons in each step, and by no more than this.
+/// Stiffness against which a wrist gives way in each step; `MAX_GIVE_M` limits the distance.
 const STIFFNESS_N_M: f32 = 300.0;
 const MAX_GIVE_M: f32 = 0.01;
-/// A wrist's goal is never farther than this from the wrist.
+/// Largest distance of a wrist's goal from the wrist.
 const LEASH_M: f32 = 0.03;
 
-/// Closes all hands on their places at once, which are held alike; hands that miss try again, while the others hold on.
+/// Closes all hands on their places at once. All grasps have the same hold. Hands that miss try again while
+/// the others hold on.
 pub fn grasp_compliantly(commander: &mut Commander, grasps: &[HandGrasp]) -> Result<(), PlayerError> {
     grasp_from(commander, grasps, 0)
 }
 
-/// The same for hands that have reached out to their first stops.
+/// Closes hands that have already reached out to their first stops; see [`grasp_compliantly`].
 pub fn grasp_reached(commander: &mut Commander, grasps: &[HandGrasp]) -> Result<(), PlayerError> {
     grasp_from(commander, grasps, 1)
 }
 
-/// The same from a stop on; those that miss go all the way once more.
+/// Closes hands from stop number `first_stop` on; hands that miss start over from the first stop.
 fn grasp_from(commander: &mut Commander, grasps: &[HandGrasp], first_stop: usize) -> Result<(), PlayerError> {
     let mut missing = grasps.to_vec();
     for attempt in 0..ATTEMPTS {
@@ -59,8 +61,8 @@ fn grasp_from(commander: &mut Commander, grasps: &[HandGrasp], first_stop: usize
     Err(PlayerError::GaveUp("not every hand could take hold".into()))
 }
 
-/// Closes hands that are where they close, as `around` has them. Each wrist's goal makes up for what it is off, as the
-/// hands of a robot are that has given way to partners, and gives way to what the hand feels.
+/// Closes hands at the poses in `around`. Each wrist's goal makes up for its position error, for example
+/// after it has given way to partners. It also gives way to the forces that the hand feels.
 fn close_compliantly(
     commander: &mut Commander,
     grasps: &[HandGrasp],
@@ -83,7 +85,7 @@ fn close_compliantly(
         for (grasp, goal) in grasps.iter().zip(&mut goals) {
             let wrist = commander.world_from_wrist(grasp.robot, grasp.side)?;
             let mut felt_n = facts.robots[grasp.robot].hand_force_n[grasp.side];
-            // Up and down, a hand feels its weight.
+            // The vertical force includes the hand's weight.
             felt_n.z = 0.0;
             let given_m = goal.translation + (felt_n / STIFFNESS_N_M).clamp_length_max(MAX_GIVE_M);
             goal.translation = wrist.translation + (given_m - wrist.translation).clamp_length_max(LEASH_M);
@@ -98,13 +100,13 @@ fn all_hold(facts: &Facts, grasps: &[HandGrasp]) -> bool {
     grasps.iter().all(|grasp| grasp.is_held(facts))
 }
 
-/// How many stops hands have on their way to what they hold alike.
+/// Returns the number of stops on the hands' way in; all grasps have the same hold.
 fn stops(grasps: &[HandGrasp]) -> usize {
     grasps.first().map_or(0, |grasp| grasp.hold.stops_m.len())
 }
 
-/// Hands open where they are, for opening fingers push; then they leave by the stops that they came by. Those that still touch
-/// go in and out once more, and give way to what they are caught on.
+/// Opens hands where they are, because opening fingers push; then the hands leave by the stops that they
+/// came by. Hands that still touch go in and out once more, and give way to what they are caught on.
 pub fn let_go(commander: &mut Commander, grasps: &[HandGrasp]) -> Result<(), PlayerError> {
     open_in_place(commander, grasps)?;
     for stop in (0..stops(grasps)).rev() {

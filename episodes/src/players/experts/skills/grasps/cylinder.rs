@@ -1,19 +1,20 @@
-//! Shapes of a hand, grasps of upright cylinders, and moving what a hand holds.
+//! Hand shapes, grasps of upright cylinders, and motions of held objects.
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
 use crate::players::PlayerError;
 use crate::players::experts::skills::commander::{Commander, HandMove};
 
-/// Where the axis of a held cylinder lies in a right wrist's frame: in front of the palm, between fingers and thumb.
+/// Position of a held cylinder's axis in a right wrist's frame: in front of the palm, between fingers and
+/// thumb.
 const AXIS_IN_WRIST_M: Vector = Vector::new(0.1195, 0.055, 0.0);
-/// How far from a cylinder a hand begins to come at it, palm first.
+/// Distance from a cylinder at which a hand begins to approach it, palm first.
 const STANDOFF_M: f32 = 0.08;
 
-/// How far ahead of a hand, and beside it, others have to themselves what it has given.
+/// Distance ahead of a hand and beside it by which it clears the object that it has given to another.
 const OUT_OF_THE_WAY_M: Vector = Vector::new(0.16, 0.04, 0.0);
 
-/// A hand that is to hold an upright cylinder.
+/// Grasp of an upright cylinder by one hand.
 #[derive(Clone, Copy)]
 pub struct CylinderGrasp<'a> {
     pub robot: usize,
@@ -26,8 +27,8 @@ pub struct CylinderGrasp<'a> {
 }
 
 impl CylinderGrasp<'_> {
-    /// Wrist motion that has the object in its grip, were the object upright and raised by `raise_m`; `standoff_m` short
-    /// of it.
+    /// Returns the wrist motion to the grip of the object, if that were upright and raised by `raise_m`.
+    /// The hand stays `standoff_m` short of it.
     fn grip(
         &self,
         commander: &mut Commander,
@@ -47,12 +48,13 @@ impl CylinderGrasp<'_> {
         HandMove::reach(self.robot, self.side, world_from_wrist)
     }
 
-    /// Open hand beside the object, `raise_m` above its grip; others may move at the same time.
+    /// Returns the motion of the open hand to beside the object, `raise_m` above its grip; others may move
+    /// at the same time.
     pub fn beside(&self, commander: &mut Commander, raise_m: f32) -> Result<HandMove, PlayerError> {
         Ok(self.grip(commander, raise_m, STANDOFF_M)?.shaped(open_rad(self.side)))
     }
 
-    /// Palm at the object.
+    /// Returns the motion that brings the palm to the object.
     pub fn around(&self, commander: &mut Commander) -> Result<HandMove, PlayerError> {
         self.grip(commander, 0.0, 0.0)
     }
@@ -65,32 +67,34 @@ impl CylinderGrasp<'_> {
         HandMove::shape(self.robot, self.side, open_rad(self.side))
     }
 
-    /// Away from the object, the way it came.
+    /// Returns the motion away from the object, the way the hand came.
     pub fn away(&self, commander: &mut Commander) -> Result<HandMove, PlayerError> {
         back_off(commander, self.robot, self.side, Vector::new(0.0, STANDOFF_M, 0.0))
     }
 
-    /// Back towards the robot, out of the way of what others do with the object.
+    /// Returns the motion back towards the robot, clear of what others do with the object.
     pub fn out_of_the_way(&self, commander: &mut Commander) -> Result<HandMove, PlayerError> {
         back_off(commander, self.robot, self.side, OUT_OF_THE_WAY_M)
     }
 
-    /// Wrist motion that brings the held object's origin to `object_m` (world), upright.
+    /// Returns the wrist motion that brings the held object's origin to `object_m` (world), upright.
     pub fn carry(&self, commander: &mut Commander, object_m: Vector) -> Result<HandMove, PlayerError> {
         self.bring(commander, Pose::from_translation(object_m))
     }
 
-    /// Wrist motion that brings the held object to a pose (world); its turn about its own axis does not matter.
+    /// Returns the wrist motion that brings the held object to a pose (world); its turn about its own axis
+    /// does not matter.
     pub fn bring(&self, commander: &mut Commander, world_from_object: Pose) -> Result<HandMove, PlayerError> {
         let object = commander.facts()?.object(self.object).pose_in_world;
         let wrist = commander.world_from_wrist(self.robot, self.side)?;
-        // How the object is turned about its axis relative to the hand stays as it was grasped.
+        // The object's turn about its axis relative to the hand stays as it was grasped.
         let upright = self.upright_rotation(object, wrist);
         let goal = Pose::from_parts(world_from_object.translation, world_from_object.rotation * upright);
         Ok(self.reach(goal * object.inverse() * wrist))
     }
 
-    /// The rotation that the held object has when its axis stands upright and the hand points along its heading.
+    /// Returns the rotation of the held object when its axis is upright and the hand points along its
+    /// heading.
     fn upright_rotation(&self, object: Pose, wrist: Pose) -> Rotation {
         let held = wrist.rotation.inverse() * object.rotation;
         let level = Rotation::from_rotation_z(self.heading_rad) * held;
@@ -122,7 +126,7 @@ pub fn pick_up_all(commander: &mut Commander, grasps: &[CylinderGrasp]) -> Resul
     Err(PlayerError::GaveUp(format!("could not grasp {}", names.join(" and "))))
 }
 
-/// One attempt: over the objects, down beside them, around them, close.
+/// Makes one attempt: over the objects, down beside them, around them, close.
 fn grasp_once(commander: &mut Commander, grasps: &[CylinderGrasp]) -> Result<(), PlayerError> {
     let each = |commander: &mut Commander,
                 part: fn(&CylinderGrasp, &mut Commander) -> Result<HandMove, PlayerError>| {
@@ -139,12 +143,12 @@ fn grasp_once(commander: &mut Commander, grasps: &[CylinderGrasp]) -> Result<(),
     commander.perform(0.2, &close)
 }
 
-/// Fingers of a right hand around a 7 cm cylinder; a left hand mirrors them.
+/// Finger angles of a right hand around a 7 cm cylinder; a left hand mirrors them.
 const CLOSED_RAD: [f32; 7] = [0.0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3];
-/// The thumb stands off, so that the cylinder passes it.
+/// Finger angles of an open right hand. The thumb is turned away, so that the cylinder passes it.
 pub const OPEN_RAD: [f32; 7] = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0];
 
-/// Fingers of a right hand that are closed so far round something, 1 for a 7 cm cylinder.
+/// Returns the finger angles of a right hand closed by `closure`, which is 1 for a 7 cm cylinder.
 pub const fn wrapped_rad(closure: f32) -> [f32; 7] {
     let mut fingers_rad = CLOSED_RAD;
     let mut i = 0;
@@ -163,7 +167,8 @@ fn open_rad(side: Side) -> [f32; 7] {
     mirrored(OPEN_RAD, side)
 }
 
-/// Every joint of a left hand turns the other way, but for the base of the thumb, which turns about the palm.
+/// Mirrors finger angles of a right hand for `side`. Every joint of a left hand turns the other way, except
+/// the base of the thumb, which turns about the palm.
 pub fn mirrored(right_rad: [f32; 7], side: Side) -> [f32; 7] {
     match side {
         Side::Right => right_rad,
@@ -171,7 +176,8 @@ pub fn mirrored(right_rad: [f32; 7], side: Side) -> [f32; 7] {
     }
 }
 
-/// From where a hand is to where what it let go of is `off_m` farther off, in a right wrist's frame.
+/// Returns the motion of a hand away from a released object, which is then `off_m` farther off, in a right
+/// wrist's frame.
 pub fn back_off(
     commander: &mut Commander,
     robot: usize,
@@ -183,12 +189,12 @@ pub fn back_off(
     Ok(HandMove::reach(robot, side, Pose::from_parts(wrist.translation - back_m, wrist.rotation)))
 }
 
-/// A point given in a right wrist's frame, in the wrist's frame of `side`.
+/// Converts a point from a right wrist's frame to the wrist's frame of `side`.
 pub fn mirrored_m(right_m: Vector, side: Side) -> Vector {
     Vector::new(right_m.x, right_m.y * away(side), right_m.z)
 }
 
-/// Sign of y, in the wrist's frame, on the side that the palm faces: 1 for a right hand.
+/// Returns the sign of y, in the wrist's frame, on the side that the palm faces: 1 for a right hand.
 pub fn away(side: Side) -> f32 {
     -side.sign()
 }

@@ -1,4 +1,4 @@
-//! Grasps of places of an object, as a [`Hold`] has it; what the places belong to is moved as one.
+//! Grasps of places on an object by a [`Hold`]. Everything that the places belong to moves as one.
 
 use tandem_sim::{Pose, Rotation, Side, Vector};
 
@@ -8,7 +8,7 @@ use crate::players::PlayerError;
 use crate::players::experts::skills::commander::{Commander, HandMove};
 use crate::scoring::Facts;
 
-/// A hand that is to hold a place of an object.
+/// Grasp of a place on an object by one hand.
 #[derive(Clone, Copy)]
 pub struct HandGrasp<'a> {
     pub robot: usize,
@@ -17,12 +17,13 @@ pub struct HandGrasp<'a> {
     /// Site of the object.
     pub place: &'a str,
     pub hold: Hold,
-    /// The way that the robot faces, in the object's frame.
+    /// The robot's heading in the object's frame.
     pub heading_rad: f32,
 }
 
 impl<'a> HandGrasp<'a> {
-    /// Both hands of a robot that faces along a heading in the object's frame, each on its place, left first.
+    /// Returns the grasps of both hands of a robot, each on its place, left first. `heading_rad` is the
+    /// robot's heading in the object's frame.
     pub fn with_both_hands(
         robot: usize,
         object: &'a str,
@@ -36,7 +37,7 @@ impl<'a> HandGrasp<'a> {
 }
 
 impl HandGrasp<'_> {
-    /// The wrist's rotation in the object's frame.
+    /// Returns the wrist's rotation in the object's frame.
     fn object_from_wrist(&self) -> Rotation {
         let [yaw_rad, pitch_rad, roll_rad] = self.hold.turned_rad;
         Rotation::from_rotation_z(self.heading_rad - self.side.sign() * yaw_rad)
@@ -44,7 +45,8 @@ impl HandGrasp<'_> {
             * Rotation::from_rotation_x(-self.side.sign() * roll_rad)
     }
 
-    /// Wrist motion to where the place is `off_m` farther off than it is held, in a right wrist's frame.
+    /// Returns the wrist motion to where the place is `off_m` farther off than when it is held, in a right
+    /// wrist's frame.
     fn reach(&self, commander: &mut Commander, off_m: Vector) -> Result<HandMove, PlayerError> {
         let facts = commander.facts()?;
         let object_from_wrist = self.object_from_wrist();
@@ -56,17 +58,18 @@ impl HandGrasp<'_> {
         Ok(HandMove::reach(self.robot, self.side, wrist))
     }
 
-    /// Open hand at a stop on its way in.
+    /// Returns the motion of the open hand to a stop on its way in.
     pub fn at_stop(&self, commander: &mut Commander, stop: usize) -> Result<HandMove, PlayerError> {
         Ok(self.reach(commander, self.hold.stops_m[stop])?.shaped(self.open_rad()))
     }
 
-    /// The hand where it closes.
+    /// Returns the motion to where the hand closes.
     pub fn around(&self, commander: &mut Commander) -> Result<HandMove, PlayerError> {
         self.reach(commander, Vector::ZERO)
     }
 
-    /// From where the hand is to where what it let go of is `off_m` farther off, in a right wrist's frame.
+    /// Returns the motion away from a released object, which is then `off_m` farther off, in a right
+    /// wrist's frame.
     pub fn off(&self, commander: &mut Commander, off_m: Vector) -> Result<HandMove, PlayerError> {
         back_off(commander, self.robot, self.side, off_m)
     }
@@ -79,7 +82,7 @@ impl HandGrasp<'_> {
         self.closing(1.0)
     }
 
-    /// Fingers on their way from open to closed.
+    /// Returns the fingers' shape at `share` of the way from open to closed.
     pub fn closing(&self, share: f32) -> HandMove {
         let (open_rad, closed_rad) = (self.open_rad(), mirrored(self.hold.closed_rad, self.side));
         let between = |i: usize| open_rad[i] + (closed_rad[i] - open_rad[i]) * share;
@@ -90,7 +93,7 @@ impl HandGrasp<'_> {
         HandMove::shape(self.robot, self.side, self.open_rad())
     }
 
-    /// Whether this very hand holds its object.
+    /// Returns `true` if this hand itself holds its object.
     pub fn is_held(&self, facts: &Facts) -> bool {
         facts.holds(self.robot, self.side, self.object)
     }
@@ -129,8 +132,8 @@ pub fn take_together(commander: &mut Commander, grasps: &[HandGrasp]) -> Result<
     Err(PlayerError::GaveUp("not every hand could take hold".into()))
 }
 
-/// Brings an object that all `grasps` hold to a pose (world) in `legs` short straight moves, so that hands and object
-/// stay together on a path that turns.
+/// Brings an object that all `grasps` hold along `path` in `legs` short straight moves. Short moves keep
+/// hands and object together on a path that turns.
 pub fn move_together(
     commander: &mut Commander,
     grasps: &[HandGrasp],

@@ -1,4 +1,4 @@
-//! An upright cylinder goes from hand to hand: picked up, given, stood on a place and let go of.
+//! Upright cylinders that go from hand to hand: they are picked up, given, put on a place and released.
 
 use tandem_sim::Vector;
 
@@ -6,12 +6,12 @@ use super::cylinder::{CylinderGrasp, pick_up_all};
 use crate::players::PlayerError;
 use crate::players::experts::skills::commander::Commander;
 
-/// How far above its place the object is let down from.
+/// Height above its place from which the object is lowered.
 const ABOVE_PLACE_M: Vector = Vector::new(0.0, 0.0, 0.05);
 const ATTEMPTS: usize = 4;
 const RELEASES: usize = 20;
 
-/// Takes what stands on something, and lifts it straight up until it is held in the air.
+/// Takes an object that stands on something, and lifts it straight up until it is held in the air.
 pub fn pick_up(commander: &mut Commander, grasp: &CylinderGrasp, lift_m: Vector) -> Result<(), PlayerError> {
     for _ in 0..ATTEMPTS {
         pick_up_all(commander, &[*grasp])?;
@@ -27,7 +27,8 @@ pub fn pick_up(commander: &mut Commander, grasp: &CylinderGrasp, lift_m: Vector)
     Err(PlayerError::GaveUp(format!("{robot} lost the {}", grasp.object.replace('_', " "))))
 }
 
-/// The taker closes its hand on what the giver holds out; then the giver lets go.
+/// Hands an object over: the taker closes its hand on it while the giver holds it out; then the giver lets
+/// go.
 pub fn hand_over(
     commander: &mut Commander,
     giver: &CylinderGrasp,
@@ -49,7 +50,7 @@ pub fn hand_over(
     Err(PlayerError::GaveUp(format!("{robot} could not take the {}", taker.object.replace('_', " "))))
 }
 
-/// Opens the hand and takes it away until it holds nothing any more: it may be a person's, who takes longer.
+/// Opens the hand and takes it away until it holds nothing. A person who controls the hand may take longer.
 fn let_go(commander: &mut Commander, giver: &CylinderGrasp) -> Result<(), PlayerError> {
     for _ in 0..RELEASES {
         release(commander, giver)?;
@@ -61,7 +62,7 @@ fn let_go(commander: &mut Commander, giver: &CylinderGrasp) -> Result<(), Player
     Err(PlayerError::GaveUp(format!("{robot} does not let go of the {}", giver.object.replace('_', " "))))
 }
 
-/// Stands a held object on a place and lets go of it.
+/// Puts a held object on a place and lets go of it.
 pub fn stand_on(
     commander: &mut Commander,
     grasp: &CylinderGrasp,
@@ -72,7 +73,7 @@ pub fn stand_on(
     let down = grasp.carry(commander, place_m)?;
     commander.perform(0.8, &[down])?;
     release(commander, grasp)?;
-    // The object has to have stood released for a moment.
+    // The object counts as placed only after a moment without touch.
     commander.perform(1.0, &[grasp.open()])
 }
 

@@ -1,5 +1,5 @@
-//! How a hand takes something, as data: how it is turned, where in it the thing lies, how far the fingers close, by which stops it
-//! comes and leaves, and how far off its robot stands. Given for right hands; left hands mirror it.
+//! Holds as data: the hand's turn, the position of the place in the hand, the closure of the fingers, the
+//! stops, and the robot's distance. They are given for right hands; left hands mirror them.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -7,25 +7,27 @@ use tandem_sim::Vector;
 
 use super::cylinder::{OPEN_RAD, wrapped_rad};
 
-/// How a right hand takes a place of an object.
+/// Hold of a place on an object by a right hand.
 #[derive(Clone, Copy)]
 pub struct Hold {
-    /// How the wrist is turned against the way that its robot faces: about z, then about its own y, then about its own x.
+    /// Rotation of the wrist against the robot's heading: about z, then about its own y, then about its own
+    /// x.
     pub turned_rad: [f32; 3],
-    /// Where the place lies in the wrist's frame while the hand holds it.
+    /// Position of the place in the wrist's frame while the hand holds it.
     pub place_in_wrist_m: Vector,
     /// Finger angles in the order of `move_wrists`.
     pub open_rad: [f32; 7],
     pub closed_rad: [f32; 7],
-    /// Where the hand stops on its way in, the farthest first: so much farther off is the place then, in the wrist's frame. It leaves by
-    /// the same stops.
+    /// Stops of the hand on its way in, the farthest first: additional offsets of the place in the wrist's
+    /// frame. The hand leaves by the same stops.
     pub stops_m: &'static [Vector],
-    /// How far behind the places of its hands the robot stands.
+    /// Distance of the robot behind the places of its hands.
     pub behind_m: f32,
 }
 
 impl Hold {
-    /// A bar of 36 mm along the wrist's z axis, of which the place is the axis: the palm on it, fingers and thumb round it.
+    /// A bar of 36 mm along the wrist's z axis; the place is the bar's axis. The palm is on the bar, with
+    /// fingers and thumb round it.
     pub const BAR: Hold = Hold {
         turned_rad: [0.0, 0.0, -FRAC_PI_2],
         place_in_wrist_m: Vector::new(0.105, 0.042, 0.0),
@@ -36,34 +38,39 @@ impl Hold {
         behind_m: 0.29,
     };
 
-    /// The edge of a plate of 30 mm, of which the place is the lower edge: palm and fingers on the plate, the thumb round its edge and
-    /// below. The hand comes from outside, above the plate, and then down. For other plates, y is 17 mm and their thickness.
+    /// The edge of a plate of 30 mm; the place is the lower edge. Palm and fingers are on the plate, the
+    /// thumb round its edge and below. The hand comes from outside, above the plate, and then down. For
+    /// other plates, y is 17 mm plus their thickness.
     pub const EDGE: Hold = Hold {
         turned_rad: [0.0, 0.0, -FRAC_PI_2],
         place_in_wrist_m: Vector::new(0.085, 0.047, 0.0),
-        // The last joint of the thumb is asked for its stop and the middle one for more than the plate leaves it: that presses.
+        // The thumb's last joint is commanded to its stop, and the middle one beyond what the plate allows:
+        // that presses.
         open_rad: [0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0],
         closed_rad: [0.0, -0.9, -1.74, 0.3, 0.2, 0.3, 0.2],
         stops_m: &[Vector::new(0.14, 0.03, 0.0), Vector::new(0.0, 0.03, 0.0)],
         behind_m: 0.32,
     };
 
-    /// The edge of a round plate of 0.8 m and 30 mm: as [`Hold::EDGE`], the hands turned to its middle.
+    /// The edge of a round plate of 0.8 m and 30 mm: [`Hold::EDGE`] with the hands turned to the plate's
+    /// middle.
     pub const ROUND_EDGE: Hold = Hold { turned_rad: [0.15, 0.0, -FRAC_PI_2], behind_m: 0.29, ..Hold::EDGE };
 
-    /// An upright square leg of 28 mm, of which the place is the axis: the palm on its outer side, thumb and fingers round it. The hand
-    /// comes and leaves a little lower, for what stands on the leg lies on the hand.
+    /// An upright square leg of 28 mm; the place is the leg's axis. The palm is on its outer side, thumb
+    /// and fingers round it. The hand comes and leaves a little lower, because the object on the leg rests
+    /// on the hand.
     pub const LEG: Hold = Hold {
         turned_rad: [0.0, 0.0, 0.0],
         place_in_wrist_m: Vector::new(0.100, 0.032, 0.0),
         open_rad: OPEN_RAD,
         closed_rad: [0.0, -0.9, -1.74, 1.0, 1.0, 1.0, 1.0],
         stops_m: &[Vector::new(0.0, 0.09, 0.025), Vector::new(0.0, 0.0, 0.025)],
-        // Nearer by, thighs of robots that sway as they walk press on the legs.
+        // Any nearer, the thighs of robots that sway as they walk press on the legs.
         behind_m: 0.38,
     };
 
-    /// A rim of 24 mm from above, of which the place is the axis: the palm on it, fingers inside, the thumb outside.
+    /// A rim of 24 mm from above; the place is the rim's axis. The palm is on it, fingers inside, the thumb
+    /// outside.
     pub const RIM: Hold = Hold {
         turned_rad: [0.0, 0.0, -FRAC_PI_2],
         place_in_wrist_m: Vector::new(0.095, 0.031, 0.0),
@@ -73,8 +80,8 @@ impl Hold {
         behind_m: 0.29,
     };
 
-    /// The rim of an upright wall, of which the place is the outer edge: the hand points down with its palm on the outside, the thumb
-    /// over the rim. The hand comes from above, beside the wall.
+    /// The rim of an upright wall; the place is the outer edge. The hand points down with its palm on the
+    /// outside, the thumb over the rim. The hand comes from above, beside the wall.
     pub const WALL: Hold = Hold {
         turned_rad: [0.0, FRAC_PI_2, 0.0],
         place_in_wrist_m: Vector::new(0.090, 0.017, 0.0),
@@ -93,7 +100,7 @@ mod tests {
     use super::*;
     use crate::describe::grips;
 
-    /// The hand's turn in the level frame of a robot that faces the thing.
+    /// Returns the hand's rotation in the level frame of a robot that faces the object.
     fn turned(hold: &Hold, side: Side) -> Rotation {
         let [yaw_rad, pitch_rad, roll_rad] = hold.turned_rad;
         Rotation::from_rotation_z(-side.sign() * yaw_rad)

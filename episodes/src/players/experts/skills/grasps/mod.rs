@@ -1,4 +1,4 @@
-//! How hands take things, hold them, hand them over and let them go.
+//! Grasp, hold, handover and release of objects.
 
 mod compliant;
 mod cylinder;
