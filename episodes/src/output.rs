@@ -74,8 +74,7 @@ pub fn write_whole_as(under_way: &Path, path: &Path, bytes: &[u8]) -> Result<(),
     })
 }
 
-/// Returns a temporary name unique to this process and call, since another process may write the same
-/// file.
+/// Returns a temporary name unique to this process and call, since another process may write the same file.
 fn own_partial_path(path: &Path) -> PathBuf {
     static WRITTEN: AtomicU32 = AtomicU32::new(0);
     let number = WRITTEN.fetch_add(1, Ordering::Relaxed);

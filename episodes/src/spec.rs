@@ -1,5 +1,4 @@
-//! The complete definition of an episode in one value, used from requests and flags to sessions,
-//! recordings and results.
+//! The complete definition of an episode in one value, from requests and flags to recordings and results.
 
 mod keyed_seed;
 
@@ -31,8 +30,8 @@ const INSTRUCTIONS: &str = "instructions: ";
 pub const OWN_CONTROLLER: &str = "controller: Tandem's own";
 pub const OWN_WORDS: &str = "instructions: Tandem's own";
 
-/// The complete definition of an episode. Equal specs played with equal calls on the same build end in
-/// the same state, bit for bit.
+/// The complete definition of an episode. Equal specs and calls on one build end in the same state, bit
+/// for bit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeSpec {
     #[serde(with = "crate::tasks::by_id_or_file")]
@@ -44,8 +43,7 @@ pub struct EpisodeSpec {
     pub scene: Option<SceneFile>,
     pub robot: RobotFile,
     pub locomotion: Controller,
-    /// Source of the robots' state and sensor data. Recordings of builds without this choice used the
-    /// simulator's own state.
+    /// Source of the robots' state. Recordings of builds without this choice used the simulator's own.
     #[serde(default = "before_there_was_a_choice")]
     pub sensing: Sensing,
     /// Renderer of the robots' images; it affects nothing else.
@@ -87,13 +85,11 @@ pub enum RobotFile {
     File(OwnRobot),
 }
 
-/// A robot described by a file: MJCF with the elements required of a robot, or a TOML description of
-/// other MJCF.
+/// A robot in a file: MJCF with the elements required of a robot, or a TOML description of other MJCF.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OwnRobot {
     pub path: PathBuf,
-    /// Hash of the file and all that it refers to when the episode was planned; see
-    /// [`RobotSource::fingerprint`].
+    /// Hash of the robot's files when the episode was planned; see [`RobotSource::fingerprint`].
     pub xxh3: String,
 }
 
@@ -125,14 +121,11 @@ pub enum Start {
     /// The task's own start under the seed.
     #[default]
     Task,
-    /// The state of another episode of the same task, seed, protocol, robot and controller, saved in a
-    /// [`crate::Checkpoint`]'s file.
+    /// The state in a [`crate::Checkpoint`]'s file of the same task, seed, protocol, robot and controller.
     Checkpoint(PathBuf),
-    /// The beginning of a phase in a recorded episode of the same task, seed, robot and controller, with
-    /// the whole budget left.
+    /// The start of a recorded phase of the same task, seed, robot and controller, with the whole budget.
     Phase(PhaseStart),
-    /// A moment of a recorded episode of the same task, seed, robot and controller, with the whole budget
-    /// left.
+    /// A moment of a recorded episode of the same task, seed, robot and controller, with the whole budget.
     Moment(MomentStart),
 }
 
@@ -143,8 +136,7 @@ pub struct MomentStart {
     pub recording: PathBuf,
     /// Control step of the recorded episode.
     pub control_step: u64,
-    /// Seconds before the recorded episode failed, if the moment was chosen this way. `None` where an
-    /// operator took over.
+    /// Seconds before the failure of the recorded episode; `None` where an operator took over.
     #[serde(default)]
     pub before_s: Option<u32>,
 }
@@ -159,8 +151,7 @@ pub struct PhaseStart {
 }
 
 impl EpisodeSpec {
-    /// Returns the spec of an episode with the embedded robot and our own controller, from the task's
-    /// start.
+    /// Returns the spec of an episode with the embedded robot and our own controller, from the task's start.
     pub fn new(task: &'static Task, seed: u32, protocol: Protocol) -> EpisodeSpec {
         EpisodeSpec {
             task: task.under(seed),
@@ -208,8 +199,7 @@ impl EpisodeSpec {
         }
     }
 
-    /// Returns the protocol's rules for the task, with the spec's own limit of thinking time if it has
-    /// one.
+    /// Returns the protocol's rules for the task, with the spec's own limit of thinking time if it has one.
     pub fn rules(&self) -> Rules {
         let rules = rules(self.protocol, self.task);
         let own = self.thinking_limit_s.map(|limit_s| Duration::from_secs(limit_s.into()));
@@ -306,8 +296,8 @@ impl EpisodeSpec {
         found.into_iter().flatten().chain(variation.departures()).collect()
     }
 
-    /// Returns the index of the phase at which the episode starts, which alone counts. `None` for any
-    /// other start, where all phases count.
+    /// Returns the index of the phase at which the episode starts, and which alone counts; `None` for
+    /// others.
     pub fn start_phase(&self) -> Option<usize> {
         match &self.start {
             Start::Phase(start) => {
@@ -350,8 +340,7 @@ impl RobotFile {
         RobotFile::with_approximations(path).map(|(robot, _)| robot)
     }
 
-    /// Returns the robot that a file currently describes, and one line for each element that is simulated
-    /// differently from MuJoCo.
+    /// Returns the robot that a file currently describes, and each deviation from MuJoCo in a line.
     pub fn with_approximations(path: &Path) -> Result<(RobotFile, Vec<String>), SimError> {
         let source = RobotSource::read(path)?;
         let xxh3 = format!("{:016x}", source.fingerprint);
@@ -406,8 +395,7 @@ impl SceneFile {
         SceneFile::with_approximations(path).map(|(scene, _)| scene)
     }
 
-    /// Returns the scene that a file currently contains, and one line for each element that is simulated
-    /// differently from MuJoCo.
+    /// Returns the scene that a file currently contains, and each deviation from MuJoCo in a line.
     pub fn with_approximations(path: &Path) -> Result<(SceneFile, Vec<String>), SimError> {
         let document = Document::read(path)?;
         let xxh3 = fingerprint(&document);
@@ -480,8 +468,7 @@ mod tests {
         };
         let words = || OWN_WORDS.to_owned();
         assert_eq!(named(None), (vec![], vec![OWN_CONTROLLER.into(), words()]));
-        // The benchmark's own kind of controller departs from Tandem's default, but not from the
-        // benchmark.
+        // The benchmark's own kind of controller departs from Tandem's default, but not from the benchmark.
         assert_eq!(named(Some("a/walk.onnx")), (vec!["controller: walk.onnx".into()], vec![words()]));
         let looped = "controller: walk.onnx in a loop over its place".to_owned();
         assert_eq!(named(Some("looped:a/walk.onnx")), (vec![looped.clone()], vec![words(), looped]));

@@ -50,8 +50,7 @@ impl Variation {
 const WAVES: usize = 12;
 /// Maximum frequency; above it, the noise would shake rather than drift.
 const FASTEST_RAD_S: f64 = 12.0;
-/// Minimum commanded speeds for noise on the base; below both of them the robot stands, and gets no
-/// noise.
+/// Minimum commanded speeds for noise on the base; below both of them the robot stands, and gets no noise.
 const WALKS_M_S: f32 = 0.02;
 const WALKS_RAD_S: f32 = 0.02;
 /// Separates this random stream from the one that moves objects under the same seed.
@@ -85,9 +84,8 @@ struct RobotNoise {
     base: [SlowNoise; 3],
 }
 
-/// A stationary process with exponentially decaying correlation, as a sum of cosines of random
-/// frequencies (Rahimi and Recht, 2007). The frequencies of the exponential kernel are
-/// Cauchy-distributed.
+/// A stationary process with exponentially decaying correlation, as a sum of cosines of random frequencies
+/// (Rahimi and Recht, 2007). The frequencies of the exponential kernel are Cauchy-distributed.
 #[derive(Clone, Debug)]
 struct SlowNoise {
     deviation: f32,

@@ -30,8 +30,7 @@ const RETURN_1_S: f64 = 3.0;
 const M_PER_RAD: f64 = 0.1;
 /// Weight of one control step in the running mean of the distance.
 const LATELY_PART: f64 = 0.1;
-/// Minimum decrease of the distance, absolute and as a fraction of the distance, for a wrist that
-/// approaches its target; smaller changes are sway.
+/// Minimum decrease of an approaching wrist's distance, absolute and relative; smaller changes are sway.
 const NEARER_M: f64 = 0.003;
 const NEARER_PART: f64 = 0.15;
 /// Minimum yielding that is reported, in metres or radians.
@@ -64,8 +63,7 @@ pub struct MotionState {
     pub(super) restraint: Restraint,
     /// Latest sensed pose of the pelvis.
     world_from_pelvis: Isometry3<f64>,
-    /// Latest sensed load on the pair of hands: forces along the heading and to its left, and the moment
-    /// about the vertical axis through the midpoint of the wrists.
+    /// Latest sensed load on both hands: forces ahead and left, and moment about the midpoint's vertical.
     pull_n: [f64; 2],
     turning_n_m: f64,
     /// Displacement of the hands by yielding to each of these.
@@ -73,8 +71,7 @@ pub struct MotionState {
     yielded_rad: f64,
     /// The solver's memory of steps that did not help; see [`Solver::caution`].
     caution: f64,
-    /// Distance of each wrist from its target, now and recently; `None` before the first reading under
-    /// the current aim.
+    /// Current and recent distances of the wrists from their targets; `None` before the first reading.
     pub(super) approaches: Sides<Option<Approach>>,
     pub(super) footing: Footing,
 }
@@ -155,8 +152,7 @@ impl Motion {
         Motion { robot, solver: body.solver(), body: body.clone(), state }
     }
 
-    /// Sets the inputs of hand control until the next reading: the pelvis, and the force of the world on
-    /// each hand (world frame).
+    /// Sets the pelvis, and the world's force on each hand (world frame), until the next reading.
     pub fn sense(&mut self, world_from_pelvis: Isometry3<f64>, hands_n: Sides<Vector3<f64>>) {
         self.state.world_from_pelvis = world_from_pelvis;
         let wrists = self.commanded_wrists();
@@ -200,8 +196,7 @@ impl Motion {
         UnitQuaternion::from_axis_angle(&Vector3::z_axis(), ahead.y.atan2(ahead.x))
     }
 
-    /// Moves the yielding of the hands by one control step. Without compliance, they return to their
-    /// targets.
+    /// Moves the yielding of the hands by one control step. Without compliance, they return to their targets.
     ///   dy/dt = F / c - l y,   |y| <= y_max
     pub(super) fn give_way(&mut self, compliance: Compliance) {
         let Compliance { ahead_n_s_m, side_n_s_m, turn_n_m_s_rad } = compliance;
@@ -232,8 +227,7 @@ impl Motion {
         self.state.world_from_pelvis.rotation.inverse() * level_m
     }
 
-    /// Returns the midpoint of the wrists under the commanded joints, without the yielding, in the pelvis
-    /// frame.
+    /// Returns the wrists' midpoint under the commanded joints without the yielding, in the pelvis frame.
     fn commanded_middle_m(&self) -> Vector3<f64> {
         let wrists = self.commanded_wrists();
         0.5 * (wrists.left.translation.vector + wrists.right.translation.vector) - self.yielded_m()
@@ -247,7 +241,7 @@ impl Motion {
         &self.state
     }
 
-    /// Joint targets of waist, arms and hands in radians.
+    /// Returns the joint targets of waist, arms and hands in radians.
     pub fn upper_rad(&self) -> &[f64; UPPER_JOINTS] {
         &self.state.upper_rad
     }
@@ -266,8 +260,7 @@ impl Motion {
         }
     }
 
-    /// Returns the state of an equal robot after `command`, with its pelvis at `world_from_pelvis`. The
-    /// hands' poses follow from the joint targets.
+    /// Returns the state of an equal robot after `command`; the hands' poses follow from the joint targets.
     pub fn told(&self, command: &RobotCommand, world_from_pelvis: Isometry3<f64>) -> MotionState {
         Motion::new(self.robot.clone(), &self.body, command, world_from_pelvis).state
     }
@@ -293,8 +286,7 @@ impl Motion {
         BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m }
     }
 
-    /// Returns the target wrist poses in the current pelvis frame. Without a target, the pose follows
-    /// from the arm's joint targets.
+    /// Returns the target wrist poses in the pelvis frame; without a target, those of the joint targets.
     pub fn targets(&self) -> Sides<Isometry3<f64>> {
         let commanded = self.commanded_wrists();
         let asked = self.in_pelvis(&self.state.aims);
@@ -357,8 +349,7 @@ impl Motion {
         self.aim(Sides::both(Aim::Joints), Restraint::default());
     }
 
-    /// Returns aims of the current kinds at which the wrists would already be, under the commanded joints
-    /// and without the yielding.
+    /// Returns aims of the current kinds that the commanded joints would meet without the yielding.
     pub(super) fn arrived(&self) -> Sides<Aim> {
         let as_told = self.yielding(self.commanded_middle_m()).inverse();
         let commanded = self.commanded_wrists().map(|wrist| as_told * wrist);
@@ -384,10 +375,8 @@ impl Motion {
         self.body.wrists.map(|wrist| configuration.root_from_frame(wrist))
     }
 
-    /// Moves the joint targets by one step towards `aims`; an arm without a target keeps its joints.
-    ///
-    /// Inverse kinematics starts at the commanded joints, not the measured ones, so the sag under gravity
-    /// does not accumulate.
+    /// Moves the joint targets by one step towards `aims`; an arm without a target keeps its joints. Inverse
+    /// kinematics starts at the commanded joints, so the sag under gravity does not accumulate.
     pub(super) fn follow(&mut self, aims: &Sides<Aim>) {
         let targets = self.in_pelvis(aims);
         if targets == Sides::both(None) {
@@ -400,8 +389,7 @@ impl Motion {
         self.solver.limits.velocity = body.speeds_rad_s(&targets, keeps_waist);
         self.solver.caution = self.state.caution;
         if let Outcome::Infeasible { .. } = self.solver.track(&mut configuration, &tasks, &[]) {
-            // Shapes that already overlap can contradict each other; the joints must still be able to
-            // separate them.
+            // Shapes that already overlap can contradict each other; the joints must still get out.
             let barrier = self.solver.self_collision.take();
             self.solver.track(&mut configuration, &tasks, &[]);
             self.solver.self_collision = barrier;
@@ -416,15 +404,13 @@ impl Motion {
         }
     }
 
-    /// Returns true if these joint targets move the centre of mass ahead beyond the limit, and farther
-    /// than the current ones do.
+    /// Returns true if these joint targets move the centre of mass beyond the limit, and farther than now.
     fn has_to_step(&self, upper_rad: &[f64; UPPER_JOINTS]) -> bool {
         let ahead_m = self.ahead_m(upper_rad);
         ahead_m > STEPS_AHEAD_M && ahead_m > self.ahead_m(&self.state.upper_rad)
     }
 
-    /// Returns the forward displacement of the whole robot's centre of mass under these joint targets,
-    /// compared with resting arms.
+    /// Returns how far these joint targets move the whole robot's centre of mass ahead of that at rest.
     fn ahead_m(&self, upper_rad: &[f64; UPPER_JOINTS]) -> f64 {
         ahead_m(&self.robot.model, upper_rad) - self.body.rest_ahead_m(&self.robot.model)
     }
@@ -434,13 +420,11 @@ impl Motion {
         self.body.tolerance(side)
     }
 
-    /// Predicts how close to `targets` (pelvis frame) the wrists would come to rest. An arm without a
-    /// target keeps its joints.
+    /// Predicts the rest poses for `targets` (pelvis frame); an arm without a target keeps its joints.
     pub fn reach(&self, targets: &Sides<Option<Isometry3<f64>>>, keeps_waist: bool) -> Reach {
         let speeds_rad_s = self.body.speeds_rad_s(targets, keeps_waist);
         let tasks = self.body.tasks(targets, 1.0);
-        // A command moves there step by step, and leaves the trunk more upright than the directly solved
-        // posture.
+        // A command moves there step by step, and leaves the trunk more upright than the direct solution.
         let mut twin = self.another();
         twin.state.restraint = Restraint { keeps_waist, stands_fast: false };
         let aims = targets.map(|target| target.map_or(Aim::Joints, Aim::Carried));
@@ -448,8 +432,7 @@ impl Motion {
         let mut asked = targets.by_side().filter(|(_, target)| target.is_some());
         let configuration = match asked.all(|(side, _)| self.body.turns_hand[side]) {
             true => self.body.posture(self.configuration(), &tasks, &speeds_rad_s),
-            // For an arm that cannot set its hand's orientation, the direct solution sacrifices the
-            // position to the orientation.
+            // The direct solution would sacrifice the position of a limited arm to the orientation.
             false => twin.configuration(),
         };
         let mut errors = frame_errors(&configuration, &tasks);
@@ -481,8 +464,7 @@ fn configuration<'a>(body: &'a UpperBody, state: &MotionState) -> Configuration<
 }
 
 impl Aim {
-    /// Returns the requested wrist pose in the frame of a pelvis at `world_from_pelvis`; `None` for
-    /// joints.
+    /// Returns the requested wrist pose in the frame of a pelvis at `world_from_pelvis`; `None` for joints.
     pub fn in_pelvis(&self, world_from_pelvis: &Isometry3<f64>) -> Option<Isometry3<f64>> {
         match self {
             Aim::Joints => None,
@@ -500,8 +482,7 @@ impl Aim {
         }
     }
 
-    /// Interpolates from this aim to `goal`, in the goal's frame. Returns the goal itself if the two are
-    /// of different kinds.
+    /// Interpolates from this aim to `goal`, in its frame. Returns `goal` if the two are of different kinds.
     pub fn towards(&self, goal: &Aim, share: f64) -> Aim {
         match (self, goal) {
             (Aim::World(from), Aim::World(to)) => Aim::World(between(from, to, share)),

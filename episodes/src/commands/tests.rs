@@ -281,8 +281,7 @@ fn a_half_that_is_left_out_is_where_the_hand_is_to_be() {
     play(action(higher, &motion), Vector3::zeros(), &mut motion);
     let moved = motion.targets().right;
     assert!((moved.translation.vector - Vector3::new(0.28, -0.24, 0.3)).norm() < 1e-12);
-    // The target is converted to the world frame and back; rounding to six decimals would be much
-    // coarser.
+    // The target is converted to the world frame and back; rounding to six decimals would be much coarser.
     assert!(moved.rotation.angle_to(&target.rotation) < 1e-12);
     let turned = WristMove { right_quaternion_wxyz: Some([0.8, 0.6, 0.0, 0.0]), ..WristMove::hold("A") };
     play(action(turned, &motion), Vector3::zeros(), &mut motion);

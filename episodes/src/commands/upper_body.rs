@@ -115,8 +115,7 @@ impl UpperBody {
         solver
     }
 
-    /// Solves for the posture that fits the tasks best, starting from another one, with these speed
-    /// limits.
+    /// Solves for the posture that fits the tasks best, starting from another one, with these speed limits.
     pub fn posture<'a>(
         &self,
         from: Configuration<'a>,

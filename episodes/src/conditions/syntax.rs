@@ -57,8 +57,7 @@ pub enum Arithmetic {
     Over,
 }
 
-/// Operators by precedence, the weakest first; all are left-associative. A longer token precedes its
-/// prefix.
+/// Operators by precedence, the weakest first; all are left-associative. A longer token precedes its prefix.
 const LEVELS: [&[(&str, Operator)]; 5] = [
     &[("||", Operator::Or)],
     &[("&&", Operator::And)],

@@ -1,5 +1,4 @@
-//! The brief: frames, cameras and hands in words, for policies. The numbers are those of the embedded
-//! robot.
+//! The brief: frames, cameras and hands in words, for policies. The numbers are those of the embedded robot.
 
 use tandem_tools_spec::{Assistance, BaseLimits, Brief, Hints, Wording};
 
@@ -8,8 +7,7 @@ use super::grips::grips;
 const FRAMES: &str = "Poses of wrists and camera, and points of query_depth, are in the robot's own pelvis frame as it is at that \
     moment: x forward, y left, z up, metres. Quaternions are [w, x, y, z].";
 
-/// Text for our own controller. Controllers from files take no height command, and walk at their own
-/// height.
+/// Text for our own controller. Controllers from files take no height command, and walk at their own height.
 const BENT_KNEES: &str = " A robot walks with bent knees: while it steps its pelvis is 0.62 to 0.68 m high, whatever height is \
     commanded, and rises to that height when it stands. What its hands hold sinks and rises along.";
 
@@ -90,8 +88,7 @@ const WAITING: &str = " To wait for a partner, send a plan of one `wait` of up t
     {\"heard\": true}, {\"touching\": true}, {\"force_above_n\": 5} or {\"phase_reached\": \"p1\"}: it is answered once, and the partner's commands \
     go on meanwhile.";
 
-/// Returns the part of an operator's brief about partners; `may_talk` is true if they may exchange
-/// messages.
+/// Returns the part of an operator's brief about partners; `may_talk` is true if they may exchange messages.
 pub fn teamwork(assistance: Assistance, may_talk: bool) -> String {
     let waiting = if assistance == Assistance::Full { WAITING } else { "" };
     // Without messages there is nothing to hear.

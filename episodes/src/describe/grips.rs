@@ -1,6 +1,5 @@
-//! Worked grips, one for each kind of object in the tasks, as policies are given them. They are the
-//! experts' own; a test in this crate compares them. Another test has a robot perform each by this
-//! information alone.
+//! Worked grips, one for each kind of object in the tasks, as policies are given them. They are the experts'
+//! own; a test in this crate compares them. Another test has a robot perform each by this information alone.
 
 use tandem_tools_spec::WorkedGrip;
 

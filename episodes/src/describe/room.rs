@@ -6,9 +6,8 @@ use tandem_sim::{ObjectModel, Pose, Rotation, SimError, Vector, wrapped_rad};
 
 use crate::tasks::{ObjectSpot, RobotSpot, Spread, Task};
 
-/// Returns one line for each object of a task, for example "service trolley, 0.72 m along A's x, 0.44 m
-/// along its y, 0.92 m high: middle 0.85 m ahead of A, 3.65 m ahead of B (from the pelvis, give or take
-/// 0.32 m)".
+/// Returns one line for each object of a task, for example "service trolley, 0.72 m along A's x, 0.44 m along
+/// its y, 0.92 m high: middle 0.85 m ahead of A, 3.65 m ahead of B (from the pelvis, give or take 0.32 m)".
 pub fn room(task: &Task, spread: Spread) -> Result<Vec<String>, SimError> {
     let line = |spot: &ObjectSpot| {
         let first = &task.robots[0];

@@ -1,5 +1,4 @@
-//! Constants of an episode for viewers: shapes, names and limits, and the renderer for the robots'
-//! images.
+//! Constants of an episode for viewers: shapes, names and limits, and the renderer for the robots' images.
 
 use std::sync::{Mutex, PoisonError};
 

@@ -138,8 +138,7 @@ impl Region<'_> {
 }
 
 impl Plane {
-    /// Returns the least-squares plane through the mean of these points, with its normal towards the
-    /// camera.
+    /// Returns the least-squares plane through the mean of these points, with its normal towards the camera.
     fn nearest<'a>(points: impl Iterator<Item = &'a Vector3<f64>> + Clone) -> Plane {
         let count = points.clone().count() as f64;
         let middle_m = points.clone().sum::<Vector3<f64>>() / count;

@@ -60,8 +60,7 @@ impl ThinkingClock {
         self.spent
     }
 
-    /// Restores an earlier [`ThinkingClock::spent`], for example when an episode resumes from a
-    /// checkpoint.
+    /// Restores an earlier [`ThinkingClock::spent`], for example when an episode resumes from a checkpoint.
     pub fn set_spent(&mut self, spent: Duration) {
         self.spent = spent;
     }

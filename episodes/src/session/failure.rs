@@ -9,8 +9,7 @@ use super::{Checkpoint, FailedStep, Session, monotonic};
 use crate::EpisodeError;
 use crate::commands::MotionState;
 
-/// Name of the file beside the recording: a [`Checkpoint`] of the last good step, with its
-/// [`FailedStep`].
+/// Name of the file beside the recording: a [`Checkpoint`] of the last good step, with its [`FailedStep`].
 pub const FAILED_STEP_FILE: &str = "failed_step.checkpoint";
 /// Control steps between snapshots of the world, and so the maximum number of steps to simulate again.
 const KEPT_STEPS: usize = 50;

@@ -40,8 +40,7 @@ pub enum KeptRequest {
     Call {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         operator: Option<String>,
-        /// Extra information shown to a policy in this process; `None` if the caller itself reads the
-        /// answer.
+        /// Extra information shown to a policy in this process; `None` if the caller itself reads the answer.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         shown: Option<Vec<ExtraInformation>>,
         tool: String,

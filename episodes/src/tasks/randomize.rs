@@ -124,8 +124,7 @@ impl Task {
     }
 }
 
-/// Rotates a point about the vertical axis through another point. A point on the axis is returned
-/// unchanged.
+/// Rotates a point about the vertical axis through another point. A point on the axis is returned unchanged.
 fn turned(point_m: [f32; 3], centre_m: [f32; 3], yaw_rad: f32) -> [f32; 3] {
     let [x_m, y_m] = [point_m[0] - centre_m[0], point_m[1] - centre_m[1]];
     if yaw_rad == 0.0 || (x_m == 0.0 && y_m == 0.0) {

@@ -1,5 +1,4 @@
-//! Tests of sessions with real physics: repeatability, effects of commands, and costs charged to a
-//! policy.
+//! Tests of sessions with real physics: repeatability, effects of commands, and costs charged to a policy.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};

@@ -38,9 +38,8 @@ pub struct Felt {
     pub touch: Option<Touch>,
 }
 
-/// Senses the grip of a hand. A scored hold needs opposite contact forces, but torques do not reveal
-/// their directions. A force on the fingertip and twice that force halfway along the finger have the same
-/// torque.
+/// Senses the grip of a hand. A scored hold needs opposite contact forces, but torques do not reveal their
+/// directions. A force on the fingertip and twice that force halfway along the finger have the same torque.
 pub fn felt(side: Side, sensed: &RobotSensed, model: &RobotModel) -> Felt {
     let closing: [f32; HAND_JOINTS] = std::array::from_fn(|finger| closing_n_m(side, finger, sensed));
     let most = |joints: Range<usize>| closing[joints].iter().copied().fold(0.0, f32::max);

@@ -36,8 +36,7 @@ const MAX_SURFACES: usize = 3;
 const BACKGROUND_M: f64 = 2.0;
 const BACKGROUND_PART: f64 = 0.25;
 
-/// Poses of the camera (MuJoCo's axes): in the frame of the reply, and in the level frame for
-/// measurements.
+/// Poses of the camera (MuJoCo's axes): in the frame of the reply, and in the level frame for measurements.
 pub struct CameraPoses {
     pub frame_from_camera: Isometry3<f64>,
     pub level_from_camera: Isometry3<f64>,
@@ -314,8 +313,7 @@ mod tests {
     const WIDTH: usize = 60;
     const HEIGHT: usize = 40;
 
-    /// Returns a view of a grey wall at 2 m with a red spot, and a red square rotated onto its corner at
-    /// 1 m.
+    /// Returns a view of a grey wall at 2 m with a red spot, and a red square rotated onto its corner at 1 m.
     fn view() -> RobotView {
         let mut rgb = Vec::new();
         let mut depth_m = Vec::new();

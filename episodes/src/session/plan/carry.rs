@@ -29,12 +29,10 @@ const CREEP_M_S: f64 = 0.02;
 const LAG_M: [f64; 2] = [0.13, 0.18];
 const LAGS_COMMANDS: u32 = 16;
 const TURNED_RAD: [f64; 2] = [0.12, 0.2];
-/// Number of commands with a robot turned away, or a wrist out of reach, after which the path is given
-/// up.
+/// Number of commands with a robot turned away, or a wrist out of reach, after which the path is given up.
 const STRAYS_COMMANDS: u32 = 3;
-/// Gain on the distance from the path, and limits of the total speed and of the yaw rate. Robots walk
-/// half a second behind their commands, and twice this gain makes them oscillate with a growing
-/// amplitude.
+/// Gain on the distance from the path, and limits of the total speed and of the yaw rate. Robots walk half a
+/// second behind their commands, and twice this gain makes them oscillate with a growing amplitude.
 const GAIN_1_S: f64 = 0.5;
 const MAX_SPEED_M_S: f64 = 0.3;
 const TURN_RAD_S: f64 = 0.4;

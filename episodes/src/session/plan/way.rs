@@ -56,8 +56,7 @@ impl Stand {
         Stand { at_m: pelvis.translation.vector.xy(), heading_rad: ahead.y.atan2(ahead.x) }
     }
 
-    /// Returns the places of a destination for a robot that stands here: its waypoints, then the
-    /// destination.
+    /// Returns the places of a destination for a robot that stands here: its waypoints, then the destination.
     pub fn places(&self, entry: &Destination) -> Vec<Stand> {
         let mut heading_rad = self.heading_rad;
         let waypoints =

@@ -50,8 +50,7 @@ impl Replay {
         Ok(Replay { session, hands })
     }
 
-    /// Repeats a call at the policy's thinking time `thought`; `shown` is that of
-    /// [`crate::RecordedCall`].
+    /// Repeats a call at the policy's thinking time `thought`; `shown` is that of [`crate::RecordedCall`].
     pub fn call(
         &mut self,
         called: &Called,

@@ -10,8 +10,7 @@ use crate::tasks::{PhaseCondition, PhaseSetting, Task};
 const KEPT_BACK: &str = "what else it asks for depends on what the seed has chosen, and is not told";
 
 impl Session {
-    /// Returns the next phase and what it lacks. `None` after the last phase, or if phases are not
-    /// disclosed.
+    /// Returns the next phase and what it lacks. `None` after the last phase, or if phases are not disclosed.
     pub(in crate::session) fn next_phase(&self) -> Option<NextPhase> {
         if !self.spec().disclosure.tells(self.ended.is_some()) {
             return None;

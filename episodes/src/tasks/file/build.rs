@@ -206,8 +206,7 @@ impl Reading<'_> {
         Some((name, mjcf))
     }
 
-    /// Resolves the name of a scene or an object: a file beside the task file, or one embedded in the
-    /// binary.
+    /// Resolves the name of a scene or an object: a file beside the task file, or one embedded in the binary.
     fn named(
         &mut self,
         name: &Spanned<String>,

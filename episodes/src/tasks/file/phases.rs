@@ -237,8 +237,7 @@ fn at_in_file(start: usize, at: Range<usize>) -> Range<usize> {
     start + at.start..start + at.end
 }
 
-/// Returns the default nearness of a phase: the mean nearness of the conditions that must hold to reach
-/// it.
+/// Returns the default nearness of a phase: the mean nearness of the conditions that must hold to reach it.
 fn nearness_of(conditions: &[PhaseCondition]) -> Nearness {
     let counts = |asked: &&PhaseCondition| match asked.setting {
         PhaseSetting::Done

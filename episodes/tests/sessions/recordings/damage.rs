@@ -17,8 +17,7 @@ use crate::common::*;
 /// Number of flipped bytes and of cuts, over all recordings.
 const FLIPS: usize = 2000;
 const CUTS: usize = 200;
-/// One in `RECOVERED` damaged recordings is recovered as well, and one in `SIMULATED` of these is
-/// simulated.
+/// One in `RECOVERED` damaged recordings is recovered as well, and one in `SIMULATED` of these is simulated.
 const RECOVERED: usize = 5;
 const SIMULATED: usize = 10;
 
@@ -57,8 +56,7 @@ fn content(recording: &Recording) -> (Vec<(u64, String)>, Vec<RecordedCall>) {
     (hashes, recording.tool_calls().unwrap())
 }
 
-/// Checks that the content recovered from `bytes` is a prefix of `original`, or that nothing is
-/// recovered.
+/// Checks that the content recovered from `bytes` is a prefix of `original`, or that nothing is recovered.
 fn recovers_a_beginning(bytes: &[u8], original: &Recording, folder: &Path, simulate: bool, what: &str) {
     let partial = folder.join("episode.mcap.partial");
     fs::write(&partial, bytes).unwrap();
@@ -201,8 +199,7 @@ fn a_chunk_that_says_it_is_huge_is_refused_before_it_is_decompressed() {
     }
 }
 
-/// Recordings of other programs may have no checksums. They are replayed, and the unchecked parts are
-/// listed.
+/// Recordings of other programs may have no checksums. They are replayed, and the unchecked parts are listed.
 #[test]
 fn a_recording_without_checksums_is_replayed_and_says_what_is_not_covered() {
     let folder = tempfile::tempdir().unwrap();

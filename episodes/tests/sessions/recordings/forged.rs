@@ -33,8 +33,7 @@ fn entries(bytes: &[u8]) -> Vec<mcap::records::Metadata> {
     metadata.collect()
 }
 
-/// Replaces a recording with a copy as another program might write it, with changed metadata of its
-/// episode.
+/// Replaces a recording with a copy as another program might write it, with changed metadata of its episode.
 fn forge(folder: &Path, change: impl Fn(&mut Entries)) {
     let path = folder.join(Recorder::FILE_NAME);
     let bytes = fs::read(&path).unwrap();

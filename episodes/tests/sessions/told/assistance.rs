@@ -13,8 +13,7 @@ use tandem_tools_spec::{
 
 use crate::common::*;
 
-/// Fields of replies under `paper`, by tool. All commands have the same fields. `*` is the name of a
-/// joint.
+/// Fields of replies under `paper`, by tool. All commands have the same fields. `*` is the name of a joint.
 const PAPER: &[(&str, &str)] = &[
     (
         "command",
@@ -188,8 +187,7 @@ impl PrivilegedEpisode for Listening {
     }
 }
 
-/// Plays an expert's episode. Returns the times of its phases, and the fields of the replies until its
-/// end.
+/// Plays an expert's episode. Returns the times of its phases, and the fields of the replies until its end.
 fn listen(assistance: Assistance) -> (Vec<Option<f64>>, EndReason, Told) {
     let spec = spec("pouring", 2003, Protocol::Agentic).assisted(assistance);
     let session = Session::start(&spec, None).unwrap();
@@ -218,8 +216,7 @@ fn replies_of_a_whole_episode_tell_what_is_listed_and_nothing_else() {
     assert_eq!(paper_times_s, full_times_s, "an expert needs nothing of what only `full` tells");
 }
 
-/// A policy in this process gets the information that it asks for under any assistance, and this is
-/// counted.
+/// A policy in this process gets the information that it asks for under any assistance, and this is counted.
 #[test]
 fn what_is_shown_beyond_the_benchmark_is_counted() {
     use tandem_episodes::players::LocalEpisode as _;

@@ -1,5 +1,4 @@
-//! Tests of code blocks: every fence declares a check, and each block that is not a command passes its
-//! check.
+//! Tests of code blocks: every fence declares a check, and each block that is not a command passes its check.
 
 use std::{
     fs,

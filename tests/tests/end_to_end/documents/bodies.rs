@@ -8,8 +8,7 @@ use tandem_tests::TestServer;
 
 use super::pages::{Block, Page, pages};
 
-/// Returns the blocks in all pages whose purpose begins with `purpose`, each with the rest of its
-/// purpose.
+/// Returns the blocks in all pages whose purpose begins with `purpose`, each with the rest of its purpose.
 fn json_blocks(purpose: &str) -> Vec<(Page, Block, String)> {
     let mut found = Vec::new();
     for page in pages() {

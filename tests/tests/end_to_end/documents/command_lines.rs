@@ -161,8 +161,7 @@ fn expect_feature(feature: &str) -> Result<(), String> {
     }
 }
 
-/// Checks that the named package, or any, has this integration test and the module by which it is
-/// filtered.
+/// Checks that the named package, or any, has this integration test and the module by which it is filtered.
 fn expect_test(args: &[&str], test: &str) -> Result<(), String> {
     let package = args.windows(2).find(|pair| pair[0] == "-p").map(|pair| pair[1]);
     let folders = match package {

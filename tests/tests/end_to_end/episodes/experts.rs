@@ -28,8 +28,7 @@ const STANDING: [&str; 4] = ["handover", "pouring", "frame_hang", "co_pouring"];
 const SEEDS: [u32; 3] = [7030, 7054, 7081];
 
 /// Plays the experts of `tasks`. Checks that phases are reached in order, and that at most `may_fail`
-/// episodes fail in total and at most one of each task. No robot may fall, whether the task is solved or
-/// not.
+/// episodes fail in total and at most one of each task. No robot may fall, whether the task is solved or not.
 fn solve(tasks: Vec<&'static Task>, may_fail: usize) {
     let plan = EvaluationPlan {
         player: players::find("expert").expect("a player"),
@@ -170,8 +169,7 @@ struct Lift {
 }
 
 const CONSOLE: &str = "console_table";
-/// Distance from the table's middle to the carriers' pelvises: 0.37 m to the legs, and 0.38 m behind
-/// them.
+/// Distance from the table's middle to the carriers' pelvises: 0.37 m to the legs, and 0.38 m behind them.
 const MIDDLE_FROM_PELVIS_M: f32 = 0.75;
 
 impl Episode for Lift {

@@ -1,5 +1,4 @@
-//! Tests of learned policies as clients: MessagePack, raw images, depth, and joint rows for one robot or
-//! all.
+//! Tests of learned policies as clients: MessagePack, raw images, depth, and joint rows for one robot or all.
 
 use serde::Deserialize;
 use serde_json::{Value, json};

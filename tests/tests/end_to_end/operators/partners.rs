@@ -73,8 +73,7 @@ fn an_expert_for_each_robot_plays_the_task_to_its_end() {
     assert!(format!("{notes:?}").contains("The task's expert drives robot B."));
 }
 
-/// An operator's token cannot start the expert or a policy, neither for its own robot nor for a
-/// partner's.
+/// An operator's token cannot start the expert or a policy, neither for its own robot nor for a partner's.
 #[test]
 fn who_started_the_episode_decides_who_drives_beside_operators() {
     let act = ActServer::start(|_| (200, json!({ "actions": [] })));

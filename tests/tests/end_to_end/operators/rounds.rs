@@ -290,8 +290,7 @@ fn only_who_asks_for_operators_gets_them() {
     assert_eq!(server.get("/healthz").ok()["episodes"], 1);
 }
 
-/// Every list of tools, and every text that names tools, includes `say` if and only if the caller may use
-/// it.
+/// Every list of tools, and every text that names tools, includes `say` if and only if the caller may use it.
 #[test]
 fn who_may_not_talk_is_not_offered_to() {
     let quiet = Team::start(json!({}));

@@ -1,5 +1,4 @@
-//! Tests of phases at both sides of every published threshold, in modified worlds: the tasks with
-//! walking.
+//! Tests of phases at both sides of every published threshold, in modified worlds: the tasks with walking.
 
 use std::f32::consts::FRAC_PI_2;
 

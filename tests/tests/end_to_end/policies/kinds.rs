@@ -187,8 +187,7 @@ fn a_policy_may_see_two_moments() {
         let way = if now > 0.5 || now > -0.5 && now < before { -0.05 } else { 0.05 };
         (1..=16u8).map(|row| vec![now + way * f32::from(row)]).collect()
     });
-    // One observation at each request, and one before the next request, a row of five control steps
-    // earlier.
+    // One observation at each request, and one before the next request, a row of five control steps earlier.
     assert_eq!(played.asked.len(), 25);
     assert_eq!(played.calls("observe").len(), 25 + 25);
     assert_eq!(

@@ -1,5 +1,4 @@
-//! Tests of agents as programs. The program is this test's own binary, started again to run `agent`
-//! below.
+//! Tests of agents as programs. The program is this test's own binary, started again to run `agent` below.
 
 use std::{env, fs, io::Read, path::Path, time::Duration};
 

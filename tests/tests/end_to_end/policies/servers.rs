@@ -83,8 +83,7 @@ fn an_openpi_policy_sees_feels_and_turns_wrists() {
     near(LEFT_WRIST, 0, 0.3);
     near(RIGHT_WRIST, 1, 0.5);
 
-    // One trial with black images, then twenty requests for each robot, in which A's measured wrist
-    // turns.
+    // One trial with black images, then twenty requests for each robot, in which A's measured wrist turns.
     let requests = server.requests.lock().expect("no panic");
     assert_eq!(requests.len(), 41);
     let bright = |request: &Value| {

@@ -1,5 +1,4 @@
-//! Tests of a policy behind XPolicyLab's frames: its observations, and that the robots execute its
-//! responses.
+//! Tests of a policy behind XPolicyLab's frames: its observations, and that the robots execute its responses.
 
 use std::{
     collections::{BTreeMap, BTreeSet},

@@ -1,5 +1,4 @@
-//! Tests of many clients at once, and of clients over their limits: each gets a response, or a time to
-//! retry.
+//! Tests of many clients at once, and of clients over their limits: each gets a response, or a time to retry.
 
 use std::{
     thread,

@@ -187,8 +187,7 @@ impl Kept {
         Kept(stream)
     }
 
-    /// Sends a request without a body and returns the status; `None` if the server has closed the
-    /// connection.
+    /// Sends a request without a body and returns the status; `None` if the server has closed the connection.
     fn ask(&mut self, path: &str, token: &str) -> Option<u16> {
         let request =
             format!("GET {path} HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer {token}\r\n\r\n");

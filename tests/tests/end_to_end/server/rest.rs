@@ -1,5 +1,4 @@
-//! Tests of episodes over REST: their life cycle from start to recording, and which calls interrupt
-//! others.
+//! Tests of episodes over REST: their life cycle from start to recording, and which calls interrupt others.
 
 use std::{
     io::Write,
