@@ -1,4 +1,4 @@
-//! How files of an episode are written, and why that can fail.
+//! Writing of an episode's files, and its errors.
 
 use std::{
     fs::{self, File},
@@ -8,7 +8,7 @@ use std::{
     sync::atomic::{AtomicU32, Ordering},
 };
 
-/// Why a file of a run folder could not be written.
+/// Error while a file of a run folder is written.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
     #[error("cannot write {}: {source}; give a folder on a disk with space that may be written to", path.display())]
@@ -22,7 +22,7 @@ pub enum OutputError {
 }
 
 impl OutputError {
-    /// Why the recording at `path` cannot be written. What the system has said comes out as it said it.
+    /// Wraps an error of the recording at `path`. An I/O error is reported as such.
     pub fn of_recording(path: &Path, source: mcap::McapError) -> OutputError {
         match source {
             mcap::McapError::Io(source) => OutputError::Io { path: path.into(), source },
@@ -31,7 +31,8 @@ impl OutputError {
     }
 }
 
-/// A text as a terminal may show it: what others have written cannot move its cursor, change its colours or its title.
+/// Returns a text that is safe to print to a terminal. Control characters are replaced, so text from
+/// other sources cannot move the cursor or change colours and title.
 pub fn printable(text: &str) -> String {
     let shown = |character: char| match character {
         '\n' | '\t' => character,
@@ -41,7 +42,7 @@ pub fn printable(text: &str) -> String {
     text.chars().map(shown).collect()
 }
 
-/// A word as a shell reads it back.
+/// Quotes a word for a shell.
 pub fn shell_word(text: &str) -> String {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"_-./:=@%+,".contains(&byte);
     match !text.is_empty() && text.bytes().all(plain) {
@@ -50,13 +51,18 @@ pub fn shell_word(text: &str) -> String {
     }
 }
 
-/// Writes a file under another name first and renames it when it is complete and on the disk: a reader sees the whole of it
-/// or nothing, even after a power cut. What cannot be written leaves nothing behind.
+/// Writes a file atomically: under another name first, then renamed once it is complete and on the disk.
+/// A reader sees the whole file or nothing, even after a power cut. A failed write leaves nothing behind.
+///
+/// # Errors
+///
+/// [`OutputError::Io`] if the file cannot be written.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     write_whole_as(&own_partial_path(path), path, bytes)
 }
 
-/// As [`write_whole`], where the file's usual name on its way is another file's: it is called `under_way` instead.
+/// Writes a file like [`write_whole`], with `under_way` as its temporary name. For files whose usual
+/// temporary name belongs to another file.
 pub fn write_whole_as(under_way: &Path, path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let written = File::create(under_way).and_then(|mut file| {
         file.write_all(bytes)?;
@@ -68,7 +74,7 @@ pub fn write_whole_as(under_way: &Path, path: &Path, bytes: &[u8]) -> Result<(),
     })
 }
 
-/// What a file is called until it is complete, where another process may write the same.
+/// Returns a temporary name unique to this process and call, since another process may write the same file.
 fn own_partial_path(path: &Path) -> PathBuf {
     static WRITTEN: AtomicU32 = AtomicU32::new(0);
     let number = WRITTEN.fetch_add(1, Ordering::Relaxed);
@@ -77,30 +83,31 @@ fn own_partial_path(path: &Path) -> PathBuf {
     partial.into()
 }
 
-/// What a file is called until it is complete.
+/// Returns the name of a file until it is complete.
 pub fn partial_path(path: &Path) -> PathBuf {
     let mut partial = path.to_path_buf().into_os_string();
     partial.push(".partial");
     partial.into()
 }
 
-/// Gives a complete file its name, once its bytes are on the disk.
+/// Renames a complete file into place once its bytes are on the disk.
 pub fn put_in_place(file: &File, partial: &Path, path: &Path) -> io::Result<()> {
     file.sync_all()?;
     fs::rename(partial, path)?;
-    // The name is part of the folder, which has to reach the disk, too; not every file system can be told.
+    // The name is part of the folder, which must be synced too; not every file system supports this.
     if let Some(Ok(folder)) = path.parent().map(File::open) {
         let _ = folder.sync_all();
     }
     Ok(())
 }
 
-/// Makes a folder, and those above it that are missing, for nobody but their owner: recordings hold what policies must not see.
+/// Creates a folder and its missing parents, accessible to their owner only: recordings contain data that
+/// policies must not see.
 pub fn create_private_folder(folder: &Path) -> io::Result<()> {
     private_folder(true).create(folder)
 }
 
-/// As [`create_private_folder`], but it is an error if the folder exists or the one above it does not.
+/// Creates a folder like [`create_private_folder`], but fails if it exists or its parent does not.
 pub fn create_new_private_folder(folder: &Path) -> io::Result<()> {
     private_folder(false).create(folder)
 }
@@ -113,21 +120,21 @@ fn private_folder(with_parents: bool) -> fs::DirBuilder {
     builder
 }
 
-/// Pictures and films as WebP.
+/// Encoding of images and videos as WebP.
 pub mod webp {
     use webp_animation::{ColorMode, Encoder, EncoderOptions, EncodingConfig, Error};
 
-    /// Quality from 0 to 100; at this one the robots' edges stay clean.
+    /// Quality from 0 to 100; at this value the robots' edges stay clean.
     const QUALITY: f32 = 80.0;
 
-    /// One RGB picture, three bytes a pixel, as a file.
+    /// Encodes one RGB image, three bytes a pixel, as a file.
     pub fn picture(width: u32, height: u32, rgb: &[u8]) -> Result<Vec<u8>, Error> {
         let mut encoder = encoder((width, height))?;
         encoder.add_frame(rgb, 0)?;
         Ok(encoder.finalize(1)?.to_vec())
     }
 
-    /// An encoder of RGB pictures.
+    /// Returns an encoder of RGB images.
     pub fn encoder(size_px: (u32, u32)) -> Result<Encoder, Error> {
         let options = EncoderOptions {
             color_mode: ColorMode::Rgb,

@@ -7,24 +7,28 @@ use tandem_tools_spec::Protocol;
 use crate::EpisodeError;
 use crate::tasks::Task;
 
-/// What a protocol allows for one task.
+/// Limits of a protocol for one task.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rules {
     pub protocol: Protocol,
-    /// The most control steps that one command may ask for.
+    /// Maximum number of control steps in one command.
     pub steps_per_command: u32,
-    /// Control steps of an episode, the initial hold included.
+    /// Control steps of an episode, including the initial hold.
     pub episode_steps: u32,
-    /// Control steps spent standing still before the policy's first call.
+    /// Control steps for which robots stand still before the policy's first call.
     pub initial_hold_steps: u32,
-    /// How long the policy may think; `None` for as long as it likes.
+    /// Limit of the policy's thinking time; `None` for no limit.
     pub thinking: Option<Duration>,
-    /// First and last of the seeds that results are reported on.
+    /// First and last of the seeds on which results are reported.
     pub seeds: (u32, u32),
 }
 
 impl Rules {
-    /// The control steps of one command, if it may ask for that many.
+    /// Checks the number of control steps that a command asks for.
+    ///
+    /// # Errors
+    ///
+    /// [`EpisodeError::TooManySteps`] outside the protocol's range.
     pub fn steps(&self, asked: u32) -> Result<u32, EpisodeError> {
         match (1..=self.steps_per_command).contains(&asked) {
             true => Ok(asked),
@@ -37,7 +41,7 @@ impl Rules {
     }
 }
 
-/// What `protocol` allows for `task`.
+/// Returns the rules of `protocol` for `task`.
 pub fn rules(protocol: Protocol, task: &Task) -> Rules {
     match protocol {
         Protocol::Agentic => Rules {

@@ -1,4 +1,4 @@
-//! What makes an episode what it is, in one value: from a request or flags to the session, the recording and the results.
+//! The complete definition of an episode in one value, from requests and flags to recordings and results.
 
 mod keyed_seed;
 
@@ -23,77 +23,77 @@ use crate::words::OwnWords;
 
 pub use keyed_seed::KeyedSeed;
 
-/// What results say of a base controller and of instructions.
+/// Prefixes of a base controller and of instructions in results.
 const CONTROLLER: &str = "controller: ";
 const INSTRUCTIONS: &str = "instructions: ";
-/// What they say of Tandem's own, which the benchmark has not.
+/// Departures from the benchmark for Tandem's own controller and wording.
 pub const OWN_CONTROLLER: &str = "controller: Tandem's own";
 pub const OWN_WORDS: &str = "instructions: Tandem's own";
 
-/// Everything that makes an episode what it is. Equal values, played by equal calls on the same build, end in the same
-/// state, bit for bit.
+/// The complete definition of an episode. Equal specs and calls on one build end in the same state, bit
+/// for bit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeSpec {
     #[serde(with = "crate::tasks::by_id_or_file")]
     pub task: &'static Task,
     pub seed: u32,
     pub protocol: Protocol,
-    /// Where it takes place, if not in the task's own scene.
+    /// Scene in place of the task's own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<SceneFile>,
     pub robot: RobotFile,
     pub locomotion: Controller,
-    /// What robots know of themselves; in recordings of builds that did not ask, the simulator's own state.
+    /// Source of the robots' state. Recordings of builds without this choice used the simulator's own.
     #[serde(default = "before_there_was_a_choice")]
     pub sensing: Sensing,
-    /// Who draws what robots see; nothing else depends on it.
+    /// Renderer of the robots' images; it affects nothing else.
     pub renderer: RendererKind,
     pub start: Start,
-    /// How much the policy is told. Recordings that do not say it are of policies that were told everything.
+    /// Assistance of the policy. Recordings without this field had full assistance.
     #[serde(default)]
     pub assistance: Assistance,
-    /// What it is told about its success: for experiments something else than the assistance has it.
+    /// Disclosure of phases to the policy; experiments may set it apart from the assistance.
     #[serde(default)]
     pub disclosure: Disclosure,
-    /// Whether it is told how to grasp; likewise.
+    /// Hints on grasping for the policy; experiments may set them apart from the assistance.
     #[serde(default)]
     pub hints: Hints,
-    /// The instructions that the policy is given in place of the task's own.
+    /// Instructions in place of the task's own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub instructions: Option<OwnWords>,
-    /// In what it varies beyond the benchmark.
+    /// Variation beyond the benchmark.
     #[serde(default, skip_serializing_if = "Variation::is_benchmarks")]
     pub variation: Variation,
-    /// What goes wrong in it.
+    /// Stress: faults injected into the episode.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stress: Option<Stress>,
-    /// How long the policy may think, if not as long as the protocol has it.
+    /// Limit of the policy's thinking time, in place of the protocol's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thinking_limit_s: Option<u32>,
-    /// What an evaluator's key makes of the seed, where there is a key.
+    /// Seed drawn by an evaluator's key, if there is a key.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub keyed_seed: Option<KeyedSeed>,
 }
 
-/// Which file describes the robots.
+/// Source of the robot's description.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RobotFile {
-    /// One that the binary carries, by name.
+    /// Robot embedded in the binary, by name.
     Embedded(String),
-    /// One of somebody's own.
+    /// A user's file.
     File(OwnRobot),
 }
 
-/// A robot that a file describes: MJCF that has what is asked of a robot, or a description in TOML of somebody else's MJCF.
+/// A robot in a file: MJCF with the elements required of a robot, or a TOML description of other MJCF.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OwnRobot {
     pub path: PathBuf,
-    /// Hash of the content when the episode was planned, with all that it names; see [`RobotSource::fingerprint`].
+    /// Hash of the robot's files when the episode was planned; see [`RobotSource::fingerprint`].
     pub xxh3: String,
 }
 
-/// A scene in place of the task's own: an MJCF file with what that names.
+/// A scene in place of the task's own: an MJCF file with the files that it refers to.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SceneFile {
     pub path: PathBuf,
@@ -101,44 +101,42 @@ pub struct SceneFile {
     pub xxh3: String,
 }
 
-/// Which base controller the robots have.
+/// Base controller of the robots.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Controller {
-    /// Our own.
+    /// Our own controller.
     #[default]
     Balance,
     /// A velocity policy in an ONNX file.
     File(PathBuf),
-    /// The same with a loop over the robot's place around it.
+    /// A velocity policy in an ONNX file, with a position loop around it.
     Looped(PathBuf),
 }
 
-/// Where an episode begins.
+/// Start state of an episode.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Start {
-    /// It begins at the task's own beginning under the seed.
+    /// The task's own start under the seed.
     #[default]
     Task,
-    /// It begins where another episode of the same task, seed, protocol, robot and controller stood: a
-    /// [`crate::Checkpoint`]'s file.
+    /// The state in a [`crate::Checkpoint`]'s file of the same task, seed, protocol, robot and controller.
     Checkpoint(PathBuf),
-    /// It begins where a phase began in a recorded episode of the same task, seed, robot and controller, with the whole
-    /// budget ahead.
+    /// The start of a recorded phase of the same task, seed, robot and controller, with the whole budget.
     Phase(PhaseStart),
-    /// It begins where a recorded episode of the same task, seed, robot and controller stood at a moment, with the whole budget ahead.
+    /// A moment of a recorded episode of the same task, seed, robot and controller, with the whole budget.
     Moment(MomentStart),
 }
 
-/// A moment of a recorded episode: the last call that was answered by then is the last that is made again.
+/// A moment of a recorded episode. All calls answered by then are replayed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MomentStart {
-    /// An `episode.mcap`.
+    /// Path of an `episode.mcap`.
     pub recording: PathBuf,
-    /// Control step of the recorded world.
+    /// Control step of the recorded episode.
     pub control_step: u64,
-    /// How many seconds before the episode went wrong that is, where it was chosen so; else somebody has taken over there.
+    /// Seconds before the failure of the recorded episode; `None` where an operator took over.
     #[serde(default)]
     pub before_s: Option<u32>,
 }
@@ -146,14 +144,14 @@ pub struct MomentStart {
 /// The beginning of a phase of a recorded episode.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PhaseStart {
-    /// An `episode.mcap`.
+    /// Path of an `episode.mcap`.
     pub recording: PathBuf,
-    /// The phase's number, as `p2`.
+    /// Number of the phase, for example `p2`.
     pub phase: String,
 }
 
 impl EpisodeSpec {
-    /// An episode of the embedded robot under our own controller, from the task's beginning.
+    /// Returns the spec of an episode with the embedded robot and our own controller, from the task's start.
     pub fn new(task: &'static Task, seed: u32, protocol: Protocol) -> EpisodeSpec {
         EpisodeSpec {
             task: task.under(seed),
@@ -176,23 +174,23 @@ impl EpisodeSpec {
         }
     }
 
-    /// The same with another seed, and what that chooses.
+    /// Returns the spec with another seed, and the options which that seed chooses.
     pub fn seeded(&self, seed: u32) -> EpisodeSpec {
         EpisodeSpec { task: self.task.under(seed), seed, keyed_seed: None, ..self.clone() }
     }
 
-    /// How far the seed moves things.
+    /// Returns the spread of the randomisation, including stress.
     pub fn spread(&self) -> Spread {
         let plain = self.variation.spread;
         self.stress.map_or(plain, |stress| stress.spread(plain))
     }
 
-    /// What robots know of themselves, under stress.
+    /// Returns the sensing of the robots, including stress.
     pub fn stressed_sensing(&self) -> Sensing {
         self.stress.map_or(self.sensing, |stress| stress.sensing(self.sensing))
     }
 
-    /// The words in which its policy is told the task.
+    /// Returns the wording of the task for the policy.
     pub fn task_words(&self) -> TaskWords {
         let words = stress::task_words(self.stress, self.task);
         match &self.instructions {
@@ -201,25 +199,25 @@ impl EpisodeSpec {
         }
     }
 
-    /// What its protocol allows for its task, with its own limit of thinking where it has one.
+    /// Returns the protocol's rules for the task, with the spec's own limit of thinking time if it has one.
     pub fn rules(&self) -> Rules {
         let rules = rules(self.protocol, self.task);
         let own = self.thinking_limit_s.map(|limit_s| Duration::from_secs(limit_s.into()));
         Rules { thinking: own.or(rules.thinking), ..rules }
     }
 
-    /// The same with another assistance, and what that has of phases and hints.
+    /// Returns the spec with another assistance, and with the disclosure and hints that belong to it.
     pub fn assisted(self, assistance: Assistance) -> EpisodeSpec {
         EpisodeSpec { assistance, disclosure: assistance.disclosure(), hints: assistance.hints(), ..self }
     }
 
-    /// Which texts its policy reads.
+    /// Returns the selection of texts for the policy.
     pub fn wording(&self) -> Wording {
         Wording { assistance: self.assistance, hints: self.hints }
     }
 
-    /// What is not as the benchmark has it, each as results name it: Tandem's own base controller and its own wording of instructions first,
-    /// which every result has that asks for nothing else.
+    /// Lists the departures from the benchmark, each as results name it. Tandem's own base controller and
+    /// wording come first; every result without other choices has these two.
     pub fn departures(&self) -> Vec<String> {
         let own_controller = (self.locomotion == Controller::Balance).then(|| OWN_CONTROLLER.to_owned());
         let own_words =
@@ -228,18 +226,18 @@ impl EpisodeSpec {
         own_controller.into_iter().chain(own_words).chain(others).collect()
     }
 
-    /// Whether a peculiarity is what the benchmark has.
+    /// Returns true if a peculiarity matches the benchmark.
     fn is_the_benchmarks(&self, what: &str) -> bool {
         let words = self.instructions.as_ref().filter(|words| words.are_the_benchmarks(self.task));
         let of_file = matches!(self.locomotion, Controller::File(_));
         (of_file && what.starts_with(CONTROLLER)) || (words.is_some() && what.starts_with(INSTRUCTIONS))
     }
 
-    /// What is not as Tandem usually has it, each as stands behind the policy's name. Whoever adds a setting decides here whether it
-    /// belongs to them.
+    /// Lists the departures from Tandem's defaults, each as shown after the policy's name. A new setting
+    /// must be classified here.
     pub fn peculiarities(&self) -> Vec<String> {
-        // Without `..`, so that the compiler asks about a new field. What is named apart, or changes nothing that a policy could
-        // tell, is left out.
+        // The pattern has no `..`, so the compiler reports every new field. Left out are fields that are
+        // shown elsewhere and fields whose effect no policy could notice.
         let EpisodeSpec {
             task,
             seed: _,
@@ -298,7 +296,8 @@ impl EpisodeSpec {
         found.into_iter().flatten().chain(variation.departures()).collect()
     }
 
-    /// Index of the phase that it begins at and that alone counts; `None` where it begins elsewhere, and all count.
+    /// Returns the index of the phase at which the episode starts, and which alone counts; `None` for
+    /// others.
     pub fn start_phase(&self) -> Option<usize> {
         match &self.start {
             Start::Phase(start) => {
@@ -320,7 +319,7 @@ impl Default for RobotFile {
 }
 
 impl RobotFile {
-    /// The embedded file's name, or the path, for messages.
+    /// Returns the embedded robot's name or the path, for messages.
     pub fn name(&self) -> String {
         match self {
             RobotFile::Embedded(name) => name.clone(),
@@ -328,7 +327,7 @@ impl RobotFile {
         }
     }
 
-    /// What policies call the kind of robot: the file's name without its folder.
+    /// Returns the name of the kind of robot for policies: the file's name without its folder.
     pub fn kind(&self) -> String {
         match self {
             RobotFile::Embedded(name) => name.clone(),
@@ -336,21 +335,25 @@ impl RobotFile {
         }
     }
 
-    /// The robot that a file describes now.
+    /// Returns the robot that a file currently describes.
     pub fn of(path: &Path) -> Result<RobotFile, SimError> {
         RobotFile::with_approximations(path).map(|(robot, _)| robot)
     }
 
-    /// The robot that a file describes now, and what the file says that does not happen quite as in MuJoCo, a line each.
+    /// Returns the robot that a file currently describes, and each deviation from MuJoCo in a line.
     pub fn with_approximations(path: &Path) -> Result<(RobotFile, Vec<String>), SimError> {
         let source = RobotSource::read(path)?;
         let xxh3 = format!("{:016x}", source.fingerprint);
-        // Whoever replays the episode may be in another folder.
+        // A replay may run in another folder.
         let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
         Ok((RobotFile::File(OwnRobot { path, xxh3 }), source.model.approximations))
     }
 
-    /// Reads the robot, whose file has to be as it was.
+    /// Reads the robot. Its file must be unchanged.
+    ///
+    /// # Errors
+    ///
+    /// An unreadable file, or [`RobotError::Changed`].
     pub fn load(&self) -> Result<RobotSource, RobotError> {
         let own = match self {
             RobotFile::Embedded(name) => return Ok(RobotSource::embedded(name)?),
@@ -364,12 +367,12 @@ impl RobotFile {
         }
     }
 
-    /// The robot that the file describes.
+    /// Returns the robot's model.
     pub fn model(&self) -> Result<Arc<RobotModel>, RobotError> {
         Ok(Arc::new(self.load()?.model))
     }
 
-    /// Whether such a robot, read as `model`, can do what a task asks of its hands.
+    /// Checks that such a robot, read as `model`, has the hands that a task needs.
     pub fn check_task(&self, model: &RobotModel, task: &Task) -> Result<(), RobotError> {
         if !task.needs_fingers() || model.has_fingers() {
             return Ok(());
@@ -377,7 +380,7 @@ impl RobotFile {
         Err(RobotError::NoFingers { task: task.id.into(), robot: self.kind() })
     }
 
-    /// A name that tells files of different content apart.
+    /// Returns a name that distinguishes files of different content.
     pub fn identity(&self) -> String {
         match self {
             RobotFile::Embedded(name) => name.clone(),
@@ -387,21 +390,25 @@ impl RobotFile {
 }
 
 impl SceneFile {
-    /// The scene that a file holds now.
+    /// Returns the scene that a file currently contains.
     pub fn of(path: &Path) -> Result<SceneFile, SimError> {
         SceneFile::with_approximations(path).map(|(scene, _)| scene)
     }
 
-    /// The scene that a file holds now, and what it says that does not happen quite as in MuJoCo, a line each.
+    /// Returns the scene that a file currently contains, and each deviation from MuJoCo in a line.
     pub fn with_approximations(path: &Path) -> Result<(SceneFile, Vec<String>), SimError> {
         let document = Document::read(path)?;
         let xxh3 = fingerprint(&document);
-        // Whoever replays the episode may be in another folder.
+        // A replay may run in another folder.
         let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
         Ok((SceneFile { path, xxh3 }, document.approximations().to_vec()))
     }
 
-    /// Reads the file, which has to be as it was.
+    /// Reads the scene. Its file must be unchanged.
+    ///
+    /// # Errors
+    ///
+    /// An unreadable file, or [`SceneError::Changed`].
     pub fn load(&self) -> Result<Document, SceneError> {
         let document = Document::read(&self.path)?;
         let now = fingerprint(&document);
@@ -417,7 +424,8 @@ fn fingerprint(document: &Document) -> String {
 }
 
 impl Controller {
-    /// The controller of a file, or our own without one; `looped:` before the path asks for the loop.
+    /// Returns the controller of a file, or our own without one. The prefix `looped:` before the path
+    /// selects the position loop.
     pub fn from_file(path: Option<&Path>) -> Controller {
         let Some(path) = path else { return Controller::Balance };
         match path.to_str().and_then(|text| text.strip_prefix("looped:")) {
@@ -426,7 +434,7 @@ impl Controller {
         }
     }
 
-    /// Base commands that such a controller follows with this robot.
+    /// Returns the limits of the base commands that such a controller follows with this robot.
     pub fn limits(&self, robot: &RobotFile) -> Result<BaseLimits, RobotError> {
         Ok(self.load()?.limits(&robot.load()?.model.scale))
     }
@@ -460,7 +468,7 @@ mod tests {
         };
         let words = || OWN_WORDS.to_owned();
         assert_eq!(named(None), (vec![], vec![OWN_CONTROLLER.into(), words()]));
-        // The benchmark's own kind of controller departs from Tandem's usual one, and not from the benchmark.
+        // The benchmark's own kind of controller departs from Tandem's default, but not from the benchmark.
         assert_eq!(named(Some("a/walk.onnx")), (vec!["controller: walk.onnx".into()], vec![words()]));
         let looped = "controller: walk.onnx in a loop over its place".to_owned();
         assert_eq!(named(Some("looped:a/walk.onnx")), (vec![looped.clone()], vec![words(), looped]));

@@ -1,5 +1,5 @@
-//! In what episodes vary beyond the benchmark, for data that learners get farther with: how far the seed moves things, how much an
-//! expert's demonstrations differ from each other, and slow noise on what robots are told.
+//! Variation of episodes beyond the benchmark, for training data: the spread of the randomisation, the
+//! variety of an expert's demonstrations, and slow noise on the robots' commands.
 
 use serde::{Deserialize, Serialize};
 use tandem_sim::{
@@ -9,32 +9,33 @@ use tandem_sim::{
 
 use crate::tasks::Spread;
 
-/// In what episodes vary beyond the benchmark; by default in nothing.
+/// Variation of an episode beyond the benchmark; none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Variation {
-    /// How far the seed moves things.
+    /// Spread of the randomisation.
     #[serde(default)]
     pub spread: Spread,
-    /// How much an expert's demonstrations differ in pace, pauses and ways: 0 for not at all, up to [`Variation::MAX_VARIETY`].
+    /// Variety of an expert's demonstrations in pace, pauses and paths: from 0 for none to
+    /// [`Variation::MAX_VARIETY`].
     #[serde(default)]
     pub variety: u8,
-    /// How much slow noise is added to what robots are told before they do it; 1 is 0.016 rad on the joints of arms.
+    /// Level of the slow noise added to the robots' commands. At 1 it is 0.016 rad on arm joints.
     #[serde(default)]
     pub disturb: f32,
 }
 
 impl Variation {
     pub const MAX_VARIETY: u8 = 3;
-    /// Experts lose most episodes long before.
+    /// Well above the level at which experts fail in most episodes.
     pub const MAX_DISTURB: f32 = 5.0;
 
     pub(crate) fn is_benchmarks(&self) -> bool {
         *self == Variation::default()
     }
 
-    /// What of it is not as the benchmark has it, each as results name it.
+    /// Lists the departures from the benchmark, each as results name it.
     pub(crate) fn departures(&self) -> impl Iterator<Item = String> {
-        // Without `..`, so that the compiler asks about a new field.
+        // The pattern has no `..`, so the compiler reports every new field.
         let Variation { spread, variety, disturb } = *self;
         let departures = [
             (spread != Spread::default()).then(|| format!("spread: {}", spread.name())),
@@ -45,17 +46,17 @@ impl Variation {
     }
 }
 
-/// Cosines of which one noise is the sum.
+/// Number of cosines in one noise signal.
 const WAVES: usize = 12;
-/// Faster is shaking, not drifting.
+/// Maximum frequency; above it, the noise would shake rather than drift.
 const FASTEST_RAD_S: f64 = 12.0;
-/// A base that is told less stands, and is left alone.
+/// Minimum commanded speeds for noise on the base; below both of them the robot stands, and gets no noise.
 const WALKS_M_S: f32 = 0.02;
 const WALKS_RAD_S: f32 = 0.02;
-/// What tells this generator's numbers from those by which the same seed moves things.
+/// Separates this random stream from the one that moves objects under the same seed.
 const STREAM: u64 = 0x6469_7374_7572_6265;
 
-/// How large and how slow the noise on one kind of number is, at level 1: its deviation and its correlation time.
+/// Standard deviation and correlation time of the noise on one kind of number, at level 1.
 #[derive(Clone, Copy)]
 struct NoiseKind {
     deviation: f32,
@@ -67,34 +68,35 @@ const WAIST: NoiseKind = NoiseKind { deviation: 0.008, time_s: 0.5 };
 const WALK: NoiseKind = NoiseKind { deviation: 0.03, time_s: 1.0 };
 const TURN: NoiseKind = NoiseKind { deviation: 0.06, time_s: 1.0 };
 
-/// Slow noise on what the robots of one episode are told: a function of seed and time alone, so that an episode that is replayed, or
-/// goes on from a checkpoint, has the same.
+/// Slow noise on the commands of one episode's robots. It is a function of seed and time alone, so that a
+/// replay or a continuation from a checkpoint has the same noise.
 #[derive(Clone, Debug)]
 pub struct Disturbance {
     robots: Vec<RobotNoise>,
 }
 
-/// The noise on one robot's commands.
+/// Noise on one robot's commands.
 #[derive(Clone, Debug)]
 struct RobotNoise {
-    /// On the upper joints in action order; none on fingers, which slip.
+    /// Noise on the upper joints in action order; none on fingers, which would slip.
     upper: Vec<Option<SlowNoise>>,
-    /// On the speeds ahead and to the left, and on turning.
+    /// Noise on the forward and leftward speed and on the yaw rate.
     base: [SlowNoise; 3],
 }
 
-/// A stationary process whose correlation falls exponentially, as a sum of cosines of random frequencies (Rahimi and Recht, 2007): those
-/// of the exponential kernel are Cauchy-distributed.
+/// A stationary process with exponentially decaying correlation, as a sum of cosines of random frequencies
+/// (Rahimi and Recht, 2007). The frequencies of the exponential kernel are Cauchy-distributed.
 #[derive(Clone, Debug)]
 struct SlowNoise {
     deviation: f32,
-    /// Frequency, rad/s, and phase.
+    /// Frequency in rad/s, and phase.
     waves: [[f64; 2]; WAVES],
 }
 
 impl Disturbance {
-    /// The noise of an episode under `seed`; `None` where nothing is disturbed. How strong it is at most is drawn for each episode: the
-    /// whole of `level` in half of them, half of it in three of ten, nothing in two of ten, which show how it goes undisturbed.
+    /// Returns the noise of an episode under `seed`; `None` for an undisturbed one. The strength is drawn
+    /// for each episode: all of `level` in 50 %, half of it in 30 %, and none in 20 %, which show
+    /// undisturbed motion.
     pub fn new(level: f32, seed: u32, robots: usize) -> Option<Disturbance> {
         let mut random = SplitMix64(u64::from(seed) ^ STREAM);
         let strength = match random.uniform([0.0, 1.0]) {
@@ -107,7 +109,7 @@ impl Disturbance {
         (scale > 0.0).then(|| Disturbance { robots: (0..robots).map(|_| robot()).collect() })
     }
 
-    /// What robot number `robot` does at `time_s` that is told `told`.
+    /// Returns the command that robot number `robot` executes at `time_s` in place of `told`.
     pub fn executed(
         &self,
         robot: usize,
@@ -180,10 +182,11 @@ mod tests {
         let mean = |of: &dyn Fn(&SlowNoise) -> f32| noises.iter().map(of).sum::<f32>() / noises.len() as f32;
         let variance = mean(&|noise| noise.at(3.0).powi(2));
         assert!((variance.sqrt() - ARM.deviation).abs() < 0.1 * ARM.deviation, "{variance}");
-        // After the correlation time 1/e is left, a bit more where the fastest are slowed down.
+        // After the correlation time 1/e remains, or slightly more, since the highest frequencies are
+        // clamped.
         let later = mean(&|noise| noise.at(3.0) * noise.at(3.0 + ARM.time_s)) / variance;
         assert!((0.25..0.5).contains(&later), "{later}");
-        // A control step moves a joint's target by far less than the noise is large.
+        // A joint's target moves much less in a control step than the noise is large.
         let step = mean(&|noise| (noise.at(3.02) - noise.at(3.0)).powi(2)).sqrt();
         assert!(step < 0.25 * ARM.deviation, "{step}");
         let again = SlowNoise::new(ARM, 1.0, &mut SplitMix64(17));

@@ -1,4 +1,4 @@
-//! Words of a file of instructions, as an episode is told them in place of its task's own.
+//! Instructions from a user's file, which replace a task's own in an episode.
 
 use std::collections::BTreeMap;
 
@@ -7,22 +7,22 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::tasks::{Task, TaskWords};
 
-/// What a file of instructions says of one task. What it leaves out keeps the task's own words.
+/// Instructions in a file for one task. The task's own remain wherever the file has none.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(from = "RecordedWords")]
 pub struct OwnWords {
-    /// Hash of the texts, by which results tell words apart.
+    /// Hash of the texts, which distinguishes instructions in results.
     pub xxh3: String,
-    /// For a policy that directs all robots.
+    /// Instruction for a policy that directs all robots.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub joint: Option<String>,
-    /// By robot, for policies that direct one each.
+    /// Instructions by robot, for policies of one robot each.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub robots: BTreeMap<String, String>,
 }
 
-/// Hashes of the benchmark's own words, joint and of each robot, which are published and which a file of instructions may hold: one for
-/// each task, in the order of [`crate::tasks::cohub`].
+/// Hashes of the benchmark's published instructions, joint and for each robot, which a user's file may
+/// contain. One for each task, in the order of [`crate::tasks::cohub`].
 const BENCHMARK_WORDS: [&str; 10] = [
     "e6e83c5720b2bda4",
     "811edfc525362d72",
@@ -36,7 +36,7 @@ const BENCHMARK_WORDS: [&str; 10] = [
     "6f4320604cdab543",
 ];
 
-/// What recordings have. Those of earlier builds hold the hash alone.
+/// Recorded form. Recordings of earlier builds have the hash alone.
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum RecordedWords {
@@ -60,18 +60,18 @@ impl From<RecordedWords> for OwnWords {
 }
 
 impl OwnWords {
-    /// The words of these texts.
+    /// Returns instructions with these texts.
     pub fn of(joint: Option<String>, robots: BTreeMap<String, String>) -> OwnWords {
         let xxh3 = format!("{:016x}", xxh3_64(format!("{:?}", (&joint, &robots)).as_bytes()));
         OwnWords { xxh3, joint, robots }
     }
 
-    /// Whether they are those that the benchmark has for `task`.
+    /// Returns true if these are the benchmark's instructions for `task`.
     pub fn are_the_benchmarks(&self, task: &Task) -> bool {
         task.is_benchmark() && BENCHMARK_WORDS.contains(&self.xxh3.as_str())
     }
 
-    /// The words of `task` with these in place of those that they replace.
+    /// Returns the instructions of `task` with these in place of those that they replace.
     pub fn over(&self, task: &Task, words: TaskWords) -> TaskWords {
         let TaskWords { joint, shared, robots } = words;
         let own = |(name, text): (&str, String)| self.robots.get(name).cloned().unwrap_or(text);

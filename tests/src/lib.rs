@@ -1,4 +1,5 @@
-//! What the end-to-end tests share: a server in this process on a free port, and a client that keeps whatever comes back.
+//! Shared helpers of the end-to-end tests: a server in this process on a free port, and a client that
+//! returns every response.
 
 mod server;
 mod skipped;

@@ -1,4 +1,4 @@
-//! The server under test, and the HTTP client that tests call it with.
+//! The server under test, and the tests' HTTP client.
 
 use std::{net::SocketAddr, path::PathBuf, sync::Arc, time::Duration};
 
@@ -10,7 +10,7 @@ use tandem::{
 };
 use ureq::{Agent, SendBody, http};
 
-/// An answer of the server, refused or not.
+/// A response of the server, successful or not.
 #[derive(Debug)]
 pub struct Answer {
     pub status: u16,
@@ -19,19 +19,19 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// The body of an answer that has to be a success.
+    /// Returns the body of a response that must be a success.
     #[track_caller]
     pub fn ok(self) -> Value {
         assert!((200..300).contains(&self.status), "{self:?}");
         self.body
     }
 
-    /// A header, empty where there is none.
+    /// Returns a header; empty if it is absent.
     pub fn header(&self, name: &str) -> &str {
         self.headers.get(name).and_then(|value| value.to_str().ok()).unwrap_or_default()
     }
 
-    /// Checks a refusal: problem details of this status whose text says each of `says`.
+    /// Checks a refusal: problem details with this status and a text that contains each of `says`.
     #[track_caller]
     pub fn refused(&self, status: u16, says: &[&str]) {
         assert_eq!(
@@ -61,12 +61,12 @@ impl TestServer {
         TestServer::with(Layer::default())
     }
 
-    /// Starts a server as [`TestServer::start`] does, with further settings.
+    /// Starts a server like [`TestServer::start`], with further settings.
     pub fn with(flags: Layer) -> TestServer {
         TestServer::with_guests(flags, Guests::default())
     }
 
-    /// The same for guests.
+    /// Starts a server like [`TestServer::with`], with guests.
     pub fn with_guests(flags: Layer, guests: Guests) -> TestServer {
         let runs = tempfile::tempdir().expect("a temporary folder");
         let flags = Layer {
@@ -83,19 +83,19 @@ impl TestServer {
         TestServer { address: server.address(), server: Some(server), settings, runs, agent }
     }
 
-    /// What the link for watching has after its `#`.
+    /// Returns the part after `#` of the link for watching.
     pub fn watch_key(&self) -> String {
         let link = self.server.as_ref().expect("a running server").watch_link();
         link.split_once('#').expect("a link with a key").1.into()
     }
 
-    /// Stops the server as SIGTERM does.
+    /// Stops the server like SIGTERM.
     pub fn stop(&mut self) {
         let left = self.server.take().expect("a running server").stop();
         assert!(left.is_empty(), "{left:?} did not end");
     }
 
-    /// Stops the server as SIGTERM does, and starts one on the same folder of runs.
+    /// Stops the server like SIGTERM, and starts another on the same folder of runs.
     pub fn restart(&mut self, guests: Guests) {
         let left = self.server.take().expect("a running server").stop_keeping();
         assert!(left.is_empty(), "{left:?} did not stop");
@@ -112,7 +112,7 @@ impl TestServer {
         started["episode_id"].as_str().expect("an id").into()
     }
 
-    /// The folder that an episode is recorded into.
+    /// Returns the folder into which an episode is recorded.
     pub fn folder(&self, id: &str) -> PathBuf {
         self.runs.path().join(id)
     }
@@ -143,19 +143,19 @@ impl TestServer {
         self.send("DELETE", path, None, b"")
     }
 
-    /// Posts as [`TestServer::post`] does, with further headers.
+    /// Posts like [`TestServer::post`], with further headers.
     pub fn post_with(&self, path: &str, headers: &[(&str, &str)], body: &Value) -> Answer {
         let headers = [&[("content-type", "application/json")], headers].concat();
         json_answer(self.ask("POST", path, &headers, body.to_string().as_bytes()))
     }
 
-    /// Calls a tool in the name of the caller that has this token.
+    /// Calls a tool with this caller's token.
     pub fn tool_as(&self, token: &str, id: &str, tool: &str, args: &Value) -> Answer {
         let path = format!("/v1/episodes/{id}/tools/{tool}");
         self.post_with(&path, &[("authorization", &format!("Bearer {token}"))], args)
     }
 
-    /// Returns the answer to a request as it comes: status, headers and bytes.
+    /// Returns the raw response to a request: status, headers and bytes.
     pub fn ask(
         &self,
         method: &str,
@@ -177,9 +177,9 @@ impl TestServer {
         (answer.status().as_u16(), answer.headers().clone(), bytes)
     }
 
-    /// Sends any bytes under any content type.
+    /// Sends arbitrary bytes with any content type.
     pub fn send(&self, method: &str, path: &str, content_type: Option<&str>, body: &[u8]) -> Answer {
-        // What MCP asks for, and what REST takes as well.
+        // MCP requires this header, and REST accepts it.
         let accept = ("accept", "application/json, text/event-stream");
         let content_type = content_type.map(|kind| ("content-type", kind));
         let headers: Vec<(&str, &str)> = [accept].into_iter().chain(content_type).collect();

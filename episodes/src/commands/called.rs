@@ -1,5 +1,5 @@
-//! What is called on an episode: a tool, or what operators with a robot each do together. It is what a recording holds and a replay
-//! calls again.
+//! Calls to an episode: a tool call, or simultaneous commands of operators with a robot each. A recording
+//! stores them, and a replay repeats them.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -11,55 +11,56 @@ use super::{Command, Motion, RobotAction, RobotOrder, find};
 use crate::EpisodeError;
 use crate::protocol::Rules;
 
-/// What is called on an episode.
+/// A call to an episode.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant, reason = "one call at a time is on its way")]
 pub enum Called {
     /// One call, by the policy of all robots or an operator of one.
     One(Call),
-    /// Commands of several operators, executed side by side for as long as the shortest of them; robots without one hold still.
+    /// Commands of several operators, executed at the same time for the duration of the shortest. Robots
+    /// without a command hold still.
     Together(Vec<OperatorCall>),
 }
 
-/// A call that the operator of one robot has a right to: it fits the contract and names no other robot.
+/// A call that the operator of one robot may make: it fits the contract and names no other robot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OperatorCall {
     robot: String,
     call: Call,
 }
 
-/// A command of an operator that the episode has read, and will execute together with those of others.
+/// A command of an operator that the episode has read, to be executed together with those of others.
 #[derive(Clone, Debug)]
 pub struct OperatorCommand {
-    /// The call, as a recording will hold it.
+    /// The call in the recording's form.
     pub(crate) call: OperatorCall,
-    /// Control steps that it asks for.
+    /// Number of control steps requested.
     pub(crate) steps: u32,
 }
 
-/// Calls that have been checked, and show their callers nothing that is withheld. [`Called::allowed`] alone makes them, and no call is
-/// answered without.
+/// Checked calls that show their callers no withheld information. Only [`Called::allowed`] makes them,
+/// and no call is answered without one.
 #[derive(Clone, Copy)]
 pub(crate) struct Allowed<'a>(&'a Called);
 
 impl<'a> Allowed<'a> {
-    /// What is called.
+    /// Returns the checked call.
     pub(crate) fn called(self) -> &'a Called {
         self.0
     }
 }
 
-/// What stands around a caller's call.
+/// Options of a caller's call.
 pub(crate) struct Surroundings {
-    /// The caller's robot, where each has an operator and several call together.
+    /// The caller's robot, if each robot has an operator and several call together.
     pub operator: Option<String>,
-    /// The look afterwards.
+    /// Observation requested after the call.
     pub then: Option<Look>,
-    /// Whether the reply is a short one.
+    /// True for a short reply.
     pub short: bool,
 }
 
-/// Arguments of [`Called::Together`] as a recording has them.
+/// Arguments of [`Called::Together`] in a recording.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct TogetherArguments {
@@ -75,10 +76,10 @@ struct OperatorArguments {
 }
 
 impl Called {
-    /// What recordings call commands of several operators.
+    /// Name of simultaneous commands in recordings.
     pub const TOGETHER: &str = "together";
 
-    /// The tool's name, or what stands for it.
+    /// Returns the tool's name, or [`Called::TOGETHER`].
     pub fn name(&self) -> &'static str {
         match self {
             Called::One(call) => call.name(),
@@ -86,7 +87,7 @@ impl Called {
         }
     }
 
-    /// Every caller's call.
+    /// Returns every caller's call.
     pub(crate) fn calls(&self) -> Vec<&Call> {
         match self {
             Called::One(call) => vec![call],
@@ -94,7 +95,11 @@ impl Called {
         }
     }
 
-    /// The calls, if each fits the contract and `check` refuses none.
+    /// Checks that each call fits the contract and passes `check`.
+    ///
+    /// # Errors
+    ///
+    /// The first refusal.
     pub(crate) fn allowed(
         &self,
         check: impl Fn(&ToolCall) -> Result<(), EpisodeError>,
@@ -106,7 +111,7 @@ impl Called {
         Ok(Allowed(self))
     }
 
-    /// How pictures are to come.
+    /// Returns the requested image formats.
     pub(crate) fn formats(&self) -> Formats {
         match self {
             Called::One(call) => call.formats,
@@ -114,12 +119,12 @@ impl Called {
         }
     }
 
-    /// Whether it looks and moves nothing.
+    /// Returns true for an observation or measurement, which moves no robot.
     pub(crate) fn is_look(&self) -> bool {
         matches!(self, Called::One(Call { tool: ToolCall::Look(_), .. }))
     }
 
-    /// Takes from every caller's call what stands around it, so that what a recording holds is left.
+    /// Removes the options from every caller's call, which leaves the content of a recording.
     pub(crate) fn take_surroundings(&mut self) -> Vec<Surroundings> {
         let take = |call: &mut Call, operator: Option<String>| {
             call.expected_step = None;
@@ -133,7 +138,7 @@ impl Called {
         }
     }
 
-    /// What [`Called::parse`] reads.
+    /// Returns the arguments as JSON, for [`Called::parse`].
     pub fn arguments(&self) -> Result<String, serde_json::Error> {
         match self {
             Called::One(call) => serde_json::to_string(call),
@@ -144,7 +149,11 @@ impl Called {
         }
     }
 
-    /// Reads what a recording holds of a call.
+    /// Parses a call from a recording.
+    ///
+    /// # Errors
+    ///
+    /// Malformed arguments, or a call that an operator may not make.
     pub fn parse(name: &str, arguments: Value) -> Result<Called, EpisodeError> {
         if name != Called::TOGETHER {
             return Ok(Called::One(Call::parse(name, arguments)?));
@@ -174,7 +183,12 @@ impl From<Call> for Called {
 }
 
 impl OperatorCall {
-    /// The call as the operator of `robot` may make it: an observation that names no robot is of the operator's own.
+    /// Returns the call for the operator of `robot`. An observation that names no robot is one of the
+    /// operator's own.
+    ///
+    /// # Errors
+    ///
+    /// A call that does not fit the contract, or [`EpisodeError::ForeignRobot`].
     pub fn new(robot: &str, call: Call) -> Result<OperatorCall, EpisodeError> {
         call.validate()?;
         let call = call.looking_through(robot);
@@ -184,28 +198,29 @@ impl OperatorCall {
         Ok(OperatorCall { robot: robot.into(), call })
     }
 
-    /// The operator's robot.
+    /// Returns the operator's robot.
     pub fn robot(&self) -> &str {
         &self.robot
     }
 
-    /// What the operator calls.
+    /// Returns the operator's tool call.
     pub fn call(&self) -> &Call {
         &self.call
     }
 
-    /// As [`OperatorCall::call`], by value.
+    /// Returns the operator's tool call by value.
     pub fn into_call(self) -> Call {
         self.call
     }
 
-    /// The command without what the operator wants to look at once it is done.
+    /// Returns the command without the observation afterwards.
     pub fn unseen(mut self) -> OperatorCall {
         self.call.then = None;
         self
     }
 
-    /// What is left of a command of which so many control steps have been executed; nothing is of one that is done, and of other calls.
+    /// Returns the rest of a command after this many control steps; `None` for a finished command and for
+    /// other calls.
     pub fn rest(&self, executed_steps: u32) -> Option<OperatorCall> {
         let ToolCall::Act(act) = &self.call.tool else { return None };
         let steps = act.steps().checked_sub(executed_steps).filter(|left| *left > 0)?;
@@ -225,13 +240,13 @@ impl OperatorCall {
         Some(OperatorCall { robot: self.robot.clone(), call })
     }
 
-    /// The command, whichever step the episode stands at: that has been checked.
+    /// Returns the command without its expected step, which has been checked.
     pub(crate) fn at_any_step(mut self) -> OperatorCall {
         self.call.expected_step = None;
         self
     }
 
-    /// Reads a command for the robots that `motions` move: what the operator's own is to do.
+    /// Reads the order for the operator's robot; `motions` are those of all robots.
     pub(crate) fn order(&self, rules: &Rules, motions: &[Motion]) -> Result<RobotOrder, EpisodeError> {
         let robot = find(&self.robot, motions)?;
         let Command { steps, orders } = Command::read(self.command()?, rules, motions)?;
@@ -266,12 +281,12 @@ impl OperatorCall {
 }
 
 impl OperatorCommand {
-    /// The operator's robot.
+    /// Returns the operator's robot.
     pub fn robot(&self) -> &str {
         self.call.robot()
     }
 
-    /// Control steps that it asks for.
+    /// Returns the number of control steps requested.
     pub fn steps(&self) -> u32 {
         self.steps
     }
@@ -335,7 +350,7 @@ mod tests {
         check(json!({ "robot": "A" }), "arguments that work");
     }
 
-    /// Every example of the contract that names a robot names A.
+    /// Every example in the contract that names a robot names A.
     #[test]
     fn operators_call_for_their_own_robots() {
         let own =

@@ -1,4 +1,4 @@
-//! Whether a robot's wrists would reach the poses asked for.
+//! `check_reach`: a test of whether a robot's wrists would reach given poses.
 
 use tandem_ik::{FrameError, Tolerance};
 use tandem_sim::Sides;
@@ -9,7 +9,7 @@ use super::move_wrists::wrist_targets;
 use super::upper_body::STEPS_AHEAD_M;
 use crate::convert::coarse;
 
-/// The reply to `check_reach`.
+/// Returns the reply to `check_reach`.
 pub fn check_reach(args: &CheckReach, motion: &Motion) -> ReachReply {
     let halves = Sides {
         left: (args.left_position_m, args.left_quaternion_wxyz),

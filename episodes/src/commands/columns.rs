@@ -1,4 +1,5 @@
-//! The action row: arms 14, hands 14, waist 3, base 4; and what of it lies beyond what a robot's joints and base can do.
+//! The action row: arms 14, hands 14, waist 3, base 4; and clamping of its values to the limits of joints
+//! and base.
 
 use std::ops::Range;
 
@@ -8,13 +9,13 @@ use tandem_sim::{
     UPPER_JOINTS, WAIST_COLUMN,
 };
 
-/// Names of the last four columns, as every message with a base command has them.
+/// Names of the last four columns, as in every message with a base command.
 const BASE: [&str; 4] = ["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"];
 
-/// A joint target that is so much beyond a limit is counted: nearer ones come of rounding.
+/// Minimum excess of a joint target over its limit to be counted; smaller ones are rounding errors.
 const COUNTED_RAD: f64 = 0.01;
 
-/// How many joint targets were asked for, and how many of them lay beyond the joints' limits.
+/// Number of joint targets, and of those beyond the joints' limits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TargetCounts {
     asked: u64,
@@ -22,31 +23,31 @@ pub struct TargetCounts {
 }
 
 impl TargetCounts {
-    /// Adds those of another command.
+    /// Adds the counts of another command.
     pub fn add(&mut self, other: TargetCounts) {
         self.asked += other.asked;
         self.beyond += other.beyond;
     }
 
-    /// The share of those beyond their limits; 0 of none.
+    /// Returns the fraction of targets beyond their limits; 0 without targets.
     pub fn beyond_share(self) -> f64 {
         self.beyond as f64 / self.asked.max(1) as f64
     }
 }
 
-/// What of a command lay beyond a limit and was moved there.
+/// Values of a command that were clamped to a limit.
 #[derive(Clone, Debug, Default)]
 pub struct Clamped {
-    /// Columns of the action row.
+    /// Clamped columns of the action row.
     pub columns: Vec<usize>,
-    /// Fields of the base command.
+    /// Clamped fields of the base command.
     pub base: Vec<&'static str>,
-    /// Joint targets, clamped or not.
+    /// Counts of joint targets, clamped or not.
     pub targets: TargetCounts,
 }
 
 impl Clamped {
-    /// The joint target `asked_rad` of a column, within the joint's limits.
+    /// Clamps the joint target of a column to the joint's limits.
     pub fn joint(&mut self, model: &RobotModel, column: usize, asked_rad: f64) -> f64 {
         let joint = &model.joints[UPPER[column]];
         let within_rad = asked_rad.clamp(joint.lower_rad.into(), joint.upper_rad.into());
@@ -58,7 +59,7 @@ impl Clamped {
         within_rad
     }
 
-    /// The base command `asked`, within what locomotion accepts.
+    /// Clamps a base command to the limits of locomotion.
     pub fn base(&mut self, limits: &BaseLimits, asked: BaseCommand) -> BaseCommand {
         let done = limits.clamp(asked);
         for field in clamped_fields(&asked, &done) {
@@ -70,43 +71,43 @@ impl Clamped {
     }
 }
 
-/// The columns of an arm.
+/// Returns the columns of an arm.
 pub fn arm(side: Side) -> Range<usize> {
     ARM_COLUMNS[side]..ARM_COLUMNS[side] + ARM_JOINTS
 }
 
-/// The columns of a hand.
+/// Returns the columns of a hand.
 pub fn hand(side: Side) -> Range<usize> {
     HAND_COLUMNS[side]..HAND_COLUMNS[side] + HAND_JOINTS
 }
 
-/// The joint columns of the waist.
+/// Returns the columns of the waist.
 pub fn waist() -> Range<usize> {
     WAIST_COLUMN..UPPER_JOINTS
 }
 
-/// Whether a column is a joint of a hand.
+/// Returns true for the column of a hand joint.
 pub fn is_hand(column: usize) -> bool {
     Side::BOTH.into_iter().any(|side| hand(side).contains(&column))
 }
 
-/// Names of the columns.
+/// Returns the names of the columns.
 pub fn action_row(model: &RobotModel) -> Vec<String> {
     let joints = UPPER.iter().map(|joint| model.joints[*joint].name.clone());
     joints.chain(BASE.map(String::from)).collect()
 }
 
-/// The base command as the last four columns.
+/// Returns the base command as the last four columns.
 pub fn base_row(base: &BaseCommand) -> [f32; 4] {
     [base.vx_m_s, base.vy_m_s, base.yaw_rate_rad_s, base.pelvis_height_m]
 }
 
-/// The base command that a row's last four columns ask for.
+/// Returns the base command in the last four columns of a row.
 pub fn base_command([vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m]: [f32; 4]) -> BaseCommand {
     BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m }
 }
 
-/// Fields of the base command that differ between what was asked and what is done.
+/// Yields the fields of the base command that clamping has changed.
 fn clamped_fields(asked: &BaseCommand, done: &BaseCommand) -> impl Iterator<Item = &'static str> {
     let pairs = base_row(asked).into_iter().zip(base_row(done));
     BASE.into_iter().zip(pairs).filter(|(_, (asked, done))| asked != done).map(|(name, _)| name)

@@ -1,5 +1,5 @@
-//! What is told of a robot's base: whether it stands or steps and why, and where it is against where it was told to be. All of it by its
-//! own controller and odometry.
+//! State of a robot's base for reports: whether it stands or steps and why, and its displacement from the
+//! commanded place. All of it is based on the robot's own controller and odometry.
 
 use nalgebra::{Isometry3, Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -8,50 +8,51 @@ use tandem_tools_spec::{BaseReport, BaseState};
 
 use crate::convert::{coarse, isometry_from_sim};
 
-/// A robot that was told to stop has stopped after so many control steps, as measured from 0.05 to 0.4 m/s in every direction; one that
-/// steps later than that was pushed.
+/// Control steps in which a robot stops after a stop command, measured from 0.05 to 0.4 m/s in every
+/// direction. A robot that steps later has been pushed.
 const SETTLES_STEPS: u32 = 75;
-/// A base that was told to move for at most so many control steps comes to rest where speed times time takes it, as far as it has not
-/// been held back by more than the leash.
+/// Maximum duration of a motion whose end is speed times time, and limit on how far the base may lag
+/// behind that place.
 const SHORT_STEPS: u32 = 125;
 const LEASH_M: f64 = 0.25;
-/// After longer walks it goes on for a while at its speed, the longer the faster it went:
+/// Parameters of the coasting distance after longer walks, which grows with the speed:
 ///   d = v (0.25 s + 0.6 s^2/m |v|),
-/// fitted to walks of 3 s ahead, back and to the side: 3 cm from 0.1 m/s, 8 from 0.2, 12 from 0.3 and 21 from 0.4.
+/// fitted to walks of 3 s ahead, back and to the side: 3 cm from 0.1 m/s, 8 from 0.2, 12 from 0.3 and 21
+/// from 0.4.
 const COASTS_S: f64 = 0.25;
 const COASTS_S2_M: f64 = 0.6;
 const CONTROL_S: f64 = 0.02;
-/// A base whose feet have been still for so many control steps, and whose pelvis is off its height, is on its way there while that changes
-/// by more; for a moment after the feet have come together it does not yet rise.
+/// A pelvis off its height counts as moving for this many control steps after the feet have stopped, even
+/// if it does not rise yet. Later it counts as moving only above this vertical speed.
 const PLANTED_STEPS: u32 = 10;
 const RISES_M_S: f64 = 0.02;
-/// Part of the mean of how fast it rises that one control step makes up.
+/// Weight of one control step in the running mean of the vertical speed.
 const RISING_PART: f64 = 0.2;
-/// What differs by less is not told.
+/// Minimum differences that are reported.
 const HEIGHT_M: f64 = 0.02;
 const DISPLACED_M: f64 = 0.02;
 
-/// How a base has been moved lately.
+/// Recent motion of a base.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Footing {
     pub pelvis_from_start: Isometry3<f64>,
     is_stepping: Option<bool>,
-    /// Control steps since it was last told to move, and how it was to.
+    /// Control steps since the last command to move, and its velocity.
     still_steps: u32,
     told_m_s: [f64; 2],
-    /// Where the commands since it last stood take it.
+    /// Place to which the commands since the last stand lead.
     walk: Option<ToldWalk>,
-    /// Where it came to rest after that, in the frame of its estimate.
+    /// Pose at which it came to rest afterwards, in the frame of its estimate.
     rests_at: Option<Isometry3<f64>>,
-    /// Control steps since its feet last moved, and how high its pelvis is and how fast it has risen lately.
+    /// Control steps since the feet last moved; height of the pelvis, and its recent vertical speed.
     planted_steps: u32,
     height_m: f64,
     rises_m_s: f64,
-    /// Whether it has stepped since its last command began, though it was told to stand.
+    /// True if the base has stepped since its last command began, despite the command to stand.
     stepped: bool,
 }
 
-/// A place to which commands take a base from where it stood, start frame.
+/// Place in the start frame to which commands lead from the last stand.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct ToldWalk {
     to_m: Vector3<f64>,
@@ -59,7 +60,7 @@ struct ToldWalk {
 }
 
 impl Footing {
-    /// A robot that stands where the episode begins.
+    /// Returns the state of a robot that stands at the start of the episode.
     pub fn new(world_from_pelvis: Isometry3<f64>) -> Footing {
         let height_m = world_from_pelvis.translation.z;
         Footing {
@@ -76,12 +77,12 @@ impl Footing {
         }
     }
 
-    /// A command begins.
+    /// Begins a command.
     pub fn begin(&mut self) {
         self.stepped = false;
     }
 
-    /// Takes in what the robot senses after a control step under the command `base`.
+    /// Updates the state with the robot's sensing after a control step under the command `base`.
     pub fn feel(&mut self, sensed: &RobotSensed, base: &BaseCommand, world_from_pelvis: &Isometry3<f64>) {
         self.pelvis_from_start = isometry_from_sim(&sensed.start_from_pelvis).inverse();
         self.is_stepping = sensed.is_stepping;
@@ -104,7 +105,7 @@ impl Footing {
         self.stepped |= self.still_steps >= SETTLES_STEPS && sensed.is_stepping == Some(true);
     }
 
-    /// Goes on to where the command takes the base in one more control step.
+    /// Moves the commanded place by one control step.
     fn walk_on(&mut self) {
         let start_from_pelvis = self.pelvis_from_start.inverse();
         let pelvis_m = start_from_pelvis.translation.vector;
@@ -116,7 +117,7 @@ impl Footing {
         walk.control_steps += 1;
     }
 
-    /// Where the base comes to rest if no further step is commanded, start frame.
+    /// Returns the place in the start frame at which the base comes to rest without further commands.
     fn rests_m(&self) -> Vector3<f64> {
         if let Some(walk) = self.walk.as_ref().filter(|walk| walk.control_steps <= SHORT_STEPS) {
             return walk.to_m;
@@ -139,7 +140,7 @@ impl Footing {
         })
     }
 
-    /// What is told of a base under the command `base`, with the pelvis at `world_from_pelvis`.
+    /// Returns the report on a base under the command `base`, with the pelvis at `world_from_pelvis`.
     pub fn report(&self, base: &BaseCommand, world_from_pelvis: &Isometry3<f64>) -> BaseReport {
         let pelvis_height_m = self.pelvis_from_start.inverse().translation.z;
         let commanded_m = f64::from(base.pelvis_height_m);

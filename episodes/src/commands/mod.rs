@@ -1,6 +1,8 @@
-//! Commands: an acting tool call becomes orders to robots, once; an order becomes a trajectory of joint targets, step by step.
+//! Commands: an acting tool call is converted to orders for robots once, and each order to a trajectory
+//! of joint targets.
 //!
-//! Each acting tool has a file of its own, from its arguments to joint targets: `move_wrists`, `walk`, `send_joint_chunk`, `wait`.
+//! Each acting tool has a file of its own, from its arguments to joint targets: `move_wrists`, `walk`,
+//! `send_joint_chunk`, `wait`.
 
 mod called;
 mod check_reach;
@@ -32,28 +34,28 @@ pub(crate) use move_wrists::wrist_targets;
 use send_joint_chunk::JointTrajectory;
 use walk::WalkTrajectory;
 
-/// What robots do for some control steps. A robot without an order holds still.
+/// Orders to robots for a number of control steps. A robot without an order holds still.
 #[derive(Clone, Debug)]
 pub struct Command {
     pub steps: u32,
-    /// One order at most for each robot. The robots are reported on in this order.
+    /// At most one order for each robot, in the order of the report.
     pub orders: Vec<RobotOrder>,
 }
 
-/// What one robot, by its index, is to do. Whatever could be refused has been refused.
+/// Order to a robot, given by its index. It has been checked and cannot be refused any more.
 #[derive(Clone, Debug)]
 pub struct RobotOrder {
     pub robot: usize,
-    /// Control steps that the order is made for. Where the command is shorter, only the order's beginning is executed.
+    /// Duration of the order in control steps. A shorter command executes only its beginning.
     pub steps: u32,
     pub action: RobotAction,
 }
 
-/// What results say of wrist commands that take hands along with the pelvis, or have them give way.
+/// Departures from the benchmark of wrist commands with carried targets, or with compliance.
 const CARRIED: &str = "wrist commands: carried";
 const COMPLIANCE: &str = "wrist commands: compliance";
 
-/// What is asked of one robot, as the arguments of a tool say it.
+/// Action of one robot, with the arguments of its tool.
 #[derive(Clone, Debug)]
 pub enum RobotAction {
     MoveWrists(Box<WristMove>),
@@ -63,7 +65,7 @@ pub enum RobotAction {
 }
 
 impl RobotAction {
-    /// What of it the benchmark's wrist commands have not.
+    /// Yields the departures from the benchmark's wrist commands.
     pub fn departures(&self) -> impl Iterator<Item = &'static str> {
         let entry = match self {
             RobotAction::MoveWrists(entry) => Some(entry),
@@ -78,7 +80,7 @@ impl RobotAction {
         carried.into_iter().chain(entry.filter(|entry| gives_way(entry)).map(|_| COMPLIANCE))
     }
 
-    /// The frame that it gives wrist poses in.
+    /// Returns the frame of its wrist poses.
     pub fn frame(&self) -> PoseFrame {
         match self {
             RobotAction::MoveWrists(entry) => entry.frame.unwrap_or_default(),
@@ -87,9 +89,9 @@ impl RobotAction {
     }
 }
 
-/// What one robot does, control step by control step.
+/// Trajectory of one robot, by control step.
 pub enum Trajectory {
-    /// The base stands, and hands go on to where they were told to be.
+    /// The base stands, and hands continue to their targets.
     Hold,
     Wrists(Box<WristTrajectory>),
     Walk(WalkTrajectory),
@@ -97,7 +99,11 @@ pub enum Trajectory {
 }
 
 impl Command {
-    /// Reads a call for the robots that `motions` move. Either all of it is in order, or none of it becomes a command.
+    /// Reads a call for the robots of `motions`.
+    ///
+    /// # Errors
+    ///
+    /// Any error in the call; the command is then refused as a whole.
     pub fn read(call: &ActCall, rules: &Rules, motions: &[Motion]) -> Result<Command, EpisodeError> {
         let steps = rules.steps(call.steps())?;
         let order = |(name, action): (&str, RobotAction)| {
@@ -107,12 +113,13 @@ impl Command {
         Ok(Command { steps, orders })
     }
 
-    /// All robots hold still for `steps` control steps, and none is reported on.
+    /// Returns a command with which all robots hold still, without reports.
     pub fn hold(steps: u32) -> Command {
         Command { steps, orders: Vec::new() }
     }
 
-    /// Several robots are told each by an order of its own, side by side and for as long as the shortest of these.
+    /// Combines orders to several robots, which are executed at the same time for the duration of the
+    /// shortest.
     pub fn together(orders: Vec<RobotOrder>) -> Command {
         let steps = orders.iter().map(|order| order.steps).min().unwrap_or_default();
         Command { steps, orders }
@@ -120,7 +127,8 @@ impl Command {
 }
 
 impl Trajectory {
-    /// Has `motion` take up `action`, which is to be done within `steps` control steps. Also says what of it was clamped.
+    /// Starts `action` on `motion`, to be finished within `steps` control steps. Returns the trajectory
+    /// and the clamped values.
     pub fn begin(action: &RobotAction, steps: u32, motion: &mut Motion) -> (Trajectory, Clamped) {
         let mut clamped = Clamped::default();
         let trajectory = match action {
@@ -136,7 +144,7 @@ impl Trajectory {
         (trajectory, clamped)
     }
 
-    /// The command of control step `step`, counted from 1.
+    /// Returns the command of control step `step`, counted from 1.
     pub fn command(&self, step: u32, motion: &mut Motion) -> RobotCommand {
         match self {
             Trajectory::Hold => wait::hold(motion),
@@ -148,7 +156,7 @@ impl Trajectory {
     }
 }
 
-/// What a call asks of each robot that it is about, by the robot's name.
+/// Returns the action of each robot in a call, with the robot's name.
 fn actions<'a>(call: &'a ActCall, motions: &'a [Motion]) -> Vec<(&'a str, RobotAction)> {
     match call {
         ActCall::MoveWrists(args) => {
@@ -171,7 +179,11 @@ fn actions<'a>(call: &'a ActCall, motions: &'a [Motion]) -> Vec<(&'a str, RobotA
     }
 }
 
-/// Index of the robot called `name`.
+/// Returns the index of the robot called `name`.
+///
+/// # Errors
+///
+/// [`EpisodeError::UnknownRobot`], which lists the robots.
 pub fn find(name: &str, motions: &[Motion]) -> Result<usize, EpisodeError> {
     let names = || motions.iter().map(|motion| motion.robot.name.clone());
     names()

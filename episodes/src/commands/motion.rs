@@ -1,4 +1,4 @@
-//! What moves one robot: its joint targets, and the inverse kinematics that makes them follow wrist poses.
+//! Motion of one robot: its joint targets, and the inverse kinematics with which they follow wrist poses.
 
 use std::sync::Arc;
 
@@ -16,36 +16,36 @@ use super::footing::Footing;
 use super::upper_body::{STEPS_AHEAD_M, UpperBody, ahead_m};
 use crate::convert::isometry_from_sim;
 
-/// Part of the remaining error that one control step removes: smooth, and a lag of two steps.
+/// Fraction of the remaining error removed in one control step: smooth, with a lag of two steps.
 const GAIN: f64 = 0.5;
-/// Control steps in which wrists come to where they can.
+/// Control steps in which wrists get as close to their targets as they can.
 const GOING_STEPS: u32 = 75;
-/// Hands give way by no more than this ahead and to the side (m) and about the vertical (rad). They creep back at this rate while they may
-/// give way, faster when they may no more.
+/// Limits of the hands' yielding ahead and to the side (m) and about the vertical (rad). The hands creep
+/// back at `LEAK_1_S` while they may yield, and return at `RETURN_1_S` when they may not.
 const MAX_YIELD_M: f64 = 0.06;
 const MAX_YIELD_RAD: f64 = 0.15;
 const LEAK_1_S: f64 = 0.1;
 const RETURN_1_S: f64 = 3.0;
-/// Of what is missing to a wrist's target, in metres, a radian counts for this.
+/// Length in metres that counts as much as a radian in the distance to a wrist's target.
 const M_PER_RAD: f64 = 0.1;
-/// Part of the mean that one control step makes up.
+/// Weight of one control step in the running mean of the distance.
 const LATELY_PART: f64 = 0.1;
-/// A wrist comes nearer that is nearer than it was lately by this much, or by this part of what is missing; less is swaying.
+/// Minimum decrease of an approaching wrist's distance, absolute and relative; smaller changes are sway.
 const NEARER_M: f64 = 0.003;
 const NEARER_PART: f64 = 0.15;
-/// A hand that has given way by less is where it was told to be: metres or radians.
+/// Minimum yielding that is reported, in metres or radians.
 const MIN_REPORTED: f64 = 0.003;
 
-/// What of a robot stays the same throughout an episode.
+/// Per-robot constants of an episode.
 #[derive(Clone)]
 pub struct RobotSheet {
     pub name: String,
     pub model: Arc<RobotModel>,
-    /// Base commands that its controller follows.
+    /// Limits of the base commands that its controller follows.
     pub base_limits: BaseLimits,
 }
 
-/// What moves one robot.
+/// Motion of one robot.
 pub struct Motion {
     pub robot: RobotSheet,
     body: Arc<UpperBody>,
@@ -53,59 +53,58 @@ pub struct Motion {
     state: MotionState,
 }
 
-/// What one robot was last told: all of a motion that outlasts a control step.
+/// State of a motion: everything that persists between control steps.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct MotionState {
-    /// Joint targets of the present control step, action order.
+    /// Joint targets of the current control step, in action order.
     pub(super) upper_rad: [f64; UPPER_JOINTS],
     pub(super) base: BaseCommand,
     pub(super) aims: Sides<Aim>,
     pub(super) restraint: Restraint,
-    /// The pelvis as it was last sensed.
+    /// Latest sensed pose of the pelvis.
     world_from_pelvis: Isometry3<f64>,
-    /// What pulled the pair of hands, as it was last sensed: the way the robot faces and to its left, and about the vertical through the
-    /// middle between the wrists.
+    /// Latest sensed load on both hands: forces ahead and left, and moment about the midpoint's vertical.
     pull_n: [f64; 2],
     turning_n_m: f64,
-    /// How far the hands have given way to each.
+    /// Displacement of the hands by yielding to each of these.
     yielded_m: [f64; 2],
     yielded_rad: f64,
-    /// What the solver remembers of steps that did not help; see [`Solver::caution`].
+    /// The solver's memory of steps that did not help; see [`Solver::caution`].
     caution: f64,
-    /// How far each wrist is from its target, and how far it was a moment ago; `None` before it has been seen under its present aim.
+    /// Current and recent distances of the wrists from their targets; `None` before the first reading.
     pub(super) approaches: Sides<Option<Approach>>,
     pub(super) footing: Footing,
 }
 
-/// What arms may not do that reach for their aims.
+/// Restrictions on arms that move to their aims.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Restraint {
-    /// Turn or bend the waist.
+    /// True to keep the waist's joints.
     pub keeps_waist: bool,
-    /// Go so far ahead that the robot has to step.
+    /// True to stop before the robot has to step.
     pub stands_fast: bool,
 }
 
-/// How a wrist nears its target: metres, of which a radian of its turning counts as a tenth.
+/// Distance of a wrist from its target in metres; a radian counts as a tenth of a metre.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Approach {
     missing_m: f64,
-    /// The mean of what it was, over the last fifth of a second or so.
+    /// Running mean of the distance over about a fifth of a second.
     lately_m: f64,
 }
 
-/// How arms would come to rest.
+/// Predicted end state of a reach.
 pub struct Reach {
-    /// What each wrist that has a target would be off.
+    /// Predicted error of each wrist with a target.
     pub errors: Sides<Option<FrameError>>,
     /// Joints that would be at their limits.
     pub joints_at_limit: Vec<String>,
-    /// How much farther ahead the whole robot's centre of mass would be than with its arms at rest.
+    /// Forward displacement of the whole robot's centre of mass, compared with resting arms.
     pub ahead_m: f64,
 }
 
-/// How the pair of hands gives way to what pulls it: the force under which it goes at 1 m/s, or the moment under which it turns at
-/// 1 rad/s; `None` for not at all.
+/// Compliance of the pair of hands: the force at which it moves at 1 m/s, or the moment at which it turns
+/// at 1 rad/s. `None` for stiff hands.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Compliance {
     pub ahead_n_s_m: Option<f64>,
@@ -117,19 +116,19 @@ impl Compliance {
     pub const NONE: Compliance = Compliance { ahead_n_s_m: None, side_n_s_m: None, turn_n_m_s_rad: None };
 }
 
-/// What a wrist is to do.
+/// Aim of a wrist.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Aim {
-    /// The arm's joints stay as they are.
+    /// The arm's joints keep their targets.
     Joints,
-    /// A pose in the world: the hand stays there while the pelvis sways or walks.
+    /// A pose in the world frame: the hand stays there while the pelvis sways or walks.
     World(Isometry3<f64>),
-    /// A pose in the pelvis frame, which goes where the pelvis goes.
+    /// A pose in the pelvis frame, which moves with the pelvis.
     Carried(Isometry3<f64>),
 }
 
 impl Motion {
-    /// A robot that stands under `rest`, with its pelvis at `world_from_pelvis`.
+    /// Returns the motion of a robot that stands under `rest`, with its pelvis at `world_from_pelvis`.
     pub fn new(
         robot: RobotSheet,
         body: &Arc<UpperBody>,
@@ -153,7 +152,7 @@ impl Motion {
         Motion { robot, solver: body.solver(), body: body.clone(), state }
     }
 
-    /// What the robot's hands are steered by until it is sensed anew: the pelvis, and the force of the world on each hand (world frame).
+    /// Sets the pelvis, and the world's force on each hand (world frame), until the next reading.
     pub fn sense(&mut self, world_from_pelvis: Isometry3<f64>, hands_n: Sides<Vector3<f64>>) {
         self.state.world_from_pelvis = world_from_pelvis;
         let wrists = self.commanded_wrists();
@@ -164,7 +163,7 @@ impl Motion {
         self.state.turning_n_m = 0.5 * apart_m.cross(&(hands_n.left - hands_n.right)).z;
     }
 
-    /// Takes in what the robot senses after a control step, for what is told of it.
+    /// Updates the reported state with the robot's sensing after a control step.
     pub fn feel(&mut self, sensed: &RobotSensed) {
         let asked = self.asked_wrists();
         let before = &self.state.approaches;
@@ -179,7 +178,7 @@ impl Motion {
         footing.feel(sensed, base, world_from_pelvis);
     }
 
-    /// From a frame in which poses may be given to the pelvis.
+    /// Returns the pose of a frame in the pelvis frame.
     pub fn pelvis_from(&self, frame: PoseFrame) -> Isometry3<f64> {
         let pelvis = &self.state.world_from_pelvis;
         match frame {
@@ -191,13 +190,13 @@ impl Motion {
         }
     }
 
-    /// Level, x the way the robot faces.
+    /// Returns the heading: level, with x in the robot's forward direction.
     pub(super) fn heading(&self) -> UnitQuaternion<f64> {
         let ahead = self.state.world_from_pelvis.rotation * Vector3::x();
         UnitQuaternion::from_axis_angle(&Vector3::z_axis(), ahead.y.atan2(ahead.x))
     }
 
-    /// Hands give way for one control step; where they must not, they come back to where they were told to be.
+    /// Moves the yielding of the hands by one control step. Without compliance, they return to their targets.
     ///   dy/dt = F / c - l y,   |y| <= y_max
     pub(super) fn give_way(&mut self, compliance: Compliance) {
         let Compliance { ahead_n_s_m, side_n_s_m, turn_n_m_s_rad } = compliance;
@@ -212,8 +211,8 @@ impl Motion {
         one(yielded_rad, *turning_n_m, turn_n_m_s_rad, MAX_YIELD_RAD);
     }
 
-    /// From wrists as they were told to be to where they have given way to, if the middle between them was told to be at `middle_m`
-    /// (pelvis frame). It turns them about this middle.
+    /// Returns the transform from commanded to yielded wrists in the pelvis frame. It rotates about
+    /// `middle_m`, the commanded midpoint of the wrists.
     fn yielding(&self, middle_m: Vector3<f64>) -> Isometry3<f64> {
         let pelvis_from_world = self.state.world_from_pelvis.rotation.inverse();
         let up = pelvis_from_world * Vector3::z_axis();
@@ -221,14 +220,14 @@ impl Motion {
         Translation3::from(self.yielded_m()) * Isometry3::rotation_wrt_point(turned, Point3::from(middle_m))
     }
 
-    /// How far the middle between the wrists has given way, pelvis frame.
+    /// Returns the displacement of the wrists' midpoint by yielding, in the pelvis frame.
     fn yielded_m(&self) -> Vector3<f64> {
         let [ahead_m, left_m] = self.state.yielded_m;
         let level_m = self.heading() * Vector3::new(ahead_m, left_m, 0.0);
         self.state.world_from_pelvis.rotation.inverse() * level_m
     }
 
-    /// Where the commanded joints would put the middle between the wrists had it not given way, pelvis frame.
+    /// Returns the wrists' midpoint under the commanded joints without the yielding, in the pelvis frame.
     fn commanded_middle_m(&self) -> Vector3<f64> {
         let wrists = self.commanded_wrists();
         0.5 * (wrists.left.translation.vector + wrists.right.translation.vector) - self.yielded_m()
@@ -242,7 +241,7 @@ impl Motion {
         &self.state
     }
 
-    /// Joint targets of waist, arms and hands in radians.
+    /// Returns the joint targets of waist, arms and hands in radians.
     pub fn upper_rad(&self) -> &[f64; UPPER_JOINTS] {
         &self.state.upper_rad
     }
@@ -251,7 +250,7 @@ impl Motion {
         self.state = state;
     }
 
-    /// What moves a robot like this one that is told the same.
+    /// Returns the motion of an equal robot in the same state.
     pub fn another(&self) -> Motion {
         Motion {
             robot: self.robot.clone(),
@@ -261,18 +260,17 @@ impl Motion {
         }
     }
 
-    /// The state of a robot like this one that was last told `command`, with its pelvis at `world_from_pelvis`: of its hands it is
-    /// known where the joints were to have them.
+    /// Returns the state of an equal robot after `command`; the hands' poses follow from the joint targets.
     pub fn told(&self, command: &RobotCommand, world_from_pelvis: Isometry3<f64>) -> MotionState {
         Motion::new(self.robot.clone(), &self.body, command, world_from_pelvis).state
     }
 
-    /// Whether a wrist is to be at a pose, and its arm not only at joint angles.
+    /// Returns true if a wrist has a pose as its aim, not joint angles.
     pub fn aims_at_pose(&self, side: Side) -> bool {
         self.state.aims[side] != Aim::Joints
     }
 
-    /// What the robot is told now.
+    /// Returns the current command.
     pub fn command(&self) -> RobotCommand {
         RobotCommand {
             upper_rad: self.state.upper_rad.map(|target_rad| target_rad as f32),
@@ -280,23 +278,22 @@ impl Motion {
         }
     }
 
-    /// The base command that a velocity (forward and left in m/s, turning in rad/s) and a height ask for. Without a height, the base
-    /// keeps the one that it was last told.
+    /// Returns the base command for a velocity (forward and left in m/s, yaw rate in rad/s) and a height.
+    /// Without a height, the base keeps the previous one.
     pub(super) fn base_asked(&self, velocity_command: [f64; 3], height_m: Option<f64>) -> BaseCommand {
         let [vx_m_s, vy_m_s, yaw_rate_rad_s] = velocity_command.map(|part| part as f32);
         let pelvis_height_m = height_m.map_or(self.state.base.pelvis_height_m, |height_m| height_m as f32);
         BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m }
     }
 
-    /// Where the wrists are to be, in the frame of the pelvis as it is now; of an arm without a target, where its joints
-    /// have the wrist.
+    /// Returns the target wrist poses in the pelvis frame; without a target, those of the joint targets.
     pub fn targets(&self) -> Sides<Isometry3<f64>> {
         let commanded = self.commanded_wrists();
         let asked = self.in_pelvis(&self.state.aims);
         Sides::from_fn(|side| asked[side].unwrap_or(commanded[side]))
     }
 
-    /// As [`Motion::targets`], as they were told and not as they have given way since.
+    /// Returns the target wrist poses like [`Motion::targets`], without the yielding.
     pub fn told_wrists(&self) -> Sides<Isometry3<f64>> {
         let as_told = self.yielding(self.commanded_middle_m()).inverse();
         let commanded = self.commanded_wrists().map(|wrist| as_told * wrist);
@@ -304,17 +301,17 @@ impl Motion {
         Sides::from_fn(|side| self.state.aims[side].in_pelvis(pelvis).unwrap_or(commanded[side]))
     }
 
-    /// A command begins that is told of by itself.
+    /// Begins a command with a report of its own.
     pub fn begin_command(&mut self) {
         self.state.footing.begin();
     }
 
-    /// Where the wrists that have targets are to be, pelvis frame.
+    /// Returns the target wrist poses in the pelvis frame; `None` without a target.
     fn asked_wrists(&self) -> Sides<Option<Isometry3<f64>>> {
         self.in_pelvis(&self.state.aims)
     }
 
-    /// How far hands have given way, pelvis frame; `None` where they have not.
+    /// Returns the displacement of a hand by yielding, in the pelvis frame; `None` without any.
     pub(super) fn given_way_m(&self, side: Side) -> Option<Vector3<f64>> {
         let MotionState { yielded_m, yielded_rad, aims, .. } = &self.state;
         let [ahead_m, left_m] = *yielded_m;
@@ -324,13 +321,13 @@ impl Motion {
         Some(given_way.translation.vector - asked.translation.vector)
     }
 
-    /// Whether a wrist comes nearer to its target; `None` where that cannot be told yet.
+    /// Returns true if a wrist approaches its target; `None` while this is unknown.
     pub(super) fn comes_nearer(&self, side: Side) -> Option<bool> {
         let Approach { missing_m, lately_m } = self.state.approaches[side]?;
         (missing_m != lately_m).then_some(lately_m - missing_m > NEARER_M.max(NEARER_PART * missing_m))
     }
 
-    /// The base stands at the height that it was last told.
+    /// Commands the base to stand at its previous height.
     pub(super) fn stand(&mut self) {
         let pelvis_height_m = self.state.base.pelvis_height_m;
         self.state.base = BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m };
@@ -340,20 +337,19 @@ impl Motion {
         self.state.base = base;
     }
 
-    /// What the wrists are to do from now on, and how.
+    /// Sets the aims of the wrists, and the restrictions on the arms.
     pub(super) fn aim(&mut self, aims: Sides<Aim>, restraint: Restraint) {
         self.state.aims = aims;
         self.state.restraint = restraint;
         self.state.approaches = Sides::both(None);
     }
 
-    /// Both arms keep their joints until they are told otherwise.
+    /// Lets both arms keep their joints.
     pub(super) fn keep_joints(&mut self) {
         self.aim(Sides::both(Aim::Joints), Restraint::default());
     }
 
-    /// Aims of the kind of those in force, at which the wrists would have arrived were they where the commanded joints put them and had
-    /// they not given way.
+    /// Returns aims of the current kinds that the commanded joints would meet without the yielding.
     pub(super) fn arrived(&self) -> Sides<Aim> {
         let as_told = self.yielding(self.commanded_middle_m()).inverse();
         let commanded = self.commanded_wrists().map(|wrist| as_told * wrist);
@@ -373,15 +369,14 @@ impl Motion {
         self.state.upper_rad[columns::hand(side)].copy_from_slice(fingers_rad);
     }
 
-    /// Where the commanded joints put the wrists, pelvis frame.
+    /// Returns the wrist poses under the commanded joints, in the pelvis frame.
     pub(super) fn commanded_wrists(&self) -> Sides<Isometry3<f64>> {
         let configuration = self.configuration();
         self.body.wrists.map(|wrist| configuration.root_from_frame(wrist))
     }
 
-    /// Joint targets for one step towards `aims`; an arm without a target keeps its joints.
-    ///
-    /// Inverse kinematics begins at the commanded, not at the measured joints: gravity's sag does not wind up.
+    /// Moves the joint targets by one step towards `aims`; an arm without a target keeps its joints. Inverse
+    /// kinematics starts at the commanded joints, so the sag under gravity does not accumulate.
     pub(super) fn follow(&mut self, aims: &Sides<Aim>) {
         let targets = self.in_pelvis(aims);
         if targets == Sides::both(None) {
@@ -409,27 +404,27 @@ impl Motion {
         }
     }
 
-    /// Whether these joint targets take the centre of mass so far ahead, and farther than those in force.
+    /// Returns true if these joint targets move the centre of mass beyond the limit, and farther than now.
     fn has_to_step(&self, upper_rad: &[f64; UPPER_JOINTS]) -> bool {
         let ahead_m = self.ahead_m(upper_rad);
         ahead_m > STEPS_AHEAD_M && ahead_m > self.ahead_m(&self.state.upper_rad)
     }
 
-    /// How much farther ahead the whole robot's centre of mass is under these joint targets than with its arms at rest.
+    /// Returns how far these joint targets move the whole robot's centre of mass ahead of that at rest.
     fn ahead_m(&self, upper_rad: &[f64; UPPER_JOINTS]) -> f64 {
         ahead_m(&self.robot.model, upper_rad) - self.body.rest_ahead_m(&self.robot.model)
     }
 
-    /// What a wrist may miss that has come to its target.
+    /// Returns the tolerance within which a wrist has arrived at its target.
     pub fn tolerance(&self, side: Side) -> Tolerance {
         self.body.tolerance(side)
     }
 
-    /// How near to `targets` (pelvis frame) the wrists would come to rest. An arm without a target keeps its joints.
+    /// Predicts the rest poses for `targets` (pelvis frame); an arm without a target keeps its joints.
     pub fn reach(&self, targets: &Sides<Option<Isometry3<f64>>>, keeps_waist: bool) -> Reach {
         let speeds_rad_s = self.body.speeds_rad_s(targets, keeps_waist);
         let tasks = self.body.tasks(targets, 1.0);
-        // A command goes there step by step, and leaves the trunk more upright than the posture that is found at once.
+        // A command moves there step by step, and leaves the trunk more upright than the direct solution.
         let mut twin = self.another();
         twin.state.restraint = Restraint { keeps_waist, stands_fast: false };
         let aims = targets.map(|target| target.map_or(Aim::Joints, Aim::Carried));
@@ -437,7 +432,7 @@ impl Motion {
         let mut asked = targets.by_side().filter(|(_, target)| target.is_some());
         let configuration = match asked.all(|(side, _)| self.body.turns_hand[side]) {
             true => self.body.posture(self.configuration(), &tasks, &speeds_rad_s),
-            // What is found at once for an arm that cannot turn its hand gives up the place for the turn.
+            // The direct solution would sacrifice the position of a limited arm to the orientation.
             false => twin.configuration(),
         };
         let mut errors = frame_errors(&configuration, &tasks);
@@ -469,7 +464,7 @@ fn configuration<'a>(body: &'a UpperBody, state: &MotionState) -> Configuration<
 }
 
 impl Aim {
-    /// The wrist's pose that is asked for, in the frame of a pelvis at `world_from_pelvis`; `None` for joints.
+    /// Returns the requested wrist pose in the frame of a pelvis at `world_from_pelvis`; `None` for joints.
     pub fn in_pelvis(&self, world_from_pelvis: &Isometry3<f64>) -> Option<Isometry3<f64>> {
         match self {
             Aim::Joints => None,
@@ -478,7 +473,7 @@ impl Aim {
         }
     }
 
-    /// An aim of the same kind at which a wrist at `pelvis_from_wrist` has arrived.
+    /// Returns an aim of the same kind that a wrist at `pelvis_from_wrist` has reached.
     pub fn at(&self, world_from_pelvis: &Isometry3<f64>, pelvis_from_wrist: &Isometry3<f64>) -> Aim {
         match self {
             Aim::Joints => Aim::Joints,
@@ -487,8 +482,7 @@ impl Aim {
         }
     }
 
-    /// The aim after `share` of the straight way from here to `goal`, in the goal's frame; the goal itself where the two are
-    /// of different kinds.
+    /// Interpolates from this aim to `goal`, in its frame. Returns `goal` if the two are of different kinds.
     pub fn towards(&self, goal: &Aim, share: f64) -> Aim {
         match (self, goal) {
             (Aim::World(from), Aim::World(to)) => Aim::World(between(from, to, share)),

@@ -1,5 +1,5 @@
-//! `move_wrists`: wrists and fingers go in a straight line and arrive with the order's last step. The line is straight in the world,
-//! or for carried targets in the pelvis frame.
+//! `move_wrists`: wrists and fingers move in a straight line and arrive at the order's last step. The
+//! line is straight in the world frame, or for carried targets in the pelvis frame.
 
 use nalgebra::{Isometry3, Translation3};
 use tandem_sim::{BaseCommand, HAND_JOINTS, Side, Sides, UPPER_JOINTS};
@@ -9,21 +9,21 @@ use super::columns::{self, Clamped};
 use super::motion::{Aim, Compliance, Motion, Restraint};
 use crate::convert::unit_quaternion;
 
-/// The way of both wrists and their fingers.
+/// Trajectory of both wrists and their fingers.
 pub struct WristTrajectory {
     steps: u32,
-    /// Where the wrists begin, of the kind of the aims that they go to.
+    /// Aims at the start, of the same kinds as the goals.
     from: Sides<Aim>,
     to: Sides<Aim>,
     compliance: Compliance,
     from_rad: [f64; UPPER_JOINTS],
-    /// Fingers that are `None` stay.
+    /// Goals of the fingers; `None` for fingers that stay.
     fingers_rad: Sides<Option<[f64; HAND_JOINTS]>>,
     base: BaseCommand,
 }
 
 impl WristTrajectory {
-    /// Has `motion` take up what `entry` asks of it, within `steps` control steps.
+    /// Starts `entry` on `motion`, to be finished within `steps` control steps.
     pub fn begin(
         entry: &WristMove,
         steps: u32,
@@ -67,7 +67,7 @@ impl WristTrajectory {
         }
     }
 
-    /// Control step `step`, counted from 1.
+    /// Makes control step `step`, counted from 1.
     pub fn advance(&self, step: u32, motion: &mut Motion) {
         let part = f64::from(step) / f64::from(self.steps);
         motion.give_way(self.compliance);
@@ -84,7 +84,7 @@ impl WristTrajectory {
     }
 }
 
-/// Where the wrists are to go.
+/// Returns the wrists' goals.
 fn aims(entry: &WristMove, motion: &Motion) -> Sides<Aim> {
     let halves = Sides {
         left: (entry.left_position_m, entry.left_quaternion_wxyz),
@@ -99,11 +99,11 @@ fn aims(entry: &WristMove, motion: &Motion) -> Sides<Aim> {
     })
 }
 
-/// Position and orientation of a wrist, each of which may be left out.
+/// Optional position and orientation of a wrist.
 type Halves = (Option<[f64; 3]>, Option<[f64; 4]>);
 
-/// Targets of the wrists in the pelvis frame that are given in `frame`. A half that is left out stays as it was asked for: were it to stay
-/// where the hand has given way to, each command would let it give way anew.
+/// Converts wrist targets from `frame` to the pelvis frame. An omitted half keeps its earlier target, not
+/// the pose after yielding; otherwise each command would let the hand yield anew.
 pub fn wrist_targets(
     halves: Sides<Halves>,
     frame: PoseFrame,
@@ -111,7 +111,7 @@ pub fn wrist_targets(
 ) -> Sides<Option<Isometry3<f64>>> {
     let present = motion.told_wrists();
     if frame == PoseFrame::Pelvis {
-        // Through another frame and back, what is left out would not stay to the last bit.
+        // A conversion to another frame and back would change the omitted half by rounding.
         return Sides::from_fn(|side| wrist_target(halves[side].0, halves[side].1, &present[side]));
     }
     let pelvis_from_frame = motion.pelvis_from(frame);
@@ -122,7 +122,8 @@ pub fn wrist_targets(
     })
 }
 
-/// A wrist's target in the pelvis frame, of which either half may be left as `present` has it; `None` where both are.
+/// Returns a wrist's target in the pelvis frame, with an omitted half taken from `present`; `None` if
+/// both are omitted.
 fn wrist_target(
     position_m: Option<[f64; 3]>,
     quaternion_wxyz: Option<[f64; 4]>,
@@ -142,7 +143,7 @@ mod tests {
 
     use super::*;
 
-    /// A third of a metre has no end of decimals, and the wire has six.
+    /// A third of a metre has infinitely many decimals, while replies have six.
     #[test]
     fn what_is_left_out_stays_to_the_last_bit() {
         let turned = UnitQuaternion::from_scaled_axis(Vector3::new(0.1, -0.7, 1.0 / 3.0));

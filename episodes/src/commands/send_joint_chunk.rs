@@ -1,4 +1,4 @@
-//! `send_joint_chunk`: one row of joint targets and base command per control step.
+//! `send_joint_chunk`: one row of joint targets and base command for each control step.
 
 use tandem_sim::{BaseCommand, UPPER_JOINTS};
 use tandem_tools_spec::JointChunk;
@@ -6,7 +6,7 @@ use tandem_tools_spec::JointChunk;
 use super::columns::{self, Clamped};
 use super::motion::{Compliance, Motion};
 
-/// One row per control step.
+/// Trajectory with one row for each control step.
 pub struct JointTrajectory {
     rows: Vec<JointRow>,
 }
@@ -18,7 +18,7 @@ struct JointRow {
 }
 
 impl JointTrajectory {
-    /// Has `motion` take up the rows of `chunk`.
+    /// Starts the rows of `chunk` on `motion`.
     pub fn begin(chunk: &JointChunk, motion: &mut Motion, clamped: &mut Clamped) -> JointTrajectory {
         let row = |row: &Vec<f64>| {
             let upper_rad =
@@ -31,7 +31,7 @@ impl JointTrajectory {
         JointTrajectory { rows }
     }
 
-    /// Control step `step`, counted from 1.
+    /// Makes control step `step`, counted from 1.
     pub fn advance(&self, step: u32, motion: &mut Motion) {
         let row = &self.rows[step as usize - 1];
         motion.give_way(Compliance::NONE);

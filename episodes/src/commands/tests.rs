@@ -1,4 +1,4 @@
-//! Where hands go while the pelvis moves under them, by kinematics alone: joints are where they are told to be.
+//! Tests of hand motion under a moving pelvis, by kinematics alone: joints are at their targets.
 
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use crate::commands::motion::Reach;
 use crate::protocol::rules;
 use crate::tasks;
 
-/// A robot called A that stands at rest with its pelvis 0.78 m over the world's origin.
+/// Returns a robot called A that stands at rest with its pelvis 0.78 m above the world's origin.
 fn standing() -> Motion {
     let source = RobotSource::embedded(assets::DEFAULT_ROBOT).unwrap();
     let model = Arc::new(source.model.clone());
@@ -26,7 +26,7 @@ fn standing() -> Motion {
     Motion::new(robot, &body, &rest, Isometry3::translation(0.0, 0.0, 0.78))
 }
 
-/// What `entry` asks of A, in one command of 50 steps.
+/// Returns A's action for `entry`, in a command of 50 steps.
 fn action(entry: WristMove, motion: &Motion) -> RobotAction {
     let rules = rules(Protocol::Benchmark, tasks::find("handover").unwrap());
     let ToolCall::Act(call) = MoveWrists { steps: 50, robots: vec![entry] }.into() else { panic!("a look") };
@@ -34,17 +34,17 @@ fn action(entry: WristMove, motion: &Motion) -> RobotAction {
     command.orders.into_iter().next().unwrap().action
 }
 
-/// Plays 50 steps, in each of which the pelvis moves by `pelvis_step_m`.
+/// Runs 50 steps, in each of which the pelvis moves by `pelvis_step_m`.
 fn play(action: RobotAction, pelvis_step_m: Vector3<f64>, motion: &mut Motion) {
     play_pulled(action, pelvis_step_m, Vector3::zeros(), motion);
 }
 
-/// As [`play`], while the hands together feel `both_n`.
+/// Runs steps like [`play`] with the total force `both_n` on the hands.
 fn play_pulled(action: RobotAction, pelvis_step_m: Vector3<f64>, both_n: Vector3<f64>, motion: &mut Motion) {
     play_felt(action, pelvis_step_m, Sides::both(0.5 * both_n), motion);
 }
 
-/// As [`play`], while each hand feels its force.
+/// Runs steps like [`play`] with a force on each hand.
 fn play_felt(
     action: RobotAction,
     pelvis_step_m: Vector3<f64>,
@@ -67,12 +67,12 @@ fn right_hand(carried: bool) -> WristMove {
     }
 }
 
-/// Where the commanded joints put the right wrist.
+/// Returns the position of the right wrist under the commanded joints.
 fn wrist_in_world_m(motion: &Motion) -> Vector3<f64> {
     (motion.world_from_pelvis() * motion.commanded_wrists().right).translation.vector
 }
 
-/// A robot whose right hand has arrived before its chest.
+/// Returns a robot whose right hand has arrived in front of its chest.
 fn arrived() -> Motion {
     let mut motion = standing();
     let goal = action(right_hand(false), &motion);
@@ -90,7 +90,7 @@ fn a_hand_stays_in_the_world_under_a_moving_pelvis_until_it_is_out_of_reach() {
     for distance_m in [0.01, -0.02, 0.06] {
         play(RobotAction::Wait, back(distance_m), &mut motion);
         let off_m = (wrist_in_world_m(&motion) - there_m).norm();
-        // Inverse kinematics comes two control steps after the pelvis.
+        // Inverse kinematics lags two control steps behind the pelvis.
         assert!(off_m < 5e-3, "{off_m} m off after {distance_m} m back");
     }
     play(RobotAction::Wait, back(0.6), &mut motion);
@@ -108,7 +108,7 @@ fn targets_are_of_the_pelvis_at_the_beginning_and_only_carried_ones_move_with_it
         play(goal, step_m, &mut motion);
         let off_m = (wrist_in_world_m(&motion) - began_m - walked * step_m).norm();
         assert!(off_m < 3e-3, "{off_m} m off with carried {carried}");
-        // The target in force is told in the frame of the pelvis that has moved on.
+        // The current target is reported in the frame of the moved pelvis.
         let told_m = motion.targets().right.translation.vector;
         let expected_m = Vector3::new(0.28, -0.24, 0.22) + (walked - 50.0) * step_m;
         assert!((told_m - expected_m).norm() < 1e-9, "{told_m} with carried {carried}");
@@ -122,18 +122,18 @@ fn hands_give_way_as_they_were_told_to_and_come_back() {
     let mut motion = arrived();
     let there_m = wrist_in_world_m(&motion);
     let off_m = |motion: &Motion| wrist_in_world_m(motion) - there_m;
-    // What pulls a stiff hand, or a soft one sideways, does not move it.
+    // A pull on a stiff hand, or a sideways pull on a compliant one, does not move it.
     for (entry, hands_n) in [(right_hand(false), ahead_n), (soft(), Vector3::new(0.0, 30.0, -20.0))] {
         let goal = action(entry, &motion);
         play_pulled(goal, Vector3::zeros(), hands_n, &mut motion);
         assert!(off_m(&motion).norm() < 1e-3, "{} under {hands_n}", off_m(&motion));
         play(RobotAction::Wait, Vector3::zeros(), &mut motion);
     }
-    // 10 N for a second, at 1 m/s for 250 N: 4 cm, less what creeps back and what the hand is behind.
+    // 10 N for a second, at 1 m/s for 250 N: 4 cm, minus the creep back and the hand's lag.
     let goal = action(soft(), &motion);
     play_pulled(goal, Vector3::zeros(), ahead_n, &mut motion);
     assert!((0.036..0.040).contains(&off_m(&motion).x), "{}", off_m(&motion));
-    // The next command begins where the hand is, and goes on to the limit.
+    // The next command starts at the hand's current place, and continues to the limit.
     let goal = action(soft(), &motion);
     play_pulled(goal, Vector3::zeros(), 3.0 * ahead_n, &mut motion);
     assert!((0.058..0.0605).contains(&off_m(&motion).x), "{}", off_m(&motion));
@@ -142,8 +142,8 @@ fn hands_give_way_as_they_were_told_to_and_come_back() {
     assert!(off_m(&motion).norm() < 1e-3, "{}", off_m(&motion));
 }
 
-/// A hand that is told again how to be turned, and not where to be, is to stay where it was asked to be: pulled on and on, it gives way by
-/// no more than the most of one command.
+/// A hand with a new orientation and no position is to stay at its earlier target. Pulled continually, it
+/// yields by no more than the limit of one command.
 #[test]
 fn targets_that_are_left_out_do_not_go_on_from_where_hands_have_given_way_to() {
     let mut motion = arrived();
@@ -159,7 +159,8 @@ fn targets_that_are_left_out_do_not_go_on_from_where_hands_have_given_way_to() {
     }
 }
 
-/// Both hands before the chest of a robot that faces left, and what they ask for; they may give way as `soft` has it.
+/// Returns a robot that faces left with both hands in front of its chest, and the action for `soft` with
+/// these targets.
 fn both_hands(soft: WristMove) -> (Motion, RobotAction) {
     let mut motion = standing();
     let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2);
@@ -184,11 +185,11 @@ fn wrists_in_world(motion: &Motion) -> Sides<Isometry3<f64>> {
     motion.commanded_wrists().map(|wrist| motion.world_from_pelvis() * wrist)
 }
 
-/// 10 N or 2 N m for a second, at 1 m/s for 250 N and 1 rad/s for 20 N m: 4 cm and 0.1 rad, less what creeps back and what the hands are
-/// behind.
+/// 10 N or 2 N m for a second, at 1 m/s for 250 N and 1 rad/s for 20 N m: 4 cm and 0.1 rad, minus the
+/// creep back and the hands' lag.
 #[test]
 fn the_pair_of_hands_gives_way_to_the_side_and_about_the_vertical() {
-    // The robot faces along y of the world, so -x is its left; its left hand is the one at -x.
+    // The robot faces along the world's y axis, so -x is its left, and its left hand is the one at -x.
     let to_left = Sides::both(Vector3::new(-5.0, 0.0, 0.0));
     let turning_n = 2.0 / 0.48;
     let turning =
@@ -217,7 +218,7 @@ fn the_pair_of_hands_gives_way_to_the_side_and_about_the_vertical() {
         }
         let apart_m = after.left.translation.vector - after.right.translation.vector;
         assert!((apart_m.norm() - 0.48).abs() < 2e-3, "hands {} m apart", apart_m.norm());
-        // The next command begins where the hands are, and without compliance they come back.
+        // The next command starts at the hands' current places; without compliance they return.
         let (trajectory, _) = Trajectory::begin(&RobotAction::Wait, 50, &mut motion);
         trajectory.command(1, &mut motion);
         let next = wrists_in_world(&motion);
@@ -244,7 +245,7 @@ fn an_arm_without_a_target_keeps_its_joints() {
     assert_eq!(after_rad[left.clone()], before_rad[left], "the left arm was given no target");
     assert_ne!(after_rad[columns::arm(Side::Right)], before_rad[columns::arm(Side::Right)]);
 
-    // Walking takes both arms along, whatever they were told before.
+    // Walking moves both arms with the pelvis, whatever their earlier targets.
     let mut walking = arrived();
     let walk = WalkMove {
         robot: "A".into(),
@@ -280,7 +281,7 @@ fn a_half_that_is_left_out_is_where_the_hand_is_to_be() {
     play(action(higher, &motion), Vector3::zeros(), &mut motion);
     let moved = motion.targets().right;
     assert!((moved.translation.vector - Vector3::new(0.28, -0.24, 0.3)).norm() < 1e-12);
-    // Through the world and back; six decimals would be coarser by far.
+    // The target is converted to the world frame and back; rounding to six decimals would be much coarser.
     assert!(moved.rotation.angle_to(&target.rotation) < 1e-12);
     let turned = WristMove { right_quaternion_wxyz: Some([0.8, 0.6, 0.0, 0.0]), ..WristMove::hold("A") };
     play(action(turned, &motion), Vector3::zeros(), &mut motion);

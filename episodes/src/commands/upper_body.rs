@@ -1,4 +1,5 @@
-//! The robot above its hips for inverse kinematics: what is free, what may not collide, and what is asked of it besides wrists.
+//! The robot above its hips for inverse kinematics: free joints, collision shapes, and secondary tasks
+//! beside the wrists' targets.
 
 use nalgebra::{Isometry3, Point3};
 use tandem_ik::{
@@ -12,40 +13,42 @@ use tandem_sim::{
 
 use super::columns;
 
-/// Unitree's limits are 22 to 37 rad/s; arms that work next to people and partners move slower.
+/// Speed limits. Unitree's are 22 to 37 rad/s; arms near people and partners move slower.
 const ARM_SPEED_RAD_S: f64 = 4.0;
 const WAIST_SPEED_RAD_S: f64 = 1.0;
 const ORIENTATION_COST: f64 = 0.5;
-/// Of an arm that cannot hold its hand any way round: what it misses of that takes its wrist off its place by millimetres.
+/// Orientation cost for an arm that cannot set its hand's orientation freely. At this cost, the
+/// orientation error displaces the wrist by millimetres only.
 const SHORT_ARM_ORIENTATION_COST: f64 = 0.02;
-/// A pose has as many numbers, and an arm takes as many joints to hold its hand at a place any way round.
+/// Number of coordinates of a pose, and of joints that an arm needs to reach any pose.
 const POSE_NUMBERS: usize = 6;
-/// Elbows stay near where they rest, without pulling a wrist off its target.
+/// Cost that keeps elbows near rest without pulling a wrist off its target.
 const POSTURE_COST: f64 = 0.02;
-/// The trunk bends only when the arms do not suffice: bending moves the centre of mass.
+/// Cost at which the trunk bends only when the arms do not suffice: bending moves the centre of mass.
 const WAIST_COST: f64 = 0.15;
 const DAMPING_COST: f64 = 2e-4;
 const REACH_RESTARTS: usize = 8;
-/// A robot steps whose centre of mass its arms take farther ahead, as measured of one arm and of both at several heights.
+/// Forward displacement of the centre of mass by the arms at which a robot steps, measured for one arm
+/// and for both at several heights.
 pub const STEPS_AHEAD_M: f64 = 0.05;
 const REACH_TOLERANCE: Tolerance = Tolerance { position_m: 0.005, orientation_rad: 0.05 };
 
-/// Shared by all robots of an episode.
+/// Model of the upper body, shared by all robots of an episode.
 pub struct UpperBody {
     pub model: Model,
     pub wrists: Sides<FrameId>,
-    /// Position in an action row of each joint of the model.
+    /// Column in an action row of each joint in the model.
     pub columns: Vec<usize>,
-    /// Whether an arm has the joints to hold its hand at a place any way round.
+    /// True for an arm with enough joints to set its hand's orientation freely.
     pub turns_hand: Sides<bool>,
     self_collision: SelfCollision,
     rest_rad: Vec<f64>,
-    /// Of all joints above the hips, in action order.
+    /// Rest angles of all joints above the hips, in action order.
     rest_upper_rad: [f64; UPPER_JOINTS],
 }
 
 impl UpperBody {
-    /// Of a robot that was read; `rest` is the command that it stands under.
+    /// Builds the model of a robot; `rest` is the command under which it stands.
     pub fn new(robot: &RobotSource, rest: &RobotCommand) -> Result<UpperBody, IkError> {
         let names = joint_names();
         let model = upper_body(&Model::from_parsed_mjcf(&robot.document.model)?)?;
@@ -64,12 +67,13 @@ impl UpperBody {
         })
     }
 
-    /// How far ahead of the pelvis the centre of mass of a robot at rest is.
+    /// Returns the forward distance of the centre of mass from the pelvis in a robot at rest.
     pub fn rest_ahead_m(&self, robot: &RobotModel) -> f64 {
         ahead_m(robot, &self.rest_upper_rad)
     }
 
-    /// What a wrist may miss that has come to its target: with an arm of few joints, any of the way that the hand is turned.
+    /// Returns the tolerance within which a wrist has arrived. With an arm of few joints, any orientation
+    /// is accepted.
     pub fn tolerance(&self, side: Side) -> Tolerance {
         match self.turns_hand[side] {
             true => REACH_TOLERANCE,
@@ -77,8 +81,8 @@ impl UpperBody {
         }
     }
 
-    /// Wrists at those `targets` that there are, of whose error one step is to remove the part `gain`, and as little else as
-    /// that takes.
+    /// Returns the tasks of one step: the wrists with `targets`, and secondary tasks that minimise other
+    /// motion. The step removes the fraction `gain` of the wrists' error.
     pub fn tasks(&self, targets: &Sides<Option<Isometry3<f64>>>, gain: f64) -> Vec<Task> {
         let mut tasks: Vec<Task> = Vec::with_capacity(7);
         for (side, target) in targets.by_side() {
@@ -104,14 +108,14 @@ impl UpperBody {
         tasks
     }
 
-    /// Limits of range and self-collision; those of speed depend on the targets.
+    /// Returns a solver with range limits and self-collision. Its speed limits depend on the targets.
     pub fn solver(&self) -> Solver {
         let mut solver = Solver::new(&self.model, 1.0 / CONTROL_HZ);
         solver.self_collision = Some(self.self_collision.clone());
         solver
     }
 
-    /// The posture, found at once from another, that does best what tasks ask of joints that may be this fast.
+    /// Solves for the posture that fits the tasks best, starting from another one, with these speed limits.
     pub fn posture<'a>(
         &self,
         from: Configuration<'a>,
@@ -127,7 +131,8 @@ impl UpperBody {
         posture
     }
 
-    /// How fast each joint of the model may move: not at all in an arm whose wrist has no target, nor in a waist that is kept.
+    /// Returns the speed limit of each joint in the model. It is 0 for an arm without a target, and for a
+    /// kept waist.
     pub fn speeds_rad_s(&self, targets: &Sides<Option<Isometry3<f64>>>, keeps_waist: bool) -> Vec<f64> {
         let speed_rad_s = |column: &usize| {
             let side = Side::BOTH.into_iter().find(|side| columns::arm(*side).contains(column));
@@ -142,7 +147,8 @@ impl UpperBody {
     }
 }
 
-/// How far ahead of the pelvis the centre of mass is with the joints above the hips at these angles, and the legs straight.
+/// Returns the forward distance of the centre of mass from the pelvis, with the joints above the hips at
+/// these angles and the legs straight.
 pub fn ahead_m(model: &RobotModel, upper_rad: &[f64; UPPER_JOINTS]) -> f64 {
     let mut q_rad = [0.0; JOINTS];
     for (column, angle_rad) in upper_rad.iter().enumerate() {
@@ -161,7 +167,7 @@ fn is_waist(joint: &str) -> bool {
     joint.starts_with("waist")
 }
 
-/// The robot with arms and waist free; legs and hands are locked straight.
+/// Returns the robot's model with free arms and waist; legs and hands are locked straight.
 pub fn upper_body(whole: &Model) -> Result<Model, IkError> {
     let names = joint_names();
     let columns = (0..UPPER_JOINTS).filter(|column| !columns::is_hand(*column));
@@ -170,7 +176,8 @@ pub fn upper_body(whole: &Model) -> Result<Model, IkError> {
     whole.reduced(&free, &vec![0.0; whole.nv()])
 }
 
-/// Capsules that may not meet: trunk, head, then forearm and hand of the left and of the right arm.
+/// Pairs of capsules that must not collide: trunk, head, then forearm and hand of the left and of the
+/// right arm.
 const PAIRS: [[usize; 2]; 10] =
     [[0, 2], [0, 3], [1, 3], [0, 4], [0, 5], [1, 5], [3, 5], [2, 5], [3, 4], [2, 4]];
 
@@ -183,7 +190,7 @@ fn capsule(model: &Model, frame: &str, ends_m: [[f64; 3]; 2], radius_m: f64) -> 
     Ok(Capsule { frame: model.frame(frame)?, ends: ends_m.map(Point3::from), radius_m })
 }
 
-/// Those of a G1, a little inside the collision shapes of its file.
+/// Returns the capsules of a G1, slightly smaller than the collision shapes of its file.
 fn g1_capsules(model: &Model) -> Result<Vec<Capsule>, IkError> {
     let mut capsules = vec![
         capsule(model, "torso_link", [[0.0, 0.0, 0.08], [0.0, 0.0, 0.25]], 0.10)?,
@@ -197,8 +204,10 @@ fn g1_capsules(model: &Model) -> Result<Vec<Capsule>, IkError> {
     Ok(capsules)
 }
 
-/// Those of a robot whose file calls its links otherwise, by where its joints are: a trunk below the shoulders and as wide, a head around
-/// the camera, a forearm up to the link of the wrist, and that link up to the palm, as thick as a G1's of this size.
+/// Returns the capsules of a robot whose file names its links differently, from the places of its joints.
+/// They are a trunk below the shoulders and as wide, a head around the camera, and a forearm and a hand
+/// of each arm. The forearm extends to the link of the wrist, and the hand from there to the palm. Their
+/// thickness is that of a G1, scaled to this robot.
 fn capsules(model: &Model, robot: &RobotModel) -> Result<Vec<Capsule>, IkError> {
     let poses = robot.forward_kinematics(Pose::IDENTITY, &[0.0; JOINTS]);
     let (name, size) = (|link: usize| &robot.links[link].name, f64::from(robot.scale.length_m(1.0)));

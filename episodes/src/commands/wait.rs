@@ -1,8 +1,9 @@
-//! `wait`, and what robots do that are told nothing new: the base stands, and hands go on to where they were told to be.
+//! `wait`, and the motion of robots without new commands: the base stands, and hands continue to their
+//! targets.
 
 use super::motion::{Compliance, Motion};
 
-/// One control step.
+/// Makes one control step.
 pub fn hold(motion: &mut Motion) {
     motion.give_way(Compliance::NONE);
     motion.stand();

@@ -1,4 +1,5 @@
-//! `walk`: the base moves, and the waist if that is asked for; arms and hands keep their joints.
+//! `walk`: moves the base, and the waist if the command has a target for it; arms and hands keep their
+//! joints.
 
 use tandem_sim::{BaseCommand, CONTROL_HZ, JOINTS, Pose, RobotModel};
 use tandem_tools_spec::WalkMove;
@@ -6,22 +7,22 @@ use tandem_tools_spec::WalkMove;
 use super::columns::{self, Clamped};
 use super::motion::{Compliance, Motion};
 
-/// Fastest turn of the trunk, and its fastest bend.
+/// Maximum rates of the trunk's yaw and pitch.
 const YAW_RAD_S: f64 = 1.0;
 const PITCH_RAD_S: f64 = 0.5;
-/// A point that is looked at is no further than this above or below the middle of the picture.
+/// Maximum vertical angle between a point to look at and the middle of the image.
 const OFF_MIDDLE_RAD: f64 = 0.35;
-/// Farthest bend for a look: a robot that bends further steps.
+/// Maximum pitch for a look; a robot that bends further steps.
 const MAX_BEND_RAD: f64 = 0.45;
 
-/// The same base command at every step, while waist joints go to their targets.
+/// The same base command at every step, while waist joints move to their targets.
 pub struct WalkTrajectory {
     base: BaseCommand,
     yaw: Option<WaistTurn>,
     pitch: Option<WaistTurn>,
 }
 
-/// The way of one waist joint, by its column, at a constant rate.
+/// Motion of one waist joint, given by its column, at a constant rate.
 struct WaistTurn {
     column: usize,
     from_rad: f64,
@@ -30,7 +31,7 @@ struct WaistTurn {
 }
 
 impl WalkTrajectory {
-    /// Has `motion` take up what `entry` asks of it.
+    /// Starts `entry` on `motion`.
     pub fn begin(entry: &WalkMove, motion: &mut Motion, clamped: &mut Clamped) -> WalkTrajectory {
         let velocity = [entry.vx_m_s, entry.vy_m_s, entry.yaw_rate_rad_s];
         let base =
@@ -54,7 +55,7 @@ impl WalkTrajectory {
         }
     }
 
-    /// One control step.
+    /// Makes one control step.
     pub fn advance(&self, step: u32, motion: &mut Motion) {
         for WaistTurn { column, from_rad, to_rad, rate_rad_s } in self.yaw.iter().chain(&self.pitch) {
             let most_rad = rate_rad_s * f64::from(step) / CONTROL_HZ;
@@ -65,8 +66,9 @@ impl WalkTrajectory {
     }
 }
 
-/// Returns the waist pitch that is nearest to `present_rad` and has a point of the pelvis frame near the middle of the picture's height,
-/// once the waist has turned to it. The camera looks down by as much as the trunk bends; that it also moves is left out.
+/// Returns the waist pitch that brings a point in the pelvis frame near the middle of the image, once the
+/// waist has turned to it. It is the pitch closest to `present_rad`. The camera's pitch follows the
+/// trunk's; the camera's displacement is neglected.
 fn bend_to_see(model: &RobotModel, point_m: [f64; 3], present_rad: f64) -> f64 {
     let links = model.forward_kinematics(Pose::IDENTITY, &[0.0; JOINTS]);
     let upright = links[model.egocentric_link] * model.egocentric.body_from_camera;

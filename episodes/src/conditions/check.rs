@@ -1,5 +1,5 @@
-//! What an expression means: names are looked up, and everything is of the kind that its place wants. Texts of mistakes say what
-//! would be right there.
+//! Type checking of expressions: resolves names, and checks that each part has the type that its position
+//! requires. Mistakes include a hint at a valid form.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use super::meaning::{Argument, Meaning, Number, Truth};
 use super::syntax::{Node, NodeKind, Operator, Relation};
 use super::{Mistake, Names};
 
-/// So many parts are looked at in a control step, terms counted wherever they stand.
+/// Maximum number of parts evaluated in a control step; the parts of a term count at each use.
 const MAX_PARTS: usize = 5000;
 
 pub fn truth(node: &Node, names: &Names) -> Result<Arc<Truth>, Mistake> {
@@ -36,7 +36,7 @@ pub fn meaning(node: &Node, names: &Names) -> Result<Meaning, Mistake> {
     Ok(meaning)
 }
 
-/// What a chain of `&&` joins; what is no such chain, by itself.
+/// Returns the operands of a chain of `&&`, or the node itself if it is no such chain.
 pub fn joined(node: &Node) -> Vec<&Node> {
     match &node.kind {
         NodeKind::Pair { operator: Operator::And, parts } => parts.iter().flat_map(joined).collect(),
@@ -117,7 +117,8 @@ impl Checker<'_> {
         }
     }
 
-    /// Both parts of a chain of `&&` or `||`, and the parts of the left one where that is a chain, too.
+    /// Returns the operands of a chain of `&&` or `||`, with the left one flattened if it is a chain of
+    /// the same operator.
     fn joined(&self, operator: Operator, [left, right]: &[Node; 2]) -> Result<Vec<Arc<Truth>>, Mistake> {
         let mut found = match &left.kind {
             NodeKind::Pair { operator: same, parts } if *same == operator => self.joined(operator, parts)?,
@@ -128,7 +129,7 @@ impl Checker<'_> {
     }
 
     fn compared(&self, relation: Relation, left: &Node, right: &Node) -> Result<Meaning, Mistake> {
-        // What a seed has chosen is a text like any other by now.
+        // Options chosen by a seed have become plain texts by now.
         if let (NodeKind::Text(one), NodeKind::Text(other)) = (&left.kind, &right.kind) {
             match relation {
                 Relation::Equal => return Ok(Truth::Always(one == other).into()),
@@ -159,7 +160,7 @@ impl Checker<'_> {
         }
     }
 
-    /// What the file's own name for an expression means.
+    /// Returns the meaning of one of the file's terms.
     fn term(&self, name: &str, at: &Range<usize>) -> Result<Meaning, Mistake> {
         if let Some(meaning) = self.names.terms.get(name) {
             return Ok(meaning.clone());
@@ -221,7 +222,7 @@ impl Checker<'_> {
         })
     }
 
-    /// What stands at one place of the brackets, after `before`.
+    /// Checks the argument of a call that follows `before`.
     fn argument(
         &self,
         function: &Function,
@@ -295,7 +296,7 @@ impl From<Number> for Meaning {
     }
 }
 
-/// The text that stands at a place which wants one.
+/// Returns the text at a position that requires one.
 fn text<'a>(function: &Function, node: &'a Node, wanted: &str) -> Result<&'a str, Mistake> {
     match &node.kind {
         NodeKind::Text(text) => Ok(text),
@@ -303,7 +304,7 @@ fn text<'a>(function: &Function, node: &'a Node, wanted: &str) -> Result<&'a str
     }
 }
 
-/// The parts of the list that stands at a place which wants one.
+/// Returns the elements of the list at a position that requires one.
 fn listed<'a>(function: &Function, node: &'a Node, example: &str) -> Result<&'a [Node], Mistake> {
     match &node.kind {
         NodeKind::List(parts) if !parts.is_empty() => Ok(parts),
@@ -320,7 +321,8 @@ fn unknown<'a>(node: &Node, kind: &str, name: &str, have: impl Iterator<Item = &
     Mistake::new(node.at.clone(), format!("no {kind} {name:?}{}; have: {known}", nearest(name, have)))
 }
 
-/// "; is it lift_m?" for what is written nearly so.
+/// Returns a suggestion such as "; is it lift_m?" if a known name is similar to this one, and an empty
+/// text otherwise.
 pub fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
     let changes = known.map(|known| (changes(name, known), known)).min();
     match changes {
@@ -329,7 +331,7 @@ pub fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
     }
 }
 
-/// How many letters have to be put in, left out or exchanged to make one word of the other: Levenshtein's distance.
+/// Returns the Levenshtein distance of two words.
 fn changes(one: &str, other: &str) -> usize {
     let other: Vec<char> = other.chars().collect();
     let mut row: Vec<usize> = (0..=other.len()).collect();

@@ -1,5 +1,5 @@
-//! The facts that an expression may ask for, one row each: its name, what stands in its brackets, what it is, and what the
-//! book says of it. To add one: its row here, and its line in the book's table, which a test holds against this one.
+//! The facts available to expressions, one row each: name, parameters, value, and the book's description.
+//! To add a fact, add its row here and its line in the book's table; a test compares the two.
 
 use tandem_sim::{Side, Vector};
 
@@ -7,32 +7,32 @@ use super::lacks;
 use super::meaning::{Argument, Fact, Measure, Statement};
 use crate::scoring::{Predicate, nearness, placement};
 
-/// A fact that expressions ask for by name.
+/// A fact that expressions refer to by name.
 #[derive(Debug)]
 pub struct Function {
     pub name: &'static str,
     pub parameters: &'static [Parameter],
     pub gives: Gives,
-    /// What it is, for readers of the book.
+    /// Description for the book.
     pub help: &'static str,
 }
 
-/// What has to stand at one place of the brackets.
+/// Type of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parameter {
-    /// A robot's name.
+    /// Name of a robot.
     Robot,
-    /// A list of them.
+    /// List of robot names.
     Robots,
     /// "left" or "right".
     Side,
-    /// An object's name.
+    /// Name of an object.
     Object,
-    /// A site of the object that stands at this place.
+    /// Name of a site on the object at argument `of`.
     Site {
         of: usize,
     },
-    /// A number, and what the book calls it.
+    /// A number, with its name in the book.
     Number(&'static str),
     Numbers,
     Truth,
@@ -54,10 +54,10 @@ const TWO_SITES: &[Parameter] =
     &[Parameter::Object, Parameter::Site { of: 0 }, Parameter::Object, Parameter::Site { of: 2 }];
 const WITHIN: &[Parameter] = &[Parameter::Object, Parameter::Object, Parameter::Number("half_m")];
 
-/// Those that nothing but a hand that closes makes true.
+/// Facts that only a closing hand can make true.
 pub const OF_FINGERS: [&str; 3] = ["holds", "holds_any", "held_by_all"];
 
-/// All of them.
+/// All facts.
 pub static FUNCTIONS: &[Function] = &[
     // Hands.
     coming(
@@ -91,7 +91,7 @@ pub static FUNCTIONS: &[Function] = &[
         .lacks(|f| lacks::hands_off(f.facts, f.robot(0), f.object(1)))
         .help("neither hand of the robot touches the object"),
     truth("fallen", &[Parameter::Robot], |f| f.facts.robots[f.robot(0)].fallen).help("the robot has fallen"),
-    // Where things are.
+    // Positions of objects.
     truth("inside", TWO_OBJECTS, |f| f.facts.inside_vessel(f.object(0), f.object(1)))
         .help("the first object's origin is between the walls of the second and over its floor"),
     truth("inside_box", &[Parameter::Object, Parameter::Object, Parameter::Site { of: 1 }], |f| {
@@ -112,7 +112,7 @@ pub static FUNCTIONS: &[Function] = &[
         f.facts.threads(f.object(0), [f.site(1), f.site(2)], f.object(3), f.site(4))
     })
     .help("a rod of the first object, from site to site, passes through a ring of the second: a site with its axis along y"),
-    // How things stand.
+    // States of objects.
     truth("stands_released", OBJECT, |f| placement::stands_released(f.facts, f.object(0)))
         .lacks(|f| lacks::stands_released(f.facts, f.object(0)))
         .help("upright within 15 degrees, slower than 0.05 m/s and 0.15 rad/s, and untouched by robots for 0.2 s"),
@@ -184,7 +184,7 @@ pub static FUNCTIONS: &[Function] = &[
         .help("the smaller of both"),
     number("max", &[Parameter::Number("x"), Parameter::Number("y")], ANY, |f| f.number(0).max(f.number(1)))
         .help("the greater of both"),
-    // What only `near` needs.
+    // Facts for `near` only.
     number("coming", &COMING, PART, |f| come(f.number(0), f.number(1), f.number(2)))
         .help("how far a number has come on its way from one to another, from 0 to 1"),
     number("one_if", &[Parameter::Truth], PART, |f| f64::from(u8::from(f.truth(0)))).help("1 if it holds, else 0"),
@@ -244,7 +244,7 @@ impl Function {
         Function { name, parameters, gives, help }
     }
 
-    /// Adds what it says of a fact that does not hold.
+    /// Sets the function that explains why the fact does not hold.
     const fn lacks(self, lacks: fn(&Fact) -> Vec<String>) -> Function {
         let Function { name, parameters, gives, help } = self;
         let gives = match gives {
@@ -256,7 +256,7 @@ impl Function {
         Function { name, parameters, gives, help }
     }
 
-    /// As the book and messages show it: `holds(robot, side, object)`.
+    /// Returns the signature for the book and messages, for example `holds(robot, side, object)`.
     pub fn signature(&self) -> String {
         let names: Vec<&str> = self.parameters.iter().map(|parameter| parameter.name()).collect();
         format!("{}({})", self.name, names.join(", "))
@@ -278,7 +278,8 @@ impl Parameter {
     }
 }
 
-/// What stands at each place, as `check` has made it by the function's parameters; another kind is a mistake in the rows above.
+/// Typed access to the arguments. `check` builds them by the function's parameters; a mismatch is a
+/// mistake in the rows above.
 impl Fact<'_> {
     fn robot(&self, place: usize) -> usize {
         match &self.arguments[place] {
@@ -322,7 +323,7 @@ impl Fact<'_> {
         }
     }
 
-    /// In the precision of what it is compared with.
+    /// Returns a number in the precision of the value that it is compared with.
     fn number_f32(&self, place: usize) -> f32 {
         self.number(place) as f32
     }
@@ -344,8 +345,8 @@ impl Fact<'_> {
     }
 }
 
-/// Returns the way back along the x axis of the object at `place`, and how far that way the site named
-/// behind it is.
+/// Returns the direction opposite to the x axis of the object at `place`. The second value is the
+/// coordinate along it of the site in the next argument.
 fn behind(f: &Fact, place: usize) -> (Vector, f32) {
     let object = f.object(place);
     let back = f.facts.object(object).pose_in_world.rotation * Vector::NEG_X;

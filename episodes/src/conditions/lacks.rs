@@ -1,11 +1,11 @@
-//! Says in sentences what a fact lacks that does not hold.
+//! Explanations, in sentences, of why a fact does not hold.
 
 use tandem_sim::Side;
 
 use crate::scoring::placement::{RELEASE_S, STILL_M_S, STILL_RAD_S, UPRIGHT_RAD};
 use crate::scoring::{Facts, Grip, ROBOT_NAMES};
 
-/// Returns what a robot lacks to hold `object` with a hand on one of these sides.
+/// Explains why a robot does not hold `object` with any hand on these sides; empty if it does.
 pub fn grip(f: &Facts, robot: usize, sides: &[Side], object: &str) -> Vec<String> {
     let hands = f.object(object).hands[robot];
     if sides.iter().any(|side| hands[*side] == Grip::Holding) {
@@ -22,14 +22,14 @@ pub fn grip(f: &Facts, robot: usize, sides: &[Side], object: &str) -> Vec<String
     }
 }
 
-/// Returns which hands of a robot are on `object`.
+/// Lists the hands of a robot that are on `object`, one sentence each.
 pub fn hands_off(f: &Facts, robot: usize, object: &str) -> Vec<String> {
     let hands = f.object(object).hands[robot];
     let on = Side::BOTH.into_iter().filter(|side| hands[*side] != Grip::Off);
     on.map(|side| format!("{}'s {} hand is on {object}", ROBOT_NAMES[robot], side.name())).collect()
 }
 
-/// Returns what an object lacks to stand upright, still and released.
+/// Explains why an object is not upright, still and released.
 pub fn stands_released(f: &Facts, object: &str) -> Vec<String> {
     let mut found: Vec<String> = (0..f.robots.len()).flat_map(|robot| hands_off(f, robot, object)).collect();
     let untouched_s = f.untouched_s(object);
@@ -54,7 +54,8 @@ pub fn stands_as_high(f: &Facts, object: &str, within_m: f32) -> Vec<String> {
     vec![format!("{object} is {by_m:.3} m {way} than at the start, at most {within_m}")]
 }
 
-/// Returns how far an object is from another along the axes on which that is more than `half_m`.
+/// Returns the distance between two objects along each axis on which it exceeds `half_m`. The z axis
+/// counts if `also_high` is set.
 pub fn apart(f: &Facts, object: &str, target: &str, half_m: f32, also_high: bool) -> Vec<String> {
     let apart_m = f.position_m(object) - f.position_m(target);
     let axes = [("x", apart_m.x), ("y", apart_m.y), ("z", if also_high { apart_m.z } else { 0.0 })];

@@ -1,4 +1,4 @@
-//! What is left of an expression once it has been checked: it cannot fail, and takes as long every time.
+//! Checked expressions. Their evaluation cannot fail, and its cost is bounded.
 
 use std::sync::Arc;
 
@@ -7,26 +7,26 @@ use tandem_sim::Side;
 use super::syntax::{Arithmetic, Relation};
 use crate::scoring::{Facts, Predicate, nearness};
 
-/// An expression of either kind.
+/// Meaning of an expression of either type.
 #[derive(Clone, Debug)]
 pub enum Meaning {
     Truth(Arc<Truth>),
     Number(Arc<Number>),
 }
 
-/// What holds or does not.
+/// A Boolean expression.
 #[derive(Debug)]
 pub enum Truth {
     Always(bool),
     Not(Arc<Truth>),
-    /// All of them hold; from the first that does not, nobody looks further.
+    /// Conjunction; evaluation stops at the first part that does not hold.
     All(Vec<Arc<Truth>>),
     Any(Vec<Arc<Truth>>),
     Compared {
         relation: Relation,
         sides: [Arc<Number>; 2],
     },
-    /// Both hold, or neither.
+    /// Equality: both hold, or neither does.
     Same([Arc<Truth>; 2]),
     Choice([Arc<Truth>; 3]),
     Fact {
@@ -44,30 +44,30 @@ pub enum Number {
     Fact { measure: &'static Measure, arguments: Vec<Argument> },
 }
 
-/// Something that holds or does not.
+/// A fact with a Boolean value.
 #[derive(Debug)]
 pub struct Statement {
     pub holds: fn(&Fact) -> bool,
-    /// How near it is to that, from 0 to 1, where that grows on the way.
+    /// Nearness to holding, from 0 to 1, for a fact that is reached gradually.
     pub near: Option<fn(&Fact) -> f32>,
-    /// Says what it lacks, one sentence each. `None` where its text alone says it.
+    /// Explanation of why it does not hold, in sentences; `None` if its text is explanation enough.
     pub lacks: Option<fn(&Fact) -> Vec<String>>,
 }
 
 #[derive(Debug)]
 pub struct Measure {
     pub value: fn(&Fact) -> f64,
-    /// The least and the greatest that it can be.
+    /// Minimum and maximum of its value.
     pub values: [f64; 2],
 }
 
-/// What a fact is made of: the world at one control step, and what stands in the brackets.
+/// Inputs of a fact: the world at one control step, and the arguments.
 pub struct Fact<'a> {
     pub facts: &'a Facts,
     pub arguments: &'a [Argument],
 }
 
-/// What stands in the brackets of a fact.
+/// Argument of a fact.
 #[derive(Debug)]
 pub enum Argument {
     Robot(usize),
@@ -98,7 +98,8 @@ impl Predicate for Truth {
 }
 
 impl Truth {
-    /// How near it is to holding, from 0 to 1: the mean of its parts, where hands that come to an object count as they come.
+    /// Returns the nearness to holding, from 0 to 1. The nearness of a conjunction is the mean of its
+    /// parts; a hand that approaches an object counts gradually.
     pub fn nearness(&self, facts: &Facts) -> f32 {
         match self {
             Truth::All(parts) => {
@@ -112,7 +113,7 @@ impl Truth {
         }
     }
 
-    /// What a comparison compares.
+    /// Returns both values of a comparison; `None` for anything else.
     pub fn sides(&self, facts: &Facts) -> Option<[f64; 2]> {
         match self {
             Truth::Compared { sides, .. } => Some(sides.each_ref().map(|side| side.value(facts))),
@@ -120,12 +121,12 @@ impl Truth {
         }
     }
 
-    /// Whether its nearness grows on the way to holding, as a hand comes to what it is to hold.
+    /// Returns true if nearness grows gradually, for example while a hand approaches its object.
     pub fn grows(&self) -> bool {
         matches!(self, Truth::Fact { statement: Statement { near: Some(_), .. }, .. })
     }
 
-    /// What it is whatever happens in the world, if that can be told.
+    /// Returns the constant result of an expression, if it can be shown not to depend on the world.
     pub fn always(&self) -> Option<bool> {
         match self {
             Truth::Always(holds) => Some(*holds),
@@ -144,7 +145,7 @@ impl Truth {
         }
     }
 
-    /// How many parts are looked at, terms counted wherever they stand.
+    /// Returns the number of parts evaluated. The parts of a term count at each use.
     pub fn size(&self) -> usize {
         let of = |parts: &[Arc<Truth>]| parts.iter().map(|part| part.size()).sum::<usize>();
         let own = match self {
@@ -173,7 +174,7 @@ impl Number {
         }
     }
 
-    /// The least and the greatest that it can be.
+    /// Returns the minimum and maximum of its value.
     pub fn range(&self) -> [f64; 2] {
         match self {
             Number::Value(value) => [*value; 2],
@@ -230,7 +231,8 @@ impl Argument {
     }
 }
 
-/// One part that settles the whole, as one that never holds does for all of them; or all that do not.
+/// Returns the constant result of a conjunction (`by` false) or disjunction (`by` true), if there is one.
+/// One part that is always `by` decides it, and so do parts that are all the opposite.
 fn settled(parts: &[Arc<Truth>], by: bool) -> Option<bool> {
     let always: Vec<Option<bool>> = parts.iter().map(|part| part.always()).collect();
     if always.contains(&Some(by)) {
@@ -250,7 +252,7 @@ fn compare(relation: Relation, left_value: f64, right_value: f64) -> bool {
     }
 }
 
-/// Whether a relation of what lies in these ranges comes out the same for all of it.
+/// Returns the result of a comparison if it is the same for all values in these ranges.
 fn always_compared(relation: Relation, left_values: [f64; 2], right_values: [f64; 2]) -> Option<bool> {
     let ([low, high], [right_low, right_high]) = (left_values, right_values);
     let (below, above) = (high < right_low, low > right_high);

@@ -1,6 +1,7 @@
-//! Conditions that somebody writes into a task's file: expressions over [`crate::Facts`], in a small typed part of the
-//! Common Expression Language. `syntax` reads them, `check` finds out what they mean, `functions` lists the facts,
-//! `meaning` is what is left to evaluate at every control step, and `lacks` says in sentences why a fact does not hold.
+//! Conditions in task files: expressions over [`crate::Facts`], in a small typed subset of the Common
+//! Expression Language. `syntax` parses them, `check` resolves names and types, and `functions` lists the
+//! facts. `meaning` is the checked form, evaluated at every control step; `lacks` explains why a fact
+//! does not hold.
 
 mod check;
 mod functions;
@@ -21,46 +22,46 @@ pub use functions::{FUNCTIONS, Function, OF_FINGERS};
 use meaning::{Fact, Statement};
 pub use meaning::{Meaning, Number, Truth};
 
-/// What an expression of a task may name.
+/// The names available to a task's expressions.
 #[derive(Debug, Default)]
 pub struct Names {
-    /// In the order of [`crate::Facts::robots`].
+    /// Robots in the order of [`crate::Facts::robots`].
     pub robots: Vec<String>,
-    /// Objects, and what moves on them.
+    /// Objects and their movable parts.
     pub objects: BTreeMap<String, Arc<ObjectModel>>,
-    /// Names that the file has given to expressions.
+    /// The file's terms: named expressions.
     pub terms: BTreeMap<String, Meaning>,
-    /// Names of expressions and of objects in which mistakes were found: who uses them makes none.
+    /// Terms with mistakes; a reference to one is not a further mistake.
     pub mistaken_terms: BTreeSet<String>,
     pub mistaken_objects: BTreeSet<String>,
-    /// What the terms that are conditions are made of.
+    /// Parts of each term that is a condition.
     pub parts_of_terms: BTreeMap<String, Vec<ConditionPart>>,
 }
 
-/// Something that has to hold, with others, for a condition to hold.
+/// One of the parts that must all hold for a condition to hold.
 #[derive(Clone, Debug)]
 pub struct ConditionPart {
-    /// The byte of the file at which it begins.
+    /// Byte offset in the file.
     pub at: usize,
-    /// As it is written.
+    /// Text of the part in the file.
     pub text: String,
     pub truth: Arc<Truth>,
 }
 
 impl ConditionPart {
-    /// Returns whether another part asks for the same, also in the terms that it names.
+    /// Returns true if another part has the same text and meaning, including the terms that it refers to.
     pub fn asks_the_same(&self, other: &ConditionPart) -> bool {
         let meaning = |part: &ConditionPart| format!("{:?}", part.truth);
         self.text == other.text && meaning(self) == meaning(other)
     }
 
-    /// Returns what it lacks to hold, one sentence each. Empty where it holds.
+    /// Explains why the part does not hold, in sentences; empty if it holds.
     pub fn lacks(&self, facts: &Facts) -> Vec<String> {
         let Self { text, truth, .. } = self;
         if truth.holds(facts) {
             return Vec::new();
         }
-        // Without the sign of a zero.
+        // The addition removes the sign of a negative zero.
         let now = |value: f64| (value * 1e3).round() / 1e3 + 0.0;
         match &**truth {
             Truth::Compared { sides, .. } => {
@@ -78,16 +79,16 @@ impl ConditionPart {
     }
 }
 
-/// What is wrong with an expression, and what would be right.
+/// A mistake in an expression, with a hint at a valid form.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistake {
-    /// The bytes of the expression that are meant.
+    /// Byte range in the expression.
     pub at: Range<usize>,
     pub text: String,
 }
 
 impl Mistake {
-    /// Whether it only follows from a mistake that is told elsewhere.
+    /// Returns true if the mistake merely follows from one reported elsewhere.
     pub fn follows(&self) -> bool {
         self.text.is_empty()
     }
@@ -101,7 +102,7 @@ impl Mistake {
     }
 }
 
-/// Reads an expression that either holds or does not.
+/// Reads an expression that is a condition.
 pub fn condition(text: &str, names: &Names) -> Result<Arc<Truth>, Mistake> {
     check::truth(&syntax::read(text)?, names)
 }
@@ -111,13 +112,13 @@ pub fn number(text: &str, names: &Names) -> Result<Arc<Number>, Mistake> {
     check::number(&syntax::read(text)?, names)
 }
 
-/// Reads an expression of either kind, for which a file has a name.
+/// Reads an expression of either type, which a file names as a term.
 pub fn term(text: &str, names: &Names) -> Result<Meaning, Mistake> {
     check::meaning(&syntax::read(text)?, names)
 }
 
-/// What has to hold at once where a condition holds that begins at this byte of its file: the parts that it joins by `&&`, and in the
-/// place of a term the parts of that.
+/// Splits a condition into the parts joined by `&&`. Terms are replaced by their own parts. `starts_at`
+/// is the byte offset of the condition in its file.
 pub fn parts(text: &str, starts_at: usize, names: &Names) -> Result<Vec<ConditionPart>, Mistake> {
     let mut found = Vec::new();
     for node in check::joined(&syntax::read(text)?) {

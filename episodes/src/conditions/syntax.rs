@@ -1,15 +1,15 @@
-//! The text of an expression as a tree. What is read is CEL's grammar without maps, messages, selectors and macros.
+//! Parser of expressions. The grammar is CEL's without maps, messages, selectors and macros.
 
 use std::ops::Range;
 
 use super::Mistake;
 
-/// Longer expressions are better cut into terms.
+/// Maximum length of an expression; longer ones should be split into terms.
 const LONGEST_BYTES: usize = 4000;
-/// So many brackets, signs and choices may stand within each other.
+/// Maximum nesting depth of brackets, signs and choices.
 const DEEPEST: usize = 40;
 
-/// A part of an expression.
+/// A node of the syntax tree.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
     pub at: Range<usize>,
@@ -30,7 +30,7 @@ pub enum NodeKind {
     Choice(Box<[Node; 3]>),
 }
 
-/// What stands between two parts.
+/// A binary operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Operator {
     Or,
@@ -57,7 +57,7 @@ pub enum Arithmetic {
     Over,
 }
 
-/// Loosest first; operators of one row are read from the left. Of signs that begin alike the longer is first.
+/// Operators by precedence, the weakest first; all are left-associative. A longer token precedes its prefix.
 const LEVELS: [&[(&str, Operator)]; 5] = [
     &[("||", Operator::Or)],
     &[("&&", Operator::And)],
@@ -73,7 +73,7 @@ const LEVELS: [&[(&str, Operator)]; 5] = [
     &[("*", Operator::Combines(Arithmetic::Times)), ("/", Operator::Combines(Arithmetic::Over))],
 ];
 
-/// Reads the whole of a text.
+/// Parses a whole text.
 pub fn read(text: &str) -> Result<Node, Mistake> {
     if text.len() > LONGEST_BYTES {
         let what =
@@ -100,7 +100,7 @@ impl Reader<'_> {
         &self.text[self.at..]
     }
 
-    /// Goes over space and comments.
+    /// Skips white space and comments.
     fn skip_space(&mut self) {
         loop {
             let rest = self.rest();
@@ -117,7 +117,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Goes over `sign` if it comes next.
+    /// Skips `sign` and returns true if it comes next.
     fn take(&mut self, sign: &str) -> bool {
         self.skip_space();
         let found = self.rest().starts_with(sign);
@@ -149,7 +149,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Counts what stands within each other.
+    /// Parses one nesting level deeper.
     fn deeper(&mut self, read: impl FnOnce(&mut Self) -> Result<Node, Mistake>) -> Result<Node, Mistake> {
         if self.depth == DEEPEST {
             let what =
@@ -228,7 +228,7 @@ impl Reader<'_> {
         }
     }
 
-    /// What is separated by commas, up to `end`.
+    /// Parses a comma-separated list up to `end`.
     fn list(&mut self, end: &str) -> Result<Vec<Node>, Mistake> {
         let mut parts = Vec::new();
         if self.take(end) {

@@ -1,10 +1,10 @@
-//! Conditions as somebody writes them, right and wrong.
+//! Tests of conditions, valid and invalid.
 
 use super::*;
 use crate::scoring::{A, Facts, Grip, Predicate};
 use crate::tasks;
 
-/// The objects of Handover, which two robots stand at.
+/// Returns the names of Handover: two robots and its objects.
 fn names() -> Names {
     let task = tasks::find("handover").unwrap();
     let parts = task.objects.iter().flat_map(|spot| ObjectModel::parts(&spot.source(), spot.name).unwrap());
@@ -33,7 +33,7 @@ fn conditions_hold_as_they_are_written() {
     check(r#"hands_off("A", "bottle") || fallen("B")"#, false);
     check(r#"upright_deg("bottle") <= 15 && released_for_s("bottle") < 0.2"#, true);
     check(r#"z_m("bottle") == z_m("target_pad")"#, true);
-    // Looser operators bind later, and equal ones from the left.
+    // Weaker operators bind later, and equal ones associate to the left.
     check("1 + 2 * 3 == 7 && time_s() > 1", true);
     check("10 - 4 - 3 == 3 && 12 / 2 / 3 == 2 && time_s() > 1", true);
     check("true || false && time_s() < 0", true);
@@ -120,7 +120,7 @@ fn what_nothing_in_the_world_can_change_is_found() {
     check(r#"1 / lift_m("bottle") > 1"#, None);
 }
 
-/// Each row of the list is of the kinds that it says: a mistake there would panic only when somebody uses it.
+/// Every row of the list has the types that it declares; a mismatch would panic only at its first use.
 #[test]
 fn every_fact_can_be_asked_for_and_is_what_it_says() {
     for function in FUNCTIONS {

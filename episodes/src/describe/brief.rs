@@ -1,4 +1,4 @@
-//! What a policy has to know of frames, cameras and hands, in words. The numbers are those of the embedded robot.
+//! The brief: frames, cameras and hands in words, for policies. The numbers are those of the embedded robot.
 
 use tandem_tools_spec::{Assistance, BaseLimits, Brief, Hints, Wording};
 
@@ -7,7 +7,7 @@ use super::grips::grips;
 const FRAMES: &str = "Poses of wrists and camera, and points of query_depth, are in the robot's own pelvis frame as it is at that \
     moment: x forward, y left, z up, metres. Quaternions are [w, x, y, z].";
 
-/// Of our own controller. Those of files have no height to command, and walk as high as they stand.
+/// Text for our own controller. Controllers from files take no height command, and walk at their own height.
 const BENT_KNEES: &str = " A robot walks with bent knees: while it steps its pelvis is 0.62 to 0.68 m high, whatever height is \
     commanded, and rises to that height when it stands. What its hands hold sinks and rises along.";
 
@@ -30,7 +30,7 @@ const HANDS: &str = "A wrist's x axis points along its fingers, and its z axis a
     is at [0.12, 0.055, 0]. The palm reaches from x = 0.04 to 0.13, and from z = -0.045 to 0.045, and is 0.04 thick. Straight \
     fingers reach to x = 0.22. The thumb, with its angles at 0, stands off the palm at x = 0.065, to y = 0.115.";
 
-/// What only they are told who are told what hands feel.
+/// Text for policies that receive the hands' sensor readings.
 const GRIP: &str = "A hand holds something, as phases ask for, while its thumb presses on one side of it and fingers or palm press \
     on the opposite one, within 60 degrees, each with 1.5 N or more, for 60 ms. grip is what the fingers' own drives feel of that: it says \
     \"two_sided\" where both press, and presses says what does. Whether on opposite sides is not felt: a thing that only hangs in a bent \
@@ -49,7 +49,8 @@ const GRASPING: &str = "Fingers that are stopped short of their targets press: a
     (compliance_n_s_m 250) from when the thing is lifted, by its legs while it is lifted, too, until it is over its goal; stiff hands \
     lower it.";
 
-/// What only they are told who have `walk_to`; held by `a_robot_pushes_a_trolley_by_one_call` and `two_robots_carry_a_basket_by_one_call`.
+/// Text for policies that have `walk_to`. The tests `a_robot_pushes_a_trolley_by_one_call` and
+/// `two_robots_carry_a_basket_by_one_call` check it.
 const CARRYING: &str = " To push, and to carry together: grip, and lift what is to be lifted by 0.09 m with compliance_n_s_m 250; then call \
     walk_to with carry, once, with every robot that holds the load, each with its own place: where it stands now, moved by what the load \
     is to move, in its own start frame (room says how these lie to each other: a partner who faces you goes to its left where you go to \
@@ -65,7 +66,7 @@ const NAMED_FRAMES: &str = " Tools that take `frame` know \"pelvis\"; \"level\",
     Targets that are to be held while a robot is pushed or walks are best given in \"start\". Of a quaternion, q and -q are the same \
     rotation.";
 
-/// How our own controller walks.
+/// Text on how our own controller walks.
 const WALKING: &str = "A robot that is told to walk gains way after 0.3 to 0.5 s. Told to stop within 2.5 s, it goes \
     on to where speed times time takes it, to within 2 cm and a tenth of the way. After longer walks it coasts: by 3 cm from 0.1 m/s, 8 cm from 0.2, 12 from 0.3 and 20 from \
     0.4, and by 0.09 rad from turning at 0.5 rad/s; it stands after about a second. While it steps the pelvis \
@@ -82,20 +83,20 @@ const TALKING: &str = " `say` reaches the others with their next reply, where `h
     are true, for example IN PLACE, HOLDING, FREE; give places in a frame that you share, for example one robot's start frame (`room` says how \
     robots begin to each other).";
 
-/// For those who have plans.
+/// Text for policies that have plans.
 const WAITING: &str = " To wait for a partner, send a plan of one `wait` of up to 500 steps with `until` and a condition, for example \
     {\"heard\": true}, {\"touching\": true}, {\"force_above_n\": 5} or {\"phase_reached\": \"p1\"}: it is answered once, and the partner's commands \
     go on meanwhile.";
 
-/// Returns the part of an operator's brief on playing with partners, who may or may not talk.
+/// Returns the part of an operator's brief about partners; `may_talk` is true if they may exchange messages.
 pub fn teamwork(assistance: Assistance, may_talk: bool) -> String {
     let waiting = if assistance == Assistance::Full { WAITING } else { "" };
-    // Only those who talk hear anything.
+    // Without messages there is nothing to hear.
     let waiting = if may_talk { waiting.into() } else { waiting.replace("{\"heard\": true}, ", "") };
     [TEAMWORK, if may_talk { TALKING } else { "" }, &waiting].concat()
 }
 
-/// The brief of an episode in the words that its policy reads, where robots follow base commands within `limits`.
+/// Returns the brief of an episode in its wording, for robots that follow base commands within `limits`.
 pub fn brief(wording: Wording, limits: &BaseLimits) -> Brief {
     let Wording { assistance, hints } = wording;
     let is_full = assistance == Assistance::Full;
@@ -130,7 +131,8 @@ mod tests {
         wire_limits(&LocomotionChoice::Balance.limits(&BodyScale::G1))
     }
 
-    /// Points of a shape, in the frame of its link, and how far it reaches beyond each of them.
+    /// Returns points of a shape in the frame of its link, and the distance by which the shape extends
+    /// beyond them.
     fn points_m(geom: &Geom) -> (Vec<Vector>, f32) {
         let (points_m, beyond_m) = match &geom.primitive {
             Primitive::Box { half_extents_m } => (vec![-*half_extents_m, *half_extents_m], 0.0),
@@ -142,7 +144,8 @@ mod tests {
         (points_m.into_iter().map(|point_m| geom.body_from_geom * point_m).collect(), beyond_m)
     }
 
-    /// Lowest and highest corner of what these links of a hand span in the wrist's frame, every finger joint at 0.
+    /// Returns the minimum and maximum corner of these links of a hand in the wrist's frame, with every
+    /// finger joint at 0.
     fn extent_m(model: &RobotModel, side: Side, links: &[usize]) -> [Vector; 2] {
         let wrist = &model.wrists[side];
         let poses = model.forward_kinematics(Pose::IDENTITY, &[0.0; JOINTS]);
@@ -200,7 +203,7 @@ mod tests {
         let mut limits = limits();
         let frames = |limits: &BaseLimits| brief(Assistance::Paper.into(), limits).frames;
         assert!(frames(&limits).contains("0.62 to 0.68 m"));
-        // As of a policy in a file.
+        // The limits of a policy from a file.
         limits.pelvis_height_m.min = limits.pelvis_height_m.max;
         assert!(!frames(&limits).contains("0.62"));
     }

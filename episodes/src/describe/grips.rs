@@ -1,22 +1,22 @@
-//! Grips that work, one for each kind of thing that tasks have, as policies are told them. They are the experts' own, which a test beside
-//! these holds; another has a robot grip each by what is told here alone.
+//! Worked grips, one for each kind of object in the tasks, as policies are given them. They are the experts'
+//! own; a test in this crate compares them. Another test has a robot perform each by this information alone.
 
 use tandem_tools_spec::WorkedGrip;
 
 const OPEN_RAD: [f64; 7] = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0];
 const HALF: f64 = std::f64::consts::FRAC_1_SQRT_2;
-/// Right and left wrists: fingers ahead and palms towards each other, fingers ahead and palms down, fingers down and palms towards each
-/// other.
+/// Right and left wrist orientations: fingers forward and palms facing each other; fingers forward and
+/// palms down; fingers down and palms facing each other.
 const AHEAD: [[f64; 4]; 2] = [[1.0, 0.0, 0.0, 0.0]; 2];
 const PALMS_DOWN: [[f64; 4]; 2] = [[HALF, -HALF, 0.0, 0.0], [HALF, HALF, 0.0, 0.0]];
 const FINGERS_DOWN: [[f64; 4]; 2] = [[HALF, 0.0, HALF, 0.0]; 2];
 
-/// Every grip.
+/// Returns every grip.
 pub fn grips() -> Vec<WorkedGrip> {
     wrapped().into_iter().chain(pinched()).collect()
 }
 
-/// Of what fingers and thumb go round.
+/// Returns the grips that wrap fingers and thumb round an object.
 fn wrapped() -> Vec<WorkedGrip> {
     let beside = vec![[0.0, 0.08, 0.0]];
     vec![
@@ -50,7 +50,7 @@ fn wrapped() -> Vec<WorkedGrip> {
     ]
 }
 
-/// Of what the thumb presses against palm or fingers.
+/// Returns the grips that press an object with the thumb against palm or fingers.
 fn pinched() -> Vec<WorkedGrip> {
     vec![
         WorkedGrip {
@@ -105,7 +105,7 @@ fn pinched() -> Vec<WorkedGrip> {
     ]
 }
 
-/// A grip whose fingers are wrapped round the thing, closed so far: 1 for one of 7 cm.
+/// Returns a grip with fingers wrapped round an object. A `closure` of 1 fits a diameter of 7 cm.
 fn grip(
     thing: &str,
     place: &str,

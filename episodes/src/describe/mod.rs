@@ -1,4 +1,4 @@
-//! What policies are told about tasks, protocols and robots.
+//! Descriptions of tasks, protocols and robots for policies.
 
 mod brief;
 mod grips;
@@ -21,7 +21,8 @@ use crate::scoring::Phase;
 use crate::stress::{self, Stress};
 use crate::tasks::{Task, TaskSet, TaskWords};
 
-/// The reply to `list_tasks` with these tasks, as they are told under `stress`, where robots follow base commands within `limits`.
+/// Returns the reply to `list_tasks`: these tasks in their wording under `stress`, for robots that follow
+/// base commands within `limits`.
 pub fn task_list(tasks: &TaskSet, stress: Option<Stress>, limits: &BaseLimits) -> TaskList {
     let info = |task: &'static Task| task_info(task, stress::task_words(stress, task));
     TaskList { tasks: tasks.all().map(info).collect(), base_limits: wire_limits(limits) }
@@ -38,7 +39,7 @@ fn task_info(task: &Task, words: TaskWords) -> TaskInfo {
     }
 }
 
-/// The phases of a task, in the order they have to be reached.
+/// Returns the phases of a task in the order in which they must be reached.
 pub fn phases(task: &Task) -> Vec<PhaseInfo> {
     let info = |(index, phase): (usize, &Phase)| PhaseInfo {
         id: phase.id.into(),
@@ -62,7 +63,7 @@ fn protocol_info(protocol: Protocol, task: &Task) -> ProtocolInfo {
     }
 }
 
-/// How an episode ends whose phases are disclosed so.
+/// Returns the text on how an episode with this disclosure of phases ends.
 pub fn ending(disclosure: Disclosure) -> &'static str {
     match disclosure {
         Disclosure::Live => {
@@ -78,7 +79,7 @@ pub fn ending(disclosure: Disclosure) -> &'static str {
     }
 }
 
-/// What each robot of a task has to do, in these words.
+/// Returns the instruction of each robot of a task in this wording.
 pub fn instructions(task: &Task, words: &TaskWords) -> Vec<Instruction> {
     let part = |(name, instruction): (&str, &String)| Instruction {
         robot: name.into(),
@@ -87,7 +88,7 @@ pub fn instructions(task: &Task, words: &TaskWords) -> Vec<Instruction> {
     task.robot_names().zip(&words.robots).map(part).collect()
 }
 
-/// The kind called `kind`, of which `robot` is one.
+/// Returns the description of a kind of robot, of which `robot` is an example.
 pub fn robot_kind(kind: String, robot: &RobotSheet) -> RobotKind {
     RobotKind {
         kind,

@@ -1,13 +1,13 @@
-//! What somebody in the room would be told of what is in it: how large things are, about how far from each robot they stand before
-//! the seed moves them, and where partners stand.
+//! Description of the room: the sizes of objects, their approximate nominal positions relative to each
+//! robot, and the start poses of partners.
 
 use tandem_sim::mjcf::{Geom, Primitive};
 use tandem_sim::{ObjectModel, Pose, Rotation, SimError, Vector, wrapped_rad};
 
 use crate::tasks::{ObjectSpot, RobotSpot, Spread, Task};
 
-/// One line for each thing of a task, as "service trolley, 0.72 m along A's x, 0.44 m along its y, 0.92 m high: middle 0.85 m ahead of
-/// A, 3.65 m ahead of B (from the pelvis, give or take 0.32 m)".
+/// Returns one line for each object of a task, for example "service trolley, 0.72 m along A's x, 0.44 m along
+/// its y, 0.92 m high: middle 0.85 m ahead of A, 3.65 m ahead of B (from the pelvis, give or take 0.32 m)".
 pub fn room(task: &Task, spread: Spread) -> Result<Vec<String>, SimError> {
     let line = |spot: &ObjectSpot| {
         let first = &task.robots[0];
@@ -25,7 +25,8 @@ pub fn room(task: &Task, spread: Spread) -> Result<Vec<String>, SimError> {
     things.chain(partners(task).into_iter().map(Ok)).collect()
 }
 
-/// Where the others stand, as the first robot has it, as "B begins at [1.26, 0.00] m in A's start frame, turned by 3.14 rad".
+/// Returns the other robots' start poses relative to the first, for example "B begins at [1.26, 0.00] m
+/// in A's start frame, turned by 3.14 rad".
 fn partners(task: &Task) -> Vec<String> {
     let [first, others @ ..] = task.robots else { return Vec::new() };
     let line = |robot: &RobotSpot| {
@@ -44,14 +45,15 @@ fn partners(task: &Task) -> Vec<String> {
     others.iter().map(line).collect()
 }
 
-/// How far a place is ahead of a robot at the start, and to its left.
+/// Returns the position of a point relative to a robot at the start: ahead of it, and to its left.
 fn seen_from(robot: &RobotSpot, [x_m, y_m]: [f32; 2]) -> (f32, f32) {
     let (east_m, north_m) = (x_m - robot.position_m[0], y_m - robot.position_m[1]);
     let (sine, cosine) = robot.yaw_rad.sin_cos();
     (cosine * east_m + sine * north_m, cosine * north_m - sine * east_m)
 }
 
-/// How far the seed may move a thing from there.
+/// Returns the largest horizontal displacement of an object by the seed, as a text; empty if it is
+/// negligible.
 fn give_or_take(task: &Task, spot: &ObjectSpot, spread: Spread) -> String {
     let offsets = task.randomize.iter().filter(|offset| offset.objects.contains(&spot.name));
     let farthest = |[low, high]: [f32; 2]| low.abs().max(high.abs());
@@ -63,7 +65,7 @@ fn give_or_take(task: &Task, spot: &ObjectSpot, spread: Spread) -> String {
     if most_m < 0.005 { String::new() } else { format!(", give or take {most_m:.2} m") }
 }
 
-/// About where a thing is for a robot at the start.
+/// Describes the nominal position of an object relative to a robot at the start.
 fn place(robot: &RobotSpot, spot: &ObjectSpot) -> String {
     let [x_m, y_m, _] = spot.position_m;
     let (ahead_m, left_m) = seen_from(robot, [x_m, y_m]);
@@ -76,7 +78,7 @@ fn place(robot: &RobotSpot, spot: &ObjectSpot) -> String {
     if told.is_empty() { format!("where {} stands", robot.name) } else { told.join(" and ") }
 }
 
-/// Along the axes of somebody from whom the thing is turned by `yaw_rad`, z up.
+/// Returns the size of an object along the axes of a frame with z up, in which the object has this yaw.
 fn size_m(spot: &ObjectSpot, yaw_rad: f32) -> Result<Vector, SimError> {
     let turn = Rotation::from_rotation_z(yaw_rad);
     let (mut low_m, mut high_m) = (Vector::INFINITY, Vector::NEG_INFINITY);
@@ -109,7 +111,7 @@ fn corners_m(geom: &Geom, object_from_part: &Pose) -> Vec<Vector> {
         Primitive::Box { half_extents_m } => of_box(*half_extents_m),
         Primitive::Ellipsoid { radii_m } => of_box(*radii_m),
         Primitive::Convex { vertices_m } => vertices_m.clone(),
-        // Things have neither floors nor meshes of their own.
+        // Objects have neither planes nor meshes of their own.
         _ => Vec::new(),
     };
     points_m.into_iter().map(|point_m| pose * point_m).collect()

@@ -1,11 +1,12 @@
-//! A control step as numbers that a page draws: a row of f32, little-endian, of one length throughout an episode.
+//! Frames of the live view: a control step as a row of little-endian f32 values. All rows of an episode
+//! have the same length.
 //!
-//!   kind (1), control step, time [s], steps left, wall clock left [s] (-1 where there is no limit);
-//!   of each robot the poses of its links, then of each object its pose;
-//!   of each robot: whether it has fallen, its camera's pose, its base command (4), for its left and its right hand
-//!   what `hand` says, and of each joint the share of its effort limit.
+//!   kind (1), control step, time [s], steps left, wall clock left [s] (-1 without a limit);
+//!   for each robot the poses of its links, then for each object its pose;
+//!   for each robot: 1 if it has fallen, its camera's pose, its base command (4), the values of `hand` for
+//!   its left and its right hand, and for each joint the torque as a fraction of the effort limit.
 //!
-//! A pose is x, y, z [m] and the quaternion x, y, z, w, in the world.
+//! A pose is x, y, z [m] and the quaternion x, y, z, w, in the world frame.
 
 use tandem_sim::{RobotStep, Side, Step};
 
@@ -15,17 +16,17 @@ use crate::commands::{Motion, base_row, wrist_state};
 use crate::convert::{isometry_from_sim, isometry_to_sim};
 use tandem_tools_spec::HandState;
 
-/// What comes first in the message of a step.
+/// First value of the message of a step.
 const STEP_KIND: f32 = 1.0;
 const NO_LIMIT: f32 = -1.0;
 
-/// What of a robot the message of a step needs.
+/// Constants of a robot that the message of a step needs.
 pub struct RobotFrame {
     pub name: String,
     pub effort_limits_n_m: Vec<f32>,
 }
 
-/// The row of `live`; `motions` are of the same robots, and left as the step has them.
+/// Returns the row of `live`. `motions` belong to the same robots, and are left in the state of the step.
 pub fn row(live: &LiveStep, motions: &mut [Motion], robots: &[RobotFrame]) -> Vec<u8> {
     let LiveStep { step, budget, .. } = live;
     let steps_left = budget.as_ref().map_or(NO_LIMIT, |budget| budget.steps_left as f32);
@@ -56,14 +57,15 @@ pub fn row(live: &LiveStep, motions: &mut [Motion], robots: &[RobotFrame]) -> Ve
     row.into_iter().flat_map(f32::to_le_bytes).collect()
 }
 
-/// The wrist's pose (7), its target's (7), how it does (1), the errors [m, rad], the force that the robot feels on it [N, world] (3), and
-/// that which objects exert on it [N, world] (3).
+/// Appends the values of a hand: the wrist's pose (7), its target's pose (7), its state (1), and the
+/// errors [m, rad]. Then the force that the robot senses on the hand [N, world] (3), and the force that
+/// objects exert on it [N, world] (3).
 fn hand(step: &Step, index: usize, side: Side, motion: &Motion, row: &mut Vec<f32>) {
     let robot: &RobotStep = &step.robots[index];
     let world_from_wrist = robot.truth.world_from_wrist[side];
     row.extend(pose_row(&world_from_wrist));
     let target = motion.targets()[side];
-    // The robot aims by where it takes itself to be; what it aims at is shown beside it as it is.
+    // The robot aims in its estimated pelvis frame; the target is drawn in the true one.
     let world_from_target = robot.truth.world_from_pelvis() * isometry_to_sim(&target);
     row.extend(pose_row(&world_from_target));
     let measured = isometry_from_sim(&robot.sensed.pelvis_from_wrist[side]);
@@ -76,13 +78,14 @@ fn hand(step: &Step, index: usize, side: Side, motion: &Motion, row: &mut Vec<f3
     row.push(missing.rotation.angle() as f32);
     row.extend(robot.hand_force_in_world_n()[side].to_array());
     let touches = step.touches.iter().filter(|touch| touch.robot == index && touch.side == side);
-    // What a hand exerts on an object, the object exerts on the hand the other way round.
+    // The contact forces act on the object; their negative acts on the hand.
     let exerted_n =
         touches.map(|touch| touch.contacts.thumb_n + touch.contacts.fingers_n + touch.contacts.palm_n);
     row.extend((-exerted_n.sum::<tandem_sim::Vector>()).to_array());
 }
 
-/// 0 stands for a hand that has no target of its own: its joints are told where to be.
+/// Returns the number of a state. 0 is also the number of a hand without a wrist target, which follows
+/// joint targets.
 fn state_number(state: HandState) -> f32 {
     match state {
         HandState::Idle => 0.0,

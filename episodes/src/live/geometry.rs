@@ -1,4 +1,4 @@
-//! The shapes of a scene in a compact form: equal meshes once, corners as they are, normals in bytes.
+//! Compact geometry of a scene: equal meshes are stored once, vertices as f32, normals as bytes.
 
 use std::collections::HashMap;
 
@@ -6,16 +6,17 @@ use serde_json::{Value, json};
 use tandem_sim::Pose;
 use tandem_sim::render::{Carrier, Part, Pattern, Scenery, TriangleMesh};
 
-/// Of a scene, what a page draws: `meshes` and `parts` for the head of a message, and the numbers that follow it.
+/// Geometry that a page draws: `meshes` and `parts` for the header of a message, and the numbers that
+/// follow it.
 pub struct Geometry {
     pub meshes: Value,
     pub parts: Value,
-    /// For each mesh its corners (three f32 each, m), its triangles (three u32 each) and its normals (three i8 of 127 and one
-    /// that says nothing), little-endian.
+    /// For each mesh, little-endian: its vertices (three f32 each, m), its triangles (three u32 each),
+    /// and its normals (three i8 scaled by 127, and a padding byte).
     pub numbers: Vec<u8>,
 }
 
-/// A pose as x, y, z (m) and its quaternion as x, y, z, w, which is three.js's order.
+/// Returns a pose as x, y, z (m) and the quaternion x, y, z, w, in the order of three.js.
 pub fn pose_row(pose: &Pose) -> [f32; 7] {
     let ([x, y, z], [i, j, k, w]) = (pose.translation.to_array(), pose.rotation.to_array());
     [x, y, z, i, j, k, w]

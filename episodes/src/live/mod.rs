@@ -1,5 +1,6 @@
-//! What those who look on see of an episode: its scene once, then steps, calls and phases as they come. Whoever plays it never learns
-//! that somebody looks: a session hands over what it has made anyway, and all else is done on the onlooker's side.
+//! The live view of an episode: its scene once, then steps, calls and phases as they occur. Viewers do
+//! not affect the episode. A session passes on data that it has computed anyway; all other work is done
+//! on the viewer's side.
 
 mod frame;
 mod geometry;
@@ -17,39 +18,40 @@ use crate::recording::{NoteMessage, ToolCallMessage, ToolCallRecord, TranscriptE
 
 pub use scene::LiveScene;
 
-/// Where a session tells what happens.
+/// Receiver of a session's events.
 pub trait Onlookers: Send {
-    /// Whether anybody looks on; where nobody does, nothing is handed over.
+    /// Returns true while there are viewers; without them, no events are sent.
     fn any(&self) -> bool;
 
-    /// Whether the control step of this number is wanted, which has just been made. The last one of a call is told in any case.
+    /// Returns true if the control step with this number, which has just been made, is wanted. The last
+    /// step of a call is sent in any case.
     fn wants_step(&self, control_step: u64) -> bool;
 
-    /// Must not wait for anybody.
+    /// Passes on an event. Must not block.
     fn tell(&self, event: LiveEvent);
 }
 
-/// Every how many control steps onlookers get one: 25 a simulated second.
+/// Control steps between two frames of the live view, which has 25 frames a simulated second.
 pub const STEPS_PER_FRAME: u64 = 2;
 
-/// Something that has happened in an episode.
+/// An event of an episode.
 #[derive(Clone)]
 pub enum LiveEvent {
     Step(Arc<LiveStep>),
-    /// A call that has been answered, or a note.
+    /// A tool call with its reply, or a note.
     Entry(Arc<LiveEntry>),
     Phase(PhaseReached),
-    /// It takes no more commands.
+    /// The result. The episode takes no more commands.
     Ended(Arc<ResultReply>),
 }
 
-/// A control step, and what the robots were told to do in it.
+/// A control step, and the motions commanded in it.
 pub struct LiveStep {
     pub step: Arc<Step>,
-    /// By robot.
+    /// Motion of each robot.
     pub(crate) motions: Vec<MotionState>,
     pub(crate) budget: Option<Budget>,
-    /// Made by the first onlooker who wants it.
+    /// Computed on the first request.
     frame: OnceLock<Arc<[u8]>>,
 }
 
@@ -58,24 +60,24 @@ impl LiveStep {
         LiveStep { step, motions, budget, frame: OnceLock::new() }
     }
 
-    /// The step as [`LiveScene::frame`] has it.
+    /// Returns the frame of the step, as [`LiveScene::frame`] encodes it.
     pub fn frame(&self, scene: &LiveScene) -> Arc<[u8]> {
         self.frame.get_or_init(|| scene.frame(self).into()).clone()
     }
 }
 
-/// A tool call with its answer, or a note.
+/// A tool call with its reply, or a note.
 pub struct LiveEntry {
-    /// The entries of an episode are counted from 1.
+    /// Number of the entry in its episode, counted from 1.
     pub entry: u32,
-    /// As a page reads it.
+    /// Entry in JSON, for pages.
     pub told: Value,
-    /// What was seen, with the name of the robot that saw it.
+    /// Images returned by the call, with the name of the robot.
     pub pictures: Vec<(String, Arc<Picture>)>,
 }
 
 impl LiveEntry {
-    /// A call; those that count have a number.
+    /// Returns the entry of a call. `number` is set for counted calls.
     pub(crate) fn of_call(entry: u32, number: Option<u32>, record: &ToolCallRecord) -> LiveEntry {
         let told = told_call(entry, number, record.time_s, &record.message);
         LiveEntry { entry, told, pictures: record.pictures.clone() }
@@ -85,13 +87,13 @@ impl LiveEntry {
         LiveEntry { entry, told: told_note(entry, time_s, note), pictures: Vec::new() }
     }
 
-    /// The entry for who comes later: a picture is seen when it is made.
+    /// Returns the entry without its images, for viewers that connect later.
     pub(crate) fn without_pictures(&self) -> LiveEntry {
         LiveEntry { entry: self.entry, told: self.told.clone(), pictures: Vec::new() }
     }
 }
 
-/// A transcript as a page reads it.
+/// Converts a transcript to JSON, for pages.
 pub(crate) fn told_transcript(transcript: &[TranscriptEntry]) -> Vec<Value> {
     let told = |(entry, told): (u32, &TranscriptEntry)| match told {
         TranscriptEntry::Call { number, time_s, call } => told_call(entry, *number, *time_s, call),
@@ -116,13 +118,13 @@ fn told_note(entry: u32, time_s: f64, note: &NoteMessage) -> Value {
     })
 }
 
-/// An episode as it stands when somebody begins to look on.
+/// State of an episode at the moment when a viewer connects.
 pub struct LiveView {
     pub scene: Arc<LiveScene>,
     pub now: Arc<LiveStep>,
-    /// Its latest calls and notes, the oldest first.
+    /// Latest calls and notes, the oldest first.
     pub entries: Vec<Arc<LiveEntry>>,
     pub phases: Vec<PhaseReached>,
-    /// What it came to, if it has ended.
+    /// Result of an episode that has ended.
     pub result: Option<ResultReply>,
 }

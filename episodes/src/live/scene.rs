@@ -1,4 +1,4 @@
-//! What does not change in an episode, for those who look on: shapes, names and limits, and who draws the robots' pictures for them.
+//! Constants of an episode for viewers: shapes, names and limits, and the renderer for the robots' images.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -22,12 +22,12 @@ pub struct LiveScene {
     numbers: Vec<u8>,
     robots: Vec<RobotFrame>,
     cameras: Cameras,
-    /// Robots of their own, which take up what those of the episode were told.
+    /// Motions of the viewer's own, set to the states of the episode's motions.
     motions: Mutex<Vec<Motion>>,
     drawing: Mutex<Drawing>,
 }
 
-/// Who draws pictures, from when somebody looks at one.
+/// Renderer of images, created at the first request.
 struct Drawing {
     kind: RendererKind,
     scenery: Option<Scenery>,
@@ -35,7 +35,7 @@ struct Drawing {
 }
 
 impl LiveScene {
-    /// The scene of the episode `spec`, which is played in `world` by robots that `motions` move.
+    /// Returns the scene of the episode `spec`, which runs in `world` with the robots of `motions`.
     pub(crate) fn of(spec: &EpisodeSpec, world: &World, motions: &[Motion]) -> LiveScene {
         let scenery = stress::scenery(spec.stress, spec.world_seed(), world);
         let Geometry { meshes, parts, numbers } = Geometry::of(&scenery);
@@ -70,8 +70,9 @@ impl LiveScene {
         }
     }
 
-    /// The message that a page draws the scene from: the length of its head in bytes (u32), the head, JSON with `more` in it and
-    /// blanks up to a multiple of four, then the numbers of its meshes, then `rest`. All little-endian.
+    /// Returns the message from which a page draws the scene. All of it is little-endian: the length of
+    /// the header in bytes (u32), then the header, which is JSON including `more`, padded with blanks to
+    /// a multiple of four. The numbers of the meshes and `rest` follow.
     pub fn message(&self, more: Value, rest: &[u8]) -> Vec<u8> {
         let mut head = self.head.clone();
         if let (Value::Object(head), Value::Object(more)) = (&mut head, more) {
@@ -87,15 +88,15 @@ impl LiveScene {
         message
     }
 
-    /// The message of a step; `frame.rs` says what is in it.
+    /// Returns the message of a step; `frame.rs` describes its format.
     pub fn frame(&self, live: &LiveStep) -> Vec<u8> {
-        // Every frame begins with the states of its own step, so that a panic leaves nothing wrong behind.
+        // Every frame begins with the states of its own step, so a panic leaves no stale state behind.
         let mut motions = self.motions.lock().unwrap_or_else(PoisonError::into_inner);
         frame::row(live, &mut motions, &self.robots)
     }
 
-    /// What robot `name` sees after `step`, as a PNG file; `None` if there is no such robot. Drawn for who looks on, and by nobody
-    /// whom the episode waits for.
+    /// Renders the view of robot `name` after `step` as a PNG file; `None` if there is no such robot. The
+    /// episode does not wait for it.
     pub fn picture(&self, step: &Step, name: &str) -> Option<Result<Vec<u8>, PictureError>> {
         let robot = self.robots.iter().position(|robot| robot.name == name)?;
         let camera: Camera = self.cameras.egocentric(step, robot);
@@ -109,7 +110,7 @@ impl LiveScene {
         Some(encode_png(drawn.width, drawn.height, &drawn.rgb))
     }
 
-    /// The names of the robots.
+    /// Yields the names of the robots.
     pub fn robots(&self) -> impl Iterator<Item = &str> {
         self.robots.iter().map(|robot| robot.name.as_str())
     }
@@ -126,7 +127,8 @@ fn robot_head(motion: &Motion) -> Value {
     })
 }
 
-/// The finger joints of a hand, in the order of commands: where each turns in the frame of the one before it in its finger, or of the wrist.
+/// Returns the finger joints of a hand in command order. The pose of each is relative to the previous
+/// link of its finger, or to the wrist.
 fn fingers(model: &RobotModel, side: Side) -> Value {
     let hand = &model.hands[side];
     let is_finger = |link: &usize| hand.thumb.contains(link) || hand.fingers.contains(link);

@@ -1,5 +1,5 @@
-//! Fits the largest plane in a region of a picture, the straight edges at which it ends there, and the
-//! corners where these meet. From the depth that the policy may measure itself.
+//! Fit of the largest plane in an image region, of its straight edges within the region, and of their
+//! corners. The fit uses only depth that the policy may measure itself.
 
 use nalgebra::{Isometry3, Matrix2, Matrix3, Point3, SymmetricEigen, Vector2, Vector3};
 use tandem_sim::SplitMix64;
@@ -8,23 +8,24 @@ use tandem_tools_spec::{EdgeFit, PlaneFit, RegionFit};
 use super::RobotView;
 use crate::convert::coarse;
 
-/// Points are of a plane that are off it by less than this, and this share of how far away they are.
+/// Maximum distance of a plane's points from it, and the same as a fraction of their distance from the
+/// camera.
 const PLANE_OFF_M: f64 = 0.003;
 const PLANE_OFF_SHARE: f64 = 0.003;
-/// Points are of an edge that are off it by less than this.
+/// Maximum distance of an edge's points from it.
 const EDGE_OFF_M: f64 = 0.004;
 const TRIALS: usize = 200;
-/// Smallest number of points of a plane, and their smallest share of those in the region.
+/// Minimum number of points on a plane, and their minimum fraction of the points in the region.
 const MIN_PLANE_POINTS: usize = 30;
 const MIN_PLANE_SHARE: f64 = 0.2;
 const MIN_EDGE_POINTS: usize = 12;
 const MIN_EDGE_M: f64 = 0.03;
 const MAX_EDGES: usize = 4;
-/// Edges meet at a corner that are turned against each other by more, and whose ends are nearer to it.
+/// Minimum angle between edges that meet at a corner, and maximum distance of their ends from it.
 const MIN_CORNER_RAD: f64 = 0.35;
 const MAX_CORNER_GAP_M: f64 = 0.03;
 
-/// Pixels of a rectangle of a view, and the point that each sees in the camera's frame.
+/// Pixels in a rectangle of a view, with their points in the camera's frame.
 struct Region<'a> {
     view: &'a RobotView,
     from: [usize; 2],
@@ -48,15 +49,15 @@ struct Line {
 /// A straight stretch of a boundary.
 struct Edge {
     line: Line,
-    /// Its start and end along the line.
+    /// Coordinates of its start and end along the line.
     ends_m: [f64; 2],
-    /// Root mean square of how far its points are off the line.
+    /// Root mean square of the points' distances from the line.
     rms_m: f64,
     points: usize,
 }
 
-/// Fits the region between two corners of the picture, and tells the result in the frame in which the
-/// camera has this pose.
+/// Fits the region between two corners of the image. The result is in the frame in which the camera has
+/// this pose.
 pub fn fit(
     view: &RobotView,
     corners: [[i64; 2]; 2],
@@ -111,8 +112,8 @@ impl Region<'_> {
         depth_m.is_finite().then(|| Vector3::from(seen_m.to_array().map(f64::from)))
     }
 
-    /// Returns where the plane ends in the region, in its own coordinates: between each of its pixels and a
-    /// neighbour that is not of it.
+    /// Returns the plane's boundary in the region, in the plane's coordinates: the points between each of
+    /// its pixels and a neighbour off the plane.
     fn boundary(&self, plane: &Plane) -> Vec<Vector2<f64>> {
         let axes = plane.axes();
         let is_of_it = |at| self.point_m(at).is_some_and(|point_m| plane.has(&point_m));
@@ -137,7 +138,7 @@ impl Region<'_> {
 }
 
 impl Plane {
-    /// The plane through the middle of these points that is nearest to them, its normal towards the camera.
+    /// Returns the least-squares plane through the mean of these points, with its normal towards the camera.
     fn nearest<'a>(points: impl Iterator<Item = &'a Vector3<f64>> + Clone) -> Plane {
         let count = points.clone().count() as f64;
         let middle_m = points.clone().sum::<Vector3<f64>>() / count;
@@ -157,7 +158,7 @@ impl Plane {
         self.off_m(point_m).abs() < PLANE_OFF_M + PLANE_OFF_SHARE * point_m.norm()
     }
 
-    /// Two directions on it, at right angles.
+    /// Returns two orthogonal directions in the plane.
     fn axes(&self) -> [Vector3<f64>; 2] {
         let aside = if self.normal.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
         let first = (aside - self.normal * self.normal.dot(&aside)).normalize();
@@ -165,8 +166,8 @@ impl Plane {
     }
 }
 
-/// Returns the plane with the most of these points, how far they are off it (root mean square), and how
-/// many they are.
+/// Returns the plane with the most of these points, their root mean square distance from it, and their
+/// number.
 fn fit_plane(points_m: &[Vector3<f64>]) -> Option<(Plane, f64, usize)> {
     if points_m.len() < MIN_PLANE_POINTS {
         return None;
@@ -260,7 +261,7 @@ fn edges(mut points: Vec<Vector2<f64>>) -> Vec<Edge> {
     found
 }
 
-/// Returns where two edges meet that reach so far.
+/// Returns the points where two edges that extend to them meet.
 fn corners_of(edges: &[Edge]) -> Vec<Vector2<f64>> {
     let mut found = Vec::new();
     for (index, Edge { line: one, .. }) in edges.iter().enumerate() {
@@ -292,8 +293,8 @@ mod tests {
     const HEIGHT: usize = 120;
     const FOCAL_PX: f32 = 130.0;
 
-    /// Returns the view of a table of 0.6 x 0.4 m, turned by 0.3 rad about the way that the camera looks, 1 m off and leaning by
-    /// `lean_rad`, and of a wall behind it.
+    /// Returns a view of a table of 0.6 x 0.4 m with a wall behind it. The table is 1 m away, rotated by
+    /// 0.3 rad about the viewing direction and tilted by `lean_rad`.
     fn view(lean_rad: f64, wall_m: f32) -> RobotView {
         let plane = Isometry3::new(Vector3::new(0.0, 0.0, -1.0), Vector3::new(lean_rad, 0.0, 0.0))
             * Isometry3::rotation(Vector3::z() * 0.3);

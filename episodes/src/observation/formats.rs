@@ -1,4 +1,4 @@
-//! Views as programs ask for them: raw colours, and depth at every pixel.
+//! Views in formats for programs: raw colours, and depth at every pixel.
 
 use tandem_sim::render::{PictureError, encode_depth_png};
 use tandem_tools_spec::{Bytes, CameraArrays, DepthFormat, Formats, ImageFormat, Protocol};
@@ -6,7 +6,8 @@ use tandem_tools_spec::{Bytes, CameraArrays, DepthFormat, Formats, ImageFormat, 
 use super::RobotView;
 use crate::EpisodeError;
 
-/// Whether a protocol allows these formats: agents measure depth at pixels that they choose, which is part of their task.
+/// Checks that a protocol allows these formats. Agents may measure depth only at chosen pixels, which is
+/// part of their task.
 pub fn check_formats(formats: &Formats, protocol: Protocol) -> Result<(), EpisodeError> {
     match (formats.depth, protocol) {
         (Some(_), Protocol::Agentic) => Err(EpisodeError::DepthImage { protocol: protocol.name() }),
@@ -14,7 +15,8 @@ pub fn check_formats(formats: &Formats, protocol: Protocol) -> Result<(), Episod
     }
 }
 
-/// What is asked for besides a PNG of a view through the camera of `robot`; `None` where nothing is.
+/// Returns the arrays requested in addition to a PNG, for the camera of `robot`; `None` if no arrays are
+/// requested.
 pub fn arrays(
     robot: &str,
     view: &RobotView,
@@ -37,10 +39,11 @@ pub fn arrays(
     Ok(asked.then(|| CameraArrays { robot: robot.into(), rgb, depth_float16, depth_png16 }))
 }
 
-/// A number from 0 to infinity in half precision (IEEE 754 binary16), rounded to the nearest, ties to even.
+/// Converts a number from 0 to infinity to half precision (IEEE 754 binary16), rounded to nearest, ties
+/// to even.
 fn half_bits(value: f32) -> u16 {
     const INFINITY: u16 = 0x7c00;
-    /// 2^-112 takes exponents from the bias of single precision, 127, to that of half, 15.
+    /// 2^-112 shifts exponents from the bias of single precision, 127, to that of half precision, 15.
     const REBIAS: f32 = f32::from_bits((127 - 112) << 23);
     if !value.is_finite() {
         return INFINITY;
@@ -56,7 +59,7 @@ mod tests {
 
     use super::*;
 
-    /// As `numpy.float16(x).view(numpy.uint16)` has them.
+    /// Expected values from `numpy.float16(x).view(numpy.uint16)`.
     #[test]
     fn half_precision() {
         for (number, bits) in [

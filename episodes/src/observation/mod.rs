@@ -1,5 +1,5 @@
-//! What the robots of an episode see and sense at one moment. A view is drawn once for a step and a robot, and encoded only where it
-//! leaves the process: in a reply or in the recording.
+//! Observations of an episode's robots. A view is rendered once for each step and robot. It is encoded
+//! only when it leaves the process, in a reply or in the recording.
 
 mod fit;
 mod formats;
@@ -17,14 +17,14 @@ pub use formats::check_formats;
 pub use observer::Observer;
 pub use proprioception::{Detail, Proprioception, robot_state};
 
-/// What several robots see and sense at the same moment.
+/// Observations of several robots at the same moment.
 #[derive(Clone, Debug)]
 pub struct TeamObservation {
     pub time_s: f64,
     pub robots: Vec<RobotObservation>,
 }
 
-/// What one robot sees and senses.
+/// Observation of one robot.
 #[derive(Clone, Debug)]
 pub struct RobotObservation {
     pub state: RobotState,
@@ -32,18 +32,19 @@ pub struct RobotObservation {
     pub view: Arc<RobotView>,
 }
 
-/// What the camera in a robot's head sees. It says neither where the camera is in the world nor which objects are seen.
+/// View of a robot's head camera. It reveals neither the camera's pose in the world nor the identity of
+/// objects.
 #[derive(Debug)]
 pub struct RobotView {
     pub intrinsics: Intrinsics,
-    /// The recording may still need it when the rest of the view is gone.
+    /// Shared, because the recording may need it after the rest of the view is dropped.
     pub picture: Arc<Picture>,
-    /// [`Frame::depth_m`]. Not every protocol gives it to policies at every pixel, so they get it by calls
-    /// alone. Empty in a view that only the recording needs.
+    /// Depth as in [`Frame::depth_m`]. Some protocols withhold it at all pixels from policies, so they
+    /// receive it through calls only. Empty in a view for the recording alone.
     pub(crate) depth_m: Vec<f32>,
 }
 
-/// The colours of a frame, and its PNG file once somebody has asked for that.
+/// Colours of a frame, and its PNG file once it has been requested.
 #[derive(Debug)]
 pub struct Picture {
     pub width: u32,
@@ -52,7 +53,7 @@ pub struct Picture {
     png: Mutex<Option<Arc<[u8]>>>,
 }
 
-/// Function that draws a picture at the first use of its colours.
+/// Function that renders an image at the first use of its colours.
 type Draw = Box<dyn FnOnce() -> Vec<u8> + Send>;
 
 impl Picture {
@@ -60,7 +61,7 @@ impl Picture {
         Picture::drawn_later([width, height], || rgb)
     }
 
-    /// Returns a picture that is drawn at the first use of its colours, on the thread that uses them.
+    /// Returns an image that is rendered at the first use of its colours, on the calling thread.
     fn drawn_later([width, height]: [u32; 2], draw: impl FnOnce() -> Vec<u8> + Send + 'static) -> Picture {
         Picture { width, height, rgb: LazyLock::new(Box::new(draw)), png: Mutex::default() }
     }
@@ -70,7 +71,7 @@ impl Picture {
         &self.rgb
     }
 
-    /// The picture as a PNG file, encoded the first time only: whoever asks meanwhile waits for it.
+    /// Returns the image as a PNG file, encoded at the first call; concurrent calls wait for it.
     pub fn png(&self) -> Result<Arc<[u8]>, PictureError> {
         let mut png = self.png.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(png) = &*png {
@@ -89,14 +90,15 @@ impl RobotView {
 }
 
 impl RobotView {
-    /// As [`Frame::depth_m`], for callers in this process whose look the episode has checked: not every protocol allows it.
+    /// Returns depth as in [`Frame::depth_m`], for callers in this process. The episode has checked their
+    /// request, since some protocols do not allow it.
     pub fn depth_m(&self) -> &[f32] {
         &self.depth_m
     }
 }
 
 impl TeamObservation {
-    /// The reply to `observe`, with pictures in the formats that were asked for.
+    /// Returns the reply to `observe`, with images in the requested formats.
     pub fn reply(&self, formats: &Formats) -> Result<Observation, PictureError> {
         let mut images = Vec::new();
         let mut arrays = Vec::new();

@@ -1,4 +1,4 @@
-//! Looks at the world of an episode: draws what its cameras see, and measures depth at pixels.
+//! The observer of an episode's world: renders its cameras, and measures depth at pixels.
 
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -21,20 +21,20 @@ use crate::convert::{coarse, isometry_from_sim};
 use crate::spec::EpisodeSpec;
 use crate::stress;
 
-/// Draws what the cameras of one world see.
+/// Renderer of one world's cameras.
 pub struct Observer {
     renderer: Box<dyn Renderer>,
     pub cameras: Cameras,
     drawn: Option<DrawnStep>,
-    /// Renderer of views that only the recording needs; `None` while callers need them.
+    /// Renderer of views for the recording alone; `None` while callers need the views.
     for_recording: Option<Arc<Mutex<Box<dyn Renderer>>>>,
 }
 
-/// The views that have been drawn of the latest step that somebody looked at.
+/// Rendered views of the latest observed step.
 struct DrawnStep {
-    /// Held, so that no other step can have its address.
+    /// Held so that its address stays unique.
     step: Arc<Step>,
-    /// The view of each robot, once it has been drawn.
+    /// View of each robot, once rendered.
     views: Vec<Option<Arc<RobotView>>>,
 }
 
@@ -44,50 +44,51 @@ fn renderer(spec: &EpisodeSpec, world: &World) -> Box<dyn Renderer> {
 }
 
 impl Observer {
-    /// Looks at the world of the episode `spec`.
+    /// Returns an observer of the world of the episode `spec`.
     pub fn new(spec: &EpisodeSpec, world: &World) -> Observer {
         let renderer = renderer(spec, world);
         let cameras = stress::cameras(spec.stress, spec.world_seed(), world);
         Observer { renderer, cameras, drawn: None, for_recording: None }
     }
 
-    /// Observes for the recording alone from now on: its thread draws the pictures, and depth is not drawn.
+    /// Switches to observations for the recording alone: its thread renders the images, without depth.
     pub fn draw_for_recording(&mut self, spec: &EpisodeSpec, world: &World) {
         self.for_recording = Some(Arc::new(Mutex::new(renderer(spec, world))));
     }
 
-    /// Draws observations at once from now on.
+    /// Switches back to immediate rendering.
     pub fn draw_at_once(&mut self) {
         self.for_recording = None;
     }
 
-    /// The renderer, and on what device it draws.
+    /// Returns the name of the renderer and of its device.
     pub fn renderer(&self) -> &str {
         self.renderer.name()
     }
 
-    /// What cameras see after `step`, in their order.
+    /// Renders the views of `cameras` after `step`, in order.
     pub fn render_all(&mut self, step: &Step, cameras: &[Camera]) -> Vec<Frame> {
         self.renderer.render_all(step, cameras)
     }
 
-    /// What any camera sees after `step`.
+    /// Renders the view of a camera after `step`.
     pub fn render(&mut self, step: &Step, camera: &Camera) -> Frame {
         self.renderer.render(step, camera)
     }
 
-    /// The colours of what the robot numbered `robot` sees after `step`, in a picture of this width and height.
+    /// Renders the colours of the view of robot number `robot` after `step`, in this size.
     pub fn eye(&mut self, step: &Step, robot: usize, [width, height]: [u32; 2]) -> Vec<u8> {
         let camera = Camera { width, height, ..self.cameras.egocentric(step, robot) };
         self.colours(step, &camera)
     }
 
-    /// Whether [`Observer::eyes`] is the quicker way to pictures of several worlds.
+    /// Returns true if [`Observer::eyes`] is the faster way to render several worlds.
     pub fn draws_together(&self) -> bool {
         self.renderer.draws_together()
     }
 
-    /// What all robots see after `step`, in pictures of this width and height, to be drawn with what others see.
+    /// Returns a request for the views of all robots after `step` in this size, to be rendered together
+    /// with other requests.
     pub fn eyes<'a>(&'a mut self, step: &'a Step, [width, height]: [u32; 2]) -> RenderRequest<'a> {
         let robots = 0..step.robots.len();
         let cameras =
@@ -95,12 +96,13 @@ impl Observer {
         RenderRequest { renderer: &mut *self.renderer, step, cameras }
     }
 
-    /// The colours of what any camera sees after `step`.
+    /// Renders the colours of a camera's view after `step`.
     pub fn colours(&mut self, step: &Step, camera: &Camera) -> Vec<u8> {
         self.renderer.render_colours(step, camera)
     }
 
-    /// What the robots numbered `robots` see after `step`; each view is drawn the first time only, and those to draw side by side.
+    /// Returns the views of these robots after `step`. Each view is rendered once; missing ones are
+    /// rendered in parallel.
     pub fn views(&mut self, step: &Arc<Step>, robots: &[usize]) -> Vec<Arc<RobotView>> {
         let DrawnStep { views, .. } = match &mut self.drawn {
             Some(drawn) if Arc::ptr_eq(&drawn.step, step) => drawn,
@@ -110,7 +112,7 @@ impl Observer {
             robots.iter().copied().filter(|robot| views[*robot].is_none()).collect();
         let cameras: Vec<Camera> =
             missing.iter().map(|robot| self.cameras.egocentric(step, *robot)).collect();
-        // Where all have been drawn, the renderer need not even place the scenery.
+        // If all have been rendered, the renderer need not even place the scenery.
         let frames = if cameras.is_empty() { Vec::new() } else { self.renderer.render_all(step, &cameras) };
         for ((robot, camera), frame) in missing.into_iter().zip(&cameras).zip(frames) {
             views[robot] = Some(Arc::new(RobotView::new(camera.intrinsics(), frame)));
@@ -118,7 +120,7 @@ impl Observer {
         robots.iter().filter_map(|robot| views[*robot].clone()).collect()
     }
 
-    /// Returns a view whose picture is drawn by the recorder.
+    /// Returns a view whose image is rendered by the recorder.
     fn view_for_recording(
         &self,
         renderer: &Arc<Mutex<Box<dyn Renderer>>>,
@@ -134,7 +136,7 @@ impl Observer {
         Arc::new(RobotView { intrinsics, picture: picture.into(), depth_m: Vec::new() })
     }
 
-    /// What the robots numbered `robots` see and sense after `step`; `sheets` describe all robots.
+    /// Observes these robots after `step`; `sheets` describe all robots.
     pub fn observe(
         &mut self,
         step: &Arc<Step>,
@@ -159,7 +161,8 @@ impl Observer {
         TeamObservation { time_s: step.time_s, robots: robots.iter().zip(views).map(observe).collect() }
     }
 
-    /// The reply to `query_depth` for robot number `robot`, called `name`: the points in `frame`, which is at `pelvis_from_frame`.
+    /// Returns the reply to `query_depth` for robot number `robot`, called `name`. The points are in
+    /// `frame`, whose pose in the pelvis frame is `pelvis_from_frame`.
     pub fn depth(
         &mut self,
         step: &Arc<Step>,
@@ -189,11 +192,12 @@ impl Observer {
         })
     }
 
-    /// Fits the plane in a region of what robot number `robot` sees.
+    /// Fits the plane in a region of the view of robot number `robot`.
     ///
     /// # Errors
     ///
-    /// [`SpecError::Invalid`] if no plane fills enough of the region, or the region reaches out of the picture.
+    /// [`SpecError::Invalid`] if no plane fills enough of the region, or if the region extends beyond the
+    /// image.
     pub fn fit(
         &mut self,
         step: &Arc<Step>,
@@ -211,7 +215,7 @@ impl Observer {
         })
     }
 
-    /// The reply to `query_depth` of a surface.
+    /// Returns the reply to `query_depth` with a surface.
     pub fn surface(
         &mut self,
         step: &Arc<Step>,
@@ -254,7 +258,7 @@ impl Observer {
         }
     }
 
-    /// What the scene's camera sees that sees all robots.
+    /// Renders the scene's camera that sees all robots.
     pub fn third_person(&mut self, step: &Step) -> Picture {
         let camera = self.cameras.third_person();
         let Frame { width, height, rgb, .. } = self.render(step, &camera);

@@ -1,4 +1,4 @@
-//! What a robot senses of itself, and its camera's calibration, as replies have them.
+//! Proprioception of a robot, and its camera's calibration, in the form of replies.
 
 use nalgebra::Isometry3;
 use tandem_sim::render::Intrinsics;
@@ -11,11 +11,11 @@ use crate::convert::{
     isometry_from_sim, opencv_axes, rounded, wire_base, wire_pose, wire_pose_from_sim, wire_vector,
 };
 
-/// How much of a state is told.
+/// Level of detail of a state.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Detail {
     Full,
-    /// No joints.
+    /// Without joints.
     Short,
 }
 
@@ -25,25 +25,25 @@ impl Detail {
     }
 }
 
-/// One robot's share of a step, as far as the robot itself knows of it.
+/// The part of a step that a robot knows about itself.
 pub struct Proprioception<'a> {
     pub time_s: f64,
     pub sensed: &'a RobotSensed,
-    /// The base command in force.
+    /// Current base command.
     pub base: &'a BaseCommand,
-    /// The simulator's word, and no reading.
+    /// True if the robot has fallen. Taken from the simulator, not from a sensor.
     pub fallen: bool,
 }
 
 impl<'a> Proprioception<'a> {
-    /// Takes from `step` what robot number `robot` knows.
+    /// Returns the proprioception of robot number `robot` in `step`.
     pub fn of(step: &'a Step, robot: usize) -> Proprioception<'a> {
         let RobotStep { sensed, truth, command, .. } = &step.robots[robot];
         Proprioception { time_s: step.time_s, sensed, base: &command.base, fallen: truth.fallen }
     }
 }
 
-/// What a robot senses that is described by `sheet`.
+/// Returns the state of the robot described by `sheet`.
 pub fn robot_state(own: &Proprioception, sheet: &RobotSheet, detail: Detail) -> RobotState {
     let Proprioception { time_s, sensed, base, fallen } = *own;
     let named = |values: &[f32]| {
@@ -67,7 +67,7 @@ pub fn robot_state(own: &Proprioception, sheet: &RobotSheet, detail: Detail) -> 
     }
 }
 
-/// The calibration of the camera in the head of the robot called `name`, with its `intrinsics`.
+/// Returns the calibration of the head camera with these `intrinsics` of the robot called `name`.
 pub fn calibration(sensed: &RobotSensed, name: &str, intrinsics: &Intrinsics) -> CameraCalibration {
     let Intrinsics { width, height, focal_px, cx, cy } = *intrinsics;
     let focal_px = rounded(focal_px.into());
@@ -85,7 +85,8 @@ pub fn calibration(sensed: &RobotSensed, name: &str, intrinsics: &Intrinsics) ->
 }
 
 impl RobotObservation {
-    /// Tells of wrists and camera in `frame`, which is at `pelvis_from_frame`, what the robot has `sensed`.
+    /// Converts wrists and camera to `frame`, whose pose in the pelvis frame is `pelvis_from_frame`. The
+    /// poses come from `sensed`.
     pub fn tell_in(&mut self, frame: PoseFrame, pelvis_from_frame: &Isometry3<f64>, sensed: &RobotSensed) {
         let in_frame =
             |pelvis_from: &Pose| wire_pose(&pelvis_from_frame.inv_mul(&isometry_from_sim(pelvis_from)));

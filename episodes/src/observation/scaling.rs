@@ -1,21 +1,21 @@
-//! Pictures in another size: one way of making them, for policies that look now as for data sets that are drawn later.
+//! Scaling of images, common to live observations of policies and to data sets drawn later.
 
 use fast_image_resize::{FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer, images::ImageRef};
 use image::{ImageBuffer, Rgb, RgbImage};
 
 use super::Picture;
 
-/// A picture, for the functions of the library `image`.
+/// An image, for the functions of the library `image`.
 pub type Pixels<'a> = ImageBuffer<Rgb<u8>, &'a [u8]>;
 
 impl Picture {
-    /// The pixels as they are.
+    /// Returns the unscaled pixels.
     pub fn pixels(&self) -> Pixels<'_> {
         ImageBuffer::from_raw(self.width, self.height, self.rgb()).expect("three bytes a pixel")
     }
 
-    /// The whole picture, stretched to another width and height: smooth in both directions, within 1 of 255 of what Pillow's
-    /// bilinear filter gives.
+    /// Returns the whole image stretched to another size. The result is smooth in both directions, and
+    /// within 1 of 255 of Pillow's bilinear filter.
     pub fn scaled(&self, [width, height]: [u32; 2]) -> RgbImage {
         let own =
             ImageRef::new(self.width, self.height, self.rgb(), PixelType::U8x3).expect("three bytes a pixel");

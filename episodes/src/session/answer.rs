@@ -1,4 +1,4 @@
-//! From a tool call to its reply: looks, commands, and what concerns the episode as a whole.
+//! Execution of tool calls: observations, commands, and calls about the episode as a whole.
 
 use tandem_sim::Pose;
 use tandem_tools_spec::{
@@ -13,7 +13,7 @@ use crate::commands::{self, Allowed, Called, Command, RobotSheet, check_reach, r
 use crate::observation::{Detail, Proprioception, TeamObservation, check_formats, robot_state};
 use crate::recording::CallOutcome;
 
-/// What a call is answered with; views are not encoded yet.
+/// The answer to a call, with views not yet encoded.
 #[derive(Clone)]
 pub enum Answer {
     Reply(Box<ToolReply>),
@@ -21,7 +21,7 @@ pub enum Answer {
 }
 
 impl Answer {
-    /// The reply that the caller gets, with views encoded as it asked for them in `formats`.
+    /// Returns the reply for the caller, with views encoded in `formats`.
     pub fn reply(self, formats: &Formats) -> Result<ToolReply, EpisodeError> {
         match self {
             Answer::Reply(reply) => Ok(*reply),
@@ -78,7 +78,7 @@ impl Session {
         }
     }
 
-    /// Refuses what an episode that has ended does no more.
+    /// Returns an error if the episode has ended.
     pub(super) fn expect_underway(&self) -> Result<(), EpisodeError> {
         match self.ended {
             Some(reason) => {
@@ -133,7 +133,7 @@ impl Session {
         Ok(ToolReply::Look(reply).into())
     }
 
-    /// What the robots that are looked through see and sense now.
+    /// Observes the requested robots.
     fn seen(&mut self, args: &Observe, formats: &Formats) -> Result<TeamObservation, EpisodeError> {
         let robots = self.looked_through(args, formats)?;
         let sheets: Vec<&RobotSheet> = self.motions.iter().map(|motion| &motion.robot).collect();
@@ -147,7 +147,7 @@ impl Session {
         Ok(seen)
     }
 
-    /// Whether an observation can be made as asked, and shows nothing that is withheld.
+    /// Checks that an observation is valid and shows nothing that is withheld.
     pub(super) fn check_look(&self, look: &Look) -> Result<(), EpisodeError> {
         self.check_told(&look.observe.clone().into())?;
         self.looked_through(&look.observe, &look.formats).map(drop)
@@ -174,7 +174,7 @@ impl Session {
         }
     }
 
-    /// Executes a command, and reports on every robot that it has an order for.
+    /// Executes a command and reports on every robot with an order in it.
     fn act(&mut self, command: &Command) -> Result<Answer, EpisodeError> {
         let began: Vec<Pose> =
             self.present.robots.iter().map(|robot| robot.sensed.start_from_pelvis).collect();
@@ -201,7 +201,7 @@ impl Session {
         .into())
     }
 
-    /// Executes what has been checked, and reports on nobody.
+    /// Executes a checked command without a report.
     pub(super) fn carry_out_unreported(&mut self, act: &ActCall) -> Result<(), EpisodeError> {
         let command = Command::read(act, &self.rules, &self.motions)?;
         self.run(&command)?;
@@ -209,7 +209,7 @@ impl Session {
         Ok(())
     }
 
-    /// Why a command that has been executed stopped; what ends the episode ends it here.
+    /// Returns the reason why an executed command stopped, and ends the episode if that reason does so.
     fn stop_reason(&mut self) -> StopReason {
         if self.has_succeeded() {
             self.ended = Some(EndReason::TaskComplete);

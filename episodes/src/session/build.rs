@@ -1,5 +1,5 @@
-//! From what an episode is to its world at rest, and to what moves its robots. The world is the task's own scene, or another in which
-//! the task's robots and objects are put where sites say.
+//! Construction of an episode's world at rest, and of its robots' motions. The scene is the task's own,
+//! or another one in which sites give the places of the task's robots and objects.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -18,27 +18,27 @@ use crate::spec::EpisodeSpec;
 use crate::stress;
 use crate::tasks::{Spread, Task};
 
-/// Site of a scene at which the origin of a task is.
+/// Site of a scene at the origin of a task.
 const TASK_SITE: &str = "task";
 const THIRD_PERSON: &str = "third_person";
-/// A site is upright within this.
+/// Maximum tilt of a site.
 const LEVEL_RAD: f32 = 0.01;
-/// In a scene that nobody has tried before, everything has to stay where it is put, for so long and as near as this.
+/// Trial of a user's scene: its duration, and the maximum displacement of robots and objects in it.
 const TRIAL_STEPS: u32 = 50;
 const STAYS_M: f32 = 0.03;
 
-/// What an episode is made of.
+/// A newly built episode.
 pub struct Built {
-    /// Before its first control step.
+    /// World before its first control step.
     pub world: World,
-    /// What moves each robot.
+    /// Motion of each robot.
     pub motions: Vec<Motion>,
-    /// Names of robot and controller that tell files of different content apart.
+    /// Names of robot and controller, which distinguish files of different content.
     pub robot: String,
     pub locomotion: String,
 }
 
-/// Reads all files and puts the world together.
+/// Reads all files and builds the world.
 pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
     let locomotion = spec.locomotion.load()?;
     let source = spec.robot.load()?;
@@ -78,7 +78,7 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
     Ok(Built { world, motions, robot: spec.robot.identity(), locomotion: locomotion.name() })
 }
 
-/// What the world of an episode is made of.
+/// Returns the spec of the episode's world.
 fn world_spec(spec: &EpisodeSpec) -> Result<WorldSpec, EpisodeError> {
     let own = own_spec(spec.task, spec.world_seed(), spec.spread())?;
     match &spec.scene {
@@ -87,7 +87,7 @@ fn world_spec(spec: &EpisodeSpec) -> Result<WorldSpec, EpisodeError> {
     }
 }
 
-/// Puts beside the task's things those that stress has stand about, which depends on where everything else is.
+/// Adds the distractors of the stress. Their places depend on those of everything else.
 fn add_distractors(
     spec: &EpisodeSpec,
     world_spec: &mut WorldSpec,
@@ -125,12 +125,13 @@ fn own_spec(task: &Task, seed: u32, spread: Spread) -> Result<WorldSpec, SimErro
     Ok(WorldSpec { scene, robots: robots.collect(), objects: objects.collect() })
 }
 
-/// The scene that a task's file brings, if it does.
+/// Returns the scene in the task's own file; `None` if the file has none.
 fn scene_of_file(task: &Task) -> Option<Result<Document, SimError>> {
     task.scene_mjcf.map(|mjcf| Document::parse_alone(task.scene, mjcf))
 }
 
-/// Puts a task into another scene. The scene is moved, so that its site `task` is at the origin; tasks and experts keep their numbers.
+/// Places a task in another scene. The scene is moved so that its site `task` is at the origin; tasks and
+/// experts keep their coordinates.
 fn elsewhere(
     mut spec: WorldSpec,
     task: &'static Task,
@@ -155,7 +156,7 @@ fn elsewhere(
     }
     for (object, spot) in spec.objects.iter_mut().zip(task.objects) {
         if let Some(site) = find(spot.name) {
-            // What the seed adds stays.
+            // The seed's offset is kept.
             let spot_m = Vector::from(spot.position_m);
             let by_m = object.world_from_object.translation - spot_m;
             let turned = Rotation::from_rotation_z(heading_rad(&object.world_from_object) - spot.yaw_rad);
@@ -175,7 +176,7 @@ fn elsewhere(
     Ok(spec)
 }
 
-/// Makes sure that a scene of a file has what the task needs: a trial of its own, in which nobody acts.
+/// Checks that a scene from a file has what the task needs, by a short trial with idle robots.
 fn try_scene(
     spec: &EpisodeSpec,
     world_spec: &WorldSpec,
@@ -217,12 +218,12 @@ fn try_scene(
     }
 }
 
-/// Where something of the task is.
+/// Place of a robot or an object of the task.
 #[derive(Clone)]
 struct Place {
-    /// What messages call it.
+    /// Name in messages.
     name: String,
-    /// The site of a scene that places it.
+    /// Site of a scene that sets the place.
     site: String,
     at_m: Vector,
 }

@@ -1,5 +1,6 @@
-//! The one way into an episode: a [`Request`] says who asks for what, and who reads the answer. What is refused before it counts, what is
-//! told, recorded and counted, and what the policy's clock does, is decided here and nowhere else.
+//! Calls to an episode: a [`Request`] has a caller, a call, and an audience for the answer. Everything
+//! passes through here: refusals that do not count, withholding, recording, counting, and control of the
+//! policy's clock.
 
 use tandem_sim::Step;
 use tandem_tools_spec::{
@@ -26,56 +27,56 @@ pub struct Request<'a> {
     pub audience: Audience<'a>,
 }
 
-/// The one who makes a request.
+/// The caller of a request.
 #[derive(Clone, Copy, Debug)]
 pub enum Caller<'a> {
-    /// The policy that directs all robots; also operators together.
+    /// The policy that directs all robots, or several operators together.
     Policy,
     /// The operator of this robot.
     Operator(&'a str),
 }
 
-/// The reader of an answer.
+/// The audience of an answer.
 #[derive(Clone, Copy, Debug)]
 pub enum Audience<'a> {
-    /// The caller, who is told what the episode's assistance grants.
+    /// The caller; it receives the information that the episode's assistance grants.
     Caller,
-    /// This process, which is told everything, for a policy that it asks itself. Of what the benchmark's own policies are not shown, the
-    /// policy is shown this; results name it.
+    /// This process, which receives all information on behalf of a policy. The list is the information
+    /// shown to the policy beyond the benchmark's own policies; results name it.
     Process(&'a [ExtraInformation]),
 }
 
-/// The answer to a request, as its audience may be told it; views are not encoded yet.
+/// The answer to a request in the form for its audience; views are not encoded yet.
 #[derive(Clone)]
 pub struct Outcome {
     answer: Answer,
     formats: Formats,
-    /// For each caller of the request: whether its reply is a short one, and its look afterwards.
+    /// For each caller of the request: true for a short reply, and the observation afterwards.
     parts: Vec<(bool, Option<SeenAfter>)>,
 }
 
-/// An observation after a command, and the formats of its pictures.
+/// An observation after a command, and the formats of its images.
 #[derive(Clone)]
 struct SeenAfter {
     seen: TeamObservation,
     formats: Formats,
 }
 
-/// What a call comes to.
+/// Reply to a call.
 #[derive(Clone, Debug)]
 pub struct CallReply {
     pub reply: ToolReply,
-    /// What was seen after a command that asked for it.
+    /// Observation after a command that requested one.
     pub observation: Option<Observation>,
 }
 
 impl<'a> Request<'a> {
-    /// A call of the policy that directs all robots.
+    /// Returns a call by the policy that directs all robots.
     pub fn of_policy(called: impl Into<Called>) -> Request<'a> {
         Request { caller: Caller::Policy, called: called.into(), audience: Audience::Caller }
     }
 
-    /// The request as a journal has it.
+    /// Returns the request in the journal's form.
     fn asked(&self) -> Result<KeptRequest, serde_json::Error> {
         let shown = match self.audience {
             Audience::Caller => None,
@@ -86,14 +87,14 @@ impl<'a> Request<'a> {
 }
 
 impl Outcome {
-    /// A reply for each caller of the request, with views encoded as it asked for them.
+    /// Returns a reply for each caller of the request, with views encoded in the requested formats.
     pub fn replies(self) -> Result<Vec<CallReply>, EpisodeError> {
         let Outcome { answer, formats, parts } = self;
         let reply = answer.reply(&formats)?;
         let told = parts.into_iter().map(|(is_short, after)| {
             let mut reply = reply.clone();
             if is_short {
-                // The recording has all of it.
+                // The recording contains the full reply.
                 shorten(&mut reply);
             }
             let observation = after.map(|SeenAfter { seen, formats }| seen.reply(&formats)).transpose()?;
@@ -102,14 +103,14 @@ impl Outcome {
         told.collect()
     }
 
-    /// The reply to a request of one caller.
+    /// Returns the reply to a request with one caller.
     pub fn reply(self) -> Result<CallReply, EpisodeError> {
         self.replies()?
             .pop()
             .ok_or_else(|| unanswered(Called::TOGETHER, "it has no command; give one at least"))
     }
 
-    /// The observation that was asked for, with views as they were drawn.
+    /// Returns the requested observation, with views not encoded.
     pub fn seen(self) -> Result<TeamObservation, EpisodeError> {
         match self.answer {
             Answer::Observation(seen) => Ok(seen),
@@ -123,9 +124,14 @@ fn unanswered(tool: &'static str, reason: &str) -> EpisodeError {
 }
 
 impl Session {
-    /// Does what is asked and returns what its audience may be told. An error changes nothing but the count of calls. A request that was
-    /// made for another step, or whose look afterwards could not be had, is refused before it counts. The call that ends the episode,
-    /// and no later one, is counted and recorded, and closes the files.
+    /// Performs a request and returns the answer in the form for its audience. A refused call changes
+    /// nothing but the count of calls. A request for another step, or with an observation that cannot be
+    /// made, is refused before it counts. The call that ends the episode is the last one counted and
+    /// recorded; it closes the files.
+    ///
+    /// # Errors
+    ///
+    /// The reason why the call is refused or fails.
     pub fn perform(&mut self, request: Request) -> Result<Outcome, EpisodeError> {
         let arrival = self.arrival(|| request.asked());
         let outcome = self.do_what_is_asked(request);
@@ -152,19 +158,21 @@ impl Session {
         Ok(Outcome { answer, formats: called.formats(), parts })
     }
 
-    /// Answers a tool call of the policy that directs all robots.
+    /// Performs a tool call by the policy that directs all robots.
     pub fn call(&mut self, call: ToolCall) -> Result<ToolReply, EpisodeError> {
         Ok(self.perform(Request::of_policy(call))?.reply()?.reply)
     }
 
-    /// As [`Session::call`], with all that may go with a call, by the operator of a robot or by the policy of all.
+    /// Performs a call like [`Session::call`], with its options, by the operator of a robot or by the
+    /// policy of all.
     pub fn ask(&mut self, operator: Option<&str>, call: Call) -> Result<CallReply, EpisodeError> {
         let caller = operator.map_or(Caller::Policy, Caller::Operator);
         self.perform(Request { caller, ..Request::of_policy(call) })?.reply()
     }
 
-    /// As [`Session::call`] of `observe`, for who asks a policy in this process: with views as they were drawn, and nothing
-    /// withheld. Of what the benchmark's own policies are not shown, the policy itself is `shown` this.
+    /// Observes like [`Session::call`] with `observe`, on behalf of a policy in this process. Views are
+    /// not encoded, and nothing is withheld. `shown` is the information shown to the policy beyond the
+    /// benchmark's own policies.
     pub fn observe(
         &mut self,
         observe: &Observe,
@@ -175,26 +183,28 @@ impl Session {
         self.perform(Request { audience, ..Request::of_policy(Call::from(look)) })?.seen()
     }
 
-    /// As [`Session::call`] of `observe`, for a policy in this process: what it is told, with views as they were drawn.
+    /// Observes like [`Session::call`] with `observe`, for a policy in this process. The observation has
+    /// the policy's level of information, with views not encoded.
     pub fn observe_as_told(&mut self, look: &Look) -> Result<TeamObservation, EpisodeError> {
         self.perform(Request::of_policy(Call::from(look.clone())))?.seen()
     }
 
-    /// As [`Session::call`], for who carries out what a policy in this process decided: nothing is withheld from the reply, which the
-    /// policy itself is not shown.
+    /// Performs a call like [`Session::call`], on behalf of a policy in this process. Nothing is withheld
+    /// from the reply, which is not shown to the policy.
     pub fn carry_out(&mut self, call: ToolCall) -> Result<ToolReply, EpisodeError> {
         let audience = Audience::Process(&[]);
         Ok(self.perform(Request { audience, ..Request::of_policy(call) })?.reply()?.reply)
     }
 
-    /// Executes the commands of several operators side by side, and looks for each what it wants to see then.
+    /// Executes the commands of several operators at the same time, then makes each one's requested
+    /// observation.
     pub fn together(&mut self, commands: Vec<OperatorCommand>) -> Result<Vec<CallReply>, EpisodeError> {
         let calls = commands.into_iter().map(|command| command.call).collect();
         self.perform(Request::of_policy(Called::Together(calls)))?.replies()
     }
 
-    /// Reads an operator's command, which [`Session::together`] executes when those of others are there, too. A refusal is counted and
-    /// recorded as that of any call.
+    /// Reads an operator's command, to be executed by [`Session::together`] once those of the other
+    /// operators have been read. A refusal is counted and recorded like that of any call.
     pub fn read_command(&mut self, call: OperatorCall) -> Result<OperatorCommand, EpisodeError> {
         let arrival = self.arrival(|| KeptRequest::command(&call));
         let read = self.read_or_refuse(call);
@@ -219,8 +229,8 @@ impl Session {
         }
     }
 
-    /// As [`Session::call`] of `get_robot_state` for each robot, for a policy in this process that needs no text: what it is told of the
-    /// step that is returned is the assistance's.
+    /// Performs `get_robot_state` for each robot like [`Session::call`], for a policy in this process
+    /// that needs no text. The assistance decides which parts of the returned step the policy may use.
     pub fn read_states(&mut self) -> Result<(Assistance, &Step), EpisodeError> {
         let robots: Vec<String> = self.motions.iter().map(|motion| motion.robot.name.clone()).collect();
         for robot in robots {
@@ -235,7 +245,7 @@ impl Session {
         Ok((self.spec().assistance, &self.present))
     }
 
-    /// A call of `get_robot_state` whose answer nobody needs as such.
+    /// Counts a call of `get_robot_state` without making its reply.
     fn count_state_read(&mut self, robot: &str) {
         let counts = self.ended.is_none();
         self.arrived(CallerRecord::Policy, true);
@@ -248,8 +258,8 @@ impl Session {
         self.let_think();
     }
 
-    /// As [`Session::call`] of an acting tool, for who reads numbers of what comes of it: there is no reply, so that none is made unless
-    /// it is recorded or shown.
+    /// Performs an acting call like [`Session::call`], for callers that read its effect as numbers. No
+    /// reply is made unless it is recorded or shown.
     pub fn act_unreported(&mut self, call: &ToolCall) -> Result<(), EpisodeError> {
         let act = match call {
             ToolCall::Act(act) if self.files.is_none() && !self.shows_calls() => act,
@@ -265,14 +275,14 @@ impl Session {
         acted
     }
 
-    /// Counts and records a call that has been refused.
+    /// Counts and records a refused call.
     pub(super) fn refuse(&mut self, caller: CallerRecord, called: &Called, refusal: &EpisodeError) {
         let underway = self.arrived(caller, called.is_look());
         self.came_out(underway, caller, called, CallOutcome::refused(refusal));
         self.let_think();
     }
 
-    /// Makes a call with nothing around it.
+    /// Makes a single call, without its options.
     pub(super) fn make(&mut self, caller: CallerRecord, called: &Called) -> Result<Answer, EpisodeError> {
         let counts = self.ended.is_none();
         let underway = self.arrived(caller, called.is_look());
@@ -286,7 +296,7 @@ impl Session {
         if let Ok(Answer::Reply(reply)) = &mut told
             && let ToolReply::Manage(ManageReply::Finish(reply)) = &mut **reply
         {
-            // Closing the files may have failed, which the reply has to say.
+            // The reply must include a failure to close the files.
             *reply = self.result().disclosed(self.spec().disclosure);
         }
         self.let_think();
@@ -299,7 +309,7 @@ impl Session {
         }
     }
 
-    /// Counts what an answer shows from which nothing is to be withheld any more.
+    /// Counts the information in an answer from which everything withheld has been removed.
     fn count(&mut self, answer: &Answer, called: &Called, caller: CallerRecord) {
         match (caller, answer) {
             (CallerRecord::Policy | CallerRecord::Operator(_), answer) => {
@@ -310,7 +320,8 @@ impl Session {
         }
     }
 
-    /// Whether the episode stands where a call expects it, and what it wants to see afterwards can be seen.
+    /// Checks that the episode is at the call's expected step, and that the observation requested
+    /// afterwards is possible.
     fn check_around(&self, call: &Call) -> Result<(), EpisodeError> {
         let now = self.env_steps();
         if let Some(expected) = call.expected_step.filter(|expected| *expected != now) {
@@ -319,7 +330,7 @@ impl Session {
         call.then.as_ref().map_or(Ok(()), |look| self.check_look(look))
     }
 
-    /// As [`Session::check_around`], of every call; a refusal is told.
+    /// Checks every call like [`Session::check_around`]; a refusal is recorded.
     fn admit(&mut self, caller: Caller, called: &Called) -> Result<(), EpisodeError> {
         for call in called.calls() {
             if let Err(refusal) = self.check_around(call) {
@@ -332,7 +343,7 @@ impl Session {
         Ok(())
     }
 
-    /// Looks after a command, if that was asked for: a call of its own.
+    /// Makes the observation requested after a command, as a call of its own.
     fn look_after(
         &mut self,
         caller: CallerRecord,
@@ -346,8 +357,9 @@ impl Session {
         }
     }
 
-    /// A call has arrived. The clock stands while it is answered, but for a look of the policy's own, which costs the policy its time: who
-    /// looks again and again would otherwise think for nothing. Returns whether the call is one of the episode's.
+    /// Notes the arrival of a call. The clock pauses during the call, except for a policy's own
+    /// observation; otherwise repeated observations would give free thinking time. Returns true if the
+    /// call belongs to the episode.
     fn arrived(&mut self, caller: CallerRecord, is_look: bool) -> bool {
         self.clock.pause();
         if self.ended.is_none() && self.clock.exhausted() {
@@ -365,12 +377,12 @@ impl Session {
         underway
     }
 
-    /// The policy has asked for something: for a call, or for a plan of several.
+    /// Counts a request of the policy: a call, or a plan of several.
     pub(super) fn count_request(&mut self) {
         self.requests = self.requests.map(|requests| requests + 1);
     }
 
-    /// A call has come out: records it, and closes the files if it has ended the episode.
+    /// Records the outcome of a call, and closes the files if the call has ended the episode.
     fn came_out(&mut self, underway: bool, caller: CallerRecord, called: &Called, outcome: CallOutcome) {
         if underway && (self.files.is_some() || self.shows_calls()) {
             let time_s = self.present.time_s;
@@ -383,17 +395,17 @@ impl Session {
                     files.keep_words(words);
                 }
             }
-            // A replay asks the clock when the call arrives, not when it has been answered.
+            // A replay reads the clock at the call's arrival, not at its reply.
             let moment = CallMoment { thought: self.clock.spent(), ..self.now() };
             self.tell(ToolCallRecord::new(moment, caller, called, outcome));
         }
-        // A plan that has ended the episode is told behind its last command.
+        // A plan that has ended the episode is recorded after its last command.
         if self.ended.is_some() && !self.planning {
             self.settle();
         }
     }
 
-    /// The policy's clock goes on, unless the episode has ended.
+    /// Resumes the policy's clock unless the episode has ended.
     pub(super) fn let_think(&mut self) {
         if self.ended.is_none() {
             self.clock.resume();
@@ -411,7 +423,7 @@ impl<'a> Caller<'a> {
 }
 
 impl<'a> Audience<'a> {
-    /// The caller as recordings have it.
+    /// Returns the caller in the recording's form.
     fn record(self, caller: Caller<'a>) -> CallerRecord<'a> {
         match (self, caller) {
             (Audience::Process(shown), _) => CallerRecord::InProcess(shown),

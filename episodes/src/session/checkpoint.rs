@@ -1,6 +1,8 @@
-//! An episode at one instant, for going on from there later: in memory, or in a file that the same build reads again.
+//! Checkpoints: the state of an episode at one instant, from which it can continue. A checkpoint is in
+//! memory, or in a file for the same build.
 //!
-//! The file is one line of JSON that says whose progress follows, so that `head -1` shows it, then the progress itself.
+//! The file starts with one line of JSON that identifies the episode, so that `head -1` shows it. The
+//! progress follows.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -22,59 +24,59 @@ use crate::scoring::ScoreMemory;
 use crate::spec::{EpisodeSpec, PhaseStart};
 use crate::stress::ExecutionMemory;
 
-/// Largest file of a checkpoint. One has some hundred kilobytes.
+/// Maximum size of a checkpoint's file; typical files have some hundred kilobytes.
 const MAX_CHECKPOINT_BYTES: u64 = 64 << 20;
 
-/// An episode at one instant. It fits episodes of the same task, seed, protocol, robot, controller and sensing, whose policies are
-/// told the same.
+/// The state of an episode at one instant. It fits episodes with the same task, seed, protocol, robot,
+/// controller and sensing, and with the same information for the policy.
 #[derive(Clone)]
 pub struct Checkpoint {
     origin: Origin,
     progress: Progress,
-    /// The step after it, where the simulator failed in that.
+    /// The step after it, if the simulator failed in that step.
     pub(super) failed: Option<FailedStep>,
 }
 
 /// The step in which the simulator failed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FailedStep {
-    /// Its number in the episode, and what came out.
+    /// Step number in the episode, and the error.
     pub failure: String,
-    /// What each robot was told.
+    /// Command of each robot.
     pub commands: Vec<RobotCommand>,
 }
 
-/// Whose progress it is.
+/// The episode to which progress belongs.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Origin {
     pub spec: EpisodeSpec,
-    /// Names of robot and controller that tell files of different content apart.
+    /// Names of robot and controller, which distinguish files of different content.
     pub robot: String,
     pub locomotion: String,
 }
 
-/// All of an episode that changes.
+/// The variable state of an episode.
 #[derive(Clone, Serialize, Deserialize)]
 struct Progress {
     world: Snapshot,
     motions: Vec<MotionState>,
     scores: ScoreMemory,
-    /// Control steps of the world that are not the episode's.
+    /// Control steps of the world before the episode.
     steps_before: u64,
     tool_calls: u32,
     requests: Option<u32>,
     thought: Duration,
     ended: Option<EndReason>,
-    /// What the policy has been shown by then.
+    /// Information shown to the policy.
     shown: ShownInformation,
-    /// What it has asked for by then that the benchmark has not.
+    /// Departures from the benchmark in the policy's commands.
     departures: BTreeSet<String>,
     targets: TargetCounts,
-    /// What robots have been told that they do not do at once, if there is such a thing.
+    /// Memory of delayed or disturbed execution; `None` without them.
     execution: Option<ExecutionMemory>,
 }
 
-/// The first line of a file.
+/// First line of a file.
 #[derive(Serialize, Deserialize)]
 struct Header {
     build: String,
@@ -82,18 +84,18 @@ struct Header {
     origin: Origin,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     failed: Option<FailedStep>,
-    /// Length and hash of what follows.
+    /// Length of the progress, and its hash.
     bytes: usize,
     xxh3: String,
 }
 
 impl Checkpoint {
-    /// Writes a file. A reader sees the whole of it or nothing.
+    /// Writes the checkpoint to a file. A reader sees the whole file or nothing.
     pub fn write(&self, path: &Path) -> Result<(), EpisodeError> {
         Ok(write_whole(path, &self.to_bytes()?)?)
     }
 
-    /// What a file of it holds.
+    /// Returns the content of the checkpoint's file.
     pub fn to_bytes(&self) -> Result<Vec<u8>, EpisodeError> {
         let progress = postcard::to_stdvec(&self.progress).map_err(CheckpointError::from)?;
         let header = Header {
@@ -109,14 +111,14 @@ impl Checkpoint {
         Ok(bytes)
     }
 
-    /// Reads a file that this build has written.
+    /// Reads a file written by this build.
     pub fn read(path: &Path) -> Result<Checkpoint, EpisodeError> {
         let bytes = read_bytes(path, MAX_CHECKPOINT_BYTES)
             .map_err(|source| CheckpointError::Read { path: path.into(), source })?;
         Checkpoint::from_bytes(&bytes, path)
     }
 
-    /// Reads where a phase of a recorded episode began; this build has to have recorded it.
+    /// Reads the checkpoint at the beginning of a phase from a recording made by this build.
     pub fn of_phase(start: &PhaseStart) -> Result<Checkpoint, EpisodeError> {
         let PhaseStart { recording: path, phase } = start;
         let recording = Recording::read(path).map_err(unreadable)?;
@@ -126,7 +128,7 @@ impl Checkpoint {
         }
     }
 
-    /// Reads what `path` holds.
+    /// Parses the content of the file at `path`.
     pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Checkpoint, EpisodeError> {
         let line = bytes.iter().position(|byte| *byte == b'\n').unwrap_or(bytes.len());
         let header: Header = serde_json::from_slice(&bytes[..line])
@@ -145,33 +147,34 @@ impl Checkpoint {
         Ok(Checkpoint { origin: header.origin, progress, failed: header.failed })
     }
 
-    /// The episode that it was made of.
+    /// Returns the spec of the checkpoint's episode.
     pub fn spec(&self) -> &EpisodeSpec {
         &self.origin.spec
     }
 
-    /// The step after it, if the simulator failed in that.
+    /// Returns the step after the checkpoint, if the simulator failed in it.
     pub fn failed(&self) -> Option<&FailedStep> {
         self.failed.as_ref()
     }
 }
 
 impl Origin {
-    /// What has to be the same for progress to fit, in words.
+    /// Describes everything that must be equal for progress to fit.
     fn episode(&self) -> String {
         let (task, seed, protocol) = (self.spec.task.id, self.spec.world_seed(), self.spec.protocol.name());
         let (machine, told) = (self.machine(), self.told());
         format!("task {task} seed {seed} under the {protocol} protocol with {machine}, and {told}")
     }
 
-    /// What its policy is told: who was told something once knows it.
+    /// Describes the information for the policy; it must match, since a policy keeps what it has read.
     fn told(&self) -> String {
         let EpisodeSpec { assistance, disclosure, hints, instructions, .. } = &self.spec;
         let words = instructions.as_ref().map_or("of the task", |words| &words.xxh3);
         format!("assistance {assistance}, phases told {disclosure}, hints {hints}, instructions {words}")
     }
 
-    /// As [`Origin::episode`], under whatever protocol and whatever its policy is told.
+    /// Describes the episode like [`Origin::episode`], without the protocol and the information for the
+    /// policy.
     fn world(&self) -> String {
         format!("task {} seed {} with {}", self.spec.task.id, self.spec.world_seed(), self.machine())
     }
@@ -191,7 +194,7 @@ impl Origin {
     }
 }
 
-/// A recording that cannot be read, or a part of it.
+/// Wraps the error of an unreadable recording or part of it.
 pub(super) fn unreadable(error: RecordingError) -> CheckpointError {
     CheckpointError::Recording(error.to_string())
 }
@@ -201,7 +204,7 @@ fn hash(bytes: &[u8]) -> String {
 }
 
 impl Session {
-    /// The episode as it stands.
+    /// Returns a checkpoint of the current state.
     pub fn checkpoint(&self) -> Result<Checkpoint, EpisodeError> {
         let progress = Progress {
             world: self.world.snapshot()?,
@@ -220,15 +223,15 @@ impl Session {
         Ok(Checkpoint { origin: self.origin.clone(), progress, failed: None })
     }
 
-    /// Takes the episode to a checkpoint of an episode of the same task, seed, protocol, robot, controller and sensing, whose
-    /// policy is told the same. On an error the episode is as it was.
+    /// Restores a checkpoint of an episode with the same task, seed, protocol, robot, controller and
+    /// sensing, and the same information for the policy. On an error the episode is unchanged.
     pub fn resume(&mut self, checkpoint: &Checkpoint) -> Result<(), EpisodeError> {
         expect_same(checkpoint.origin.episode(), self.origin.episode())?;
         self.restore(&checkpoint.progress)
     }
 
-    /// As [`Session::resume`], under whatever protocol and whatever its policy is told, with the whole budget ahead: what was
-    /// done so far is not this episode's.
+    /// Restores a checkpoint like [`Session::resume`], under any protocol and with any information for
+    /// the policy. The whole budget is left: earlier steps and calls do not count.
     pub fn take_up(&mut self, checkpoint: &Checkpoint) -> Result<(), EpisodeError> {
         expect_same(checkpoint.origin.world(), self.origin.world())?;
         self.restore(&checkpoint.progress)?;

@@ -1,50 +1,52 @@
-//! The time that the policy may think: the wall clock runs between its calls, never while we compute.
+//! The policy's thinking time: the wall clock runs between its calls, and never during computation.
 
 use std::time::{Duration, Instant};
 
-/// Time since some fixed moment. Episodes use [`monotonic`]; tests turn the hands themselves.
+/// A function that returns the time since a fixed moment. Episodes use [`monotonic`]; tests set the time
+/// themselves.
 pub type Clock = Box<dyn Fn() -> Duration + Send>;
 
-/// The machine's monotonic clock.
+/// Returns the machine's monotonic clock.
 pub fn monotonic() -> Clock {
     let start = Instant::now();
     Box::new(move || start.elapsed())
 }
 
-/// The policy's wall clock: it runs from the end of a call to the beginning of the next, never while we compute.
+/// The policy's wall clock: it runs from the end of a call to the beginning of the next, and never during
+/// computation.
 pub struct ThinkingClock {
     now: Clock,
     allowed: Option<Duration>,
     spent: Duration,
-    /// When the policy began to think; `None` while a call is being answered.
+    /// Moment when the policy began to think; `None` during a call.
     since: Option<Duration>,
 }
 
 impl ThinkingClock {
-    /// Stands still until [`ThinkingClock::resume`].
+    /// Returns a clock that is paused until [`ThinkingClock::resume`].
     pub fn new(allowed: Option<Duration>, now: Clock) -> ThinkingClock {
         ThinkingClock { now, allowed, spent: Duration::ZERO, since: None }
     }
 
-    /// A call has arrived.
+    /// Pauses the clock when a call arrives.
     pub fn pause(&mut self) {
         if let Some(since) = self.since.take() {
             self.spent += (self.now)().saturating_sub(since);
         }
     }
 
-    /// The reply is ready.
+    /// Resumes the clock when the reply is ready.
     pub fn resume(&mut self) {
         self.since.get_or_insert((self.now)());
     }
 
-    /// What the policy has left; `None` for as long as it likes.
+    /// Returns the remaining thinking time; `None` without a limit.
     pub fn left(&self) -> Option<Duration> {
         let allowed = self.allowed?;
         Some(allowed.saturating_sub(self.spent + self.thinking()))
     }
 
-    /// How long the policy has been thinking since the last reply.
+    /// Returns the thinking time since the last reply.
     pub fn thinking(&self) -> Duration {
         self.since.map_or(Duration::ZERO, |since| (self.now)().saturating_sub(since))
     }
@@ -53,12 +55,12 @@ impl ThinkingClock {
         self.left() == Some(Duration::ZERO)
     }
 
-    /// How long the policy has thought up to the last [`ThinkingClock::pause`].
+    /// Returns the thinking time up to the last [`ThinkingClock::pause`].
     pub fn spent(&self) -> Duration {
         self.spent
     }
 
-    /// Goes back to an earlier [`ThinkingClock::spent`], as when an episode is taken up again from a snapshot.
+    /// Restores an earlier [`ThinkingClock::spent`], for example when an episode resumes from a checkpoint.
     pub fn set_spent(&mut self, spent: Duration) {
         self.spent = spent;
     }

@@ -1,5 +1,5 @@
-//! When the simulator fails: the world goes back to the last good step, and that is kept for a report, with what the robots were told
-//! next.
+//! Simulator failures: the world goes back to its last good step. A checkpoint of that step is saved for
+//! a report, with the robots' next commands.
 
 use tandem_sim::dynamics::Diverged;
 use tandem_sim::{RobotCommand, SimError, Snapshot, World};
@@ -9,12 +9,13 @@ use super::{Checkpoint, FailedStep, Session, monotonic};
 use crate::EpisodeError;
 use crate::commands::MotionState;
 
-/// The file beside the recording: a [`Checkpoint`] of the last good step, with its [`FailedStep`].
+/// Name of the file beside the recording: a [`Checkpoint`] of the last good step, with its [`FailedStep`].
 pub const FAILED_STEP_FILE: &str = "failed_step.checkpoint";
-/// Control steps after which the world is kept anew: at most so many are simulated again.
+/// Control steps between snapshots of the world, and so the maximum number of steps to simulate again.
 const KEPT_STEPS: usize = 50;
 
-/// The world as it was a while ago, and what it has been told since. It costs less than to keep it at every step.
+/// An earlier snapshot of the world and the commands since then. This costs less than a snapshot at every
+/// step.
 #[derive(Default)]
 pub struct Rewind {
     kept: Option<Snapshot>,
@@ -29,17 +30,17 @@ impl Rewind {
         }
     }
 
-    /// The world is another one's from here on.
+    /// Drops the snapshot when the world is replaced.
     pub fn forget(&mut self) {
         *self = Rewind::default();
     }
 
-    /// The world has made a good step.
+    /// Records the commands of a good step.
     pub fn stepped(&mut self, commands: Vec<RobotCommand>) {
         self.since.push(commands);
     }
 
-    /// Takes the world back to its last good step.
+    /// Restores the world to its last good step.
     fn back(&self, world: &mut World) -> Result<(), SimError> {
         if let Some(kept) = &self.kept {
             world.restore(kept)?;
@@ -52,8 +53,8 @@ impl Rewind {
 }
 
 impl Session {
-    /// Physics has diverged: the episode ends as it was before this step, in which robots were told `commands`; `motions` are those from
-    /// before it.
+    /// Handles a divergence of physics: the episode ends in the state before this step, in which the
+    /// robots had `commands`. `motions` are from before the step.
     pub(super) fn fail(
         &mut self,
         diverged: Diverged,
@@ -79,7 +80,7 @@ impl Session {
         EpisodeError::Diverged { step, source: diverged }
     }
 
-    /// Makes the step again in which the simulator failed; `None` if it succeeds now.
+    /// Repeats the step in which the simulator failed; `None` if it succeeds now.
     pub fn fail_again(
         checkpoint: &Checkpoint,
         failed: &FailedStep,

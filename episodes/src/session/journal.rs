@@ -1,6 +1,6 @@
-//! The journal of an episode: what it has been asked, so that another process can bring it to where it stands
-//! by asking the same again. Looks are in it as well, since they count, cost time and are recorded. What has
-//! been answered is not: it comes to the same.
+//! The journal of an episode: its requests, which another process can repeat to restore its state.
+//! Observations are included, since they count, cost time and are recorded. Replies are not, since they
+//! can be reproduced.
 
 use std::time::Duration;
 
@@ -11,85 +11,87 @@ use super::Session;
 use crate::commands::{Called, OperatorCall};
 use crate::recording::state_hash_text;
 
-/// One request, when it came, and where it led.
+/// A request with its arrival time and its result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JournalEntry {
     /// The policy's thinking time when the request came, in nanoseconds.
     thought_ns: u64,
     pub(super) asked: KeptRequest,
-    /// The world afterwards, where it has moved.
+    /// State of the world afterwards, if it has moved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) state: Option<StateMark>,
-    /// Why the episode had ended by then.
+    /// Reason for the end of the episode, if it had ended by then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ended: Option<EndReason>,
 }
 
-/// A state of the world, to tell whether another is the same.
+/// A state of the world, for comparisons.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StateMark {
     pub(super) control_step: u64,
     state_hash: String,
 }
 
-/// A request to an episode, in the form that a journal keeps. Arguments are JSON.
+/// A request to an episode, in the journal's form. Arguments are JSON.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum KeptRequest {
-    /// [`Session::perform`].
+    /// A call of [`Session::perform`].
     Call {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         operator: Option<String>,
-        /// The extra information that a policy in this process is shown; `None` where the caller itself reads
-        /// the answer.
+        /// Extra information shown to a policy in this process; `None` if the caller itself reads the answer.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         shown: Option<Vec<ExtraInformation>>,
         tool: String,
         arguments: String,
     },
-    /// [`Session::read_command`], where that has refused.
+    /// A call of [`Session::read_command`] that was refused.
     Command { robot: String, tool: String, arguments: String },
-    /// [`Session::note`].
+    /// A call of [`Session::note`].
     Note { operator: Option<String>, note: Note },
-    /// [`Session::refused_before`].
+    /// A call of [`Session::refused_before`].
     Refused { operator: Option<String>, tool: String, arguments: String, problem: String },
-    /// [`Session::end`].
+    /// A call of [`Session::end`].
     End { reason: EndReason },
 }
 
-/// Entries that a session has written down and nobody has taken yet.
+/// Entries written since they were last taken.
 #[derive(Default)]
 pub struct Journal {
     entries: Vec<JournalEntry>,
-    /// The step of the last mark.
+    /// Step of the last mark.
     marked_step: u64,
-    /// The reason why an entry is missing.
+    /// Reason why an entry is missing.
     failed: Option<String>,
 }
 
-/// A request and the policy's thinking time when it came; `None` where no journal is kept.
+/// A request and the policy's thinking time at its arrival; `None` without a journal.
 pub(super) type Arrival = Option<(Duration, Result<KeptRequest, serde_json::Error>)>;
 
 impl JournalEntry {
-    /// Returns the control step that the world had come to, where it had moved.
+    /// Returns the control step of the world after the request, if it had moved.
     pub fn control_step(&self) -> Option<u64> {
         self.state.as_ref().map(|state| state.control_step)
     }
 
-    /// Returns the policy's thinking time when the request came.
+    /// Returns the policy's thinking time at the request's arrival.
     pub fn thought(&self) -> Duration {
         Duration::from_nanos(self.thought_ns)
     }
 }
 
 impl Session {
-    /// Writes down from now on what is asked, for [`Session::take_journal`].
+    /// Starts a journal, to be read by [`Session::take_journal`].
     pub fn keep_journal(&mut self) {
         self.journal = Some(Journal { marked_step: self.present.control_step, ..Journal::default() });
     }
 
-    /// Takes the entries written since the last call. An error means that an entry is missing: the journal is
-    /// then worthless.
+    /// Takes the entries written since the last call.
+    ///
+    /// # Errors
+    ///
+    /// The reason why an entry is missing; the journal is then worthless.
     pub fn take_journal(&mut self) -> Result<Vec<JournalEntry>, String> {
         let Some(journal) = &mut self.journal else { return Ok(Vec::new()) };
         match journal.failed.take() {
@@ -98,12 +100,12 @@ impl Session {
         }
     }
 
-    /// What has come, if a journal is kept.
+    /// Returns the arriving request, if a journal is kept.
     pub(super) fn arrival(&self, asked: impl FnOnce() -> Result<KeptRequest, serde_json::Error>) -> Arrival {
         self.journal.as_ref().map(|_| (self.clock.spent() + self.clock.thinking(), asked()))
     }
 
-    /// Writes down what had come, and where it has led.
+    /// Writes the entry of a request, with its result.
     pub(super) fn write_down(&mut self, arrival: Arrival) {
         let Some((thought, asked)) = arrival else { return };
         let (step, ended) = (self.present.control_step, self.ended);

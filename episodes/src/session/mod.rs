@@ -1,4 +1,5 @@
-//! An episode: a world, its rules, and the tool calls that act on it. Synchronous; it lives on a thread of its own.
+//! Sessions: an episode's world, its rules, and the tool calls that act on it. A session is synchronous
+//! and lives on a thread of its own.
 
 mod answer;
 mod build;
@@ -59,56 +60,61 @@ pub struct Session {
     origin: Origin,
     rules: Rules,
     world: World,
-    /// What the last control step left behind.
+    /// State after the last control step.
     present: Arc<Step>,
     motions: Vec<Motion>,
     scores: Scores,
-    /// Control steps of the world before the episode, where it begins at a phase of another one.
+    /// Control steps of the world before the episode, which may start in the middle of another one.
     steps_before: u64,
     clock: ThinkingClock,
     observer: Observer,
     files: Option<RunFiles>,
     spectators: Spectators,
-    /// Up to the end.
+    /// Number of tool calls, up to the end.
     tool_calls: u32,
-    /// As many, with one for a plan; `None` where calls are made again that do not tell which of them were a plan's.
+    /// Number of requests: calls, with one for each plan. `None` in a replay, where the calls of plans
+    /// are not marked.
     requests: Option<u32>,
-    /// Whether the commands of a plan are made.
+    /// True while the commands of a plan are made.
     planning: bool,
-    /// Calls that have been recorded or shown, those that do not count included.
+    /// Number of calls recorded or shown, including those that do not count.
     told_calls: u32,
-    /// What notes say that was used.
+    /// Usage reported in notes.
     usage: Usage,
-    /// Time that physics took, for the real-time factor.
+    /// Computation time of physics, for the real-time factor.
     physics: Duration,
     ended: Option<EndReason>,
-    /// How the simulator failed, if it did.
+    /// Reason of a simulator failure, if there was one.
     simulator_failure: Option<String>,
     rewind: Rewind,
-    /// What the policy has been shown that the benchmark's own policies are not.
+    /// Information shown to the policy beyond the benchmark's own policies.
     shown: ShownInformation,
-    /// What it has asked for that the benchmark has not.
+    /// Departures from the benchmark in the policy's commands.
     departures: BTreeSet<String>,
-    /// Joint targets that it has asked for.
+    /// Counts of the policy's joint targets.
     targets: TargetCounts,
-    /// What robots do in place of what they are told, where that is something else.
+    /// Execution that differs from the commands, if there is any.
     execution: Option<Execution>,
-    /// State hashes of the steps since they were last taken, where somebody wants them.
+    /// State hashes of the steps since they were last taken; `None` unless requested.
     hashes: Option<Vec<u64>>,
-    /// What it has been asked, where that is written down.
+    /// Journal of requests, if one is kept.
     journal: Option<Journal>,
-    /// What it came to, from when the files were closed: the one truth that everybody is told.
+    /// Final result, set when the files are closed; all parties receive this one.
     result: Option<ResultReply>,
 }
 
 impl Session {
-    /// Builds the world of `spec` and takes it to where the episode begins, which under some protocols is after an initial
-    /// hold. With a folder, the episode is recorded there.
+    /// Builds the world of `spec` and brings it to the start of the episode, which under some protocols
+    /// follows an initial hold. With a folder, the episode is recorded there.
+    ///
+    /// # Errors
+    ///
+    /// The reason why the world cannot be built, or the start state cannot be read.
     pub fn start(spec: &EpisodeSpec, folder: Option<&Path>) -> Result<Session, EpisodeError> {
         Session::start_with_clock(spec, folder.map(RunFolder::from), monotonic())
     }
 
-    /// As [`Session::start`], with the policy's wall clock read from `clock`.
+    /// Starts a session like [`Session::start`], with the policy's wall clock read from `clock`.
     pub fn start_with_clock(
         spec: &EpisodeSpec,
         folder: Option<RunFolder>,
@@ -120,7 +126,7 @@ impl Session {
         Ok(session)
     }
 
-    /// Builds the world of `spec`, at the task's own beginning.
+    /// Builds the world of `spec` at the task's own start.
     fn build(spec: &EpisodeSpec, clock: Clock) -> Result<Session, EpisodeError> {
         let Built { world, motions, robot, locomotion } = build(spec)?;
         let rules = spec.rules();
@@ -159,7 +165,7 @@ impl Session {
         })
     }
 
-    /// Takes a world that has just been built to where its episode begins.
+    /// Brings a newly built world to the start of its episode.
     fn begin(&mut self, folder: Option<RunFolder>) -> Result<(), EpisodeError> {
         let hold_steps = match &self.origin.spec.start {
             Start::Task => self.rules.initial_hold_steps,
@@ -191,12 +197,12 @@ impl Session {
         Ok(())
     }
 
-    /// Share of the joint targets so far that lay beyond the joints' limits.
+    /// Returns the fraction of joint targets beyond the joints' limits.
     pub fn joints_clamped_share(&self) -> f64 {
         self.targets.beyond_share()
     }
 
-    /// All robots stand still for so many control steps.
+    /// Lets all robots stand still for this many control steps.
     fn hold(&mut self, steps: u32) -> Result<(), EpisodeError> {
         match steps {
             0 => Ok(()),
@@ -204,7 +210,7 @@ impl Session {
         }
     }
 
-    /// Ends the episode of a policy that has gone: its wall clock has run out, or its last call was `idle` ago.
+    /// Ends the episode of an absent policy: its wall clock has run out, or its last call was `idle` ago.
     pub fn end_if_abandoned(&mut self, idle: Duration) {
         let reason = if self.clock.exhausted() {
             EndReason::WallClockExhausted
@@ -216,7 +222,7 @@ impl Session {
         self.end(reason);
     }
 
-    /// Ends the episode for a reason that lies outside it, unless it has ended before, and closes its files.
+    /// Ends the episode for an external reason, unless it has already ended, and closes its files.
     pub fn end(&mut self, reason: EndReason) {
         let arrival = self.arrival(|| KeptRequest::end(reason));
         self.ended.get_or_insert(reason);
@@ -224,12 +230,12 @@ impl Session {
         self.write_down(arrival);
     }
 
-    /// Closes the files, once; from here on the result stays as it is.
+    /// Closes the files once; after this the result is final.
     fn settle(&mut self) {
         if self.result.is_some() {
             return;
         }
-        // Nothing is left to think about.
+        // No thinking time is charged any more.
         self.clock.pause();
         if !self.scores.complete() {
             self.keep_picture("end");
@@ -242,8 +248,8 @@ impl Session {
         self.show_end();
     }
 
-    /// Executes a command; fewer of its steps if the last phase is reached or the budget ends. Returns how many, and what of each order
-    /// was clamped.
+    /// Executes a command, with fewer steps if the last phase is reached or the budget ends. Returns the
+    /// number of steps, and the clamped values of each order.
     fn run(&mut self, command: &Command) -> Result<(u32, Vec<Clamped>), EpisodeError> {
         let left = self.steps_left();
         self.motions.iter_mut().for_each(Motion::begin_command);
@@ -267,7 +273,8 @@ impl Session {
         Ok((steps, clamped))
     }
 
-    /// One control step, the `step`th of a command, from the robots' trajectories to what is scored and recorded of it.
+    /// Makes one control step, number `step` of a command: from the robots' trajectories to scores and
+    /// recording.
     fn step(&mut self, step: u32, trajectories: &[Trajectory]) -> Result<(), EpisodeError> {
         let started = Instant::now();
         let motions: Vec<MotionState> = self.motions.iter().map(|motion| motion.state().clone()).collect();
@@ -281,7 +288,7 @@ impl Session {
         self.physics += started.elapsed();
         match stepped {
             Ok(mut present) => {
-                // What robots were told is what there is to learn from.
+                // The recorded label is the command that was given.
                 for (robot, told) in present.robots.iter_mut().zip(commands) {
                     robot.command = told;
                 }
@@ -321,14 +328,14 @@ impl Session {
         Ok(())
     }
 
-    /// What robots do in the next step that are told `commands`.
+    /// Returns the commands that the robots execute in the next step in place of `commands`.
     fn executed(&mut self, commands: &[RobotCommand]) -> Vec<RobotCommand> {
         let Some(execution) = &mut self.execution else { return commands.to_vec() };
         let robots = self.motions.iter().map(|motion| (&*motion.robot.model, &motion.robot.base_limits));
         execution.execute(self.present.time_s, commands, robots)
     }
 
-    /// Keeps what this step has reached, of phases that had a number from `first` on.
+    /// Records the phases reached in this step, which are those from number `first` on.
     fn phases_reached(&mut self, first: usize) {
         let reached = self.reached();
         for phase in &reached[first..] {
@@ -343,7 +350,7 @@ impl Session {
         }
     }
 
-    /// Keeps a checkpoint where a phase begins, if the episode is recorded.
+    /// Saves a checkpoint at the beginning of a phase, if the episode is recorded.
     fn keep_checkpoint(&mut self, name: &str) {
         if self.files.is_some() {
             let checkpoint = self.checkpoint().and_then(|checkpoint| checkpoint.to_bytes());
@@ -353,7 +360,7 @@ impl Session {
         }
     }
 
-    /// Keeps a picture of this moment for the strip, if the episode is recorded.
+    /// Saves an image of this moment for the strip, if the episode is recorded.
     fn keep_picture(&mut self, caption: &str) {
         if let Some(files) = self.files.as_mut().filter(|files| files.shows_moments()) {
             let names = self.motions.iter().map(|motion| motion.robot.name.as_str());
@@ -361,22 +368,23 @@ impl Session {
         }
     }
 
-    /// What the episode is.
+    /// Returns the spec of the episode.
     pub fn spec(&self) -> &EpisodeSpec {
         &self.origin.spec
     }
 
-    /// What the last control step left behind.
+    /// Returns the state after the last control step.
     pub fn present(&self) -> &Step {
         &self.present
     }
 
-    /// What scoring and experts see.
+    /// Returns the facts for scoring and experts.
     pub fn facts(&self) -> Facts {
         self.scores.facts(&self.present)
     }
 
-    /// What the scene's camera sees that sees all robots, which no tool shows. The policy's clock stands meanwhile.
+    /// Renders the scene's camera that sees all robots, which no tool shows. The policy's clock is paused
+    /// meanwhile.
     pub fn third_person(&mut self) -> Picture {
         self.clock.pause();
         let picture = self.observer.third_person(&self.present);
@@ -384,68 +392,70 @@ impl Session {
         picture
     }
 
-    /// What the camera in a robot's head sees now in a picture of this width and height; as high an angle as ever, and as wide as the
-    /// picture: red, green and blue, row by row. No call: what is shown to a policy is for the caller to count.
+    /// Renders a robot's head camera in this size, with an unchanged vertical field of view: red, green
+    /// and blue, row by row. This is no call; the caller counts the images shown to a policy.
     pub fn eye(&mut self, robot: usize, size_px: [u32; 2]) -> Vec<u8> {
         self.observer.eye(&self.present, robot, size_px)
     }
 
-    /// Whether [`Session::eyes`] is the quicker way to pictures of several episodes.
+    /// Returns true if [`Session::eyes`] is the faster way to render several episodes.
     pub fn draws_together(&self) -> bool {
         self.observer.draws_together()
     }
 
-    /// What [`Session::eye`] gives of all robots, to be drawn with what is seen in other episodes.
+    /// Returns a request for the images of [`Session::eye`] of all robots, to be rendered together with
+    /// those of other episodes.
     pub fn eyes(&mut self, size_px: [u32; 2]) -> RenderRequest<'_> {
         self.observer.eyes(&self.present, size_px)
     }
 
-    /// How far the task has come: the phases reached, and how near the next one is, from 0 to 1.
+    /// Returns the progress of the task: the number of phases reached plus the nearness of the next, from
+    /// 0 to 1.
     pub fn progress(&self) -> f64 {
         self.scores.progress(&self.present)
     }
 
-    /// How many phases have been reached.
+    /// Returns the number of phases reached.
     pub fn reached_phases(&self) -> usize {
         self.scores.reached().count()
     }
 
-    /// How long physics has taken.
+    /// Returns the computation time of physics.
     pub fn physics(&self) -> Duration {
         self.physics
     }
 
-    /// How long the policy has thought, up to its last call.
+    /// Returns the policy's thinking time up to its last call.
     pub fn thought(&self) -> Duration {
         self.clock.spent()
     }
 
-    /// How long it has been thinking since it was last answered.
+    /// Returns the policy's thinking time since the last reply.
     pub fn thinking(&self) -> Duration {
         self.clock.thinking()
     }
 
-    /// Why the episode has ended, if it has.
+    /// Returns the reason for the end of the episode; `None` while it runs.
     pub fn ended(&self) -> Option<EndReason> {
         self.ended
     }
 
-    /// Equal for equal physical states, 16 hexadecimal digits.
+    /// Returns the state hash, 16 hexadecimal digits; equal physical states have equal hashes.
     pub fn state_hash(&self) -> String {
         state_hash_text(self.world.state_hash())
     }
 
-    /// Why the recording is not complete, if it is not; the episode goes on without it.
+    /// Returns the reason why the recording is incomplete, if it is. The episode continues without it.
     pub fn recording_failed(&self) -> Option<&str> {
         self.files.as_ref().and_then(RunFiles::failed)
     }
 
-    /// Ends the episode and writes what a recorded one leaves behind.
+    /// Ends the episode and writes the files of a recorded one.
     pub fn close(self) -> ResultReply {
         self.close_as(EndReason::Finished)
     }
 
-    /// As [`Session::close`], of an episode that could not be played on, and why.
+    /// Closes an episode like [`Session::close`] that could not continue, with the reason.
     pub fn close_failed(mut self, why: String) -> ResultReply {
         self.simulator_failure.get_or_insert(why);
         self.close_as(EndReason::SimulatorFailed)
@@ -457,7 +467,7 @@ impl Session {
     }
 }
 
-/// [`fingerprint::build`] as an episode's own error.
+/// Returns [`fingerprint::build`] with an episode's error.
 fn this_build() -> Result<&'static str, EpisodeError> {
     fingerprint::build().map_err(EpisodeError::Build)
 }

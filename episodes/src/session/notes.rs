@@ -1,5 +1,6 @@
-//! What is kept of an episode for those who read it later, and is no call of it: notes of whoever plays, calls that were refused before
-//! they reached the episode, and plans, whose commands are calls of their own. None of it changes a state, a count, a budget or a clock.
+//! Entries of an episode for its readers that are not calls: notes, calls refused before they reached the
+//! episode, and plans, whose commands are calls of their own. They do not affect state, counts, budget or
+//! clock.
 
 use tandem_tools_spec::{Note, SpecError};
 
@@ -11,7 +12,11 @@ use crate::output::OutputError;
 use crate::recording::{CallMoment, CallerRecord, NoteMessage, ToolCallRecord};
 
 impl Session {
-    /// Keeps a note of the policy that directs all robots, or of the operator of one.
+    /// Records a note of the policy that directs all robots, or of the operator of one.
+    ///
+    /// # Errors
+    ///
+    /// An invalid note, another operator's robot, or an episode that has ended.
     pub fn note(&mut self, operator: Option<&str>, note: Note) -> Result<(), EpisodeError> {
         let arrival = self.arrival(|| KeptRequest::note(operator, &note));
         let kept = self.keep_note(operator, note);
@@ -41,14 +46,14 @@ impl Session {
         Ok(())
     }
 
-    /// Keeps a call that was refused before it reached the episode: `arguments` as they came.
+    /// Records a call that was refused before it reached the episode, with its raw `arguments`.
     pub fn refused_before(&mut self, operator: Option<&str>, tool: &str, arguments: &str, problem: &str) {
         let arrival = self.arrival(|| KeptRequest::refused(operator, [tool, arguments, problem]));
         self.tell_beside(operator, tool, arguments, Err(problem));
         self.write_down(arrival);
     }
 
-    /// Keeps what was asked and answered and is no call of the episode.
+    /// Records a request and its outcome that are not a call of the episode.
     pub(super) fn tell_beside(
         &mut self,
         operator: Option<&str>,
@@ -62,7 +67,7 @@ impl Session {
         }
     }
 
-    /// Records a call, and shows it to those who look on.
+    /// Records a call and shows it to viewers.
     pub(super) fn tell(&mut self, record: Result<ToolCallRecord, OutputError>) {
         self.told_calls += 1;
         self.show_call(&record);
@@ -71,7 +76,7 @@ impl Session {
         }
     }
 
-    /// This moment, as recordings have it.
+    /// Returns the current moment in the recording's form.
     pub(super) fn now(&self) -> CallMoment {
         CallMoment {
             time_s: self.present.time_s,

@@ -1,4 +1,5 @@
-//! What a session tells those who look on. It changes nothing: steps and calls are handed over as they have been made.
+//! Events of a session for viewers. They do not affect the session: steps and calls are passed on after
+//! they have been made.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -11,20 +12,20 @@ use crate::live::{LiveEntry, LiveEvent, LiveScene, LiveStep, LiveView, Onlookers
 use crate::output::OutputError;
 use crate::recording::{NoteMessage, ToolCallRecord};
 
-/// Calls and notes that are kept for who comes later.
+/// Maximum number of calls and notes stored for later viewers.
 const KEPT_ENTRIES: usize = 50;
 
-/// Who looks on, if anybody may, and what those are shown first who come later.
+/// The receiver of events, if there is one, and the entries for later viewers.
 #[derive(Default)]
 pub struct Spectators {
     onlookers: Option<Box<dyn Onlookers>>,
-    /// The latest, the oldest first.
+    /// Latest entries, the oldest first.
     entries: VecDeque<Arc<LiveEntry>>,
-    /// How many there have been, and how many of them count as calls.
+    /// Number of entries, and number of counted calls among them.
     told_entries: u32,
     counted_calls: u32,
     scene: Option<Arc<LiveScene>>,
-    /// The control step that was told last.
+    /// Control step sent last.
     told_step: Option<u64>,
 }
 
@@ -37,12 +38,12 @@ impl Spectators {
 }
 
 impl Session {
-    /// From now on, tells `onlookers` what happens.
+    /// Sends events to `onlookers` from now on.
     pub fn set_onlookers(&mut self, onlookers: Box<dyn Onlookers>) {
         self.spectators.onlookers = Some(onlookers);
     }
 
-    /// The episode as it stands, for who begins to look on. No call.
+    /// Returns the current state of the episode for a new viewer. This is no call.
     pub fn live_view(&mut self) -> LiveView {
         let scene = match &self.spectators.scene {
             Some(scene) => scene.clone(),
@@ -60,15 +61,16 @@ impl Session {
         }
     }
 
-    /// As [`Session::live_view`], for the person who drives `robot`, who sees where everything is. It is a look whose picture nobody
-    /// needs, so that recordings and results name what was shown.
+    /// Returns the state like [`Session::live_view`], for the person driving `robot`, with a view of the
+    /// whole scene. It counts as an observation, so that recordings and results include it; its image is
+    /// not used.
     pub fn drivers_view(&mut self, robot: &str) -> Result<LiveView, EpisodeError> {
         let look = Observe { robots: Some(vec![robot.into()]), short: None, frame: None };
         self.observe(&look, &[ExtraInformation::ThirdPerson])?;
         Ok(self.live_view())
     }
 
-    /// Shows the present step, where it is one that is shown.
+    /// Sends the current step, if it is wanted.
     pub(super) fn show_step(&mut self, budget: Budget) {
         let step = self.present.control_step;
         let onlookers = self.spectators.onlookers.as_deref();
@@ -86,7 +88,7 @@ impl Session {
         self.spectators.tell(|| LiveEvent::Phase(phase.clone()));
     }
 
-    /// Shows the step in which the episode has ended, and what it came to.
+    /// Sends the last step and the result of the episode.
     pub(super) fn show_end(&mut self) {
         self.tell_step(self.budget());
         if let Some(result) = &self.result {
@@ -94,12 +96,12 @@ impl Session {
         }
     }
 
-    /// Whether calls are shown or kept to be shown.
+    /// Returns true if calls are shown, or stored for viewers.
     pub(super) fn shows_calls(&self) -> bool {
         self.spectators.onlookers.is_some()
     }
 
-    /// A call that has been answered, and the step to which it has come: what follows may be long in coming.
+    /// Sends a finished call, and the step that it has reached, since the next step may take long.
     pub(super) fn show_call(&mut self, record: &Result<ToolCallRecord, OutputError>) {
         if self.spectators.told_step != Some(self.present.control_step) {
             self.tell_step(self.budget());

@@ -1,5 +1,5 @@
-//! What an episode leaves in its folder: `episode.mcap`, `result.json`, `strip.png`, `report.html`. None of them can fail the
-//! episode: what cannot be written is named in the result, and the episode goes on without it.
+//! Files in an episode's folder: `episode.mcap`, `result.json`, `strip.png`, `report.html`. A failed
+//! write does not end the episode: the result names the failure.
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -25,12 +25,12 @@ use crate::results::write_result;
 use crate::scoring::Facts;
 use crate::tasks::Task;
 
-/// Where an episode is recorded.
+/// Destination of an episode's files.
 #[derive(Clone, Debug)]
 pub struct RunFolder {
     pub path: PathBuf,
     pub visibility: Visibility,
-    /// Whether a strip of pictures and a page are made, for people.
+    /// True to make a strip of images and a page, for people.
     pub pages: bool,
 }
 
@@ -44,12 +44,12 @@ impl From<&Path> for RunFolder {
 pub struct RunFiles {
     folder: PathBuf,
     pages: bool,
-    /// `None` where the recording could not begin.
+    /// Recorder; `None` if the recording could not start.
     recorder: Option<RecorderThread>,
-    /// The first failure, unless it is the recorder's.
+    /// First failure, except the recorder's.
     failed: Option<String>,
     moments: Vec<KeyMoment>,
-    /// What robots are told together.
+    /// Joint instruction of the robots.
     instruction: String,
     begin_s: f64,
     calls: CallCounts,
@@ -59,7 +59,8 @@ pub struct RunFiles {
 }
 
 impl RunFiles {
-    /// Makes the folder and begins the recording where `session` stands. If that fails, the episode goes on all the same.
+    /// Makes the folder and starts the recording in the current state of `session`. The episode continues
+    /// even if this fails.
     pub(super) fn create(folder: RunFolder, session: &Session) -> RunFiles {
         let begun = begin(&folder, session);
         let failed = begun.as_ref().err().map(EpisodeError::to_string);
@@ -104,7 +105,7 @@ impl RunFiles {
         }
     }
 
-    /// Keeps the last good step before the one in which the simulator failed.
+    /// Saves the last good step before the one in which the simulator failed.
     pub(super) fn failed_step(&mut self, checkpoint: Result<Vec<u8>, EpisodeError>) {
         let path = self.folder.join(FAILED_STEP_FILE);
         self.note(checkpoint.and_then(|bytes| Ok(write_whole(&path, &bytes)?)));
@@ -117,12 +118,12 @@ impl RunFiles {
         }
     }
 
-    /// Counts a call of this tool, and whether it was answered.
+    /// Counts a call of this tool and its success.
     pub(super) fn count_call(&mut self, name: &'static str, ok: bool) {
         self.calls.count(name, ok);
     }
 
-    /// Keeps what an operator said, for the page.
+    /// Stores an operator's message, for the page.
     pub(super) fn keep_words(&mut self, words: SaidWords) {
         self.said.push(words);
     }
@@ -139,7 +140,7 @@ impl RunFiles {
         recorder.append_pictures(pictures, move |recorder| recorder.tool_call(record?));
     }
 
-    /// Lets the episode run ahead of the recorder, or makes it wait again as usual.
+    /// Lets the episode run ahead of the recorder, or makes it wait again.
     pub(super) fn catch_up(&mut self, catches_up: bool) {
         if let Some(recorder) = &mut self.recorder {
             recorder.catch_up(catches_up);
@@ -153,12 +154,12 @@ impl RunFiles {
         }
     }
 
-    /// Whether moments are wanted for the strip.
+    /// Returns true if moments are needed for the strip.
     pub(super) fn shows_moments(&self) -> bool {
         self.pages
     }
 
-    /// Keeps a moment for the strip.
+    /// Stores a moment for the strip.
     pub(super) fn keep(&mut self, moment: Result<KeyMoment, PictureError>) {
         match moment {
             Ok(moment) => self.moments.push(moment),
@@ -166,12 +167,12 @@ impl RunFiles {
         }
     }
 
-    /// Why the recording is not complete, if it is not.
+    /// Returns the reason why the recording is incomplete, if it is.
     pub(super) fn failed(&self) -> Option<&str> {
         self.failed.as_deref().or_else(|| self.recorder.as_ref()?.failed())
     }
 
-    /// Closes the recording and writes the rest; `result` then names what failed.
+    /// Closes the recording and writes the other files. `result` then names any failure.
     pub(super) fn finish(&mut self, result: &mut ResultReply, task: &Task) {
         let recorder = self.recorder.as_mut().and_then(RecorderThread::stop);
         result.recording_failed = self.failed().map(str::to_owned);
@@ -185,7 +186,7 @@ impl RunFiles {
         result.recording_failed = self.failed().map(str::to_owned);
         self.note(write_result(result, &self.folder).map(drop));
         result.recording_failed = self.failed().map(str::to_owned);
-        // A folder goes that nothing could be written into; any other is not empty.
+        // Removes the folder if nothing could be written into it; otherwise it is not empty, and stays.
         let _ = fs::remove_dir(&self.folder);
     }
 
@@ -214,13 +215,13 @@ impl RunFiles {
     }
 }
 
-/// Begins the recording, so that what cannot be written is known from the start.
+/// Starts the recording, so that write errors are known from the beginning.
 fn begin(folder: &RunFolder, session: &Session) -> Result<RecorderThread, EpisodeError> {
     let RunFolder { path, visibility, .. } = folder;
     let failed = |source| OutputError::Io { path: path.clone(), source };
     create_private_folder(path).map_err(failed)?;
     match fs::remove_file(path.join(FAILED_STEP_FILE)) {
-        // That of an earlier episode in this folder is not of this one.
+        // The file of an earlier episode in this folder is removed.
         Err(source) if source.kind() != io::ErrorKind::NotFound => return Err(failed(source).into()),
         _ => {}
     }
@@ -243,7 +244,8 @@ fn begin(folder: &RunFolder, session: &Session) -> Result<RecorderThread, Episod
     Ok(RecorderThread::start(recorder).map_err(failed)?)
 }
 
-/// A moment for the picture strip: what the third-person camera and the robots called `names` see after `step`.
+/// Returns a moment for the strip: the views after `step` of the third-person camera and of the robots
+/// called `names`.
 pub(super) fn moment<'a>(
     caption: &str,
     step: &Step,

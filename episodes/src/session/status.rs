@@ -1,4 +1,4 @@
-//! How the episode stands: budget, phases, falls, result.
+//! Status of an episode: budget, phases, falls, result.
 
 mod next_phase;
 
@@ -15,7 +15,7 @@ use crate::scoring::Phase;
 use crate::spec::EpisodeSpec;
 
 impl Session {
-    /// The world, for benches that tell robots what no command can.
+    /// Returns the world, for benches that control robots in ways that no command can.
     pub(crate) fn world_mut(&mut self) -> &mut tandem_sim::World {
         &mut self.world
     }
@@ -24,7 +24,7 @@ impl Session {
         self.rules.episode_steps.saturating_sub(self.env_steps())
     }
 
-    /// Control steps executed so far, the initial hold included.
+    /// Returns the number of control steps executed, including the initial hold.
     pub fn env_steps(&self) -> u32 {
         self.present.control_step.saturating_sub(self.steps_before) as u32
     }
@@ -44,7 +44,7 @@ impl Session {
             .collect()
     }
 
-    /// Who has fallen, as far as the policy is told.
+    /// Returns the fallen robots as the policy may know them.
     pub(super) fn told_fallen(&self) -> Vec<RobotFallen> {
         match self.spec().assistance {
             Assistance::Paper => Vec::new(),
@@ -52,12 +52,12 @@ impl Session {
         }
     }
 
-    /// Whether success ends the episode now.
+    /// Returns true if success ends the episode now.
     pub(super) fn has_succeeded(&self) -> bool {
         self.spec().disclosure.ends_on_success() && self.scores.complete()
     }
 
-    /// The phases reached, as far as the policy is told.
+    /// Returns the phases reached as the policy may know them.
     pub(super) fn phases(&self) -> Vec<PhaseReached> {
         match self.spec().disclosure.tells(self.ended.is_some()) {
             true => self.reached(),
@@ -76,7 +76,7 @@ impl Session {
             .collect()
     }
 
-    /// Where the episode stands, for those who look on: asking is no call.
+    /// Returns the status of the episode, for viewers; this is no call.
     pub fn status(&self) -> StatusReply {
         let EpisodeSpec { assistance, disclosure, .. } = *self.spec();
         StatusReply {
@@ -99,11 +99,11 @@ impl Session {
         }
     }
 
-    /// What has to be known to begin.
+    /// Returns the information needed to start.
     pub fn briefing(&self) -> Briefing {
         let task = self.spec().task;
         let words = self.spec().task_words();
-        // All robots of an episode are of one file.
+        // All robots of an episode have the same file.
         let kind = self.spec().robot.kind();
         let info = |name: &String| RobotInfo { robot: name.clone(), kind: kind.clone() };
         Briefing {
@@ -118,7 +118,7 @@ impl Session {
             },
             room: match self.spec().assistance {
                 Assistance::Paper => Vec::new(),
-                // What cannot be read would have kept the world from being built.
+                // An unreadable file would have prevented the world from being built.
                 Assistance::Full => describe::room(task, self.spec().spread()).unwrap_or_default(),
             },
             ending: describe::ending(self.spec().disclosure).into(),
@@ -129,7 +129,7 @@ impl Session {
         }
     }
 
-    /// The result as it stands, whatever the policy is told of it; after the end, as it was then.
+    /// Returns the full result, whatever the policy may know of it. After the end it is final.
     pub fn result(&self) -> ResultReply {
         match &self.result {
             Some(result) => result.clone(),
@@ -137,7 +137,7 @@ impl Session {
         }
     }
 
-    /// What notes say that was used, and at the end how the play of models ended.
+    /// Returns the usage reported in notes and, at the end, the reason for the end.
     fn usage_so_far(&self) -> Usage {
         let usage = self.usage.clone();
         match self.ended {

@@ -1,32 +1,32 @@
-//! Seeds that an evaluator's key draws, and what a policy is told of them.
+//! Seeds drawn by an evaluator's key, and the seed that a policy is told.
 
 use serde::{Deserialize, Serialize};
 use tandem_tools_spec::Assistance;
 
 use super::EpisodeSpec;
 
-/// The seed that an evaluator's key draws for a public one.
+/// Seed that an evaluator's key draws for a public seed.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KeyedSeed {
-    /// Names the key and tells nothing of it.
+    /// Fingerprint that identifies the key without revealing it.
     pub key_fingerprint: String,
-    /// The seed in whose place it stands.
+    /// Seed used in place of the public one.
     pub drawn: u32,
 }
 
 impl EpisodeSpec {
-    /// The same with what an evaluator's key makes of the seed.
+    /// Returns the spec with the seed drawn by an evaluator's key.
     pub fn keyed(self, keyed_seed: Option<KeyedSeed>) -> EpisodeSpec {
         let drawn = keyed_seed.as_ref().map_or(self.seed, |keyed| keyed.drawn);
         EpisodeSpec { task: self.task.under(drawn), keyed_seed, ..self }
     }
 
-    /// The seed that decides what happens: the evaluator's, where a key has drawn one.
+    /// Returns the seed that determines the episode: the one drawn by a key, if there is a key.
     pub fn world_seed(&self) -> u32 {
         self.keyed_seed.as_ref().map_or(self.seed, |keyed| keyed.drawn)
     }
 
-    /// The seed, as far as the policy is told.
+    /// Returns the seed as the policy may know it; `None` under the paper's assistance.
     pub fn told_seed(&self) -> Option<u32> {
         match self.assistance {
             Assistance::Paper => None,

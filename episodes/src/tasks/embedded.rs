@@ -1,8 +1,8 @@
-//! The files of tasks that the binary carries.
+//! Task files embedded in the binary.
 
 use super::{TaskOrigin, TaskSource};
 
-/// Tasks in which one robot has to tell the others something.
+/// Name of the suite whose tasks require one robot to inform the others.
 pub const TANDEM_PLUS: &str = "tandem+";
 
 /// A file name and its text.
@@ -14,17 +14,17 @@ macro_rules! embedded {
     };
 }
 
-/// In the benchmark's order.
+/// Task files of the benchmark, in the benchmark's order.
 pub(super) const COHUB_FILES: &[Embedded] = embedded! { "cohub":
     "handover" "pouring" "frame_hang" "co_pouring" "trash_collection" "cart_service" "co_carry" "table_align" "move_house" "big_table"
 };
 
-/// In the order in which they are listed.
+/// Task files of the TANDEM+ suite, in listing order.
 pub(super) const TANDEM_PLUS_FILES: &[Embedded] = embedded! { "tandem_plus":
     "which_one" "blind_carry" "relay" "set_the_table" "swap"
 };
 
-/// Returns where a source comes from: from the program if it is one of its files, word for word.
+/// Returns the origin of a source. Only a verbatim copy of an embedded file counts as built in.
 pub(super) fn origin_of(source: &TaskSource) -> TaskOrigin {
     let has_it = |files: &[Embedded]| {
         files

@@ -1,8 +1,8 @@
-//! Tasks as data: where robots and objects are, what varies with the seed, what is asked, and the phases
-//! that score it. Every task is a TOML file: the benchmark's in `episodes/tasks/cohub`, our own in
-//! `episodes/tasks/tandem_plus`, and those of users.
+//! Tasks as data: the poses of robots and objects, the randomisation, the instructions, and the phases
+//! that score an episode. Every task is a TOML file: the benchmark's in `episodes/tasks/cohub`, our own
+//! in `episodes/tasks/tandem_plus`, and those of users.
 //!
-//! To add a task to a suite: one file there and its line in `set`.
+//! To add a task to a suite, add its file to the folder and its name to the list in `embedded`.
 
 mod embedded;
 mod file;
@@ -26,74 +26,76 @@ use tandem_sim::{ObjectFile, RobotModel, SimError, SplitMix64, Step};
 use crate::conditions::{ConditionPart, OF_FINGERS, Truth};
 use crate::scoring::{Phase, Scores};
 
-/// What tells the numbers by which a seed chooses from those by which it moves things.
+/// Separates the random stream of choices from the stream of offsets.
 const CHOICES_STREAM: u64 = 0x6368_6f69_6365_7331;
 
-/// A task, as its file has it.
+/// A task as its file defines it.
 #[derive(Debug)]
 pub struct Task {
     pub id: &'static str,
-    /// File name of the scene under `sim/assets/scenes`, or what messages call the scene that the file brings.
+    /// File name of the scene under `sim/assets/scenes`, or the name that messages use for a scene from
+    /// the task's own files.
     pub scene: &'static str,
-    /// The MJCF of the scene, where it is not one that the binary carries.
+    /// MJCF of the scene; `None` for an embedded one.
     pub scene_mjcf: Option<&'static str>,
     pub robots: &'static [RobotSpot],
     pub objects: &'static [ObjectSpot],
-    /// What the seed moves, in the order in which it is drawn.
+    /// Offsets drawn from the seed, in drawing order.
     pub randomize: &'static [Offset],
-    /// What has to be done, for a policy that directs all robots.
+    /// Instruction for a policy that directs all robots.
     pub instruction: &'static str,
-    /// Instruction for operators of one robot each, in place of the joint one, where that tells what not
-    /// all of them may know.
+    /// Instruction for operators of one robot each. Set when the joint instruction contains information
+    /// not meant for every robot.
     pub shared_instruction: Option<&'static str>,
-    /// The task in other words, for each level of stress. `None` where the file has none.
+    /// Rewordings of the instructions, one for each stress level; `None` if the file has none.
     pub rewordings: Option<[TaskWords; 3]>,
     /// Control steps of an episode under the benchmark protocol.
     pub benchmark_steps: u32,
     /// Control steps of an episode under the agentic protocol.
     pub agentic_steps: u32,
-    /// How long a policy may think under the agentic protocol.
+    /// Limit of a policy's thinking time under the agentic protocol.
     pub thinking_s: u32,
-    /// p1, p2, ... in the order they have to be reached.
+    /// Phases p1, p2, ... in the order in which they must be reached.
     pub phases: &'static [Phase],
-    /// By phase, the expressions of its conditions.
+    /// Conditions of each phase with their expressions.
     pub conditions: Vec<Vec<PhaseCondition>>,
-    /// Whether the file says that hands have to close, whatever its conditions ask for.
+    /// True when the file requires closing hands, whatever its conditions require.
     pub says_needs_fingers: bool,
     pub origin: TaskOrigin,
     pub source: TaskSource,
-    /// Hash of the source, by which results tell files of one name apart.
+    /// Hash of the source, which distinguishes files of the same name in results.
     pub xxh3: String,
-    /// What has been chosen in it. Empty where the seed has not been told yet.
+    /// Options chosen by the seed; empty while no seed is set.
     pub chosen: Vec<ChosenOption>,
-    /// The same task for each way in which its choices fall out. Unset where it has no choices.
+    /// The task for each combination of options; unset for a task without choices.
     pub variants: Arc<OnceLock<Vec<&'static Task>>>,
 }
 
-/// Where a task comes from.
+/// Origin of a task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TaskOrigin {
-    /// One of the benchmark's ten.
+    /// One of the benchmark's ten tasks.
     Benchmark,
-    /// A suite of our own.
+    /// One of our own suites, by name.
     Suite(&'static str),
-    /// A file that a user names, or one of the program's benches.
+    /// A file from a user, or one of the program's benches.
     File,
 }
 
-/// What policies are told to do.
+/// Instructions of a task for its policies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TaskWords {
-    /// For a policy that directs all robots.
+    /// Instruction for a policy that directs all robots.
     pub joint: String,
-    /// What those who direct one robot each read in its place, where it tells what not all of them may know.
+    /// Instruction for policies of one robot each, in place of `joint`; `None` unless `joint` contains
+    /// information not meant for every robot.
     pub shared: Option<String>,
-    /// For policies that direct one each, in the order of the robots.
+    /// Instructions for policies of one robot each, in the order of the robots.
     pub robots: Vec<String>,
 }
 
 impl TaskWords {
-    /// The task's own.
+    /// Returns the instructions of the task's own wording.
     pub fn of(task: &Task) -> TaskWords {
         TaskWords {
             joint: task.instruction.into(),
@@ -103,18 +105,18 @@ impl TaskWords {
     }
 }
 
-/// A condition of a phase, as its task's file has it.
+/// A condition of a phase, as the task's file gives it.
 #[derive(Clone, Debug)]
 pub struct PhaseCondition {
     pub setting: PhaseSetting,
-    /// How long it has to hold without a break.
+    /// Duration for which it must hold without interruption.
     pub for_s: f64,
     pub truth: Arc<Truth>,
-    /// What has to hold at once for it to hold, each with its line and column in the file.
+    /// Parts that must all hold at once, each with its line and column in the file.
     pub parts: Vec<([usize; 2], ConditionPart)>,
 }
 
-/// What a condition is to its phase: the setting of the file that it stands in.
+/// Role of a condition in its phase: the name of its setting in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PhaseSetting {
     Done,
@@ -142,49 +144,50 @@ impl PhaseSetting {
     }
 }
 
-/// What a choice of a task's file has come to.
+/// An option chosen by the seed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ChosenOption {
     pub name: String,
     pub option: String,
 }
 
-/// The texts that a task was read from: it is made of nothing else, so that whoever has them has the task.
+/// The texts of a task, which fully define it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TaskSource {
     /// Name of the file, without its folder.
     pub name: String,
     pub text: String,
-    /// MJCF files that it names, which lie beside it.
+    /// MJCF files that the task names, by file name; they are in the same folder.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub beside: BTreeMap<String, String>,
 }
 
-/// Where a robot stands, and its part of the task.
+/// Start pose of a robot, and its instruction.
 #[derive(Debug)]
 pub struct RobotSpot {
     pub name: &'static str,
     pub position_m: [f32; 2],
-    /// Which way it faces; 0 is along world x.
+    /// Yaw in the world frame; 0 faces along x.
     pub yaw_rad: f32,
-    /// What has to be done, for a policy that directs this robot alone.
+    /// Instruction for a policy that directs this robot alone.
     pub instruction: &'static str,
 }
 
-/// Where an object rests before the seed moves it.
+/// Nominal pose of an object, before randomisation.
 #[derive(Debug)]
 pub struct ObjectSpot {
     pub name: &'static str,
-    /// File name under `sim/assets/objects`, or what messages call the MJCF that the task's file brings.
+    /// File name under `sim/assets/objects`, or the name that messages use for an MJCF from the task's
+    /// own files.
     pub file: &'static str,
     pub position_m: [f32; 3],
     pub yaw_rad: f32,
-    /// The object's MJCF, where it is not one that the binary carries.
+    /// MJCF of the object; `None` for an embedded one.
     pub mjcf: Option<&'static str>,
 }
 
 impl ObjectSpot {
-    /// What the object is made of.
+    /// Returns the source of the object's model.
     pub fn source(&self) -> ObjectFile {
         match self.mjcf {
             None => ObjectFile::Embedded(self.file.into()),
@@ -194,39 +197,40 @@ impl ObjectSpot {
 }
 
 impl Task {
-    /// Begins to score an episode of this task with robots of this model, with the state before the first control step.
+    /// Starts to score an episode of this task with robots of this model, from the state before the first
+    /// control step.
     pub fn scores(&self, robot: &Arc<RobotModel>, start: &Step) -> Result<Scores, SimError> {
         Scores::new(self.phases, self.objects.iter().map(|spot| (spot.name, spot.source())), robot, start)
     }
 
-    /// Whether it is one of the benchmark's ten.
+    /// Returns true for one of the benchmark's ten tasks.
     pub fn is_benchmark(&self) -> bool {
         self.origin == TaskOrigin::Benchmark
     }
 
-    /// Hash of its file, unless it is one of the benchmark's.
+    /// Returns the hash of the task's file; `None` for a benchmark task.
     pub fn file_xxh3(&self) -> Option<&str> {
         (!self.is_benchmark()).then_some(self.xxh3.as_str())
     }
 
-    /// This task as the seed's choices make it. One that has nothing to choose is itself.
+    /// Returns this task with the options that the seed chooses. A task without choices returns itself.
     pub fn under(&'static self, seed: u32) -> &'static Task {
         let Some(variants) = self.variants.get() else { return self };
         let drawn = SplitMix64(u64::from(seed) ^ CHOICES_STREAM).uniform([0.0, variants.len() as f32]);
         variants.get(drawn as usize).copied().unwrap_or(self)
     }
 
-    /// Whether its file leaves something to the seed's choice.
+    /// Returns true if the file has choices.
     pub fn has_choices(&self) -> bool {
         self.variants.get().is_some()
     }
 
-    /// The option that has been chosen, if the task has a choice of this name.
+    /// Returns the chosen option of the choice with this name.
     pub fn chosen(&self, name: &str) -> Option<&str> {
         self.chosen.iter().find(|chosen| chosen.name == name).map(|chosen| chosen.option.as_str())
     }
 
-    /// The suite of our own that it belongs to.
+    /// Returns the name of the task's suite; `None` for benchmark tasks and files.
     pub fn suite(&self) -> Option<&'static str> {
         match self.origin {
             TaskOrigin::Suite(suite) => Some(suite),
@@ -234,26 +238,28 @@ impl Task {
         }
     }
 
-    /// Whether its robots have to hold something with a thumb and fingers: its conditions ask for it, or
-    /// its file says so.
+    /// Returns true if the robots need a thumb and fingers to hold something: a condition requires it, or
+    /// the file says so.
     pub fn needs_fingers(&self) -> bool {
         self.says_needs_fingers || asks_for_fingers(&self.source.text)
     }
 
-    /// Names of the robots, in their order.
+    /// Returns the names of the robots, in order.
     pub fn robot_names(&self) -> impl Iterator<Item = &'static str> {
         self.robots.iter().map(|robot| robot.name)
     }
 }
 
-/// The benchmark has one task of each id; a file may have another.
+/// Tasks are equal if both id and file are. The benchmark has one task for each id; a file may define
+/// another with the same id.
 impl PartialEq for Task {
     fn eq(&self, other: &Task) -> bool {
         self.id == other.id && self.file_xxh3() == other.file_xxh3()
     }
 }
 
-/// Whether an expression in a task's file asks for what only fingers do. Comments and instructions are none.
+/// Returns true if an expression in a task file uses a function that only hands with fingers can satisfy.
+/// Comments and instructions do not count.
 fn asks_for_fingers(file: &str) -> bool {
     fn asks(value: &toml::Value) -> bool {
         match value {

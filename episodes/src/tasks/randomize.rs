@@ -1,4 +1,5 @@
-//! What the seed changes: offsets drawn uniformly, in table order, from a generator that is the same everywhere.
+//! Randomisation by seed: offsets drawn uniformly, in table order, from a generator that is the same on
+//! every platform.
 
 use std::ops::RangeInclusive;
 
@@ -7,7 +8,7 @@ use tandem_sim::SplitMix64;
 
 use super::Task;
 
-/// A displacement that some objects share, uniform on each axis of the world and about it.
+/// A displacement shared by several objects: uniform along each world axis and about the vertical.
 #[derive(Debug)]
 pub struct Offset {
     /// Objects that move together.
@@ -15,19 +16,20 @@ pub struct Offset {
     pub x_m: RangeInclusive<f32>,
     pub y_m: RangeInclusive<f32>,
     pub z_m: RangeInclusive<f32>,
-    /// Turn about the vertical axis of the first of them.
+    /// Rotation about the vertical axis through the first object.
     pub yaw_rad: RangeInclusive<f32>,
-    /// How much farther a spread of 2 turns them, either way; a spread of 4 three times as much.
+    /// Additional yaw in either direction at a spread of 2; a spread of 4 adds three times as much.
     pub wider_yaw_rad: f32,
-    /// What hangs on a wall across y: a wider spread, which would bring it into the wall or off it, does not widen y.
+    /// True for objects on a wall across y. A wider spread does not widen their y range, which would move
+    /// them into the wall or off it.
     pub on_wall: bool,
 }
 
-/// How far the seed moves things, as a multiple of the benchmark's randomisation.
+/// Width of the randomisation, as a multiple of the benchmark's.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "u8", into = "u8")]
 pub enum Spread {
-    /// As far as in the benchmark.
+    /// The benchmark's own randomisation.
     #[default]
     Single,
     Double,
@@ -38,7 +40,7 @@ pub enum Spread {
 impl Spread {
     pub const ALL: [Spread; 4] = [Spread::Single, Spread::Double, Spread::Triple, Spread::Quadruple];
 
-    /// The multiple.
+    /// Returns the multiple.
     pub fn times(self) -> u8 {
         match self {
             Spread::Single => 1,
@@ -76,12 +78,12 @@ impl TryFrom<u8> for Spread {
 }
 
 impl Offset {
-    /// What x, y, z and yaw are drawn from. Ranges are widened about their middles.
+    /// Returns the ranges of x, y, z and yaw. A wider spread widens them about their middles.
     pub fn ranges(&self, spread: Spread) -> [[f32; 2]; 4] {
         let [x_m, y_m, z_m, yaw_rad] = [&self.x_m, &self.y_m, &self.z_m, &self.yaw_rad];
         let own = [x_m, y_m, z_m, yaw_rad].map(|range| [*range.start(), *range.end()]);
         if spread == Spread::Single {
-            // As it is, to the last bit.
+            // Returned unchanged, to the last bit.
             return own;
         }
         let times = f32::from(spread.times());
@@ -98,7 +100,7 @@ impl Offset {
 }
 
 impl Task {
-    /// Where every object starts under `seed`, in the order of [`Task::objects`]: world position in metres, and yaw.
+    /// Returns the start pose of every object for a seed, in the order of [`Task::objects`].
     pub fn start_poses(&self, seed: u32, spread: Spread) -> Vec<StartPose> {
         let mut random = SplitMix64(seed.into());
         let mut start_poses: Vec<StartPose> = self
@@ -122,7 +124,7 @@ impl Task {
     }
 }
 
-/// A point turned about the vertical axis through another, where it lies beside that.
+/// Rotates a point about the vertical axis through another point. A point on the axis is returned unchanged.
 fn turned(point_m: [f32; 3], centre_m: [f32; 3], yaw_rad: f32) -> [f32; 3] {
     let [x_m, y_m] = [point_m[0] - centre_m[0], point_m[1] - centre_m[1]];
     if yaw_rad == 0.0 || (x_m == 0.0 && y_m == 0.0) {
@@ -133,14 +135,14 @@ fn turned(point_m: [f32; 3], centre_m: [f32; 3], yaw_rad: f32) -> [f32; 3] {
     [centre_m[0] + east_m, centre_m[1] + north_m, point_m[2]]
 }
 
-/// Where one object starts.
+/// Start pose of an object: world position, and yaw.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartPose {
     pub position_m: [f32; 3],
     pub yaw_rad: f32,
 }
 
-/// Seeds and ranges.
+/// Tests of seeds and ranges.
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -164,7 +166,7 @@ mod tests {
                     };
                     let moved = start_poses.iter().map(|start| value(&start[index]) - rest[axis]);
                     let (least, most) = moved.fold((f32::MAX, f32::MIN), |(l, h), m| (l.min(m), h.max(m)));
-                    // Sums of several offsets seldom come near their ends.
+                    // Sums of several offsets seldom reach the ends of their ranges.
                     let (slack, width) = (1e-5, high - low);
                     assert!(
                         least >= low - slack && least <= low + 0.25 * width + slack,
@@ -191,7 +193,7 @@ mod tests {
         }
     }
 
-    /// What a place of the list of tasks was before there was a spread: the four numbers of each offset drawn and added.
+    /// Poses before spreads were introduced: each offset's four numbers drawn and added.
     #[test]
     fn a_spread_of_one_is_what_the_benchmark_has_bit_for_bit() {
         for task in cohub() {
@@ -241,7 +243,7 @@ mod tests {
             let any = task.start_poses(7, Spread::Double);
             assert!(any.iter().zip(task.objects).any(|(start, spot)| turned(start, spot)), "{}", task.id);
         }
-        // The bottle stays where it stands on the trolley's tray.
+        // The bottle keeps its place on the trolley's tray.
         let task = crate::tasks::find("cart_service").unwrap();
         let [trolley, bottle] = [0, 1].map(|index| task.objects[index].position_m);
         let apart_m = bottle[1] - trolley[1];

@@ -1,4 +1,4 @@
-//! The tasks that there are to play: the benchmark's, those of our own suite, and those of files.
+//! The available tasks: the benchmark's, those of our own suite, and those of files.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -15,7 +15,7 @@ fn read(files: &[Embedded]) -> Vec<&'static Task> {
     files.iter().map(|(name, text)| embedded_task(name, text)).collect()
 }
 
-/// Returns the task of a file that the binary carries.
+/// Returns the task of an embedded file.
 ///
 /// # Panics
 ///
@@ -35,24 +35,25 @@ pub fn tandem_plus() -> &'static [&'static Task] {
     &TANDEM_PLUS_TASKS
 }
 
-/// Returns every task that the program carries: the benchmark's, then those of our own suite.
+/// Returns every built-in task: the benchmark's, then those of our own suite.
 pub fn built_in() -> impl Iterator<Item = &'static Task> + Clone {
     cohub().iter().chain(tandem_plus()).copied()
 }
 
-/// The tasks that there are to play: those that the program carries, and those of files.
+/// The available tasks: the built-in ones and those of files.
 #[derive(Clone, Debug, Default)]
 pub struct TaskSet {
     of_files: Vec<&'static Task>,
 }
 
 impl TaskSet {
-    /// Returns the built-in tasks and those of files. One of a file that has the id of another takes its place.
+    /// Returns the built-in tasks and those of files. A task of a file replaces a built-in one with the
+    /// same id.
     pub fn with_files(of_files: Vec<&'static Task>) -> TaskSet {
         TaskSet { of_files }
     }
 
-    /// Returns the first task that a file brings.
+    /// Returns the task of the first file.
     pub fn first_of_files(&self) -> Option<&'static Task> {
         self.of_files.first().copied()
     }
@@ -63,21 +64,21 @@ impl TaskSet {
         built_in().filter(replaced).chain(self.of_files.iter().copied())
     }
 
-    /// Returns the task called `id`.
+    /// Returns the task with this id.
     ///
     /// # Errors
     ///
-    /// [`EpisodeError::UnknownTask`], which lists those that there are.
+    /// [`EpisodeError::UnknownTask`], which lists the available ones.
     pub fn find(&self, id: &str) -> Result<&'static Task, EpisodeError> {
         find_in(self.all(), id)
     }
 }
 
-/// Returns the benchmark's task called `id`.
+/// Returns the benchmark task with this id.
 ///
 /// # Errors
 ///
-/// [`EpisodeError::UnknownTask`], which lists those that there are.
+/// [`EpisodeError::UnknownTask`], which lists the available ones.
 pub fn find(id: &str) -> Result<&'static Task, EpisodeError> {
     find_in(cohub().iter().copied(), id)
 }
@@ -93,7 +94,8 @@ fn find_in(
     })
 }
 
-/// Returns the tasks of these, each once: the benchmark's in its order, then those of files as they come.
+/// Returns the distinct tasks among these: the benchmark's in its order, then those of files in the given
+/// order.
 pub fn in_order(played: impl Iterator<Item = &'static Task> + Clone) -> Vec<&'static Task> {
     let mut found: Vec<&'static Task> =
         cohub().iter().copied().filter(|task| played.clone().any(|one| one == *task)).collect();

@@ -1,4 +1,4 @@
-//! Worlds that nobody disturbs: scenes settle, objects stay, idling reaches nothing.
+//! Tests of undisturbed worlds: scenes settle, objects stay in place, and waiting reaches no phase.
 
 use crate::common::*;
 use tandem_episodes::tasks;
@@ -20,7 +20,7 @@ fn scenes_settle_within_a_second_and_start_again_bit_for_bit() {
     }
 }
 
-/// Does nothing in every task: objects move less than `drift_m`, nobody falls, no phase is reached.
+/// Waits in every task: objects move less than `drift_m`, no robot falls, no phase is reached.
 fn idle(wait_s: u32, drift_m: f32) {
     for &task in tasks::cohub() {
         let mut session = start(task.id, 1, Protocol::Agentic);
@@ -37,7 +37,8 @@ fn idle(wait_s: u32, drift_m: f32) {
     }
 }
 
-/// As many seconds as every run of the tests can pay for; 2 mm in 60 s are a sixth of a millimetre then.
+/// A duration short enough for every test run. The drift limit of 2 mm in 60 s scales to a sixth of a
+/// millimetre.
 #[test]
 fn objects_stay_and_idling_reaches_nothing() {
     idle(5, 0.002 / 12.0);

@@ -1,4 +1,5 @@
-//! Checkpoints in memory and on disk: an episode goes on from one bit for bit, and no other episode does.
+//! Tests of checkpoints in memory and on disk: an episode continues from its own checkpoint bit for bit,
+//! and other episodes are refused.
 
 use std::path::Path;
 
@@ -24,7 +25,7 @@ fn an_episode_taken_up_from_a_checkpoint_goes_on_as_it_did() {
     }
 }
 
-/// An episode one command in, its checkpoint in a file, and how it went on.
+/// Writes the checkpoint of an episode after one command. Returns how the episode continued.
 fn written(path: &Path) -> (String, StatusReply) {
     let mut session = handover(5);
     command(&mut session, raise_hand(25));
@@ -33,7 +34,7 @@ fn written(path: &Path) -> (String, StatusReply) {
     (session.state_hash(), status(&mut session))
 }
 
-/// The error of an episode `spec` that begins at the checkpoint in `path`.
+/// Returns the error of an episode `spec` that starts at the checkpoint in `path`.
 fn refusal(spec: EpisodeSpec, path: &Path) -> String {
     let spec = EpisodeSpec { start: Start::Checkpoint(path.into()), ..spec };
     match Session::start(&spec, None) {
@@ -81,7 +82,7 @@ fn checkpoints_of_other_episodes_are_refused_by_name() {
     }
 }
 
-/// A robot's idea of itself is part of its state.
+/// A robot's state estimate is part of the checkpoint.
 #[test]
 fn a_checkpoint_is_no_start_for_robots_that_know_themselves_otherwise() {
     let folder = tempfile::tempdir().unwrap();
@@ -92,7 +93,7 @@ fn a_checkpoint_is_no_start_for_robots_that_know_themselves_otherwise() {
     assert!(text.contains("state estimate estimator") && text.contains("state estimate truth"), "{text}");
 }
 
-/// Who was told something once knows it, and results say so.
+/// A policy does not forget what it has read, and results depend on it.
 #[test]
 fn a_checkpoint_is_no_start_for_policies_that_are_told_otherwise() {
     let folder = tempfile::tempdir().unwrap();

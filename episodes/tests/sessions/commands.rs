@@ -1,4 +1,4 @@
-//! Sessions on real physics: what repeats, what a command moves and what it leaves alone, what a policy is charged.
+//! Tests of sessions with real physics: repeatability, effects of commands, and costs charged to a policy.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -51,7 +51,7 @@ fn a_wrist_arrives_and_nobody_else_moves() {
     }
 }
 
-/// Steps back from the counter while the right hand has a target before the chest.
+/// Walks back from the counter while the right hand has a target in front of the chest.
 #[test]
 fn walking_leaves_a_hand_where_it_is_and_takes_a_carried_one_along() {
     for carried in [false, true] {
@@ -71,7 +71,7 @@ fn walking_leaves_a_hand_where_it_is_and_takes_a_carried_one_along() {
         assert!(walked_m.x < -0.06, "walked {walked_m} m");
         let expected_m = if carried { walked_m } else { Vector::ZERO };
         let off_m = (moved_m - expected_m).length();
-        // The arm follows the walking pelvis a few control steps late.
+        // The arm follows the walking pelvis with a delay of a few control steps.
         let late_m = walked_m.length() / 6.0;
         assert!(off_m < late_m, "carried {carried}: moved {moved_m} m, {off_m} m off; walked {walked_m} m");
     }
@@ -80,7 +80,7 @@ fn walking_leaves_a_hand_where_it_is_and_takes_a_carried_one_along() {
 #[test]
 fn a_wrist_that_cannot_arrive_is_reported_short() {
     let mut session = handover(0);
-    // To the side, where nobody is in the way.
+    // A target to the side, free of obstacles.
     let far_m = [0.2, -1.1, 0.2];
     let far = WristMove { right_position_m: Some(far_m), ..WristMove::hold("A") };
     let call = ToolCall::from(MoveWrists { steps: 50, robots: vec![far] });
@@ -162,7 +162,7 @@ fn depth_finds_the_bottle_where_it_is() {
     };
     let camera = &seen.cameras[0];
     assert_eq!((camera.width, camera.height, seen.images.len()), (320, 240, 1));
-    // The pinhole formula that the reply's description gives to a policy, with its numbers only.
+    // Applies the pinhole formula from the reply's description, with the reply's numbers alone.
     let [w, i, j, k] = camera.camera_in_pelvis.quaternion_wxyz.map(|part| part as f32);
     let rotation = tandem_sim::Rotation::from_xyzw(i, j, k, w);
     let origin = Vector::from_array(camera.camera_in_pelvis.position_m.map(|part| part as f32));
@@ -299,7 +299,8 @@ fn episodes_go_the_same_way_whoever_draws() {
     assert!(hashes.iter().all(|hash| *hash == hashes[0]), "{hashes:?}");
 }
 
-/// The benchmark's wrist commands neither take hands along nor have them give way: who asks for that is named.
+/// The benchmark's wrist commands have neither `carried` targets nor compliance. Results name commands
+/// that use them.
 #[test]
 fn what_wrist_commands_ask_beyond_the_benchmark_is_named() {
     let told = |entry: WristMove| {
@@ -315,7 +316,7 @@ fn what_wrist_commands_ask_beyond_the_benchmark_is_named() {
     assert_eq!(told(compliance), ["wrist commands: compliance"]);
 }
 
-/// Degrees for radians are the usual mistake.
+/// Degrees in place of radians are the usual mistake.
 #[test]
 fn joint_targets_beyond_their_limits_are_counted() {
     let told = |arm: f64| {
@@ -328,7 +329,7 @@ fn joint_targets_beyond_their_limits_are_counted() {
         session.close().joints_clamped_share
     };
     assert_eq!(told(0.1), None);
-    // The joints of the arms, of 31.
+    // The 14 arm joints among 31.
     let share = told(0.1_f64.to_degrees()).expect("a share");
     assert!((share - 14.0 / 31.0).abs() < 1e-3, "{share}");
 }

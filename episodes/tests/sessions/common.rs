@@ -1,4 +1,4 @@
-//! Sessions to play with, and calls that they answer.
+//! Sessions and calls shared by the tests.
 
 use tandem_episodes::{EpisodeSpec, Session, tasks};
 use tandem_tools_spec::{
@@ -43,7 +43,7 @@ pub fn state(session: &mut Session, robot: &str) -> RobotState {
     }
 }
 
-/// A's right hand to the side of its chest, fingers half closed.
+/// Returns a command that moves A's right hand to the side of its chest, with fingers half closed.
 pub fn raise_hand(steps: u32) -> ToolCall {
     MoveWrists { steps, robots: vec![hand_up()] }.into()
 }
@@ -70,7 +70,7 @@ pub fn squat(height_m: f64) -> ToolCall {
     Walk { steps: 50, robots: vec![entry] }.into()
 }
 
-/// A second and a half in which every kind of command is used.
+/// Runs about a second and a half with every kind of command.
 pub fn play(session: &mut Session) {
     command(session, raise_hand(25));
     command(session, squat(0.70));
@@ -79,7 +79,7 @@ pub fn play(session: &mut Session) {
     wait(session, 10);
 }
 
-/// The action row under which a robot stays as it measures itself.
+/// Returns the action row that holds a robot at its measured joint positions.
 pub fn row(session: &mut Session, robot: &str) -> Vec<f64> {
     let columns = session.briefing().action_row;
     let state = state(session, robot);

@@ -1,4 +1,4 @@
-//! Recordings drawn again: films, and pictures with depth.
+//! Tests of recordings rendered again: videos, and images with depth.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use tandem_tools_spec::Protocol;
 const STEPS: u32 = 12;
 const SIZE: PictureSize = PictureSize { width: 64, height: 48 };
 
-/// A quarter of a second of Handover.
+/// Records a quarter of a second of Handover.
 fn recorded(folder: &Path) -> Recording {
     let mut session = Session::start(&spec("handover", 3, Protocol::Benchmark), Some(folder)).unwrap();
     command(&mut session, raise_hand(STEPS));
@@ -65,7 +65,7 @@ fn films_have_a_picture_for_every_moment() {
     assert!(left.iter().all(|path| path.extension().is_none_or(|e| e != "partial")), "{left:?}");
 }
 
-/// Every file below `folder` and when it was written.
+/// Returns every file below `folder` with its modification time.
 fn files(folder: &Path) -> BTreeMap<PathBuf, SystemTime> {
     let mut found = BTreeMap::new();
     for entry in std::fs::read_dir(folder).unwrap().map(Result::unwrap) {
@@ -95,7 +95,7 @@ fn pictures_are_drawn_once_whatever_stops_the_run() {
     let before = files(&out);
     assert_eq!(before.len(), 3 * 3 * 2 + 2, "{before:?}");
 
-    // A run that was killed while it drew left a camera without its depth.
+    // A run that was killed while drawing has left a camera without its depth image.
     let lost = out.join("A/depth/000005.png");
     let depth_mm = image::open(&lost).unwrap().into_luma16();
     std::fs::remove_file(&lost).unwrap();
@@ -107,7 +107,7 @@ fn pictures_are_drawn_once_whatever_stops_the_run() {
     assert_eq!(written, [&out.join("A/depth/000005.png"), &out.join("A/rgb/000005.png")]);
     assert_eq!(image::open(&lost).unwrap().into_luma16(), depth_mm);
 
-    // It is the depth that the camera sees.
+    // The file holds the depth that the camera sees.
     let step = recording.steps().nth(5).unwrap().unwrap();
     let mut scene = EpisodeRenderer::of(&recording.spec).unwrap();
     let camera = scene.camera(EpisodeCamera::Egocentric(0), &step, Some(SIZE));
@@ -120,7 +120,8 @@ fn pictures_are_drawn_once_whatever_stops_the_run() {
     assert!(text.contains("pictures of another recording, rate or size"), "{text}");
 }
 
-/// What a data set is drawn with and what a policy is shown is one picture: the camera's own, scaled. Drawn at that size it is another.
+/// A data set's images and a policy's observations are the same: the camera's own image, scaled.
+/// Rendering at that size yields different pixels.
 #[test]
 fn small_pictures_are_the_cameras_own_scaled() {
     let folder = tempfile::tempdir().unwrap();
@@ -136,7 +137,7 @@ fn small_pictures_are_the_cameras_own_scaled() {
     let camera = scene.camera(view, &step, Some(small));
     assert_ne!(scene.draw(&step, &camera).rgb, colours.rgb());
 
-    // The one camera that is asked for, without depth.
+    // The one requested camera, without depth.
     let out = folder.path().join("lean");
     let plan = |name: &str| PicturesPlan {
         rate_hz: 10,

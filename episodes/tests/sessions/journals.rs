@@ -1,5 +1,5 @@
-//! Episodes brought back from what they were asked: the same states, counts, clocks and results as without an
-//! interruption.
+//! Tests of episodes restored from their journals: states, counts, clocks and results are the same as
+//! without an interruption.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,7 +17,7 @@ use tandem_tools_spec::{
     Wait,
 };
 
-/// Nobody looks on.
+/// A receiver without viewers.
 struct Nobody;
 
 impl Onlookers for Nobody {
@@ -32,7 +32,7 @@ impl Onlookers for Nobody {
     fn tell(&self, _: LiveEvent) {}
 }
 
-/// A clock whose hands the test turns.
+/// A clock that the test advances.
 #[derive(Clone, Default)]
 struct Hands(Arc<AtomicU64>);
 
@@ -51,7 +51,7 @@ fn call(tool: &str, arguments: serde_json::Value) -> Call {
     Call::parse(tool, arguments).unwrap()
 }
 
-/// Asks for something of every kind, some of which is refused.
+/// Makes a request of every kind, some of them refused.
 fn ask_everything(session: &mut Session, hands: &Hands) {
     hands.pass(700);
     command(session, raise_hand(25));
@@ -81,7 +81,7 @@ fn ask_everything(session: &mut Session, hands: &Hands) {
     session.ask(Some("B"), ToolCall::from(Say { text: "Ready.".into() }).into()).unwrap();
 }
 
-/// As another process reads it.
+/// Returns the entries after a round trip through JSON, as another process reads them.
 fn copied(entries: &[JournalEntry]) -> Vec<JournalEntry> {
     serde_json::from_str(&serde_json::to_string(entries).unwrap()).unwrap()
 }
@@ -108,7 +108,7 @@ fn bring_back_into(
     Session::bring_back(back).unwrap()
 }
 
-/// What a session says of itself, but for how long physics took.
+/// Returns a session's status, result and thinking time, without the time that physics took.
 fn said(session: &mut Session) -> serde_json::Value {
     let mut told = json!([session.status(), session.result(), session.thought().as_millis()]);
     let result = told[1].as_object_mut().unwrap();
@@ -130,7 +130,7 @@ fn an_episode_is_brought_back_as_it_stood() {
     let mut again = bring_back(&spec, &entries, &hands, 0);
     assert_eq!(said(&mut again), said(&mut session));
     assert_eq!(again.state_hash(), session.state_hash());
-    // Both go on, and are brought back once more.
+    // Both continue, and are restored once more.
     hands.pass(900);
     for session in [&mut session, &mut again] {
         command(session, raise_hand(25));
@@ -141,7 +141,7 @@ fn an_episode_is_brought_back_as_it_stood() {
     assert_eq!(once_more.state_hash(), session.state_hash());
 }
 
-/// Returns topic, time in ns and content of every message of a recording.
+/// Returns the topic, the time in ns and the content of every message in a recording.
 fn recorded(folder: &Path) -> Vec<(String, u64, Vec<u8>)> {
     let bytes = std::fs::read(folder.join(Recorder::FILE_NAME)).unwrap();
     let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
@@ -150,7 +150,7 @@ fn recorded(folder: &Path) -> Vec<(String, u64, Vec<u8>)> {
         .collect()
 }
 
-/// Pictures that only the recording needs are drawn later, and are the same.
+/// Images that only the recording needs are rendered later, and are identical.
 #[test]
 fn the_recording_is_made_again_with_its_pictures() {
     let hands = Hands::default();
@@ -163,7 +163,7 @@ fn the_recording_is_made_again_with_its_pictures() {
     ask_everything(&mut session, &hands);
     let entries = session.take_journal().unwrap();
     let mut again = bring_back_into(Some(RunFolder::from(&*second)), &spec, &entries, &hands, 0);
-    // A look at the same moment as one of before, which is answered now.
+    // An observation at the same moment as an earlier one, answered after the restoration.
     let look = Observe { robots: None, short: None, frame: None };
     let [seen, seen_again] = [&mut session, &mut again].map(|session| {
         let seen = session.observe(&look, &[]).unwrap();
@@ -191,7 +191,7 @@ fn the_clock_goes_on_from_what_was_thought_and_what_ended_stays_ended() {
     wait(&mut session, 2);
     let mut entries = session.take_journal().unwrap();
 
-    // A server was away for a day, which costs nothing; before it, the policy had been thinking for 100 s.
+    // A server's absence for a day costs nothing; before it, the policy had been thinking for 100 s.
     hands.pass(86_400_000);
     let mut again = bring_back(&spec, &entries, &hands, 100_000);
     hands.pass(699_000);

@@ -1,4 +1,4 @@
-//! Sessions on real physics.
+//! Tests of sessions with real physics.
 
 mod at_rest;
 mod checkpoints;

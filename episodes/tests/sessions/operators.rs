@@ -1,4 +1,4 @@
-//! Calls with something around them, and commands of several operators, in one process.
+//! Tests of calls with options around them, and of commands from several operators in one process.
 
 use tandem_episodes::{EpisodeError, OperatorCall, Session};
 use tandem_tools_spec::{Call, Formats, Look, Observe, StopReason, TalkReply, ToolCall, ToolReply, Wait};
@@ -47,7 +47,7 @@ fn commands_that_were_read_before_are_executed_as_things_stand_then() {
     let early = read(&mut session, "A", raise.clone().into()).unwrap();
     let other = read(&mut session, "B", Call { then: Some(look()), ..sink.clone().into() }).unwrap();
     assert_eq!((early.robot(), early.steps(), other.steps(), calls(&mut session)), ("A", 25, 50, 1));
-    // The other's robot moves meanwhile.
+    // The other operator's robot moves meanwhile.
     let replies = session.together(vec![other]).unwrap();
     let ToolReply::Act(reply) = &replies[0].reply else { panic!("{replies:?}") };
     assert_eq!((reply.executed_steps, reply.stop_reason), (50, StopReason::StepsDone));

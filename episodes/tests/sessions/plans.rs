@@ -1,4 +1,4 @@
-//! Several commands by one call: as if they had been called in turn, and replayed so.
+//! Tests of plans: several commands in one call have the same effect as separate calls, also in a replay.
 
 use serde_json::json;
 use tandem_episodes::{A, Session};
@@ -167,14 +167,14 @@ fn commands_of_a_plan_may_ask_for_short_replies() {
         plan(&mut session, "send_plan", json!({ "commands": [wait(json!(null)), wait(json!(true))] }))
             .unwrap();
     assert!(target(&short).is_none(), "{short:?}");
-    // Each command counts as a call, and the reply says so.
+    // Each command counts as a call, and the reply includes the count.
     assert_eq!((full.commands, full.tool_calls, short.tool_calls), (2, 2, 4));
     assert_eq!(session.result().tool_calls, 4);
     let refused = plan(&mut session, "send_plan", json!({ "commands": [wait(json!("yes"))] })).unwrap_err();
     assert!(refused.contains("command 1 of ") && refused.contains("short"), "{refused}");
 }
 
-/// Two robots stand; one of them has nothing to say.
+/// Two robots stand; one of them has nothing to report.
 #[test]
 fn a_robot_that_did_nothing_is_told_of_in_a_line() {
     let mut session = agentic();
@@ -188,7 +188,8 @@ fn a_robot_that_did_nothing_is_told_of_in_a_line() {
     assert!(told.get("pelvis_in_start").is_none() && told.to_string().len() < 160, "{told}");
 }
 
-/// By a waypoint back from the counter, to the side and turned: by odometry alone, and as the simulator has it.
+/// Walks back from the counter via a waypoint, then sideways with a turn. The odometry and the simulator
+/// agree on the result.
 #[test]
 fn a_robot_walks_to_a_place() {
     let mut session = agentic();
@@ -207,7 +208,7 @@ fn a_robot_walks_to_a_place() {
     let ahead = moved.rotation * tandem_sim::Vector::X;
     let off_rad = (ahead.y.atan2(ahead.x) - 0.8).abs();
     assert!(off_m < 0.02 && off_rad < 0.03, "{off_m} m and {off_rad} rad off: {:?}", reply.last.robots);
-    // Into the counter there is no way.
+    // The counter blocks this target.
     let to = json!({ "steps": 1200, "robots": [{ "robot": "A", "to_m": [0.6, 0.0], "heading_rad": 0.0 }] });
     let reply = plan(&mut session, "walk_to", to).unwrap();
     assert!(reply.stopped.as_ref().is_some_and(|why| why.contains("A")), "{reply:?}");
@@ -217,7 +218,7 @@ fn a_robot_walks_to_a_place() {
     assert!(reply.stopped.unwrap().contains("the steps are used up; A is"), "its place is half a metre off");
 }
 
-/// With a wrist where it does not reach, a robot that carries stands again at once, and says why.
+/// A robot that carries, with a wrist target out of reach, stops at once and reports the reason.
 #[test]
 fn a_robot_that_does_not_reach_what_it_carries_stops() {
     let mut session = agentic();

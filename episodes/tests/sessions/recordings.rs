@@ -1,4 +1,4 @@
-//! Recordings read back: every step as it was, and phases scored again from the steps alone.
+//! Tests of recordings read back: every step is identical, and phases can be scored from the steps alone.
 
 mod damage;
 mod forged;
@@ -107,7 +107,7 @@ fn a_moment_is_pictured_once() {
     assert_eq!((pictures_s("/A/egocentric"), pictures_s("/B/egocentric")), (vec![0.0], vec![0.0, 0.02]));
 }
 
-/// What an episode of `calls` waits of 5 steps leaves whose process is killed a second later: the bytes that are on the disk.
+/// Returns the file left on disk if the process is killed one second after `calls` waits of 5 steps.
 pub fn interrupted(folder: &Path, calls: u32) -> PathBuf {
     let spec = spec("handover", 3, Protocol::Benchmark);
     let mut session = Session::start(&spec, Some(folder)).unwrap();
@@ -127,7 +127,7 @@ fn an_interrupted_recording_is_recovered_up_to_the_last_reply() {
     let text = Recording::read(&partial).map(drop).unwrap_err().to_string();
     assert!(text.contains("tandem recover") && text.contains("episode.mcap.partial"), "{text}");
 
-    // Whatever comes of it, it is not written to.
+    // The source file is never written to, whatever the outcome.
     let bytes = std::fs::read(&partial).unwrap();
     let on_the_way = folder.path().join("episode.mcap.recovering");
     for taken in [&on_the_way, &folder.path().join(Recorder::FILE_NAME)] {
@@ -172,7 +172,7 @@ fn a_torn_end_is_left_out() {
     }
 }
 
-/// Four steps of Pouring, as a version wrote them that had every step whole, as JSON.
+/// Four steps of Pouring, written by a version that stored each step whole, as JSON.
 #[test]
 fn recordings_of_earlier_versions_are_read() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/sessions/recordings/whole_steps.mcap");

@@ -1,4 +1,4 @@
-//! Recordings simulated again: the same where they are whole, and found out where a number was changed.
+//! Tests of verification: intact recordings are reproduced, and changed numbers are detected.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ fn verified(path: &Path) -> Verification {
     verify(&Recording::read(path).unwrap()).unwrap()
 }
 
-/// Records the expert of a task and returns where; `None` where it has none.
+/// Records the expert of a task and returns the path; `None` without an expert.
 fn demonstration(task: &str, folder: &Path) -> Option<PathBuf> {
     let spec = spec(task, 3, Protocol::Benchmark);
     let mut episode = InProcess::new(Session::start(&spec, Some(folder)).unwrap());
@@ -43,7 +43,7 @@ fn every_task_is_verified_and_goes_on_where_each_phase_begins() {
         assert_eq!((found.outcome, found.steps), (Verdict::Same, steps), "{}", task.id);
         assert_eq!((found.unanswered_steps, found.other_build), (0, None), "{}", task.id);
 
-        // What the robots were told from there on, told again, ends as it did.
+        // The recorded commands from this phase on, repeated, lead to the same end.
         let recorded = Recording::read(&recording).unwrap().result.unwrap();
         let reached = recorded.phases.0.iter().filter(|(_, time_s)| time_s.is_some()).count();
         for index in 0..task.phases.len().min(reached + 1) {
@@ -66,7 +66,8 @@ fn every_task_is_verified_and_goes_on_where_each_phase_begins() {
     }
 }
 
-/// Noise of sensors is drawn from the episode's seed: played again it is the same, and under another seed another.
+/// Sensor noise is drawn from the episode's seed: the same seed yields the same noise, and another seed
+/// different noise.
 #[test]
 fn noise_is_the_same_again() {
     let sensing = Sensing { sensors: SensorModel::G1, ..Sensing::default() };
@@ -82,13 +83,13 @@ fn noise_is_the_same_again() {
     let begun = |spec: EpisodeSpec| read(&mut Session::start(&spec, None).unwrap());
     assert_eq!(begun(noisy(5)), first);
     assert_ne!(begun(noisy(6)), first);
-    // Objects apart, nothing else depends on the seed.
+    // Apart from objects, nothing else depends on the seed.
     let exact = |seed: u32| begun(spec("handover", seed, Protocol::Benchmark));
     assert_eq!(exact(5), exact(6));
 }
 
-/// Slow noise on what robots are told is drawn from the seed: the same again, whatever the policy is told is the label, and nobody
-/// who does not ask for it has any.
+/// Slow noise on commands is drawn from the seed and is reproducible. The label is the policy's own
+/// command. Without the option, there is no noise.
 #[test]
 fn what_is_disturbed_is_the_same_again_and_its_label_is_what_was_told() {
     let stand = |seed: u32, disturb: f32, folder: &Path| {
@@ -113,7 +114,8 @@ fn what_is_disturbed_is_the_same_again_and_its_label_is_what_was_told() {
     assert!((1..=4).contains(&differ), "most episodes are disturbed: {differ} of 4");
 }
 
-/// Three commands of A, in which a second is thought; the policy's clock runs out after `thinking_s` more.
+/// Records three commands of A with a second of thinking. The policy's clock runs out after `thinking_s`
+/// more.
 fn agentic(folder: &Path, thinking_s: u64) -> PathBuf {
     let policy_clock_ns = Arc::new(AtomicU64::new(0));
     let read = policy_clock_ns.clone();
@@ -149,7 +151,7 @@ fn the_clock_is_charged_again_as_it_was() {
     }
 }
 
-/// A copy of a recording in which `change` was made to the JSON of the tool calls and to that of the result.
+/// Copies a recording with `change` applied to the JSON of the tool calls and of the result.
 fn changed(path: &Path, change: impl Fn(&str) -> String) -> PathBuf {
     let bytes = std::fs::read(path).unwrap();
     let copy = path.with_file_name("changed.mcap");
@@ -166,7 +168,8 @@ fn changed(path: &Path, change: impl Fn(&str) -> String) -> PathBuf {
     for index in &summary.metadata_indexes {
         let mut record = mcap::read::metadata(&bytes, index).unwrap();
         if record.name == "result" {
-            // Whoever changes a result leaves out its checksum, which early recordings had none of.
+            // Removes the checksum, since early recordings had none; otherwise the change would be
+            // detected by it.
             record.metadata.remove("crc32").expect("a checksum");
             record.metadata.values_mut().for_each(|text| *text = change(text));
         }
@@ -192,16 +195,17 @@ fn a_changed_number_is_found_at_its_step() {
         let Verdict::State(found) = verified(&copy).outcome else { panic!("{from} -> {to} is not found") };
         assert_eq!((found.control_step, found.call), (step, Some((number, tool.into()))), "{from} -> {to}");
     };
-    // A wrist that goes elsewhere is seen in the command's first step; so is a height.
+    // Another wrist target differs from the command's first step on; so does another height.
     check("0.28,-0.24,0.22", "0.28,-0.24,0.2200001", 8, 2, "move_wrists");
     check("\"pelvis_height_m\\\":0.7", "\"pelvis_height_m\\\":0.7000001", 43, 4, "walk");
-    // A wait that is shorter brings what follows forward.
+    // A shorter wait moves the following command forward.
     check("{\\\"steps\\\":7}", "{\\\"steps\\\":6}", 7, 2, "move_wrists");
-    // One that is longer at the end has states that were never recorded.
+    // A longer last wait has states that were never recorded.
     check("{\\\"steps\\\":10}", "{\\\"steps\\\":11}", 43, 3, "wait");
 }
 
-/// What a policy was shown is counted again: how often, and by a policy in this process, too, to whom the reply is not shown.
+/// The replay counts the information given to the policy again, including that given to a policy in this
+/// process, which receives no reply.
 #[test]
 fn a_result_that_hides_what_its_policy_was_told_differs() {
     use tandem_tools_spec::ExtraInformation::{JointVelocities, ThirdPerson};
@@ -250,7 +254,7 @@ fn a_start_at_a_phase_is_recorded_and_verified_without_the_demonstration() {
     let folder = tempfile::tempdir().unwrap();
     let recording = demonstration("pouring", folder.path()).unwrap();
     let begin = |phase: &str| Start::Phase(PhaseStart { recording: recording.clone(), phase: phase.into() });
-    // Under another protocol, too: the budget is the new episode's own.
+    // It also works under another protocol: the budget is the new episode's own.
     let own = EpisodeSpec { start: begin("p2"), ..spec("pouring", 3, Protocol::Agentic) };
     let again = folder.path().join("again");
     let mut session = Session::start(&own, Some(&again)).unwrap();

@@ -1,4 +1,4 @@
-//! What is kept of an episode for those who read it: every call, also those that do not count, and notes. It changes nothing.
+//! Tests of transcripts: they include every call, counted or not, and notes, and change nothing else.
 
 use std::path::Path;
 
@@ -21,7 +21,8 @@ fn thought(text: &str) -> Note {
     }
 }
 
-/// Plays an episode with looks, a refused call and a plan; with notes and calls that do not reach it, where it `tells` of itself.
+/// Plays an episode with observations, a refused call and a plan. With `tells`, also sends notes and
+/// calls that do not reach the episode.
 fn play(session: &mut Session, tells: bool) {
     let note = |session: &mut Session, note: Note| {
         if tells {
@@ -52,7 +53,7 @@ fn recorded(folder: &Path, tells: bool) -> (ResultReply, Recording) {
     (result, Recording::read(&folder.join(Recorder::FILE_NAME)).unwrap())
 }
 
-/// Each entry in a word, with the number of a call that counts.
+/// Returns one line for each entry, with the number of a counted call.
 fn told(recording: &Recording) -> Vec<String> {
     let word = |entry: &TranscriptEntry| match entry {
         TranscriptEntry::Call { number: Some(number), call, .. } => {
@@ -136,7 +137,7 @@ fn notes_are_about_robots_that_there_are_and_come_before_the_end() {
     assert_eq!(session.close().usage.unwrap().notes, 1);
 }
 
-/// A caller may send anything, of any length.
+/// A caller may send any text of any length.
 #[test]
 fn what_is_no_json_is_kept_as_a_text_and_cut() {
     let folder = tempfile::tempdir().unwrap();
@@ -161,7 +162,7 @@ fn what_is_no_json_is_kept_as_a_text_and_cut() {
     assert_eq!(recording.tool_calls().unwrap(), []);
 }
 
-/// The plan that reaches the last step of an episode is told as any other.
+/// A plan that reaches the last step of an episode is recorded like any other.
 #[test]
 fn a_plan_that_ends_the_episode_is_told() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,5 @@
-//! Any bytes as the arguments of every tool: what is read comes out of JSON again as it was, and still passes its checks.
+//! Fuzzes the arguments of every tool: a parsed call survives a round trip through JSON, and still passes
+//! validation.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,5 +1,5 @@
-//! Any bytes as a recording: read to its end or refused, and never more memory than the file can hold. Checksums of 0 are taken
-//! as left out, so that what is behind them is reached, too.
+//! Fuzzes recordings: they are read to the end or refused, and never use more memory than the file can
+//! hold. Checksums of 0 count as absent, so the code after them is reached, too.
 #![no_main]
 
 use std::path::Path;

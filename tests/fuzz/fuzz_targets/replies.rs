@@ -1,4 +1,4 @@
-//! Any bytes as the reply to every tool, as a client of ours may get them: read or refused.
+//! Fuzzes the replies to every tool, as a client may receive them: they are parsed or refused.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

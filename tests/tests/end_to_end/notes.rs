@@ -1,4 +1,5 @@
-//! Notes over HTTP: who may send them, and that they change nothing of an episode; and calls that are refused before they reach one.
+//! Tests of notes over HTTP: authorisation, and that they do not affect an episode; and of calls refused
+//! before they reach an episode.
 
 use serde_json::{Value, json};
 use tandem::hosting::Guests;
@@ -104,7 +105,7 @@ fn operators_note_for_their_own_robot() {
     let mut of_a = thought();
     of_a["robot"] = "A".into();
     server.post_with(&path, &headers[..1], &of_a).refused(409, &["another operator's", "yours is \"B\""]);
-    // Who started the episode may note, too.
+    // The caller that started the episode may add notes, too.
     assert_eq!(note(&server, &id, &of_a).0, 204);
     server.delete(&format!("/v1/episodes/{id}")).ok();
     let robots: Vec<Option<String>> = transcript(&server, &id)
@@ -117,7 +118,7 @@ fn operators_note_for_their_own_robot() {
     assert_eq!(robots, [Some("B".into()), Some("A".into())]);
 }
 
-/// An agent that sends what is no call learns from it, and so does who reads the episode.
+/// An agent that sends an invalid call gets an error, and the transcript includes it.
 #[test]
 fn calls_that_cannot_be_read_are_in_the_transcript() {
     let server = TestServer::start();

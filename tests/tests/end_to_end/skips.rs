@@ -1,4 +1,4 @@
-//! What a test leaves out is seen by who runs it.
+//! A test that reports of skipped tests are visible.
 
 use std::{env, process::Command};
 

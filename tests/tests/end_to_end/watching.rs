@@ -1,4 +1,4 @@
-//! Those who watch: they come by the link alone, see what happens, and change nothing.
+//! Tests of viewers: they need the link alone, see the episode, and change nothing.
 
 use std::net::TcpStream;
 use std::sync::Mutex;
@@ -14,7 +14,7 @@ use crate::policies::plans::{plan, play};
 
 const TOKEN: &str = "correct-horse-battery-staple";
 
-/// Steps of 0.1 s each that move both robots.
+/// Returns calls of 0.1 s each that move both robots.
 fn calls() -> Vec<(&'static str, Value)> {
     let move_wrists =
         json!({ "steps": 5, "robots": [{ "robot": "A", "right_position_m": [0.25, -0.2, 0.2] }] });
@@ -34,14 +34,14 @@ fn watch(server: &TestServer, id: &str) -> WebSocket<TcpStream> {
     tungstenite::client(request, stream).expect("a socket").0
 }
 
-/// A GET of a page by who has the link.
+/// Gets a page with the key of the link.
 fn get(server: &TestServer, path: &str) -> (u16, Vec<u8>) {
     let key = format!("Bearer {}", server.watch_key());
     let (status, _, bytes) = server.ask("GET", path, &[("authorization", &key)], b"");
     (status, bytes)
 }
 
-/// The head of a scene's message, and the numbers of its frames.
+/// Returns the header of a scene's message, and the numbers of its frames.
 fn scene(message: &[u8]) -> (Value, Vec<f32>) {
     let size = u32::from_le_bytes(message[..4].try_into().expect("four bytes")) as usize;
     let head: Value = serde_json::from_slice(&message[4..4 + size]).expect("JSON");
@@ -185,7 +185,7 @@ fn watching_changes_nothing() {
     let play = |watchers: usize| {
         let server = TestServer::start();
         let id = server.episode("benchmark");
-        // They are told more than they read, which is nothing: nobody waits for them.
+        // The viewers read nothing that they are sent; the episode does not wait for them.
         let sockets: Vec<_> = (0..watchers).map(|_| watch(&server, &id)).collect();
         for (tool, args) in (0..8).flat_map(|_| calls()) {
             server.tool(&id, tool, &args).ok();
@@ -319,7 +319,7 @@ fn evaluations_in_the_runs_folder_are_listed_as_they_fill() {
         "planned": 2, "runs": false, "last_unix_s": complete[0]["last_unix_s"],
     });
     assert_eq!(complete, json!([expected]));
-    // One that has come to its end is not taken for one that is played, whatever its folder lacks.
+    // A finished evaluation is not listed as running, even if its folder lacks files.
     std::fs::remove_file(folder.join("episodes/handover-2.json")).expect("a result");
     assert_eq!((&list()[0]["played"], &list()[0]["runs"]), (&json!(1), &json!(false)));
     let again = plan(players::find("idle").expect("a player"), vec![1, 2], false);
@@ -329,13 +329,13 @@ fn evaluations_in_the_runs_folder_are_listed_as_they_fill() {
     assert_eq!(*seen.lock().expect("a list"), [true, true]);
     assert_eq!(list()[0]["runs"], json!(false));
 
-    // Nor is one whose process is gone.
+    // An evaluation whose process has ended is not listed as running either.
     let planned = folder.join("planned.json");
     std::fs::write(&planned, r#"{"episodes": 2, "left_out": 0, "state": "playing"}"#).expect("a file");
     assert_eq!(list()[0]["runs"], json!(false));
 }
 
-/// A page shows one step in five, and of a look what the policy was shown.
+/// A page shows one step in five; for an observation it shows the policy's own image.
 #[test]
 fn what_a_policy_was_shown_is_drawn_again_bit_for_bit() {
     let server = TestServer::start();
@@ -355,7 +355,7 @@ fn what_a_policy_was_shown_is_drawn_again_bit_for_bit() {
     }
 }
 
-/// What an agent says is seen as it is said, and refusals that do not reach the episode, too.
+/// An agent's notes are shown as they arrive, and so are refusals that do not reach the episode.
 #[test]
 fn notes_and_refusals_are_seen_as_they_come() {
     let server = TestServer::start();

@@ -1,4 +1,4 @@
-//! The modules of a crate form no circle, on any level of the tree.
+//! A test that a crate's modules have no circular dependencies, at any level of the tree.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,10 +8,11 @@ use super::{
     sources::expect_none,
 };
 
-/// Arrows between the children of one module: from, to, and the first place that draws it.
+/// Dependencies between the children of one module: from, to, and the first place with such a dependency.
 type Siblings<'a> = BTreeMap<(&'a str, &'a str), &'a str>;
 
-/// A file and its folder belong together; what is compared are two children of the same module, whatever lies below them.
+/// Groups dependencies by the parent module. A file and its folder belong together, so two children of
+/// one parent are compared, whatever is below them.
 fn levels(arrows: &[Arrow]) -> BTreeMap<&[String], Siblings<'_>> {
     let mut levels: BTreeMap<&[String], Siblings> = BTreeMap::new();
     for Arrow { from, to, place } in arrows {
@@ -23,7 +24,7 @@ fn levels(arrows: &[Arrow]) -> BTreeMap<&[String], Siblings<'_>> {
     levels
 }
 
-/// Every arrow that lies on a circle.
+/// Returns every dependency that is part of a circle.
 fn circles(arrows: &[Arrow]) -> Vec<String> {
     let mut found = Vec::new();
     for (level, siblings) in levels(arrows) {

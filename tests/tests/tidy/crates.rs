@@ -1,23 +1,24 @@
-//! Which crate may depend on which.
+//! Tests of the dependencies between crates.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
 use super::sources::{expect_none, root};
 
-/// Which crates of the workspace each crate may depend on. `sim`, `ik` and `tools_spec` know nothing of each other.
+/// Allowed dependencies of each crate in the workspace. `sim`, `ik` and `tools_spec` are independent of
+/// each other.
 const ARROWS: &[(&str, &[&str])] = &[
     ("tools_spec", &[]),
     ("ik", &[]),
     ("sim", &[]),
-    // The same sources, with every extra.
+    // The same sources with every extra.
     ("tests/extras", &[]),
     ("episodes", &["tandem-sim", "tandem-ik", "tandem-tools-spec"]),
     ("gateway", &["tandem-episodes", "tandem-tools-spec"]),
     ("tests", &["tandem", "tandem-episodes", "tandem-ik", "tandem-sim", "tandem-tools-spec"]),
 ];
 
-/// The folders of the crates that have sources of their own.
+/// Returns the folders of the crates with sources of their own.
 pub fn members() -> impl Iterator<Item = &'static str> {
     ARROWS.iter().map(|(member, _)| *member).filter(|member| root().join(member).join("src").is_dir())
 }
@@ -57,7 +58,7 @@ fn the_arrows_name_every_member() {
     assert_eq!(named, listed);
 }
 
-/// The versions of every package that a lock file names.
+/// Returns the versions of every package in a lock file.
 fn locked(path: &str) -> BTreeMap<String, BTreeSet<String>> {
     let text = fs::read_to_string(root().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"));
     let lock: toml::Table = text.parse().unwrap_or_else(|error| panic!("{path}: {error}"));
@@ -69,7 +70,8 @@ fn locked(path: &str) -> BTreeMap<String, BTreeSet<String>> {
     versions
 }
 
-/// The same crates in the program and in the wheel: the same seed with the same commands has to end in the same state in both.
+/// The program and the wheel use the same versions of crates: the same seed with the same commands must
+/// end in the same state in both.
 #[test]
 fn the_wheel_is_made_of_the_same_versions() {
     let program = locked("Cargo.lock");

@@ -1,6 +1,8 @@
-//! What the book says about adding something (`docs/src/extending.md`) is true: beside its own file and its line in a list, no
-//! code has to be told.
-//! A list that somebody keeps by hand would name everything in it, so no text in the code may be such a name.
+//! Tests of the instructions in `docs/src/extending.md`: an extension needs its own file and its line in
+//! a list, and no other change in code.
+//!
+//! Any other list kept by hand would contain the names of all extensions, so no text in the code may be
+//! such a name.
 
 use std::path::Path;
 
@@ -15,16 +17,16 @@ use super::{
     sources::{below, expect_none},
 };
 
-/// Something that the book says how to add.
+/// An extension that the book describes.
 struct Step {
-    /// As the book calls it.
+    /// Name in the book.
     what: &'static str,
     /// Folder of the files.
     folder: &'static str,
     extension: &'static str,
-    /// What a file of this kind says; others may lie beside it.
+    /// Text in every file of this kind; the folder may have other files.
     says: &'static str,
-    /// Beginnings of the paths that may name it.
+    /// Path prefixes of the code that may name it.
     may: &'static [&'static str],
 }
 
@@ -34,7 +36,8 @@ const STEPS: &[Step] = &[
         folder: "episodes/tasks",
         extension: "toml",
         says: "[[phases]]",
-        // An expert plays one task; the demo and the contract's example are Handover.
+        // An expert plays one task; Handover is the task of the demo and of the example in the tool's
+        // contract.
         may: &[
             "episodes/src/tasks/",
             "episodes/src/players/experts/",
@@ -54,8 +57,8 @@ const STEPS: &[Step] = &[
         folder: "sim/assets/objects",
         extension: "xml",
         says: "<mujoco",
-        // Tasks place them, and their experts take hold of them; tests stand beside what they test. The table of MJCF support has
-        // elements and attributes of the same names.
+        // Tasks place objects, and experts grip them, and benches use them. The table of MJCF support
+        // has elements and attributes with the same names.
         may: &[
             "episodes/src/tasks/",
             "episodes/src/players/experts/",
@@ -69,7 +72,7 @@ const STEPS: &[Step] = &[
         folder: "sim/assets/robots",
         extension: "xml",
         says: "<mujoco",
-        // The one that is used unless a file is given.
+        // The default robot.
         may: &["sim/src/assets.rs"],
     },
     Step {
@@ -84,7 +87,7 @@ const STEPS: &[Step] = &[
         folder: "episodes/src/players",
         extension: "rs",
         says: "impl Player for",
-        // The floor of a report is that of nobody, by the name that results have for it.
+        // The baseline in a report is the idle player, by its name in results.
         may: &["episodes/src/players/", "episodes/src/results/mod.rs"],
     },
     Step {
@@ -98,7 +101,7 @@ const STEPS: &[Step] = &[
 
 const CRATES: [&str; 4] = ["tools_spec", "sim", "episodes", "gateway"];
 
-/// The texts of a file, with their lines; those in macros, too.
+/// Texts in a file with their lines, including those in macros.
 #[derive(Default)]
 struct Texts {
     found: Vec<(String, usize)>,
@@ -136,7 +139,7 @@ impl<'ast> Visit<'ast> for Texts {
     }
 }
 
-/// The file's name, or that of its folder.
+/// Returns the name of the file, or of its folder.
 fn name(path: &Path) -> String {
     let parts = path.with_extension("");
     let last = parts.iter().rev().find(|part| *part != "mod" && *part != "robot").unwrap_or_default();

@@ -1,4 +1,4 @@
-//! How many files a folder has, and what every file has to say and must not.
+//! Tests of the number of files in a folder, and of texts that every file must or must not contain.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -10,10 +10,10 @@ use super::sources::{everywhere, expect_none, files, root};
 
 const MAX_FILES: usize = 12;
 
-/// The heading under which ARCHITECTURE.md says why some folders have more.
+/// Heading in ARCHITECTURE.md of the table of larger folders with reasons.
 const REASONS: &str = "## Folders with more than twelve files";
 
-/// The folders of the table under [`REASONS`], whose rows are "| `folder` | reason |".
+/// Returns the folders of the table under [`REASONS`], whose rows are "| `folder` | reason |".
 fn with_reason(text: &str) -> BTreeSet<&str> {
     let section = text.split(REASONS).nth(1).unwrap_or_default();
     let section = section.split("\n## ").next().unwrap_or_default();
@@ -21,7 +21,7 @@ fn with_reason(text: &str) -> BTreeSet<&str> {
     rows.filter(|(_, reason)| reason.trim_end_matches('|').trim() != "").map(|(folder, _)| folder).collect()
 }
 
-/// What is wrong with the number of files in these folders.
+/// Returns the violations of the limit on files in these folders.
 fn crowded(counts: &BTreeMap<String, usize>, reasons: &BTreeSet<&str>) -> Vec<String> {
     let many = |folder: &str| counts.get(folder).is_some_and(|count| *count > MAX_FILES);
     let unexplained =

@@ -1,4 +1,4 @@
-//! How long files and functions are.
+//! Tests of the lengths of files and functions.
 
 use std::path::Path;
 
@@ -41,7 +41,7 @@ fn most_source_files_are_short() {
     );
 }
 
-/// Functions of more than [`LONGEST_FUNCTION_LINES`], from `fn` to the closing brace.
+/// Functions longer than [`LONGEST_FUNCTION_LINES`], from `fn` to the closing brace.
 struct Long<'a> {
     path: &'a Path,
     found: Vec<String>,

@@ -1,4 +1,4 @@
-//! Invariants of the repository itself. Each failure names the place and says what mends it.
+//! Invariants of the repository. Each failure gives the place and a remedy.
 
 mod circles;
 mod crates;

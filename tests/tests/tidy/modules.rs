@@ -1,4 +1,4 @@
-//! The modules of a crate without their tests, and which of them names which.
+//! Modules of a crate without their tests, and the references between them.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -15,23 +15,23 @@ use super::{
 /// A module's path from the crate's root, whose own path is empty.
 pub type Name = Vec<String>;
 
-/// One file of a crate. Items that are compiled for tests only are left out.
+/// A source file of a crate, without items compiled for tests only.
 pub struct Module {
     pub name: Name,
     pub path: PathBuf,
     pub items: Vec<Item>,
 }
 
-/// That one module names something of another.
+/// A reference from one module to an item of another.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Arrow {
     pub from: Name,
     pub to: Name,
-    /// The file and line that draw the arrow.
+    /// File and line of the reference.
     pub place: String,
 }
 
-/// The modules of the crate in the folder `member`.
+/// Returns the modules of the crate in the folder `member`.
 pub fn modules(member: &str) -> Vec<Module> {
     read(&below(&format!("{member}/src"), &["rs"]), Path::new(member).join("src").as_path())
 }
@@ -55,7 +55,7 @@ fn read(sources: &[Source], folder: &Path) -> Vec<Module> {
     found
 }
 
-/// `a/b.rs` and `a/b/mod.rs` are `a::b`; `lib.rs` is the root.
+/// Returns the name of a file's module: `a::b` for `a/b.rs` and `a/b/mod.rs`, and the root for `lib.rs`.
 fn name(path: &Path) -> Name {
     let whole = path.with_extension("");
     let parts = whole.components().filter_map(|part| match part {
@@ -76,7 +76,7 @@ fn is_test(attributes: &[Attribute]) -> bool {
     })
 }
 
-/// The attributes of an item of a kind that is ever compiled for tests only.
+/// Returns the attributes of an item, for the kinds of items that may be compiled for tests only.
 fn attributes(item: &Item) -> &[Attribute] {
     match item {
         Item::Mod(item) => &item.attrs,
@@ -89,7 +89,7 @@ fn attributes(item: &Item) -> &[Attribute] {
     }
 }
 
-/// Every arrow from module to module, through re-exports to where the thing is.
+/// Returns every reference between modules, with re-exports resolved to the defining module.
 pub fn arrows(modules: &[Module]) -> Vec<Arrow> {
     let map = Map::new(modules);
     let mut found = Vec::new();
@@ -107,13 +107,13 @@ pub fn arrows(modules: &[Module]) -> Vec<Arrow> {
     found
 }
 
-/// Which modules there are, and what each calls by another name.
+/// Names of all modules, and the names that each imports.
 struct Map<'a> {
     names: BTreeSet<&'a Name>,
     imported: BTreeMap<(&'a Name, String), Name>,
 }
 
-/// Longer chains of re-exports than anybody writes: a circle among them.
+/// Limit on re-export chains, against circles among them.
 const MAX_HOPS: usize = 8;
 
 impl<'a> Map<'a> {
@@ -122,7 +122,7 @@ impl<'a> Map<'a> {
         let mut imported = BTreeMap::new();
         for module in modules {
             for (own, path) in imports(&module.name, &module.items) {
-                // What begins with neither `crate` nor `super` is a child's, or of another crate.
+                // A path with neither `crate` nor `super` starts from a child module or another crate.
                 let path = path.unwrap_or_else(|relative| [module.name.as_slice(), &relative].concat());
                 imported.insert((&module.name, own), path);
             }
@@ -130,7 +130,7 @@ impl<'a> Map<'a> {
         Map { names, imported }
     }
 
-    /// The module in which the thing at `path` stands.
+    /// Returns the module that defines the item at `path`.
     fn home(&self, path: &[String]) -> Name {
         let (mut at, mut rest) = (Name::new(), path.to_vec());
         let mut hops = 0;
@@ -151,7 +151,7 @@ impl<'a> Map<'a> {
     }
 }
 
-/// A crate made of texts, for the tests of these invariants.
+/// Makes a crate from texts, for the tests of these invariants.
 pub fn made_of(files: &[(&str, &str)]) -> Vec<Module> {
     let sources: Vec<Source> = files
         .iter()

@@ -1,4 +1,4 @@
-//! The order of the modules of a crate: each imports only from those before it.
+//! Tests of the order of a crate's modules: each imports only from those before it.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,8 @@ use super::{
     sources::expect_none,
 };
 
-/// For each crate, rows of its top-level modules. A module may name those of earlier rows, never those of its own or a later one.
+/// Top-level modules of each crate, by row. A module may refer to modules of earlier rows only, not of
+/// its own or a later row.
 const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "sim",

@@ -1,4 +1,4 @@
-//! The paths that a file of Rust names.
+//! Paths in a Rust file.
 
 use proc_macro2::{TokenStream, TokenTree};
 use syn::{
@@ -8,21 +8,21 @@ use syn::{
 
 use super::modules::Name;
 
-/// A path from the crate's root that a file names, and where.
+/// A path from the crate's root that a file refers to, with its line.
 pub struct Mention {
     pub path: Name,
     pub line: usize,
 }
 
-/// Every path of `items`, in the module `name`, that begins with `crate`, `self` or `super`.
+/// Returns every path in `items`, in the module `name`, that begins with `crate`, `self` or `super`.
 pub fn mentions(name: &[String], items: &[Item]) -> Vec<Mention> {
     let mut collector = Collector { at: name.to_vec(), found: Vec::new() };
     items.iter().for_each(|item| collector.visit_item(item));
     collector.found
 }
 
-/// What the module `name` imports: the name it gives it, and the path from the root; or, where the path begins with
-/// neither `crate` nor `super`, the path as it is.
+/// Returns the imports of the module `name`: the local name, and the path from the root. A path that
+/// begins with neither `crate` nor `super` is returned unchanged as an error.
 pub fn imports(name: &[String], items: &[Item]) -> Vec<(String, Result<Name, Name>)> {
     let mut found = Vec::new();
     for item in items {
@@ -35,7 +35,7 @@ pub fn imports(name: &[String], items: &[Item]) -> Vec<(String, Result<Name, Nam
     found
 }
 
-/// Every path of a `use`, with the name that it is imported by.
+/// Returns every path of a `use`, with its local name.
 fn leaves(tree: &UseTree) -> Vec<(String, Name)> {
     let mut found = Vec::new();
     walk(tree, &mut Name::new(), &mut found);
@@ -64,7 +64,7 @@ fn walk(tree: &UseTree, before: &mut Name, found: &mut Vec<(String, Name)>) {
     }
 }
 
-/// `path` as the module `at` writes it, from the crate's root.
+/// Resolves `path`, as written in the module `at`, from the crate's root.
 fn absolute(at: &[String], path: &[String]) -> Option<Name> {
     let (first, rest) = path.split_first()?;
     match first.as_str() {
@@ -91,7 +91,7 @@ impl Collector {
         self.found.extend(absolute(&self.at, path).map(|path| Mention { path, line }));
     }
 
-    /// Macros are not parsed; their paths are still paths.
+    /// Collects paths from the tokens of a macro, which is not parsed.
     fn add_tokens(&mut self, tokens: TokenStream) {
         let (mut path, mut line, mut colons) = (Name::new(), 0, 0);
         for token in tokens {

@@ -1,47 +1,48 @@
-//! The files of the repository, as the invariants read them.
+//! Files of the repository, for the invariants.
 
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-/// Folders that hold what was built or recorded, not what was written.
+/// Folders with build products and recordings.
 const NOT_OURS: [&str; 5] = ["target", "runs", "book", "node_modules", "__pycache__"];
 
-/// One file.
+/// A file.
 pub struct Source {
-    /// The path from the root of the repository.
+    /// Path relative to the root of the repository.
     pub path: PathBuf,
     pub text: String,
 }
 
 impl Source {
-    /// The file as Rust, with the lines at which everything stands.
+    /// Parses the file as Rust, with line numbers.
     pub fn parse(&self) -> syn::File {
         syn::parse_file(&self.text).unwrap_or_else(|error| panic!("{}: {error}", self.path.display()))
     }
 }
 
-/// The root of the repository.
+/// Returns the root of the repository.
 pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ lies in the workspace").into()
 }
 
-/// Every file with one of the `extensions`.
+/// Returns every file with one of the `extensions`.
 pub fn everywhere(extensions: &[&str]) -> Vec<Source> {
     let found = below("", extensions);
     assert!(found.len() > 20, "only {} files found below {}", found.len(), root().display());
     found
 }
 
-/// Every file of a folder of the repository with one of the `extensions`.
+/// Returns every file in a folder of the repository with one of the `extensions`.
 pub fn below(folder: &str, extensions: &[&str]) -> Vec<Source> {
     let ours =
         |path: &PathBuf| path.extension().is_some_and(|own| extensions.iter().any(|ours| own == *ours));
     files(folder).into_iter().filter(ours).map(read).collect()
 }
 
-/// Paths of all files of a folder of the repository, from its root. Hidden ones are left out.
+/// Returns the paths of all files in a folder, relative to the root of the repository. Hidden files are
+/// left out.
 pub fn files(folder: &str) -> Vec<PathBuf> {
     let mut paths = Vec::new();
     collect(&root().join(folder), &mut paths);

@@ -1,4 +1,4 @@
-//! Within a crate, a type's name says which type it is.
+//! A test that the name of a type is unique within its crate.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,8 @@ use super::{
     sources::{Source, below, expect_none, files},
 };
 
-/// The names of all types that a file defines, with their lines. Associated types belong to their traits, and do not count.
+/// Names and lines of all types that a file defines. Associated types belong to their traits, and do not
+/// count.
 #[derive(Default)]
 struct Types {
     found: Vec<(String, usize)>,
@@ -51,7 +52,7 @@ impl<'ast> Visit<'ast> for Types {
     }
 }
 
-/// Names that stand for more than one type of a crate, with their places.
+/// Returns names of more than one type in a crate, with their places.
 fn repeated(sources: &[Source]) -> Vec<String> {
     let mut places: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for source in sources {
@@ -65,7 +66,7 @@ fn repeated(sources: &[Source]) -> Vec<String> {
     repeated.map(|(name, places)| format!("{name}: {}", places.join(", "))).collect()
 }
 
-/// The folders of all crates: of each member its sources, and each of its test programs.
+/// Returns the source folders of all crates, and the folder of each test program.
 fn crate_folders() -> Vec<String> {
     let mut folders = Vec::new();
     for member in members() {

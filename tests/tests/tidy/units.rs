@@ -1,4 +1,4 @@
-//! Names of physical quantities say their unit.
+//! A test that names of physical quantities include their unit.
 
 use std::path::Path;
 
@@ -9,11 +9,12 @@ use syn::{
 
 use super::{modules::modules, sources::expect_none};
 
-/// The crates in which numbers are physical. `ik` is left out: its vectors hold coordinates of any joint, in rad or m,
-/// and its costs and errors are weighted.
+/// Crates in which numbers are physical. `ik` is left out: its vectors hold coordinates of any joint, in
+/// rad or m, and its costs and errors are weighted.
 const CRATES: [&str; 4] = ["tools_spec", "sim", "episodes", "gateway"];
 
-/// In these files numbers belong to joints of any kind, in rad or m as in `ik`, or to rows of a solver or a filter, which mix them.
+/// Files with coordinates of any joint, in rad or m as in `ik`, or with rows of a solver or a filter, which
+/// mix units.
 const GENERALISED: [&str; 7] = [
     "sim/src/dynamics/",
     "sim/src/estimate/covariance.rs",
@@ -27,10 +28,10 @@ const GENERALISED: [&str; 7] = [
 /// Types that hold a quantity.
 const QUANTITIES: [&str; 5] = ["f32", "f64", "Vector", "Vector3", "Vec3"];
 
-/// Types that hold quantities of another type.
+/// Types that contain quantities of another type.
 const CONTAINERS: [&str; 6] = ["Option", "Vec", "Box", "Sides", "Range", "RangeInclusive"];
 
-/// What the name of a quantity may end in.
+/// Allowed suffixes of a quantity's name.
 const UNITS: &[&str] = &[
     "m",
     "m2",
@@ -65,9 +66,9 @@ const UNITS: &[&str] = &[
     "kg_m3",
 ];
 
-/// What the name of a number without a unit may end in, or a name that says of several units which is where.
+/// Allowed suffixes of a number without a unit, or of numbers in several units with a documented order.
 const DIMENSIONLESS: &[&str] = &[
-    // Directions, of length one, and orientations.
+    // Unit vectors and orientations.
     "axis",
     "normal",
     "direction",
@@ -81,7 +82,7 @@ const DIMENSIONLESS: &[&str] = &[
     "rgba",
     "albedo",
     "colour",
-    // Parts, multiples and tangents.
+    // Fractions, multiples and tangents.
     "share",
     "tan",
     "fraction",
@@ -97,10 +98,10 @@ const DIMENSIONLESS: &[&str] = &[
     "waves",
     "gain",
     "caution",
-    // Both are counted in phases.
+    // Counted in phases.
     "reward",
     "progress",
-    // Numbers of conversions and checks, which may be any, and of ranges whose own names carry the unit.
+    // Arbitrary numbers in conversions and checks, and in ranges whose own names carry the unit.
     "value",
     "values",
     "median",
@@ -111,12 +112,12 @@ const DIMENSIONLESS: &[&str] = &[
     "row",
     "rows",
     "command",
-    // Units by themselves, as notes have them.
+    // Units by themselves, as in notes.
     "usd",
     "seconds",
-    // Corners in a picture: column and row in pixels, then what is interpolated between them.
+    // Corners in an image: column and row in pixels, then the interpolated values.
     "corners",
-    // A camera's intrinsics, in pixels, as every library calls them.
+    // A camera's intrinsics in pixels, with the names that every library uses.
     "fx",
     "fy",
     "cx",
@@ -149,7 +150,7 @@ fn is_quantity(kind: &Type) -> bool {
     }
 }
 
-/// Names of quantities, as fields and parameters, that say no unit.
+/// Quantities, as fields and parameters, whose names have no unit.
 #[derive(Default)]
 struct Unnamed {
     found: Vec<(String, usize)>,

@@ -1,5 +1,5 @@
-//! What a hand feels of what it touches: by the torques of its own drives, and by where its joints have thumb, fingers and palm. Nothing
-//! here is of the simulator's contacts.
+//! Sensing of a hand's contacts: from the torques of its own drives, and from the poses of thumb, fingers
+//! and palm. The simulator's contacts are not used.
 
 use std::ops::Range;
 
@@ -9,36 +9,37 @@ use tandem_tools_spec::{Grip, HandPart, Touch};
 
 use crate::commands::columns;
 
-/// Against what presses on it with 1.5 N a finger's drive works with 0.1 N m or so; one that is free, with less than 0.03.
+/// Torque thresholds of a finger's drive. Against a contact force of 1.5 N it is about 0.1 N m; in a free
+/// finger it is below 0.03 N m.
 const PRESSES_N_M: f32 = 0.1;
 const TOUCHES_N_M: f32 = 0.05;
-/// A thumb presses this far from its joint, and against the palm if the arm feels less than this part of it.
+/// Lever arm of the thumb's contact. The thumb presses against the palm if the arm senses less than this
+/// fraction of the thumb's force.
 const THUMB_LEVER_M: f32 = 0.06;
 const WITHIN_PART: f32 = 0.5;
-/// A finger that turns faster works against its own inertia and damping.
+/// Joint speed above which a finger works against its own inertia and damping.
 const MOVES_RAD_S: f32 = 0.5;
-/// Shapes as near as this touch each other.
+/// Maximum distance of touching shapes.
 const NEAR_M: f32 = 0.004;
 /// Joints in the order of `move_wrists`.
 const THUMB: Range<usize> = 0..3;
 const PARTS: [(HandPart, Range<usize>); 3] =
     [(HandPart::Thumb, THUMB), (HandPart::Middle, 3..5), (HandPart::Index, 5..7)];
-/// thumb_0 swings the thumb to the side, and neither opens nor closes it.
+/// Index of thumb_0, which swings the thumb to the side, and neither opens nor closes it.
 const SWINGING: usize = 0;
-/// Points along a capsule at which its distance from another shape is taken.
+/// Number of points along a capsule at which its distance from another shape is computed.
 const POINTS: usize = 9;
 
-/// The contacts that a hand feels by the torques of its own drives.
+/// Contacts of a hand, sensed by the torques of its own drives.
 pub struct Felt {
     pub grip: Grip,
-    /// The parts of the hand that press.
+    /// Parts of the hand that press.
     pub presses: Vec<HandPart>,
     pub touch: Option<Touch>,
 }
 
-/// Finds what a hand feels between its fingers. A scored hold asks for opposite presses. Torques do not tell
-/// their directions: a press on the tip and one of twice the force halfway along the finger have the same
-/// torque.
+/// Senses the grip of a hand. A scored hold needs opposite contact forces, but torques do not reveal their
+/// directions. A force on the fingertip and twice that force halfway along the finger have the same torque.
 pub fn felt(side: Side, sensed: &RobotSensed, model: &RobotModel) -> Felt {
     let closing: [f32; HAND_JOINTS] = std::array::from_fn(|finger| closing_n_m(side, finger, sensed));
     let most = |joints: Range<usize>| closing[joints].iter().copied().fold(0.0, f32::max);
@@ -48,7 +49,7 @@ pub fn felt(side: Side, sensed: &RobotSensed, model: &RobotModel) -> Felt {
     let [thumb, fingers] =
         [&PARTS[..1], &PARTS[1..]].map(|parts| parts.iter().filter_map(pressing).collect::<Vec<HandPart>>());
     let of_itself = thumb_n_m >= TOUCHES_N_M && thumb_touches_own_hand(side, sensed, model);
-    // What the palm presses back is within the hand, and does not reach the arm.
+    // The palm's reaction is internal to the hand, and does not load the arm.
     let within_n = WITHIN_PART * thumb_n_m / THUMB_LEVER_M;
     let palm_presses = sensed.hand_force_in_pelvis_n[side].length() < within_n;
     let (grip, palm) = match (thumb.is_empty(), fingers.is_empty()) {
@@ -75,18 +76,19 @@ pub fn felt(side: Side, sensed: &RobotSensed, model: &RobotModel) -> Felt {
     Felt { grip, presses, touch }
 }
 
-/// The torque with which a finger joint's drive closes it; 0 of joints that turn, and of the one that neither opens nor closes.
+/// Returns the torque with which a finger joint's drive closes it. It is 0 for a moving joint, and for
+/// the joint that neither opens nor closes.
 fn closing_n_m(side: Side, finger: usize, sensed: &RobotSensed) -> f32 {
     let joint = UPPER[columns::hand(side).start + finger];
     if finger == SWINGING || sensed.joints.qd_rad_s[joint].abs() > MOVES_RAD_S {
         return 0.0;
     }
-    // Left thumbs and right fingers close in the positive sense.
+    // Left thumbs and right fingers close in the positive direction.
     let sign = if THUMB.contains(&finger) { side.sign() } else { -side.sign() };
     sign * sensed.joints.torque_n_m[joint]
 }
 
-/// Whether the last link of the thumb lies on the palm or on a finger of its own hand.
+/// Returns true if the last link of the thumb touches the palm or a finger of its own hand.
 fn thumb_touches_own_hand(side: Side, sensed: &RobotSensed, model: &RobotModel) -> bool {
     let hand = &model.hands[side];
     let Some(thumb) = hand.thumb.last() else { return false };
@@ -110,7 +112,7 @@ fn thumb_touches_own_hand(side: Side, sensed: &RobotSensed, model: &RobotModel) 
     })
 }
 
-/// Distance of a point from a shape; of shapes that hands do not have, infinite.
+/// Returns the distance of a point from a shape; infinite for shapes that hands do not have.
 fn distance_m(point_m: Vector, pose: &Pose, geom: &Geom) -> f32 {
     let point_m = pose.inverse() * point_m;
     match &geom.primitive {

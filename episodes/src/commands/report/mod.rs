@@ -1,4 +1,4 @@
-//! How a robot did under an order that has just been executed.
+//! Reports on robots after an executed order.
 
 mod feel;
 
@@ -15,23 +15,23 @@ use super::columns::{self, Clamped};
 use super::motion::{Aim, Motion, RobotSheet};
 use crate::convert::{coarse, coarse_pose, isometry_from_sim, rounded_to};
 
-/// A measured joint this near to its limit rests at it.
+/// Maximum distance from its limit of a measured joint that rests at it.
 const AT_LIMIT_RAD: f32 = 0.01;
-/// An arm of which a joint turns faster is on the way; a finger likewise.
+/// Joint speeds above which an arm or a finger is moving.
 const ARM_MOVES_RAD_S: f32 = 0.05;
 const FINGER_MOVES_RAD_S: f32 = 0.2;
-/// An arm without a wrist target that is farther from what its joints stand for has been pushed.
+/// Displacement above which an arm without a wrist target has been pushed.
 const PUSHED_AWAY_M: f64 = 0.03;
 const PUSHED_AWAY_RAD: f64 = 0.15;
-/// Factor on the tolerance of arrival of a hand that presses on something from two sides.
+/// Factor on the arrival tolerance for a hand that presses on an object from two sides.
 const HOLDING_FACTOR: f64 = 3.0;
-/// A hand that is blocked and feels this much touches something.
+/// Force at which a blocked hand touches something.
 const TOUCHED_N: f32 = 3.0;
-/// Fingers that are free come this near to their targets.
+/// Tolerance within which free fingers reach their targets.
 const FINGER_TOLERANCE_RAD: f64 = 0.06;
 
-/// What became of an order of which `clamped` was moved to limits, where the robot senses `sensed` after it; its own odometry had its
-/// pelvis at `began` before. Wrist poses are told in `frame`.
+/// Returns the report on an order. `clamped` are its clamped values, `sensed` is the robot's sensing
+/// after it, and `began` is the pelvis before it by odometry. Wrist poses are in `frame`.
 pub fn report(
     clamped: &Clamped,
     began: &Pose,
@@ -74,7 +74,7 @@ fn base_motion(began: &Pose, ended: &Pose) -> BaseMotion {
     }
 }
 
-/// How one hand did.
+/// Returns the report on one hand.
 fn hand_report(
     side: Side,
     clamped: &Clamped,
@@ -83,7 +83,8 @@ fn hand_report(
     frame: PoseFrame,
 ) -> HandReport {
     let (arm, hand) = (columns::arm(side), columns::hand(side));
-    // Where the hand has given way to since is told beside it, or a target that is sent again would go on from there.
+    // The target is reported without the yielding, which is reported separately. Otherwise a repeated
+    // target would start from the yielded pose.
     let asked = motion.state().aims[side].in_pelvis(motion.world_from_pelvis());
     let asked = asked.unwrap_or_else(|| motion.commanded_wrists()[side]);
     let measured = isometry_from_sim(&sensed.pelvis_from_wrist[side]);
@@ -119,12 +120,12 @@ fn hand_report(
             robot,
             among(&clamped.columns, |column| arm.contains(&column) || hand.contains(&column)),
         ),
-        // A finger is at a limit whenever the hand is open; that says nothing about reach.
+        // A finger of an open hand is always at a limit, which says nothing about reach.
         joints_at_limit: names(robot, arm.clone().filter(|column| at_limit(*column, robot, sensed))),
     }
 }
 
-/// How a wrist does that is to be at `target` and is at `measured`, both in the pelvis frame.
+/// Returns the state of a wrist with its target and measured pose, both in the pelvis frame.
 pub fn wrist_state(
     side: Side,
     target: &Isometry3<f64>,
@@ -146,7 +147,7 @@ pub fn wrist_state(
     }
     let tolerance = motion.tolerance(side);
     let near = |factor: f64| is_near(measured, target, &tolerance, factor);
-    // Under its load an arm sags.
+    // An arm sags under its load.
     if near(1.0)
         || (near(HOLDING_FACTOR) && feel::felt(side, sensed, &motion.robot.model).grip == Grip::TwoSided)
     {
@@ -160,7 +161,7 @@ pub fn wrist_state(
     }
 }
 
-/// Whether a wrist is within the tolerance by this factor.
+/// Returns true if a wrist is within `factor` times the tolerance.
 fn is_near(wrist: &Isometry3<f64>, target: &Isometry3<f64>, tolerance: &Tolerance, factor: f64) -> bool {
     let missing = wrist.inv_mul(target);
     missing.translation.vector.norm() <= factor * tolerance.position_m

@@ -1,5 +1,6 @@
-//! Surfaces in a picture: what is joined to a pixel and looks alike, the thing that it is of, or the nearest ones of a colour. From the
-//! colours and the depth that the policy may see itself; nothing is known of which object a pixel belongs to.
+//! Surfaces in an image: the connected region of similar colour at a pixel, the object at a pixel, or the
+//! nearest surfaces of a colour. They are found from colours and depth that the policy may see itself,
+//! without knowledge of the object to which a pixel belongs.
 
 mod round;
 mod thing;
@@ -13,32 +14,35 @@ use super::RobotView;
 use crate::convert::coarse;
 use thing::Relief;
 
-/// Neighbours are of one surface whose depth differs by less: this, and this part of it, for what is seen at a slant.
+/// Maximum difference in depth between neighbours of one surface: a distance, and a fraction of the depth
+/// for slanted surfaces.
 const STEP_M: f32 = 0.012;
 const STEP_PART: f32 = 0.03;
-/// Pixels look alike whose colours, by their shares of red and green, differ by less, and of which one is less than so much brighter.
+/// Maximum difference in the shares of red and green between similar colours, and maximum ratio of their
+/// brightness.
 const ALIKE_SHARE: f32 = 0.06;
 const BRIGHTER: f32 = 1.8;
-/// What is smaller is no surface: edges of things mix colours.
+/// Minimum size of a surface; smaller regions are edges, where colours mix.
 const MIN_PIXELS: usize = 12;
 /// Saturation and value below which a colour is grey or black, and value above which it is white.
 const GREY_SATURATION: f32 = 0.25;
 const BLACK_VALUE: f32 = 0.2;
 const WHITE_VALUE: f32 = 0.75;
 
-/// The most surfaces of a colour that are told.
+/// Maximum number of surfaces of a colour in a reply.
 const MAX_SURFACES: usize = 3;
-/// What reaches farther, or fills more of the picture and goes on beyond it, is no thing but what things stand on or before.
+/// Size above which a surface is background. A surface cut off by the image's border is background above
+/// this fraction of the image.
 const BACKGROUND_M: f64 = 2.0;
 const BACKGROUND_PART: f64 = 0.25;
 
-/// Frames in which surfaces are told, or measured, by the pose of the camera (MuJoCo's axes) in each.
+/// Poses of the camera (MuJoCo's axes): in the frame of the reply, and in the level frame for measurements.
 pub struct CameraPoses {
     pub frame_from_camera: Isometry3<f64>,
     pub level_from_camera: Isometry3<f64>,
 }
 
-/// Finds what `query` asks for.
+/// Finds the surfaces of a query.
 pub fn find(view: &RobotView, query: &SurfaceQuery, poses: &CameraPoses) -> Vec<Surface> {
     let relief = Relief::of(view);
     let describe = |joined_by: JoinedBy, pixels: &[usize]| describe(view, &relief, joined_by, pixels, poses);
@@ -50,7 +54,7 @@ pub fn find(view: &RobotView, query: &SurfaceQuery, poses: &CameraPoses) -> Vec<
                 are_alike(like, rgb(view, pixel))
             });
             let thing = relief.thing(view, seed);
-            // Where both are nearly the same, one says it.
+            // If both regions are nearly the same, only one is reported.
             let is_more = 10 * thing.len() > 11 * alike.len();
             let found =
                 [(JoinedBy::Color, alike), (JoinedBy::Shape, if is_more { thing } else { Vec::new() })];
@@ -82,7 +86,7 @@ fn is_background(view: &RobotView, surface: &Surface) -> bool {
     surface.extent_m.iter().any(|part_m| *part_m > BACKGROUND_M) || (surface.cut_off && fills)
 }
 
-/// Every surface of a colour that is not only an edge.
+/// Returns every surface of a colour, without mere edges.
 fn of_color(view: &RobotView, color: Color) -> Vec<Vec<usize>> {
     let mut seen = vec![false; view.depth_m.len()];
     let is_of_it = |pixel: usize| name(rgb(view, pixel)) == color;
@@ -98,7 +102,8 @@ fn of_color(view: &RobotView, color: Color) -> Vec<Vec<usize>> {
     found
 }
 
-/// Whether some pixel has only pixels of the same surface around it: edges of things mix colours, in lines.
+/// Returns true if some pixel is surrounded by pixels of the same surface. Edges, where colours mix, are
+/// lines.
 fn is_broad(view: &RobotView, pixels: &[usize]) -> bool {
     let width = view.picture.width as usize;
     let own: BTreeSet<usize> = pixels.iter().copied().collect();
@@ -110,12 +115,12 @@ fn is_broad(view: &RobotView, pixels: &[usize]) -> bool {
     })
 }
 
-/// Every pixel that is joined to `seed` by neighbours of about the same depth that `belong`.
+/// Returns every pixel connected to `seed` by neighbours of similar depth for which `belong` is true.
 fn joined(view: &RobotView, seed: usize, seen: &mut [bool], belong: &dyn Fn(usize) -> bool) -> Vec<usize> {
     grow(view, seed, seen, &|_, other| belong(other))
 }
 
-/// Every pixel that is joined to `seed` by neighbours of about the same depth that `are_joined`.
+/// Returns every pixel connected to `seed` by neighbours of similar depth for which `are_joined` is true.
 fn grow(
     view: &RobotView,
     seed: usize,
@@ -153,7 +158,7 @@ fn rgb(view: &RobotView, pixel: usize) -> [f32; 3] {
     std::array::from_fn(|i| f32::from(view.picture.rgb()[3 * pixel + i]) / 255.0)
 }
 
-/// Whether two colours are those of one material in more and in less light.
+/// Returns true if two colours may be one material under different light.
 fn are_alike(one_rgb: [f32; 3], other_rgb: [f32; 3]) -> bool {
     let sum = |rgb: [f32; 3]| rgb.iter().sum::<f32>() + 0.05;
     let share = |rgb: [f32; 3], i: usize| (rgb[i] + 0.05 / 3.0) / sum(rgb);
@@ -161,7 +166,7 @@ fn are_alike(one_rgb: [f32; 3], other_rgb: [f32; 3]) -> bool {
     brighter < BRIGHTER && (0..2).all(|i| (share(one_rgb, i) - share(other_rgb, i)).abs() < ALIKE_SHARE)
 }
 
-/// What people call a colour: by hue, saturation and value.
+/// Returns the common name of a colour, from hue, saturation and value.
 fn name([red, green, blue]: [f32; 3]) -> Color {
     let value = red.max(green).max(blue);
     let range = value - red.min(green).min(blue);
@@ -205,7 +210,7 @@ fn describe(
     let (mut color, mut whole) = ([0.0; 3], 0.0);
     for &pixel in pixels {
         let (at, at_m) = (place(pixel), point_m(pixel));
-        // What is near has more pixels, and what is seen at a slant fewer.
+        // Weights pixels by area: near surfaces have more pixels, and slanted ones fewer.
         let area = relief.area(pixel).max(f64::MIN_POSITIVE);
         whole += area;
         for i in 0..2 {
@@ -248,12 +253,12 @@ fn describe(
     }
 }
 
-/// Twice the area of a triangle, positive where its corners go round one way.
+/// Returns twice the signed area of a triangle; the sign is its orientation.
 fn doubled_area(a: [i64; 2], b: [i64; 2], c: [i64; 2]) -> i64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// The convex hull of pixels, by Andrew's monotone chain.
+/// Returns the convex hull of pixels, by Andrew's monotone chain.
 fn hull(mut pixels: Vec<[i64; 2]>) -> Vec<[i64; 2]> {
     pixels.sort_unstable();
     let chain = |pixels: &mut dyn Iterator<Item = &[i64; 2]>| {
@@ -274,7 +279,8 @@ fn hull(mut pixels: Vec<[i64; 2]>) -> Vec<[i64; 2]> {
     if whole.is_empty() { pixels.into_iter().take(1).collect() } else { whole }
 }
 
-/// Those four of a convex outline that span the largest area; all where there are no more.
+/// Returns the four points of a convex outline that span the largest area, or all of them if there are no
+/// more than four.
 fn corners(outline: &[[i64; 2]]) -> Vec<[i64; 2]> {
     let count = outline.len();
     if count <= 4 {
@@ -283,7 +289,7 @@ fn corners(outline: &[[i64; 2]]) -> Vec<[i64; 2]> {
     let (mut most, mut best) = (-1, [0; 4]);
     for one in 0..count {
         for other in one + 2..count {
-            // The farthest from the diagonal on either side of it.
+            // The farthest points from the diagonal, one on either side.
             let farthest = |range: &mut dyn Iterator<Item = usize>| {
                 let area = |i: usize| doubled_area(outline[one], outline[other], outline[i % count]).abs();
                 range.map(|i| (area(i), i % count)).max().unwrap_or((0, one))
@@ -307,7 +313,7 @@ mod tests {
     const WIDTH: usize = 60;
     const HEIGHT: usize = 40;
 
-    /// A grey wall 2 m off, before it 1 m off a red square that stands on its corner, and a red spot on the wall.
+    /// Returns a view of a grey wall at 2 m with a red spot, and a red square rotated onto its corner at 1 m.
     fn view() -> RobotView {
         let mut rgb = Vec::new();
         let mut depth_m = Vec::new();
@@ -343,7 +349,7 @@ mod tests {
         );
         assert!(!square.cut_off && square.axis.is_none());
         assert!((square.extent_m[0] - 0.4).abs() < 1e-3 && square.extent_m[2].abs() < 1e-3, "{square:?}");
-        // Its corners are those of the square on its corner, each 0.2 m from the middle.
+        // The corners of the rotated square are each 0.2 m from its middle.
         assert_eq!(square.corners_m.len(), 4);
         for corner_m in &square.corners_m {
             let from_middle_m: f64 =
@@ -355,7 +361,8 @@ mod tests {
         assert_eq!(found(None, Some(Color::Blue)), []);
     }
 
-    /// The spot on the wall is of one colour, and the wall goes on around it; the square before the wall is a thing by itself.
+    /// The spot has one colour, and the wall continues around it; the square in front of the wall is an
+    /// object of its own.
     #[test]
     fn a_pixel_tells_of_its_colour_and_of_the_whole_thing() {
         let told = |at: [i64; 2]| -> Vec<(JoinedBy, u32)> {
@@ -366,7 +373,7 @@ mod tests {
         assert_eq!(told([30, 20]), [(JoinedBy::Color, 221)]);
     }
 
-    /// The largest of a colour is mostly the room.
+    /// The largest surface of a colour is usually part of the room.
     #[test]
     fn surfaces_of_a_colour_come_nearest_first_and_the_room_last() {
         let mut view = view();
@@ -374,7 +381,8 @@ mod tests {
             found_in(view, None, Some(Color::Red)).iter().map(|surface| surface.pixels).collect()
         };
         assert_eq!(told(&view), [221, 36]);
-        // A red carpet before the robot, nearer than all and over a quarter of the picture, and a line where two colours mix.
+        // A red carpet in front of the robot, nearer than all else and larger than a quarter of the
+        // image; and a line of mixed colours.
         let is_carpet = |u: usize, v: usize| v > 30 || (v > 26 && u < 20);
         let mut rgb = view.picture.rgb().to_vec();
         for pixel in 0..WIDTH * HEIGHT {

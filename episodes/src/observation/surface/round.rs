@@ -1,22 +1,24 @@
-//! The axis of what is upright and round: level slices of it are arcs about one point.
+//! Axis of an upright round object, whose horizontal slices are concentric arcs.
 
 use nalgebra::{Matrix3, Point3, Vector2, Vector3};
 
-/// Slices are this high, and say something with so many points.
+/// Height of a slice, and minimum number of points in it.
 const SLICE_M: f64 = 0.01;
 const MIN_POINTS: usize = 5;
-/// Slices are arcs that lie off circles by less, and by less than this part of the radius, and that go round by more than this.
+/// Limits for a slice to be an arc: maximum distance of its points from the circle, also as a fraction of
+/// the radius; minimum angle of the arc; and the range of radii.
 const OFF_M: f64 = 0.002;
 const OFF_PART: f64 = 0.06;
 const MIN_ARC_RAD: f64 = 1.2;
 const RADII_M: std::ops::Range<f64> = 0.01..0.4;
-/// So many slices, and so large a part of all, are about one axis, to within so much or so large a part of the radius.
+/// Limits for slices to share an axis: minimum number of them, minimum fraction of all slices, and
+/// maximum distance of their centres, also as a fraction of the radius.
 const MIN_SLICES: usize = 3;
 const MIN_SHARE: f64 = 0.5;
 const ABOUT_M: f64 = 0.006;
 const ABOUT_PART: f64 = 0.15;
 
-/// An upright axis in a level frame.
+/// A vertical axis in a level frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis {
     pub at_m: Vector2<f64>,
@@ -32,7 +34,8 @@ struct Circle {
     radius_m: f64,
 }
 
-/// The axis that `points_m` are about, seen from `eye_m`, all in a level frame; `None` if they are not of something upright and round.
+/// Returns the axis of the object whose points are `points_m`, seen from `eye_m`, all in a level frame.
+/// `None` if the object is not upright and round.
 pub fn axis(points_m: &[Point3<f64>], eye_m: &Point3<f64>) -> Option<Axis> {
     let heights = || points_m.iter().map(|point_m| point_m.z);
     let (bottom_m, top_m) =
@@ -61,7 +64,8 @@ pub fn axis(points_m: &[Point3<f64>], eye_m: &Point3<f64>) -> Option<Axis> {
     enough(arcs.len()).then_some(Axis { at_m, bottom_m, top_m, radius_m })
 }
 
-/// The circle that points lie on, by Kasa's least squares: x^2 + y^2 = 2 a x + 2 b y + c.
+/// Returns the circle through points by Kasa's least squares: x^2 + y^2 = 2 a x + 2 b y + c. `None` if
+/// they are not an arc that faces the eye.
 fn arc(points_m: &[Vector2<f64>], eye_m: &Vector2<f64>) -> Option<Circle> {
     let mean_m = points_m.iter().sum::<Vector2<f64>>() / points_m.len() as f64;
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
@@ -77,7 +81,7 @@ fn arc(points_m: &[Vector2<f64>], eye_m: &Vector2<f64>) -> Option<Circle> {
     let off_m =
         points_m.iter().map(|point_m| ((point_m - middle_m).norm() - radius_m).abs()).fold(0.0, f64::max);
     let is_round = RADII_M.contains(&radius_m) && off_m < OFF_M.min(OFF_PART * radius_m);
-    // Of a thing its near side is seen; a hollow shows its far one.
+    // The near side of an object is visible, but the far side of a hollow.
     let stands_out = (middle_m - eye_m).norm() > (mean_m - eye_m).norm();
     let towards = (eye_m - middle_m).normalize();
     let angles_rad = points_m.iter().map(|point_m| {
@@ -93,7 +97,8 @@ fn arc(points_m: &[Vector2<f64>], eye_m: &Vector2<f64>) -> Option<Circle> {
 mod tests {
     use super::*;
 
-    /// What is seen of an upright thing whose outline at each height is `at`, by the angle from the eye.
+    /// Returns the visible points of an upright object with the outline `at`, a function of the height
+    /// and of the angle from the eye.
     fn seen(at: &dyn Fn(f64, f64) -> Vector2<f64>) -> Vec<Point3<f64>> {
         let grid = (0..20).flat_map(|row| (0..21).map(move |column| (row, column)));
         let point = |(row, column): (u32, u32)| {
@@ -107,7 +112,7 @@ mod tests {
     #[test]
     fn what_is_upright_and_round_has_an_axis() {
         let eye_m = Point3::new(0.0, 0.0, 1.2);
-        // Turned to the eye, which is a metre behind along x.
+        // The angle is measured from the direction to the eye, one metre away against x.
         let round = |radius_m: f64, angle_rad: f64| {
             Vector2::new(1.0 - radius_m * angle_rad.cos(), 0.2 + radius_m * angle_rad.sin())
         };

@@ -1,18 +1,21 @@
-//! The thing at a pixel, whatever its colours: what is joined to it in the picture by depth that goes on, over edges that stand out but
-//! not over corners that go in, as where it stands on a table. After Stein et al., "Object partitioning using local convexity", 2014.
+//! The object at a pixel, whatever its colours: the region connected to it by continuous depth, across
+//! convex edges but not across concave corners, such as that with a table below. After Stein et al.,
+//! "Object partitioning using local convexity", 2014.
 
 use nalgebra::{Point3, Unit, Vector3};
 
 use super::grow;
 use crate::observation::RobotView;
 
-/// Surfaces that turn towards each other by less are one: of things that are nearly flat, and of hollows as a bottle's neck has.
+/// Cosine of the maximum angle at a concave edge within one object, for nearly flat objects and for
+/// hollows such as a bottle's neck.
 const HOLLOW_COS: f64 = 0.94;
-/// What lies off the planes of both neighbours by more, and by more than this part of the way, is behind an edge of the nearer one.
+/// Maximum distance of a neighbour from both tangent planes, also as a fraction of the distance between
+/// the points. Beyond it, the neighbour is behind the nearer object's edge.
 const OFF_PLANE_M: f64 = 0.003;
 const OFF_PLANE_PART: f64 = 0.25;
 
-/// What each pixel of a picture sees, in the camera's frame: where, and which way that faces.
+/// Points and normals of an image's pixels, in the camera's frame.
 pub struct Relief {
     points_m: Vec<Option<Point3<f64>>>,
     normals: Vec<Option<Unit<Vector3<f64>>>>,
@@ -27,7 +30,8 @@ impl Relief {
             depth_m.is_finite().then(|| Point3::from(at_m.to_array().map(f64::from)))
         };
         let points_m: Vec<_> = (0..width * height).map(point_m).collect();
-        // The slope along a row or a column, by the nearer of the two neighbours: the other may be of something behind.
+        // The slope along a row or column, from the nearer of the two neighbours; the other may belong to
+        // an object behind.
         let slope = |pixel: usize, before: Option<usize>, after: Option<usize>| {
             let here_m = points_m[pixel]?;
             let to = |other: Option<usize>, sign: f64| Some(sign * (points_m[other?]? - here_m));
@@ -50,19 +54,19 @@ impl Relief {
         self.points_m[pixel]
     }
 
-    /// The area that a pixel sees, to a factor.
+    /// Returns the area visible in a pixel, up to a constant factor.
     pub fn area(&self, pixel: usize) -> f64 {
         let (Some(point_m), Some(normal)) = (self.points_m[pixel], &self.normals[pixel]) else { return 0.0 };
         let towards = -point_m.coords.normalize().dot(normal);
         point_m.z.powi(2) / towards.max(0.2)
     }
 
-    /// Every pixel of the thing that `seed` sees.
+    /// Returns every pixel of the object at `seed`.
     pub fn thing(&self, view: &RobotView, seed: usize) -> Vec<usize> {
         grow(view, seed, &mut vec![false; view.depth_m.len()], &|one, other| self.are_of_one(one, other))
     }
 
-    /// Whether two neighbours are of one thing.
+    /// Returns true if two neighbouring pixels belong to one object.
     fn are_of_one(&self, one: usize, other: usize) -> bool {
         let (Some(from_m), Some(to_m)) = (self.points_m[one], self.points_m[other]) else { return false };
         let (Some(from), Some(to)) = (&self.normals[one], &self.normals[other]) else { return false };

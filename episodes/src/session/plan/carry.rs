@@ -1,10 +1,10 @@
-//! `walk_to` of robots that push or carry: bases and hands go along one path, from rest to rest, each robot's
-//! in its own start frame.
+//! `walk_to` for robots that push or carry: bases and hands follow one path from rest to rest, each
+//! robot's in its own start frame.
 //!
-//! A path is a row of ways, each a turn and a shift at a constant rate, as of one rigid body. Robots that hold
-//! one load, and whose places fit it, so go as if they were one body with it all along, though none of them
-//! knows where the others are. All along, wrists are to be where they were to their robot at the first step:
-//! where a base stays off its place, the next way does not begin from there.
+//! A path is a sequence of legs, each a turn and a shift at constant rates, in the manner of a rigid
+//! body. Robots that hold one load, with places that fit it, thus move as one body with it, without
+//! knowledge of each other's poses. The wrists keep their poses relative to the robot's planned place,
+//! which are those of the first step. So an error of the base does not carry over to the next leg.
 
 use nalgebra::{Isometry3, Rotation2, Vector2};
 use tandem_sim::{CONTROL_HZ, Side, Sides};
@@ -20,81 +20,81 @@ use crate::commands;
 use crate::convert::isometry_from_sim;
 use crate::session::Session;
 
-/// How fast a path is gone, and how soon that is so.
+/// Speed along a path, its acceleration, and its minimum.
 const PACE_M_S: f64 = 0.2;
 const ACCELERATION_M_S2: f64 = 0.2;
 const CREEP_M_S: f64 = 0.02;
-/// A path slows down for a robot that lags by the first and waits for one that lags by the second, and is given
-/// up after so many commands of that. The same for one that is turned away from its path.
+/// The path slows down for a robot that lags by the first distance, and waits at the second. It is given
+/// up after waiting for this many commands. The angles apply to robots turned away from the path.
 const LAG_M: [f64; 2] = [0.13, 0.18];
 const LAGS_COMMANDS: u32 = 16;
 const TURNED_RAD: [f64; 2] = [0.12, 0.2];
-/// A path is given up after so many commands with a robot turned away, or a wrist out of reach.
+/// Number of commands with a robot turned away, or a wrist out of reach, after which the path is given up.
 const STRAYS_COMMANDS: u32 = 3;
-/// Velocity for what a robot is off its path, and the most of it with the path's own; turning. Twice the gain
-/// makes robots that walk half a second behind their commands swing from side to side, more and more.
+/// Gain on the distance from the path, and limits of the total speed and of the yaw rate. Robots walk half a
+/// second behind their commands, and twice this gain makes them oscillate with a growing amplitude.
 const GAIN_1_S: f64 = 0.5;
 const MAX_SPEED_M_S: f64 = 0.3;
 const TURN_RAD_S: f64 = 0.4;
-/// How hands give way to partners.
+/// Compliance of hands that carry with partners.
 const COMPLIANCE_N_S_M: f64 = 250.0;
-/// At its end robots correct their places in so many commands, and then come to rest within so many.
+/// Number of commands at the end of the path for corrections, and maximum number after them until rest.
 const CORRECTING_COMMANDS: u32 = 4;
 const RESTING_COMMANDS: u32 = 12;
-/// A hand that held and holds nothing for so many commands has lost it.
+/// Number of commands without a hold after which a hand has lost its object.
 const LOST_COMMANDS: u32 = 4;
 
-/// One robot on its way.
+/// A robot on the path.
 #[derive(Debug)]
 struct Carrier {
     name: String,
     robot: usize,
     carries: bool,
     ways: Vec<Way>,
-    /// Where its wrists stay, in the frame of the place where it stands.
+    /// Fixed wrist poses in the frame of the robot's planned place.
     stand_from_wrist: Sides<Isometry3<f64>>,
-    /// What it was off its path half a cycle of its gait ago.
+    /// Displacement to the path half a gait cycle ago.
     before_m: Option<Vector2<f64>>,
-    /// For how many commands each hand that held has held nothing; `None` before it holds.
+    /// Number of commands without a hold of each hand; `None` before its first hold.
     empty: Sides<Option<u32>>,
-    /// The hand that cannot come to where it is to be.
+    /// Hand with a target out of reach.
     out_of_reach: Option<Side>,
     corrections: Corrections,
 }
 
-/// What a team does next.
+/// Next action of a team.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum CarryStage {
     OnWay,
-    /// At the end of its path, for so many commands.
+    /// Corrections at the end of the path, with the number of commands made.
     Correcting(u32),
-    /// Told to stand for so many commands; for the last of them, all have stood.
+    /// Standing, with the number of commands made, and the number of the latest in which all stood.
     Resting {
         commands: u32,
         calm: u32,
     },
-    /// Robots make up by one short walk for what is missing where they stand.
+    /// A short walk of each robot from its standing place to its goal.
     Pulse,
 }
 
-/// Robots that go along one path.
+/// Robots that follow one path.
 #[derive(Debug)]
 pub struct CarryPlan {
     carriers: Vec<Carrier>,
-    /// Control steps that are left.
+    /// Remaining control steps.
     left_steps: u32,
-    /// Length of each way, the longest of the robots'.
+    /// Length of each leg: the longest among the robots.
     ways_m: Vec<f64>,
     pace: PathPace,
     stage: CarryStage,
     attempts: u32,
-    /// Commands in a row in which a robot was turned away or a wrist out of reach.
+    /// Number of consecutive commands with a robot turned away, or a wrist out of reach.
     strays: u32,
-    /// Why the robots go no further.
+    /// Reason why the robots stop early.
     stopped: Option<String>,
 }
 
-/// How far a path has been gone, and how fast.
+/// Progress along a path, and its speed.
 #[derive(Debug, Default)]
 struct PathPace {
     gone_m: f64,
@@ -103,7 +103,7 @@ struct PathPace {
 }
 
 impl PathPace {
-    /// Goes on for `time_s` along a path of `length_m`, at a share of its pace.
+    /// Advances for `time_s` along a path of `length_m`, at a fraction of the normal speed.
     fn go(&mut self, length_m: f64, share: f64, time_s: f64) {
         let left_m = length_m - self.gone_m;
         if share > 0.0 {
@@ -140,7 +140,7 @@ impl CarryPlan {
         self.ways_m.iter().sum()
     }
 
-    /// The way that is gone now, and the share of it that has been.
+    /// Returns the current leg, and the completed fraction of it.
     fn leg(&self) -> (usize, f64) {
         let mut left_m = self.pace.gone_m;
         for (leg, way_m) in self.ways_m.iter().enumerate() {
@@ -156,7 +156,7 @@ impl CarryPlan {
         self.length_m() - self.pace.gone_m < 1e-6
     }
 
-    /// Gives up, and comes to rest.
+    /// Gives up and lets the robots come to rest.
     fn stop(&mut self, why: String) {
         self.stopped.get_or_insert(why);
         if !matches!(self.stage, CarryStage::Resting { .. }) {
@@ -164,7 +164,7 @@ impl CarryPlan {
         }
     }
 
-    /// Returns the next command, after the reply to the one before.
+    /// Returns the next command after the reply to the previous one.
     pub fn advance(&mut self, session: &Session, last: Option<&CommandReply>) -> PlanAdvance {
         if let Some(reply) = last {
             self.left_steps = self.left_steps.saturating_sub(reply.executed_steps);
@@ -187,7 +187,7 @@ impl CarryPlan {
 }
 
 impl Session {
-    /// Begins a walk of robots, and what those hold that carry, to their places.
+    /// Starts a walk of robots, some of which carry or push a load, to their places.
     pub(super) fn carry_plan(&self, walk: &WalkTo) -> Result<CarryPlan, EpisodeError> {
         let carriers = walk.robots.iter().map(|entry| self.carrier(entry));
         Ok(CarryPlan::new(carriers.collect::<Result<_, _>>()?, walk.steps))
@@ -212,7 +212,7 @@ impl Session {
         })
     }
 
-    /// The next command, of so many steps.
+    /// Returns the next command, of `steps` control steps.
     fn next_moves(&self, plan: &mut CarryPlan, steps: u32) -> ActCall {
         let leg = plan.leg();
         let off_m: Vec<_> = plan.carriers.iter_mut().map(|carrier| self.off_path_m(carrier, leg)).collect();
@@ -244,15 +244,15 @@ impl Session {
         ActCall::MoveWrists(MoveWrists { steps, robots: robots.collect() })
     }
 
-    /// How far a robot is from where it is to be now, start frame: the mean of now and half a cycle ago, which
-    /// knows nothing of the pelvis' sway.
+    /// Returns the displacement from a robot to its planned place, in its start frame. It is the mean of
+    /// the current value and the one half a gait cycle ago, which cancels the sway of the pelvis.
     fn off_path_m(&self, carrier: &mut Carrier, leg: (usize, f64)) -> Vector2<f64> {
         let now_m = carrier.at(leg).at_m - self.stands_at(carrier.robot).at_m;
         0.5 * (now_m + carrier.before_m.replace(now_m).unwrap_or(now_m))
     }
 
-    /// The share of its pace at which a team goes on of which robots are `off_m` their path: 0 where one lags
-    /// too far, is turned away or does not reach what it holds.
+    /// Returns the fraction of the normal speed for a team whose robots are `off_m` from the path. It is
+    /// 0 if a robot lags too far, is turned away, or cannot reach its load.
     fn share_of_pace(&self, plan: &CarryPlan, off_m: &[Vector2<f64>]) -> f64 {
         let share = |off: f64, [slows, stops]: [f64; 2]| ((stops - off) / (stops - slows)).clamp(0.0, 1.0);
         plan.carriers.iter().zip(off_m).fold(1.0, |least, (carrier, off_m)| {
@@ -262,13 +262,13 @@ impl Session {
         })
     }
 
-    /// How far a robot is turned away from its path.
+    /// Returns the angle between a robot's heading and its planned heading.
     fn turned_rad(&self, carrier: &Carrier, leg: (usize, f64)) -> f64 {
         wrapped(carrier.at(leg).heading_rad - self.stands_at(carrier.robot).heading_rad).abs()
     }
 
-    /// The base command of a robot that is `off_m` its path, on which it goes on by so much of its way a
-    /// second: ahead, left, turning.
+    /// Returns the base command of a robot that is `off_m` from the path and advances on its leg by
+    /// `rate_1_s`: ahead, left, turning.
     fn velocity(
         &self,
         carrier: &Carrier,
@@ -285,7 +285,7 @@ impl Session {
         [own_m_s.x, own_m_s.y, turning.clamp(-TURN_RAD_S, TURN_RAD_S)]
     }
 
-    /// Why the robots go no further, if they do not.
+    /// Returns the reason why the robots must stop; `None` if they can continue.
     fn why_not_on(&self, reply: &CommandReply, plan: &mut CarryPlan) -> Option<String> {
         let leg = plan.leg();
         let carrying = plan.carriers.iter_mut().zip(&reply.robots).filter(|(carrier, _)| carrier.carries);
@@ -317,7 +317,8 @@ impl Session {
             .map(|why| format!("they stopped with what they hold: {why}; {}", self.how_far_off(plan)))
     }
 
-    /// Goes on to what comes after a command after which all `stand` or do not; whether nothing does.
+    /// Advances to the next stage after a command; `stand` is true if all robots stand. Returns true at
+    /// the end.
     fn is_done(&self, stand: bool, plan: &mut CarryPlan) -> bool {
         plan.stage = match plan.stage {
             CarryStage::OnWay if plan.is_at_end() => CarryStage::Correcting(0),
@@ -337,8 +338,8 @@ impl Session {
         false
     }
 
-    /// Whether a team that rests is to rest: at its places, or no nearer than it comes. Is sent once more
-    /// otherwise.
+    /// Returns true if a resting team has reached its places, or cannot get closer. Otherwise starts
+    /// another attempt.
     fn is_there(&self, plan: &mut CarryPlan) -> bool {
         let all_within = |most_m: f64, most_rad: f64| {
             plan.carriers.iter().all(|carrier| self.missing_to_end(carrier).is_within(most_m, most_rad))
@@ -376,12 +377,12 @@ fn hand_state(report: &RobotReport, side: Side) -> Option<HandState> {
 }
 
 impl Carrier {
-    /// Where it is to be after a share of one of its ways.
+    /// Returns the planned place after a fraction of one of the legs.
     fn at(&self, (leg, share): (usize, f64)) -> Stand {
         self.ways[leg].at(share)
     }
 
-    /// Goes on with this base command while its wrists go to where they are of one that stands at `stand`.
+    /// Returns a move with this base command, in which the wrists take their poses relative to `stand`.
     fn wrist_move(
         &self,
         stand: &Stand,
@@ -409,13 +410,13 @@ impl Carrier {
             left_quaternion_wxyz: quaternion_wxyz(Side::Left),
             right_position_m: position_m(Side::Right),
             right_quaternion_wxyz: quaternion_wxyz(Side::Right),
-            // One who has no partner gives way to nobody.
+            // Without a partner, the hands stay stiff.
             compliance_n_s_m: several.then_some(COMPLIANCE_N_S_M),
             ..base
         }
     }
 
-    /// The hand that has lost what it held, if one has.
+    /// Returns the hand that has lost its object, if there is one.
     fn lost(&mut self, report: &RobotReport) -> Option<Side> {
         Side::BOTH.into_iter().find(|side| {
             let grip = match side {

@@ -1,4 +1,4 @@
-//! `send_plan`: commands in order, each until its steps are done or until what it expects holds.
+//! `send_plan`: commands in sequence. Each runs until its steps are done, or until its expectation holds.
 
 use tandem_tools_spec::{CommandReply, PlanStep, PlannedCall, SendPlan, SpecError, Tool as _};
 
@@ -10,7 +10,7 @@ use crate::commands::Command;
 use crate::scoring::Phase;
 use crate::session::Session;
 
-/// The commands of a plan, and how far they have been carried out.
+/// The commands of a plan, with its progress.
 #[derive(Debug)]
 pub struct CommandList {
     steps: Vec<PlanStep>,
@@ -18,7 +18,7 @@ pub struct CommandList {
     current: Option<CurrentCommand>,
 }
 
-/// The command that is being carried out.
+/// The current command.
 #[derive(Debug)]
 enum CurrentCommand {
     Whole,
@@ -27,7 +27,11 @@ enum CurrentCommand {
 }
 
 impl Session {
-    /// Reads a plan. Commands that could not be carried out refuse it.
+    /// Reads a plan.
+    ///
+    /// # Errors
+    ///
+    /// A command that cannot be executed; the plan is then refused as a whole.
     pub(super) fn command_list(
         &self,
         plan: &SendPlan,
@@ -70,7 +74,7 @@ impl Session {
 }
 
 impl CommandList {
-    /// Returns the next command, after the reply to the one before.
+    /// Returns the next command after the reply to the previous one.
     pub fn advance(&mut self, session: &Session, last: Option<&CommandReply>, heard: bool) -> PlanAdvance {
         loop {
             let Some(step) = self.steps.get(self.index) else { return PlanAdvance::Done(None) };
@@ -98,16 +102,16 @@ impl CommandList {
         }
     }
 
-    /// True where the command that was made last asks for a short reply.
+    /// Returns true if the last command asks for a short reply.
     pub fn is_short(&self) -> bool {
         self.steps.get(self.index).or(self.steps.last()).is_some_and(|step| step.short)
     }
 }
 
-/// What comes of a command after a reply.
+/// Next step of a command after a reply.
 enum CommandProgress {
     Make(tandem_tools_spec::ActCall, CurrentCommand),
-    /// It is over; with a reason, the plan goes no further.
+    /// The end of the command; with a reason, the plan stops.
     Over(Option<String>),
 }
 
@@ -153,7 +157,7 @@ impl CurrentCommand {
 }
 
 impl PlanStage {
-    /// Returns the next command of a walk. A list of commands holds no list.
+    /// Returns the next command of a walk. Lists of commands are not nested.
     fn walk_on(&mut self, session: &Session, last: Option<&CommandReply>) -> PlanAdvance {
         match self {
             PlanStage::Walk(walk) => walk.advance(session, last),

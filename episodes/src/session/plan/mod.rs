@@ -1,7 +1,8 @@
-//! Several commands by one call. Each is made, counted and recorded by itself, so that a recording holds nothing of plans.
+//! Plans: several commands in one call. Each command is made, counted and recorded by itself, so a
+//! recording contains no plans.
 //!
-//! A [`PlanRun`] says which command is next, and is handed the reply to each. So a plan of the policy of all robots and one of an
-//! operator, whose commands go through the team's rounds, are the same.
+//! A [`PlanRun`] returns the next command and receives its reply. It serves both a plan of the policy of
+//! all robots, and one of an operator whose commands pass through the team's rounds.
 
 mod carry;
 mod commands;
@@ -26,23 +27,23 @@ use carry::CarryPlan;
 use commands::CommandList;
 use walk_to::WalkPlan;
 
-/// A plan under way.
+/// A plan in execution.
 #[derive(Debug)]
 pub struct PlanRun {
     stage: PlanStage,
     progress: PlanProgress,
-    /// True once another operator has said something.
+    /// True once another operator has sent a message.
     heard: bool,
-    /// Robot of the operator whose plan it is; `None` where one policy directs all.
+    /// Robot of the plan's operator; `None` for the policy of all robots.
     operator: Option<String>,
 }
 
-/// What comes next of a plan.
+/// Next step of a plan.
 #[derive(Debug)]
 pub enum PlanAdvance {
-    /// This command, whose reply goes to [`PlanRun::take`].
+    /// The next command; its reply is passed to [`PlanRun::take`].
     Make(ActCall),
-    /// Nothing, for this reason if not all was carried out.
+    /// The end, with the reason if the plan stopped early.
     Done(Option<String>),
 }
 
@@ -53,13 +54,13 @@ enum PlanStage {
     Carry(CarryPlan),
 }
 
-/// The part of a plan that has been carried out.
+/// The executed part of a plan.
 #[derive(Debug, Default)]
 struct PlanProgress {
     commands: u32,
     executed_steps: u32,
     last: Option<CommandReply>,
-    /// True where the last reply is to be a short one.
+    /// True if the last reply is to be short.
     is_short: bool,
 }
 
@@ -78,7 +79,8 @@ impl PlanRun {
         }
     }
 
-    /// Takes the reply to the last command. Returns why the plan goes no further, where the episode has ended.
+    /// Processes the reply to the last command. Returns the reason why the plan stops, if the episode has
+    /// ended.
     pub fn take(&mut self, reply: CommandReply) -> Option<String> {
         self.progress.commands += 1;
         self.progress.executed_steps += reply.executed_steps;
@@ -91,17 +93,17 @@ impl PlanRun {
         }
     }
 
-    /// Notes that another operator has said something.
+    /// Notes a message from another operator.
     pub fn hear(&mut self) {
         self.heard = true;
     }
 
-    /// True while no command has been carried out.
+    /// Returns true while no command has been executed.
     pub fn is_untouched(&self) -> bool {
         self.progress.commands == 0
     }
 
-    /// Returns the reply to a plan of which at least one command has been carried out.
+    /// Returns the reply to a plan with at least one executed command.
     fn reply(self, tool_calls: u32, stopped: Option<String>) -> Result<PlanReply, EpisodeError> {
         let PlanProgress { commands, executed_steps, last, is_short } = self.progress;
         let mut last = last.ok_or_else(|| SpecError::Invalid {
@@ -116,7 +118,7 @@ impl PlanRun {
 }
 
 impl Session {
-    /// Carries out a plan of the policy of all robots, or refuses all of it.
+    /// Executes a plan of the policy of all robots, or refuses it as a whole.
     pub(super) fn plan(&mut self, caller: CallerRecord, plan: &PlanCall) -> Result<PlanReply, EpisodeError> {
         let call = ToolCall::Plan(plan.clone());
         let run = self.begin_or_refuse(caller, &Called::from(call.clone()), plan)?;
@@ -131,8 +133,8 @@ impl Session {
         reply
     }
 
-    /// Begins a plan of an operator, whose commands are made with those of the others. A refusal is counted and recorded as that of any
-    /// call.
+    /// Starts a plan of an operator, whose commands are executed together with those of the others. A
+    /// refusal is counted and recorded like that of any call.
     pub fn begin_plan(&mut self, operator: &OperatorCall, plan: &PlanCall) -> Result<PlanRun, EpisodeError> {
         let arrival = self.arrival(|| KeptRequest::command(operator));
         let caller = CallerRecord::Operator(operator.robot());
@@ -146,7 +148,7 @@ impl Session {
         }
     }
 
-    /// Returns the reply to an operator's plan that goes no further, and shows it to onlookers.
+    /// Returns the reply to an operator's finished plan, and shows it to viewers.
     pub fn end_plan(
         &mut self,
         call: &Call,
@@ -191,7 +193,7 @@ impl Session {
             let stopped = match made.and_then(|answer| answer.reply(&Formats::default())) {
                 Ok(ToolReply::Act(reply)) => run.take(reply),
                 Ok(other) => Some(format!("{other:?} is no reply to a command")),
-                // What keeps the first command from being made refuses the plan.
+                // An error in the first command refuses the plan.
                 Err(error) if run.is_untouched() => return Err(error),
                 Err(error) => Some(error.to_string()),
             };
@@ -201,7 +203,7 @@ impl Session {
         }
     }
 
-    /// Shows the plan behind its commands to those who read what was asked.
+    /// Records the plan after its commands, for readers of the requests.
     fn tell_plan(
         &mut self,
         operator: Option<&str>,

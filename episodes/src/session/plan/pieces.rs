@@ -1,4 +1,4 @@
-//! A command that goes on until something holds, as commands of a tenth of a second.
+//! A command that runs until a condition holds, split into commands of a tenth of a second.
 
 use nalgebra::Isometry3;
 use tandem_sim::{HAND_JOINTS, Side, Sides};
@@ -26,10 +26,10 @@ enum PieceKind {
     Wrists(Vec<WristWay>),
 }
 
-/// The way of one robot's wrists and fingers, of which each piece is a part.
+/// Trajectory of one robot's wrists and fingers, split into the pieces.
 #[derive(Debug)]
 struct WristWay {
-    /// The move as it was given, with poses in `frame`.
+    /// The original move, with poses in `frame`.
     entry: WristMove,
     /// Start and end of each wrist with a target.
     wrists: Sides<Option<[Isometry3<f64>; 2]>>,
@@ -37,7 +37,11 @@ struct WristWay {
 }
 
 impl Pieces {
-    /// Reads the command; a piece of it that could not be carried out refuses it.
+    /// Reads the command.
+    ///
+    /// # Errors
+    ///
+    /// A piece that cannot be executed.
     pub fn new(call: &ActCall, session: &Session) -> Result<Pieces, EpisodeError> {
         let kind = match call {
             ActCall::Wait(_) => PieceKind::Wait,
@@ -82,7 +86,7 @@ impl Pieces {
 impl WristWay {
     fn new(entry: &WristMove, session: &Session) -> Result<WristWay, EpisodeError> {
         let motion = &session.motions[commands::find(&entry.robot, &session.motions)?];
-        // Hands that are carried stay as they are to the pelvis, others to the room.
+        // Carried hands move with the pelvis; others stay in the room.
         let frame = match entry.carried {
             Some(true) => PoseFrame::Pelvis,
             Some(false) | None => PoseFrame::Start,
@@ -108,7 +112,7 @@ impl WristWay {
         Ok(WristWay { entry: WristMove { frame: Some(frame), ..entry.clone() }, wrists, fingers_rad })
     }
 
-    /// Returns the move to this share of the way.
+    /// Returns the move to this fraction of the trajectory.
     fn until(&self, share: f64) -> WristMove {
         let wrist = |side: Side| {
             self.wrists[side].map(|[from, to]| from.try_lerp_slerp(&to, share, 1e-9).unwrap_or(to))

@@ -1,5 +1,5 @@
-//! `walk_to`: a row of short walks, each told anew from where the robot's own odometry has it, and short ones
-//! for what is missing once it stands.
+//! `walk_to`: a sequence of short walks, each computed from the robot's odometry, and corrections from
+//! its standing place at the end.
 
 use std::collections::VecDeque;
 
@@ -12,72 +12,74 @@ use crate::EpisodeError;
 use crate::commands;
 use crate::session::Session;
 
-/// Speed by what is missing, and the most of it: ahead, back, to the sides; turning.
+/// Gain from displacement to speed, and limits of the speed: ahead and back, to the sides, turning.
 const GAIN_1_S: f64 = 0.7;
 const AHEAD_M_S: f64 = 0.3;
 const ASIDE_M_S: f64 = 0.2;
 const TURN_RAD_S: f64 = 0.4;
-/// A robot this near to its place is let come to rest; it coasts a little. A waypoint is passed from farther
-/// off.
+/// Distance and angle to its place at which a robot is stopped, since it coasts a little; and the larger
+/// distance at which a waypoint counts as passed.
 const NEAR_M: f64 = 0.03;
 const NEAR_RAD: f64 = 0.04;
 const PASSED_M: f64 = 0.1;
-/// One that stands this near has arrived, and is sent once more until it is a little nearer.
+/// Tolerances of a standing robot: within the first it has arrived, but corrections continue until the
+/// second.
 pub const THERE_M: f64 = 0.015;
 pub const THERE_RAD: f64 = 0.026;
 pub const WELL_M: f64 = 0.013;
 pub const WELL_RAD: f64 = 0.023;
-/// How often a robot that has come to rest is sent once more, by a pulse where it is this near.
+/// Maximum number of further attempts after the first rest, and the tolerance within which a single pulse
+/// is used.
 pub const ATTEMPTS: u32 = 5;
 const PULSE_M: f64 = 0.1;
 const PULSE_RAD: f64 = 0.15;
-/// Commands for which all have stood: by then nothing sways any more.
+/// Number of commands with all robots standing, after which their sway has ended.
 pub const CALM_COMMANDS: u32 = 2;
-/// A robot that has not come nearer by this much in so many walks is held up.
+/// Minimum approach within this many walks; with less, the robot is blocked.
 const NEARER_M: f64 = 0.03;
 const PATIENCE_WALKS: u32 = 12;
 
-/// How a robot is to move next.
+/// Next motion of a robot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum WalkerStage {
     Walks,
-    /// It is to make up by one short walk for what is missing where it stands.
+    /// A short walk from its standing place to its goal.
     Corrects,
     Rests,
 }
 
-/// One robot on its way.
+/// A walking robot.
 #[derive(Debug)]
 struct Walker {
     name: String,
     robot: usize,
-    /// Where it is to go by and, at last, to come to rest.
+    /// Remaining waypoints, and the destination as the last.
     places: VecDeque<Stand>,
     stage: WalkerStage,
-    /// Where it was half a cycle ago, if it walked then.
+    /// Position half a gait cycle ago, if the robot walked then.
     before_m: Option<Vector2<f64>>,
-    /// The nearest that it has been, and walks since then.
+    /// Smallest distance to the goal, and the number of walks since then.
     nearest_m: f64,
     walks: u32,
     corrections: Corrections,
 }
 
-/// Robots on their way, each to a place of its own.
+/// Robots that walk, each to a place of its own.
 #[derive(Debug)]
 pub struct WalkPlan {
     walkers: Vec<Walker>,
-    /// Control steps that are left.
+    /// Remaining control steps.
     left_steps: u32,
-    /// Short walks from where robots came to rest.
+    /// Number of further attempts after rest.
     attempts: u32,
-    /// Commands in a row for which all have stood.
+    /// Number of consecutive commands with all robots standing.
     calm: u32,
-    /// True while the last command was a walk.
+    /// True if the last command was a walk.
     walks: bool,
 }
 
 impl WalkPlan {
-    /// Returns the next command, after the reply to the one before.
+    /// Returns the next command after the reply to the previous one.
     pub fn advance(&mut self, session: &Session, last: Option<&CommandReply>) -> PlanAdvance {
         if let Some(done) = last.and_then(|reply| self.after(session, reply)) {
             return done;
@@ -96,7 +98,7 @@ impl WalkPlan {
         })
     }
 
-    /// Takes the reply to a command; returns whether and why it was the last.
+    /// Processes the reply to a command. Returns the end of the plan if it was the last.
     fn after(&mut self, session: &Session, reply: &CommandReply) -> Option<PlanAdvance> {
         self.left_steps = self.left_steps.saturating_sub(reply.executed_steps);
         let stopped = |why: String| Some(PlanAdvance::Done(Some(why)));
@@ -128,7 +130,11 @@ impl WalkPlan {
 }
 
 impl Session {
-    /// Begins a walk, for which every robot has to be one of the episode's.
+    /// Starts a walk.
+    ///
+    /// # Errors
+    ///
+    /// A robot that the episode does not have.
     pub(super) fn walk_stage(&self, walk: &WalkTo) -> Result<PlanStage, EpisodeError> {
         if walk.robots.iter().any(|entry| entry.carry == Some(true)) {
             return self.carry_plan(walk).map(PlanStage::Carry);
@@ -152,7 +158,7 @@ impl Session {
         })
     }
 
-    /// Where a robot's odometry has it.
+    /// Returns the place of a robot by its odometry.
     pub(super) fn stands_at(&self, robot: usize) -> Stand {
         Stand::of(&self.present.robots[robot].sensed.start_from_pelvis)
     }
@@ -162,7 +168,7 @@ impl Session {
         now.missing_to(walker.places.back().unwrap_or(&now))
     }
 
-    /// How a robot is to walk next; `None` where it is to come to rest.
+    /// Returns the next walk of a robot; `None` if it is to stop.
     fn next_walk(&self, walker: &mut Walker) -> Option<WalkMove> {
         let now = self.stands_at(walker.robot);
         match walker.stage {
@@ -194,7 +200,7 @@ impl Session {
             walker.walks += 1;
         }
         let wanted_m_s = GAIN_1_S * off.way_m;
-        // The same part of every speed, so that the way stays straight.
+        // All speeds are scaled equally, so that the path stays straight.
         let most = (wanted_m_s.x.abs() / AHEAD_M_S).max(wanted_m_s.y.abs() / ASIDE_M_S).max(1.0);
         let turning_rad_s = (GAIN_1_S * off.turn_rad).clamp(-TURN_RAD_S, TURN_RAD_S);
         Some(walker.walk([wanted_m_s.x / most, wanted_m_s.y / most, turning_rad_s]))
@@ -206,14 +212,14 @@ impl Session {
     }
 }
 
-/// Whether no robot of the reply steps, as far as that is told.
+/// Returns true if no robot in the reply steps; robots without a base state do not count.
 pub fn all_stand(reply: &CommandReply) -> bool {
     let states = reply.robots.iter().map(|robot| robot.base.and_then(|base| base.state));
     states.flatten().all(|state| state == BaseState::Standing)
 }
 
 impl Walker {
-    /// Is sent once more from where it stands, if it is `off` its place.
+    /// Starts another attempt from the standing place, unless the robot is close enough to its goal.
     fn try_again(&mut self, off: &Missing) {
         (self.before_m, self.walks, self.nearest_m) = (None, 0, f64::INFINITY);
         self.stage = if off.is_within(WELL_M, WELL_RAD) {

@@ -1,4 +1,4 @@
-//! Places on the floor, and ways from one to another as of a rigid body.
+//! Places on the floor, and paths between them in the manner of a rigid body.
 
 use nalgebra::{Isometry3, Rotation2, Translation3, UnitQuaternion, Vector2, Vector3};
 use tandem_sim::{CONTROL_HZ, Pose};
@@ -6,45 +6,46 @@ use tandem_tools_spec::Destination;
 
 use crate::convert::isometry_from_sim;
 
-/// Control steps of one walk: about half a cycle of the gait. The pelvis sways from side to side once a cycle,
-/// so that the mean of two moments that are half a cycle apart knows nothing of it.
+/// Control steps of one walk, about half a gait cycle. The pelvis sways once a cycle, so the mean of two
+/// moments half a cycle apart is free of the sway.
 pub const WALK_STEPS: u32 = 13;
-/// A radian of a way is as long as so many metres.
+/// Length in metres that counts as much as a radian.
 const M_PER_RAD: f64 = 0.5;
-/// Short walks make up for this part of what others have missed, and for no more than so much.
+/// Fraction of earlier misses that a correction adds, and its limit.
 const MISSED_PART: f64 = 0.5;
 const MAX_MISS_M: f64 = 0.04;
 
-/// A place and a heading on the floor, in a start frame.
+/// A position and a heading on the floor, in a start frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Stand {
     pub at_m: Vector2<f64>,
     pub heading_rad: f64,
 }
 
-/// The way from one place to another, as a rigid body goes that turns and shifts at constant rates:
+/// Path between two places of a rigid body that turns and shifts at constant rates:
 ///   p(s) = p_0 + R_0 V(s w) s v,   V(a) = [sin a, -(1 - cos a); 1 - cos a, sin a] / a,   s in 0..=1.
-/// v is chosen so that p(1) is the other place. Each point of that body goes along such a way with the same w.
+/// v is chosen so that p(1) is the other place. Each point of the body moves along such a path with the
+/// same w.
 #[derive(Clone, Copy, Debug)]
 pub struct Way {
     from: Stand,
-    /// v and w, for the whole way.
+    /// v and w, for the whole path.
     pub shift_m: Vector2<f64>,
     pub turn_rad: f64,
 }
 
-/// What is missing from one place to another: [ahead, left] as one faces there, and the angle.
+/// Displacement from one place to another: [ahead, left] in the first one's heading, and the angle.
 pub struct Missing {
     pub way_m: Vector2<f64>,
     pub turn_rad: f64,
 }
 
-/// Short walks of a robot that make up for what is missing where it stands. Each also makes up for what the
-/// ones before it missed ahead or back: a robot that steps leans otherwise than one that stands, and would come
-/// to rest behind its place again and again.
+/// Short walks that correct a robot's place. Each also adds to the misses of earlier ones ahead or back.
+/// A stepping robot leans differently from a standing one, and would otherwise stop behind its place
+/// every time.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Corrections {
-    /// `None` before the first.
+    /// Accumulated miss; `None` before the first correction.
     missed_ahead_m: Option<f64>,
 }
 
@@ -55,7 +56,7 @@ impl Stand {
         Stand { at_m: pelvis.translation.vector.xy(), heading_rad: ahead.y.atan2(ahead.x) }
     }
 
-    /// The places of one that stands here: waypoints, and the destination.
+    /// Returns the places of a destination for a robot that stands here: its waypoints, then the destination.
     pub fn places(&self, entry: &Destination) -> Vec<Stand> {
         let mut heading_rad = self.heading_rad;
         let waypoints =
@@ -83,19 +84,19 @@ impl Stand {
 }
 
 impl Missing {
-    /// Whether it is no more than this.
+    /// Returns true if distance and angle are at most these.
     pub fn is_within(&self, most_m: f64, most_rad: f64) -> bool {
         self.way_m.norm() <= most_m && self.turn_rad.abs() <= most_rad
     }
 
-    /// What is missing to the place of the robot `name`, in words.
+    /// Describes the displacement of the robot `name` from its place.
     pub fn told(&self, name: &str) -> String {
         format!("{name} is {:.3} m and {:.3} rad off its place", self.way_m.norm(), self.turn_rad.abs())
     }
 }
 
 impl Corrections {
-    /// The base command that makes up in [`WALK_STEPS`] for what is missing now: ahead, left, turning.
+    /// Returns the base command that corrects the displacement in [`WALK_STEPS`]: ahead, left, turning.
     pub fn pulse(&mut self, missing: &Missing) -> [f64; 3] {
         let [ahead_m, left_m]: [f64; 2] = missing.way_m.into();
         let missed_m = self.missed_ahead_m.map_or(0.0, |missed_m| missed_m + MISSED_PART * ahead_m);
@@ -115,12 +116,12 @@ impl Way {
         Way { from, shift_m, turn_rad }
     }
 
-    /// Its length, a turn's in metres as [`M_PER_RAD`] has it.
+    /// Returns the length, with a turn converted by [`M_PER_RAD`].
     pub fn length_m(&self) -> f64 {
         self.shift_m.norm().max(M_PER_RAD * self.turn_rad.abs())
     }
 
-    /// The place after a share of it.
+    /// Returns the place after a fraction of the path.
     pub fn at(&self, share: f64) -> Stand {
         let angle = share * self.turn_rad;
         let (sine, versine) = if angle.abs() < 1e-6 {
@@ -137,7 +138,7 @@ impl Way {
     }
 }
 
-/// The same angle from -pi to pi.
+/// Wraps an angle to the range from -pi to pi.
 pub fn wrapped(angle_rad: f64) -> f64 {
     (angle_rad + std::f64::consts::PI).rem_euclid(2.0 * std::f64::consts::PI) - std::f64::consts::PI
 }
@@ -152,11 +153,11 @@ mod tests {
         Stand { at_m: Vector2::new(x_m, y_m), heading_rad }
     }
 
-    /// Two robots that face each other across a load, each with a start frame of its own: all along their ways
-    /// they are where they were to each other.
+    /// Two robots face each other across a load, each with its own start frame. Their relative pose stays
+    /// constant along their paths.
     #[test]
     fn robots_whose_places_fit_go_as_one_body() {
-        // The start frame of B in that of A, and where B stands as A stands.
+        // The start frame of B in that of A, and the place of B relative to A.
         let a_from_b = stand(1.3, 0.1, 2.9).start_from_stand();
         let stand_from_partner = stand(1.2, 0.05, PI).start_from_stand();
         let b_of = |a: &Stand| {
@@ -180,7 +181,7 @@ mod tests {
         assert!((straight.at(0.5).at_m - Vector2::new(0.5, 1.0)).norm() < 1e-9, "{straight:?}");
     }
 
-    /// A robot whose every short walk ends 1.5 cm behind comes nearer with each.
+    /// A robot whose every correction ends 1.5 cm behind gets closer with each.
     #[test]
     fn short_walks_make_up_for_what_they_miss() {
         let mut corrections = Corrections::default();

@@ -1,5 +1,4 @@
-//! An episode that another process has played, or this one before it put the episode aside, brought to where it
-//! stood.
+//! Restoration of an episode that another process, or this one, has put aside.
 
 use std::time::Duration;
 
@@ -15,22 +14,25 @@ use crate::session::journal::{JournalEntry, KeptRequest};
 use crate::session::{Audience, Caller, Clock, Request, RunFolder, Session, this_build};
 use crate::spec::EpisodeSpec;
 
-/// What an episode is brought back from.
+/// Inputs of the restoration of an episode.
 pub struct BringBack {
     pub spec: EpisodeSpec,
-    /// Where it is recorded from its beginning on.
+    /// Folder of the recording, which starts from the beginning.
     pub folder: Option<RunFolder>,
     pub entries: Vec<JournalEntry>,
-    /// The policy's wall clock from the last entry on.
+    /// The policy's wall clock after the last entry.
     pub clock: Clock,
-    /// How long the policy has been thinking since then.
+    /// The policy's thinking time since then.
     pub thinking: Duration,
     pub onlookers: Box<dyn Onlookers>,
 }
 
 impl Session {
-    /// Plays an episode again up to the last entry of its journal, and goes on from there. An error says where
-    /// it went another way.
+    /// Repeats an episode up to the last entry of its journal, and continues from there.
+    ///
+    /// # Errors
+    ///
+    /// The step at which the repetition differs.
     pub fn bring_back(back: BringBack) -> Result<Session, EpisodeError> {
         let BringBack { spec, folder, entries, clock, thinking, onlookers } = back;
         let hands = SetHands::default();
@@ -51,13 +53,13 @@ impl Session {
         session.caught_up();
         hands.pass(thinking);
         hands.go();
-        // The clock goes from this look on.
+        // The clock runs from this reading on.
         session.clock.thinking();
         session.keep_journal();
         Ok(session)
     }
 
-    /// Leaves pictures and files to the recorder, since nobody waits for an answer.
+    /// Leaves images and files to the recorder, since no caller waits for a reply.
     fn catch_up(&mut self) {
         self.observer.draw_for_recording(&self.origin.spec, &self.world);
         if let Some(files) = &mut self.files {
@@ -75,7 +77,7 @@ impl Session {
 }
 
 impl KeptRequest {
-    /// Asks it again. What was refused is refused again, so that a refusal is no error.
+    /// Repeats the request. A refused request is refused again, so a refusal is no error.
     fn ask(self, session: &mut Session) -> Result<(), EpisodeError> {
         match self {
             KeptRequest::Call { operator, shown, tool, arguments } => {
@@ -100,7 +102,7 @@ impl KeptRequest {
     }
 }
 
-/// Reads the arguments of a request.
+/// Parses the arguments of a request.
 fn read(arguments: &str) -> Result<Value, EpisodeError> {
     Ok(serde_json::from_str(arguments).map_err(OutputError::from)?)
 }

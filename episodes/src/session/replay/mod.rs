@@ -1,4 +1,4 @@
-//! A recorded episode played again: call by call, with the policy's clock as it was charged.
+//! Replay of a recorded episode: call by call, with the policy's clock as it was charged.
 
 mod bring_back;
 mod set_clock;
@@ -18,7 +18,7 @@ use crate::spec::{EpisodeSpec, MomentStart, Start};
 pub use bring_back::BringBack;
 use set_clock::SetHands;
 
-/// An episode under way for the second time.
+/// An episode being replayed.
 pub struct Replay {
     session: Session,
     /// The policy's clock.
@@ -26,8 +26,8 @@ pub struct Replay {
 }
 
 impl Replay {
-    /// Takes the episode `spec` to where its policy took over. Where it did not begin at its task's own beginning, `begin` is
-    /// the checkpoint that it began with, of the recording at `path`.
+    /// Brings the episode `spec` to the state in which its policy took over. `begin` is the checkpoint
+    /// with which it started, from the recording at `path`; `None` for the task's own start.
     pub fn start(
         spec: &EpisodeSpec,
         begin: Option<&RecordedCheckpoint>,
@@ -38,7 +38,7 @@ impl Replay {
         if let Some(begin) = begin {
             session.resume(&Checkpoint::from_bytes(&begin.bytes, path)?)?;
         } else if spec.start != Start::Task {
-            // What it names may be anything, and may begin elsewhere in its turn.
+            // The file it names is not trusted, and its episode may start from yet another file.
             return Err(CheckpointError::NoBeginning { path: path.into() }.into());
         }
         session.requests = None;
@@ -50,7 +50,7 @@ impl Replay {
         Ok(Replay { session, hands })
     }
 
-    /// Makes a call that was made when the policy had thought for as long as `thought`; `shown` as [`crate::RecordedCall`] has it.
+    /// Repeats a call at the policy's thinking time `thought`; `shown` is that of [`crate::RecordedCall`].
     pub fn call(
         &mut self,
         called: &Called,
@@ -62,12 +62,16 @@ impl Replay {
         self.session.make(caller, called).map(drop)
     }
 
-    /// The hashes of the states since they were last taken, the first of all included.
+    /// Takes the state hashes since they were last taken, including that of the first state.
     pub fn take_hashes(&mut self) -> Vec<u64> {
         self.session.hashes.as_mut().map(std::mem::take).unwrap_or_default()
     }
 
-    /// The checkpoint of a recorded episode at a moment of it, up to which it is played again; it has to go as it was recorded.
+    /// Replays a recorded episode up to a moment and returns a checkpoint of it.
+    ///
+    /// # Errors
+    ///
+    /// An unreadable recording, or a replay that differs from it.
     pub fn checkpoint_at(start: &MomentStart) -> Result<Checkpoint, EpisodeError> {
         let MomentStart { recording: path, control_step, .. } = start;
         let recording = Recording::read(path).map_err(unreadable)?;
@@ -78,7 +82,7 @@ impl Replay {
             if call.time_s > until_s {
                 break;
             }
-            // A call that was refused is refused again.
+            // A refused call is refused again.
             let called = Called::parse(&call.tool, call.arguments)?;
             let _ = replay.call(&called, call.thought, call.shown.as_deref());
         }
@@ -95,7 +99,7 @@ impl Replay {
         }
     }
 
-    /// The result as it stands, and whether the episode has ended by itself.
+    /// Returns the current result, and true if the episode has ended by itself.
     pub fn result(&self) -> (ResultReply, bool) {
         (self.session.result(), self.session.ended.is_some())
     }

@@ -1,4 +1,4 @@
-//! A clock that shows what it is told while an episode is played again, and then goes on by itself.
+//! A clock that is set during a replay, and runs by itself afterwards.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, OnceLock};
@@ -6,16 +6,16 @@ use std::time::Duration;
 
 use crate::session::Clock;
 
-/// The hands of a clock that stands until it is told to go on.
+/// Setter of a clock, which is stopped until [`SetHands::go`].
 #[derive(Clone, Default)]
 pub struct SetHands {
     shown_ns: Arc<AtomicU64>,
-    /// Whether it goes.
+    /// Set once the clock runs.
     goes: Arc<OnceLock<()>>,
 }
 
 impl SetHands {
-    /// The clock with these hands, which runs as `running` does once it goes.
+    /// Returns the clock controlled by this setter. Once it runs, it advances like `running`.
     pub fn clock(&self, running: Clock) -> Clock {
         let hands = self.clone();
         let since = OnceLock::new();
@@ -28,12 +28,12 @@ impl SetHands {
         })
     }
 
-    /// Turns the hands on by this much.
+    /// Advances the stopped clock.
     pub fn pass(&self, passed: Duration) {
         self.shown_ns.fetch_add(u64::try_from(passed.as_nanos()).unwrap_or(u64::MAX), Relaxed);
     }
 
-    /// Lets the clock go on from what it shows when it is next looked at.
+    /// Starts the clock from its current time at its next reading.
     pub fn go(&self) {
         self.goes.get_or_init(|| ());
     }

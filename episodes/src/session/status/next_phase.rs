@@ -1,4 +1,4 @@
-//! Explains the next phase: says part by part what it still lacks.
+//! Explanation of the next phase: the parts of its conditions that do not hold.
 
 use tandem_tools_spec::NextPhase;
 
@@ -10,8 +10,7 @@ use crate::tasks::{PhaseCondition, PhaseSetting, Task};
 const KEPT_BACK: &str = "what else it asks for depends on what the seed has chosen, and is not told";
 
 impl Session {
-    /// Returns the phase that is to be reached next, and what it lacks. `None` where phases are not told,
-    /// and after the last.
+    /// Returns the next phase and what it lacks. `None` after the last phase, or if phases are not disclosed.
     pub(in crate::session) fn next_phase(&self) -> Option<NextPhase> {
         if !self.spec().disclosure.tells(self.ended.is_some()) {
             return None;
@@ -29,7 +28,7 @@ fn lacks(task: &'static Task, index: usize, memory: &PhaseMemory, facts: &Facts)
     let told = |number: usize| told_parts(task, index, number);
     let missing = |number: usize| told(number).flat_map(|part| part.lacks(facts)).collect::<Vec<_>>();
     let keeps_back = |number: usize| told(number).count() < conditions[number].parts.len();
-    // How long a condition holds says whether those parts of it hold that are kept back.
+    // The duration would reveal whether withheld parts of the condition hold.
     let lasts = |number: usize, since_s: Option<f64>| {
         let PhaseCondition { for_s, truth, .. } = &conditions[number];
         let told = (!keeps_back(number)).then(|| lasting(*for_s, since_s, truth.holds(facts), facts));
@@ -68,8 +67,8 @@ fn lacks(task: &'static Task, index: usize, memory: &PhaseMemory, facts: &Facts)
     found
 }
 
-/// Returns the parts of a condition that are the same whatever the seed chooses. No other may be read by a
-/// robot's operator.
+/// Returns the parts of a condition that do not depend on the seed's choice. An operator of a robot may
+/// read no others.
 fn told_parts(
     task: &'static Task,
     phase: usize,
@@ -89,7 +88,7 @@ fn after(when: &str, lacks: Vec<String>) -> impl Iterator<Item = String> {
     lacks.into_iter().map(move |lack| format!("{when}: {lack}"))
 }
 
-/// Returns how long a condition still has to hold without a break.
+/// Returns the remaining duration for which a condition must hold without interruption.
 fn lasting(for_s: f64, since_s: Option<f64>, holds: bool, facts: &Facts) -> Option<String> {
     let held_s = since_s.filter(|_| holds).map_or(0.0, |since_s| facts.time_s - since_s);
     (for_s > 0.0).then(|| format!("that has to hold for {for_s} s without a break: so far {held_s:.2} s"))
@@ -152,7 +151,7 @@ mod tests {
         assert!(held.ends_with("so far 0.20 s"), "{held}");
     }
 
-    /// On which pad the bottle belongs only A is told; C reads what the phase lacks, too.
+    /// Only A knows the pad for the bottle, but C also reads what the phase lacks.
     #[test]
     fn what_the_seed_chooses_is_kept_back() {
         let relay = TaskSet::default().find("relay").unwrap();

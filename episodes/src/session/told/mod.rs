@@ -1,5 +1,5 @@
-//! What a policy is told of what was measured. What its assistance withholds is taken out of every reply here and nowhere else, and
-//! what the benchmark's own policies are not shown is counted by what it is and by the robot that it is of.
+//! Information for a policy. What its assistance withholds is removed from every reply here and nowhere
+//! else. Information beyond the benchmark's own policies is counted by kind and by robot.
 
 mod short;
 
@@ -20,47 +20,48 @@ use crate::EpisodeError;
 use crate::commands::{Allowed, Called};
 use crate::observation::TeamObservation;
 
-/// How many replies showed what the benchmark's own policies are not shown.
+/// Number of replies with information beyond the benchmark's own policies.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct ShownInformation(BTreeMap<ExtraInformation, BTreeMap<String, u32>>);
 
 impl ShownInformation {
-    /// What was shown, by name.
+    /// Returns the names of the information shown.
     pub fn names(&self) -> Vec<String> {
         self.0.keys().map(|what| what.name().into()).collect()
     }
 
-    /// How many replies showed it, by name and robot.
+    /// Returns the number of replies with each kind of information, by name and robot.
     pub fn replies(&self) -> BTreeMap<String, BTreeMap<String, u32>> {
         self.0.iter().map(|(what, robots)| (what.name().into(), robots.clone())).collect()
     }
 
-    /// Counts that an observation has shown all this of every robot in it.
+    /// Counts an observation that has shown all of `shown` for every robot in it.
     pub fn count_each(&mut self, shown: &[ExtraInformation], seen: &TeamObservation) {
         for robot in &seen.robots {
             shown.iter().for_each(|what| self.count(*what, &robot.state.robot));
         }
     }
 
-    /// Counts that a reply has shown `what` of `robot`.
+    /// Counts a reply that has shown `what` of `robot`.
     fn count(&mut self, what: ExtraInformation, robot: &str) {
         *self.0.entry(what).or_default().entry(robot.into()).or_default() += 1;
     }
 
-    /// Counts what an answer shows from which nothing is to be withheld any more; an observation is in the formats of its call.
+    /// Counts the information in an answer from which everything withheld has been removed. An
+    /// observation is in the formats of its call.
     pub fn count_answer(&mut self, answer: &Answer, formats: &Formats, protocol: Protocol) {
         match answer {
             Answer::Observation(seen) => self.count_seen(seen, formats),
             Answer::Reply(reply) => match &**reply {
                 ToolReply::Act(reply) => reply.robots.iter().for_each(|report| self.count_report(report)),
-                // Its commands have been counted one by one.
+                // The commands have been counted one by one.
                 ToolReply::Plan(_) => {}
                 ToolReply::Look(LookReply::GetRobotState(state)) => self.count_state(state),
-                // Agents of the benchmark have it, its learned policies have not.
+                // Agents of the benchmark have this information; its learned policies do not.
                 ToolReply::Look(LookReply::QueryDepth(depth)) if protocol == Protocol::Benchmark => {
                     self.count(ExtraInformation::PixelDepth, &depth.robot);
                 }
-                // Of no robot alone.
+                // The information belongs to no single robot.
                 ToolReply::Manage(ManageReply::GetStatus(status)) if status.next_phase.is_some() => {
                     status
                         .fallen
@@ -76,7 +77,7 @@ impl ShownInformation {
         }
     }
 
-    /// As [`ShownInformation::count_answer`], of an observation.
+    /// Counts the information in an observation.
     fn count_seen(&mut self, seen: &TeamObservation, formats: &Formats) {
         for robot in &seen.robots {
             self.count_state(&robot.state);
@@ -96,7 +97,7 @@ impl ShownInformation {
         self.count_those(&shown, &state.robot);
     }
 
-    /// As of an answer that shows all of a robot's state.
+    /// Counts the information in an answer that shows all of a robot's state.
     pub fn count_whole_state(&mut self, robot: &str) {
         let shown = [
             ExtraInformation::JointVelocities,
@@ -125,14 +126,14 @@ impl ShownInformation {
 }
 
 impl Answer {
-    /// The answer as a policy of this assistance is told it.
+    /// Returns the answer as a policy with this assistance receives it.
     pub fn told(&self, assistance: Assistance) -> Answer {
         let mut told = self.clone();
         told.withhold(assistance);
         told
     }
 
-    /// Takes out what a policy of this assistance is not told.
+    /// Removes the information withheld from a policy with this assistance.
     fn withhold(&mut self, assistance: Assistance) {
         match (assistance, self) {
             (Assistance::Full, _) => {}
@@ -143,7 +144,7 @@ impl Answer {
                 ToolReply::Look(LookReply::GetRobotState(state)) => withhold_state(state),
                 ToolReply::Look(LookReply::Observe(seen)) => seen.states.iter_mut().for_each(withhold_state),
                 ToolReply::Look(LookReply::CheckReach(reach)) => reach.needs_a_step = false,
-                // What is asked about a pixel, and how the episode stands, which is told as it is to be.
+                // The reply to a query of pixels, and the status, which is already in the policy's form.
                 ToolReply::Look(LookReply::QueryDepth(_)) | ToolReply::Manage(_) | ToolReply::Talk(_) => {}
             },
         }
@@ -154,7 +155,7 @@ fn withhold_seen(seen: &mut TeamObservation) {
     seen.robots.iter_mut().for_each(|robot| withhold_state(&mut robot.state));
 }
 
-// Written without `..`, so that the compiler asks of a new field whether it is told.
+// The patterns have no `..`, so the compiler reports every new field.
 
 fn withhold_state(state: &mut RobotState) {
     let RobotState {
@@ -183,7 +184,7 @@ fn withhold_report(reply: &mut CommandReply) {
         time_s: _,
         robots,
         fallen,
-        // These are told as the disclosure has it.
+        // Already in the form of the disclosure.
         phases: _,
         budget: _,
     } = reply;
@@ -234,12 +235,12 @@ fn withhold_hand(hand: &mut HandReport) {
 }
 
 impl Session {
-    /// Checks that no caller's call shows what the episode withholds.
+    /// Checks that no caller's call shows withheld information.
     pub(super) fn allow<'a>(&self, called: &'a Called) -> Result<Allowed<'a>, EpisodeError> {
         called.allowed(|tool| self.check_told(tool))
     }
 
-    /// Refuses a call that would show what the policy is not told.
+    /// Refuses a call that would show withheld information.
     pub(super) fn check_told(&self, call: &ToolCall) -> Result<(), EpisodeError> {
         let refused = |reason: &str| {
             EpisodeError::Spec(SpecError::Invalid { tool: call.name(), reason: reason.into() })

@@ -1,18 +1,18 @@
-//! Replies as a language model wants to read them: without what is as it should be.
+//! Short replies for language models: without everything that is as expected.
 
 use tandem_tools_spec::{
     BaseMotion, CommandReply, FingerReport, Grip, HandReport, HandState, LookReply, ManageReply, Pose,
     RobotReport, RobotState, StatusReply, ToolReply,
 };
 
-/// What is less is not worth a word: metres and radians, newtons, the share of a joint's effort.
+/// Minimum values that are reported: metres and radians, newtons, the fraction of a joint's effort limit.
 const MOVED: f64 = 0.01;
 const FELT_N: f64 = 1.0;
-/// What an arm that hangs free may feel of its own friction.
+/// Force that the friction of a free arm may cause.
 const HANGING_N: f64 = 6.0;
 const HARD_SHARE: f64 = 0.8;
 
-/// Takes out of a reply what its caller can do without.
+/// Removes from a reply the parts that its caller can do without.
 pub fn shorten(reply: &mut ToolReply) {
     match reply {
         ToolReply::Act(reply) => shorten_report(reply),
@@ -32,7 +32,7 @@ fn shorten_state(state: &mut RobotState) {
     (state.joint_velocities_rad_s, state.joint_torques_n_m) = (None, None);
 }
 
-/// As [`shorten`], of the reply to a command.
+/// Shortens the reply to a command like [`shorten`].
 pub fn shorten_report(reply: &mut CommandReply) {
     reply.fallen.retain(|robot| robot.fallen);
     for RobotReport { left, right, base_motion, pelvis_in_start, .. } in &mut reply.robots {
@@ -42,7 +42,7 @@ pub fn shorten_report(reply: &mut CommandReply) {
                 .all(|part| part.abs() < MOVED)
         };
         *base_motion = base_motion.filter(|motion| !is_small(motion));
-        // One that has not left its place is where it was when the episode began.
+        // A robot that has not moved is where it was when the episode began.
         pelvis_in_start.take_if(|pelvis| is_at_start(pelvis));
         shorten_hand(left);
         shorten_hand(right);
@@ -111,7 +111,7 @@ mod tests {
         assert!(presses.get("largest_effort").is_none(), "{presses}");
         let blocked = left(hand("blocked", 9.0));
         assert_eq!((&blocked["position_error_m"], &blocked["target"]), (&json!(0.02), &json!(null)));
-        // Where nothing says that a hand is where it should be, it is told where it is.
+        // Without a state that says that the hand is at its target, its pose is reported.
         let untold = left(HandReport { state: None, ..hand("idle", 0.0) });
         assert!(untold["measured"].is_object() && untold["position_error_m"].is_number(), "{untold}");
     }

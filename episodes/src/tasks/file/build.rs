@@ -1,4 +1,5 @@
-//! From a task's table to the task: everything is looked up, and all mistakes are found, not only the first.
+//! Construction of a [`Task`] from its TOML table: resolves every name and collects all mistakes, not
+//! only the first.
 
 use std::ops::RangeInclusive;
 use std::sync::{Arc, OnceLock};
@@ -20,20 +21,20 @@ use crate::tasks::{ChosenOption, ObjectSpot, Offset, RobotSpot, Task, TaskOrigin
 
 const MAX_OBJECTS: usize = 64;
 const MAX_PHASES: usize = 12;
-/// Robots that begin nearer to each other touch.
+/// Minimum distance between the robots' start positions: robots that start closer touch each other.
 const ROBOT_NAMES_APART_M: f64 = 0.35;
-/// Nothing is farther away than this.
+/// Largest absolute value of a coordinate.
 const FARTHEST_M: f64 = 100.0;
 const DEFAULT_BENCHMARK_STEPS: u32 = 1000;
-/// The agentic protocol's of the benchmark.
+/// The benchmark's budget under the agentic protocol.
 const DEFAULT_AGENTIC_STEPS: u32 = 6000;
 const DEFAULT_THINKING_S: u32 = 1800;
-/// Before a policy's first call robots stand still for 300 steps.
+/// The minimum leaves room for the 300 steps for which robots stand still before a policy's first call.
 const AGENTIC_STEPS_ALLOWED: RangeInclusive<u32> = 400..=200_000;
 const BENCHMARK_STEPS_ALLOWED: RangeInclusive<u32> = 50..=200_000;
 const THINKING_S_ALLOWED: RangeInclusive<u32> = 1..=1_000_000;
 
-/// The MJCF files that a task's file names.
+/// Returns the names of the MJCF files that a task file refers to.
 pub(super) fn files_beside(source: &TaskSource) -> Result<Vec<String>, TaskFileError> {
     let table = parse(source)?;
     let named = table.scene.into_iter().chain(table.objects.into_iter().filter_map(|object| object.file));
@@ -52,7 +53,8 @@ fn is_file(name: &str) -> bool {
     name.ends_with(".xml")
 }
 
-/// The task that a source says: before anything is chosen, where it has choices, with the others as its variants.
+/// Returns the task that a source describes. For a file with choices this is the undecided task, with one
+/// variant for each combination of options.
 pub(super) fn task(source: &TaskSource, xxh3: &str) -> Result<&'static Task, TaskFileError> {
     let table = parse(source)?;
     let mut reading = Reading::new(source, &[]);
@@ -87,12 +89,12 @@ pub(super) fn task(source: &TaskSource, xxh3: &str) -> Result<&'static Task, Tas
         chosen: Vec::new(),
         ..one_way(source, xxh3, ways(&choices).swap_remove(0), &variants)?
     };
-    // Nobody else has seen it yet.
+    // No other thread has access to the task yet.
     let _ = variants.set(made);
     Ok(leaked(undecided))
 }
 
-/// The task where this has been chosen.
+/// Builds the task for one combination of options.
 fn one_way(
     source: &TaskSource,
     xxh3: &str,
@@ -113,7 +115,7 @@ fn leaked(task: Task) -> &'static Task {
 }
 
 impl Reading<'_> {
-    /// Returns the task without its source. `None` where it cannot be made.
+    /// Returns the task without its source; `None` if it cannot be built.
     fn task(&mut self, table: TaskTable) -> Option<Task> {
         self.id(&table.id, "the task");
         self.words(&table.instruction);
@@ -169,14 +171,14 @@ impl Reading<'_> {
         *given.as_ref()
     }
 
-    /// Numbers that a place or an angle can have.
+    /// Checks that coordinates or angles are finite and within `most_value` of zero.
     fn finite<T>(&mut self, given: &Spanned<T>, values: &[f64], most_value: f64) {
         if values.iter().any(|value| !value.is_finite() || value.abs() > most_value) {
             self.wrong(given.span(), format!("a number here is at most {most_value} either way"));
         }
     }
 
-    /// What messages call the scene, and its text if it is not one that the binary carries.
+    /// Returns the scene's display name for messages, and its MJCF unless the scene is built in.
     fn scene(&mut self, table: &TaskTable) -> Option<(&'static str, Option<&'static str>)> {
         let (at, (name, mjcf)) = match (&table.scene, &table.scene_mjcf) {
             (Some(name), None) => (name.span(), self.named(name, assets::scene)?),
@@ -204,7 +206,7 @@ impl Reading<'_> {
         Some((name, mjcf))
     }
 
-    /// What a name of a scene or an object stands for: a file beside the task's, or one that the binary carries.
+    /// Resolves the name of a scene or an object: a file beside the task file, or one embedded in the binary.
     fn named(
         &mut self,
         name: &Spanned<String>,
@@ -230,7 +232,8 @@ impl Reading<'_> {
         }
     }
 
-    /// MJCF that stands in the task's file itself. Lines are put before it, so that its mistakes are told by the lines of that.
+    /// Returns inline MJCF from the task file. Padding lines before it make its mistakes carry the task
+    /// file's line numbers.
     fn inline(&self, text: &Spanned<String>) -> (&'static str, Option<&'static str>) {
         let mjcf = text.as_ref();
         let at = place_in_file(&self.source.text, text);
@@ -266,7 +269,7 @@ impl Reading<'_> {
                 }
             }
         }
-        // What follows knows robots by the names that they ought to have.
+        // Later checks refer to robots by their expected names.
         let spot = |(robot, name): (&RobotTable, &'static str)| RobotSpot {
             name,
             position_m: robot.position_m.as_ref().map(|value| value as f32),
@@ -387,7 +390,7 @@ fn angle_rad(given: Option<&Spanned<f64>>) -> f32 {
     given.map_or(0.0, |given| rad(*given.as_ref()))
 }
 
-/// Degrees, as they are written, in radians.
+/// Converts degrees, as the file gives them, to radians.
 fn rad(angle_deg: f64) -> f32 {
     angle_deg.to_radians() as f32
 }

@@ -1,5 +1,5 @@
-//! What the seed chooses in a task's file: `{name}` in its texts stands for the option. A file with choices is as many tasks as there
-//! are ways to choose, all of one id and one hash.
+//! The seed's choices in a task file: each `{name}` in its texts is replaced by an option. A file with
+//! choices yields one task for each combination of options, all with one id and one hash.
 
 use toml::Spanned;
 
@@ -8,17 +8,17 @@ use super::reading::Reading;
 use super::table::ChoiceTable;
 use crate::tasks::ChosenOption;
 
-/// A task is made for each way to choose.
+/// Maximum number of combinations, each of which becomes a task.
 const MAX_COMBINATIONS: usize = 64;
 
-/// A choice as its file has it.
+/// A choice as the file declares it.
 pub(super) struct Choice {
     name: String,
     options: Vec<String>,
 }
 
 impl Reading<'_> {
-    /// The choices of a file; what is wrong with them is found here.
+    /// Returns the choices of a file and records their mistakes.
     pub fn choices(&mut self, tables: Vec<ChoiceTable>) -> Vec<Choice> {
         let mut found: Vec<Choice> = Vec::new();
         for table in tables {
@@ -51,7 +51,7 @@ impl Reading<'_> {
         found
     }
 
-    /// An option stands between quotes of TOML and of expressions alike.
+    /// Checks an option, which must be valid inside the quotes of both TOML and expressions.
     fn option(&mut self, option: &Spanned<String>, before: &[Spanned<String>]) {
         let text = option.as_ref();
         if text.is_empty() || text.contains(['"', '\'', '\\', '{', '}']) || text.contains(char::is_control) {
@@ -64,7 +64,7 @@ impl Reading<'_> {
     }
 }
 
-/// Every way to choose, in the order of the options; the last choice changes first.
+/// Returns every combination of options in the order of the options; the last choice varies fastest.
 pub(super) fn ways(choices: &[Choice]) -> Vec<Vec<ChosenOption>> {
     let mut ways = vec![Vec::new()];
     for Choice { name, options } in choices {
@@ -77,7 +77,7 @@ pub(super) fn ways(choices: &[Choice]) -> Vec<Vec<ChosenOption>> {
     ways
 }
 
-/// A text for those who cannot know yet what the seed chooses: all options stand in it.
+/// Fills each placeholder with all of its options, for readers of an undecided task.
 pub(super) fn with_options(text: &str, choices: &[Choice]) -> String {
     let fill = |text: String, choice: &Choice| {
         text.replace(&placeholder(&choice.name), &format!("[{}]", choice.options.join(" / ")))

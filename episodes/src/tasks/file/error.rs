@@ -1,4 +1,4 @@
-//! Why a task's file cannot be played, with the place of each mistake.
+//! Errors of task files, with the position of each mistake.
 
 use std::fmt;
 use std::ops::Range;
@@ -14,12 +14,13 @@ pub enum TaskFileError {
     Changed { name: String, was: String, now: String },
 }
 
-/// What is wrong with a file, each as `my_task.toml:12:8: what, and what would be right`, with the line itself.
+/// Mistakes in a file, each formatted as `my_task.toml:12:8: the mistake and a hint`, followed by the
+/// line itself.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Mistakes(Vec<String>);
 
 impl Mistakes {
-    /// Mistakes at these bytes of a text, in the order of the text.
+    /// Formats the mistakes at these byte ranges of a text, sorted by position.
     pub fn new(name: &str, text: &str, mut found: Vec<(Range<usize>, String)>) -> Mistakes {
         found.sort_by_key(|(at, _)| at.start);
         Mistakes(found.into_iter().map(|(at, what)| shown(name, text, at, &what)).collect())
@@ -32,7 +33,7 @@ impl fmt::Display for Mistakes {
     }
 }
 
-/// A mistake with its line under it, and marks under what is meant.
+/// Formats a mistake with its line below it and markers under the offending text.
 fn shown(name: &str, text: &str, at: Range<usize>, what: &str) -> String {
     let start = floor_char(text, at.start);
     let [number, column] = line_and_column(text, start);
@@ -46,14 +47,14 @@ fn shown(name: &str, text: &str, at: Range<usize>, what: &str) -> String {
     format!("{name}:{number}:{column}: {what}\n {number} | {line}\n {margin} | {pad}{}", "^".repeat(marks))
 }
 
-/// The line and the column of a byte of a text, both from 1.
+/// Returns the line and the column of a byte of a text, both counted from 1.
 pub fn line_and_column(text: &str, byte: usize) -> [usize; 2] {
     let before = &text[..floor_char(text, byte)];
     let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
     [1 + before.matches('\n').count(), 1 + before[line_start..].chars().count()]
 }
 
-/// The last place at or before a byte at which a letter begins.
+/// Returns the last character boundary at or before a byte.
 fn floor_char(text: &str, byte: usize) -> usize {
     (0..=byte.min(text.len())).rev().find(|byte| text.is_char_boundary(*byte)).unwrap_or_default()
 }

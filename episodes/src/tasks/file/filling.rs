@@ -1,14 +1,15 @@
-//! Texts of a task's file with what the seed has chosen in the place of `{name}`.
+//! Substitution of the chosen options for the placeholders `{name}` in the texts of a task file.
 
 use crate::tasks::ChosenOption;
 
-/// A text with what has been chosen in it.
+/// Returns a text with its placeholders replaced by the chosen options.
 pub(super) fn filled(text: &str, way: &[ChosenOption]) -> String {
     let fill = |text: String, chosen: &ChosenOption| text.replace(&placeholder(&chosen.name), &chosen.option);
     way.iter().fold(text.to_owned(), fill)
 }
 
-/// Where in a text that stands which is at this byte once it is filled; what is within an option, where its placeholder begins.
+/// Maps a byte position in the filled text back to the written text. A position within an option maps to
+/// the start of its placeholder.
 pub(super) fn unfilled_place(text: &str, way: &[ChosenOption], filled_at: usize) -> usize {
     let (mut at, mut filled_to) = (0, 0);
     while let Some(letter) = text[at..].chars().next() {
@@ -25,7 +26,7 @@ pub(super) fn unfilled_place(text: &str, way: &[ChosenOption], filled_at: usize)
     at
 }
 
-/// The names in `{...}` of a text, and where each begins.
+/// Yields the names in `{...}` in a text, each with the offset of its brace.
 pub(super) fn placeholders(text: &str) -> impl Iterator<Item = (usize, &str)> {
     text.match_indices('{').filter_map(|(at, _)| {
         let name = text[at + 1..].split_once('}')?.0;
@@ -34,14 +35,15 @@ pub(super) fn placeholders(text: &str) -> impl Iterator<Item = (usize, &str)> {
     })
 }
 
-/// " (with wanted = green)" behind what is wrong with a text in which something has been chosen.
+/// Returns a suffix for the mistakes of a text, for example " (with wanted = green)"; empty if the text
+/// has no chosen option.
 pub(super) fn told(text: &str, way: &[ChosenOption]) -> String {
     let of_text = way.iter().filter(|chosen| text.contains(&placeholder(&chosen.name)));
     let told: Vec<String> = of_text.map(|chosen| format!("{} = {}", chosen.name, chosen.option)).collect();
     if told.is_empty() { String::new() } else { format!(" (with {})", told.join(", ")) }
 }
 
-/// What stands in texts for the option of this choice.
+/// Returns the placeholder of a choice.
 pub(super) fn placeholder(name: &str) -> String {
     format!("{{{name}}}")
 }

@@ -1,7 +1,8 @@
-//! A task's file: TOML with its room, robots, objects, randomisation, instructions, budget and phases,
-//! whose conditions are expressions ([`crate::conditions`]).
+//! A task's file: TOML with its scene, robots, objects, randomisation, instructions, budget and phases.
+//! The conditions of its phases are expressions ([`crate::conditions`]).
 //!
-//! A task is made of its texts alone, which recordings and results hold; so whoever has one of those has the task.
+//! A task is built from its texts alone. Recordings and results include these texts, so each of them is
+//! enough to restore the task.
 
 mod build;
 mod choices;
@@ -26,10 +27,15 @@ pub use error::TaskFileError;
 
 use crate::tasks::{self, Task, TaskSource};
 
-/// Tasks live as long as the program, and a server or a report may read the same one thousands of times: each is made once.
+/// Cache of all tasks. Tasks live as long as the program, and a server or a report may read the same task
+/// thousands of times.
 static MADE: Mutex<Vec<&'static Task>> = Mutex::new(Vec::new());
 
-/// Reads a task's file, and the MJCF files that it names.
+/// Reads a task file and the MJCF files that it names.
+///
+/// # Errors
+///
+/// An unreadable file, or the mistakes in the task file.
 pub fn read_task(path: &Path) -> Result<&'static Task, TaskFileError> {
     let read = |path: &Path| {
         read_text(path, MAX_TEXT_BYTES).map_err(|source| TaskFileError::Read { path: path.into(), source })
@@ -43,7 +49,11 @@ pub fn read_task(path: &Path) -> Result<&'static Task, TaskFileError> {
     task_of(source)
 }
 
-/// The task that these texts are.
+/// Returns the task that a source describes; equal sources share one task.
+///
+/// # Errors
+///
+/// The mistakes in the task file.
 pub fn task_of(source: TaskSource) -> Result<&'static Task, TaskFileError> {
     let known = |made: &[&'static Task]| {
         let same = |task: &&&'static Task| task.source == source;
@@ -59,7 +69,7 @@ pub fn task_of(source: TaskSource) -> Result<&'static Task, TaskFileError> {
 }
 
 fn made() -> std::sync::MutexGuard<'static, Vec<&'static Task>> {
-    // Nothing panics while it holds the lock.
+    // No code panics while it holds the lock.
     MADE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -68,7 +78,7 @@ fn fingerprint(source: &TaskSource) -> String {
     format!("{:016x}", xxh3_64(format!("{:?}", (text, beside)).as_bytes()))
 }
 
-/// A task in JSON: the id of one of the benchmark's, or all of the file of another. For `#[serde(with)]`.
+/// JSON form of a task for `#[serde(with)]`: the id of a benchmark task, or the whole file of any other.
 pub mod by_id_or_file {
     use super::*;
 
@@ -79,12 +89,12 @@ pub mod by_id_or_file {
         File(RecordedTask),
     }
 
-    /// Readers that know no such files find the id beside the text.
+    /// A recorded task file. The id is stored for readers that do not support task files.
     #[derive(Serialize, Deserialize)]
     struct RecordedTask {
         id: String,
         xxh3: String,
-        /// What the seed has chosen in it.
+        /// Options chosen by the seed, by the name of the choice.
         #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
         chosen: BTreeMap<String, String>,
         #[serde(flatten)]

@@ -1,4 +1,4 @@
-//! The phases of a task's file: which of the four ways to be reached each has, and what its expressions mean.
+//! The phases of a task file: selects which of the four kinds each phase is, and reads its expressions.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -14,10 +14,10 @@ use crate::tasks::{PhaseCondition, PhaseSetting};
 
 const EXAMPLE: &str =
     "give done = '...', or first = '...' and then = '...', or lasting = '...' and for_s, or milestones";
-/// Nothing is waited for any longer.
+/// Longest duration that a phase may require.
 const LONGEST_S: f64 = 3600.0;
 
-/// The phases and what their conditions are made of, and before them the terms, each of which may name those above it.
+/// Returns the phases with their conditions. Terms are read first; each may refer to those above it.
 pub(super) fn phases(
     reading: &mut Reading,
     terms: BTreeMap<Spanned<String>, Spanned<String>>,
@@ -85,7 +85,7 @@ impl Reading<'_> {
         Some((phase, conditions))
     }
 
-    /// How a phase is reached, and by which conditions.
+    /// Returns the criterion of a phase and its conditions.
     fn done(&mut self, table: &PhaseTable, names: &Names) -> Option<(Done, Vec<PhaseCondition>)> {
         let PhaseTable { done, first, then, broken, lasting, for_s, at_end, milestones, .. } = table;
         let given =
@@ -164,7 +164,7 @@ impl Reading<'_> {
         Some((Done::Milestones(conditions.iter().map(milestone).collect()), conditions))
     }
 
-    /// A condition of a phase, with what it is made of.
+    /// Returns a condition of a phase with its parts.
     fn asked(
         &mut self,
         setting: PhaseSetting,
@@ -178,7 +178,7 @@ impl Reading<'_> {
         Some(PhaseCondition { setting, for_s, truth, parts })
     }
 
-    /// Reads a condition that a phase may have, as [`Reading::asked`] does. `None` if it has a mistake.
+    /// Reads an optional condition, as [`Reading::asked`] does; `None` if it has a mistake.
     fn if_asked(
         &mut self,
         setting: PhaseSetting,
@@ -191,7 +191,7 @@ impl Reading<'_> {
         }
     }
 
-    /// What an expression without mistakes is made of.
+    /// Returns the parts of an expression that has no mistakes.
     fn parts(&self, text: &Spanned<String>, names: &Names) -> Option<Vec<ConditionPart>> {
         conditions::parts(text.as_ref(), place_in_file(&self.source.text, text), names).ok()
     }
@@ -203,7 +203,7 @@ impl Reading<'_> {
         *for_s.as_ref()
     }
 
-    /// A condition on which something depends: one that comes out the same whatever happens is a mistake.
+    /// Returns a condition that the facts decide. A condition with a constant result is a mistake.
     fn condition(&mut self, text: &Spanned<String>, names: &Names) -> Option<Arc<Truth>> {
         let truth = self.meant(text, |text| conditions::condition(text, names))?;
         let what = match truth.always() {
@@ -219,7 +219,7 @@ impl Reading<'_> {
         None
     }
 
-    /// What an expression means; a mistake in it is told by its place in the file.
+    /// Returns the meaning of an expression. A mistake in it is recorded at its position in the file.
     fn meant<T>(&mut self, text: &Spanned<String>, read: impl Fn(&str) -> Result<T, Mistake>) -> Option<T> {
         match read(text.as_ref()) {
             Ok(meaning) => Some(meaning),
@@ -237,7 +237,7 @@ fn at_in_file(start: usize, at: Range<usize>) -> Range<usize> {
     start + at.start..start + at.end
 }
 
-/// How near a phase is whose file does not say it: the mean of what has to hold for it at the end.
+/// Returns the default nearness of a phase: the mean nearness of the conditions that must hold to reach it.
 fn nearness_of(conditions: &[PhaseCondition]) -> Nearness {
     let counts = |asked: &&PhaseCondition| match asked.setting {
         PhaseSetting::Done

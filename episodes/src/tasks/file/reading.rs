@@ -1,4 +1,4 @@
-//! A task's file as it is looked through: what is found wrong with it, and what is asked of every part.
+//! Validation of a task file: collects mistakes and checks the properties common to all parts.
 
 use std::ops::Range;
 
@@ -9,16 +9,16 @@ use super::filling::{filled, placeholders, told, unfilled_place};
 use crate::conditions::nearest;
 use crate::tasks::{ChosenOption, TaskSource};
 
-/// Folders, columns and results are called so.
+/// Maximum length of an id, which also names folders, columns and results.
 const LONGEST_ID: usize = 40;
 
-/// A source as it is looked through, and what has been found wrong with it.
+/// A source under validation, with the mistakes found in it.
 pub(super) struct Reading<'a> {
     source_as_written: &'a TaskSource,
-    /// The same with what has been chosen in it; lines stay where they are.
+    /// The source with the chosen options filled in; line breaks stay in place.
     pub source: TaskSource,
     chosen: &'a [ChosenOption],
-    /// By their places in `source`.
+    /// Mistakes by byte range in `source`.
     found: Vec<(Range<usize>, String)>,
 }
 
@@ -28,7 +28,7 @@ impl<'a> Reading<'a> {
         Reading { source_as_written: written, source, chosen, found: Vec::new() }
     }
 
-    /// Whether nothing has been found wrong.
+    /// Returns an error if any mistake has been found.
     pub fn checked(&mut self) -> Result<(), TaskFileError> {
         match self.found.is_empty() {
             true => Ok(()),
@@ -36,7 +36,7 @@ impl<'a> Reading<'a> {
         }
     }
 
-    /// What has been found wrong, by the file's own lines.
+    /// Takes the mistakes found, with positions in the written file.
     pub fn mistakes(&mut self) -> TaskFileError {
         let TaskSource { name, text, .. } = self.source_as_written;
         let written = |(at, what): (Range<usize>, String)| {
@@ -47,7 +47,7 @@ impl<'a> Reading<'a> {
         TaskFileError::Mistakes(Mistakes::new(name, text, found))
     }
 
-    /// The line and the column of the file itself at which that stands which is at this byte of `source`.
+    /// Returns the line and column in the written file of a byte of `source`.
     pub fn place(&self, at: usize) -> [usize; 2] {
         let text = &self.source_as_written.text;
         line_and_column(text, unfilled_place(text, self.chosen, at))
@@ -57,7 +57,8 @@ impl<'a> Reading<'a> {
         self.found.push((at, what.into()));
     }
 
-    /// What is wrong with MJCF. Where that stands in the task's file itself, it is told by the file's line and not by where the MJCF begins.
+    /// Records a mistake in MJCF. For inline MJCF, the position is the line in the task file, not the
+    /// start of the MJCF.
     pub fn wrong_mjcf(&mut self, at: Range<usize>, what: String) {
         let inline = what.strip_prefix(&format!("`{}:", self.source.name)).and_then(|rest| {
             let (line, what) = rest.split_once("`: ")?;
@@ -72,7 +73,7 @@ impl<'a> Reading<'a> {
         self.wrong(at, what);
     }
 
-    /// A name of which folders, columns and results are made.
+    /// Checks an id, which names folders, columns and results.
     pub fn id(&mut self, id: &Spanned<String>, whose: &str) {
         let text = id.as_ref();
         let plain =
@@ -100,15 +101,15 @@ impl<'a> Reading<'a> {
     }
 }
 
-/// Where a text of the file begins behind its quotes. One with escapes in it does not stand there as it is; then it is where its
-/// quotes are.
+/// Returns the byte offset of a text in the file, after its opening quotes. A text with escapes does not
+/// appear verbatim; for it, this is the offset of its quotes.
 pub(super) fn place_in_file(file: &str, text: &Spanned<String>) -> usize {
     let span = text.span();
     let written = file.get(span.clone()).and_then(|written| written.find(text.as_ref().as_str()));
     span.start + written.unwrap_or_default()
 }
 
-/// A text for as long as the program runs.
+/// Leaks a text, so that it lives as long as the program.
 pub(super) fn lasting(text: &str) -> &'static str {
     String::leak(text.to_owned())
 }

@@ -1,4 +1,4 @@
-//! The same task in other words, as its file has them for the levels of stress.
+//! Rewordings of a task's instructions, one set for each stress level.
 
 use toml::Spanned;
 
@@ -6,11 +6,11 @@ use super::reading::Reading;
 use super::table::RewordingTable;
 use crate::tasks::{RobotSpot, TaskWords};
 
-/// One for each level.
+/// Number of stress levels, and so of rewordings.
 const LEVELS: usize = 3;
 
 impl Reading<'_> {
-    /// What the file gives in other words; what is wrong with them is found here.
+    /// Returns the file's rewordings and records their mistakes.
     pub fn rewordings(
         &mut self,
         tables: &Option<Spanned<Vec<RewordingTable>>>,
@@ -48,7 +48,7 @@ impl Reading<'_> {
     }
 }
 
-/// Re-wordings of which each text is made like this; nothing where there are not as many as levels.
+/// Returns rewordings with `made` applied to each text; `None` unless there is one for each level.
 pub(super) fn in_words(
     tables: &[RewordingTable],
     made: impl Fn(&Spanned<String>) -> String,

@@ -1,4 +1,5 @@
-//! A task's file as TOML has it, before anything in it has been looked up. Spans say where in the file a value stands.
+//! A task file as parsed from TOML, before any name in it is resolved. Spans give the position of a value
+//! in the file.
 
 use std::collections::BTreeMap;
 
@@ -9,21 +10,22 @@ use toml::Spanned;
 #[serde(deny_unknown_fields)]
 pub struct TaskTable {
     pub id: Spanned<String>,
-    /// A room that the program carries, or an MJCF file beside this one.
+    /// Name of an embedded scene, or of an MJCF file beside this one.
     pub scene: Option<Spanned<String>>,
-    /// The scene itself.
+    /// Inline MJCF of the scene.
     pub scene_mjcf: Option<Spanned<String>>,
     pub instruction: Spanned<String>,
-    /// What operators of one robot each read in its place, where it tells what not every robot may know.
+    /// Instruction for operators of one robot each. Used in place of `instruction` when that contains
+    /// information not meant for every robot.
     pub shared_instruction: Option<Spanned<String>>,
-    /// The same in other words, for levels 1, 2 and 3 of stress.
+    /// Rewordings for stress levels 1, 2 and 3.
     pub rewordings: Option<Spanned<Vec<RewordingTable>>>,
-    /// Hands have to close, whatever conditions ask for.
+    /// True for a task that needs closing hands whatever its conditions require.
     #[serde(default)]
     pub needs_fingers: bool,
     #[serde(default)]
     pub budget: BudgetTable,
-    /// What the seed chooses among: `{name}` in the texts of the file stands for the option.
+    /// Choices made by the seed; each `{name}` in the file's texts is replaced by an option.
     #[serde(default)]
     pub choices: Vec<ChoiceTable>,
     pub robots: Spanned<Vec<RobotTable>>,
@@ -31,7 +33,7 @@ pub struct TaskTable {
     pub objects: Vec<ObjectTable>,
     #[serde(default)]
     pub randomize: Vec<OffsetTable>,
-    /// Names for expressions; each may name those that stand before it.
+    /// Named expressions; each may refer to those before it.
     #[serde(default)]
     pub terms: BTreeMap<Spanned<String>, Spanned<String>>,
     pub phases: Spanned<Vec<PhaseTable>>,
@@ -52,7 +54,7 @@ pub struct ChoiceTable {
     pub options: Spanned<Vec<Spanned<String>>>,
 }
 
-/// What is told in the place of the instructions of the same names.
+/// Texts that replace the instructions of the same names.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RewordingTable {
@@ -75,9 +77,9 @@ pub struct RobotTable {
 #[serde(deny_unknown_fields)]
 pub struct ObjectTable {
     pub name: Spanned<String>,
-    /// An object that the program carries, or an MJCF file beside this one; as the object is called where it is left out.
+    /// Name of an embedded object, or of an MJCF file beside this one; by default the object's name.
     pub file: Option<Spanned<String>>,
-    /// The object itself.
+    /// Inline MJCF of the object.
     pub mjcf: Option<Spanned<String>>,
     pub position_m: Spanned<[f64; 3]>,
     #[serde(default)]
@@ -92,14 +94,15 @@ pub struct OffsetTable {
     pub y_m: Option<Spanned<Extent>>,
     pub z_m: Option<Spanned<Extent>>,
     pub yaw_deg: Option<Spanned<Extent>>,
-    /// How much farther `--spread 2` turns them, either way.
+    /// Additional yaw in either direction at `--spread 2`.
     pub wider_yaw_deg: Option<Spanned<f64>>,
-    /// They hang on a wall across y: `--spread 2` does not widen y, which would bring them into it or off it.
+    /// True for objects on a wall across y. `--spread 2` does not widen their y range, which would move
+    /// them into the wall or off it.
     #[serde(default)]
     pub on_wall: bool,
 }
 
-/// How far an offset goes: so much either way, or from one number to another.
+/// Range of an offset: symmetric about zero, or between two numbers.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(untagged)]
 pub enum Extent {
@@ -107,7 +110,7 @@ pub enum Extent {
     FromTo([f64; 2]),
 }
 
-/// One phase: `done` alone, or `first` and `then`, or `lasting` and `for_s`, or `milestones`.
+/// A phase: `done` alone, or `first` and `then`, or `lasting` and `for_s`, or `milestones`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PhaseTable {
@@ -123,9 +126,9 @@ pub struct PhaseTable {
     pub for_s: Option<Spanned<f64>>,
     pub at_end: Option<Spanned<String>>,
     pub milestones: Option<Spanned<Vec<MilestoneTable>>>,
-    /// What makes the phase impossible to reach, once it has held while the phase was next.
+    /// Condition that makes the phase unreachable once it has held while the phase was next.
     pub spoiled: Option<Spanned<String>>,
-    /// A number from 0 to 1 for dense rewards.
+    /// Nearness from 0 to 1, for dense rewards.
     pub near: Option<Spanned<String>>,
 }
 

@@ -1,4 +1,4 @@
-//! Tasks' files, right and wrong.
+//! Tests of task files, valid and invalid.
 
 use super::*;
 use crate::EpisodeSpec;
@@ -78,12 +78,12 @@ fn a_file_becomes_a_task_like_any_other() {
     assert!(near[0] > 0.0 && near[0] < 0.5 && near[1] == 0.5 && near[2] == 1.0, "{near:?}");
     let Done::Lasting { for_s, .. } = &task.phases[2].done else { panic!("it has to last") };
     assert_eq!(*for_s, 0.5);
-    // The same file is the same task, and another one is another.
+    // Equal files share one task, and different files do not.
     assert!(std::ptr::eq(task, load(FILE).unwrap()));
     assert_ne!(task, load(&FILE.replace("0.03", "0.04")).unwrap());
 }
 
-/// The file with a choice in it, which operators are not told in common.
+/// Returns the file with a choice that the shared instruction does not reveal.
 fn with_choice() -> String {
     let text = FILE.replacen(
         "instruction = \"Lift the box.\"",
@@ -112,7 +112,7 @@ fn a_seed_chooses_and_nobody_is_told_before() {
         assert_eq!(lifted.holds(&held), side == "right");
     }
     assert!(counts.iter().all(|count| (430..=570).contains(count)), "{counts:?}");
-    // A recording holds what was chosen, and a spec of another seed chooses anew.
+    // A recording stores the chosen option, and a spec with another seed draws a new one.
     let spec = EpisodeSpec::new(task, 3, Protocol::Benchmark);
     let read: EpisodeSpec = serde_json::from_str(&serde_json::to_string(&spec).unwrap()).unwrap();
     assert!(std::ptr::eq(read.task, spec.task), "{:?}", read.task.chosen("side"));
@@ -131,10 +131,10 @@ fn mistakes_in_choices_are_told_by_their_places() {
     check("[\"left\", \"right\"]", "[\"left\", \"left\"]", "this option is given twice");
     check("[\"left\", \"right\"]", "[\"left\", \"a 'b'\"]", "an option is a word or two without quotes");
     check("{side}", "{other}", "lift.toml:8:8: nothing in the file asks for it; write {side}");
-    // A mistake in one of the ways alone is told, too, by the line that is in the file.
+    // A mistake in only one of the combinations is reported too, with its line in the written file.
     let one_way = "no hand \"rigt\"; is it right?; have: left, right (with side = rigt)\n 31 | held = 'holds(\"A\", \"{side}\", \"box\")'\n    |                    ^^^^^^^^";
     check("[\"left\", \"right\"]", "[\"left\", \"rigt\"]", one_way);
-    // Behind what has been chosen, too.
+    // The position is also correct after a filled placeholder.
     check(
         "\"{side}\", \"box\"",
         "\"{side}\", \"bax\"",
@@ -149,7 +149,7 @@ fn mistakes_in_choices_are_told_by_their_places() {
     assert!(error.contains("lift.toml:4:25: no choice \"box\"; [[choices]] have: none"), "{error}");
 }
 
-/// Other words for the file with a choice in it, which tell the robot as much as its own.
+/// A rewording of the file with a choice, with the same information for the robot.
 const OTHER_WORDS: &str = r#"
 [[rewordings]]
 instruction = "Raise the box by its {side} side."
@@ -217,13 +217,13 @@ fn the_suite_is_whole() {
         assert_eq!((task.suite(), TaskSet::default().find(task.id).ok()), (Some(TANDEM_PLUS), Some(*task)));
         assert!(crate::tasks::find(task.id).is_err(), "{} is none of the ten", task.id);
         assert_eq!(EpisodeSpec::new(task, 0, Protocol::Benchmark).peculiarities()[0], "suite: tandem+");
-        // What one robot alone may know stands in no instruction that all of them read.
+        // Information for a single robot does not appear in an instruction that all of them read.
         let shared = task.shared_instruction.unwrap_or(task.instruction);
         assert!(
             !shared.contains('[')
                 && task.robots.iter().filter(|robot| robot.instruction.contains('[')).count() <= 1
         );
-        // A file of somebody else's that says the same with a comment more is not the suite's.
+        // A user's file that differs from the suite's by one comment does not belong to the suite.
         let own = TaskSource { text: format!("# mine\n{}", task.source.text), ..task.source.clone() };
         assert_eq!(task_of(own).unwrap().suite(), None);
     }
@@ -243,7 +243,7 @@ fn a_spec_holds_the_whole_file() {
     assert!(error.contains("lift.toml is not the file that was recorded"), "{error}");
 }
 
-/// A mistake is told by its line and column.
+/// Each mistake is reported with its line and column.
 #[test]
 fn mistakes_are_told_by_their_places() {
     let check = |right: &str, wrong: &str, expected: &str| {
@@ -256,7 +256,7 @@ fn mistakes_are_told_by_their_places() {
     check("\"floor\"", "\"room.xml\"", "lift.toml:3:9: there is no room.xml beside");
     check("scene = \"floor\"\n", "", "no scene; give scene = \"floor\"");
     check("name = \"A\"", "name = \"R\"", "lift.toml:7:8: there are 1 to 3 [[robots]], called \"A\"");
-    // What only follows from a mistake is not told.
+    // Mistakes that merely follow from another are not reported.
     for (right, wrong) in [("name = \"A\"", "name = \"R\""), ("<freejoint/>", "<freejoint/><warp/>")] {
         let error = load(&FILE.replacen(right, wrong, 1)).unwrap_err();
         assert_eq!(error.matches("lift.toml").count(), 1, "{error}");
@@ -300,7 +300,7 @@ fn mistakes_are_told_by_their_places() {
     check("near = 'coming(", "near = '!coming(", "something that holds or not is wanted");
     check("id = ", "id == ", "lift.toml:2:");
     check("position_m = [0.4", "file = \"box\"\nposition_m = [0.4", "given twice");
-    // All of them are found.
+    // All occurrences are reported.
     let error = load(&FILE.replace("\"box\")", "\"bax\")")).unwrap_err();
     assert!(error.matches("no object \"bax\"").count() >= 4, "{error}");
 }

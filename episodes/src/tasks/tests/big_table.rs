@@ -25,7 +25,7 @@ fn lift_on_both_sides_of_3_cm_and_with_all_three() {
     for two in [[A, B], [A, C], [B, C]] {
         assert!(!lifted(&held_by(&two).raised("round_table", 0.0301)), "{two:?}");
     }
-    // What counts is the lowest point of the foot.
+    // The lowest point of the foot counts.
     assert!(!lifted(&held_by(&[A, B, C]).raised("round_table", 0.0301).turned(
         "round_table",
         Vector::X,

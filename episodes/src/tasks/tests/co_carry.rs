@@ -17,7 +17,7 @@ fn held() -> Facts {
     Facts::at_rest(task()).grip(A, Left, "basket", Holding).grip(B, Right, "basket", Holding)
 }
 
-/// The basket's base on the patch, `beside_m` off its middle.
+/// Places the basket's base on the patch, offset by `beside_m` from its middle.
 fn at_patch(mut facts: Facts, beside_m: Vector) -> Facts {
     let patch_m = facts.position_m("basket_patch");
     facts.object_mut("basket").pose_in_world.translation = patch_m + beside_m;
@@ -30,7 +30,7 @@ fn lift_on_both_sides_of_3_cm_and_with_both_robots() {
     assert!(!lifted(&held().raised("basket", 0.0299)));
     assert!(!lifted(&held().grip(A, Left, "basket", Touching).raised("basket", 0.0301)));
     assert!(!lifted(&held().grip(B, Right, "basket", Touching).raised("basket", 0.0301)));
-    // What counts is the lowest point of the base.
+    // The lowest point of the base counts.
     assert!(!lifted(&held().raised("basket", 0.0301).turned("basket", Vector::Y, 0.02)));
 }
 

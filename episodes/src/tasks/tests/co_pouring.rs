@@ -24,7 +24,7 @@ fn lift_on_both_sides_of_3_cm_and_with_both_robots() {
     assert!(!lifted(&held().raised("tub", 0.0299)));
     assert!(!lifted(&held().grip(A, Left, "tub", Touching).raised("tub", 0.0301)));
     assert!(!lifted(&held().grip(B, Right, "tub", Touching).raised("tub", 0.0301)));
-    // What counts is the lowest point: that of an end, 88 mm beside the middle.
+    // The lowest point counts: here an end of the tub, 88 mm from its middle.
     let tilted = |lift_m: f32| held().raised("tub", lift_m).turned("tub", Vector::X, 0.02);
     assert!(lifted(&tilted(0.0319)));
     assert!(!lifted(&tilted(0.0316)));

@@ -18,7 +18,7 @@ fn held() -> Facts {
     Facts::at_rest(task()).grip(A, Left, "frame", Holding).grip(B, Right, "frame", Holding)
 }
 
-/// The loop's centre at `offset_m` from where the middle of the peg's free part is.
+/// Places the loop's centre at `offset_m` from the middle of the peg's free part.
 fn on_peg(offset_m: Vector) -> Facts {
     let mut facts = Facts::at_rest(task());
     let middle_m = (facts.site_m("wall_peg", "root") + facts.site_m("wall_peg", "tip")) * 0.5;
@@ -44,7 +44,7 @@ fn the_peg_is_in_the_loop_or_beside_it() {
         (Vector::new(0.0361, 0.0, 0.0), false),
         (Vector::new(0.0, 0.0, -0.0359), true),
         (Vector::new(0.0, 0.0, -0.0361), false),
-        // The ends of the peg, 53.5 mm from its middle.
+        // The ends of the peg are 53.5 mm from its middle.
         (Vector::new(0.0, 0.053, 0.0), true),
         (Vector::new(0.0, 0.054, 0.0), false),
         (Vector::new(0.0, -0.053, 0.0), true),
@@ -80,7 +80,7 @@ fn hanging_on_both_sides_of_every_threshold() {
     let moving = |m_s| changed(&|frame| frame.velocity_m_s = Vector::X * m_s);
     let turning = |rad_s| changed(&|frame| frame.angular_velocity_rad_s = Vector::Y * rad_s);
     let untouched = |for_s| changed(&|frame| frame.untouched_s = for_s);
-    // Turned in the plane of the picture, about the loop.
+    // Rotated in the plane of the picture frame, about the loop.
     let tilted = |degrees: f32| {
         let mut facts = on_peg(Vector::ZERO);
         let (loop_m, loop_in_frame_m) =

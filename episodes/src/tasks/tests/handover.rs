@@ -55,7 +55,7 @@ fn transfer_conditions() {
     }
 }
 
-/// The bottle stands on the target, untouched for 10 s.
+/// Places the bottle on the target; it has been untouched for 10 s.
 fn on_target() -> Facts {
     let mut facts = at_rest();
     facts.object_mut("bottle").pose_in_world = facts.object("target_pad").pose_in_world;

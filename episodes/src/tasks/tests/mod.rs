@@ -1,10 +1,10 @@
-//! Both sides of every threshold of the benchmark's tasks.
+//! Tests at both sides of every threshold of the benchmark's tasks.
 
 use super::{PhaseSetting, find};
 use crate::scoring::{Facts, Predicate};
 
-/// Makes `task()` and a function for each condition: `name = phase setting`, and behind it in brackets
-/// which one of several.
+/// Defines `task()` and a function for each condition, from `name = phase setting`. An index in brackets
+/// selects among several conditions of the same setting.
 macro_rules! conditions {
     ($task:literal: $($name:ident = $phase:literal $setting:ident $([$index:literal])?,)*) => {
         fn task() -> &'static $crate::tasks::Task {
@@ -31,7 +31,7 @@ mod pouring;
 mod table_align;
 mod trash_collection;
 
-/// Returns whether the condition of a phase holds that has this setting and is number `index` of those.
+/// Returns true if the condition number `index` among those of this phase and setting holds.
 fn holds(task: &str, phase: usize, setting: PhaseSetting, index: usize, facts: &Facts) -> bool {
     let conditions = &find(task).unwrap().conditions[phase];
     let condition = conditions.iter().filter(|condition| condition.setting == setting).nth(index).unwrap();

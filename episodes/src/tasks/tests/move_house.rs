@@ -20,7 +20,7 @@ fn held() -> Facts {
     Facts::at_rest(task()).held_by(&[B, C], "console_table")
 }
 
-/// The table's middle on that of the marks, `beside_m` off and turned by `degrees`.
+/// Places the table's middle on that of the marks, offset by `beside_m` and rotated by `degrees`.
 fn at_marks(mut facts: Facts, beside_m: Vector, degrees: f32) -> Facts {
     let marks_m = facts.position_m("foot_marks");
     facts.object_mut("console_table").pose_in_world =
@@ -62,7 +62,8 @@ fn the_door_is_open_on_both_sides_of_its_angle() {
     );
 }
 
-/// B and C hold the table this high; the rearmost point of it and of each of them is this far beyond the middle of the wall.
+/// Places the table and its carriers, B and C, which hold it at this height. The rearmost points of the
+/// table and of each robot are these distances beyond the middle of the wall.
 fn beyond(table_m: f32, b_m: f32, c_m: f32, lift_m: f32) -> Facts {
     let mut facts = held();
     facts.object_mut("console_table").pose_in_world.translation.z = lift_m;
@@ -96,7 +97,7 @@ fn all_of_table_and_carriers_passes_the_plane_together() {
 
 #[test]
 fn a_heel_behind_the_plane_is_not_through_the_door() {
-    // C's pelvis is farther beyond than its rear, which follows it.
+    // C's pelvis is farther beyond the wall than its rearmost point.
     let facts = beyond(0.6, 1.0, 0.15, 0.05);
     let pelvis_m = facts.robots[C].pelvis_in_world.translation.x;
     assert!(pelvis_m > 0.2 && !passed(&facts), "{pelvis_m}");
@@ -125,7 +126,8 @@ fn place_on_both_sides_of_every_threshold() {
         ("-x", stands(Vector::X * -0.0359, 0.0), stands(Vector::X * -0.0361, 0.0)),
         ("y", stands(Vector::Y * 0.0359, 0.0), stands(Vector::Y * 0.0361, 0.0)),
         ("-y", stands(Vector::Y * -0.0359, 0.0), stands(Vector::Y * -0.0361, 0.0)),
-        // Feet 0.37 m ahead go sideways by 3.5 cm, with corners that turn out by a millimetre.
+        // The feet, 0.37 m from the middle, move sideways by 3.5 cm; their corners move by one millimetre
+        // more.
         ("turned", stands(Vector::ZERO, 5.1), stands(Vector::ZERO, 5.5)),
         ("turned back", stands(Vector::ZERO, -5.1), stands(Vector::ZERO, -5.5)),
         ("height", stands(Vector::Z * 0.0399, 0.0), stands(Vector::Z * 0.0401, 0.0)),
@@ -137,6 +139,6 @@ fn place_on_both_sides_of_every_threshold() {
         assert!(placed(&inside), "{what} inside");
         assert!(!placed(&outside), "{what} outside");
     }
-    // A tilt of 15 degrees would take feet off their marks; the limit is that of every placement.
+    // A tilt of 15 degrees would lift feet off their marks; the limit is the common one of all placements.
     assert!(!placed(&stands(Vector::ZERO, 0.0).turned("console_table", Vector::X, 0.3)));
 }

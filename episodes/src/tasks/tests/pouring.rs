@@ -35,7 +35,7 @@ fn tip_on_both_sides_of_60_degrees() {
         (held(Holding, 0.1, 60.1), true),
         (held(Holding, 0.1, 59.9), false),
         (held(Touching, 0.1, 60.1), false),
-        // Tipped to its side the cup is widest at its rim, which comes down below where its base was.
+        // Tipped onto its side, the cup is widest at its rim, which is then lower than its base was.
         (held(Holding, 0.06, 90.0), false),
         (held(Holding, 0.08, 90.0), true),
         (lifted(0.1, 0.1).grip(B, Right, "cup", Holding).turned("cup", Vector::X, 1.5), false),
@@ -54,7 +54,7 @@ fn marble_on_both_sides_of_the_glass() {
     };
     for (offset_m, expected) in [
         (Vector::new(0.0, 0.0, 0.02), true),
-        // The wall is nearer below, 29.6 mm from the axis, than at the flared mouth, 46.5 mm.
+        // The wall is closer to the axis at the bottom (29.6 mm) than at the flared mouth (46.5 mm).
         (Vector::new(0.0290, 0.0, 0.02), true),
         (Vector::new(0.0300, 0.0, 0.02), false),
         (Vector::new(0.0450, 0.0, 0.02), false),

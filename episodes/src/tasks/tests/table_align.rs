@@ -19,7 +19,8 @@ fn held() -> Facts {
     Facts::at_rest(task()).held_by(&[A, B], "office_table")
 }
 
-/// The table `before_m` before the chair and `across_m` across, turned by `degrees` from square.
+/// Places the table `before_m` in front of the chair and `across_m` to its side, rotated by `degrees`
+/// from square.
 fn placed(before_m: f32, across_m: f32, degrees: f32) -> Facts {
     let mut facts = Facts::at_rest(task());
     let turn = Rotation::from_rotation_z(FRAC_PI_2 + degrees.to_radians());
@@ -59,7 +60,7 @@ fn carry_on_both_sides_of_the_patch_and_of_1_cm() {
         let [x_m, y_m, z_m] = position_m;
         assert_eq!(carried(&at(x_m, y_m, z_m)), expected, "{position_m:?}");
     }
-    // One foot bar is lower than the other.
+    // The tilt lowers one of the foot bars.
     assert!(!carried(&at(0.0, 0.0, 0.0101).turned("office_table", Vector::Y, 0.01)));
 }
 

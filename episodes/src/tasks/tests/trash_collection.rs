@@ -16,7 +16,7 @@ fn held() -> Facts {
     Facts::at_rest(task()).held_by(&[A], "bin")
 }
 
-/// A holds the bin, its base at `base_m`, `beside_m` off the carry point.
+/// Places the bin in A's hands, offset by `beside_m` from the carry point and with its base at `base_m`.
 fn held_at(beside_m: Vector, base_m: f32) -> Facts {
     let mut facts = held();
     let point_m = facts.position_m("carry_point");
@@ -31,7 +31,7 @@ fn lift_on_both_sides_of_2_cm_and_by_a() {
     assert!(!lifted(&Facts::at_rest(task()).held_by(&[B], "bin").raised("bin", 0.0201)));
     let touched = held().grip(A, Left, "bin", Touching).grip(A, Right, "bin", Touching);
     assert!(!lifted(&touched.raised("bin", 0.0201)));
-    // What counts is the lowest point: leaning by 5 degrees, that of a long side, 85 mm beside the middle.
+    // The lowest point counts: at a tilt of 5 degrees, one of a long side, 85 mm from the middle.
     let leaning = |lift_m: f32| held().raised("bin", lift_m).turned("bin", Vector::X, 5_f32.to_radians());
     assert!(lifted(&leaning(0.0276)));
     assert!(!lifted(&leaning(0.0272)));
@@ -42,7 +42,7 @@ fn deliver_on_both_sides_of_every_threshold() {
     for (beside_m, base_m, expected) in [
         (Vector::ZERO, 0.0201, true),
         (Vector::ZERO, 0.0199, false),
-        // The bin is 0.721 m tall, the bench 0.80 m.
+        // The bin is 0.721 m tall, and the bench is 0.80 m high.
         (Vector::ZERO, 0.0888, true),
         (Vector::ZERO, 0.0892, false),
         (Vector::X * 0.2499, 0.06, true),
@@ -52,8 +52,8 @@ fn deliver_on_both_sides_of_every_threshold() {
     ] {
         assert_eq!(delivered(&held_at(beside_m, base_m)), expected, "{beside_m} {base_m}");
     }
-    // What counts is the highest point of the rim: leaning by 5 degrees either way, that of a long side, which is 0.715 m up, 82 mm
-    // beside the middle, and 6 mm thick around that.
+    // The highest point of the rim counts. At a tilt of 5 degrees it is one of a long side: 0.715 m up,
+    // 82 mm from the middle, on a rim 6 mm thick.
     for degrees in [5_f32, -5.0] {
         let leaning =
             |base_m: f32| held_at(Vector::ZERO, base_m).turned("bin", Vector::X, degrees.to_radians());

@@ -1,5 +1,5 @@
-//! `walk_to` with what hands hold: a trolley pushed by one robot, a basket carried by two. Only where the things are comes from the
-//! simulator, which a policy would measure.
+//! Tests of `walk_to` with a load: a trolley pushed by one robot, a basket carried by two. Only the
+//! objects' positions come from the simulator; a policy would measure them.
 
 use nalgebra::Vector3;
 use serde_json::{Value, json};
@@ -21,7 +21,7 @@ fn plan(session: &mut Session, tool: &str, args: Value) -> PlanReply {
     }
 }
 
-/// `walk_to` with `carry` of these robots, each by [ahead, left] as it faces now.
+/// Calls `walk_to` with `carry` for these robots. Each moves by [ahead, left] in its current heading.
 fn carry(session: &mut Session, robots: &[&str], by_m: [[f64; 2]; 2], steps: u32) -> PlanReply {
     let entries: Vec<Value> = robots
         .iter()
@@ -40,12 +40,12 @@ fn carry(session: &mut Session, robots: &[&str], by_m: [[f64; 2]; 2], steps: u32
     plan(session, "walk_to", json!({ "steps": steps, "robots": entries }))
 }
 
-/// Set down and let go of, a load ends its task.
+/// Returns true once the task is complete, for example when the load has been set down and released.
 fn is_done(session: &Session) -> bool {
     session.result().phases.0.iter().all(|(_, time_s)| time_s.is_some())
 }
 
-/// Both robots raise both hands so often by so much, giving way to each other, and keep their fingers as they are.
+/// Raises both hands of both robots `times` times by `by_m`, with compliance and unchanged fingers.
 fn move_up(session: &mut Session, by_m: f64, times: u32) {
     for _ in 0..times {
         if is_done(session) {
@@ -115,10 +115,10 @@ fn two_robots_carry_a_basket_by_one_call() {
     let b = trial(B, &[(Side::Left, "b_left"), (Side::Right, "b_right")], std::f64::consts::PI);
     a.take(&mut session);
     b.take(&mut session);
-    // Both lift by 9 cm, giving way to each other.
+    // Both lift by 9 cm with compliance.
     move_up(&mut session, 0.03, 3);
     assert!(session.facts().lift_m("basket") > 0.04, "lifted {}", session.facts().lift_m("basket"));
-    // The patch as each robot faces.
+    // The displacement to the patch in each robot's heading.
     let facts = session.facts();
     let way_m = facts.position_m("basket_patch") - facts.position_m("basket");
     let way_m = Vector3::new(f64::from(way_m.x), f64::from(way_m.y), 0.0);
@@ -136,7 +136,7 @@ fn two_robots_carry_a_basket_by_one_call() {
     assert!(off_m.truncate().length() < 0.12, "{off_m}");
     assert!(reply.last.phases.iter().any(|phase| phase.number == "p2"), "{:?}", reply.last.phases);
     assert!(a.holds(&session) && b.holds(&session), "all hands still hold the rim");
-    // Down again as the brief has it, and open.
+    // Lowers the load as the brief describes, and opens the hands.
     move_up(&mut session, -0.03, 4);
     let open = json!([0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0]);
     let opened = json!([0.0, -0.3, 0.0, 0.0, 0.0, 0.0, 0.0]);

@@ -1,4 +1,4 @@
-//! What robots tell of what their hands and their base feel, held against what the simulator knows.
+//! Tests of the sensed states of hands and base in replies, against the simulator.
 
 use crate::common::*;
 use tandem_episodes::players::{self, Episode, PlayerError, PrivilegedEpisode};
@@ -9,10 +9,11 @@ use tandem_tools_spec::{
     Touch, Walk, WalkMove, WristMove,
 };
 
-/// Plays on, and holds what is told of each hand's grip against its contacts.
+/// An episode that compares each hand's reported grip with its contacts.
 struct Gripping {
     session: Session,
-    /// How often a hand holds and says so, holds and does not, does not and says so, does not and says nothing.
+    /// Number of reports by case: holding and reported; holding but not reported; reported but not
+    /// holding; neither.
     counts: [u32; 4],
     wrong: Vec<String>,
 }
@@ -54,8 +55,8 @@ impl PrivilegedEpisode for Gripping {
     }
 }
 
-/// In the tasks of which each has another grip: a hand that holds says so, and one that does not says nothing of it, but for moments in
-/// which it closes or opens.
+/// Tasks with a different grip each. A report matches the contacts, except for moments in which a hand
+/// closes or opens.
 #[test]
 fn hands_feel_that_they_hold() {
     for task in ["handover", "co_carry", "big_table", "trash_collection", "cart_service"] {
@@ -130,7 +131,7 @@ fn a_base_says_what_it_does_and_where_it_will_rest() {
         stands_after += 1;
         assert!(stands_after < 75, "it never stands: {base:?}");
         if base.state == Some(BaseState::Standing) {
-            // What it sees then is not seen from a pelvis that still rises.
+            // An observation at this moment is not taken from a rising pelvis.
             assert!((base.pelvis_height_m - 0.76).abs() < 0.021, "{base:?}");
             break;
         }
@@ -150,7 +151,8 @@ fn a_base_says_what_it_does_and_where_it_will_rest() {
     assert_eq!(session.facts().robots.len(), 2);
 }
 
-/// Both arms far ahead weigh so much that a robot steps; one does not. Before, the robot is asked; afterwards it says so.
+/// Both arms far ahead make a robot step by their weight; one arm does not. `check_reach` predicts the
+/// step, and the reply reports it.
 #[test]
 fn a_reach_says_whether_it_takes_a_step() {
     for (reach_m, height_m, hands, steps) in [
@@ -181,7 +183,7 @@ fn a_reach_says_whether_it_takes_a_step() {
     }
 }
 
-/// Hands that reach too far stop where the robot still stands, if they are told so.
+/// With `stand_fast`, hands that reach too far stop before the robot has to step.
 #[test]
 fn a_robot_that_is_to_stand_fast_stops_before_it_has_to_step() {
     for stands_fast in [false, true] {
@@ -203,7 +205,7 @@ fn a_robot_that_is_to_stand_fast_stops_before_it_has_to_step() {
     }
 }
 
-/// A hand far across needs the waist, and one whose waist is to stay comes as far as the arm does.
+/// A hand target far across needs the waist. With `keep_waist`, the hand moves as far as the arm allows.
 #[test]
 fn a_waist_that_is_to_stay_does_not_turn() {
     for keep_waist in [false, true] {
@@ -226,7 +228,7 @@ fn a_waist_that_is_to_stay_does_not_turn() {
     }
 }
 
-/// An observation tells of wrists and camera in the frame that it is asked for.
+/// An observation gives wrists and camera in the requested frame.
 #[test]
 fn an_observation_is_told_in_the_frame_that_it_names() {
     let mut session = handover(2011);
@@ -251,8 +253,8 @@ fn an_observation_is_told_in_the_frame_that_it_names() {
     assert!(pelvis["cameras"][0].get("camera_in_frame").is_none());
 }
 
-/// A target in the start frame stays where it is while its robot walks and turns; one in the level frame is where gravity and the robot's
-/// heading have it.
+/// A target in the start frame stays in place while its robot walks and turns. A target in the level
+/// frame follows gravity and the robot's heading.
 #[test]
 fn targets_are_read_in_the_frame_that_they_name() {
     let mut session = handover(2011);
@@ -272,7 +274,7 @@ fn targets_are_read_in_the_frame_that_they_name() {
     let now = wait(&mut session, 1).robots.remove(A);
     let start_from_pelvis = now.pelvis_in_start.unwrap();
     let held = now.right.measured.unwrap();
-    // Where the hand is, in the start frame: asked for there, it stays.
+    // The hand's current position in the start frame, as a target in that frame, keeps the hand in place.
     let [w, x, y, z] = start_from_pelvis.quaternion_wxyz.map(|part| part as f32);
     let turned = tandem_sim::Rotation::from_xyzw(x, y, z, w).normalize();
     let at = Vector::from_array(held.position_m.map(|part| part as f32));
@@ -312,7 +314,7 @@ fn other_frames_are_not_for_paper() {
     assert!(refused.contains("leave frame out"), "{refused}");
 }
 
-/// The camera is turned by the waist: what lies to the side comes to the middle of the picture.
+/// The waist turns the camera: a point to the side moves to the middle of the image.
 #[test]
 fn a_robot_looks_where_it_is_told_to() {
     let mut session = handover(2011);
@@ -334,14 +336,14 @@ fn a_robot_looks_where_it_is_told_to() {
     };
     command(&mut session, look(Some([1.0, 0.7, 0.0]), None).into());
     assert!((yaw_rad(&mut session) - 0.7f64.atan2(1.0)).abs() < 0.03);
-    // No faster than 1 rad/s, and within the joint's range.
+    // The yaw rate is limited to 1 rad/s, and the yaw to the joint's range.
     command(&mut session, look(None, Some(-0.9)).into());
     let turned_rad = yaw_rad(&mut session);
     assert!((turned_rad - (0.7f64.atan2(1.0) - 1.0)).abs() < 0.03, "{turned_rad}");
     let report = command(&mut session, look(None, Some(-9.0)).into()).robots.remove(0);
     assert_eq!(report.waist_joints_clamped, ["waist_yaw_joint"]);
     assert_eq!(report.base.unwrap().state, Some(BaseState::Standing), "it turns on the spot");
-    // What is near and low comes into the picture by a bend, what is far and high by standing upright again.
+    // A near low point enters the image by a bend, and a far high one by standing upright again.
     let pitch_rad = |session: &mut Session| {
         wait(session, 25);
         state(session, "A").joint_positions_rad.get("waist_pitch_joint").unwrap()

@@ -1,5 +1,5 @@
-//! Every grip of the brief, carried out by what the brief says of it and by tools that every policy has. Only where the things are comes
-//! from the simulator, which a policy would measure.
+//! Tests of every grip in the brief, performed with the brief's information and the common tools alone.
+//! Only the objects' positions come from the simulator; a policy would measure them.
 
 use std::f64::consts::PI;
 
@@ -11,7 +11,8 @@ use tandem_tools_spec::{Call, CommandReply, Grip, Protocol, ToolReply, WorkedGri
 
 use crate::common::*;
 
-/// A thing to grip: in a task, by hands of a robot at places of an object, facing along a heading in the object's frame.
+/// An object to grip in a task: a robot, the places of its hands on the object, and its heading in the
+/// object's frame.
 pub struct Trial {
     pub thing: &'static str,
     pub task: &'static str,
@@ -19,7 +20,7 @@ pub struct Trial {
     pub object: &'static str,
     pub places: &'static [(Side, &'static str)],
     pub heading_rad: f64,
-    /// Whether the robot has to walk there.
+    /// True if the robot has to walk there.
     pub walks: bool,
 }
 
@@ -37,7 +38,7 @@ pub fn heading_rad(pose: &Isometry3<f64>) -> f64 {
     ahead.y.atan2(ahead.x)
 }
 
-/// At the same place, but upright.
+/// Returns the pose made upright, with the same position and heading.
 pub fn upright(pose: &Isometry3<f64>) -> Isometry3<f64> {
     Isometry3::from_parts(
         pose.translation,
@@ -81,7 +82,7 @@ impl Trial {
         }
     }
 
-    /// Brings the hands to where the places are so much farther off, and shapes their fingers.
+    /// Moves the hands to a distance of `off_m` from their places, and sets their fingers.
     fn move_hands(
         &self,
         session: &mut Session,
@@ -132,12 +133,12 @@ impl Trial {
         self.places.iter().map(|(side, _)| facts.object(self.object).hands[self.robot][*side]).collect()
     }
 
-    /// Whether all hands hold the thing.
+    /// Returns true if all hands hold the object.
     pub fn holds(&self, session: &Session) -> bool {
         self.hands(session).iter().all(|hand| *hand == Truth::Holding)
     }
 
-    /// Takes the thing by the grip that the brief has for it, in a session that has just begun. Returns the grip, and what was told last.
+    /// Takes the object with the brief's grip, in a new session. Returns the grip and the last reply.
     pub fn take(&self, session: &mut Session) -> (WorkedGrip, CommandReply) {
         let grips = session.briefing().brief.grips;
         let grip = grips

@@ -1,4 +1,4 @@
-//! What replies say of hands and of the way of the base, and what hands feel while an expert works.
+//! Tests of replies on hands and base motion, and of the hand forces during an expert's episode.
 
 use crate::common::*;
 use tandem_episodes::players::{self, Episode, PlayerError, PrivilegedEpisode};
@@ -8,7 +8,7 @@ use tandem_tools_spec::{
     Grip, HandReport, HandState, MoveWrists, Protocol, ToolCall, ToolReply, Walk, WalkMove, WristMove,
 };
 
-/// A's right hand after a move of it in 25 steps and `still` steps of rest.
+/// Moves A's right hand in 25 steps, waits `still` steps, and returns the report on it.
 fn moved_to(session: &mut Session, position_m: [f64; 3], still: u32) -> HandReport {
     let goal = WristMove { right_position_m: Some(position_m), ..hand_up() };
     let mut reply = command(session, MoveWrists { steps: 25, robots: vec![goal] }.into());
@@ -37,7 +37,7 @@ fn a_wrist_says_how_it_stands_to_its_target() {
     assert!((0.05..0.5).contains(&effort.share), "arms are not weightless: {right:?}");
     assert!(right.force_n.unwrap().iter().all(|part_n| part_n.abs() < 1.5), "it touches nothing: {right:?}");
 
-    // Into the counter, whose top is 4 cm over the pelvis; half a hand is as much.
+    // A target inside the counter: its top is 4 cm above the pelvis, as high as half a hand.
     let right = moved_to(&mut session, [0.30, -0.24, 0.05], 100);
     assert_eq!(right.state, Some(HandState::Blocked), "{right:?}");
     assert!(right.force_n.unwrap()[2] > 5.0, "the counter holds it: {right:?}");
@@ -99,12 +99,12 @@ fn the_way_of_the_base_is_told_by_its_own_odometry() {
     }
 }
 
-/// Plays on, and notes the hand forces whenever A alone holds the bottle in the air.
+/// An episode that records the hand forces while A alone holds the bottle in the air.
 struct Lifting {
     session: Session,
-    /// By the robots' hands at each of these moments.
+    /// Forces on the robots' hands at each of these moments.
     felt_n: Vec<Vec<Sides<Vector>>>,
-    /// What A's replies say of its right hand then.
+    /// Reports on A's right hand at these moments.
     told: Vec<HandReport>,
 }
 
@@ -131,7 +131,8 @@ impl PrivilegedEpisode for Lifting {
     }
 }
 
-/// Forces are estimated from the arm's torques alone, so the bottle's weight has to show where it is held, and only there.
+/// Forces are estimated from the arm's torques alone, so the bottle's weight must appear on the hand that
+/// holds it, and only there.
 #[test]
 fn a_hand_that_lifts_the_bottle_feels_its_weight() {
     const BOTTLE_N: f32 = 0.5 * 9.81;
@@ -151,7 +152,7 @@ fn a_hand_that_lifts_the_bottle_feels_its_weight() {
         assert_eq!(fingers, Some(HandState::Blocked), "the bottle is between them: {right:?}");
         assert_eq!(right.grip, Some(Grip::TwoSided), "{right:?}");
     }
-    // Later B moves its arms, and their inertia shows.
+    // Only the first moment is checked: later B moves its arms, and their inertia adds to the estimate.
     for force_n in lifting.felt_n[0][B] {
         assert!(force_n.length() < 0.05, "B's hands touch nothing and feel {force_n} N");
     }

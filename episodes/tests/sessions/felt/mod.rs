@@ -1,4 +1,5 @@
-//! What robots feel and see, what they tell of it, and what is done by what policies are told alone: grips, and loads that are carried.
+//! Tests of the robots' sensing and its reports, and of manipulation by a policy's information alone:
+//! grips and carried loads.
 
 mod carries;
 mod feel;

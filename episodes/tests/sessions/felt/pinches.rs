@@ -1,4 +1,5 @@
-//! A round thing between fingers that do not oppose each other: what replies say of a grip that is not scored.
+//! A test of replies on a pinch that is not scored as a grip: a round object between fingers that do not
+//! oppose each other.
 
 use std::collections::BTreeMap;
 
@@ -30,9 +31,9 @@ done = 'holds("A", "right", "apple") && lift_m("apple") >= 0.5'
 "#;
 
 const OPEN_RAD: [f64; 7] = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0];
-/// The thumb swings to a side of the apple, which the fingers press on from ahead.
+/// Finger angles at which the thumb presses on the side of the apple, and the fingers on its front.
 const CLOSE_RAD: [f64; 7] = [-0.5, -0.9, -1.2, 1.3, 1.3, 1.3, 1.3];
-/// The middle of the apple, ahead and to the left of the wrist.
+/// Position of the apple's middle relative to the wrist: ahead, and to the left.
 const PLACE_M: [f64; 2] = [0.16, 0.065];
 
 fn apple() -> &'static Task {
@@ -40,14 +41,14 @@ fn apple() -> &'static Task {
     task_of(source).expect("a task")
 }
 
-/// Moves A's right hand, and returns the report on it.
+/// Moves A's right hand and returns the report on it.
 fn move_hand(session: &mut Session, mut entry: Value) -> Value {
     entry["robot"] = json!("A");
     let call = Call::parse("move_wrists", json!({ "steps": 25, "robots": [entry] })).expect("a command");
     json!(session.ask(None, call).expect("an answer").reply)["robots"][0]["right"].clone()
 }
 
-/// Brings the wrist to the apple, `beside_m` farther to the right, with its fingers so.
+/// Moves the wrist to the apple, offset by `beside_m` to the right, and sets the fingers.
 fn approach(session: &mut Session, beside_m: f64, fingers_rad: [f64; 7]) {
     let facts = session.facts();
     let apple_m = facts.robots[A].pelvis_in_world.inverse() * facts.object("apple").pose_in_world.translation;
@@ -59,8 +60,7 @@ fn approach(session: &mut Session, beside_m: f64, fingers_rad: [f64; 7]) {
     move_hand(session, entry);
 }
 
-/// For three seconds thumb and fingers press and nothing is held: replies say what presses, and nothing of a
-/// hold.
+/// For three seconds thumb and fingers press without a hold: replies list what presses, and report no hold.
 #[test]
 fn a_pinch_that_is_not_scored_is_told_as_no_hold() {
     let mut session =

@@ -1,4 +1,4 @@
-//! Surfaces in what robots see, held against where the simulator has the things.
+//! Tests of surfaces in depth queries against the simulator's object poses.
 
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use serde_json::{Value, json};
@@ -25,7 +25,8 @@ fn of_sim(pose: &Pose) -> Isometry3<f64> {
     isometry(pose.translation.to_array().map(f64::from), [r.w, r.x, r.y, r.z].map(f64::from))
 }
 
-/// Where in A's picture a thing is, so far above its origin; and that point in A's start frame.
+/// Returns the pixel in A's image of a point `above_m` above an object's origin, and the point in A's
+/// start frame.
 fn seen(session: &mut Session, object: &str, above_m: f64) -> ([i64; 2], [f64; 3]) {
     let look = json!({ "robots": ["A"], "short": true });
     let LookReply::Observe(reply) = ask(session, "observe", look) else { panic!("no observation") };
@@ -52,7 +53,7 @@ fn surfaces(session: &mut Session, query: Value) -> DepthReply {
     }
 }
 
-/// A pixel on a bottle that stands on a counter tells of the whole bottle and of nothing else, and of its axis.
+/// A pixel on a bottle on the counter yields the whole bottle, nothing else, and its axis.
 #[test]
 fn a_pixel_on_a_bottle_tells_of_all_of_it() {
     let mut session = start("handover", 2011, Protocol::Agentic);
@@ -73,7 +74,7 @@ fn a_pixel_on_a_bottle_tells_of_all_of_it() {
     assert!(whole.extent_m[0] < 0.09 && whole.extent_m[1] < 0.09, "nothing of the counter: {whole:?}");
 }
 
-/// Every colour that is seen at all comes nearest first, and walls and floors last.
+/// For every visible colour, surfaces come nearest first, and walls and floors last.
 #[test]
 fn surfaces_of_a_colour_are_things() {
     let mut session = start("cart_service", 2011, Protocol::Agentic);
@@ -88,7 +89,7 @@ fn surfaces_of_a_colour_are_things() {
             println!("{color}: {} px, {:?} m at {:?}", surface.pixels, surface.extent_m, surface.centroid_m);
         }
     }
-    // The bar of the trolley before A is the nearest yellow thing.
+    // The trolley's bar in front of A is the nearest yellow object.
     let bar = &surfaces(&mut session, json!({ "color": "yellow" })).surfaces[0];
     let facts = session.facts();
     let pelvis_from_world = of_sim(&facts.robots[A].pelvis_in_world).inverse();

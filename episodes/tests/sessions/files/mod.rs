@@ -1,4 +1,4 @@
-//! Episodes in scenes and with robots of files.
+//! Tests of episodes with scenes and robots from files.
 
 mod phases;
 mod robots;

@@ -1,4 +1,4 @@
-//! Why a recorded episode of a task's file did not reach a phase.
+//! Tests of the explanation why a recorded episode of a task file did not reach a phase.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ fn parcel() -> &'static Task {
     read_task(Path::new(path)).expect("a task")
 }
 
-/// The trace of an episode in which everybody stands still.
+/// Returns the trace of an episode in which the robots stand still.
 fn stood_still(task: &'static Task) -> PhaseTrace {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let spec = EpisodeSpec::new(task, 0, Protocol::Benchmark);
@@ -26,7 +26,7 @@ fn stood_still(task: &'static Task) -> PhaseTrace {
         .expect("not all was reached")
 }
 
-/// The task with another condition of its first phase.
+/// Returns the task with another condition of its first phase.
 fn with(done: &str) -> &'static Task {
     let mut source = parcel().source.clone();
     let own = "done = 'x_m(\"parcel\") >= line_m && released_for_s(\"parcel\") >= 0.2'";

@@ -1,4 +1,4 @@
-//! Episodes with robots of somebody's own.
+//! Tests of episodes with users' robots.
 
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,7 @@ fn parcel() -> &'static Task {
     read_task(Path::new(path)).expect("a task")
 }
 
-/// With arms of four joints a hand gets to a place, and any way round that these let it be.
+/// With an arm of four joints a hand reaches a position, in whatever orientation these joints allow.
 #[test]
 fn a_described_robot_reaches_and_results_name_it() {
     let spec = spec(parcel());

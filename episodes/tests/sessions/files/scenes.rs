@@ -1,4 +1,5 @@
-//! Tasks in scenes of files: a kitchen laid out as SceneSmith exports one, and what is said of scenes that do not fit.
+//! Tests of tasks in scenes from files: a kitchen in SceneSmith's export layout, and the errors of
+//! unsuitable scenes.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,7 +21,7 @@ fn start(task: &str, scene: &Path) -> Result<Session, String> {
     Session::start(&in_scene(task, scene)?, None).map_err(|error| error.to_string())
 }
 
-/// A copy of the kitchen, to be changed.
+/// Copies the kitchen, to be modified.
 fn copy_of_kitchen(to: &Path) -> PathBuf {
     fs::create_dir(to.join("meshes")).unwrap();
     for folder in ["", "meshes"] {
@@ -73,12 +74,12 @@ fn sites_place_what_they_name() {
     let mut session = start("handover", &scene).unwrap();
     wait(&mut session, 1);
     let moved_m = session.facts().position_m("bottle");
-    // Of the site in the frame of the task's, which is turned by a quarter.
+    // The offset of the site in the frame of the task's site, which is rotated by a quarter turn.
     let placed_m = tandem_sim::Vector::new(0.3, -0.1, 0.8);
     assert!((moved_m - placed_m).abs().max_element() <= 0.026, "{moved_m}");
 }
 
-/// What is said of the kitchen once `from` in a file of it has become `to`.
+/// Checks the error of the kitchen with `from` replaced by `to` in one of its files.
 #[track_caller]
 fn check(file: &str, from: &str, to: &str, expected: &[&str]) {
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Recordings of which bytes were changed or cut off: none aborts or panics, none is verified, and what is recovered can be
-//! replayed.
+//! Tests of recordings with changed or missing bytes: reading never aborts or panics, none is verified,
+//! and recovered ones can be replayed.
 
 use std::fs;
 use std::ops::Range;
@@ -14,14 +14,14 @@ use tandem_tools_spec::{Finish, Observe, Protocol};
 use super::interrupted;
 use crate::common::*;
 
-/// Flipped bytes and cuts of all recordings together.
+/// Number of flipped bytes and of cuts, over all recordings.
 const FLIPS: usize = 2000;
 const CUTS: usize = 200;
-/// Every so manieth is recovered, too, and of these every so manieth simulated again.
+/// One in `RECOVERED` damaged recordings is recovered as well, and one in `SIMULATED` of these is simulated.
 const RECOVERED: usize = 5;
 const SIMULATED: usize = 10;
 
-/// Numbers that look random and are the same in every run (xorshift64, Marsaglia 2003).
+/// Pseudorandom numbers, the same in every run (xorshift64, Marsaglia 2003).
 struct Chance(u64);
 
 impl Chance {
@@ -33,7 +33,8 @@ impl Chance {
     }
 }
 
-/// Three small recordings: pictures and a result, three robots, and one that was recovered and has no end.
+/// Makes three small recordings: one with images and a result, one with three robots, and one recovered
+/// without an end.
 fn recordings(folder: &Path) -> [PathBuf; 3] {
     let [looks, three, cut] = ["looks", "three", "cut"].map(|name| folder.join(name));
     let mut session = Session::start(&spec("handover", 3, Protocol::Benchmark), Some(&looks)).unwrap();
@@ -49,13 +50,13 @@ fn recordings(folder: &Path) -> [PathBuf; 3] {
     [looks, three, cut].map(|folder| folder.join(Recorder::FILE_NAME))
 }
 
-/// All that is read of a recording.
+/// Reads the state hashes and the tool calls of a recording.
 fn content(recording: &Recording) -> (Vec<(u64, String)>, Vec<RecordedCall>) {
     let hashes = recording.state_hashes().map(Result::unwrap).collect();
     (hashes, recording.tool_calls().unwrap())
 }
 
-/// What is recovered of `bytes` is a beginning of `original`, or nothing is left.
+/// Checks that the content recovered from `bytes` is a prefix of `original`, or that nothing is recovered.
 fn recovers_a_beginning(bytes: &[u8], original: &Recording, folder: &Path, simulate: bool, what: &str) {
     let partial = folder.join("episode.mcap.partial");
     fs::write(&partial, bytes).unwrap();
@@ -88,7 +89,8 @@ fn recovers_a_beginning(bytes: &[u8], original: &Recording, folder: &Path, simul
     assert!(fs::read(&partial).unwrap() == bytes, "{what}: what is recovered stays as it is");
 }
 
-/// Whether a file ends where a record does, as what a killed process leaves: nothing says then that more had been written.
+/// Returns true if a file ends with a complete record, as after a kill; nothing indicates then that more
+/// was written.
 fn ends_behind_a_record(bytes: &[u8]) -> bool {
     let mut position = mcap::MAGIC.len();
     while let Some(length) = bytes.get(position + 1..).and_then(<[u8]>::first_chunk) {
@@ -103,7 +105,7 @@ fn ends_behind_a_record(bytes: &[u8]) -> bool {
     position == bytes.len()
 }
 
-/// Every byte is held to something, so that no change goes unseen: there is none without meaning.
+/// Every byte is covered by a check, so no change is missed: there are no bytes without meaning.
 #[test]
 fn no_flipped_byte_is_verified() {
     let folder = tempfile::tempdir().unwrap();
@@ -115,7 +117,7 @@ fn no_flipped_byte_is_verified() {
         assert_eq!(original.uncovered(), [""; 0], "{}", path.display());
         let place = tempfile::tempdir().unwrap();
         let chunks = chunk_contents(&bytes);
-        // The beginning and the end have most kinds of bytes; a chunk is one.
+        // The start and the end contain most kinds of bytes; a chunk is a single kind.
         let ends = (0..160).chain(bytes.len() - 160..bytes.len());
         let random = (0..FLIPS / 3 - 320).map(|_| chance.below(bytes.len())).collect::<Vec<_>>();
         for (number, flipped) in ends.chain(random).enumerate() {
@@ -140,11 +142,11 @@ fn no_flipped_byte_is_verified() {
         }
     }
     assert!(in_chunks > FLIPS / 4, "most bytes are in chunks: {in_chunks}");
-    // Of a few bits the compressed bytes say nothing; the checksum of all data does.
+    // The compressed bytes do not reveal a few of the flipped bits; the checksum of all data does.
     assert!(named * 50 > in_chunks * 49, "chunks are named: {named} of {in_chunks}");
 }
 
-/// Where the chunks of a recording are, without opcode and length.
+/// Returns the ranges of the chunks in a recording, without opcode and length.
 fn chunk_contents(bytes: &[u8]) -> Vec<Range<usize>> {
     let summary = mcap::Summary::read(bytes).unwrap().unwrap();
     let content = |chunk: &mcap::records::ChunkIndex| {
@@ -162,7 +164,7 @@ fn no_cut_is_verified() {
         let bytes = fs::read(&path).unwrap();
         let original = Recording::read(&path).unwrap();
         let place = tempfile::tempdir().unwrap();
-        // Within its first mark a file is not yet known to be MCAP, and nothing is left to recover.
+        // A cut within the magic bytes leaves no recognisable MCAP file, and nothing to recover.
         let in_the_mark = 0..mcap::MAGIC.len();
         let random = (0..CUTS / 3 + 1).map(|_| chance.below(bytes.len())).collect::<Vec<_>>();
         for (number, left) in in_the_mark.clone().chain(random).enumerate() {
@@ -179,7 +181,7 @@ fn no_cut_is_verified() {
     }
 }
 
-/// Sizes that a file does not have are not believed, whatever checksum says so.
+/// A declared size beyond the file's is refused, whatever its checksum.
 #[test]
 fn a_chunk_that_says_it_is_huge_is_refused_before_it_is_decompressed() {
     let folder = tempfile::tempdir().unwrap();
@@ -197,7 +199,7 @@ fn a_chunk_that_says_it_is_huge_is_refused_before_it_is_decompressed() {
     }
 }
 
-/// Other programs may write recordings without checksums; these are replayed, and what cannot be checked is named.
+/// Recordings of other programs may have no checksums. They are replayed, and the unchecked parts are listed.
 #[test]
 fn a_recording_without_checksums_is_replayed_and_says_what_is_not_covered() {
     let folder = tempfile::tempdir().unwrap();
@@ -231,7 +233,7 @@ fn a_recording_without_checksums_is_replayed_and_says_what_is_not_covered() {
     );
     assert_eq!(verify(&recording).unwrap().outcome, Verdict::Same);
 
-    // Nothing tells what was changed here, so that everything behind the checksums is met with any byte in it.
+    // Nothing detects changes here, so the reading code after the checksums meets arbitrary bytes.
     let bytes = fs::read(&copy).unwrap();
     let mut chance = Chance(27);
     let mut read = 0;
@@ -247,7 +249,7 @@ fn a_recording_without_checksums_is_replayed_and_says_what_is_not_covered() {
     assert!(read > FLIPS / 8, "most changes are within contents: {read}");
 }
 
-/// What a killed process has left is a copy of the file at any moment.
+/// A kill leaves a copy of the file as it is at some moment.
 #[test]
 fn a_process_that_is_killed_loses_at_most_25_steps() {
     let folder = tempfile::tempdir().unwrap();

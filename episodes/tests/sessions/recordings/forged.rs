@@ -1,5 +1,5 @@
-//! Recordings that somebody made up: whoever reads, scores, verifies or takes them over is told so, and neither hangs, panics nor runs
-//! out of memory.
+//! Tests of forged recordings: reading, scoring, verification and takeover report an error, without a
+//! hang, a panic or memory exhaustion.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,14 +16,14 @@ use crate::common::*;
 
 type Entries = BTreeMap<String, String>;
 
-/// Plays a little of a task into `folder`.
+/// Records a few steps of a task into `folder`.
 fn record(task: &str, folder: &Path) {
     let mut session = Session::start(&spec(task, 3, Protocol::Benchmark), Some(folder)).unwrap();
     wait(&mut session, 3);
     session.close();
 }
 
-/// What a recording says of its episode.
+/// Returns the metadata records of a recording.
 fn entries(bytes: &[u8]) -> Vec<mcap::records::Metadata> {
     let records = mcap::read::LinearReader::new(bytes).unwrap().map(Result::unwrap);
     let metadata = records.filter_map(|record| match record {
@@ -33,7 +33,7 @@ fn entries(bytes: &[u8]) -> Vec<mcap::records::Metadata> {
     metadata.collect()
 }
 
-/// Puts a copy of a recording in its place as another program would have written it, with other entries about its episode.
+/// Replaces a recording with a copy as another program might write it, with changed metadata of its episode.
 fn forge(folder: &Path, change: impl Fn(&mut Entries)) {
     let path = folder.join(Recorder::FILE_NAME);
     let bytes = fs::read(&path).unwrap();
@@ -76,7 +76,7 @@ fn nothing_is_read_of_what_a_recording_names() {
     let endless = take_over(Path::new("/dev/zero")).unwrap_err();
     assert!(endless.contains("no regular file"), "{endless}");
 
-    // One that begins in a device, and one that begins in itself.
+    // One starts from a device, and one from itself.
     for names in [Path::new("/dev/zero"), &own] {
         forge(folder.path(), |entries| begin_at(entries, names));
         let text = verify(&Recording::read(&own).unwrap()).map(drop).unwrap_err().to_string();

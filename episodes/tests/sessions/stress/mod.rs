@@ -1,4 +1,5 @@
-//! What is laid over an episode: each axis changes what it says and nothing else, a higher level more of it, the same again every time.
+//! Tests of stress: each axis changes its own quantity and nothing else, a higher level changes it more,
+//! and results are reproducible.
 
 use tandem_episodes::players::{self, InProcess};
 use tandem_episodes::replay::{Verdict, verify};
@@ -15,11 +16,11 @@ fn under(task: &str, seed: u32, stress: Option<(StressAxis, StressLevel)>) -> Ep
     EpisodeSpec { stress, ..spec(task, seed, Protocol::Benchmark) }
 }
 
-/// What the expert of Handover comes to, and whether its recording is the same again.
+/// Returns the result of Handover's expert, and the verdict on its recording.
 fn expert(spec: &EpisodeSpec) -> (ResultReply, Verdict) {
     let folder = tempfile::tempdir().unwrap();
     let mut episode = InProcess::new(Session::start(spec, Some(folder.path())).unwrap());
-    // Under stress it may give up.
+    // Under stress the expert may give up.
     let _ = players::find("expert").unwrap().play(spec, &mut episode);
     let result = episode.session.close();
     let recording = Recording::read(&folder.path().join(Recorder::FILE_NAME)).unwrap();
@@ -27,7 +28,7 @@ fn expert(spec: &EpisodeSpec) -> (ResultReply, Verdict) {
     (result, verify(&recording).unwrap().outcome)
 }
 
-/// What moves is moved by the physical axes, and by no other; each is named, verified, and the same again.
+/// Only the physical axes affect motion. Every axis is listed in the result, verified, and reproducible.
 #[test]
 fn every_axis_is_recorded_verified_and_the_same_again() {
     let (plain, _) = expert(&under("handover", SEED, None));
@@ -44,7 +45,7 @@ fn every_axis_is_recorded_verified_and_the_same_again() {
     }
 }
 
-/// What robot A sees first, and what the room looks like.
+/// Returns robot A's first image and a view of the room.
 fn pictures(stress: Option<(StressAxis, StressLevel)>) -> [Vec<u8>; 2] {
     let mut session = Session::start(&under("handover", SEED, stress), None).unwrap();
     let room = session.third_person();
@@ -65,7 +66,7 @@ fn pictures_differ_ever_more_under_camera_light_and_texture_and_no_other_axis_to
             .map(|picture| levels.each_ref().map(|seen| mean_difference(&seen[picture], &plain[picture])));
         let grows = |differences: &[f64; 3]| differences[0] > 0.0 && differences.is_sorted_by(|a, b| a < b);
         match axis {
-            // Those who look on see the room as it is.
+            // Viewers see the room without the stress.
             StressAxis::Camera => assert!(grows(&eye) && room == [0.0; 3], "{eye:?} {room:?}"),
             StressAxis::Light | StressAxis::Texture => {
                 assert!(grows(&eye) && grows(&room), "{}: {eye:?} {room:?}", axis.name());
@@ -82,7 +83,7 @@ fn pictures_differ_ever_more_under_camera_light_and_texture_and_no_other_axis_to
     }
 }
 
-/// Of what robots are told of their cameras nothing changes, whatever the cameras do.
+/// Camera stress does not change the camera pose that the robots report.
 #[test]
 fn a_robot_takes_its_camera_to_be_where_its_file_has_it() {
     let told = |stress| {
@@ -92,7 +93,8 @@ fn a_robot_takes_its_camera_to_be_where_its_file_has_it() {
     assert_eq!(told(Some((StressAxis::Camera, StressLevel::Three))), told(None));
 }
 
-/// In every task things stand farther apart and others stand about, which nobody has to touch, and all of it rests.
+/// In every task objects are farther apart and distractors are added, which need not be touched; all of
+/// them are at rest.
 #[test]
 fn distractors_stand_in_every_task_and_rest() {
     for &task in tasks::cohub() {
@@ -118,7 +120,7 @@ fn distractors_stand_in_every_task_and_rest() {
     }
 }
 
-/// Noise is that of a G1, then twice and four times of it, number by number.
+/// The noise is that of a G1, then twice and four times as much, number by number.
 #[test]
 fn sensors_are_ever_noisier() {
     let read = |stress| {
@@ -138,7 +140,7 @@ fn sensors_are_ever_noisier() {
     );
 }
 
-/// How far robots that nobody commands are from where they are without a push, at most.
+/// Compares the largest displacement of idle robots with and without a push.
 #[test]
 fn robots_that_stand_are_pushed_ever_farther() {
     let places_m = |stress| {
@@ -159,7 +161,7 @@ fn robots_that_stand_are_pushed_ever_farther() {
     assert!(one > 0.001 && two > one && three > two, "{one} {two} {three}");
 }
 
-/// An episode goes on from a checkpoint in the midst of it as it went, with what had not reached its robots yet.
+/// An episode continues from a checkpoint as before, including delayed commands.
 #[test]
 fn what_is_late_arrives_after_a_checkpoint_too() {
     for axis in [StressAxis::Latency, StressAxis::Partner, StressAxis::Push] {
@@ -197,7 +199,8 @@ fn policies_read_other_words() {
     assert_eq!(told(Some((StressAxis::Push, StressLevel::Two))), plain);
 }
 
-/// An episode begins again in the midst of another one, where that stood, whatever the protocol, and is verified from there.
+/// An episode starts in the middle of another one, at its state, under any protocol, and is verified from
+/// there.
 #[test]
 fn an_episode_begins_again_at_a_moment_of_another() {
     let folder = tempfile::tempdir().unwrap();

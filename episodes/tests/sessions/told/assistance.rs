@@ -1,4 +1,5 @@
-//! What replies tell: under `paper` what the benchmark tells its agents, in every reply of a whole episode, and under `full` the rest.
+//! Tests of the fields in replies: under `paper` those that the benchmark gives its agents, in every
+//! reply of a whole episode, and under `full` the rest.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +13,7 @@ use tandem_tools_spec::{
 
 use crate::common::*;
 
-/// What replies tell under `paper`, by tool. All commands answer alike. Joints are `*`.
+/// Fields of replies under `paper`, by tool. All commands have the same fields. `*` is the name of a joint.
 const PAPER: &[(&str, &str)] = &[
     (
         "command",
@@ -51,14 +52,14 @@ const PAPER: &[(&str, &str)] = &[
     ),
 ];
 
-/// What replies tell beside that where there is something to say.
+/// Further fields that are present only at times.
 const PAPER_AT_TIMES: &[(&str, &str)] = &[(
     "command",
     "robots.SIDE.joints_clamped robots.SIDE.joints_at_limit robots.waist_joints_clamped robots.waist_joints_at_limit \
      robots.base_command_clamped",
 )];
 
-/// What `full` tells beside that.
+/// Further fields under `full`.
 const FULL: &[(&str, &str)] = &[
     (
         "command",
@@ -79,7 +80,7 @@ const FULL: &[(&str, &str)] = &[
          states.pelvis_in_start.position_m states.pelvis_in_start.quaternion_wxyz states.fallen",
     ),
     ("get_status", "seed state_hash fallen.robot fallen.fallen phases.id phases.number phases.time_s"),
-    // That more was told is said, too.
+    // The additional information is counted, too.
     (
         "finish",
         "seed state_hash extra_information extra_information_replies.joint_velocities.* \
@@ -88,7 +89,7 @@ const FULL: &[(&str, &str)] = &[
     ),
 ];
 
-/// As [`PAPER_AT_TIMES`], under `full`.
+/// Further fields under `full` that are present only at times.
 const FULL_AT_TIMES: &[(&str, &str)] = &[
     (
         "command",
@@ -115,7 +116,7 @@ fn listed(lists: &[&[(&str, &str)]]) -> Told {
     told
 }
 
-/// What was told but for what is told at times.
+/// Removes the fields that are present only at times.
 fn without(mut told: Told, at_times: &[(&str, &str)]) -> Told {
     for (tool, fields) in listed(&[at_times]) {
         if let Some(told) = told.get_mut(&tool) {
@@ -125,7 +126,7 @@ fn without(mut told: Told, at_times: &[(&str, &str)]) -> Told {
     told
 }
 
-/// Collects the paths of what a reply holds; names of joints and robots are no fields.
+/// Collects the field paths of a reply. Names of joints and robots are not fields.
 fn collect(reply: &Value, path: &str, fields: &mut BTreeSet<String>) {
     match reply {
         Value::Object(object) => {
@@ -144,7 +145,7 @@ fn collect(reply: &Value, path: &str, fields: &mut BTreeSet<String>) {
     }
 }
 
-/// An episode that an expert plays, in which every tool is asked as well, and that notes what replies tell.
+/// An episode played by an expert that also calls every tool, and collects the fields of the replies.
 struct Listening {
     session: Session,
     told: Told,
@@ -186,7 +187,7 @@ impl PrivilegedEpisode for Listening {
     }
 }
 
-/// Has an expert play a whole episode, and returns the times of its phases with what replies told until it was over.
+/// Plays an expert's episode. Returns the times of its phases, and the fields of the replies until its end.
 fn listen(assistance: Assistance) -> (Vec<Option<f64>>, EndReason, Told) {
     let spec = spec("pouring", 2003, Protocol::Agentic).assisted(assistance);
     let session = Session::start(&spec, None).unwrap();
@@ -215,7 +216,7 @@ fn replies_of_a_whole_episode_tell_what_is_listed_and_nothing_else() {
     assert_eq!(paper_times_s, full_times_s, "an expert needs nothing of what only `full` tells");
 }
 
-/// A policy in this process is shown what is asked for it, whatever the assistance is, and that is counted.
+/// A policy in this process gets the information that it asks for under any assistance, and this is counted.
 #[test]
 fn what_is_shown_beyond_the_benchmark_is_counted() {
     use tandem_episodes::players::LocalEpisode as _;

@@ -1,4 +1,4 @@
-//! How episodes end: what a policy is told of its success, what is still answered, and that nothing runs on.
+//! Tests of endings: the disclosure of success, the calls that remain available, and stopped clocks.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -33,7 +33,7 @@ fn success_is_told_and_ends_the_episode_as_the_disclosure_says() {
         let told = result.phases.0.iter().filter(|(_, time_s)| time_s.is_some()).count();
         assert_eq!((told, result.ended), (told_at_the_end, ended), "{disclosure}");
         assert_eq!(status(&mut session).phases.len(), told_at_the_end, "{disclosure}");
-        // What is kept does not depend on what was told.
+        // The stored result does not depend on the disclosure.
         let kept = session.close();
         assert!(kept.phases.0.iter().all(|(_, time_s)| time_s.is_some()), "{disclosure}: {kept:?}");
     }

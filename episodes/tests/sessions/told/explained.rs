@@ -1,4 +1,4 @@
-//! What `get_status` with `explain` says of the phase that is next.
+//! Tests of the next phase in `get_status` with `explain`.
 
 use tandem_episodes::Session;
 use tandem_tools_spec::{Assistance, Disclosure, GetStatus, ManageReply, NextPhase, Protocol, ToolReply};

@@ -1,4 +1,4 @@
-//! What a policy is told, under way and at the end.
+//! Tests of the information given to a policy, during an episode and at its end.
 
 mod assistance;
 mod endings;

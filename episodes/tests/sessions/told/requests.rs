@@ -1,5 +1,5 @@
-//! What no way of asking gets past: what is withheld from a call alone is withheld from a look inside a command, from operators and from
-//! who asks without end.
+//! Tests against bypasses: information withheld from a plain call is also withheld from an observation
+//! within a command, from operators, and under repeated requests.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -61,7 +61,7 @@ fn an_operator_may_command_no_more_than_the_policy_of_all_robots() {
     assert!(session.together(vec![allowed]).is_ok());
 }
 
-/// Lets time pass while a call is answered.
+/// A receiver that lets time pass while a call is answered.
 struct SlowAnswers(Arc<AtomicU64>);
 
 impl Onlookers for SlowAnswers {

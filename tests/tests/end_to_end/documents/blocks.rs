@@ -1,4 +1,4 @@
-//! Every block of code says what becomes of it, and what is no command is what it says it is.
+//! Tests of code blocks: every fence declares a check, and each block that is not a command passes its check.
 
 use std::{
     fs,
@@ -18,7 +18,7 @@ use super::{
     pages::{Block, Page, all_documents, root},
 };
 
-/// The scene that `xml,scene` shows.
+/// Scene shown by `xml,scene`.
 const SCENE: &str = "episodes/tests/scenes/kitchen/handover.xml";
 
 #[test]
@@ -47,7 +47,7 @@ fn commands_in_the_text_are_accepted() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Whether a block that nobody runs is right. Scripts and bodies of tools have tests of their own.
+/// Checks a block that is not run. Scripts and tool bodies have tests of their own.
 fn check(block: &Block) -> Result<(), String> {
     match (block.language.as_str(), block.purpose.as_str()) {
         ("sh", "run") => Ok(()),
@@ -81,7 +81,7 @@ fn check(block: &Block) -> Result<(), String> {
     }
 }
 
-/// The file of a folder of the repository that has the block's text.
+/// Returns the file in a folder of the repository that has the block's text.
 fn example(block: &Block, folder: &str) -> Result<PathBuf, String> {
     let examples = fs::read_dir(root().join(folder)).map_err(|error| error.to_string())?;
     let is_this = |path: &Path| fs::read_to_string(path).is_ok_and(|text| text == block.text);
@@ -89,7 +89,7 @@ fn example(block: &Block, folder: &str) -> Result<PathBuf, String> {
     paths.find(|path| is_this(path)).ok_or_else(|| format!("no file in {folder} has this text"))
 }
 
-/// Gives `read` a file with the block's text.
+/// Calls `read` with a file that has the block's text.
 fn in_a_file(block: &Block, read: impl Fn(&str) -> Result<(), String>) -> Result<(), String> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join(format!("block.{}", block.language));
@@ -97,7 +97,7 @@ fn in_a_file(block: &Block, read: impl Fn(&str) -> Result<(), String>) -> Result
     read(path.to_str().expect("a path of ours"))
 }
 
-/// Whether Python reads it; without Python nobody knows.
+/// Checks that Python compiles a block; skipped without Python.
 fn compile(block: &Block) -> Result<(), String> {
     if !is_installed("python3") {
         skipped("no python3 to compile blocks with");
@@ -113,12 +113,12 @@ fn compile(block: &Block) -> Result<(), String> {
     })
 }
 
-/// Whether a program can be called.
+/// Returns true if a program can be run.
 pub fn is_installed(program: &str) -> bool {
     succeeds(Command::new(program).arg("--version"))
 }
 
-/// Files of Python that users are given have nobody else who compiles them.
+/// No other check compiles the Python files given to users.
 #[test]
 fn examples_are_python() {
     let folders = ["agents", "bridges", "environments", "servers"]
@@ -135,12 +135,12 @@ fn examples_are_python() {
     }
 }
 
-/// Whether a command ends well.
+/// Returns true if a command succeeds.
 pub fn succeeds(command: &mut Command) -> bool {
     command.output().is_ok_and(|output| output.status.success())
 }
 
-/// Parts of a document have no single root, so they are given one.
+/// Parses XML. Fragments have no single root, so one is added.
 fn parse_xml(text: &str) -> Result<(), String> {
     roxmltree::Document::parse(&format!("<block>{text}</block>")).map(drop).map_err(|error| error.to_string())
 }

@@ -1,4 +1,4 @@
-//! Bodies that pages show are answered, and files that a server reads are read.
+//! Tests of request bodies and of server files in the documents: a server accepts them.
 
 use std::fs;
 
@@ -8,7 +8,7 @@ use tandem_tests::TestServer;
 
 use super::pages::{Block, Page, pages};
 
-/// The blocks of all pages whose purpose begins with `purpose`, with what follows it.
+/// Returns the blocks in all pages whose purpose begins with `purpose`, each with the rest of its purpose.
 fn json_blocks(purpose: &str) -> Vec<(Page, Block, String)> {
     let mut found = Vec::new();
     for page in pages() {
@@ -42,14 +42,14 @@ fn tools_accept_the_bodies_that_pages_show() {
     }
 }
 
-/// The bodies of all calls of a tool by curl in a script.
+/// Returns the bodies of a script's curl calls to a tool.
 fn sent_to<'a>(tool: &str, script: &'a str) -> Vec<&'a str> {
     let route = format!("/tools/{tool} ");
     let calls = script.split(route.as_str()).skip(1);
     calls.filter_map(|rest| rest.split_once("-d '")?.1.split('\'').next()).collect()
 }
 
-/// What is reached in half a second, a reader sees done.
+/// A motion that takes half a second is complete for the reader.
 #[test]
 fn hands_that_pages_move_arrive() {
     let server = TestServer::start();

@@ -1,4 +1,5 @@
-//! Command lines that pages show are accepted: `tandem` by its own parser, of others what they name in this repository is there.
+//! Tests of command lines in the documents: `tandem` is checked by its own parser. For other programs,
+//! the files, packages and tests of this repository that they name must exist.
 
 use std::path::Path;
 
@@ -7,10 +8,10 @@ use tandem::cli::Cli;
 
 use super::pages::root;
 
-/// Programs that are taken at their word: they are not ours.
+/// External programs whose arguments are not checked.
 const OTHERS: [&str; 7] = ["claude", "export", "jupyter", "jupytext", "mdbook", "ollama", "openssl"];
 
-/// What variables of a cluster stand for, so that a line with them can be read.
+/// Values of a cluster's variables, with which a line can be parsed.
 const VARIABLES: [(&str, &str); 6] = [
     ("$(JOB_COMPLETION_INDEX)", "0"),
     ("$SLURM_ARRAY_TASK_ID", "0"),
@@ -20,7 +21,7 @@ const VARIABLES: [(&str, &str); 6] = [
     ("$PWD", "."),
 ];
 
-/// What the command line says to a command that leaves out something, or asks for help.
+/// Errors of an incomplete command, or of a request for help.
 const UNFINISHED: [ErrorKind; 4] = [
     ErrorKind::DisplayHelp,
     ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand,
@@ -46,7 +47,8 @@ pub fn check_args(manifest: &str) -> Result<(), String> {
     check_tandem(&args)
 }
 
-/// Checks a command that prose mentions: it may leave out what has to be given besides, as a file. Other words in backticks pass.
+/// Checks a command mentioned in prose, which may omit required arguments such as a file. Other words in
+/// backticks pass.
 pub fn check_mention(text: &str) -> Result<(), String> {
     let found = commands(text);
     let words: Vec<&str> = found.first().into_iter().flatten().map(String::as_str).collect();
@@ -81,7 +83,7 @@ fn check_command(words: &[&str]) -> Result<(), String> {
             let folder = package.split('[').next().unwrap_or_default();
             expect_file(&format!("{folder}/pyproject.toml"))
         }
-        // The package's own command line.
+        // The Python package's own command line.
         ["python" | "python3", "-m", "tandem", args @ ..] => match args.is_empty() {
             true => Ok(()),
             false => check_tandem(args),
@@ -112,7 +114,7 @@ fn expect_file(path: &str) -> Result<(), String> {
     }
 }
 
-/// Subcommands of Cargo, and the packages, features and tests that they name.
+/// Checks a subcommand of Cargo, and the packages, features and tests that it names.
 fn check_cargo(args: &[&str]) -> Result<(), String> {
     let end = args.iter().position(|word| *word == "--").unwrap_or(args.len());
     let (own, rest) = args.split_at(end);
@@ -136,13 +138,13 @@ fn check_cargo(args: &[&str]) -> Result<(), String> {
     Ok(())
 }
 
-/// Whether `.cargo/config.toml` has such a command.
+/// Returns true if `.cargo/config.toml` has this alias.
 fn is_alias(command: &str) -> bool {
     let config = std::fs::read_to_string(root().join(".cargo/config.toml")).unwrap_or_default();
     config.lines().any(|line| line.starts_with(&format!("{command} = ")))
 }
 
-/// The folder of a package, as `sim` of `tandem-sim`.
+/// Returns the folder of a package, for example `sim` for `tandem-sim`.
 fn folder_of(package: &str) -> Result<String, String> {
     let name = package.strip_prefix("tandem-").unwrap_or("gateway").replace('-', "_");
     match package.starts_with("tandem") && root().join(&name).join("Cargo.toml").exists() {
@@ -159,7 +161,7 @@ fn expect_feature(feature: &str) -> Result<(), String> {
     }
 }
 
-/// Whether the package that is named, or any, has such an integration test, and in it what it is filtered by.
+/// Checks that the named package, or any, has this integration test and the module by which it is filtered.
 fn expect_test(args: &[&str], test: &str) -> Result<(), String> {
     let package = args.windows(2).find(|pair| pair[0] == "-p").map(|pair| pair[1]);
     let folders = match package {
@@ -176,7 +178,7 @@ fn expect_test(args: &[&str], test: &str) -> Result<(), String> {
     }
 }
 
-/// Whether a folder has a module of that name, at any depth.
+/// Returns true if a folder has a module with this name, at any depth.
 fn is_below(folder: &Path, module: &str) -> bool {
     let Ok(entries) = std::fs::read_dir(folder) else { return false };
     entries.flatten().any(|entry| {
@@ -185,7 +187,8 @@ fn is_below(folder: &Path, module: &str) -> bool {
     })
 }
 
-/// The commands of a script as words, as far as pages need it: quotes, comments, pipes, lists and redirections.
+/// Splits a script into commands and words, with the syntax that the pages use: quotes, comments, pipes,
+/// lists and redirections.
 fn commands(script: &str) -> Vec<Vec<String>> {
     let script = script.replace("\\\n", " ");
     let mut splitter = Splitter::default();
@@ -217,13 +220,13 @@ fn commands(script: &str) -> Vec<Vec<String>> {
     splitter.commands
 }
 
-/// What has been split so far.
+/// State of the splitter.
 #[derive(Default)]
 struct Splitter {
     commands: Vec<Vec<String>>,
     command: Vec<String>,
     word: Option<String>,
-    /// Whether the next word is a file that something is read from or written to.
+    /// Set when the next word is a redirection's file.
     redirected: bool,
 }
 

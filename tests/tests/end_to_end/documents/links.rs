@@ -1,4 +1,4 @@
-//! Links lead somewhere, the table of contents lists every page, and README stays short.
+//! Tests of the documents' links, of the table of contents, and of README's length.
 
 use std::{
     fs,
@@ -7,10 +7,10 @@ use std::{
 
 use super::pages::{BOOK, CONTENTS, Page, all_documents, page, pages, paths_below, root};
 
-/// README is a door; the book is the house.
+/// Maximum number of lines of README; details belong in the book.
 const README_LINES: usize = 150;
 
-/// Links of a page, with their lines.
+/// Returns the links of a page with their lines.
 fn links(page: &Page) -> Vec<(usize, String)> {
     let mut found = Vec::new();
     for (line, text) in page.prose() {
@@ -20,7 +20,7 @@ fn links(page: &Page) -> Vec<(usize, String)> {
     found
 }
 
-/// What a heading is called in an address: as GitHub and mdBook call it.
+/// Returns the anchor of a heading by the rules of GitHub and mdBook.
 fn anchor(heading: &str) -> String {
     let kept = heading.trim().chars().filter(|letter| letter.is_alphanumeric() || " -_".contains(*letter));
     kept.map(|letter| if letter == ' ' { '-' } else { letter.to_ascii_lowercase() }).collect()
@@ -32,7 +32,7 @@ fn has_anchor(path: &Path, wanted: &str) -> bool {
     headings.map(|line| anchor(line.trim_start_matches('#'))).any(|anchor| anchor == wanted)
 }
 
-/// Why a link of a page leads nowhere, if so.
+/// Returns the reason why a link is broken; `None` for a valid one.
 fn broken(page: &Page, target: &str) -> Option<String> {
     if target.starts_with("https://") {
         return None;
@@ -66,7 +66,8 @@ fn links_lead_somewhere() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Whether a word in backticks is a path of this repository. Those of what evaluations write have parts in capitals.
+/// Returns true if a word in backticks is a path in this repository. Paths of evaluation results have
+/// parts in capitals.
 fn is_own_path(word: &str) -> bool {
     let folders = ["docs/", "episodes/", "gateway/", "ik/", "sim/", "tests/", "tools_spec/"];
     let begins = folders.iter().any(|folder| word.starts_with(folder));

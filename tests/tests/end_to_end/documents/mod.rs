@@ -1,19 +1,19 @@
-//! README and the book in `docs/` are true: their commands run or are at least accepted, their bodies are answered, their links lead
-//! somewhere, and their tables say what the code says.
+//! Tests of README and the book in `docs/`: commands run or are at least accepted, request bodies are
+//! accepted, links are valid, and tables match the code.
 //!
-//! Every block of code says in its fence what becomes of it here:
+//! The fence of every code block declares its check:
 //!
-//! | fence | what happens |
+//! | fence | check |
 //! |---|---|
-//! | `sh,run` | all such blocks of a page are one script, run beside a server of its own |
-//! | `sh,check` | the command line accepts every `tandem`, and files, packages and tests that other commands name are there |
-//! | `json` | parses; `json,tool=NAME` and `json,start` are sent to a server, `json,instructions` is read by one |
-//! | `toml,map`, `toml,settings` | read as a policy map, as settings |
-//! | `toml,task`, `toml,robot` | a file of `gateway/examples/tasks`, of `robots` there, which is read as a task, as a robot |
-//! | `python` | compiles; `python,run` is run where its packages are installed |
-//! | `xml` | parses; `xml,scene` is the scene that a test plays in |
-//! | `yaml` | its `args` are accepted by the command line |
-//! | `text` | nothing: it is no command |
+//! | `sh,run` | all such blocks of a page are run as one script, with a server of their own |
+//! | `sh,check` | the command line accepts every `tandem`; files, packages and tests in other commands exist |
+//! | `json` | parses; `json,tool=NAME` and `json,start` are sent to a server, which reads `json,instructions` |
+//! | `toml,map`, `toml,settings` | is read as a policy map, or as settings |
+//! | `toml,task`, `toml,robot` | equals a file in `gateway/examples`, which is read as a task or a robot |
+//! | `python` | compiles; `python,run` is run if its packages are installed |
+//! | `xml` | parses; `xml,scene` equals the scene of a test |
+//! | `yaml` | the command line accepts its `args` |
+//! | `text` | none: it is no command |
 
 mod blocks;
 mod bodies;

@@ -1,40 +1,40 @@
-//! The pages: README, what else lies beside it, and the book; their blocks of code and their prose.
+//! Pages: README, the other documents beside it, and the book, with their code blocks and prose.
 
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-/// Folder of the book's pages, from the root of the repository.
+/// Folder of the book's pages, relative to the root of the repository.
 pub const BOOK: &str = "docs/src";
 
 /// The book's table of contents.
 pub const CONTENTS: &str = "SUMMARY.md";
 
-/// One page.
+/// A page.
 pub struct Page {
-    /// From the root of the repository.
+    /// Path relative to the root of the repository.
     pub path: PathBuf,
     pub text: String,
 }
 
 /// A fenced block of code.
 pub struct Block {
-    /// The language, as `sh`.
+    /// Language, for example `sh`.
     pub language: String,
-    /// What the fence says besides, as `run`; empty where it says nothing.
+    /// Rest of the fence, for example `run`; empty if there is none.
     pub purpose: String,
     pub text: String,
-    /// Line of the fence, from 1.
+    /// Line of the fence, counted from 1.
     pub line: usize,
 }
 
-/// The root of the repository.
+/// Returns the root of the repository.
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("tests/ lies in the workspace")
 }
 
-/// README and the pages of the book without its table of contents.
+/// Returns README and the pages of the book, without its table of contents.
 pub fn pages() -> Vec<Page> {
     let book = paths_below(&root().join(BOOK));
     let paths = book.into_iter().filter(|path| !path.ends_with(CONTENTS));
@@ -43,7 +43,7 @@ pub fn pages() -> Vec<Page> {
     pages
 }
 
-/// The pages, and what else lies at the root for people to read.
+/// Returns the pages, the table of contents, and the other documents at the root.
 pub fn all_documents() -> Vec<Page> {
     let mut documents = pages();
     documents.push(page(&format!("{BOOK}/{CONTENTS}")));
@@ -53,7 +53,7 @@ pub fn all_documents() -> Vec<Page> {
     documents
 }
 
-/// One page by its path from the root of the repository.
+/// Returns a page by its path relative to the root of the repository.
 pub fn page(path: &str) -> Page {
     read(root().join(path))
 }
@@ -63,7 +63,7 @@ fn read(path: PathBuf) -> Page {
     Page { path: path.strip_prefix(root()).expect("below the root").into(), text }
 }
 
-/// Every page of a folder and of the folders in it, in order.
+/// Returns every page in a folder and its subfolders, in order.
 pub fn paths_below(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).expect("a folder of the repository") {
@@ -79,12 +79,12 @@ pub fn paths_below(folder: &Path) -> Vec<PathBuf> {
 }
 
 impl Page {
-    /// Where something stands, for messages.
+    /// Returns the location of a line, for messages.
     pub fn at(&self, line: usize) -> String {
         format!("{}:{line}", self.path.display())
     }
 
-    /// The fenced blocks of code, in order.
+    /// Returns the fenced code blocks, in order.
     pub fn blocks(&self) -> Vec<Block> {
         let mut blocks: Vec<Block> = Vec::new();
         let mut open = false;
@@ -109,7 +109,7 @@ impl Page {
         blocks
     }
 
-    /// The lines outside of blocks of code, with their numbers from 1.
+    /// Returns the lines outside code blocks, numbered from 1.
     fn lines(&self) -> Vec<(usize, &str)> {
         let mut fenced = false;
         let mut lines = Vec::new();
@@ -123,13 +123,13 @@ impl Page {
         lines
     }
 
-    /// The text without blocks of code and without what stands in backticks, by lines.
+    /// Returns the text outside code blocks and backticks, by line.
     pub fn prose(&self) -> Vec<(usize, String)> {
         let outside = |line: &str| line.split('`').step_by(2).collect::<Vec<_>>().join("`");
         self.lines().into_iter().map(|(number, line)| (number, outside(line))).collect()
     }
 
-    /// What stands in backticks, with the numbers of the lines.
+    /// Returns the texts in backticks with their line numbers.
     pub fn in_backticks(&self) -> Vec<(usize, String)> {
         let inside = |(number, line): (usize, &'_ str)| {
             let words: Vec<_> =

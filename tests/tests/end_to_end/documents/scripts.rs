@@ -1,7 +1,8 @@
-//! Scripts of pages are run: all `sh,run` of a page as one script, beside a server of its own, in a folder of its own.
+//! Tests that run the scripts of the pages: all `sh,run` blocks of a page are one script, with a server
+//! and a folder of its own.
 //!
-//! In front of the programs that are installed stand `tandem`, which is this very program again, `cargo`, which runs it, and `curl`, which
-//! takes a refusal for a failure.
+//! The path begins with three programs of ours: `tandem`, which is this test program; `cargo`, which runs
+//! it; and `curl`, which fails on an error status.
 
 use std::{
     env, fs,
@@ -21,16 +22,16 @@ use super::{
     pages::{Page, pages, root},
 };
 
-/// Where pages say that a server is.
+/// Address of the server in the pages.
 const ADDRESS: &str = "127.0.0.1:8700";
 
-/// The arguments of `tandem`, one a line, where this program is to be it.
+/// Environment variable with the arguments of `tandem`, one a line, for this program in that role.
 const ARGUMENTS: &str = "TANDEM_DOCUMENTS_ARGUMENTS";
 
-/// The test that is `tandem` then.
+/// Name of the test that acts as `tandem`.
 const AS_TANDEM: &str = "documents::scripts::this_program_is_tandem_where_a_script_calls_it";
 
-/// A policy for the loop that a page shows: it does not move.
+/// Policy for the loop in a page: it does not move.
 const POLICY: &str = "import numpy as np
 def policy(image, state):
     return np.tile([0.0] * 34 + [0.75], (20, 1))
@@ -88,7 +89,7 @@ fn this_program_is_tandem_where_a_script_calls_it() {
     exit(code);
 }
 
-/// All blocks of a page in one language that are to be run, as one text.
+/// Returns all blocks of a page in one language that are to be run, joined into one text.
 fn script(page: &Page, language: &str) -> String {
     let blocks =
         page.blocks().into_iter().filter(|block| block.language == language && block.purpose == "run");
@@ -101,7 +102,7 @@ fn run_script(page: &Page, script: &str) {
         return;
     }
     let began = Instant::now();
-    // Where a page calls a server of a task's file, this is it.
+    // Some pages call a server with a task file; this is the file.
     let task_file = Some(vec![root().join("gateway/examples/tasks/pass_the_parcel.toml")]);
     let server = TestServer::with(Layer { task_file, ..Layer::default() });
     let folder = workplace();
@@ -123,7 +124,7 @@ fn expect_success(page: &Page, output: std::io::Result<Output>) {
     assert!(output.status.success(), "{}: {}\n{failed}\n{told}", page.path.display(), output.status);
 }
 
-/// A folder in which the repository's folders can be named, with programs of ours in `bin`.
+/// Makes a folder with links to the repository's folders, and our own programs in `bin`.
 fn workplace() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder");
     for name in ["episodes", "gateway", "sim", "tests"] {
@@ -149,7 +150,7 @@ fn write_program(bin: &Path, name: &str, line: &str) {
     fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).expect("a program that may be run");
 }
 
-/// Where a program lies that is installed.
+/// Returns the path of an installed program.
 fn installed_path(program: &str) -> String {
     let found = Command::new("sh").args(["-c", &format!("command -v {program}")]).output();
     let found = found.expect("a shell").stdout;

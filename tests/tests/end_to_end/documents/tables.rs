@@ -1,4 +1,5 @@
-//! Tables of the book say what the code says: tasks and their phases, flags of the command line, routes of the server.
+//! Tests of the book's tables against the code: tasks and their phases, command-line flags, and routes of
+//! the server.
 
 use clap::{Arg, Command, CommandFactory};
 use tandem::cli::Cli;
@@ -7,7 +8,7 @@ use tandem_tests::TestServer;
 
 use super::pages::{BOOK, page};
 
-/// Flags that every subcommand has.
+/// Flags of every subcommand.
 const EVERYWHERE: [&str; 2] = ["help", "version"];
 
 #[test]
@@ -21,7 +22,7 @@ fn pages_of_tasks_say_what_tasks_are() {
     }
 }
 
-/// What the page of a task has to say, word for word.
+/// Returns the texts that the page of a task must contain, word for word.
 fn expected_of(task: &Task) -> Vec<String> {
     let robots = task.robots.iter().map(|robot| format!("| {} | {} |", robot.name, robot.instruction));
     let phases = task.phases.iter().enumerate().map(|(index, phase)| {
@@ -54,7 +55,7 @@ fn the_reference_has_every_flag_with_its_meaning() {
     for (name, flags) in &subcommands {
         let section = sections.iter().find(|section| section.lines().next() == Some(name));
         let section = section.unwrap_or_else(|| panic!("the reference has no section {name}"));
-        // It has the flags of `serve`, and says so.
+        // `doctor` has the flags of `serve`; the book refers to those.
         if name == "doctor" {
             let serve = subcommands.iter().find(|(name, _)| name == "serve").map(|(_, flags)| flags);
             assert_eq!(serve, Some(flags), "`doctor` takes what `serve` takes");
@@ -75,7 +76,7 @@ fn the_reference_has_every_flag_with_its_meaning() {
     }
 }
 
-/// Flags that `--help` does not list are for experiments, and stand in one place.
+/// Flags hidden from `--help` are for experiments, and are documented in one place.
 #[test]
 fn flags_for_experiments_are_told_of_in_one_place() {
     fn hidden(command: &Command) -> Vec<String> {
@@ -97,7 +98,7 @@ fn flags_for_experiments_are_told_of_in_one_place() {
     assert_eq!(told, hidden);
 }
 
-/// A flag with its help text, without what follows in brackets: the default and where else it can be given.
+/// A flag with its help text, without the default and other sources in brackets.
 #[derive(Debug, PartialEq)]
 struct Flag {
     name: String,
@@ -112,13 +113,13 @@ impl Flag {
     }
 }
 
-/// The words of a text without signs, so that tables may set them as they like.
+/// Returns the words of a text without punctuation, so that tables may format them freely.
 fn words(text: &str) -> String {
     let words = text.split(|letter: char| !letter.is_alphanumeric()).filter(|word| !word.is_empty());
     words.collect::<Vec<_>>().join(" ")
 }
 
-/// Every subcommand that can be called without another one below it, with its flags.
+/// Collects every subcommand that can be called by itself, with its flags.
 fn leaves(path: &str, command: &Command, found: &mut Vec<(String, Vec<Flag>)>) {
     let mut below = command.get_subcommands().peekable();
     if below.peek().is_none() || !command.is_subcommand_required_set() {

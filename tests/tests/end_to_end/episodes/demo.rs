@@ -1,4 +1,5 @@
-//! The main job, as `tandem demo` does it: the expert plays Handover over HTTP, and the run's folder tells what happened.
+//! A test of the main use, `tandem demo`: the expert plays Handover over HTTP, and the run's folder
+//! documents it.
 
 use std::{fs, path::Path, thread};
 

@@ -1,4 +1,4 @@
-//! How episodes end, and that everybody is told the same of it.
+//! Tests of endings: all parties receive the same result.
 
 use std::{
     fs,
@@ -27,7 +27,7 @@ fn everybody_is_told_the_same_result() {
     let result = server.tool(&id, "finish", &json!({})).ok();
     assert_eq!((&result["tool_calls"], &result["ended"]), (&json!(5), &json!("finished")), "{result}");
 
-    // The recording is closed by now, and what comes later is not part of the episode.
+    // The recording is closed by now; later calls are not part of the episode.
     let recording = Recording::read(&server.folder(&id).join("episode.mcap")).expect("a closed recording");
     server.tool(&id, "get_status", &json!({})).ok();
     server.tool(&id, "wait", &json!({ "steps": 1 })).refused(409, &["it was finished"]);

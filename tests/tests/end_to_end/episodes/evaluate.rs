@@ -1,4 +1,4 @@
-//! Evaluations: the number of jobs changes nothing, and an interrupted run goes on where it stopped.
+//! Tests of evaluations: the number of jobs does not change results, and an interrupted run continues.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -79,13 +79,13 @@ fn what_policies_are_told_is_recorded_and_not_mixed() {
     let name = "expert + phases told: never + hints: on";
     let never = play(three, paper, Disclosure::Never, Hints::On, name);
     assert_eq!(never.result.phases, live.result.phases, "results have every phase");
-    // Who is told otherwise plays another run, which has a folder of its own.
+    // Another assistance is another run, which needs a folder of its own.
     let mixed = evaluate(&EvaluationPlan { assistance: paper, ..plan(1, vec![1]) }, one.path(), &|_| {});
     let refused = mixed.expect_err("another run is there").to_string();
     assert!(refused.contains("assistance is \"paper\", and was \"full\""), "{refused}");
 }
 
-/// State hashes without the times that a machine took.
+/// Returns the state hashes, without the machine's timings.
 fn hashes(episodes: &[PlayedEpisode]) -> Vec<(u32, Option<&str>)> {
     episodes.iter().map(|episode| (episode.spec.seed, episode.result.state_hash.as_deref())).collect()
 }
@@ -99,7 +99,7 @@ fn jobs_change_nothing_and_kept_episodes_are_not_played_again() {
     assert_ne!(alone.episodes[0].result.state_hash, alone.episodes[1].result.state_hash);
     assert_eq!(alone.tasks["handover"].p3, 2);
 
-    // A kept episode comes back with the figures of the machine that played it; a lost one is played again.
+    // A stored episode keeps the figures of the machine that played it; a lost one is played again.
     std::fs::remove_file(one.path().join("episodes/handover-2.json")).expect("the file was written");
     let finished = AtomicU32::new(0);
     let count = |_: EpisodeEvent| {
@@ -145,7 +145,8 @@ fn phases_are_played_on_their_own_by_shares_and_joined_by_a_report() {
     assert_eq!((level.two_robots.collaborative_share, level.two_robots.drop_share), (Some(1.0), Some(0.0)));
 }
 
-/// What the robots of one seed were told, replayed on another, is no policy's doing; a report says how far it gets.
+/// Commands of one seed replayed on another are open-loop control, not a policy; a report includes their
+/// success.
 #[test]
 fn a_demonstration_is_replayed_without_a_look_on_other_seeds_alone() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -171,7 +172,7 @@ fn a_demonstration_is_replayed_without_a_look_on_other_seeds_alone() {
     assert!(floor.players.iter().any(|rate| rate.player == "open-loop" && rate.measured == "in this report"));
 }
 
-/// Of what failed nothing is kept but what it came to, and it is not played again.
+/// For a failed episode only the result is stored, and the episode is not played again.
 #[test]
 fn only_what_succeeded_is_kept_where_that_is_wished() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -185,7 +186,8 @@ fn only_what_succeeded_is_kept_where_that_is_wished() {
     assert_eq!(again.expect("it was played").tasks["handover"].p3, 0);
 }
 
-/// Demonstrations of one seed that are to differ do, succeed, and are the same again; without that the expert is who it was.
+/// Demonstrations of one seed with variety differ, succeed, and are reproducible. Without variety the
+/// expert is unchanged.
 #[test]
 fn demonstrations_vary_as_they_are_asked_to() {
     let play = |variety: u8, disturb: f32| {

@@ -1,4 +1,4 @@
-//! Learned policies as clients: MessagePack, raw pictures, depth, and rows of joints for one robot or all.
+//! Tests of learned policies as clients: MessagePack, raw images, depth, and joint rows for one robot or all.
 
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -8,7 +8,7 @@ use tandem_tools_spec::{CameraCalibration, DepthRow};
 const MSGPACK: &str = "application/msgpack";
 const PIXELS: usize = 320 * 240;
 
-/// What such a policy reads of a reply.
+/// The fields of a reply that such a policy reads.
 #[derive(Debug, Deserialize)]
 struct StepReply {
     step: u32,
@@ -42,7 +42,7 @@ struct Arrays {
     depth_png16: Option<Vec<u8>>,
 }
 
-/// A call in MessagePack, and its answer as it comes.
+/// Calls a tool with MessagePack and returns the raw response.
 fn call(server: &TestServer, id: &str, tool: &str, args: &Value) -> (u16, Vec<u8>) {
     let path = format!("/v1/episodes/{id}/tools/{tool}");
     let body = rmp_serde::to_vec(args).expect("MessagePack");
@@ -81,8 +81,7 @@ fn one_call_steps_and_returns_what_is_seen_then() {
     }
 }
 
-/// Raw pictures are what the PNGs hold, and depth is what is measured at pixels.
-/// How far along the camera's axis a point of the pelvis frame is.
+/// Returns the coordinate along the camera's axis of a point in the pelvis frame.
 fn along_axis_m(camera: &CameraCalibration, point_m: [f64; 3]) -> f64 {
     let tandem_tools_spec::Pose { position_m, quaternion_wxyz: [w, x, y, z] } = camera.camera_in_pelvis;
     let axis = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)];
@@ -114,11 +113,11 @@ fn every_form_says_the_same() {
         let depth_m = half(u16::from_le_bytes([depth[at], depth[at + 1]]));
         let row: DepthRow = serde_json::from_value(row.clone()).expect("a row");
         let expected_m = along_axis_m(&camera, row.point_m().expect("a point"));
-        // Rows are to the millimetre.
+        // Rows are rounded to the millimetre.
         assert!((depth_m - expected_m).abs() < 1e-3 * expected_m + 0.001, "{depth_m} {expected_m}");
     }
     let result = server.delete(&format!("/v1/episodes/{id}")).ok();
-    // More than the benchmark's policies see, and how often.
+    // The information beyond the benchmark's, and how often it was given.
     let shown = ["depth_images", "pixel_depth", "joint_velocities", "joint_torques", "odometry", "gravity"];
     assert_eq!(result["extra_information"], json!(shown));
     let replies = &result["extra_information_replies"];
@@ -128,7 +127,7 @@ fn every_form_says_the_same() {
     );
 }
 
-/// A positive normal number of half precision.
+/// Decodes a positive normal number of half precision.
 fn half(bits: u16) -> f64 {
     let (exponent, fraction) = (i32::from(bits >> 10), f64::from(bits & 0x3ff));
     (1.0 + fraction / 1024.0) * f64::from(exponent - 15).exp2()

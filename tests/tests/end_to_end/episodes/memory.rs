@@ -1,4 +1,4 @@
-//! What episodes take of memory, and that they leave none behind.
+//! Tests of the memory that episodes use, and of leaks.
 
 use std::{env, fs, process::Command, thread};
 
@@ -7,14 +7,15 @@ use tandem::settings::Layer;
 use tandem_episodes::tasks;
 use tandem_tests::TestServer;
 
-/// Memory of this process, which is the server's, too: `VmRSS` is what it has, `VmHWM` the most that it has had.
+/// Returns a memory figure of this process, which includes the server: `VmRSS` is the current size,
+/// `VmHWM` the peak.
 fn memory_kb(what: &str) -> u64 {
     let status = fs::read_to_string("/proc/self/status").expect("the state of this process");
     let line = status.lines().find_map(|line| line.strip_prefix(what)).expect("its memory");
     line.trim_matches([':', ' ', '\t']).trim_end_matches(" kB").parse().expect("a number")
 }
 
-/// Starts this many episodes, plays each a little, and closes them.
+/// Starts this many episodes, plays a few steps of each, and closes them.
 fn play(server: &TestServer, episodes: usize) {
     for _ in 0..episodes {
         let id = server.episode("benchmark");
@@ -22,14 +23,15 @@ fn play(server: &TestServer, episodes: usize) {
         server.tool(&id, "get_robot_state", &json!({ "robot": "A" })).ok();
         server.tool(&id, "wait", &json!({ "steps": 0 })).refused(422, &[]);
         server.delete(&format!("/v1/episodes/{id}")).ok();
-        // What was recorded is not what is measured, and names are looked for one by one.
+        // The recording is removed, since neither it nor the search for a free name is to be measured.
         fs::remove_dir_all(server.folder(&id)).expect("the episode's folder");
     }
 }
 
 fn check(episodes: usize) {
     let server = TestServer::start();
-    // What is allocated once: assets, threads of the server, and the allocator's own arenas, which a hundred episodes fill.
+    // Warms up allocations made once: assets, server threads, and the allocator's arenas, which a hundred
+    // episodes fill.
     play(&server, 200);
     let before_kb = memory_kb("VmRSS");
     play(&server, episodes);
@@ -44,12 +46,12 @@ fn five_hundred_episodes_leave_no_memory_behind() {
     check(500);
 }
 
-/// Most that an episode may take, of all that the server takes beyond what it took before the first.
+/// Maximum memory of an episode, as its share of the server's growth since before the first one.
 const EPISODE_KB: u64 = 12_000;
-/// What a core needs that draws.
+/// Memory of a core that renders.
 const CORE_KB: u64 = 40_000;
 const EPISODES: usize = 21;
-/// Set where the process is there for this alone.
+/// Environment variable set in a process that runs this test alone.
 const ALONE: &str = "TANDEM_TESTS_MEMORY_ALONE";
 
 #[test]
@@ -88,7 +90,7 @@ fn episodes_side_by_side() {
     assert!(most_kb <= EPISODES as u64 * EPISODE_KB + cores * CORE_KB, "at most {most_kb} kB");
 }
 
-/// Other tests of this program take memory, too.
+/// Runs in a process of its own, since other tests of this program allocate memory, too.
 #[test]
 fn an_episode_takes_at_most_twelve_megabytes() {
     let mut alone = Command::new(env::current_exe().expect("this program"));

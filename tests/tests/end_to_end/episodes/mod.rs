@@ -1,4 +1,4 @@
-//! Episodes from start to result, as players of every kind play them.
+//! Tests of episodes from start to result, with players of every kind.
 
 mod demo;
 mod endings;

@@ -1,4 +1,4 @@
-//! Tasks of users' files beside the same tasks of the program, and what is kept of a file.
+//! Tests of users' task files against the same built-in tasks, and of the stored copy of a file.
 
 use tandem_episodes::evaluation::{EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate};
 use tandem_episodes::players;
@@ -6,10 +6,10 @@ use tandem_episodes::tasks::{self, Task};
 use tandem_episodes::{Controller, Instructions, RendererKind, RobotFile, Sensing, Variation, read_task};
 use tandem_tools_spec::{Assistance, PhaseTimes, Protocol};
 
-/// As the book names them.
+/// Seeds named in the book.
 const SEEDS: [u32; 5] = [2000, 2001, 2002, 2003, 2004];
 
-/// Phases and the hash of the last state, for each seed, as the task's expert plays.
+/// Returns the phase times and the final state hash for each seed, with the task's expert.
 fn played(task: &'static Task) -> Vec<(PhaseTimes, Option<String>)> {
     let plan = EvaluationPlan {
         player: players::find("expert").expect("a player"),
@@ -43,8 +43,7 @@ fn played(task: &'static Task) -> Vec<(PhaseTimes, Option<String>)> {
     episodes.into_iter().map(|played| (played.result.phases, played.result.state_hash)).collect()
 }
 
-/// A user's copy of a task, with a comment more, is another task that is played and scored as the program's
-/// own.
+/// A user's copy of a task with an added comment is a different task, with the same play and score.
 #[test]
 fn a_copy_of_a_task_is_scored_as_the_task_itself() {
     for id in ["handover", "big_table"] {

@@ -1,16 +1,17 @@
-//! A policy that knows nothing but what the tools say and measure lifts the bottle: the numbers in the description of
-//! `move_wrists` hold.
+//! A test of the numbers in the description of `move_wrists`: a policy that uses only the tools' texts
+//! and measurements lifts the bottle.
 
 use serde_json::{Value, json};
 use tandem_tests::TestServer;
 
-/// A pixel on the body of Handover's bottle as robot A sees it on seed 0. A person or a model finds it in the picture.
+/// Pixel on the body of Handover's bottle as robot A sees it on seed 0. A person or a model would find it
+/// in the image.
 const PIXEL: [u32; 2] = [188, 215];
 const BOTTLE_RADIUS_M: f64 = 0.035;
 const OPEN_RAD: [f64; 7] = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0];
 const CLOSED_RAD: [f64; 7] = [0.0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3];
 
-/// Position fields as `[x, y, z]`.
+/// Parses a position `[x, y, z]`.
 fn position_m(value: &Value) -> [f64; 3] {
     serde_json::from_value(value.clone()).expect("a position")
 }
@@ -25,7 +26,7 @@ fn the_bottle_is_lifted_by_what_the_tools_say() {
     let measured = tool("query_depth", json!({ "robot": "A", "pixels": [PIXEL] }));
     let surface_m = position_m(&json!(measured["points"][0].as_array().expect("a row")[2..]));
 
-    // The pixel sees the surface; the axis lies a radius behind it.
+    // The pixel shows the surface; the axis is one radius behind it.
     let sight_m = [surface_m[0] - eye_m[0], surface_m[1] - eye_m[1]];
     let behind = 1.0 + BOTTLE_RADIUS_M / sight_m[0].hypot(sight_m[1]);
     let axis_m = [eye_m[0] + sight_m[0] * behind, eye_m[1] + sight_m[1] * behind];

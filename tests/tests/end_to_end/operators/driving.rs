@@ -1,5 +1,5 @@
-//! People who drive in real time by a socket each: what they say moves their robot and no other, time stands still while one is away, and
-//! the recording comes to the same again.
+//! Tests of teleoperation in real time, by one socket for each person. Messages move the person's own
+//! robot only, time stops while a person is absent, and the recording is verified.
 
 use std::{
     net::TcpStream,
@@ -11,15 +11,15 @@ use tungstenite::{Message, WebSocket, client::IntoClientRequest};
 
 use super::team::Team;
 
-/// A page that drives.
+/// A page that drives robots.
 pub struct DriversSocket {
     socket: WebSocket<TcpStream>,
     scene: Value,
-    /// The last row that has come.
+    /// Latest row received.
     row: Vec<f32>,
 }
 
-/// The status of a request for the socket with these headers, or the socket.
+/// Opens the socket with these headers. Returns the status of the response if it is refused.
 fn ask_for(
     team: &Team,
     robots: &str,
@@ -32,7 +32,7 @@ fn ask_for(
     }
     let stream = TcpStream::connect(team.server.address).expect("a connection");
     let opened = tungstenite::client(request, stream.try_clone().expect("a stream"));
-    // What is read from now on may not have come yet.
+    // A read with a short timeout, since no message may have arrived yet.
     stream.set_read_timeout(Some(Duration::from_millis(15))).expect("a limit");
     match opened {
         Ok((socket, _)) => Ok(socket),
@@ -43,7 +43,7 @@ fn ask_for(
     }
 }
 
-/// The cookie that the operator of robot number `robot` is given.
+/// Returns the cookie given to the operator of robot number `robot`.
 fn entered(team: &Team, robot: usize) -> String {
     let bearer = format!("Bearer {}", team.tokens[robot]);
     let headers = [("authorization", bearer.as_str()), ("content-type", "application/json")];
@@ -54,12 +54,12 @@ fn entered(team: &Team, robot: usize) -> String {
 }
 
 impl DriversSocket {
-    /// Enters as the operator of robot number `robot`, as the page does.
+    /// Enters like the page, as the operator of robot number `robot`.
     pub fn open(team: &Team, robot: usize) -> DriversSocket {
         DriversSocket::open_for(team, &[robot])
     }
 
-    /// Enters as the operator of the first of these robots, beside whom the others stand still.
+    /// Enters as the operator of the first of these robots; the others stand still.
     fn open_for(team: &Team, robots: &[usize]) -> DriversSocket {
         let names: Vec<&str> = robots.iter().map(|robot| ["A", "B"][*robot]).collect();
         let cookies: Vec<String> = robots.iter().map(|robot| entered(team, *robot)).collect();
@@ -83,7 +83,7 @@ impl DriversSocket {
         self.socket.send(Message::text(word)).expect("a page that is heard");
     }
 
-    /// Takes in what has come.
+    /// Reads the messages that have arrived.
     pub fn read(&mut self) {
         loop {
             match self.socket.read() {
@@ -103,7 +103,8 @@ impl DriversSocket {
         self.row.get(1).copied().unwrap_or_default()
     }
 
-    /// The place of a robot's right wrist in its pelvis frame, as nearly as a robot that stands has it.
+    /// Returns the position of a robot's right wrist in its pelvis frame, with the accuracy of a standing
+    /// robot.
     fn wrist_m(&self, robot: usize) -> [f32; 3] {
         let robots = self.scene["robots"].as_array().expect("robots");
         let links = |robot: &Value| robot["links"].as_u64().expect("links") as usize * 7;
@@ -121,7 +122,7 @@ fn apart_m(one: [f32; 3], other: [f32; 3]) -> f32 {
     one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f32>().sqrt()
 }
 
-/// Both pages say what their robots are to do, 50 times a second, for so long.
+/// Sends the moves of both pages' robots at 50 Hz for `time`.
 fn drive(pages: &mut [DriversSocket], moves: [Value; 2], time: Duration) {
     let began = Instant::now();
     while began.elapsed() < time {
@@ -148,7 +149,7 @@ fn two_people_drive_in_real_time_and_the_recording_comes_to_the_same() {
     let moved = [0, 1].map(|robot| apart_m(before[robot], pages[0].wrist_m(robot)));
     assert!(moved[0] > 0.1 && moved[1] < 0.02, "{moved:?}");
 
-    // B goes away: time stands still, and A is told for whom it waits.
+    // B leaves: time stops, and A learns for whom the episode waits.
     let [mut a, b] = pages;
     drop(b);
     std::thread::sleep(Duration::from_millis(300));
@@ -164,7 +165,7 @@ fn two_people_drive_in_real_time_and_the_recording_comes_to_the_same() {
         a.read();
     }
     assert_eq!(a.step(), stood);
-    // It comes back, and time goes on.
+    // B returns, and time continues.
     let mut pages = [a, DriversSocket::open(&team, 1)];
     drive(&mut pages, [still(), still()], Duration::from_secs(1));
     assert!(pages[0].step() > stood + 5.0, "{} after {stood}", pages[0].step());
@@ -175,7 +176,7 @@ fn two_people_drive_in_real_time_and_the_recording_comes_to_the_same() {
     );
 }
 
-/// The answers to the robot that stands still come on the same socket, before or after.
+/// Replies for the idle robot come on the same socket, before or after those for the own robot.
 #[test]
 fn a_person_beside_a_robot_that_nobody_drives_is_told_how_it_goes() {
     for robots in [[0, 1], [1, 0]] {

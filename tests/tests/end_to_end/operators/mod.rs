@@ -1,4 +1,4 @@
-//! Episodes in which each robot has an operator of its own.
+//! Tests of episodes with an operator for each robot.
 
 mod driving;
 mod page;

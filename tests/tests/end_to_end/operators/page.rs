@@ -1,4 +1,4 @@
-//! The page on which people drive robots: what it is made of, and that time stands still while one of them is away.
+//! Tests of the teleoperation page: its contents, and that time stops while an operator is absent.
 
 use serde_json::{Value, json};
 use tandem::{settings::Layer, token::Token};
@@ -6,7 +6,7 @@ use tandem_tests::TestServer;
 
 use super::team::Team;
 
-/// A command of an operator: a tenth of a second in which a wrist moves and a hand closes.
+/// Returns an operator's command: a tenth of a second in which a wrist moves and a hand closes.
 fn tick(robot: &str, x_m: f64) -> Value {
     json!({ "steps": 5, "robots": [{
         "robot": robot, "carried": true, "vx_m_s": 0, "vy_m_s": 0, "yaw_rate_rad_s": 0,
@@ -47,12 +47,12 @@ fn two_people_drive_and_time_stands_still_while_one_is_away() {
     let steps = || team.server.get(&format!("/v1/episodes/{}", team.id)).ok()["env_steps"].clone();
     let before = steps();
     std::thread::scope(|scope| {
-        // B is away: what A wants waits, and the world with it.
+        // B is absent: A's command waits, and the world with it.
         let waiting = scope.spawn(|| team.ask(0, "move_wrists", tick("A", 0.25)));
         std::thread::sleep(std::time::Duration::from_secs(1));
         assert!(!waiting.is_finished());
         assert_eq!(steps(), before);
-        // It comes back.
+        // B returns.
         let back = team.ask(1, "move_wrists", tick("B", 0.25)).ok();
         assert_eq!(back["partners"], json!([{ "robot": "A", "did": "acted" }]));
         assert_eq!(waiting.join().expect("A's answer").ok()["executed_steps"], 5);

@@ -1,4 +1,5 @@
-//! Who else drives beside a person: the task's expert, a learned policy, and programs, whose commands go on over the steps of people.
+//! Tests of a person's partners: the task's expert, a learned policy, and programs whose commands span
+//! several of a person's steps.
 
 use std::{
     sync::{
@@ -21,7 +22,8 @@ use crate::policies::act_server::ActServer;
 pub const EXPERT: &str = "/operate/expert";
 pub const POLICY: &str = "/operate/policy";
 
-/// The answer to who has `token`, or to who started the episode, and asks for a partner at `path` for robot B.
+/// Asks for a partner at `path` for robot B, as the caller with `token` or as the one that started the
+/// episode.
 fn asked_for(team: &Team, path: &str, token: Option<&str>) -> (u16, Value) {
     answer_to(team, path, token, json!({ "episode": team.id, "robot": "B" }))
 }
@@ -34,12 +36,12 @@ fn answer_to(team: &Team, path: &str, token: Option<&str>, body: Value) -> (u16,
     (answer.0, serde_json::from_slice(&answer.2).unwrap_or_default())
 }
 
-/// The status where who started the episode asks.
+/// Asks as the caller that started the episode and returns the status.
 pub fn ask_for(team: &Team, path: &str) -> u16 {
     asked_for(team, path, None).0
 }
 
-/// A server whose people may have the policy at `url` beside them.
+/// Starts a server that offers the policy at `url` as a partner.
 fn server_with_policy(url: &str) -> TestServer {
     TestServer::with_guests(Default::default(), guests_with_policy(url))
 }
@@ -71,7 +73,7 @@ fn an_expert_for_each_robot_plays_the_task_to_its_end() {
     assert!(format!("{notes:?}").contains("The task's expert drives robot B."));
 }
 
-/// An operator's token has neither its own robot nor a partner's driven by the expert or a policy.
+/// An operator's token cannot start the expert or a policy, neither for its own robot nor for a partner's.
 #[test]
 fn who_started_the_episode_decides_who_drives_beside_operators() {
     let act = ActServer::start(|_| (200, json!({ "actions": [] })));
@@ -131,7 +133,7 @@ fn beside_a_person_a_longer_command_goes_on() {
 
 #[test]
 fn a_learned_policy_drives_its_own_robot_beside_a_person() {
-    // 10 rows of 35 numbers: both arms raised, the base standing.
+    // 10 rows of 35 numbers: both arms raised, the base at rest.
     let mut row = vec![0.0; 35];
     (row[0], row[7], row[34]) = (-0.6, -0.6, 0.76);
     let act = ActServer::start(move |_| (200, json!({ "actions": vec![row.clone(); 10] })));
@@ -211,7 +213,7 @@ fn a_policy_that_was_lost_may_be_asked_for_again_and_nobody_waits_for_it() {
     drive_until(&|| failed.load(Ordering::SeqCst));
     broken.store(false, Ordering::SeqCst);
     let before = asked();
-    // Asking is no more than a wish while the lost one says goodbye.
+    // A request is only noted while the failed policy is still ending.
     drive_until(&|| {
         assert_eq!(ask_for(&team, POLICY), 204);
         asked() >= before + 3

@@ -1,4 +1,5 @@
-//! Two programs in two processes play Handover in lockstep, one robot each: the expert's commands, in halves.
+//! Tests of two operator processes that play Handover in lockstep, one robot each: the expert's commands,
+//! in halves.
 
 use std::{
     env,
@@ -14,10 +15,10 @@ use ureq::Agent;
 
 use super::team::Team;
 
-/// The environment variable that tells an operator's process its task, as JSON.
+/// Environment variable with the task of an operator's process, as JSON.
 const TASK: &str = "TANDEM_TEST_OPERATOR";
 
-/// What the expert of all robots did on seed 0 of Handover, and what came of it.
+/// Returns the commands of the expert for all robots on seed 0 of Handover, and its result.
 fn expert(runs: &Path) -> (Vec<(String, Value)>, ResultReply) {
     let seeds = "0".parse().expect("a seed");
     let flags = Layer { renderer: Some(RendererKind::Cpu), ..Layer::default() };
@@ -28,7 +29,7 @@ fn expert(runs: &Path) -> (Vec<(String, Value)>, ResultReply) {
     (commands.map(|call| (call.tool, call.arguments)).collect(), result)
 }
 
-/// The part of a command that is for `robot`; a robot that is not named holds still.
+/// Returns the part of a command for `robot`. A robot without a part holds still.
 fn half((tool, args): &(String, Value), robot: &str) -> (String, Value) {
     let steps = args["steps"]
         .as_u64()
@@ -101,7 +102,7 @@ fn who_is_left_alone_is_told_and_the_recording_is_whole() {
         assert_eq!(reply["partners"][0]["robot"], "A", "{reply}");
         reply["partners"][0]["did"].as_str().expect("what it did").to_owned()
     };
-    // The process of the other takes a while to begin.
+    // The other process takes a while to start.
     while partner_did() != "acted" {}
     other.kill().expect("its end");
     other.wait().expect("its end");

@@ -1,4 +1,4 @@
-//! Restarts under people who drive: their pages, the expert and a policy drive on.
+//! Tests of restarts during teleoperation: the people's pages, the expert and a policy continue.
 
 use std::time::{Duration, Instant};
 
@@ -12,7 +12,8 @@ use super::{
 };
 use crate::policies::act_server::ActServer;
 
-/// Drives robot A for so many control steps and returns the last; each step takes a command of both robots.
+/// Drives robot A for this many control steps and returns the last. Each step needs a command from both
+/// robots.
 fn drive(team: &Team, steps: f32) -> f32 {
     let mut page = DriversSocket::open(team, 0);
     let (began, mut first) = (Instant::now(), None);
@@ -38,7 +39,7 @@ fn a_page_and_the_expert_drive_on_after_a_restart() {
     assert_eq!(ask_for(&team, EXPERT), 204);
     let before = drive(&team, 10.0);
     team.server.restart(Guests::default());
-    // Nobody has to ask for the expert: without it, a step would wait ten minutes for robot B.
+    // The expert continues without a request. Without it, a step would wait ten minutes for robot B.
     assert!(drive(&team, 10.0) > before, "it begins where it was");
     let (result, notes) = notes(&team);
     assert_eq!(notes.matches("The task's expert drives robot B.").count(), 2, "{notes}");

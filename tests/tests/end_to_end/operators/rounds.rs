@@ -1,4 +1,4 @@
-//! Who may command when, and what each operator sees and hears.
+//! Tests of the operators' turns, and of each operator's observations and messages.
 
 use std::sync::mpsc;
 
@@ -13,7 +13,7 @@ fn names<'a>(list: &'a Value, field: &str) -> Vec<&'a str> {
     list.as_array().into_iter().flatten().filter_map(|entry| entry[field].as_str()).collect()
 }
 
-/// A row that lets a robot stand as it is told by its joints.
+/// Returns a row with which a robot under joint control stands.
 fn row() -> Vec<f64> {
     let mut row = vec![0.0; 35];
     row[34] = 0.75;
@@ -53,7 +53,7 @@ fn an_operator_sees_and_commands_its_own_robot_alone() {
     let other = team.server.episode("benchmark");
     assert_eq!(status("GET", &format!("/v1/episodes/{other}")), 404, "it is not theirs to know of");
     team.server.tool_as(&team.tokens[1], &other, "wait", &json!({ "steps": 1 })).refused(404, &[]);
-    // Nobody commands past the operators, and who directs all has no partner to talk to.
+    // No caller commands past the operators, and a policy of all robots has no partner to talk to.
     team.server.tool(&team.id, "wait", &json!({ "steps": 1 })).refused(403, &["Authorization: Bearer"]);
     team.server.tool(&other, "say", &json!({ "text": "Hello." })).refused(409, &["per_robot"]);
     assert_eq!(team.server.get(&episode).ok()["env_steps"], 0);
@@ -76,7 +76,7 @@ fn a_step_is_made_when_both_have_commanded_and_the_shorter_command_ends_it() {
     assert!(a.get("observation").is_none());
     assert_eq!(names(&b["observation"]["arrays"], "robot"), ["B"]);
 
-    // The look beside the next command does not get in its way, nor does a refused command.
+    // Neither an observation beside the next command nor a refused command interferes with it.
     team.ask(0, "wait", json!({ "steps": 51 })).refused(422, &["1 to 50"]);
     team.ask(0, "wait", json!({ "steps": 5, "expected_step": 3 })).refused(409, &["stands at step 4"]);
     let wait = || ("wait", json!({ "steps": 6, "expected_step": 4 }));
@@ -143,11 +143,11 @@ fn who_keeps_silent_is_held_and_told_so() {
     }
     let late = || team.ask(1, "wait", json!({ "steps": 5 }));
     late().refused(409, &["robot \"B\" was held still from step 0 to 10", "look again"]);
-    // From here on it is waited for, and its next command counts.
+    // From here on B is waited for, and its next command counts.
     let [a, b] = team.both(("wait", json!({ "steps": 5 })), ("wait", json!({ "steps": 5 })));
     let replies = [a.ok(), b.ok()];
     assert_eq!(replies.map(|reply| reply["step"].clone()), [15, 15]);
-    // Who looks knows where it stands, and need not be told.
+    // An observation includes the current step, so no notice is needed.
     team.ask(0, "wait", json!({ "steps": 5 })).ok();
     team.ask(1, "get_robot_state", json!({ "robot": "B" })).ok();
     let [a, b] = team.both(("wait", json!({ "steps": 5 })), ("wait", json!({ "steps": 5 })));
@@ -187,7 +187,8 @@ fn operators_talk_where_they_may() {
     assert_eq!(said[1].arguments["text"], words[1]);
 }
 
-/// Under the stress `partner` every fifth seed has one robot say nothing: what it says is recorded, and nobody hears it.
+/// Under the `partner` stress, in every fifth seed one robot is silent: its messages are recorded, and
+/// not delivered.
 #[test]
 fn a_silent_partner_is_not_heard() {
     let stress = (Some(StressAxis::Partner), Some(StressLevel::Three));
@@ -221,7 +222,7 @@ fn the_episode_ends_when_every_operator_has_finished() {
     assert_eq!(closed["state_hash"], result["state_hash"]);
 }
 
-/// Over MCP the token says which episode is meant.
+/// Over MCP the token identifies the episode.
 #[test]
 fn operators_may_speak_mcp() {
     let team = Team::start(json!({ "patience_s": 0.1 }));
@@ -242,7 +243,7 @@ fn operators_may_speak_mcp() {
     assert!(failed && text.contains("driven by its own operator"), "{text}");
     let start = json!({ "task": "handover", "seed": 0 });
     assert!(call(&team.tokens[0], "start_episode", start).0);
-    // What is refused is not offered.
+    // Tools that would be refused are not listed.
     let offered = |token: &str| {
         let list = json!({ "jsonrpc": "2.0", "id": 1, "method": "tools/list", "params": {} });
         let bearer = format!("Bearer {token}");
@@ -289,7 +290,7 @@ fn only_who_asks_for_operators_gets_them() {
     assert_eq!(server.get("/healthz").ok()["episodes"], 1);
 }
 
-/// Every list of tools, and every text that names tools, has `say` where the caller may use it and nowhere else.
+/// Every list of tools, and every text that names tools, includes `say` if and only if the caller may use it.
 #[test]
 fn who_may_not_talk_is_not_offered_to() {
     let quiet = Team::start(json!({}));
@@ -298,7 +299,8 @@ fn who_may_not_talk_is_not_offered_to() {
     let grasp = json!({
         "jsonrpc": "2.0", "id": 1, "method": "tools/call", "params": { "name": "grasp", "arguments": {} },
     });
-    // An operator who may not talk, and who has started an episode whose operators may.
+    // An operator without permission to talk, and a caller that has started an episode whose operators
+    // have it.
     for (team, token) in [(&quiet, quiet.tokens[0].as_str()), (&talking, "none")] {
         let bearer = format!("Bearer {token}");
         let headers = [("authorization", &*bearer), ("accept", "application/json, text/event-stream")];

@@ -1,10 +1,10 @@
-//! What the tests of operators share: an episode with an operator for each robot.
+//! Shared helpers of the operators' tests: an episode with an operator for each robot.
 
 use serde_json::{Value, json};
 use tandem_episodes::{Recorder, Recording, replay};
 use tandem_tests::{Answer, TestServer};
 
-/// An episode whose robots have operators, on a server of its own.
+/// An episode with operators, on a server of its own.
 pub struct Team {
     pub server: TestServer,
     pub id: String,
@@ -12,12 +12,12 @@ pub struct Team {
 }
 
 impl Team {
-    /// Starts Handover, seed 0, with these fields beside the task.
+    /// Starts Handover, seed 0, with these fields in addition to the task.
     pub fn start(fields: Value) -> Team {
         Team::on(TestServer::start(), 0, fields)
     }
 
-    /// The same on a server, with another seed.
+    /// Starts such an episode on a server, with another seed.
     pub fn on(server: TestServer, seed: u32, fields: Value) -> Team {
         let mut body =
             json!({ "task": "handover", "seed": seed, "protocol": "benchmark", "operators": "per_robot" });
@@ -32,12 +32,12 @@ impl Team {
         Team { server, id, tokens }
     }
 
-    /// The answer to the operator of robot number `robot`.
+    /// Calls a tool as the operator of robot number `robot`.
     pub fn ask(&self, robot: usize, tool: &str, args: Value) -> Answer {
         self.server.tool_as(&self.tokens[robot], &self.id, tool, &args)
     }
 
-    /// Both operators command at once.
+    /// Sends a command of each operator at the same time.
     pub fn both(&self, a: (&str, Value), b: (&str, Value)) -> [Answer; 2] {
         std::thread::scope(|scope| {
             let other = scope.spawn(|| self.ask(1, b.0, b.1));
@@ -45,7 +45,7 @@ impl Team {
         })
     }
 
-    /// Ends the episode, and has its recording played again, which has to come to the same.
+    /// Ends the episode and verifies its recording.
     pub fn verified(&self) -> (Value, Recording) {
         let result = self.server.delete(&format!("/v1/episodes/{}", self.id)).ok();
         let path = self.server.folder(&self.id).join(Recorder::FILE_NAME);

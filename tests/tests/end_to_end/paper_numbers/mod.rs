@@ -1,4 +1,5 @@
-//! The program against the benchmark's published numbers: one table of them, and tests on both sides of each.
+//! Tests of the program against the benchmark's published numbers: one table of them, and checks at both
+//! sides of each.
 
 mod rules;
 mod scene;

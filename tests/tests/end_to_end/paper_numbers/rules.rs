@@ -1,4 +1,4 @@
-//! Scenes, randomisation, budgets, camera and the order of joints.
+//! Tests of scenes, randomisation, budgets, the camera and the order of joints.
 
 use std::time::Duration;
 
@@ -36,7 +36,7 @@ fn seeds_move_what_the_benchmark_moves_and_as_far() {
                 x_m: ends(&offset.x_m),
                 y_m: ends(&offset.y_m),
                 z_m: ends(&offset.z_m),
-                // Whole degrees have been published.
+                // The published values are whole degrees.
                 yaw_deg: ends(&offset.yaw_rad).map(|turn_rad| turn_rad.to_degrees().round()),
             })
             .collect();
@@ -77,7 +77,7 @@ fn the_camera_and_the_joints_are_as_published() {
         assert_eq!([camera.width, camera.height], table::CAMERA_PX);
         let across_deg = 2.0 * (f64::from(camera.width) / 2.0 / camera.fx).atan().to_degrees();
         assert!((across_deg - table::CAMERA_HORIZONTAL_FOV_DEG).abs() < 0.1, "{across_deg} degrees across");
-        // The height of the third column of the rotation: how far the optical axis, of length 1, goes down.
+        // The z component of the rotation's third column is the vertical component of the unit optical axis.
         let [w, x, y, z] = camera.camera_in_pelvis.quaternion_wxyz;
         let down_deg = -(w * w - x * x - y * y + z * z).asin().to_degrees();
         assert!((down_deg - table::CAMERA_DOWN_DEG).abs() < 0.1, "{down_deg} degrees down");
@@ -94,7 +94,7 @@ fn the_camera_and_the_joints_are_as_published() {
     assert_eq!(base, table::ACTION_BASE);
 }
 
-/// Which group a joint belongs to, by Unitree's name for it.
+/// Returns the group of a joint, from Unitree's name.
 fn group(joint: &str) -> &'static str {
     let is_of = |parts: &[&str]| parts.iter().any(|part| joint.contains(part));
     match joint {

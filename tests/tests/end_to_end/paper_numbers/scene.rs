@@ -1,4 +1,4 @@
-//! A task's world that can be changed by hand, and whether its phases are done in it.
+//! A task's world that tests can modify, with checks of its phases.
 
 use tandem_episodes::{Done, EpisodeSpec, Facts, Grip, ObjectFacts, Session, tasks};
 use tandem_sim::{Pose, Rotation, Side, Vector};
@@ -6,11 +6,11 @@ use tandem_tools_spec::Protocol;
 
 use super::table::AtRest;
 
-/// A hair's breadth to either side of a threshold, as a share of it.
+/// Factors just inside and just outside a threshold.
 const INSIDE: f32 = 0.999;
 const OUTSIDE: f32 = 1.001;
 
-/// A task's world before anything has happened.
+/// A task's world at its start.
 pub struct Scene {
     pub task: &'static tasks::Task,
     start: Facts,
@@ -23,7 +23,7 @@ impl Scene {
         Scene { task, start: session.facts() }
     }
 
-    /// Whether the last condition of phase `p` holds in the world as `change` leaves it.
+    /// Returns true if the last condition of phase `p` holds in the world modified by `change`.
     pub fn done(&self, p: usize, change: impl Fn(&mut Facts)) -> bool {
         let mut facts = self.start.clone();
         change(&mut facts);
@@ -40,7 +40,8 @@ impl Scene {
         }
     }
 
-    /// Whether the phase `p`, a sequence, begins in the world as `change` leaves it; it must not be broken where it begins.
+    /// Returns true if the sequence of phase `p` begins in the world modified by `change`. It must not be
+    /// broken at its beginning.
     pub fn begins(&self, p: usize, change: impl Fn(&mut Facts)) -> bool {
         let mut facts = self.start.clone();
         change(&mut facts);
@@ -52,7 +53,7 @@ impl Scene {
         first.holds(&facts)
     }
 
-    /// Checks as [`Scene::threshold`] does, for the beginning of a sequence.
+    /// Checks a threshold like [`Scene::threshold`], for the beginning of a sequence.
     pub fn beginning(&self, p: usize, threshold: f32, large: bool, change: impl Fn(&mut Facts, f32)) {
         let at = |share: f32| self.begins(p, |facts| change(facts, threshold * share));
         let (good, bad) = if large { (OUTSIDE, INSIDE) } else { (INSIDE, OUTSIDE) };
@@ -60,7 +61,8 @@ impl Scene {
         assert!(!at(bad), "{} p{p} begins at {}", self.task.id, threshold * bad);
     }
 
-    /// Phase `p` is done at the good side of `threshold` and not at the other; `large` says that more is better.
+    /// Checks that phase `p` is done on the good side of `threshold` and not on the other. With `large`,
+    /// the good side is above it.
     pub fn threshold(&self, p: usize, threshold: f32, large: bool, change: impl Fn(&mut Facts, f32)) {
         let at = |share: f32| self.done(p, |facts| change(facts, threshold * share));
         let (good, bad) = if large { (OUTSIDE, INSIDE) } else { (INSIDE, OUTSIDE) };
@@ -68,7 +70,8 @@ impl Scene {
         assert!(!at(bad), "{} p{p} at {}", self.task.id, threshold * bad);
     }
 
-    /// Phase `p` asks for `object` to be let go and at rest; `settle` puts it where it belongs.
+    /// Checks the limits under which phase `p` takes `object` as released and at rest. `settle` places
+    /// the object.
     pub fn rest(&self, p: usize, object: &str, limits: &AtRest, settle: impl Fn(&mut Facts)) {
         let settled = |facts: &mut Facts| {
             settle(facts);
@@ -101,12 +104,12 @@ pub fn hold(facts: &mut Facts, robot: usize, side: Side, object: &str) {
     object.untouched_s = 0.0;
 }
 
-/// Each of these robots holds `object` with its left hand.
+/// Makes each of these robots hold `object` with its left hand.
 pub fn held_by(facts: &mut Facts, robots: &[usize], object: &str) {
     robots.iter().for_each(|robot| hold(facts, *robot, Side::Left, object));
 }
 
-/// Puts `object`, which nobody touches, somewhere beside `target`, not turned.
+/// Places `object`, untouched and with no rotation, at an offset from `target`.
 pub fn put(facts: &mut Facts, object: &str, target: &str, beside_m: Vector) {
     let target_m = facts.position_m(target);
     let object = changed(facts, object);
@@ -119,7 +122,7 @@ pub fn raise(facts: &mut Facts, object: &str, by_m: f32) {
     object.pose_in_world.translation.z = object.rest_height_m + by_m;
 }
 
-/// About the object's own origin, over x of the world.
+/// Tilts an object about its own origin and the world's x axis.
 pub fn tilt(facts: &mut Facts, object: &str, by_deg: f32) {
     changed(facts, object).pose_in_world.rotation = Rotation::from_rotation_x(by_deg.to_radians());
 }

@@ -1,18 +1,19 @@
-//! The numbers that the benchmark has published, as it published them: degrees stay degrees. Nothing here is read from a task.
+//! The benchmark's published numbers in their published units; degrees stay degrees. Nothing here is read
+//! from a task.
 
-/// One task.
+/// A task.
 pub struct Published {
     pub id: &'static str,
     pub robots: usize,
-    /// Number of the scene in the collection that it was taken from.
+    /// Number of the scene in its source collection.
     pub scene: &'static str,
     pub episode_steps: u32,
     pub moves: &'static [Moves],
-    /// Whether more than one robot has to work on p1, p2 and p3; published for tasks of two robots.
+    /// True for each of p1, p2 and p3 that needs more than one robot; published for tasks of two robots.
     pub collaborative: Option<[bool; 3]>,
 }
 
-/// A range, from the first to the second number, from which one value is drawn uniformly for some objects together.
+/// Ranges from which one displacement is drawn uniformly for a group of objects.
 #[derive(Debug, PartialEq)]
 pub struct Moves {
     pub objects: &'static [&'static str],
@@ -30,7 +31,7 @@ const fn apple_in_tub(apple: &'static [&'static str]) -> Moves {
     moves(apple, [-0.008, 0.008], [-0.008, 0.008])
 }
 
-/// Stacks follow the containers that stand on them, and so does what is in a container or on a trolley.
+/// Stacks move with the containers on them, and so do the contents of containers and trolleys.
 pub const TASKS: [Published; 10] = [
     Published {
         id: "handover",
@@ -171,7 +172,7 @@ pub const TABLE_HEIGHT_M: f32 = 0.04;
 pub const TABLE_SQUARE_DEG: f32 = 4.0;
 pub const CONSOLE_LIFT_M: f32 = 0.03;
 pub const CONSOLE_CARRIED_M: f32 = 0.15;
-/// Side of the square that each foot has to stand on.
+/// Side of the square mark for each foot.
 pub const CONSOLE_MARK_M: f32 = 0.10;
 pub const CONSOLE_HEIGHT_M: f32 = 0.04;
 pub const DOOR_OPEN_RAD: f32 = 1.45;
@@ -180,7 +181,7 @@ pub const ROUND_LIFT_M: f32 = 0.03;
 pub const ROUND_CLEAR_M: f32 = 0.01;
 pub const ROUND_HEIGHT_M: f32 = 0.05;
 
-/// How an object has to stand or hang at the end.
+/// Limits of the final state of an object that stands or hangs.
 pub struct AtRest {
     pub tilt_deg: f32,
     pub speed_m_s: f32,
@@ -197,9 +198,9 @@ pub const CAMERA_PX: [u32; 2] = [320, 240];
 pub const CAMERA_HORIZONTAL_FOV_DEG: f64 = 102.0;
 pub const CAMERA_DOWN_DEG: f64 = 25.0;
 
-/// Joints of one robot's state by group.
+/// Number of joints by group in a robot's state.
 pub const STATE: [(&str, usize); 4] = [("leg", 12), ("waist", 3), ("arm", 14), ("hand", 14)];
-/// What an action row holds, in order: joints by group, then the base.
+/// Columns of an action row, in order: joints by group, then the base.
 pub const ACTION: [(&str, usize); 3] = [("arm", 14), ("hand", 14), ("waist", 3)];
 pub const ACTION_BASE: [&str; 4] = ["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"];
 
@@ -208,6 +209,6 @@ pub const AGENTIC_EPISODE_STEPS: u32 = 6000;
 pub const AGENTIC_HOLD_STEPS: u32 = 300;
 pub const AGENTIC_THINKING_S: u64 = 30 * 60;
 pub const AGENTIC_SEEDS: (u32, u32) = (0, 9);
-/// The longest chunk that a policy of the benchmark executes before it looks again.
+/// Maximum number of steps that a policy of the benchmark executes between observations.
 pub const BENCHMARK_STEPS_PER_COMMAND: u32 = 50;
 pub const BENCHMARK_SEEDS: (u32, u32) = (1, 100);

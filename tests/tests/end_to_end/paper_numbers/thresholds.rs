@@ -1,4 +1,4 @@
-//! Phases on both sides of every published threshold, in worlds that were changed by hand: the tasks that are done standing.
+//! Tests of phases at both sides of every published threshold, in modified worlds: the tasks without walking.
 
 use tandem_episodes::{A, B, Done, Facts};
 use tandem_sim::{Rotation, Side, Vector};
@@ -65,7 +65,7 @@ fn frame_hang() {
         held(facts);
         raise(facts, "frame", lift_m);
     });
-    // Its loop round the middle of the peg, turned about it in the plane of the picture.
+    // Places the frame's loop at the middle of the peg, rotated about it in the plane of the picture frame.
     let hang = |facts: &mut Facts, turned_deg: f32| {
         let peg_m = (facts.site_m("wall_peg", "root") + facts.site_m("wall_peg", "tip")) * 0.5;
         let rotation = Rotation::from_rotation_y(turned_deg.to_radians());

@@ -1,4 +1,4 @@
-//! Phases on both sides of every published threshold, in worlds that were changed by hand: the tasks that walk.
+//! Tests of phases at both sides of every published threshold, in modified worlds: the tasks with walking.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -24,7 +24,7 @@ fn trash_collection() {
     for axis in SIDEWAYS {
         scene.threshold(2, table::BIN_DELIVERED_M, false, |facts, off_m| deliver(facts, axis * off_m));
     }
-    // Where its rim is as high as the bench, whose top bears the bottle.
+    // Height of the bench, on whose top the bottle stands.
     let bench_m = |facts: &Facts| {
         let bottle = facts.object("pet_bottle");
         bottle.model.lowest_m(&bottle.pose_in_world)
@@ -48,7 +48,7 @@ fn trash_collection() {
     assert!(!scene.done(3, |facts| deliver(facts, Vector::ZERO)), "the bottle is on the bench");
 }
 
-/// Hands of as many robots as there are, on nothing.
+/// Returns the state of hands that touch nothing, for all robots.
 fn hands_off(facts: &Facts) -> Vec<Sides<Grip>> {
     vec![Sides::both(Grip::Off); facts.robots.len()]
 }
@@ -173,7 +173,7 @@ fn move_house() {
             place(facts, axis * off_m + Vector::Z * 0.05);
             held_by(facts, &[B, C], "console_table");
         });
-        // All of a foot, 28 mm square, stands on its mark.
+        // The whole of a foot, 28 mm square, is on its mark.
         let beside_m = table::CONSOLE_MARK_M / 2.0 - 0.014;
         scene.threshold(3, beside_m, false, |facts, off_m| place(facts, axis * off_m));
     }

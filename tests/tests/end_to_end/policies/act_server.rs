@@ -1,4 +1,4 @@
-//! A policy behind `/act`: each request is a POST of JSON, answered by JSON.
+//! A fake policy server for `/act`: each request is a POST with JSON, and so is its response.
 
 use std::{
     io::{BufRead, BufReader, Read, Write},
@@ -9,15 +9,15 @@ use std::{
 
 use serde_json::Value;
 
-/// A server that lives until the test ends.
+/// A server that runs until the test ends.
 pub struct ActServer {
     pub address: SocketAddr,
-    /// All requests so far.
+    /// Requests received.
     pub requests: Arc<Mutex<Vec<Value>>>,
 }
 
 impl ActServer {
-    /// Every request is answered by `decide`, with a status and JSON.
+    /// Starts a server that answers every request by `decide`, with a status and JSON.
     pub fn start(decide: impl Fn(&Value) -> (u16, Value) + Send + Sync + 'static) -> ActServer {
         ActServer::start_with_text(move |request| {
             let (status, reply) = decide(request);
@@ -25,7 +25,7 @@ impl ActServer {
         })
     }
 
-    /// As [`ActServer::start`], with any text.
+    /// Starts a server like [`ActServer::start`], with arbitrary text.
     pub fn start_with_text(decide: impl Fn(&Value) -> (u16, String) + Send + Sync + 'static) -> ActServer {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
         let address = listener.local_addr().expect("an address");
@@ -46,7 +46,7 @@ impl ActServer {
     }
 }
 
-/// Answers one request; `None` when the client has gone.
+/// Answers one request; `None` if the client has closed the connection.
 fn serve(
     mut stream: &TcpStream,
     decide: &(dyn Fn(&Value) -> (u16, String) + Send + Sync),
@@ -68,7 +68,7 @@ fn serve(
     }
     let mut body = vec![0; length];
     reader.read_exact(&mut body).ok()?;
-    // Who asks for another protocol sends none.
+    // Requests of other protocols have no body.
     let request: Value = serde_json::from_slice(&body).unwrap_or_default();
     let (status, text) = decide(&request);
     heard.lock().expect("no panic").push(request);

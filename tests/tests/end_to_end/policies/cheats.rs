@@ -1,4 +1,5 @@
-//! Cheats as a policy would try them: a program with its token and nothing else. Each is refused, or changes nothing of what is scored.
+//! Tests of cheats: a policy program tries them with its token alone. Each is refused, or does not affect
+//! the score.
 
 use std::{
     env, fs,
@@ -15,10 +16,10 @@ use tandem_tools_spec::{Driving, EndReason, Operators};
 use super::plans::{plan, play};
 
 const LONG: Duration = Duration::from_secs(100);
-/// A seed that no other number of an episode happens to be.
+/// A seed that differs from every other number in an episode.
 const SEED: u32 = 48_611;
 
-/// The command line that starts `cheat` below, which somehow has found out where its evaluation lies.
+/// Returns the command line that starts `cheat` below, as if it had discovered the evaluation's folder.
 fn cheat_command(found: &Path) -> String {
     let binary = env::current_exe().expect("this binary");
     format!(
@@ -28,7 +29,7 @@ fn cheat_command(found: &Path) -> String {
     )
 }
 
-/// The program's view of its server.
+/// The program's access to its server.
 struct Cheat {
     url: String,
     episode: String,
@@ -36,7 +37,7 @@ struct Cheat {
 }
 
 impl Cheat {
-    /// The status of a request, and its body.
+    /// Sends a request and returns its status and body.
     fn ask(&self, path: &str, body: Option<Value>) -> (u16, String) {
         let agent: ureq::Agent = ureq::Agent::config_builder().http_status_as_error(false).build().into();
         let (url, bearer) = (format!("{}{path}", self.url), format!("Bearer {}", self.token));
@@ -62,7 +63,7 @@ impl Cheat {
             .1
     }
 
-    /// Has somebody else drive.
+    /// Tries to have another party drive.
     fn try_operating(&self) {
         for path in ["/operate/expert", "/operate/policy", "/operate/enter", "/operate/mark"] {
             tell("operate", json!(self.ask(path, Some(json!({ "good": true }))).0));
@@ -72,7 +73,7 @@ impl Cheat {
         }
     }
 
-    /// Asks in other ways for what is withheld, and commands what is not allowed.
+    /// Requests withheld information in other ways, and sends commands that are not allowed.
     fn try_looking(&self, robot: &str) {
         for frame in ["start", "level"] {
             let look = json!({ "steps": 1, "observe": { "robots": [robot], "frame": frame } });
@@ -89,7 +90,7 @@ impl Cheat {
         }
     }
 
-    /// Starts another episode, and returns what it asked for.
+    /// Tries to start another episode, and returns the request.
     fn try_starting(&self) -> Value {
         let another = json!({ "task": "handover", "seed": SEED, "protocol": "benchmark" });
         tell("start", json!(self.ask("/v1/episodes", Some(another.clone())).0));
@@ -98,7 +99,7 @@ impl Cheat {
     }
 }
 
-/// Says what came of a cheat, for the test to read.
+/// Prints the outcome of a cheat, for the test to read.
 fn tell(name: &str, came: Value) {
     println!("\nCHEAT {}", json!({ "name": name, "came": came }));
 }
@@ -138,11 +139,11 @@ fn cheat() {
     plant_links(folder, &found);
     tell("finish", json!(cheat.tool("finish", json!({})).1));
     tell("start", json!(cheat.ask("/v1/episodes", Some(another)).0));
-    // Once more, after the server has written its own.
+    // Forges the results again, after the server has written its own.
     forge(&found);
 }
 
-/// Writes results of a success where results are kept.
+/// Writes results of a success to the evaluation's folder.
 fn forge(found: &Path) {
     let folder = found.join(format!("episodes/handover-{SEED}"));
     let forged = json!({
@@ -175,7 +176,7 @@ fn mode(_: &Path) -> u32 {
     0o700
 }
 
-/// What came of the cheats of one program, by name.
+/// Returns the outcomes of one program's cheats with this name.
 fn came(stdout: &str, name: &str) -> Vec<Value> {
     let all =
         stdout.lines().filter_map(|line| serde_json::from_str::<Value>(line.strip_prefix("CHEAT ")?).ok());
@@ -246,7 +247,7 @@ fn operators_that_cheat_gain_nothing() {
     }
 }
 
-/// Whoever has the public seed alone cannot simulate the episode, and whoever has the recording can.
+/// The public seed alone is not enough to simulate the episode; the recording is.
 #[test]
 fn a_key_of_the_evaluators_draws_other_worlds() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -274,7 +275,7 @@ fn a_key_of_the_evaluators_draws_other_worlds() {
     assert_eq!(verified.outcome, tandem_episodes::replay::Verdict::Same);
 }
 
-/// What stands on a command line everybody on the machine can read.
+/// A command line is visible to every user on the machine.
 #[cfg(unix)]
 #[test]
 fn examples_put_no_token_on_a_command_line() {
@@ -282,7 +283,7 @@ fn examples_put_no_token_on_a_command_line() {
     let place = tempfile::tempdir().expect("a temporary folder");
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../gateway/examples/agents");
     for name in ["claude", "codex"] {
-        // In the place of the program that the example runs: what it is given, and the files among that.
+        // Replaces the program that the example runs, and prints its arguments and the files among them.
         let fake = place.path().join(name);
         let script = "#!/bin/sh\necho \"$@\"\nfor word in \"$@\"; do if [ -f \"$word\" ]; then ls -l \"$word\"; cat \"$word\"; fi; done\n";
         fs::write(&fake, script).expect("a file");

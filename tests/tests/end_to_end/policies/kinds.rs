@@ -1,5 +1,6 @@
-//! Learned policies that tell other things than rows of joints at 50 Hz: poses of wrists, differences to what they sense, rows at
-//! their own rate; and policies that see more than one moment. What they tell reaches the episode as calls that replay.
+//! Tests of learned policies with other outputs than joint rows at 50 Hz: wrist poses, differences from
+//! the measured state, and rows at their own rate. Further tests of policies that observe more than one
+//! moment. Their outputs reach the episode as calls that can be replayed.
 
 use std::path::Path;
 
@@ -18,15 +19,15 @@ use super::{
     servers::map,
 };
 
-/// What a policy remembers of the requests for A, and what came of its episode.
+/// The requests for A, and the outcome of the episode.
 struct Played {
     episode: PlayedEpisode,
     recording: Recording,
-    /// What A's requests had, but for the trial before the episode.
+    /// Requests for A, without the trial before the episode.
     asked: Vec<rmpv::Value>,
 }
 
-/// Plays Handover by a policy that answers what it is sent by `rows`, and replays it.
+/// Plays Handover with a policy that answers requests by `rows`, and verifies the recording.
 fn played(
     map_text: &str,
     rows: impl Fn(&rmpv::Value) -> Vec<Vec<f32>> + Send + Sync + Copy + 'static,
@@ -57,13 +58,13 @@ fn recording(folder: &Path) -> Recording {
 }
 
 impl Played {
-    /// The arguments of the recorded calls of one tool.
+    /// Returns the arguments of the recorded calls of one tool.
     fn calls(&self, tool: &str) -> Vec<Value> {
         let calls = self.recording.tool_calls().expect("calls");
         calls.into_iter().filter(|call| call.tool == tool).map(|call| call.arguments).collect()
     }
 
-    /// The angle of one of A's joints after a number of control steps.
+    /// Returns the angle of one of A's joints at a control step.
     fn angle_rad(&self, joint: usize, control_step: u64) -> f32 {
         let mut steps = self.recording.steps().map(|step| step.expect("a whole step"));
         let step = steps.find(|step| step.control_step == control_step).expect("a step");
@@ -71,9 +72,9 @@ impl Played {
     }
 }
 
-/// A place before the robot.
+/// A position in front of the robot.
 const GOAL_M: [f32; 3] = [0.32, -0.22, 0.14];
-/// The right palm, which faces left, is turned down.
+/// Orientation in which the right palm, which faces left at first, is turned down.
 const PALM_DOWN_ROWS: [f32; 6] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0];
 const CLOSED: [f32; 7] = [0.0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3];
 
@@ -90,7 +91,7 @@ rate_hz = 10
 fn a_policy_may_tell_where_wrists_are_to_be() {
     let played = played(WRIST, |request| {
         let wrist = floats(request, "wrist");
-        // Straight there, by 3 cm a row.
+        // Moves straight to the goal, by 3 cm a row.
         let way: Vec<f32> = GOAL_M.iter().zip(&wrist).map(|(goal, at)| goal - at).collect();
         let length_m = way.iter().map(|part| part * part).sum::<f32>().sqrt().max(1e-6);
         let row = |number: u8| {
@@ -100,7 +101,7 @@ fn a_policy_may_tell_where_wrists_are_to_be() {
         };
         (1..=10).map(row).collect()
     });
-    // Twenty looks, and ten rows after each, of five control steps.
+    // Twenty observations, and ten rows after each, of five control steps.
     assert_eq!(played.episode.result.tool_calls, 20 + 200);
     let calls = played.calls("move_wrists");
     assert_eq!((calls.len(), &calls[0]["steps"]), (200, &5.into()));
@@ -114,7 +115,7 @@ fn a_policy_may_tell_where_wrists_are_to_be() {
         let turned = PALM_DOWN_ROWS.iter().zip(&wrist[3..]).all(|(goal, at)| (goal - at).abs() < 0.1);
         assert!(off_m < 0.02 && turned, "{off_m} m, {wrist:?}");
     }
-    // Its fingers have closed, and the other arm, which no key tells, has kept its joints.
+    // The fingers have closed. The other arm, which no key commands, has kept its joints.
     assert!((played.angle_rad(41, 1000) - CLOSED[5]).abs() < 0.2, "{}", played.angle_rad(41, 1000));
     assert!((played.angle_rad(18, 1000) - played.angle_rad(18, 1)).abs() < 0.03);
 }
@@ -129,7 +130,7 @@ rows = 15
 rate_hz = 15
 delta = ["left_wrist_yaw_joint"]
 "#;
-/// Where this joint is among the columns of a row and the joints of a state.
+/// Index of this joint among the columns of a row, and among the joints of a state.
 const WRIST_COLUMN: usize = 6;
 const WRIST_JOINT: usize = 21;
 
@@ -143,7 +144,8 @@ fn a_policy_may_tell_differences_at_its_own_rate() {
     assert_eq!(interpolated.episode.result.tool_calls, 40, "a second, fifty control steps, is one command");
     let last_rad = interpolated.angle_rad(WRIST_JOINT, 1000);
     assert!((last_rad - 0.9).abs() < 0.03, "{last_rad}");
-    // Fifteen rows in fifty control steps, evenly: what is told is what was sensed and 0.02 more, a third of it each 20 ms.
+    // Fifteen rows in fifty control steps, evenly. The first row's target is the measured angle plus
+    // 0.02, reached in steps of 20 ms.
     let targets = |played: &Played| -> Vec<f64> {
         let calls = played.calls("send_joint_chunk");
         let rows = calls[1]["robots"][0]["rows"].as_array().expect("rows");
@@ -180,12 +182,12 @@ stride = 1
 #[test]
 fn a_policy_may_see_two_moments() {
     let played = played(SWING, |request| {
-        // It goes on as fast as it sees itself go, a little faster at first, and turns back at the ends.
+        // Continues at the observed speed, slightly faster at first, and turns back at the ends.
         let [before, now] = floats(request, "state")[..] else { panic!("two moments") };
         let way = if now > 0.5 || now > -0.5 && now < before { -0.05 } else { 0.05 };
         (1..=16u8).map(|row| vec![now + way * f32::from(row)]).collect()
     });
-    // A look at the request, and one a row, which is five control steps, before the next.
+    // One observation at each request, and one before the next request, a row of five control steps earlier.
     assert_eq!(played.asked.len(), 25);
     assert_eq!(played.calls("observe").len(), 25 + 25);
     assert_eq!(

@@ -1,4 +1,4 @@
-//! Policies that live elsewhere: programs that are started for an episode, and learned policies at servers.
+//! Tests of external policies: programs that are started for an episode, and learned policies on servers.
 
 pub mod act_server;
 mod cheats;

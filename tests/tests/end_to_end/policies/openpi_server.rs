@@ -1,4 +1,4 @@
-//! A policy as openpi serves it: metadata first, then an answer to each request.
+//! A fake policy server for openpi: it sends metadata first, then a response to each request.
 
 use std::{
     net::{SocketAddr, TcpListener, TcpStream},
@@ -9,35 +9,36 @@ use std::{
 use rmpv::Value;
 use tungstenite::{Message, WebSocket};
 
-/// Decides the reply to a request, from its number on this connection (counted from 0) and its content.
+/// Returns the reply to a request, from its number on this connection (counted from 0) and its content.
 pub type Decide = dyn Fn(usize, &Value) -> Reply + Send + Sync;
 
-/// What the server sends back.
+/// Response of the server.
 pub enum Reply {
     /// Rows under `actions`.
     Rows(Vec<Vec<f32>>),
     Text(&'static str),
     Bytes(Vec<u8>),
-    /// The connection is closed.
+    /// Closes the connection.
     Nothing,
-    /// The connection stays open and silent for as long as the client is there.
+    /// Keeps the connection open and silent while the client is connected.
     Silence,
 }
 
-/// A server that lives until the test ends.
+/// A server that runs until the test ends.
 pub struct OpenpiServer {
     pub address: SocketAddr,
-    /// The requests so far, of all connections.
+    /// Requests received on all connections.
     pub requests: Arc<Mutex<Vec<Value>>>,
 }
 
 impl OpenpiServer {
-    /// Connection number `n`, counted from 0, is answered by `decide(n)`.
+    /// Starts a server whose connection number `n`, counted from 0, is answered by `decide(n)`.
     pub fn start(decide: impl Fn(usize) -> Box<Decide> + Send + 'static) -> OpenpiServer {
         OpenpiServer::start_at(([127, 0, 0, 1], 0).into(), usize::MAX, decide)
     }
 
-    /// As [`OpenpiServer::start`], at this address; nobody listens any more after so many connections.
+    /// Starts a server like [`OpenpiServer::start`] at this address. It stops listening after
+    /// `connections` connections.
     pub fn start_at(
         address: SocketAddr,
         connections: usize,
@@ -84,7 +85,7 @@ fn serve(stream: TcpStream, decide: &Decide, heard: &Mutex<Vec<Value>>) {
 }
 
 fn send(socket: &mut WebSocket<TcpStream>, message: Message) {
-    // The client may have gone.
+    // The client may have closed the connection.
     let _ = socket.send(message);
 }
 
@@ -94,7 +95,7 @@ fn packed(value: &Value) -> Vec<u8> {
     bytes
 }
 
-/// `{"actions": array}`, written as openpi-client's `msgpack_numpy` does.
+/// Encodes `{"actions": array}` in the format of openpi-client's `msgpack_numpy`.
 fn actions(rows: &[Vec<f32>]) -> Value {
     let data = rows.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
     let shape = [rows.len(), rows.first().map_or(0, Vec::len)];
@@ -108,14 +109,14 @@ fn actions(rows: &[Vec<f32>]) -> Value {
     Value::Map(vec![("actions".into(), array)])
 }
 
-/// The value under `key`.
+/// Returns the value under `key`.
 pub fn entry<'a>(map: &'a Value, key: &str) -> &'a Value {
     let entries = map.as_map().expect("a map");
     let found = entries.iter().find(|(name, _)| name.as_slice() == Some(key.as_bytes()));
     &found.unwrap_or_else(|| panic!("no {key:?} in {map}")).1
 }
 
-/// The floats of the array under `key`.
+/// Returns the floats of the array under `key`.
 pub fn floats(map: &Value, key: &str) -> Vec<f32> {
     let array = entry(map, key);
     assert_eq!(entry(array, "dtype").as_str(), Some("<f4"));

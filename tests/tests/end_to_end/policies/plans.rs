@@ -1,4 +1,4 @@
-//! The evaluations that the tests of policies play.
+//! Evaluation plans shared by the tests of policies.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{Assistance, Protocol};
 
-/// Handover on `seeds`, under the benchmark protocol.
+/// Returns a plan for Handover on `seeds`, under the benchmark protocol.
 pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> EvaluationPlan<'_> {
     EvaluationPlan {
         player,
@@ -40,12 +40,13 @@ pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> EvaluationPla
     }
 }
 
-/// Plays the plan; the results go into `folder`.
+/// Plays the plan, with its results in `folder`.
 pub fn play(plan: &EvaluationPlan, folder: &Path) -> Evaluation {
     evaluate(plan, folder, &|_| {}).expect("it is played")
 }
 
-/// The measured angle of joint number `joint` of every robot, at the end of the recorded episode `name`.
+/// Returns the measured angle of joint number `joint` of every robot, at the end of the recorded episode
+/// `name`.
 pub fn last_angles_rad(folder: &Path, name: &str, joint: usize) -> Vec<f32> {
     let path = folder.join("episodes").join(name).join(Recorder::FILE_NAME);
     let recording = Recording::read(&path).expect("a recording");

@@ -1,4 +1,4 @@
-//! Agents as programs. The programs are this test's own binary, started anew to run `agent` below.
+//! Tests of agents as programs. The program is this test's own binary, started again to run `agent` below.
 
 use std::{env, fs, io::Read, path::Path, time::Duration};
 
@@ -15,7 +15,7 @@ use super::plans::{plan, play};
 
 const LONG: Duration = Duration::from_secs(100);
 
-/// The command line that starts `agent` below in this role.
+/// Returns the command line that starts `agent` below in this role.
 fn agent_command(role: &str) -> String {
     let binary = env::current_exe().expect("this binary");
     format!(
@@ -58,13 +58,13 @@ fn agent() {
         Ok("crash") if env::var("TANDEM_ROBOT").as_deref() != Ok("A") => {
             panic!("the planner has no plan");
         }
-        // A partner of one that crashes later, when this has long left.
+        // The partner of a program that crashes later; this one leaves early.
         Ok("leave_partner") if env::var("TANDEM_ROBOT").as_deref() == Ok("A") => {}
         Ok("leave_partner") => {
             tool("wait", json!({ "steps": 5 })).expect("it waits alone");
             panic!("the planner has no plan");
         }
-        // A partner of one that crashes.
+        // The partner of a program that crashes.
         Ok("crash") => while tool("wait", json!({ "steps": 5 })).is_ok() {},
         Ok("hang") => std::thread::sleep(LONG),
         Ok("kill") => {
@@ -76,7 +76,7 @@ fn agent() {
     }
 }
 
-/// What the program of one robot does.
+/// Acts as the program of one robot.
 fn operate(robot: &str, tool: &dyn Fn(&str, Value) -> Result<Value, ureq::Error>) {
     let partner = if robot == "A" { "B" } else { "A" };
     assert!(tool("get_robot_state", json!({ "robot": robot })).is_ok());
@@ -220,7 +220,7 @@ fn a_program_that_crashes_is_listed_apart_and_played_again() {
         let recorded = folder.path().join("episodes/handover-1/result.json");
         assert!(fs::read_to_string(recorded).expect("a result").contains("\"policy_failed\""));
 
-        // Whoever wants them counted gets what was played, and nothing is played again.
+        // With `retries: 0` the failed episodes count, and none of them is played again.
         let kept = play(&EvaluationPlan { retries: 0, ..plan.clone() }, folder.path());
         assert_eq!((kept.tasks["handover"].episodes, kept.tasks["handover"].policy_failed), (2, 0));
         let hashes = |evaluation: &Evaluation| {
@@ -252,7 +252,7 @@ fn a_crash_of_one_of_two_programs_is_named() {
     }
 }
 
-/// B's program crashes, whatever A's does.
+/// Checks the result of an episode in which B's program crashes, with A's in this role.
 fn check_named_crash(role: &str) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let driving = Driving { operators: Some(Operators::PerRobot), patience_s: Some(1.0), talk: None };
@@ -282,7 +282,7 @@ fn check_named_crash(role: &str) {
 fn a_program_is_stopped_with_all_that_it_started() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let pids = folder.path().join("pids");
-    // It does not care about being asked, and has a child that outlives it.
+    // A program that ignores termination requests and has a long-lived child.
     let command =
         format!("trap '' TERM; sleep 1000 & echo $! > '{}'; while :; do sleep 1; done", pids.display());
     let left_out = |command: &str, limit: Duration| {
@@ -290,14 +290,14 @@ fn a_program_is_stopped_with_all_that_it_started() {
     };
     let text = left_out(&command, Duration::from_millis(300));
     assert!(text.ends_with("was stopped without a call, when its 0.3 s were over"), "{text}");
-    // And one that is left behind by a program that ends.
+    // A child process left behind by a program that ends.
     let text = left_out(&format!("sleep 1000 & echo $! >> '{}'", pids.display()), LONG);
     assert!(text.contains("the program ended without a call"), "{text}");
     let text = fs::read_to_string(&pids).expect("it was written");
     let pids: Vec<&str> = text.lines().collect();
     assert_eq!(pids.len(), 2);
     for pid in pids {
-        // A process that has ended stays a zombie until its new parent looks.
+        // A process that has ended remains a zombie until its new parent reaps it.
         let state = fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
         assert!(state.is_empty() || state.contains(") Z "), "{state}");
     }

@@ -1,4 +1,5 @@
-//! Learned policies at servers that work: what they are shown, and that robots do what they answer.
+//! Tests of learned policies on working servers: their observations, and that the robots execute their
+//! responses.
 
 use std::{collections::BTreeMap, fs, path::Path, sync::Mutex};
 
@@ -13,25 +14,26 @@ use super::{
     plans::{last_angles_rad, plan, play},
 };
 
-/// Where the wrists' last joints are among the 43 of a state.
+/// Index of the wrists' last joints among the 43 of a state.
 const LEFT_WRIST: usize = 21;
 const RIGHT_WRIST: usize = 35;
-/// These words are in the instruction of A alone.
+/// Words in A's instruction only.
 const WORDS_OF_A: &str = "Take the bottle";
-/// Where the same joints are in an action row.
+/// Index of the same joints in an action row.
 pub const LEFT_WRIST_COLUMN: usize = 6;
 const RIGHT_WRIST_COLUMN: usize = 13;
 
-/// Reads the map from a file that says `text`.
+/// Reads a policy map from a file with this text.
 pub fn map(folder: &Path, text: &str) -> PolicyMap {
     let path = folder.join("map.toml");
     fs::write(&path, text).expect("a file");
     PolicyMap::find(&path.display().to_string()).expect("a map")
 }
 
-/// A policy that keeps every robot as it first felt it, but for a wrist, whose column and angle follow from its words.
+/// Returns a policy that keeps every robot at its first measured state, except for one wrist. Its column
+/// and angle follow from the instruction.
 pub fn turning(wrist: impl Fn(&str) -> (usize, f32) + Send + Sync + 'static, rows: usize) -> Box<Decide> {
-    // Words tell them apart: each robot has its own.
+    // Robots are distinguished by their instructions.
     let first: Mutex<BTreeMap<String, Vec<f32>>> = Mutex::default();
     Box::new(move |number, request| {
         let state = floats(request, "observation/state");
@@ -50,7 +52,7 @@ pub fn turning(wrist: impl Fn(&str) -> (usize, f32) + Send + Sync + 'static, row
 
 #[test]
 fn an_openpi_policy_sees_feels_and_turns_wrists() {
-    // A shared policy that knows from its words which robot it is asked for.
+    // A shared policy that recognises the robot from its instruction.
     let server = OpenpiServer::start(|_| {
         turning(
             |words| {
@@ -68,7 +70,7 @@ fn an_openpi_policy_sees_feels_and_turns_wrists() {
     let evaluation = play(&plan(&policy, vec![1], true), folder.path());
     let [played] = &evaluation.episodes[..] else { panic!("{evaluation:?}") };
     assert_eq!((played.result.ended, played.result.env_steps), (EndReason::StepBudgetExhausted, 1000));
-    // Twenty looks, and a command for each.
+    // Twenty observations, and a command for each.
     assert_eq!(played.result.tool_calls, 40);
     assert_eq!(
         (&*played.policy.name, played.policy.extra_information.len()),
@@ -81,7 +83,7 @@ fn an_openpi_policy_sees_feels_and_turns_wrists() {
     near(LEFT_WRIST, 0, 0.3);
     near(RIGHT_WRIST, 1, 0.5);
 
-    // One trial with black pictures, then twenty for each robot, in which A feels that its wrist turns.
+    // One trial with black images, then twenty requests for each robot, in which A's measured wrist turns.
     let requests = server.requests.lock().expect("no panic");
     assert_eq!(requests.len(), 41);
     let bright = |request: &Value| {
@@ -125,7 +127,7 @@ fn each_robot_may_have_a_policy_of_its_own() {
     );
 }
 
-/// A policy that directs both robots, and sees the room.
+/// Map of a policy that directs both robots and sees the room.
 const CENTRAL: &str = r#"
 preset = "openpi"
 scope = "global"

@@ -1,4 +1,5 @@
-//! Learned policies at servers that fail: each ends its own episode, with a result that says why, and no other.
+//! Tests of learned policies on failing servers: each failure ends its own episode only, and the result
+//! includes the reason.
 
 use std::{thread, time::Duration};
 
@@ -19,7 +20,7 @@ use super::{
 
 const FAST: &str = "preset = \"openpi\"\nconnect_s = 0.0\nreply_s = 5.0\n";
 
-/// Holds for the trial and the first three answers, then does something else.
+/// Holds still for the trial and the first three responses, then acts as `then`.
 fn until_then(then: impl Fn() -> Reply + Send + Sync + 'static) -> Box<Decide> {
     let hold = still(20);
     Box::new(move |number, request| if number < 4 { hold(number, request) } else { then() })
@@ -104,7 +105,7 @@ fn a_policy_that_is_not_ready_is_left_out_and_played_the_next_time() {
     assert_eq!(asked(), before, "nobody is asked");
 }
 
-/// An address at which nobody listens.
+/// Returns an address without a server.
 fn nowhere() -> std::net::SocketAddr {
     std::net::TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("an address")
 }
@@ -131,7 +132,7 @@ fn an_evaluation_without_its_server_stops_and_goes_on_later() {
         assert!(text.contains("run the same command again: of 4 episodes 0 are played and kept"), "{text}");
     }
 
-    // Whoever looks on is told what is waited for.
+    // Observers of the run learn what it waits for.
     let slow = PolicyMap { connect_s: 1.5, ..fast.clone() };
     let url = format!("ws://{}", nowhere());
     let policy = RemotePolicy::new(PolicyProtocol::Openpi, vec![url.clone()], slow);
@@ -147,7 +148,7 @@ fn an_evaluation_without_its_server_stops_and_goes_on_later() {
     let told = told.map(|wait| wait.to_string()).unwrap_or_default();
     assert!(told.starts_with(&format!("waiting for {url}, ")), "{told}");
 
-    // One that is gone after two episodes, and comes back.
+    // A server that leaves after two episodes and returns.
     let address = nowhere();
     let short = OpenpiServer::start_at(address, 2, |_| still(50));
     let policy = RemotePolicy::new(PolicyProtocol::Openpi, vec![short.url()], fast.clone());
@@ -184,7 +185,7 @@ fn what_a_server_behind_act_refuses_is_told() {
     }
 }
 
-/// What nginx answers for a server that is not there.
+/// Response of nginx without an upstream server.
 const PAGE: &str =
     "<html>\r\n<head><title>502 Bad Gateway</title></head>\r\n<body>\r\n</body>\r\n</html>\r\n";
 
@@ -200,7 +201,7 @@ fn a_page_in_html_is_shown() {
         let policy = RemotePolicy::new(protocol, vec![url], map(folder.path(), FAST));
         match evaluate(&plan(&policy, vec![1], false), folder.path(), &|_| {}) {
             Ok(evaluation) => evaluation.left_out.join(", "),
-            // Behind such a page there may be no server at all.
+            // Such a page may mean that there is no server at all.
             Err(error) => error.to_string(),
         }
     };

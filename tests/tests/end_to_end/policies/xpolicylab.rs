@@ -1,4 +1,4 @@
-//! A policy behind XPolicyLab's frames: what it is told, and that the robots do what it answers.
+//! Tests of a policy behind XPolicyLab's frames: its observations, and that the robots execute its responses.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -20,7 +20,8 @@ use super::{
     xpolicylab_server::{XPolicyLabServer, floats, map, read_floats},
 };
 
-/// Where the left wrist's last joint is among the 43 of a state, and among the 7 of an arm.
+/// Index of the left wrist's last joint among the 43 of a state; `LAST_OF_ARM` is its index among the 7
+/// of an arm.
 const LEFT_WRIST: usize = 21;
 const LAST_OF_ARM: usize = 6;
 const ROWS: usize = 50;
@@ -32,7 +33,7 @@ fn policy(server: &XPolicyLabServer) -> RemotePolicy {
     RemotePolicy::new(PolicyProtocol::XPolicyLab, vec![server.url()], preset)
 }
 
-/// Keeps every robot as it first felt it, but for A's left wrist.
+/// Keeps every robot at its first measured state, except for A's left wrist.
 fn turning(first: &Mutex<BTreeMap<String, Vec<Vec<f32>>>>, observation: &Value) -> Value {
     let words = entry(observation, "instruction").as_str().expect("a text");
     let state = entry(observation, "state");
@@ -60,11 +61,11 @@ fn an_xpolicylab_policy_is_asked_trial_by_trial() {
     let turned_rad = last_angles_rad(folder.path(), "handover-1", LEFT_WRIST)[0];
     assert!((turned_rad - 0.3).abs() < 0.03, "{turned_rad}");
 
-    // A trial with zeros, which the model forgets, then twenty looks for each of two robots.
+    // A trial with zeros, from which the model is reset, then twenty observations of each of two robots.
     let mut expected = vec!["hello", "prepare_case", "reset", "infer", "trial_end", "reset"];
     expected.extend(["infer"; 40]);
     expected.extend(["trial_end", "close"]);
-    // The last words are heard after the episode is over.
+    // The last messages arrive after the episode has ended.
     while server.asked().len() < expected.len() {
         std::thread::yield_now();
     }
@@ -86,7 +87,7 @@ fn an_xpolicylab_policy_is_asked_trial_by_trial() {
     assert_ne!(trial, entry(&frames[3], "trial_id"), "the trial with zeros is another");
 }
 
-/// A's server has answered when B's begins to think, which it does until A's has heard that somebody is there still.
+/// A's server has responded when B's starts to think. B's continues until A's has received a heartbeat.
 #[test]
 fn a_server_that_has_answered_hears_heartbeats_while_another_thinks() {
     let (first_of_a, first_of_b) = (Mutex::default(), Mutex::default());
@@ -97,7 +98,7 @@ fn a_server_that_has_answered_hears_heartbeats_while_another_thinks() {
         frames.iter().filter(|frame| entry(frame, "message_type").as_str() == Some("heartbeat")).count()
     };
     let of_b = XPolicyLabServer::start(move |observation| {
-        // The first look is the trial with zeros.
+        // The first observation is the trial with zeros.
         while looks.load(Ordering::Relaxed) == 1 && beats() == 0 {
             thread::sleep(Duration::from_millis(20));
         }

@@ -1,4 +1,4 @@
-//! A policy as XPolicyLab serves it: frames of msgpack, each answered under its `message_id`.
+//! A fake policy server for XPolicyLab: frames in MessagePack, each answered with its `message_id`.
 
 use std::{
     net::{SocketAddr, TcpListener, TcpStream},
@@ -11,13 +11,13 @@ use tungstenite::Message;
 
 use super::openpi_server::entry;
 
-/// The payload of the answer to an observation, or what went wrong.
+/// Returns the response to an observation, or an error.
 pub type Infer = dyn Fn(&Value) -> Result<Value, &'static str> + Send + Sync;
 
-/// A server that lives until the test ends.
+/// A server that runs until the test ends.
 pub struct XPolicyLabServer {
     pub address: SocketAddr,
-    /// The frames so far, of all connections.
+    /// Frames received on all connections.
     pub frames: Arc<Mutex<Vec<Value>>>,
 }
 
@@ -43,7 +43,7 @@ impl XPolicyLabServer {
         format!("ws://{}", self.address)
     }
 
-    /// What was asked, in its order.
+    /// Returns the types of the messages, in order.
     pub fn asked(&self) -> Vec<String> {
         let frames = self.frames.lock().expect("no panic");
         frames.iter().map(|frame| entry(frame, "message_type").as_str().expect("a text").to_owned()).collect()
@@ -79,20 +79,20 @@ fn serve(stream: TcpStream, infer: &Infer, heard: &Mutex<Vec<Value>>) {
             rmpv::encode::write_value(&mut bytes, &answer).expect("memory");
             Message::binary(bytes)
         };
-        // What answers something else, and what is no frame, is nobody's.
+        // The client must ignore responses to other messages, and messages that are no frames.
         let _ = socket.send(of("another".into()));
         let _ = socket.send(Message::text("hello"));
-        // The client may have gone.
+        // The client may have closed the connection.
         let _ = socket.send(of(entry(&frame, "message_id").clone()));
     }
 }
 
-/// A map of these entries.
+/// Returns a map with these entries.
 pub fn map(entries: &[(&str, Value)]) -> Value {
     Value::Map(entries.iter().map(|(key, value)| ((*key).into(), value.clone())).collect())
 }
 
-/// An array of one row, written as the package msgpack-numpy does.
+/// Encodes an array of one row in the format of the package msgpack-numpy.
 pub fn floats(values: &[f32]) -> Value {
     let key = |name: &str| Value::Binary(name.into());
     let data = values.iter().flat_map(|value| value.to_le_bytes()).collect();
@@ -105,7 +105,7 @@ pub fn floats(values: &[f32]) -> Value {
     ])
 }
 
-/// The floats of such an array.
+/// Returns the floats of such an array.
 pub fn read_floats(array: &Value) -> Vec<f32> {
     assert_eq!((entry(array, "nd"), entry(array, "type").as_str()), (&Value::from(true), Some("<f4")));
     let (bytes, _) = entry(array, "data").as_slice().expect("bytes").as_chunks::<4>();

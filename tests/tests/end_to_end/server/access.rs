@@ -1,4 +1,5 @@
-//! A server with a token: callers without it learn nothing, and nothing that callers send is in a log.
+//! Tests of a server with a token: callers without it receive no information, and nothing that callers
+//! send is logged.
 
 use std::{
     io,
@@ -63,7 +64,7 @@ fn who_has_no_token_gets_one_answer_everywhere() {
     assert_eq!(moved["step"], 2);
 }
 
-/// All lines that this process has logged.
+/// All lines logged by this process.
 #[derive(Clone, Default)]
 struct Lines(Arc<Mutex<Vec<u8>>>);
 

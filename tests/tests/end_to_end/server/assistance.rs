@@ -1,12 +1,13 @@
-//! Assistance on every way to a policy: replies over REST and MCP, to operators, after commands, briefs, prompts and the texts of tools
-//! tell what the benchmark tells its agents, or all of it.
+//! Tests of assistance in everything that reaches a policy: replies over REST and MCP, replies to
+//! operators, observations after commands, briefs, prompts, and the texts of tools. They contain the
+//! benchmark's information, or all of it.
 
 use serde_json::{Value, json};
 use tandem::settings::Layer;
 use tandem_tests::TestServer;
 use tandem_tools_spec::{Assistance, Format};
 
-/// Fields that `full` alone has.
+/// Fields that only `full` has.
 const FULL_FIELDS: [&str; 12] = [
     "joint_velocities_rad_s",
     "joint_torques_n_m",
@@ -19,11 +20,11 @@ const FULL_FIELDS: [&str; 12] = [
     "state",
     "odometry",
     "grasping",
-    // Of a task: by what it is scored.
+    // A task's field about scoring.
     "collaborative",
 ];
 
-/// Words about what `full` alone tells.
+/// Words about information that only `full` gives.
 const FULL_WORDS: [&str; 9] = [
     "torques",
     "fallen",
@@ -40,12 +41,12 @@ fn server(assistance: Assistance) -> TestServer {
     TestServer::with(Layer { assistance: Some(assistance), ..Layer::default() })
 }
 
-/// Those of [`FULL_FIELDS`] that stand anywhere in a reply.
+/// Returns the fields of [`FULL_FIELDS`] that occur anywhere in a reply.
 fn full_fields(reply: &Value) -> Vec<&'static str> {
     let mut found: Vec<&'static str> = match reply {
         Value::Object(object) => {
             let own = FULL_FIELDS.into_iter().filter(|field| object.contains_key(*field));
-            // A result counts what was told by its name.
+            // A result names the information given, with counts.
             let inner = object.iter().filter(|(name, _)| *name != "extra_information_replies");
             own.chain(inner.flat_map(|(_, value)| full_fields(value))).collect()
         }
@@ -62,14 +63,14 @@ fn rpc(server: &TestServer, method: &str, params: Value) -> Value {
     server.post("/mcp", &message).ok()["result"].clone()
 }
 
-/// What a tool answers over MCP, as JSON.
+/// Returns a tool's reply over MCP, as JSON.
 fn over_mcp(server: &TestServer, tool: &str, args: Value) -> Value {
     let called = rpc(server, "tools/call", json!({ "name": tool, "arguments": args }));
     let text = called["content"][0]["text"].as_str().unwrap_or_else(|| panic!("no text: {called}"));
     serde_json::from_str(text).unwrap_or_else(|error| panic!("{error}: {text}"))
 }
 
-/// Every reply with fields of its own, by the way that it comes.
+/// Returns every reply with fields of its own, and how it was obtained.
 fn replies(server: &TestServer) -> Vec<(&'static str, Value)> {
     let start = json!({ "task": "handover", "seed": 0, "protocol": "benchmark" });
     let started = server.post("/v1/episodes", &start).ok();
@@ -105,7 +106,7 @@ fn replies(server: &TestServer) -> Vec<(&'static str, Value)> {
     ]
 }
 
-/// Every text that is written for models, with the place where it stands.
+/// Returns every text written for models, and where it appears.
 fn texts(server: &TestServer) -> Vec<(String, String)> {
     let id = server.episode("agentic");
     let mut texts: Vec<(String, String)> = Format::ALL
@@ -131,7 +132,7 @@ fn replies_tell_nothing_beyond_the_assistance() {
     let full = server(Assistance::Full);
     let told: Vec<(&str, Vec<&str>)> =
         replies(&full).into_iter().map(|(way, reply)| (way, full_fields(&reply))).collect();
-    // What is taken out under `paper` is there otherwise.
+    // The fields withheld under `paper` are present otherwise.
     for field in FULL_FIELDS {
         assert!(told.iter().any(|(_, fields)| fields.contains(&field)), "{field} is in no reply: {told:?}");
     }

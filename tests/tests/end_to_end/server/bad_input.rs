@@ -1,5 +1,5 @@
-//! Bad input changes nothing: each call is refused with a text that says what would work, the state hash stays, and the
-//! episode goes on.
+//! Tests of bad input: each call is refused with a hint at a valid one, the state hash is unchanged, and
+//! the episode continues.
 
 use serde_json::{Value, json};
 use tandem_tests::TestServer;
@@ -18,7 +18,7 @@ fn wrist(field: &str, value: Value) -> Value {
     json!({ "steps": 5, "robots": [{ "robot": "A", field: value }] })
 }
 
-/// Tool, arguments, status, and what the refusal has to say.
+/// Returns calls with their tool, arguments and status, and the texts that the refusal must contain.
 fn refused_calls() -> Vec<(&'static str, Value, u16, &'static [&'static str])> {
     vec![
         ("grasp", json!({}), 404, &["\"grasp\"", "observe", "move_wrists", "send_joint_chunk"]),
@@ -48,7 +48,8 @@ fn refused_calls() -> Vec<(&'static str, Value, u16, &'static [&'static str])> {
     ]
 }
 
-/// Bodies that never become a call: content type, bytes, status, and what the refusal has to say.
+/// Returns bodies that are no calls, with their content type, bytes and status, and the texts that the
+/// refusal must contain.
 fn refused_bodies() -> Vec<(&'static str, Vec<u8>, u16, &'static [&'static str])> {
     let json = "application/json";
     vec![
@@ -75,7 +76,7 @@ fn bad_input_changes_nothing() {
     let id = server.episode("agentic");
     let status = || {
         let mut status = server.get(&format!("/v1/episodes/{id}")).ok();
-        // The policy's wall clock runs while this test thinks.
+        // The policy's wall clock runs during this test.
         status["budget"].as_object_mut().expect("a budget").remove("wall_clock_left_s");
         status
     };

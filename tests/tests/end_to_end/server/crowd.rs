@@ -1,4 +1,4 @@
-//! Many clients at once, and clients that ask too much: each is answered, or told when to come again.
+//! Tests of many clients at once, and of clients over their limits: each gets a response, or a time to retry.
 
 use std::{
     thread,
@@ -11,7 +11,7 @@ use tandem_tests::{Answer, TestServer};
 
 const CLIENTS: usize = 50;
 
-/// The answers to many clients that ask at the same time.
+/// Returns the responses to many clients that send requests at the same time.
 fn all_at_once(ask: impl Fn(usize) -> Answer + Sync) -> Vec<Answer> {
     thread::scope(|scope| {
         let clients: Vec<_> = (0..CLIENTS)
@@ -26,7 +26,7 @@ fn all_at_once(ask: impl Fn(usize) -> Answer + Sync) -> Vec<Answer> {
     })
 }
 
-/// Counts the clients that were answered, and checks that all others were told to come again.
+/// Counts the clients with a regular response, and checks that all others got a time to retry.
 #[track_caller]
 fn answered(answers: &[Answer], status: u16) -> usize {
     let (good, others): (Vec<&Answer>, Vec<&Answer>) =

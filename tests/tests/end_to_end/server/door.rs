@@ -1,4 +1,4 @@
-//! Programs of this machine are let in, and web pages are not.
+//! Tests of access: programs on this machine are admitted, and web pages are not.
 
 use std::{
     io::{BufRead, BufReader, Read, Write},
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use tandem::{settings::Layer, token::Token};
 use tandem_tests::TestServer;
 
-/// Sends bytes as they are and returns everything that comes back until the server closes the connection.
+/// Sends raw bytes and returns everything received until the server closes the connection.
 fn raw(server: &TestServer, request: &str) -> String {
     let mut stream = TcpStream::connect(server.address).expect("a connection");
     stream.set_read_timeout(Some(Duration::from_secs(60))).expect("a timeout");
@@ -20,7 +20,7 @@ fn raw(server: &TestServer, request: &str) -> String {
     String::from_utf8_lossy(&answer).into_owned()
 }
 
-/// The answer to a request with these headers and this body.
+/// Sends a request with these headers and this body, and returns the response.
 fn ask(server: &TestServer, line: &str, headers: &[&str], body: &str) -> String {
     let mut request =
         format!("{line} HTTP/1.1\r\nconnection: close\r\naccept: application/json, text/event-stream\r\n");
@@ -39,7 +39,7 @@ fn header<'a>(answer: &'a str, name: &str) -> &'a str {
 
 const JSON: &str = "content-type: application/json";
 
-/// A request to every route, with a body where one is read; the episode is the first of seed 0.
+/// A request to every route, with a body if it reads one. The episode is the first of seed 0.
 const REQUESTS: [(&str, &str); 15] = [
     ("GET /healthz", ""),
     ("GET /metrics", ""),
@@ -177,7 +177,7 @@ fn with_token(flags: Layer) -> TestServer {
     TestServer::with(Layer { token: Some(Token::parse(TOKEN, "a test").expect("a token")), ..flags })
 }
 
-/// A connection that stays open from request to request.
+/// A connection kept open between requests.
 struct Kept(TcpStream);
 
 impl Kept {
@@ -187,7 +187,7 @@ impl Kept {
         Kept(stream)
     }
 
-    /// The status of the answer to a request without a body; `None` where the server has closed the connection.
+    /// Sends a request without a body and returns the status; `None` if the server has closed the connection.
     fn ask(&mut self, path: &str, token: &str) -> Option<u16> {
         let request =
             format!("GET {path} HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer {token}\r\n\r\n");
@@ -214,7 +214,7 @@ impl Kept {
     /// Waits until the server has closed the connection.
     fn wait_for_the_end(&mut self) {
         let mut rest = Vec::new();
-        // A connection that is cut with bytes under way is reset.
+        // A connection closed with unread bytes is reset.
         let _ = self.0.read_to_end(&mut rest);
     }
 }
@@ -225,7 +225,7 @@ fn a_connection_that_has_made_a_good_call_outlives_a_long_thought() {
     let (mut known, mut unknown, mut idle) = (Kept::open(&server), Kept::open(&server), Kept::open(&server));
     assert_eq!(known.ask("/healthz", TOKEN), Some(200));
     assert_eq!(unknown.ask("/healthz", "another-token-of-somebody"), Some(401));
-    // Three times as long as the header of a request may take.
+    // Three times the time limit of a request's header.
     std::thread::sleep(Duration::from_secs(3));
     unknown.wait_for_the_end();
     idle.wait_for_the_end();
@@ -252,7 +252,7 @@ fn nobody_takes_a_place_by_being_slow() {
         assert_eq!(Kept::open(&server).ask("/healthz", TOKEN), Some(200));
     }
     drop(slow);
-    // What no page reads, nobody waits for.
+    // The server does not wait for a body that the page does not read.
     let page = raw(
         &server,
         "GET /operate HTTP/1.1\r\nhost: localhost\r\nconnection: close\r\ncontent-length: 9\r\n\r\n{",
@@ -265,7 +265,7 @@ fn an_address_keeps_so_many_connections_waiting_and_no_more() {
     let server = with_token(Layer { max_requests: Some(4), ..Layer::default() });
     let mut known = Kept::open(&server);
     assert_eq!(known.ask("/healthz", TOKEN), Some(200));
-    // 64 may wait, of which one is known.
+    // 64 connections may wait, one of which has made a valid call.
     let mut waiting: Vec<Kept> = (0..67).map(|_| Kept::open(&server)).collect();
     for kept in &mut waiting[..4] {
         kept.wait_for_the_end();

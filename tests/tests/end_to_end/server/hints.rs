@@ -1,4 +1,5 @@
-//! Hints: whether the texts that a policy reads say how to grasp, wherever the server shows them, and in the recording.
+//! Tests of hints: the server's texts for policies, and the recording, include instructions on grasping
+//! only with hints.
 
 use serde_json::{Value, json};
 use tandem::settings::Layer;
@@ -6,7 +7,7 @@ use tandem_episodes::Recording;
 use tandem_tests::TestServer;
 use tandem_tools_spec::Hints;
 
-/// Every text about tools and hands that a server with these hints shows.
+/// Returns every text about tools and hands that a server with these hints shows.
 fn texts(hints: Hints) -> Vec<(&'static str, Value)> {
     let server = TestServer::with(Layer { hints: Some(hints), ..Layer::default() });
     let start = json!({ "task": "handover", "seed": 0, "protocol": "benchmark" });

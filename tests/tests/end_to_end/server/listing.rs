@@ -1,4 +1,4 @@
-//! Who sees which episodes: in the list, and on the page that a browser finds first.
+//! Tests of the episodes that each caller sees: in the list, and on the start page for browsers.
 
 use serde_json::{Value, json};
 use tandem::{settings::Layer, token::Token};
@@ -16,7 +16,7 @@ fn ids(list: &Value) -> Vec<&str> {
         .collect()
 }
 
-/// What a caller with this token is answered, as text.
+/// Returns the response to a caller with this token, as text.
 fn asked(server: &TestServer, token: &str, path: &str) -> (u16, String) {
     let bearer = format!("Bearer {token}");
     let (status, _, bytes) = server.ask(
@@ -104,7 +104,7 @@ fn who_has_a_token_sees_its_own_episodes() {
     assert!(![&host, &page].iter().any(|page| page.contains(operator) || page.contains(TOKEN)));
 }
 
-/// A language model reads what it gets with a program that asks for no page.
+/// A language model reads pages with a program that does not ask for HTML.
 #[test]
 fn who_asks_for_no_page_gets_a_few_lines() {
     let server = TestServer::start();
@@ -119,7 +119,7 @@ fn who_asks_for_no_page_gets_a_few_lines() {
             assert_eq!(headers["content-type"], "text/plain; charset=utf-8");
         }
     }
-    // It leads on to where the description is, and the client follows.
+    // It redirects to the description, and the client follows.
     assert_eq!(server.get("/openapi.json").ok(), server.get("/v1/openapi.json").ok());
 }
 

@@ -1,10 +1,10 @@
-//! The MCP route, as a host sees it: JSON-RPC over HTTP, with pictures as blocks of their own.
+//! Tests of the MCP route from a host's side: JSON-RPC over HTTP, with images as separate blocks.
 
 use serde_json::{Value, json};
 use tandem_tests::TestServer;
 use tandem_tools_spec::{Format, Hints};
 
-/// One JSON-RPC request, without any session.
+/// Sends one JSON-RPC request without a session.
 fn rpc(server: &TestServer, method: &str, params: Value) -> Value {
     let request = json!({ "jsonrpc": "2.0", "id": 1, "method": method, "params": params });
     server.post("/mcp", &request).ok()["result"].clone()
@@ -53,7 +53,7 @@ fn an_episode_can_be_played() {
     assert!(seen["content"][2]["data"].as_str().is_some_and(|data| data.starts_with("iVBORw0KGgo")));
 }
 
-/// Readers of JSON differ in which of two fields of one name they take, so neither is taken.
+/// JSON readers differ in which of two fields with the same name they use, so duplicates are refused.
 #[test]
 fn fields_that_stand_there_twice_are_refused() {
     let server = TestServer::start();
@@ -142,7 +142,8 @@ fn what_is_no_call_is_refused_with_the_codes_of_json_rpc() {
     check(&of_task(json!({ "task": "handover", "seed": "x" })), -32602, "give one as 0");
 }
 
-/// What a host is told of the server is what it can do there: an operator's episode has begun, and it can begin no other.
+/// The instructions for a host describe the caller's abilities. An operator's episode has already
+/// started, and the operator cannot start another.
 #[test]
 fn instructions_say_what_the_caller_can_do() {
     let server = TestServer::start();

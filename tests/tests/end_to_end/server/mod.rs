@@ -1,4 +1,4 @@
-//! The server as callers meet it: its routes, who is let in, and what is refused.
+//! Tests of the server from the callers' side: its routes, its access control, and its refusals.
 
 mod access;
 mod assistance;

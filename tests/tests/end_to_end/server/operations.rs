@@ -1,4 +1,5 @@
-//! What the operators of a server see: metrics, the page of the interface, and the tools in every host's form.
+//! Tests for administrators of a server: metrics, the page of the interface, and the tools in every
+//! host's format.
 
 use serde_json::{Value, json};
 use tandem_tests::TestServer;

@@ -1,4 +1,5 @@
-//! Requests that come twice, and commands that come late: nothing is done twice, and nothing on an old view.
+//! Tests of repeated requests and late commands: no request takes effect twice, and no command acts on an
+//! outdated observation.
 
 use serde_json::{Value, json};
 use tandem_tests::{Answer, TestServer};
@@ -20,7 +21,7 @@ fn a_key_stands_for_one_call() {
     assert_eq!(keyed(&server, &path, "k2", &json!({ "steps": 5 })).ok()["step"], 10);
     keyed(&server, &path, "", &json!({ "steps": 5 })).refused(400, &["1 to 255"]);
 
-    // A refusal is kept as well, and what is read wrongly is refused again anyhow.
+    // A refusal is cached as well; a request that cannot be read is refused again in any case.
     let stale = json!({ "steps": 5, "expected_step": 3 });
     let refused = keyed(&server, &path, "k3", &stale);
     refused.refused(409, &["stands at step 10 and not at 3"]);
@@ -44,7 +45,7 @@ fn a_key_stands_for_one_start() {
     assert_eq!(first.ok(), again.ok(), "with the same tokens");
     start("s1", 1).refused(422, &["a new one for each"]);
     assert_eq!(start("s2", 0).ok()["episode_id"], "handover-seed0-2");
-    // What may work later is tried again.
+    // Failures that may be temporary are not cached.
     start("s3", 0).refused(429, &["all 2 places"]);
     server.delete("/v1/episodes/handover-seed0").ok();
     assert_eq!(start("s3", 0).status, 201);
@@ -75,7 +76,7 @@ fn a_command_may_bring_back_what_is_seen_then() {
     let seen = &reply["observation"];
     assert_eq!((&seen["time_s"], &seen["states"][0]["robot"]), (&reply["time_s"], &json!("B")));
     assert!(seen["images"][0]["png_base64"].as_str().is_some_and(|png| png.starts_with("iVBORw0KGgo")));
-    // What could not be looked at stops the command, too.
+    // An invalid observation also prevents the command.
     wait(json!({ "robots": ["C"] })).refused(422, &["\"C\"", "A, B"]);
     wait(json!({ "robot": "A" })).refused(422, &["unknown field `robot`"]);
     assert_eq!(server.get(&format!("/v1/episodes/{id}")).ok()["step"], 5);

@@ -1,4 +1,4 @@
-//! Episodes over REST: their life from start to recording, and who may interrupt whom.
+//! Tests of episodes over REST: their life cycle from start to recording, and which calls interrupt others.
 
 use std::{
     io::Write,
@@ -88,7 +88,7 @@ fn places_are_limited_and_an_ended_episode_makes_room() {
     assert_eq!(server.get("/healthz").ok()["episodes"], 2);
 }
 
-/// Sends a request and does not wait for the answer.
+/// Sends a request without waiting for the response.
 fn send_only(server: &TestServer, id: &str, tool: &str, args: &Value) -> TcpStream {
     let body = args.to_string();
     let mut stream = TcpStream::connect(server.address).expect("a connection");
@@ -141,7 +141,7 @@ fn tools_and_tasks_are_listed() {
     let handover = tasks["tasks"].as_array().into_iter().flatten().find(|task| task["id"] == "handover");
     assert_eq!(handover.and_then(|task| task["phases"].as_array()).map(Vec::len), Some(3), "{tasks}");
 
-    // What robots can do is known before the first episode, and it is what each robot of an episode can do.
+    // The limits are available before the first episode, and are the same for each robot of an episode.
     let started =
         server.post("/v1/episodes", &json!({ "task": "handover", "seed": 0, "protocol": "benchmark" })).ok();
     for field in ["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"] {
