@@ -1,5 +1,5 @@
-//! A call on an episode as a program makes it: the tool, and what may stand beside the tool's own arguments. Models are shown none
-//! of that: it stands in the schemas of bodies, not in those of tools.
+//! A call on an episode as a program makes it: the tool, and what may stand beside the tool's own
+//! arguments. Models are shown none of that: it stands in the schemas of bodies, not in those of tools.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
@@ -19,16 +19,16 @@ pub struct Call {
     /// The tool and its arguments.
     #[serde(flatten)]
     pub tool: ToolCall,
-    /// How pictures are to come, where the tool is `observe`.
+    /// Formats of images, where the tool is `observe`.
     #[serde(flatten)]
     pub formats: Formats,
     /// The step that the episode has to stand at, where the tool is a command.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_step: Option<u32>,
-    /// What to look at once a command is done.
+    /// Observation to make once a command is done.
     #[serde(rename = "observe", skip_serializing_if = "Option::is_none")]
     pub then: Option<Look>,
-    /// Whether the reply is to leave out what is as it should be. Observations have a word of their own for that.
+    /// True for a reply without what is as expected. Observations have a field of their own for that.
     #[serde(skip_serializing_if = "is_false")]
     pub short: bool,
 }
@@ -37,11 +37,11 @@ fn is_false(flag: &bool) -> bool {
     !flag
 }
 
-/// What goes with every tool that has no such field of its own.
+/// Fields of every tool that has none of the same name.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 struct WithAll {
-    /// As its schemas describe it.
+    /// True for a short reply.
     short: Option<bool>,
 }
 
@@ -52,22 +52,23 @@ impl WithAll {
 /// An observation, and how its pictures are to come.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Look {
-    /// What to look at.
+    /// The observation.
     #[serde(flatten)]
     pub observe: Observe,
-    /// How pictures are to come.
+    /// Formats of its images.
     #[serde(flatten)]
     pub formats: Formats,
 }
 
-/// What goes with a command.
+/// Fields beside those of a command.
 #[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
 struct WithCommand {
-    /// The step that the episode has to stand at, as the `step` of an earlier reply has it; where it stands at another, the
-    /// command is refused with 409 and nothing moves. Null: at any.
+    /// The step that the episode has to stand at, as the `step` of an earlier reply has it; where it stands
+    /// at another, the command is refused with 409 and nothing moves. Null: at any.
     #[schemars(range(max = u32::MAX))]
     expected_step: Option<u32>,
-    /// Arguments of observe: the reply then has as `observation` what is seen when the command is done. Null: nothing.
+    /// Arguments of observe: the reply then has as `observation` what is seen when the command is done.
+    /// Null: nothing.
     #[schemars(extend("properties" = observe_properties(), "additionalProperties" = false))]
     observe: Option<Map<String, Value>>,
 }
@@ -273,7 +274,7 @@ fn properties_of(mut schema: Value) -> Map<String, Value> {
     schema["properties"].as_object_mut().map(std::mem::take).unwrap_or_default()
 }
 
-/// What `observe` may hold beside a command. The command's own schema is still to be worded, and this with it.
+/// Returns the schema of `observe` beside a command, which is still to be worded with the command's own.
 fn observe_properties() -> Value {
     let own = properties_of(plain_schema::<Observe>()).into_iter();
     json!(own.chain(properties_of(plain_schema::<Formats>())).collect::<Map<_, _>>())

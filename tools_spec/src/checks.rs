@@ -1,4 +1,5 @@
-//! Checks that need no world. Each returns the sentence a caller needs: what is wrong, where, and what would work.
+//! Checks that need no world. Each returns the sentence a caller needs: what is wrong, where, and what
+//! would work.
 
 use crate::limits::{LARGEST, MAX_PIXELS, SMALLEST_COMPONENT};
 use crate::parts::{BASE_COLUMNS, PixelRegion};
@@ -11,7 +12,7 @@ pub fn finite(place: &str, values: &[f64]) -> Result<(), String> {
     }
 }
 
-/// What is given of a base command, in the order of its columns, is finite.
+/// Checks that the given values of a base command, in the order of its columns, are finite.
 pub fn base(command: [Option<f64>; 4]) -> Result<(), String> {
     BASE_COLUMNS.iter().zip(command).try_for_each(|(column, part)| finite(column, part.as_slice()))
 }

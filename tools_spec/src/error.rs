@@ -1,10 +1,11 @@
-//! What can be wrong with a call before any world is asked.
+//! Errors of a call that are found before any world is asked.
 
 use serde_json::Value;
 
 use crate::refusal::{Refusal, RefusalClass};
 
-/// A call that does not fit the contract. The text says what would work, because its reader is often a language model.
+/// A call that does not fit the contract. The text says what would work, because its reader is often a
+/// language model.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SpecError {
     /// The name is not one of the tools that act on an episode.
@@ -20,9 +21,9 @@ pub enum SpecError {
     Malformed {
         /// The tool that was called.
         tool: &'static str,
-        /// Where in the arguments, as `robots[0].steps: `, or empty for the whole.
+        /// Place in the arguments, for example `robots[0].steps: `; empty for the whole.
         place: String,
-        /// What does not fit there.
+        /// Mismatch at that place.
         reason: String,
         /// One complete set of arguments, as JSON.
         example: String,
@@ -32,13 +33,13 @@ pub enum SpecError {
     Invalid {
         /// The tool that was called.
         tool: &'static str,
-        /// What is wrong, where, and what would work.
+        /// Mistake, its place, and a correct call.
         reason: String,
     },
 }
 
 impl SpecError {
-    /// As it is told where the episode is named among the arguments: an example names it, too.
+    /// Returns the error for a caller that names the episode among the arguments, as the example then does.
     pub fn naming_episode(mut self, id: &str) -> SpecError {
         if let SpecError::Malformed { example, .. } = &mut self
             && let Ok(Value::Object(arguments)) = serde_json::from_str(example)
@@ -49,7 +50,7 @@ impl SpecError {
         self
     }
 
-    /// What this error is to its caller.
+    /// Returns the refusal that the caller reads.
     pub const fn refusal(&self) -> Refusal {
         match self {
             SpecError::UnknownTool { .. } => {

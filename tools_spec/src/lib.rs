@@ -1,7 +1,8 @@
 //! The wire contract: every tool that a policy can call, with its arguments, its reply and its JSON Schema.
 //!
-//! The doc comments of the argument types are the text that a language model reads, so they say units, frames and what
-//! happens. Nothing here knows the simulator: [`Call::parse`] checks what can be checked without looking at a world.
+//! The doc comments of the argument types are the text that a language model reads, so they say units,
+//! frames and what happens. Nothing here knows the simulator: [`Call::parse`] checks what can be checked
+//! without looking at a world.
 //!
 //! To add a tool: one file in `tools/` and its line in `list.rs`. What does not answer it yet does not compile.
 
@@ -40,7 +41,8 @@ pub use schema::{EpisodeToolSpec, Format, ToolSpec, TypedTool, TypedTools};
 pub use tool::{Route, Tool, parse_args};
 pub use tools::*;
 
-/// The REST interface of `version` as OpenAPI 3.1, from the same types that read and write it, for a caller who may or may not `talk`.
+/// The REST interface of `version` as OpenAPI 3.1, from the same types that read and write it, for a caller
+/// who may or may not `talk`.
 pub fn openapi(version: &str, wording: impl Into<Wording>, talk: bool) -> serde_json::Value {
     let wording = wording.into();
     let specs: Vec<ToolSpec> = call::specs_for_programs(wording)
@@ -51,8 +53,8 @@ pub fn openapi(version: &str, wording: impl Into<Wording>, talk: bool) -> serde_
     schema::openapi(version, &specs)
 }
 
-/// The tools of the running episode `id` with these `robots`, whose commands may have up to `most_steps` control steps, for a caller
-/// who may or may not `talk`.
+/// The tools of the running episode `id` with these `robots`, whose commands may have up to `most_steps`
+/// control steps, for a caller who may or may not `talk`.
 pub fn episode_tool_specs(
     wording: impl Into<Wording>,
     id: &str,

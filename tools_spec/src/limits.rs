@@ -1,9 +1,10 @@
-//! What [`crate::checks`] refuses, as JSON Schema says it, so that a caller who keeps to the schema is not refused for it.
+//! Limits of [`crate::checks`] as JSON Schema, so that a caller that keeps to the schema is not refused for
+//! them.
 
 use serde_json::{Value, json};
 
-/// No number of this contract, in metres, radians or metres per second, is anywhere near this large; a larger one would
-/// overflow the single precision of the physics.
+/// No number of this contract, in metres, radians or metres per second, is anywhere near this large; a
+/// larger one would overflow the single precision of the physics.
 pub const LARGEST: f64 = 1e6;
 
 /// A quaternion whose largest component is smaller has no direction.
@@ -21,7 +22,7 @@ pub const ROBOT_NAMES: [&str; 3] = ["A", "B", "C"];
 /// The names as a pattern.
 pub const ROBOT_PATTERN: &str = "^[ABC]$";
 
-/// What head cameras see, in pixels: columns and rows.
+/// Image size of head cameras in pixels: columns and rows.
 const PICTURE_PX: [u32; 2] = [320, 240];
 
 /// `contains` of a quaternion: it has a direction.
@@ -29,8 +30,8 @@ pub fn direction() -> Value {
     json!({ "anyOf": [{ "minimum": SMALLEST_COMPONENT }, { "maximum": -SMALLEST_COMPONENT }] })
 }
 
-/// `not` of a list with an entry per robot: one is named twice. (`maxContains` would be shorter, but readers of older drafts take
-/// the `contains` beside it for a demand.)
+/// `not` of a list with an entry per robot: one is named twice. (`maxContains` would be shorter, but
+/// readers of older drafts take the `contains` beside it for a demand.)
 pub fn a_robot_twice() -> Value {
     let twice = |name: &str, first: usize, second: usize| {
         let mut entries = vec![json!({}); second + 1];
@@ -56,7 +57,8 @@ pub fn pixel_range() -> Value {
     json!(PICTURE_PX.map(|px| json!({ "type": "integer", "minimum": 0, "maximum": px - 1 })))
 }
 
-/// `oneOf` of an object that has one of these fields, each given with the type that it has where it is not null.
+/// `oneOf` of an object that has one of these fields, each given with the type that it has where it is not
+/// null.
 pub fn one_of(fields: &[(&str, &str)]) -> Value {
     fields.iter().map(|(field, kind)| has(field, kind)).collect()
 }
@@ -77,8 +79,9 @@ fn has(field: &str, kind: &str) -> Value {
     json!({ "required": [field], "properties": { field: { "type": kind } } })
 }
 
-/// Says how many control steps a command may have wherever `most_steps` marks that something counts them: as `maximum`, as
-/// `maxItems`, or as `equal_rows`, a list with an entry per robot whose rows are equally many.
+/// Says how many control steps a command may have wherever `most_steps` marks that something counts them:
+/// as `maximum`, as `maxItems`, or as `equal_rows`, a list with an entry per robot whose rows are equally
+/// many.
 pub fn bound_steps(schema: &mut Value, most_steps: u32) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(|item| bound_steps(item, most_steps)),
@@ -117,7 +120,8 @@ pub fn bound_robots(schema: &mut Value, robots: &[String]) {
     }
 }
 
-/// Bounds every number of a schema where it has no bound of its own. Integers are left alone, whose types bound them.
+/// Bounds every number of a schema where it has no bound of its own. Integers are left alone, whose types
+/// bound them.
 pub fn bound_numbers(schema: &mut Value) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(bound_numbers),

@@ -1,4 +1,5 @@
-//! The one list of tools: what a caller may ask, what it gets back and how both are read follow from a tool's line here.
+//! The one list of tools: what a caller may ask, what it gets back and how both are read follow from a
+//! tool's line here.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -9,8 +10,8 @@ use crate::schema::{ToolSpec, TypedTools, TypedToolsCollector};
 use crate::tool::{Tool, parse_args};
 use crate::tools::*;
 
-/// Makes all that has to know every tool. A tool is the one line with the type of its arguments, in the group of what it
-/// does:
+/// Makes all that has to know every tool. A tool is the one line with the type of its arguments, in the
+/// group of what it does:
 ///
 /// ```text
 /// /// Asks how things stand.
@@ -19,14 +20,15 @@ use crate::tools::*;
 /// }
 /// ```
 ///
-/// That line adds `query_depth` to the names and to the specifications; the variants `LookCall::QueryDepth`, with the
-/// arguments, and `LookReply::QueryDepth`, with the tool's own `Tool::Reply`; a `From<QueryDepth>` for `ToolCall`; and
-/// its arms where calls are read, named, checked and asked for their robots and steps, and where replies are read. Whoever
-/// answers `LookCall`s does not compile until it answers this one.
+/// That line adds `query_depth` to the names and to the specifications; the variants
+/// `LookCall::QueryDepth`, with the arguments, and `LookReply::QueryDepth`, with the tool's own
+/// `Tool::Reply`; a `From<QueryDepth>` for `ToolCall`; and its arms where calls are read, named, checked
+/// and asked for their robots and steps, and where replies are read. Whoever answers `LookCall`s does not
+/// compile until it answers this one.
 ///
-/// In a group with `-> each R`, `R` is made here and every tool has a reply of its own; with `-> all R`, every tool of the
-/// group replies with the existing type `R`. A group `for operators` is offered only in episodes whose operators may talk. What
-/// `without_episode` lists has no call on an episode.
+/// In a group with `-> each R`, `R` is made here and every tool has a reply of its own; with `-> all R`,
+/// every tool of the group replies with the existing type `R`. A group `for operators` is offered only in
+/// episodes whose operators may talk. What `without_episode` lists has no call on an episode.
 macro_rules! tools {
     (
         without_episode { $($free:ident,)* }
@@ -81,7 +83,7 @@ macro_rules! tools {
             impl $call {
                 /// The tools of this group, by name.
                 pub const TOOLS: &[&str] = &[$( $tool::NAME, )*];
-                /// Whether only operators who may talk are offered them.
+                /// True if only operators that may talk are offered them.
                 pub const FOR_OPERATORS: bool = tools!(@for_operators $($audience)?);
 
                 /// The robots that the arguments name.
@@ -102,7 +104,8 @@ macro_rules! tools {
             tools!(@replies $whose $reply $call { $($tool)* });
         )*
 
-        /// A call on an episode, read and checked as far as that needs no world. It serialises to its arguments.
+        /// A call on an episode, read and checked as far as that needs no world. It serialises to its
+        /// arguments.
         #[derive(Debug, Clone, PartialEq, Serialize)]
         #[serde(untagged)]
         pub enum ToolCall {
@@ -164,7 +167,8 @@ macro_rules! tools {
                 }
             }
 
-            /// Checks a call that was built in Rust rather than read from JSON; [`ToolCall::parse`] has already done it.
+            /// Checks a call that was built in Rust rather than read from JSON; [`ToolCall::parse`] has
+            /// already done it.
             pub fn validate(&self) -> Result<(), SpecError> {
                 let checked = match self {
                     $( $( ToolCall::$group($call::$tool(args)) => args.validate(), )* )*

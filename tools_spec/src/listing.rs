@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use crate::parts::{Operators, Protocol};
 use crate::tools::EndReason;
 
-/// The episodes that the caller may know of, by id: for who started them all that the server holds, for the operator of a robot
-/// its own.
+/// The episodes that the caller may know of, by id: for who started them all that the server holds, for the
+/// operator of a robot its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct EpisodeList {
     /// The episodes.
@@ -26,7 +26,7 @@ pub struct EpisodeEntry {
     pub seed: Option<u32>,
     /// The rules in force.
     pub protocol: Protocol,
-    /// Whether each robot has an operator of its own.
+    /// True where each robot has an operator of its own.
     pub operators: Operators,
     /// Control steps executed so far, the initial hold included.
     pub step: u32,

@@ -1,28 +1,29 @@
-//! What a refusal is to its caller, whatever protocol carries it, and its form over HTTP: RFC 9457 problem details.
+//! Refusals as callers read them, whatever protocol carries them, and their form over HTTP: RFC 9457 problem
+//! details.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// What an error is to its caller. Each error enum gives one for every variant; its text is the error's own.
+/// An error as its caller reads it. Each error enum gives one for every variant; its text is the error's own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Refusal {
     /// A stable name for the kind of problem, as `unknown-robot`.
     pub kind: &'static str,
     /// The kind in words.
     pub title: &'static str,
-    /// What is wrong in general, which a protocol maps to its own codes.
+    /// General kind, which a protocol maps to its own codes.
     pub class: RefusalClass,
     /// Seconds after which the same request may work; without, it will be refused again.
     pub retry_after_s: Option<u16>,
-    /// What the caller can do, where the error's own text does not say it.
+    /// Remedy, where the error's own text does not say it.
     pub hint: Option<&'static str>,
 }
 
 /// Classes of refusals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RefusalClass {
-    /// What the request names does not exist.
+    /// The request names something that does not exist.
     NotFound,
     /// The request can be read and says something that can never work.
     Invalid,
@@ -30,7 +31,7 @@ pub enum RefusalClass {
     Conflict,
     /// The caller may not do this.
     Forbidden,
-    /// What the request names has existed and exists no longer.
+    /// The request names something that exists no longer.
     Gone,
     /// Another server has what the request names.
     Elsewhere,
@@ -53,12 +54,12 @@ impl Refusal {
         Refusal { kind, title, class, retry_after_s: None, hint: None }
     }
 
-    /// As this one, for a request that may work after so many seconds.
+    /// Returns this refusal for a request that may work after `retry_after_s` seconds.
     pub const fn retry_after_s(self, seconds: u16) -> Refusal {
         Refusal { retry_after_s: Some(seconds), ..self }
     }
 
-    /// As this one, with what the caller can do.
+    /// Returns this refusal with a remedy.
     pub const fn hint(self, hint: &'static str) -> Refusal {
         Refusal { hint: Some(hint), ..self }
     }
@@ -74,12 +75,13 @@ pub struct ProblemBody {
     pub title: String,
     /// The HTTP status.
     pub status: u16,
-    /// What was wrong with this call and what would work.
+    /// Mistake of this call, and a call that would work.
     pub detail: String,
     /// Why the recording of the episode is not complete; left out where it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording_failed: Option<String>,
-    /// What the episode came to, as finish tells it, where it is refused because it has ended; left out otherwise.
+    /// Result of the episode, as finish returns it, where it is refused because it has ended; left out
+    /// otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub result: Option<Value>,
 }

@@ -1,4 +1,5 @@
-//! JSON as JSON Schema understands it, which is not quite as serde does: an array is no object, and `1.0` is an integer.
+//! JSON as JSON Schema understands it, which is not quite as serde does: an array is no object, and `1.0`
+//! is an integer.
 
 use serde::de::value::{MapDeserializer, SeqDeserializer};
 use serde::de::{Deserializer, Error as _, IntoDeserializer, Unexpected, Visitor};

@@ -1,4 +1,4 @@
-//! What a tool is, and how its arguments are read from JSON.
+//! The trait of tools, and how their arguments are read from JSON.
 
 use schemars::JsonSchema;
 use serde::{Serialize, de::DeserializeOwned};
@@ -7,12 +7,12 @@ use serde_json::{Value, json};
 use crate::error::SpecError;
 use crate::strict_value::StrictValue;
 
-/// Where REST serves a tool.
+/// REST route of a tool.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Route {
-    /// As `POST`.
+    /// HTTP method, for example `POST`.
     pub method: &'static str,
-    /// As `/v1/episodes/{episode_id}/tools/wait`.
+    /// Path, for example `/v1/episodes/{episode_id}/tools/wait`.
     pub path: String,
 }
 
@@ -23,21 +23,21 @@ impl Route {
     }
 }
 
-/// The arguments of one tool. The type's doc comment is the tool's description; how to grasp stands apart from it, as the
-/// schema's `hint`, which not every policy is told.
+/// The arguments of one tool. The type's doc comment is the tool's description; how to grasp stands apart
+/// from it, as the schema's `hint`, which not every policy is told.
 pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
-    /// What the tool answers.
+    /// Type of its reply.
     type Reply: Serialize + DeserializeOwned + JsonSchema;
     /// The name a caller uses.
     const NAME: &'static str;
-    /// Whether the call leaves the world exactly as it was and costs no steps.
+    /// True if the call leaves the world exactly as it was and costs no steps.
     const READ_ONLY: bool;
-    /// Whether calling it again with the same arguments changes nothing more.
+    /// True if calling it again with the same arguments changes nothing more.
     const IDEMPOTENT: bool = Self::READ_ONLY;
 
-    /// Whether its schema can be strict: every field of it said, and no others.
+    /// True if its schema can be strict: it names every field, and allows no others.
     const STRICT: bool = true;
-    /// Whether only policies that are told all are offered it.
+    /// True if only policies with full assistance are offered it.
     const FULL_ONLY: bool = false;
 
     /// Arguments that work, shown to callers whose own did not.
@@ -53,13 +53,13 @@ pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
         0
     }
 
-    /// Where REST serves it.
+    /// Returns its REST route.
     fn route() -> Route {
         Route::of_episode("{episode_id}", Self::NAME)
     }
 
-    /// Checks what needs no world: lengths, finite numbers, quaternions that have a direction. The text says what
-    /// would work.
+    /// Checks what needs no world: lengths, finite numbers, quaternions that have a direction. The text
+    /// says what would work.
     fn validate(&self) -> Result<(), String> {
         Ok(())
     }
@@ -89,7 +89,7 @@ pub fn read_as<T: DeserializeOwned>(
     })
 }
 
-/// What may be null may be left out, and not every face of the contract knows of null.
+/// Fields that may be null may be left out, and not every face of the contract has null.
 fn without_nulls(value: Value) -> Value {
     match value {
         Value::Array(items) => items.into_iter().map(without_nulls).collect(),

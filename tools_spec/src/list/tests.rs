@@ -11,14 +11,14 @@ use crate::parts::Assistance;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wave {
-    /// How many times.
+    /// Number of times.
     pub times: u32,
 }
 
 /// The reply to `wave`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WaveReply {
-    /// Whether anybody waved back.
+    /// True if somebody waved back.
     pub answered: bool,
 }
 

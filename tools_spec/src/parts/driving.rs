@@ -10,15 +10,15 @@ const PATIENCE_S: [f64; 2] = [0.05, 600.0];
 /// By whom an episode is driven.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Driving {
-    /// "per_robot": each robot has an operator of its own, who sees and commands that robot alone, by the token that the reply
-    /// has for it. "one" or null: one policy directs all robots.
+    /// "per_robot": each robot has an operator of its own, who sees and commands that robot alone, by the
+    /// token that the reply has for it. "one" or null: one policy directs all robots.
     pub operators: Option<Operators>,
-    /// How long operators wait for one who does not command, in seconds, before its robot holds still. Null: 120. Refused where
-    /// one policy directs all.
+    /// Seconds for which operators wait for one that does not command, before its robot holds still. Null:
+    /// 120. Refused where one policy directs all.
     #[schemars(range(min = PATIENCE_S[0], max = PATIENCE_S[1]))]
     pub patience_s: Option<f64>,
-    /// True: operators may talk to each other by the tool say, which is refused where one policy directs all. False or null: they
-    /// may not.
+    /// True: operators may talk to each other by the tool say, which is refused where one policy directs
+    /// all. False or null: they may not.
     pub talk: Option<bool>,
 }
 
@@ -28,12 +28,12 @@ impl Driving {
 
     const PATIENCE_S: f64 = 120.0;
 
-    /// Whether each robot has an operator of its own.
+    /// Returns true if each robot has an operator of its own.
     pub fn is_per_robot(&self) -> bool {
         self.operators == Some(Operators::PerRobot)
     }
 
-    /// How long operators wait for one who does not command.
+    /// Returns the seconds for which operators wait for one that does not command.
     pub fn patience_s(&self) -> f64 {
         self.patience_s.unwrap_or(Driving::PATIENCE_S)
     }
@@ -46,7 +46,8 @@ impl Driving {
         ])
     }
 
-    /// Checks the patience, and that nothing is said of operators where there are none. The text says what would work.
+    /// Checks the patience, and that nothing is said of operators where there are none. The text says what
+    /// would work.
     pub fn validate(&self) -> Result<(), String> {
         let given = [self.patience_s.map(|_| "patience_s"), self.talk.filter(|talk| *talk).map(|_| "talk")];
         if let (false, Some(field)) = (self.is_per_robot(), given.into_iter().flatten().next()) {
@@ -64,7 +65,7 @@ impl Driving {
     }
 }
 
-/// How many operators an episode has.
+/// Operators of an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Operators {
@@ -74,34 +75,35 @@ pub enum Operators {
     PerRobot,
 }
 
-/// What a robot's operator needs to drive it.
+/// Credentials of a robot's operator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OperatorToken {
     /// The robot, as "A".
     pub robot: String,
-    /// What its operator sends with every request, as `Authorization: Bearer TOKEN`.
+    /// Token that its operator sends with every request, as `Authorization: Bearer TOKEN`.
     pub token: String,
 }
 
-/// What an operator hears with a reply.
+/// News for an operator with a reply.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Partner {
     /// The partner's robot, as "B".
     pub robot: String,
-    /// What it did while the command was executed.
+    /// Its activity during the command.
     pub did: PartnerDid,
     /// The tool by which its operator commanded it; left out where none did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tool: Option<String>,
 }
 
-/// What the robot of another operator did during a command.
+/// Activity of another operator's robot during a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PartnerDid {
-    /// What its operator told it.
+    /// It followed its operator's command.
     Acted,
-    /// It held still: no command came for as long as the episode's patience lasts. Nobody waits for its operator until it calls again.
+    /// It held still: no command came for as long as the episode's patience lasts. Nobody waits for its
+    /// operator until it calls again.
     HeldSilent,
     /// It held still: its operator has called finish.
     HeldFinished,
@@ -112,12 +114,12 @@ pub enum PartnerDid {
 pub struct Heard {
     /// The robot whose operator spoke, as "B".
     pub from: String,
-    /// What it said.
+    /// The words.
     pub text: String,
     /// The control step that the episode was at.
     #[serde(default)]
     pub step: u32,
-    /// Which of the speaker's sayings it is, counted from 1.
+    /// Number of the message among the speaker's, counted from 1.
     #[serde(default)]
     pub number: u32,
 }

@@ -34,15 +34,15 @@ impl fmt::Display for Protocol {
     }
 }
 
-/// How much a policy is told.
+/// Amount of information that a policy gets.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Assistance {
-    /// What the benchmark tells its agents: pictures, joint angles, wrist poses, calibration, depth at pixels, how far wrists are from
-    /// their targets and which joints are at a limit, and the budget; success at the end of the episode.
+    /// The benchmark's: images, joint angles, wrist poses, calibration, depth at pixels, distances of wrists
+    /// from their targets, joints at a limit, and the budget; success at the end of the episode.
     Paper,
-    /// All that a robot could sense, how hands stand to their targets, who has fallen, phases as they are reached, by what they are
-    /// scored, and how to grasp.
+    /// All that a robot could sense, how hands stand to their targets, who has fallen, phases as they are
+    /// reached, by what they are scored, and how to grasp.
     #[default]
     Full,
 }
@@ -59,7 +59,7 @@ impl Assistance {
         }
     }
 
-    /// What policies are told with it, `disclosure` and `hints`, for the log of a program that starts.
+    /// Describes the assistance with `disclosure` and `hints`, for the log of a program that starts.
     pub fn about(self, disclosure: Disclosure, hints: Hints) -> String {
         let sensed = match self {
             Assistance::Paper => "what the benchmark tells its agents",
@@ -77,7 +77,7 @@ impl Assistance {
         format!("assistance {self}: policies are told {sensed}, {success}{grasps}")
     }
 
-    /// What it tells of phases.
+    /// Returns its disclosure of phases.
     pub fn disclosure(self) -> Disclosure {
         match self {
             Assistance::Paper => Disclosure::End,
@@ -85,7 +85,7 @@ impl Assistance {
         }
     }
 
-    /// What its texts say besides geometry.
+    /// Returns its hints.
     pub fn hints(self) -> Hints {
         match self {
             Assistance::Paper => Hints::Off,
@@ -100,12 +100,12 @@ impl fmt::Display for Assistance {
     }
 }
 
-/// Which texts about tools a policy reads.
+/// Version of the texts about tools that a policy reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Wording {
-    /// Whether they speak of what only `full` tells.
+    /// Assistance: `full` adds what only it offers.
     pub assistance: Assistance,
-    /// Whether they say how to grasp.
+    /// Hints on grasping.
     pub hints: Hints,
 }
 
@@ -121,7 +121,7 @@ impl From<Hints> for Wording {
     }
 }
 
-/// What a policy may be shown that the benchmark's own policies are not.
+/// Information that a policy may get and the benchmark's own policies do not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ExtraInformation {
@@ -131,17 +131,17 @@ pub enum ExtraInformation {
     PixelDepth,
     /// The camera that sees all robots.
     ThirdPerson,
-    /// How fast joints turn.
+    /// Joint velocities.
     JointVelocities,
-    /// How hard drives work.
+    /// Torques of drives.
     JointTorques,
-    /// What the world does to hands.
+    /// Forces of the world on hands.
     HandForces,
-    /// How far a robot has gone.
+    /// Odometry.
     Odometry,
-    /// Which way is down.
+    /// Direction of gravity.
     Gravity,
-    /// What the next phase lacks, as the simulator measures it.
+    /// Conditions that the next phase lacks, as the simulator measures them.
     PhaseConditions,
 }
 
@@ -159,7 +159,7 @@ impl ExtraInformation {
         ExtraInformation::PhaseConditions,
     ];
 
-    /// As results and reports call it.
+    /// Name in results and reports.
     pub fn name(self) -> &'static str {
         match self {
             ExtraInformation::DepthImages => "depth_images",
@@ -174,7 +174,7 @@ impl ExtraInformation {
         }
     }
 
-    /// Whether `full` assistance tells it unasked, so that who names the assistance has named it.
+    /// Returns true if `full` assistance includes it, so that naming the assistance names it.
     pub fn is_of_full_assistance(self) -> bool {
         match self {
             ExtraInformation::DepthImages
@@ -190,7 +190,7 @@ impl ExtraInformation {
     }
 }
 
-/// What replies tell about phases, and whether success ends an episode.
+/// Disclosure of phases in replies, and whether success ends an episode.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Disclosure {
@@ -216,7 +216,7 @@ impl Disclosure {
         }
     }
 
-    /// Whether phases are told in an episode that has `ended` or goes on.
+    /// Returns true if phases are disclosed in an episode that has `ended` or goes on.
     pub fn tells(self, ended: bool) -> bool {
         match self {
             Disclosure::Live => true,
@@ -225,7 +225,7 @@ impl Disclosure {
         }
     }
 
-    /// Whether the last phase ends the episode.
+    /// Returns true if the last phase ends the episode.
     pub fn ends_on_success(self) -> bool {
         self == Disclosure::Live
     }
@@ -237,11 +237,11 @@ impl fmt::Display for Disclosure {
     }
 }
 
-/// What texts say besides geometry.
+/// Recipes in texts beside geometry.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Hints {
-    /// How to grasp: finger angles, ways to come near, orders of closing.
+    /// Recipes for grasping: finger angles, approaches, orders of closing.
     #[default]
     On,
     /// Nothing.
@@ -267,13 +267,13 @@ impl fmt::Display for Hints {
     }
 }
 
-/// What is left of the episode.
+/// Remaining budget of an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Budget {
     /// Control steps of 20 ms.
     pub steps_left: u32,
-    /// Seconds that the policy may still spend between calls; the simulator's own time is not counted. Null where the
-    /// protocol sets no limit.
+    /// Seconds that the policy may still spend between calls; the simulator's own time is not counted. Null
+    /// where the protocol sets no limit.
     pub wall_clock_left_s: Option<f64>,
     /// The most steps that one command may ask for.
     pub steps_per_command: u32,
@@ -282,7 +282,7 @@ pub struct Budget {
 /// A phase of the task, and when it was reached.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PhaseReached {
-    /// What the phase is called, as `grasp_and_lift`.
+    /// Name of the phase, for example `grasp_and_lift`.
     pub id: String,
     /// `p1`, `p2`, ... in the order they have to be reached.
     pub number: String,
@@ -293,15 +293,16 @@ pub struct PhaseReached {
 /// The phase to reach next.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NextPhase {
-    /// What the phase is called, for example `place`.
+    /// Name of the phase, for example `place`.
     pub id: String,
     /// `p1`, `p2`, ... in the order they have to be reached.
     pub number: String,
-    /// What does not hold yet, one sentence each. Empty where the next control step reaches the phase.
+    /// Conditions that do not hold yet, one sentence each. Empty where the next control step reaches the
+    /// phase.
     pub lacks: Vec<String>,
 }
 
-/// Whether a robot has fallen.
+/// Fall of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotFallen {
     /// The robot, as "A".

@@ -7,13 +7,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PoseFrame {
-    /// In the robot's pelvis as it is at that moment: x forward, y left, z up. It leans and turns with the pelvis.
+    /// In the robot's pelvis as it is at that moment: x forward, y left, z up. It leans and turns with the
+    /// pelvis.
     #[default]
     Pelvis,
     /// In the pelvis, but upright: z against gravity, x the way that the robot faces.
     Level,
-    /// On the floor under the pelvis as it was when the episode began, z up, x where the robot faced: it stays in the room while the
-    /// robot moves, as far as its odometry is right.
+    /// On the floor under the pelvis as it was when the episode began, z up, x where the robot faced: it
+    /// stays in the room while the robot moves, as far as its odometry is right.
     Start,
 }
 

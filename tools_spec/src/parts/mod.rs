@@ -1,4 +1,4 @@
-//! What several tools share.
+//! Types that several tools share.
 
 mod command;
 mod driving;

@@ -1,5 +1,5 @@
-//! Notes: what whoever plays says of its own play, for those who read the episode later. A note is no tool: it changes nothing of the
-//! episode, and no policy is told of it.
+//! Notes: what whoever plays says of its own play, for those who read the episode later. A note is no tool:
+//! it changes nothing of the episode, and no policy is told of it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,35 +20,36 @@ const MAX_TOKENS: u32 = 1_000_000_000;
 const MAX_USD: f64 = 1e6;
 const MAX_SECONDS: f64 = 1e6;
 
-/// Something that whoever plays says of its play, kept in the recording for those who read the episode later: what a model thought, what
-/// it said, what that took. It changes nothing of the episode, costs no call, no steps and no time, and no policy is told of it.
+/// Something that whoever plays says of its play, kept in the recording for those who read the episode
+/// later: what a model thought, what it said, what that took. It changes nothing of the episode, costs no
+/// call, no steps and no time, and no policy is told of it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Note {
     /// The words, at most 50,000 characters. They may be empty where the note says what was used.
     #[schemars(length(max = MAX_CHARACTERS))]
     pub text: String,
-    /// What the words are. Null: a note.
+    /// Kind of the words. Null: a note.
     pub kind: Option<NoteKind>,
     /// The robot that it is about, as "A". Null: all, and for the operator of a robot its own.
     #[schemars(regex(pattern = ROBOT_PATTERN))]
     pub robot: Option<String>,
-    /// What the model read and wrote for it. Null: not said.
+    /// Tokens that the model read and wrote for it. Null: not said.
     pub tokens: Option<TokenCount>,
-    /// What that cost in US dollars. Null: not said.
+    /// Cost in US dollars. Null: not said.
     #[schemars(range(min = 0, max = MAX_USD))]
     pub usd: Option<f64>,
     /// The model, by the name that its server has for it, at most 200 characters. Null: not said.
     #[schemars(length(max = MAX_NAME_CHARACTERS))]
     pub model: Option<String>,
-    /// How long the model took, in seconds. Null: not said.
+    /// Seconds that the model took. Null: not said.
     #[schemars(range(min = 0, max = MAX_SECONDS))]
     pub seconds: Option<f64>,
-    /// How the model's play ends with this note. Null: it goes on.
+    /// End of the model's play. Null: it goes on.
     pub ending: Option<AgentEnding>,
 }
 
-/// How the play of a language model ended.
+/// End of a language model's play.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum AgentEnding {
@@ -77,7 +78,7 @@ pub enum AgentEnding {
 }
 
 impl AgentEnding {
-    /// What happened, as reports have it.
+    /// Describes the end for reports.
     pub fn words(self) -> &'static str {
         match self {
             AgentEnding::Success => "the task was completed",
@@ -94,19 +95,19 @@ impl AgentEnding {
         }
     }
 
-    /// Whether the end of the episode says as much.
+    /// Returns true if the end of the episode says as much.
     pub fn is_of_the_episode(self) -> bool {
         matches!(self, AgentEnding::Success | AgentEnding::Finished)
     }
 }
 
-/// What the words of a note are.
+/// Kind of a note's words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum NoteKind {
-    /// What a model thought before it acted.
+    /// Thoughts of a model before it acted.
     Thought,
-    /// What a model said.
+    /// Words of a model.
     Message,
     /// Anything else, as what a program did on its own.
     Note,
@@ -122,17 +123,17 @@ pub struct TokenCount {
     /// Tokens that the model wrote, its thoughts included.
     #[schemars(range(max = MAX_TOKENS))]
     pub output: u32,
-    /// Of those that it read, how many came from a cache. Left out: none.
+    /// Number of read tokens that came from a cache. Left out: none.
     #[serde(default)]
     #[schemars(range(max = MAX_TOKENS))]
     pub cached: u32,
 }
 
 impl Note {
-    /// What refusals call it.
+    /// Name in refusals.
     pub const NAME: &str = "notes";
 
-    /// What a note has, at least one of them.
+    /// Fields of a note, of which it has at least one.
     pub(crate) fn conditions() -> Value {
         let mut used = one_of(&[("tokens", "object"), ("usd", "number"), ("seconds", "number")]);
         let words = json!({ "properties": { "text": { "minLength": 1 } } });
@@ -192,45 +193,45 @@ impl Note {
     }
 }
 
-/// What all notes of an episode say that was used, added up.
+/// Sum of the usage in all notes of an episode.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Usage {
-    /// How many notes there are.
+    /// Number of notes.
     pub notes: u32,
     /// Tokens that models read, those from a cache included.
     pub input_tokens: u64,
     /// Tokens that models wrote.
     pub output_tokens: u64,
-    /// Of those that they read, how many came from a cache.
+    /// Number of read tokens that came from a cache.
     pub cached_tokens: u64,
-    /// What it cost in US dollars; left out where no note says it.
+    /// Cost in US dollars; left out where no note has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub usd: Option<f64>,
-    /// How long models took, in seconds; left out where no note says it.
+    /// Seconds that models took; left out where no note has them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_s: Option<f64>,
     /// The models that notes name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<String>,
-    /// How the play of the models ended: one for all robots, or one for each that has said so.
+    /// Ends of the models' play: one for all robots, or one for each that has reported it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub endings: Vec<ModelEnding>,
 }
 
-/// How a model's play ended, and its own words for it.
+/// End of a model's play, in its own words, too.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ModelEnding {
     /// The robot that it directed; left out where it directed all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub robot: Option<String>,
-    /// How it ended.
+    /// The end.
     pub ending: AgentEnding,
     /// The words of the model or of its endpoint, as of a refusal; empty where there are none.
     pub text: String,
 }
 
 impl ModelEnding {
-    /// What happened, with the robot where the model directed one alone.
+    /// Describes the end, with the robot where the model directed one alone.
     pub fn words(&self) -> String {
         let words = self.ending.words();
         self.robot.as_ref().map_or_else(|| words.into(), |robot| format!("{robot}: {words}"))
@@ -261,7 +262,7 @@ impl Usage {
         }
     }
 
-    /// How models' play ended where the end of the episode does not say it.
+    /// Returns the ends of models' play that the end of the episode does not say.
     pub fn own_endings(&self) -> impl Iterator<Item = &ModelEnding> {
         self.endings.iter().filter(|ended| !ended.ending.is_of_the_episode())
     }

@@ -1,4 +1,5 @@
-//! Pictures as JSON and MessagePack carry them, in which form they come to programs, and how pixels of them are named.
+//! Pictures as JSON and MessagePack carry them, in which form they come to programs, and how pixels of them
+//! are named.
 
 use base64::{Engine, prelude::BASE64_STANDARD};
 use schemars::JsonSchema;
@@ -6,14 +7,15 @@ use serde::{Deserialize, Serialize, de::Error as _};
 
 use crate::limits;
 
-/// How the pictures of an observation are to come.
+/// Formats of an observation's images.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Formats {
     /// "png", or "rgb" for the bytes of each pixel row by row, which come in `arrays` then. Null: "png".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub images: Option<ImageFormat>,
-    /// Depth along the optical axis at every pixel, in `arrays`: "float16" for little-endian numbers in metres, infinite where
-    /// nothing is; "png16" for a PNG of 16 bits in millimetres, 0 where nothing is. Under the benchmark protocol only. Null: none.
+    /// Depth along the optical axis at every pixel, in `arrays`: "float16" for little-endian numbers in
+    /// metres, infinite where nothing is; "png16" for a PNG of 16 bits in millimetres, 0 where nothing is.
+    /// Under the benchmark protocol only. Null: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth: Option<DepthFormat>,
 }
@@ -23,7 +25,7 @@ impl Formats {
     pub const FIELDS: [&str; 2] = ["images", "depth"];
 }
 
-/// How colours come.
+/// Format of colour images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ImageFormat {
@@ -33,7 +35,7 @@ pub enum ImageFormat {
     Rgb,
 }
 
-/// How depth comes.
+/// Format of depth images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum DepthFormat {
@@ -108,7 +110,7 @@ impl JsonSchema for Bytes {
     }
 }
 
-/// What one camera saw, pixel by pixel, row by row from the top left. Its size is that of its calibration.
+/// Pixels of one camera, row by row from the top left. The size is that of its calibration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CameraArrays {
     /// The robot whose head camera it is.
@@ -116,12 +118,12 @@ pub struct CameraArrays {
     /// Three bytes a pixel, red, green, blue, where `images` was "rgb". Base64 in JSON.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rgb: Option<Bytes>,
-    /// Distances along the optical axis in metres, little-endian numbers of half precision, infinite where nothing is; where
-    /// `depth` was "float16". Base64 in JSON.
+    /// Distances along the optical axis in metres, little-endian numbers of half precision, infinite where
+    /// nothing is; where `depth` was "float16". Base64 in JSON.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_float16: Option<Bytes>,
-    /// The same in millimetres as a PNG of 16 bits, 0 where nothing is or it is further than 65.535 m; where `depth` was "png16".
-    /// Base64 in JSON.
+    /// The same in millimetres as a PNG of 16 bits, 0 where nothing is or it is further than 65.535 m;
+    /// where `depth` was "png16". Base64 in JSON.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_png16: Option<Bytes>,
 }
@@ -142,7 +144,7 @@ pub struct PixelRegion {
 }
 
 impl PixelRegion {
-    /// How many pixels it names with another stride, which is not zero.
+    /// Returns the number of its pixels with another stride, which is not zero.
     pub(crate) fn count(&self, stride: u32) -> u128 {
         let along = |axis: usize| u128::from(self.from[axis].abs_diff(self.to[axis]) / u64::from(stride)) + 1;
         along(0).saturating_mul(along(1))

@@ -13,13 +13,14 @@ pub struct Pose {
     pub quaternion_wxyz: [f64; 4],
 }
 
-/// One number per joint, in the robot's published joint order; JSON object from joint name to number. JSON carries them
-/// to four decimals, which a model reads in a third of the text; MessagePack, which programs ask for, to six.
+/// One number per joint, in the robot's published joint order; JSON object from joint name to number. JSON
+/// carries them to four decimals, which a model reads in a third of the text; MessagePack, which programs
+/// ask for, to six.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct JointValues(pub Vec<(String, f64)>);
 
 impl JointValues {
-    /// Whether it has no joint.
+    /// Returns true if it has no joint.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
@@ -60,7 +61,7 @@ impl JsonSchema for JointValues {
     }
 }
 
-/// What a base command is made of, in the order of action rows. Fields and columns bear these names.
+/// Columns of a base command, in the order of action rows. Fields and columns have these names.
 pub const BASE_COLUMNS: [&str; 4] = ["vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m"];
 
 /// The base command in force. Velocities are zero between commands; the height persists.

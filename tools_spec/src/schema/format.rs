@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use super::spec::ToolSpec;
 use super::strict::SHORT;
 
-/// Whose form.
+/// Host whose form a specification has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Format {
     /// OpenAI's Responses API, strict.
@@ -67,8 +67,9 @@ impl ToolSpec {
         })
     }
 
-    /// A host that leaves `short` out gets the short reply, which the server's instructions say once. Has no output schema, since clients drop the pictures of tools that declare one, and only the annotations that are not
-    /// MCP's defaults: a list of tools is read by a model in every conversation.
+    /// A host that leaves `short` out gets the short reply, which the server's instructions say once. Has
+    /// no output schema, since clients drop the pictures of tools that declare one, and only the
+    /// annotations that are not MCP's defaults: a list of tools is read by a model in every conversation.
     fn of_mcp(&self) -> Value {
         let mut schema = Value::Object(self.lenient_schema());
         slim(&mut schema);

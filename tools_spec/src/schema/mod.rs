@@ -1,4 +1,5 @@
-//! The contract as machines read it: strict JSON Schema for the hosts of language models, OpenAPI for everybody else.
+//! The contract as machines read it: strict JSON Schema for the hosts of language models, OpenAPI for
+//! everybody else.
 
 mod format;
 mod nullable;

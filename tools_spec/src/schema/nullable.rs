@@ -2,7 +2,8 @@
 
 use serde_json::{Map, Value, json};
 
-/// Two types of one field become two choices. Strict hosts and common MCP clients read those; not all of them read a list of types.
+/// Two types of one field become two choices. Strict hosts and common MCP clients read those; not all of
+/// them read a list of types.
 pub fn as_choices(object: &mut Map<String, Value>) {
     let Some(Value::Array(kinds)) = object.get("type") else { return };
     let kinds = kinds.clone();
@@ -20,8 +21,8 @@ pub fn as_choices(object: &mut Map<String, Value>) {
     object.insert("anyOf".into(), choices.into());
 }
 
-/// Has fields that may be null be left out in place of it: on every level, or, where the call's own fields are to stay as they are,
-/// only in what its lists hold. Their texts say so, too.
+/// Has fields that may be null be left out in place of it: on every level, or, where the call's own fields
+/// are to stay as they are, only in what its lists hold. Their texts say so, too.
 pub fn leave_out(schema: &mut Value, own_fields: bool) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(|item| leave_out(item, own_fields)),
@@ -53,7 +54,7 @@ fn leave_out_own(object: &mut Map<String, Value>) {
     }
 }
 
-/// What a field is where it is given, described as one that may be left out; of a field that may be null.
+/// Returns the schema of a field that may be null as one that may be left out.
 fn the_choice_beside_null(property: &Value) -> Option<Value> {
     let choices = property["anyOf"].as_array()?;
     let is_null = |choice: &&Value| choice["type"] == "null";

@@ -12,8 +12,8 @@ use crate::refusal::ProblemBody;
 use crate::tool::Tool;
 use crate::tools::{Briefing, Finish, GetStatus, StartEpisode};
 
-/// The document of a server of `version` with these tools. Each tool has a path of its own, so that generated clients have a
-/// method for each.
+/// The document of a server of `version` with these tools. Each tool has a path of its own, so that
+/// generated clients have a method for each.
 pub fn openapi(version: &str, tools: &[ToolSpec]) -> Value {
     let mut paths = paths_without_tools();
     for spec in tools {
@@ -125,7 +125,7 @@ fn page(id: &str, description: &str) -> Value {
     operation
 }
 
-/// What is answered with a text that has no schema.
+/// Describes a text response, which has no schema.
 fn text(id: &str, description: &str, kind: &str) -> Value {
     let mut operation = operation(id, description, "200", Value::Null);
     operation["responses"]["200"]["content"] = json!({ (kind): { "schema": { "type": "string" } } });
@@ -146,8 +146,8 @@ fn operation(id: &str, description: &str, success: &str, reply: Value) -> Value 
     })
 }
 
-/// Every reply of an episode says at which step it stands, and so when its recording has failed; operators of single robots hear of
-/// each other.
+/// Every reply of an episode says at which step it stands, and so when its recording has failed; operators
+/// of single robots hear of each other.
 fn with_notice(mut reply: Value) -> Value {
     let list =
         |of: Value, description: &str| json!({ "type": "array", "items": of, "description": description });

@@ -12,15 +12,16 @@ pub fn plain_schema<T: JsonSchema>() -> Value {
     settings.into_generator().into_root_schema_for::<T>().to_value()
 }
 
-/// Returns the schema of `T` as arguments. Where a policy is told less, the text that a description has for that takes its place.
+/// Returns the schema of `T` as arguments. Where a policy is told less, the text that a description has for
+/// that takes its place.
 pub fn argument_schema<T: JsonSchema>(wording: Wording) -> Value {
     let mut schema = plain_schema::<T>();
     word(&mut schema, wording);
     schema
 }
 
-/// The schema of `T` as a body that is read: what the checks refuse, it does not allow. How many control steps a command may
-/// have is still to be said.
+/// The schema of `T` as a body that is read: what the checks refuse, it does not allow. How many control
+/// steps a command may have is still to be said.
 pub fn body_schema<T: JsonSchema>(wording: Wording) -> Value {
     let mut schema = argument_schema::<T>(wording);
     bound_numbers(&mut schema);

@@ -15,41 +15,42 @@ use crate::tool::{Route, Tool};
 pub struct ToolSpec {
     /// The name a caller uses.
     pub name: &'static str,
-    /// What the tool does, for the model.
+    /// Description of the tool for the model.
     pub description: String,
     /// Strict JSON Schema of the arguments, with `episode_id` where the tool acts on an episode.
     pub input_schema: Map<String, Value>,
     /// The same with the defaults of what may be left out.
     #[serde(skip)]
     with_defaults: Map<String, Value>,
-    /// As [`ToolSpec::body_schema`], where what counts control steps is only marked.
+    /// The schema of [`ToolSpec::body_schema`], where fields that count control steps are only marked.
     #[serde(skip)]
     marked_body: Value,
-    /// JSON Schema of the reply. Hosts of language models do not want it (MCP clients drop the pictures of a tool that
-    /// declares one), so it is only part of the OpenAPI description.
+    /// JSON Schema of the reply. Hosts of language models do not want it (MCP clients drop the pictures of
+    /// a tool that declares one), so it is only part of the OpenAPI description.
     #[serde(skip)]
     pub reply_schema: Value,
-    /// Whether the call leaves the world as it was.
+    /// True if the call leaves the world as it was.
     pub read_only: bool,
-    /// Whether calling it again changes nothing more.
+    /// True if calling it again changes nothing more.
     #[serde(skip)]
     pub idempotent: bool,
-    /// Whether the tool acts on an episode that `start_episode` made.
+    /// True if the tool acts on an episode that `start_episode` made.
     pub on_episode: bool,
-    /// Whether only operators who may talk to each other are offered it.
+    /// True if only operators that may talk to each other are offered it.
     #[serde(skip)]
     pub for_operators: bool,
-    /// Whether only policies that are told all are offered it.
+    /// True if only policies with full assistance are offered it.
     #[serde(skip)]
     pub full_only: bool,
-    /// Whether its schema is strict.
+    /// True if its schema is strict.
     #[serde(skip)]
     pub strict: bool,
-    /// Where REST serves it.
+    /// Its REST route.
     pub route: Route,
 }
 
-/// A tool of an episode that runs: its route names the episode, and its body is described as the episode's rules have it.
+/// A tool of an episode that runs: its route names the episode, and its body is described as the episode's
+/// rules have it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EpisodeToolSpec {
     /// The tool.
@@ -60,8 +61,8 @@ pub struct EpisodeToolSpec {
 }
 
 impl ToolSpec {
-    /// The specification of `T`, which acts on an episode; without a path to name it, the arguments carry `episode_id`. It may be
-    /// for operators who talk alone.
+    /// The specification of `T`, which acts on an episode; without a path to name it, the arguments carry
+    /// `episode_id`. It may be for operators who talk alone.
     pub fn on_episode<T: Tool>(wording: Wording, for_operators: bool) -> ToolSpec {
         let mut spec = ToolSpec::without_episode::<T>(wording);
         if spec.input_schema["properties"].get(SHORT).is_none() {
@@ -107,7 +108,7 @@ impl ToolSpec {
         self.marked_body["anyOf"] = conditions;
     }
 
-    /// What a command of a plan has to be where it names this tool.
+    /// Returns the schema of a plan's command that names this tool.
     pub(crate) fn as_planned(&self) -> Value {
         let mut arguments = self.marked_body.clone();
         arguments.as_object_mut().and_then(|arguments| arguments.shift_remove("$schema"));
@@ -119,22 +120,23 @@ impl ToolSpec {
         self.marked_body["properties"]["commands"]["items"]["anyOf"] = planned.into();
     }
 
-    /// JSON Schema of a REST body, which need not be strict: what may be null may be left out, and lengths are said. A command
-    /// may have up to `most_steps` control steps.
+    /// JSON Schema of a REST body, which need not be strict: what may be null may be left out, and lengths
+    /// are said. A command may have up to `most_steps` control steps.
     pub fn body_schema(&self, most_steps: u32) -> Value {
         let mut schema = self.marked_body.clone();
         bound_steps(&mut schema, most_steps);
         schema
     }
 
-    /// The strict schema with one thing let go: what may be null is left out instead, and has its default. For hosts that check arguments against the
-    /// schema and do not insist on strictness, as those of MCP.
+    /// The strict schema with one thing let go: what may be null is left out instead, and has its default.
+    /// For hosts that check arguments against the schema and do not insist on strictness, as those of MCP.
     pub fn lenient_schema(&self) -> Map<String, Value> {
         leaving_out(&self.with_defaults, true)
     }
 
-    /// A strict schema for hosts that limit both how many fields of all tools may be left out and how many may be of two types:
-    /// the call's own fields may be null, those of the entries of its lists may be left out.
+    /// A strict schema for hosts that limit both how many fields of all tools may be left out and how many
+    /// may be of two types: the call's own fields may be null, those of the entries of its lists may be
+    /// left out.
     pub fn few_unions_schema(&self) -> Map<String, Value> {
         leaving_out(&self.input_schema, false)
     }

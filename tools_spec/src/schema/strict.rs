@@ -1,5 +1,6 @@
-//! JSON Schema that strict hosts accept: every field required, nullable instead of optional, no unknown fields, and none
-//! of the keywords (`minimum`, `maxItems`, `format`, ...) that they refuse or warn about. The server checks those itself.
+//! JSON Schema that strict hosts accept: every field required, nullable instead of optional, no unknown
+//! fields, and none of the keywords (`minimum`, `maxItems`, `format`, ...) that they refuse or warn about.
+//! The server checks those itself.
 
 use schemars::JsonSchema;
 use serde_json::{Map, Value, json};
@@ -50,7 +51,8 @@ pub fn strict_schema<T: JsonSchema>(wording: Wording, defaults: bool) -> (String
 pub const SHORT: &str = "short";
 pub const SHORTLY: &str = "True: a shorter reply, without what is as expected.";
 
-/// Adds the field by which a tool is asked for a short reply. Strict hosts limit how many fields may be null, so it may not.
+/// Adds the field by which a tool is asked for a short reply. Strict hosts limit how many fields may be
+/// null, so it may not.
 pub fn require_short(schema: &mut Map<String, Value>, default: bool) {
     let mut short = json!({ "type": "boolean", "description": SHORTLY });
     if default {
@@ -97,7 +99,8 @@ fn make_strict(schema: &mut Value) {
             if object.get("type").is_some_and(|kind| kind == "object") {
                 close_object(object);
             }
-            // A property may be called like a keyword, so names are walked past and only their schemas are made strict.
+            // A property may be called like a keyword, so names are walked past and only their schemas are
+            // made strict.
             for (keyword, value) in object.iter_mut() {
                 match value {
                     Value::Object(properties) if keyword == "properties" => {
@@ -118,8 +121,9 @@ fn unwrap_lines(object: &mut Map<String, Value>) {
     }
 }
 
-/// Strict hosts refuse `oneOf`, which is how schemars writes an enum whose variants are described: the names become an
-/// `enum` and their descriptions part of the enum's own. Of any other `oneOf` only the texts are left.
+/// Strict hosts refuse `oneOf`, which is how schemars writes an enum whose variants are described: the
+/// names become an `enum` and their descriptions part of the enum's own. Of any other `oneOf` only the
+/// texts are left.
 fn list_choices(object: &mut Map<String, Value>) {
     let Some(Value::Array(choices)) = object.remove("oneOf") else {
         return;

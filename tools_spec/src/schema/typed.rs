@@ -25,9 +25,9 @@ pub struct TypedTool {
     pub arguments: Value,
     /// The name of the reply's type.
     pub reply: String,
-    /// Whether the tool acts on an episode.
+    /// True if the tool acts on an episode.
     pub on_episode: bool,
-    /// Whether only operators who may talk to each other are offered it.
+    /// True if only operators that may talk to each other are offered it.
     pub for_operators: bool,
 }
 
@@ -54,7 +54,7 @@ impl TypedToolsCollector {
         self.generator.subschema_for::<T>();
     }
 
-    /// What was collected, in the words of a policy that is told everything.
+    /// Returns the collected tools and types, in the words for full assistance.
     pub fn finish(mut self) -> TypedTools {
         let mut types = self.generator.take_definitions(true);
         let described = types.values_mut().chain(self.tools.iter_mut().map(|tool| &mut tool.arguments));

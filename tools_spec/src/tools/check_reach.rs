@@ -1,4 +1,5 @@
-//! `check_reach`: whether the arms could get to a pose, without moving. `episodes/src/commands/check_reach.rs` answers it.
+//! `check_reach`: whether the arms could get to a pose, without moving.
+//! `episodes/src/commands/check_reach.rs` answers it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -81,18 +82,18 @@ impl Tool for CheckReach {
 pub struct ReachReply {
     /// The robot that was asked about.
     pub robot: String,
-    /// Whether every wrist that was given a pose reaches it, both at once if both were.
+    /// True if every wrist that was given a pose reaches it, both at once if both were.
     pub reachable: bool,
-    /// How near the left wrist comes; null if it was given no pose.
+    /// Nearest approach of the left wrist; null if it was given no pose.
     pub left: Option<HandReach>,
-    /// How near the right wrist comes; null if it was given no pose.
+    /// Nearest approach of the right wrist; null if it was given no pose.
     pub right: Option<HandReach>,
-    /// Whether the robot would most likely take a step to keep its balance, as arms ahead of it weigh: walk nearer instead. Left out where
-    /// it would not, and where the assistance is "paper".
+    /// True if the robot would most likely step to keep its balance under arms so far ahead: walk nearer
+    /// instead. Left out where it would not, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "is_false")]
     pub needs_a_step: bool,
-    /// Joints of the waist and of the arms asked about that would rest at a limit, by name: what keeps the wrists from
-    /// coming nearer.
+    /// Joints of the waist and of the arms asked about that would rest at a limit, by name: what keeps the
+    /// wrists from coming nearer.
     pub joints_at_limit: Vec<String>,
 }
 
@@ -100,10 +101,10 @@ fn is_false(flag: &bool) -> bool {
     !flag
 }
 
-/// How near one wrist comes to a pose.
+/// Nearest approach of one wrist to a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HandReach {
-    /// Whether it comes within the tolerance of 5 mm and 0.05 rad.
+    /// True if it comes within 5 mm and 0.05 rad.
     pub reachable: bool,
     /// Distance left, in metres.
     pub position_error_m: f64,

@@ -39,7 +39,8 @@ pub enum EndReason {
     Finished,
     /// No call came for so long that the server took the policy for gone.
     Abandoned,
-    /// The policy itself failed: its program or its server crashed, or was gone. Only `tandem evaluate` ends episodes so.
+    /// The policy itself failed: its program or its server crashed, or was gone. Only `tandem evaluate`
+    /// ends episodes so.
     PolicyFailed,
     /// The simulator itself failed; the recording holds what went before.
     SimulatorFailed,
@@ -63,8 +64,8 @@ pub struct ResultReply {
     pub env_steps: u32,
     /// Calls of tools up to the end, reads, refused calls and the one that ended the episode included.
     pub tool_calls: u32,
-    /// As tool_calls, but with one for a plan or a walk, whose commands are a call each: what the policy asked for itself. Left out in
-    /// results of earlier versions.
+    /// Requests of the policy itself: like tool_calls, but a plan or a walk, whose commands are a call each,
+    /// counts once. Left out in results of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub requests: Option<u32>,
     /// Wall clock that the policy has thought between its calls, in seconds.
@@ -74,39 +75,41 @@ pub struct ResultReply {
     pub falls: u32,
     /// Simulated seconds per second that the physics took.
     pub realtime_factor: f64,
-    /// Hash of the whole physical state at the end, 16 hexadecimal digits; left out where it is told to a policy whose assistance is
-    /// "paper".
+    /// Hash of the whole physical state at the end, 16 hexadecimal digits; left out where it is told to a
+    /// policy whose assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state_hash: Option<String>,
-    /// How the simulator failed: in which step, at which body, and what came out; left out where it did not.
+    /// Failure of the simulator: its step, body and error; left out where it did not fail.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulator_failure: Option<String>,
-    /// How much the policy was told.
+    /// Amount of information that the policy got.
     #[serde(default)]
     pub assistance: Assistance,
-    /// What the policy was shown beyond what the benchmark's own policies see, as "depth_images"; left out where it was nothing.
+    /// Information that the policy got beyond the benchmark's own policies, for example "depth_images"; left
+    /// out where it was none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub extra_information: Vec<String>,
-    /// How many replies showed it, by what it was, then by the robot that it was of; left out where it was nothing.
+    /// Number of replies with each of it, by its name and by the robot it was of; left out where it was none.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub extra_information_replies: BTreeMap<String, BTreeMap<String, u32>>,
-    /// Share of the joint targets that lay beyond the joints' limits by more than 0.01 rad, and were moved there; left out where none did.
+    /// Share of the joint targets that lay beyond the joints' limits by more than 0.01 rad, and were moved
+    /// there; left out where none did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joints_clamped_share: Option<f64>,
-    /// What was not as the benchmark has it, as "assistance: full"; left out where it was nothing.
+    /// Departures from the benchmark, for example "assistance: full"; left out where there was none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub departures: Vec<String>,
     /// Why the recording is not complete; left out where it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording_failed: Option<String>,
-    /// What notes on the episode say that was used; left out where there are none.
+    /// Usage that notes on the episode report; left out where there are none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub usage: Option<Usage>,
 }
 
 impl ResultReply {
-    /// The result as a policy hears it at the end. Under "paper" it is told neither seed nor hash, by which it could find the episode among
-    /// those that it has played before.
+    /// The result as a policy hears it at the end. Under "paper" it is told neither seed nor hash, by which
+    /// it could find the episode among those that it has played before.
     pub fn disclosed(mut self, disclosure: Disclosure) -> ResultReply {
         match self.assistance {
             Assistance::Paper => (self.seed, self.state_hash) = (None, None),
@@ -120,7 +123,7 @@ impl ResultReply {
 }
 
 impl ResultReply {
-    /// How the play of language models ended, in words, where the end of the episode does not say it.
+    /// Describes the end of language models' play, where the end of the episode does not say it.
     pub fn model_endings(&self) -> Option<String> {
         let endings = self.usage.iter().flat_map(Usage::own_endings);
         let words: Vec<String> = endings.map(ModelEnding::words).collect();
@@ -147,7 +150,8 @@ impl Usage {
     }
 }
 
-/// Seconds by the number of the phase, in the task's order; JSON object from `p1`, `p2`, ... to seconds or null.
+/// Seconds by the number of the phase, in the task's order; JSON object from `p1`, `p2`, ... to seconds or
+/// null.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhaseTimes(pub Vec<(String, Option<f64>)>);
 

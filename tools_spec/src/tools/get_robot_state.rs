@@ -50,25 +50,27 @@ pub struct RobotState {
     /// Joint velocities in radians per second; left out of a short reply, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint_velocities_rad_s: Option<JointValues>,
-    /// Joint torques in newton metres, as the drives apply them; left out of a short reply, and where the assistance is "paper".
+    /// Joint torques in newton metres, as the drives apply them; left out of a short reply, and where the
+    /// assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub joint_torques_n_m: Option<JointValues>,
-    /// Measured pose of the left wrist (`left_wrist_yaw_link`) in the pelvis frame (x forward, y left, z up), or in `frame`.
+    /// Measured pose of the left wrist (`left_wrist_yaw_link`) in the pelvis frame (x forward, y left, z
+    /// up), or in `frame`.
     pub left_wrist: Pose,
     /// Measured pose of the right wrist (`right_wrist_yaw_link`) in the same frame.
     pub right_wrist: Pose,
-    /// The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright. Left out where the assistance is
-    /// "paper".
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub gravity_in_pelvis: Option<[f64; 3]>,
-    /// Where its own IMU and joints have it: the pose of its pelvis in the start frame, which lies on the floor under the pelvis as
-    /// it was when the episode began, z up, x where the robot faced. Drifts by up to 1 % of the way walked. Left out where the
+    /// The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright. Left out where the
     /// assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gravity_in_pelvis: Option<[f64; 3]>,
+    /// Pose of its pelvis in the start frame by its own IMU and joints. The start frame is on the floor under
+    /// the pelvis at the start of the episode, z up, x the robot's heading then. Drifts by up to 1 % of the
+    /// way walked. Left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pelvis_in_start: Option<Pose>,
-    /// What locomotion is doing.
+    /// Base command in force.
     pub base_command: BaseCommand,
-    /// Whether the robot has fallen; left out where the assistance is "paper".
+    /// True if the robot has fallen; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fallen: Option<bool>,
 }

@@ -48,20 +48,22 @@ pub struct StatusReply {
     /// Every robot of the episode; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fallen: Vec<RobotFallen>,
-    /// How much is told. Where it is "paper", phases are told once the episode has ended, which it does not do by itself on success:
-    /// call finish. Where it is "full", the last phase ends the episode.
+    /// Amount of information. With "paper", phases are disclosed once the episode has ended, which success
+    /// does not do by itself: call finish. With "full", the last phase ends the episode.
     pub assistance: Assistance,
-    /// What is told of the phases, where that is not as the assistance has it; left out otherwise.
+    /// Disclosure of phases, where it is not the assistance's; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disclosure: Option<Disclosure>,
     /// Every phase reached so far, where the assistance tells it.
     pub phases: Vec<PhaseReached>,
-    /// The phase to reach next, and what it lacks; left out where the call did not ask for it, and where phases are not told.
+    /// The phase to reach next, and what it lacks; left out where the call did not ask for it, and where
+    /// phases are not told.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub next_phase: Option<NextPhase>,
-    /// What is left of the episode.
+    /// Remaining budget of the episode.
     pub budget: Budget,
-    /// Hash of the whole physical state, 16 hexadecimal digits. Equal hashes mean equal states. Left out where the assistance is "paper".
+    /// Hash of the whole physical state, 16 hexadecimal digits. Equal hashes mean equal states. Left out
+    /// where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state_hash: Option<String>,
 }

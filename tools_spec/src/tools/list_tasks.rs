@@ -57,17 +57,18 @@ impl TaskList {
 /// One task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TaskInfo {
-    /// What start_episode calls it, as `handover`.
+    /// Id for start_episode, for example `handover`.
     pub id: String,
     /// The suite that it belongs to, as `tandem+`; left out of the benchmark's tasks and of those of files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub suite: Option<String>,
-    /// What has to be done, for whoever directs all robots.
+    /// Instruction for a policy of all robots.
     pub instruction: String,
-    /// What each robot has to do, for policies that direct one; left out of a short reply.
+    /// Instruction for each robot, for policies that direct one; left out of a short reply.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub robots: Vec<Instruction>,
-    /// The phases, in the order they have to be reached; left out of a short reply, and where the assistance is "paper".
+    /// The phases, in the order they have to be reached; left out of a short reply, and where the
+    /// assistance is "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub phases: Vec<PhaseInfo>,
     /// The protocols and their budgets for this task; left out of a short reply.
@@ -78,7 +79,7 @@ pub struct TaskInfo {
 /// The budgets of one protocol.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ProtocolInfo {
-    /// Which protocol.
+    /// The protocol.
     pub protocol: Protocol,
     /// The most control steps of 20 ms that one command may ask for.
     pub steps_per_command: u32,

@@ -1,5 +1,5 @@
-//! `move_wrists`: the command of agents that think in poses. `episodes/src/commands/move_wrists.rs` makes wrist and finger
-//! trajectories of it.
+//! `move_wrists`: the command of agents that think in poses. `episodes/src/commands/move_wrists.rs` makes
+//! wrist and finger trajectories of it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

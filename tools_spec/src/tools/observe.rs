@@ -62,14 +62,15 @@ pub struct Observation {
     /// The pictures, in the order of `cameras`. Over MCP they follow as image blocks and are left out here.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub images: Vec<CameraImage>,
-    /// What a program asked for besides PNGs or in place of them, one entry per robot; left out otherwise.
+    /// Arrays that a program asked for beside PNGs or in place of them, one entry per robot; left out
+    /// otherwise.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub arrays: Vec<CameraArrays>,
 }
 
-/// A pinhole camera without distortion: a point (x, y, z) in the camera's frame is seen at u = fx x / z + cx,
-/// v = fy y / z + cy. Axes: x right, y down, z forward (OpenCV's). Pixel (0, 0) is the top left one and its centre lies
-/// at u = v = 0.
+/// A pinhole camera without distortion: a point (x, y, z) in the camera's frame is seen at u = fx x / z +
+/// cx, v = fy y / z + cy. Axes: x right, y down, z forward (OpenCV's). Pixel (0, 0) is the top left one and
+/// its centre lies at u = v = 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CameraCalibration {
     /// The robot whose head carries it.

@@ -145,7 +145,8 @@ impl JsonSchema for Color {
 pub enum JoinedBy {
     /// By like colour.
     Color,
-    /// By shape, whatever the colours: over edges that stand out, not over corners that go in, as where a thing stands on a table.
+    /// By shape, whatever the colours: over edges that stand out, not over corners that go in, as where a
+    /// thing stands on a table.
     Shape,
 }
 
@@ -165,7 +166,7 @@ pub struct UprightAxis {
 pub struct Surface {
     /// By what its pixels are joined.
     pub joined_by: JoinedBy,
-    /// How many pixels it has.
+    /// Number of its pixels.
     pub pixels: u32,
     /// Its top left and bottom right in the picture, as [u, v].
     pub from: [i64; 2],
@@ -175,14 +176,15 @@ pub struct Surface {
     pub rgb: [u8; 3],
     /// The middle of its area, in metres in the frame of the reply.
     pub centroid_m: [f64; 3],
-    /// How far it reaches along each axis of that frame, in metres.
+    /// Extent along each axis of that frame, in metres.
     pub extent_m: [f64; 3],
-    /// The four points of its outline that span the most of it in the picture, in the order of its outline: of a rectangle its corners.
+    /// The four points of its outline that span the most of it in the picture, in the order of its outline:
+    /// of a rectangle its corners.
     pub corners_m: Vec<[f64; 3]>,
     /// Its axis, where it is upright and round; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<UprightAxis>,
-    /// Whether it goes on beyond the picture.
+    /// True if it goes on beyond the image.
     pub cut_off: bool,
 }
 
@@ -195,7 +197,7 @@ pub struct PlaneFit {
     pub normal: [f64; 3],
     /// Root mean square of how far its points are off it, in metres.
     pub rms_m: f64,
-    /// How many pixels of the region see it.
+    /// Number of the region's pixels that see it.
     pub pixels: u32,
     /// Their share of those that see anything.
     pub share: f64,
@@ -210,18 +212,18 @@ pub struct EdgeFit {
     pub to_m: [f64; 3],
     /// Root mean square of how far its points are off it, in metres.
     pub rms_m: f64,
-    /// How many points it was fitted to.
+    /// Number of points that it was fitted to.
     pub points: u32,
 }
 
-/// What `fit` found in a region.
+/// Result of `fit` in a region.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RegionFit {
     /// The largest plane.
     pub plane: PlaneFit,
     /// Its straight edges, the longest first, up to four. An edge may be where something hides the plane.
     pub edges: Vec<EdgeFit>,
-    /// Where two of them meet, in metres in the frame of the reply.
+    /// Corners, where two of them meet, in metres in the frame of the reply.
     pub corners_m: Vec<[f64; 3]>,
 }
 
@@ -233,22 +235,23 @@ pub struct DepthReply {
     /// The frame of the points, where the call named another than that of the pelvis; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame: Option<PoseFrame>,
-    /// The surfaces that were found: at a pixel the patch of its colour and, where that is more, the whole thing; of a colour up to three,
-    /// the nearest first and what is of the room last. Left out where none was asked for.
+    /// The surfaces that were found: at a pixel the patch of its colour and, where that is more, the whole
+    /// thing; of a colour up to three, the nearest first and what is of the room last. Left out where none
+    /// was asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub surfaces: Vec<Surface>,
-    /// What was fitted to the region; left out where that was not asked for.
+    /// Plane, edges and corners of the region; left out where `fit` was not asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fit: Option<RegionFit>,
-    /// What each column of `points` is: "u", "v", "x_m", "y_m", "z_m".
+    /// Columns of `points`: "u", "v", "x_m", "y_m", "z_m".
     pub columns: [String; 5],
-    /// One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where nothing is seen. Of a surface
-    /// none.
+    /// One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where
+    /// nothing is seen. Of a surface none.
     pub points: Vec<DepthRow>,
 }
 
 impl DepthReply {
-    /// What the columns are.
+    /// The columns.
     pub const COLUMNS: [&str; 5] = ["u", "v", "x_m", "y_m", "z_m"];
 }
 

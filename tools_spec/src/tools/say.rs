@@ -1,5 +1,5 @@
-//! `say`: operators of one episode talk. Offered only in an episode that was started so. `gateway/src/hosting/team/` lets the
-//! others hear it.
+//! `say`: operators of one episode talk. Offered only in an episode that was started so.
+//! `gateway/src/hosting/team/` lets the others hear it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -10,12 +10,12 @@ use crate::tool::Tool;
 /// The most characters that are said at once.
 const MAX_CHARACTERS: usize = 500;
 
-/// Say something to the operators of the other robots: at most 500 characters, which they hear with their next reply. Costs no
-/// steps; physics stands still. Answers as get_status does.
+/// Say something to the operators of the other robots: at most 500 characters, which they hear with their
+/// next reply. Costs no steps; physics stands still. Answers as get_status does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Say {
-    /// What to say, 1 to 500 characters.
+    /// The words, 1 to 500 characters.
     #[schemars(length(min = 1, max = MAX_CHARACTERS))]
     pub text: String,
 }

@@ -12,8 +12,8 @@ use crate::tool::Tool;
 /// Numbers in a row: 31 joint targets and the base command.
 pub const ACTION_ROW_LEN: usize = 35;
 
-/// The blocks of joints that a row begins with, in order, with the number of columns of each. Within a hand: thumb_0,
-/// thumb_1, thumb_2, middle_0, middle_1, index_0, index_1.
+/// The blocks of joints that a row begins with, in order, with the number of columns of each. Within a
+/// hand: thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0, index_1.
 const JOINT_BLOCKS: [(&str, usize); 5] =
     [("left_arm", 7), ("right_arm", 7), ("left_hand", 7), ("right_hand", 7), ("waist", 3)];
 

@@ -47,44 +47,45 @@ pub struct StartReply {
     pub episode_id: String,
     /// An episode to which no call comes for as many seconds ends.
     pub idle_limit_s: u64,
-    /// What each robot's operator needs, where each robot has one of its own; left out otherwise.
+    /// Credentials of each robot's operator, where each has one of its own; left out otherwise.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub operators: Vec<OperatorToken>,
-    /// What the policy has to know.
+    /// The briefing.
     #[serde(flatten)]
     pub briefing: Briefing,
 }
 
-/// What a policy is told when an episode begins.
+/// Briefing of a policy at the start of an episode.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Briefing {
-    /// What has to be done.
+    /// Instruction for all robots.
     pub instruction: String,
-    /// What those who direct one robot each read in place of `instruction`, where that tells what not all of them may know; left out
-    /// where they may read it.
+    /// Instruction for those who direct one robot each, where `instruction` says more than all of them may
+    /// know; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shared_instruction: Option<String>,
-    /// What each robot has to do.
+    /// Instruction for each robot.
     pub instructions: Vec<Instruction>,
     /// The robots.
     pub robots: Vec<RobotInfo>,
     /// The phases of the task, in the order they have to be reached; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub phases: Vec<PhaseInfo>,
-    /// The things of the task: how large they are, along the first robot's axes, and how far from each robot they stand before the seed
-    /// moves them by a decimetre or so. Left out where the assistance is "paper".
+    /// The things of the task: how large they are, along the first robot's axes, and how far from each
+    /// robot they stand before the seed moves them by a decimetre or so. Left out where the assistance is
+    /// "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub room: Vec<String>,
-    /// How the episode ends, and when phases are told.
+    /// Ways in which the episode ends, and disclosure of phases.
     pub ending: String,
-    /// What can be asked of robots of each kind.
+    /// Commands and joints of each kind of robot.
     pub kinds: Vec<RobotKind>,
-    /// What has to be known to see and to act.
+    /// Facts for seeing and acting.
     pub brief: Brief,
     /// The columns of a row of send_joint_chunk; left out of a short reply.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub action_row: Vec<String>,
-    /// Where the episode stands after the initial hold.
+    /// Status of the episode after the initial hold.
     pub status: StatusReply,
     /// Why the recording is not complete; left out where it is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -111,17 +112,17 @@ impl Briefing {
 /// One phase of a task.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PhaseInfo {
-    /// What the phase is called, as `transfer`.
+    /// Name of the phase, for example `transfer`.
     pub id: String,
     /// `p1`, `p2`, ...
     pub number: String,
     /// When the phase counts as reached.
     pub description: String,
-    /// Whether more than one robot has to work on it.
+    /// True if more than one robot has to work on it.
     pub collaborative: bool,
 }
 
-/// What one robot has to do.
+/// Instruction of one robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Instruction {
     /// The robot, as "A".
@@ -135,14 +136,14 @@ pub struct Instruction {
 pub struct RobotInfo {
     /// The robot, as "A".
     pub robot: String,
-    /// Which of `kinds` it is.
+    /// Its kind, one of `kinds`.
     pub kind: String,
 }
 
 /// A kind of robot: its joints in published order, and what its locomotion accepts.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotKind {
-    /// What `robots` call it.
+    /// Name in `robots`.
     pub kind: String,
     /// Its joints; left out of a short reply.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -165,27 +166,27 @@ pub struct JointInfo {
     pub effort_n_m: f64,
 }
 
-/// What has to be known of the robots to see and to act, in words.
+/// Facts about the robots for seeing and acting, in words.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Brief {
     /// The frames that poses are given in.
     pub frames: String,
-    /// How the frames of different robots are related.
+    /// Relation of the frames of different robots.
     pub partners: String,
-    /// How an operator plays with partners; left out where one policy directs all robots.
+    /// Playing with partners, for an operator; left out where one policy directs all robots.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub teamwork: Option<String>,
-    /// What is known of a robot's own way; left out where the assistance is "paper".
+    /// Odometry of a robot; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub odometry: Option<String>,
     /// The camera's convention, and what moves it.
     pub camera: String,
     /// The shape of a hand.
     pub hands: String,
-    /// How walking goes, as measured, and what replies say of the base; left out where the assistance is "paper".
+    /// Walking as measured, and the base's states in replies; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub walking: Option<String>,
-    /// How to grasp; left out where the server gives no hints.
+    /// Grasping; left out where the server gives no hints.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grasping: Option<String>,
     /// Grips that work, as `grasping` says how to use them; left out where the server gives no hints.
@@ -211,26 +212,27 @@ impl Brief {
 /// A grip that works, of a right hand whose robot faces the thing squarely.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WorkedGrip {
-    /// What it is for.
+    /// Things that it suits.
     pub thing: String,
-    /// Which point of the thing `place_m` is.
+    /// Point of the thing that `place_m` is.
     pub place: String,
-    /// How the right wrist is turned, in the level frame.
+    /// Orientation of the right wrist, in the level frame.
     pub right_quaternion_wxyz: [f64; 4],
-    /// How the left wrist is.
+    /// Orientation of the left wrist.
     pub left_quaternion_wxyz: [f64; 4],
-    /// Where the place lies in the right wrist's frame while the hand holds it; negate y for a left hand.
+    /// Place of that point in the right wrist's frame while the hand holds it; negate y for a left hand.
     pub place_m: [f64; 3],
-    /// Where the hand stops on its way in, the farthest first: so much is added to `place_m` there.
+    /// Stops of the hand on its way in, the farthest first: offsets from `place_m`.
     pub stops_m: Vec<[f64; 3]>,
-    /// Finger angles of a right hand on its way in and out, as right_fingers_rad; a left one negates all but the first.
+    /// Finger angles of a right hand on its way in and out, as right_fingers_rad; a left one negates all
+    /// but the first.
     pub open_rad: [f64; 7],
     /// Finger angles of a right hand that holds.
     pub close_rad: [f64; 7],
-    /// How far behind the places of its hands the pelvis stands; left out where that does not matter.
+    /// Distance of the pelvis behind the places of its hands; left out where that does not matter.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stand_behind_m: Option<f64>,
-    /// How low the pelvis is commanded, so that hands come there; left out where the robot stands upright.
+    /// Pelvis height at which hands come there; left out where the robot stands upright.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pelvis_height_m: Option<f64>,
 }

@@ -1,4 +1,5 @@
-//! `walk_to`: walks to a place by the robot's own odometry. `episodes/src/session/plan/` carries it out as a row of commands.
+//! `walk_to`: walks to a place by the robot's own odometry. `episodes/src/session/plan/` carries it out as
+//! a row of commands.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

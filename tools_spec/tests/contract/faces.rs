@@ -56,7 +56,7 @@ fn for_each_object(value: &Value, visit: &mut impl FnMut(&Map<String, Value>)) {
     }
 }
 
-/// How many fields of all tools may be left out, and how many have a choice of types.
+/// Counts the fields of all tools that may be left out, and those with a choice of types.
 fn optional_and_unions(tools: &Value) -> (usize, usize) {
     let (mut optional, mut unions) = (0, 0);
     for_each_object(tools, &mut |object| {
@@ -70,8 +70,8 @@ fn optional_and_unions(tools: &Value) -> (usize, usize) {
     (optional, unions)
 }
 
-/// https://platform.claude.com/docs/en/build-with-claude/structured-outputs: at most 20 strict tools, 24 fields that may be left
-/// out and 16 that have a union of types, over all tools of a request.
+/// https://platform.claude.com/docs/en/build-with-claude/structured-outputs: at most 20 strict tools, 24
+/// fields that may be left out and 16 that have a union of types, over all tools of a request.
 #[test]
 fn anthropic_takes_all_tools_at_once() {
     let specs = tool_specs(Hints::On).into_iter().filter(|spec| spec.strict);
@@ -176,7 +176,8 @@ fn robots_that_carry_have_as_many_waypoints_as_each_other() {
     assert!(call(false, [11, 0]).is_some_and(|refusal| refusal.contains("10 at most")));
 }
 
-/// Arguments that are shown to a caller are such as its schema has them: with the episode where it is named there, and without null.
+/// Arguments that are shown to a caller are such as its schema has them: with the episode where it is named
+/// there, and without null.
 #[test]
 fn examples_fit_the_schemas() {
     for name in ["check_reach", "move_wrists", "query_depth", "walk_to", "observe"] {

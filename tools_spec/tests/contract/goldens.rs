@@ -37,7 +37,7 @@ fn differing(one: Vec<ToolSpec>, other: Vec<ToolSpec>) -> Value {
     other.into_iter().filter(|other| !one.contains(other)).map(|other| json!(other)).collect()
 }
 
-/// What is told under `paper` is said in other texts.
+/// Texts under `paper` differ.
 #[test]
 fn tools_of_paper() {
     check("paper", &differing(tool_specs(Hints::Off), tool_specs(Assistance::Paper)));

@@ -268,7 +268,7 @@ fn a_region_names_every_so_many_pixels_row_by_row() {
     refused("query_depth", region([0, 0], [3, 3], -1), &["region.stride"]);
 }
 
-/// What the checks refuse in a body, its schema does not allow.
+/// A body that the checks refuse is not allowed by its schema.
 #[test]
 fn openapi_says_what_is_refused() {
     let document = tandem_tools_spec::openapi("1.2.3", Hints::On, false);
@@ -368,7 +368,7 @@ fn bodies_of_an_episode_name_its_own_robots() {
     }
 }
 
-/// What is said of operators needs some, and the body's schema says so.
+/// Fields for operators need operators, and the body's schema says so.
 #[test]
 fn a_start_says_what_only_operators_can_have() {
     let document = tandem_tools_spec::openapi("1.2.3", Hints::On, false);

@@ -122,8 +122,7 @@ impl From<&RobotCommand> for Json<BaseCommandMessage> {
     }
 }
 
-/// What a robot's hands feel and hold: forces of the world on them (world frame), estimated from the arms'
-/// torques.
+/// Grip of a robot's hands: forces of the world on them (world frame), estimated from the arms' torques.
 #[derive(Serialize, JsonSchema)]
 #[schemars(rename = "Hands")]
 pub struct HandsMessage {
@@ -178,7 +177,7 @@ impl From<&PhaseReached> for Json<PhaseMessage> {
     }
 }
 
-/// What is left of the episode.
+/// Remaining budget of the episode.
 #[derive(Serialize, JsonSchema)]
 #[schemars(rename = "BudgetLeft")]
 pub struct BudgetMessage {
@@ -404,29 +403,29 @@ fn counted() -> bool {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ToolCallMessage {
     pub tool: String,
-    /// How many control steps had been made when it was answered.
+    /// Control steps made when it was answered.
     #[serde(default)]
     pub control_step: u64,
-    /// How long the policy has thought since the episode began, this call's own thinking included.
+    /// Thinking time of the policy since the episode began, this call's own included.
     pub thought_ns: u64,
     pub arguments: String,
     /// The robot whose operator made the call; absent where one policy directs all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "String")]
     pub operator: Option<String>,
-    /// Of what the benchmark's own policies are not shown, what a policy was shown that is asked in the simulator's process;
-    /// absent where the policy was shown the whole reply.
+    /// Information beyond the benchmark's own policies that was shown to a policy asked in the simulator's
+    /// process; absent where the policy was shown the whole reply.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Vec<String>")]
     pub shown: Option<Vec<String>>,
-    /// Whether it is a call of the episode, which counts and which a replay makes again. What was refused before it reached the
-    /// episode is none, and neither is a plan, which stands behind its commands.
+    /// True for a call of the episode, which counts and which a replay makes again. A call that was refused
+    /// before it reached the episode is none, and neither is a plan, which follows its commands.
     #[serde(default = "counted")]
     pub counted: bool,
     pub ok: bool,
     /// The reply without pictures, or the text of the problem.
     pub reply: String,
-    /// What it showed, one for each robot.
+    /// Views that it showed, one for each robot.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub pictures: Vec<ShownPicture>,
 }

@@ -15,11 +15,11 @@ pub struct NoteMessage {
     /// `thought`, `message` or `note`.
     #[schemars(with = "String")]
     pub kind: NoteKind,
-    /// How many messages `/tool_calls` had by then: the note belongs to what comes next.
+    /// Number of messages on `/tool_calls` by then: the note belongs to what comes next.
     pub calls_before: u32,
-    /// How many control steps had been made.
+    /// Control steps made by then.
     pub control_step: u64,
-    /// How long the policy had thought by then since the episode began.
+    /// Thinking time of the policy by then since the episode began.
     pub thought_ns: u64,
     /// The robot that it is about; absent where it is about all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -38,15 +38,15 @@ pub struct NoteMessage {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "u32")]
     pub cached_tokens: Option<u32>,
-    /// What it cost in US dollars.
+    /// Cost in US dollars.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "f64")]
     pub usd: Option<f64>,
-    /// How long the model took.
+    /// Seconds that the model took.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "f64")]
     pub seconds: Option<f64>,
-    /// How the model's play ended with it; absent where it went on.
+    /// End of the model's play; absent where it went on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "String")]
     pub ending: Option<AgentEnding>,

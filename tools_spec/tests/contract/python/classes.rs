@@ -13,15 +13,15 @@ use super::{OF_DEPTH, OF_OBSERVE, OF_RESULT, OF_START, described, is_method};
 pub struct Contract<'a> {
     types: &'a Map<String, Value>,
     arguments: BTreeSet<String>,
-    /// What commands are answered with.
+    /// Replies to commands.
     commands: BTreeSet<String>,
-    /// What is told of points and surfaces.
+    /// Points and surfaces.
     depth: BTreeSet<String>,
-    /// What else tools of an episode are answered with.
+    /// Replies of other tools of an episode.
     replies: BTreeSet<String>,
-    /// What an episode came to.
+    /// Results of episodes.
     result: BTreeSet<String>,
-    /// What only starts and lists of tasks are answered with.
+    /// Replies of starts and lists of tasks.
     start: BTreeSet<String>,
 }
 
@@ -83,7 +83,7 @@ impl<'a> Contract<'a> {
         self.types[name]["properties"].is_object()
     }
 
-    /// Whether it is one of several texts that stands in replies, too, whose modules have it.
+    /// Returns true if it is one of several texts that replies have, too, whose modules define it.
     pub fn is_replied(&self, name: &str) -> bool {
         !self.is_class(name)
             && [&self.commands, &self.depth, &self.replies, &self.result]
@@ -253,7 +253,7 @@ fn head(about: &str) -> Lines {
     lines
 }
 
-/// What reads a field that may be left out.
+/// Returns the code that reads a field that may be left out.
 fn optional_reading(field: &Value, wire: &str, is_class: &dyn Fn(&str) -> bool) -> String {
     let got = format!("value.get(\"{wire}\")");
     match reading(&without_null(field).0, "got", is_class) {

@@ -1,4 +1,5 @@
-//! The tools as typed Python: classes of arguments and replies, and a method for each tool, in `gateway/python/tandem/contract`.
+//! The tools as typed Python: classes of arguments and replies, and a method for each tool, in
+//! `gateway/python/tandem/contract`.
 //!
 //! `UPDATE_EXPECT=1 cargo test --release --package tandem-tools-spec --test contract python` writes them anew.
 
@@ -17,13 +18,13 @@ use types::Parameter;
 
 /// The package answers it with pictures as arrays, which JSON Schema does not know.
 const OBSERVE: &str = "observe";
-/// What it is answered with besides pictures.
+/// Replies beside images.
 const OF_OBSERVE: [&str; 2] = ["RobotState", "CameraCalibration"];
-/// What is told of points and surfaces.
+/// Points and surfaces.
 const OF_DEPTH: [&str; 1] = ["DepthReply"];
-/// What an episode came to.
+/// Results of episodes.
 const OF_RESULT: &str = "ResultReply";
-/// What a list of tasks is, and what a start says wherever the episode runs.
+/// Lists of tasks, and the parts of a start that do not depend on where the episode runs.
 const OF_START: [&str; 2] = ["Briefing", "TaskList"];
 
 #[test]
@@ -113,7 +114,7 @@ fn method(lines: &mut Lines, tool: &TypedTool, parameters: &[Parameter]) {
     }
 }
 
-/// What a schema says of itself.
+/// Returns the description of a schema.
 fn described(schema: &Value) -> String {
     schema["description"].as_str().unwrap_or_default().replace("Null:", "None:")
 }

@@ -9,7 +9,7 @@ const LONGEST_LINE: usize = 118;
 pub struct Lines(String);
 
 impl Lines {
-    /// What a module begins with.
+    /// Header of a module.
     pub fn head(&mut self, about: &str) {
         self.add(0, &format!("\"\"\"{about}\n"));
         self.add(

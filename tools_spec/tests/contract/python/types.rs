@@ -6,9 +6,9 @@ use super::described;
 
 /// An argument of a tool, or a field of a class.
 pub struct Parameter {
-    /// As the wire has it.
+    /// The wire's.
     pub wire: String,
-    /// As Python has it, which has words of its own.
+    /// Python's, which has words of its own.
     pub name: String,
     pub kind: String,
     pub about: String,
@@ -78,7 +78,7 @@ fn argument_type(schema: &Value) -> (String, bool) {
     (kind, may_be_null)
 }
 
-/// Whether it is an array of numbers, or of such arrays: what NumPy has arrays for.
+/// Returns true for an array of numbers, or of such arrays, which NumPy has arrays for.
 fn is_numbers(schema: &Value) -> bool {
     let items = &schema["items"];
     schema["type"] == "array"
@@ -110,7 +110,7 @@ pub fn reply_type(schema: &Value, plain: &dyn Fn(&str) -> Option<String>) -> Str
     if may_be_null { format!("{kind} | None") } else { kind }
 }
 
-/// What reads a reply from `value`, of which `is_class` says which names have classes.
+/// Returns the code that reads a reply from `value`; `is_class` says which names have classes.
 pub fn reading(schema: &Value, value: &str, is_class: &dyn Fn(&str) -> bool) -> String {
     let (schema, may_be_null) = without_null(schema);
     let read = match schema["type"].as_str() {
