@@ -100,18 +100,18 @@ impl Call {
         }
     }
 
-    /// The tool's name.
+    /// Returns the tool's name.
     pub fn name(&self) -> &'static str {
         self.tool.name()
     }
 
-    /// The robots that the call and the look after it name.
+    /// Returns the robots that the call and the look after it name.
     pub fn robots(&self) -> Vec<&str> {
         let then = self.then.iter().flat_map(|look| look.observe.robots());
         self.tool.robots().into_iter().chain(then).collect()
     }
 
-    /// Control steps of 20 ms that the call asks for; only commands ask for any.
+    /// Returns control steps of 20 ms that the call asks for; only commands ask for any.
     pub fn steps(&self) -> u32 {
         self.tool.steps()
     }
@@ -162,14 +162,14 @@ impl Look {
         Ok(Look { observe: parse_args(args)?, formats })
     }
 
-    /// The call alone.
+    /// Returns the call alone.
     fn call(&self) -> ToolCall {
         self.observe.clone().into()
     }
 }
 
 impl SendPlan {
-    /// The commands as calls.
+    /// Returns the commands as calls.
     pub fn calls(&self) -> Result<Vec<PlanStep>, SpecError> {
         let call = |(index, command): (usize, &PlannedCommand)| {
             let refused = |reason: String| SpecError::Invalid {
@@ -239,7 +239,7 @@ fn beside<T: DeserializeOwned + Default>(
         .map_err(|error| SpecError::Invalid { tool, reason: format!("{}: {}", error.path(), error.inner()) })
 }
 
-/// Every tool, with what programs may send beside its arguments in the schema of its body.
+/// Returns every tool, with what programs may send beside its arguments in the schema of its body.
 pub fn specs_for_programs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
     let wording = wording.into();
     let mut specs = every_tool_spec(wording);

@@ -4,7 +4,7 @@
 use crate::limits::{LARGEST, MAX_PIXELS, SMALLEST_COMPONENT};
 use crate::parts::{BASE_COLUMNS, PixelRegion};
 
-/// Every number is finite and of sane size.
+/// Checks that every number is finite and of sane size.
 pub fn finite(place: &str, values: &[f64]) -> Result<(), String> {
     match values.iter().find(|number| number.is_nan() || number.abs() > LARGEST) {
         Some(number) => Err(format!("{place} holds {number}; every number must be finite, from -1e6 to 1e6")),
@@ -17,7 +17,7 @@ pub fn base(command: [Option<f64>; 4]) -> Result<(), String> {
     BASE_COLUMNS.iter().zip(command).try_for_each(|(column, part)| finite(column, part.as_slice()))
 }
 
-/// A quaternion that has a direction. Its length does not matter: it is normalised before use.
+/// Checks that a quaternion has a direction. Its length does not matter: it is normalised before use.
 pub fn quaternion(place: &str, quaternion_wxyz: &[f64; 4]) -> Result<(), String> {
     finite(place, quaternion_wxyz)?;
     if quaternion_wxyz.iter().all(|part| part.abs() < SMALLEST_COMPONENT) {
@@ -29,7 +29,7 @@ pub fn quaternion(place: &str, quaternion_wxyz: &[f64; 4]) -> Result<(), String>
     Ok(())
 }
 
-/// A position and an orientation, each of which may be left out.
+/// Checks a position and an orientation, each of which may be left out.
 pub fn pose(
     side: &str,
     position_m: Option<&[f64; 3]>,
@@ -44,7 +44,8 @@ pub fn pose(
     Ok(())
 }
 
-/// At least one control step. The largest number depends on the protocol, which the episode knows.
+/// Checks that there is at least one control step. The largest number depends on the protocol, which the
+/// episode knows.
 pub fn steps(steps: u32) -> Result<(), String> {
     if steps == 0 {
         return Err("steps is 0; give at least 1 control step of 20 ms, as 25 for half a second".into());
@@ -52,7 +53,7 @@ pub fn steps(steps: u32) -> Result<(), String> {
     Ok(())
 }
 
-/// At least one robot, none of them twice.
+/// Checks that there is at least one robot, none of them twice.
 pub fn robots(names: &[&str]) -> Result<(), String> {
     if names.is_empty() {
         return Err("robots is empty; name at least one robot, as \"A\"".into());
@@ -67,7 +68,7 @@ pub fn robots(names: &[&str]) -> Result<(), String> {
 /// With this stride a region of a whole picture fits.
 const WIDEST_STRIDE: u32 = 20;
 
-/// At least one pixel, and not too many. Whether they lie in the picture, the episode knows.
+/// Checks that there is at least one pixel, and not too many. The episode checks that they are in the image.
 pub fn pixels(pixels: &[[i64; 2]]) -> Result<(), String> {
     if pixels.is_empty() {
         return Err("pixels is empty; give at least one [u, v], as [[160, 120]]".into());
@@ -81,7 +82,7 @@ pub fn pixels(pixels: &[[i64; 2]]) -> Result<(), String> {
     Ok(())
 }
 
-/// A region that names pixels, and not too many.
+/// Checks that a region names pixels, and not too many.
 pub fn region(region: &PixelRegion) -> Result<(), String> {
     if region.stride == 0 {
         return Err("region.stride is 0; give at least 1, as 10 for every tenth pixel across and down".into());

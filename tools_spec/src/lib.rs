@@ -41,8 +41,8 @@ pub use schema::{EpisodeToolSpec, Format, ToolSpec, TypedTool, TypedTools};
 pub use tool::{Route, Tool, parse_args};
 pub use tools::*;
 
-/// The REST interface of `version` as OpenAPI 3.1, from the same types that read and write it, for a caller
-/// who may or may not `talk`.
+/// Returns the REST interface of `version` as OpenAPI 3.1, from the same types that read and write it, for
+/// a caller who may or may not `talk`.
 pub fn openapi(version: &str, wording: impl Into<Wording>, talk: bool) -> serde_json::Value {
     let wording = wording.into();
     let specs: Vec<ToolSpec> = call::specs_for_programs(wording)
@@ -53,8 +53,8 @@ pub fn openapi(version: &str, wording: impl Into<Wording>, talk: bool) -> serde_
     schema::openapi(version, &specs)
 }
 
-/// The tools of the running episode `id` with these `robots`, whose commands may have up to `most_steps`
-/// control steps, for a caller who may or may not `talk`.
+/// Returns the tools of the running episode `id` with these `robots`, whose commands may have up to
+/// `most_steps` control steps, for a caller who may or may not `talk`.
 pub fn episode_tool_specs(
     wording: impl Into<Wording>,
     id: &str,

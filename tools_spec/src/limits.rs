@@ -25,12 +25,12 @@ pub const ROBOT_PATTERN: &str = "^[ABC]$";
 /// Image size of head cameras in pixels: columns and rows.
 const PICTURE_PX: [u32; 2] = [320, 240];
 
-/// `contains` of a quaternion: it has a direction.
+/// Returns `contains` of a quaternion: it has a direction.
 pub fn direction() -> Value {
     json!({ "anyOf": [{ "minimum": SMALLEST_COMPONENT }, { "maximum": -SMALLEST_COMPONENT }] })
 }
 
-/// `not` of a list with an entry per robot: one is named twice. (`maxContains` would be shorter, but
+/// Returns `not` of a list with an entry per robot: one is named twice. (`maxContains` would be shorter, but
 /// readers of older drafts take the `contains` beside it for a demand.)
 pub fn a_robot_twice() -> Value {
     let twice = |name: &str, first: usize, second: usize| {
@@ -45,31 +45,32 @@ pub fn a_robot_twice() -> Value {
     json!({ "anyOf": all.collect::<Vec<_>>() })
 }
 
-/// `items` of a list of pixels.
+/// Returns `items` of a list of pixels.
 pub fn pixel() -> Value {
     json!({
         "type": "array", "prefixItems": pixel_range(), "items": { "type": "integer" }, "minItems": 2, "maxItems": 2,
     })
 }
 
-/// `prefixItems` of a pixel.
+/// Returns `prefixItems` of a pixel.
 pub fn pixel_range() -> Value {
     json!(PICTURE_PX.map(|px| json!({ "type": "integer", "minimum": 0, "maximum": px - 1 })))
 }
 
-/// `oneOf` of an object that has one of these fields, each given with the type that it has where it is not
-/// null.
+/// Returns `oneOf` of an object that has one of these fields, each given with the type that it has where it
+/// is not null.
 pub fn one_of(fields: &[(&str, &str)]) -> Value {
     fields.iter().map(|(field, kind)| has(field, kind)).collect()
 }
 
-/// `allOf` of an object in which at least one of these fields is given, each a list.
+/// Returns `allOf` of an object in which at least one of these fields is given, each a list.
 pub fn at_least_one(fields: &[&str]) -> Value {
     let given: Vec<Value> = fields.iter().map(|field| has(field, "array")).collect();
     json!([{ "anyOf": given }])
 }
 
-/// `not` of an object of whose fields only one is given, each with the type that it has where it is not null.
+/// Returns `not` of an object of whose fields only one is given, each with the type that it has where it is
+/// not null.
 pub fn all_of(fields: &[(&str, &str)]) -> Value {
     let given: Vec<Value> = fields.iter().map(|(field, kind)| has(field, kind)).collect();
     json!({ "allOf": given })

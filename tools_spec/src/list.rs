@@ -37,21 +37,21 @@ macro_rules! tools {
             $group:ident($call:ident) -> $whose:ident $reply:ident $(for $audience:ident)? { $($tool:ident,)* }
         )*
     ) => {
-        /// The tools of every policy, in the order it meets them, in the texts that it reads.
+        /// Returns the tools of every policy, in the order it meets them, in the texts that it reads.
         pub fn tool_specs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
             let wording = wording.into();
             let specs = every_tool_spec(wording).into_iter().filter(|spec| !spec.for_operators);
             specs.filter(|spec| !spec.full_only || wording.assistance == Assistance::Full).collect()
         }
 
-        /// The tools of an operator who may talk: those of every policy, and those for talking.
+        /// Returns the tools of an operator who may talk: those of every policy, and those for talking.
         pub fn operator_tool_specs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
             let wording = wording.into();
             let specs = every_tool_spec(wording).into_iter();
             specs.filter(|spec| !spec.full_only || wording.assistance == Assistance::Full).collect()
         }
 
-        /// Every tool, whoever is offered it.
+        /// Returns every tool.
         pub(crate) fn every_tool_spec(wording: Wording) -> Vec<ToolSpec> {
             vec![
                 $( ToolSpec::without_episode::<$free>(wording), )*
@@ -59,7 +59,7 @@ macro_rules! tools {
             ]
         }
 
-        /// Every tool with its arguments and its reply as named types.
+        /// Returns every tool with its arguments and its reply as named types.
         pub fn typed_tools() -> TypedTools {
             let mut tools = TypedToolsCollector::new();
             $( tools.add::<$free>(false, false); )*
@@ -86,14 +86,14 @@ macro_rules! tools {
                 /// True if only operators that may talk are offered them.
                 pub const FOR_OPERATORS: bool = tools!(@for_operators $($audience)?);
 
-                /// The robots that the arguments name.
+                /// Returns the robots that the arguments name.
                 pub fn robots(&self) -> Vec<&str> {
                     match self {
                         $( $call::$tool(args) => args.robots(), )*
                     }
                 }
 
-                /// Control steps of 20 ms that the call asks for; only commands ask for any.
+                /// Returns control steps of 20 ms that the call asks for; only commands ask for any.
                 pub fn steps(&self) -> u32 {
                     match self {
                         $( $call::$tool(args) => args.steps(), )*
@@ -128,7 +128,7 @@ macro_rules! tools {
         )* )*
 
         impl ToolCall {
-            /// One call of every tool that every check of the contract accepts.
+            /// Returns one call of every tool that every check of the contract accepts.
             pub fn examples() -> Vec<ToolCall> {
                 vec![$( $( $tool::example().into(), )* )*]
             }
@@ -146,21 +146,21 @@ macro_rules! tools {
                 }
             }
 
-            /// The tool's name.
+            /// Returns the tool's name.
             pub fn name(&self) -> &'static str {
                 match self {
                     $( $( ToolCall::$group($call::$tool(_)) => $tool::NAME, )* )*
                 }
             }
 
-            /// The robots that the arguments name.
+            /// Returns the robots that the arguments name.
             pub fn robots(&self) -> Vec<&str> {
                 match self {
                     $( ToolCall::$group(call) => call.robots(), )*
                 }
             }
 
-            /// Control steps of 20 ms that the call asks for; only commands ask for any.
+            /// Returns control steps of 20 ms that the call asks for; only commands ask for any.
             pub fn steps(&self) -> u32 {
                 match self {
                     $( ToolCall::$group(call) => call.steps(), )*

@@ -28,7 +28,7 @@ pub struct EpisodeEntry {
     pub protocol: Protocol,
     /// True where each robot has an operator of its own.
     pub operators: Operators,
-    /// Control steps executed so far, the initial hold included.
+    /// Control steps executed up to now, the initial hold included.
     pub step: u32,
     /// Why the episode has ended; null while it goes on.
     pub ended: Option<EndReason>,

@@ -20,7 +20,7 @@ impl<'de> IntoDeserializer<'de, Error> for StrictValue {
     }
 }
 
-/// The integer that a number without a fraction is.
+/// Returns the integer that a number without a fraction is.
 fn integer(value: Value) -> Value {
     match value.as_f64() {
         Some(number) if value.is_f64() && number.fract() == 0.0 && number.abs() <= LARGEST_EXACT => {

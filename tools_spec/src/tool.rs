@@ -17,14 +17,14 @@ pub struct Route {
 }
 
 impl Route {
-    /// The route of a tool that acts on the episode `id`.
+    /// Returns the route of a tool that acts on the episode `id`.
     pub fn of_episode(id: &str, tool: &str) -> Route {
         Route { method: "POST", path: format!("/v1/episodes/{id}/tools/{tool}") }
     }
 }
 
 /// The arguments of one tool. The type's doc comment is the tool's description; how to grasp stands apart
-/// from it, as the schema's `hint`, which not every policy is told.
+/// from it, for policies with full assistance.
 pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
     /// Type of its reply.
     type Reply: Serialize + DeserializeOwned + JsonSchema;
@@ -43,12 +43,12 @@ pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
     /// Arguments that work, shown to callers whose own did not.
     fn example() -> Self;
 
-    /// The robots that the arguments name, each as often as they name it.
+    /// Returns the robots that the arguments name, each as often as they name it.
     fn robots(&self) -> Vec<&str> {
         Vec::new()
     }
 
-    /// Control steps of 20 ms that the call asks for; only commands ask for any.
+    /// Returns control steps of 20 ms that the call asks for; only commands ask for any.
     fn steps(&self) -> u32 {
         0
     }
@@ -101,7 +101,7 @@ fn without_nulls(value: Value) -> Value {
     }
 }
 
-/// Serde names Rust's types, which a caller need not know.
+/// Replaces the names of Rust's types in an error of serde by plain words.
 fn in_plain_words(reason: &str) -> String {
     reason.replace("expected u32", "expected a whole number from 0 to 4294967295")
 }

@@ -291,7 +291,7 @@ impl OperatorCommand {
         self.steps
     }
 
-    /// Name of the tool.
+    /// Returns the name of the tool.
     pub fn tool(&self) -> &'static str {
         self.call.call().name()
     }

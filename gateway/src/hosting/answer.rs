@@ -59,7 +59,8 @@ impl Answer {
             ToolReply::Manage(ManageReply::GetStatus(status)) | ToolReply::Talk(TalkReply::Say(status)) => {
                 status.fallen.retain(|entry| entry.robot == robot)
             }
-            // A look is of the own robot alone, the commands of a plan are already answered so, and a result concerns all robots.
+            // A look is of the own robot alone, the commands of a plan are already answered so, and a
+            // result concerns all robots.
             ToolReply::Look(_) | ToolReply::Plan(_) | ToolReply::Manage(ManageReply::Finish(_)) => {}
         }
         self

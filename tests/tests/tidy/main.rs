@@ -11,3 +11,4 @@ mod paths;
 mod sources;
 mod types;
 mod units;
+mod words;

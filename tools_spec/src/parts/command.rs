@@ -24,7 +24,7 @@ pub struct CommandReply {
     /// is "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fallen: Vec<RobotFallen>,
-    /// Every phase reached so far, where the episode's assistance tells it.
+    /// Every phase reached up to now, where the episode's assistance discloses it.
     pub phases: Vec<PhaseReached>,
     /// Remaining budget of the episode.
     pub budget: Budget,
@@ -89,7 +89,7 @@ pub struct BaseReport {
     pub state: Option<BaseState>,
     /// Measured height of the pelvis over the floor, in metres.
     pub pelvis_height_m: f64,
-    /// The height that it was last told, where it is more than 2 cm off that; left out otherwise.
+    /// Commanded height, where the measured one is more than 2 cm off; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub commanded_height_m: Option<f64>,
     /// Predicted resting place of the pelvis if no further step is commanded, [x, y] in the start frame: to
@@ -101,7 +101,7 @@ pub struct BaseReport {
     /// as it faced there: something pulled or pushed it. Left out below 2 cm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub displaced_m: Option<[f64; 2]>,
-    /// True where it took a step during the command though it was told to stand, after arms that reach far
+    /// True where it took a step during the command though it was commanded to stand, after arms that reach far
     /// or what pulls at them; left out otherwise.
     #[serde(default, skip_serializing_if = "is_false")]
     pub stepped: bool,
@@ -117,12 +117,11 @@ fn is_false(flag: &bool) -> bool {
 pub enum BaseState {
     /// Both feet stay where they are, and the pelvis is as high as it gets.
     Standing,
-    /// It walks as it was told to.
+    /// It walks as commanded.
     Stepping,
-    /// It was told to stop walking and still steps, or its pelvis still rises or sinks to the height that
-    /// it was told.
+    /// It was commanded to stop and still steps, or its pelvis still rises or sinks to the commanded height.
     Settling,
-    /// It steps though nobody told it to: what its hands hold or touch, or a partner, pulls or pushes it.
+    /// It steps without a command: what its hands hold or touch, or a partner, pulls or pushes it.
     Pushed,
 }
 
@@ -250,7 +249,7 @@ pub enum HandState {
     /// There: a wrist within 5 mm and 0.05 rad, or of a hand that holds something, under which its arm
     /// sags, within 15 mm and 0.15 rad; every finger joint within 0.06 rad.
     Arrived,
-    /// A wrist without a target, whose arm keeps its joints as it was told to.
+    /// A wrist without a target, whose arm keeps its joints.
     Idle,
     /// Coming nearer.
     Moving,

@@ -38,7 +38,7 @@ impl Driving {
         self.patience_s.unwrap_or(Driving::PATIENCE_S)
     }
 
-    /// JSON Schema of what [`Driving::validate`] demands of several fields together.
+    /// Returns the JSON Schema of what [`Driving::validate`] demands of several fields together.
     pub(crate) fn conditions() -> Value {
         json!([
             { "required": ["operators"], "properties": { "operators": { "const": Operators::PerRobot } } },

@@ -1,4 +1,4 @@
-//! The rules of an episode, what a policy is told of its success and of grasping, and where the episode stands.
+//! The rules of an episode, the information that a policy gets, and the episode's status.
 
 use std::fmt;
 
@@ -19,7 +19,7 @@ impl Protocol {
     /// Every protocol.
     pub const ALL: [Protocol; 2] = [Protocol::Agentic, Protocol::Benchmark];
 
-    /// The name that JSON, command lines and reports use.
+    /// Returns the name that JSON, command lines and reports use.
     pub fn name(self) -> &'static str {
         match self {
             Protocol::Agentic => "agentic",
@@ -51,7 +51,7 @@ impl Assistance {
     /// Both.
     pub const ALL: [Assistance; 2] = [Assistance::Paper, Assistance::Full];
 
-    /// The name that JSON, command lines and reports use.
+    /// Returns the name that JSON, command lines and reports use.
     pub fn name(self) -> &'static str {
         match self {
             Assistance::Paper => "paper",
@@ -159,7 +159,7 @@ impl ExtraInformation {
         ExtraInformation::PhaseConditions,
     ];
 
-    /// Name in results and reports.
+    /// Returns the name in results and reports.
     pub fn name(self) -> &'static str {
         match self {
             ExtraInformation::DepthImages => "depth_images",
@@ -197,9 +197,9 @@ pub enum Disclosure {
     /// Every reply tells the phases reached, and the last phase ends the episode.
     #[default]
     Live,
-    /// Phases are told once the episode has ended, which it does not do by itself on success: call finish.
+    /// Phases are disclosed once the episode has ended, which it does not do by itself on success: call finish.
     End,
-    /// Phases are never told, nor does success end the episode: call finish.
+    /// Phases are never disclosed, nor does success end the episode: call finish.
     Never,
 }
 
@@ -207,7 +207,7 @@ impl Disclosure {
     /// Every kind.
     pub const ALL: [Disclosure; 3] = [Disclosure::Live, Disclosure::End, Disclosure::Never];
 
-    /// The name that JSON, command lines and reports use.
+    /// Returns the name that JSON, command lines and reports use.
     pub fn name(self) -> &'static str {
         match self {
             Disclosure::Live => "live",
@@ -252,7 +252,7 @@ impl Hints {
     /// Both.
     pub const ALL: [Hints; 2] = [Hints::On, Hints::Off];
 
-    /// The name that JSON, command lines and reports use.
+    /// Returns the name that JSON, command lines and reports use.
     pub fn name(self) -> &'static str {
         match self {
             Hints::On => "on",

@@ -1,5 +1,5 @@
-//! Notes: what whoever plays says of its own play, for those who read the episode later. A note is no tool:
-//! it changes nothing of the episode, and no policy is told of it.
+//! Notes of a player on its own play, for those who read the episode later. A note is no tool: it changes
+//! nothing of the episode, and no policy sees it.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,9 +20,9 @@ const MAX_TOKENS: u32 = 1_000_000_000;
 const MAX_USD: f64 = 1e6;
 const MAX_SECONDS: f64 = 1e6;
 
-/// Something that whoever plays says of its play, kept in the recording for those who read the episode
+/// A player's words on its own play, kept in the recording for those who read the episode
 /// later: what a model thought, what it said, what that took. It changes nothing of the episode, costs no
-/// call, no steps and no time, and no policy is told of it.
+/// call, no steps and no time, and no policy sees it.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Note {
@@ -141,7 +141,7 @@ impl Note {
         used
     }
 
-    /// A note that works.
+    /// Returns a note that works.
     pub fn example() -> Note {
         Note {
             text: "The bottle is 0.31 m ahead of A, a bit to the right. I reach above it first.".into(),

@@ -50,7 +50,7 @@ pub enum DepthFormat {
 pub struct Png(pub Vec<u8>);
 
 impl Png {
-    /// The file as base64, as JSON and MCP carry it.
+    /// Returns the file as base64, as JSON and MCP carry it.
     pub fn to_base64(&self) -> String {
         BASE64_STANDARD.encode(&self.0)
     }
@@ -128,7 +128,7 @@ pub struct CameraArrays {
     pub depth_png16: Option<Bytes>,
 }
 
-/// Every so many pixels of a rectangle, beginning at `from`.
+/// Pixels of a rectangle at a stride, beginning at `from`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PixelRegion {
@@ -150,7 +150,7 @@ impl PixelRegion {
         along(0).saturating_mul(along(1))
     }
 
-    /// The pixels that it names, row by row. Count them first.
+    /// Returns the pixels that it names, row by row. Count them first.
     pub(crate) fn pixels(&self) -> Vec<[i64; 2]> {
         let along = |axis: usize| {
             let ends = [self.from[axis].min(self.to[axis]), self.from[axis].max(self.to[axis])];

@@ -25,7 +25,7 @@ impl JointValues {
         self.0.is_empty()
     }
 
-    /// The value of one joint.
+    /// Returns the value of one joint.
     pub fn get(&self, joint: &str) -> Option<f64> {
         self.0.iter().find(|(name, _)| name == joint).map(|(_, value)| *value)
     }

@@ -22,7 +22,7 @@ impl Format {
     /// Every form.
     pub const ALL: [Format; 4] = [Format::OpenAi, Format::OpenAiChat, Format::Anthropic, Format::Mcp];
 
-    /// The name that callers use.
+    /// Returns the name that callers use.
     pub fn name(self) -> &'static str {
         match self {
             Format::OpenAi => "openai",
@@ -32,14 +32,14 @@ impl Format {
         }
     }
 
-    /// The form called `name`.
+    /// Returns the form called `name`.
     pub fn find(name: &str) -> Option<Format> {
         Format::ALL.into_iter().find(|format| format.name() == name)
     }
 }
 
 impl ToolSpec {
-    /// The tool in the form of `format`.
+    /// Returns the tool in the form of `format`.
     pub fn formatted(&self, format: Format) -> Value {
         match format {
             Format::OpenAi => {
@@ -67,9 +67,10 @@ impl ToolSpec {
         })
     }
 
-    /// A host that leaves `short` out gets the short reply, which the server's instructions say once. Has
-    /// no output schema, since clients drop the pictures of tools that declare one, and only the
-    /// annotations that are not MCP's defaults: a list of tools is read by a model in every conversation.
+    /// Returns the tool for MCP. A host that leaves `short` out gets the short reply, which the server's
+    /// instructions say once. Has no output schema, since clients drop the pictures of tools that declare
+    /// one, and only the annotations that are not MCP's defaults: a list of tools is read by a model in
+    /// every conversation.
     fn of_mcp(&self) -> Value {
         let mut schema = Value::Object(self.lenient_schema());
         slim(&mut schema);

@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-/// Two types of one field become two choices. Strict hosts and common MCP clients read those; not all of
+/// Makes two choices of two types of one field. Strict hosts and common MCP clients read those; not all of
 /// them read a list of types.
 pub fn as_choices(object: &mut Map<String, Value>) {
     let Some(Value::Array(kinds)) = object.get("type") else { return };

@@ -12,7 +12,7 @@ use crate::refusal::ProblemBody;
 use crate::tool::Tool;
 use crate::tools::{Briefing, Finish, GetStatus, StartEpisode};
 
-/// The document of a server of `version` with these tools. Each tool has a path of its own, so that
+/// Returns the document of a server of `version` with these tools. Each tool has a path of its own, so that
 /// generated clients have a method for each.
 pub fn openapi(version: &str, tools: &[ToolSpec]) -> Value {
     let mut paths = paths_without_tools();
@@ -63,7 +63,7 @@ fn tool(spec: &ToolSpec) -> Value {
     call
 }
 
-/// Answered without a body.
+/// Describes an answer without a body.
 fn note() -> Value {
     let mut schema = body_schema::<Note>(Wording::from(Hints::On));
     schema["anyOf"] = Note::conditions();
@@ -116,7 +116,7 @@ fn list_tools(specs: Value) -> Value {
     list
 }
 
-/// A page, which is a few lines of text for who does not accept `text/html`.
+/// Returns a page, which is a few lines of text for who does not accept `text/html`.
 fn page(id: &str, description: &str) -> Value {
     let description =
         format!("{description} For a call that does not accept text/html, a few lines of text.");
@@ -146,7 +146,7 @@ fn operation(id: &str, description: &str, success: &str, reply: Value) -> Value 
     })
 }
 
-/// Every reply of an episode says at which step it stands, and so when its recording has failed; operators
+/// Adds the step to every reply of an episode, and a failure of its recording; operators
 /// of single robots hear of each other.
 fn with_notice(mut reply: Value) -> Value {
     let list =
@@ -170,7 +170,7 @@ fn with_notice(mut reply: Value) -> Value {
     reply
 }
 
-/// A body may be left out where no field of it is required.
+/// Lets a body be left out where no field of it is required.
 fn json_body(schema: Value) -> Value {
     let required = schema["required"].as_array().is_some_and(|fields| !fields.is_empty());
     json!({ "required": required, "content": { "application/json": { "schema": schema } } })

@@ -6,7 +6,8 @@ use serde_json::{Map, Value};
 use crate::limits::bound_numbers;
 use crate::parts::{Assistance, Wording};
 
-/// The schema of `T` as it is, for replies: nothing has to be strict about what the server itself sends.
+/// Returns the schema of `T` as it is, for replies: nothing has to be strict about what the server itself
+/// sends.
 pub fn plain_schema<T: JsonSchema>() -> Value {
     let settings = SchemaSettings::draft2020_12().with(|s| s.inline_subschemas = true);
     settings.into_generator().into_root_schema_for::<T>().to_value()
@@ -20,8 +21,8 @@ pub fn argument_schema<T: JsonSchema>(wording: Wording) -> Value {
     schema
 }
 
-/// The schema of `T` as a body that is read: what the checks refuse, it does not allow. How many control
-/// steps a command may have is still to be said.
+/// Returns the schema of `T` as a body that is read: what the checks refuse, it does not allow. How many
+/// control steps a command may have is still to be said.
 pub fn body_schema<T: JsonSchema>(wording: Wording) -> Value {
     let mut schema = argument_schema::<T>(wording);
     bound_numbers(&mut schema);
@@ -49,7 +50,7 @@ pub fn word(schema: &mut Value, wording: Wording) {
     }
 }
 
-/// Takes out the fields that are for who is told all.
+/// Removes the fields that are for full assistance.
 fn leave_to_full(object: &mut Map<String, Value>, wording: Wording) {
     let Some(Value::Object(properties)) = object.get_mut("properties") else { return };
     let mut left = Vec::new();

@@ -61,8 +61,8 @@ pub struct EpisodeToolSpec {
 }
 
 impl ToolSpec {
-    /// The specification of `T`, which acts on an episode; without a path to name it, the arguments carry
-    /// `episode_id`. It may be for operators who talk alone.
+    /// Returns the specification of `T`, which acts on an episode; without a path to name it, the arguments
+    /// carry `episode_id`. It may be for operators who talk alone.
     pub fn on_episode<T: Tool>(wording: Wording, for_operators: bool) -> ToolSpec {
         let mut spec = ToolSpec::without_episode::<T>(wording);
         if spec.input_schema["properties"].get(SHORT).is_none() {
@@ -76,7 +76,7 @@ impl ToolSpec {
         ToolSpec { on_episode: true, for_operators, ..spec }
     }
 
-    /// The specification of `T`, which needs no episode.
+    /// Returns the specification of `T`, which needs no episode.
     pub fn without_episode<T: Tool>(wording: Wording) -> ToolSpec {
         let (description, input_schema) = strict_schema::<T>(wording, false);
         ToolSpec {
@@ -120,28 +120,29 @@ impl ToolSpec {
         self.marked_body["properties"]["commands"]["items"]["anyOf"] = planned.into();
     }
 
-    /// JSON Schema of a REST body, which need not be strict: what may be null may be left out, and lengths
-    /// are said. A command may have up to `most_steps` control steps.
+    /// Returns the JSON Schema of a REST body, which need not be strict: what may be null may be left out,
+    /// and lengths are said. A command may have up to `most_steps` control steps.
     pub fn body_schema(&self, most_steps: u32) -> Value {
         let mut schema = self.marked_body.clone();
         bound_steps(&mut schema, most_steps);
         schema
     }
 
-    /// The strict schema with one thing let go: what may be null is left out instead, and has its default.
-    /// For hosts that check arguments against the schema and do not insist on strictness, as those of MCP.
+    /// Returns the strict schema with one thing let go: what may be null is left out instead, and has its
+    /// default. For hosts that check arguments against the schema and do not insist on strictness, as those
+    /// of MCP.
     pub fn lenient_schema(&self) -> Map<String, Value> {
         leaving_out(&self.with_defaults, true)
     }
 
-    /// A strict schema for hosts that limit both how many fields of all tools may be left out and how many
-    /// may be of two types: the call's own fields may be null, those of the entries of its lists may be
-    /// left out.
+    /// Returns a strict schema for hosts that limit both how many fields of all tools may be left out and
+    /// how many may be of two types: the call's own fields may be null, those of the entries of its lists
+    /// may be left out.
     pub fn few_unions_schema(&self) -> Map<String, Value> {
         leaving_out(&self.input_schema, false)
     }
 
-    /// The tool as the running episode `id` with these `robots` has it.
+    /// Returns the tool as the running episode `id` with these `robots` has it.
     pub fn of_episode(self, id: &str, robots: &[String], most_steps: u32) -> EpisodeToolSpec {
         let mut body_schema = self.body_schema(most_steps);
         bound_robots(&mut body_schema, robots);

@@ -32,7 +32,8 @@ const DROPPED: &[&str] = &[
     "most_steps",
 ];
 
-/// The description of `T` and its schema without it, with or without defaults, which strict hosts refuse.
+/// Returns the description of `T` and its schema without it, with or without defaults, which strict hosts
+/// refuse.
 pub fn strict_schema<T: JsonSchema>(wording: Wording, defaults: bool) -> (String, Map<String, Value>) {
     let mut schema = argument_schema::<T>(wording);
     if !defaults {
@@ -114,16 +115,16 @@ fn make_strict(schema: &mut Value) {
     }
 }
 
-/// Doc comments break lines where the source does; a model reads sentences.
+/// Joins the lines of descriptions, which break where the source does.
 fn unwrap_lines(object: &mut Map<String, Value>) {
     if let Some(Value::String(text)) = object.get_mut("description") {
         *text = text.replace("\n\n", "\u{1}").replace('\n', " ").replace('\u{1}', "\n\n");
     }
 }
 
-/// Strict hosts refuse `oneOf`, which is how schemars writes an enum whose variants are described: the
-/// names become an `enum` and their descriptions part of the enum's own. Of any other `oneOf` only the
-/// texts are left.
+/// Replaces `oneOf`, which strict hosts refuse and which is how schemars writes an enum whose variants are
+/// described: the names become an `enum` and their descriptions part of the enum's own. Of any other
+/// `oneOf` only the texts are left.
 fn list_choices(object: &mut Map<String, Value>) {
     let Some(Value::Array(choices)) = object.remove("oneOf") else {
         return;

@@ -51,12 +51,12 @@ pub enum EndReason {
 pub struct ResultReply {
     /// The task's id.
     pub task: String,
-    /// The seed; left out where it is told to a policy whose assistance is "paper".
+    /// The seed; left out for a policy whose assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u32>,
     /// The rules that were in force.
     pub protocol: Protocol,
-    /// When each phase was reached, in simulated seconds; null where it was not, or is not told.
+    /// Times in simulated seconds at which phases were reached; null where one was not, or is not disclosed.
     pub phases: PhaseTimes,
     /// Why the episode ended.
     pub ended: EndReason,
@@ -75,7 +75,7 @@ pub struct ResultReply {
     pub falls: u32,
     /// Simulated seconds per second that the physics took.
     pub realtime_factor: f64,
-    /// Hash of the whole physical state at the end, 16 hexadecimal digits; left out where it is told to a
+    /// Hash of the whole physical state at the end, 16 hexadecimal digits; left out for a
     /// policy whose assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state_hash: Option<String>,
@@ -108,7 +108,7 @@ pub struct ResultReply {
 }
 
 impl ResultReply {
-    /// The result as a policy hears it at the end. Under "paper" it is told neither seed nor hash, by which
+    /// Returns the result as a policy gets it at the end. Under "paper" it has neither seed nor hash, by which
     /// it could find the episode among those that it has played before.
     pub fn disclosed(mut self, disclosure: Disclosure) -> ResultReply {
         match self.assistance {
@@ -132,7 +132,7 @@ impl ResultReply {
 }
 
 impl Usage {
-    /// The same, with how a model's play ended where the episode's end says it and no note does.
+    /// Adds the end of a model's play where the episode's end says it and no note does.
     pub fn ended_by(mut self, reason: EndReason) -> Usage {
         let ending = match reason {
             EndReason::TaskComplete => Some(AgentEnding::Success),
@@ -156,7 +156,7 @@ impl Usage {
 pub struct PhaseTimes(pub Vec<(String, Option<f64>)>);
 
 impl PhaseTimes {
-    /// When the phase with this number, as `p2`, was reached.
+    /// Returns the time at which the phase with this number, for example `p2`, was reached.
     pub fn reached_s(&self, number: &str) -> Option<f64> {
         self.0.iter().find(|(phase, _)| phase == number).and_then(|(_, time_s)| *time_s)
     }

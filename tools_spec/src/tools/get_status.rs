@@ -41,7 +41,7 @@ pub struct StatusReply {
     pub protocol: Protocol,
     /// Simulated seconds since the episode began.
     pub time_s: f64,
-    /// Control steps of 20 ms executed so far, the initial hold included.
+    /// Control steps of 20 ms executed up to now, the initial hold included.
     pub env_steps: u32,
     /// Why the episode has ended; null while it goes on.
     pub ended: Option<EndReason>,
@@ -54,10 +54,10 @@ pub struct StatusReply {
     /// Disclosure of phases, where it is not the assistance's; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disclosure: Option<Disclosure>,
-    /// Every phase reached so far, where the assistance tells it.
+    /// Every phase reached up to now, where the assistance discloses it.
     pub phases: Vec<PhaseReached>,
     /// The phase to reach next, and what it lacks; left out where the call did not ask for it, and where
-    /// phases are not told.
+    /// phases are not disclosed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub next_phase: Option<NextPhase>,
     /// Remaining budget of the episode.

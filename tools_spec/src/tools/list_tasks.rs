@@ -43,7 +43,7 @@ pub struct TaskList {
 }
 
 impl TaskList {
-    /// The list as it is told shortly.
+    /// Returns the short list.
     pub fn shortened(mut self) -> TaskList {
         for TaskInfo { id: _, suite: _, instruction: _, robots, phases, protocols } in &mut self.tasks {
             robots.clear();

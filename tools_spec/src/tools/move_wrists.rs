@@ -95,7 +95,7 @@ pub struct WristMove {
 }
 
 impl WristMove {
-    /// A move of `robot` that keeps every target and does not walk.
+    /// Returns a move of `robot` that keeps every target and does not walk.
     pub fn hold(robot: &str) -> WristMove {
         WristMove {
             robot: robot.into(),

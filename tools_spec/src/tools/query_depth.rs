@@ -37,7 +37,7 @@ pub struct QueryDepth {
 }
 
 impl QueryDepth {
-    /// Every pixel that a call names which has been checked.
+    /// Returns every pixel that a call names which has been checked.
     pub fn named(&self) -> Vec<[i64; 2]> {
         let region = self.region.iter().flat_map(PixelRegion::pixels);
         self.pixels.iter().flatten().copied().chain(region).collect()
@@ -275,13 +275,13 @@ impl JsonSchema for DepthRow {
 }
 
 impl DepthRow {
-    /// The row of a pixel that sees `point_m`.
+    /// Returns the row of a pixel that sees `point_m`.
     pub fn new([u, v]: [i64; 2], point_m: Option<[f64; 3]>) -> DepthRow {
         let [x_m, y_m, z_m] = point_m.map_or([None; 3], |point_m| point_m.map(Some));
         DepthRow(u, v, x_m, y_m, z_m)
     }
 
-    /// The point, if the pixel sees one.
+    /// Returns the point, if the pixel sees one.
     pub fn point_m(&self) -> Option<[f64; 3]> {
         Some([self.2?, self.3?, self.4?])
     }

@@ -17,7 +17,7 @@ pub const ACTION_ROW_LEN: usize = 35;
 const JOINT_BLOCKS: [(&str, usize); 5] =
     [("left_arm", 7), ("right_arm", 7), ("left_hand", 7), ("right_hand", 7), ("waist", 3)];
 
-/// The layout of a row in one line, as `left_arm 7, right_arm 7, ...`.
+/// Returns the layout of a row in one line, as `left_arm 7, right_arm 7, ...`.
 pub fn action_row_layout() -> String {
     let blocks = JOINT_BLOCKS.into_iter().chain(BASE_COLUMNS.map(|column| (column, 1)));
     blocks.map(|(block, columns)| format!("{block} {columns}")).collect::<Vec<_>>().join(", ")
@@ -82,7 +82,7 @@ impl Tool for SendJointChunk {
         self.robots.iter().map(|entry| entry.robot.as_str()).collect()
     }
 
-    /// One a row; every robot has as many.
+    /// Returns one a row; every robot has as many.
     fn steps(&self) -> u32 {
         let rows = self.robots.first().map_or(0, |entry| entry.rows.len());
         u32::try_from(rows).unwrap_or(u32::MAX)

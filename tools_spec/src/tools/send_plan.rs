@@ -79,7 +79,7 @@ pub struct Expectation {
 }
 
 impl Expectation {
-    /// True where no condition is given.
+    /// Returns true where no condition is given.
     pub fn is_empty(&self) -> bool {
         *self == Expectation::default()
     }
@@ -184,7 +184,7 @@ impl PlannedCommand {
 pub struct PlanReply {
     /// Commands that were carried out. Each counts as a tool call of the episode.
     pub commands: u32,
-    /// Tool calls of the episode so far.
+    /// Tool calls of the episode up to now.
     pub tool_calls: u32,
     /// Control steps of 20 ms that they took together.
     pub executed_steps: u32,

@@ -93,7 +93,7 @@ pub struct Briefing {
 }
 
 impl Briefing {
-    /// The briefing as whoever directs this robot alone reads it.
+    /// Returns the briefing for the operator of this robot alone.
     pub fn for_robot(mut self, robot: &str) -> Briefing {
         self.instructions.retain(|entry| entry.robot == robot);
         self.status.fallen.retain(|entry| entry.robot == robot);
@@ -101,7 +101,7 @@ impl Briefing {
         self
     }
 
-    /// The briefing as it is told shortly.
+    /// Returns the short briefing.
     pub fn shortened(mut self) -> Briefing {
         self.action_row.clear();
         self.kinds.iter_mut().for_each(|kind| kind.joints.clear());
@@ -195,7 +195,7 @@ pub struct Brief {
 }
 
 impl Brief {
-    /// All of it, a line each.
+    /// Returns all of it, a line each.
     pub fn lines(&self) -> Vec<String> {
         let Brief { frames, partners, teamwork, odometry, camera, hands, walking, grasping, grips } = self;
         let told = [frames, partners]

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 use tandem_tools_spec::{Format, Hints, ToolSpec, episode_tool_specs, openapi, tool_specs};
 
-/// Everything that a policy is told of the tools, face by face.
+/// Returns everything that a policy is told of the tools, face by face.
 fn faces(hints: Hints) -> Vec<String> {
     let specs = tool_specs(hints);
     let mut faces = vec![

@@ -32,7 +32,7 @@ fn tools_in_every_format() {
     }
 }
 
-/// The tools of `other` that differ from those of `one`.
+/// Returns the tools of `other` that differ from those of `one`.
 fn differing(one: Vec<ToolSpec>, other: Vec<ToolSpec>) -> Value {
     other.into_iter().filter(|other| !one.contains(other)).map(|other| json!(other)).collect()
 }

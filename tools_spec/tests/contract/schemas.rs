@@ -115,7 +115,7 @@ fn nullable_fields_may_be_left_out() {
     assert!(ToolCall::parse("observe", json!({})).is_ok());
 }
 
-/// A refusal must contain every one of `says`.
+/// Returns a refusal must contain every one of `says`.
 fn refused(name: &str, args: Value, says: &[&str]) {
     let text = match ToolCall::parse(name, args.clone()) {
         Ok(call) => panic!("{name} {args} was accepted: {call:?}"),

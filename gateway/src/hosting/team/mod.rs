@@ -294,8 +294,8 @@ impl Team {
         }
     }
 
-    /// True where a command by the operator on `seat` goes on after a shorter one of a partner: beside people, partners of this process
-    /// and plans, whose commands are short.
+    /// Returns true where a command by the operator on `seat` goes on after a shorter one of a partner:
+    /// beside people, partners of this process and plans, whose commands are short.
     fn goes_on(&self, seat: usize) -> bool {
         let wheels = self.wheels();
         wheels.partners[seat].is_some()

@@ -1,5 +1,5 @@
-//! Plans of one operator: each command goes through the team's rounds like any other, and those of the partners go on over as many of
-//! them as they have steps.
+//! Plans of one operator: each command goes through the team's rounds like any other, and those of the
+//! partners go on over as many of them as they have steps.
 
 use std::sync::Arc;
 

@@ -190,8 +190,8 @@ impl ServerHandler for McpServer {
 }
 
 impl McpServer {
-    /// Returns the instructions for `caller`. An operator's have its part of the task and how to play with partners, since a model may see
-    /// nothing else of the briefing.
+    /// Returns the instructions for `caller`. An operator's have its part of the task and how to play with
+    /// partners, since a model may see nothing else of the briefing.
     async fn instructions(&self, caller: &Caller) -> String {
         let begin = instructions(caller);
         let Caller::Operator { episode, .. } = caller else { return begin };

@@ -1,4 +1,5 @@
-//! Resources that MCP hosts may read: an episode's briefing and the brief of the server, as tools do not repeat them, and pages of the book.
+//! Resources that MCP hosts may read: an episode's briefing and the brief of the server, as tools do not
+//! repeat them, and pages of the book.
 
 use rmcp::{
     ErrorData,

@@ -17,7 +17,7 @@ pub struct Bend {
 const TOLERANCE: f32 = 1e-3;
 
 impl TriangleMesh {
-    /// The bends of the mesh, and of each triangle which of them is its.
+    /// Returns the bends of the mesh, and the indices of each triangle's own.
     pub(in crate::render) fn bends(&self) -> (Vec<Bend>, Vec<usize>) {
         let ellipsoid = Bend::of_ellipsoid(self.corners_m());
         let mut bends: Vec<Bend> = Vec::new();

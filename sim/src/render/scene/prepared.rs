@@ -89,7 +89,7 @@ fn grain(part: &Part) -> usize {
     if part.pattern == Pattern::Print { 0 } else { part.mesh.longest_axis() }
 }
 
-/// The places of a mesh's corners, each once, and its triangles by their numbers.
+/// Returns the places of a mesh's corners, each once, and its triangles by their numbers.
 fn joined(mesh: &TriangleMesh) -> (Points, Vec<[u32; 3]>) {
     let (mut numbers, mut places_m) = (HashMap::new(), Vec::new());
     let mut number = |corner: u32| {

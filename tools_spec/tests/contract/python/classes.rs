@@ -62,7 +62,7 @@ impl<'a> Contract<'a> {
         found
     }
 
-    /// All that a schema is made of.
+    /// Returns all that a schema is made of.
     fn reached(&self, schema: &Value) -> BTreeSet<String> {
         let mut reached = BTreeSet::new();
         let mut next = self.named_in(schema);
@@ -91,14 +91,14 @@ impl<'a> Contract<'a> {
                 .any(|names| names.contains(name))
     }
 
-    /// The type of a name that has no class and is no choice, as that of numbers by joint.
+    /// Returns the type of a name that has no class and is no choice, as that of numbers by joint.
     fn plain(&self, name: &str) -> Option<String> {
         let schema = &self.types[name];
         let named = self.is_class(name) || choices(schema).is_some();
         (!named).then(|| reply_type(schema, &|name| self.plain(name)))
     }
 
-    /// The module of what tools are given.
+    /// Returns the module of what tools are given.
     pub fn arguments(&self) -> String {
         let mut lines = head("What tools are given.");
         lines.add(0, "from collections.abc import Mapping, Sequence");
@@ -136,27 +136,27 @@ impl<'a> Contract<'a> {
         }
     }
 
-    /// The module of what commands reply.
+    /// Returns the module of what commands reply.
     pub fn commands(&self) -> String {
         self.reply_module("What commands reply.", &self.commands)
     }
 
-    /// The module of what is told of points and surfaces.
+    /// Returns the module of what is told of points and surfaces.
     pub fn depth(&self) -> String {
         self.reply_module("What query_depth replies.", &self.depth)
     }
 
-    /// The module of what other tools of an episode reply.
+    /// Returns the module of what other tools of an episode reply.
     pub fn replies(&self) -> String {
         self.reply_module("What tools reply that are no commands.", &self.replies)
     }
 
-    /// The module of what an episode came to.
+    /// Returns the module of what an episode came to.
     pub fn result(&self) -> String {
         self.reply_module("What an episode came to.", &self.result)
     }
 
-    /// The module of what a start and a list of tasks reply.
+    /// Returns the module of what a start and a list of tasks reply.
     pub fn start(&self) -> String {
         self.reply_module("What a start replies, and what tasks there are.", &self.start)
     }
@@ -200,7 +200,7 @@ impl<'a> Contract<'a> {
         }
     }
 
-    /// The name for the texts of a type that is one of several; nothing of another type.
+    /// Returns the name for the texts of a type that is one of several; nothing of another type.
     fn choices(&self, lines: &mut Lines, name: &str) {
         let Some(values) = choices(&self.types[name]) else { return };
         lines.add(0, "");
@@ -262,7 +262,7 @@ fn optional_reading(field: &Value, wire: &str, is_class: &dyn Fn(&str) -> bool) 
     }
 }
 
-/// The texts of a type that is one of several.
+/// Returns the texts of a type that is one of several.
 fn choices(schema: &Value) -> Option<Vec<String>> {
     let text = |value: &Value| value.as_str().map(str::to_owned);
     if let Some(values) = schema["enum"].as_array() {

@@ -53,7 +53,7 @@ fn the_python_package_has_every_tool() {
     }
 }
 
-/// A class with a method for each tool of an episode that a policy of all robots may call.
+/// Returns a class with a method for each tool of an episode that a policy of all robots may call.
 fn methods(contract: &Contract, tools: &[TypedTool]) -> String {
     let offered: Vec<&TypedTool> = tools.iter().filter(|tool| is_method(tool)).collect();
     let parameters = |tool: &TypedTool| types::parameters(&tool.arguments);

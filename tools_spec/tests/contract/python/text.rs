@@ -9,7 +9,7 @@ const LONGEST_LINE: usize = 118;
 pub struct Lines(String);
 
 impl Lines {
-    /// Header of a module.
+    /// Writes the header of a module.
     pub fn head(&mut self, about: &str) {
         self.add(0, &format!("\"\"\"{about}\n"));
         self.add(
@@ -19,7 +19,7 @@ impl Lines {
         self.add(0, "from __future__ import annotations\n");
     }
 
-    /// Adds a line, so many levels in.
+    /// Adds a line, indented by a number of levels.
     pub fn add(&mut self, level: usize, line: &str) {
         if !line.is_empty() {
             self.0.push_str(&"    ".repeat(level));
@@ -51,7 +51,7 @@ impl Lines {
     }
 }
 
-/// A docstring, with a paragraph for each of `further`.
+/// Returns a docstring, with a paragraph for each of `further`.
 pub fn docstring(lines: &mut Lines, level: usize, text: &str, further: &[String]) {
     if text.is_empty() && further.is_empty() {
         return;
@@ -73,7 +73,7 @@ pub fn docstring(lines: &mut Lines, level: usize, text: &str, further: &[String]
     lines.add(level, "\"\"\"");
 }
 
-/// The words of a text in lines of at most `width`; all but the first `hanging` columns in.
+/// Returns the words of a text in lines of at most `width`; all but the first `hanging` columns in.
 fn wrapped(text: &str, width: usize, hanging: usize) -> Vec<String> {
     let text = text.replace('\\', "\\\\").replace("\"\"\"", "'''");
     let mut lines = vec![String::new()];

@@ -15,7 +15,7 @@ pub struct Parameter {
     pub required: bool,
 }
 
-/// The parameters that arguments have, those that have to be given first.
+/// Returns the parameters that arguments have, those that have to be given first.
 pub fn parameters(schema: &Value) -> Vec<Parameter> {
     let properties = schema["properties"].as_object().into_iter().flatten();
     let parameter = |(wire, of): (&String, &Value)| {
@@ -44,12 +44,12 @@ pub fn python_name(wire: &str) -> String {
     }
 }
 
-/// The name that a reference refers to.
+/// Returns the name that a reference refers to.
 pub fn reference(schema: &Value) -> Option<&str> {
     schema["$ref"].as_str()?.strip_prefix("#/$defs/")
 }
 
-/// A schema without its null, and whether it had one.
+/// Returns a schema without its null, and whether it had one.
 pub fn without_null(schema: &Value) -> (Value, bool) {
     if let Some(choices) = schema["anyOf"].as_array() {
         let others: Vec<&Value> = choices.iter().filter(|choice| choice["type"] != "null").collect();
@@ -67,7 +67,7 @@ pub fn without_null(schema: &Value) -> (Value, bool) {
     (schema.clone(), false)
 }
 
-/// The type of what a caller gives.
+/// Returns the type of what a caller gives.
 fn argument_type(schema: &Value) -> (String, bool) {
     let (schema, may_be_null) = without_null(schema);
     let kind = match schema["type"].as_str() {
@@ -85,7 +85,7 @@ fn is_numbers(schema: &Value) -> bool {
         && (items["type"] == "number" || items["type"] == "integer" || is_numbers(items))
 }
 
-/// The type of what is replied.
+/// Returns the type of what is replied.
 pub fn reply_type(schema: &Value, plain: &dyn Fn(&str) -> Option<String>) -> String {
     let (schema, may_be_null) = without_null(schema);
     let kind = match schema["type"].as_str() {
