@@ -27,6 +27,8 @@ pub enum Called {
 pub struct OperatorCall {
     robot: String,
     call: Call,
+    /// True for a command of a plan, which has been counted as a request already.
+    planned: bool,
 }
 
 /// A command of an operator that the episode has read, to be executed together with those of others.
@@ -119,6 +121,14 @@ impl Called {
         }
     }
 
+    /// Returns true if every command is one of a plan, which has been counted as a request already.
+    pub(crate) fn continues_plans(&self) -> bool {
+        match self {
+            Called::One(_) => false,
+            Called::Together(calls) => calls.iter().all(|own| own.planned),
+        }
+    }
+
     /// Returns true for an observation or measurement, which moves no robot.
     pub(crate) fn is_look(&self) -> bool {
         matches!(self, Called::One(Call { tool: ToolCall::Look(_), .. }))
@@ -195,7 +205,12 @@ impl OperatorCall {
         if let Some(name) = call.robots().into_iter().find(|name| *name != robot) {
             return Err(EpisodeError::ForeignRobot { name: name.into(), own: robot.into() });
         }
-        Ok(OperatorCall { robot: robot.into(), call })
+        Ok(OperatorCall { robot: robot.into(), call, planned: false })
+    }
+
+    /// Returns the call as a command of a plan.
+    pub fn planned(self) -> OperatorCall {
+        OperatorCall { planned: true, ..self }
     }
 
     /// Returns the operator's robot.
@@ -237,7 +252,7 @@ impl OperatorCall {
             }
         };
         let call = Call { tool: ToolCall::Act(rest), expected_step: None, ..self.call.clone() };
-        Some(OperatorCall { robot: self.robot.clone(), call })
+        Some(OperatorCall { robot: self.robot.clone(), call, planned: self.planned })
     }
 
     /// Returns the command without its expected step, which has been checked.

@@ -25,7 +25,7 @@ pub use report::{report, wrist_state};
 pub use upper_body::{UpperBody, upper_body};
 
 use tandem_sim::RobotCommand;
-use tandem_tools_spec::{ActCall, JointChunk, PoseFrame, WalkMove, WristMove};
+use tandem_tools_spec::{ActCall, JointChunk, WalkMove, WristMove};
 
 use crate::EpisodeError;
 use crate::protocol::Rules;
@@ -78,14 +78,6 @@ impl RobotAction {
         };
         let carried = entry.filter(|entry| entry.carried == Some(true)).map(|_| CARRIED);
         carried.into_iter().chain(entry.filter(|entry| gives_way(entry)).map(|_| COMPLIANCE))
-    }
-
-    /// Returns the frame of its wrist poses.
-    pub fn frame(&self) -> PoseFrame {
-        match self {
-            RobotAction::MoveWrists(entry) => entry.frame.unwrap_or_default(),
-            RobotAction::Walk(_) | RobotAction::SendJointChunk(_) | RobotAction::Wait => PoseFrame::Pelvis,
-        }
     }
 }
 

@@ -74,6 +74,9 @@ pub struct MotionState {
     /// Current and recent distances of the wrists from their targets; `None` before the first reading.
     pub(super) approaches: Sides<Option<Approach>>,
     pub(super) footing: Footing,
+    /// Frame of the latest wrist targets, in which reports have the wrists.
+    #[serde(default)]
+    pub(super) frame: PoseFrame,
 }
 
 /// Restrictions on arms that move to their aims.
@@ -148,6 +151,7 @@ impl Motion {
             caution: 1.0,
             approaches: Sides::both(None),
             footing: Footing::new(world_from_pelvis),
+            frame: PoseFrame::default(),
         };
         Motion { robot, solver: body.solver(), body: body.clone(), state }
     }
@@ -337,16 +341,15 @@ impl Motion {
         self.state.base = base;
     }
 
-    /// Sets the aims of the wrists, and the restrictions on the arms.
-    pub(super) fn aim(&mut self, aims: Sides<Aim>, restraint: Restraint) {
-        self.state.aims = aims;
-        self.state.restraint = restraint;
+    /// Sets the aims of the wrists, the restrictions on the arms, and the frame of reports.
+    pub(super) fn aim(&mut self, aims: Sides<Aim>, restraint: Restraint, frame: PoseFrame) {
+        (self.state.aims, self.state.restraint, self.state.frame) = (aims, restraint, frame);
         self.state.approaches = Sides::both(None);
     }
 
     /// Lets both arms keep their joints.
     pub(super) fn keep_joints(&mut self) {
-        self.aim(Sides::both(Aim::Joints), Restraint::default());
+        self.aim(Sides::both(Aim::Joints), Restraint::default(), PoseFrame::Pelvis);
     }
 
     /// Returns aims of the current kinds that the commanded joints would meet without the yielding.
@@ -358,7 +361,7 @@ impl Motion {
 
     pub(super) fn set_joints(&mut self, upper_rad: [f64; UPPER_JOINTS]) {
         self.state.upper_rad = upper_rad;
-        self.state.aims = Sides::both(Aim::Joints);
+        (self.state.aims, self.state.frame) = (Sides::both(Aim::Joints), PoseFrame::Pelvis);
     }
 
     pub(super) fn turn_waist(&mut self, column: usize, target_rad: f64) {

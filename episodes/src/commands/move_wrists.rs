@@ -51,7 +51,7 @@ impl WristTrajectory {
             keeps_waist: entry.keep_waist.unwrap_or(false),
             stands_fast: entry.stand_fast.unwrap_or(false),
         };
-        motion.aim(to, restraint);
+        motion.aim(to, restraint, entry.frame.unwrap_or_default());
         WristTrajectory {
             steps,
             from: motion.arrived(),

@@ -26,7 +26,7 @@ pub fn grip(f: &Facts, robot: usize, sides: &[Side], object: &str) -> Vec<String
 pub fn hands_off(f: &Facts, robot: usize, object: &str) -> Vec<String> {
     let hands = f.object(object).hands[robot];
     let on = Side::BOTH.into_iter().filter(|side| hands[*side] != Grip::Off);
-    on.map(|side| format!("{}'s {} hand is on {object}", ROBOT_NAMES[robot], side.name())).collect()
+    on.map(|side| format!("{}'s {} hand is still on {object}", ROBOT_NAMES[robot], side.name())).collect()
 }
 
 /// Explains why an object is not upright, still and released.

@@ -3,6 +3,7 @@
 use tandem_tools_spec::{Assistance, BaseLimits, Brief, Hints, Wording};
 
 use super::grips::grips;
+use crate::tasks::GripKind;
 
 const FRAMES: &str = "Poses of wrists and camera, and points of query_depth, are in the robot's own pelvis frame as it is at that \
     moment: x forward, y left, z up, metres. Quaternions are [w, x, y, z].";
@@ -97,7 +98,7 @@ pub fn teamwork(assistance: Assistance, may_talk: bool) -> String {
 }
 
 /// Returns the brief of an episode in its wording, for robots that follow base commands within `limits`.
-pub fn brief(wording: Wording, limits: &BaseLimits) -> Brief {
+pub fn brief(wording: Wording, limits: &BaseLimits, kinds: Option<&[GripKind]>) -> Brief {
     let Wording { assistance, hints } = wording;
     let is_full = assistance == Assistance::Full;
     let is_hinted = hints == Hints::On;
@@ -114,7 +115,7 @@ pub fn brief(wording: Wording, limits: &BaseLimits) -> Brief {
         grasping: is_hinted.then(|| {
             [if is_full { GRIP } else { "" }, GRASPING, if is_full { CARRYING } else { "" }].concat()
         }),
-        grips: if is_hinted { grips() } else { Vec::new() },
+        grips: if is_hinted { grips(kinds) } else { Vec::new() },
     }
 }
 
@@ -191,7 +192,7 @@ mod tests {
 
     #[test]
     fn without_hints_there_is_geometry_only() {
-        let brief = |hints: Hints| super::brief(hints.into(), &limits());
+        let brief = |hints: Hints| super::brief(hints.into(), &limits(), None);
         let (with, without) = (brief(Hints::On), brief(Hints::Off));
         assert!(with.grasping.is_some());
         assert!(!with.grips.is_empty());
@@ -201,7 +202,7 @@ mod tests {
     #[test]
     fn bent_knees_are_those_of_our_own_controller() {
         let mut limits = limits();
-        let frames = |limits: &BaseLimits| brief(Assistance::Paper.into(), limits).frames;
+        let frames = |limits: &BaseLimits| brief(Assistance::Paper.into(), limits, None).frames;
         assert!(frames(&limits).contains("0.62 to 0.68 m"));
         // The limits of a policy from a file.
         limits.pelvis_height_m.min = limits.pelvis_height_m.max;
@@ -210,7 +211,7 @@ mod tests {
 
     #[test]
     fn nothing_is_said_of_what_is_not_told() {
-        let brief = serde_json::json!(brief(Assistance::Paper.into(), &limits())).to_string();
+        let brief = serde_json::json!(brief(Assistance::Paper.into(), &limits(), None)).to_string();
         for word in ["pelvis_in_start", "base_motion", "grasping", "odometry", "walking", "level", "grip"] {
             assert!(!brief.contains(word), "{word}: {brief}");
         }

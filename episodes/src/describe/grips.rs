@@ -3,6 +3,8 @@
 
 use tandem_tools_spec::WorkedGrip;
 
+use crate::tasks::GripKind;
+
 const OPEN_RAD: [f64; 7] = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0];
 const HALF: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Right and left wrist orientations: fingers forward and palms facing each other; fingers forward and
@@ -11,97 +13,119 @@ const AHEAD: [[f64; 4]; 2] = [[1.0, 0.0, 0.0, 0.0]; 2];
 const PALMS_DOWN: [[f64; 4]; 2] = [[HALF, -HALF, 0.0, 0.0], [HALF, HALF, 0.0, 0.0]];
 const FINGERS_DOWN: [[f64; 4]; 2] = [[HALF, 0.0, HALF, 0.0]; 2];
 
-/// Returns every grip.
-pub fn grips() -> Vec<WorkedGrip> {
-    wrapped().into_iter().chain(pinched()).collect()
+/// Returns the grips of these kinds, or every one.
+pub fn grips(kinds: Option<&[GripKind]>) -> Vec<WorkedGrip> {
+    let all = wrapped().into_iter().chain(pinched());
+    all.filter(|(kind, _)| kinds.is_none_or(|kinds| kinds.contains(kind))).map(|(_, grip)| grip).collect()
 }
 
 /// Returns the grips that wrap fingers and thumb round an object.
-fn wrapped() -> Vec<WorkedGrip> {
+fn wrapped() -> Vec<(GripKind, WorkedGrip)> {
     let beside = vec![[0.0, 0.08, 0.0]];
     vec![
-        WorkedGrip {
-            stand_behind_m: None,
-            ..grip(
-                "upright round things of 7 cm: bottle, cup",
+        (
+            GripKind::Bottle,
+            WorkedGrip {
+                stand_behind_m: None,
+                ..grip(
+                    "upright round things of 7 cm: bottle, cup",
+                    "its axis",
+                    AHEAD,
+                    [0.12, 0.055, 0.0],
+                    beside.clone(),
+                    1.0,
+                )
+            },
+        ),
+        (
+            GripKind::Bar,
+            grip(
+                "a bar of 36 mm, as a handle, from above",
+                "its axis",
+                PALMS_DOWN,
+                [0.105, 0.042, 0.0],
+                beside.clone(),
+                1.3,
+            ),
+        ),
+        (
+            GripKind::Moulding,
+            grip(
+                "an upright moulding of 50 by 40 mm, from outside",
                 "its axis",
                 AHEAD,
-                [0.12, 0.055, 0.0],
+                [0.112, 0.045, 0.0],
                 beside.clone(),
-                1.0,
-            )
-        },
-        grip(
-            "a bar of 36 mm, as a handle, from above",
-            "its axis",
-            PALMS_DOWN,
-            [0.105, 0.042, 0.0],
-            beside.clone(),
-            1.3,
-        ),
-        grip(
-            "an upright moulding of 50 by 40 mm, from outside",
-            "its axis",
-            AHEAD,
-            [0.112, 0.045, 0.0],
-            beside.clone(),
-            1.1,
+                1.1,
+            ),
         ),
     ]
 }
 
 /// Returns the grips that press an object with the thumb against palm or fingers.
-fn pinched() -> Vec<WorkedGrip> {
+fn pinched() -> Vec<(GripKind, WorkedGrip)> {
     vec![
-        WorkedGrip {
-            open_rad: [0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0],
-            close_rad: [0.0, -0.9, -1.74, 0.3, 0.2, 0.3, 0.2],
-            stand_behind_m: Some(0.32),
-            ..grip(
-                "the edge of a plate of 30 mm, as of a table: thumb under it (thinner or thicker: y of place_m is 0.017 and the thickness)",
-                "the lower edge; of a round plate 0.24 m apart, both straight ahead",
-                PALMS_DOWN,
-                [0.085, 0.047, 0.0],
-                vec![[0.14, 0.03, 0.0], [0.0, 0.03, 0.0]],
-                1.0,
-            )
-        },
-        WorkedGrip {
-            pelvis_height_m: Some(0.64),
-            close_rad: [0.0, -0.9, -1.74, 1.0, 1.0, 1.0, 1.0],
-            stand_behind_m: Some(0.38),
-            ..grip(
-                "an upright leg of 28 mm, from outside, 5 cm under what stands on it",
-                "its axis",
-                AHEAD,
-                [0.1, 0.032, 0.0],
-                vec![[0.0, 0.09, 0.025], [0.0, 0.0, 0.025]],
-                1.0,
-            )
-        },
-        WorkedGrip {
-            close_rad: [0.0, -0.95, -0.6, 1.57, 0.6, 1.57, 0.6],
-            ..grip(
-                "a rim of 24 mm, from above, fingers inside",
-                "its axis",
-                PALMS_DOWN,
-                [0.095, 0.031, 0.0],
-                vec![[0.0, 0.09, 0.0]],
-                1.0,
-            )
-        },
-        WorkedGrip {
-            close_rad: [0.0, -1.04, -1.74, 0.3, 0.3, 0.3, 0.3],
-            stand_behind_m: Some(0.38),
-            ..grip(
-                "the rim of an upright wall, as of a tall bin: palm on its outside, thumb over the rim",
-                "the outer edge",
-                FINGERS_DOWN,
-                [0.09, 0.017, 0.0],
-                vec![[0.16, 0.05, 0.0], [0.0, 0.05, 0.0]],
-                1.0,
-            )
-        },
+        (
+            GripKind::PlateEdge,
+            WorkedGrip {
+                open_rad: [0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0],
+                close_rad: [0.0, -0.9, -1.74, 0.3, 0.2, 0.3, 0.2],
+                stand_behind_m: Some(0.32),
+                ..grip(
+                    "the edge of a plate of 30 mm, as of a table: thumb under it (thinner or thicker: y of place_m is 0.017 and the thickness)",
+                    "the lower edge; of a round plate 0.24 m apart, both straight ahead",
+                    PALMS_DOWN,
+                    [0.085, 0.047, 0.0],
+                    vec![[0.14, 0.03, 0.0], [0.0, 0.03, 0.0]],
+                    1.0,
+                )
+            },
+        ),
+        (
+            GripKind::Leg,
+            WorkedGrip {
+                pelvis_height_m: Some(0.64),
+                close_rad: [0.0, -0.9, -1.74, 1.0, 1.0, 1.0, 1.0],
+                stand_behind_m: Some(0.38),
+                ..grip(
+                    "an upright leg of 28 mm, from outside, 5 cm under what stands on it",
+                    "its axis",
+                    AHEAD,
+                    [0.1, 0.032, 0.0],
+                    vec![[0.0, 0.09, 0.025], [0.0, 0.0, 0.025]],
+                    1.0,
+                )
+            },
+        ),
+        (
+            GripKind::Rim,
+            WorkedGrip {
+                close_rad: [0.0, -0.95, -0.6, 1.57, 0.6, 1.57, 0.6],
+                ..grip(
+                    "a rim of 24 mm, from above, fingers inside",
+                    "its axis",
+                    PALMS_DOWN,
+                    [0.095, 0.031, 0.0],
+                    vec![[0.0, 0.09, 0.0]],
+                    1.0,
+                )
+            },
+        ),
+        (
+            GripKind::WallRim,
+            WorkedGrip {
+                close_rad: [0.0, -1.04, -1.74, 0.3, 0.3, 0.3, 0.3],
+                stand_behind_m: Some(0.38),
+                ..grip(
+                    "the rim of an upright wall, as of a tall bin: palm on its outside, thumb over the rim",
+                    "the outer edge",
+                    FINGERS_DOWN,
+                    [0.09, 0.017, 0.0],
+                    vec![[0.16, 0.05, 0.0], [0.0, 0.05, 0.0]],
+                    1.0,
+                )
+            },
+        ),
     ]
 }
 

@@ -22,6 +22,7 @@ pub(super) fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) 
         seed: Some(seed),
         protocol: Protocol::Benchmark,
         phases: PhaseTimes(phases),
+        success: None,
         ended: EndReason::Finished,
         env_steps: 812,
         tool_calls: 61,

@@ -143,6 +143,7 @@ fn result() -> ResultReply {
         seed: Some(7),
         protocol: Protocol::Agentic,
         phases: PhaseTimes(vec![("p1".into(), Some(0.2))]),
+        success: None,
         ended: EndReason::Finished,
         env_steps: STEPS,
         tool_calls: 2,

@@ -241,6 +241,7 @@ mod tests {
                 ("p2".into(), Some(9.86)),
                 ("p3".into(), p3_s),
             ]),
+            success: None,
             ended: EndReason::Finished,
             env_steps: 812,
             tool_calls: 61,

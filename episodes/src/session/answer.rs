@@ -186,7 +186,7 @@ impl Session {
             .zip(&clamped)
             .map(|(order, clamped)| {
                 let sensed = &self.present.robots[order.robot].sensed;
-                report(clamped, &began[order.robot], sensed, &self.motions[order.robot], order.action.frame())
+                report(clamped, &began[order.robot], sensed, &self.motions[order.robot])
             })
             .collect();
         Ok(ToolReply::Act(CommandReply {

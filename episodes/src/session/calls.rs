@@ -148,7 +148,12 @@ impl Session {
             Called::One(Call { tool: ToolCall::Plan(plan), .. }) => {
                 ToolReply::Plan(self.plan(record, plan)?).into()
             }
-            _ => self.make(record, &called)?,
+            _ => {
+                if called.continues_plans() {
+                    self.requests = self.requests.map(|requests| requests.saturating_sub(1));
+                }
+                self.make(record, &called)?
+            }
         };
         let mut parts = Vec::with_capacity(callers.len());
         for around in callers {

@@ -61,6 +61,8 @@ pub struct Task {
     pub conditions: Vec<Vec<PhaseCondition>>,
     /// True when the file requires closing hands, whatever its conditions require.
     pub says_needs_fingers: bool,
+    /// Grips that the brief explains; `None` for every one of them.
+    pub grips: Option<Vec<GripKind>>,
     pub origin: TaskOrigin,
     pub source: TaskSource,
     /// Hash of the source, which distinguishes files of the same name in results.
@@ -69,6 +71,19 @@ pub struct Task {
     pub chosen: Vec<ChosenOption>,
     /// The task for each combination of options; unset for a task without choices.
     pub variants: Arc<OnceLock<Vec<&'static Task>>>,
+}
+
+/// A grip that the brief can explain, by the object that it suits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GripKind {
+    Bottle,
+    Bar,
+    Moulding,
+    PlateEdge,
+    Leg,
+    Rim,
+    WallRim,
 }
 
 /// Origin of a task.

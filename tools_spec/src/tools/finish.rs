@@ -58,6 +58,9 @@ pub struct ResultReply {
     pub protocol: Protocol,
     /// Times in simulated seconds at which phases were reached; null where one was not, or is not disclosed.
     pub phases: PhaseTimes,
+    /// True if every phase was reached; left out where phases are not disclosed, and in results of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub success: Option<bool>,
     /// Why the episode ended.
     pub ended: EndReason,
     /// Control steps of 20 ms, the initial hold included.
@@ -117,6 +120,7 @@ impl ResultReply {
         }
         if !disclosure.tells(true) {
             self.phases.0.iter_mut().for_each(|(_, time_s)| *time_s = None);
+            self.success = None;
         }
         self
     }

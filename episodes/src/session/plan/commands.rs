@@ -102,6 +102,12 @@ impl CommandList {
         }
     }
 
+    /// Returns the number of commands that have been begun, however many short ones each is made of.
+    pub fn begun(&self) -> u32 {
+        let begun = self.index + usize::from(self.current.is_some());
+        begun.min(self.steps.len()) as u32
+    }
+
     /// Returns true if the last command asks for a short reply.
     pub fn is_short(&self) -> bool {
         self.steps.get(self.index).or(self.steps.last()).is_some_and(|step| step.short)
@@ -142,7 +148,13 @@ impl CurrentCommand {
         match self {
             CurrentCommand::Whole => CommandProgress::Over(missing()),
             CurrentCommand::Until(mut pieces) => match missing() {
-                None => CommandProgress::Over(None),
+                None if step.expects.arrived != Some(true) || pieces.is_way_done() => {
+                    CommandProgress::Over(None)
+                }
+                None => match pieces.next_piece() {
+                    Some(call) => CommandProgress::Make(call, CurrentCommand::Until(pieces)),
+                    None => CommandProgress::Over(None),
+                },
                 Some(why) => match pieces.next_piece() {
                     Some(call) => CommandProgress::Make(call, CurrentCommand::Until(pieces)),
                     None => CommandProgress::Over(Some(format!("its steps are done and {why}"))),

@@ -72,6 +72,7 @@ impl PlanRun {
             PlanStage::Commands(list) => {
                 let next = list.advance(session, last, self.heard);
                 self.progress.is_short = list.is_short();
+                self.progress.commands = list.begun();
                 next
             }
             PlanStage::Walk(walk) => walk.advance(session, last),
@@ -82,7 +83,10 @@ impl PlanRun {
     /// Processes the reply to the last command. Returns the reason why the plan stops, if the episode has
     /// ended.
     pub fn take(&mut self, reply: CommandReply) -> Option<String> {
-        self.progress.commands += 1;
+        match self.stage {
+            PlanStage::Walk(_) | PlanStage::Carry(_) => self.progress.commands += 1,
+            PlanStage::Commands(_) => {}
+        }
         self.progress.executed_steps += reply.executed_steps;
         let stop = reply.stop_reason;
         self.progress.last = Some(reply);
@@ -100,7 +104,7 @@ impl PlanRun {
 
     /// Returns true while no command has been executed.
     pub fn is_untouched(&self) -> bool {
-        self.progress.commands == 0
+        self.progress.last.is_none()
     }
 
     /// Returns the reply to a plan with at least one executed command.
@@ -140,7 +144,10 @@ impl Session {
         let caller = CallerRecord::Operator(operator.robot());
         let called = Called::Together(vec![operator.clone()]);
         match self.begin_or_refuse(caller, &called, plan) {
-            Ok(run) => Ok(PlanRun { operator: Some(operator.robot().into()), ..run }),
+            Ok(run) => {
+                self.count_request();
+                Ok(PlanRun { operator: Some(operator.robot().into()), ..run })
+            }
             Err(refusal) => {
                 self.write_down(arrival);
                 Err(refusal)

@@ -10,12 +10,16 @@ use crate::session::Session;
 
 /// Control steps of a piece, after each of which the conditions are checked.
 const PIECE_STEPS: u32 = 5;
+/// Control steps for wrists to arrive after their way.
+const ARRIVING_STEPS: u32 = 25;
 
 /// A command in pieces.
 #[derive(Debug)]
 pub struct Pieces {
     steps: u32,
     done: u32,
+    /// Control steps of waiting after the way of the wrists.
+    waited: u32,
     kind: PieceKind,
 }
 
@@ -57,7 +61,7 @@ impl Pieces {
                 );
             }
         };
-        let mut pieces = Pieces { steps: call.steps(), done: 0, kind };
+        let mut pieces = Pieces { steps: call.steps(), done: 0, waited: 0, kind };
         if let Some(first) = pieces.next_piece() {
             Command::read(&first, &session.rules, &session.motions)?;
         }
@@ -68,7 +72,7 @@ impl Pieces {
     pub fn next_piece(&mut self) -> Option<ActCall> {
         let steps = (self.steps - self.done).min(PIECE_STEPS);
         if steps == 0 {
-            return None;
+            return self.wait_to_arrive();
         }
         self.done += steps;
         let share = f64::from(self.done) / f64::from(self.steps);
@@ -80,6 +84,19 @@ impl Pieces {
                 ActCall::MoveWrists(MoveWrists { steps, robots })
             }
         })
+    }
+
+    /// Returns true once wrists have their last targets: until then, one that has arrived is only on its way.
+    pub fn is_way_done(&self) -> bool {
+        self.done == self.steps || !matches!(self.kind, PieceKind::Wrists(_))
+    }
+
+    fn wait_to_arrive(&mut self) -> Option<ActCall> {
+        if self.waited == ARRIVING_STEPS || !matches!(self.kind, PieceKind::Wrists(_)) {
+            return None;
+        }
+        self.waited += PIECE_STEPS;
+        Some(ActCall::Wait(Wait { steps: PIECE_STEPS }))
     }
 }
 

@@ -85,8 +85,10 @@ impl WalkPlan {
             return done;
         }
         if self.left_steps == 0 {
-            let why = format!("the steps are used up; {}", session.how_far(&self.walkers));
-            return PlanAdvance::Done(Some(why));
+            let is_there = |walker: &Walker| session.missing_of(walker).is_within(THERE_M, THERE_RAD);
+            let why = (!self.walkers.iter().all(is_there))
+                .then(|| format!("the steps are used up; {}", session.how_far(&self.walkers)));
+            return PlanAdvance::Done(why);
         }
         let steps = self.left_steps.min(WALK_STEPS);
         let moves: Vec<WalkMove> =

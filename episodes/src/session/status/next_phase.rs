@@ -7,7 +7,8 @@ use crate::conditions::ConditionPart;
 use crate::scoring::{Facts, Phase, PhaseMemory, Predicate};
 use crate::tasks::{PhaseCondition, PhaseSetting, Task};
 
-const KEPT_BACK: &str = "what else it asks for depends on what the seed has chosen, and is not told";
+const KEPT_BACK: &str =
+    "the rest depends on what the seed has chosen for this episode, which only the instructions say";
 
 impl Session {
     /// Returns the next phase and what it lacks. `None` after the last phase, or if phases are not disclosed.
@@ -130,7 +131,7 @@ mod tests {
         assert_eq!(
             placed,
             [
-                "B's right hand is on bottle",
+                "B's right hand is still on bottle",
                 "bottle leans by 17.2 degrees, at most 15.0",
                 "bottle moves at 0.06 m/s, at most 0.05",
                 "bottle is 0.200 m along y from target_pad, at most 0.06",

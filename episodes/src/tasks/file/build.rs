@@ -154,6 +154,7 @@ impl Reading<'_> {
             phases: Vec::leak(phases),
             conditions,
             says_needs_fingers: table.needs_fingers,
+            grips: table.grips,
             origin: TaskOrigin::File,
             source: TaskSource::default(),
             xxh3: String::new(),

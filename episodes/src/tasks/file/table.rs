@@ -6,6 +6,8 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use toml::Spanned;
 
+use crate::tasks::GripKind;
+
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TaskTable {
@@ -23,6 +25,8 @@ pub struct TaskTable {
     /// True for a task that needs closing hands whatever its conditions require.
     #[serde(default)]
     pub needs_fingers: bool,
+    /// Grips that the brief explains; every one of them if it is not given.
+    pub grips: Option<Vec<GripKind>>,
     #[serde(default)]
     pub budget: BudgetTable,
     /// Choices made by the seed; each `{name}` in the file's texts is replaced by an option.

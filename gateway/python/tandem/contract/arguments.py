@@ -118,7 +118,7 @@ class JointChunk:
 
 @dataclass(frozen=True)
 class PixelRegion:
-    """Every so many pixels of a rectangle, beginning at `from`."""
+    """Pixels of a rectangle at a stride, beginning at `from`."""
 
     from_: Numbers
     """Its top left pixel [u, v], as [100, 80]."""

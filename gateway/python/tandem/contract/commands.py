@@ -15,7 +15,7 @@ BaseState: TypeAlias = Literal[
     "settling",
     "pushed",
 ]
-"""Whether a base stands or steps, and why."""
+"""State of a base."""
 
 Grip: TypeAlias = Literal[
     "none",
@@ -23,7 +23,7 @@ Grip: TypeAlias = Literal[
     "one_sided",
     "two_sided",
 ]
-"""What the fingers of a hand feel between them: the torques of their drives while they are stopped short of their
+"""Contact between the fingers of a hand, by the torques of their drives while they are stopped short of their
 targets.
 """
 
@@ -42,7 +42,7 @@ HandState: TypeAlias = Literal[
     "blocked",
     "out_of_reach",
 ]
-"""How a wrist or fingers stand to their target."""
+"""State of a wrist or of fingers against their target."""
 
 PoseFrame: TypeAlias = Literal[
     "pelvis",
@@ -62,12 +62,12 @@ Touch: TypeAlias = Literal[
     "itself",
     "something",
 ]
-"""What a hand touches, as far as it can feel that."""
+"""Contact of a hand, as far as it can feel that."""
 
 
 @dataclass(frozen=True)
 class BaseMotion:
-    """How a pelvis moved during a command, forward and left as the robot faced when the command began."""
+    """Motion of a pelvis during a command, along the robot's heading when it began."""
 
     forward_m: float
     """Forward, in metres."""
@@ -79,7 +79,7 @@ class BaseMotion:
     """Upwards, in metres."""
 
     turned_rad: float
-    """How far it turned, in radians, counter-clockwise seen from above."""
+    """Turn in radians, counter-clockwise from above."""
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> BaseMotion:
@@ -94,30 +94,30 @@ class BaseMotion:
 
 @dataclass(frozen=True)
 class BaseReport:
-    """What a base does, by its own controller and odometry."""
+    """Motion of a base, by its own controller and odometry."""
 
     state: BaseState | None
-    """Whether it stands or steps, and why; left out where its controller does not tell standing from stepping."""
+    """Standing or stepping, and the reason; left out where its controller does not distinguish them."""
 
     pelvis_height_m: float
-    """How high the pelvis is over the floor, in metres: measured, not commanded."""
+    """Measured height of the pelvis over the floor, in metres."""
 
     commanded_height_m: float | None
-    """The height that it was last told, where it is more than 2 cm off that; left out otherwise."""
+    """Commanded height, where the measured one is more than 2 cm off; left out otherwise."""
 
     comes_to_rest_m: tuple[float, float] | None
-    """Where the pelvis will come to rest if no further step is commanded: [x, y] in the start frame, to within 3
-    cm after a walk of up to 2.5 s, and to within 5 cm after a longer one. Only of a base that steps or settles.
+    """Predicted resting place of the pelvis if no further step is commanded, [x, y] in the start frame: to within
+    3 cm after a walk of up to 2.5 s, 5 cm after a longer one. Only of a base that steps or settles.
     """
 
     displaced_m: tuple[float, float] | None
-    """How far a base that was told to stand is from where it came to rest, [forward, left] in metres as it faced
-    there; left out where that is less than 2 cm. Something pulled or pushed it.
+    """Displacement of a base that was commanded to stand from its resting place, [forward, left] in metres as it
+    faced there: something pulled or pushed it. Left out below 2 cm.
     """
 
     stepped: bool | None
-    """True where it took a step during the command though it was told to stand, after arms that reach far or what
-    pulls at them; left out otherwise.
+    """True where it took a step during the command though it was commanded to stand, after arms that reach far or
+    what pulls at them; left out otherwise.
     """
 
     @staticmethod
@@ -135,7 +135,7 @@ class BaseReport:
 
 @dataclass(frozen=True)
 class Budget:
-    """What is left of the episode."""
+    """Remaining budget of an episode."""
 
     steps_left: int
     """Control steps of 20 ms."""
@@ -183,10 +183,10 @@ class CommandReply:
     """
 
     phases: tuple[PhaseReached, ...]
-    """Every phase reached so far, where the episode's assistance tells it."""
+    """Every phase reached up to now, where the episode's assistance discloses it."""
 
     budget: Budget
-    """What is left of the episode."""
+    """Remaining budget of the episode."""
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> CommandReply:
@@ -204,7 +204,7 @@ class CommandReply:
 
 @dataclass(frozen=True)
 class Effort:
-    """How hard a joint works."""
+    """Effort of a joint."""
 
     joint: str
     """The joint, as `right_elbow_joint`."""
@@ -223,12 +223,12 @@ class Effort:
 
 @dataclass(frozen=True)
 class FingerReport:
-    """How the fingers of one hand did. Angles are [thumb_0, thumb_1, thumb_2, middle_0, middle_1, index_0,
-    index_1].
+    """Outcome of a command for the fingers of one hand. Angles are [thumb_0, thumb_1, thumb_2, middle_0, middle_1,
+    index_0, index_1].
     """
 
     state: HandState | None
-    """How they stand to their targets; left out where the assistance is "paper"."""
+    """State against their targets; left out where the assistance is "paper"."""
 
     target_rad: tuple[float, float, float, float, float, float, float] | None
     """Joint angles that were asked for, in radians. Left out of a short reply."""
@@ -248,23 +248,21 @@ class FingerReport:
 
 @dataclass(frozen=True)
 class HandReport:
-    """How one hand did under a command, at its last step."""
+    """Outcome of a command for one hand, at its last step."""
 
     state: HandState | None
-    """How the wrist stands to its target; left out where the assistance is "paper"."""
+    """State of the wrist against its target; left out where the assistance is "paper"."""
 
     grip: Grip | None
-    """What the fingers feel between them, by their own torques; left out where the assistance is "paper"."""
+    """Grip by the fingers' own torques; left out where the assistance is "paper"."""
 
     presses: tuple[HandPart, ...]
-    """What of the hand presses, by the torques of the fingers' own drives; left out where nothing does, and where
+    """Parts of the hand that press, by the torques of the fingers' own drives; left out where none does, and where
     the assistance is "paper".
     """
 
     touches: Touch | None
-    """What stops the hand, as far as it can feel that; left out where it feels nothing, and where the assistance
-    is "paper".
-    """
+    """Obstacle that the hand feels; left out where it feels none, and where the assistance is "paper"."""
 
     target: Pose | None
     """The wrist pose that was asked for, in the pelvis frame as it is now, and not where the hand has given way to
@@ -286,9 +284,9 @@ class HandReport:
     """Angle from target to measured, in radians; left out as the distance is."""
 
     given_way_m: tuple[float, float, float] | None
-    """How far the hand has given way to what pulls it, by the command's compliance: it is to be so far from
-    `target`, [x, y, z] in metres in the pelvis frame, and its state is told against that. Left out where it has
-    not, and where the assistance is "paper".
+    """Yielding of the hand by the command's compliance: offset of the yielded target from `target`, [x, y, z] in
+    metres in the pelvis frame, against which its state is reported. Left out where it has not yielded, and
+    where the assistance is "paper".
     """
 
     fingers: FingerReport | None
@@ -343,7 +341,7 @@ class PhaseReached:
     """A phase of the task, and when it was reached."""
 
     id: str
-    """What the phase is called, as `grasp_and_lift`."""
+    """Name of the phase, for example `grasp_and_lift`."""
 
     number: str
     """`p1`, `p2`, ... in the order they have to be reached."""
@@ -369,7 +367,7 @@ class PlanReply:
     """Commands that were carried out. Each counts as a tool call of the episode."""
 
     tool_calls: int
-    """Tool calls of the episode so far."""
+    """Tool calls of the episode up to now."""
 
     executed_steps: int
     """Control steps of 20 ms that they took together."""
@@ -413,7 +411,7 @@ class Pose:
 
 @dataclass(frozen=True)
 class RobotFallen:
-    """Whether a robot has fallen."""
+    """Fall of a robot."""
 
     robot: str
     """The robot, as "A"."""
@@ -432,7 +430,7 @@ class RobotFallen:
 
 @dataclass(frozen=True)
 class RobotReport:
-    """How one robot did under a command."""
+    """Outcome of a command for one robot."""
 
     robot: str
     """The robot, as "A"."""
@@ -447,17 +445,17 @@ class RobotReport:
     """Its right arm and hand."""
 
     base: BaseReport | None
-    """What its base does; left out where the assistance is "paper"."""
+    """Motion of its base; left out where the assistance is "paper"."""
 
     pelvis_in_start: Pose | None
-    """Where its own IMU and joints have it: the pose of its pelvis in the start frame, which lies on the floor
-    under the pelvis as it was when the episode began, z up, x where the robot faced. Drifts by up to 1 % of the
-    way walked. Left out where the assistance is "paper".
+    """Pose of its pelvis in the start frame by its own IMU and joints. The start frame is on the floor under the
+    pelvis at the start of the episode, z up, x the robot's heading then. Drifts by up to 1 % of the way walked.
+    Left out where the assistance is "paper".
     """
 
     base_motion: BaseMotion | None
-    """How far the command took the base, by the same odometry; left out where the assistance is "paper", and of a
-    short reply where it is less than a centimetre and a hundredth of a radian.
+    """Motion of the base during the command, by the same odometry. Left out where the assistance is "paper", and
+    of a short reply where it is less than a centimetre and a hundredth of a radian.
     """
 
     waist_joints_clamped: tuple[str, ...]

@@ -34,10 +34,10 @@ class DepthReply:
     """
 
     fit: RegionFit | None
-    """What was fitted to the region; left out where that was not asked for."""
+    """Plane, edges and corners of the region; left out where `fit` was not asked for."""
 
     columns: tuple[str, str, str, str, str]
-    """What each column of `points` is: "u", "v", "x_m", "y_m", "z_m"."""
+    """Columns of `points`: "u", "v", "x_m", "y_m", "z_m"."""
 
     points: tuple[tuple[float | None, float | None, float | None, float | None, float | None], ...]
     """One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where nothing is
@@ -71,7 +71,7 @@ class EdgeFit:
     """Root mean square of how far its points are off it, in metres."""
 
     points: int
-    """How many points it was fitted to."""
+    """Number of points that it was fitted to."""
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> EdgeFit:
@@ -98,7 +98,7 @@ class PlaneFit:
     """Root mean square of how far its points are off it, in metres."""
 
     pixels: int
-    """How many pixels of the region see it."""
+    """Number of the region's pixels that see it."""
 
     share: float
     """Their share of those that see anything."""
@@ -117,7 +117,7 @@ class PlaneFit:
 
 @dataclass(frozen=True)
 class RegionFit:
-    """What `fit` found in a region."""
+    """Result of `fit` in a region."""
 
     plane: PlaneFit
     """The largest plane."""
@@ -126,7 +126,7 @@ class RegionFit:
     """Its straight edges, the longest first, up to four. An edge may be where something hides the plane."""
 
     corners_m: tuple[tuple[float, float, float], ...]
-    """Where two of them meet, in metres in the frame of the reply."""
+    """Corners, where two of them meet, in metres in the frame of the reply."""
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> RegionFit:
@@ -146,7 +146,7 @@ class Surface:
     """By what its pixels are joined."""
 
     pixels: int
-    """How many pixels it has."""
+    """Number of its pixels."""
 
     from_: tuple[int, int]
     """Its top left and bottom right in the picture, as [u, v]."""
@@ -161,7 +161,7 @@ class Surface:
     """The middle of its area, in metres in the frame of the reply."""
 
     extent_m: tuple[float, float, float]
-    """How far it reaches along each axis of that frame, in metres."""
+    """Extent along each axis of that frame, in metres."""
 
     corners_m: tuple[tuple[float, float, float], ...]
     """The four points of its outline that span the most of it in the picture, in the order of its outline: of a
@@ -172,7 +172,7 @@ class Surface:
     """Its axis, where it is upright and round; left out otherwise."""
 
     cut_off: bool
-    """Whether it goes on beyond the picture."""
+    """True if it goes on beyond the image."""
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> Surface:

@@ -15,14 +15,14 @@ Assistance: TypeAlias = Literal[
     "paper",
     "full",
 ]
-"""How much a policy is told."""
+"""Amount of information that a policy gets."""
 
 Disclosure: TypeAlias = Literal[
     "live",
     "end",
     "never",
 ]
-"""What replies tell about phases, and whether success ends an episode."""
+"""Disclosure of phases in replies, and whether success ends an episode."""
 
 EndReason: TypeAlias = Literal[
     "task_complete",
@@ -121,10 +121,10 @@ class CameraCalibration:
 
 @dataclass(frozen=True)
 class HandReach:
-    """How near one wrist comes to a pose."""
+    """Nearest approach of one wrist to a pose."""
 
     reachable: bool
-    """Whether it comes within the tolerance of 5 mm and 0.05 rad."""
+    """True if it comes within 5 mm and 0.05 rad."""
 
     position_error_m: float
     """Distance left, in metres."""
@@ -147,13 +147,13 @@ class NextPhase:
     """The phase to reach next."""
 
     id: str
-    """What the phase is called, for example `place`."""
+    """Name of the phase, for example `place`."""
 
     number: str
     """`p1`, `p2`, ... in the order they have to be reached."""
 
     lacks: tuple[str, ...]
-    """What does not hold yet, one sentence each. Empty where the next control step reaches the phase."""
+    """Conditions that do not hold yet, one sentence each. Empty where the next control step reaches the phase."""
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> NextPhase:
@@ -173,17 +173,17 @@ class ReachReply:
     """The robot that was asked about."""
 
     reachable: bool
-    """Whether every wrist that was given a pose reaches it, both at once if both were."""
+    """True if every wrist that was given a pose reaches it, both at once if both were."""
 
     left: HandReach | None
-    """How near the left wrist comes; null if it was given no pose."""
+    """Nearest approach of the left wrist; null if it was given no pose."""
 
     right: HandReach | None
-    """How near the right wrist comes; null if it was given no pose."""
+    """Nearest approach of the right wrist; null if it was given no pose."""
 
     needs_a_step: bool | None
-    """Whether the robot would most likely take a step to keep its balance, as arms ahead of it weigh: walk nearer
-    instead. Left out where it would not, and where the assistance is "paper".
+    """True if the robot would most likely step to keep its balance under arms so far ahead: walk nearer instead.
+    Left out where it would not, and where the assistance is "paper".
     """
 
     joints_at_limit: tuple[str, ...]
@@ -242,16 +242,16 @@ class RobotState:
     """
 
     pelvis_in_start: Pose | None
-    """Where its own IMU and joints have it: the pose of its pelvis in the start frame, which lies on the floor
-    under the pelvis as it was when the episode began, z up, x where the robot faced. Drifts by up to 1 % of the
-    way walked. Left out where the assistance is "paper".
+    """Pose of its pelvis in the start frame by its own IMU and joints. The start frame is on the floor under the
+    pelvis at the start of the episode, z up, x the robot's heading then. Drifts by up to 1 % of the way walked.
+    Left out where the assistance is "paper".
     """
 
     base_command: BaseCommand
-    """What locomotion is doing."""
+    """Base command in force."""
 
     fallen: bool | None
-    """Whether the robot has fallen; left out where the assistance is "paper"."""
+    """True if the robot has fallen; left out where the assistance is "paper"."""
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> RobotState:
@@ -289,7 +289,7 @@ class StatusReply:
     """Simulated seconds since the episode began."""
 
     env_steps: int
-    """Control steps of 20 ms executed so far, the initial hold included."""
+    """Control steps of 20 ms executed up to now, the initial hold included."""
 
     ended: EndReason | None
     """Why the episode has ended; null while it goes on."""
@@ -298,23 +298,23 @@ class StatusReply:
     """Every robot of the episode; left out where the assistance is "paper"."""
 
     assistance: Assistance
-    """How much is told. Where it is "paper", phases are told once the episode has ended, which it does not do by
-    itself on success: call finish. Where it is "full", the last phase ends the episode.
+    """Amount of information. With "paper", phases are disclosed once the episode has ended, which success does not
+    do by itself: call finish. With "full", the last phase ends the episode.
     """
 
     disclosure: Disclosure | None
-    """What is told of the phases, where that is not as the assistance has it; left out otherwise."""
+    """Disclosure of phases, where it is not the assistance's; left out otherwise."""
 
     phases: tuple[PhaseReached, ...]
-    """Every phase reached so far, where the assistance tells it."""
+    """Every phase reached up to now, where the assistance discloses it."""
 
     next_phase: NextPhase | None
     """The phase to reach next, and what it lacks; left out where the call did not ask for it, and where phases are
-    not told.
+    not disclosed.
     """
 
     budget: Budget
-    """What is left of the episode."""
+    """Remaining budget of the episode."""
 
     state_hash: str | None
     """Hash of the whole physical state, 16 hexadecimal digits. Equal hashes mean equal states. Left out where the

@@ -24,18 +24,18 @@ AgentEnding: TypeAlias = Literal[
     "context",
     "endpoint",
 ]
-"""How the play of a language model ended."""
+"""End of a language model's play."""
 
 
 @dataclass(frozen=True)
 class ModelEnding:
-    """How a model's play ended, and its own words for it."""
+    """End of a model's play, in its own words, too."""
 
     robot: str | None
     """The robot that it directed; left out where it directed all."""
 
     ending: AgentEnding
-    """How it ended."""
+    """The end."""
 
     text: str
     """The words of the model or of its endpoint, as of a refusal; empty where there are none."""
@@ -58,13 +58,18 @@ class ResultReply:
     """The task's id."""
 
     seed: int | None
-    """The seed; left out where it is told to a policy whose assistance is "paper"."""
+    """The seed; left out for a policy whose assistance is "paper"."""
 
     protocol: Protocol
     """The rules that were in force."""
 
     phases: dict[str, float | None]
-    """When each phase was reached, in simulated seconds; null where it was not, or is not told."""
+    """Times in simulated seconds at which phases were reached; null where one was not, or is not disclosed."""
+
+    success: bool | None
+    """True if every phase was reached; left out where phases are not disclosed, and in results of earlier
+    versions.
+    """
 
     ended: EndReason
     """Why the episode ended."""
@@ -76,8 +81,8 @@ class ResultReply:
     """Calls of tools up to the end, reads, refused calls and the one that ended the episode included."""
 
     requests: int | None
-    """As tool_calls, but with one for a plan or a walk, whose commands are a call each: what the policy asked for
-    itself. Left out in results of earlier versions.
+    """Requests of the policy itself: like tool_calls, but a plan or a walk, whose commands are a call each, counts
+    once. Left out in results of earlier versions.
     """
 
     thinking_s: float | None
@@ -90,23 +95,23 @@ class ResultReply:
     """Simulated seconds per second that the physics took."""
 
     state_hash: str | None
-    """Hash of the whole physical state at the end, 16 hexadecimal digits; left out where it is told to a policy
-    whose assistance is "paper".
+    """Hash of the whole physical state at the end, 16 hexadecimal digits; left out for a policy whose assistance
+    is "paper".
     """
 
     simulator_failure: str | None
-    """How the simulator failed: in which step, at which body, and what came out; left out where it did not."""
+    """Failure of the simulator: its step, body and error; left out where it did not fail."""
 
     assistance: Assistance | None
-    """How much the policy was told."""
+    """Amount of information that the policy got."""
 
     extra_information: tuple[str, ...]
-    """What the policy was shown beyond what the benchmark's own policies see, as "depth_images"; left out where it
-    was nothing.
+    """Information that the policy got beyond the benchmark's own policies, for example "depth_images"; left out
+    where it was none.
     """
 
     extra_information_replies: dict[str, dict[str, int]]
-    """How many replies showed it, by what it was, then by the robot that it was of; left out where it was nothing."""
+    """Number of replies with each of it, by its name and by the robot it was of; left out where it was none."""
 
     joints_clamped_share: float | None
     """Share of the joint targets that lay beyond the joints' limits by more than 0.01 rad, and were moved there;
@@ -114,13 +119,13 @@ class ResultReply:
     """
 
     departures: tuple[str, ...]
-    """What was not as the benchmark has it, as "assistance: full"; left out where it was nothing."""
+    """Departures from the benchmark, for example "assistance: full"; left out where there was none."""
 
     recording_failed: str | None
     """Why the recording is not complete; left out where it is."""
 
     usage: Usage | None
-    """What notes on the episode say that was used; left out where there are none."""
+    """Usage that notes on the episode report; left out where there are none."""
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> ResultReply:
@@ -130,6 +135,7 @@ class ResultReply:
             seed=value.get("seed"),
             protocol=value["protocol"],
             phases=value["phases"],
+            success=value.get("success"),
             ended=value["ended"],
             env_steps=value["env_steps"],
             tool_calls=value["tool_calls"],
@@ -151,10 +157,10 @@ class ResultReply:
 
 @dataclass(frozen=True)
 class Usage:
-    """What all notes of an episode say that was used, added up."""
+    """Sum of the usage in all notes of an episode."""
 
     notes: int
-    """How many notes there are."""
+    """Number of notes."""
 
     input_tokens: int
     """Tokens that models read, those from a cache included."""
@@ -163,19 +169,19 @@ class Usage:
     """Tokens that models wrote."""
 
     cached_tokens: int
-    """Of those that they read, how many came from a cache."""
+    """Number of read tokens that came from a cache."""
 
     usd: float | None
-    """What it cost in US dollars; left out where no note says it."""
+    """Cost in US dollars; left out where no note has it."""
 
     model_s: float | None
-    """How long models took, in seconds; left out where no note says it."""
+    """Seconds that models took; left out where no note has them."""
 
     models: tuple[str, ...]
     """The models that notes name."""
 
     endings: tuple[ModelEnding, ...]
-    """How the play of the models ended: one for all robots, or one for each that has said so."""
+    """Ends of the models' play: one for all robots, or one for each that has reported it."""
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> Usage:

@@ -41,16 +41,19 @@ class BaseLimits:
 
 @dataclass(frozen=True)
 class Brief:
-    """What has to be known of the robots to see and to act, in words."""
+    """Facts about the robots for seeing and acting, in words."""
 
     frames: str
     """The frames that poses are given in."""
 
     partners: str
-    """How the frames of different robots are related."""
+    """Relation of the frames of different robots."""
+
+    teamwork: str | None
+    """Playing with partners, for an operator; left out where one policy directs all robots."""
 
     odometry: str | None
-    """What is known of a robot's own way; left out where the assistance is "paper"."""
+    """Odometry of a robot; left out where the assistance is "paper"."""
 
     camera: str
     """The camera's convention, and what moves it."""
@@ -59,10 +62,10 @@ class Brief:
     """The shape of a hand."""
 
     walking: str | None
-    """How walking goes, as measured, and what replies say of the base; left out where the assistance is "paper"."""
+    """Walking as measured, and the base's states in replies; left out where the assistance is "paper"."""
 
     grasping: str | None
-    """How to grasp; left out where the server gives no hints."""
+    """Grasping; left out where the server gives no hints."""
 
     grips: tuple[WorkedGrip, ...]
     """Grips that work, as `grasping` says how to use them; left out where the server gives no hints."""
@@ -73,6 +76,7 @@ class Brief:
         return Brief(
             frames=value["frames"],
             partners=value["partners"],
+            teamwork=value.get("teamwork"),
             odometry=value.get("odometry"),
             camera=value["camera"],
             hands=value["hands"],
@@ -84,18 +88,18 @@ class Brief:
 
 @dataclass(frozen=True)
 class Briefing:
-    """What a policy is told when an episode begins."""
+    """Briefing of a policy at the start of an episode."""
 
     instruction: str
-    """What has to be done."""
+    """Instruction for all robots."""
 
     shared_instruction: str | None
-    """What those who direct one robot each read in place of `instruction`, where that tells what not all of them
-    may know; left out where they may read it.
+    """Instruction for those who direct one robot each, where `instruction` says more than all of them may know;
+    left out otherwise.
     """
 
     instructions: tuple[Instruction, ...]
-    """What each robot has to do."""
+    """Instruction for each robot."""
 
     robots: tuple[RobotInfo, ...]
     """The robots."""
@@ -109,19 +113,19 @@ class Briefing:
     """
 
     ending: str
-    """How the episode ends, and when phases are told."""
+    """Ways in which the episode ends, and disclosure of phases."""
 
     kinds: tuple[RobotKind, ...]
-    """What can be asked of robots of each kind."""
+    """Commands and joints of each kind of robot."""
 
     brief: Brief
-    """What has to be known to see and to act."""
+    """Facts for seeing and acting."""
 
     action_row: tuple[str, ...]
     """The columns of a row of send_joint_chunk; left out of a short reply."""
 
     status: StatusReply
-    """Where the episode stands after the initial hold."""
+    """Status of the episode after the initial hold."""
 
     recording_failed: str | None
     """Why the recording is not complete; left out where it is."""
@@ -147,7 +151,7 @@ class Briefing:
 
 @dataclass(frozen=True)
 class Instruction:
-    """What one robot has to do."""
+    """Instruction of one robot."""
 
     robot: str
     """The robot, as "A"."""
@@ -196,7 +200,7 @@ class PhaseInfo:
     """One phase of a task."""
 
     id: str
-    """What the phase is called, as `transfer`."""
+    """Name of the phase, for example `transfer`."""
 
     number: str
     """`p1`, `p2`, ..."""
@@ -205,7 +209,7 @@ class PhaseInfo:
     """When the phase counts as reached."""
 
     collaborative: bool
-    """Whether more than one robot has to work on it."""
+    """True if more than one robot has to work on it."""
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> PhaseInfo:
@@ -223,7 +227,7 @@ class ProtocolInfo:
     """The budgets of one protocol."""
 
     protocol: Protocol
-    """Which protocol."""
+    """The protocol."""
 
     steps_per_command: int
     """The most control steps of 20 ms that one command may ask for."""
@@ -284,7 +288,7 @@ class RobotInfo:
     """The robot, as "A"."""
 
     kind: str
-    """Which of `kinds` it is."""
+    """Its kind, one of `kinds`."""
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> RobotInfo:
@@ -300,7 +304,7 @@ class RobotKind:
     """A kind of robot: its joints in published order, and what its locomotion accepts."""
 
     kind: str
-    """What `robots` call it."""
+    """Name in `robots`."""
 
     joints: tuple[JointInfo, ...]
     """Its joints; left out of a short reply."""
@@ -335,16 +339,16 @@ class TaskInfo:
     """One task."""
 
     id: str
-    """What start_episode calls it, as `handover`."""
+    """Id for start_episode, for example `handover`."""
 
     suite: str | None
     """The suite that it belongs to, as `tandem+`; left out of the benchmark's tasks and of those of files."""
 
     instruction: str
-    """What has to be done, for whoever directs all robots."""
+    """Instruction for a policy of all robots."""
 
     robots: tuple[Instruction, ...]
-    """What each robot has to do, for policies that direct one; left out of a short reply."""
+    """Instruction for each robot, for policies that direct one; left out of a short reply."""
 
     phases: tuple[PhaseInfo, ...]
     """The phases, in the order they have to be reached; left out of a short reply, and where the assistance is
@@ -391,22 +395,22 @@ class WorkedGrip:
     """A grip that works, of a right hand whose robot faces the thing squarely."""
 
     thing: str
-    """What it is for."""
+    """Things that it suits."""
 
     place: str
-    """Which point of the thing `place_m` is."""
+    """Point of the thing that `place_m` is."""
 
     right_quaternion_wxyz: tuple[float, float, float, float]
-    """How the right wrist is turned, in the level frame."""
+    """Orientation of the right wrist, in the level frame."""
 
     left_quaternion_wxyz: tuple[float, float, float, float]
-    """How the left wrist is."""
+    """Orientation of the left wrist."""
 
     place_m: tuple[float, float, float]
-    """Where the place lies in the right wrist's frame while the hand holds it; negate y for a left hand."""
+    """Place of that point in the right wrist's frame while the hand holds it; negate y for a left hand."""
 
     stops_m: tuple[tuple[float, float, float], ...]
-    """Where the hand stops on its way in, the farthest first: so much is added to `place_m` there."""
+    """Stops of the hand on its way in, the farthest first: offsets from `place_m`."""
 
     open_rad: tuple[float, float, float, float, float, float, float]
     """Finger angles of a right hand on its way in and out, as right_fingers_rad; a left one negates all but the
@@ -417,10 +421,10 @@ class WorkedGrip:
     """Finger angles of a right hand that holds."""
 
     stand_behind_m: float | None
-    """How far behind the places of its hands the pelvis stands; left out where that does not matter."""
+    """Distance of the pelvis behind the places of its hands; left out where that does not matter."""
 
     pelvis_height_m: float | None
-    """How low the pelvis is commanded, so that hands come there; left out where the robot stands upright."""
+    """Pelvis height at which hands come there; left out where the robot stands upright."""
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> WorkedGrip:

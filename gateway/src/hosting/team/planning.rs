@@ -97,7 +97,7 @@ impl Team {
         call: ActCall,
         under_way: &mut PlanUnderWay,
     ) -> Result<tandem_tools_spec::CommandReply, HostingError> {
-        let command = OperatorCall::new(robot, Call::from(ToolCall::Act(call)))?;
+        let command = OperatorCall::new(robot, Call::from(ToolCall::Act(call)))?.planned();
         let Answer { reply, mut heard, partners, .. } = self.clone().act_on(episode, seat, command).await?;
         under_way.heard.append(&mut heard);
         under_way.partners = partners;

@@ -130,9 +130,8 @@ impl ServerHandler for McpServer {
         context: RequestContext<RoleServer>,
     ) -> Result<GetPromptResponse, ErrorData> {
         let arguments = request.arguments.unwrap_or_default();
-        let list = self.app.table.task_list();
         let caller = caller_of(&context).unwrap_or(&Caller::Host);
-        Ok(prompt::prompt(&request.name, arguments, list, self.app.settings.wording(), caller)?.into())
+        Ok(prompt::prompt(&request.name, arguments, &self.app, caller)?.into())
     }
 
     async fn list_resources(

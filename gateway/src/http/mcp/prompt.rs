@@ -6,11 +6,9 @@ use rmcp::{
     model::{GetPromptResult, JsonObject, Prompt, PromptArgument, PromptMessage, Role},
 };
 use tandem_episodes::{brief, tasks::TaskSet};
-use tandem_tools_spec::{
-    Brief, Protocol, ProtocolInfo, StartEpisode, TaskInfo, TaskList, Wording, parse_args,
-};
+use tandem_tools_spec::{Brief, Protocol, ProtocolInfo, StartEpisode, TaskInfo, parse_args};
 
-use crate::hosting::Caller;
+use crate::{hosting::Caller, http::app::AppState};
 
 /// Name of the only prompt.
 const NAME: &str = "play_task";
@@ -36,11 +34,11 @@ pub fn prompts(tasks: &TaskSet) -> Vec<Prompt> {
 pub fn prompt(
     name: &str,
     arguments: JsonObject,
-    list: TaskList,
-    wording: Wording,
+    app: &AppState,
     caller: &Caller,
 ) -> Result<GetPromptResult, ErrorData> {
     let refused = |text: String| ErrorData::invalid_params(text, None);
+    let (list, tasks) = (app.table.task_list(), &app.settings.tasks);
     if name != NAME {
         return Err(refused(format!("no prompt {name:?}; have: {NAME}")));
     }
@@ -50,7 +48,9 @@ pub fn prompt(
         let have: Vec<&str> = list.tasks.iter().map(|info| info.id.as_str()).collect();
         refused(format!("no task {:?}; have: {}", start.task, have.join(", ")))
     })?;
-    let text = text(info, &start, &brief(wording, &list.base_limits), caller);
+    let grips = tasks.find(&start.task).ok().and_then(|task| task.grips.as_deref());
+    let brief = brief(app.settings.wording(), &list.base_limits, grips);
+    let text = text(info, &start, &brief, caller);
     let mut result = GetPromptResult::new(vec![PromptMessage::new_text(Role::User, text)]);
     result.description = Some(info.instruction.clone());
     Ok(result)

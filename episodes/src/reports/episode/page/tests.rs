@@ -22,6 +22,7 @@ fn result(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> ResultReply {
         seed: Some(4),
         protocol,
         phases: PhaseTimes(phases.collect()),
+        success: None,
         ended: EndReason::Finished,
         env_steps: 500,
         tool_calls: 3,

@@ -117,7 +117,7 @@ mod tests {
             ..Hold::BAR
         };
         let holds = [Hold::BAR, moulding, Hold::EDGE, Hold::LEG, Hold::RIM, Hold::WALL];
-        let told = grips();
+        let told = grips(None);
         assert_eq!(told.len(), holds.len() + 1, "and one of upright round things");
         for (hold, told) in holds.iter().zip(&told[1..]) {
             let near = |what: &str, told: &[f64], is: &[f32]| {
