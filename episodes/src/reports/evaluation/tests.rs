@@ -26,6 +26,7 @@ pub fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Pl
             seed: Some(seed),
             protocol: Protocol::Benchmark,
             phases: PhaseTimes(times.collect()),
+            success: None,
             ended,
             env_steps: 500 + seed,
             tool_calls: 60,
