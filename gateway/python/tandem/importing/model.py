@@ -1,0 +1,76 @@
+"""A model that MuJoCo has compiled, written as plain MJCF."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+from .assets import write_assets
+from .bodies import write_bodies
+from .constraints import write_actuators, write_contacts, write_equalities
+from .engine import mujoco
+from .files import numbers
+from .names import Names
+from .report import Report
+from .trial import compared
+
+FLAGS = {"contact": mujoco.mjtDisableBit.mjDSBL_CONTACT, "gravity": mujoco.mjtDisableBit.mjDSBL_GRAVITY}
+
+
+def import_model(source: Path, out: Path) -> Report:
+    """Writes `scene.xml` of an MJCF or URDF file."""
+    model = mujoco.MjModel.from_xml_path(str(source))
+    written = out / "scene.xml"
+    report = Report(str(source), str(written))
+    names = Names(model)
+    parts = [
+        "<mujoco>",
+        '<compiler angle="radian" meshdir="meshes" texturedir="textures"/>',
+        options(model, report),
+        custom(source.read_text(errors="replace")),
+        *write_assets(model, names, out, report),
+        *write_bodies(model, names, report),
+        *write_contacts(model, names, report),
+        *write_equalities(model, names, report),
+        *write_actuators(model, names, report),
+        "</mujoco>",
+    ]
+    written.write_text("\n".join(part for part in parts if part) + "\n")
+    rest(model, report)
+    report.after_1_s = compared(model, mujoco.MjModel.from_xml_path(str(written)), names)
+    return report
+
+
+def options(model: Any, report: Report) -> str:
+    off = [name for name, bit in FLAGS.items() if model.opt.disableflags & bit]
+    others = int(model.opt.disableflags) & ~sum(int(bit) for bit in FLAGS.values())
+    if others & int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT):
+        report.drop('<flag constraint="disable">')
+    for what in ("density", "viscosity"):
+        if getattr(model.opt, what):
+            report.drop(f"{what} of a medium")
+    flags = "".join(f' {name}="disable"' for name in off)
+    flag = f"<flag{flags}/>" if flags else ""
+    return f'<option gravity="{numbers(model.opt.gravity)}">{flag}</option>'
+
+
+def custom(text: str) -> str:
+    """What is drawn by robosuite's convention, which compiling loses: groups 1 and 2."""
+    by_group = re.search(r'inertiagrouprange\s*=\s*"\s*0\s+0\s*"', text) and re.search(r'group\s*=\s*"1"', text)
+    return '<custom><numeric name="drawn_groups" data="1 2"/></custom>' if by_group else ""
+
+
+def rest(model: Any, report: Report) -> None:
+    """What of a model has no place in what is written."""
+    for what, times in [
+        ("<tendon>", model.ntendon),
+        ("<flex>", model.nflex),
+        ("<skin>", model.nskin),
+        ("<sensor>", model.nsensor),
+        ("<key>", model.nkey),
+        ("<light>", model.nlight),
+        ("plugin", model.nplugin),
+    ]:
+        if times:
+            report.drop(what, int(times))
