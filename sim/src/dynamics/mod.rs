@@ -21,7 +21,7 @@ mod tests;
 mod trees;
 
 pub use contacts::ContactPoint;
-pub use contacts::collider::{Collider, ColliderId};
+pub use contacts::collider::{Collider, ColliderId, Mask};
 pub use contacts::friction::{Directions, Friction};
 pub use energy_balance::{EnergyBalance, EnergyBefore};
 pub use joints::equality::{Equality, EqualityId};
@@ -81,6 +81,11 @@ impl Dynamics {
         self.collision.keep_apart(a, b);
     }
 
+    /// Lets these colliders never touch from now on. It has to be called before the first step.
+    pub fn keep_colliders_apart(&mut self, a: ColliderId, b: ColliderId) {
+        self.collision.keep_colliders_apart(a, b);
+    }
+
     pub fn add_equality(&mut self, equality: Equality, active: bool) -> EqualityId {
         self.solver.equalities.push(equality, active)
     }
@@ -105,6 +110,12 @@ impl Dynamics {
 
     pub fn collider(&self, id: ColliderId) -> &Collider {
         self.collision.collider(id)
+    }
+
+    /// All colliders that a link carries.
+    pub fn colliders_on(&self, link: LinkId) -> Vec<ColliderId> {
+        let numbered = self.collision.colliders().zip(0..);
+        numbered.filter(|(collider, _)| collider.on == Some(link)).map(|(_, id)| ColliderId(id)).collect()
     }
 
     /// Leaves colliders of this tag only a share of their friction; see [`Friction::left`].

@@ -14,7 +14,7 @@ const MAX_NESTING: usize = 200;
 const ROTATIONS: [&str; 6] = ["quat", "axisangle", "euler", "xyaxes", "zaxis", "fullinertia"];
 
 /// What is known of a file whose elements were all accepted.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Checked {
     /// What is not quite as in MuJoCo, each with the first line that has it.
     pub approximated: Vec<String>,
@@ -23,7 +23,7 @@ pub(super) struct Checked {
 }
 
 /// Where a body and what is on it stand in the text.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct BodyBytes {
     pub body: usize,
     pub joints: Vec<usize>,
@@ -41,21 +41,24 @@ pub(super) fn check(source: &MjcfText) -> Result<Checked, SimError> {
     let mut check = Check {
         source,
         names: BTreeMap::new(),
-        classes: BTreeMap::from([("main".into(), Class::default())]),
+        classes: BTreeSet::from(["main".into()]),
         approximated: BTreeSet::new(),
+        refused: Vec::new(),
         found: Checked { bodies: vec![BodyBytes::default()], ..Checked::default() },
     };
-    check.collect_names(&root)?;
+    check.collect_names(&root);
     for default in root.children().filter(|node| node.has_tag_name("default")) {
-        check.collect_class(&default, None)?;
+        check.collect_class(&default, None);
     }
-    check.check_shared_defaults(&root)?;
-    check_angles(source, &root)?;
+    check.check_angles(&root);
     if let Some(mujoco) = support::element("", "mujoco") {
-        check.attributes(&root, mujoco, None)?;
+        check.attributes(&root, mujoco);
     }
-    check.children(&root, 0, None)?;
-    Ok(check.found)
+    check.children(&root, 0);
+    match SimError::of_all(check.refused) {
+        None => Ok(check.found),
+        Some(error) => Err(error),
+    }
 }
 
 fn is_default(node: &Node) -> bool {
@@ -75,38 +78,35 @@ fn check_depth(source: &MjcfText, xml: &roxmltree::Document) -> Result<(), SimEr
     Ok(())
 }
 
-/// Angles in a class are read with the settings that stand before it; in MuJoCo all settings come first.
-fn check_angles(source: &MjcfText, root: &Node) -> Result<(), SimError> {
-    let has_angles = |node: Node| node.has_attribute("euler") || node.has_attribute("axisangle");
-    let mut sections =
-        root.children().skip_while(|one| !one.descendants().any(has_angles) || !is_default(one));
-    match sections.find(|one| one.has_tag_name("compiler")) {
-        Some(compiler) => Err(source.refuse(&compiler, "a <default> before it has angles; put it first")),
-        None => Ok(()),
-    }
-}
-
-/// What a default class states of its own.
-#[derive(Default)]
-struct Class {
-    parent: Option<String>,
-    /// How many words it states, by element and attribute.
-    words: BTreeMap<(String, String), usize>,
-}
-
 struct Check<'a> {
     source: &'a MjcfText,
     /// The names in use, by kind of element.
     names: BTreeMap<&'static str, BTreeSet<String>>,
-    classes: BTreeMap<String, Class>,
+    classes: BTreeSet<String>,
     /// Elements and attributes that have been told of.
     approximated: BTreeSet<(String, String)>,
+    /// All that makes the file one that is not read.
+    refused: Vec<SimError>,
     found: Checked,
 }
 
 impl Check<'_> {
+    fn refuse(&mut self, node: &Node, what: impl AsRef<str>) {
+        self.refused.push(self.source.refuse(node, what));
+    }
+
+    /// Angles in a class are read with the settings that stand before it; in MuJoCo all settings come first.
+    fn check_angles(&mut self, root: &Node) {
+        let has_angles = |node: Node| node.has_attribute("euler") || node.has_attribute("axisangle");
+        let mut sections =
+            root.children().skip_while(|one| !one.descendants().any(has_angles) || !is_default(one));
+        if let Some(compiler) = sections.find(|one| one.has_tag_name("compiler")) {
+            self.refuse(&compiler, "a <default> before it has angles; put it first");
+        }
+    }
+
     /// Names are unique among elements of a kind.
-    fn collect_names(&mut self, root: &Node) -> Result<(), SimError> {
+    fn collect_names(&mut self, root: &Node) {
         for node in root.descendants().filter(Node::is_element) {
             let within = node.parent_element().map_or("", |parent| parent.tag_name().name());
             let kind = support::element(within, node.tag_name().name()).and_then(|element| element.kind);
@@ -116,79 +116,49 @@ impl Check<'_> {
                 continue;
             };
             if !self.names.entry(kind).or_default().insert(name.into()) || (kind, name) == ("body", "world") {
-                let what = format!("there is a {kind} `{name}` already; name it otherwise");
-                return Err(self.source.refuse(&node, what));
+                self.refuse(&node, format!("there is a {kind} `{name}` already; name it otherwise"));
             }
         }
-        Ok(())
     }
 
-    fn collect_class(&mut self, node: &Node, parent: Option<&str>) -> Result<(), SimError> {
+    fn collect_class(&mut self, node: &Node, parent: Option<&str>) {
         let name = match (node.attribute("class"), parent) {
             (Some("main") | None, None) => "main",
+            (Some(name), Some(_)) if !self.classes.contains(name) => name,
             (Some(_), None) => {
-                return Err(self.source.refuse(node, "the outermost class is called main; put this into it"));
+                return self.refuse(node, "the outermost class is called main; put this into it");
             }
-            (Some(name), Some(_)) if !self.classes.contains_key(name) => name,
-            (Some(_), Some(_)) => {
-                return Err(self.source.refuse(node, "there is a class of this name already"));
-            }
-            (None, Some(_)) => return Err(self.source.refuse(node, "a class inside another needs a name")),
+            (Some(_), Some(_)) => return self.refuse(node, "there is a class of this name already"),
+            (None, Some(_)) => return self.refuse(node, "a class inside another needs a name"),
         };
-        let class = self.classes.entry(name.into()).or_default();
-        class.parent = parent.map(String::from);
-        for child in node.children().filter(|child| child.is_element() && !is_default(child)) {
-            for attribute in child.attributes() {
-                let key = (child.tag_name().name().into(), attribute.name().into());
-                class.words.insert(key, attribute.value().split_whitespace().count());
-            }
-        }
+        self.classes.insert(name.into());
         for child in node.children().filter(is_default) {
-            self.collect_class(&child, Some(name))?;
+            self.collect_class(&child, Some(name));
         }
-        Ok(())
     }
 
-    /// In MuJoCo all actuators have one set of defaults, here each kind has its own.
-    fn check_shared_defaults(&self, root: &Node) -> Result<(), SimError> {
-        let of = |tag: &str, within: &str| {
-            let within =
-                |node: &Node| node.parent_element().is_some_and(|parent| parent.has_tag_name(within));
-            root.descendants().find(|node| node.has_tag_name(tag) && within(node))
-        };
-        for (one, other) in [("motor", "position"), ("position", "motor")] {
-            if let (Some(node), Some(_)) = (of(one, "default"), of(other, "actuator")) {
-                let what = format!("it would count for every <{other}> too; state it on each actuator");
-                return Err(self.source.refuse(&node, what));
-            }
-        }
-        Ok(())
-    }
-
-    /// Checks what an element holds. `body` is the one in which it stands, `class` that of its elements by default.
-    fn children(&mut self, node: &Node, body: usize, class: Option<&str>) -> Result<(), SimError> {
+    /// Checks what an element holds. `body` is the one in which it stands.
+    fn children(&mut self, node: &Node, body: usize) {
         let within = node.tag_name().name();
         for child in node.children().filter(Node::is_element) {
             let name = child.tag_name().name();
             let Some(element) = support::element(within, name) else {
                 let have = support::names_within(within).join(", ");
-                let what = format!("no element that is read; in a <{within}> may stand: {have}");
-                return Err(self.source.refuse(&child, what));
+                self.refuse(&child, format!("no element that is read; in a <{within}> may stand: {have}"));
+                continue;
             };
-            let note = element.note;
             match element.support {
-                Support::Ignored => continue,
-                Support::Refused => {
-                    return Err(self.source.refuse(&child, format!("<{name}> is not read; {note}")));
+                Support::Ignored => {}
+                Support::Refused => self.refuse(&child, format!("<{name}> is not read; {}", element.note)),
+                // What happens in place of it does not depend on what it says.
+                Support::Approximated => self.approximate(&child, name, "", element.note),
+                Support::Mapped => {
+                    self.attributes(&child, element);
+                    let body = self.locate(&child, body);
+                    self.children(&child, body);
                 }
-                Support::Approximated => self.approximate(&child, name, "", note),
-                Support::Mapped => {}
             }
-            self.attributes(&child, element, class)?;
-            let body = self.locate(&child, body);
-            self.children(&child, body, child.attribute("childclass").or(class))?;
         }
-        Ok(())
     }
 
     /// Notes where bodies, joints and geoms stand; the body in which the element's own content stands.
@@ -213,37 +183,35 @@ impl Check<'_> {
         }
     }
 
-    fn attributes(&mut self, node: &Node, element: &Element, class: Option<&str>) -> Result<(), SimError> {
+    fn attributes(&mut self, node: &Node, element: &Element) {
         let name = element.name;
         for attribute in node.attributes() {
             let known = element.attribute(attribute.name());
             let Some(known) = known else {
-                let what = format!("<{name}> has no attribute `{}` that is read", attribute.name());
-                return Err(self.source.refuse(node, what));
+                self.refuse(node, format!("<{name}> has no attribute `{}` that is read", attribute.name()));
+                continue;
             };
             let usual =
                 matches!(known.takes, Takes::Only(values) if value::is_one_of(attribute.value(), values));
             match known.support {
                 Support::Ignored => {}
                 Support::Refused if !usual => {
-                    let what = format!("{} is not read; {}", stated(&attribute), known.note);
-                    return Err(self.source.refuse(node, what));
+                    self.refuse(node, format!("{} is not read; {}", stated(&attribute), known.note));
                 }
                 Support::Approximated if !usual => self.approximate(node, name, attribute.name(), known.note),
                 Support::Refused | Support::Approximated => {}
-                Support::Mapped => self.value(node, &attribute, known.takes)?,
+                Support::Mapped => self.value(node, &attribute, known.takes),
             }
         }
         let rotations = node.attributes().filter(|attribute| ROTATIONS.contains(&attribute.name())).count();
         if rotations > 1 {
-            return Err(self.source.refuse(node, "state one rotation"));
+            self.refuse(node, "state one rotation");
         }
-        self.check_inherited(node, name, class)
     }
 
-    fn value(&self, node: &Node, attribute: &XmlAttribute, takes: Takes) -> Result<(), SimError> {
+    fn value(&mut self, node: &Node, attribute: &XmlAttribute, takes: Takes) {
         let known = |name: &str| match takes {
-            Takes::Class => self.classes.contains_key(name),
+            Takes::Class => self.classes.contains(name),
             Takes::NameOf(kind) => self.names.get(kind).is_some_and(|names| names.contains(name)),
             Takes::Text
             | Takes::Numbers { .. }
@@ -260,52 +228,9 @@ impl Check<'_> {
             Takes::NameOf(kind) if !known(attribute.value()) => Some(format!("the name of a {kind}")),
             takes => value::wanted(attribute.value(), takes),
         };
-        match wanted {
-            None => Ok(()),
-            Some(wanted) => Err(self.source.refuse(node, format!("{}; use {wanted}", stated(attribute)))),
+        if let Some(wanted) = wanted {
+            self.refuse(node, format!("{}; use {wanted}", stated(attribute)));
         }
-    }
-
-    /// Where MuJoCo would mix what an element states with what its class does, the element has to state all of it.
-    fn check_inherited(&self, node: &Node, element: &str, class: Option<&str>) -> Result<(), SimError> {
-        let class = match is_default(&node.parent_element().unwrap_or(*node)) {
-            true => node.parent_element().and_then(|parent| self.parent_of(parent.attribute("class"))),
-            false => Some(node.attribute("class").or(class).unwrap_or("main")),
-        };
-        let inherits = |attribute: &str| self.inherited(class, element, attribute);
-        for attribute in node.attributes().filter(|one| ["size", "friction"].contains(&one.name())) {
-            let count = attribute.value().split_whitespace().count();
-            if inherits(attribute.name()).is_some_and(|inherited| inherited > count) {
-                let what = format!("{} states fewer numbers than its class; state all", stated(&attribute));
-                return Err(self.source.refuse(node, what));
-            }
-        }
-        let rotation = |stated: &dyn Fn(&str) -> bool| ROTATIONS[..5].iter().any(|name| stated(name));
-        let own = |name: &str| node.has_attribute(name);
-        let of_class = |name: &str| inherits(name).is_some();
-        let only_position = own("pos") && !rotation(&own) && rotation(&of_class);
-        let only_rotation = !own("pos") && rotation(&own) && of_class("pos");
-        if ["geom", "site"].contains(&element) && (only_position || only_rotation) {
-            return Err(self.source.refuse(node, "its class states the other half of its pose; state both"));
-        }
-        Ok(())
-    }
-
-    fn parent_of(&self, class: Option<&str>) -> Option<&str> {
-        self.classes.get(class.unwrap_or("main"))?.parent.as_deref()
-    }
-
-    /// How many words the nearest class that has it states for an attribute.
-    fn inherited(&self, class: Option<&str>, element: &str, attribute: &str) -> Option<usize> {
-        let key = (element.to_string(), attribute.to_string());
-        let mut class = class;
-        while let Some(name) = class {
-            if let Some(words) = self.classes.get(name)?.words.get(&key) {
-                return Some(*words);
-            }
-            class = self.parent_of(Some(name));
-        }
-        None
     }
 
     fn approximate(&mut self, node: &Node, element: &str, attribute: &str, note: &str) {

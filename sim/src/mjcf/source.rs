@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use roxmltree::Node;
+use xxhash_rust::xxh3::xxh3_64;
 
 use crate::{
     SimError,
@@ -11,7 +12,7 @@ use crate::{
 };
 
 /// XML text without `<include>`.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct MjcfText {
     pub text: String,
     files: Vec<SourceFile>,
@@ -21,7 +22,7 @@ pub(super) struct MjcfText {
     folder: PathBuf,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct SourceFile {
     name: String,
     text: String,
@@ -30,7 +31,7 @@ struct SourceFile {
 }
 
 /// A part of the text that stands in a file without a break.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct Piece {
     start: usize,
     file: usize,
@@ -45,6 +46,23 @@ impl MjcfText {
         source.files.push(SourceFile { name: file.into(), text: xml.into(), path: None });
         source.append(0, folder, false)?;
         Ok(source)
+    }
+
+    /// Returns the files that were included, and a hash of each.
+    pub fn included(&self) -> Vec<(PathBuf, u64)> {
+        let hashed = |file: &SourceFile| Some((file.path.clone()?, xxh3_64(file.text.as_bytes())));
+        self.files.iter().filter_map(hashed).collect()
+    }
+
+    /// Finds a file that is not where it is named, by its name beside one of the included files.
+    pub fn beside_including(&self, path: PathBuf) -> PathBuf {
+        if path.exists() {
+            return path;
+        }
+        let named = path.strip_prefix(&self.folder).unwrap_or(&path);
+        let folders = self.files.iter().filter_map(|file| file.path.as_ref()?.parent());
+        let mut beside = folders.map(|folder| with_own_separators(folder.join(named)));
+        beside.find(|beside| beside.exists()).unwrap_or(path)
     }
 
     /// The text as a tree of elements.

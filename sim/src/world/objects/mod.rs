@@ -1,6 +1,8 @@
 //! Objects: everything named in a world that is not a robot. One that has joints inside is an object per link.
 
 mod insert;
+#[cfg(test)]
+mod joined_tests;
 mod model;
 #[cfg(test)]
 mod site_tests;
