@@ -1,5 +1,5 @@
-//! Plays a scene for a second in which nobody acts, and prints as JSON what came of it: `settle FILE`. Its comparison with MuJoCo is
-//! `tests/peers/worlds/worlds.py`.
+//! Plays a scene for a second in which nobody acts, and prints as JSON what came of it: `settle FILE`. Its
+//! comparison with MuJoCo is `tests/peers/worlds/worlds.py`.
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -52,7 +52,9 @@ fn drive(actuator: &Actuator, command: f64) -> Drive {
     let command = actuator.control_range.map_or(command, |[low, high]| command.clamp(low, high));
     match actuator.kind {
         ActuatorKind::Motor => Drive { feedforward: command * actuator.gear, ..Drive::NONE },
-        ActuatorKind::Position { kp, kd } => Drive { target: command / actuator.gear, kp, kd, ..Drive::NONE },
+        ActuatorKind::Position { kp, kd } => {
+            Drive { target: command / actuator.gear - actuator.placed_at, kp, kd, ..Drive::NONE }
+        }
     }
 }
 

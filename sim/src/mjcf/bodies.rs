@@ -101,8 +101,22 @@ impl Document {
         for link in trees.iter_mut().flat_map(|tree| &mut tree.links) {
             link.name = link.bodies[0].name.clone();
         }
+        self.set_total_mass(&mut trees);
         self.check_masses(&trees, &places)?;
         Ok(trees)
+    }
+
+    /// Scales all masses if the file says what they add up to; the world has none.
+    fn set_total_mass(&self, trees: &mut [BodyTree]) {
+        let stated_kg = self.model.compiler.set_total_mass as f32;
+        let mut links: Vec<_> = trees.iter_mut().skip(1).flat_map(|tree| &mut tree.links).collect();
+        let total_kg: f32 = links.iter().map(|link| link.mass.mass()).sum();
+        if stated_kg > 0.0 && total_kg > 0.0 {
+            for link in links.iter_mut().filter(|link| link.mass.mass() > 0.0) {
+                let mass_kg = link.mass.mass() * stated_kg / total_kg;
+                link.mass.set_mass(mass_kg, true);
+            }
+        }
     }
 
     /// As in MuJoCo, planes are on bodies that no joint moves.

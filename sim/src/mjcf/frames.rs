@@ -2,7 +2,7 @@
 
 use rapier3d::math::{Matrix, Pose, Rotation, Vector};
 
-use super::source::MjcfText;
+use super::text::source::MjcfText;
 use super::{pose, vector};
 use crate::SimError;
 

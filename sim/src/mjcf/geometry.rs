@@ -6,8 +6,7 @@ use mjcf_rs::body::GeomType;
 use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::prelude::SharedShape;
 
-use super::looks::SurfacePattern;
-use super::{Document, Mesh, pose, vector};
+use super::{Document, Mesh, SurfacePattern, pose, vector};
 use crate::SimError;
 use crate::dynamics::{Directions, Friction, Mask};
 

@@ -8,8 +8,8 @@ use rapier3d::glamx::DVec3;
 use std::collections::BTreeMap;
 
 use super::Document;
-use super::source::MjcfText;
-use super::stated::Classes;
+use super::text::source::MjcfText;
+use super::text::stated::Classes;
 use crate::SimError;
 use crate::dynamics::Axis;
 
@@ -29,8 +29,10 @@ pub enum LinkJoint {
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisJoint {
     pub name: String,
-    /// The effort has no limit here: the actuator has one.
+    /// The effort has no limit here: the actuator has one. Its positions are 0 where the file places the bodies.
     pub axis: Axis,
+    /// What the file calls that position.
+    pub placed_at: f64,
 }
 
 /// Drives one hinge or slide. Efforts are N m or N, positions rad or m.
@@ -45,6 +47,8 @@ pub struct Actuator {
     pub speed_limit: Option<f64>,
     /// By how much a motor's command is multiplied, and a position's divided.
     pub gear: f64,
+    /// What commands of positions call the position in which the joint is placed.
+    pub placed_at: f64,
     /// Its number among all actuators of the file, of which some do nothing.
     pub index: usize,
 }
@@ -171,7 +175,8 @@ impl Document {
         acting.map(|(index, element)| self.actuator(index, element, limit(index))).collect()
     }
 
-    /// Reads what drives a joint, with gains and efforts of the joint: a gear g makes g times the force of g times the position.
+    /// Reads what drives a joint, with gains and efforts of the joint: a gear g makes g times the force of g
+    /// times the position.
     fn actuator(
         &self,
         index: usize,
@@ -209,10 +214,11 @@ impl Document {
             control_range: own_range.or(self.inherited_range(&joint)?),
             effort_range: self.effort_range(&joint, effort_range),
             speed_limit,
-            joint,
             kind,
             gear,
+            placed_at: self.axis_joint(&joint)?.ref_,
             index,
+            joint,
         })
     }
 
@@ -258,8 +264,8 @@ impl Document {
         };
         let refuse = |what: &str| self.source.refuse_at(self.checked.bodies[body].joints[0], what);
         let name = joint.name.clone().unwrap_or_default();
-        if joint.ref_ != 0.0 || joint.springdamper.is_some_and(|numbers| numbers != [0.0; 2]) {
-            return Err(refuse("`ref` and `springdamper` are not read; state stiffness and damping"));
+        if joint.springdamper.is_some_and(|numbers| numbers != [0.0; 2]) {
+            return Err(refuse("springdamper is not read; state stiffness and damping"));
         }
         match joint.type_ {
             JointType::Free if entry.parent != Some(0) => {
@@ -281,11 +287,11 @@ impl Document {
             friction_loss: joint.frictionloss,
             damping: joint.damping,
             stiffness: joint.stiffness,
-            spring_rest: joint.springref,
-            range: self.limits("", joint.limited, joint.range)?,
+            spring_rest: joint.springref - joint.ref_,
+            range: self.limits("", joint.limited, joint.range)?.map(|ends| ends.map(|end| end - joint.ref_)),
             ..Axis::along(DVec3::from_array(joint.axis))
         };
-        Ok(AxisJoint { name, axis })
+        Ok(AxisJoint { name, axis, placed_at: joint.ref_ })
     }
 
     /// A range, if it limits anything; `what` is limited.

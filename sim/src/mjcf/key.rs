@@ -30,7 +30,8 @@ impl Document {
                 have => Err(self
                     .unsupported(format!("key `{name}` has {have} numbers in {what}; it takes {expected}"))),
             };
-            // Of a ball MuJoCo has a quaternion, here there are three angles; where somebody begins is then where it is placed.
+            // Of a ball MuJoCo has a quaternion, here there are three angles; where somebody begins is then
+            // where it is placed.
             let has_ball = self.split.ball.is_some();
             let positions = if has_ball { Vec::new() } else { numbers("qpos", &key.qpos, coordinates)? };
             let mut rest = positions.as_slice();
@@ -44,6 +45,11 @@ impl Document {
                     return Err(self.unsupported(what));
                 }
             }
+            let placed_at = joints.iter().flat_map(|joint| match joint {
+                LinkJoint::Hinge(axis) | LinkJoint::Slide(axis) => vec![axis.placed_at],
+                LinkJoint::Fixed | LinkJoint::Free { .. } => vec![0.0; joint.coordinates()],
+            });
+            let positions = positions.iter().zip(placed_at).map(|(own, placed_at)| own - placed_at).collect();
             Ok(Key {
                 time_s: key.time,
                 positions,

@@ -1,35 +1,28 @@
-//! The one reader of MJCF, for robots, scenes and objects: the text with all that it includes (`source`), every element
-//! and attribute accepted or refused by one table (`check`, `support`), parsed by `mjcf-rs`, and then as we use it:
-//! bodies in trees, shapes, joints with their actuators, equalities, keys, and what that parser leaves out.
+//! The one reader of MJCF, for robots, scenes and objects: the text with all that it includes (`text`), every
+//! element and attribute accepted or refused by one table (`support`), parsed by `mjcf-rs`, and then as we
+//! use it: bodies in trees, shapes, joints with their actuators, equalities, keys, what that parser leaves
+//! out, and the files that it names (`assets`).
 
+mod assets;
 mod bodies;
-mod check;
-mod concave;
 mod equality;
-mod files;
 mod frames;
 mod geometry;
 mod joints;
-mod kept;
 mod key;
-mod looks;
-mod plain;
-mod settings;
-mod source;
-mod split;
-mod stated;
 mod support;
 #[cfg(test)]
 mod tests;
+mod text;
 
+pub use assets::files::Mesh;
+pub use assets::looks::SurfacePattern;
 pub use bodies::{BodyLink, BodyTree, PlacedBody};
 pub use equality::{EqualityConstraint, EqualityKind};
-pub use files::Mesh;
 pub use frames::{MjcfCamera, Site};
 pub use geometry::{Geom, Primitive};
 pub use joints::{Actuator, ActuatorKind, AxisJoint, LinkJoint};
 pub use key::Key;
-pub use looks::SurfacePattern;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -40,12 +33,14 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::SimError;
 use crate::user_file::{MAX_TEXT_BYTES, read_text};
-use check::Checked;
+use assets::kept;
+use assets::looks::Looks;
 use joints::UnreadRanges;
-use looks::Looks;
-use settings::FileSettings;
-use source::MjcfText;
-use split::Split;
+use text::check::{self, Checked};
+use text::plain::plain;
+use text::settings::FileSettings;
+use text::source::{self, MjcfText};
+use text::split::{Split, split};
 
 /// A parsed file. What it says is all in effect, or it would not have been read.
 #[derive(Clone, Debug)]
@@ -102,10 +97,10 @@ impl Document {
     fn parse_in(file: &str, xml: &str, folder: &Path) -> Result<Document, SimError> {
         let source = MjcfText::read(file, xml, folder)?;
         let mut checked = check::check(&source)?;
-        let text = plain::plain(&source.text, &source.xml()?);
+        let text = plain(&source.text, &source.xml()?);
         let mut model = mjcf_rs::Model::from_str(&text, folder)
             .map_err(|source| SimError::Mjcf { file: file.into(), source })?;
-        let split = split::split(&mut model, &mut checked.bodies);
+        let split_bodies = split(&mut model, &mut checked.bodies);
         let mut document = Document {
             file: file.into(),
             model,
@@ -113,7 +108,7 @@ impl Document {
             speed_limit_values: joints::speed_limits(&source)?,
             unread: UnreadRanges::of(&source)?,
             checked,
-            split,
+            split: split_bodies,
             folder: folder.into(),
             meshes: BTreeMap::new(),
             texture_rgb: BTreeMap::new(),
@@ -187,8 +182,8 @@ impl Document {
         if self.settings.falls { self.model.option.gravity } else { [0.0; 3] }
     }
 
-    /// Tells files of different content apart, with all that they include and name; comments do not count. Of a file that was read it
-    /// is that of the file, whatever has been changed of the document.
+    /// Tells files of different content apart, with all that they include and name; comments do not count. Of
+    /// a file that was read it is that of the file, whatever has been changed of the document.
     pub fn fingerprint(&self) -> u64 {
         if let Some(known) = self.known_fingerprint {
             return known;

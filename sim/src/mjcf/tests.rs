@@ -97,7 +97,7 @@ fn joints_keep_everything_the_file_says() {
         range: Some([0.0, 1.5]),
         ..Axis::along(DVec3::Z)
     };
-    let hinge = AxisJoint { name: "hinge".into(), axis };
+    let hinge = AxisJoint { name: "hinge".into(), axis, placed_at: 0.0 };
     assert_eq!(trees[1].links[1].joint, LinkJoint::Hinge(hinge));
     let bolt = trees[1].links[2].joint.axis().expect("a slide");
     assert_eq!(bolt.range, None, "`limited` is false");
@@ -130,6 +130,7 @@ fn equalities_and_actuators_are_read() {
         effort_range: None,
         speed_limit: None,
         gear: 1.0,
+        placed_at: 0.0,
         index: 0,
     };
     let position = Actuator {
@@ -139,6 +140,7 @@ fn equalities_and_actuators_are_read() {
         effort_range: Some([-4.0, 4.0]),
         speed_limit: None,
         gear: 1.0,
+        placed_at: 0.0,
         index: 1,
     };
     assert_eq!(document.actuators().expect("actuators"), [motor, position]);
@@ -241,7 +243,7 @@ fn what_is_refused_says_what_would_work() {
         let error = refusal(&inside);
         assert!(error.contains(told), "{error}");
     };
-    check(body(r#"<joint ref="1"/>"#), "`ref` and `springdamper` are not read");
+    check(body(r#"<joint springdamper="1 1"/>"#), "state stiffness and damping");
     check(body(r#"<body name="b"><freejoint/></body>"#), "move it to the top level");
     check(body(r#"<geom size="1" condim="2"/>"#), "use 1, 3, 4 or 6");
     let coupled = r#"<equality><joint joint1="h" joint2="i"/></equality>"#;
@@ -282,6 +284,21 @@ fn masks_say_what_touches_what() {
     assert!(!geoms[1].touches.meets(geoms[1].touches), "it touches nothing of its own kind");
 }
 
+/// Positions are counted from where the file places the bodies, whatever it calls that.
+#[test]
+fn a_joint_may_be_placed_elsewhere_than_at_0() {
+    let body = r#"<worldbody><body><joint name="h" ref="0.5" range="0 2" springref="0.7"/>
+        <geom size="1"/></body></worldbody>"#;
+    let driven =
+        r#"<actuator><position joint="h"/></actuator><keyframe><key name="start" qpos="1"/></keyframe>"#;
+    let found = document(&format!("{body}{driven}"));
+    let trees = found.trees().expect("trees");
+    let axis = trees[1].links[0].joint.axis().expect("a hinge");
+    assert_eq!((axis.range, axis.spring_rest), (Some([-0.5, 1.5]), 0.7 - 0.5));
+    assert_eq!(found.keys().expect("keys")[0].positions, [0.5]);
+    assert_eq!(found.actuators().expect("actuators")[0].placed_at, 0.5);
+}
+
 #[test]
 fn settings_of_a_file_hold_for_all_of_it() {
     let mass_kg = |compiler: &str| {
@@ -295,6 +312,7 @@ fn settings_of_a_file_hold_for_all_of_it() {
     assert_eq!(mass_kg(""), [7.0, 5.0]);
     assert_eq!(mass_kg(r#"<compiler inertiagrouprange="0 0"/>"#), [7.0, 2.0]);
     assert_eq!(mass_kg(r#"<compiler inertiafromgeom="true"/>"#), [5.0, 5.0]);
+    assert_eq!(mass_kg(r#"<compiler settotalmass="24"/>"#), [14.0, 10.0]);
     let flags = r#"<option><flag contact="disable" gravity="disable"/></option>"#;
     let none = document(&format!("{flags}<worldbody><geom size=\"1\"/></worldbody>"));
     assert!(!none.trees().expect("trees")[0].links[0].geoms[0].collides);

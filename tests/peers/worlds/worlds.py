@@ -17,11 +17,14 @@ import argparse
 import json
 import os
 import re
+import select
 import subprocess
 import sys
 import tempfile
+import threading
 import zipfile
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +41,7 @@ KEPT = {".xml", ".obj", ".stl", ".msh", ".png", ".jpg", ".jpeg", ".bin", ".skn",
 def fetch(folder: Path) -> None:
     for package in PACKAGES.read_text().split():
         download = [sys.executable, "-m", "pip", "download", "-q", "--no-deps", "--only-binary=:all:"]
-        if subprocess.run([*download, "-d", str(folder / "wheels"), package]).returncode:
+        if subprocess.run([*download, "-d", str(folder / "wheels"), package], check=False).returncode:
             print(f"{package}: could not be fetched", file=sys.stderr)
     for wheel in sorted((folder / "wheels").glob("*.whl")):
         package = folder / "files" / wheel.name.split("-")[0]
@@ -70,7 +73,7 @@ def reference(path: Path) -> dict[str, Any]:
 def run(command: list[str]) -> tuple[dict[str, Any] | None, str]:
     """What a program prints as JSON, or why it does not."""
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S)
+        done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=LIMIT_S)
     except subprocess.TimeoutExpired:
         return None, f"takes more than {LIMIT_S:.0f} s"
     if done.returncode:
@@ -78,8 +81,50 @@ def run(command: list[str]) -> tuple[dict[str, Any] | None, str]:
     return json.loads(done.stdout.splitlines()[-1]), ""
 
 
-def myself(*arguments: str) -> tuple[dict[str, Any] | None, str]:
-    return run([sys.executable, str(Path(__file__).resolve()), *arguments])
+class Worker:
+    """Another process that has MuJoCo, for files at which it may crash or hang."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[str] | None = None
+
+    def ask(self, *question: str) -> tuple[dict[str, Any] | None, str]:
+        """What `answer` says, or why there is no answer."""
+        if self._process is None or self._process.poll() is not None:
+            command = [sys.executable, str(Path(__file__).resolve()), "work", "."]
+            pipe, null = subprocess.PIPE, subprocess.DEVNULL
+            self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=null, text=True)
+        assert self._process.stdin and self._process.stdout
+        print(json.dumps(question), file=self._process.stdin, flush=True)
+        if not select.select([self._process.stdout], [], [], LIMIT_S)[0]:
+            self._process.kill()
+            return None, f"takes more than {LIMIT_S:.0f} s"
+        line = self._process.stdout.readline()
+        if not line:
+            return None, "MuJoCo ended with the process"
+        found = json.loads(line)
+        return (None, found["error"]) if "error" in found else (found, "")
+
+
+def work() -> None:
+    """Answers the questions of a `Worker`, a line each."""
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    for line in sys.stdin:
+        what, path, *rest = json.loads(line)
+        try:
+            found = reference(Path(path)) if what == "reference" else imported(Path(path), Path(rest[0]))
+        except Exception as error:
+            found = {"error": str(error)}
+        print(json.dumps(found), file=answers, flush=True)
+
+
+WORKERS = threading.local()
+
+
+def myself(*question: str) -> tuple[dict[str, Any] | None, str]:
+    if not hasattr(WORKERS, "own"):
+        WORKERS.own = Worker()
+    return WORKERS.own.ask(*question)
 
 
 def imported(path: Path, out: Path) -> dict[str, Any]:
@@ -125,29 +170,34 @@ def is_model(path: Path) -> bool:
     return bool(re.search(r"<mujoco\b(?!include)", head)) and "<mujocoinclude" not in head
 
 
-def compare(folder: Path, settle: str, tsv: Path, only: str) -> None:
-    files = [path for path in sorted((folder / "files").rglob("*.xml")) if only in str(path) and is_model(path)]
-    seen: set[str] = set()
-    with tsv.open("w") as table:
-        for path in files:
+def compare(folder: Path, settle: str, tsv: Path, only: str, jobs: int) -> None:
+    distinct: dict[tuple[str, str, bytes], Path] = {}
+    for path in sorted((folder / "files").rglob("*.xml")):
+        if only in str(path) and is_model(path):
             package = path.relative_to(folder / "files").parts[0]
-            key = f"{package}/{path.name}/{hash(path.read_bytes())}"
-            expected, _ = myself("reference", str(path)) if key not in seen else (None, "")
-            seen.add(key)
-            if expected is None:
-                continue
-            native = outcome(settle, path, expected)
-            after = ("", "")
-            if native[0] not in ("same", "other"):
-                with tempfile.TemporaryDirectory() as out:
-                    written, error = myself("import", str(path), out)
-                    scene = Path(out) / "scene.xml"
-                    refused = ("refused", error[-300:].replace("\n", " "))
-                    after = refused if written is None else outcome(settle, scene, expected)
-            row = [package, str(path.relative_to(folder / "files" / package)), *native, *after]
-            table.write("\t".join(row).replace(str(folder), "") + "\n")
-            table.flush()
+            distinct.setdefault((package, path.name, path.read_bytes()), path)
+    with tsv.open("w") as table, ThreadPoolExecutor(jobs) as pool:
+        trials = [pool.submit(tried, folder, settle, path) for path in distinct.values()]
+        for trial in as_completed(trials):
+            if row := trial.result():
+                table.write("\t".join(row).replace(str(folder), "") + "\n")
+                table.flush()
     show(tsv)
+
+
+def tried(folder: Path, settle: str, path: Path) -> list[str]:
+    """The row of a file; empty if MuJoCo does not read it by itself."""
+    expected, _ = myself("reference", str(path))
+    if expected is None:
+        return []
+    native, after = outcome(settle, path, expected), ("", "")
+    if native[0] not in ("same", "other"):
+        with tempfile.TemporaryDirectory() as out:
+            written, error = myself("import", str(path), out)
+            refused = ("refused", error[-300:].replace("\n", " "))
+            after = refused if written is None else outcome(settle, Path(out) / "scene.xml", expected)
+    package = path.relative_to(folder / "files").parts[0]
+    return [package, str(path.relative_to(folder / "files" / package)), *native, *after]
 
 
 def show(tsv: Path) -> None:
@@ -171,24 +221,22 @@ def show(tsv: Path) -> None:
 def main() -> None:
     target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["fetch", "compare", "show", "reference", "import"])
+    parser.add_argument("what", choices=["fetch", "compare", "show", "work"])
     parser.add_argument("path", type=Path)
-    parser.add_argument("out", type=Path, nargs="?")
     parser.add_argument("--settle", default=str(target / "release" / "examples" / "settle"))
     parser.add_argument("--tsv", type=Path, default=Path("worlds.tsv"))
     parser.add_argument("--only", default="", help="files with this in their path")
+    parser.add_argument("--jobs", type=int, default=2)
     given = parser.parse_args()
     match given.what:
         case "fetch":
             fetch(given.path)
         case "compare":
-            compare(given.path, given.settle, given.tsv, given.only)
+            compare(given.path, given.settle, given.tsv, given.only, given.jobs)
         case "show":
             show(given.path)
-        case "reference":
-            print(json.dumps(reference(given.path)))
         case _:
-            print(json.dumps(imported(given.path, given.out)))
+            work()
 
 
 if __name__ == "__main__":

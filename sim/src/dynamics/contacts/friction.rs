@@ -113,7 +113,8 @@ pub struct Terms<const N: usize> {
 
 pub struct Contact<const N: usize> {
     bias_m_s: [f64; 2],
-    /// 1 / (1 + softness) with correction and 1 without; less where the normal can hardly be moved, see [`firmness`].
+    /// 1 / (1 + softness) with correction and 1 without; less where the normal can hardly be moved, see
+    /// [`firmness`].
     firmness: [f64; 2],
     inverse_friction: [f64; N],
     /// Y Y^T, the inverses of its diagonal, and of its blocks over the tangents and over the rolls.
@@ -309,8 +310,8 @@ impl Symmetric2 {
 
 /// Returns mass and firmness of a normal with an inverse mass `a` below the least `e`. An impulse that meets
 ///   n = f (n - (v + b) / a),   f / a = 1 / (e + softness a)
-/// gives way by as much as is missing:  a n + v + b = -(e + (softness - 1) a) n. Links that overlap along a direction in which their
-/// joints hardly let them move would be torn apart by any other.
+/// gives way by as much as is missing:  a n + v + b = -(e + (softness - 1) a) n. Links that overlap along a
+/// direction in which their joints hardly let them move would be torn apart by any other.
 fn propped<const N: usize>(inverse_mass: f64, terms: &Terms<N>) -> (f64, [f64; 2]) {
     let least = terms.least_inverse_mass;
     let a = inverse_mass.max(SMALLEST_SHARE * least);

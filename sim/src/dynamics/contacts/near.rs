@@ -93,7 +93,8 @@ fn in_order(pair: &ColliderPair) -> [ColliderId; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// Bodies of one tree that a joint joins do not collide, as in MuJoCo; nor do two that are kept apart, or whose masks say so.
+/// Bodies of one tree that a joint joins do not collide, as in MuJoCo; nor do two that are kept apart, or
+/// whose masks say so.
 fn may_touch(pair: [ColliderId; 2], surfaces: &[Surface], trees: &Trees, apart: &Apart) -> bool {
     let [a, b] = pair.map(|id| &surfaces[id.index()]);
     if !a.collider.touches.meets(b.collider.touches) || apart.colliders.contains(&pair) {

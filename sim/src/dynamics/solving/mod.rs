@@ -30,7 +30,8 @@ const DAMPED_SHARE: f64 = 0.5;
 const DEEP_M: f64 = 0.01;
 /// So deep nothing gives way any more.
 const RIGID_M: f64 = 0.02;
-/// Share of the links' own inverse masses that the inverse mass of a contact's normal is not taken to be below.
+/// Share of the links' own inverse masses that the inverse mass of a contact's normal is not taken to be
+/// below.
 const LEAST_SHARE: f64 = 0.01;
 /// J that the relaxing sweeps took: where it was so much, there may be more that they should have taken.
 const HARD_J: f64 = 0.3;
@@ -292,8 +293,9 @@ fn giving_share(gap_m: f64) -> f64 {
     ((RIGID_M + gap_m) / (RIGID_M - DEEP_M)).clamp(0.0, 1.0)
 }
 
-/// Returns the least inverse mass (1/kg) along a contact's normal: a share of those that the two links would have by themselves.
-/// Only joints bring it so low, where they let neither link move. What flies has that of its whole tree at least.
+/// Returns the least inverse mass (1/kg) along a contact's normal: a share of those that the two links would
+/// have by themselves. Only joints bring it so low, where they let neither link move. What flies has that of
+/// its whole tree at least.
 fn least_inverse_mass(trees: &Trees, bodies: [Option<LinkId>; 2]) -> f64 {
     let held = |body: LinkId| !matches!(trees.all[body.tree.index()].links[0].joint, Joint::Free);
     let within_one = matches!(bodies, [Some(a), Some(b)] if a.tree == b.tree);

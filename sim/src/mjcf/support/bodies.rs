@@ -155,8 +155,8 @@ const JOINT: &[Attribute] = &[
     mapped(&["limited"], MAYBE),
     mapped(&["stiffness", "damping", "frictionloss", "armature"], AMOUNT),
     mapped(&["springref"], NUMBER),
-    only(&["ref"], &["0"], "`ref` and `springdamper` are not read; state stiffness and damping"),
-    only(&["springdamper"], &["0 0"], "`ref` and `springdamper` are not read; state stiffness and damping"),
+    attribute(Support::Mapped, &["ref"], NUMBER, "not in a robot's file"),
+    only(&["springdamper"], &["0 0"], "state stiffness and damping"),
     attribute(Support::Approximated, &["margin"], Takes::Only(&["0"]), "a limit acts at the limit"),
     approximated(
         &["solreflimit", "solimplimit", "solreffriction", "solimpfriction"],

@@ -93,7 +93,8 @@ pub(super) const ELEMENTS: &[Element] = &[
     ),
     element(Support::Refused, "pair", &["contact", "default"], &[], "state friction on the geoms"),
     element(Support::Refused, "deformable", &["mujoco"], &[], "nothing bends or stretches here"),
-    element(Support::Refused, "tendon", &["mujoco", "default"], &[], "couple joints with an equality"),
+    element(Support::Refused, "tendon", &["mujoco"], &[], "couple joints with an equality"),
+    element(Support::Ignored, "tendon", &["default"], &[], "there are no tendons"),
     element(Support::Mapped, "equality", &["mujoco"], &[], "they are hard; a robot's file has none"),
     element(
         Support::Mapped,
@@ -190,7 +191,7 @@ const COMPILER: &[Attribute] = &[
         numbers(2, 2),
         "where it is `0 0` and geoms of group 1 touch nothing, as in robosuite's and RoboCasa's files, group 0 is not drawn",
     ),
-    only(&["settotalmass"], &["-1"], "state masses that add up"),
+    mapped(&["settotalmass"], NUMBER),
     only(&["fitaabb", "alignfree"], &["false"], "shapes and frames are as the file states them"),
     only(&["convexhull"], &["true"], "meshes collide as their hulls"),
     attribute(

@@ -18,7 +18,8 @@ pub struct Bend {
 const TOLERANCE: f32 = 1e-3;
 
 impl TriangleMesh {
-    /// Returns the bends of the mesh, and the number of its bend for each triangle: the last of those that fit.
+    /// Returns the bends of the mesh, and the number of its bend for each triangle: the last of those that
+    /// fit.
     pub(in crate::render) fn bends(&self) -> (Vec<Bend>, Vec<u32>) {
         let ellipsoid = Bend::of_ellipsoid(self.corners_m());
         let mut bends = Bends::default();
@@ -32,7 +33,8 @@ impl TriangleMesh {
     }
 }
 
-/// The bends of a mesh so far, found by the normals that they give: a mesh of a file may have one for each triangle.
+/// The bends of a mesh so far, found by the normals that they give: a mesh of a file may have one for each
+/// triangle.
 #[derive(Default)]
 struct Bends {
     all: Vec<Bend>,

@@ -8,7 +8,8 @@ use crate::render::TriangleMesh;
 const DEPTH_M: f32 = 1e-4;
 /// Corners of a convex mesh may lie so far in front of its faces.
 const ROUNDING_M: f32 = 1e-5;
-/// A mesh of more triangles hides nothing: to find out whether it is convex takes time that grows with their square.
+/// A mesh of more triangles hides nothing: to find out whether it is convex takes time that grows with their
+/// square.
 const MAX_HULL_TRIANGLES: usize = 1000;
 
 /// A mesh in the frame of its body.
@@ -21,7 +22,8 @@ struct Placed {
     hull_m: Option<Vec<(Vector, f32)>>,
 }
 
-/// Takes triangles that lie inside of another mesh of the body out of the meshes, each of which has its pose in the body's frame.
+/// Takes triangles that lie inside of another mesh of the body out of the meshes, each of which has its pose
+/// in the body's frame.
 pub fn take_out(meshes: &mut [(TriangleMesh, Pose)]) {
     let placed: Vec<Placed> =
         meshes.iter().map(|(mesh, body_from_mesh)| Placed::of(mesh, body_from_mesh)).collect();

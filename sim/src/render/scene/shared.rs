@@ -23,7 +23,8 @@ struct KeptMesh {
 
 /// Facts about a mesh's triangles that no pose, colour or light changes.
 pub struct MeshGeometry {
-    /// Corners of the triangles. A mesh with flat faces names a place once for each triangle there; here it is named once.
+    /// Corners of the triangles. A mesh with flat faces names a place once for each triangle there; here it
+    /// is named once.
     pub points: Points,
     /// The triangles, by the numbers of their corners' points.
     pub triangles: Vec<[u32; 3]>,

@@ -1,4 +1,5 @@
-//! Meshes of the geoms of a body, without what is hidden. A process makes them once for all worlds that have such a body.
+//! Meshes of the geoms of a body, without what is hidden. A process makes them once for all worlds that have
+//! such a body.
 
 use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
@@ -11,7 +12,8 @@ use super::shared::SharedMesh;
 use crate::mjcf::{Geom, Primitive};
 use crate::render::TriangleMesh;
 
-/// Meshes of so many triangles are kept in all, at about 200 bytes each, and those of the latest body whatever it has.
+/// Meshes of so many triangles are kept in all, at about 200 bytes each, and those of the latest body
+/// whatever it has.
 const MAX_KEPT_TRIANGLES: usize = 1_500_000;
 
 static BODIES: LazyLock<Mutex<KeptBodies>> = LazyLock::new(Mutex::default);
@@ -64,7 +66,8 @@ impl KeptBodies {
         Some(body.meshes.clone())
     }
 
-    /// Keeps the meshes of a body, and forgets those that nobody has asked for the longest if there are too many.
+    /// Keeps the meshes of a body, and forgets those that nobody has asked for the longest if there are too
+    /// many.
     fn keep(&mut self, key: u128, meshes: Vec<Option<SharedMesh>>) {
         let triangles = meshes.iter().flatten().map(|mesh| mesh.triangles.len()).sum();
         let body = KeptBody { meshes, triangles, asked: self.clock };

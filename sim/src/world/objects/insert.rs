@@ -120,7 +120,8 @@ fn insert_moving(
     Ok(id)
 }
 
-/// Returns the link that carries another by several joints, if something moves it: as where there is one joint, the two do not touch.
+/// Returns the link that carries another by several joints, if something moves it: as where there is one
+/// joint, the two do not touch.
 fn carrier(tree: &BodyTree, link: usize) -> Option<usize> {
     let above = |link: usize| tree.links[link].parent;
     let first_part = above(link).filter(|parent| tree.links[*parent].is_part)?;

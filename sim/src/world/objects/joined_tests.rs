@@ -5,7 +5,8 @@ use rapier3d::math::Pose;
 use crate::World;
 use crate::mjcf::Document;
 
-/// Plays a second of a scene in which nobody acts; returns the farthest that any object was from where it began.
+/// Plays a second of a scene in which nobody acts; returns the farthest that any object was from where it
+/// began.
 fn farthest_m(inside: &str) -> f32 {
     let document = Document::parse("scene.xml", &format!("<mujoco>{inside}</mujoco>")).expect("a scene");
     let mut world = World::of_scene(document).expect("a world");
@@ -22,7 +23,8 @@ fn farthest_m(inside: &str) -> f32 {
     farthest_m
 }
 
-/// A drawer that overlaps its carcass, which stands fast as the base of its tree, as another tree, or as the world itself.
+/// A drawer that overlaps its carcass, which stands fast as the base of its tree, as another tree, or as the
+/// world itself.
 #[test]
 fn what_moves_may_be_kept_apart_from_what_does_not() {
     let rail = r#"<joint type="slide" axis="0 -1 0" range="0 0.3" damping="5"/>"#;

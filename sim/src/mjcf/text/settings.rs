@@ -6,7 +6,7 @@ use super::source::MjcfText;
 use crate::SimError;
 
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct FileSettings {
+pub(in crate::mjcf) struct FileSettings {
     /// Geoms of these groups give bodies their mass.
     pub inertia_groups: RangeInclusive<i32>,
     /// Whether anything touches anything.

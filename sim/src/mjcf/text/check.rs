@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use roxmltree::{Attribute as XmlAttribute, Node};
 
 use super::source::{self, MjcfText};
-use super::support::{self, Element, Support, Takes, value};
 use crate::SimError;
+use crate::mjcf::support::{self, Element, Support, Takes, value};
 
 /// Elements inside one another, at most: the parser recurses.
 const MAX_NESTING: usize = 200;
@@ -15,7 +15,7 @@ const ROTATIONS: [&str; 6] = ["quat", "axisangle", "euler", "xyaxes", "zaxis", "
 
 /// What is known of a file whose elements were all accepted.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Checked {
+pub(in crate::mjcf) struct Checked {
     /// What is not quite as in MuJoCo, each with the first line that has it.
     pub approximated: Vec<String>,
     /// Bodies in the order of `mjcf-rs`: the world, then every body before those on it.
@@ -24,13 +24,13 @@ pub(super) struct Checked {
 
 /// Where a body and what is on it stand in the text.
 #[derive(Clone, Debug, Default)]
-pub(super) struct BodyBytes {
+pub(in crate::mjcf) struct BodyBytes {
     pub body: usize,
     pub joints: Vec<usize>,
     pub geoms: Vec<usize>,
 }
 
-pub(super) fn check(source: &MjcfText) -> Result<Checked, SimError> {
+pub(in crate::mjcf) fn check(source: &MjcfText) -> Result<Checked, SimError> {
     let xml = source.xml()?;
     check_depth(source, &xml)?;
     let root = xml.root_element();
@@ -224,6 +224,8 @@ impl Check<'_> {
         };
         let wanted = match takes {
             Takes::Class if !known(attribute.value()) => Some("the class of a <default>".to_string()),
+            // Of a class nobody has, it does not matter what it names.
+            Takes::NameOf(_) if node.parent_element().is_some_and(|parent| is_default(&parent)) => None,
             Takes::NameOf("mesh") => None,
             Takes::NameOf(kind) if !known(attribute.value()) => Some(format!("the name of a {kind}")),
             takes => value::wanted(attribute.value(), takes),

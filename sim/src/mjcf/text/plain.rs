@@ -1,5 +1,5 @@
-//! Classes as MuJoCo has them, where `mjcf-rs` has them otherwise: attributes that an element takes from its classes in part are written
-//! on the element.
+//! Classes as MuJoCo has them, where `mjcf-rs` has them otherwise: attributes that an element takes from its
+//! classes in part are written on the element.
 
 use std::ops::Range;
 
@@ -20,7 +20,7 @@ const LISTS: [&str; 2] = ["size", "friction"];
 type Edit = (Range<usize>, String);
 
 /// Returns the text of a file in which no element mixes what it states with what its classes state.
-pub(super) fn plain(text: &str, xml: &Document) -> String {
+pub(in crate::mjcf) fn plain(text: &str, xml: &Document) -> String {
     let mut edits: Vec<Edit> = Vec::new();
     let classes = Classes::of(xml);
     for node in xml.descendants().filter(Node::is_element) {

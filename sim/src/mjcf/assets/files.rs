@@ -1,4 +1,5 @@
-//! Files that an MJCF file names: meshes (OBJ, STL and MSH), and pictures on materials, of which only the colour is taken.
+//! Files that an MJCF file names: meshes (OBJ, STL and MSH), and pictures on materials, of which only the
+//! colour is taken.
 
 use std::fmt;
 use std::io::{self, Cursor};
@@ -11,7 +12,7 @@ use rapier3d::math::{Rotation, Vector};
 use rapier3d::prelude::{MassProperties, SharedShape};
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::{Document, pose, vector};
+use crate::mjcf::{Document, pose, vector};
 use crate::{
     SimError,
     user_file::{read_bytes, with_own_separators},
@@ -67,7 +68,7 @@ impl Mesh {
     }
 
     /// Returns the share of its hull that the mesh fills; 1 if it has none.
-    pub(super) fn hull_share(&self) -> f32 {
+    pub(in crate::mjcf) fn hull_share(&self) -> f32 {
         let Some(hull) = self.hull() else { return 1.0 };
         let middle_m = self.vertices_m.first().copied().unwrap_or_default();
         let six_times_m3 = |corners: &[u32; 3]| {
@@ -81,7 +82,7 @@ impl Mesh {
 
 impl Document {
     /// Reads the meshes that its assets name files of, scaled as the assets say.
-    pub(super) fn read_meshes(&mut self) -> Result<(), SimError> {
+    pub(in crate::mjcf) fn read_meshes(&mut self) -> Result<(), SimError> {
         let mut refused = Vec::new();
         for asset in &self.model.assets.meshes {
             let Some(path) = self.model.resolve_mesh_file(asset, &self.folder) else { continue };
@@ -99,7 +100,7 @@ impl Document {
     }
 
     /// Reads the mean colours of the textures that its assets name files of.
-    pub(super) fn read_textures(&mut self) -> Result<(), SimError> {
+    pub(in crate::mjcf) fn read_textures(&mut self) -> Result<(), SimError> {
         for asset in &self.model.assets.textures {
             if let Some(path) = self.model.resolve_texture_file(asset, &self.folder) {
                 let path = self.source.beside_including(with_own_separators(path));
@@ -134,7 +135,7 @@ impl Document {
 }
 
 /// Reads a file that an MJCF file names.
-pub(super) fn read_mesh_bytes(path: &Path) -> io::Result<Vec<u8>> {
+pub(in crate::mjcf) fn read_mesh_bytes(path: &Path) -> io::Result<Vec<u8>> {
     read_bytes(path, MAX_MESH_BYTES)
 }
 
@@ -190,8 +191,8 @@ fn read_stl(path: &Path, bytes: &[u8]) -> Result<Mesh, SimError> {
     })
 }
 
-/// Reads MuJoCo's own format, little-endian: numbers of vertices, normals, texture coordinates and faces (i32), then 3, 3 and 2 f32 and
-/// 3 i32 for each.
+/// Reads MuJoCo's own format, little-endian: numbers of vertices, normals, texture coordinates and faces
+/// (i32), then 3, 3 and 2 f32 and 3 i32 for each.
 fn read_msh(bytes: &[u8]) -> Option<Mesh> {
     const COUNTS_BYTES: usize = 16;
     let mut counts = [0; 4];

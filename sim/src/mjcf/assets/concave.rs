@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use mjcf_rs::body::{Geom, GeomType};
 
-use super::Document;
+use crate::mjcf::Document;
 
 /// A mesh that fills less of its hull is told to weigh otherwise.
 const CONVEX_SHARE: f32 = 0.95;
@@ -12,8 +12,9 @@ const CONVEX_SHARE: f32 = 0.95;
 const HOLLOW_SHARE: f32 = 0.6;
 
 impl Document {
-    /// Notes meshes that collide or weigh as their hulls and are far from convex, each kind with the first mesh.
-    pub(super) fn note_concave_meshes(&mut self) {
+    /// Notes meshes that collide or weigh as their hulls and are far from convex, each kind with the first
+    /// mesh.
+    pub(in crate::mjcf) fn note_concave_meshes(&mut self) {
         let (mut weighing, mut hollow) = (Vec::new(), Vec::new());
         let mut shares: BTreeMap<&str, f32> = BTreeMap::new();
         for (body, geom, byte) in self.mesh_geoms() {

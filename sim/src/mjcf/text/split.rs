@@ -1,7 +1,8 @@
 //! Bodies with several joints as chains of bodies with one each, and ball joints as three hinges.
 //!
-//! MuJoCo moves a body by its joints one after the other, each in the frame that the one before has left. So do bodies without mass or
-//! shape at the same place, each on the one before; the last of them has all that the body has.
+//! MuJoCo moves a body by its joints one after the other, each in the frame that the one before has left. So
+//! do bodies without mass or shape at the same place, each on the one before; the last of them has all that
+//! the body has.
 
 use mjcf_rs::body::{Body, Joint, JointType};
 use mjcf_rs::{BodyEntry, Model, Pose, Tristate};
@@ -14,7 +15,7 @@ const BALL_AXES: [(&str, [f64; 3]); 3] =
 
 /// What has been split of a file.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Split {
+pub(in crate::mjcf) struct Split {
     /// For each body whether it is there for one of several joints of the body on it alone.
     pub is_part: Vec<bool>,
     /// Where the first ball joint stands in the text.
@@ -22,7 +23,7 @@ pub(super) struct Split {
 }
 
 /// Splits all bodies of a model, and the list of where they stand in the text.
-pub(super) fn split(model: &mut Model, bytes: &mut Vec<BodyBytes>) -> Split {
+pub(in crate::mjcf) fn split(model: &mut Model, bytes: &mut Vec<BodyBytes>) -> Split {
     let mut split = Split::default();
     let (mut bodies, mut places) = (Vec::new(), Vec::new());
     // The number that each body of the file has now.

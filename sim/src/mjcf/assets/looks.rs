@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use roxmltree::Node;
 
-use super::source::MjcfText;
-use super::stated::Classes;
 use crate::SimError;
+use crate::mjcf::text::source::MjcfText;
+use crate::mjcf::text::stated::Classes;
 
 /// A pattern that a file gives one of its materials.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub enum SurfacePattern {
 
 /// Choices of a file that MJCF has no attributes for.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Looks {
+pub(in crate::mjcf) struct Looks {
     /// By material.
     pub patterns: BTreeMap<String, SurfacePattern>,
     /// `None` for those that MuJoCo draws.
@@ -60,7 +60,8 @@ impl Looks {
     }
 }
 
-/// Whether a file keeps to robosuite's and RoboCasa's convention: what has mass and collides is in group 0, what is seen in group 1.
+/// Whether a file keeps to robosuite's and RoboCasa's convention: what has mass and collides is in group 0,
+/// what is seen in group 1.
 fn draws_group_1(xml: &roxmltree::Document) -> bool {
     let weighs_by_0 = xml.descendants().any(|node| {
         let range = node.attribute("inertiagrouprange").filter(|_| node.has_tag_name("compiler"));

@@ -1,12 +1,13 @@
-//! Documents that the process has read: a scene with meshes is read once for all its episodes, until one of its files changes.
+//! Documents that the process has read: a scene with meshes is read once for all its episodes, until one of
+//! its files changes.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::Document;
 use super::files::read_mesh_bytes;
+use crate::mjcf::Document;
 
 /// The latest are kept.
 const MAX_KEPT: usize = 4;
@@ -19,7 +20,7 @@ struct KeptDocument {
 }
 
 /// Returns what was read of a file, if none of the files that it names has changed since.
-pub(super) fn find(path: &Path) -> Option<Document> {
+pub(in crate::mjcf) fn find(path: &Path) -> Option<Document> {
     // Every call leaves it whole.
     let kept = || KEPT.lock().unwrap_or_else(PoisonError::into_inner);
     let found = kept().iter().find(|kept| kept.path == path).map(|kept| kept.document.clone())?;
@@ -29,7 +30,7 @@ pub(super) fn find(path: &Path) -> Option<Document> {
 }
 
 /// Keeps a document that names meshes or pictures; all others are read fast enough.
-pub(super) fn keep(path: &Path, document: &Document) {
+pub(in crate::mjcf) fn keep(path: &Path, document: &Document) {
     if document.meshes.is_empty() && document.texture_rgb.is_empty() {
         return;
     }

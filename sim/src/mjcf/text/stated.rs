@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use roxmltree::{Document, Node};
 
 /// The default classes of a file by name.
-pub(super) struct Classes<'a, 'i> {
+pub(in crate::mjcf) struct Classes<'a, 'i> {
     /// A class may stand in several places.
     named: BTreeMap<&'a str, Vec<Node<'a, 'i>>>,
 }

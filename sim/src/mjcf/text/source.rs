@@ -13,7 +13,7 @@ use crate::{
 
 /// XML text without `<include>`.
 #[derive(Clone, Debug)]
-pub(super) struct MjcfText {
+pub(in crate::mjcf) struct MjcfText {
     pub text: String,
     files: Vec<SourceFile>,
     /// Earliest first; together they are the text.
@@ -152,7 +152,7 @@ impl MjcfText {
 }
 
 /// Refuses a text that names other files.
-pub(super) fn refuse_files(file: &str, xml: &str) -> Result<(), SimError> {
+pub(in crate::mjcf) fn refuse_files(file: &str, xml: &str) -> Result<(), SimError> {
     let tree =
         roxmltree::Document::parse(xml).map_err(|source| SimError::Xml { file: file.into(), source })?;
     let Some(naming) = tree.descendants().find(|node| node.has_attribute("file")) else { return Ok(()) };
@@ -179,7 +179,7 @@ fn inside(node: &Node) -> Option<Range<usize>> {
 }
 
 /// An element by its name, or else by the nearest element around it that has one.
-pub(super) fn describe(node: &Node) -> String {
+pub(in crate::mjcf) fn describe(node: &Node) -> String {
     let tag = |node: &Node| node.tag_name().name().to_string();
     let name = |node: &Node| {
         let class = node.attribute("class").filter(|_| node.has_tag_name("default"));
