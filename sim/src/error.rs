@@ -17,12 +17,14 @@ pub enum SimError {
     RobotDescription { file: String, source: Box<dyn std::error::Error + Send + Sync> },
     #[error("`{path}` is not a mesh that can be read: {source}")]
     Mesh { path: String, source: Box<dyn std::error::Error + Send + Sync> },
-    #[error("mesh file `{path}` is of a kind that is not read; use .obj or .stl")]
+    #[error("mesh file `{path}` is of a kind that is not read; use .obj, .stl or .msh")]
     MeshKind { path: String },
     #[error("`{path}` is not a picture that can be read: {source}; use .png")]
     Texture { path: String, source: image::ImageError },
     #[error("`{file}`: {what}")]
     Unsupported { file: String, what: String },
+    #[error("{} things are not read:{}", .0.len(), listed(.0))]
+    Several(Vec<SimError>),
     #[error(
         "this build cannot read `{path}`: ONNX policies are an extra; build with `cargo build --release --features onnx`"
     )]
@@ -53,4 +55,25 @@ pub enum SimError {
     OtherWorld(#[from] OtherWorld),
     #[error("snapshot cannot be read: {0}; it must come from this binary and this world")]
     Snapshot(#[from] postcard::Error),
+}
+
+/// Of so many things the texts are told.
+const MAX_TOLD: usize = 40;
+
+impl SimError {
+    /// Makes one error of all that is wrong with a file; `None` if nothing is.
+    pub(crate) fn of_all(mut errors: Vec<SimError>) -> Option<SimError> {
+        match errors.len() {
+            0 | 1 => errors.pop(),
+            _ => Some(SimError::Several(errors)),
+        }
+    }
+}
+
+fn listed(errors: &[SimError]) -> String {
+    let mut text: String = errors.iter().take(MAX_TOLD).map(|error| format!("\n  {error}")).collect();
+    if errors.len() > MAX_TOLD {
+        text += &format!("\n  and {} more", errors.len() - MAX_TOLD);
+    }
+    text
 }

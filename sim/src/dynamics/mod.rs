@@ -24,7 +24,7 @@ mod tests;
 mod trees;
 
 pub use contacts::ContactPoint;
-pub use contacts::collider::{Collider, ColliderId};
+pub use contacts::collider::{Collider, ColliderId, Mask};
 pub use contacts::friction::{Directions, Friction};
 pub use energy_balance::{EnergyBalance, EnergyBefore};
 pub use joints::equality::{Equality, EqualityId};
@@ -93,6 +93,11 @@ impl Dynamics {
         self.collision.keep_apart(a, b);
     }
 
+    /// Lets these colliders never touch from now on. It has to be called before the first step.
+    pub fn keep_colliders_apart(&mut self, a: ColliderId, b: ColliderId) {
+        self.collision.keep_colliders_apart(a, b);
+    }
+
     pub fn add_equality(&mut self, equality: Equality, active: bool) -> EqualityId {
         self.solver.equalities.push(equality, active)
     }
@@ -119,7 +124,13 @@ impl Dynamics {
         self.collision.collider(id)
     }
 
-    /// Reduces the friction of all colliders with this tag to a share; see [`Friction::left`].
+    /// All colliders that a link carries.
+    pub fn colliders_on(&self, link: LinkId) -> Vec<ColliderId> {
+        let numbered = self.collision.colliders().zip(0..);
+        numbered.filter(|(collider, _)| collider.on == Some(link)).map(|(_, id)| ColliderId(id)).collect()
+    }
+
+    /// Leaves colliders of this tag only a share of their friction; see [`Friction::left`].
     pub fn leave_friction(&mut self, tag: u128, share: f64) {
         let of_tag = self.collision.colliders_mut().filter(|collider| collider.tag == tag);
         of_tag.for_each(|collider| collider.friction.left = share);

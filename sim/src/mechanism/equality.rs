@@ -1,13 +1,15 @@
 //! Equalities of a file between the links of its bodies, and links that never touch.
 
 use crate::SimError;
-use crate::dynamics::{DPose3, Dynamics, Equality, LinkId, TreeId};
+use crate::dynamics::{ColliderId, DPose3, Dynamics, Equality, LinkId, TreeId};
 use crate::mjcf::{BodyTree, Document, EqualityKind};
 
 /// A tree of a file and its id in dynamics; `None` for a part of the world.
 pub(crate) struct PlacedTree<'a> {
     pub tree: &'a BodyTree,
     pub id: Option<TreeId>,
+    /// Colliders of the geoms of a tree that is a part of the world, in their order.
+    pub colliders: Vec<Option<ColliderId>>,
 }
 
 /// One body of an equality.
@@ -70,7 +72,7 @@ fn weld(a: End, b: End, a_from_b: DPose3) -> Option<Equality> {
 fn end(dynamics: &Dynamics, placed: &[PlacedTree], world_from_file: &DPose3, body: Option<&String>) -> End {
     let world = End { link: None, carrier_from_body: *world_from_file, world_from_body: *world_from_file };
     let Some(name) = body else { return world };
-    for PlacedTree { tree, id } in placed {
+    for PlacedTree { tree, id, .. } in placed {
         let Some((link, in_link)) = tree.body(name) else { continue };
         return match id {
             Some(id) => End {
@@ -87,32 +89,50 @@ fn end(dynamics: &Dynamics, placed: &[PlacedTree], world_from_file: &DPose3, bod
     world
 }
 
-/// Excludes contacts between the links that the file's `<exclude>` names. Two parts of the room never
-/// touch anyway.
+/// Lets bodies that the file's `<exclude>` names never touch. Two parts of the room do not anyway.
 pub(crate) fn keep_apart(
     dynamics: &mut Dynamics,
     document: &Document,
     placed: &[PlacedTree],
 ) -> Result<(), SimError> {
     for pair in document.exclusions()? {
-        let links = pair.each_ref().map(|name| {
-            placed.iter().find_map(|PlacedTree { tree, id }| Some((*id)?.link(tree.body(name)?.0)))
-        });
-        match links {
-            [Some(a), Some(b)] => dynamics.keep_apart(a, b),
-            [None, None] => {}
-            [Some(_), None] | [None, Some(_)] => {
-                let what = format!("exclude of `{}` and `{}`, one of which never moves", pair[0], pair[1]);
-                return Err(document.unsupported(what));
+        match pair.each_ref().map(|name| excluded(placed, name)) {
+            [Some(Excluded::Link(a)), Some(Excluded::Link(b))] => dynamics.keep_apart(a, b),
+            [Some(Excluded::Link(link)), Some(Excluded::Room(colliders))]
+            | [Some(Excluded::Room(colliders)), Some(Excluded::Link(link))] => {
+                for own in dynamics.colliders_on(link) {
+                    colliders.iter().for_each(|other| dynamics.keep_colliders_apart(own, *other));
+                }
             }
+            _ => {}
         }
     }
     Ok(())
 }
 
-/// Returns the link that a joint of a file moves, unless it is part of the world.
+/// A body that an `<exclude>` names.
+enum Excluded {
+    Link(LinkId),
+    /// Colliders of a part of the world.
+    Room(Vec<ColliderId>),
+}
+
+fn excluded(placed: &[PlacedTree], name: &str) -> Option<Excluded> {
+    placed.iter().find_map(|PlacedTree { tree, id, colliders }| {
+        let (link, _) = tree.body(name)?;
+        Some(match id {
+            Some(id) => Excluded::Link(id.link(link)),
+            None => {
+                let body = tree.links[link].bodies.iter().find(|body| body.name == name)?;
+                Excluded::Room(colliders[body.geoms.clone()].iter().flatten().copied().collect())
+            }
+        })
+    })
+}
+
+/// The link that a joint of a file moves, unless that is a part of the world.
 pub(super) fn joint_link(placed: &[PlacedTree], joint: &str) -> Option<LinkId> {
-    placed.iter().find_map(|PlacedTree { tree, id }| {
+    placed.iter().find_map(|PlacedTree { tree, id, .. }| {
         let index = tree.links.iter().position(|link| link.joint.name() == Some(joint))?;
         Some((*id)?.link(index))
     })

@@ -42,8 +42,8 @@ impl Machinery {
     /// Sets the drives from this time on. As in MuJoCo, an actuator's control is 0 before the first key.
     pub fn drive(&self, dynamics: &mut Dynamics, time_s: f64) {
         let key = self.keys.iter().rev().find(|key| key.time_s <= time_s);
-        for (index, (link, actuator)) in self.actuated.iter().enumerate() {
-            let command = key.map_or(0.0, |key| key.controls[index]);
+        for (link, actuator) in &self.actuated {
+            let command = key.map_or(0.0, |key| key.controls[actuator.index]);
             dynamics.tree_mut(link.tree).drive(link.link, drive(actuator, command));
         }
     }
@@ -52,8 +52,10 @@ impl Machinery {
 fn drive(actuator: &Actuator, command: f64) -> Drive {
     let command = actuator.control_range.map_or(command, |[low, high]| command.clamp(low, high));
     match actuator.kind {
-        ActuatorKind::Motor => Drive { feedforward: command, ..Drive::NONE },
-        ActuatorKind::Position { kp, kd } => Drive { target: command, kp, kd, ..Drive::NONE },
+        ActuatorKind::Motor => Drive { feedforward: command * actuator.gear, ..Drive::NONE },
+        ActuatorKind::Position { kp, kd } => {
+            Drive { target: command / actuator.gear - actuator.placed_at, kp, kd, ..Drive::NONE }
+        }
     }
 }
 
@@ -61,7 +63,7 @@ fn drive(actuator: &Actuator, command: f64) -> Drive {
 /// leaves out stay in their placed poses, at rest.
 pub(crate) fn begin(dynamics: &mut Dynamics, placed: &[PlacedTree], key: &Key, world_from_file: &DPose3) {
     let (mut positions, mut velocities) = (key.positions.as_slice(), key.velocities.as_slice());
-    for PlacedTree { tree, id } in placed {
+    for PlacedTree { tree, id, .. } in placed {
         let Some(id) = *id else { continue };
         for (index, link) in tree.links.iter().enumerate() {
             match link.joint {

@@ -14,7 +14,7 @@ pub(crate) use solid::Solid;
 
 pub(crate) use crate::dynamics::rounded;
 
-use crate::dynamics::{Axis, Collider, DPose3, DQuat, Dynamics, Joint, Link, LinkId, Mass};
+use crate::dynamics::{Axis, Collider, ColliderId, DPose3, DQuat, Dynamics, Joint, Link, LinkId, Mass};
 use crate::mjcf::{Actuator, AxisJoint, BodyLink, BodyTree, Geom, LinkJoint, Primitive};
 use crate::owner::Owner;
 
@@ -24,18 +24,26 @@ pub(crate) fn precise(pose: &Pose) -> DPose3 {
     DPose3::from_parts(pose.translation.as_dvec3(), DQuat::from_xyzw(x, y, z, w).normalize())
 }
 
-/// Adds the collision shape of a geom, if it has one, to a link or to the world; the geom's pose is in
-/// the frame of either.
-pub(crate) fn add_collider(dynamics: &mut Dynamics, geom: &Geom, on: Option<LinkId>, owner: Option<Owner>) {
-    let Some((body_from_shape, shape)) = geom.collider().filter(|_| geom.collides) else { return };
-    dynamics.add_collider(Collider {
+/// Adds the collision shape of a geom, if it has one, to a link or to the world; the geom's pose is in the frame of either.
+pub(crate) fn add_collider(
+    dynamics: &mut Dynamics,
+    geom: &Geom,
+    on: Option<LinkId>,
+    owner: Option<Owner>,
+) -> Option<ColliderId> {
+    if !geom.collides {
+        return None;
+    }
+    let (body_from_shape, shape) = geom.collider()?;
+    Some(dynamics.add_collider(Collider {
         shape,
         on,
         body_from_shape: precise(&body_from_shape),
         friction: geom.friction,
         endless: matches!(geom.primitive, Primitive::Plane { .. }),
         tag: owner.map_or(0, Owner::tag),
-    });
+        touches: geom.touches,
+    }))
 }
 
 /// Builds the links of a file's tree, with the top of the tree placed by `world_from_file`. Drives of

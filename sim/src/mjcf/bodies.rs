@@ -1,7 +1,10 @@
 //! Bodies of a file as trees: links, the joints between them, their masses, geoms and sites. Plain data
 //! without dynamics.
 
+use std::ops::Range;
+
 use mjcf_rs::body::{GeomType, InertiaSpec, Inertial};
+use mjcf_rs::compiler::InertiaFromGeom;
 use rapier3d::glamx::DPose3;
 use rapier3d::math::{Matrix, Pose, Vector};
 use rapier3d::prelude::MassProperties;
@@ -26,6 +29,8 @@ pub struct BodyLink {
     /// Pose with the joint at 0.
     pub parent_from_link: DPose3,
     pub joint: LinkJoint,
+    /// Whether it is there for one of several joints of the body on it, and is no body of the file by itself.
+    pub is_part: bool,
     /// Mass and inertia in the link's frame.
     pub mass: MassProperties,
     pub geoms: Vec<Geom>,
@@ -38,6 +43,8 @@ pub struct BodyLink {
 pub struct PlacedBody {
     pub name: String,
     pub link_from_body: DPose3,
+    /// Its geoms among those of the link.
+    pub geoms: Range<usize>,
 }
 
 impl BodyTree {
@@ -88,17 +95,32 @@ impl Document {
                 }
             };
             places.push(place);
+            trees[place.tree].links[place.link].is_part |= self.split.is_part[id];
             self.refuse_planes_that_move(id, &trees[place.tree].links, place.link)?;
             self.add_body(id, &mut trees[place.tree].links[place.link], place.link_from_body)?;
         }
         for link in trees.iter_mut().flat_map(|tree| &mut tree.links) {
             link.name = link.bodies[0].name.clone();
         }
+        self.set_total_mass(&mut trees);
         self.check_masses(&trees, &places)?;
         Ok(trees)
     }
 
-    /// Refuses planes on bodies that a joint moves, as MuJoCo does.
+    /// Scales all masses if the file says what they add up to; the world has none.
+    fn set_total_mass(&self, trees: &mut [BodyTree]) {
+        let stated_kg = self.model.compiler.set_total_mass as f32;
+        let mut links: Vec<_> = trees.iter_mut().skip(1).flat_map(|tree| &mut tree.links).collect();
+        let total_kg: f32 = links.iter().map(|link| link.mass.mass()).sum();
+        if stated_kg > 0.0 && total_kg > 0.0 {
+            for link in links.iter_mut().filter(|link| link.mass.mass() > 0.0) {
+                let mass_kg = link.mass.mass() * stated_kg / total_kg;
+                link.mass.set_mass(mass_kg, true);
+            }
+        }
+    }
+
+    /// As in MuJoCo, planes are on bodies that no joint moves.
     fn refuse_planes_that_move(&self, id: usize, links: &[BodyLink], link: usize) -> Result<(), SimError> {
         let geoms = &self.model.bodies[id].body.geoms;
         let Some(plane) = geoms.iter().position(|geom| geom.type_ == GeomType::Plane) else { return Ok(()) };
@@ -130,15 +152,37 @@ impl Document {
         Ok(())
     }
 
+    /// Whether the mass of a body is that of its geoms.
+    pub(super) fn takes_mass_of_geoms(&self, body: usize) -> bool {
+        match self.model.compiler.inertia_from_geom {
+            InertiaFromGeom::True => true,
+            InertiaFromGeom::False => false,
+            InertiaFromGeom::Auto => self.model.bodies[body].body.inertial.is_none(),
+        }
+    }
+
     fn add_body(&self, id: usize, link: &mut BodyLink, link_from_body: DPose3) -> Result<(), SimError> {
         let body = &self.model.bodies[id].body;
         let name = if id == 0 { Some("world") } else { body.name.as_deref() };
-        link.bodies.push(PlacedBody { name: name.unwrap_or_default().into(), link_from_body });
         let on_link: Pose = pose(&link_from_body);
         let geoms = self.geoms(id)?;
+        link.bodies.push(PlacedBody {
+            name: name.unwrap_or_default().into(),
+            link_from_body,
+            geoms: link.geoms.len()..link.geoms.len() + geoms.len(),
+        });
         let mass = match &body.inertial {
-            Some(inertial) => stated_mass(inertial),
-            None => geoms.iter().map(mass_of_geom).fold(MassProperties::default(), |sum, part| sum + part),
+            Some(inertial) if !self.takes_mass_of_geoms(id) => stated_mass(inertial),
+            None if !self.takes_mass_of_geoms(id) => MassProperties::default(),
+            Some(_) | None => {
+                let groups = body.geoms.iter().map(|geom| geom.group);
+                let weighing = geoms
+                    .iter()
+                    .zip(groups)
+                    .filter(|(_, group)| self.settings.inertia_groups.contains(group));
+                let masses = weighing.map(|(geom, _)| mass_of_geom(geom));
+                masses.fold(MassProperties::default(), |sum, part| sum + part)
+            }
         };
         link.mass += mass.transform_by(&on_link);
         link.geoms.extend(
@@ -157,6 +201,7 @@ fn new_link(parent: Option<usize>, parent_from_link: DPose3, joint: LinkJoint) -
         parent,
         parent_from_link,
         joint,
+        is_part: false,
         mass: MassProperties::default(),
         geoms: Vec::new(),
         sites: Vec::new(),
@@ -188,8 +233,10 @@ fn mass_of_geom(geom: &Geom) -> MassProperties {
         | Primitive::Capsule { .. }
         | Primitive::Cylinder { .. }
         | Primitive::Box { .. }
-        | Primitive::Convex { .. }
-        | Primitive::Mesh(_) => shape.mass_properties(1.0).transform_by(&body_from_shape),
+        | Primitive::Convex { .. } => shape.mass_properties(1.0).transform_by(&body_from_shape),
+        Primitive::Mesh(ref mesh) => {
+            mesh.mass_properties().unwrap_or_default().transform_by(&geom.body_from_geom)
+        }
     };
     let mass_kg = geom.mass_kg.unwrap_or(geom.density_kg_m3 * of_unit_density.mass());
     let mut mass = of_unit_density;

@@ -70,6 +70,7 @@ impl Document {
     /// Returns pairs of bodies that never touch.
     pub fn exclusions(&self) -> Result<Vec<[String; 2]>, SimError> {
         let named = |name: &str| match self.model.body_id_by_name(name) {
+            None if name == "world" => Ok(name.to_string()),
             Some(_) => Ok(name.to_string()),
             None => Err(self.unsupported(format!("exclude of `{name}`, which is no body"))),
         };

@@ -3,7 +3,7 @@
 
 use rapier3d::math::{Matrix, Pose, Rotation, Vector};
 
-use super::source::MjcfText;
+use super::text::source::MjcfText;
 use super::{pose, vector};
 use crate::SimError;
 
@@ -71,11 +71,39 @@ const DEFAULT_RESOLUTION_PX: (u32, u32) = (320, 240);
 
 pub(super) fn cameras(source: &MjcfText) -> Result<Vec<MjcfCamera>, SimError> {
     let xml = source.xml()?;
-    xml.descendants().filter(|node| node.has_tag_name("camera")).map(|node| camera(source, node)).collect()
+    let mut found = Vec::new();
+    for node in xml.descendants().filter(|node| node.has_tag_name("camera")) {
+        let is_used = node.attribute("name").is_some_and(|name| USED.contains(&name));
+        match unreadable(&node) {
+            Some(what) if is_used => return Err(source.refuse(&node, what)),
+            Some(_) => {}
+            None => found.push(camera(&node)),
+        }
+    }
+    Ok(found)
 }
 
-fn camera(source: &MjcfText, node: roxmltree::Node) -> Result<MjcfCamera, SimError> {
-    // Their number and finiteness have been checked.
+/// Cameras that somebody looks through.
+const USED: [&str; 2] = ["third_person", "egocentric"];
+
+/// Says what would have to be otherwise for a camera to be read.
+fn unreadable(node: &roxmltree::Node) -> Option<&'static str> {
+    let has = |names: &[&str]| names.iter().any(|name| node.has_attribute(*name));
+    let parent = node.parent()?;
+    if !parent.has_tag_name("body") && !parent.has_tag_name("worldbody") {
+        return Some("state everything on the camera itself, outside of frames and classes");
+    }
+    if parent.has_tag_name("body") && !parent.has_attribute("name") {
+        return Some("name the body that carries it");
+    }
+    if has(&["axisangle", "euler", "zaxis"]) {
+        return Some("use quat or xyaxes");
+    }
+    has(&["focal", "focalpixel", "principal", "principalpixel", "sensorsize"]).then_some("use fovy")
+}
+
+fn camera(node: &roxmltree::Node) -> MjcfCamera {
+    // Whether they are right in number and finite has been checked.
     let numbers = |attribute: &str| -> Option<Vec<f32>> {
         let words = node.attribute(attribute)?.split_whitespace();
         Some(words.filter_map(|word| word.parse().ok()).collect())
@@ -92,16 +120,13 @@ fn camera(source: &MjcfText, node: roxmltree::Node) -> Result<MjcfCamera, SimErr
         (None, None) => Rotation::IDENTITY,
     };
     let body = node.parent().filter(|parent| parent.has_tag_name("body"));
-    if body.is_some_and(|body| !body.has_attribute("name")) {
-        return Err(source.refuse(&node, "name the body that carries it"));
-    }
     let fovy_deg = numbers("fovy").map_or(DEFAULT_FOVY_DEG, |v| v[0]);
     let resolution_px = numbers("resolution").map_or(DEFAULT_RESOLUTION_PX, |v| (v[0] as u32, v[1] as u32));
-    Ok(MjcfCamera {
+    MjcfCamera {
         name: node.attribute("name").unwrap_or_default().to_string(),
         body: body.and_then(|body| body.attribute("name")).map(str::to_string),
         body_from_camera: Pose::from_parts(position, rotation),
         vertical_fov_rad: fovy_deg.to_radians(),
         resolution_px,
-    })
+    }
 }

@@ -6,9 +6,9 @@ use mjcf_rs::body::GeomType;
 use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::prelude::SharedShape;
 
-use super::{Document, Mesh, pose, vector};
+use super::{Document, Mesh, SurfacePattern, pose, vector};
 use crate::SimError;
-use crate::dynamics::{Directions, Friction};
+use crate::dynamics::{Directions, Friction, Mask};
 
 /// Shape in its own frame; axial shapes are along z, as in MJCF.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,12 +53,15 @@ pub struct Geom {
     pub friction: Friction,
     pub density_kg_m3: f32,
     pub mass_kg: Option<f32>,
+    /// Whether there is anything that it touches.
     pub collides: bool,
+    pub touches: Mask,
     pub drawn: bool,
+    pub pattern: Option<SurfacePattern>,
 }
 
-/// MuJoCo hides groups 3 and above; robots keep their collision shapes there.
-const LAST_DRAWN_GROUP: i32 = 2;
+/// What is more transparent than this is not drawn, for nothing is drawn half.
+const MAX_CLEAR_ALPHA: f32 = 0.5;
 const DEFAULT_DENSITY_KG_M3: f64 = 1000.0;
 const DEFAULT_RGBA: [f64; 4] = [0.5, 0.5, 0.5, 1.0];
 /// Dimensions of the slab as which a plane collides: its thickness, which nothing passes, and its reach
@@ -77,17 +80,24 @@ impl Geom {
             None => (pose(&geom.pose), vector(geom.size).y),
         };
         let material = geom.material.as_ref().and_then(|name| document.model.assets.material(name));
+        let rgba = rgba(document, geom, material);
+        let touches = match document.settings.touches {
+            true => Mask { kinds: geom.contype, touched: geom.conaffinity },
+            false => Mask { kinds: 0, touched: 0 },
+        };
         Ok(Geom {
             primitive: primitive(document, geom, half_length_m).map_err(|what| refuse(&what))?,
             body_from_geom,
-            rgba: rgba(document, geom, material),
+            rgba,
             material: geom.material.clone(),
             checker_rgb: material.and_then(|material| checker_rgb(document, material)),
             friction: friction(geom).map_err(|what| refuse(&what))?,
             density_kg_m3: geom.density.unwrap_or(DEFAULT_DENSITY_KG_M3) as f32,
             mass_kg: geom.mass.map(|m| m as f32),
-            collides: geom.contype != 0 || geom.conaffinity != 0,
-            drawn: geom.group <= LAST_DRAWN_GROUP,
+            collides: touches.kinds != 0 || touches.touched != 0,
+            touches,
+            drawn: document.looks.is_drawn(geom.group) && rgba[3] > MAX_CLEAR_ALPHA,
+            pattern: geom.material.as_ref().and_then(|name| document.looks.patterns.get(name).copied()),
         })
     }
 
@@ -112,7 +122,7 @@ impl Geom {
                 SharedShape::cuboid(PLANE_REACH_M, PLANE_REACH_M, PLANE_THICKNESS_M / 2.0)
             }
             Primitive::Convex { vertices_m } => SharedShape::convex_hull(vertices_m)?,
-            Primitive::Mesh(mesh) => SharedShape::convex_hull(&mesh.vertices_m)?,
+            Primitive::Mesh(mesh) => mesh.hull()?,
         };
         Some((body_from_shape, shape))
     }

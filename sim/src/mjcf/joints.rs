@@ -8,8 +8,8 @@ use rapier3d::glamx::DVec3;
 use std::collections::BTreeMap;
 
 use super::Document;
-use super::source::MjcfText;
-use super::stated::stated;
+use super::text::source::MjcfText;
+use super::text::stated::Classes;
 use crate::SimError;
 use crate::dynamics::Axis;
 
@@ -29,8 +29,10 @@ pub enum LinkJoint {
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisJoint {
     pub name: String,
-    /// The axis, without a limit of effort: the actuator has one.
+    /// The effort has no limit here: the actuator has one. Its positions are 0 where the file places the bodies.
     pub axis: Axis,
+    /// What the file calls that position.
+    pub placed_at: f64,
 }
 
 /// Actuator of one hinge or slide. Efforts are in N m or N, positions in rad or m.
@@ -43,6 +45,12 @@ pub struct Actuator {
     pub effort_range: Option<[f64; 2]>,
     /// Speed (rad/s or m/s) at which the actuator can push no further.
     pub speed_limit: Option<f64>,
+    /// By how much a motor's command is multiplied, and a position's divided.
+    pub gear: f64,
+    /// What commands of positions call the position in which the joint is placed.
+    pub placed_at: f64,
+    /// Its number among all actuators of the file, of which some do nothing.
+    pub index: usize,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,8 +77,8 @@ pub(super) fn speed_limits(source: &MjcfText) -> Result<Option<Vec<f64>>, SimErr
     Ok(limits.map(words))
 }
 
-/// Ranges by the names of joints, which `mjcf-rs` does not read.
-#[derive(Debug, Default, PartialEq)]
+/// Ranges by the names of joints that `mjcf-rs` reads past.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct UnreadRanges {
     /// `actuatorfrcrange` of a joint: the limits of the total effort of all its actuators.
     effort: BTreeMap<String, [f64; 2]>,
@@ -82,6 +90,7 @@ pub(super) struct UnreadRanges {
 impl UnreadRanges {
     pub fn of(source: &MjcfText) -> Result<UnreadRanges, SimError> {
         let xml = source.xml()?;
+        let classes = Classes::of(&xml);
         let mut found = UnreadRanges::default();
         let acts = |node: &roxmltree::Node| {
             node.ancestors().any(|one| one.has_tag_name("worldbody") || one.has_tag_name("actuator"))
@@ -89,13 +98,13 @@ impl UnreadRanges {
         for node in xml.descendants().filter(acts) {
             // The support table has accepted only numbers.
             let numbers = |attribute: &str| -> Vec<f64> {
-                let words = stated(&node, attribute).unwrap_or_default().split_ascii_whitespace();
+                let words = classes.stated(&node, attribute).unwrap_or_default().split_ascii_whitespace();
                 words.filter_map(|word| word.parse().ok()).collect()
             };
             if node.has_tag_name("joint")
                 && let Some(name) = node.attribute("name")
                 && let [low, high] = numbers("actuatorfrcrange")[..]
-                && stated(&node, "actuatorfrclimited") != Some("false")
+                && classes.stated(&node, "actuatorfrclimited") != Some("false")
             {
                 found.effort.insert(name.into(), [low, high]);
             }
@@ -158,31 +167,43 @@ impl Document {
             return Err(self.unsupported(what));
         }
         let limit = |index: usize| limits.as_ref().map(|limits| limits[index]);
-        elements.iter().enumerate().map(|(index, element)| self.actuator(element, limit(index))).collect()
+        let acts = |element: &ActuatorElement| {
+            matches!(element.kind, Kind::Motor | Kind::Position)
+                && element.joint.is_some()
+                && element.gear[0] != 0.0
+        };
+        let acting = elements.iter().enumerate().filter(|(_, element)| acts(element));
+        acting.map(|(index, element)| self.actuator(index, element, limit(index))).collect()
     }
 
-    fn actuator(&self, element: &ActuatorElement, speed_limit: Option<f64>) -> Result<Actuator, SimError> {
+    /// Reads what drives a joint, with gains and efforts of the joint: a gear g makes g times the force of g
+    /// times the position.
+    fn actuator(
+        &self,
+        index: usize,
+        element: &ActuatorElement,
+        speed_limit: Option<f64>,
+    ) -> Result<Actuator, SimError> {
         let joint = element.joint.clone().unwrap_or_default();
         self.axis_joint(&joint)?;
-        if element.gear != [1.0, 0.0, 0.0, 0.0, 0.0, 0.0] {
-            let what = format!("actuator of joint `{joint}` has a gear; state gains and ranges of the joint");
-            return Err(self.unsupported(what));
-        }
+        let gear = element.gear[0];
         let kind = match element.kind {
-            Kind::Motor => ActuatorKind::Motor,
             Kind::Position => {
-                ActuatorKind::Position { kp: element.kp.unwrap_or(1.0), kd: element.kv.unwrap_or(0.0) }
+                let (kp, kd) = (element.kp.unwrap_or(1.0), element.kv.unwrap_or(0.0));
+                ActuatorKind::Position { kp: gear * gear * kp, kd: gear * gear * kd }
             }
-            Kind::Velocity | Kind::IntVelocity | Kind::Damper | Kind::General | Kind::Other => {
-                let what = format!("actuator {:?} of joint `{joint}`; use motor or position", element.kind);
-                return Err(self.unsupported(what));
+            Kind::Motor | Kind::Velocity | Kind::IntVelocity | Kind::Damper | Kind::General | Kind::Other => {
+                ActuatorKind::Motor
             }
         };
         let limits = |what: &str, limited, range| {
             let limits = self.limits(what, limited, range);
             limits.map_err(|what| self.unsupported(format!("actuator of joint `{joint}`: {what}")))
         };
-        let effort_range = limits("force", element.force_limited, element.force_range)?;
+        let effort_range = limits("force", element.force_limited, element.force_range)?.map(|[low, high]| {
+            let (low, high) = (low * gear, high * gear);
+            [low.min(high), low.max(high)]
+        });
         if let Some(limit) = speed_limit.filter(|limit| *limit <= 0.0 || effort_range.is_none()) {
             let what = format!(
                 "actuator of joint `{joint}`: a speed limit of {limit}; it has to be above 0, and needs a forcerange"
@@ -194,8 +215,11 @@ impl Document {
             control_range: own_range.or(self.inherited_range(&joint)?),
             effort_range: self.effort_range(&joint, effort_range),
             speed_limit,
-            joint,
             kind,
+            gear,
+            placed_at: self.axis_joint(&joint)?.ref_,
+            index,
+            joint,
         })
     }
 
@@ -237,30 +261,23 @@ impl Document {
         let joint = match entry.body.joints.as_slice() {
             [] => return Ok(LinkJoint::Fixed),
             [joint] => joint,
-            several => {
-                let what = format!("it has {} joints; put a body between two joints", several.len());
-                return Err(self.refuse_body(body, &what));
-            }
+            _ => return Err(self.refuse_body(body, "a free body has no other joint")),
         };
         let refuse = |what: &str| self.source.refuse_at(self.checked.bodies[body].joints[0], what);
         let name = joint.name.clone().unwrap_or_default();
-        if joint.ref_ != 0.0 || joint.springdamper.is_some_and(|numbers| numbers != [0.0; 2]) {
-            return Err(refuse("`ref` and `springdamper` are not read; state stiffness and damping"));
+        if joint.springdamper.is_some_and(|numbers| numbers != [0.0; 2]) {
+            return Err(refuse("springdamper is not read; state stiffness and damping"));
         }
         match joint.type_ {
             JointType::Free if entry.parent != Some(0) => {
                 Err(refuse("a free body lies in another; move it to the top level"))
             }
-            JointType::Free => {
-                let states = [joint.stiffness, joint.damping, joint.frictionloss, joint.armature];
-                match states == [0.0; 4] {
-                    true => Ok(LinkJoint::Free { name }),
-                    false => Err(refuse("nothing holds or slows a free body; use <freejoint>")),
-                }
-            }
-            JointType::Hinge => Ok(LinkJoint::Hinge(self.axis(name, joint).map_err(|what| refuse(&what))?)),
+            JointType::Free => Ok(LinkJoint::Free { name }),
             JointType::Slide => Ok(LinkJoint::Slide(self.axis(name, joint).map_err(|what| refuse(&what))?)),
-            JointType::Ball => Err(refuse("it is a ball; use free, hinge or slide")),
+            // Balls have become hinges.
+            JointType::Hinge | JointType::Ball => {
+                Ok(LinkJoint::Hinge(self.axis(name, joint).map_err(|what| refuse(&what))?))
+            }
         }
     }
 
@@ -271,11 +288,11 @@ impl Document {
             friction_loss: joint.frictionloss,
             damping: joint.damping,
             stiffness: joint.stiffness,
-            spring_rest: joint.springref,
-            range: self.limits("", joint.limited, joint.range)?,
+            spring_rest: joint.springref - joint.ref_,
+            range: self.limits("", joint.limited, joint.range)?.map(|ends| ends.map(|end| end - joint.ref_)),
             ..Axis::along(DVec3::from_array(joint.axis))
         };
-        Ok(AxisJoint { name, axis })
+        Ok(AxisJoint { name, axis, placed_at: joint.ref_ })
     }
 
     /// Returns a range if it limits anything; `what` is the limited quantity.

@@ -21,7 +21,7 @@ impl Document {
     pub fn keys(&self) -> Result<Vec<Key>, SimError> {
         let joints = (0..self.model.bodies.len()).map(|body| self.joint(body));
         let joints = joints.collect::<Result<Vec<_>, _>>()?;
-        let coordinates = joints.iter().map(LinkJoint::coordinates).sum();
+        let coordinates: usize = joints.iter().map(LinkJoint::coordinates).sum();
         let freedoms = joints.iter().map(LinkJoint::freedoms).sum();
         let read = |key: &mjcf_rs::extras::Keyframe| {
             let name = key.name.clone().unwrap_or_default();
@@ -31,7 +31,10 @@ impl Document {
                 have => Err(self
                     .unsupported(format!("key `{name}` has {have} numbers in {what}; it takes {expected}"))),
             };
-            let positions = numbers("qpos", &key.qpos, coordinates)?;
+            // Of a ball MuJoCo has a quaternion, here there are three angles; where somebody begins is then
+            // where it is placed.
+            let has_ball = self.split.ball.is_some();
+            let positions = if has_ball { Vec::new() } else { numbers("qpos", &key.qpos, coordinates)? };
             let mut rest = positions.as_slice();
             for joint in joints.iter().filter(|_| !positions.is_empty()) {
                 let (own, others) = rest.split_at(joint.coordinates());
@@ -43,6 +46,11 @@ impl Document {
                     return Err(self.unsupported(what));
                 }
             }
+            let placed_at = joints.iter().flat_map(|joint| match joint {
+                LinkJoint::Hinge(axis) | LinkJoint::Slide(axis) => vec![axis.placed_at],
+                LinkJoint::Fixed | LinkJoint::Free { .. } => vec![0.0; joint.coordinates()],
+            });
+            let positions = positions.iter().zip(placed_at).map(|(own, placed_at)| own - placed_at).collect();
             Ok(Key {
                 time_s: key.time,
                 positions,

@@ -1,25 +1,24 @@
-//! The only reader of MJCF, for robots, scenes and objects. It assembles the text with all includes
-//! (`source`), and accepts or refuses every element and attribute by one table (`check`, `support`). It
-//! parses the text with `mjcf-rs`, and converts it to its own types: bodies in trees, shapes, joints
-//! with their actuators, equalities, keys, and the parts that `mjcf-rs` leaves out.
+//! The one reader of MJCF, for robots, scenes and objects: the text with all that it includes (`text`), every
+//! element and attribute accepted or refused by one table (`support`), parsed by `mjcf-rs`, and then as we
+//! use it: bodies in trees, shapes, joints with their actuators, equalities, keys, what that parser leaves
+//! out, and the files that it names (`assets`).
 
+mod assets;
 mod bodies;
-mod check;
 mod equality;
-mod files;
 mod frames;
 mod geometry;
 mod joints;
 mod key;
-mod source;
-mod stated;
 mod support;
 #[cfg(test)]
 mod tests;
+mod text;
 
+pub use assets::files::Mesh;
+pub use assets::looks::SurfacePattern;
 pub use bodies::{BodyLink, BodyTree, PlacedBody};
 pub use equality::{EqualityConstraint, EqualityKind};
-pub use files::Mesh;
 pub use frames::{MjcfCamera, Site};
 pub use geometry::{Geom, Primitive};
 pub use joints::{Actuator, ActuatorKind, AxisJoint, LinkJoint};
@@ -34,12 +33,17 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::SimError;
 use crate::user_file::{MAX_TEXT_BYTES, read_text};
-use check::Checked;
+use assets::kept;
+use assets::looks::Looks;
 use joints::UnreadRanges;
-use source::MjcfText;
+use text::check::{self, Checked};
+use text::plain::plain;
+use text::settings::FileSettings;
+use text::source::{self, MjcfText};
+use text::split::{Split, split};
 
-/// A parsed file. All its content is in effect; otherwise it would have been refused.
-#[derive(Debug)]
+/// A parsed file. What it says is all in effect, or it would not have been read.
+#[derive(Clone, Debug)]
 pub struct Document {
     pub file: String,
     pub model: mjcf_rs::Model,
@@ -49,11 +53,18 @@ pub struct Document {
     unread: UnreadRanges,
     source: MjcfText,
     checked: Checked,
-    /// Folder that the file's references are relative to.
+    split: Split,
+    /// The folder in which files lie that it names.
     folder: PathBuf,
     /// Content of the files that assets name, by asset.
     meshes: BTreeMap<String, Arc<Mesh>>,
     texture_rgb: BTreeMap<String, [f32; 3]>,
+    looks: Looks,
+    settings: FileSettings,
+    /// All files that were read, and a hash of the bytes of each.
+    files: Vec<(PathBuf, u64)>,
+    /// See [`Document::fingerprint`].
+    known_fingerprint: Option<u64>,
 }
 
 impl Document {
@@ -83,57 +94,124 @@ impl Document {
     ///
     /// Returns an error if a file cannot be read, or as for [`Document::parse`].
     pub fn read(path: &Path) -> Result<Document, SimError> {
+        if let Some(kept) = kept::find(path) {
+            return Ok(kept);
+        }
         let file = path.display().to_string();
         let xml = read_text(path, MAX_TEXT_BYTES)
             .map_err(|source| SimError::Read { path: file.clone(), source })?;
-        Document::parse_in(&file, &xml, path.parent().unwrap_or(Path::new(".")))
+        let mut document = Document::parse_in(&file, &xml, path.parent().unwrap_or(Path::new(".")))?;
+        document.files.push((path.into(), xxh3_64(xml.as_bytes())));
+        document.known_fingerprint = Some(document.fingerprint());
+        kept::keep(path, &document);
+        Ok(document)
     }
 
     fn parse_in(file: &str, xml: &str, folder: &Path) -> Result<Document, SimError> {
         let source = MjcfText::read(file, xml, folder)?;
-        let checked = check::check(&source)?;
-        let model = mjcf_rs::Model::from_str(&source.text, folder)
+        let mut checked = check::check(&source)?;
+        let text = plain(&source.text, &source.xml()?);
+        let mut model = mjcf_rs::Model::from_str(&text, folder)
             .map_err(|source| SimError::Mjcf { file: file.into(), source })?;
+        let split_bodies = split(&mut model, &mut checked.bodies);
         let mut document = Document {
             file: file.into(),
             model,
             cameras: frames::cameras(&source)?,
             speed_limit_values: joints::speed_limits(&source)?,
             unread: UnreadRanges::of(&source)?,
-            source,
             checked,
+            split: split_bodies,
             folder: folder.into(),
             meshes: BTreeMap::new(),
             texture_rgb: BTreeMap::new(),
+            looks: Looks::of(&source)?,
+            settings: FileSettings::of(&source)?,
+            files: source.included(),
+            known_fingerprint: None,
+            source,
         };
-        document.approximate_collisions();
-        document.meshes = document.read_meshes()?;
-        document.texture_rgb = document.read_textures()?;
+        document.read_meshes()?;
+        document.read_textures()?;
+        document.check_bodies()?;
+        document.note_transparency();
+        document.note_joints();
+        document.note_concave_meshes();
         Ok(document)
     }
 
-    /// Returns the elements of the file that only approximate MuJoCo, one per line with their first place.
+    /// Refuses all joints and geoms that cannot be had.
+    fn check_bodies(&self) -> Result<(), SimError> {
+        let mut refused = Vec::new();
+        for (body, entry) in self.model.bodies.iter().enumerate() {
+            refused.extend(self.joint(body).err());
+            let geoms = 0..entry.body.geoms.len();
+            refused.extend(geoms.filter_map(|geom| Geom::read(self, body, geom).err()));
+        }
+        SimError::of_all(refused).map_or(Ok(()), Err)
+    }
+
+    /// Notes balls, and free joints that a class or they themselves give springs or damping.
+    fn note_joints(&mut self) {
+        let bodies = self.model.bodies.iter().zip(&self.checked.bodies);
+        let mut joints = bodies.flat_map(|(entry, bytes)| entry.body.joints.iter().zip(&bytes.joints));
+        let held = joints.find(|(joint, _)| {
+            let states = [joint.stiffness, joint.damping, joint.frictionloss, joint.armature];
+            joint.type_ == mjcf_rs::body::JointType::Free && states != [0.0; 4]
+        });
+        let ball = "a ball is three hinges about x, y and z, which lock where the second is turned by 90 degrees; it has no range";
+        let free = "nothing holds or slows a free body: springs, damping, friction and armature are left out";
+        let notes = [(self.split.ball, ball), (held.map(|(_, byte)| *byte), free)];
+        let told = notes
+            .into_iter()
+            .filter_map(|(byte, what)| Some(format!("`{}`: joint: {what}", self.source.line(byte?))));
+        let told: Vec<String> = told.collect();
+        self.checked.approximated.extend(told);
+    }
+
+    /// What the file says that does not happen quite as in MuJoCo, a line each with the first place that says it.
     pub fn approximations(&self) -> &[String] {
         &self.checked.approximated
     }
 
-    /// Reports geoms with one-sided collision masks: here they collide with all others.
-    fn approximate_collisions(&mut self) {
+    /// Notes the first geom that is neither clear nor solid: nothing is drawn half.
+    fn note_transparency(&mut self) {
         let bodies = self.model.bodies.iter().zip(&self.checked.bodies);
-        let mut one_sided = bodies.flat_map(|(entry, bytes)| entry.body.geoms.iter().zip(&bytes.geoms));
-        if let Some((_, byte)) = one_sided.find(|(geom, _)| (geom.contype == 0) != (geom.conaffinity == 0)) {
-            let what = "only one of contype and conaffinity is 0: it touches all that is not 0 in both";
+        let mut geoms = bodies.flat_map(|(entry, bytes)| entry.body.geoms.iter().zip(&bytes.geoms));
+        let assets = &self.model.assets;
+        let is_half = |(geom, _): &(&mjcf_rs::body::Geom, &usize)| {
+            let material = || assets.material(geom.material.as_ref()?)?.rgba;
+            geom.rgba.or_else(material).is_some_and(|[_, _, _, alpha]| alpha > 0.0 && alpha < 1.0)
+        };
+        if let Some((_, byte)) = geoms.find(is_half) {
+            let what = "it lets light through: here it is not drawn, or, above an alpha of 0.5, it is solid";
             let line = self.source.line(*byte);
             self.checked.approximated.push(format!("`{line}`: geom: {what}"));
         }
     }
 
-    /// Returns a hash of the content, including all files that it includes and names; comments do not count.
+    /// How things fall where the file is a scene, m/s^2, in the frame of the file.
+    pub(crate) fn gravity_m_s2(&self) -> [f64; 3] {
+        if self.settings.falls { self.model.option.gravity } else { [0.0; 3] }
+    }
+
+    /// Tells files of different content apart, with all that they include and name; comments do not count. Of
+    /// a file that was read it is that of the file, whatever has been changed of the document.
     pub fn fingerprint(&self) -> u64 {
+        if let Some(known) = self.known_fingerprint {
+            return known;
+        }
         let read = (&self.model, &self.cameras, &self.meshes, &self.texture_rgb, &self.speed_limit_values);
         let mut content = format!("{read:?}");
+        // What older versions did not read changes nothing where a file does not have it.
         if self.unread != UnreadRanges::default() {
             content += &format!("{:?}", self.unread);
+        }
+        if self.looks != Looks::default() {
+            content += &format!("{:?}", self.looks);
+        }
+        if self.settings != FileSettings::default() {
+            content += &format!("{:?}", self.settings);
         }
         xxh3_64(content.as_bytes())
     }

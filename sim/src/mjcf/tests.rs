@@ -97,7 +97,7 @@ fn joints_keep_everything_the_file_says() {
         range: Some([0.0, 1.5]),
         ..Axis::along(DVec3::Z)
     };
-    let hinge = AxisJoint { name: "hinge".into(), axis };
+    let hinge = AxisJoint { name: "hinge".into(), axis, placed_at: 0.0 };
     assert_eq!(trees[1].links[1].joint, LinkJoint::Hinge(hinge));
     let bolt = trees[1].links[2].joint.axis().expect("a slide");
     assert_eq!(bolt.range, None, "`limited` is false");
@@ -129,6 +129,9 @@ fn equalities_and_actuators_are_read() {
         control_range: Some([-5.0, 5.0]),
         effort_range: None,
         speed_limit: None,
+        gear: 1.0,
+        placed_at: 0.0,
+        index: 0,
     };
     let position = Actuator {
         joint: "bolt".into(),
@@ -136,6 +139,9 @@ fn equalities_and_actuators_are_read() {
         control_range: None,
         effort_range: Some([-4.0, 4.0]),
         speed_limit: None,
+        gear: 1.0,
+        placed_at: 0.0,
+        index: 1,
     };
     assert_eq!(document.actuators().expect("actuators"), [motor, position]);
 }
@@ -237,19 +243,81 @@ fn what_is_refused_says_what_would_work() {
         let error = refusal(&inside);
         assert!(error.contains(told), "{error}");
     };
-    check(body(&format!("{hinge}<joint name=\"i\"/>")), "put a body between two joints");
-    check(body(r#"<joint type="ball"/>"#), "use free, hinge or slide");
-    check(body(r#"<joint ref="1"/>"#), "`ref` and `springdamper` are not read");
+    check(body(r#"<joint springdamper="1 1"/>"#), "state stiffness and damping");
     check(body(r#"<body name="b"><freejoint/></body>"#), "move it to the top level");
     check(body(r#"<geom size="1" condim="2"/>"#), "use 1, 3, 4 or 6");
     let coupled = r#"<equality><joint joint1="h" joint2="i"/></equality>"#;
     check(format!("{}{coupled}", body(hinge)), "no hinge or slide `i`; have: h");
     let welded = r#"<equality><weld body1="b"/></equality>"#;
     check(format!("{}{welded}", body(hinge)), "unknown body `b`; have: a");
-    let general = r#"<actuator><velocity joint="h"/></actuator>"#;
-    check(format!("{}{general}", body(hinge)), "use motor or position");
-    let geared = r#"<actuator><motor joint="h" gear="2"/></actuator>"#;
-    check(format!("{}{geared}", body(hinge)), "has a gear");
+    let driven = r#"<actuator><motor joint="i"/></actuator>"#;
+    check(format!("{}{driven}", body(hinge)), "no hinge or slide `i`; have: h");
+}
+
+#[test]
+fn all_that_is_refused_of_a_file_is_told_at_once() {
+    let told =
+        refusal("<worldbody><geom size=\"-1\"/>\n<geom colour=\"red\" size=\"1\"/></worldbody>\n<tendon/>");
+    assert_eq!(told.lines().count(), 4, "{told}");
+    for line in [
+        "3 things are not read:",
+        "`test.xml:2`: geom in <worldbody>: size=\"-1\"; use 1 to 3 numbers of at least 0",
+        "`test.xml:3`: geom in <worldbody>: <geom> has no attribute `colour` that is read",
+        "`test.xml:4`: <tendon>: <tendon> is not read; couple joints with an equality",
+    ] {
+        assert!(told.lines().any(|told| told.trim() == line), "{told}");
+    }
+    let told = refusal(
+        "<worldbody><geom type=\"box\" size=\"1\"/>\n<body><joint/><geom type=\"sdf\"/></body></worldbody>",
+    );
+    assert!(told.contains("`test.xml:2`") && told.contains("`test.xml:3`"), "{told}");
+}
+
+#[test]
+fn masks_say_what_touches_what() {
+    let geoms = r#"<geom size="1" contype="4" conaffinity="3"/><geom size="1" conaffinity="0"/>
+        <geom size="1" contype="0" conaffinity="0"/>"#;
+    let geoms = trees(&format!("<worldbody>{geoms}</worldbody>"))[0].links[0].geoms.clone();
+    assert_eq!(geoms.iter().map(|geom| geom.collides).collect::<Vec<_>>(), [true, true, false]);
+    assert_eq!((geoms[0].touches.kinds, geoms[0].touches.touched), (4, 3));
+    assert!(geoms[0].touches.meets(geoms[1].touches) && geoms[1].touches.meets(geoms[0].touches));
+    assert!(!geoms[1].touches.meets(geoms[1].touches), "it touches nothing of its own kind");
+}
+
+/// Positions are counted from where the file places the bodies, whatever it calls that.
+#[test]
+fn a_joint_may_be_placed_elsewhere_than_at_0() {
+    let body = r#"<worldbody><body><joint name="h" ref="0.5" range="0 2" springref="0.7"/>
+        <geom size="1"/></body></worldbody>"#;
+    let driven =
+        r#"<actuator><position joint="h"/></actuator><keyframe><key name="start" qpos="1"/></keyframe>"#;
+    let found = document(&format!("{body}{driven}"));
+    let trees = found.trees().expect("trees");
+    let axis = trees[1].links[0].joint.axis().expect("a hinge");
+    assert_eq!((axis.range, axis.spring_rest), (Some([-0.5, 1.5]), 0.7 - 0.5));
+    assert_eq!(found.keys().expect("keys")[0].positions, [0.5]);
+    assert_eq!(found.actuators().expect("actuators")[0].placed_at, 0.5);
+}
+
+#[test]
+fn settings_of_a_file_hold_for_all_of_it() {
+    let mass_kg = |compiler: &str| {
+        let geoms = r#"<geom size="1" mass="2" group="0"/><geom size="1" mass="3" group="1"/>"#;
+        let stated = r#"<inertial pos="0 0 0" mass="7" diaginertia="1 1 1"/>"#;
+        let body = |stated: &str| format!("<body><freejoint/>{stated}{geoms}</body>");
+        let bodies = body(stated) + &body("");
+        let trees = trees(&format!("{compiler}<worldbody>{bodies}</worldbody>"));
+        [1, 2].map(|tree: usize| trees[tree].links[0].mass.mass().round())
+    };
+    assert_eq!(mass_kg(""), [7.0, 5.0]);
+    assert_eq!(mass_kg(r#"<compiler inertiagrouprange="0 0"/>"#), [7.0, 2.0]);
+    assert_eq!(mass_kg(r#"<compiler inertiafromgeom="true"/>"#), [5.0, 5.0]);
+    assert_eq!(mass_kg(r#"<compiler settotalmass="24"/>"#), [14.0, 10.0]);
+    let flags = r#"<option><flag contact="disable" gravity="disable"/></option>"#;
+    let none = document(&format!("{flags}<worldbody><geom size=\"1\"/></worldbody>"));
+    assert!(!none.trees().expect("trees")[0].links[0].geoms[0].collides);
+    assert_eq!(none.gravity_m_s2(), [0.0; 3]);
+    assert_eq!(document(r#"<option gravity="0 0 -1.62"/>"#).gravity_m_s2(), [0.0, 0.0, -1.62]);
 }
 
 #[test]
@@ -326,16 +394,21 @@ fn our_own_files_have_nothing_that_is_approximated() {
 
 #[test]
 fn what_is_approximated_is_named_once() {
-    let geoms = r#"<geom size="1" solref="0.01 1"/><geom size="1" solref="0.02 1" contype="2"/>"#;
-    let document = document(&format!("<worldbody>{geoms}<geom size=\"1\" contype=\"0\"/></worldbody>"));
+    let geoms = r#"<geom size="1" solref="0.01 1"/><geom size="1" solref="0.02 1" margin="1"/>"#;
+    let glass = r#"<geom size="1" rgba="1 1 1 0.3"/>"#;
+    let ball = r#"<body><joint type="ball"/><geom size="1"/></body>"#;
+    let free = r#"<body><joint type="free" damping="1"/><geom size="1"/></body>"#;
+    let document = document(&format!("<worldbody>{geoms}{glass}{glass}{ball}{free}</worldbody>"));
     let told = document.approximations().join("\n");
-    assert_eq!(document.approximations().len(), 3, "{told}");
+    assert_eq!(document.approximations().len(), 5, "{told}");
+    assert!(told.contains("geom: it lets light through"), "{told}");
+    assert!(told.contains("joint: a ball is three hinges"), "{told}");
+    assert!(told.contains("joint: nothing holds or slows a free body"), "{told}");
     assert!(told.contains("`test.xml:1`: geom in <worldbody> has solref: every contact"), "{told}");
-    assert!(told.contains("only one of contype and conaffinity is 0"), "{told}");
 }
 
 #[test]
-fn classes_are_not_mixed_with_what_elements_state_in_part() {
+fn classes_are_those_of_the_file() {
     let with = |defaults: &str, geom: &str| {
         let inside = format!("<default>{defaults}</default><worldbody>{geom}</worldbody>");
         let xml = format!("<mujoco>{inside}</mujoco>");
@@ -344,8 +417,6 @@ fn classes_are_not_mixed_with_what_elements_state_in_part() {
     let pads = r#"<default class="pad"><geom friction="0.8 0.003 0" pos="1 0 0" size="1"/></default>"#;
     assert_eq!(with(pads, r#"<geom class="pad" friction="1 0 0"/>"#), "");
     for (geom, expected) in [
-        (r#"<geom class="pad" friction="1"/>"#, "states fewer numbers than its class"),
-        (r#"<geom class="pad" euler="0 0 1"/>"#, "its class states the other half of its pose"),
         (r#"<geom class="pod"/>"#, "class=\"pod\"; use the class of a <default>"),
         (r#"<geom class="pad" material="wood"/>"#, "material=\"wood\"; use the name of a material"),
         (r#"<geom class="pad" colour="red"/>"#, "<geom> has no attribute `colour` that is read"),
@@ -354,7 +425,6 @@ fn classes_are_not_mixed_with_what_elements_state_in_part() {
         assert!(error.contains(expected), "{error}");
     }
     for (defaults, expected) in [
-        ("<general/>", "use motor or position"),
         ("<default><geom/></default>", "a class inside another needs a name"),
         (r#"<default class="main"><geom/></default>"#, "there is a class of this name already"),
     ] {
@@ -363,10 +433,6 @@ fn classes_are_not_mixed_with_what_elements_state_in_part() {
     }
     let late = r#"<default><geom euler="0 0 1"/></default><compiler angle="degree"/>"#;
     assert!(refusal(late).contains("a <default> before it has angles; put it first"));
-    let body = r#"<worldbody><body><joint name="h"/><geom size="1"/></body></worldbody>"#;
-    let position = r#"<actuator><position joint="h"/></actuator>"#;
-    let error = refusal(&format!("<default><motor ctrlrange=\"-1 1\"/></default>{body}{position}"));
-    assert!(error.contains("it would count for every <position> too"), "{error}");
 }
 
 #[test]

@@ -73,8 +73,12 @@ fn pushed_m(robot: &RobotModel, obstacle: &[Geom], across_m: f32) -> [f32; 2] {
         mass: Mass::from_rapier(&robot.links[robot.soles.left.link].mass),
     };
     let id = dynamics.add_tree(Tree::new("foot", vec![link]).expect("a tree"));
-    foot(robot).iter().for_each(|geom| add_collider(&mut dynamics, geom, Some(id.link(0)), None));
-    obstacle.iter().for_each(|geom| add_collider(&mut dynamics, geom, None, None));
+    foot(robot).iter().for_each(|geom| {
+        add_collider(&mut dynamics, geom, Some(id.link(0)), None);
+    });
+    obstacle.iter().for_each(|geom| {
+        add_collider(&mut dynamics, geom, None, None);
+    });
     dynamics.tree_mut(id).drive(0, Drive { feedforward: 100.0, kd: 200.0, ..Drive::NONE });
     let others = drawn(&Pose::IDENTITY, obstacle);
     let mut deepest_m = 0.0_f32;

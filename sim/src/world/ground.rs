@@ -3,7 +3,7 @@
 use rapier3d::math::{Pose, Vector};
 
 use super::World;
-use crate::dynamics::{Collider, DPose3, DVec3, Directions, Friction};
+use crate::dynamics::{Collider, DPose3, DVec3, Directions, Friction, Mask};
 use crate::mechanism::{add_collider, rounded};
 use crate::mjcf::{Geom, Primitive};
 
@@ -49,7 +49,9 @@ impl World {
             density_kg_m3: 0.0,
             mass_kg: None,
             collides: true,
+            touches: Mask::ALL,
             drawn: false,
+            pattern: None,
         };
         add_collider(&mut self.dynamics, &ground, None, None);
     }

@@ -30,7 +30,7 @@ use rapier3d::math::Pose;
 
 use crate::body::RobotModel;
 use crate::dynamics::{DVec3, Diverged, Dynamics, LinkId, Settings};
-use crate::mechanism::Machinery;
+use crate::mechanism::{Machinery, precise};
 use crate::mjcf::{Document, MjcfCamera};
 use crate::robot::{Robot, RobotCommand, RobotPlacement, Sensing};
 use crate::{CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError, assets};
@@ -59,6 +59,18 @@ impl From<&str> for SceneSource {
         SceneSource::Embedded(name.into())
     }
 }
+
+/// Returns how things fall in a scene, world frame.
+fn gravity_m_s2(scene: &Document, world_from_scene: &Pose) -> DVec3 {
+    let stated = scene.gravity_m_s2();
+    if stated == USUAL_GRAVITY_M_S2 {
+        return DVec3::new(0.0, 0.0, -f64::from(GRAVITY_M_S2));
+    }
+    precise(world_from_scene).rotation * DVec3::from_array(stated)
+}
+
+/// MJCF's default.
+const USUAL_GRAVITY_M_S2: [f64; 3] = [0.0, 0.0, -9.81];
 
 /// A simulated room. One thread owns it.
 pub struct World {
@@ -121,7 +133,7 @@ impl World {
 
     /// Builds the world as [`World::of_scene`] does, with the scene's own origin at `world_from_scene`.
     fn furnished(scene: &Document, world_from_scene: &Pose) -> Result<World, SimError> {
-        let gravity_m_s2 = DVec3::new(0.0, 0.0, -f64::from(GRAVITY_M_S2));
+        let gravity_m_s2 = gravity_m_s2(scene, world_from_scene);
         let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), gravity_m_s2));
         let Furniture { fixed, objects, machinery } =
             objects::insert_scene(&mut dynamics, scene, world_from_scene)?;

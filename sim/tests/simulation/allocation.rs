@@ -8,7 +8,8 @@ use std::cell::Cell;
 
 use rapier3d::prelude::SharedShape;
 use tandem_sim::dynamics::{
-    Axis, Collider, DPose3, DVec3, Directions, Drive, Dynamics, Friction, Joint, Link, Mass, Settings, Tree,
+    Axis, Collider, DPose3, DVec3, Directions, Drive, Dynamics, Friction, Joint, Link, Mask, Mass, Settings,
+    Tree,
 };
 
 thread_local! {
@@ -50,6 +51,7 @@ fn scene() -> Dynamics {
         friction: FRICTION,
         endless: false,
         tag: 0,
+        touches: Mask::ALL,
     });
     for tower in 0..3 {
         let mut axis = Axis::along(DVec3::Y);
@@ -74,6 +76,7 @@ fn scene() -> Dynamics {
                 friction: FRICTION,
                 endless: false,
                 tag: 0,
+                touches: Mask::ALL,
             });
         }
         let drive = Drive { target: 2.0, kp: 10.0, kd: 0.1, feedforward: 0.0 };

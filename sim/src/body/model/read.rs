@@ -82,6 +82,17 @@ pub(super) fn only_tree(document: &Document) -> Result<BodyTree, SimError> {
         let name = &tree.links[0].name;
         return Err(document.unsupported(format!("a robot is free to move; give `{name}` a <freejoint>")));
     }
+    for link in &tree.links {
+        let placed_at = match &link.joint {
+            LinkJoint::Hinge(axis) | LinkJoint::Slide(axis) => axis.placed_at,
+            LinkJoint::Fixed | LinkJoint::Free { .. } => 0.0,
+        };
+        if link.is_part || placed_at != 0.0 {
+            let what =
+                format!("a robot's bodies have one joint each, without `ref`; `{}` has not", link.name);
+            return Err(document.unsupported(what));
+        }
+    }
     if world.into_iter().any(|link| !link.geoms.is_empty() || !link.sites.is_empty()) {
         return Err(document.unsupported("a robot has its geoms and sites on bodies, none in the worldbody"));
     }

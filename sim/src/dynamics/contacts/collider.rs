@@ -27,6 +27,24 @@ pub struct Collider {
     pub endless: bool,
     /// Tag by which the owner of the world recognises the collider.
     pub tag: u128,
+    pub touches: Mask,
+}
+
+/// Kinds of a collider, and kinds that it touches, as bits: MJCF's `contype` and `conaffinity`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mask {
+    pub kinds: u32,
+    pub touched: u32,
+}
+
+impl Mask {
+    /// Mask of what touches everything that is not masked.
+    pub const ALL: Mask = Mask { kinds: 1, touched: 1 };
+
+    /// Whether two colliders with these masks touch: it is enough if one of them touches the other's kinds.
+    pub fn meets(self, other: Mask) -> bool {
+        self.kinds & other.touched != 0 || other.kinds & self.touched != 0
+    }
 }
 
 /// A collider at its pose in this step.

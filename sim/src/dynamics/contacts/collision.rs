@@ -70,6 +70,10 @@ impl Collision {
         self.near.keep_apart(a, b);
     }
 
+    pub fn keep_colliders_apart(&mut self, a: ColliderId, b: ColliderId) {
+        self.near.keep_colliders_apart(a, b);
+    }
+
     pub fn collider(&self, id: ColliderId) -> &Collider {
         &self.surfaces[id.index()].collider
     }

@@ -107,6 +107,8 @@ pub struct Terms<const N: usize> {
     pub bias_m_s: [f64; 2],
     /// Compliance as a share of the effective mass.
     pub softness: f64,
+    /// The normal's inverse mass is taken to be no less than this.
+    pub least_inverse_mass: f64,
     /// mu_c; that of the normal is not used.
     pub friction: [f64; N],
     /// Initial impulses.
@@ -115,8 +117,9 @@ pub struct Terms<const N: usize> {
 
 pub struct Contact<const N: usize> {
     bias_m_s: [f64; 2],
-    /// 1 / (1 + softness).
-    firmness: f64,
+    /// 1 / (1 + softness) with correction and 1 without; less where the normal can hardly be moved, see
+    /// [`firmness`].
+    firmness: [f64; 2],
     inverse_friction: [f64; N],
     /// Y Y^T, the inverses of its diagonal, and of its blocks over the tangents and over the rolls.
     inverse_mass: [[f64; N]; N],
@@ -152,11 +155,16 @@ impl<const N: usize> Contacts<N> {
             most += mu[3] * mu[3] * inverse_mass[3][3];
         }
         let step = if most > 0.0 { 1.0 / most } else { 0.0 };
+        let mut mass: [f64; N] = std::array::from_fn(|lane| inverse(inverse_mass[lane][lane]));
+        let mut firmness = [1.0 / (1.0 + terms.softness), 1.0];
+        if inverse_mass[0][0] < terms.least_inverse_mass {
+            (mass[0], firmness) = propped(inverse_mass[0][0], &terms);
+        }
         self.all.push(Contact {
             bias_m_s: terms.bias_m_s,
-            firmness: 1.0 / (1.0 + terms.softness),
+            firmness,
             inverse_friction: mu.map(|mu| if mu > 0.0 { 1.0 / mu } else { 0.0 }),
-            mass: std::array::from_fn(|lane| inverse(inverse_mass[lane][lane])),
+            mass,
             pair_mass: [1, 4].map(|lane| Symmetric2::inverse_of(&inverse_mass, lane)),
             inverse_mass,
             slide_gain: mu.map(|mu| step * mu * mu),
@@ -203,8 +211,8 @@ impl<const N: usize> Contact<N> {
     fn update(&self, pass: Pass, mut v: [f64; N]) -> [f64; N] {
         let (a, old) = (&self.inverse_mass, &self.impulse);
         let (bias_m_s, firmness) = match pass {
-            Pass::Correcting => (self.bias_m_s[0], self.firmness),
-            Pass::Relaxing => (self.bias_m_s[1], 1.0),
+            Pass::Correcting => (self.bias_m_s[0], self.firmness[0]),
+            Pass::Relaxing => (self.bias_m_s[1], self.firmness[1]),
         };
         let normal = (firmness * (old[0] - (v[0] + bias_m_s) * self.mass[0])).max(0.0);
         if normal == 0.0 {
@@ -308,7 +316,20 @@ impl Symmetric2 {
     }
 }
 
-/// Inverts an inverse mass; 0 if nothing can move.
+/// Returns mass and firmness of a normal with an inverse mass `a` below the least `e`. An impulse that meets
+///   n = f (n - (v + b) / a),   f / a = 1 / (e + softness a)
+/// gives way by as much as is missing:  a n + v + b = -(e + (softness - 1) a) n. Links that overlap along a
+/// direction in which their joints hardly let them move would be torn apart by any other.
+fn propped<const N: usize>(inverse_mass: f64, terms: &Terms<N>) -> (f64, [f64; 2]) {
+    let least = terms.least_inverse_mass;
+    let a = inverse_mass.max(SMALLEST_SHARE * least);
+    (a.recip(), [terms.softness, 0.0].map(|softness| a / (least + softness * a)))
+}
+
+/// Of the least inverse mass: what is less is rounding.
+const SMALLEST_SHARE: f64 = 1e-9;
+
+/// 0 for what nothing moves.
 fn inverse(inverse_mass: f64) -> f64 {
     if inverse_mass > 0.0 { inverse_mass.recip() } else { 0.0 }
 }

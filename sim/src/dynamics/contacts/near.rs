@@ -15,8 +15,7 @@ pub struct NearPairs {
     /// Pairs in order, the smaller collider first: all that could touch in this step, and some that
     /// could not. The latter depend on the past, so nothing else may depend on them.
     pub pairs: Vec<[ColliderId; 2]>,
-    /// Pairs of links that never touch, smaller first.
-    apart: BTreeSet<(LinkId, LinkId)>,
+    apart: Apart,
     broad_phase: BroadPhaseBvh,
     /// Colliders as the broad phase reads them; it has no bodies to read.
     colliders: ColliderSet,
@@ -24,6 +23,15 @@ pub struct NearPairs {
     bodies: RigidBodySet,
     parameters: IntegrationParameters,
     events: Vec<BroadPhasePairEvent>,
+}
+
+/// What never touches.
+#[derive(Default)]
+struct Apart {
+    /// Links, smaller first.
+    links: BTreeSet<(LinkId, LinkId)>,
+    /// Colliders, smaller first.
+    colliders: BTreeSet<[ColliderId; 2]>,
 }
 
 impl NearPairs {
@@ -43,7 +51,11 @@ impl NearPairs {
     }
 
     pub fn keep_apart(&mut self, a: LinkId, b: LinkId) {
-        self.apart.insert((a.min(b), a.max(b)));
+        self.apart.links.insert((a.min(b), a.max(b)));
+    }
+
+    pub fn keep_colliders_apart(&mut self, a: ColliderId, b: ColliderId) {
+        self.apart.colliders.insert([a.min(b), a.max(b)]);
     }
 
     /// Sets the bounds of a collider; [`NearPairs::update`] must follow.
@@ -81,16 +93,19 @@ fn in_order(pair: &ColliderPair) -> [ColliderId; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// Returns true if two colliders may touch. As in MuJoCo, bodies of one tree that a joint connects do
-/// not collide. Neither do two links that are kept apart.
-fn may_touch(
-    pair: [ColliderId; 2],
-    surfaces: &[Surface],
-    trees: &Trees,
-    apart: &BTreeSet<(LinkId, LinkId)>,
-) -> bool {
-    let [a, b] = pair.map(|id| surfaces[id.index()].body);
-    let (Some(a), Some(b)) = (a, b) else { return true };
-    let joined = a.tree == b.tree && trees.all[a.tree.index()].layout.are_neighbours(a.link, b.link);
-    !joined && !apart.contains(&(a.min(b), a.max(b)))
+/// Bodies of one tree that a joint joins do not collide, as in MuJoCo; nor do two that are kept apart, or
+/// whose masks say so.
+fn may_touch(pair: [ColliderId; 2], surfaces: &[Surface], trees: &Trees, apart: &Apart) -> bool {
+    let [a, b] = pair.map(|id| &surfaces[id.index()]);
+    if !a.collider.touches.meets(b.collider.touches) || apart.colliders.contains(&pair) {
+        return false;
+    }
+    // A link that nothing moves can be kept apart from others, too.
+    if let (Some(a), Some(b)) = (a.collider.on, b.collider.on)
+        && apart.links.contains(&(a.min(b), a.max(b)))
+    {
+        return false;
+    }
+    let (Some(a), Some(b)) = (a.body, b.body) else { return true };
+    a.tree != b.tree || !trees.all[a.tree.index()].layout.are_neighbours(a.link, b.link)
 }

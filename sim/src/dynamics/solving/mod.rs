@@ -14,9 +14,10 @@ use crate::dynamics::contacts::{Candidate, ContactPoint, Impulses, continued};
 use crate::dynamics::joints::bounds::JointRows;
 use crate::dynamics::joints::equality::Equalities;
 use crate::dynamics::settings::{Pass, Settings};
-use crate::dynamics::trees::Trees;
+use crate::dynamics::trees::link::Joint;
 use crate::dynamics::trees::rows::Whitened;
 use crate::dynamics::trees::spatial::ForceVector;
+use crate::dynamics::trees::{LinkId, Trees};
 
 /// Velocity (rad/s or m/s) removed in the last sweep from which on more sweeps follow, and their maximum
 /// number. Only the ends of ranges and motors that are turned too fast count. An example is a heavy body
@@ -33,7 +34,10 @@ const DAMPED_SHARE: f64 = 0.5;
 const DEEP_M: f64 = 0.01;
 /// Penetration depth from which on a contact is rigid.
 const RIGID_M: f64 = 0.02;
-/// Energy (J) removed by the relaxing sweeps above which they may have failed to remove all of it.
+/// Share of the links' own inverse masses that the inverse mass of a contact's normal is not taken to be
+/// below.
+const LEAST_SHARE: f64 = 0.01;
+/// J that the relaxing sweeps took: where it was so much, there may be more that they should have taken.
 const HARD_J: f64 = 0.3;
 
 #[derive(Default)]
@@ -299,7 +303,23 @@ fn giving_share(gap_m: f64) -> f64 {
     ((RIGID_M + gap_m) / (RIGID_M - DEEP_M)).clamp(0.0, 1.0)
 }
 
-/// Adds a contact. Returns its index.
+/// Returns the least inverse mass (1/kg) along a contact's normal: a share of those that the two links would
+/// have by themselves. Only joints bring it so low, where they let neither link move. What flies has that of
+/// its whole tree at least.
+fn least_inverse_mass(trees: &Trees, bodies: [Option<LinkId>; 2]) -> f64 {
+    let held = |body: LinkId| !matches!(trees.all[body.tree.index()].links[0].joint, Joint::Free);
+    let within_one = matches!(bodies, [Some(a), Some(b)] if a.tree == b.tree);
+    if !within_one && !bodies.into_iter().flatten().all(held) {
+        return 0.0;
+    }
+    let own = |body: LinkId| {
+        let mass_kg = trees.all[body.tree.index()].links[body.link].mass.mass_kg;
+        if mass_kg > 0.0 { mass_kg.recip() } else { 0.0 }
+    };
+    LEAST_SHARE * bodies.into_iter().flatten().map(own).sum::<f64>()
+}
+
+/// Adds a contact; returns its number.
 #[inline(always)]
 fn push<S: Simd, const N: usize>(
     simd: S,
@@ -338,6 +358,7 @@ fn push<S: Simd, const N: usize>(
     let terms = Terms {
         bias_m_s: [open_m_s + correction_m_s.max(-settings.fastest_correction_m_s), open_m_s],
         softness: softness.compliance(settings.dt_s) * giving_share(gap_m),
+        least_inverse_mass: least_inverse_mass(trees, candidate.bodies),
         friction: std::array::from_fn(|lane| friction[lane]),
         impulse: std::array::from_fn(|lane| if friction[lane] > 0.0 { impulse[lane] } else { 0.0 }),
     };

@@ -4,8 +4,8 @@ use rapier3d::glamx::{DMat3, DPose3, DVec3};
 use rapier3d::prelude::SharedShape;
 
 use super::super::{
-    Axis, Collider, ColliderId, Directions, Dynamics, Friction, Joint, Link, LinkId, Mass, Settings, Tree,
-    TreeId,
+    Axis, Collider, ColliderId, Directions, Dynamics, Friction, Joint, Link, LinkId, Mask, Mass, Settings,
+    Tree, TreeId,
 };
 
 pub const DT_S: f64 = 1.0 / 200.0;
@@ -43,6 +43,7 @@ impl Bench {
             friction,
             endless: false,
             tag: 0,
+            touches: Mask::ALL,
         });
     }
 
@@ -57,6 +58,7 @@ impl Bench {
             friction,
             endless: true,
             tag: 0,
+            touches: Mask::ALL,
         });
     }
 
@@ -69,6 +71,7 @@ impl Bench {
             friction,
             endless: false,
             tag: 0,
+            touches: Mask::ALL,
         })
     }
 

@@ -3,7 +3,7 @@
 use rapier3d::glamx::{DMat3, DPose3, DQuat, DVec3};
 use rapier3d::prelude::SharedShape;
 
-use super::super::{Collider, Directions, Friction, Mass, TreeId};
+use super::super::{Collider, Directions, Friction, Mask, Mass, TreeId};
 use super::bench::{Bench, DOWN, lone, sliding};
 
 const RADIUS_M: f64 = 0.035;
@@ -27,6 +27,7 @@ fn bottle(bench: &mut Bench, tilt: DVec3, spin_rad_s: DVec3, friction: Friction)
         friction,
         endless: false,
         tag: 0,
+        touches: Mask::ALL,
     });
     bench.dynamics.tree_mut(tree).set_base(at, DVec3::ZERO, spin_rad_s);
     tree

@@ -55,7 +55,7 @@ pub(super) const ELEMENTS: &[Element] = &[
         support: Support::Mapped,
         kind: Some("joint"),
         attributes: &[&[NAME, CLASS], JOINT],
-        note: "at most one a body; limits are hard; of a robot's file all are hinges at their body's origin, without springs and damping",
+        note: "limits are hard; of a robot's file there is one a body, and all are hinges at their body's origin, without springs and damping",
     },
     Element {
         name: "freejoint",
@@ -96,10 +96,10 @@ pub(super) const ELEMENTS: &[Element] = &[
     Element {
         name: "camera",
         within: &["frame", "default"],
-        support: Support::Refused,
+        support: Support::Ignored,
         kind: None,
         attributes: &[],
-        note: "state everything on the camera itself, outside of frames",
+        note: "nobody looks through it; `third_person` and `egocentric` state everything on themselves, outside of frames",
     },
     Element {
         name: "light",
@@ -130,8 +130,13 @@ const fn refused_in_tree(name: &'static str, note: &'static str) -> Element {
 const CHILDCLASS: Attribute = mapped(&["childclass"], Takes::Class);
 
 const BODY: &[Attribute] = &[
-    only(&["mocap"], &["false"], "nothing is moved from outside"),
-    only(&["gravcomp"], &["0"], "everything has its whole weight"),
+    attribute(
+        Support::Approximated,
+        &["mocap"],
+        Takes::Only(&["false"]),
+        "it stays where it is: nothing is moved from outside",
+    ),
+    attribute(Support::Approximated, &["gravcomp"], Takes::Only(&["0"]), "everything has its whole weight"),
     refused(&["sleep"], "bodies never sleep; leave it out"),
     ignored(&["simple", "fuse"], "they change how MuJoCo computes, not what"),
     USER,
@@ -142,7 +147,7 @@ const JOINT: &[Attribute] = &[
         Support::Mapped,
         &["type"],
         Takes::Word(&["free", "hinge", "slide", "ball"]),
-        "`ball` is refused; use three hinges with bodies between them",
+        "a `ball` becomes three hinges, about x, y and z, without limits; a `free` one has neither springs nor damping",
     ),
     mapped(&["pos"], numbers(3, 3)),
     mapped(&["axis"], Takes::Direction(3)),
@@ -150,8 +155,8 @@ const JOINT: &[Attribute] = &[
     mapped(&["limited"], MAYBE),
     mapped(&["stiffness", "damping", "frictionloss", "armature"], AMOUNT),
     mapped(&["springref"], NUMBER),
-    only(&["ref"], &["0"], "`ref` and `springdamper` are not read; state stiffness and damping"),
-    only(&["springdamper"], &["0 0"], "`ref` and `springdamper` are not read; state stiffness and damping"),
+    attribute(Support::Mapped, &["ref"], NUMBER, "not in a robot's file"),
+    only(&["springdamper"], &["0 0"], "state stiffness and damping"),
     attribute(Support::Approximated, &["margin"], Takes::Only(&["0"]), "a limit acts at the limit"),
     approximated(
         &["solreflimit", "solimplimit", "solreffriction", "solimpfriction"],
@@ -183,12 +188,7 @@ const GEOM: &[Attribute] = &[
     mapped(&["friction"], Takes::Numbers { least: 1, most: 3, sign: Sign::NotNegative }),
     mapped(&["condim"], Takes::Word(&["1", "3", "4", "6"])),
     mapped(&["priority"], NUMBER),
-    attribute(
-        Support::Approximated,
-        &["contype", "conaffinity"],
-        Takes::Only(&["0", "1"]),
-        "a geom with both 0 touches nothing; all others touch each other",
-    ),
+    mapped(&["contype", "conaffinity"], AMOUNT),
     attribute(
         Support::Approximated,
         &["margin", "gap"],
@@ -205,8 +205,18 @@ const GEOM: &[Attribute] = &[
     refused(&["hfield"], "write a height field as boxes or as meshes"),
     ignored(&["fitscale"], "it is for shapes fitted to meshes, which are refused"),
     mapped(&["material"], Takes::NameOf("material")),
-    mapped(&["rgba"], COLOR),
-    attribute(Support::Mapped, &["group"], NUMBER, "groups above 2 are not drawn, as in MuJoCo"),
+    attribute(
+        Support::Mapped,
+        &["rgba"],
+        COLOR,
+        "what has an alpha up to 0.5 is not drawn, all else is solid",
+    ),
+    attribute(
+        Support::Mapped,
+        &["group"],
+        NUMBER,
+        "groups above 2 are not drawn, as in MuJoCo, unless the `<numeric>` `drawn_groups` chooses others",
+    ),
     ignored(&["fluidshape", "fluidcoef"], "there is no medium"),
     USER,
 ];
@@ -225,10 +235,16 @@ const CAMERA: &[Attribute] = &[
     mapped(&["pos"], numbers(3, 3)),
     mapped(&["quat"], Takes::Quaternion),
     mapped(&["xyaxes"], Takes::Axes),
-    refused(&["axisangle", "euler", "zaxis"], "use quat or xyaxes"),
+    ignored(
+        &["axisangle", "euler", "zaxis"],
+        "nobody looks through it; `third_person` and `egocentric` use quat or xyaxes",
+    ),
     mapped(&["fovy"], Takes::Numbers { least: 1, most: 1, sign: Sign::Positive }),
     mapped(&["resolution"], Takes::Numbers { least: 2, most: 2, sign: Sign::Positive }),
-    refused(&["focal", "focalpixel", "principal", "principalpixel", "sensorsize"], "use fovy"),
+    ignored(
+        &["focal", "focalpixel", "principal", "principalpixel", "sensorsize"],
+        "nobody looks through it; `third_person` and `egocentric` use fovy",
+    ),
     only(&["orthographic"], &["false"], "every camera has a perspective"),
     only(&["projection"], &["perspective"], "every camera has a perspective"),
     attribute(Support::Approximated, &["mode"], Takes::Only(&["fixed"]), "a camera is fixed to its body"),

@@ -15,7 +15,8 @@ every element and every attribute by the table below; nothing is dropped silentl
   scene is read.
 * **ignored**: it has no effect on motion here, nor on what is drawn.
 * **refused**: a file that has it is not read. The message names file, line and the nearest element that has a name, and says
-  what to write instead. Where the table gives values, those are what happens anyway, and accepted.
+  what to write instead, for all that is refused of a file at once. Where the table gives values, those are what happens
+  anyway, and accepted. [`python -m tandem.importing`](scenes.md#files-that-are-refused) writes such files in what is read.
 
 Whatever is not in the table is refused too: a misspelt attribute, or one that a newer MuJoCo has. So are
 
@@ -24,7 +25,7 @@ Whatever is not in the table is refused too: a misspelt attribute, or one that a
 * a `<compiler>` after a `<default>` that states angles, which it would change in MuJoCo;
 * ranges whose smaller number comes second, `limited=\"true\"` without a range, and a range with neither `limited` nor
   `autolimits`;
-* joints that move nothing that has mass, two joints on one body, and shapes with an extent of 0;
+* joints that move nothing that has mass, and shapes with an extent of 0;
 * more than 200 elements inside one another.
 
 A robot's file has one free body with all others on it, hinges with one `<position>` actuator each, called as the published

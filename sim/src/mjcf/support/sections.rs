@@ -1,8 +1,8 @@
 //! Elements beside the bodies: settings, defaults, assets, contacts, equalities, actuators and keys.
 
 use super::{
-    AMOUNT, ANY_NUMBERS, Attribute, BOOLEAN, CLASS, COLOR, Element, MAYBE, NAME, NUMBER, Support, Takes,
-    USER, approximated, attribute, ignored, mapped, numbers, only, refused,
+    AMOUNT, ANY_NUMBERS, Attribute, BOOLEAN, CLASS, COLOR, Element, MAYBE, NAME, NUMBER, Sign, Support,
+    Takes, USER, approximated, attribute, ignored, mapped, numbers, only, refused,
 };
 
 pub(super) const ELEMENTS: &[Element] = &[
@@ -34,9 +34,16 @@ pub(super) const ELEMENTS: &[Element] = &[
         &["custom"],
         "numeric",
         &[NUMERIC],
-        "one called `actuator_speed_limit` has the speeds (rad/s or m/s) at which motors can push no further, one for each actuator in their order: from 80 % of it on a motor pushes less, it brakes with all it has, and from 120 % on, where something else turns it, with more; MuJoCo's motors have no such limit; others are ignored",
+        "one called `actuator_speed_limit` has the speeds (rad/s or m/s) at which motors can push no further, one for each actuator in their order: from 80 % of it on a motor pushes less, it brakes with all it has, and from 120 % on, where something else turns it, with more; MuJoCo's motors have no such limit; one called `drawn_groups` has the groups of geoms that are drawn; others are ignored",
     ),
-    element(Support::Ignored, "text", &["custom"], &[], "nobody asks for it"),
+    named(
+        Support::Mapped,
+        "text",
+        &["custom"],
+        "text",
+        &[&[NAME, mapped(&["data"], Takes::Text)]],
+        "one called `material_patterns` has names of materials, each with its pattern behind it: `wood`, `fabric` or `print`; others are ignored",
+    ),
     element(Support::Ignored, "tuple", &["custom"], &[], "nobody asks for it"),
     element(
         Support::Ignored,
@@ -51,7 +58,7 @@ pub(super) const ELEMENTS: &[Element] = &[
         "default",
         &["mujoco", "default"],
         &[&[mapped(&["class"], Takes::Text)]],
-        "classes inherit as in MuJoCo; but an element states all numbers of a size, a friction or a pose, or none",
+        "classes inherit as in MuJoCo",
     ),
     element(Support::Mapped, "asset", &["mujoco"], &[], ""),
     named(
@@ -60,7 +67,7 @@ pub(super) const ELEMENTS: &[Element] = &[
         &["asset", "default"],
         "mesh",
         &[&[NAME, CLASS], MESH],
-        "files are OBJ and STL",
+        "files are OBJ, STL and MSH; they lie where the compiler says, or beside an included file",
     ),
     named(
         Support::Mapped,
@@ -82,11 +89,12 @@ pub(super) const ELEMENTS: &[Element] = &[
         &["contact"],
         "exclude",
         &[&[NAME, mapped(&["body1", "body2"], Takes::Text)]],
-        "of two bodies that move, or two that do not",
+        "",
     ),
     element(Support::Refused, "pair", &["contact", "default"], &[], "state friction on the geoms"),
     element(Support::Refused, "deformable", &["mujoco"], &[], "nothing bends or stretches here"),
-    element(Support::Refused, "tendon", &["mujoco", "default"], &[], "couple joints with an equality"),
+    element(Support::Refused, "tendon", &["mujoco"], &[], "couple joints with an equality"),
+    element(Support::Ignored, "tendon", &["default"], &[], "there are no tendons"),
     element(Support::Mapped, "equality", &["mujoco"], &[], "they are hard; a robot's file has none"),
     element(
         Support::Mapped,
@@ -103,7 +111,13 @@ pub(super) const ELEMENTS: &[Element] = &[
     element(Support::Refused, "flexvert", &["equality"], &[], "use joint, weld or connect"),
     element(Support::Refused, "flexstrain", &["equality"], &[], "use joint, weld or connect"),
     element(Support::Refused, "distance", &["equality"], &[], "use joint, weld or connect"),
-    element(Support::Mapped, "actuator", &["mujoco"], &[], "one a joint"),
+    element(
+        Support::Mapped,
+        "actuator",
+        &["mujoco"],
+        &[],
+        "one a joint; in a default they state the same for actuators of every kind, as in MuJoCo",
+    ),
     named(Support::Mapped, "motor", ACTUATORS, "actuator", &[ACTUATOR], "not in a robot's file"),
     named(
         Support::Mapped,
@@ -161,7 +175,7 @@ const fn named(
 }
 
 const fn other_actuator(name: &'static str) -> Element {
-    element(Support::Refused, name, ACTUATORS, &[], "use motor or position")
+    element(Support::Approximated, name, ACTUATORS, &[], "it does nothing; motor and position act")
 }
 
 const COMPILER: &[Attribute] = &[
@@ -170,9 +184,14 @@ const COMPILER: &[Attribute] = &[
     mapped(&["eulerseq"], Takes::AxisSequence),
     mapped(&["meshdir", "texturedir", "assetdir"], Takes::Text),
     only(&["coordinate"], &["local"], "let MuJoCo 2.3.3 save the file"),
-    only(&["inertiafromgeom"], &["auto"], "state an <inertial>, or none"),
-    only(&["inertiagrouprange"], &["0 5"], "give geoms that should weigh nothing mass=\"0\""),
-    only(&["settotalmass"], &["-1"], "state masses that add up"),
+    mapped(&["inertiafromgeom"], MAYBE),
+    attribute(
+        Support::Mapped,
+        &["inertiagrouprange"],
+        numbers(2, 2),
+        "where it is `0 0` and geoms of group 1 touch nothing, as in robosuite's and RoboCasa's files, group 0 is not drawn",
+    ),
+    mapped(&["settotalmass"], NUMBER),
     only(&["fitaabb", "alignfree"], &["false"], "shapes and frames are as the file states them"),
     only(&["convexhull"], &["true"], "meshes collide as their hulls"),
     attribute(
@@ -187,12 +206,7 @@ const COMPILER: &[Attribute] = &[
         Takes::Only(&["0"]),
         "masses and inertias stay as the file states them",
     ),
-    attribute(
-        Support::Approximated,
-        &["exactmeshinertia"],
-        Takes::Only(&["false"]),
-        "a mesh weighs what its hull weighs",
-    ),
+    mapped(&["exactmeshinertia"], BOOLEAN),
     ignored(
         &["discardvisual", "usethread", "fusestatic", "saveinertial", "conflict"],
         "they change how MuJoCo computes, not what",
@@ -206,9 +220,14 @@ const OPTION: &[Attribute] = &[
         Takes::Only(&["0.005"]),
         "every world is stepped by 5 ms",
     ),
-    only(&["gravity"], &["0 0 -9.81"], "z is up, and things weigh what they weigh on earth"),
-    only(&["wind"], &["0 0 0"], "there is no medium"),
-    only(&["density", "viscosity"], &["0"], "there is no medium"),
+    attribute(
+        Support::Mapped,
+        &["gravity"],
+        numbers(3, 3),
+        "of a scene; robots take things to weigh what they weigh on earth, whatever it is",
+    ),
+    attribute(Support::Approximated, &["wind"], Takes::Only(&["0 0 0"]), "there is no medium"),
+    attribute(Support::Approximated, &["density", "viscosity"], Takes::Only(&["0"]), "there is no medium"),
     refused(&["actuatorgroupdisable"], "leave out actuators that should do nothing"),
     ignored(&["magnetic"], "nothing senses it"),
     ignored(&["o_margin", "o_solref", "o_solimp", "o_friction"], "the flag that would use them is refused"),
@@ -237,17 +256,16 @@ const OPTION: &[Attribute] = &[
 ];
 
 const FLAG: &[Attribute] = &[
+    mapped(&["contact", "gravity"], Takes::Word(&["enable", "disable"])),
     only(
         &[
             "constraint",
             "equality",
             "frictionloss",
             "limit",
-            "contact",
             "passive",
             "spring",
             "damper",
-            "gravity",
             "clampctrl",
             "actuation",
             "filterparent",
@@ -282,13 +300,13 @@ const MESH: &[Attribute] = &[
     attribute(Support::Mapped, &["vertex"], ANY_NUMBERS, "drawn as its hull"),
     approximated(&["face"], "a mesh of vertices is drawn as its hull"),
     mapped(&["scale"], numbers(3, 3)),
-    only(&["refpos"], &["0 0 0"], "place the geom instead"),
-    only(&["refquat"], &["1 0 0 0"], "place the geom instead"),
+    mapped(&["refpos"], numbers(3, 3)),
+    mapped(&["refquat"], Takes::Quaternion),
     attribute(
         Support::Approximated,
         &["inertia"],
-        Takes::Only(&["convex"]),
-        "a mesh weighs what its hull weighs",
+        Takes::Only(&["convex", "exact"]),
+        "a mesh weighs what its hull weighs, unless this is `exact`",
     ),
     approximated(&["maxhullvert"], "a hull has all the corners it needs"),
     refused(&["builtin", "params"], "write the mesh to a file"),
@@ -379,12 +397,17 @@ const ACTUATOR: &[Attribute] = &[
     mapped(&["ctrlrange"], numbers(2, 2)),
     attribute(Support::Mapped, &["forcerange"], numbers(2, 2), "of the form `-x x`; others are refused"),
     mapped(&["ctrllimited", "forcelimited"], MAYBE),
-    only(&["gear"], &["1"], "it has a gear; state gains and ranges of the joint"),
+    attribute(
+        Support::Mapped,
+        &["gear"],
+        Takes::Numbers { least: 1, most: 6, sign: Sign::Any },
+        "its first number; not in a robot's file",
+    ),
     only(&["damping", "armature"], &["0"], "state it on the joint"),
     only(&["nsample", "interp", "delay"], &["0"], "commands act at once"),
-    refused(
+    approximated(
         &["jointinparent", "tendon", "site", "refsite", "body", "slidersite", "cranksite", "cranklength"],
-        "actuators act on joints",
+        "actuators act on joints; this one does nothing",
     ),
     ignored(&["lengthrange"], "it is for muscles"),
     ignored(&["group"], "actuators are not drawn"),
@@ -392,7 +415,7 @@ const ACTUATOR: &[Attribute] = &[
 ];
 const POSITION: &[Attribute] = &[
     mapped(&["kp", "kv"], AMOUNT),
-    refused(&["dampratio"], "state kv"),
+    approximated(&["dampratio"], "of a robot's gains; elsewhere state kv, or nothing damps"),
     only(&["timeconst"], &["0"], "commands act at once"),
     mapped(&["inheritrange"], AMOUNT),
 ];
@@ -401,5 +424,5 @@ const KEY: &[Attribute] = &[
     NAME,
     mapped(&["time"], NUMBER),
     mapped(&["qpos", "qvel", "ctrl"], ANY_NUMBERS),
-    refused(&["act", "mpos", "mquat"], "no actuator has a state, and nothing is moved from outside"),
+    approximated(&["act", "mpos", "mquat"], "no actuator has a state, and nothing is moved from outside"),
 ];

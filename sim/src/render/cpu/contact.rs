@@ -99,22 +99,23 @@ impl ContactMap {
     ) {
         let mut batch = TriangleBatch::default();
         for (number, part) in prepared.scenery.parts.iter().enumerate() {
-            let (pose, (centre_m, around_m)) = (placed.world_from_mesh[number], prepared.bounds[number]);
+            let (pose, geometry) = (placed.world_from_mesh[number], prepared.geometry(number));
+            let (centre_m, around_m) = geometry.bounds;
             if layer != HeightLayer::of(part) || !self.concerns(layer, pose * centre_m, around_m) {
                 continue;
             }
             let world_from_mesh = Affine::of(pose);
-            prepared.points[number].map_into(
+            geometry.points.map_into(
                 &mut self.corners_m,
                 #[inline(always)]
                 |block| world_from_mesh.map_lanes(block),
             );
             let too_high = |[_, _, z_m]: &[f32; 3]| *z_m > HIGHEST_SUPPORT_M;
-            let mut corners_m = self.corners_m[..prepared.points[number].count()].iter();
+            let mut corners_m = self.corners_m[..geometry.points.count()].iter();
             if layer == HeightLayer::Support && corners_m.any(too_high) {
                 continue;
             }
-            for triangle in &prepared.triangles[number] {
+            for triangle in &geometry.triangles {
                 batch.push(self.projected(layer, triangle.map(|corner| self.corners_m[corner as usize])), 0);
                 if batch.is_full() {
                     self.fill(simd, layer, &batch.take());

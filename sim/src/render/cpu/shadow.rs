@@ -84,19 +84,20 @@ impl ShadowMap {
                 continue;
             }
             let map_from_mesh = self.map_from_world.after(placed.world_from_mesh[number]);
-            let (centre_m, around_m) = prepared.bounds[number];
+            let geometry = prepared.geometry(number);
+            let (centre_m, around_m) = geometry.bounds;
             let texels = around_m * 0.5 * TEXELS as f32 / prepared.scenery.focus_radius_m;
             let [u, v, _] = map_from_mesh.map(centre_m);
             let around = [u, v].map(|middle| cells(middle - texels, middle + texels));
             if around.iter().any(Range::is_empty) {
                 continue;
             }
-            prepared.points[number].map_into(
+            geometry.points.map_into(
                 &mut self.corners,
                 #[inline(always)]
                 |block| map_from_mesh.map_lanes(block),
             );
-            let [columns, rows] = reached_cells(&self.corners[..prepared.points[number].count()]);
+            let [columns, rows] = reached_cells(&self.corners[..geometry.points.count()]);
             let reached =
                 u128::MAX.unbounded_shl(columns.start as u32) & !u128::MAX.unbounded_shl(columns.end as u32);
             for moving in &mut self.moving[rows] {
@@ -104,10 +105,10 @@ impl ShadowMap {
             }
             let to_sun =
                 placed.world_from_mesh[number].rotation.inverse() * prepared.scenery.light.sun_direction;
-            prepared.faces[number].put_front(&mut self.front, [to_sun.x, to_sun.y, to_sun.z, 0.0]);
+            geometry.faces.put_front(&mut self.front, [to_sun.x, to_sun.y, to_sun.z, 0.0]);
             for triangle in &self.front {
-                let corners = prepared.triangles[number][*triangle as usize]
-                    .map(|corner| self.corners[corner as usize]);
+                let corners =
+                    geometry.triangles[*triangle as usize].map(|corner| self.corners[corner as usize]);
                 batch.push(corners, 0);
                 if batch.is_full() {
                     layer.fill(simd, &batch.take());

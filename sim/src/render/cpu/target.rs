@@ -40,11 +40,12 @@ pub(super) fn draw<S: Simd>(
     let mut batch = TriangleBatch::default();
     for (number, part) in prepared.scenery.parts.iter().enumerate() {
         let camera_from_mesh = camera_from_world * placed.world_from_mesh[number];
-        if !lens.sees(prepared.bounds[number], camera_from_mesh) {
+        let geometry = prepared.geometry(number);
+        if !lens.sees(geometry.bounds, camera_from_mesh) {
             continue;
         }
         let map = Affine::of(camera_from_mesh);
-        prepared.points[number].map_into(&mut corners, |block| {
+        geometry.points.map_into(&mut corners, |block| {
             let [x, y, z] = map.map_lanes(block);
             let nearness: Lanes = lanes(|i| -1.0 / z[i]);
             let ([cx, cy], focal) = (lens.centre_px, lens.focal_px);
@@ -52,9 +53,9 @@ pub(super) fn draw<S: Simd>(
             let row = lanes(|i| cy - y[i] * focal * nearness[i]);
             [column, row, nearness, z]
         });
-        let (sheets, triangles) = (prepared.sheets_of(number), &prepared.triangles[number]);
+        let (sheets, triangles) = (prepared.sheets_of(number), &geometry.triangles);
         let eye_m = camera_from_mesh.inverse().translation;
-        prepared.faces[number].put_front(&mut front, [eye_m.x, eye_m.y, eye_m.z, 1.0]);
+        geometry.faces.put_front(&mut front, [eye_m.x, eye_m.y, eye_m.z, 1.0]);
         for number in &front {
             let (sheet, triangle) = (sheets[*number as usize], triangles[*number as usize]);
             let [a, b, c] = triangle.map(|corner| corners[corner as usize]);

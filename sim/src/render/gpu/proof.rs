@@ -14,7 +14,7 @@ const MEAN_DIFFERENCE: f32 = 1.0;
 /// Returns a ball over a checkered floor, with its shadow.
 pub fn scenery() -> Scenery {
     let part = |mesh: TriangleMesh, rgb: [f32; 3], pattern: Pattern, id: u32| Part {
-        mesh,
+        mesh: mesh.into(),
         carrier: Carrier::Room,
         carrier_from_mesh: Pose::IDENTITY,
         rgb,

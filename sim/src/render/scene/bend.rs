@@ -1,5 +1,7 @@
 //! Orientation of a mesh's surface: triangles that continue each other smoothly share one bend.
 
+use std::collections::HashMap;
+
 use rapier3d::math::{Matrix, Vector};
 
 use crate::render::{TriangleMesh, Vertex};
@@ -17,21 +19,71 @@ pub struct Bend {
 const TOLERANCE: f32 = 1e-3;
 
 impl TriangleMesh {
-    /// Returns the bends of the mesh, and the indices of each triangle's own.
-    pub(in crate::render) fn bends(&self) -> (Vec<Bend>, Vec<usize>) {
+    /// Returns the bends of the mesh, and the number of its bend for each triangle: the last of those that
+    /// fit.
+    pub(in crate::render) fn bends(&self) -> (Vec<Bend>, Vec<u32>) {
         let ellipsoid = Bend::of_ellipsoid(self.corners_m());
-        let mut bends: Vec<Bend> = Vec::new();
+        let mut bends = Bends::default();
         let mut of_triangles = Vec::with_capacity(self.triangles.len());
         for corners in &self.triangles {
             let corners = corners.map(|corner| self.vertices[corner as usize]);
-            let same = bends.iter().rposition(|bend| bend.fits(&corners)).unwrap_or_else(|| {
-                bends.push(Bend::of(&corners, ellipsoid));
-                bends.len() - 1
-            });
+            let same = bends.find(&corners).unwrap_or_else(|| bends.add(Bend::of(&corners, ellipsoid)));
             of_triangles.push(same);
         }
-        (bends, of_triangles)
+        (bends.all, of_triangles)
     }
+}
+
+/// The bends of a mesh so far, found by the normals that they give: a mesh of a file may have one for each
+/// triangle.
+#[derive(Default)]
+struct Bends {
+    all: Vec<Bend>,
+    /// Numbers of the flat ones, by the cell of their normal.
+    flat: HashMap<[i32; 3], Vec<u32>>,
+    /// Numbers of the others.
+    curved: Vec<u32>,
+}
+
+/// Side of the cells in which normals lie. One that fits is in the cell of a triangle's normal or beside it.
+const CELL: f32 = 2.0 * TOLERANCE;
+/// The tolerance and what rounding may add to it.
+const REACH: f32 = 1.01 * TOLERANCE;
+/// Of curved bends, only so many of the latest are tried. The shapes that are not of files have fewer.
+const MAX_CURVED: usize = 64;
+
+impl Bends {
+    /// Finds the last bend that fits a triangle.
+    fn find(&self, corners: &[Vertex; 3]) -> Option<u32> {
+        let normal = corners[0].normal;
+        let [low, high] = [cell(normal - Vector::splat(REACH)), cell(normal + Vector::splat(REACH))];
+        let fits = |number: &&u32| self.all[**number as usize].fits(corners);
+        let mut found = self.curved.iter().rev().take(MAX_CURVED).find(fits).copied();
+        for x in low[0]..=high[0] {
+            for y in low[1]..=high[1] {
+                for z in low[2]..=high[2] {
+                    let beside = self.flat.get(&[x, y, z]).map_or(&[][..], Vec::as_slice);
+                    found = found.max(beside.iter().rev().find(fits).copied());
+                }
+            }
+        }
+        found
+    }
+
+    /// Adds a bend, and returns its number.
+    fn add(&mut self, bend: Bend) -> u32 {
+        let number = self.all.len() as u32;
+        match bend.slope_1_m {
+            None => self.flat.entry(cell(bend.normal.normalize_or_zero())).or_default().push(number),
+            Some(_) => self.curved.push(number),
+        }
+        self.all.push(bend);
+        number
+    }
+}
+
+fn cell(normal: Vector) -> [i32; 3] {
+    (normal / CELL).floor().to_array().map(|coordinate| coordinate as i32)
 }
 
 impl Bend {
@@ -81,5 +133,52 @@ impl Bend {
         let slope_1_m = outer(b.normal - a.normal, ac.cross(face) * scale)
             + outer(c.normal - a.normal, face.cross(ab) * scale);
         Bend { normal: a.normal - slope_1_m * a.position_m, slope_1_m: Some(slope_1_m) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mjcf::Primitive;
+
+    /// As [`TriangleMesh::bends`] finds them, but looking at all bends so far for each triangle.
+    fn one_by_one(mesh: &TriangleMesh) -> Vec<u32> {
+        let ellipsoid = Bend::of_ellipsoid(mesh.corners_m());
+        let mut bends: Vec<Bend> = Vec::new();
+        let find = |corners: &[u32; 3]| {
+            let corners = corners.map(|corner| mesh.vertices[corner as usize]);
+            let same = bends.iter().rposition(|bend| bend.fits(&corners));
+            same.unwrap_or_else(|| {
+                bends.push(Bend::of(&corners, ellipsoid));
+                bends.len() - 1
+            }) as u32
+        };
+        mesh.triangles.iter().map(find).collect()
+    }
+
+    #[test]
+    fn bends_are_those_of_a_search_through_all() {
+        let hull = |count: u32| Primitive::Convex {
+            vertices_m: (0..count)
+                .map(|i| {
+                    let (polar, round) = (i as f32 / count as f32 * 3.0, i as f32 * 2.4);
+                    Vector::new(polar.sin() * round.cos(), polar.sin() * round.sin(), polar.cos())
+                })
+                .collect(),
+        };
+        for shape in [
+            Primitive::Sphere { radius_m: 0.1 },
+            Primitive::Capsule { radius_m: 0.1, half_length_m: 0.3 },
+            Primitive::Cylinder { radius_m: 0.1, half_length_m: 0.3 },
+            Primitive::Box { half_extents_m: Vector::new(0.1, 0.2, 0.3) },
+            Primitive::Ellipsoid { radii_m: Vector::new(0.1, 0.2, 0.3) },
+            hull(40),
+            hull(3000),
+        ] {
+            let mesh = TriangleMesh::of(&shape);
+            let (bends, of_triangles) = mesh.bends();
+            assert!(of_triangles == one_by_one(&mesh), "{} triangles", mesh.triangles.len());
+            assert_eq!(of_triangles.iter().max().map(|most| *most as usize + 1), Some(bends.len()));
+        }
     }
 }

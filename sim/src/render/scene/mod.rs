@@ -6,11 +6,13 @@ pub mod faces;
 mod hidden;
 pub mod mesh;
 pub mod prepared;
+pub mod shared;
+mod visible;
 
 use rapier3d::math::{Pose, Vector};
 
 use crate::mjcf::{Geom, Primitive};
-use crate::render::{Light, Pattern, TriangleMesh};
+use crate::render::{Light, Pattern, SharedMesh};
 use crate::{Step, World};
 
 /// Shapes and colours of a world, made once.
@@ -25,7 +27,7 @@ pub struct Scenery {
 /// One mesh that moves with its carrier.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    pub mesh: TriangleMesh,
+    pub mesh: SharedMesh,
     pub carrier: Carrier,
     pub carrier_from_mesh: Pose,
     /// sRGB, 0 to 1.
@@ -74,8 +76,8 @@ const ACCENT_MATERIAL: &str = "accent";
 impl Scenery {
     /// Collects everything in `world` that is drawn.
     pub fn of(world: &World) -> Scenery {
-        let mut parts: Vec<Part> =
-            drawn(world.room()).map(|geom| part(geom, Carrier::Room, geom.rgba, ROOM_ID)).collect();
+        let mut parts = Vec::new();
+        add_parts(&mut parts, world.room(), Carrier::Room, ROOM_ID, |geom| geom.rgba);
         for part in &mut parts {
             part.casts_shadow &= top_m(part) < LAMPS_M;
         }
@@ -83,16 +85,13 @@ impl Scenery {
         for (robot, id) in (0..world.robots().len()).zip(first_robot..) {
             for (link, model) in world.robots()[robot].model.links.iter().enumerate() {
                 let carrier = Carrier::Link { robot, link };
-                parts
-                    .extend(drawn(&model.geoms).map(|geom| part(geom, carrier, robot_rgba(geom, robot), id)));
+                add_parts(&mut parts, &model.geoms, carrier, id, |geom| robot_rgba(geom, robot));
             }
         }
         let first_object = first_robot + world.robots().len() as u32;
         for ((object, (_, model)), id) in world.object_models().enumerate().zip(first_object..) {
-            let carrier = Carrier::Object(object);
-            parts.extend(drawn(&model.geoms).map(|geom| part(geom, carrier, geom.rgba, id)));
+            add_parts(&mut parts, &model.geoms, Carrier::Object(object), id, |geom| geom.rgba);
         }
-        hidden::take_out(&mut parts);
         Scenery { parts, focus_radius_m: FOCUS_RADIUS_M, light: Light::default() }
     }
 
@@ -126,19 +125,28 @@ pub fn robot_rgba(geom: &Geom, robot: usize) -> [f32; 4] {
     }
 }
 
-fn drawn(geoms: &[Geom]) -> impl Iterator<Item = &Geom> {
-    geoms.iter().filter(|geom| geom.drawn)
+/// Adds those geoms of a carrier of which anything can be seen.
+fn add_parts(
+    parts: &mut Vec<Part>,
+    geoms: &[Geom],
+    carrier: Carrier,
+    id: u32,
+    rgba: impl Fn(&Geom) -> [f32; 4],
+) {
+    let drawn: Vec<&Geom> = geoms.iter().filter(|geom| geom.drawn).collect();
+    let meshes = visible::meshes(&drawn).into_iter().zip(drawn);
+    parts.extend(meshes.filter_map(|(mesh, geom)| Some(part(geom, mesh?, carrier, rgba(geom), id))));
 }
 
-fn part(geom: &Geom, carrier: Carrier, [r, g, b, _]: [f32; 4], id: u32) -> Part {
+fn part(geom: &Geom, mesh: SharedMesh, carrier: Carrier, [r, g, b, _]: [f32; 4], id: u32) -> Part {
     Part {
-        mesh: TriangleMesh::of(&geom.primitive),
+        mesh,
         carrier,
         carrier_from_mesh: geom.body_from_geom,
         rgb: geom.checker_rgb.map_or([r, g, b], |[first, _]| first),
         pattern: match geom.checker_rgb {
             Some([_, second]) => Pattern::Checker(second),
-            None => Pattern::of(geom.material.as_deref().unwrap_or_default()),
+            None => Pattern::of(geom.pattern),
         },
         id,
         // Nothing is below a floor.

@@ -1,27 +1,17 @@
 //! A scenery with precomputed constant data for drawing.
 
-use std::collections::HashMap;
-
 use rapier3d::math::Vector;
 
 use super::bend::Bend;
-use super::faces::Faces;
-use crate::render::shading::lanes::Points;
+use super::shared::MeshGeometry;
 use crate::render::shading::linear;
-use crate::render::{Part, Pattern, Scenery, TriangleMesh};
+use crate::render::{Part, Pattern, Scenery};
 
 /// Mark of a sample without a surface.
 pub const NOTHING: u32 = u32::MAX;
 
 pub struct Prepared {
     pub scenery: Scenery,
-    /// Where corners of each part's triangles are. A mesh with flat faces names a place once for each triangle there; here it is named
-    /// once.
-    pub points: Vec<Points>,
-    /// Each part's triangles, by the numbers of their corners' points.
-    pub triangles: Vec<Vec<[u32; 3]>>,
-    /// Planes of each part's triangles.
-    pub faces: Vec<Faces>,
     pub sheets: Vec<Sheet>,
     /// The number of each triangle's sheet, with triangles counted part by part.
     pub sheet_of: Vec<u32>,
@@ -29,8 +19,6 @@ pub struct Prepared {
     first: Vec<usize>,
     /// Id in images of each sheet.
     ids: Vec<u32>,
-    /// Centre and radius of a sphere around each part, in its mesh's frame.
-    pub bounds: Vec<(Vector, f32)>,
     /// The two colours of each part.
     pub linear_rgb: Vec<[Vector; 2]>,
     /// Axis of each part's mesh that comes first in its pattern: the one that a grain runs along.
@@ -49,26 +37,28 @@ impl Prepared {
         let (mut sheets, mut sheet_of, mut first) = (Vec::new(), Vec::new(), Vec::new());
         for (part, number) in scenery.parts.iter().zip(0..) {
             first.push(sheet_of.len());
-            let (bends, bend_of) = part.mesh.bends();
-            sheet_of.extend(bend_of.iter().map(|bend| (sheets.len() + bend) as u32));
+            let MeshGeometry { bends, bend_of, .. } = part.mesh.geometry();
+            let first_sheet = sheets.len() as u32;
+            sheet_of.extend(bend_of.iter().map(|bend| first_sheet + bend));
             sheets.extend(bends.iter().map(|bend| Sheet { part: number, bend: *bend }));
         }
         first.push(sheet_of.len());
         let id = |sheet: &Sheet| scenery.parts[sheet.part as usize].id;
-        let (points, triangles) = scenery.parts.iter().map(|part| joined(&part.mesh)).unzip();
         Prepared {
-            points,
-            triangles,
-            faces: scenery.parts.iter().map(|part| Faces::of(&part.mesh)).collect(),
             ids: sheets.iter().map(id).collect(),
             sheets,
             sheet_of,
             first,
-            bounds: scenery.parts.iter().map(|part| part.mesh.bounds()).collect(),
             linear_rgb: scenery.parts.iter().map(colours).collect(),
             grain: scenery.parts.iter().map(grain).collect(),
             scenery,
         }
+    }
+
+    /// The triangles of a part.
+    #[inline(always)]
+    pub fn geometry(&self, part: usize) -> &MeshGeometry {
+        self.scenery.parts[part].mesh.geometry()
     }
 
     /// Numbers of the sheets of a part's triangles.
@@ -86,21 +76,7 @@ impl Prepared {
 
 /// Returns the grain axis; print is upright, whichever axis is longest.
 fn grain(part: &Part) -> usize {
-    if part.pattern == Pattern::Print { 0 } else { part.mesh.longest_axis() }
-}
-
-/// Returns the places of a mesh's corners, each once, and its triangles by their numbers.
-fn joined(mesh: &TriangleMesh) -> (Points, Vec<[u32; 3]>) {
-    let (mut numbers, mut places_m) = (HashMap::new(), Vec::new());
-    let mut number = |corner: u32| {
-        let place_m = mesh.vertices[corner as usize].position_m;
-        *numbers.entry(place_m.to_array().map(f32::to_bits)).or_insert_with(|| {
-            places_m.push(place_m);
-            places_m.len() as u32 - 1
-        })
-    };
-    let triangles = mesh.triangles.iter().map(|corners| corners.map(&mut number)).collect();
-    (Points::new(&places_m), triangles)
+    if part.pattern == Pattern::Print { 0 } else { part.mesh.geometry().longest_axis }
 }
 
 /// Returns the two linear colours of a part.

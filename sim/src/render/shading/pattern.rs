@@ -3,6 +3,7 @@
 use rapier3d::math::{Matrix, Pose, Vector};
 
 use super::lanes::{Affine, Lanes, lanes};
+use crate::mjcf::SurfacePattern;
 
 /// Pattern of a surface between two colours.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -19,12 +20,7 @@ pub enum Pattern {
     Print,
 }
 
-/// Words in names of materials that select a pattern. The names are those of MJCF files, and scenes need
-/// nothing else.
-const WOODS: [&str; 8] = ["wood", "birch", "oak", "walnut", "pine", "beech", "plank", "batten"];
-const FABRICS: [&str; 7] = ["fabric", "cloth", "velvet", "curtain", "carpet", "rug", "cushion"];
-const PRINTS: [&str; 2] = ["label", "print"];
-/// The second colour, as a share of the first: calm enough for things on it to stand out.
+/// The second colour, as a part of the first: calm enough for what lies on it to stand out.
 const WOOD_DARK: f32 = 0.70;
 const FABRIC_DARK: f32 = 0.75;
 const INK_DARK: f32 = 0.45;
@@ -44,14 +40,13 @@ pub const WORD_GAP: f32 = 0.3;
 pub const WORD_STRAY: f32 = 0.37;
 
 impl Pattern {
-    /// Returns the pattern of a material, by its name.
-    pub fn of(material: &str) -> Pattern {
-        let has = |words: &[&str]| words.iter().any(|word| material.contains(word));
-        match () {
-            () if has(&WOODS) => Pattern::Wood,
-            () if has(&FABRICS) => Pattern::Fabric,
-            () if has(&PRINTS) => Pattern::Print,
-            () => Pattern::Plain,
+    /// Returns the pattern that a file gives a material.
+    pub fn of(stated: Option<SurfacePattern>) -> Pattern {
+        match stated {
+            Some(SurfacePattern::Wood) => Pattern::Wood,
+            Some(SurfacePattern::Fabric) => Pattern::Fabric,
+            Some(SurfacePattern::Print) => Pattern::Print,
+            None => Pattern::Plain,
         }
     }
 

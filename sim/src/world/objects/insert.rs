@@ -1,5 +1,7 @@
 //! Insertion of scenes and objects into a world.
 
+use std::iter::successors;
+
 use rapier3d::math::Pose;
 
 use super::model::part_name;
@@ -9,7 +11,7 @@ use crate::dynamics::{Dynamics, Link, Tree, TreeId};
 use crate::mechanism::{
     Machinery, PlacedTree, START, add_collider, add_equalities, begin, keep_apart, links, precise, rounded,
 };
-use crate::mjcf::{BodyLink, BodyTree, Document, Geom};
+use crate::mjcf::{BodyLink, BodyTree, Document, Geom, LinkJoint};
 use crate::owner::Owner;
 
 /// Content of a scene's file in a world.
@@ -34,10 +36,11 @@ pub(in crate::world) fn insert_scene(
     let actuators = scene.actuators()?;
     let mut placed = Vec::with_capacity(trees.len());
     for tree in &trees {
+        let mut colliders = Vec::new();
         let id = if tree.is_fixed() {
             for mut geom in tree.links.iter().flat_map(in_file) {
                 geom.body_from_geom = *world_from_scene * geom.body_from_geom;
-                add_collider(dynamics, &geom, None, None);
+                colliders.push(add_collider(dynamics, &geom, None, None));
                 fixed.push(geom);
             }
             None
@@ -46,7 +49,7 @@ pub(in crate::world) fn insert_scene(
             let tree_links = links(tree, &world_from_file, &actuators);
             Some(insert_moving(dynamics, tree, tree_links, name, &mut objects)?)
         };
-        placed.push(PlacedTree { tree, id });
+        placed.push(PlacedTree { tree, id, colliders });
     }
     // Welds hold bodies in their placed poses, whatever their initial state.
     add_equalities(dynamics, scene, &placed, &world_from_file)?;
@@ -85,7 +88,7 @@ pub(in crate::world) fn insert_object(
     let name = |link: &BodyLink| part_name(&placement.name, link);
     let tree_links = links(&tree, &world_from_file, &[]);
     let id = insert_moving(dynamics, &tree, tree_links, name, objects)?;
-    let placed = [PlacedTree { tree: &tree, id: Some(id) }];
+    let placed = [PlacedTree { tree: &tree, id: Some(id), colliders: Vec::new() }];
     add_equalities(dynamics, &document, &placed, &world_from_file)?;
     keep_apart(dynamics, &document, &placed)
 }
@@ -110,11 +113,24 @@ fn insert_moving(
             joint: link.joint.name().map(String::from),
             world_from_mark: Pose::IDENTITY,
         });
+        if let Some(carrier) = carrier(tree, index) {
+            dynamics.keep_apart(id.link(index), id.link(carrier));
+        }
     }
     Ok(id)
 }
 
-/// Returns the geoms of a link that does not move, in the frame of its file.
+/// Returns the link that carries another by several joints, if something moves it: as where there is one
+/// joint, the two do not touch.
+fn carrier(tree: &BodyTree, link: usize) -> Option<usize> {
+    let above = |link: usize| tree.links[link].parent;
+    let first_part = above(link).filter(|parent| tree.links[*parent].is_part)?;
+    let carrier = successors(Some(first_part), |part| above(*part)).find(|one| !tree.links[*one].is_part)?;
+    let moves = |link: &usize| tree.links[*link].joint != LinkJoint::Fixed;
+    successors(Some(carrier), |one| above(*one)).any(|one| moves(&one)).then_some(carrier)
+}
+
+/// Geoms of a link that does not move, in the frame of its file.
 fn in_file(link: &BodyLink) -> impl Iterator<Item = Geom> {
     let file_from_link = rounded(&link.parent_from_link);
     link.geoms

@@ -1,6 +1,8 @@
 //! Objects: all named things in a world except robots. A file with inner joints gives one object per link.
 
 mod insert;
+#[cfg(test)]
+mod joined_tests;
 mod model;
 #[cfg(test)]
 mod site_tests;

@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use roxmltree::Node;
+use xxhash_rust::xxh3::xxh3_64;
 
 use crate::{
     SimError,
@@ -11,8 +12,8 @@ use crate::{
 };
 
 /// XML text without `<include>`.
-#[derive(Debug)]
-pub(super) struct MjcfText {
+#[derive(Clone, Debug)]
+pub(in crate::mjcf) struct MjcfText {
     pub text: String,
     files: Vec<SourceFile>,
     /// Pieces in order of position; together they are the text.
@@ -21,7 +22,7 @@ pub(super) struct MjcfText {
     folder: PathBuf,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 struct SourceFile {
     name: String,
     text: String,
@@ -29,8 +30,8 @@ struct SourceFile {
     path: Option<PathBuf>,
 }
 
-/// A contiguous part of the text from one file.
-#[derive(Debug)]
+/// A part of the text that stands in a file without a break.
+#[derive(Clone, Debug)]
 struct Piece {
     start: usize,
     file: usize,
@@ -48,7 +49,24 @@ impl MjcfText {
         Ok(source)
     }
 
-    /// Parses the text as a tree of elements.
+    /// Returns the files that were included, and a hash of each.
+    pub fn included(&self) -> Vec<(PathBuf, u64)> {
+        let hashed = |file: &SourceFile| Some((file.path.clone()?, xxh3_64(file.text.as_bytes())));
+        self.files.iter().filter_map(hashed).collect()
+    }
+
+    /// Finds a file that is not where it is named, by its name beside one of the included files.
+    pub fn beside_including(&self, path: PathBuf) -> PathBuf {
+        if path.exists() {
+            return path;
+        }
+        let named = path.strip_prefix(&self.folder).unwrap_or(&path);
+        let folders = self.files.iter().filter_map(|file| file.path.as_ref()?.parent());
+        let mut beside = folders.map(|folder| with_own_separators(folder.join(named)));
+        beside.find(|beside| beside.exists()).unwrap_or(path)
+    }
+
+    /// The text as a tree of elements.
     pub fn xml(&self) -> Result<roxmltree::Document<'_>, SimError> {
         let file = || self.files[0].name.clone();
         roxmltree::Document::parse(&self.text).map_err(|source| SimError::Xml { file: file(), source })
@@ -135,7 +153,7 @@ impl MjcfText {
 }
 
 /// Refuses a text that names other files.
-pub(super) fn refuse_files(file: &str, xml: &str) -> Result<(), SimError> {
+pub(in crate::mjcf) fn refuse_files(file: &str, xml: &str) -> Result<(), SimError> {
     let tree =
         roxmltree::Document::parse(xml).map_err(|source| SimError::Xml { file: file.into(), source })?;
     let Some(naming) = tree.descendants().find(|node| node.has_attribute("file")) else { return Ok(()) };
@@ -161,8 +179,8 @@ fn inside(node: &Node) -> Option<Range<usize>> {
     Some(node.first_child()?.range().start..node.last_child()?.range().end)
 }
 
-/// Describes an element by its name, or else by the nearest element around it that has one.
-pub(super) fn describe(node: &Node) -> String {
+/// An element by its name, or else by the nearest element around it that has one.
+pub(in crate::mjcf) fn describe(node: &Node) -> String {
     let tag = |node: &Node| node.tag_name().name().to_string();
     let name = |node: &Node| {
         let class = node.attribute("class").filter(|_| node.has_tag_name("default"));

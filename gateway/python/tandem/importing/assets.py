@@ -1,0 +1,89 @@
+"""Meshes, pictures and materials."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from .engine import mujoco
+from .files import Array, escaped, numbers, write_obj, write_png
+from .names import Names
+from .report import Report
+
+MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+#: Roles of textures by which a material has a colour.
+COLOURS = (mujoco.mjtTextureRole.mjTEXROLE_RGB, mujoco.mjtTextureRole.mjTEXROLE_RGBA)
+
+
+def write_assets(model: Any, names: Names, out: Path, report: Report) -> list[str]:
+    used = sorted({int(mesh) for mesh, kind in zip(model.geom_dataid, model.geom_type, strict=True) if kind == MESH})
+    rows = [*meshes(model, used, out, report), *materials(model, names, out, report)]
+    if model.nhfield:
+        report.drop("<hfield>", int(model.nhfield))
+    return ["<asset>", *rows, "</asset>"] if rows else []
+
+
+def mesh_name(mesh: int) -> str:
+    return f"mesh_{mesh}"
+
+
+def meshes(model: Any, used: list[int], out: Path, report: Report) -> list[str]:
+    """Writes the meshes that geoms show, in the frames into which MuJoCo has put them."""
+    rows: list[str] = []
+    if used:
+        (out / "meshes").mkdir(exist_ok=True)
+    for mesh in used:
+        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+        face, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+        uv: Array | None = None
+        uv_faces: Array | None = None
+        if model.mesh_texcoordadr[mesh] >= 0:
+            begin = model.mesh_texcoordadr[mesh]
+            uv = model.mesh_texcoord[begin : begin + model.mesh_texcoordnum[mesh]]
+            uv_faces = model.mesh_facetexcoord[face : face + faces]
+        file = f"{mesh_name(mesh)}.obj"
+        write_obj(
+            out / "meshes" / file,
+            model.mesh_vert[first : first + count],
+            model.mesh_face[face : face + faces],
+            uv,
+            uv_faces,
+        )
+        rows.append(f'<mesh name="{mesh_name(mesh)}" file="{file}"/>')
+        report.meshes += 1
+        report.triangles += int(faces)
+    return rows
+
+
+def materials(model: Any, names: Names, out: Path, report: Report) -> list[str]:
+    """Writes the materials, and the pictures that give them their colours."""
+    rows: list[str] = []
+    written: set[int] = set()
+    for material in range(model.nmat):
+        texture = next((int(model.mat_texid[material, role]) for role in COLOURS if model.mat_texid[material, role] >= 0), -1)
+        picture = ""
+        if texture >= 0:
+            if texture not in written:
+                rows.append(write_texture(model, texture, out))
+                written.add(texture)
+            repeat = numbers(model.mat_texrepeat[material])
+            uniform = "true" if model.mat_texuniform[material] else "false"
+            picture = f' texture="texture_{texture}" texrepeat="{repeat}" texuniform="{uniform}"'
+        rgba = numbers(model.mat_rgba[material])
+        shine = "".join(
+            f' {name}="{numbers(getattr(model, "mat_" + name)[material])}"'
+            for name in ("emission", "specular", "shininess", "reflectance")
+        )
+        rows.append(f'<material name="{escaped(names.of("material", material))}" rgba="{rgba}"{picture}{shine}/>')
+    report.pictures = len(written)
+    return rows
+
+
+def write_texture(model: Any, texture: int, out: Path) -> str:
+    (out / "textures").mkdir(exist_ok=True)
+    height, width, channels = (int(a[texture]) for a in (model.tex_height, model.tex_width, model.tex_nchannel))
+    first = int(model.tex_adr[texture])
+    pixels: Any = model.tex_data[first : first + height * width * channels].reshape(height, width, channels)
+    # MuJoCo's first row is the lowest.
+    write_png(out / "textures" / f"texture_{texture}.png", pixels[::-1])
+    return f'<texture name="texture_{texture}" type="2d" file="texture_{texture}.png"/>'

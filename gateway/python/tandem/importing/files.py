@@ -1,0 +1,47 @@
+"""Files beside the written MJCF: meshes as OBJ, pictures as PNG."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+Array = Any
+
+
+def numbers(values: Any) -> str:
+    """Numbers as an attribute has them."""
+    return " ".join(f"{value:.9g}" for value in np.ravel(values))
+
+
+def escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace('"', "&quot;")
+
+
+def write_obj(path: Path, vertices: Array, faces: Array, uv: Array | None = None, uv_faces: Array | None = None) -> None:
+    """Writes triangles, whose corners may have texture coordinates."""
+    lines = [f"v {x:.8g} {y:.8g} {z:.8g}" for x, y, z in vertices]
+    if uv is not None and uv_faces is not None:
+        lines += [f"vt {u:.6g} {v:.6g}" for u, v in uv]
+        corners = zip(faces + 1, uv_faces + 1, strict=True)
+        lines += [f"f {a}/{ta} {b}/{tb} {c}/{tc}" for (a, b, c), (ta, tb, tc) in corners]
+    else:
+        lines += [f"f {a} {b} {c}" for a, b, c in faces + 1]
+    path.write_text("\n".join(lines) + "\n")
+
+
+def write_png(path: Path, pixels: Array) -> None:
+    """Writes a picture of 1, 3 or 4 bytes a pixel: height, width, bytes."""
+    height, width, channels = pixels.shape
+    kinds = {1: 0, 2: 4, 3: 2, 4: 6}
+    header = struct.pack(">IIBBBBB", width, height, 8, kinds[channels], 0, 0, 0)
+    rows: Any = np.concatenate([np.zeros((height, 1), np.uint8), pixels.reshape(height, -1).astype(np.uint8)], axis=1)
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    data = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows.tobytes(), 6)) + chunk(b"IEND", b"")
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + data)

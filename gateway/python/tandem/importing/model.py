@@ -1,0 +1,103 @@
+"""A model that MuJoCo has compiled, written as plain MJCF."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .assets import write_assets
+from .bodies import write_bodies
+from .constraints import write_actuators, write_contacts, write_equalities
+from .engine import mujoco
+from .files import numbers
+from .names import Names
+from .report import Report
+
+#: How long the source and what was written are compared.
+SECONDS = 1.0
+FLAGS = {"contact": mujoco.mjtDisableBit.mjDSBL_CONTACT, "gravity": mujoco.mjtDisableBit.mjDSBL_GRAVITY}
+
+
+def import_model(source: Path, out: Path) -> Report:
+    """Writes `scene.xml` of an MJCF or URDF file."""
+    model = mujoco.MjModel.from_xml_path(str(source))
+    written = out / "scene.xml"
+    report = Report(str(source), str(written))
+    names = Names(model)
+    parts = [
+        "<mujoco>",
+        '<compiler angle="radian" meshdir="meshes" texturedir="textures"/>',
+        options(model, report),
+        custom(source.read_text(errors="replace")),
+        *write_assets(model, names, out, report),
+        *write_bodies(model, names, report),
+        *write_contacts(model, names, report),
+        *write_equalities(model, names, report),
+        *write_actuators(model, names, report),
+        "</mujoco>",
+    ]
+    written.write_text("\n".join(part for part in parts if part) + "\n")
+    rest(model, report)
+    report.after_1_s = compared(model, mujoco.MjModel.from_xml_path(str(written)), names)
+    return report
+
+
+def options(model: Any, report: Report) -> str:
+    off = [name for name, bit in FLAGS.items() if model.opt.disableflags & bit]
+    others = int(model.opt.disableflags) & ~sum(int(bit) for bit in FLAGS.values())
+    if others & int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT):
+        report.drop('<flag constraint="disable">')
+    for what in ("density", "viscosity"):
+        if getattr(model.opt, what):
+            report.drop(f"{what} of a medium")
+    flags = "".join(f' {name}="disable"' for name in off)
+    flag = f"<flag{flags}/>" if flags else ""
+    return f'<option gravity="{numbers(model.opt.gravity)}">{flag}</option>'
+
+
+def custom(text: str) -> str:
+    """What is drawn by robosuite's convention, which compiling loses: groups 1 and 2."""
+    by_group = re.search(r'inertiagrouprange\s*=\s*"\s*0\s+0\s*"', text) and re.search(r'group\s*=\s*"1"', text)
+    return '<custom><numeric name="drawn_groups" data="1 2"/></custom>' if by_group else ""
+
+
+def rest(model: Any, report: Report) -> None:
+    """What of a model has no place in what is written."""
+    for what, times in [
+        ("<tendon>", model.ntendon),
+        ("<flex>", model.nflex),
+        ("<skin>", model.nskin),
+        ("<sensor>", model.nsensor),
+        ("<key>", model.nkey),
+        ("<light>", model.nlight),
+        ("plugin", model.nplugin),
+    ]:
+        if times:
+            report.drop(what, int(times))
+
+
+def played(model: Any) -> tuple[Any, Any]:
+    """Where bodies are at the beginning and after a second in which nobody acts."""
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    begin = data.xpos.copy()
+    while data.time < SECONDS:
+        mujoco.mj_step(model, data)
+    return begin, data.xpos.copy()
+
+
+def compared(source: Any, written: Any, names: Names) -> dict[str, Any]:
+    """How far (m) bodies have come in a second, and how far they then are from the source's."""
+    written.opt.timestep = source.opt.timestep
+    _, expected = played(source)
+    begin, found = played(written)
+    moved = [body for body in range(1, written.nbody) if written.body_weldid[body]]
+    if not moved:
+        return {"from_begin_m": 0.0, "from_source_m": 0.0}
+    away = np.linalg.norm(found - expected, axis=1)
+    farthest = max(moved, key=lambda body: away[body])
+    come = max(float(np.linalg.norm(found[body] - begin[body])) for body in moved)
+    return {"from_begin_m": come, "from_source_m": float(away[farthest]), "farthest": names.of("body", farthest)}

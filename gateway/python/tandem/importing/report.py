@@ -1,0 +1,40 @@
+"""What became of an imported file."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+
+@dataclass
+class Report:
+    """What was read, what was written and what was left out."""
+
+    source: str
+    written: str
+    #: Each body that moves: its name, mass (kg) and joints.
+    bodies: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
+    meshes: int = 0
+    triangles: int = 0
+    pictures: int = 0
+    #: What is not in the written file, and how often the source has it.
+    dropped: dict[str, int] = field(default_factory=dict[str, int])
+    #: How far (m) bodies are from where they began and from the source's after 1 s in MuJoCo, nobody acting.
+    after_1_s: dict[str, Any] = field(default_factory=dict[str, Any])
+
+    def drop(self, what: str, times: int = 1) -> None:
+        self.dropped = dict(Counter(self.dropped) + Counter({what: times}))
+
+    def write(self, out: Path) -> None:
+        (out / "report.json").write_text(json.dumps(asdict(self), indent=1) + "\n")
+
+    def told(self) -> str:
+        lines = [f"{self.source} -> {self.written}: {len(self.bodies)} bodies that move, {self.meshes} meshes"]
+        lines += [f"  left out: {what} ({times})" for what, times in self.dropped.items()]
+        if "from_source_m" in self.after_1_s:
+            far = self.after_1_s["from_source_m"]
+            lines.append(f"  after 1 s in MuJoCo the farthest body is {1000 * far:.0f} mm from the source's")
+        return "\n".join(lines)

@@ -1,0 +1,327 @@
+//! Files that an MJCF file names: meshes (OBJ, STL and MSH), and pictures on materials, of which only the
+//! colour is taken.
+
+use std::fmt;
+use std::io::{self, Cursor};
+use std::path::Path;
+use std::sync::{Arc, OnceLock};
+
+use image::ImageReader;
+use mjcf_rs::assets::MeshInertia;
+use rapier3d::math::{Rotation, Vector};
+use rapier3d::prelude::{MassProperties, SharedShape};
+use xxhash_rust::xxh3::xxh3_64;
+
+use crate::mjcf::{Document, pose, vector};
+use crate::{
+    SimError,
+    user_file::{read_bytes, with_own_separators},
+};
+
+/// The most bytes of a mesh or a picture.
+const MAX_MESH_BYTES: u64 = 1 << 30;
+/// Bytes of a binary STL file before its triangles, and of each of these.
+const STL_HEAD_BYTES: usize = 84;
+const STL_TRIANGLE_BYTES: usize = 50;
+
+/// Triangles as a file has them, in metres, counter-clockwise seen from outside.
+#[derive(Clone, Default)]
+pub struct Mesh {
+    pub vertices_m: Vec<Vector>,
+    pub triangles: Vec<[u32; 3]>,
+    /// Whether it weighs what is inside of its triangles, and not its hull.
+    pub weighs_exactly: bool,
+    hull: OnceLock<Option<SharedShape>>,
+}
+
+impl PartialEq for Mesh {
+    fn eq(&self, other: &Mesh) -> bool {
+        self.vertices_m == other.vertices_m
+            && self.triangles == other.triangles
+            && self.weighs_exactly == other.weighs_exactly
+    }
+}
+
+/// What a fingerprint is of: that a mesh weighs exactly, its asset says.
+impl fmt::Debug for Mesh {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Mesh { vertices_m, triangles, .. } = self;
+        f.debug_struct("Mesh").field("vertices_m", vertices_m).field("triangles", triangles).finish()
+    }
+}
+
+impl Mesh {
+    /// Returns the convex hull, made once; `None` for points that lie in a plane.
+    pub(crate) fn hull(&self) -> Option<SharedShape> {
+        self.hull.get_or_init(|| SharedShape::convex_hull(&self.vertices_m)).clone()
+    }
+
+    /// Mass properties at a density of 1.
+    pub(crate) fn mass_properties(&self) -> Option<MassProperties> {
+        let of_hull = || Some(self.hull()?.mass_properties(1.0));
+        let exact = self
+            .weighs_exactly
+            .then(|| MassProperties::from_trimesh(1.0, &self.vertices_m, &self.triangles))
+            // Nothing is inside of a surface with holes.
+            .filter(|exact| exact.mass() > 0.0);
+        exact.or_else(of_hull)
+    }
+
+    /// Returns the share of its hull that the mesh fills; 1 if it has none.
+    pub(in crate::mjcf) fn hull_share(&self) -> f32 {
+        let Some(hull) = self.hull() else { return 1.0 };
+        let middle_m = self.vertices_m.first().copied().unwrap_or_default();
+        let six_times_m3 = |corners: &[u32; 3]| {
+            let [a, b, c] = corners.map(|corner| (self.vertices_m[corner as usize] - middle_m).as_dvec3());
+            a.cross(b).dot(c)
+        };
+        let volume_m3 = self.triangles.iter().map(six_times_m3).sum::<f64>().abs() / 6.0;
+        volume_m3 as f32 / hull.mass_properties(1.0).mass()
+    }
+}
+
+impl Document {
+    /// Reads the meshes that its assets name files of, scaled as the assets say.
+    pub(in crate::mjcf) fn read_meshes(&mut self) -> Result<(), SimError> {
+        let mut refused = Vec::new();
+        for asset in &self.model.assets.meshes {
+            let Some(path) = self.model.resolve_mesh_file(asset, &self.folder) else { continue };
+            let path = self.source.beside_including(with_own_separators(path));
+            let bytes = read_mesh_bytes(&path).map_err(|source| unreadable(&path, source));
+            match bytes.and_then(|bytes| Ok((self.read_mesh(asset, &path, &bytes)?, xxh3_64(&bytes)))) {
+                Ok((mesh, hash)) => {
+                    self.files.push((path, hash));
+                    self.meshes.insert(asset.name.clone().unwrap_or_default(), Arc::new(mesh));
+                }
+                Err(error) => refused.push(error),
+            }
+        }
+        SimError::of_all(refused).map_or(Ok(()), Err)
+    }
+
+    /// Reads the mean colours of the textures that its assets name files of.
+    pub(in crate::mjcf) fn read_textures(&mut self) -> Result<(), SimError> {
+        for asset in &self.model.assets.textures {
+            if let Some(path) = self.model.resolve_texture_file(asset, &self.folder) {
+                let path = self.source.beside_including(with_own_separators(path));
+                let bytes = read_mesh_bytes(&path).map_err(|source| unreadable(&path, source))?;
+                self.texture_rgb.insert(asset.name.clone().unwrap_or_default(), mean_rgb(&path, &bytes)?);
+                self.files.push((path, xxh3_64(&bytes)));
+            }
+        }
+        Ok(())
+    }
+
+    fn read_mesh(&self, asset: &mjcf_rs::assets::Mesh, path: &Path, bytes: &[u8]) -> Result<Mesh, SimError> {
+        let mut mesh = read(path, bytes)?;
+        if mesh.triangles.is_empty() {
+            return Err(self.unsupported(format!("mesh `{}` has no triangles", path.display())));
+        }
+        let scale = vector(asset.scale);
+        if asset.refpose != mjcf_rs::Pose::default() {
+            let reference = pose(&asset.refpose);
+            let turn: Rotation = reference.rotation.inverse();
+            let place = |vertex_m: &mut Vector| *vertex_m = turn * (*vertex_m - reference.translation);
+            mesh.vertices_m.iter_mut().for_each(place);
+        }
+        mesh.vertices_m.iter_mut().for_each(|vertex_m| *vertex_m *= scale);
+        // A reflection turns what was outside inside.
+        if scale.x * scale.y * scale.z < 0.0 {
+            mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+        }
+        mesh.weighs_exactly = asset.inertia == MeshInertia::Exact || self.model.compiler.exact_mesh_inertia;
+        Ok(mesh)
+    }
+}
+
+/// Reads a file that an MJCF file names.
+pub(in crate::mjcf) fn read_mesh_bytes(path: &Path) -> io::Result<Vec<u8>> {
+    read_bytes(path, MAX_MESH_BYTES)
+}
+
+/// Reads the content of a file of the kind that its name says.
+fn read(path: &Path, bytes: &[u8]) -> Result<Mesh, SimError> {
+    let kind = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    match kind.as_str() {
+        "obj" => read_obj(path, bytes),
+        "stl" => read_stl(path, bytes),
+        "msh" => read_msh(bytes).ok_or_else(|| {
+            let source = "it is no MSH file of MuJoCo's, or it ends too early".into();
+            SimError::Mesh { path: path.display().to_string(), source }
+        }),
+        _ => Err(SimError::MeshKind { path: path.display().to_string() }),
+    }
+}
+
+fn read_obj(path: &Path, mut bytes: &[u8]) -> Result<Mesh, SimError> {
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_points: true,
+        ignore_lines: true,
+        ..tobj::LoadOptions::default()
+    };
+    // Colours are those of the MJCF file.
+    let without_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+    let (models, _) = tobj::load_obj_buf(&mut bytes, &options, without_materials)
+        .map_err(|source| SimError::Mesh { path: path.display().to_string(), source: Box::new(source) })?;
+    let mut found = Mesh::default();
+    for tobj::Model { mesh, .. } in models {
+        let first = found.vertices_m.len() as u32;
+        found.vertices_m.extend(mesh.positions.chunks_exact(3).map(Vector::from_slice));
+        let corners = mesh.indices.chunks_exact(3);
+        found.triangles.extend(corners.map(|corner| [corner[0], corner[1], corner[2]].map(|i| first + i)));
+    }
+    Ok(found)
+}
+
+fn read_stl(path: &Path, bytes: &[u8]) -> Result<Mesh, SimError> {
+    let mut bytes = bytes.to_vec();
+    // The header of a binary file may begin as a text does; its length tells what it is.
+    if let Some(count) = number(&bytes, STL_HEAD_BYTES - 4)
+        && bytes.len() == STL_HEAD_BYTES + STL_TRIANGLE_BYTES * count as usize
+    {
+        bytes[..STL_HEAD_BYTES - 4].fill(0);
+    }
+    let mesh = stl_io::read_stl(&mut Cursor::new(bytes))
+        .map_err(|source| SimError::Mesh { path: path.display().to_string(), source: Box::new(source) })?;
+    Ok(Mesh {
+        vertices_m: mesh.vertices.iter().map(|v| Vector::new(v[0], v[1], v[2])).collect(),
+        triangles: mesh.faces.iter().map(|face| face.vertices.map(|corner| corner as u32)).collect(),
+        ..Mesh::default()
+    })
+}
+
+/// Reads MuJoCo's own format, little-endian: numbers of vertices, normals, texture coordinates and faces
+/// (i32), then 3, 3 and 2 f32 and 3 i32 for each.
+fn read_msh(bytes: &[u8]) -> Option<Mesh> {
+    const COUNTS_BYTES: usize = 16;
+    let mut counts = [0; 4];
+    for (index, count) in counts.iter_mut().enumerate() {
+        *count = number(bytes, 4 * index)? as usize;
+    }
+    let [vertices, normals, coordinates, faces] = counts;
+    let first_face = COUNTS_BYTES + 4 * (3 * vertices + 3 * normals + 2 * coordinates);
+    if bytes.len() != first_face + 12 * faces {
+        return None;
+    }
+    let coordinate = |index: usize| Some(f32::from_bits(number(bytes, COUNTS_BYTES + 4 * index)?));
+    let vertex =
+        |i: usize| Some(Vector::new(coordinate(3 * i)?, coordinate(3 * i + 1)?, coordinate(3 * i + 2)?));
+    let corner =
+        |index: usize| number(bytes, first_face + 4 * index).filter(|corner| (*corner as usize) < vertices);
+    let triangle = |i: usize| Some([corner(3 * i)?, corner(3 * i + 1)?, corner(3 * i + 2)?]);
+    Some(Mesh {
+        vertices_m: (0..vertices).map(vertex).collect::<Option<_>>()?,
+        triangles: (0..faces).map(triangle).collect::<Option<_>>()?,
+        ..Mesh::default()
+    })
+}
+
+/// Reads a little-endian number of four bytes.
+fn number(bytes: &[u8], at: usize) -> Option<u32> {
+    Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?))
+}
+
+fn mean_rgb(path: &Path, bytes: &[u8]) -> Result<[f32; 3], SimError> {
+    let name = || path.display().to_string();
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let reader = reader.map_err(|source| unreadable(path, source))?;
+    let picture = reader.decode().map_err(|source| SimError::Texture { path: name(), source })?.into_rgb8();
+    let mut sum = [0.0f64; 3];
+    for pixel in picture.pixels() {
+        for (sum, value) in sum.iter_mut().zip(pixel.0) {
+            *sum += f64::from(value) / 255.0;
+        }
+    }
+    Ok(sum.map(|sum| (sum / picture.pixels().len().max(1) as f64) as f32))
+}
+
+fn unreadable(path: &Path, source: io::Error) -> SimError {
+    SimError::Read { path: path.display().to_string(), source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mjcf::Primitive;
+
+    /// A unit square of two triangles, and one side of a tent over it.
+    const OBJ: &str =
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 0.5 1\nvn 0 0 1\nf 4//1 3//1 2//1 1//1\nf -5 -4 -1\n";
+    const STL: &str = "solid tent\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid tent\n";
+
+    fn read_geom(file: &str, content: impl AsRef<[u8]>, asset: &str) -> Result<Arc<Mesh>, SimError> {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        std::fs::create_dir(folder.path().join("meshes")).expect("a folder");
+        std::fs::write(folder.path().join("meshes").join(file), content).expect("a mesh");
+        let xml = format!(
+            r#"<mujoco><compiler meshdir="meshes"/><asset><mesh name="tent" file="{file}" {asset}/></asset>
+            <worldbody><geom type="mesh" mesh="tent"/></worldbody></mujoco>"#
+        );
+        let path = folder.path().join("scene.xml");
+        std::fs::write(&path, xml).expect("a scene");
+        match Document::read(&path)?.geoms(0)?.remove(0).primitive {
+            Primitive::Mesh(mesh) => Ok(mesh),
+            other => panic!("{other:?} is no mesh of a file"),
+        }
+    }
+
+    #[test]
+    fn files_of_both_kinds_are_read_and_scaled() {
+        let mesh = read_geom("tent.obj", OBJ, r#"scale="1 2 1""#).expect("an OBJ file");
+        assert_eq!((mesh.vertices_m.len(), mesh.triangles.len()), (5, 3));
+        // The reader counts vertices as the faces first name them.
+        let corners_m = mesh.triangles[2].map(|corner| mesh.vertices_m[corner as usize]);
+        assert_eq!(corners_m, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 1.0, 1.0]].map(Vector::from));
+
+        let mesh = read_geom("tent.STL", STL, r#"scale="1 1 -1""#).expect("an STL file");
+        // The reflection keeps the outside outside.
+        assert_eq!((mesh.vertices_m.len(), mesh.triangles.as_slice()), (3, [[0, 2, 1]].as_slice()));
+    }
+
+    /// One triangle in each binary format; the header of the STL file begins as that of a text would.
+    #[test]
+    fn binary_files_are_told_from_texts_by_their_length() {
+        let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let floats = corners.as_flattened().iter().flat_map(|number| number.to_le_bytes());
+        let mut stl = b"solid made by a printer".to_vec();
+        stl.resize(80, b' ');
+        stl.extend(1u32.to_le_bytes());
+        stl.extend([0; 12]);
+        stl.extend(floats.clone());
+        stl.extend([0; 2]);
+        let mut msh: Vec<u8> = [3i32, 0, 0, 1].into_iter().flat_map(i32::to_le_bytes).collect();
+        msh.extend(floats);
+        msh.extend([0i32, 1, 2].into_iter().flat_map(i32::to_le_bytes));
+        for (file, content) in [("tent.stl", stl), ("tent.msh", msh)] {
+            let mesh = read_geom(file, content, "").unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(mesh.vertices_m, corners.map(Vector::from));
+            assert_eq!(mesh.triangles, [[0, 1, 2]]);
+        }
+    }
+
+    /// As MuJoCo does it: the reference is subtracted, then the mesh is turned back, then scaled.
+    #[test]
+    fn a_reference_pose_moves_the_mesh() {
+        let asset = r#"refpos="1 0 0" refquat="0.70710678 0 0 0.70710678" scale="2 1 1""#;
+        let mesh = read_geom("tent.stl", STL, asset).expect("a mesh");
+        let expected_m = [[0.0, 1.0, 0.0], [0.0, 0.0, 0.0], [2.0, 1.0, 0.0]].map(Vector::from);
+        for (found_m, expected_m) in mesh.vertices_m.iter().zip(expected_m) {
+            assert!((*found_m - expected_m).length() < 1e-6, "{found_m} instead of {expected_m}");
+        }
+    }
+
+    #[test]
+    fn files_that_are_no_meshes_are_named() {
+        for (file, content, expected) in [
+            ("tent.ply", "ply", "tent.ply` is of a kind that is not read; use .obj, .stl or .msh"),
+            ("tent.msh", "0123456789abcdef", "tent.msh` is not a mesh that can be read"),
+            ("tent.obj", "f 1 2 3\n", "tent.obj` is not a mesh that can be read"),
+            ("tent.obj", "# nothing\n", "tent.obj` has no triangles"),
+            ("tent.stl", "solid", "tent.stl` is not a mesh that can be read"),
+        ] {
+            let text = read_geom(file, content, "").expect_err(file).to_string();
+            assert!(text.contains(expected), "{text}");
+        }
+    }
+}

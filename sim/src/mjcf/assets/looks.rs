@@ -1,0 +1,140 @@
+//! Conventions on what of a file is drawn, and how: patterns of materials, and groups.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use roxmltree::Node;
+
+use crate::SimError;
+use crate::mjcf::text::source::MjcfText;
+use crate::mjcf::text::stated::Classes;
+
+/// A pattern that a file gives one of its materials.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SurfacePattern {
+    Wood,
+    Fabric,
+    Print,
+}
+
+/// Choices of a file that MJCF has no attributes for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(in crate::mjcf) struct Looks {
+    /// By material.
+    pub patterns: BTreeMap<String, SurfacePattern>,
+    /// `None` for those that MuJoCo draws.
+    pub drawn_groups: Option<BTreeSet<i32>>,
+}
+
+/// The `<text>` that gives materials patterns: names of materials, each with the pattern behind it.
+const PATTERNS: &str = "material_patterns";
+/// The `<numeric>` with the groups that are drawn.
+const DRAWN_GROUPS: &str = "drawn_groups";
+/// MuJoCo hides groups 3 and above; robots keep their collision shapes there.
+const LAST_DRAWN_GROUP: i32 = 2;
+
+impl Looks {
+    pub fn of(source: &MjcfText) -> Result<Looks, SimError> {
+        let xml = source.xml()?;
+        let named = |tag: &str, name: &str| {
+            let mut found = xml.descendants().filter(|node| node.has_tag_name(tag));
+            found.find(|node| node.attribute("name") == Some(name))
+        };
+        let patterns = match named("text", PATTERNS) {
+            Some(text) => patterns(source, &text)?,
+            None => BTreeMap::new(),
+        };
+        let groups = |node: Node| {
+            let words = node.attribute("data").unwrap_or_default().split_ascii_whitespace();
+            words.filter_map(|word| word.parse::<f64>().ok()).map(|group| group as i32).collect()
+        };
+        let chosen = named("numeric", DRAWN_GROUPS).map(groups);
+        let drawn_groups = chosen.or_else(|| draws_group_1(&xml).then(|| BTreeSet::from([1, 2])));
+        Ok(Looks { patterns, drawn_groups })
+    }
+
+    pub fn is_drawn(&self, group: i32) -> bool {
+        match &self.drawn_groups {
+            Some(groups) => groups.contains(&group),
+            None => group <= LAST_DRAWN_GROUP,
+        }
+    }
+}
+
+/// Whether a file keeps to robosuite's and RoboCasa's convention: what has mass and collides is in group 0,
+/// what is seen in group 1.
+fn draws_group_1(xml: &roxmltree::Document) -> bool {
+    let weighs_by_0 = xml.descendants().any(|node| {
+        let range = node.attribute("inertiagrouprange").filter(|_| node.has_tag_name("compiler"));
+        range.is_some_and(|range| range.split_ascii_whitespace().eq(["0", "0"]))
+    });
+    let classes = Classes::of(xml);
+    let in_tree = |node: &Node| node.ancestors().any(|one| one.has_tag_name("worldbody"));
+    let mut geoms = xml.descendants().filter(|node| node.has_tag_name("geom")).filter(in_tree);
+    weighs_by_0
+        && geoms.any(|geom| {
+            let says = |attribute: &str, word: &str| classes.stated(&geom, attribute) == Some(word);
+            says("group", "1") && says("contype", "0") && says("conaffinity", "0")
+        })
+}
+
+fn patterns(source: &MjcfText, text: &Node) -> Result<BTreeMap<String, SurfacePattern>, SimError> {
+    let words: Vec<&str> = text.attribute("data").unwrap_or_default().split_ascii_whitespace().collect();
+    let mut found = BTreeMap::new();
+    for pair in words.chunks(2) {
+        let pattern = match pair {
+            [_, "wood"] => SurfacePattern::Wood,
+            [_, "fabric"] => SurfacePattern::Fabric,
+            [_, "print"] => SurfacePattern::Print,
+            _ => {
+                let what =
+                    format!("`{}`; use a material and its pattern: wood, fabric or print", pair.join(" "));
+                return Err(source.refuse(text, what));
+            }
+        };
+        found.insert(pair[0].to_string(), pattern);
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mjcf::{Document, Geom};
+
+    fn geoms(inside: &str) -> Result<Vec<Geom>, SimError> {
+        let document = Document::parse("room.xml", &format!("<mujoco>{inside}</mujoco>"))?;
+        Ok(document.trees()?.remove(0).links.remove(0).geoms)
+    }
+
+    #[test]
+    fn a_material_has_a_pattern_where_the_file_says_so_and_not_by_its_name() {
+        let asset = r#"<asset><material name="oak"/><material name="print_tex"/></asset>"#;
+        let shapes =
+            r#"<worldbody><geom size="1" material="oak"/><geom size="1" material="print_tex"/></worldbody>"#;
+        let found = |custom: &str| {
+            let geoms = geoms(&format!("{custom}{asset}{shapes}"))?;
+            Ok::<_, SimError>(geoms.iter().map(|geom| geom.pattern).collect::<Vec<_>>())
+        };
+        assert_eq!(found("").expect("a room"), [None, None]);
+        let text = |data: &str| format!(r#"<custom><text name="material_patterns" data="{data}"/></custom>"#);
+        assert_eq!(found(&text("oak wood")).expect("a room"), [Some(SurfacePattern::Wood), None]);
+        let error = found(&text("oak wood print_tex")).expect_err("half a pair").to_string();
+        assert!(error.contains("`print_tex`; use a material and its pattern"), "{error}");
+    }
+
+    #[test]
+    fn what_is_see_through_or_in_a_hidden_group_is_not_drawn() {
+        let drawn =
+            |inside: &str| geoms(inside).expect("a room").iter().map(|geom| geom.drawn).collect::<Vec<_>>();
+        let alphas = r#"<worldbody><geom size="1" rgba="1 0 0 0"/><geom size="1" rgba="1 0 0 0.5"/>
+            <geom size="1" rgba="1 0 0 0.6"/><geom size="1" group="3"/></worldbody>"#;
+        assert_eq!(drawn(alphas), [false, false, true, false]);
+        let groups = r#"<worldbody><geom size="1"/><geom size="1" group="1" contype="0" conaffinity="0"/>
+            <geom size="1" group="3"/></worldbody>"#;
+        assert_eq!(drawn(groups), [true, true, false]);
+        let robosuite = format!(r#"<compiler inertiagrouprange="0 0"/>{groups}"#);
+        assert_eq!(drawn(&robosuite), [false, true, false]);
+        let chosen = format!(r#"<custom><numeric name="drawn_groups" data="0 3"/></custom>{groups}"#);
+        assert_eq!(drawn(&chosen), [true, false, true]);
+    }
+}

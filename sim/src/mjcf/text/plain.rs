@@ -1,0 +1,159 @@
+//! Classes as MuJoCo has them, where `mjcf-rs` has them otherwise: attributes that an element takes from its
+//! classes in part are written on the element.
+
+use std::ops::Range;
+
+use roxmltree::{Document, Node};
+
+use super::stated::Classes;
+
+/// Elements of which MuJoCo's classes have one set of defaults.
+const ACTUATORS: [&str; 6] = ["general", "motor", "position", "velocity", "intvelocity", "damper"];
+/// What these have in common.
+const SHARED: [&str; 5] = ["ctrlrange", "forcerange", "ctrllimited", "forcelimited", "gear"];
+/// Ways to say a rotation; an element has one at most.
+const ROTATIONS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
+/// Attributes of which an element may state only the first numbers.
+const LISTS: [&str; 2] = ["size", "friction"];
+
+/// A part of a text, and what takes its place.
+type Edit = (Range<usize>, String);
+
+/// Returns the text of a file in which no element mixes what it states with what its classes state.
+pub(in crate::mjcf) fn plain(text: &str, xml: &Document) -> String {
+    let mut edits: Vec<Edit> = Vec::new();
+    let classes = Classes::of(xml);
+    for node in xml.descendants().filter(Node::is_element) {
+        let within = |name: &str| node.ancestors().any(|one| one.has_tag_name(name));
+        match node.tag_name().name() {
+            "geom" | "site" if within("worldbody") => {
+                let levels = levels(&node, &classes);
+                add_pose(&levels, &mut edits);
+                LISTS.iter().for_each(|list| add_list(&levels, list, &mut edits));
+            }
+            "motor" | "position" if within("actuator") => add_shared(&node, &classes, &mut edits),
+            _ => {}
+        }
+    }
+    edits.sort_by_key(|(range, _)| range.start);
+    let (mut plain, mut from) = (String::with_capacity(text.len()), 0);
+    for (range, instead) in edits {
+        plain.push_str(&text[from..range.start]);
+        plain.push_str(&instead);
+        from = range.end;
+    }
+    plain + &text[from..]
+}
+
+/// The elements that state something for this one: itself, then those of its classes, the nearest first.
+fn levels<'a, 'i: 'a>(node: &Node<'a, 'i>, classes: &Classes<'a, 'i>) -> Vec<Node<'a, 'i>> {
+    let of_class = |class: Node<'a, 'i>| {
+        let name = node.tag_name();
+        class.children().filter(move |child| child.tag_name() == name).collect::<Vec<_>>()
+    };
+    std::iter::once(*node).chain(classes.of_element(node).into_iter().flat_map(of_class)).collect()
+}
+
+/// Position and rotation of an element come from wherever they are stated next.
+fn add_pose(levels: &[Node], edits: &mut Vec<Edit>) {
+    let next = |names: &[&'static str]| {
+        levels.iter().enumerate().find_map(|(level, one)| {
+            let name = names.iter().find(|name| one.has_attribute(**name))?;
+            Some((level, *name, one.attribute(*name)?))
+        })
+    };
+    let (Some(position), Some(rotation)) = (next(&["pos"]), next(&ROTATIONS)) else { return };
+    if position.0 == rotation.0 {
+        return;
+    }
+    for (level, name, value) in [position, rotation] {
+        if level > 0 {
+            edits.push(inserted(&levels[0], name, value));
+        }
+    }
+}
+
+/// Numbers that an element does not state are those of its classes.
+fn add_list(levels: &[Node], name: &str, edits: &mut Vec<Edit>) {
+    let stated: Vec<Vec<&str>> = levels
+        .iter()
+        .filter_map(|one| Some(one.attribute(name)?.split_ascii_whitespace().collect()))
+        .collect();
+    let Some(nearest) = stated.first() else { return };
+    let longest = stated.iter().map(Vec::len).max().unwrap_or(0);
+    if nearest.len() == longest {
+        return;
+    }
+    let number = |at: usize| stated.iter().find_map(|numbers| numbers.get(at)).copied().unwrap_or("0");
+    let all: Vec<&str> = (0..longest).map(number).collect();
+    match levels[0].attribute_node(name) {
+        Some(own) => edits.push((own.range_value(), all.join(" "))),
+        None => edits.push(inserted(&levels[0], name, &all.join(" "))),
+    }
+}
+
+/// What the nearest class says of any kind of actuator counts for all.
+fn add_shared<'a, 'i: 'a>(node: &Node<'a, 'i>, classes: &Classes<'a, 'i>, edits: &mut Vec<Edit>) {
+    for name in SHARED.iter().filter(|name| !node.has_attribute(**name)) {
+        let of_class = |class: Node| {
+            let mut elements = class.children().filter(|child| ACTUATORS.contains(&child.tag_name().name()));
+            elements.find_map(|child| child.attribute(*name).map(String::from))
+        };
+        if let Some(value) = classes.of_element(node).into_iter().find_map(of_class) {
+            edits.push(inserted(node, name, &value));
+        }
+    }
+}
+
+/// An attribute more, behind the name of an element.
+fn inserted(node: &Node, name: &str, value: &str) -> Edit {
+    let at = node.range().start + 1 + node.tag_name().name().len();
+    (at..at, format!(" {name}=\"{value}\""))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::mjcf::{ActuatorKind, Document};
+
+    #[test]
+    fn an_element_has_of_its_classes_what_it_does_not_state() {
+        let document = Document::parse(
+            "room.xml",
+            r#"<mujoco><default><geom type="box" size="1 2 3" friction="0.5 0.1 0.2"/>
+                 <default class="turned"><geom quat="0 0 0 1" pos="5 0 0"/></default></default>
+               <worldbody><geom class="turned" pos="0 1 0" size="4" friction="0.7"/>
+                 <geom class="turned" quat="1 0 0 0"/></worldbody></mujoco>"#,
+        )
+        .expect("a room");
+        let geoms = &document.trees().expect("trees")[0].links[0].geoms;
+        let first = &geoms[0];
+        assert_eq!(first.body_from_geom.translation.to_array(), [0.0, 1.0, 0.0]);
+        assert!(
+            (first.body_from_geom.rotation.z.abs() - 1.0).abs() < 1e-6,
+            "{}",
+            first.body_from_geom.rotation
+        );
+        assert_eq!((first.friction.slide, first.friction.roll_m), (0.7, 0.2));
+        let crate::mjcf::Primitive::Box { half_extents_m } = first.primitive else { panic!("a box") };
+        assert_eq!(half_extents_m.to_array(), [4.0, 2.0, 3.0]);
+        assert_eq!(geoms[1].body_from_geom.translation.to_array(), [5.0, 0.0, 0.0]);
+        assert_eq!(geoms[1].body_from_geom.rotation.z, 0.0);
+    }
+
+    #[test]
+    fn actuators_of_all_kinds_have_one_set_of_defaults() {
+        let actuators = Document::parse(
+            "room.xml",
+            r#"<mujoco><default><motor ctrlrange="-1 1" ctrllimited="true"/>
+                 <default class="strong"><general forcerange="-9 9" forcelimited="true"/></default></default>
+               <worldbody><body><joint name="h"/><geom size="1"/></body></worldbody>
+               <actuator><position class="strong" joint="h" kp="3" gear="2"/></actuator></mujoco>"#,
+        )
+        .expect("a room")
+        .actuators()
+        .expect("actuators");
+        assert_eq!(actuators[0].control_range, Some([-1.0, 1.0]));
+        assert_eq!(actuators[0].effort_range, Some([-18.0, 18.0]), "at the joint, behind the gear");
+        assert_eq!(actuators[0].kind, ActuatorKind::Position { kp: 12.0, kd: 0.0 });
+    }
+}

