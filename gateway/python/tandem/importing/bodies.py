@@ -96,10 +96,10 @@ def write_joint(model: Any, names: Names, report: Report, joint: int) -> str:
     if stiffness:
         row += f' springref="{float(model.qpos_spring[at]) - zero:.9g}"'
     low, high = (float(end) - zero for end in model.jnt_range[joint])
-    if model.jnt_limited[joint] and low < high:
+    if model.jnt_limited[joint] and np.isfinite([low, high]).all() and low < high:
         row += f' limited="true" range="{low:.9g} {high:.9g}"'
     elif model.jnt_limited[joint]:
-        report.drop("range of a joint that has one number twice")
+        report.drop("range of a joint that has no end, or one number twice")
     return row + "/>"
 
 
