@@ -1,5 +1,5 @@
-//! Plays a scene for a second in which nobody acts, and prints as JSON what came of it: `settle FILE`. Its
-//! comparison with MuJoCo is `tests/peers/worlds/worlds.py`.
+//! Simulates one second of a scene without robots and prints the result as JSON: `settle FILE`.
+//! `tests/peers/worlds/worlds.py` compares it with MuJoCo.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -56,7 +56,7 @@ fn settle(path: &Path) -> Result<Value, SimError> {
     }))
 }
 
-/// Position (m) and quaternion, w first.
+/// Returns position (m) and quaternion, w first.
 fn row(pose: &Pose) -> [f32; 7] {
     let ([x, y, z], [i, j, k, w]) = (pose.translation.to_array(), pose.rotation.to_array());
     [x, y, z, w, i, j, k]

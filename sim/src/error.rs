@@ -57,11 +57,11 @@ pub enum SimError {
     Snapshot(#[from] postcard::Error),
 }
 
-/// Of so many things the texts are told.
+/// Maximum number of errors that [`SimError::Several`] prints.
 const MAX_TOLD: usize = 40;
 
 impl SimError {
-    /// Makes one error of all that is wrong with a file; `None` if nothing is.
+    /// Combines all errors of a file into one; `None` if there are none.
     pub(crate) fn of_all(mut errors: Vec<SimError>) -> Option<SimError> {
         match errors.len() {
             0 | 1 => errors.pop(),

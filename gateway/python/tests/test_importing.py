@@ -1,4 +1,4 @@
-"""Files of others, written as MJCF that Tandem reads; left out where MuJoCo is not installed."""
+"""Tests of `tandem.importing`; skipped where MuJoCo is not installed."""
 
 from __future__ import annotations
 

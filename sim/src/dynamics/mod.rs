@@ -93,7 +93,7 @@ impl Dynamics {
         self.collision.keep_apart(a, b);
     }
 
-    /// Lets these colliders never touch from now on. It has to be called before the first step.
+    /// Excludes contacts between two colliders. It must be called before the first step.
     pub fn keep_colliders_apart(&mut self, a: ColliderId, b: ColliderId) {
         self.collision.keep_colliders_apart(a, b);
     }
@@ -124,13 +124,13 @@ impl Dynamics {
         self.collision.collider(id)
     }
 
-    /// All colliders that a link carries.
+    /// Returns all colliders of a link.
     pub fn colliders_on(&self, link: LinkId) -> Vec<ColliderId> {
         let numbered = self.collision.colliders().zip(0..);
         numbered.filter(|(collider, _)| collider.on == Some(link)).map(|(_, id)| ColliderId(id)).collect()
     }
 
-    /// Leaves colliders of this tag only a share of their friction; see [`Friction::left`].
+    /// Reduces the friction of all colliders with this tag to a share; see [`Friction::left`].
     pub fn leave_friction(&mut self, tag: u128, share: f64) {
         let of_tag = self.collision.colliders_mut().filter(|collider| collider.tag == tag);
         of_tag.for_each(|collider| collider.friction.left = share);

@@ -8,7 +8,7 @@ use crate::mjcf::{BodyTree, Document, EqualityKind};
 pub(crate) struct PlacedTree<'a> {
     pub tree: &'a BodyTree,
     pub id: Option<TreeId>,
-    /// Colliders of the geoms of a tree that is a part of the world, in their order.
+    /// Colliders of the geoms, in their order; filled only for a tree that is part of the world.
     pub colliders: Vec<Option<ColliderId>>,
 }
 
@@ -89,7 +89,8 @@ fn end(dynamics: &Dynamics, placed: &[PlacedTree], world_from_file: &DPose3, bod
     world
 }
 
-/// Lets bodies that the file's `<exclude>` names never touch. Two parts of the room do not anyway.
+/// Excludes contacts between the bodies that the file's `<exclude>` names. Two parts of the room never touch
+/// anyway.
 pub(crate) fn keep_apart(
     dynamics: &mut Dynamics,
     document: &Document,
@@ -110,7 +111,7 @@ pub(crate) fn keep_apart(
     Ok(())
 }
 
-/// A body that an `<exclude>` names.
+/// Body that an `<exclude>` names.
 enum Excluded {
     Link(LinkId),
     /// Colliders of a part of the world.
@@ -130,7 +131,7 @@ fn excluded(placed: &[PlacedTree], name: &str) -> Option<Excluded> {
     })
 }
 
-/// The link that a joint of a file moves, unless that is a part of the world.
+/// Returns the link that a joint of a file moves, unless it is part of the world.
 pub(super) fn joint_link(placed: &[PlacedTree], joint: &str) -> Option<LinkId> {
     placed.iter().find_map(|PlacedTree { tree, id, .. }| {
         let index = tree.links.iter().position(|link| link.joint.name() == Some(joint))?;

@@ -29,7 +29,8 @@ pub struct BodyLink {
     /// Pose with the joint at 0.
     pub parent_from_link: DPose3,
     pub joint: LinkJoint,
-    /// Whether it is there for one of several joints of the body on it, and is no body of the file by itself.
+    /// True for a link that only carries one of several joints of the body on it, and is no body of the
+    /// file.
     pub is_part: bool,
     /// Mass and inertia in the link's frame.
     pub mass: MassProperties,
@@ -43,7 +44,7 @@ pub struct BodyLink {
 pub struct PlacedBody {
     pub name: String,
     pub link_from_body: DPose3,
-    /// Its geoms among those of the link.
+    /// Indices of its geoms among the link's.
     pub geoms: Range<usize>,
 }
 
@@ -107,7 +108,7 @@ impl Document {
         Ok(trees)
     }
 
-    /// Scales all masses if the file says what they add up to; the world has none.
+    /// Scales all masses to the total mass that the file states, if any. The world has no mass.
     fn set_total_mass(&self, trees: &mut [BodyTree]) {
         let stated_kg = self.model.compiler.set_total_mass as f32;
         let mut links: Vec<_> = trees.iter_mut().skip(1).flat_map(|tree| &mut tree.links).collect();
@@ -120,7 +121,7 @@ impl Document {
         }
     }
 
-    /// As in MuJoCo, planes are on bodies that no joint moves.
+    /// Refuses planes on bodies that a joint moves, as MuJoCo does.
     fn refuse_planes_that_move(&self, id: usize, links: &[BodyLink], link: usize) -> Result<(), SimError> {
         let geoms = &self.model.bodies[id].body.geoms;
         let Some(plane) = geoms.iter().position(|geom| geom.type_ == GeomType::Plane) else { return Ok(()) };
@@ -152,7 +153,7 @@ impl Document {
         Ok(())
     }
 
-    /// Whether the mass of a body is that of its geoms.
+    /// Returns true if the mass of a body comes from its geoms.
     pub(super) fn takes_mass_of_geoms(&self, body: usize) -> bool {
         match self.model.compiler.inertia_from_geom {
             InertiaFromGeom::True => true,

@@ -83,10 +83,10 @@ pub(super) fn cameras(source: &MjcfText) -> Result<Vec<MjcfCamera>, SimError> {
     Ok(found)
 }
 
-/// Cameras that somebody looks through.
+/// Names of the cameras that the program uses.
 const USED: [&str; 2] = ["third_person", "egocentric"];
 
-/// Says what would have to be otherwise for a camera to be read.
+/// Returns the advice for a camera that cannot be read; `None` for one that can.
 fn unreadable(node: &roxmltree::Node) -> Option<&'static str> {
     let has = |names: &[&str]| names.iter().any(|name| node.has_attribute(*name));
     let parent = node.parent()?;
@@ -103,7 +103,7 @@ fn unreadable(node: &roxmltree::Node) -> Option<&'static str> {
 }
 
 fn camera(node: &roxmltree::Node) -> MjcfCamera {
-    // Whether they are right in number and finite has been checked.
+    // Their number and finiteness have been checked.
     let numbers = |attribute: &str| -> Option<Vec<f32>> {
         let words = node.attribute(attribute)?.split_whitespace();
         Some(words.filter_map(|word| word.parse().ok()).collect())

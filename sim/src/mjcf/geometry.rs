@@ -53,14 +53,14 @@ pub struct Geom {
     pub friction: Friction,
     pub density_kg_m3: f32,
     pub mass_kg: Option<f32>,
-    /// Whether there is anything that it touches.
+    /// True if its mask lets it touch anything.
     pub collides: bool,
     pub touches: Mask,
     pub drawn: bool,
     pub pattern: Option<SurfacePattern>,
 }
 
-/// What is more transparent than this is not drawn, for nothing is drawn half.
+/// Maximum alpha of geoms that are not drawn. All others are drawn solid, since there is no transparency.
 const MAX_CLEAR_ALPHA: f32 = 0.5;
 const DEFAULT_DENSITY_KG_M3: f64 = 1000.0;
 const DEFAULT_RGBA: [f64; 4] = [0.5, 0.5, 0.5, 1.0];

@@ -29,9 +29,10 @@ pub enum LinkJoint {
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisJoint {
     pub name: String,
-    /// The effort has no limit here: the actuator has one. Its positions are 0 where the file places the bodies.
+    /// The effort has no limit here: the actuator has one. The joint position is 0 where the file places the
+    /// bodies.
     pub axis: Axis,
-    /// What the file calls that position.
+    /// Joint position in the file where the file places the bodies: its `ref`.
     pub placed_at: f64,
 }
 
@@ -45,11 +46,11 @@ pub struct Actuator {
     pub effort_range: Option<[f64; 2]>,
     /// Speed (rad/s or m/s) at which the actuator can push no further.
     pub speed_limit: Option<f64>,
-    /// By how much a motor's command is multiplied, and a position's divided.
+    /// Factor on the commands of a motor, and divisor of position commands.
     pub gear: f64,
-    /// What commands of positions call the position in which the joint is placed.
+    /// Joint position in the file where the file places the bodies: the `ref` of the joint.
     pub placed_at: f64,
-    /// Its number among all actuators of the file, of which some do nothing.
+    /// Index among all actuators of the file, some of which have no effect.
     pub index: usize,
 }
 
@@ -77,7 +78,7 @@ pub(super) fn speed_limits(source: &MjcfText) -> Result<Option<Vec<f64>>, SimErr
     Ok(limits.map(words))
 }
 
-/// Ranges by the names of joints that `mjcf-rs` reads past.
+/// Ranges by the names of joints, which `mjcf-rs` does not read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct UnreadRanges {
     /// `actuatorfrcrange` of a joint: the limits of the total effort of all its actuators.
@@ -176,8 +177,8 @@ impl Document {
         acting.map(|(index, element)| self.actuator(index, element, limit(index))).collect()
     }
 
-    /// Reads what drives a joint, with gains and efforts of the joint: a gear g makes g times the force of g
-    /// times the position.
+    /// Reads an actuator. Gains and efforts are those of the joint: a gear g multiplies efforts by g and
+    /// gains of positions by g^2.
     fn actuator(
         &self,
         index: usize,
@@ -274,7 +275,7 @@ impl Document {
             }
             JointType::Free => Ok(LinkJoint::Free { name }),
             JointType::Slide => Ok(LinkJoint::Slide(self.axis(name, joint).map_err(|what| refuse(&what))?)),
-            // Balls have become hinges.
+            // Balls have been split into hinges.
             JointType::Hinge | JointType::Ball => {
                 Ok(LinkJoint::Hinge(self.axis(name, joint).map_err(|what| refuse(&what))?))
             }

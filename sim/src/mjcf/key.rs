@@ -31,8 +31,8 @@ impl Document {
                 have => Err(self
                     .unsupported(format!("key `{name}` has {have} numbers in {what}; it takes {expected}"))),
             };
-            // Of a ball MuJoCo has a quaternion, here there are three angles; where somebody begins is then
-            // where it is placed.
+            // MuJoCo has a quaternion for a ball joint; here it has three angles. A file with balls
+            // therefore starts where its bodies are placed.
             let has_ball = self.split.ball.is_some();
             let positions = if has_ball { Vec::new() } else { numbers("qpos", &key.qpos, coordinates)? };
             let mut rest = positions.as_slice();

@@ -1,7 +1,8 @@
-//! The one reader of MJCF, for robots, scenes and objects: the text with all that it includes (`text`), every
-//! element and attribute accepted or refused by one table (`support`), parsed by `mjcf-rs`, and then as we
-//! use it: bodies in trees, shapes, joints with their actuators, equalities, keys, what that parser leaves
-//! out, and the files that it names (`assets`).
+//! The only reader of MJCF, for robots, scenes and objects. It assembles the text with all includes
+//! (`text`), and accepts or refuses every element and attribute by one table (`support`). It parses the text
+//! with `mjcf-rs`, and converts it to its own types: bodies in trees, shapes, joints with their actuators,
+//! equalities, keys, and the parts that `mjcf-rs` leaves out. Finally, it reads the files that the text
+//! names (`assets`).
 
 mod assets;
 mod bodies;
@@ -42,7 +43,7 @@ use text::settings::FileSettings;
 use text::source::{self, MjcfText};
 use text::split::{Split, split};
 
-/// A parsed file. What it says is all in effect, or it would not have been read.
+/// A parsed file. All its content is in effect; otherwise it would have been refused.
 #[derive(Clone, Debug)]
 pub struct Document {
     pub file: String,
@@ -54,16 +55,16 @@ pub struct Document {
     source: MjcfText,
     checked: Checked,
     split: Split,
-    /// The folder in which files lie that it names.
+    /// Folder that the file's references are relative to.
     folder: PathBuf,
     /// Content of the files that assets name, by asset.
     meshes: BTreeMap<String, Arc<Mesh>>,
     texture_rgb: BTreeMap<String, [f32; 3]>,
     looks: Looks,
     settings: FileSettings,
-    /// All files that were read, and a hash of the bytes of each.
+    /// All files that were read, each with a hash of its bytes.
     files: Vec<(PathBuf, u64)>,
-    /// See [`Document::fingerprint`].
+    /// Fingerprint of a document that was read from a file; see [`Document::fingerprint`].
     known_fingerprint: Option<u64>,
 }
 
@@ -140,7 +141,7 @@ impl Document {
         Ok(document)
     }
 
-    /// Refuses all joints and geoms that cannot be had.
+    /// Refuses all joints and geoms that are not supported.
     fn check_bodies(&self) -> Result<(), SimError> {
         let mut refused = Vec::new();
         for (body, entry) in self.model.bodies.iter().enumerate() {
@@ -151,7 +152,8 @@ impl Document {
         SimError::of_all(refused).map_or(Ok(()), Err)
     }
 
-    /// Notes balls, and free joints that a class or they themselves give springs or damping.
+    /// Notes ball joints, and free joints with springs, damping, friction or armature of their own or of a
+    /// class.
     fn note_joints(&mut self) {
         let bodies = self.model.bodies.iter().zip(&self.checked.bodies);
         let mut joints = bodies.flat_map(|(entry, bytes)| entry.body.joints.iter().zip(&bytes.joints));
@@ -169,12 +171,12 @@ impl Document {
         self.checked.approximated.extend(told);
     }
 
-    /// What the file says that does not happen quite as in MuJoCo, a line each with the first place that says it.
+    /// Returns the elements of the file that only approximate MuJoCo, one per line with their first place.
     pub fn approximations(&self) -> &[String] {
         &self.checked.approximated
     }
 
-    /// Notes the first geom that is neither clear nor solid: nothing is drawn half.
+    /// Notes the first geom that is partly transparent: it is drawn solid or not at all.
     fn note_transparency(&mut self) {
         let bodies = self.model.bodies.iter().zip(&self.checked.bodies);
         let mut geoms = bodies.flat_map(|(entry, bytes)| entry.body.geoms.iter().zip(&bytes.geoms));
@@ -190,20 +192,21 @@ impl Document {
         }
     }
 
-    /// How things fall where the file is a scene, m/s^2, in the frame of the file.
+    /// Returns the gravity of a scene in m/s^2, in the frame of the file.
     pub(crate) fn gravity_m_s2(&self) -> [f64; 3] {
         if self.settings.falls { self.model.option.gravity } else { [0.0; 3] }
     }
 
-    /// Tells files of different content apart, with all that they include and name; comments do not count. Of
-    /// a file that was read it is that of the file, whatever has been changed of the document.
+    /// Returns a hash of the content, including all files that it includes and names; comments do not count.
+    /// For a document that was read from a file, it is the hash of the file, even if the document has been
+    /// changed since.
     pub fn fingerprint(&self) -> u64 {
         if let Some(known) = self.known_fingerprint {
             return known;
         }
         let read = (&self.model, &self.cameras, &self.meshes, &self.texture_rgb, &self.speed_limit_values);
         let mut content = format!("{read:?}");
-        // What older versions did not read changes nothing where a file does not have it.
+        // Fields that older versions did not read keep the hash unchanged where a file does not use them.
         if self.unread != UnreadRanges::default() {
             content += &format!("{:?}", self.unread);
         }

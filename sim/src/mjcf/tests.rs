@@ -284,7 +284,7 @@ fn masks_say_what_touches_what() {
     assert!(!geoms[1].touches.meets(geoms[1].touches), "it touches nothing of its own kind");
 }
 
-/// Positions are counted from where the file places the bodies, whatever it calls that.
+/// Joint positions are 0 where the file places the bodies, whatever its `ref` is.
 #[test]
 fn a_joint_may_be_placed_elsewhere_than_at_0() {
     let body = r#"<worldbody><body><joint name="h" ref="0.5" range="0 2" springref="0.7"/>

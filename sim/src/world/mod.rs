@@ -60,7 +60,7 @@ impl From<&str> for SceneSource {
     }
 }
 
-/// Returns how things fall in a scene, world frame.
+/// Returns the gravity of a scene in the world frame.
 fn gravity_m_s2(scene: &Document, world_from_scene: &Pose) -> DVec3 {
     let stated = scene.gravity_m_s2();
     if stated == USUAL_GRAVITY_M_S2 {
@@ -69,7 +69,7 @@ fn gravity_m_s2(scene: &Document, world_from_scene: &Pose) -> DVec3 {
     precise(world_from_scene).rotation * DVec3::from_array(stated)
 }
 
-/// MJCF's default.
+/// Default gravity of MJCF.
 const USUAL_GRAVITY_M_S2: [f64; 3] = [0.0, 0.0, -9.81];
 
 /// A simulated room. One thread owns it.

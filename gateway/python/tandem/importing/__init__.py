@@ -1,10 +1,10 @@
-"""Scenes, objects and robots of other programs as MJCF that Tandem reads.
+"""Import of scenes, objects and robots from other programs as MJCF that Tandem reads.
 
     pip install "tandem-sim[import]"
     python -m tandem.importing scene.xml imported
 
-MuJoCo's own compiler reads what it can, MJCF and URDF; what comes of it is written plainly: bodies, joints, shapes, meshes and
-pictures, with a report of what was left out. Of OBJ, STL, PLY, GLB and glTF files, read by trimesh, an object is made.
+MuJoCo's own compiler reads MJCF and URDF. The result is written as plain MJCF: bodies, joints, shapes, meshes and images, with
+a report of the parts that were left out. OBJ, STL, PLY, GLB and glTF files, read by trimesh, become one object each.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from .names import Names
 from .report import Report
 
 MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
-#: Roles of textures by which a material has a colour.
+#: Texture roles that give a material its colour.
 COLOURS = (mujoco.mjtTextureRole.mjTEXROLE_RGB, mujoco.mjtTextureRole.mjTEXROLE_RGBA)
 
 
@@ -28,7 +28,7 @@ def mesh_name(mesh: int) -> str:
 
 
 def meshes(model: Any, used: list[int], out: Path, report: Report) -> list[str]:
-    """Writes the meshes that geoms show, in the frames into which MuJoCo has put them."""
+    """Writes the meshes of geoms, in the frames that MuJoCo gives them."""
     rows: list[str] = []
     if used:
         (out / "meshes").mkdir(exist_ok=True)
@@ -56,7 +56,7 @@ def meshes(model: Any, used: list[int], out: Path, report: Report) -> list[str]:
 
 
 def materials(model: Any, names: Names, out: Path, report: Report) -> list[str]:
-    """Writes the materials, and the pictures that give them their colours."""
+    """Writes the materials and the images that give them their colours."""
     rows: list[str] = []
     written: set[int] = set()
     for material in range(model.nmat):
@@ -84,6 +84,6 @@ def write_texture(model: Any, texture: int, out: Path) -> str:
     height, width, channels = (int(a[texture]) for a in (model.tex_height, model.tex_width, model.tex_nchannel))
     first = int(model.tex_adr[texture])
     pixels: Any = model.tex_data[first : first + height * width * channels].reshape(height, width, channels)
-    # MuJoCo's first row is the lowest.
+    # The first row of MuJoCo is the lowest.
     write_png(out / "textures" / f"texture_{texture}.png", pixels[::-1])
     return f'<texture name="texture_{texture}" type="2d" file="texture_{texture}.png"/>'

@@ -1,4 +1,4 @@
-"""Bodies with what is on them."""
+"""Bodies with their joints, geoms and sites."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .files import escaped, numbers
 from .names import Names
 from .report import Report
 
-#: Kinds of geoms, and how many numbers of a size each has.
+#: Types of geoms, each with the number of values in its size.
 SHAPES = {
     int(mujoco.mjtGeom.mjGEOM_PLANE): ("plane", 3),
     int(mujoco.mjtGeom.mjGEOM_SPHERE): ("sphere", 1),
@@ -28,7 +28,7 @@ JOINTS = {
     int(mujoco.mjtJoint.mjJNT_SLIDE): "slide",
     int(mujoco.mjtJoint.mjJNT_HINGE): "hinge",
 }
-#: What MuJoCo gives a geom that states no colour, so that its material's counts.
+#: MuJoCo's colour of a geom that states none; the colour of its material applies.
 NO_COLOUR = np.array([0.5, 0.5, 0.5, 1.0])
 
 
@@ -104,7 +104,7 @@ def write_joint(model: Any, names: Names, report: Report, joint: int) -> str:
 
 
 def first(value: Any) -> float:
-    """The number itself, or of a polynomial its linear term."""
+    """Returns the number itself, or the linear term of a polynomial."""
     return float(np.ravel(value)[0])
 
 
@@ -135,7 +135,7 @@ def write_geom(model: Any, names: Names, report: Report, geom: int) -> str:
         row += f' size="{numbers(size)}"'
     if model.geom_margin[geom] or model.geom_gap[geom]:
         report.drop("margin or gap of a geom")
-    # What it weighs is in the body's inertial.
+    # The body's inertial includes its mass.
     weighs = ' mass="0"' if model.geom_bodyid[geom] and kind != "plane" else ""
     return row + weighs + "/>"
 

@@ -1,4 +1,4 @@
-"""What `python -m tandem.importing` does with each file."""
+"""The command line of `python -m tandem.importing`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MODELS = (".xml", ".mjcf", ".urdf")
 
 
 def import_file(source: str | Path, out: str | Path) -> Report:
-    """Writes `scene.xml` (of a mesh `object.xml`), its files and `report.json` into the folder `out`."""
+    """Writes `scene.xml` (`object.xml` for a mesh), its files and `report.json` into the folder `out`."""
     source, out = Path(source), Path(out)
     kind = source.suffix.lower()
     if kind in MODELS:
@@ -48,7 +48,7 @@ def main(arguments: list[str] | None = None) -> int:
         except ImportError as error:
             print(f'{error}; pip install "tandem-sim[import]"', file=sys.stderr)
             return 1
-        except Exception as error:  # What a compiler of somebody else's raises has no one type.
+        except Exception as error:  # Errors of foreign compilers have no common type.
             print(f"{file}: {error}", file=sys.stderr)
             failed += 1
     return 1 if failed else 0

@@ -1,4 +1,4 @@
-"""What holds, parts and drives bodies."""
+"""Equalities, excluded contacts and actuators."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def write_actuators(model: Any, names: Names, report: Report) -> list[str]:
 
 
 def write_actuator(model: Any, names: Names, number: int) -> str | None:
-    """A motor or a position actuator of a hinge or a slide; `None` for all others."""
+    """Returns a motor or a position actuator of a hinge or a slide; `None` for all others."""
     gain, bias = model.actuator_gainprm[number], model.actuator_biasprm[number]
     plain = (
         int(model.actuator_trntype[number]) == int(mujoco.mjtTrn.mjTRN_JOINT)

@@ -1,4 +1,4 @@
-"""Libraries of the extra `import`, which the wheel can be used without."""
+"""Libraries of the optional extra `import`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files beside the written MJCF: meshes as OBJ, pictures as PNG."""
+"""Files next to the written MJCF: meshes as OBJ, images as PNG."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Array = Any
 
 
 def numbers(values: Any) -> str:
-    """Numbers as an attribute has them."""
+    """Returns numbers in the format of an attribute."""
     return " ".join(f"{value:.9g}" for value in np.ravel(values))
 
 
@@ -22,7 +22,7 @@ def escaped(text: str) -> str:
 
 
 def write_obj(path: Path, vertices: Array, faces: Array, uv: Array | None = None, uv_faces: Array | None = None) -> None:
-    """Writes triangles, whose corners may have texture coordinates."""
+    """Writes triangles, optionally with texture coordinates."""
     lines = [f"v {x:.8g} {y:.8g} {z:.8g}" for x, y, z in vertices]
     if uv is not None and uv_faces is not None:
         lines += [f"vt {u:.6g} {v:.6g}" for u, v in uv]
@@ -34,7 +34,7 @@ def write_obj(path: Path, vertices: Array, faces: Array, uv: Array | None = None
 
 
 def write_png(path: Path, pixels: Array) -> None:
-    """Writes a picture of 1, 3 or 4 bytes a pixel: height, width, bytes."""
+    """Writes an image of shape (height, width, bytes), with 1 to 4 bytes per pixel."""
     height, width, channels = pixels.shape
     kinds = {1: 0, 2: 4, 3: 2, 4: 6}
     header = struct.pack(">IIBBBBB", width, height, 8, kinds[channels], 0, 0, 0)

@@ -1,4 +1,4 @@
-"""An object of a file with a mesh, read by trimesh."""
+"""Import of a mesh file as an object, read by trimesh."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .files import escaped, numbers, write_obj, write_png
 from .report import Report
 
 DENSITY_KG_M3 = 500.0
-#: A mesh that fills less of its hull is told.
+#: Share of its hull below which a mesh is reported.
 HOLLOW_SHARE = 0.6
 
 
 def import_mesh(source: Path, out: Path) -> Report:
-    """Writes `object.xml`: one free body, y of the file up if it is glTF, with its lowest point at z = 0."""
+    """Writes `object.xml`: one free body with its lowest point at z = 0. In a glTF file, y is up."""
     trimesh: Any = import_module("trimesh")
 
     scene: Any = trimesh.load(str(source), force="scene")

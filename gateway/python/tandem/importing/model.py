@@ -1,4 +1,4 @@
-"""A model that MuJoCo has compiled, written as plain MJCF."""
+"""Export of a model that MuJoCo has compiled, as plain MJCF."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from .files import numbers
 from .names import Names
 from .report import Report
 
-#: How long the source and what was written are compared.
+#: Duration of the comparison between the source and the written file.
 SECONDS = 1.0
 FLAGS = {"contact": mujoco.mjtDisableBit.mjDSBL_CONTACT, "gravity": mujoco.mjtDisableBit.mjDSBL_GRAVITY}
 
 
 def import_model(source: Path, out: Path) -> Report:
-    """Writes `scene.xml` of an MJCF or URDF file."""
+    """Writes `scene.xml` for an MJCF or URDF file."""
     model = mujoco.MjModel.from_xml_path(str(source))
     written = out / "scene.xml"
     report = Report(str(source), str(written))
@@ -59,13 +59,13 @@ def options(model: Any, report: Report) -> str:
 
 
 def custom(text: str) -> str:
-    """What is drawn by robosuite's convention, which compiling loses: groups 1 and 2."""
+    """Returns the drawn groups (1 and 2) for a file with robosuite's convention, which the compiler drops."""
     by_group = re.search(r'inertiagrouprange\s*=\s*"\s*0\s+0\s*"', text) and re.search(r'group\s*=\s*"1"', text)
     return '<custom><numeric name="drawn_groups" data="1 2"/></custom>' if by_group else ""
 
 
 def rest(model: Any, report: Report) -> None:
-    """What of a model has no place in what is written."""
+    """Reports the parts of a model that are not written."""
     for what, times in [
         ("<tendon>", model.ntendon),
         ("<flex>", model.nflex),
@@ -80,7 +80,7 @@ def rest(model: Any, report: Report) -> None:
 
 
 def played(model: Any) -> tuple[Any, Any]:
-    """Where bodies are at the beginning and after a second in which nobody acts."""
+    """Returns the positions of bodies at the beginning and after one second without commands."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     begin = data.xpos.copy()
@@ -90,7 +90,7 @@ def played(model: Any) -> tuple[Any, Any]:
 
 
 def compared(source: Any, written: Any, names: Names) -> dict[str, Any]:
-    """How far (m) bodies have come in a second, and how far they then are from the source's."""
+    """Returns how far (m) bodies move in one second, and how far they then are from those of the source."""
     written.opt.timestep = source.opt.timestep
     _, expected = played(source)
     begin, found = played(written)

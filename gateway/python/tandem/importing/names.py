@@ -1,4 +1,4 @@
-"""Names of what a compiled model has; MuJoCo knows things by number, files by name."""
+"""Names of the elements of a compiled model. MuJoCo refers to elements by number, files by name."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ OBJECTS = {
 
 
 class Names:
-    """The name of each thing by its kind and number: the file's own, or one made of both."""
+    """Name of each element by its kind and number: the file's own, or one made of both."""
 
     def __init__(self, model: Any) -> None:
         self._model = model
@@ -29,5 +29,5 @@ class Names:
         return own or f"{kind}_{number}"
 
     def stated(self, kind: str, number: int) -> str | None:
-        """The name that the file gives, if it gives one."""
+        """Returns the name in the file; `None` without one."""
         return mujoco.mj_id2name(self._model, OBJECTS[kind], int(number)) or None

@@ -1,4 +1,4 @@
-"""What became of an imported file."""
+"""The report on an imported file."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from typing import Any
 
 @dataclass
 class Report:
-    """What was read, what was written and what was left out."""
+    """Source, written file and the parts that were left out."""
 
     source: str
     written: str
-    #: Each body that moves: its name, mass (kg) and joints.
+    #: Name, mass (kg) and joints of each body that can move.
     bodies: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     meshes: int = 0
     triangles: int = 0
     pictures: int = 0
-    #: What is not in the written file, and how often the source has it.
+    #: Parts that are not in the written file, with their number in the source.
     dropped: dict[str, int] = field(default_factory=dict[str, int])
-    #: How far (m) bodies are from where they began and from the source's after 1 s in MuJoCo, nobody acting.
+    #: Distances (m) of bodies from their initial positions and from those of the source after 1 s in MuJoCo without commands.
     after_1_s: dict[str, Any] = field(default_factory=dict[str, Any])
 
     def drop(self, what: str, times: int = 1) -> None:

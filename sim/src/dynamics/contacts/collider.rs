@@ -30,7 +30,8 @@ pub struct Collider {
     pub touches: Mask,
 }
 
-/// Kinds of a collider, and kinds that it touches, as bits: MJCF's `contype` and `conaffinity`.
+/// Collision mask, as bits: the kinds of a collider and the kinds that it touches. They are MJCF's `contype`
+/// and `conaffinity`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mask {
     pub kinds: u32,
@@ -38,10 +39,11 @@ pub struct Mask {
 }
 
 impl Mask {
-    /// Mask of what touches everything that is not masked.
+    /// Default mask: such colliders touch each other.
     pub const ALL: Mask = Mask { kinds: 1, touched: 1 };
 
-    /// Whether two colliders with these masks touch: it is enough if one of them touches the other's kinds.
+    /// Returns true if two colliders with these masks touch. It is enough if one of them touches a kind of
+    /// the other.
     pub fn meets(self, other: Mask) -> bool {
         self.kinds & other.touched != 0 || other.kinds & self.touched != 0
     }

@@ -107,7 +107,7 @@ pub struct Terms<const N: usize> {
     pub bias_m_s: [f64; 2],
     /// Compliance as a share of the effective mass.
     pub softness: f64,
-    /// The normal's inverse mass is taken to be no less than this.
+    /// Lower bound of the normal's inverse mass.
     pub least_inverse_mass: f64,
     /// mu_c; that of the normal is not used.
     pub friction: [f64; N],
@@ -117,8 +117,8 @@ pub struct Terms<const N: usize> {
 
 pub struct Contact<const N: usize> {
     bias_m_s: [f64; 2],
-    /// 1 / (1 + softness) with correction and 1 without; less where the normal can hardly be moved, see
-    /// [`firmness`].
+    /// 1 / (1 + softness) with correction and 1 without. Both are lower for a normal that can hardly move,
+    /// see [`propped`].
     firmness: [f64; 2],
     inverse_friction: [f64; N],
     /// Y Y^T, the inverses of its diagonal, and of its blocks over the tangents and over the rolls.
@@ -316,20 +316,20 @@ impl Symmetric2 {
     }
 }
 
-/// Returns mass and firmness of a normal with an inverse mass `a` below the least `e`. An impulse that meets
+/// Returns mass and firmness of a normal whose inverse mass `a` is below the least `e`. An impulse with
 ///   n = f (n - (v + b) / a),   f / a = 1 / (e + softness a)
-/// gives way by as much as is missing:  a n + v + b = -(e + (softness - 1) a) n. Links that overlap along a
-/// direction in which their joints hardly let them move would be torn apart by any other.
+/// yields by the difference:  a n + v + b = -(e + (softness - 1) a) n. Without this, overlapping links would be
+/// torn apart where their joints hardly let them move in the direction of the overlap.
 fn propped<const N: usize>(inverse_mass: f64, terms: &Terms<N>) -> (f64, [f64; 2]) {
     let least = terms.least_inverse_mass;
     let a = inverse_mass.max(SMALLEST_SHARE * least);
     (a.recip(), [terms.softness, 0.0].map(|softness| a / (least + softness * a)))
 }
 
-/// Of the least inverse mass: what is less is rounding.
+/// Share of the least inverse mass below which an inverse mass is rounding error.
 const SMALLEST_SHARE: f64 = 1e-9;
 
-/// 0 for what nothing moves.
+/// Inverts an inverse mass; 0 if nothing can move.
 fn inverse(inverse_mass: f64) -> f64 {
     if inverse_mass > 0.0 { inverse_mass.recip() } else { 0.0 }
 }

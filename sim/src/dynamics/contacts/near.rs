@@ -25,12 +25,12 @@ pub struct NearPairs {
     events: Vec<BroadPhasePairEvent>,
 }
 
-/// What never touches.
+/// Pairs of links and of colliders that never touch.
 #[derive(Default)]
 struct Apart {
-    /// Links, smaller first.
+    /// Pairs of links, smaller first.
     links: BTreeSet<(LinkId, LinkId)>,
-    /// Colliders, smaller first.
+    /// Pairs of colliders, smaller first.
     colliders: BTreeSet<[ColliderId; 2]>,
 }
 
@@ -93,14 +93,14 @@ fn in_order(pair: &ColliderPair) -> [ColliderId; 2] {
     [a.min(b), a.max(b)]
 }
 
-/// Bodies of one tree that a joint joins do not collide, as in MuJoCo; nor do two that are kept apart, or
-/// whose masks say so.
+/// Returns true if two colliders may touch. As in MuJoCo, bodies of one tree that a joint connects do not
+/// collide. Neither do two that are kept apart or whose masks exclude each other.
 fn may_touch(pair: [ColliderId; 2], surfaces: &[Surface], trees: &Trees, apart: &Apart) -> bool {
     let [a, b] = pair.map(|id| &surfaces[id.index()]);
     if !a.collider.touches.meets(b.collider.touches) || apart.colliders.contains(&pair) {
         return false;
     }
-    // A link that nothing moves can be kept apart from others, too.
+    // Fixed links can be kept apart from others, too.
     if let (Some(a), Some(b)) = (a.collider.on, b.collider.on)
         && apart.links.contains(&(a.min(b), a.max(b)))
     {

@@ -34,10 +34,9 @@ const DAMPED_SHARE: f64 = 0.5;
 const DEEP_M: f64 = 0.01;
 /// Penetration depth from which on a contact is rigid.
 const RIGID_M: f64 = 0.02;
-/// Share of the links' own inverse masses that the inverse mass of a contact's normal is not taken to be
-/// below.
+/// Lower bound of the inverse mass of a contact's normal, as a share of the links' own inverse masses.
 const LEAST_SHARE: f64 = 0.01;
-/// J that the relaxing sweeps took: where it was so much, there may be more that they should have taken.
+/// Energy (J) removed by the relaxing sweeps above which they may have failed to remove all of it.
 const HARD_J: f64 = 0.3;
 
 #[derive(Default)]
@@ -303,9 +302,10 @@ fn giving_share(gap_m: f64) -> f64 {
     ((RIGID_M + gap_m) / (RIGID_M - DEEP_M)).clamp(0.0, 1.0)
 }
 
-/// Returns the least inverse mass (1/kg) along a contact's normal: a share of those that the two links would
-/// have by themselves. Only joints bring it so low, where they let neither link move. What flies has that of
-/// its whole tree at least.
+/// Returns the least inverse mass (1/kg) along a contact's normal: [`LEAST_SHARE`] of the two links' own
+/// inverse masses. The inverse mass is lower only where joints let neither link move. The result is 0 between
+/// two trees, or a tree and the world, if a tree is free: the inverse mass is then at least that of the
+/// whole tree.
 fn least_inverse_mass(trees: &Trees, bodies: [Option<LinkId>; 2]) -> f64 {
     let held = |body: LinkId| !matches!(trees.all[body.tree.index()].links[0].joint, Joint::Free);
     let within_one = matches!(bodies, [Some(a), Some(b)] if a.tree == b.tree);
@@ -319,7 +319,7 @@ fn least_inverse_mass(trees: &Trees, bodies: [Option<LinkId>; 2]) -> f64 {
     LEAST_SHARE * bodies.into_iter().flatten().map(own).sum::<f64>()
 }
 
-/// Adds a contact; returns its number.
+/// Adds a contact. Returns its index.
 #[inline(always)]
 fn push<S: Simd, const N: usize>(
     simd: S,

@@ -1,4 +1,5 @@
-//! Meshes that are not convex: they collide as their hulls, as in MuJoCo, and weigh otherwise than there.
+//! Notes on meshes that are not convex: they collide as their hulls, as in MuJoCo, but have other masses
+//! than in MuJoCo.
 
 use std::collections::BTreeMap;
 
@@ -6,14 +7,14 @@ use mjcf_rs::body::{Geom, GeomType};
 
 use crate::mjcf::Document;
 
-/// A mesh that fills less of its hull is told to weigh otherwise.
+/// Share of its hull below which a mesh gets a note on its mass.
 const CONVEX_SHARE: f32 = 0.95;
-/// A mesh that fills less of its hull is told to collide otherwise than it looks.
+/// Share of its hull below which a mesh gets a note on its collision shape.
 const HOLLOW_SHARE: f32 = 0.6;
 
 impl Document {
-    /// Notes meshes that collide or weigh as their hulls and are far from convex, each kind with the first
-    /// mesh.
+    /// Notes meshes that are far from convex and collide or have mass as their hulls. There is one note of
+    /// each kind, with the first mesh.
     pub(in crate::mjcf) fn note_concave_meshes(&mut self) {
         let (mut weighing, mut hollow) = (Vec::new(), Vec::new());
         let mut shares: BTreeMap<&str, f32> = BTreeMap::new();
@@ -48,7 +49,7 @@ impl Document {
         self.checked.approximated.extend(notes);
     }
 
-    /// All geoms that are meshes, with the number of their body and where they are in the text.
+    /// Returns all geoms that are meshes, each with the index of its body and its position in the text.
     fn mesh_geoms(&self) -> impl Iterator<Item = (usize, &Geom, usize)> {
         let bodies = self.model.bodies.iter().zip(&self.checked.bodies).enumerate();
         let geoms = bodies.flat_map(|(body, (entry, bytes))| {
@@ -57,7 +58,7 @@ impl Document {
         geoms.filter(|(_, geom, _)| geom.type_ == GeomType::Mesh)
     }
 
-    /// Whether a geom gives something that moves a part of its mass or of its inertia.
+    /// Returns true if a geom contributes mass or inertia to something that moves.
     fn weighs(&self, body: usize, geom: &Geom) -> bool {
         let mut above = std::iter::successors(Some(body), |body| self.model.bodies[*body].parent);
         self.takes_mass_of_geoms(body)
@@ -72,7 +73,7 @@ impl Document {
 mod tests {
     use super::*;
 
-    /// Two cubes of 1 m that lie 1 m apart: 2 m^3 in a hull of 3 m^3.
+    /// Returns a mesh of two cubes of 1 m with a gap of 1 m between them: 2 m^3 in a hull of 3 m^3.
     fn pair_of_cubes() -> String {
         let mut obj = String::new();
         for (cube, x) in [0.0, 2.0].into_iter().enumerate() {

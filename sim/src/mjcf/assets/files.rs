@@ -1,5 +1,5 @@
-//! Files that an MJCF file names: meshes (OBJ, STL and MSH), and pictures on materials, of which only the
-//! colour is taken.
+//! Files that an MJCF file refers to: meshes (OBJ, STL and MSH), and images of materials, of which only the
+//! colour is used.
 
 use std::fmt;
 use std::io::{self, Cursor};
@@ -18,18 +18,18 @@ use crate::{
     user_file::{read_bytes, with_own_separators},
 };
 
-/// The most bytes of a mesh or a picture.
+/// Maximum size of a mesh or an image.
 const MAX_MESH_BYTES: u64 = 1 << 30;
-/// Bytes of a binary STL file before its triangles, and of each of these.
+/// Size of the header of a binary STL file, and of each triangle after it.
 const STL_HEAD_BYTES: usize = 84;
 const STL_TRIANGLE_BYTES: usize = 50;
 
-/// Triangles as a file has them, in metres, counter-clockwise seen from outside.
+/// Triangles of a file, in metres, counter-clockwise seen from outside.
 #[derive(Clone, Default)]
 pub struct Mesh {
     pub vertices_m: Vec<Vector>,
     pub triangles: Vec<[u32; 3]>,
-    /// Whether it weighs what is inside of its triangles, and not its hull.
+    /// True if mass and inertia are those of the volume inside the triangles, and not of the hull.
     pub weighs_exactly: bool,
     hull: OnceLock<Option<SharedShape>>,
 }
@@ -42,7 +42,7 @@ impl PartialEq for Mesh {
     }
 }
 
-/// What a fingerprint is of: that a mesh weighs exactly, its asset says.
+/// Input of the fingerprint. It omits `weighs_exactly`, which the asset states.
 impl fmt::Debug for Mesh {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Mesh { vertices_m, triangles, .. } = self;
@@ -51,23 +51,23 @@ impl fmt::Debug for Mesh {
 }
 
 impl Mesh {
-    /// Returns the convex hull, made once; `None` for points that lie in a plane.
+    /// Returns the convex hull, which is computed once; `None` for points in one plane.
     pub(crate) fn hull(&self) -> Option<SharedShape> {
         self.hull.get_or_init(|| SharedShape::convex_hull(&self.vertices_m)).clone()
     }
 
-    /// Mass properties at a density of 1.
+    /// Returns the mass properties at a density of 1.
     pub(crate) fn mass_properties(&self) -> Option<MassProperties> {
         let of_hull = || Some(self.hull()?.mass_properties(1.0));
         let exact = self
             .weighs_exactly
             .then(|| MassProperties::from_trimesh(1.0, &self.vertices_m, &self.triangles))
-            // Nothing is inside of a surface with holes.
+            // A surface with holes may enclose no volume.
             .filter(|exact| exact.mass() > 0.0);
         exact.or_else(of_hull)
     }
 
-    /// Returns the share of its hull that the mesh fills; 1 if it has none.
+    /// Returns the share of its hull that the mesh fills; 1 without a hull.
     pub(in crate::mjcf) fn hull_share(&self) -> f32 {
         let Some(hull) = self.hull() else { return 1.0 };
         let middle_m = self.vertices_m.first().copied().unwrap_or_default();
@@ -81,7 +81,7 @@ impl Mesh {
 }
 
 impl Document {
-    /// Reads the meshes that its assets name files of, scaled as the assets say.
+    /// Reads the meshes of assets that name a file, scaled as the assets specify.
     pub(in crate::mjcf) fn read_meshes(&mut self) -> Result<(), SimError> {
         let mut refused = Vec::new();
         for asset in &self.model.assets.meshes {
@@ -99,7 +99,7 @@ impl Document {
         SimError::of_all(refused).map_or(Ok(()), Err)
     }
 
-    /// Reads the mean colours of the textures that its assets name files of.
+    /// Reads the mean colours of textures that name a file.
     pub(in crate::mjcf) fn read_textures(&mut self) -> Result<(), SimError> {
         for asset in &self.model.assets.textures {
             if let Some(path) = self.model.resolve_texture_file(asset, &self.folder) {
@@ -125,7 +125,7 @@ impl Document {
             mesh.vertices_m.iter_mut().for_each(place);
         }
         mesh.vertices_m.iter_mut().for_each(|vertex_m| *vertex_m *= scale);
-        // A reflection turns what was outside inside.
+        // A reflection turns surfaces inside out.
         if scale.x * scale.y * scale.z < 0.0 {
             mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
         }
@@ -134,12 +134,12 @@ impl Document {
     }
 }
 
-/// Reads a file that an MJCF file names.
+/// Reads the bytes of a file that an MJCF file names.
 pub(in crate::mjcf) fn read_mesh_bytes(path: &Path) -> io::Result<Vec<u8>> {
     read_bytes(path, MAX_MESH_BYTES)
 }
 
-/// Reads the content of a file of the kind that its name says.
+/// Parses a file of the kind given by its extension.
 fn read(path: &Path, bytes: &[u8]) -> Result<Mesh, SimError> {
     let kind = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     match kind.as_str() {
@@ -176,7 +176,7 @@ fn read_obj(path: &Path, mut bytes: &[u8]) -> Result<Mesh, SimError> {
 
 fn read_stl(path: &Path, bytes: &[u8]) -> Result<Mesh, SimError> {
     let mut bytes = bytes.to_vec();
-    // The header of a binary file may begin as a text does; its length tells what it is.
+    // The header of a binary file may begin like a text file; the length identifies it.
     if let Some(count) = number(&bytes, STL_HEAD_BYTES - 4)
         && bytes.len() == STL_HEAD_BYTES + STL_TRIANGLE_BYTES * count as usize
     {
@@ -191,8 +191,8 @@ fn read_stl(path: &Path, bytes: &[u8]) -> Result<Mesh, SimError> {
     })
 }
 
-/// Reads MuJoCo's own format, little-endian: numbers of vertices, normals, texture coordinates and faces
-/// (i32), then 3, 3 and 2 f32 and 3 i32 for each.
+/// Parses MuJoCo's MSH format, little-endian. It has the numbers of vertices, normals, texture coordinates
+/// and faces (i32). Then follow 3, 3 and 2 f32 and 3 i32 for each.
 fn read_msh(bytes: &[u8]) -> Option<Mesh> {
     const COUNTS_BYTES: usize = 16;
     let mut counts = [0; 4];
@@ -217,7 +217,7 @@ fn read_msh(bytes: &[u8]) -> Option<Mesh> {
     })
 }
 
-/// Reads a little-endian number of four bytes.
+/// Reads a little-endian number of four bytes; `None` beyond the end.
 fn number(bytes: &[u8], at: usize) -> Option<u32> {
     Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?))
 }
@@ -270,7 +270,7 @@ mod tests {
     fn files_of_both_kinds_are_read_and_scaled() {
         let mesh = read_geom("tent.obj", OBJ, r#"scale="1 2 1""#).expect("an OBJ file");
         assert_eq!((mesh.vertices_m.len(), mesh.triangles.len()), (5, 3));
-        // The reader counts vertices as the faces first name them.
+        // The reader numbers vertices in the order in which the faces use them.
         let corners_m = mesh.triangles[2].map(|corner| mesh.vertices_m[corner as usize]);
         assert_eq!(corners_m, [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 1.0, 1.0]].map(Vector::from));
 
@@ -279,7 +279,7 @@ mod tests {
         assert_eq!((mesh.vertices_m.len(), mesh.triangles.as_slice()), (3, [[0, 2, 1]].as_slice()));
     }
 
-    /// One triangle in each binary format; the header of the STL file begins as that of a text would.
+    /// One triangle in each binary format. The header of the STL file begins like that of a text file.
     #[test]
     fn binary_files_are_told_from_texts_by_their_length() {
         let corners = [[0.0f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
@@ -300,7 +300,7 @@ mod tests {
         }
     }
 
-    /// As MuJoCo does it: the reference is subtracted, then the mesh is turned back, then scaled.
+    /// MuJoCo subtracts the reference position, rotates the mesh back, and then scales it.
     #[test]
     fn a_reference_pose_moves_the_mesh() {
         let asset = r#"refpos="1 0 0" refquat="0.70710678 0 0 0.70710678" scale="2 1 1""#;

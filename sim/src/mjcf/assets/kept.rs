@@ -1,4 +1,4 @@
-//! Documents that the process has read: a scene with meshes is read once for all its episodes, until one of
+//! Cache of parsed documents: a process reads a scene with meshes once for all its episodes, until one of
 //! its files changes.
 
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use xxhash_rust::xxh3::xxh3_64;
 use super::files::read_mesh_bytes;
 use crate::mjcf::Document;
 
-/// The latest are kept.
+/// Maximum number of cached documents; the latest are kept.
 const MAX_KEPT: usize = 4;
 
 static KEPT: Mutex<Vec<KeptDocument>> = Mutex::new(Vec::new());
@@ -19,9 +19,9 @@ struct KeptDocument {
     document: Document,
 }
 
-/// Returns what was read of a file, if none of the files that it names has changed since.
+/// Returns the cached document of a file, if none of its files has changed since.
 pub(in crate::mjcf) fn find(path: &Path) -> Option<Document> {
-    // Every call leaves it whole.
+    // Every call leaves the cache consistent, so a poisoned lock is safe to use.
     let kept = || KEPT.lock().unwrap_or_else(PoisonError::into_inner);
     let found = kept().iter().find(|kept| kept.path == path).map(|kept| kept.document.clone())?;
     let is_same =
@@ -29,7 +29,7 @@ pub(in crate::mjcf) fn find(path: &Path) -> Option<Document> {
     found.files.iter().all(is_same).then_some(found)
 }
 
-/// Keeps a document that names meshes or pictures; all others are read fast enough.
+/// Caches a document that names meshes or images. All others are fast to read.
 pub(in crate::mjcf) fn keep(path: &Path, document: &Document) {
     if document.meshes.is_empty() && document.texture_rgb.is_empty() {
         return;

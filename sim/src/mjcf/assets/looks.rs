@@ -1,4 +1,4 @@
-//! Conventions on what of a file is drawn, and how: patterns of materials, and groups.
+//! Conventions for appearance: patterns of materials, and the groups of geoms that are drawn.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,7 +8,7 @@ use crate::SimError;
 use crate::mjcf::text::source::MjcfText;
 use crate::mjcf::text::stated::Classes;
 
-/// A pattern that a file gives one of its materials.
+/// Pattern that a file gives to one of its materials.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SurfacePattern {
     Wood,
@@ -16,20 +16,21 @@ pub enum SurfacePattern {
     Print,
 }
 
-/// Choices of a file that MJCF has no attributes for.
+/// Appearance settings for which MJCF has no attributes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(in crate::mjcf) struct Looks {
-    /// By material.
+    /// Patterns by the name of the material.
     pub patterns: BTreeMap<String, SurfacePattern>,
-    /// `None` for those that MuJoCo draws.
+    /// Groups that are drawn; `None` for MuJoCo's default.
     pub drawn_groups: Option<BTreeSet<i32>>,
 }
 
-/// The `<text>` that gives materials patterns: names of materials, each with the pattern behind it.
+/// Name of the `<text>` with patterns: names of materials, each followed by its pattern.
 const PATTERNS: &str = "material_patterns";
-/// The `<numeric>` with the groups that are drawn.
+/// Name of the `<numeric>` with the groups that are drawn.
 const DRAWN_GROUPS: &str = "drawn_groups";
-/// MuJoCo hides groups 3 and above; robots keep their collision shapes there.
+/// Last group that is drawn by default. As in MuJoCo, groups 3 and above are hidden; robots have their
+/// collision shapes there.
 const LAST_DRAWN_GROUP: i32 = 2;
 
 impl Looks {
@@ -60,8 +61,8 @@ impl Looks {
     }
 }
 
-/// Whether a file keeps to robosuite's and RoboCasa's convention: what has mass and collides is in group 0,
-/// what is seen in group 1.
+/// Returns true if a file follows the convention of robosuite and RoboCasa: geoms with mass and collisions
+/// are in group 0, visible ones in group 1.
 fn draws_group_1(xml: &roxmltree::Document) -> bool {
     let weighs_by_0 = xml.descendants().any(|node| {
         let range = node.attribute("inertiagrouprange").filter(|_| node.has_tag_name("compiler"));

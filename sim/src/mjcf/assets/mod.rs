@@ -1,4 +1,4 @@
-//! What a file names and what is drawn of it: meshes, pictures, patterns and groups; kept for the next who asks.
+//! Assets of a file and their appearance: meshes, images, patterns and groups, and a cache of documents.
 
 mod concave;
 pub mod files;

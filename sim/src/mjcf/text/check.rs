@@ -1,4 +1,4 @@
-//! Goes through a file element by element and accepts or refuses each as the table in [`support`] says.
+//! Check of a file, element by element, against the table in [`support`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,21 +8,21 @@ use super::source::{self, MjcfText};
 use crate::SimError;
 use crate::mjcf::support::{self, Element, Support, Takes, value};
 
-/// Elements inside one another, at most: the parser recurses.
+/// Maximum nesting of elements: the parser recurses.
 const MAX_NESTING: usize = 200;
-/// Ways to say a rotation; an element has one at most.
+/// Attributes that give a rotation; an element has at most one.
 const ROTATIONS: [&str; 6] = ["quat", "axisangle", "euler", "xyaxes", "zaxis", "fullinertia"];
 
-/// What is known of a file whose elements were all accepted.
+/// Findings about a file whose elements were all accepted.
 #[derive(Clone, Debug, Default)]
 pub(in crate::mjcf) struct Checked {
-    /// What is not quite as in MuJoCo, each with the first line that has it.
+    /// Elements that differ slightly from MuJoCo, each with the first line that has it.
     pub approximated: Vec<String>,
     /// Bodies in the order of `mjcf-rs`: the world, then every body before those on it.
     pub bodies: Vec<BodyBytes>,
 }
 
-/// Where a body and what is on it stand in the text.
+/// Positions in the text of a body and of the elements on it.
 #[derive(Clone, Debug, Default)]
 pub(in crate::mjcf) struct BodyBytes {
     pub body: usize,
@@ -83,9 +83,9 @@ struct Check<'a> {
     /// The names in use, by kind of element.
     names: BTreeMap<&'static str, BTreeSet<String>>,
     classes: BTreeSet<String>,
-    /// Elements and attributes that have been told of.
+    /// Elements and attributes that have been reported.
     approximated: BTreeSet<(String, String)>,
-    /// All that makes the file one that is not read.
+    /// Reasons for which the file is refused.
     refused: Vec<SimError>,
     found: Checked,
 }
@@ -95,7 +95,8 @@ impl Check<'_> {
         self.refused.push(self.source.refuse(node, what));
     }
 
-    /// Angles in a class are read with the settings that stand before it; in MuJoCo all settings come first.
+    /// Refuses settings after a class with angles: angles in a class are read with the settings before it,
+    /// and in MuJoCo all settings come first.
     fn check_angles(&mut self, root: &Node) {
         let has_angles = |node: Node| node.has_attribute("euler") || node.has_attribute("axisangle");
         let mut sections =
@@ -105,7 +106,7 @@ impl Check<'_> {
         }
     }
 
-    /// Names are unique among elements of a kind.
+    /// Collects names, which must be unique among elements of a kind.
     fn collect_names(&mut self, root: &Node) {
         for node in root.descendants().filter(Node::is_element) {
             let within = node.parent_element().map_or("", |parent| parent.tag_name().name());
@@ -137,7 +138,7 @@ impl Check<'_> {
         }
     }
 
-    /// Checks what an element holds. `body` is the one in which it stands.
+    /// Checks the content of an element. `body` is the body that contains it.
     fn children(&mut self, node: &Node, body: usize) {
         let within = node.tag_name().name();
         for child in node.children().filter(Node::is_element) {
@@ -150,7 +151,7 @@ impl Check<'_> {
             match element.support {
                 Support::Ignored => {}
                 Support::Refused => self.refuse(&child, format!("<{name}> is not read; {}", element.note)),
-                // What happens in place of it does not depend on what it says.
+                // The approximation does not depend on the content.
                 Support::Approximated => self.approximate(&child, name, "", element.note),
                 Support::Mapped => {
                     self.attributes(&child, element);
@@ -161,7 +162,8 @@ impl Check<'_> {
         }
     }
 
-    /// Notes where bodies, joints and geoms stand; the body in which the element's own content stands.
+    /// Records the positions of bodies, joints and geoms. Returns the body that contains the element's
+    /// own content.
     fn locate(&mut self, node: &Node, body: usize) -> usize {
         let byte = node.range().start;
         let in_tree = node.ancestors().any(|one| one.has_tag_name("worldbody"));
@@ -224,7 +226,7 @@ impl Check<'_> {
         };
         let wanted = match takes {
             Takes::Class if !known(attribute.value()) => Some("the class of a <default>".to_string()),
-            // Of a class nobody has, it does not matter what it names.
+            // In an unused class it does not matter which name an attribute has.
             Takes::NameOf(_) if node.parent_element().is_some_and(|parent| is_default(&parent)) => None,
             Takes::NameOf("mesh") => None,
             Takes::NameOf(kind) if !known(attribute.value()) => Some(format!("the name of a {kind}")),

@@ -1,4 +1,5 @@
-//! From the text of a file, with all that it includes, to the model that `mjcf-rs` reads, and what that reads past.
+//! From the text of a file with all includes to the model of `mjcf-rs`, and to the parts that `mjcf-rs` does
+//! not read.
 
 pub mod check;
 pub mod plain;

@@ -1,5 +1,5 @@
-//! Classes as MuJoCo has them, where `mjcf-rs` has them otherwise: attributes that an element takes from its
-//! classes in part are written on the element.
+//! Default classes with the semantics of MuJoCo, where those of `mjcf-rs` differ: attributes that an element
+//! inherits in part are written on the element.
 
 use std::ops::Range;
 
@@ -7,19 +7,20 @@ use roxmltree::{Document, Node};
 
 use super::stated::Classes;
 
-/// Elements of which MuJoCo's classes have one set of defaults.
+/// Actuators that share one set of defaults in a class of MuJoCo.
 const ACTUATORS: [&str; 6] = ["general", "motor", "position", "velocity", "intvelocity", "damper"];
-/// What these have in common.
+/// Attributes that these actuators share.
 const SHARED: [&str; 5] = ["ctrlrange", "forcerange", "ctrllimited", "forcelimited", "gear"];
-/// Ways to say a rotation; an element has one at most.
+/// Attributes that give a rotation; an element has at most one.
 const ROTATIONS: [&str; 5] = ["quat", "axisangle", "euler", "xyaxes", "zaxis"];
 /// Attributes of which an element may state only the first numbers.
 const LISTS: [&str; 2] = ["size", "friction"];
 
-/// A part of a text, and what takes its place.
+/// Range of the text and its replacement.
 type Edit = (Range<usize>, String);
 
-/// Returns the text of a file in which no element mixes what it states with what its classes state.
+/// Returns the text of a file in which no attribute comes partly from an element and partly from its
+/// classes.
 pub(in crate::mjcf) fn plain(text: &str, xml: &Document) -> String {
     let mut edits: Vec<Edit> = Vec::new();
     let classes = Classes::of(xml);
@@ -45,7 +46,8 @@ pub(in crate::mjcf) fn plain(text: &str, xml: &Document) -> String {
     plain + &text[from..]
 }
 
-/// The elements that state something for this one: itself, then those of its classes, the nearest first.
+/// Returns the elements that state attributes for this one: itself, then those of its classes, the nearest
+/// first.
 fn levels<'a, 'i: 'a>(node: &Node<'a, 'i>, classes: &Classes<'a, 'i>) -> Vec<Node<'a, 'i>> {
     let of_class = |class: Node<'a, 'i>| {
         let name = node.tag_name();
@@ -54,7 +56,7 @@ fn levels<'a, 'i: 'a>(node: &Node<'a, 'i>, classes: &Classes<'a, 'i>) -> Vec<Nod
     std::iter::once(*node).chain(classes.of_element(node).into_iter().flat_map(of_class)).collect()
 }
 
-/// Position and rotation of an element come from wherever they are stated next.
+/// Adds position and rotation, each from the nearest level that states it.
 fn add_pose(levels: &[Node], edits: &mut Vec<Edit>) {
     let next = |names: &[&'static str]| {
         levels.iter().enumerate().find_map(|(level, one)| {
@@ -73,7 +75,7 @@ fn add_pose(levels: &[Node], edits: &mut Vec<Edit>) {
     }
 }
 
-/// Numbers that an element does not state are those of its classes.
+/// Fills up the numbers that an element does not state with those of its classes.
 fn add_list(levels: &[Node], name: &str, edits: &mut Vec<Edit>) {
     let stated: Vec<Vec<&str>> = levels
         .iter()
@@ -92,7 +94,7 @@ fn add_list(levels: &[Node], name: &str, edits: &mut Vec<Edit>) {
     }
 }
 
-/// What the nearest class says of any kind of actuator counts for all.
+/// Adds the attributes that the nearest class states for any kind of actuator.
 fn add_shared<'a, 'i: 'a>(node: &Node<'a, 'i>, classes: &Classes<'a, 'i>, edits: &mut Vec<Edit>) {
     for name in SHARED.iter().filter(|name| !node.has_attribute(**name)) {
         let of_class = |class: Node| {
@@ -105,7 +107,7 @@ fn add_shared<'a, 'i: 'a>(node: &Node<'a, 'i>, classes: &Classes<'a, 'i>, edits:
     }
 }
 
-/// An attribute more, behind the name of an element.
+/// Returns the edit that inserts an attribute after the name of an element.
 fn inserted(node: &Node, name: &str, value: &str) -> Edit {
     let at = node.range().start + 1 + node.tag_name().name().len();
     (at..at, format!(" {name}=\"{value}\""))

@@ -1,4 +1,4 @@
-//! Settings of a file that hold for all of its bodies.
+//! Settings of a file that apply to all its bodies.
 
 use std::ops::RangeInclusive;
 
@@ -7,11 +7,11 @@ use crate::SimError;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::mjcf) struct FileSettings {
-    /// Geoms of these groups give bodies their mass.
+    /// Groups of the geoms that contribute to the masses of bodies.
     pub inertia_groups: RangeInclusive<i32>,
-    /// Whether anything touches anything.
+    /// True if contacts are enabled.
     pub touches: bool,
-    /// Whether things have weight.
+    /// True if gravity is enabled.
     pub falls: bool,
 }
 
@@ -22,7 +22,7 @@ impl Default for FileSettings {
 }
 
 impl FileSettings {
-    /// Reads what the last element that states a setting says of it.
+    /// Reads the settings. The last element that states a setting counts.
     pub fn of(source: &MjcfText) -> Result<FileSettings, SimError> {
         let xml = source.xml()?;
         let stated = |tag: &str, attribute: &str| {

@@ -30,7 +30,7 @@ struct SourceFile {
     path: Option<PathBuf>,
 }
 
-/// A part of the text that stands in a file without a break.
+/// A contiguous part of the text from one file.
 #[derive(Clone, Debug)]
 struct Piece {
     start: usize,
@@ -49,13 +49,13 @@ impl MjcfText {
         Ok(source)
     }
 
-    /// Returns the files that were included, and a hash of each.
+    /// Returns the included files, each with a hash of its text.
     pub fn included(&self) -> Vec<(PathBuf, u64)> {
         let hashed = |file: &SourceFile| Some((file.path.clone()?, xxh3_64(file.text.as_bytes())));
         self.files.iter().filter_map(hashed).collect()
     }
 
-    /// Finds a file that is not where it is named, by its name beside one of the included files.
+    /// Returns the path of a file. If it does not exist, it is searched relative to the included files.
     pub fn beside_including(&self, path: PathBuf) -> PathBuf {
         if path.exists() {
             return path;
@@ -66,7 +66,7 @@ impl MjcfText {
         beside.find(|beside| beside.exists()).unwrap_or(path)
     }
 
-    /// The text as a tree of elements.
+    /// Parses the text as a tree of elements.
     pub fn xml(&self) -> Result<roxmltree::Document<'_>, SimError> {
         let file = || self.files[0].name.clone();
         roxmltree::Document::parse(&self.text).map_err(|source| SimError::Xml { file: file(), source })
@@ -179,7 +179,7 @@ fn inside(node: &Node) -> Option<Range<usize>> {
     Some(node.first_child()?.range().start..node.last_child()?.range().end)
 }
 
-/// An element by its name, or else by the nearest element around it that has one.
+/// Describes an element by its name, or else by the nearest element around it that has one.
 pub(in crate::mjcf) fn describe(node: &Node) -> String {
     let tag = |node: &Node| node.tag_name().name().to_string();
     let name = |node: &Node| {

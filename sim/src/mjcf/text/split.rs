@@ -1,32 +1,33 @@
-//! Bodies with several joints as chains of bodies with one each, and ball joints as three hinges.
+//! Conversion of bodies with several joints to chains of bodies with one joint each, and of ball joints to
+//! three hinges.
 //!
-//! MuJoCo moves a body by its joints one after the other, each in the frame that the one before has left. So
-//! do bodies without mass or shape at the same place, each on the one before; the last of them has all that
-//! the body has.
+//! MuJoCo applies the joints of a body one after the other, each in the frame that the previous one leaves.
+//! A chain of bodies at the same place has the same effect. All but the last have neither mass nor shape; the
+//! last has the content of the original body.
 
 use mjcf_rs::body::{Body, Joint, JointType};
 use mjcf_rs::{BodyEntry, Model, Pose, Tristate};
 
 use super::check::BodyBytes;
 
-/// Axes of the hinges that a ball becomes, and their names behind the ball's.
+/// Axes of the hinges that replace a ball, with the suffixes of their names.
 const BALL_AXES: [(&str, [f64; 3]); 3] =
     [("x", [1.0, 0.0, 0.0]), ("y", [0.0, 1.0, 0.0]), ("z", [0.0, 0.0, 1.0])];
 
-/// What has been split of a file.
+/// Record of the splits in a file.
 #[derive(Clone, Debug, Default)]
 pub(in crate::mjcf) struct Split {
-    /// For each body whether it is there for one of several joints of the body on it alone.
+    /// True for each body that only carries one of several joints of the body on it.
     pub is_part: Vec<bool>,
-    /// Where the first ball joint stands in the text.
+    /// Position of the first ball joint in the text.
     pub ball: Option<usize>,
 }
 
-/// Splits all bodies of a model, and the list of where they stand in the text.
+/// Splits all bodies of a model, and the list of their positions in the text.
 pub(in crate::mjcf) fn split(model: &mut Model, bytes: &mut Vec<BodyBytes>) -> Split {
     let mut split = Split::default();
     let (mut bodies, mut places) = (Vec::new(), Vec::new());
-    // The number that each body of the file has now.
+    // The new index of each body of the file.
     let mut numbers: Vec<usize> = Vec::new();
     for (entry, place) in model.bodies.drain(..).zip(bytes.drain(..)) {
         let BodyEntry { parent, mut body } = entry;
@@ -57,7 +58,7 @@ pub(in crate::mjcf) fn split(model: &mut Model, bytes: &mut Vec<BodyBytes>) -> S
     split
 }
 
-/// The joints of a body with hinges for balls, each with where it stands in the text.
+/// Returns the joints of a body with its balls replaced by hinges, each with its position in the text.
 fn hinged(joints: Vec<Joint>, place: &BodyBytes, split: &mut Split) -> Vec<(Joint, usize)> {
     let mut found = Vec::new();
     for (joint, byte) in joints.into_iter().zip(&place.joints) {

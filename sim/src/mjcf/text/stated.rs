@@ -1,12 +1,12 @@
-//! What elements state or take from their classes, where `mjcf-rs` does not read it.
+//! Lookup of attributes, own or inherited from classes, that `mjcf-rs` does not read.
 
 use std::collections::BTreeMap;
 
 use roxmltree::{Document, Node};
 
-/// The default classes of a file by name.
+/// Default classes of a file by name.
 pub(in crate::mjcf) struct Classes<'a, 'i> {
-    /// A class may stand in several places.
+    /// A class may be defined in several places.
     named: BTreeMap<&'a str, Vec<Node<'a, 'i>>>,
 }
 
@@ -19,7 +19,7 @@ impl<'a, 'i: 'a> Classes<'a, 'i> {
         Classes { named }
     }
 
-    /// Finds the classes of an element, the nearest first, each inside of the next.
+    /// Returns the classes of an element, the nearest first, each nested in the next.
     pub fn of_element(&self, node: &Node<'a, 'i>) -> Vec<Node<'a, 'i>> {
         let around = node.ancestors().skip(1).find_map(|one| one.attribute("childclass"));
         let name = node.attribute("class").or(around).unwrap_or("main");
@@ -27,7 +27,7 @@ impl<'a, 'i: 'a> Classes<'a, 'i> {
         places.flat_map(|class| class.ancestors().take_while(|one| one.has_tag_name("default"))).collect()
     }
 
-    /// An attribute of an element: its own, or that of the nearest class that has it.
+    /// Returns an attribute of an element: its own, or that of the nearest class that has it.
     pub fn stated(&self, node: &Node<'a, 'i>, attribute: &str) -> Option<&'a str> {
         node.attribute(attribute).or_else(|| {
             let elements = self.of_element(node).into_iter().filter_map(|class| {

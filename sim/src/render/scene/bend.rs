@@ -19,8 +19,7 @@ pub struct Bend {
 const TOLERANCE: f32 = 1e-3;
 
 impl TriangleMesh {
-    /// Returns the bends of the mesh, and the number of its bend for each triangle: the last of those that
-    /// fit.
+    /// Returns the bends of the mesh, and for each triangle the index of the last bend that fits.
     pub(in crate::render) fn bends(&self) -> (Vec<Bend>, Vec<u32>) {
         let ellipsoid = Bend::of_ellipsoid(self.corners_m());
         let mut bends = Bends::default();
@@ -34,26 +33,26 @@ impl TriangleMesh {
     }
 }
 
-/// The bends of a mesh so far, found by the normals that they give: a mesh of a file may have one for each
-/// triangle.
+/// Bends of a mesh, indexed by their normals: a mesh of a file may have one for each triangle.
 #[derive(Default)]
 struct Bends {
     all: Vec<Bend>,
-    /// Numbers of the flat ones, by the cell of their normal.
+    /// Indices of flat bends, by the cell of their normal.
     flat: HashMap<[i32; 3], Vec<u32>>,
-    /// Numbers of the others.
+    /// Indices of curved bends.
     curved: Vec<u32>,
 }
 
-/// Side of the cells in which normals lie. One that fits is in the cell of a triangle's normal or beside it.
+/// Side of the cells for normals. A bend that fits a triangle is in the cell of the triangle's normal or in
+/// an adjacent one.
 const CELL: f32 = 2.0 * TOLERANCE;
-/// The tolerance and what rounding may add to it.
+/// Tolerance plus a margin for rounding.
 const REACH: f32 = 1.01 * TOLERANCE;
-/// Of curved bends, only so many of the latest are tried. The shapes that are not of files have fewer.
+/// Maximum number of curved bends that are tried, the latest first. Primitive shapes have fewer.
 const MAX_CURVED: usize = 64;
 
 impl Bends {
-    /// Finds the last bend that fits a triangle.
+    /// Returns the last bend that fits a triangle.
     fn find(&self, corners: &[Vertex; 3]) -> Option<u32> {
         let normal = corners[0].normal;
         let [low, high] = [cell(normal - Vector::splat(REACH)), cell(normal + Vector::splat(REACH))];
@@ -70,7 +69,7 @@ impl Bends {
         found
     }
 
-    /// Adds a bend, and returns its number.
+    /// Adds a bend and returns its index.
     fn add(&mut self, bend: Bend) -> u32 {
         let number = self.all.len() as u32;
         match bend.slope_1_m {
@@ -141,7 +140,7 @@ mod tests {
     use super::*;
     use crate::mjcf::Primitive;
 
-    /// As [`TriangleMesh::bends`] finds them, but looking at all bends so far for each triangle.
+    /// Returns the result of [`TriangleMesh::bends`] by a search over all earlier bends for each triangle.
     fn one_by_one(mesh: &TriangleMesh) -> Vec<u32> {
         let ellipsoid = Bend::of_ellipsoid(mesh.corners_m());
         let mut bends: Vec<Bend> = Vec::new();

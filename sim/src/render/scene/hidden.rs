@@ -9,22 +9,20 @@ use crate::render::TriangleMesh;
 const DEPTH_M: f32 = 1e-4;
 /// Maximum distance of a convex mesh's corners in front of its faces.
 const ROUNDING_M: f32 = 1e-5;
-/// A mesh of more triangles hides nothing: to find out whether it is convex takes time that grows with their
-/// square.
+/// Maximum number of triangles of a mesh that can hide others. The test for convexity takes quadratic time.
 const MAX_HULL_TRIANGLES: usize = 1000;
 
-/// A mesh in the frame of its body.
+/// Mesh in the frame of its body.
 struct Placed {
     corners_m: Vec<Vector>,
-    /// Centre and radius of a sphere around it.
+    /// Centre and radius of a sphere around the mesh.
     centre_m: Vector,
     radius_m: f32,
     /// Normals of its faces, outwards, and how far along them the faces lie, if it is convex.
     hull_m: Option<Vec<(Vector, f32)>>,
 }
 
-/// Takes triangles that lie inside of another mesh of the body out of the meshes, each of which has its pose
-/// in the body's frame.
+/// Removes triangles inside another mesh of the body. Each mesh has its pose in the frame of the body.
 pub fn take_out(meshes: &mut [(TriangleMesh, Pose)]) {
     let placed: Vec<Placed> =
         meshes.iter().map(|(mesh, body_from_mesh)| Placed::of(mesh, body_from_mesh)).collect();
@@ -59,7 +57,7 @@ impl Placed {
     }
 }
 
-/// Returns the faces of a mesh with these corners: their normals, and how far along them they lie.
+/// Returns the faces of a mesh with these corners: their normals, and their offsets along them.
 fn hull_m(mesh: &TriangleMesh, corners_m: &[Vector]) -> Vec<(Vector, f32)> {
     let face = |triangle: &[u32; 3]| {
         let [a, b, c] = triangle.map(|corner| corners_m[corner as usize]);
@@ -69,7 +67,7 @@ fn hull_m(mesh: &TriangleMesh, corners_m: &[Vector]) -> Vec<(Vector, f32)> {
     mesh.triangles.iter().map(face).collect()
 }
 
-/// Whether a point is so deep behind all of some faces.
+/// Returns true if a point is at least this deep behind all of some faces.
 fn is_deeper(faces_m: &[(Vector, f32)], point_m: Vector, depth_m: f32) -> bool {
     faces_m.iter().all(|(normal, along_m)| normal.dot(point_m) < along_m - depth_m)
 }

@@ -125,7 +125,7 @@ pub fn robot_rgba(geom: &Geom, robot: usize) -> [f32; 4] {
     }
 }
 
-/// Adds those geoms of a carrier of which anything can be seen.
+/// Adds the visible geoms of a carrier.
 fn add_parts(
     parts: &mut Vec<Part>,
     geoms: &[Geom],

@@ -55,7 +55,7 @@ impl Prepared {
         }
     }
 
-    /// The triangles of a part.
+    /// Returns the geometry of a part.
     #[inline(always)]
     pub fn geometry(&self, part: usize) -> &MeshGeometry {
         self.scenery.parts[part].mesh.geometry()

@@ -1,4 +1,4 @@
-//! A mesh with what drawing needs to know of it, worked out once and shared by all sceneries that show it.
+//! Meshes with derived geometry, which is computed once and shared by all scenes that contain the mesh.
 
 use std::collections::HashMap;
 use std::ops::Deref;
@@ -11,7 +11,7 @@ use super::faces::Faces;
 use crate::render::TriangleMesh;
 use crate::render::shading::lanes::Points;
 
-/// A triangle mesh that is copied by reference.
+/// Triangle mesh that is cloned by reference.
 #[derive(Clone, Debug)]
 pub struct SharedMesh(Arc<KeptMesh>);
 
@@ -21,26 +21,26 @@ struct KeptMesh {
     geometry: OnceLock<MeshGeometry>,
 }
 
-/// Facts about a mesh's triangles that no pose, colour or light changes.
+/// Geometry of a mesh that does not depend on pose, colour or light.
 pub struct MeshGeometry {
-    /// Corners of the triangles. A mesh with flat faces names a place once for each triangle there; here it
-    /// is named once.
+    /// Corners of the triangles, each position once. Meshes with flat faces repeat a corner for each
+    /// triangle there.
     pub points: Points,
-    /// The triangles, by the numbers of their corners' points.
+    /// Triangles, as indices of their corners in `points`.
     pub triangles: Vec<[u32; 3]>,
     /// Planes of the triangles.
     pub faces: Faces,
     pub bends: Vec<Bend>,
-    /// The number of each triangle's bend.
+    /// Index of each triangle's bend.
     pub bend_of: Vec<u32>,
     /// Centre and radius of a sphere around the mesh.
     pub bounds: (Vector, f32),
-    /// The number of the axis along which the mesh is longest.
+    /// Index of the longest axis of the mesh.
     pub longest_axis: usize,
 }
 
 impl SharedMesh {
-    /// Returns what drawing needs to know of the mesh; the first caller works it out.
+    /// Returns the derived geometry of the mesh. The first call computes it.
     pub(in crate::render) fn geometry(&self) -> &MeshGeometry {
         self.0.geometry.get_or_init(|| MeshGeometry::of(&self.0.mesh))
     }
@@ -88,7 +88,8 @@ impl std::fmt::Debug for MeshGeometry {
     }
 }
 
-/// Joins the corners of a mesh that are at one place, and numbers its triangles' corners by the places.
+/// Joins the corners of a mesh that have the same position. Returns the positions, and the triangles as
+/// indices of them.
 fn joined(mesh: &TriangleMesh) -> (Points, Vec<[u32; 3]>) {
     let (mut numbers, mut places_m) = (HashMap::new(), Vec::new());
     let mut number = |corner: u32| {

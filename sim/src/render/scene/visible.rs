@@ -1,5 +1,4 @@
-//! Meshes of the geoms of a body, without what is hidden. A process makes them once for all worlds that have
-//! such a body.
+//! Visible meshes of the geoms of a body, cached for all worlds of a process that contain such a body.
 
 use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
@@ -12,35 +11,35 @@ use super::shared::SharedMesh;
 use crate::mjcf::{Geom, Primitive};
 use crate::render::TriangleMesh;
 
-/// Meshes of so many triangles are kept in all, at about 200 bytes each, and those of the latest body
-/// whatever it has.
+/// Maximum number of cached triangles, of about 200 bytes each. The meshes of the latest body are always
+/// kept.
 const MAX_KEPT_TRIANGLES: usize = 1_500_000;
 
 static BODIES: LazyLock<Mutex<KeptBodies>> = LazyLock::new(Mutex::default);
 
-/// Meshes by the geoms that they are of.
+/// Cache of meshes, by a hash of their geoms.
 #[derive(Default)]
 struct KeptBodies {
     of_geoms: HashMap<u128, KeptBody>,
     triangles: usize,
-    /// How often somebody has asked.
+    /// Number of lookups.
     clock: u64,
 }
 
 struct KeptBody {
     meshes: Vec<Option<SharedMesh>>,
     triangles: usize,
-    /// The clock when it was asked for last.
+    /// Value of the clock at the last lookup.
     asked: u64,
 }
 
-/// Returns what can be seen of each of a body's geoms; nothing of those inside of others.
+/// Returns the visible part of each of a body's geoms; `None` for geoms inside others.
 pub fn meshes(geoms: &[&Geom]) -> Vec<Option<SharedMesh>> {
     if geoms.is_empty() {
         return Vec::new();
     }
     let key = key(geoms);
-    // Every call leaves it whole, so that a panic elsewhere leaves nothing wrong behind.
+    // Every call leaves the cache consistent, so a poisoned lock is safe to use.
     let kept = || BODIES.lock().unwrap_or_else(PoisonError::into_inner);
     let found = kept().find(key);
     found.unwrap_or_else(|| {
@@ -66,8 +65,7 @@ impl KeptBodies {
         Some(body.meshes.clone())
     }
 
-    /// Keeps the meshes of a body, and forgets those that nobody has asked for the longest if there are too
-    /// many.
+    /// Caches the meshes of a body. Removes the least recently used ones if there are too many triangles.
     fn keep(&mut self, key: u128, meshes: Vec<Option<SharedMesh>>) {
         let triangles = meshes.iter().flatten().map(|mesh| mesh.triangles.len()).sum();
         let body = KeptBody { meshes, triangles, asked: self.clock };
@@ -85,7 +83,7 @@ impl KeptBodies {
     }
 }
 
-/// Tells the shapes and places of geoms apart.
+/// Returns a hash of the shapes and poses of geoms.
 fn key(geoms: &[&Geom]) -> u128 {
     let mut content = Content(Xxh3::new());
     for geom in geoms {

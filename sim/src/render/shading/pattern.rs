@@ -20,7 +20,7 @@ pub enum Pattern {
     Print,
 }
 
-/// The second colour, as a part of the first: calm enough for what lies on it to stand out.
+/// The second colour, as a share of the first: calm enough for things on it to stand out.
 const WOOD_DARK: f32 = 0.70;
 const FABRIC_DARK: f32 = 0.75;
 const INK_DARK: f32 = 0.45;
@@ -40,7 +40,7 @@ pub const WORD_GAP: f32 = 0.3;
 pub const WORD_STRAY: f32 = 0.37;
 
 impl Pattern {
-    /// Returns the pattern that a file gives a material.
+    /// Returns the pattern that a file gives a material; plain without one.
     pub fn of(stated: Option<SurfacePattern>) -> Pattern {
         match stated {
             Some(SurfacePattern::Wood) => Pattern::Wood,

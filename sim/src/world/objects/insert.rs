@@ -120,8 +120,8 @@ fn insert_moving(
     Ok(id)
 }
 
-/// Returns the link that carries another by several joints, if something moves it: as where there is one
-/// joint, the two do not touch.
+/// Returns the link that carries another by several joints, if it can move. The two do not touch, as with a
+/// single joint.
 fn carrier(tree: &BodyTree, link: usize) -> Option<usize> {
     let above = |link: usize| tree.links[link].parent;
     let first_part = above(link).filter(|parent| tree.links[*parent].is_part)?;
@@ -130,7 +130,7 @@ fn carrier(tree: &BodyTree, link: usize) -> Option<usize> {
     successors(Some(carrier), |one| above(*one)).any(|one| moves(&one)).then_some(carrier)
 }
 
-/// Geoms of a link that does not move, in the frame of its file.
+/// Returns the geoms of a link that does not move, in the frame of its file.
 fn in_file(link: &BodyLink) -> impl Iterator<Item = Geom> {
     let file_from_link = rounded(&link.parent_from_link);
     link.geoms

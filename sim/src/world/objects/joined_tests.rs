@@ -1,12 +1,12 @@
-//! Bodies of scenes that overlap where their joints or the file hold them.
+//! Tests of bodies in scenes that overlap where their joints or the file hold them.
 
 use rapier3d::math::Pose;
 
 use crate::World;
 use crate::mjcf::Document;
 
-/// Plays a second of a scene in which nobody acts; returns the farthest that any object was from where it
-/// began.
+/// Simulates a scene for one second without robots. Returns the maximum distance of any object from its
+/// initial position.
 fn farthest_m(inside: &str) -> f32 {
     let document = Document::parse("scene.xml", &format!("<mujoco>{inside}</mujoco>")).expect("a scene");
     let mut world = World::of_scene(document).expect("a world");
@@ -23,8 +23,7 @@ fn farthest_m(inside: &str) -> f32 {
     farthest_m
 }
 
-/// A drawer that overlaps its carcass, which stands fast as the base of its tree, as another tree, or as the
-/// world itself.
+/// A drawer that overlaps its fixed carcass: the base of its own tree, another tree, or the world itself.
 #[test]
 fn what_moves_may_be_kept_apart_from_what_does_not() {
     let rail = r#"<joint type="slide" axis="0 -1 0" range="0 0.3" damping="5"/>"#;
@@ -53,7 +52,7 @@ fn what_no_joint_can_part_stays_together() {
           <geom type="capsule" fromto="-.1 0 0 .1 0 0" size="0.1" mass="1"/>
           <body name="pole"><joint axis="0 1 0" range="-90 90"/>
             <geom type="capsule" fromto="0 0 0 0.001 0 0.6" size="0.049" mass="1"/></body></body>"#;
-    // In MuJoCo the pole falls, and the cart is where it recoils to.
+    // In MuJoCo the pole falls, and the cart moves by its recoil.
     let moved_m = farthest_m(&format!("<worldbody>{floor}{cart}</worldbody>"));
     assert!(moved_m < 1.0, "{moved_m} m");
     let chain = r#"<body name="torso" pos="0 0 1"><freejoint/><geom type="sphere" size=".25" mass="3"/>
@@ -63,7 +62,7 @@ fn what_no_joint_can_part_stays_together() {
             <geom type="capsule" fromto="-.2 0 0 .3 0 0" size=".08" mass=".3"/></body></body></body>"#;
     let moved_m = farthest_m(&format!("<worldbody>{floor}{chain}</worldbody>"));
     assert!(moved_m < 1.2, "{moved_m} m");
-    // Neither drawer can move aside for the other.
+    // Neither drawer can move out of the way of the other.
     let drawer = |x: f64| {
         let joint = r#"<joint type="slide" axis="0 1 0"/>"#;
         format!(r#"<body pos="{x} 0 1">{joint}<geom type="box" size=".1 .1 .1"/></body>"#)
@@ -72,7 +71,7 @@ fn what_no_joint_can_part_stays_together() {
     assert!(moved_m < 0.01, "{moved_m} m");
 }
 
-/// What lies on a body with two joints does not touch what carries the body, as with one.
+/// A body on two joints does not touch the body that carries it, just as with one joint.
 #[test]
 fn a_body_with_two_joints_does_not_touch_what_carries_it() {
     let scene = |joints: &str| {
