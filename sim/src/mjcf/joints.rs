@@ -121,6 +121,50 @@ impl UnreadRanges {
     }
 }
 
+/// What an actuator exerts for what it is told, before its gear.
+enum Law {
+    Motor { gain: f64 },
+    Position { kp: f64, kd: f64 },
+}
+
+/// Returns the law of an actuator that acts here.
+fn law(element: &ActuatorElement) -> Option<Law> {
+    match element.kind {
+        Kind::Motor => Some(Law::Motor { gain: 1.0 }),
+        Kind::Position => {
+            Some(Law::Position { kp: element.kp.unwrap_or(1.0), kd: element.kv.unwrap_or(0.0) })
+        }
+        Kind::General => general_law(element),
+        Kind::Velocity | Kind::IntVelocity | Kind::Damper | Kind::Other => None,
+    }
+}
+
+/// MuJoCo's force is gain * control + bias, with a bias of b0 + b1 q + b2 q' if it is affine.
+fn general_law(element: &ActuatorElement) -> Option<Law> {
+    let is = |stated: &Option<String>, usual: &str| stated.as_deref().unwrap_or(usual) == usual;
+    if !is(&element.gain_type, "fixed") || !is(&element.dyn_type, "none") {
+        return None;
+    }
+    let number = |numbers: &[f64], at: usize, usual: f64| numbers.get(at).copied().unwrap_or(usual);
+    let gain = number(&element.gainprm, 0, 1.0);
+    let [b0, b1, b2] = [0, 1, 2].map(|at| number(&element.biasprm, at, 0.0));
+    match element.bias_type.as_deref() {
+        None | Some("none") => Some(Law::Motor { gain }),
+        Some("affine") if b0 == 0.0 && b1 == -gain && gain > 0.0 && b2 <= 0.0 => {
+            Some(Law::Position { kp: gain, kd: -b2 })
+        }
+        Some(_) => None,
+    }
+}
+
+impl Document {
+    /// Whether some `<general>` does nothing here.
+    pub(super) fn has_idle_actuators(&self) -> bool {
+        let idle = |element: &ActuatorElement| element.kind == Kind::General && law(element).is_none();
+        self.model.actuators.iter().any(idle)
+    }
+}
+
 impl LinkJoint {
     pub fn name(&self) -> Option<&str> {
         match self {
@@ -169,9 +213,7 @@ impl Document {
         }
         let limit = |index: usize| limits.as_ref().map(|limits| limits[index]);
         let acts = |element: &ActuatorElement| {
-            matches!(element.kind, Kind::Motor | Kind::Position)
-                && element.joint.is_some()
-                && element.gear[0] != 0.0
+            law(element).is_some() && element.joint.is_some() && element.gear[0] != 0.0
         };
         let acting = elements.iter().enumerate().filter(|(_, element)| acts(element));
         acting.map(|(index, element)| self.actuator(index, element, limit(index))).collect()
@@ -188,14 +230,12 @@ impl Document {
         let joint = element.joint.clone().unwrap_or_default();
         self.axis_joint(&joint)?;
         let gear = element.gear[0];
-        let kind = match element.kind {
-            Kind::Position => {
-                let (kp, kd) = (element.kp.unwrap_or(1.0), element.kv.unwrap_or(0.0));
-                ActuatorKind::Position { kp: gear * gear * kp, kd: gear * gear * kd }
+        let (kind, gain) = match law(element) {
+            Some(Law::Position { kp, kd }) => {
+                (ActuatorKind::Position { kp: gear * gear * kp, kd: gear * gear * kd }, 1.0)
             }
-            Kind::Motor | Kind::Velocity | Kind::IntVelocity | Kind::Damper | Kind::General | Kind::Other => {
-                ActuatorKind::Motor
-            }
+            Some(Law::Motor { gain }) => (ActuatorKind::Motor, gain),
+            None => (ActuatorKind::Motor, 0.0),
         };
         let limits = |what: &str, limited, range| {
             let limits = self.limits(what, limited, range);
@@ -217,7 +257,7 @@ impl Document {
             effort_range: self.effort_range(&joint, effort_range),
             speed_limit,
             kind,
-            gear,
+            gear: gear * gain,
             placed_at: self.axis_joint(&joint)?.ref_,
             index,
             joint,

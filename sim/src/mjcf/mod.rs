@@ -164,10 +164,12 @@ impl Document {
         let ball = "a ball is three hinges about x, y and z, which lock where the second is turned by 90 degrees; it has no range";
         let free = "nothing holds or slows a free body: springs, damping, friction and armature are left out";
         let notes = [(self.split.ball, ball), (held.map(|(_, byte)| *byte), free)];
+        let idle = "a <general> that is neither a motor nor a position does nothing";
+        let idle = self.has_idle_actuators().then(|| format!("`{}`: {idle}", self.file));
         let told = notes
             .into_iter()
             .filter_map(|(byte, what)| Some(format!("`{}`: joint: {what}", self.source.line(byte?))));
-        let told: Vec<String> = told.collect();
+        let told: Vec<String> = told.chain(idle).collect();
         self.checked.approximated.extend(told);
     }
 

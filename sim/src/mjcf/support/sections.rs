@@ -127,7 +127,14 @@ pub(super) const ELEMENTS: &[Element] = &[
         &[ACTUATOR, POSITION],
         "of a robot's file all are of this kind",
     ),
-    other_actuator("general"),
+    named(
+        Support::Mapped,
+        "general",
+        ACTUATORS,
+        "actuator",
+        &[ACTUATOR, GENERAL],
+        "with a fixed gain and no bias it is a motor, with a gain of k and a bias of `0 -k -d` a position; all others do nothing",
+    ),
     other_actuator("velocity"),
     other_actuator("intvelocity"),
     other_actuator("damper"),
@@ -412,6 +419,11 @@ const ACTUATOR: &[Attribute] = &[
     ignored(&["lengthrange"], "it is for muscles"),
     ignored(&["group"], "actuators are not drawn"),
     USER,
+];
+const GENERAL: &[Attribute] = &[
+    mapped(&["gainprm", "biasprm"], ANY_NUMBERS),
+    mapped(&["gaintype", "biastype", "dyntype"], Takes::Text),
+    approximated(&["dynprm", "actlimited", "actrange", "actdim", "actearly"], "no actuator has a state"),
 ];
 const POSITION: &[Attribute] = &[
     mapped(&["kp", "kv"], AMOUNT),

@@ -32,7 +32,7 @@ pub(in crate::mjcf) fn plain(text: &str, xml: &Document) -> String {
                 add_pose(&levels, &mut edits);
                 LISTS.iter().for_each(|list| add_list(&levels, list, &mut edits));
             }
-            "motor" | "position" if within("actuator") => add_shared(&node, &classes, &mut edits),
+            "general" | "motor" | "position" if within("actuator") => add_shared(&node, &classes, &mut edits),
             _ => {}
         }
     }
@@ -157,5 +157,24 @@ mod tests {
         assert_eq!(actuators[0].control_range, Some([-1.0, 1.0]));
         assert_eq!(actuators[0].effort_range, Some([-18.0, 18.0]), "at the joint, behind the gear");
         assert_eq!(actuators[0].kind, ActuatorKind::Position { kp: 12.0, kd: 0.0 });
+    }
+
+    #[test]
+    fn general_actuators_act_if_they_are_motors_or_positions() {
+        let read = |general: &str| {
+            let body = r#"<worldbody><body><joint name="h"/><geom size="1"/></body></worldbody>"#;
+            let general = format!(r#"<actuator><general joint="h" {general}/></actuator>"#);
+            let xml = format!("<mujoco>{body}{general}</mujoco>");
+            let document = Document::parse("room.xml", &xml).expect("a room");
+            let found = document.actuators().expect("actuators");
+            let acts = found.first().map(|actuator| (actuator.kind, actuator.gear));
+            assert_eq!(acts.is_none(), document.approximations().len() == 1, "a note if it does nothing");
+            acts
+        };
+        assert_eq!(read(r#"gainprm="7" gear="2""#), Some((ActuatorKind::Motor, 14.0)));
+        let position = ActuatorKind::Position { kp: 9.0, kd: 1.0 };
+        assert_eq!(read(r#"gainprm="9" biastype="affine" biasprm="0 -9 -1""#), Some((position, 1.0)));
+        assert_eq!(read(r#"gainprm="9" biastype="affine" biasprm="0 -8 -1""#), None);
+        assert_eq!(read(r#"dyntype="integrator""#), None);
     }
 }
