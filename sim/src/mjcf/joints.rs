@@ -46,7 +46,7 @@ pub struct Actuator {
     pub effort_range: Option<[f64; 2]>,
     /// Speed (rad/s or m/s) at which the actuator can push no further.
     pub speed_limit: Option<f64>,
-    /// Factor on the commands of a motor, and divisor of position commands.
+    /// Factor on the commands of a motor (with its gain), and divisor of position commands.
     pub gear: f64,
     /// Joint position in the file where the file places the bodies: the `ref` of the joint.
     pub placed_at: f64,
@@ -121,13 +121,13 @@ impl UnreadRanges {
     }
 }
 
-/// What an actuator exerts for what it is told, before its gear.
+/// Effort of an actuator for its command, without its gear.
 enum Law {
     Motor { gain: f64 },
     Position { kp: f64, kd: f64 },
 }
 
-/// Returns the law of an actuator that acts here.
+/// Returns the law of an actuator; `None` for one that is not supported and has no effect.
 fn law(element: &ActuatorElement) -> Option<Law> {
     match element.kind {
         Kind::Motor => Some(Law::Motor { gain: 1.0 }),
@@ -139,7 +139,8 @@ fn law(element: &ActuatorElement) -> Option<Law> {
     }
 }
 
-/// MuJoCo's force is gain * control + bias, with a bias of b0 + b1 q + b2 q' if it is affine.
+/// Returns the law of a `<general>`, if it is a motor or a position actuator. MuJoCo's force is gain * control
+/// + bias, with a bias of b0 + b1 q + b2 q' if it is affine.
 fn general_law(element: &ActuatorElement) -> Option<Law> {
     let is = |stated: &Option<String>, usual: &str| stated.as_deref().unwrap_or(usual) == usual;
     if !is(&element.gain_type, "fixed") || !is(&element.dyn_type, "none") {
@@ -158,7 +159,7 @@ fn general_law(element: &ActuatorElement) -> Option<Law> {
 }
 
 impl Document {
-    /// Whether some `<general>` does nothing here.
+    /// Returns true if the file has a `<general>` without effect.
     pub(super) fn has_idle_actuators(&self) -> bool {
         let idle = |element: &ActuatorElement| element.kind == Kind::General && law(element).is_none();
         self.model.actuators.iter().any(idle)

@@ -153,7 +153,7 @@ impl Document {
     }
 
     /// Notes ball joints, and free joints with springs, damping, friction or armature of their own or of a
-    /// class.
+    /// class. Also notes `<general>` actuators without effect.
     fn note_joints(&mut self) {
         let bodies = self.model.bodies.iter().zip(&self.checked.bodies);
         let mut joints = bodies.flat_map(|(entry, bytes)| entry.body.joints.iter().zip(&bytes.joints));
