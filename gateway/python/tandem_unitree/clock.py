@@ -1,0 +1,43 @@
+"""When a robot's time passes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Literal, TypeAlias
+
+from .sensing import STEP_S
+
+ClockKind: TypeAlias = Literal["real", "hold"]
+"""`real`: time passes as for a robot, so thinking costs. `hold`: time stands still while no program commands."""
+
+HOLD_AFTER_S = 0.5
+"""Time without a message after which the clock `hold` stands still."""
+
+
+class Clock:
+    """Decides whether a control step is made, and when the next one is due.
+
+    All processes on a machine share the monotonic clock, and steps are due at its multiples of 20 ms, so the robots of an
+    episode command at the same time and none waits for another.
+    """
+
+    def __init__(self, kind: ClockKind, monotonic_s: Callable[[], float] = time.monotonic) -> None:
+        self._kind = kind
+        self._monotonic_s = monotonic_s
+        self._heard_s = -HOLD_AFTER_S - 1.0
+        self._due = int(monotonic_s() / STEP_S) + 1
+
+    def heard(self) -> None:
+        """Notes that a program has sent a message."""
+        self._heard_s = self._monotonic_s()
+
+    def passes(self, walks: bool) -> bool:
+        """Returns whether time passes; `walks` says that a velocity is in force."""
+        return self._kind == "real" or walks or self._monotonic_s() - self._heard_s < HOLD_AFTER_S
+
+    def wait_s(self) -> float:
+        """Returns the seconds until the next control step is due, and leaves out those that are already over."""
+        now_s = self._monotonic_s()
+        self._due = max(self._due + 1, int(now_s / STEP_S))
+        return max(0.0, self._due * STEP_S - now_s)

@@ -1,0 +1,86 @@
+"""The operator of one robot, over Tandem's REST interface."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tandem import Client, EpisodeEnded, Refused
+from tandem.base import ROW_COLUMNS
+
+from .commands import BaseRange
+from .sensing import Moment, moment_of
+
+
+@dataclass(frozen=True)
+class Seat:
+    """Where an operator plays: a server, and the token that names episode and robot."""
+
+    url: str
+    token: str
+
+
+class Link:
+    """One operator's connection. A link is for one thread; `again` makes another for a second thread."""
+
+    def __init__(self, seat: Seat) -> None:
+        self._seat = seat
+        self._client = Client(seat.url, token=seat.token)
+        held = self._client.request("GET", "/v1/episodes")["episodes"]
+        if not held:
+            raise Refused("no-episode", "No episode", "the token is not an operator's, or its episode is over; start another one")
+        self.episode_id = str(held[0]["episode_id"])
+        briefing = self._get("/briefing")
+        self.robot = str(briefing["instructions"][0]["robot"])
+        kind_of = {robot["robot"]: robot["kind"] for robot in briefing["robots"]}
+        kind = {kind["kind"]: kind for kind in briefing["kinds"]}[kind_of[self.robot]]
+        names = ("vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m")
+        self.limits = BaseRange(**{name: (float(kind[name]["min"]), float(kind[name]["max"])) for name in names})
+        self.instruction = str(briefing["instruction"])
+
+    def again(self) -> Link:
+        """Returns a further link of the same operator."""
+        return Link(self._seat)
+
+    def _get(self, path: str) -> Any:
+        return self._client.request("GET", f"/v1/episodes/{self.episode_id}{path}")
+
+    def _call(self, tool: str, arguments: dict[str, Any]) -> Any:
+        return self._client.request("POST", f"/v1/episodes/{self.episode_id}/tools/{tool}", arguments)
+
+    def sense(self, before: Moment | None) -> Moment:
+        """Returns what the robot senses now."""
+        return moment_of(self._call("get_robot_state", {"robot": self.robot}), before)
+
+    def command(self, row: NDArray[np.float64]) -> bool:
+        """Executes one control step with an action row. Returns `False` if it came too late for this step and was refused."""
+        if row.shape != (ROW_COLUMNS,):
+            raise ValueError(f"a row has {ROW_COLUMNS} numbers, not {row.shape}")
+        try:
+            rows = [[round(value, 6) for value in row.tolist()]]
+            self._call("send_joint_chunk", {"robots": [{"robot": self.robot, "rows": rows}], "short": True})
+        except EpisodeEnded:
+            raise
+        except Refused:
+            return False
+        return True
+
+    def picture(self) -> tuple[float, NDArray[np.uint8]]:
+        """Returns the simulated time and what the head camera sees: height by width by red, green, blue."""
+        seen = self._call("observe", {"robots": [self.robot], "images": "rgb", "short": True})
+        camera = seen["cameras"][0]
+        pixels = np.frombuffer(base64.b64decode(seen["arrays"][0]["rgb"]), np.uint8)
+        return float(seen["time_s"]), pixels.reshape(camera["height"], camera["width"], 3)
+
+    def note(self, text: str) -> None:
+        """Keeps a note in the recording."""
+        body = {"text": text, "kind": "note", "robot": self.robot}
+        self._client.request("POST", f"/v1/episodes/{self.episode_id}/notes", body)
+
+    def close(self) -> None:
+        """Closes the connection."""
+        self._client.close()

@@ -1,0 +1,143 @@
+"""Starts episodes, and a process for each robot."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Any
+
+from tandem import Client, TandemError, serve
+from tandem.contract.replies import Protocol
+
+from .adapter import serve_robot
+from .link import Seat
+from .remarks import LOG
+from .robot import RobotSettings
+
+PATIENCE_S = 0.2
+"""Time for which robots wait for one whose process does not command; then it is held still until it commands again."""
+
+POLL_S = 0.25
+"""Period at which the end of an episode is looked for."""
+
+
+@dataclass(frozen=True)
+class EpisodeSettings:
+    """What is played."""
+
+    task: str
+    seed: int = 0
+    protocol: Protocol = "agentic"
+    episodes: int = 1
+    """Episodes to play, one after another, with seeds that follow `seed`."""
+
+    experts: tuple[str, ...] = ()
+    """Robots that the task's expert drives."""
+
+    server: str | None = None
+    """Server to play on; `None` starts one."""
+
+    runs: Path = Path("runs")
+    """Folder of the recordings of a server that is started."""
+
+
+@dataclass
+class _Worker:
+    """The process of one robot."""
+
+    robot: str
+    process: BaseProcess
+    connection: Connection
+
+
+@contextmanager
+def _server(settings: EpisodeSettings) -> Iterator[str]:
+    """Gives the URL of the server to play on."""
+    if settings.server is not None:
+        yield settings.server
+        return
+    with serve(runs=settings.runs) as server:
+        LOG.info("server at %s, recordings in %s", server.url, settings.runs)
+        yield server.url
+
+
+def play(settings: EpisodeSettings, robots: Sequence[RobotSettings]) -> list[dict[str, Any]]:
+    """Plays episodes, each robot in a process of its own, and returns their results.
+
+    robots: How each robot would be reached; those that the task does not have, and those of the expert, are left out.
+    """
+    workers: list[_Worker] = []
+    results: list[dict[str, Any]] = []
+    with _server(settings) as url:
+        client = Client(url)
+        try:
+            for seed in range(settings.seed, settings.seed + settings.episodes):
+                results.append(_play_one(client, url, settings, seed, robots, workers))
+        finally:
+            _stop(workers)
+    return results
+
+
+def _play_one(
+    client: Client, url: str, settings: EpisodeSettings, seed: int, robots: Sequence[RobotSettings], workers: list[_Worker]
+) -> dict[str, Any]:
+    """Plays one episode to its end, or until the processes have ended or the user interrupts, and returns its result."""
+    body = {"task": settings.task, "seed": seed, "protocol": settings.protocol}
+    started = client.request("POST", "/v1/episodes", {**body, "operators": "per_robot", "patience_s": PATIENCE_S})
+    path = f"/v1/episodes/{started['episode_id']}"
+    tokens = {operator["robot"]: str(operator["token"]) for operator in started["operators"]}
+    interrupted = False
+    try:
+        _seat(url, tokens, [robot for robot in robots if robot.robot in tokens and robot.robot not in settings.experts], workers)
+        for robot in settings.experts:
+            client.request("POST", "/operate/expert", {"episode": started["episode_id"], "robot": robot})
+        _say_free(url, tokens, {worker.robot for worker in workers} | set(settings.experts))
+        while client.request("GET", path)["ended"] is None and any(worker.process.is_alive() for worker in workers):
+            time.sleep(POLL_S)
+    except KeyboardInterrupt:
+        interrupted = True
+    result: dict[str, Any] = client.request("DELETE", path)
+    LOG.info("result: %s", json.dumps(result))
+    if interrupted:
+        raise KeyboardInterrupt
+    return result
+
+
+def _seat(url: str, tokens: dict[str, str], robots: Sequence[RobotSettings], workers: list[_Worker]) -> None:
+    """Gives each robot's process its seat in an episode, and starts the processes before the first one."""
+    if not workers:
+        context = multiprocessing.get_context("spawn")
+        for robot in robots:
+            ours, theirs = context.Pipe()
+            process = context.Process(target=serve_robot, args=(robot, theirs), name=f"robot {robot.robot}")
+            process.start()
+            theirs.close()
+            workers.append(_Worker(robot.robot, process, ours))
+    if not workers:
+        raise TandemError("no robot is left to be driven; name some with --robots")
+    for worker in workers:
+        worker.connection.send(Seat(url, tokens[worker.robot]))
+
+
+def _say_free(url: str, tokens: dict[str, str], driven: set[str]) -> None:
+    """Says how other operators take the robots that nobody drives."""
+    for robot, token in tokens.items():
+        if robot not in driven:
+            LOG.info("robot %s stands still until its operator calls: %s, token %s", robot, url, token)
+
+
+def _stop(workers: Sequence[_Worker]) -> None:
+    """Ends the processes, which end themselves when their connection closes."""
+    for worker in workers:
+        worker.connection.close()
+    for worker in workers:
+        worker.process.join(5.0)
+        if worker.process.is_alive():
+            worker.process.terminate()
