@@ -11,8 +11,8 @@ from tandem import EpisodeEnded, TandemError
 
 from .exchange import Exchange
 from .link import Link, Seat
-from .remarks import LOG
-from .robot import Robot, RobotSettings
+from .robot.remarks import LOG
+from .robot.shared import Robot, RobotSettings
 
 END_POLL_S = 0.2
 """Period at which a robot whose episode has ended asks for another one."""
@@ -42,8 +42,8 @@ class Adapter:
 
     def run(self) -> None:
         """Serves the robot until `stop` is called or no episode follows."""
-        from .dds import Dds
-        from .lerobot import LeRobot
+        from .transport.dds import Dds
+        from .transport.lerobot import LeRobot
 
         settings = self._settings
         topics = Dds(settings.domain, settings.interface)
@@ -122,14 +122,15 @@ class Adapter:
 
     def _link_note(self) -> None:
         """Notes in the recording by what interface and clock the robot is driven."""
+        robot, clock = self._settings.robot, self._settings.clock
         self._link.note(
-            f"Robot {self._settings.robot} is driven over the interfaces of a Unitree G1 (tandem_unitree), clock {self._settings.clock}. "
-            "Programs are told joint velocities, torques, orientation and odometry, which the benchmark's observations do not have."
+            f"Robot {robot} is driven over the interfaces of a Unitree G1 (tandem_unitree), clock {clock}. Its programs are "
+            "told joint velocities, torques, orientation and odometry, which observations of the benchmark do not have."
         )
 
     def _look(self) -> None:
         """Fetches pictures while a client watches."""
-        from .cameras import Cameras
+        from .transport.cameras import Cameras
 
         cameras = Cameras(self._settings.address, self._settings.camera_fps)
         period_s = 1.0 / self._settings.camera_fps
@@ -150,7 +151,7 @@ class Adapter:
 
     def _say_figures(self, low_states: int, wall_s: float) -> None:
         LOG.info(
-            "robot %s: %d control steps in %.1f s of wall clock, %.2f ms each; %d refused; lowstate at %.1f Hz; %d wrong checksums",
+            "robot %s: %d control steps in %.1f s, %.2f ms each; %d refused; lowstate at %.1f Hz; %d wrong checksums",
             *(self._settings.robot, self.steps, wall_s, 1000 * self.busy_s / max(1, self.steps)),
             *(self.late, low_states / max(1e-9, wall_s), self.robot.commands.bad_crcs),
         )

@@ -14,8 +14,8 @@ from pathlib import Path
 from tandem import TandemError
 
 from .link import Link, Seat
-from .remarks import LOG
-from .robot import RobotSettings
+from .robot.remarks import LOG
+from .robot.shared import RobotSettings
 
 ROBOTS = {
     "A": RobotSettings("A", 1, address="127.0.0.2"),
@@ -33,7 +33,10 @@ def log_to_stderr(*, verbose: bool = False) -> None:
 
 def _pairs(text: str) -> dict[str, str]:
     """Reads `A=0,B=5`."""
-    pairs = dict(pair.partition("=")[::2] for pair in text.split(","))
+    pairs: dict[str, str] = {}
+    for pair in text.split(","):
+        robot, _, value = pair.partition("=")
+        pairs[robot] = value
     unknown = [robot for robot, value in pairs.items() if robot not in ROBOTS or not value]
     if unknown:
         raise argparse.ArgumentTypeError(f"give robots with their values, for example A=0,B=5; not {text!r}")
@@ -56,8 +59,9 @@ def _names(text: str) -> tuple[str, ...]:
 
 def parser() -> argparse.ArgumentParser:
     """Returns the parser of the command line."""
-    own = argparse.ArgumentParser(prog="python -m tandem_unitree", description=(__doc__ or "").split("\n")[0])
-    own.description = "Serves robots of an episode as Unitree G1s: DDS topics, RPC services, LeRobot's and teleimager's sockets."
+    own = argparse.ArgumentParser(
+        prog="python -m tandem_unitree", description="Serves the robots of an episode as Unitree G1s."
+    )
     what = own.add_argument_group("what is played")
     what.add_argument("--task", help="task of an episode to start, for example handover")
     what.add_argument("--seed", type=int, default=0, help="seed of the (first) episode; default 0")
@@ -75,7 +79,9 @@ def parser() -> argparse.ArgumentParser:
         "--addresses", type=_pairs, default={}, help="addresses of ZMQ sockets; default A=127.0.0.2,B=127.0.0.3,C=127.0.0.4"
     )
     how.add_argument("--clock", choices=("real", "hold"), default="real", help="whether time passes while no program commands")
-    how.add_argument("--released", action="store_true", help="begin with the mode released, so that rt/lowcmd moves joints at once")
+    how.add_argument(
+        "--released", action="store_true", help="begin with the mode released, so that rt/lowcmd moves joints at once"
+    )
     how.add_argument("--camera-fps", type=float, default=15.0, help="pictures a second while a client watches; default 15")
     how.add_argument("--verbose", action="store_true", help="log every service call")
     return own

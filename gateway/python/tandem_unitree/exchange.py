@@ -6,14 +6,14 @@ import time
 from threading import Event
 from typing import Protocol
 
-from .commands import RELEASED
-from .joints import HANDS
-from .lerobot import LeRobot
-from .messages import Messages
-from .remarks import LOG
-from .robot import Robot
-from .rpc import Request, response
-from .services import SERVICES
+from .robot.commands import RELEASED
+from .robot.messages import Messages
+from .robot.remarks import LOG
+from .robot.services import SERVICES
+from .robot.shared import Robot
+from .transport.lerobot import LeRobot
+from .wire.joints import HANDS
+from .wire.rpc import Request, response
 
 STATE_S = 0.004
 """Period of `rt/lowstate` and `rt/secondary_imu`: 250 Hz."""
@@ -101,7 +101,9 @@ class Exchange:
         if request is None:
             return
         code, data = self._robot.services.answer(service, request)
-        LOG.debug("robot %s: %s %d %s: %d %s", self._robot.settings.robot, service, request.api_id, request.parameter, code, data)
+        LOG.debug(
+            "robot %s: %s %d %s: %d %s", self._robot.settings.robot, service, request.api_id, request.parameter, code, data
+        )
         if not request.noreply:
             self._topics.write(f"rt/api/{service}/response", response(request, code, data))
 

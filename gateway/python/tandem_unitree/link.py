@@ -12,8 +12,14 @@ from numpy.typing import NDArray
 from tandem import Client, EpisodeEnded, Refused
 from tandem.base import ROW_COLUMNS
 
-from .commands import BaseRange
-from .sensing import Moment, moment_of
+from .robot.commands import BaseRange
+from .robot.sensing import Moment, moment_of
+
+_TOO_LATE = ("late-command", "double-command")
+"""Kinds of refusal of a command that came after its step, or while another one of the same robot was waiting."""
+
+_GONE = ("unknown-episode", "no-token", "needs-token", "shutting-down")
+"""Kinds of refusal where the server no longer holds the episode."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +38,9 @@ class Link:
         self._client = Client(seat.url, token=seat.token)
         held = self._client.request("GET", "/v1/episodes")["episodes"]
         if not held:
-            raise Refused("no-episode", "No episode", "the token is not an operator's, or its episode is over; start another one")
+            raise Refused(
+                "no-episode", "No episode", "the token is not an operator's, or its episode is over; start another one"
+            )
         self.episode_id = str(held[0]["episode_id"])
         briefing = self._get("/briefing")
         self.robot = str(briefing["instructions"][0]["robot"])
@@ -50,7 +58,12 @@ class Link:
         return self._client.request("GET", f"/v1/episodes/{self.episode_id}{path}")
 
     def _call(self, tool: str, arguments: dict[str, Any]) -> Any:
-        return self._client.request("POST", f"/v1/episodes/{self.episode_id}/tools/{tool}", arguments)
+        try:
+            return self._client.request("POST", f"/v1/episodes/{self.episode_id}/tools/{tool}", arguments)
+        except Refused as refused:
+            if refused.kind in _GONE:
+                raise EpisodeEnded(refused.kind, refused.title, refused.detail) from refused
+            raise
 
     def sense(self, before: Moment | None) -> Moment:
         """Returns what the robot senses now."""
@@ -63,9 +76,9 @@ class Link:
         try:
             rows = [[round(value, 6) for value in row.tolist()]]
             self._call("send_joint_chunk", {"robots": [{"robot": self.robot, "rows": rows}], "short": True})
-        except EpisodeEnded:
-            raise
-        except Refused:
+        except Refused as refused:
+            if refused.kind not in _TOO_LATE:
+                raise
             return False
         return True
 

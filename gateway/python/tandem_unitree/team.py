@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -18,8 +18,8 @@ from tandem.contract.replies import Protocol
 
 from .adapter import serve_robot
 from .link import Seat
-from .remarks import LOG
-from .robot import RobotSettings
+from .robot.remarks import LOG
+from .robot.shared import RobotSettings
 
 PATIENCE_S = 0.2
 """Time for which robots wait for one whose process does not command; then it is held still until it commands again."""
@@ -58,7 +58,7 @@ class _Worker:
 
 
 @contextmanager
-def _server(settings: EpisodeSettings) -> Iterator[str]:
+def _server(settings: EpisodeSettings) -> Generator[str]:
     """Gives the URL of the server to play on."""
     if settings.server is not None:
         yield settings.server
@@ -95,7 +95,9 @@ def _play_one(
     tokens = {operator["robot"]: str(operator["token"]) for operator in started["operators"]}
     interrupted = False
     try:
-        _seat(url, tokens, [robot for robot in robots if robot.robot in tokens and robot.robot not in settings.experts], workers)
+        _seat(
+            url, tokens, [robot for robot in robots if robot.robot in tokens and robot.robot not in settings.experts], workers
+        )
         for robot in settings.experts:
             client.request("POST", "/operate/expert", {"episode": started["episode_id"], "robot": robot})
         _say_free(url, tokens, {worker.robot for worker in workers} | set(settings.experts))

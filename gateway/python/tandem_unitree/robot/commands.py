@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .joints import (
+from ..wire.joints import (
     BASE_COLUMNS,
     HAND_COLUMNS,
     LEGS,
@@ -16,7 +16,7 @@ from .joints import (
     UPPER_BODY_COLUMNS,
     WEIGHT_MOTOR,
 )
-from .layout import HAND_COMMAND, HAND_MOTORS, LOW_COMMAND, Record, body_of, command_crc, modes_of
+from ..wire.layout import HAND_COMMAND, HAND_MOTORS, LOW_COMMAND, Record, body_of, command_crc, modes_of
 from .messages import ENABLED, MODE_MACHINE, SERIES_ANKLE
 from .remarks import Remarks
 
@@ -84,9 +84,7 @@ class Commands:
             return
         motors = record["motors"]
         if record["mode_machine"] != MODE_MACHINE:
-            self.remarks.once(
-                f"rt/lowcmd has mode_machine {record['mode_machine']}; a G1 expects the {MODE_MACHINE} of its LowState_ and may not move"
-            )
+            self.remarks.once(f"rt/lowcmd should have mode_machine {MODE_MACHINE}, as LowState_ has; a G1 may not move without")
         if (motors["kp"][LEGS] > 0).any() or (motors["tau"][LEGS] != 0).any():
             self.remarks.once("rt/lowcmd moves the waist and the arms; the legs stay with the simulator's balance controller")
         self._say_ignored_gains(record, "rt/lowcmd")
@@ -151,7 +149,9 @@ class Commands:
         if needs_mode:
             driven &= modes_of(record)[UPPER_BODY] == ENABLED
         if record["mode_pr"] != SERIES_ANKLE:
-            self.remarks.once("mode_pr 1 (parallel ankles and waist, A and B) cannot be simulated: waist roll and pitch are ignored")
+            self.remarks.once(
+                "mode_pr 1 (parallel ankles and waist, A and B) cannot be simulated: waist roll and pitch are ignored"
+            )
             driven &= ~np.isin(UPPER_BODY, PARALLEL_WAIST)
         columns = UPPER_BODY_COLUMNS[driven]
         row[columns] += weight * (motors["q"][driven] - row[columns])
@@ -168,7 +168,9 @@ class Commands:
     def _say_ignored_gains(self, record: Record, topic: str) -> None:
         motors = record["motors"][UPPER_BODY]
         if (motors["kp"] > 0).any() or (motors["tau"] != 0).any() or (motors["dq"] != 0).any():
-            self.remarks.once(f"{topic}: q is followed; kp, kd, dq and tau are ignored, since drives keep the simulator's gains")
+            self.remarks.once(
+                f"{topic}: q is followed; kp, kd, dq and tau are ignored, since drives keep the simulator's gains"
+            )
 
 
 def _finite(values: NDArray[np.float32], otherwise: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .joints import BODY, BODY_MOTORS, HANDS
-from .layout import (
+from ..wire.joints import BODY, BODY_MOTORS, HANDS
+from ..wire.layout import (
     BATTERY,
     HAND_MOTORS,
     HAND_STATE,
@@ -123,4 +123,3 @@ def _blank_hand() -> Record:
     hand["imu"]["temperature"] = IMU_TEMPERATURE
     hand["power_v"] = hand["system_v"] = hand["device_v"] = 24.0
     return hand
-

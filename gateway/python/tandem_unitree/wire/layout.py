@@ -104,9 +104,7 @@ LOW_STATE = _record(
 PRESS_SENSORS = 9
 """Pressure sensors of a Dex3-1."""
 
-PRESS_SENSOR = _record(
-    104, pressure=_words(0, 12), temperature=_words(48, 12), lost=(96, "<u4"), reserve=(100, "<u4")
-)
+PRESS_SENSOR = _record(104, pressure=_words(0, 12), temperature=_words(48, 12), lost=(96, "<u4"), reserve=(100, "<u4"))
 """`PressSensorState_` of unitree_hg."""
 
 HAND_STATE = _record(

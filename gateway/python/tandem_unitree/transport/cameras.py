@@ -13,7 +13,7 @@ import zmq
 from numpy.typing import NDArray
 from PIL import Image
 
-from .lerobot import Publisher
+from .sockets import Publisher, bound, received
 
 LEROBOT_PORT = 5555
 """Port of LeRobot's `ZMQCamera`: JSON with JPEG in base64."""
@@ -67,18 +67,13 @@ class Cameras:
     def __init__(self, address: str, fps: float) -> None:
         self._lerobot = Publisher(address, LEROBOT_PORT)
         self._teleimager = Publisher(address, TELEIMAGER_PORT)
-        self._configuration = teleimager_configuration(fps)
-        self._requests = zmq.Context.instance().socket(zmq.REP)
-        self._requests.bind(f"tcp://{address}:{CONFIGURATION_PORT}")
+        self._configuration = json.dumps(teleimager_configuration(fps)).encode()
+        self._requests = bound(zmq.REP, address, CONFIGURATION_PORT)
 
     def answer(self) -> None:
         """Answers clients that ask for the configuration."""
-        while True:
-            try:
-                self._requests.recv(zmq.NOBLOCK)
-            except zmq.Again:
-                return
-            self._requests.send_json(self._configuration)
+        while received(self._requests) is not None:
+            self._requests.send(self._configuration)
 
     def are_watched(self) -> bool:
         """Returns whether a client listens to a camera."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .joints import JOINTS
+from ..wire.joints import JOINTS
 
 Vector = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
+from ..wire.rpc import BAD_PARAMETER, NOT_IMPLEMENTED, OK, Request
 from .commands import FACTORY_MODE, RELEASED, Commands
-from .rpc import BAD_PARAMETER, NOT_IMPLEMENTED, OK, Request
 
 Reply: TypeAlias = tuple[int, str]
 """Status code, and data as JSON."""
@@ -58,16 +58,13 @@ class Services:
         if request.api_id == API_VERSION:
             return OK, _VERSIONS[service]
         try:
-            parameter = json.loads(request.parameter or "{}")
-            if not isinstance(parameter, dict):
-                return BAD_PARAMETER, ""
+            parameter: dict[str, Any] = json.loads(request.parameter or "{}")
             code, data = self._handlers[service](request.api_id, parameter)
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, AttributeError):
             return BAD_PARAMETER, ""
         if code == NOT_IMPLEMENTED:
-            self._commands.remarks.once(
-                f"{service} {request.api_id} {request.parameter or '{}'} cannot be simulated and is answered with {NOT_IMPLEMENTED}"
-            )
+            call = f"{service} {request.api_id} {request.parameter or '{}'}"
+            self._commands.remarks.once(f"{call} cannot be simulated and is answered with {NOT_IMPLEMENTED}")
         return code, data
 
     def _sport(self, api_id: int, parameter: Mapping[str, Any]) -> Reply:

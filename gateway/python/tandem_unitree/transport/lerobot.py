@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import zmq
 
-from .joints import MOTORS
-from .layout import LOW_COMMAND, Record, blank
+from ..wire.joints import MOTORS
+from ..wire.layout import LOW_COMMAND, Record, blank
+from .sockets import Publisher, bound, received
 
 COMMAND_PORT = 6000
 """Port of commands: PULL here, PUSH at the client."""
@@ -71,49 +72,17 @@ class LeRobot:
     """The two sockets of one robot. All calls come from one thread."""
 
     def __init__(self, address: str) -> None:
-        context = zmq.Context.instance()
-        self._commands = context.socket(zmq.PULL)
-        self._commands.setsockopt(zmq.RCVHWM, 16)
-        self._commands.bind(f"tcp://{address}:{COMMAND_PORT}")
+        self._commands = bound(zmq.PULL, address, COMMAND_PORT, RCVHWM=16)
         self._states = Publisher(address, STATE_PORT)
 
     def take(self) -> Record | None:
         """Returns the newest command that has come since the last call."""
         newest: bytes | None = None
-        while True:
-            try:
-                newest = self._commands.recv(zmq.NOBLOCK)
-            except zmq.Again:
-                return None if newest is None else command_of(newest)
+        while (payload := received(self._commands)) is not None:
+            newest = payload
+        return None if newest is None else command_of(newest)
 
     def publish(self, low: Record) -> None:
         """Tells a `LowState_` if a client listens."""
         if self._states.has_subscribers():
             self._states.send(state_payload(low))
-
-
-class Publisher:
-    """A PUB socket that knows whether anybody listens. All calls come from one thread."""
-
-    def __init__(self, address: str, port: int) -> None:
-        self._socket = zmq.Context.instance().socket(zmq.XPUB)
-        self._socket.setsockopt(zmq.SNDHWM, 2)
-        self._socket.setsockopt(zmq.XPUB_VERBOSER, 1)
-        self._socket.bind(f"tcp://{address}:{port}")
-        self._subscriptions = 0
-
-    def has_subscribers(self) -> bool:
-        """Returns whether a client has subscribed."""
-        while True:
-            try:
-                notice = self._socket.recv(zmq.NOBLOCK)
-            except zmq.Again:
-                return self._subscriptions > 0
-            self._subscriptions += 1 if notice[:1] == b"\x01" else -1
-
-    def send(self, payload: bytes) -> None:
-        """Sends to all clients; one that does not keep up misses messages."""
-        try:
-            self._socket.send(payload, zmq.NOBLOCK)
-        except zmq.Again:
-            return

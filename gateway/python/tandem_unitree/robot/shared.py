@@ -6,10 +6,10 @@ import threading
 import time
 from dataclasses import dataclass
 
+from ..link import Link
+from ..wire.joints import standing_row
 from .clock import Clock, ClockKind
 from .commands import Commands
-from .joints import standing_row
-from .link import Link
 from .remarks import Remarks
 from .sensing import STEP_S, Moment
 from .services import Services

@@ -15,8 +15,8 @@ from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
+from ..robot.services import SERVICES
 from . import idl
-from .services import SERVICES
 
 MAX_UNREAD = 64
 """Messages of a topic that are kept until they are read; older ones are dropped."""
@@ -100,6 +100,6 @@ class Dds:
 
     def close(self) -> None:
         """Leaves the domain."""
-        self._participant = self._domain = None
         self._writers.clear()
         self._readers.clear()
+        del self._participant, self._domain
