@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..wire.joints import BODY, BODY_MOTORS, HANDS
 from ..wire.layout import (
     BATTERY,
@@ -18,7 +16,7 @@ from ..wire.layout import (
     serialized,
     state_crc,
 )
-from .sensing import Moment, Vector, roll_pitch_yaw, rotated_back, torso_of
+from .sensing import Moment, Vector, resting_force, roll_pitch_yaw, torso_of
 
 MODE_MACHINE = 5
 """`mode_machine` of a G1 with 29 degrees of freedom."""
@@ -96,8 +94,7 @@ class Messages:
     def torso_imu(self, moment: Moment) -> bytes:
         """Returns `IMUState_` of the torso."""
         quaternion, gyro = torso_of(moment)
-        up = rotated_back(quaternion, np.array([0.0, 0.0, 9.81]))
-        _fill_imu(self._torso, quaternion, gyro, up)
+        _fill_imu(self._torso, quaternion, gyro, resting_force(quaternion))
         return serialized(self._torso)
 
     def odometry(self, moment: Moment) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -47,7 +48,7 @@ class Moment:
     @property
     def accelerometer_m_s2(self) -> Vector:
         """Specific force of a pelvis at rest, in its own frame: gravity alone, without the acceleration of a gait."""
-        return GRAVITY_M_S2 * rotated_back(self.quaternion_wxyz, np.array([0.0, 0.0, 1.0]))
+        return resting_force(self.quaternion_wxyz)
 
     def until(self, later: Moment, share: float) -> Moment:
         """Returns the moment between this one and `later`; `share` runs from 0 (this one) to 1 (`later`)."""
@@ -58,7 +59,7 @@ class Moment:
         return Moment(
             time_s=self.time_s + share * (later.time_s - self.time_s),
             joints=self.joints + share * (later.joints - self.joints),
-            quaternion_wxyz=mixed / np.linalg.norm(mixed),
+            quaternion_wxyz=mixed / math.sqrt(mixed @ mixed),
             position_m=self.position_m + share * (later.position_m - self.position_m),
             gyro_rad_s=later.gyro_rad_s,
             velocity_m_s=later.velocity_m_s,
@@ -102,8 +103,8 @@ def _row(by_joint: Mapping[str, float]) -> Vector:
 
 def product(a: Vector, b: Vector) -> Vector:
     """Returns the quaternion a b."""
-    w, x, y, z = a
-    v, p, q, r = b
+    w, x, y, z = a.tolist()
+    v, p, q, r = b.tolist()
     return np.array(
         [
             w * v - x * p - y * q - z * r,
@@ -120,35 +121,45 @@ def rate_between(before: Vector, after: Vector, step_s: float) -> Vector:
     return (2.0 if turn[0] >= 0 else -2.0) * turn[1:] / step_s
 
 
-def rotated_back(quaternion: Vector, vector: Vector) -> Vector:
-    """Returns `vector` of the start frame in the frame whose orientation is `quaternion`."""
-    w, axis = quaternion[0], -quaternion[1:]
-    twice = 2 * np.cross(axis, vector)
-    return vector + w * twice + np.cross(axis, twice)
-
-
-def roll_pitch_yaw(quaternion: Vector) -> Vector:
-    """Returns roll, pitch and yaw with R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    w, x, y, z = quaternion
+def rotation(quaternion: Vector) -> NDArray[np.float64]:
+    """Returns the rotation matrix R of a quaternion: `R.T @ v` is a vector of the start frame in the rotated frame."""
+    w, x, y, z = quaternion.tolist()
     return np.array(
         [
-            np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
-            np.arcsin(np.clip(2 * (w * y - z * x), -1, 1)),
-            np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
 
 
+def resting_force(quaternion: Vector) -> Vector:
+    """Returns the specific force of a body at rest in its own frame, [m/s^2]: gravity alone."""
+    return GRAVITY_M_S2 * rotation(quaternion)[2]
+
+
+def roll_pitch_yaw(quaternion: Vector) -> tuple[float, float, float]:
+    """Returns roll, pitch and yaw with R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    w, x, y, z = quaternion.tolist()
+    return (
+        math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+        math.asin(min(max(2 * (w * y - z * x), -1.0), 1.0)),
+        math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+    )
+
+
 def torso_of(moment: Moment) -> tuple[Vector, Vector]:
-    """Returns orientation and angular velocity of the torso, which the waist turns by yaw, then roll, then pitch."""
-    half = 0.5 * moment.joints[0, 12:15]
-    cosines, sines = np.cos(half), np.sin(half)
-    yaw = np.array([cosines[0], 0.0, 0.0, sines[0]])
-    roll = np.array([cosines[1], sines[1], 0.0, 0.0])
-    pitch = np.array([cosines[2], 0.0, sines[2], 0.0])
-    tilt = product(roll, pitch)
-    yaw_rate, roll_rate, pitch_rate = moment.joints[1, 12:15]
-    rate = rotated_back(product(yaw, tilt), moment.gyro_rad_s)
-    rate = rate + rotated_back(tilt, np.array([0.0, 0.0, yaw_rate]))
-    rate = rate + rotated_back(pitch, np.array([roll_rate, 0.0, 0.0])) + np.array([0.0, pitch_rate, 0.0])
-    return product(moment.quaternion_wxyz, product(yaw, tilt)), rate
+    """Returns orientation and angular velocity of the torso, which the waist turns by yaw, then roll, then pitch.
+
+    With W = Rz Rx Ry: torso = pelvis W, and its rate is W^T w + (Rx Ry)^T z yaw' + Ry^T x roll' + y pitch'.
+    """
+    yaw, roll, pitch = (0.5 * moment.joints[0, 12:15]).tolist()
+    yaw_rate, roll_rate, pitch_rate = moment.joints[1, 12:15].tolist()
+    about_z = np.array([math.cos(yaw), 0.0, 0.0, math.sin(yaw)])
+    about_x = np.array([math.cos(roll), math.sin(roll), 0.0, 0.0])
+    about_y = np.array([math.cos(pitch), 0.0, math.sin(pitch), 0.0])
+    tilt = product(about_x, about_y)
+    waist = product(about_z, tilt)
+    rate = moment.gyro_rad_s @ rotation(waist) + yaw_rate * rotation(tilt)[2] + roll_rate * rotation(about_y)[0]
+    rate[1] += pitch_rate
+    return product(moment.quaternion_wxyz, waist), rate
