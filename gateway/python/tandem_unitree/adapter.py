@@ -48,6 +48,7 @@ class Adapter:
         settings = self._settings
         topics = Dds(settings.domain, settings.interface)
         exchange = Exchange(self.robot, topics, LeRobot(settings.address))
+        self._note()
         workers = [threading.Thread(target=self._guarded, args=(self._step,), daemon=True)]
         if settings.camera_fps > 0:
             workers.append(threading.Thread(target=self._guarded, args=(self._look,), daemon=True))
@@ -57,7 +58,6 @@ class Adapter:
             "robot %s: DDS domain %d on %s; LeRobot and teleimager at %s; clock %s",
             *(settings.robot, settings.domain, settings.interface, settings.address, settings.clock),
         )
-        self._link_note()
         begun_s = time.monotonic()
         try:
             exchange.run(self._stop)
@@ -116,11 +116,11 @@ class Adapter:
                 self._link.close()
                 self._link = Link(seat)
                 robot.begin(self._link)
-                self._link_note()
+                self._note()
                 return True
         return False
 
-    def _link_note(self) -> None:
+    def _note(self) -> None:
         """Notes in the recording by what interface and clock the robot is driven."""
         robot, clock = self._settings.robot, self._settings.clock
         self._link.note(

@@ -43,7 +43,7 @@ while time.time() - begun_s < 3:
     time.sleep(1 / 30)
 last = robot.get_observation()
 turned_rad, knee_rad = (last[name] - first[name] for name in ("kWaistYaw.q", "kLeftKnee.q"))
-print(f"{address}: {len(first)} keys, {sent} actions, the waist turns {turned_rad:.3f} of {turn_rad} rad, the knee {knee_rad:.3f} of 0.3")
+print(f"{address}: {len(first)} keys, {sent} actions, waist {turned_rad:.3f} of {turn_rad} rad, knee {knee_rad:.3f} of 0.3")
 robot.disconnect()
 assert abs(turned_rad - turn_rad) < 0.02 and abs(knee_rad) < 0.1
 print("fine")

@@ -1,10 +1,11 @@
-"""Programs that others wrote for a Unitree G1 drive Tandem's robots, each beside a bridge of its own, alone with `lo` in a network namespace.
+"""Programs that others wrote for a Unitree G1 drive Tandem's robots, each in a network namespace with `lo` alone.
 
     python tests/peers/unitree/run.py --wheel target/wheels/tandem_sim-*.whl
     python tests/peers/unitree/run.py --wheel target/wheels/tandem_sim-*.whl sdk latency
 
-Environments are made in `target/unitree` by Python 3.10 (`cyclonedds` 0.10 has no wheel for a later one) and 3.12 (LeRobot). What
-cannot be had here is skipped, and said: an interpreter, a package, namespaces, or libturbojpeg for teleimager's client.
+Environments are made in `target/unitree` by Python 3.10 (`cyclonedds` 0.10 has no wheel for a later one) and 3.12
+(LeRobot). What cannot be had here is skipped, and said: an interpreter, a package, namespaces, or libturbojpeg for
+teleimager's client.
 """
 
 import argparse
@@ -157,8 +158,9 @@ def inside(case, pythons):
 def run(name, makers, made):
     """Runs one case in a namespace of its own; returns whether it has passed."""
     case = CASES[name]
-    if case.needs_library is not None and ctypes.util.find_library(case.needs_library) is None and not os.environ.get("TURBOJPEG"):
-        raise Skipped(f"no lib{case.needs_library}")
+    library = case.needs_library
+    if library is not None and not (ctypes.util.find_library(library) or os.environ.get("TURBOJPEG")):
+        raise Skipped(f"no lib{library}")
     for needed in sorted(case.environments - set(made)):
         made[needed] = makers[needed]()
     alone = ["unshare", "--net"] if os.geteuid() == 0 else ["unshare", "--net", "--user", "--map-root-user"]

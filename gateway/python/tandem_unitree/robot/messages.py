@@ -100,8 +100,7 @@ class Messages:
     def odometry(self, moment: Moment) -> bytes:
         """Returns `SportModeState_`: position and velocity in the start frame, yaw rate in the pelvis frame."""
         record = self._odometry
-        sec, rest = divmod(moment.time_s, 1.0)
-        record["sec"], record["nanosec"] = int(sec), int(1e9 * rest)
+        record["sec"], record["nanosec"] = divmod(round(1e9 * moment.time_s), 10**9)
         _fill_imu(record, moment.quaternion_wxyz, moment.gyro_rad_s, moment.accelerometer_m_s2)
         record["position"][...] = moment.position_m
         record["body_height"] = moment.position_m[2]
