@@ -11,6 +11,7 @@ from tandem import EpisodeEnded, TandemError
 
 from .exchange import Exchange
 from .link import Link, Seat
+from .robot.clock import PictureTurns
 from .robot.remarks import LOG
 from .robot.shared import Robot, RobotSettings
 
@@ -104,7 +105,6 @@ class Adapter:
     def _begin_next(self) -> bool:
         """Waits for the next episode; returns whether there is one."""
         robot = self.robot
-        robot.ended = True
         LOG.info("robot %s: the episode has ended; states go on as they are", self._settings.robot)
         while not self._stop.is_set():
             try:
@@ -133,21 +133,23 @@ class Adapter:
         from .transport.cameras import Cameras
 
         cameras = Cameras(self._settings.address, self._settings.camera_fps)
-        period_s = 1.0 / self._settings.camera_fps
+        turns = PictureTurns(ord(self._settings.robot) - ord("A"), self._settings.camera_fps)
         seat, link = self._seat, Link(self._seat)
         while not self._stop.is_set():
             cameras.answer()
             if not cameras.are_watched():
                 self._stop.wait(IDLE_PICTURE_S)
                 continue
-            due_s = time.monotonic() + period_s
+            self.robot.stepped.wait(IDLE_PICTURE_S)
+            self.robot.stepped.clear()
+            if not turns.is_due(time.monotonic()):
+                continue
             if seat is not self._seat:
                 seat, link = self._seat, Link(self._seat)
             try:
                 cameras.publish(link.picture()[1])
             except EpisodeEnded:
                 self._stop.wait(END_POLL_S)
-            self._stop.wait(max(0.0, due_s - time.monotonic()))
 
     def _say_figures(self, low_states: int, wall_s: float) -> None:
         LOG.info(

@@ -44,6 +44,7 @@ class Case:
 
 ONE = ["--task", "handover", "--robots", "A"]
 CASES = {
+    "book": Case(ONE, [("clients", "book.py", "1")]),
     "sdk": Case(ONE, [("clients", "sdk.py", "1")]),
     "far": Case([*ONE, "--domains", "A=0"], [("clients", "far.py")]),
     "lerobot": Case(
@@ -144,7 +145,7 @@ def inside(case, pythons):
         try:
             wait_until_served(bridge, log)
             clients = [
-                subprocess.Popen([pythons[name], str(HERE / script), *arguments], cwd=folder)
+                subprocess.Popen([pythons[name], str(HERE / "clients" / script), *arguments], cwd=folder)
                 for name, script, *arguments in case.clients
             ]
             statuses = [client.wait(MAX_CLIENT_S) for client in clients]

@@ -15,6 +15,27 @@ HOLD_AFTER_S = 0.5
 """Time without a message after which the clock `hold` stands still."""
 
 
+class PictureTurns:
+    """Decides after which control steps a robot fetches a picture.
+
+    Robots take turns, so that no control step waits for more than one picture.
+
+    number: Which of the robots it is, from 0.
+    """
+
+    def __init__(self, number: int, fps: float) -> None:
+        self._number = number
+        self._steps = max(1, round(1.0 / (fps * STEP_S)))
+        self._turn: int | None = None
+
+    def is_due(self, now_s: float) -> bool:
+        """Returns whether to fetch a picture after the control step that has just ended."""
+        turn = (int(now_s / STEP_S) - self._number) // self._steps
+        due = turn != self._turn
+        self._turn = turn
+        return due
+
+
 class Clock:
     """Decides whether a control step is made, and when the next one is due.
 

@@ -49,7 +49,7 @@ class Robot:
         self.lock = threading.Lock()
         self.clock = Clock(settings.clock)
         self.remarks = Remarks(settings.robot)
-        self.ended = False
+        self.stepped = threading.Event()
         self.latest = self._previous = link.sense(None)
         self._sensed_s = time.monotonic()
         standing = standing_row(self.latest.joints[0], link.limits.pelvis_height_m[1])
@@ -63,13 +63,13 @@ class Robot:
             self.latest = self._previous = first
             self.commands.limits = link.limits
             self.commands.stand(standing_row(first.joints[0], link.limits.pelvis_height_m[1]))
-            self.ended = False
 
     def sensed(self, moment: Moment) -> None:
         """Takes what the robot senses after a control step."""
         with self.lock:
             self._previous, self.latest = self.latest, moment
             self._sensed_s = time.monotonic()
+        self.stepped.set()
 
     def shown(self) -> Moment:
         """Returns the moment to publish. The last control step is played back within the 20 ms after it."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import zmq
 
+from tandem import TandemError
+
 _CONTEXT = zmq.Context()
 
 
@@ -12,7 +14,10 @@ def bound(kind: int, address: str, port: int, **options: int) -> zmq.Socket[byte
     socket = _CONTEXT.socket(kind)
     for name, value in options.items():
         socket.setsockopt(zmq.SocketOption[name], value)
-    socket.bind(f"tcp://{address}:{port}")
+    try:
+        socket.bind(f"tcp://{address}:{port}")
+    except zmq.ZMQError as error:
+        raise TandemError(f"{address}:{port} cannot be served ({error}); give another address with --addresses") from error
     return socket
 
 

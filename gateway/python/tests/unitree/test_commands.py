@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tandem_unitree.robot.clock import Clock
+from tandem_unitree.robot.clock import Clock, PictureTurns
 from tandem_unitree.robot.commands import FACTORY_MODE, RELEASED, BaseRange, Commands
 from tandem_unitree.robot.remarks import Remarks
 from tandem_unitree.robot.services import Services
@@ -223,3 +223,11 @@ def test_steps_are_due_at_multiples_of_20_ms_and_never_made_up_for() -> None:
     assert clock.wait_s() == 0.0
     hands.now_s = 100.309
     assert np.isclose(clock.wait_s(), 0.011)
+
+
+def test_robots_take_turns_to_fetch_pictures() -> None:
+    turns = [PictureTurns(number, 15.0) for number in range(3)]
+    for robot in turns:
+        robot.is_due(9.99)
+    due = [[robot.is_due(10.0 + 0.02 * step + 0.01) for robot in turns] for step in range(6)]
+    assert all(sum(step) == 1 for step in due) and all(sum(robot) == 2 for robot in zip(*due, strict=True))
