@@ -49,7 +49,7 @@ class Adapter:
         settings = self._settings
         topics = Dds(settings.domain, settings.interface)
         exchange = Exchange(self.robot, topics, LeRobot(settings.address))
-        self._note()
+        self._join()
         workers = [threading.Thread(target=self._guarded, args=(self._step,), daemon=True)]
         if settings.camera_fps > 0:
             workers.append(threading.Thread(target=self._guarded, args=(self._look,), daemon=True))
@@ -116,12 +116,13 @@ class Adapter:
                 self._link.close()
                 self._link = Link(seat)
                 robot.begin(self._link)
-                self._note()
+                self._join()
                 return True
         return False
 
-    def _note(self) -> None:
-        """Notes in the recording by what interface and clock the robot is driven."""
+    def _join(self) -> None:
+        """Has partners' commands go on over this robot's steps, and notes interface and clock in the recording."""
+        self._link.pace()
         robot, clock = self._settings.robot, self._settings.clock
         self._link.note(
             f"Robot {robot} is driven over the interfaces of a Unitree G1 (tandem_unitree), clock {clock}. Its programs are "
@@ -169,9 +170,7 @@ def serve_robot(settings: RobotSettings, connection: Connection) -> None:
         return connection.recv() if connection.poll(wait_s) else None
 
     try:
-        adapter = Adapter(settings, connection.recv(), next_seat)
-        connection.send("ready")
-        adapter.run()
+        Adapter(settings, connection.recv(), next_seat).run()
     except (EOFError, KeyboardInterrupt):
         return
     except TandemError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import logging
 import os
 import signal
@@ -121,6 +122,14 @@ def _join(given: argparse.Namespace, token: str) -> int:
     return 0
 
 
+def _check_extra() -> None:
+    """Checks that the packages of the wheel's extra are there."""
+    missing = [name for name in ("cyclonedds", "zmq", "PIL") if importlib.util.find_spec(name) is None]
+    if missing:
+        extra = 'pip install "tandem-sim[unitree]", by Python 3.10 where cyclonedds 0.10 has no other wheel'
+        raise TandemError(f"the extra `unitree` is not installed ({', '.join(missing)} is missing): {extra}")
+
+
 def _interrupt(_signal: int, _frame: object) -> None:
     raise KeyboardInterrupt
 
@@ -133,6 +142,7 @@ def command_line(arguments: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, _interrupt)
     token = given.token or (os.environ.get("TANDEM_TOKEN") if given.task is None else None)
     try:
+        _check_extra()
         if given.task is None:
             if given.server is None or token is None:
                 own.error("give --task to start an episode, or --server and --token to join one")
@@ -151,9 +161,6 @@ def command_line(arguments: Sequence[str] | None = None) -> int:
         play(settings, [robot for robot in _robots(given) if robot.robot in given.robots])
     except KeyboardInterrupt:
         return 130
-    except ModuleNotFoundError as error:
-        print(f"{error}; install the wheel's extra: pip install tandem-sim[unitree]", file=sys.stderr)
-        return 1
     except TandemError as error:
         print(error, file=sys.stderr)
         return 1

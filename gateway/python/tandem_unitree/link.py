@@ -13,12 +13,13 @@ from tandem import Client, EpisodeEnded, Refused
 from tandem.base import ROW_COLUMNS
 
 from .robot.commands import BaseRange
+from .robot.remarks import LOG
 from .robot.sensing import Moment, moment_of
 
 _TOO_LATE = ("late-command", "double-command")
 """Kinds of refusal of a command that came after its step, or while another one of the same robot was waiting."""
 
-_GONE = ("unknown-episode", "no-token", "needs-token", "shutting-down")
+_GONE = ("unknown-episode", "no-token", "operator-finished", "shutting-down")
 """Kinds of refusal where the server no longer holds the episode."""
 
 
@@ -88,6 +89,13 @@ class Link:
         camera = seen["cameras"][0]
         pixels = np.frombuffer(base64.b64decode(seen["arrays"][0]["rgb"]), np.uint8)
         return float(seen["time_s"]), pixels.reshape(camera["height"], camera["width"], 3)
+
+    def pace(self) -> None:
+        """Has partners' commands go on over the single steps of this robot, which a server before this version cannot."""
+        try:
+            self._client.request("POST", "/operate/pace")
+        except Refused as refused:
+            LOG.info("robot %s: commands of partners are cut to one step each (%s)", self.robot, refused.title)
 
     def note(self, text: str) -> None:
         """Keeps a note in the recording."""

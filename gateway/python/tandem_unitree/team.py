@@ -95,9 +95,8 @@ def _play_one(
     tokens = {operator["robot"]: str(operator["token"]) for operator in started["operators"]}
     interrupted = False
     try:
-        _seat(
-            url, tokens, [robot for robot in robots if robot.robot in tokens and robot.robot not in settings.experts], workers
-        )
+        served = [robot for robot in robots if robot.robot in tokens and robot.robot not in settings.experts]
+        _seat(url, tokens, served, workers)
         for robot in settings.experts:
             client.request("POST", "/operate/expert", {"episode": started["episode_id"], "robot": robot})
         _say_free(url, tokens, {worker.robot for worker in workers} | set(settings.experts))
@@ -109,6 +108,8 @@ def _play_one(
     LOG.info("result: %s", json.dumps(result))
     if interrupted:
         raise KeyboardInterrupt
+    if not any(worker.process.is_alive() for worker in workers):
+        raise TandemError("no robot is served any more; the log says why")
     return result
 
 

@@ -9,11 +9,14 @@ from __future__ import annotations
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
+from cyclonedds.core import DDSException
 from cyclonedds.domain import Domain, DomainParticipant
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
+
+from tandem import TandemError
 
 from ..robot.services import SERVICES
 from . import idl
@@ -73,8 +76,13 @@ class Dds:
     """
 
     def __init__(self, domain: int, interface: str) -> None:
-        self._domain = Domain(domain, _CONFIGURATION.format(interface=quoteattr(interface)))
-        self._participant = DomainParticipant(domain)
+        try:
+            self._domain = Domain(domain, _CONFIGURATION.format(interface=quoteattr(interface)))
+            self._participant = DomainParticipant(domain)
+        except DDSException as error:
+            raise TandemError(
+                f"domain {domain} on {interface!r} cannot be served; name an interface of this machine"
+            ) from error
         self._writers = {name: self._writer(name, kind) for name, kind in PUBLISHED.items()}
         self._readers = {name: self._reader(name, kind) for name, kind in SUBSCRIBED.items()}
 

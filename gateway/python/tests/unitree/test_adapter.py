@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import struct
+import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -93,14 +94,39 @@ def test_a_call_is_answered_with_its_own_number(seat: Seat) -> None:
     assert robot.latest.position_m[0] < before_m - 0.03, "it walks"
 
 
-def test_an_episode_that_is_over_is_ended(seat: Seat) -> None:
+def test_commands_of_a_partner_go_on_over_single_steps(tmp_path: Path) -> None:
+    with tandem.serve(runs=tmp_path) as server:
+        body = {"task": "handover", "seed": 0, "operators": "per_robot", "patience_s": 20}
+        started = tandem.Client(server.url).request("POST", "/v1/episodes", body)
+        tokens = [str(operator["token"]) for operator in started["operators"]]
+        bridge = tandem.Client(server.url, token=tokens[0])
+        try:
+            bridge.request("POST", "/operate/pace")
+        except tandem.Refused as refused:
+            pytest.skip(f"the server is of an older build: {refused}")
+        tools = f"/v1/episodes/{started['episode_id']}/tools"
+
+        def steps() -> None:
+            for _ in range(20):
+                bridge.request("POST", f"{tools}/wait", {"steps": 1})
+
+        pacing = threading.Thread(target=steps)
+        pacing.start()
+        reply = tandem.Client(server.url, token=tokens[1]).request("POST", f"{tools}/wait", {"steps": 20})
+        pacing.join()
+        assert reply["executed_steps"] == 20
+
+
+def test_an_episode_that_is_over_is_ended(seat: Seat, tmp_path: Path) -> None:
     link = Link(seat)
-    note: Callable[[str], None] = link.note
-    note("Robot B is driven by a test.")
-    robot = Robot(RobotSettings("B", 2), link)
-    with tandem.serve() as other, pytest.raises(tandem.Refused):
+    link.note("Robot B is driven by a test.")
+    tandem.Client(seat.url).request("DELETE", f"/v1/episodes/{link.episode_id}")
+    with pytest.raises(tandem.EpisodeEnded):
+        link.command(np.zeros(35))
+    with pytest.raises(tandem.EpisodeEnded):
+        link.sense(None)
+    with tandem.serve(runs=tmp_path / "other") as other, pytest.raises(tandem.Refused, match="start another one"):
         Link(Seat(other.url, "0" * 40))
-    assert robot.shown().time_s == robot.latest.time_s
 
 
 def test_the_command_line_says_where_robots_are() -> None:

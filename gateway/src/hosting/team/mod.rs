@@ -58,6 +58,8 @@ struct Wheels {
     drivers: u64,
     /// Whether commands are made of what they say.
     turning: bool,
+    /// Seats of programs that send one control step after another in real time.
+    paced: Vec<usize>,
     /// By seat: whether the task's expert or a policy drives.
     partners: Vec<Option<PartnerKind>>,
     /// By seat: the partner that drove when the server before this one ended, until it is seated again.
@@ -241,8 +243,8 @@ impl Team {
         .await
     }
 
-    /// Takes a command, and answers when it has been executed. Beside people who drive in real time, whose commands are of one step
-    /// each, it goes on over as many of theirs as it has steps; that of an expert or a policy always does.
+    /// Takes a command, and answers when it has been executed. Beside people and programs that drive in real time, whose commands are of
+    /// one step each, it goes on over as many of theirs as it has steps; that of an expert or a policy always does.
     async fn act(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
@@ -288,10 +290,22 @@ impl Team {
         }
     }
 
+    /// Notes that the operator of `robot` sends one control step after another in real time, so that its partners' commands go on over
+    /// as many of these as they have steps.
+    pub fn pace(&self, robot: &str) -> Result<(), HostingError> {
+        let seat = self.seat(robot)?;
+        let mut wheels = self.wheels();
+        if !wheels.paced.contains(&seat) {
+            wheels.paced.push(seat);
+        }
+        Ok(())
+    }
+
     /// Whether a command by who has `seat` goes on where that of a partner was shorter.
     fn goes_on(&self, seat: usize) -> bool {
         let wheels = self.wheels();
-        wheels.partners[seat].is_some() || wheels.seats.iter().any(Option::is_some)
+        let is_beside_program = wheels.paced.iter().any(|paced| *paced != seat);
+        wheels.partners[seat].is_some() || wheels.seats.iter().any(Option::is_some) || is_beside_program
     }
 
     /// Takes a command, and answers when the step has been made.
