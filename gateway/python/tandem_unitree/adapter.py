@@ -11,7 +11,7 @@ from tandem import EpisodeEnded, TandemError
 
 from .exchange import Exchange
 from .link import Link, Seat
-from .robot.clock import PictureTurns
+from .robot.clock import LastMessage, PictureTurns
 from .robot.remarks import LOG
 from .robot.shared import Robot, RobotSettings
 
@@ -26,16 +26,23 @@ class Adapter:
     """One robot on all its interfaces.
 
     next_seat: Waits for up to the given seconds and returns where the next episode is played; `None` where there is none.
+    last_message: When a program was last heard, shared by the episode's robots.
     """
 
-    def __init__(self, settings: RobotSettings, seat: Seat, next_seat: Callable[[float], Seat | None]) -> None:
+    def __init__(
+        self,
+        settings: RobotSettings,
+        seat: Seat,
+        next_seat: Callable[[float], Seat | None],
+        last_message: LastMessage | None = None,
+    ) -> None:
         self._settings = settings
         self._next_seat = next_seat
         self._link = Link(seat)
         self._seat = seat
         if self._link.robot != settings.robot:
             raise TandemError(f"the token is of robot {self._link.robot}, not of {settings.robot}")
-        self.robot = Robot(settings, self._link)
+        self.robot = Robot(settings, self._link, last_message)
         self._stop = threading.Event()
         self.steps = 0
         self.late = 0
@@ -94,6 +101,8 @@ class Adapter:
                     row = robot.commands.row(robot.latest.time_s)
                 if passes and not self._link.command(row):
                     self.late += 1
+                    continue
+                if not passes and not self._link.has_moved():
                     continue
                 robot.sensed(self._link.sense(robot.latest))
             except EpisodeEnded:
@@ -160,7 +169,7 @@ class Adapter:
         )
 
 
-def serve_robot(settings: RobotSettings, connection: Connection) -> None:
+def serve_robot(settings: RobotSettings, connection: Connection, last_message: LastMessage) -> None:
     """Runs the process of one robot. Its seats come by `connection`, so that no token is on a command line."""
     from .command_line import log_to_stderr
 
@@ -170,7 +179,7 @@ def serve_robot(settings: RobotSettings, connection: Connection) -> None:
         return connection.recv() if connection.poll(wait_s) else None
 
     try:
-        Adapter(settings, connection.recv(), next_seat).run()
+        Adapter(settings, connection.recv(), next_seat, last_message).run()
     except (EOFError, KeyboardInterrupt):
         return
     except TandemError as error:

@@ -49,7 +49,7 @@ class Link:
         kind = {kind["kind"]: kind for kind in briefing["kinds"]}[kind_of[self.robot]]
         names = ("vx_m_s", "vy_m_s", "yaw_rate_rad_s", "pelvis_height_m")
         self.limits = BaseRange(**{name: (float(kind[name]["min"]), float(kind[name]["max"])) for name in names})
-        self.instruction = str(briefing["instruction"])
+        self._step = -1
 
     def again(self) -> Link:
         """Returns a further link of the same operator."""
@@ -68,7 +68,16 @@ class Link:
 
     def sense(self, before: Moment | None) -> Moment:
         """Returns what the robot senses now."""
-        return moment_of(self._call("get_robot_state", {"robot": self.robot}), before)
+        state = self._call("get_robot_state", {"robot": self.robot})
+        self._step = int(state["step"])
+        return moment_of(state, before)
+
+    def has_moved(self) -> bool:
+        """Returns whether the episode has moved on since `sense`. Unlike `sense` it makes nobody wait for this robot."""
+        held = self._client.request("GET", "/v1/episodes")["episodes"]
+        if not held or held[0]["ended"] is not None:
+            raise EpisodeEnded("ended", "Episode ended", "the episode has ended")
+        return int(held[0]["step"]) != self._step
 
     def command(self, row: NDArray[np.float64]) -> bool:
         """Executes one control step with an action row. Returns `False` if it came too late for this step and was refused."""

@@ -117,9 +117,10 @@ def _seat(url: str, tokens: dict[str, str], robots: Sequence[RobotSettings], wor
     """Gives each robot's process its seat in an episode, and starts the processes before the first one."""
     if not workers:
         context = multiprocessing.get_context("spawn")
+        last_message = context.Value("d", 0.0, lock=False)
         for robot in robots:
             ours, theirs = context.Pipe()
-            process = context.Process(target=serve_robot, args=(robot, theirs), name=f"robot {robot.robot}")
+            process = context.Process(target=serve_robot, args=(robot, theirs, last_message), name=f"robot {robot.robot}")
             process.start()
             theirs.close()
             workers.append(_Worker(robot.robot, process, ours))

@@ -53,7 +53,7 @@ CASES = {
     ),
     "inspect": Case([*ONE, "--domains", "A=0"], [("clients", "inspect_g1.py")]),
     "teleimager": Case(ONE, [("clients", "teleimager_client.py")], needs_library="turbojpeg"),
-    "hold": Case([*ONE, "--clock", "hold"], [("clients", "thinking.py", "1", "hold")]),
+    "hold": Case(["--task", "handover", "--clock", "hold"], [("clients", "thinking.py", "1", "hold")]),
     "real": Case(ONE, [("clients", "thinking.py", "1", "real")]),
     "latency": Case(ONE, [("clients", "latency.py", "1")]),
     "latency_two": Case(["--task", "handover"], [("clients", "latency.py", domain) for domain in "12"]),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Literal, TypeAlias
+from dataclasses import dataclass
+from typing import Literal, Protocol, TypeAlias
 
 from .sensing import STEP_S
 
@@ -36,6 +37,20 @@ class PictureTurns:
         return due
 
 
+class LastMessage(Protocol):
+    """The time of the last message of any program, which the processes of an episode's robots share."""
+
+    value: float
+    """Time by the monotonic clock, [s]; 0 if there was none yet."""
+
+
+@dataclass
+class OwnLastMessage:
+    """The time of the last message of one robot's programs."""
+
+    value: float = 0.0
+
+
 class Clock:
     """Decides whether a control step is made, and when the next one is due.
 
@@ -43,19 +58,23 @@ class Clock:
     episode command at the same time and none waits for another.
     """
 
-    def __init__(self, kind: ClockKind, monotonic_s: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, kind: ClockKind, last_message: LastMessage | None = None, monotonic_s: Callable[[], float] = time.monotonic
+    ) -> None:
         self._kind = kind
         self._monotonic_s = monotonic_s
-        self._heard_s = -HOLD_AFTER_S - 1.0
+        self._last_message = OwnLastMessage() if last_message is None else last_message
         self._due = int(monotonic_s() / STEP_S) + 1
 
     def heard(self) -> None:
         """Notes that a program has sent a message."""
-        self._heard_s = self._monotonic_s()
+        self._last_message.value = self._monotonic_s()
 
     def passes(self, walks: bool) -> bool:
         """Returns whether time passes; `walks` says that a velocity is in force."""
-        return self._kind == "real" or walks or self._monotonic_s() - self._heard_s < HOLD_AFTER_S
+        if walks:
+            self.heard()
+        return self._kind == "real" or self._monotonic_s() - self._last_message.value < HOLD_AFTER_S
 
     def wait_s(self) -> float:
         """Returns the seconds until the next control step is due, and leaves out those that are already over."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ..link import Link
 from ..wire.joints import standing_row
-from .clock import Clock, ClockKind
+from .clock import Clock, ClockKind, LastMessage
 from .commands import Commands
 from .remarks import Remarks
 from .sensing import STEP_S, Moment
@@ -44,10 +44,10 @@ class RobotSettings:
 class Robot:
     """The commands in force of one robot, and the two control steps between which it is shown."""
 
-    def __init__(self, settings: RobotSettings, link: Link) -> None:
+    def __init__(self, settings: RobotSettings, link: Link, last_message: LastMessage | None = None) -> None:
         self.settings = settings
         self.lock = threading.Lock()
-        self.clock = Clock(settings.clock)
+        self.clock = Clock(settings.clock, last_message)
         self.remarks = Remarks(settings.robot)
         self.stepped = threading.Event()
         self.latest = self._previous = link.sense(None)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tandem_unitree.robot.clock import Clock, PictureTurns
+from tandem_unitree.robot.clock import Clock, OwnLastMessage, PictureTurns
 from tandem_unitree.robot.commands import FACTORY_MODE, RELEASED, BaseRange, Commands
 from tandem_unitree.robot.remarks import Remarks
 from tandem_unitree.robot.services import Services
@@ -203,7 +203,7 @@ class Hands:
 
 def test_the_clock_holds_after_half_a_second() -> None:
     hands = Hands()
-    hold, real = Clock("hold", hands), Clock("real", hands)
+    hold, real = Clock("hold", None, hands), Clock("real", None, hands)
     assert not hold.passes(walks=False) and real.passes(walks=False)
     hold.heard()
     hands.now_s += 0.4
@@ -212,9 +212,19 @@ def test_the_clock_holds_after_half_a_second() -> None:
     assert not hold.passes(walks=False) and hold.passes(walks=True), "a velocity is in force"
 
 
+def test_robots_of_an_episode_hold_together() -> None:
+    hands, shared = Hands(), OwnLastMessage()
+    first, second = Clock("hold", shared, hands), Clock("hold", shared, hands)
+    first.heard()
+    assert second.passes(walks=False)
+    hands.now_s += 1.0
+    assert not second.passes(walks=False)
+    assert first.passes(walks=True) and second.passes(walks=False), "one of them walks"
+
+
 def test_steps_are_due_at_multiples_of_20_ms_and_never_made_up_for() -> None:
     hands = Hands()
-    clock = Clock("real", hands)
+    clock = Clock("real", None, hands)
     hands.now_s = 100.001
     assert np.isclose(clock.wait_s(), 0.039)
     hands.now_s = 100.045

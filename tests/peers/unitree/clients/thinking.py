@@ -26,9 +26,11 @@ loco.SetTimeout(5.0)
 loco.Init()
 time.sleep(1.0)
 for _ in range(2):
+    started = latest[0].tick
     assert loco.SetVelocity(-0.1, 0, 0, 1.0) == 0
     time.sleep(2.2)
     tick, states = latest[0].tick, count[0]
+    assert tick - started >= 1000, "a velocity in force lets time pass"
     time.sleep(4.0)
     passed_ms, came = latest[0].tick - tick, count[0] - states
     print(f"while the program thinks for 4 s, {passed_ms} ms pass and {came} states come")
