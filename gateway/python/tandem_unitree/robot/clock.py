@@ -15,6 +15,9 @@ ClockKind: TypeAlias = Literal["real", "hold"]
 HOLD_AFTER_S = 0.5
 """Time without a message after which the clock `hold` stands still."""
 
+MAX_LATE_STEPS = 5
+"""Steps in a row that may be late before the clock looks whether they really are."""
+
 
 class PictureTurns:
     """Decides after which control steps a robot fetches a picture.
@@ -64,7 +67,9 @@ class Clock:
         self._kind = kind
         self._monotonic_s = monotonic_s
         self._last_message = OwnLastMessage() if last_message is None else last_message
-        self._due = int(monotonic_s() / STEP_S) + 1
+        self._slot = int(monotonic_s() / STEP_S)
+        self._late = 0
+        self._late_since_s = 0.0
 
     def heard(self) -> None:
         """Notes that a program has sent a message."""
@@ -77,7 +82,24 @@ class Clock:
         return self._kind == "real" or self._monotonic_s() - self._last_message.value < HOLD_AFTER_S
 
     def wait_s(self) -> float:
-        """Returns the seconds until the next control step is due, and leaves out those that are already over."""
+        """Returns the seconds until the next control step is due.
+
+        A step that took longer than 20 ms is followed by the next one at once. Where that goes on though steps come every
+        20 ms, this robot commands early and waits for a partner, and it goes back to the multiples of 20 ms.
+        """
         now_s = self._monotonic_s()
-        self._due = max(self._due + 1, int(now_s / STEP_S))
-        return max(0.0, self._due * STEP_S - now_s)
+        slot = int(now_s / STEP_S)
+        if slot <= self._slot:
+            self._slot, self._late = self._slot + 1, 0
+            return self._slot * STEP_S - now_s
+        if self._late == 0:
+            self._late_since_s = now_s
+        self._late += 1
+        self._slot = slot
+        if self._late > MAX_LATE_STEPS:
+            is_early = now_s - self._late_since_s < 1.05 * MAX_LATE_STEPS * STEP_S
+            self._late = 0
+            if is_early:
+                self._slot = slot + 1
+                return self._slot * STEP_S - now_s
+        return 0.0

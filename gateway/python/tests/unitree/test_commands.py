@@ -226,13 +226,27 @@ def test_steps_are_due_at_multiples_of_20_ms_and_never_made_up_for() -> None:
     hands = Hands()
     clock = Clock("real", None, hands)
     hands.now_s = 100.001
-    assert np.isclose(clock.wait_s(), 0.039)
-    hands.now_s = 100.045
+    assert np.isclose(clock.wait_s(), 0.019)
+    hands.now_s = 100.025
     assert np.isclose(clock.wait_s(), 0.015)
     hands.now_s = 100.305
-    assert clock.wait_s() == 0.0
+    assert clock.wait_s() == 0.0, "late: at once"
     hands.now_s = 100.309
     assert np.isclose(clock.wait_s(), 0.011)
+
+
+@pytest.mark.parametrize(("period_s", "is_early"), [(0.020, True), (0.025, False)])
+def test_a_robot_that_waits_for_its_partner_goes_back_into_step(period_s: float, is_early: bool) -> None:
+    hands = Hands()
+    clock = Clock("real", None, hands)
+    waits_s: list[float] = []
+    for _ in range(12):
+        hands.now_s += period_s
+        waits_s.append(clock.wait_s())
+        if waits_s[-1] > 0:
+            break
+        # Its command is executed when the partner has commanded.
+    assert (waits_s[-1] > 0) == is_early
 
 
 def test_robots_take_turns_to_fetch_pictures() -> None:
