@@ -72,7 +72,7 @@ def parser() -> argparse.ArgumentParser:
     what.add_argument("--experts", type=_names, default=(), help="robots that the task's expert drives, for example B")
     what.add_argument("--runs", type=Path, default=Path("runs"), help="folder of recordings; default runs")
     what.add_argument("--server", help="URL of a server to play on; without it one is started")
-    what.add_argument("--token", help="operator's token, to join an episode (also read from TANDEM_TOKEN)")
+    what.add_argument("--token", help="an operator's token, or with --task the server's; also read from TANDEM_TOKEN")
     how = own.add_argument_group("how robots are reached")
     how.add_argument("--domains", type=_domains, default={}, help="DDS domains, for example A=0; default A=1,B=2,C=3")
     how.add_argument("--interface", default="lo", help="network interface of the DDS topics; default lo")
@@ -156,6 +156,7 @@ def command_line(arguments: Sequence[str] | None = None) -> int:
             episodes=given.episodes,
             experts=given.experts,
             server=given.server,
+            token=given.token,
             runs=given.runs,
         )
         play(settings, [robot for robot in _robots(given) if robot.robot in given.robots])

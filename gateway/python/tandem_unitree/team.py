@@ -44,6 +44,9 @@ class EpisodeSettings:
     server: str | None = None
     """Server to play on; `None` starts one."""
 
+    token: str | None = None
+    """Token of that server, if it wants one."""
+
     runs: Path = Path("runs")
     """Folder of the recordings of a server that is started."""
 
@@ -76,7 +79,7 @@ def play(settings: EpisodeSettings, robots: Sequence[RobotSettings]) -> list[dic
     workers: list[_Worker] = []
     results: list[dict[str, Any]] = []
     with _server(settings) as url:
-        client = Client(url)
+        client = Client(url, token=settings.token)
         try:
             for seed in range(settings.seed, settings.seed + settings.episodes):
                 results.append(_play_one(client, url, settings, seed, robots, workers))

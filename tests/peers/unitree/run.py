@@ -75,21 +75,35 @@ def command(*words, **options):
         raise Skipped(f"{' '.join(map(str, words))} failed: {(done.stderr or done.stdout).strip()[-300:]}")
 
 
-def environment(folder, interpreter, *installs):
+def fingerprint(word):
+    """Returns a word of a command line, with the contents or the age of the file that it names."""
+    path = Path(word.partition("[")[0])
+    if path.suffix == ".txt":
+        return path.read_text()
+    return f"{word} {path.stat().st_mtime_ns}" if path.suffix == ".whl" and path.exists() else word
+
+
+def interpreter_of(version):
+    """Returns an interpreter of a version of Python that runs, from the path or from pyenv."""
+    name = f"python{version}"
+    found = [shutil.which(name), *sorted(Path.home().glob(f".pyenv/versions/{version}*/bin/{name}"))]
+    for path in filter(None, found):
+        if subprocess.run([path, "--version"], capture_output=True, check=False).returncode == 0:
+            return str(path)
+    raise Skipped(f"no {name}")
+
+
+def environment(folder, version, *installs):
     """Returns the interpreter of an environment, which is made unless it is there."""
     python = folder / "bin" / "python"
-    done = folder / "complete"
-    if done.exists():
+    done, wanted = folder / "complete.txt", "\n".join(fingerprint(word) for install in installs for word in install)
+    if done.exists() and done.read_text() == wanted:
         return python
-    found = shutil.which(interpreter) or next(
-        (str(path) for path in Path.home().glob(f".pyenv/versions/{interpreter.removeprefix('python')}*/bin/python")), None
-    )
-    if found is None:
-        raise Skipped(f"no {interpreter}")
+    found = interpreter_of(version)
     command(found, "-m", "venv", "--clear", str(folder))
     for install in installs:
         command(str(python), "-m", "pip", "install", "--quiet", *install)
-    done.touch()
+    done.write_text(wanted)
     return python
 
 
@@ -97,16 +111,16 @@ def environments(given):
     """Returns what makes each environment; those that were given are taken as they are."""
     folder = Path(given.environments)
     own = {
-        "bridge": lambda: environment(folder / "bridge", "python3.10", [f"{given.wheel}[unitree]"]),
+        "bridge": lambda: environment(folder / "bridge", "3.10", [f"{given.wheel}[unitree]"]),
         "clients": lambda: environment(
             folder / "clients",
-            "python3.10",
+            "3.10",
             ["-r", str(HERE / "clients.txt")],
             ["--no-deps", "-r", str(HERE / "clients_alone.txt")],
         ),
         "lerobot": lambda: environment(
             folder / "lerobot",
-            "python3.12",
+            "3.12",
             ["-r", str(HERE / "lerobot.txt")],
             ["--no-deps", "-r", str(HERE / "lerobot_alone.txt")],
         ),
