@@ -10,7 +10,7 @@ from multiprocessing.connection import Connection
 from tandem import EpisodeEnded, TandemError
 
 from .exchange import Exchange
-from .link import Link, Seat
+from .link import Access, Link
 from .robot.clock import LastMessage, PictureTurns
 from .robot.remarks import LOG
 from .robot.shared import Robot, RobotSettings
@@ -25,21 +25,21 @@ IDLE_PICTURE_S = 0.05
 class Adapter:
     """One robot on all its interfaces.
 
-    next_seat: Waits for up to the given seconds and returns where the next episode is played; `None` where there is none.
+    next_access: Waits for up to the given seconds and returns the access to the next episode; `None` where there is none.
     last_message: When a program was last heard, shared by the episode's robots.
     """
 
     def __init__(
         self,
         settings: RobotSettings,
-        seat: Seat,
-        next_seat: Callable[[float], Seat | None],
+        access: Access,
+        next_access: Callable[[float], Access | None],
         last_message: LastMessage | None = None,
     ) -> None:
         self._settings = settings
-        self._next_seat = next_seat
-        self._link = Link(seat)
-        self._seat = seat
+        self._next_access = next_access
+        self._link = Link(access)
+        self._access = access
         if self._link.robot != settings.robot:
             raise TandemError(f"the token is of robot {self._link.robot}, not of {settings.robot}")
         self.robot = Robot(settings, self._link, last_message)
@@ -117,13 +117,13 @@ class Adapter:
         LOG.info("robot %s: the episode has ended; states go on as they are", self._settings.robot)
         while not self._stop.is_set():
             try:
-                seat = self._next_seat(END_POLL_S)
+                access = self._next_access(END_POLL_S)
             except (EOFError, OSError):
                 return False
-            if seat is not None:
-                self._seat = seat
+            if access is not None:
+                self._access = access
                 self._link.close()
-                self._link = Link(seat)
+                self._link = Link(access)
                 robot.begin(self._link)
                 self._join()
                 return True
@@ -144,7 +144,7 @@ class Adapter:
 
         cameras = Cameras(self._settings.address, self._settings.camera_fps)
         turns = PictureTurns(ord(self._settings.robot) - ord("A"), self._settings.camera_fps)
-        seat, link = self._seat, Link(self._seat)
+        access, link = self._access, Link(self._access)
         while not self._stop.is_set():
             cameras.answer()
             if not cameras.are_watched():
@@ -154,8 +154,8 @@ class Adapter:
             self.robot.stepped.clear()
             if not turns.is_due(time.monotonic()):
                 continue
-            if seat is not self._seat:
-                seat, link = self._seat, Link(self._seat)
+            if access is not self._access:
+                access, link = self._access, Link(self._access)
             try:
                 cameras.publish(link.picture()[1])
             except EpisodeEnded:
@@ -170,16 +170,16 @@ class Adapter:
 
 
 def serve_robot(settings: RobotSettings, connection: Connection, last_message: LastMessage) -> None:
-    """Runs the process of one robot. Its seats come by `connection`, so that no token is on a command line."""
+    """Runs the process of one robot. Accesses come by `connection`, so that no token is on a command line."""
     from .command_line import log_to_stderr
 
     log_to_stderr()
 
-    def next_seat(wait_s: float) -> Seat | None:
+    def next_access(wait_s: float) -> Access | None:
         return connection.recv() if connection.poll(wait_s) else None
 
     try:
-        Adapter(settings, connection.recv(), next_seat, last_message).run()
+        Adapter(settings, connection.recv(), next_access, last_message).run()
     except (EOFError, KeyboardInterrupt):
         return
     except TandemError as error:

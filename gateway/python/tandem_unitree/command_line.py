@@ -14,7 +14,7 @@ from pathlib import Path
 
 from tandem import TandemError
 
-from .link import Link, Seat
+from .link import Access, Link
 from .robot.remarks import LOG
 from .robot.shared import RobotSettings
 
@@ -23,7 +23,7 @@ ROBOTS = {
     "B": RobotSettings("B", 2, address="127.0.0.3"),
     "C": RobotSettings("C", 3, address="127.0.0.4"),
 }
-"""Where robots are reached where nothing else is said."""
+"""Domains and addresses of robots by default."""
 
 
 def log_to_stderr(*, verbose: bool = False) -> None:
@@ -110,15 +110,15 @@ def _join(given: argparse.Namespace, token: str) -> int:
     """Joins an episode as the operator of one robot, in this process."""
     from .adapter import Adapter
 
-    seat = Seat(given.server, token)
-    link = Link(seat)
+    access = Access(given.server, token)
+    link = Link(access)
     settings = {one.robot: one for one in _robots(given)}[link.robot]
     link.close()
 
-    def no_seat(wait_s: float) -> Seat | None:
+    def no_access(wait_s: float) -> Access | None:
         raise EOFError
 
-    Adapter(settings, seat, no_seat).run()
+    Adapter(settings, access, no_access).run()
     return 0
 
 

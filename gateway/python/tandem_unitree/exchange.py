@@ -64,7 +64,7 @@ class Exchange:
             time.sleep(max(0.0, due_s - time.monotonic()))
 
     def take(self) -> None:
-        """Reads what programs have sent."""
+        """Reads the messages of programs."""
         robot = self._robot
         with robot.lock:
             heard = self._take_joints()
@@ -108,7 +108,7 @@ class Exchange:
             self._topics.write(f"rt/api/{service}/response", response(request, code, data))
 
     def publish(self) -> None:
-        """Publishes what is due in this turn."""
+        """Publishes the messages that are due in this turn."""
         messages, topics = self._messages, self._topics
         moment = self._robot.shown()
         low_state = messages.low_state(moment)

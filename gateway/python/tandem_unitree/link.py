@@ -24,8 +24,8 @@ _GONE = ("unknown-episode", "no-token", "operator-finished", "shutting-down")
 
 
 @dataclass(frozen=True)
-class Seat:
-    """Where an operator plays: a server, and the token that names episode and robot."""
+class Access:
+    """Access of an operator: a server, and the token that names episode and robot."""
 
     url: str
     token: str
@@ -34,9 +34,9 @@ class Seat:
 class Link:
     """One operator's connection. A link is for one thread; `again` makes another for a second thread."""
 
-    def __init__(self, seat: Seat) -> None:
-        self._seat = seat
-        self._client = Client(seat.url, token=seat.token)
+    def __init__(self, access: Access) -> None:
+        self._access = access
+        self._client = Client(access.url, token=access.token)
         held = self._client.request("GET", "/v1/episodes")["episodes"]
         if not held:
             raise Refused(
@@ -53,7 +53,7 @@ class Link:
 
     def again(self) -> Link:
         """Returns a further link of the same operator."""
-        return Link(self._seat)
+        return Link(self._access)
 
     def _get(self, path: str) -> Any:
         return self._client.request("GET", f"/v1/episodes/{self.episode_id}{path}")
@@ -67,7 +67,7 @@ class Link:
             raise
 
     def sense(self, before: Moment | None) -> Moment:
-        """Returns what the robot senses now."""
+        """Returns the robot's present state."""
         state = self._call("get_robot_state", {"robot": self.robot})
         self._step = int(state["step"])
         return moment_of(state, before)
@@ -93,7 +93,7 @@ class Link:
         return True
 
     def picture(self) -> tuple[float, NDArray[np.uint8]]:
-        """Returns the simulated time and what the head camera sees: height by width by red, green, blue."""
+        """Returns the simulated time and the head camera's picture: height by width by red, green, blue."""
         seen = self._call("observe", {"robots": [self.robot], "images": "rgb", "short": True})
         camera = seen["cameras"][0]
         pixels = np.frombuffer(base64.b64decode(seen["arrays"][0]["rgb"]), np.uint8)

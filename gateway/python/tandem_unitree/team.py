@@ -17,7 +17,7 @@ from tandem import Client, TandemError, serve
 from tandem.contract.replies import Protocol
 
 from .adapter import serve_robot
-from .link import Seat
+from .link import Access
 from .robot.remarks import LOG
 from .robot.shared import RobotSettings
 
@@ -30,7 +30,7 @@ POLL_S = 0.25
 
 @dataclass(frozen=True)
 class EpisodeSettings:
-    """What is played."""
+    """The episodes to play."""
 
     task: str
     seed: int = 0
@@ -74,7 +74,7 @@ def _server(settings: EpisodeSettings) -> Generator[str]:
 def play(settings: EpisodeSettings, robots: Sequence[RobotSettings]) -> list[dict[str, Any]]:
     """Plays episodes, each robot in a process of its own, and returns their results.
 
-    robots: How each robot would be reached; those that the task does not have, and those of the expert, are left out.
+    robots: Interfaces of each robot; those that the task does not have, and those of the expert, are left out.
     """
     workers: list[_Worker] = []
     results: list[dict[str, Any]] = []
@@ -99,7 +99,7 @@ def _play_one(
     interrupted = False
     try:
         served = [robot for robot in robots if robot.robot in tokens and robot.robot not in settings.experts]
-        _seat(url, tokens, served, workers)
+        _give_access(url, tokens, served, workers)
         for robot in settings.experts:
             client.request("POST", "/operate/expert", {"episode": started["episode_id"], "robot": robot})
         _say_free(url, tokens, {worker.robot for worker in workers} | set(settings.experts))
@@ -116,8 +116,8 @@ def _play_one(
     return result
 
 
-def _seat(url: str, tokens: dict[str, str], robots: Sequence[RobotSettings], workers: list[_Worker]) -> None:
-    """Gives each robot's process its seat in an episode, and starts the processes before the first one."""
+def _give_access(url: str, tokens: dict[str, str], robots: Sequence[RobotSettings], workers: list[_Worker]) -> None:
+    """Gives each robot's process access to an episode, and starts the processes before the first one."""
     if not workers:
         context = multiprocessing.get_context("spawn")
         last_message = context.Value("d", 0.0, lock=False)
@@ -130,11 +130,11 @@ def _seat(url: str, tokens: dict[str, str], robots: Sequence[RobotSettings], wor
     if not workers:
         raise TandemError("no robot is left to be driven; name some with --robots")
     for worker in workers:
-        worker.connection.send(Seat(url, tokens[worker.robot]))
+        worker.connection.send(Access(url, tokens[worker.robot]))
 
 
 def _say_free(url: str, tokens: dict[str, str], driven: set[str]) -> None:
-    """Says how other operators take the robots that nobody drives."""
+    """Logs the tokens of robots that nobody drives."""
     for robot, token in tokens.items():
         if robot not in driven:
             LOG.info("robot %s stands still until its operator calls: %s, token %s", robot, url, token)

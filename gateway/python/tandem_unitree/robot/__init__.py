@@ -1,1 +1,1 @@
-"""One simulated G1: what it is told, what it senses, what it publishes, and when its time passes."""
+"""One simulated G1: its commands, senses, messages and clock."""

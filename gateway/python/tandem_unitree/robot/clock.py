@@ -1,4 +1,4 @@
-"""When a robot's time passes."""
+"""Clock of a robot's control steps."""
 
 from __future__ import annotations
 

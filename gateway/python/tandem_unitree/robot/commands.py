@@ -1,4 +1,4 @@
-"""What programs ask of a robot, and the action row that comes of it."""
+"""Commands of a robot's programs, and the action row that follows from them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The messages that a robot publishes, filled by NumPy from what it senses."""
+"""The messages that a robot publishes, filled by NumPy."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MOTOR_TEMPERATURES = (35, 40)
 MOTOR_VOLTAGE = 54.0
 IMU_TEMPERATURE = 40
 STATE_OF_CHARGE = 100
-"""Constants of what the simulator does not simulate."""
+"""Constants in place of quantities that are not simulated."""
 
 SMALLEST_ANGLE_RAD = 1e-6
 """Replaces an angle of exactly zero of a finger: xr_teleoperate waits until an angle of a hand differs from zero."""

@@ -1,4 +1,4 @@
-"""Log lines that say once what a program asks for and the simulator does not do."""
+"""Log lines about requests that the simulator does not follow, each written once."""
 
 from __future__ import annotations
 

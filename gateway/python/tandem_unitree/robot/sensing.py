@@ -1,4 +1,4 @@
-"""What a robot senses, from the replies of `get_robot_state`, with the rates that an IMU would measure."""
+"""Joints, orientation and odometry of a robot from replies of `get_robot_state`, with the rates that an IMU measures."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ STEP_S = 0.02
 
 @dataclass(frozen=True)
 class Moment:
-    """What a robot senses at one control step."""
+    """State of a robot at one control step."""
 
     time_s: float
     """Simulated seconds since the episode began."""
@@ -43,7 +43,7 @@ class Moment:
     """Velocity of the pelvis in the start frame, averaged over the last control step."""
 
     fallen: bool
-    """Whether the robot has fallen."""
+    """True if the robot has fallen."""
 
     @property
     def accelerometer_m_s2(self) -> Vector:

@@ -1,6 +1,6 @@
 """RPC services of a G1: `sport` (called `loco` by older programs), `arm` and `motion_switcher`.
 
-What the simulator cannot do is answered with code 3203 and one log line. Numbers of calls and their parameters as in
+Calls that cannot be simulated get code 3203 and one log line. Numbers of calls and their parameters as in
 `g1_loco_api.py`, `g1_arm_action_api.py` and `motion_switcher_api.py` of unitree_sdk2_python.
 """
 

@@ -1,4 +1,4 @@
-"""What the threads of one robot's process share."""
+"""State shared by the threads of one robot's process."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .services import Services
 
 @dataclass(frozen=True)
 class RobotSettings:
-    """How the programs of one robot reach it."""
+    """Interfaces and clock of one robot."""
 
     robot: str
     """The robot, for example "A"."""
@@ -32,17 +32,17 @@ class RobotSettings:
     """IP address of its ZMQ sockets."""
 
     clock: ClockKind = "real"
-    """When its time passes."""
+    """Rule by which its time passes."""
 
     released: bool = False
-    """Whether it begins with the mode released, so that `rt/lowcmd` drives it."""
+    """True if it begins with the mode released, so that `rt/lowcmd` drives it."""
 
     camera_fps: float = 15.0
     """Pictures a second while a client watches; 0 for no cameras."""
 
 
 class Robot:
-    """The commands in force of one robot, and the two control steps between which it is shown."""
+    """The commands in force of one robot, and the last two control steps, between which states are interpolated."""
 
     def __init__(self, settings: RobotSettings, link: Link, last_message: LastMessage | None = None) -> None:
         self.settings = settings

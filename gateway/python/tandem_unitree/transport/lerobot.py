@@ -45,7 +45,7 @@ def command_of(payload: bytes) -> Record | None:
 
 
 def state_payload(low: Record) -> bytes:
-    """Returns the message that tells a `LowState_`; a motor's temperature is the mean of its two."""
+    """Returns the message of a `LowState_`; a motor's temperature is the mean of its two."""
     motors = low["motors"]
     columns = zip(
         motors["q"].tolist(),
@@ -83,6 +83,6 @@ class LeRobot:
         return None if newest is None else command_of(newest)
 
     def publish(self, low: Record) -> None:
-        """Tells a `LowState_` if a client listens."""
+        """Sends a `LowState_` if a client listens."""
         if self._states.has_subscribers():
             self._states.send(state_payload(low))

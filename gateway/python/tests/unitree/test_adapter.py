@@ -17,7 +17,7 @@ pytest.importorskip("zmq")
 import tandem
 from tandem_unitree.command_line import parser
 from tandem_unitree.exchange import Exchange
-from tandem_unitree.link import Link, Seat
+from tandem_unitree.link import Access, Link
 from tandem_unitree.robot.shared import Robot, RobotSettings
 from tandem_unitree.wire.layout import LOW_COMMAND, LOW_STATE, blank, body_of, command_crc, serialized, state_crc
 
@@ -39,13 +39,13 @@ class Topics:
 
 
 @pytest.fixture
-def seat(tmp_path: Path) -> Iterator[Seat]:
-    """The seat of robot B, whose partner is not there."""
+def access(tmp_path: Path) -> Iterator[Access]:
+    """The access of robot B, whose partner is not there."""
     with tandem.serve(runs=tmp_path) as server:
         body = {"task": "handover", "seed": 0, "operators": "per_robot", "patience_s": 0.05}
         started = tandem.Client(server.url).request("POST", "/v1/episodes", body)
         [token] = [operator["token"] for operator in started["operators"] if operator["robot"] == "B"]
-        yield Seat(server.url, token)
+        yield Access(server.url, token)
 
 
 def turned(robot: Robot, link: Link, exchange: Exchange, steps: int) -> float:
@@ -58,8 +58,8 @@ def turned(robot: Robot, link: Link, exchange: Exchange, steps: int) -> float:
     return float(robot.latest.joints[0, 12])
 
 
-def test_a_robot_follows_its_programs(seat: Seat) -> None:
-    link = Link(seat)
+def test_a_robot_follows_its_programs(access: Access) -> None:
+    link = Link(access)
     assert link.robot == "B" and link.limits.pelvis_height_m[1] > 0.7
     robot, topics = Robot(RobotSettings("B", 2), link), Topics()
     exchange = Exchange(robot, topics, None)
@@ -79,8 +79,8 @@ def test_a_robot_follows_its_programs(seat: Seat) -> None:
     )
 
 
-def test_a_call_is_answered_with_its_own_number(seat: Seat) -> None:
-    link = Link(seat)
+def test_a_call_is_answered_with_its_own_number(access: Access) -> None:
+    link = Link(access)
     robot, topics = Robot(RobotSettings("B", 2), link), Topics()
     text = json.dumps({"velocity": [-0.2, 0, 0], "duration": 5}).encode() + b"\0"
     header = b"\0\1\0\0" + struct.pack("<qqqi?3xI", 77, 7105, 0, 0, False, len(text))
@@ -117,16 +117,16 @@ def test_commands_of_a_partner_go_on_over_single_steps(tmp_path: Path) -> None:
         assert reply["executed_steps"] == 20
 
 
-def test_an_episode_that_is_over_is_ended(seat: Seat, tmp_path: Path) -> None:
-    link = Link(seat)
+def test_an_episode_that_is_over_is_ended(access: Access, tmp_path: Path) -> None:
+    link = Link(access)
     link.note("Robot B is driven by a test.")
-    tandem.Client(seat.url).request("DELETE", f"/v1/episodes/{link.episode_id}")
+    tandem.Client(access.url).request("DELETE", f"/v1/episodes/{link.episode_id}")
     with pytest.raises(tandem.EpisodeEnded):
         link.command(np.zeros(35))
     with pytest.raises(tandem.EpisodeEnded):
         link.sense(None)
     with tandem.serve(runs=tmp_path / "other") as other, pytest.raises(tandem.Refused, match="start another one"):
-        Link(Seat(other.url, "0" * 40))
+        Link(Access(other.url, "0" * 40))
 
 
 def test_the_command_line_says_where_robots_are() -> None:
