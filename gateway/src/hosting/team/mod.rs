@@ -60,6 +60,8 @@ struct Wheels {
     drivers: u64,
     /// True while a task turns setpoints into commands.
     turning: bool,
+    /// Seats of programs that send one control step after another in real time.
+    paced: Vec<usize>,
     /// Expert or policy that drives, by seat.
     partners: Vec<Option<PartnerKind>>,
     /// Partner that drove when the previous server ended, by seat; `None` once it drives again.
@@ -247,8 +249,8 @@ impl Team {
 
     /// Takes a command and answers when it has been executed.
     ///
-    /// People who drive in real time command one step each. Beside them, a longer command continues over
-    /// as many of their rounds as it has steps. Commands of an expert or a policy always do.
+    /// People and programs that drive in real time command one step each. Beside them, a longer command
+    /// continues over as many of their rounds as it has steps. Commands of an expert or a policy always do.
     async fn act(
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
@@ -294,12 +296,28 @@ impl Team {
         }
     }
 
+    /// Notes that the operator of `robot` sends one control step after another in real time, so that its
+    /// partners' commands continue over them.
+    ///
+    /// # Errors
+    ///
+    /// A robot without an operator.
+    pub fn pace(&self, robot: &str) -> Result<(), HostingError> {
+        let seat = self.seat(robot)?;
+        let mut wheels = self.wheels();
+        if !wheels.paced.contains(&seat) {
+            wheels.paced.push(seat);
+        }
+        Ok(())
+    }
+
     /// Returns true where a command by the operator on `seat` goes on after a shorter one of a partner:
-    /// beside people, partners of this process and plans, whose commands are short.
+    /// beside people and programs in real time, partners of this process and plans, whose commands are short.
     fn goes_on(&self, seat: usize) -> bool {
         let wheels = self.wheels();
         wheels.partners[seat].is_some()
             || wheels.seats.iter().any(Option::is_some)
+            || wheels.paced.iter().any(|paced| *paced != seat)
             || wheels.plans.iter().any(|plans| *plans > 0)
     }
 

@@ -40,6 +40,7 @@ pub fn router() -> Router<AppState> {
         .route("/operate/mark", post(collecting::mark))
         .route("/operate/code", post(collecting::code))
         .route("/operate/expert", post(expert))
+        .route("/operate/pace", post(pace))
         .route("/operate/policy", get(known_policy).merge(post(policy)))
         .route(ENTER, post(drive::enter))
         .route(DRIVE, get(drive::drive))
@@ -80,6 +81,17 @@ async fn expert(
     let StandIn { episode, robot } = stand_in(&app, &who, &body)?;
     let (hosted, team) = app.table.team(&episode).await?;
     team.take_expert(&hosted.thread, &robot).await?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Lets partners' commands continue over those of the calling operator, which sends one control step after
+/// another in real time.
+async fn pace(
+    State(app): State<AppState>,
+    Extension(caller): Extension<Caller>,
+) -> Result<StatusCode, ApiError> {
+    let (_, team, robot) = app.table.own_robot(&caller).await?;
+    team.pace(robot)?;
     Ok(StatusCode::NO_CONTENT)
 }
 

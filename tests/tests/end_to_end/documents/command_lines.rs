@@ -88,7 +88,9 @@ fn check_command(words: &[&str]) -> Result<(), String> {
             true => Ok(()),
             false => check_tandem(args),
         },
-        ["python" | "python3", "-m", module, ..] if module.starts_with("tandem.") => {
+        ["python" | "python3", "-m", module, ..]
+            if module.starts_with("tandem.") || module.starts_with("tandem_") =>
+        {
             expect_file(&format!("gateway/python/{}/__main__.py", module.replace('.', "/")))
         }
         ["python" | "python3", file, ..] => expect_file(file),

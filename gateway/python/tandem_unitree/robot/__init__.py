@@ -1,0 +1,1 @@
+"""One simulated G1: its commands, senses, messages and clock."""

@@ -1,0 +1,1 @@
+"""DDS topics and ZMQ sockets."""
