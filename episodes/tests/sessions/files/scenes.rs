@@ -97,7 +97,7 @@ fn what_a_scene_lacks_is_named() {
     check("handover.xml", "0.7071068 0 0 0.7071068", "0.9 0.43 0 0", &["site \"task\"", "tilted by 51"]);
     check("handover.xml", r#"file="scene.xml""#, r#"file="hall.xml""#, &["hall.xml"]);
     check("scene.xml", "kitchen_north_wall_wall.obj", "wall.obj", &["cannot read", "meshes/wall.obj"]);
-    check("scene.xml", "kitchen_north_wall_wall.obj", "wall.msh", &["wall.msh", "use .obj or .stl"]);
+    check("scene.xml", "kitchen_north_wall_wall.obj", "wall.ply", &["wall.ply", "use .obj, .stl or .msh"]);
     check("scene.xml", "floor_texture.png", "floor.png", &["cannot read", "floor.png"]);
     check("scene.xml", r#"mesh="kitchen_island_visual_mesh""#, r#"mesh="top""#, &["mesh `top` is no asset"]);
     check(

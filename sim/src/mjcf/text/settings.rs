@@ -27,7 +27,7 @@ impl FileSettings {
         let xml = source.xml()?;
         let stated = |tag: &str, attribute: &str| {
             let elements = xml.descendants().filter(|node| node.has_tag_name(tag));
-            elements.filter_map(|node| node.attribute(attribute)).last()
+            elements.filter_map(|node| node.attribute(attribute)).next_back()
         };
         let mut settings = FileSettings::default();
         let numbers = |text: &str| -> Vec<i32> {
