@@ -152,7 +152,8 @@ fn a_plan_walks_and_goes_on() {
     assert!(refused.contains("no robot \"C\""), "{refused}");
 }
 
-/// A plan's commands are what the tools take, `short` among it: the reply is short where the last command asked for that.
+/// A plan's commands are what the tools take, `short` among it: the reply is short where the last command
+/// asked for that.
 #[test]
 fn commands_of_a_plan_may_ask_for_short_replies() {
     let mut session = agentic();

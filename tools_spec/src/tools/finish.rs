@@ -58,7 +58,8 @@ pub struct ResultReply {
     pub protocol: Protocol,
     /// Times in simulated seconds at which phases were reached; null where one was not, or is not disclosed.
     pub phases: PhaseTimes,
-    /// True if every phase was reached; left out where phases are not disclosed, and in results of earlier versions.
+    /// True if every phase was reached; left out where phases are not disclosed, and in results of earlier
+    /// versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub success: Option<bool>,
     /// Why the episode ended.

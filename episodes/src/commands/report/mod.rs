@@ -30,8 +30,9 @@ const TOUCHED_N: f32 = 3.0;
 /// Tolerance within which free fingers reach their targets.
 const FINGER_TOLERANCE_RAD: f64 = 0.06;
 
-/// Returns the report on an order. `clamped` are its clamped values, `sensed` is the robot's sensing
-/// after it, and `began` is the pelvis before it by odometry. Wrist poses are in the frame of the latest wrist targets.
+/// Returns the report on an order. `clamped` are its clamped values, `sensed` is the robot's sensing after
+/// it, and `began` is the pelvis before it by odometry. Wrist poses are in the frame of the latest wrist
+/// targets.
 pub fn report(clamped: &Clamped, began: &Pose, sensed: &RobotSensed, motion: &Motion) -> RobotReport {
     let (robot, frame) = (&motion.robot, motion.state().frame);
     RobotReport {

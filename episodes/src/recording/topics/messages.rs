@@ -387,7 +387,8 @@ impl ToolCallRecord {
     }
 }
 
-/// A picture that a call showed: what the robot's camera saw after this many control steps, which its topic has.
+/// A picture that a call showed: what the robot's camera saw after this many control steps, which its topic
+/// has.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ShownPicture {
     pub robot: String,

@@ -28,7 +28,8 @@ pub struct NoteMessage {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "String")]
     pub model: Option<String>,
-    /// Tokens that the model read, those from a cache included; absent, as the next two, where none were counted.
+    /// Tokens that the model read, those from a cache included; absent, as the next two, where none were
+    /// counted.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "u32")]
     pub input_tokens: Option<u32>,

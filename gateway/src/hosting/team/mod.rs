@@ -14,6 +14,7 @@ mod planning;
 mod round;
 
 use std::{
+    collections::BTreeSet,
     sync::{
         Arc, Mutex, MutexGuard,
         atomic::{AtomicBool, Ordering::Relaxed},
@@ -61,7 +62,7 @@ struct Wheels {
     /// True while a task turns setpoints into commands.
     turning: bool,
     /// Seats of programs that send one control step after another in real time.
-    paced: Vec<usize>,
+    paced: BTreeSet<usize>,
     /// Expert or policy that drives, by seat.
     partners: Vec<Option<PartnerKind>>,
     /// Partner that drove when the previous server ended, by seat; `None` once it drives again.
@@ -296,18 +297,11 @@ impl Team {
         }
     }
 
-    /// Notes that the operator of `robot` sends one control step after another in real time, so that its
-    /// partners' commands continue over them.
-    ///
-    /// # Errors
-    ///
-    /// A robot without an operator.
+    /// Notes that the operator of `robot` sends control steps in real time: its partners' commands go on
+    /// over them.
     pub fn pace(&self, robot: &str) -> Result<(), HostingError> {
         let seat = self.seat(robot)?;
-        let mut wheels = self.wheels();
-        if !wheels.paced.contains(&seat) {
-            wheels.paced.push(seat);
-        }
+        self.wheels().paced.insert(seat);
         Ok(())
     }
 
