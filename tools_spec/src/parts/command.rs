@@ -184,11 +184,10 @@ pub struct HandReport {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub largest_effort: Option<Effort>,
     /// Force of the world on the hand in newtons, [x, y, z] in the pelvis frame, as the arm's own joints
-    /// feel it: a hand that holds
-    /// 0.5 kg feels about -4.9 along z, one that presses ahead on something a negative x. What moving the arm takes is not counted; an arm
-    /// that hangs free may feel up to 5 N of its own friction. Left out of a short reply where it is less
-    /// than 1 N, of an arm that keeps its joints and holds nothing less than 6 N, and where the assistance
-    /// is "paper".
+    /// feel it: a hand that holds 0.5 kg feels about -4.9 along z, one that presses ahead on something a
+    /// negative x. What moving the arm takes is not counted; an arm that hangs free may feel up to 5 N of
+    /// its own friction. Left out of a short reply where it is less than 1 N, of an arm that keeps its
+    /// joints and holds nothing less than 6 N, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_n: Option<[f64; 3]>,
     /// Joints of this arm and hand whose target lay beyond a limit and was moved to it; left out where
