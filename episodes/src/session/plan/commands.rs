@@ -15,6 +15,7 @@ use crate::session::Session;
 pub struct CommandList {
     steps: Vec<PlanStep>,
     index: usize,
+    begun: usize,
     current: Option<CurrentCommand>,
 }
 
@@ -55,7 +56,7 @@ impl Session {
                 return Err(refused("`heard` is for operators, each of whom has a robot".into()).into());
             }
         }
-        Ok(CommandList { steps, index: 0, current: None })
+        Ok(CommandList { steps, index: 0, begun: 0, current: None })
     }
 
     fn check_phase(&self, step: &PlanStep) -> Result<(), String> {
@@ -88,7 +89,7 @@ impl CommandList {
                 },
                 _ => match CurrentCommand::begin(session, step) {
                     Ok((call, current)) => {
-                        self.current = Some(current);
+                        (self.current, self.begun) = (Some(current), self.index + 1);
                         return PlanAdvance::Make(call);
                     }
                     Err(stopped) => Some(stopped),
@@ -104,13 +105,12 @@ impl CommandList {
 
     /// Returns the number of commands that have been begun, however many short ones each is made of.
     pub fn begun(&self) -> u32 {
-        let begun = self.index + usize::from(self.current.is_some());
-        begun.min(self.steps.len()) as u32
+        self.begun as u32
     }
 
     /// Returns true if the last command asks for a short reply.
     pub fn is_short(&self) -> bool {
-        self.steps.get(self.index).or(self.steps.last()).is_some_and(|step| step.short)
+        self.begun.checked_sub(1).and_then(|last| self.steps.get(last)).is_some_and(|step| step.short)
     }
 }
 

@@ -268,9 +268,10 @@ fn every_grip_of_the_brief_grips() {
         })
         .collect();
     assert!(failed.is_empty(), "{failed:?}");
-    assert_eq!(
-        start("handover", 2012, Protocol::Benchmark).briefing().brief.grips.len(),
-        TRIALS.len(),
-        "every grip is tried"
-    );
+    let told = TRIALS.iter().flat_map(|trial| {
+        let grips = start(trial.task, 2012, Protocol::Benchmark).briefing().brief.grips;
+        grips.into_iter().map(|grip| grip.thing)
+    });
+    let told: std::collections::BTreeSet<String> = told.collect();
+    assert_eq!(told.len(), TRIALS.len(), "every grip is tried: {told:?}");
 }

@@ -47,7 +47,7 @@ const PAPER: &[(&str, &str)] = &[
     ),
     (
         "finish",
-        "task protocol assistance phases.p1 phases.p2 phases.p3 ended env_steps tool_calls requests thinking_s falls realtime_factor \
+        "task protocol assistance phases.p1 phases.p2 phases.p3 success ended env_steps tool_calls requests thinking_s falls realtime_factor \
          departures",
     ),
 ];

@@ -87,7 +87,8 @@ impl Document {
         for asset in &self.model.assets.meshes {
             let Some(path) = self.model.resolve_mesh_file(asset, &self.folder) else { continue };
             let path = self.source.beside_including(with_own_separators(path));
-            let bytes = read_mesh_bytes(&path).map_err(|source| unreadable(&path, source));
+            let bytes = check_kind(&path)
+                .and_then(|()| read_mesh_bytes(&path).map_err(|source| unreadable(&path, source)));
             match bytes.and_then(|bytes| Ok((self.read_mesh(asset, &path, &bytes)?, xxh3_64(&bytes)))) {
                 Ok((mesh, hash)) => {
                     self.files.push((path, hash));
@@ -139,10 +140,22 @@ pub(in crate::mjcf) fn read_mesh_bytes(path: &Path) -> io::Result<Vec<u8>> {
     read_bytes(path, MAX_MESH_BYTES)
 }
 
+/// Refuses a file whose extension names no kind of mesh, whether it is there or not.
+fn check_kind(path: &Path) -> Result<(), SimError> {
+    match kind(path).as_str() {
+        "obj" | "stl" | "msh" => Ok(()),
+        _ => Err(SimError::MeshKind { path: path.display().to_string() }),
+    }
+}
+
+/// Returns the extension of a file in lower case.
+fn kind(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
 /// Parses a file of the kind given by its extension.
 fn read(path: &Path, bytes: &[u8]) -> Result<Mesh, SimError> {
-    let kind = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    match kind.as_str() {
+    match kind(path).as_str() {
         "obj" => read_obj(path, bytes),
         "stl" => read_stl(path, bytes),
         "msh" => read_msh(bytes).ok_or_else(|| {
