@@ -41,7 +41,7 @@ pub struct WalkMove {
     /// Waist angle to the left of straight ahead: head and arms turn along, at 1 rad/s. Null: unchanged.
     pub waist_yaw_rad: Option<f64>,
     /// Point [x, y, z] in the pelvis frame to look at: the waist turns and, as far as the picture needs,
-    /// bends. In place of waist_yaw_rad.
+    /// bends; arms go along. In place of waist_yaw_rad.
     pub look_at_m: Option<[f64; 3]>,
 }
 
