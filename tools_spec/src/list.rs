@@ -5,7 +5,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use crate::error::SpecError;
-use crate::parts::{Assistance, CommandReply, Wording};
+use crate::parts::{Assistance, CommandReply, PlanReply, Wording};
 use crate::schema::{ToolSpec, TypedTools, TypedToolsCollector};
 use crate::tool::{Tool, parse_args};
 use crate::tools::*;

@@ -15,7 +15,7 @@ const FINGERS_DOWN: [[f64; 4]; 2] = [[HALF, 0.0, HALF, 0.0]; 2];
 
 /// Returns the grips of these kinds, or every one.
 pub fn grips(kinds: Option<&[GripKind]>) -> Vec<WorkedGrip> {
-    let all = wrapped().into_iter().chain(pinched());
+    let all = wrapped().into_iter().chain(pinched()).chain(rims());
     all.filter(|(kind, _)| kinds.is_none_or(|kinds| kinds.contains(kind))).map(|(_, grip)| grip).collect()
 }
 
@@ -62,7 +62,7 @@ fn wrapped() -> Vec<(GripKind, WorkedGrip)> {
     ]
 }
 
-/// Returns the grips that press an object with the thumb against palm or fingers.
+/// Returns the grips that press a plate or a leg with the thumb against palm or fingers.
 fn pinched() -> Vec<(GripKind, WorkedGrip)> {
     vec![
         (
@@ -97,6 +97,12 @@ fn pinched() -> Vec<(GripKind, WorkedGrip)> {
                 )
             },
         ),
+    ]
+}
+
+/// Returns the grips that press a rim with the thumb against palm or fingers.
+fn rims() -> Vec<(GripKind, WorkedGrip)> {
+    vec![
         (
             GripKind::Rim,
             WorkedGrip {

@@ -6,6 +6,7 @@ mod episode;
 mod frames;
 mod note;
 mod pictures;
+mod plan;
 mod quantities;
 
 pub use command::{
@@ -20,4 +21,5 @@ pub use episode::{
 pub use frames::PoseFrame;
 pub use note::{AgentEnding, ModelEnding, Note, NoteKind, TokenCount, Usage};
 pub use pictures::{Bytes, CameraArrays, DepthFormat, Formats, ImageFormat, PixelRegion, Png};
+pub use plan::PlanReply;
 pub use quantities::{BASE_COLUMNS, BaseCommand, BaseLimits, JointValues, Pose, Range};

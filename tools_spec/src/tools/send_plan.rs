@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use crate::checks;
-use crate::parts::CommandReply;
+use crate::parts::PlanReply;
 use crate::tool::Tool;
 use crate::tools::{MoveWrists, SendJointChunk, Wait, Walk, WalkTo};
 
@@ -177,19 +177,4 @@ impl PlannedCommand {
             _ => Ok(()),
         }
     }
-}
-
-/// The reply to `send_plan` and `walk_to`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct PlanReply {
-    /// Commands that were carried out. Each counts as a tool call of the episode.
-    pub commands: u32,
-    /// Tool calls of the episode up to now.
-    pub tool_calls: u32,
-    /// Control steps of 20 ms that they took together.
-    pub executed_steps: u32,
-    /// Why no more were; null where all was done.
-    pub stopped: Option<String>,
-    /// The reply to the last command that was carried out.
-    pub last: CommandReply,
 }

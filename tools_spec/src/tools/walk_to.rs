@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::checks;
 use crate::limits;
+use crate::parts::PlanReply;
 use crate::tool::Tool;
-use crate::tools::PlanReply;
 
 /// The most control steps of one call: thirty seconds.
 const MAX_STEPS: u32 = 1500;

@@ -183,8 +183,8 @@ class WalkMove:
     """Waist angle to the left of straight ahead: head and arms turn along, at 1 rad/s. None: unchanged."""
 
     look_at_m: Numbers | None = None
-    """Point [x, y, z] in the pelvis frame to look at: the waist turns and, as far as the picture needs, bends. In
-    place of waist_yaw_rad.
+    """Point [x, y, z] in the pelvis frame to look at: the waist turns and, as far as the picture needs, bends;
+    arms go along. In place of waist_yaw_rad.
     """
 
 

@@ -364,7 +364,7 @@ class PlanReply:
     """The reply to `send_plan` and `walk_to`."""
 
     commands: int
-    """Commands that were carried out. Each counts as a tool call of the episode."""
+    """Commands that were carried out: of a plan, those that it lists; of a walk, each short one."""
 
     tool_calls: int
     """Tool calls of the episode up to now."""

@@ -163,10 +163,7 @@ impl ServerHandler for McpServer {
             let text = format!("no tool {:?}; have: {}", request.name, have.join(", "));
             return Err(ErrorData::invalid_params(text, None));
         }
-        let mut args = request.arguments.unwrap_or_default();
-        // A model reads every reply, so that a short one is the default, as the instructions say.
-        args.entry("short").or_insert(true.into());
-        let args = Value::Object(args);
+        let args = Value::Object(request.arguments.unwrap_or_default());
         let episode = args["episode_id"].as_str().map(str::to_owned);
         let called = match duplicate_field(&context) {
             Some(DuplicateField(reason)) => Err(ApiError::MalformedJson(reason.clone())),
@@ -203,7 +200,7 @@ impl McpServer {
     async fn call(&self, caller: &Caller, name: &str, args: Value) -> Result<Vec<ContentBlock>, ApiError> {
         match name {
             ListTasks::NAME => {
-                let ListTasks { short } = parse_args(args)?;
+                let ListTasks { short } = parse_args(short_unless_given(args))?;
                 let list = self.app.table.task_list();
                 json_block(&if short { list.shortened() } else { list })
             }
@@ -211,7 +208,7 @@ impl McpServer {
                 if let Caller::Operator { .. } = caller {
                     return Err(HostingError::HostsBusiness.into());
                 }
-                let (args, driving) = parse_start(args)?;
+                let (args, driving) = parse_start(short_unless_given(args))?;
                 json_block(&self.app.table.start_driven(args, driving).await?)
             }
             _ => self.call_episode(caller, name, args).await,
@@ -239,7 +236,8 @@ impl McpServer {
         let handle = args.as_object_mut().and_then(|object| object.shift_remove("episode_id"));
         let asked = args.to_string();
         let named = handle.as_ref().and_then(Value::as_str).unwrap_or("as start_episode returned it");
-        let call = Call::parse(name, args).map_err(|error| ApiError::from(error.naming_episode(named)));
+        let call = Call::parse(name, short_unless_given(args))
+            .map_err(|error| ApiError::from(error.naming_episode(named)));
         let id = match (handle, caller) {
             (Some(Value::String(id)), _) => id,
             // An operator's token implies its episode.
@@ -273,6 +271,14 @@ impl McpServer {
         let answered = episode.call(caller, call, None).await;
         content(&answered.map_err(|error| ApiError::from(error).in_episode(&episode.thread))?.reply)
     }
+}
+
+/// Asks for a short reply unless the call says otherwise: a model reads all of it, and the instructions say so.
+fn short_unless_given(mut args: Value) -> Value {
+    if let Some(args) = args.as_object_mut() {
+        args.entry("short").or_insert(true.into());
+    }
+    args
 }
 
 /// Returns the content of an answer: its JSON without images, then the images.

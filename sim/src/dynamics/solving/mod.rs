@@ -35,7 +35,7 @@ const DEEP_M: f64 = 0.01;
 /// Penetration depth from which on a contact is rigid.
 const RIGID_M: f64 = 0.02;
 /// Lower bound of the inverse mass of a contact's normal, as a share of the links' own inverse masses.
-const LEAST_SHARE: f64 = 0.01;
+const MIN_SHARE: f64 = 0.01;
 /// Energy (J) removed by the relaxing sweeps above which they may have failed to remove all of it.
 const HARD_J: f64 = 0.3;
 
@@ -302,7 +302,7 @@ fn giving_share(gap_m: f64) -> f64 {
     ((RIGID_M + gap_m) / (RIGID_M - DEEP_M)).clamp(0.0, 1.0)
 }
 
-/// Returns the least inverse mass (1/kg) along a contact's normal: [`LEAST_SHARE`] of the two links' own
+/// Returns the least inverse mass (1/kg) along a contact's normal: [`MIN_SHARE`] of the two links' own
 /// inverse masses. The inverse mass is lower only where joints let neither link move. The result is 0 between
 /// two trees, or a tree and the world, if a tree is free: the inverse mass is then at least that of the
 /// whole tree.
@@ -316,7 +316,7 @@ fn least_inverse_mass(trees: &Trees, bodies: [Option<LinkId>; 2]) -> f64 {
         let mass_kg = trees.all[body.tree.index()].links[body.link].mass.mass_kg;
         if mass_kg > 0.0 { mass_kg.recip() } else { 0.0 }
     };
-    LEAST_SHARE * bodies.into_iter().flatten().map(own).sum::<f64>()
+    MIN_SHARE * bodies.into_iter().flatten().map(own).sum::<f64>()
 }
 
 /// Adds a contact. Returns its index.

@@ -98,13 +98,13 @@ fn key(geoms: &[&Geom]) -> u128 {
 struct Content(Xxh3);
 
 impl Content {
-    fn numbers(&mut self, numbers: &[f32]) {
-        numbers.iter().for_each(|number| self.0.update(&number.to_bits().to_ne_bytes()));
+    fn numbers(&mut self, values: &[f32]) {
+        values.iter().for_each(|number| self.0.update(&number.to_bits().to_ne_bytes()));
     }
 
-    fn points(&mut self, points: &[Vector]) {
-        self.0.update(&points.len().to_ne_bytes());
-        points.iter().for_each(|point| self.numbers(&point.to_array()));
+    fn points(&mut self, points_m: &[Vector]) {
+        self.0.update(&points_m.len().to_ne_bytes());
+        points_m.iter().for_each(|point| self.numbers(&point.to_array()));
     }
 
     fn shape(&mut self, shape: &Primitive) {
@@ -128,9 +128,9 @@ impl Content {
         }
     }
 
-    fn kind(&mut self, kind: u8, numbers: &[f32]) {
+    fn kind(&mut self, kind: u8, values: &[f32]) {
         self.0.update(&[kind]);
-        self.numbers(numbers);
+        self.numbers(values);
     }
 }
 

@@ -54,7 +54,7 @@ fn two_people_drive_and_time_stands_still_while_one_is_away() {
         assert_eq!(steps(), before);
         // B returns.
         let back = team.ask(1, "move_wrists", tick("B", 0.25)).ok();
-        assert_eq!(back["partners"], json!([{ "robot": "A", "did": "acted" }]));
+        assert_eq!(back["partners"], json!([{ "robot": "A", "did": "acted", "tool": "move_wrists" }]));
         assert_eq!(waiting.join().expect("A's answer").ok()["executed_steps"], 5);
     });
     // The link of one robot does not move another.

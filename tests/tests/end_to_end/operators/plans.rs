@@ -7,7 +7,7 @@ use super::team::Team;
 /// B's wait of 50 steps is answered once, though A's walk is many short commands.
 #[test]
 fn a_walk_goes_on_beside_the_partners_commands() {
-    let team = Team::start(json!({}));
+    let team = Team::start(json!({ "patience_s": 5 }));
     let walk = json!({ "steps": 300, "robots": [{ "robot": "A", "to_m": [-0.2, 0.0] }] });
     let (a, waits) = std::thread::scope(|scope| {
         let walks = scope.spawn(|| team.ask(0, "walk_to", walk).ok());
@@ -30,7 +30,7 @@ fn a_walk_goes_on_beside_the_partners_commands() {
 
 #[test]
 fn an_operator_waits_in_one_call_until_it_hears() {
-    let team = Team::start(json!({ "talk": true }));
+    let team = Team::start(json!({ "talk": true, "patience_s": 5 }));
     let until = |heard: bool| {
         json!({ "commands": [
             { "tool": "wait", "arguments": { "steps": 400 }, "expects": { "heard": heard }, "until": true },

@@ -70,7 +70,7 @@ fn a_step_is_made_when_both_have_commanded_and_the_shorter_command_ends_it() {
         assert_eq!((&reply["executed_steps"], &reply["step"]), (&json!(4), &json!(4)), "{reply}");
     }
     assert_eq!((&a["stop_reason"], &b["stop_reason"]), (&json!("partner_done"), &json!("steps_done")));
-    assert_eq!(a["partners"], json!([{ "robot": "B", "did": "acted" }]));
+    assert_eq!(a["partners"], json!([{ "robot": "B", "did": "acted", "tool": "send_joint_chunk" }]));
     assert_eq!((names(&a["robots"], "robot"), names(&b["robots"], "robot")), (vec!["A"], vec!["B"]));
     assert_eq!(a["robots"][0]["right"]["state"], "moving", "four tenths of the way: {a}");
     assert!(a.get("observation").is_none());
@@ -163,7 +163,9 @@ fn operators_talk_where_they_may() {
     team.ask(0, "say", json!({ "text": "" })).refused(422, &["text is empty"]);
     let words = ["I lift it.", "Take it by the top."];
     words.iter().for_each(|text| drop(team.ask(0, "say", json!({ "text": text })).ok()));
-    let heard = words.map(|text| json!({ "from": "A", "text": text }));
+    let told =
+        |(text, number): (&str, u32)| json!({ "from": "A", "text": text, "step": 0, "number": number });
+    let heard = [(words[0], 1), (words[1], 2)].map(told);
     let reply = team.ask(1, "wait", json!({ "steps": 2 })).ok();
     assert_eq!(reply["heard"], json!(heard));
     assert!(team.ask(1, "get_status", json!({})).ok().get("heard").is_none(), "once is enough");

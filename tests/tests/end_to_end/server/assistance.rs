@@ -33,8 +33,8 @@ const FULL_WORDS: [&str; 9] = [
     "phases that are scored",
     "pelvis_in_start",
     "base_motion",
-    "are blocked",
-    "Closed around",
+    "is blocked",
+    "close to close_rad",
 ];
 
 fn server(assistance: Assistance) -> TestServer {
@@ -87,15 +87,21 @@ fn replies(server: &TestServer) -> Vec<(&'static str, Value)> {
     let looking = json!({ "steps": 1, "observe": { "depth": "png16" } });
     vec![
         ("the list of tasks", server.get("/v1/tasks").ok()),
-        ("the list of tasks over MCP", over_mcp(server, "list_tasks", json!({}))),
+        ("the list of tasks over MCP", over_mcp(server, "list_tasks", json!({ "short": false }))),
         ("the start", started),
         ("the briefing", server.get(&format!("{path}/briefing")).ok()),
         ("the status", server.get(&path).ok()),
         ("a command that looks", server.tool(&id, "wait", &looking).ok()),
         ("a look", server.tool(&id, "observe", &json!({ "short": false, "images": "rgb" })).ok()),
-        ("a command over MCP", over_mcp(server, "wait", json!({ "episode_id": id, "steps": 1 }))),
-        ("a look over MCP", over_mcp(server, "observe", json!({ "episode_id": id }))),
-        ("a state over MCP", over_mcp(server, "get_robot_state", json!({ "episode_id": id, "robot": "A" }))),
+        (
+            "a command over MCP",
+            over_mcp(server, "wait", json!({ "episode_id": id, "steps": 1, "short": false })),
+        ),
+        ("a look over MCP", over_mcp(server, "observe", json!({ "episode_id": id, "short": false }))),
+        (
+            "a state over MCP",
+            over_mcp(server, "get_robot_state", json!({ "episode_id": id, "robot": "A", "short": false })),
+        ),
         ("an operator's command", of_team("wait", json!({ "steps": 1, "observe": {} }))),
         ("an operator's look", of_team("observe", json!({ "robots": ["A"] }))),
         ("an operator's words", of_team("say", json!({ "text": "hello" }))),

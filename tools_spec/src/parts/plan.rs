@@ -1,0 +1,21 @@
+//! The reply to several commands by one call.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::command::CommandReply;
+
+/// The reply to `send_plan` and `walk_to`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PlanReply {
+    /// Commands that were carried out: of a plan, those that it lists; of a walk, each short one.
+    pub commands: u32,
+    /// Tool calls of the episode up to now.
+    pub tool_calls: u32,
+    /// Control steps of 20 ms that they took together.
+    pub executed_steps: u32,
+    /// Why no more were; null where all was done.
+    pub stopped: Option<String>,
+    /// The reply to the last command that was carried out.
+    pub last: CommandReply,
+}
