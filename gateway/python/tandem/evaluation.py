@@ -273,8 +273,7 @@ class Plan:
         return replace(self, tasks=[task], seeds=[seed], out=None, progress=None)
 
     def play(self, folder: Path, jobs: int = 1) -> dict[str, Any]:
-        """Plays the missing episodes of the folder in this process, and returns the new contents of `results.json`.
-        """
+        """Plays the missing episodes of the folder in this process, and returns the new contents of `results.json`."""
         policy = self.policy
         if isinstance(policy, str):
             return self._run(None, folder, jobs)
@@ -359,8 +358,8 @@ class _WatchedPolicy:
             is_broken = not self._has_played and len(self._failures) >= MAX_EQUAL_FAILURES and len(set(self._failures)) == 1
             if is_broken:
                 self.broken = (
-                    f"the policy has failed alike in the first {MAX_EQUAL_FAILURES} episodes ({self._failures[0]}); mend it, and run "
-                    "the evaluation again: what was played is kept"
+                    f"the policy has failed alike in the first {MAX_EQUAL_FAILURES} episodes ({self._failures[0]}); mend it, "
+                    "and run the evaluation again: what was played is kept"
                 )
         if is_broken:
             # This ends the evaluation before it starts another episode.

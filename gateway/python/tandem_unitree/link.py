@@ -97,7 +97,7 @@ class Link:
         seen = self._call("observe", {"robots": [self.robot], "images": "rgb", "short": True})
         camera = seen["cameras"][0]
         pixels = np.frombuffer(base64.b64decode(seen["arrays"][0]["rgb"]), np.uint8)
-        return float(seen["time_s"]), pixels.reshape(camera["height"], camera["width"], 3)
+        return float(seen["time_s"]), np.reshape(pixels, (camera["height"], camera["width"], 3))
 
     def pace(self) -> None:
         """Has partners' commands go on over the single steps of this robot, which a server before this version cannot."""

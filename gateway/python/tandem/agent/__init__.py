@@ -1,6 +1,6 @@
 """Language models as players: a tool loop for any endpoint with OpenAI's or Anthropic's formats.
 
-    python -m tandem.agent --model NAME --api openai --task handover --seed 0
+python -m tandem.agent --model NAME --api openai --task handover --seed 0
 """
 
 from __future__ import annotations

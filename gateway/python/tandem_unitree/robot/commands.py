@@ -57,7 +57,7 @@ class Commands:
 
     def stand(self, standing: NDArray[np.float64]) -> None:
         """Forgets all commands; the robot keeps the pose `standing`, as at the beginning of an episode."""
-        self._rest = standing.copy()
+        self._rest: NDArray[np.float64] = np.array(standing)
         self._low = self._arm = None
         self._until_s = -np.inf
 
@@ -119,10 +119,10 @@ class Commands:
         """Walks with vx [m/s], vy [m/s] and yaw rate [rad/s] until the simulated time `until_s`."""
         ranges = (self.limits.vx_m_s, self.limits.vy_m_s, self.limits.yaw_rate_rad_s)
         wanted = np.array(velocity, dtype=np.float64)
-        low, high = np.array(ranges).T
-        self._velocity = np.clip(wanted, low, high)
+        low, high = ([float(limits[end]) for limits in ranges] for end in (0, 1))
+        self._velocity = np.minimum(np.maximum(wanted, low), high)
         if not np.array_equal(wanted, self._velocity):
-            self.remarks.once(f"velocities are limited to {low.tolist()} .. {high.tolist()} (vx m/s, vy m/s, yaw rad/s)")
+            self.remarks.once(f"velocities are limited to {low} .. {high} (vx m/s, vy m/s, yaw rad/s)")
         self._until_s = until_s
 
     def walks(self, time_s: float) -> bool:
@@ -131,7 +131,7 @@ class Commands:
 
     def row(self, time_s: float) -> NDArray[np.float64]:
         """Returns the action row in force at a simulated time."""
-        row = self._rest.copy()
+        row: NDArray[np.float64] = np.array(self._rest)
         if self._low is not None:
             self._take(row, self._low, 1.0, needs_mode=True)
         elif self._arm is not None:

@@ -196,7 +196,7 @@ def _command_mask() -> NDArray[np.uint8]:
     """Returns ones where a `LowCmd_` has data and zeros where it has padding, whose bytes a sender may leave undefined."""
     mask = np.full(LOW_COMMAND.itemsize, 0xFF, np.uint8)
     mask[3] = 0
-    motors = mask[4 : 4 + MOTORS * MOTOR_COMMAND.itemsize].reshape(MOTORS, MOTOR_COMMAND.itemsize)
+    motors = np.reshape(mask[4 : 4 + MOTORS * MOTOR_COMMAND.itemsize], (MOTORS, MOTOR_COMMAND.itemsize))
     motors[:-1, 25:] = 0
     return mask
 

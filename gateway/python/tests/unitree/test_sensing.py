@@ -69,7 +69,7 @@ def test_the_torso_turns_as_the_difference_of_its_orientations() -> None:
     joints[0, 12:15], joints[1, 12:15] = [0.4, -0.3, 0.2], [0.5, 0.7, -0.6]
     pelvis, gyro, step_s = quaternion(0.1, 0.2, 0.3), np.array([0.3, -0.1, 0.2]), 1e-5
     orientation, rate = torso_of(moment(joints, pelvis, gyro))
-    later = joints.copy()
+    later = np.array(joints)
     later[0] += step_s * joints[1]
     turned = product(pelvis, np.array([1.0, *(0.5 * step_s * gyro)]))
     after, _ = torso_of(moment(later, turned / np.linalg.norm(turned), gyro))

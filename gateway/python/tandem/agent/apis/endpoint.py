@@ -21,7 +21,7 @@ RETRIES = 6
 NO_KEY = "none"
 """Placeholder key: local endpoints such as Ollama and vLLM need none, but the SDKs require one."""
 
-_MOST_CHARACTERS = 500
+_MAX_CHARACTERS = 500
 _REFUSED = (400, 422)
 _TOO_LONG = re.compile(
     r"context.{0,20}(length|window|size)|too long|too many tokens|maximum.{0,40}tokens|exceed.{0,40}(token|context)", re.I
@@ -123,7 +123,7 @@ def request(sdk: Any, settings: AgentSettings, optional: OptionalFields, send: C
         except Exception as error:
             # Some versions of the SDKs pass invalid or truncated JSON on without an error of their own.
             text = f"{_where(settings)} answers nothing that the API {settings.api} knows: {type(error).__name__}: {error}"
-            raise EndpointError(without_keys(text[:_MOST_CHARACTERS])) from None
+            raise EndpointError(without_keys(text[:_MAX_CHARACTERS])) from None
 
 
 def understood(settings: AgentSettings, read: Callable[[], Reply]) -> Reply:
@@ -132,11 +132,11 @@ def understood(settings: AgentSettings, read: Callable[[], Reply]) -> Reply:
         return read()
     except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
         text = f"{_where(settings)} answers what is no reply of the API {settings.api}: {type(error).__name__}: {error}"
-        raise EndpointError(without_keys(text[:_MOST_CHARACTERS])) from None
+        raise EndpointError(without_keys(text[:_MAX_CHARACTERS])) from None
 
 
 def _status_error(settings: AgentSettings, status: int, message: str, told: str) -> EndpointError:
-    short = " ".join(message.removeprefix(f"Error code: {status} - ").split())[:_MOST_CHARACTERS]
+    short = " ".join(message.removeprefix(f"Error code: {status} - ").split())[:_MAX_CHARACTERS]
     text = without_keys(f"{_where(settings)} answers {status}: {short}")
     if status in (*_REFUSED, 413) and _TOO_LONG.search(told):
         return TooLong(text)
