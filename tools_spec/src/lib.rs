@@ -33,8 +33,8 @@ pub use parts::{
     Budget, Bytes, CameraArrays, CommandReply, DepthFormat, Disclosure, Driving, Effort, ExtraInformation,
     FingerReport, Formats, Grip, HandPart, HandReport, HandState, Heard, Hints, ImageFormat, JointValues,
     ModelEnding, NextPhase, Note, NoteKind, OperatorToken, Operators, Partner, PartnerDid, PhaseReached,
-    PixelRegion, Png, Pose, PoseFrame, Protocol, Range, RobotFallen, RobotReport, StopReason, TokenCount,
-    Touch, Usage, Wording,
+    PixelRegion, PlanReply, Png, Pose, PoseFrame, Protocol, Range, RobotFallen, RobotReport, StopReason,
+    TokenCount, Touch, Usage, Wording,
 };
 pub use refusal::{ProblemBody, Refusal, RefusalClass};
 pub use schema::{EpisodeToolSpec, Format, ToolSpec, TypedTool, TypedTools};
