@@ -13,7 +13,7 @@ const PITCH_RAD_S: f64 = 0.5;
 /// Maximum vertical angle between a point to look at and the middle of the image.
 const OFF_MIDDLE_RAD: f64 = 0.35;
 /// Maximum pitch for a look; a robot that bends further steps.
-const MAX_BEND_RAD: f64 = 0.45;
+const MAX_BEND_RAD: f64 = 0.35;
 
 /// The same base command at every step, while waist joints move to their targets.
 pub struct WalkTrajectory {

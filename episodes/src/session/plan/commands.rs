@@ -77,6 +77,10 @@ impl Session {
 impl CommandList {
     /// Returns the next command after the reply to the previous one.
     pub fn advance(&mut self, session: &Session, last: Option<&CommandReply>, heard: bool) -> PlanAdvance {
+        if last.is_some_and(|reply| reply.fallen.iter().any(|robot| robot.fallen)) {
+            let place = format!("command {} of {}", self.begun, self.steps.len());
+            return PlanAdvance::Done(Some(format!("after {place}: a robot has fallen")));
+        }
         loop {
             let Some(step) = self.steps.get(self.index) else { return PlanAdvance::Done(None) };
             let stopped = match (self.current.take(), last) {
