@@ -109,7 +109,7 @@ fn a_command_lasts_until_what_it_expects_holds() {
     let reply = plan(&mut session, "send_plan", json!({ "commands": [over, settle, lower] })).unwrap();
     assert_eq!(reply.stopped, None, "{reply:?}");
     let lowering_steps = reply.executed_steps - 50;
-    assert!((100..300).contains(&lowering_steps) && lowering_steps % 5 == 0, "{reply:?}");
+    assert!((100..300).contains(&lowering_steps) && lowering_steps.is_multiple_of(5), "{reply:?}");
     let still = json!({
         "tool": "wait", "arguments": { "steps": 12 }, "expects": { "phase_reached": "p1" }, "until": true,
     });

@@ -39,10 +39,10 @@ pub fn word(schema: &mut Value, wording: Wording) {
                 false => None,
             };
             let of_paper = text_of("paper");
-            if let Some(Value::String(text)) = object.get_mut("description") {
-                if let (Some(of_paper), Assistance::Paper) = (of_paper, wording.assistance) {
-                    *text = of_paper;
-                }
+            if let (Some(of_paper), Assistance::Paper) = (of_paper, wording.assistance)
+                && let Some(Value::String(text)) = object.get_mut("description")
+            {
+                *text = of_paper;
             }
             object.values_mut().for_each(|value| word(value, wording));
         }

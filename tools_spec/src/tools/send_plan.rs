@@ -143,12 +143,9 @@ impl Tool for SendPlan {
                 checks::finite(&format!("{}: expects.{name}", self.place(index)), force_n.as_slice())?;
             }
         }
-        let named = self.commands.iter().enumerate();
-        named
-            .map(|(index, command)| {
-                command.check_name().map_err(|why| format!("{}: {why}", self.place(index)))
-            })
-            .collect()
+        self.commands.iter().enumerate().try_for_each(|(index, command)| {
+            command.check_name().map_err(|why| format!("{}: {why}", self.place(index)))
+        })
     }
 }
 
