@@ -14,8 +14,8 @@ const BENT_KNEES: &str = " A robot walks with bent knees: while it steps its pel
 
 const PARTNERS: &str = "The pelvis frames of different robots are unrelated. To relate two of them, find the same two points, well \
     apart, with query_depth of both robots: robots at full height stand upright to within a few degrees, so a turn about z and a shift take the \
-    points of the one to those of the other. With a lowered pelvis or far-reaching arms a robot leans ahead by 5 to 20 degrees: then level its \
-    points first, by the plane of floor or table.";
+    points of the one to those of the other. With a lowered pelvis or far-reaching arms a robot leans ahead by 5 to 20 degrees: then turn its \
+    points upright first, by the plane of floor or table.";
 
 const PARTNERS_MOVE: &str = " In frame \"level\" they are upright exactly, and pelvis_in_start keeps the relation valid while robots move.";
 

@@ -106,7 +106,6 @@ fn what_a_scene_lacks_is_named() {
         r#"<geom name="wall_collision" type="sdf""#,
         &["wall_collision"],
     );
-    check("scene.xml", r#"type="hinge""#, r#"type="ball""#, &["kitchen_cupboard_1_door_hinge", "is a ball"]);
     check("scene.xml", r#"body2="kitchen_cupboard_1_door""#, r#"body2="door""#, &["exclude of `door`"]);
     check(
         "scene.xml",
