@@ -31,7 +31,7 @@ def import_model(source: Path, out: Path) -> Report:
         "<mujoco>",
         '<compiler angle="radian" meshdir="meshes" texturedir="textures"/>',
         options(model, report),
-        custom(source.read_text(errors="replace")),
+        custom(source.read_text(encoding="utf-8", errors="replace")),
         *write_assets(model, names, out, report),
         *write_bodies(model, names, report),
         *write_contacts(model, names, report),
