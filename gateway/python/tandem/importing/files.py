@@ -30,7 +30,7 @@ def write_obj(path: Path, vertices: Array, faces: Array, uv: Array | None = None
         lines += [f"f {a}/{ta} {b}/{tb} {c}/{tc}" for (a, b, c), (ta, tb, tc) in corners]
     else:
         lines += [f"f {a} {b} {c}" for a, b, c in faces + 1]
-    path.write_text("\n".join(lines) + "\n")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def write_png(path: Path, pixels: Array) -> None:

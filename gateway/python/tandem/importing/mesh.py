@@ -41,7 +41,9 @@ def import_mesh(source: Path, out: Path) -> Report:
     name = escaped(source.stem)
     body = f'<body name="{name}"><freejoint/>{"".join(geoms)}</body>'
     head = '<mujoco><compiler meshdir="meshes" texturedir="textures"/>'
-    written.write_text("\n".join([head, "<asset>", *assets, "</asset>", f"<worldbody>{body}</worldbody></mujoco>"]) + "\n")
+    written.write_text(
+        "\n".join([head, "<asset>", *assets, "</asset>", f"<worldbody>{body}</worldbody></mujoco>"]) + "\n", encoding="utf-8"
+    )
     report.bodies.append({"name": source.stem, "mass_kg": mass_kg(pieces), "joints": ["free"]})
     return report
 

@@ -39,7 +39,7 @@ def import_model(source: Path, out: Path) -> Report:
         *write_actuators(model, names, report),
         "</mujoco>",
     ]
-    written.write_text("\n".join(part for part in parts if part) + "\n")
+    written.write_text("\n".join(part for part in parts if part) + "\n", encoding="utf-8")
     rest(model, report)
     report.after_1_s = compared(model, mujoco.MjModel.from_xml_path(str(written)), names)
     return report

@@ -29,7 +29,7 @@ class Report:
         self.dropped = dict(Counter(self.dropped) + Counter({what: times}))
 
     def write(self, out: Path) -> None:
-        (out / "report.json").write_text(json.dumps(asdict(self), indent=1) + "\n")
+        (out / "report.json").write_text(json.dumps(asdict(self), indent=1) + "\n", encoding="utf-8")
 
     def told(self) -> str:
         lines = [f"{self.source} -> {self.written}: {len(self.bodies)} bodies that move, {self.meshes} meshes"]
