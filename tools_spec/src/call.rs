@@ -187,7 +187,7 @@ impl SendPlan {
             };
             let (expects, short) =
                 (command.expects.clone().unwrap_or_default(), with_all.short.unwrap_or(false));
-            Ok(PlanStep { call, expects, until: command.until, short })
+            Ok(PlanStep { place: self.place(index), call, expects, until: command.until, short })
         };
         self.commands.iter().enumerate().map(call).collect()
     }
@@ -196,6 +196,8 @@ impl SendPlan {
 /// One command of a plan, read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanStep {
+    /// Name of its place in messages.
+    pub place: String,
     /// The command.
     pub call: PlannedCall,
     /// Conditions that have to hold after it.

@@ -5,92 +5,113 @@ use tandem_tools_spec::{Assistance, BaseLimits, Brief, Hints, Wording};
 use super::grips::grips;
 use crate::tasks::GripKind;
 
-const FRAMES: &str = "Poses of wrists and camera, and points of query_depth, are in the robot's own pelvis frame as it is at that \
-    moment: x forward, y left, z up, metres. Quaternions are [w, x, y, z].";
+const FRAMES: &str = "Poses of wrists and camera, and points of query_depth, are in the robot's own pelvis \
+    frame as it is at that moment: x forward, y left, z up, metres. Quaternions are [w, x, y, z].";
 
 /// Text for our own controller. Controllers from files take no height command, and walk at their own height.
-const BENT_KNEES: &str = " A robot walks with bent knees: while it steps its pelvis is 0.62 to 0.68 m high, whatever height is \
-    commanded, and rises to that height when it stands. What its hands hold sinks and rises along.";
+const BENT_KNEES: &str = " A robot walks with bent knees: while it steps its pelvis is 0.62 to 0.68 m high, \
+    whatever height is commanded, and rises to that height when it stands. What its hands hold sinks and \
+    rises along.";
 
-const PARTNERS: &str = "The pelvis frames of different robots are unrelated. To relate two of them, find the same two points, well \
-    apart, with query_depth of both robots: robots at full height stand upright to within a few degrees, so a turn about z and a shift take the \
-    points of the one to those of the other. With a lowered pelvis or far-reaching arms a robot leans ahead by 5 to 20 degrees: then turn its \
+const PARTNERS: &str = "The pelvis frames of different robots are unrelated. To relate two of them, find the \
+    same two points, well apart, with query_depth of both robots: robots at full height stand upright to \
+    within a few degrees, so a turn about z and a shift take the points of the one to those of the other. \
+    With a lowered pelvis or far-reaching arms a robot leans ahead by 5 to 20 degrees: then turn its \
     points upright first, by the plane of floor or table.";
 
-const PARTNERS_MOVE: &str = " In frame \"level\" they are upright exactly, and pelvis_in_start keeps the relation valid while robots move.";
+const PARTNERS_MOVE: &str = " In frame \"level\" they are upright exactly, and pelvis_in_start keeps the \
+    relation valid while robots move.";
 
-const ODOMETRY: &str = "pelvis_in_start is where a robot's own IMU and joints have it: the pose of its pelvis in a frame that lies on \
-    the floor under where the pelvis was when the episode began, z up, x where the robot faced. It drifts by up to 1 % of the way \
-    walked. base_motion is the same over one command.";
+const ODOMETRY: &str = "pelvis_in_start is where a robot's own IMU and joints have it: the pose of its pelvis \
+    in a frame that lies on the floor under where the pelvis was when the episode began, z up, x where the \
+    robot faced. It drifts by up to 1 % of the way walked. base_motion is the same over one command.";
 
-const CAMERA: &str = "The camera is in the head, above the waist: waist joints turn and tilt it, and wrist targets may move the \
-    waist, so take camera_in_pelvis from the latest observe. Its axes are x right, y down, z forward; the point (x, y, z) is seen at \
-    u = fx x / z + cx, v = fy y / z + cy, with (0, 0) the middle of the top left pixel.";
+const CAMERA: &str = "The camera is in the head, above the waist: waist joints turn and tilt it, and wrist \
+    targets may move the waist, so take camera_in_pelvis from the latest observe. Its axes are x right, y \
+    down, z forward; the point (x, y, z) is seen at u = fx x / z + cx, v = fy y / z + cy, with (0, 0) the \
+    middle of the top left pixel.";
 
-const HANDS: &str = "A wrist's x axis points along its fingers, and its z axis across them; the right palm faces along its y axis, \
-    the left palm against it. All in the wrist's frame, in metres, of a right hand (negate y for a left one): a hand closes on what \
-    is at [0.12, 0.055, 0]. The palm reaches from x = 0.04 to 0.13, and from z = -0.045 to 0.045, and is 0.04 thick. Straight \
-    fingers reach to x = 0.22. The thumb, with its angles at 0, stands off the palm at x = 0.065, to y = 0.115.";
+const HANDS: &str = "A wrist's x axis points along its fingers, and its z axis across them; the right palm \
+    faces along its y axis, the left palm against it. All in the wrist's frame, in metres, of a right hand \
+    (negate y for a left one): a hand closes on what is at [0.12, 0.055, 0]. The palm reaches from x = \
+    0.04 to 0.13, and from z = -0.045 to 0.045, and is 0.04 thick. Straight fingers reach to x = 0.22. The \
+    thumb, with its angles at 0, stands off the palm at x = 0.065, to y = 0.115.";
 
 /// Text for policies that receive the hands' sensor readings.
-const GRIP: &str = "A hand holds something, as phases ask for, while its thumb presses on one side of it and fingers or palm press \
-    on the opposite one, within 60 degrees, each with 1.5 N or more, for 60 ms. grip is what the fingers' own drives feel of that: it says \
-    \"two_sided\" where both press, and presses says what does. Whether on opposite sides is not felt: a thing that only hangs in a bent \
-    hand, or a round one at the fingertips, is pressed on neighbouring sides, and not held. If it slips, or a phase is not reached, open, \
-    bring the palm nearer, so that the thumb comes round, and close farther. Where it says \"one_sided\", close by 0.2 rad more what \
-    presses does not name, mostly the thumb; where it says \"touching\" or \"none\" though the hand is closed, bring the palm nearer first. ";
+const GRIP: &str = "A hand holds something, as phases ask for, while its thumb presses on one side of it and \
+    fingers or palm press on the opposite one, within 60 degrees, each with 1.5 N or more, for 60 ms. grip \
+    is what the fingers' own drives feel of that: it says \"two_sided\" where both press, and presses says \
+    what does. Whether on opposite sides is not felt: a thing that only hangs in a bent hand, or a round \
+    one at the fingertips, is pressed on neighbouring sides, and not held. If it slips, or a phase is not \
+    reached, open, bring the palm nearer, so that the thumb comes round, and close farther. Where it says \
+    \"one_sided\", close by 0.2 rad more what presses does not name, mostly the thumb; where it says \
+    \"touching\" or \"none\" though the hand is closed, bring the palm nearer first. ";
 
-const GRASPING: &str = "Fingers that are stopped short of their targets press: ask them for 0.3 rad more than a thing leaves them. `grips` has \
-    grips that work, of right hands (left ones negate all angles but the first), for a robot that faces the thing squarely. Put the wrist where the place lies at place_m in its frame: \
-    position = place - R place_m, R being the quaternion's rotation. Come with open_rad over the stops, at each of which place_m is so \
-    much more, then to place_m itself; close to close_rad in 25 to 40 steps, fingers first around a bar, and hold still for 20. A hand \
-    that closes on a thing without lying on it drags it, and is dragged: robots that are pulled so step and sink; then let the hand go \
-    along (no wrist target, or compliance_n_s_m 250) and lay the palm on. To let go, ask for open_rad and leave over the stops, the way \
-    you came; fingers that stay bent hook under a bar. Stand with the pelvis stand_behind_m behind the places of both hands, and in the \
-    middle between them: nearer by, thighs and knees push what stands on legs. Who carries with partners lets the hands give way \
-    (compliance_n_s_m 250) from when the thing is lifted, by its legs while it is lifted, too, until it is over its goal; stiff hands \
-    lower it.";
+const GRASPING: &str = "Fingers that are stopped short of their targets press: ask them for 0.3 rad more than \
+    a thing leaves them. `grips` has grips that work, of right hands (left ones negate all angles but the \
+    first), for a robot that faces the thing squarely. Put the wrist where the place lies at place_m in \
+    its frame: position = place - R place_m, R being the quaternion's rotation. Come with open_rad over \
+    the stops, at each of which place_m is so much more, then to place_m itself; close to close_rad in 25 \
+    to 40 steps, fingers first around a bar, and hold still for 20. A hand that closes on a thing without \
+    lying on it drags it, and is dragged: robots that are pulled so step and sink; then let the hand go \
+    along (no wrist target, or compliance_n_s_m 250) and lay the palm on. To let go, ask for open_rad and \
+    leave over the stops, the way you came; fingers that stay bent hook under a bar. Stand with the pelvis \
+    stand_behind_m behind the places of both hands, and in the middle between them: nearer by, thighs and \
+    knees push what stands on legs. Who carries with partners lets the hands give way (compliance_n_s_m \
+    250) from when the thing is lifted, by its legs while it is lifted, too, until it is over its goal; \
+    stiff hands lower it.";
 
 /// Text for policies that have `walk_to`. The tests `a_robot_pushes_a_trolley_by_one_call` and
 /// `two_robots_carry_a_basket_by_one_call` check it.
-const CARRYING: &str = " To push, and to carry together: grip, and lift what is to be lifted by 0.09 m with compliance_n_s_m 250; then call \
-    walk_to with carry, once, with every robot that holds the load, each with its own place: where it stands now, moved by what the load \
-    is to move, in its own start frame (room says how these lie to each other: a partner who faces you goes to its left where you go to \
-    your right). Hands keep their places to the robots and their height; 450 steps a metre. As long as several hold it, name each of them in every \
-    command, with compliance_n_s_m 250: the hands of one that is not named stay stiff, and lead it away. To set down, bring the wrists down again by \
-    steps of 0.03 m with compliance_n_s_m 250 once both stand: a thing has touched when force_n along z falls towards 0, as from -4.4 to \
-    -2.0. Open as you are, with compliance_n_s_m 250 and the wrist poses that the last reply tells, until grip is \"none\", and only \
-    then leave over the stops: a hand that turns stiff while it holds pulls its robot from where it stands.";
+const CARRYING: &str = " To push, and to carry together: grip, and lift what is to be lifted by 0.09 m with \
+    compliance_n_s_m 250; then call walk_to with carry, once, with every robot that holds the load, each \
+    with its own place: where it stands now, moved by what the load is to move, in its own start frame \
+    (room says how these lie to each other: a partner who faces you goes to its left where you go to your \
+    right). Hands keep their places to the robots and their height; 450 steps a metre. As long as several \
+    hold it, name each of them in every command, with compliance_n_s_m 250: the hands of one that is not \
+    named stay stiff, and lead it away. To set down, bring the wrists down again by steps of 0.03 m with \
+    compliance_n_s_m 250 once both stand: a thing has touched when force_n along z falls towards 0, as \
+    from -4.4 to -2.0. Open as you are, with compliance_n_s_m 250 and the wrist poses that the last reply \
+    tells, until grip is \"none\", and only then leave over the stops: a hand that turns stiff while it \
+    holds pulls its robot from where it stands.";
 
-const NAMED_FRAMES: &str = " Tools that take `frame` know \"pelvis\"; \"level\", the same but upright: z against gravity, x the way the robot \
-    faces (a robot that crouches or carries leans by up to 0.1 rad, which is 7 cm at arm's length); and \"start\", which lies on the \
-    floor under where the pelvis was when the episode began, z up, x where the robot faced, and stays in the room while the robot moves. \
-    Targets that are to be held while a robot is pushed or walks are best given in \"start\". Of a quaternion, q and -q are the same \
-    rotation.";
+const NAMED_FRAMES: &str = " Tools that take `frame` know \"pelvis\"; \"level\", the same but upright: z \
+    against gravity, x the way the robot faces (a robot that crouches or carries leans by up to 0.1 rad, \
+    which is 7 cm at arm's length); and \"start\", which lies on the floor under where the pelvis was when \
+    the episode began, z up, x where the robot faced, and stays in the room while the robot moves. Targets \
+    that are to be held while a robot is pushed or walks are best given in \"start\". Of a quaternion, q \
+    and -q are the same rotation.";
 
 /// Text on how our own controller walks.
-const WALKING: &str = "A robot that is told to walk gains way after 0.3 to 0.5 s. Told to stop within 2.5 s, it goes \
-    on to where speed times time takes it, to within 2 cm and a tenth of the way. After longer walks it coasts: by 3 cm from 0.1 m/s, 8 cm from 0.2, 12 from 0.3 and 20 from \
-    0.4, and by 0.09 rad from turning at 0.5 rad/s; it stands after about a second. While it steps the pelvis \
-    sways by up to 4 cm to each side, twice a second: mean over half a second what you steer by, or have walk_to do it. base.state says \
-    \"standing\", \"stepping\", \"settling\" (told to stop, or the pelvis still rises; comes_to_rest_m says where it will stand) or \"pushed\": it steps because its \
-    hands or a partner pull it, drifts and sinks by 10 cm. Then free what pulls: loosen wrist targets, give way with compliance_n_s_m, or \
-    walk the way it is pulled. Arms that reach more than 0.35 m ahead make a robot step, too: walk nearer instead, or ask for stand_fast.";
+const WALKING: &str = "A robot that is told to walk gains way after 0.3 to 0.5 s. Told to stop within 2.5 s, \
+    it goes on to where speed times time takes it, to within 2 cm and a tenth of the way. After longer \
+    walks it coasts: by 3 cm from 0.1 m/s, 8 cm from 0.2, 12 from 0.3 and 20 from 0.4, and by 0.09 rad \
+    from turning at 0.5 rad/s; it stands after about a second. While it steps the pelvis sways by up to 4 \
+    cm to each side, twice a second: mean over half a second what you steer by, or have walk_to do it. \
+    base.state says \"standing\", \"stepping\", \"settling\" (told to stop, or the pelvis still rises; \
+    comes_to_rest_m says where it will stand) or \"pushed\": it steps because its hands or a partner pull \
+    it, drifts and sinks by 10 cm. Then free what pulls: loosen wrist targets, give way with \
+    compliance_n_s_m, or walk the way it is pulled. Arms that reach more than 0.35 m ahead make a robot \
+    step, too: walk nearer instead, or ask for stand_fast.";
 
-const TEAMWORK: &str = "Each robot has an operator of its own; your tools see and move your robot alone. Time passes only while every operator \
-    has a command, and the shortest ends the step: a longer one stops with stop_reason \"partner_done\", so repeat it. `partners` in a reply says \
-    what the others' robots did. When your part is done call finish: your robot then holds still, and the others play on.";
+const TEAMWORK: &str = "Each robot has an operator of its own; your tools see and move your robot alone. Time \
+    passes only while every operator has a command, and the shortest ends the step: a longer one stops \
+    with stop_reason \"partner_done\", so repeat it. `partners` in a reply says what the others' robots \
+    did. When your part is done call finish: your robot then holds still, and the others play on.";
 
-const TALKING: &str = " `say` reaches the others with their next reply, where `heard` has it. Agree on a few words at once and use them when they \
-    are true, for example IN PLACE, HOLDING, FREE; give places in a frame that you share, for example one robot's start frame (`room` says how \
-    robots begin to each other).";
+const TALKING: &str = " `say` reaches the others with their next reply, where `heard` has it. Agree on a few \
+    words at once and use them when they are true, for example IN PLACE, HOLDING, FREE; give places in a \
+    frame that you share, for example one robot's start frame (`room` says how robots begin to each \
+    other).";
 
 /// Text for policies that have plans.
-const WAITING: &str = " To wait for a partner, send a plan of one `wait` of up to 500 steps with `until` and a condition, for example \
-    {\"heard\": true}, {\"touching\": true}, {\"force_above_n\": 5} or {\"phase_reached\": \"p1\"}: it is answered once, and the partner's commands \
-    go on meanwhile. To carry one thing with an operator for each robot, go by chunks that both begin at a word: a plan of four move_wrists of 25 \
-    steps with the base velocity and, in frame \"start\", the hands going along as far, compliance_n_s_m and side_compliance_n_s_m 250, then two \
-    waits of 25; say DONE, and begin the next when the other has said it. A walk_to with carry pulls a partner who does not walk.";
+const WAITING: &str = " To wait for a partner, send a plan of one `wait` of up to 500 steps with `until` and a \
+    condition, for example {\"heard\": true}, {\"touching\": true}, {\"force_above_n\": 5} or \
+    {\"phase_reached\": \"p1\"}: it is answered once, and the partner's commands go on meanwhile. To carry \
+    one thing with an operator for each robot, go by chunks that both begin at a word: a plan of four \
+    move_wrists of 25 steps with the base velocity and, in frame \"start\", the hands going along as far, \
+    compliance_n_s_m and side_compliance_n_s_m 250, then two waits of 25; say DONE, and begin the next \
+    when the other has said it. A walk_to with carry pulls a partner who does not walk.";
 
 /// Returns the part of an operator's brief about partners; `may_talk` is true if they may exchange messages.
 pub fn teamwork(assistance: Assistance, may_talk: bool) -> String {

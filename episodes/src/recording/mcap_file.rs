@@ -149,7 +149,7 @@ fn string_map(entries: &[(&str, &str)]) -> BTreeMap<String, String> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Visibility {
-    /// Readable under way, as `episode.mcap.partial`.
+    /// Readable during the episode, under the name `episode.mcap.partial`.
     #[default]
     Live,
     /// Readable after the end. Until then nobody sees data that is withheld from policies, and a killed

@@ -149,10 +149,13 @@ impl Session {
                 ToolReply::Plan(self.plan(record, plan)?).into()
             }
             _ => {
-                if called.continues_plans() {
-                    self.requests = self.requests.map(|requests| requests.saturating_sub(1));
+                self.planning = called.continues_plans();
+                let made = self.make(record, &called);
+                self.planning = false;
+                if self.ended.is_some() {
+                    self.settle();
                 }
-                self.make(record, &called)?
+                made?
             }
         };
         let mut parts = Vec::with_capacity(callers.len());

@@ -99,7 +99,12 @@ fn a_plan_that_cannot_be_carried_out_moves_nothing() {
 #[test]
 fn a_command_lasts_until_what_it_expects_holds() {
     let mut session = agentic();
-    let to = |position_m: [f64; 3], steps: u32| json!({ "steps": steps, "robots": [{ "robot": "A", "right_position_m": position_m, "right_quaternion_wxyz": [0.707, -0.707, 0, 0] }] });
+    let to = |position_m: [f64; 3], steps: u32| {
+        let palm_down = [0.707, -0.707, 0.0, 0.0];
+        let wrist =
+            json!({ "robot": "A", "right_position_m": position_m, "right_quaternion_wxyz": palm_down });
+        json!({ "steps": steps, "robots": [wrist] })
+    };
     let over = json!({ "tool": "move_wrists", "arguments": to([0.33, -0.33, 0.32], 25) });
     let settle = json!({ "tool": "wait", "arguments": { "steps": 25 } });
     let lower = json!({
@@ -116,20 +121,24 @@ fn a_command_lasts_until_what_it_expects_holds() {
     let reply = plan(&mut session, "send_plan", json!({ "commands": [still] })).unwrap();
     assert_eq!(reply.executed_steps, 12);
     assert!(reply.stopped.unwrap().contains("its steps are done and p1 has not been reached"));
+    let until = |command: serde_json::Value| {
+        let mut command = command;
+        (command["expects"], command["until"]) = (json!({ "arrived": true }), json!(true));
+        command
+    };
+    // A wrist that has arrived at an intermediate target is only on its way.
+    let back = until(json!({ "tool": "move_wrists", "arguments": to([0.3, -0.3, 0.3], 60) }));
+    let reply = plan(&mut session, "send_plan", json!({ "commands": [back] })).unwrap();
+    assert_eq!((reply.stopped, reply.commands), (None, 1));
+    assert!((60..=85).contains(&reply.executed_steps), "{}", reply.executed_steps);
     for (command, says) in [
         (json!({ "tool": "wait", "arguments": { "steps": 5 }, "until": true }), "needs a condition"),
-        (
-            json!({ "tool": "wait", "arguments": { "steps": 501 }, "expects": { "arrived": true }, "until": true }),
-            "at most 500",
-        ),
+        (until(json!({ "tool": "wait", "arguments": { "steps": 501 } })), "at most 500"),
         (
             json!({ "tool": "wait", "arguments": { "steps": 5 }, "expects": { "heard": true } }),
             "for operators",
         ),
-        (
-            json!({ "tool": "send_joint_chunk", "arguments": { "robots": [] }, "expects": { "arrived": true }, "until": true }),
-            "cannot have `until`",
-        ),
+        (until(json!({ "tool": "send_joint_chunk", "arguments": { "robots": [] } })), "cannot have `until`"),
     ] {
         let refused = plan(&mut session, "send_plan", json!({ "commands": [command] })).unwrap_err();
         assert!(refused.contains(says), "{refused}");
@@ -147,7 +156,8 @@ fn a_plan_walks_and_goes_on() {
     assert_eq!(reply.stopped, None, "{reply:?}");
     let [x_m, ..] = reply.last.robots[A].pelvis_in_start.unwrap().position_m;
     assert!((x_m + 0.2).abs() < 0.02, "{x_m}");
-    let nowhere = json!({ "tool": "walk_to", "arguments": { "steps": 500, "robots": [{ "robot": "C", "to_m": [0, 0] }] } });
+    let nobody = json!([{ "robot": "C", "to_m": [0, 0] }]);
+    let nowhere = json!({ "tool": "walk_to", "arguments": { "steps": 500, "robots": nobody } });
     let refused = plan(&mut session, "send_plan", json!({ "commands": [nowhere] })).unwrap_err();
     assert!(refused.contains("no robot \"C\""), "{refused}");
 }

@@ -172,7 +172,7 @@ fn a_torn_end_is_left_out() {
     }
 }
 
-/// Four steps of Pouring, written by a version that stored each step whole, as JSON.
+/// Four steps of Pouring, written by a version that stored each step whole, in JSON.
 #[test]
 fn recordings_of_earlier_versions_are_read() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/sessions/recordings/whole_steps.mcap");

@@ -168,7 +168,7 @@ def evaluate(
     jobs: int = 1,
     **settings: Unpack[EvaluationSettings],
 ) -> Evaluation:
-    """Plays every seed of every task and counts the results, as `tandem evaluate` does.
+    """Plays every seed of every task and counts the results, like `tandem evaluate`.
 
     policy: Called with each episode after its start; it plays until it is done or the episode has ended. Its
         exceptions end only the current episode, which is not counted. The first one is printed, and if the first
@@ -192,7 +192,7 @@ def collect(
     jobs: int = 1,
     **settings: Unpack[EvaluationSettings],
 ) -> Evaluation:
-    """Records demonstrations of the experts, as `tandem collect` does, in a folder for each episode. These folders
+    """Records demonstrations of the experts, like `tandem collect`, in a folder for each episode. These folders
     are in the folder `episodes` of `out`. By default, `out` is a folder in runs/ that is named after all settings.
     """
     # Both are iterated twice.

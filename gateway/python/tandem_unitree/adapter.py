@@ -12,7 +12,7 @@ from tandem import EpisodeEnded, TandemError
 from .exchange import Exchange
 from .link import Access, Link
 from .robot.clock import LastMessage, PictureTurns
-from .robot.remarks import LOG
+from .robot.remarks import LOG, log_to_stderr
 from .robot.shared import Robot, RobotSettings
 
 END_POLL_S = 0.2
@@ -171,8 +171,6 @@ class Adapter:
 
 def serve_robot(settings: RobotSettings, connection: Connection, last_message: LastMessage) -> None:
     """Runs the process of one robot. Accesses come by `connection`, so that no token is on a command line."""
-    from .command_line import log_to_stderr
-
     log_to_stderr()
 
     def next_access(wait_s: float) -> Access | None:

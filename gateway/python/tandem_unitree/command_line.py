@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
-import logging
 import os
 import signal
 import sys
@@ -15,7 +14,7 @@ from pathlib import Path
 from tandem import TandemError
 
 from .link import Access, Link
-from .robot.remarks import LOG
+from .robot.remarks import log_to_stderr
 from .robot.shared import RobotSettings
 
 ROBOTS = {
@@ -24,12 +23,6 @@ ROBOTS = {
     "C": RobotSettings("C", 3, address="127.0.0.4"),
 }
 """Domains and addresses of robots by default."""
-
-
-def log_to_stderr(*, verbose: bool = False) -> None:
-    """Prints the log of this package."""
-    logging.basicConfig(format="%(message)s", stream=sys.stderr)
-    LOG.setLevel(logging.DEBUG if verbose else logging.INFO)
 
 
 def _pairs(text: str) -> dict[str, str]:

@@ -109,7 +109,7 @@ def environment(folder, version, *installs):
 
 def environments(given):
     """Returns what makes each environment; those that were given are taken as they are."""
-    folder = Path(given.environments)
+    folder = Path(given.environments).absolute()
     own = {
         "bridge": lambda: environment(folder / "bridge", "3.10", [f"{given.wheel}[unitree]"]),
         "clients": lambda: environment(
@@ -128,7 +128,7 @@ def environments(given):
     for name in own:
         path = getattr(given, name)
         if path is not None:
-            own[name] = lambda path=path: Path(path)
+            own[name] = lambda path=path: Path(path).absolute()
     return own
 
 

@@ -168,9 +168,6 @@ impl CarryPlan {
     pub fn advance(&mut self, session: &Session, last: Option<&CommandReply>) -> PlanAdvance {
         if let Some(reply) = last {
             self.left_steps = self.left_steps.saturating_sub(reply.executed_steps);
-            if reply.fallen.iter().any(|robot| robot.fallen) {
-                return PlanAdvance::Done(Some("a robot has fallen".into()));
-            }
             if let Some(why) = session.why_not_on(reply, self) {
                 self.stop(why);
             }

@@ -1,10 +1,11 @@
 //! `send_plan`: commands in sequence. Each runs until its steps are done, or until its expectation holds.
 
-use tandem_tools_spec::{CommandReply, PlanStep, PlannedCall, SendPlan, SpecError, Tool as _};
+use tandem_tools_spec::{ActCall, CommandReply, PlanStep, PlannedCall, SendPlan, SpecError, Tool as _};
 
+use super::PlanAdvance;
 use super::expectation::unexpected;
 use super::pieces::Pieces;
-use super::{PlanAdvance, PlanStage};
+use super::walkers::Walkers;
 use crate::EpisodeError;
 use crate::commands::Command;
 use crate::scoring::Phase;
@@ -24,7 +25,7 @@ pub struct CommandList {
 enum CurrentCommand {
     Whole,
     Until(Pieces),
-    Walk(Box<PlanStage>),
+    Walk(Walkers),
 }
 
 impl Session {
@@ -39,17 +40,15 @@ impl Session {
         operator: Option<&str>,
     ) -> Result<CommandList, EpisodeError> {
         let steps = plan.calls()?;
-        for (index, step) in steps.iter().enumerate() {
+        for step in &steps {
             let refused = |reason: String| SpecError::Invalid {
                 tool: SendPlan::NAME,
-                reason: format!("{}: {reason}", plan.place(index)),
+                reason: format!("{}: {reason}", step.place),
             };
             match &step.call {
-                PlannedCall::Act(call) if step.until => {
-                    Pieces::new(call, self).map(drop)?;
-                }
+                PlannedCall::Act(call) if step.until => drop(Pieces::new(call, self)?),
                 PlannedCall::Act(call) => drop(Command::read(call, &self.rules, &self.motions)?),
-                PlannedCall::WalkTo(walk) => drop(self.walk_stage(walk)?),
+                PlannedCall::WalkTo(walk) => drop(self.walkers(walk)?),
             }
             self.check_phase(step).map_err(refused)?;
             if step.expects.heard.is_some() && operator.is_none() {
@@ -77,10 +76,6 @@ impl Session {
 impl CommandList {
     /// Returns the next command after the reply to the previous one.
     pub fn advance(&mut self, session: &Session, last: Option<&CommandReply>, heard: bool) -> PlanAdvance {
-        if last.is_some_and(|reply| reply.fallen.iter().any(|robot| robot.fallen)) {
-            let place = format!("command {} of {}", self.begun, self.steps.len());
-            return PlanAdvance::Done(Some(format!("after {place}: a robot has fallen")));
-        }
         loop {
             let Some(step) = self.steps.get(self.index) else { return PlanAdvance::Done(None) };
             let stopped = match (self.current.take(), last) {
@@ -100,8 +95,7 @@ impl CommandList {
                 },
             };
             if let Some(why) = stopped {
-                let place = format!("command {} of {}", self.index + 1, self.steps.len());
-                return PlanAdvance::Done(Some(format!("after {place}: {why}")));
+                return PlanAdvance::Done(Some(format!("after {}: {why}", step.place)));
             }
             self.index += 1;
         }
@@ -120,16 +114,13 @@ impl CommandList {
 
 /// Next step of a command after a reply.
 enum CommandProgress {
-    Make(tandem_tools_spec::ActCall, CurrentCommand),
+    Make(ActCall, CurrentCommand),
     /// The end of the command; with a reason, the plan stops.
     Over(Option<String>),
 }
 
 impl CurrentCommand {
-    fn begin(
-        session: &Session,
-        step: &PlanStep,
-    ) -> Result<(tandem_tools_spec::ActCall, CurrentCommand), String> {
+    fn begin(session: &Session, step: &PlanStep) -> Result<(ActCall, CurrentCommand), String> {
         match &step.call {
             PlannedCall::Act(call) if !step.until => Ok((call.clone(), CurrentCommand::Whole)),
             PlannedCall::Act(call) => {
@@ -138,9 +129,9 @@ impl CurrentCommand {
                 Ok((first, CurrentCommand::Until(pieces)))
             }
             PlannedCall::WalkTo(walk) => {
-                let mut stage = session.walk_stage(walk).map_err(|error| error.to_string())?;
-                match stage.walk_on(session, None) {
-                    PlanAdvance::Make(call) => Ok((call, CurrentCommand::Walk(stage.into()))),
+                let mut walkers = session.walkers(walk).map_err(|error| error.to_string())?;
+                match walkers.advance(session, None) {
+                    PlanAdvance::Make(call) => Ok((call, CurrentCommand::Walk(walkers))),
                     PlanAdvance::Done(why) => Err(why.unwrap_or_else(|| "it has no steps".into())),
                 }
             }
@@ -151,34 +142,21 @@ impl CurrentCommand {
         let missing = || unexpected(&step.expects, reply, heard);
         match self {
             CurrentCommand::Whole => CommandProgress::Over(missing()),
-            CurrentCommand::Until(mut pieces) => match missing() {
-                None if step.expects.arrived != Some(true) || pieces.is_way_done() => {
-                    CommandProgress::Over(None)
+            CurrentCommand::Until(mut pieces) => {
+                // Wrists that have arrived at an intermediate target are only on their way.
+                let is_on_way = step.expects.arrived == Some(true) && !pieces.is_way_done();
+                match (missing(), pieces.next_piece()) {
+                    (None, _) if !is_on_way => CommandProgress::Over(None),
+                    (_, Some(call)) => CommandProgress::Make(call, CurrentCommand::Until(pieces)),
+                    (missing, None) => {
+                        CommandProgress::Over(missing.map(|why| format!("its steps are done and {why}")))
+                    }
                 }
-                None => match pieces.next_piece() {
-                    Some(call) => CommandProgress::Make(call, CurrentCommand::Until(pieces)),
-                    None => CommandProgress::Over(None),
-                },
-                Some(why) => match pieces.next_piece() {
-                    Some(call) => CommandProgress::Make(call, CurrentCommand::Until(pieces)),
-                    None => CommandProgress::Over(Some(format!("its steps are done and {why}"))),
-                },
-            },
-            CurrentCommand::Walk(mut stage) => match stage.walk_on(session, Some(reply)) {
-                PlanAdvance::Make(call) => CommandProgress::Make(call, CurrentCommand::Walk(stage)),
+            }
+            CurrentCommand::Walk(mut walkers) => match walkers.advance(session, Some(reply)) {
+                PlanAdvance::Make(call) => CommandProgress::Make(call, CurrentCommand::Walk(walkers)),
                 PlanAdvance::Done(stopped) => CommandProgress::Over(stopped.or_else(missing)),
             },
-        }
-    }
-}
-
-impl PlanStage {
-    /// Returns the next command of a walk. Lists of commands are not nested.
-    fn walk_on(&mut self, session: &Session, last: Option<&CommandReply>) -> PlanAdvance {
-        match self {
-            PlanStage::Walk(walk) => walk.advance(session, last),
-            PlanStage::Carry(carry) => carry.advance(session, last),
-            PlanStage::Commands(_) => PlanAdvance::Done(None),
         }
     }
 }

@@ -9,6 +9,7 @@ mod commands;
 mod expectation;
 mod pieces;
 mod walk_to;
+mod walkers;
 mod way;
 
 use tandem_tools_spec::{
@@ -23,9 +24,8 @@ use crate::EpisodeError;
 use crate::commands::{Called, OperatorCall};
 use crate::output::OutputError;
 use crate::recording::CallerRecord;
-use carry::CarryPlan;
 use commands::CommandList;
-use walk_to::WalkPlan;
+use walkers::Walkers;
 
 /// A plan in execution.
 #[derive(Debug)]
@@ -50,18 +50,15 @@ pub enum PlanAdvance {
 #[derive(Debug)]
 enum PlanStage {
     Commands(CommandList),
-    Walk(WalkPlan),
-    Carry(CarryPlan),
+    Walk(Walkers),
 }
 
 /// The executed part of a plan.
 #[derive(Debug, Default)]
 struct PlanProgress {
-    commands: u32,
+    replies: u32,
     executed_steps: u32,
     last: Option<CommandReply>,
-    /// True if the last reply is to be short.
-    is_short: bool,
 }
 
 impl PlanRun {
@@ -69,29 +66,20 @@ impl PlanRun {
     pub fn advance(&mut self, session: &Session) -> PlanAdvance {
         let last = self.progress.last.as_ref();
         match &mut self.stage {
-            PlanStage::Commands(list) => {
-                let next = list.advance(session, last, self.heard);
-                self.progress.is_short = list.is_short();
-                self.progress.commands = list.begun();
-                next
-            }
+            PlanStage::Commands(list) => list.advance(session, last, self.heard),
             PlanStage::Walk(walk) => walk.advance(session, last),
-            PlanStage::Carry(carry) => carry.advance(session, last),
         }
     }
 
     /// Processes the reply to the last command. Returns the reason why the plan stops, if the episode has
-    /// ended.
+    /// ended or a robot has fallen.
     pub fn take(&mut self, reply: CommandReply) -> Option<String> {
-        match self.stage {
-            PlanStage::Walk(_) | PlanStage::Carry(_) => self.progress.commands += 1,
-            PlanStage::Commands(_) => {}
-        }
+        self.progress.replies += 1;
         self.progress.executed_steps += reply.executed_steps;
-        let stop = reply.stop_reason;
+        let (stop, falls) = (reply.stop_reason, reply.fallen.iter().any(|robot| robot.fallen));
         self.progress.last = Some(reply);
         match stop {
-            StopReason::StepsDone | StopReason::PartnerDone => None,
+            StopReason::StepsDone | StopReason::PartnerDone => falls.then(|| "a robot has fallen".into()),
             StopReason::TaskComplete => Some("the task is complete".into()),
             StopReason::StepBudgetExhausted => Some("the episode's steps are used up".into()),
         }
@@ -109,7 +97,11 @@ impl PlanRun {
 
     /// Returns the reply to a plan with at least one executed command.
     fn reply(self, tool_calls: u32, stopped: Option<String>) -> Result<PlanReply, EpisodeError> {
-        let PlanProgress { commands, executed_steps, last, is_short } = self.progress;
+        let PlanProgress { replies, executed_steps, last } = self.progress;
+        let (commands, is_short) = match self.stage {
+            PlanStage::Commands(list) => (list.begun(), list.is_short()),
+            PlanStage::Walk(_) => (replies, false),
+        };
         let mut last = last.ok_or_else(|| SpecError::Invalid {
             tool: SendPlan::NAME,
             reason: "no command was made; give at least one".into(),
@@ -146,7 +138,7 @@ impl Session {
         match self.begin_or_refuse(caller, &called, plan) {
             Ok(run) => {
                 self.count_request();
-                Ok(PlanRun { operator: Some(operator.robot().into()), ..run })
+                Ok(run)
             }
             Err(refusal) => {
                 self.write_down(arrival);
@@ -155,7 +147,8 @@ impl Session {
         }
     }
 
-    /// Returns the reply to an operator's finished plan, and shows it to viewers.
+    /// Returns the reply to an operator's finished plan, short if the call asked for that, and shows the whole
+    /// to viewers.
     pub fn end_plan(
         &mut self,
         call: &Call,
@@ -165,7 +158,11 @@ impl Session {
         let operator = run.operator.clone();
         let reply = run.reply(self.tool_calls, stopped);
         self.tell_plan(operator.as_deref(), &call.tool, reply.as_ref())?;
-        reply
+        let mut reply = reply?;
+        if call.short {
+            shorten_report(&mut reply.last);
+        }
+        Ok(reply)
     }
 
     fn begin_or_refuse(
@@ -177,11 +174,12 @@ impl Session {
         let allowed = self.allow(called).and_then(|_| self.expect_underway());
         let begun = allowed.and_then(|()| match plan {
             PlanCall::SendPlan(plan) => self.command_list(plan, caller.operator()).map(PlanStage::Commands),
-            PlanCall::WalkTo(walk) => self.walk_stage(walk),
+            PlanCall::WalkTo(walk) => self.walkers(walk).map(PlanStage::Walk),
         });
         match begun {
             Ok(stage) => {
-                Ok(PlanRun { stage, progress: PlanProgress::default(), heard: false, operator: None })
+                let operator = caller.operator().map(str::to_owned);
+                Ok(PlanRun { stage, progress: PlanProgress::default(), heard: false, operator })
             }
             Err(refusal) => {
                 self.refuse(caller, called, &refusal);
@@ -191,10 +189,10 @@ impl Session {
     }
 
     fn carry_out_plan(&mut self, caller: CallerRecord, mut run: PlanRun) -> Result<PlanReply, EpisodeError> {
-        loop {
+        let stopped = loop {
             let call = match run.advance(self) {
                 PlanAdvance::Make(call) => call,
-                PlanAdvance::Done(stopped) => return run.reply(self.tool_calls, stopped),
+                PlanAdvance::Done(stopped) => break stopped,
             };
             let made = self.make(caller, &Called::from(ToolCall::Act(call)));
             let stopped = match made.and_then(|answer| answer.reply(&Formats::default())) {
@@ -205,9 +203,10 @@ impl Session {
                 Err(error) => Some(error.to_string()),
             };
             if stopped.is_some() {
-                return run.reply(self.tool_calls, stopped);
+                break stopped;
             }
-        }
+        };
+        run.reply(self.tool_calls, stopped)
     }
 
     /// Records the plan after its commands, for readers of the requests.

@@ -16,10 +16,9 @@ const ARRIVING_STEPS: u32 = 25;
 /// A command in pieces.
 #[derive(Debug)]
 pub struct Pieces {
+    /// Control steps of the command's own motion.
     steps: u32,
     done: u32,
-    /// Control steps of waiting after the way of the wrists.
-    waited: u32,
     kind: PieceKind,
 }
 
@@ -61,7 +60,7 @@ impl Pieces {
                 );
             }
         };
-        let mut pieces = Pieces { steps: call.steps(), done: 0, waited: 0, kind };
+        let mut pieces = Pieces { steps: call.steps(), done: 0, kind };
         if let Some(first) = pieces.next_piece() {
             Command::read(&first, &session.rules, &session.motions)?;
         }
@@ -70,9 +69,12 @@ impl Pieces {
 
     /// Returns the next piece; `None` once the command's steps are done.
     pub fn next_piece(&mut self) -> Option<ActCall> {
-        let steps = (self.steps - self.done).min(PIECE_STEPS);
+        let arriving_steps = if let PieceKind::Wrists(_) = self.kind { ARRIVING_STEPS } else { 0 };
+        let is_way_done = self.done >= self.steps;
+        let end = if is_way_done { self.steps + arriving_steps } else { self.steps };
+        let steps = (end - self.done).min(PIECE_STEPS);
         if steps == 0 {
-            return self.wait_to_arrive();
+            return None;
         }
         self.done += steps;
         let share = f64::from(self.done) / f64::from(self.steps);
@@ -80,7 +82,9 @@ impl Pieces {
             PieceKind::Wait => ActCall::Wait(Wait { steps }),
             PieceKind::Walk(walk) => ActCall::Walk(Walk { steps, ..walk.clone() }),
             PieceKind::Wrists(ways) => {
-                let robots = ways.iter().map(|way| way.until(share)).collect();
+                let robots =
+                    ways.iter().map(|way| if is_way_done { way.arriving() } else { way.until(share) });
+                let robots = robots.collect();
                 ActCall::MoveWrists(MoveWrists { steps, robots })
             }
         })
@@ -88,15 +92,7 @@ impl Pieces {
 
     /// Returns true once wrists have their last targets: until then, one that has arrived is only on its way.
     pub fn is_way_done(&self) -> bool {
-        self.done == self.steps || !matches!(self.kind, PieceKind::Wrists(_))
-    }
-
-    fn wait_to_arrive(&mut self) -> Option<ActCall> {
-        if self.waited == ARRIVING_STEPS || !matches!(self.kind, PieceKind::Wrists(_)) {
-            return None;
-        }
-        self.waited += PIECE_STEPS;
-        Some(ActCall::Wait(Wait { steps: PIECE_STEPS }))
+        self.done >= self.steps || !matches!(self.kind, PieceKind::Wrists(_))
     }
 }
 
@@ -127,6 +123,11 @@ impl WristWay {
             right: entry.right_fingers_rad.map(|to| [present_rad(Side::Right), to]),
         };
         Ok(WristWay { entry: WristMove { frame: Some(frame), ..entry.clone() }, wrists, fingers_rad })
+    }
+
+    /// Returns the move that keeps the last targets, while the base stands.
+    fn arriving(&self) -> WristMove {
+        WristMove { vx_m_s: None, vy_m_s: None, yaw_rate_rad_s: None, ..self.until(1.0) }
     }
 
     /// Returns the move to this fraction of the trajectory.

@@ -6,8 +6,8 @@ use std::collections::VecDeque;
 use nalgebra::Vector2;
 use tandem_tools_spec::{ActCall, BaseState, CommandReply, Destination, Wait, Walk, WalkMove, WalkTo};
 
+use super::PlanAdvance;
 use super::way::{Corrections, Missing, Stand, WALK_STEPS};
-use super::{PlanAdvance, PlanStage};
 use crate::EpisodeError;
 use crate::commands;
 use crate::session::Session;
@@ -104,9 +104,6 @@ impl WalkPlan {
     fn after(&mut self, session: &Session, reply: &CommandReply) -> Option<PlanAdvance> {
         self.left_steps = self.left_steps.saturating_sub(reply.executed_steps);
         let stopped = |why: String| Some(PlanAdvance::Done(Some(why)));
-        if reply.fallen.iter().any(|robot| robot.fallen) {
-            return stopped("a robot has fallen".into());
-        }
         if let Some(walker) = self.walkers.iter().find(|walker| walker.walks > PATIENCE_WALKS) {
             let (name, far) = (&walker.name, session.how_far(&self.walkers));
             return stopped(format!("{name} gets no nearer: something is in its way or holds it; {far}"));
@@ -137,13 +134,10 @@ impl Session {
     /// # Errors
     ///
     /// A robot that the episode does not have.
-    pub(super) fn walk_stage(&self, walk: &WalkTo) -> Result<PlanStage, EpisodeError> {
-        if walk.robots.iter().any(|entry| entry.carry == Some(true)) {
-            return self.carry_plan(walk).map(PlanStage::Carry);
-        }
+    pub(super) fn walk_plan(&self, walk: &WalkTo) -> Result<WalkPlan, EpisodeError> {
         let walkers = walk.robots.iter().map(|entry| self.walker(entry)).collect::<Result<_, _>>()?;
         let left_steps = walk.steps;
-        Ok(PlanStage::Walk(WalkPlan { walkers, left_steps, attempts: 0, calm: 0, walks: false }))
+        Ok(WalkPlan { walkers, left_steps, attempts: 0, calm: 0, walks: false })
     }
 
     fn walker(&self, entry: &Destination) -> Result<Walker, EpisodeError> {

@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 import logging
+import sys
 
 LOG = logging.getLogger("tandem_unitree")
 """The log of this package."""
+
+
+def log_to_stderr(*, verbose: bool = False) -> None:
+    """Prints the log of this package."""
+    logging.basicConfig(format="%(message)s", stream=sys.stderr)
+    LOG.setLevel(logging.DEBUG if verbose else logging.INFO)
 
 
 class Remarks:

@@ -35,6 +35,7 @@ pub use collection::{CollectedEpisode, Collection, CollectionProgress, Collectio
 use driving::Wheel;
 pub use driving::{Driver, Wish};
 pub use partner::PartnerPolicy;
+use planning::finish_all;
 pub use round::OperatorMemory;
 use round::{PartnerKind, Pending, Round};
 
@@ -67,8 +68,8 @@ struct Wheels {
     partners: Vec<Option<PartnerKind>>,
     /// Partner that drove when the previous server ended, by seat; `None` once it drives again.
     left: Vec<Option<PartnerKind>>,
-    /// By seat: plans under way.
-    plans: Vec<u32>,
+    /// Number of plans under way.
+    plans: u32,
 }
 
 /// The operator of one robot.
@@ -119,9 +120,7 @@ impl Team {
         let patience = Duration::from_secs_f64(driving.patience_s());
         let (none, under_way) = (seats.iter().map(|_| None).collect(), vec![None; seats.len()]);
         let (partners, left) = (vec![None; seats.len()], vec![None; seats.len()]);
-        let plans = vec![0; seats.len()];
-        let wheels =
-            Mutex::new(Wheels { seats: none, under_way, partners, left, plans, ..Wheels::default() });
+        let wheels = Mutex::new(Wheels { seats: none, under_way, partners, left, ..Wheels::default() });
         Ok(Team { seats, patience, talk: driving.talk == Some(true), silence, round, wheels })
     }
 
@@ -189,7 +188,10 @@ impl Team {
                 let words = Heard { from: robot.into(), text: say.text.clone(), step: 0, number: 0 };
                 self.say(episode, seat, call, words, keyed).await
             }
-            ToolCall::Plan(_) => self.plan(episode, seat, call, keyed).await,
+            ToolCall::Plan(plan) => {
+                let plan = plan.clone();
+                self.plan(episode, seat, (call, plan), keyed).await
+            }
             ToolCall::Manage(ManageCall::Finish(_)) => self.finish(episode, seat, keyed).await,
             ToolCall::Look(_) | ToolCall::Manage(ManageCall::GetStatus(_)) => {
                 let _place = self.take_place(robot)?;
@@ -262,16 +264,8 @@ impl Team {
         if call.call().steps() <= 1 || !self.goes_on(seat) {
             return self.act_once(episode, seat, call, keyed).await;
         }
-        let (team, episode) = (self.clone(), episode.clone());
-        // A command that has begun is finished even if its caller leaves.
-        let going_on = tokio::spawn(async move {
-            let answer = team.act_on(&episode, seat, call).await?;
-            match keyed {
-                Some(keyed) => episode.keep_answer(keyed, answer).await,
-                None => Ok(answer),
-            }
-        });
-        going_on.await.map_err(|_| HostingError::EpisodeStopped)?
+        let (team, own) = (self.clone(), episode.clone());
+        finish_all(episode, keyed, async move { team.act_on(&own, seat, call).await }).await
     }
 
     async fn act_on(
@@ -312,7 +306,7 @@ impl Team {
         wheels.partners[seat].is_some()
             || wheels.seats.iter().any(Option::is_some)
             || wheels.paced.iter().any(|paced| *paced != seat)
-            || wheels.plans.iter().any(|plans| *plans > 0)
+            || wheels.plans > 0
     }
 
     /// Takes a command and answers when the step has been made.

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use tandem_episodes::{OperatorCall, PlanAdvance, PlanRun};
-use tandem_tools_spec::{ActCall, Call, Heard, Partner, ToolCall, ToolReply};
+use tandem_tools_spec::{ActCall, Call, CommandReply, Heard, Partner, PlanCall, ToolCall, ToolReply};
 
 use super::Team;
 use crate::hosting::{Answer, EpisodeThread, HostingError, durable::Keyed};
@@ -12,21 +12,20 @@ use crate::hosting::{Answer, EpisodeThread, HostingError, durable::Keyed};
 /// A plan of one operator while it is carried out; the partners' commands go on as long.
 struct PlanUnderWay {
     team: Arc<Team>,
-    seat: usize,
     heard: Vec<Heard>,
     partners: Vec<Partner>,
 }
 
 impl PlanUnderWay {
-    fn new(team: &Arc<Team>, seat: usize) -> PlanUnderWay {
-        team.wheels().plans[seat] += 1;
-        PlanUnderWay { team: team.clone(), seat, heard: Vec::new(), partners: Vec::new() }
+    fn new(team: &Arc<Team>) -> PlanUnderWay {
+        team.wheels().plans += 1;
+        PlanUnderWay { team: team.clone(), heard: Vec::new(), partners: Vec::new() }
     }
 }
 
 impl Drop for PlanUnderWay {
     fn drop(&mut self) {
-        self.team.wheels().plans[self.seat] -= 1;
+        self.team.wheels().plans -= 1;
     }
 }
 
@@ -36,25 +35,16 @@ impl Team {
         self: &Arc<Self>,
         episode: &Arc<EpisodeThread>,
         seat: usize,
-        own: OperatorCall,
+        (own, plan): (OperatorCall, PlanCall),
         keyed: Option<Keyed>,
     ) -> Result<Answer, HostingError> {
-        let ToolCall::Plan(plan) = own.call().tool.clone() else { return Err(HostingError::EpisodeStopped) };
         self.round().check_plays(seat)?;
         let run = {
             let _place = self.take_place(own.robot())?;
             episode.begin_plan(own.clone(), plan).await?
         };
-        let (team, episode) = (self.clone(), episode.clone());
-        // What has begun is finished, whether its caller is still there or not.
-        let going_on = tokio::spawn(async move {
-            let answer = team.carry_out(&episode, seat, &own, run).await?;
-            match keyed {
-                Some(keyed) => episode.keep_answer(keyed, answer).await,
-                None => Ok(answer),
-            }
-        });
-        going_on.await.map_err(|_| HostingError::EpisodeStopped)?
+        let (team, thread) = (self.clone(), episode.clone());
+        finish_all(episode, keyed, async move { team.carry_out(&thread, seat, &own, run).await }).await
     }
 
     async fn carry_out(
@@ -64,59 +54,26 @@ impl Team {
         own: &OperatorCall,
         mut run: PlanRun,
     ) -> Result<Answer, HostingError> {
-        let mut under_way = PlanUnderWay::new(self, seat);
-        loop {
+        let mut under_way = PlanUnderWay::new(self);
+        let stopped = loop {
             let next;
             (run, next) = episode.advance_plan(run).await?;
-            let stopped = match next {
-                PlanAdvance::Make(call) => {
-                    match self.make_planned(episode, own.robot(), seat, call, &mut under_way).await {
-                        Ok(reply) => run.take(reply),
-                        Err(error) if run.is_untouched() => return Err(error),
-                        Err(error) => Some(error.to_string()),
-                    }
-                }
-                PlanAdvance::Done(stopped) => {
-                    return self.end_plan(episode, own, run, stopped, &mut under_way).await;
-                }
+            let call = match next {
+                PlanAdvance::Make(call) => call,
+                PlanAdvance::Done(stopped) => break stopped,
+            };
+            let stopped = match self.make_planned(episode, own.robot(), seat, call, &mut under_way).await {
+                Ok(reply) => run.take(reply),
+                Err(error) if run.is_untouched() => return Err(error),
+                Err(error) => Some(error.to_string()),
             };
             if !under_way.heard.is_empty() {
                 run.hear();
             }
             if stopped.is_some() {
-                return self.end_plan(episode, own, run, stopped, &mut under_way).await;
+                break stopped;
             }
-        }
-    }
-
-    async fn make_planned(
-        self: &Arc<Self>,
-        episode: &Arc<EpisodeThread>,
-        robot: &str,
-        seat: usize,
-        call: ActCall,
-        under_way: &mut PlanUnderWay,
-    ) -> Result<tandem_tools_spec::CommandReply, HostingError> {
-        let command = OperatorCall::new(robot, Call::from(ToolCall::Act(call)))?.planned();
-        let Answer { reply, mut heard, partners, .. } = self.clone().act_on(episode, seat, command).await?;
-        under_way.heard.append(&mut heard);
-        under_way.partners = partners;
-        match reply {
-            ToolReply::Act(reply) => Ok(reply),
-            ToolReply::Look(_) | ToolReply::Plan(_) | ToolReply::Manage(_) | ToolReply::Talk(_) => {
-                Err(HostingError::EpisodeStopped)
-            }
-        }
-    }
-
-    async fn end_plan(
-        self: &Arc<Self>,
-        episode: &Arc<EpisodeThread>,
-        own: &OperatorCall,
-        run: PlanRun,
-        stopped: Option<String>,
-        under_way: &mut PlanUnderWay,
-    ) -> Result<Answer, HostingError> {
+        };
         let (reply, step) = episode.end_plan(own.call().clone(), run, stopped).await?;
         Ok(Answer {
             reply: ToolReply::Plan(reply),
@@ -128,4 +85,41 @@ impl Team {
             others_play_on: false,
         })
     }
+
+    async fn make_planned(
+        self: &Arc<Self>,
+        episode: &Arc<EpisodeThread>,
+        robot: &str,
+        seat: usize,
+        call: ActCall,
+        under_way: &mut PlanUnderWay,
+    ) -> Result<CommandReply, HostingError> {
+        let command = OperatorCall::new(robot, Call::from(ToolCall::Act(call)))?.planned();
+        let Answer { reply, mut heard, partners, .. } = self.clone().act_on(episode, seat, command).await?;
+        under_way.heard.append(&mut heard);
+        under_way.partners = partners;
+        match reply {
+            ToolReply::Act(reply) => Ok(reply),
+            ToolReply::Look(_) | ToolReply::Plan(_) | ToolReply::Manage(_) | ToolReply::Talk(_) => {
+                Err(HostingError::EpisodeStopped)
+            }
+        }
+    }
+}
+
+/// Finishes what has begun, even if its caller leaves, and keeps the answer to a call with a key.
+pub async fn finish_all(
+    episode: &Arc<EpisodeThread>,
+    keyed: Option<Keyed>,
+    work: impl Future<Output = Result<Answer, HostingError>> + Send + 'static,
+) -> Result<Answer, HostingError> {
+    let episode = episode.clone();
+    let going_on = tokio::spawn(async move {
+        let answer = work.await?;
+        match keyed {
+            Some(keyed) => episode.keep_answer(keyed, answer).await,
+            None => Ok(answer),
+        }
+    });
+    going_on.await.map_err(|_| HostingError::EpisodeStopped)?
 }

@@ -53,9 +53,9 @@ fn instructions(caller: &Caller) -> String {
         }
     };
     format!(
-        "Simulated humanoids that must work together. {begin} with observe and act with move_wrists, walk, send_joint_chunk or wait \
-         until the task is done, then call finish. Physics stands still between calls. Replies are short; `short: false` gives \
-         the whole one."
+        "Simulated humanoids that must work together. {begin} with observe and act with move_wrists, walk, \
+         send_joint_chunk or wait until the task is done, then call finish. Physics stands still between calls. \
+         Replies are short; `short: false` gives the whole one."
     )
 }
 
@@ -140,7 +140,7 @@ impl ServerHandler for McpServer {
         context: RequestContext<RoleServer>,
     ) -> Result<ListResourcesResult, ErrorData> {
         let caller = caller_of(&context).unwrap_or(&Caller::Host);
-        Ok(ListResourcesResult::with_all_items(resources::resources(caller)))
+        Ok(ListResourcesResult::with_all_items(resources::resources(&self.app, caller)))
     }
 
     async fn read_resource(

@@ -6,6 +6,7 @@ use rmcp::{
     model::{ReadResourceResult, Resource, ResourceContents},
 };
 use tandem_episodes::brief;
+use tandem_tools_spec::Assistance;
 
 use crate::{
     hosting::Caller,
@@ -17,7 +18,7 @@ const BRIEF: &str = "tandem://brief";
 /// The briefing of the operator's own episode.
 const BRIEFING: &str = "tandem://briefing";
 
-/// Pages of the book for policies: URI, title, text.
+/// Pages of the book for policies with full assistance: URI, title, text.
 const PAGES: [(&str, &str, &str); 4] = [
     ("tandem://book/tools", "Tools and their replies", include_str!("../../../../docs/src/tools.md")),
     ("tandem://book/concepts", "Concepts", include_str!("../../../../docs/src/concepts.md")),
@@ -30,7 +31,7 @@ const PAGES: [(&str, &str, &str); 4] = [
 ];
 
 /// Returns the resources that `caller` may read.
-pub fn resources(caller: &Caller) -> Vec<Resource> {
+pub fn resources(app: &AppState, caller: &Caller) -> Vec<Resource> {
     let brief = Resource::new(BRIEF, "brief")
         .with_description("Frames, cameras, hands, walking and grips that work")
         .with_mime_type("text/plain");
@@ -39,7 +40,9 @@ pub fn resources(caller: &Caller) -> Vec<Resource> {
             .with_description("Your episode: your part, the robots, the room, the brief and the budget")
             .with_mime_type("application/json")
     });
-    let pages = PAGES.map(|(uri, title, _)| Resource::new(uri, title).with_mime_type("text/markdown"));
+    let page =
+        |(uri, title, _): &(&str, &str, &str)| Resource::new(*uri, *title).with_mime_type("text/markdown");
+    let pages = pages(app).iter().map(page);
     [brief].into_iter().chain(briefing).chain(pages).collect()
 }
 
@@ -59,14 +62,23 @@ pub async fn read(app: &AppState, caller: &Caller, uri: &str) -> Result<ReadReso
             serde_json::to_string(&briefing.shortened())
                 .map_err(|error| ErrorData::internal_error(error.to_string(), None))?
         }
-        _ => match PAGES.iter().find(|(known, ..)| *known == uri) {
+        _ => match pages(app).iter().find(|(known, ..)| *known == uri) {
             Some((.., text)) => (*text).to_owned(),
             None => {
-                let have: Vec<String> = resources(caller).into_iter().map(|resource| resource.uri).collect();
+                let have: Vec<String> =
+                    resources(app, caller).into_iter().map(|resource| resource.uri).collect();
                 let text = format!("no resource {uri:?}; have: {}", have.join(", "));
                 return Err(ErrorData::resource_not_found(text, None));
             }
         },
     };
     Ok(ReadResourceResult::new(vec![ResourceContents::text(text, uri)]))
+}
+
+/// Returns the pages that policies of this server may read: they speak of what only `full` tells.
+fn pages(app: &AppState) -> &'static [(&'static str, &'static str, &'static str)] {
+    match app.settings.assistance {
+        Assistance::Full => &PAGES,
+        Assistance::Paper => &[],
+    }
 }

@@ -69,10 +69,8 @@ fn hinged(joints: Vec<Joint>, place: &BodyBytes, split: &mut Split) -> Vec<(Join
         split.ball.get_or_insert(*byte);
         found.extend(BALL_AXES.map(|(suffix, axis)| {
             let name = joint.name.as_ref().map(|name| format!("{name}/{suffix}"));
-            let limits = (Tristate::False, None);
-            let (limited, range) = limits;
-            let hinge = Joint { name, type_: JointType::Hinge, axis, limited, range, ..joint.clone() };
-            (hinge, *byte)
+            let (limited, type_) = (Tristate::False, JointType::Hinge);
+            (Joint { name, type_, axis, limited, range: None, ..joint.clone() }, *byte)
         }));
     }
     found

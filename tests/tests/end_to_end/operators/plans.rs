@@ -32,7 +32,7 @@ fn a_walk_goes_on_beside_the_partners_commands() {
 fn an_operator_waits_in_one_call_until_it_hears() {
     let team = Team::start(json!({ "talk": true, "patience_s": 5 }));
     let until = |heard: bool| {
-        json!({ "commands": [
+        json!({ "short": true, "commands": [
             { "tool": "wait", "arguments": { "steps": 400 }, "expects": { "heard": heard }, "until": true },
         ] })
     };
@@ -48,9 +48,9 @@ fn an_operator_waits_in_one_call_until_it_hears() {
     });
     assert_eq!((&b["stopped"], &b["heard"][0]["text"]), (&json!(null), &json!("IN PLACE")), "{b}");
     assert!(b["executed_steps"].as_u64().is_some_and(|steps| (20..=30).contains(&steps)), "{b}");
-    let foreign = json!({ "commands": [
-        { "tool": "walk", "arguments": { "steps": 5, "robots": [{ "robot": "A", "vx_m_s": 0.1, "vy_m_s": 0, "yaw_rate_rad_s": 0 }] } },
-    ] });
+    assert!(b["last"]["robots"][0]["left"].get("target").is_none(), "it is short: {b}");
+    let of_a = json!([{ "robot": "A", "vx_m_s": 0.1, "vy_m_s": 0, "yaw_rate_rad_s": 0 }]);
+    let foreign = json!({ "commands": [{ "tool": "walk", "arguments": { "steps": 5, "robots": of_a } }] });
     team.ask(1, "send_plan", foreign).refused(409, &["yours is \"B\""]);
     team.verified();
 }
