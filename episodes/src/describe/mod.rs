@@ -1,6 +1,7 @@
 //! Descriptions of tasks, protocols and robots for policies.
 
 mod brief;
+mod furniture;
 mod grips;
 mod room;
 

@@ -1,20 +1,22 @@
 //! Description of the room: the sizes of objects, their approximate nominal positions relative to each
-//! robot, and the start poses of partners.
+//! robot, the furniture near them, and the start poses of partners.
 
 use tandem_sim::mjcf::{Geom, Primitive};
 use tandem_sim::{ObjectModel, Pose, Rotation, SimError, Vector, wrapped_rad};
 
+use super::furniture::furniture;
 use crate::tasks::{ObjectSpot, RobotSpot, Spread, Task};
 
 /// Returns one line for each object of a task, for example "service trolley, 0.72 m along A's x, 0.44 m along
-/// its y, 0.92 m high: middle 0.85 m ahead of A, 3.65 m ahead of B (from the pelvis, give or take 0.32 m)".
-pub fn room(task: &Task, spread: Spread) -> Result<Vec<String>, SimError> {
+/// its y, 0.92 m high: middle 0.85 m ahead of A, 3.65 m ahead of B (from the pelvis, give or take 0.32 m)"; then one for each piece of furniture among the
+/// room's fixed geoms, and one for each partner.
+pub fn room(task: &Task, spread: Spread, fixed: &[Geom]) -> Result<Vec<String>, SimError> {
     let line = |spot: &ObjectSpot| {
         let first = &task.robots[0];
         let [x_m, y_m, z_m] = size_m(spot, spot.yaw_rad - first.yaw_rad)?.to_array();
-        let places: Vec<String> = task.robots.iter().map(|robot| place(robot, spot)).collect();
+        let [spot_x_m, spot_y_m, _] = spot.position_m;
+        let places = places(task, [spot_x_m, spot_y_m]);
         let name = spot.name.replace('_', " ");
-        let places = places.join(", ");
         Ok(format!(
             "{name}, {x_m:.2} m along {}'s x, {y_m:.2} m along its y, {z_m:.2} m high: middle {places} (from the pelvis{})",
             first.name,
@@ -22,7 +24,13 @@ pub fn room(task: &Task, spread: Spread) -> Result<Vec<String>, SimError> {
         ))
     };
     let things = task.objects.iter().map(line);
-    things.chain(partners(task).into_iter().map(Ok)).collect()
+    things.chain(furniture(task, fixed).into_iter().chain(partners(task)).map(Ok)).collect()
+}
+
+/// Describes a point relative to each robot at the start.
+pub(super) fn places(task: &Task, at_m: [f32; 2]) -> String {
+    let places: Vec<String> = task.robots.iter().map(|robot| place(robot, at_m)).collect();
+    places.join(", ")
 }
 
 /// Returns the other robots' start poses relative to the first, for example "B begins at [1.26, 0.00] m
@@ -65,10 +73,8 @@ fn give_or_take(task: &Task, spot: &ObjectSpot, spread: Spread) -> String {
     if most_m < 0.005 { String::new() } else { format!(", give or take {most_m:.2} m") }
 }
 
-/// Describes the nominal position of an object relative to a robot at the start.
-fn place(robot: &RobotSpot, spot: &ObjectSpot) -> String {
-    let [x_m, y_m, _] = spot.position_m;
-    let (ahead_m, left_m) = seen_from(robot, [x_m, y_m]);
+fn place(robot: &RobotSpot, at_m: [f32; 2]) -> String {
+    let (ahead_m, left_m) = seen_from(robot, at_m);
     let part = |part_m: f32, towards: &str, away: &str| {
         let words = if part_m < 0.0 { away } else { towards };
         (part_m.abs() >= 0.005).then(|| format!("{:.2} m {words} {}", part_m.abs(), robot.name))
@@ -80,21 +86,29 @@ fn place(robot: &RobotSpot, spot: &ObjectSpot) -> String {
 
 /// Returns the size of an object along the axes of a frame with z up, in which the object has this yaw.
 fn size_m(spot: &ObjectSpot, yaw_rad: f32) -> Result<Vector, SimError> {
-    let turn = Rotation::from_rotation_z(yaw_rad);
-    let (mut low_m, mut high_m) = (Vector::INFINITY, Vector::NEG_INFINITY);
-    for part in ObjectModel::parts(&spot.source(), spot.name)? {
-        for geom in part.model.geoms.iter().filter(|geom| geom.drawn || geom.collides) {
-            for corner_m in corners_m(geom, &part.object_from_part) {
-                let corner_m = turn * corner_m;
-                (low_m, high_m) = (low_m.min(corner_m), high_m.max(corner_m));
-            }
-        }
-    }
+    let parts = ObjectModel::parts(&spot.source(), spot.name)?;
+    let corners = parts.iter().flat_map(|part| {
+        let visible = part.model.geoms.iter().filter(|geom| geom.drawn || geom.collides);
+        visible.flat_map(|geom| corners_m(geom, &part.object_from_part))
+    });
+    let [low_m, high_m] = extent_m(corners, yaw_rad);
     Ok(high_m - low_m)
 }
 
-fn corners_m(geom: &Geom, object_from_part: &Pose) -> Vec<Vector> {
-    let pose = *object_from_part * geom.body_from_geom;
+/// Returns the lowest and highest coordinates of points along the axes of a frame that is turned by
+/// `-yaw_rad` about z.
+pub(super) fn extent_m(points_m: impl Iterator<Item = Vector>, yaw_rad: f32) -> [Vector; 2] {
+    let turn = Rotation::from_rotation_z(yaw_rad);
+    points_m
+        .map(|point_m| turn * point_m)
+        .fold([Vector::INFINITY, Vector::NEG_INFINITY], |[low_m, high_m], point_m| {
+            [low_m.min(point_m), high_m.max(point_m)]
+        })
+}
+
+/// Returns the corners of a geom's box, or its vertices.
+pub(super) fn corners_m(geom: &Geom, frame_from_body: &Pose) -> Vec<Vector> {
+    let pose = *frame_from_body * geom.body_from_geom;
     let of_box = |half_m: Vector| -> Vec<Vector> {
         let sign = |corner: usize, axis: usize| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
         let signs = |corner: usize| Vector::new(sign(corner, 0), sign(corner, 1), sign(corner, 2));
@@ -111,8 +125,8 @@ fn corners_m(geom: &Geom, object_from_part: &Pose) -> Vec<Vector> {
         Primitive::Box { half_extents_m } => of_box(*half_extents_m),
         Primitive::Ellipsoid { radii_m } => of_box(*radii_m),
         Primitive::Convex { vertices_m } => vertices_m.clone(),
-        // Objects have neither planes nor meshes of their own.
-        _ => Vec::new(),
+        Primitive::Mesh(mesh) => mesh.vertices_m.clone(),
+        Primitive::Plane { .. } => Vec::new(),
     };
     points_m.into_iter().map(|point_m| pose * point_m).collect()
 }
@@ -124,7 +138,7 @@ mod tests {
 
     #[test]
     fn things_are_as_large_and_as_far_as_people_would_say() {
-        let lines = |id: &str| room(tasks::find(id).unwrap(), Spread::Single).unwrap();
+        let lines = |id: &str| room(tasks::find(id).unwrap(), Spread::Single, &[]).unwrap();
         let cart = lines("cart_service");
         assert!(
             cart[0].starts_with("service trolley, ") && cart[0].contains("0.85 m ahead of A"),

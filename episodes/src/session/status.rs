@@ -119,7 +119,9 @@ impl Session {
             room: match self.spec().assistance {
                 Assistance::Paper => Vec::new(),
                 // An unreadable file would have prevented the world from being built.
-                Assistance::Full => describe::room(task, self.spec().spread()).unwrap_or_default(),
+                Assistance::Full => {
+                    describe::room(task, self.spec().spread(), self.world.room()).unwrap_or_default()
+                }
             },
             ending: describe::ending(self.spec().disclosure).into(),
             brief: describe::brief(

@@ -30,6 +30,10 @@ fn a_plan_does_what_its_commands_do() {
     let listed = commands.map(|(tool, arguments)| json!({ "tool": tool, "arguments": arguments }));
     let reply = plan(&mut planned, "send_plan", json!({ "commands": listed })).unwrap();
     assert_eq!((reply.commands, reply.executed_steps, reply.stopped), (3, 70, None));
+    let [first, second, third] = &reply.outcomes[..] else { panic!("{:?}", reply.outcomes) };
+    assert!(first.starts_with("command 1 of 3, 25 steps: A right "), "{first}");
+    assert!(second.starts_with("command 2 of 3, 20 steps: A right arrived"), "{second}");
+    assert!(third.starts_with("command 3 of 3, 25 steps: A right "), "{third}");
     assert_eq!(planned.state_hash(), one_by_one.state_hash());
     let (one, other) = (planned.result(), one_by_one.result());
     assert_eq!((one.tool_calls, one.env_steps), (other.tool_calls, other.env_steps), "every command counts");
@@ -154,6 +158,9 @@ fn a_plan_walks_and_goes_on() {
     ]);
     let reply = plan(&mut session, "send_plan", json!({ "commands": commands })).unwrap();
     assert_eq!(reply.stopped, None, "{reply:?}");
+    let [walk, wait] = &reply.outcomes[..] else { panic!("{:?}", reply.outcomes) };
+    assert!(walk.contains("A pelvis at [-0.") && walk.ends_with("m in start"), "{walk}");
+    assert_eq!(wait, "command 2 of 2, 5 steps");
     let [x_m, ..] = reply.last.robots[A].pelvis_in_start.unwrap().position_m;
     assert!((x_m + 0.2).abs() < 0.02, "{x_m}");
     let nobody = json!([{ "robot": "C", "to_m": [0, 0] }]);

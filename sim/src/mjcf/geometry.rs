@@ -44,6 +44,7 @@ pub enum Primitive {
 /// One geom in its body's frame.
 #[derive(Clone, Debug)]
 pub struct Geom {
+    pub name: Option<String>,
     pub primitive: Primitive,
     pub body_from_geom: Pose,
     pub rgba: [f32; 4],
@@ -86,6 +87,7 @@ impl Geom {
             false => Mask { kinds: 0, touched: 0 },
         };
         Ok(Geom {
+            name: geom.name.clone(),
             primitive: primitive(document, geom, half_length_m).map_err(|what| refuse(&what))?,
             body_from_geom,
             rgba,

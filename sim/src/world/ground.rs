@@ -40,6 +40,7 @@ impl World {
         let lowest = shapes.map(bottom_m).min_by(|a, b| a.0.total_cmp(&b.0));
         let (bottom_m, friction) = lowest.unwrap_or((0.0, PLAIN));
         let ground = Geom {
+            name: None,
             primitive: Primitive::Plane { half_extents_m: [0.0; 2] },
             body_from_geom: Pose::from_translation(Vector::Z * bottom_m),
             rgba: [0.0; 4],

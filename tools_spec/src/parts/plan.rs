@@ -16,6 +16,10 @@ pub struct PlanReply {
     pub executed_steps: u32,
     /// Why no more were; null where all was done.
     pub stopped: Option<String>,
+    /// A line for each command of a plan that was begun: its steps, and where that left the robots. Left out
+    /// where there is one command.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outcomes: Vec<String>,
     /// The reply to the last command that was carried out.
     pub last: CommandReply,
 }

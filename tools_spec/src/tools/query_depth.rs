@@ -105,6 +105,7 @@ pub struct SurfaceQuery {
 pub enum Color {
     Red,
     Orange,
+    Brown,
     Yellow,
     Green,
     Blue,
@@ -116,9 +117,10 @@ pub enum Color {
 
 impl Color {
     /// Every colour.
-    pub const ALL: [Color; 9] = [
+    pub const ALL: [Color; 10] = [
         Color::Red,
         Color::Orange,
+        Color::Brown,
         Color::Yellow,
         Color::Green,
         Color::Blue,

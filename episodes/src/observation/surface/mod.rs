@@ -27,6 +27,8 @@ const MIN_PIXELS: usize = 12;
 /// Saturation and value below which a colour is grey or black, and value above which it is white.
 const GREY_SATURATION: f32 = 0.25;
 const BLACK_VALUE: f32 = 0.2;
+/// Saturation below which an orange is the brown of wood and cardboard, in whatever light.
+const BROWN_SATURATION: f32 = 0.72;
 const WHITE_VALUE: f32 = 0.75;
 
 /// Maximum number of surfaces of a colour in a reply.
@@ -185,6 +187,7 @@ fn name([red, green, blue]: [f32; 3]) -> Color {
     };
     match (60.0 * sixth).rem_euclid(360.0) {
         hue if !(18.0..340.0).contains(&hue) => Color::Red,
+        hue if hue < 42.0 && range < BROWN_SATURATION * value => Color::Brown,
         hue if hue < 42.0 => Color::Orange,
         hue if hue < 70.0 => Color::Yellow,
         hue if hue < 170.0 => Color::Green,
@@ -404,6 +407,9 @@ mod tests {
         for (rgb, expected) in [
             ([0.9, 0.1, 0.1], Color::Red),
             ([0.9, 0.5, 0.1], Color::Orange),
+            ([0.45, 0.25, 0.05], Color::Orange),
+            ([0.87, 0.74, 0.55], Color::Brown),
+            ([0.36, 0.21, 0.12], Color::Brown),
             ([0.9, 0.8, 0.1], Color::Yellow),
             ([0.1, 0.6, 0.2], Color::Green),
             ([0.1, 0.3, 0.9], Color::Blue),

@@ -106,9 +106,18 @@ impl CommandList {
         self.begun as u32
     }
 
+    /// Returns the place of the last command that has been begun, for example "command 2 of 3".
+    pub fn place(&self) -> &str {
+        self.last_begun().map_or("", |step| &step.place)
+    }
+
     /// Returns true if the last command asks for a short reply.
     pub fn is_short(&self) -> bool {
-        self.begun.checked_sub(1).and_then(|last| self.steps.get(last)).is_some_and(|step| step.short)
+        self.last_begun().is_some_and(|step| step.short)
+    }
+
+    fn last_begun(&self) -> Option<&PlanStep> {
+        self.steps.get(self.begun.checked_sub(1)?)
     }
 }
 

@@ -7,6 +7,7 @@
 mod carry;
 mod commands;
 mod expectation;
+mod outcomes;
 mod pieces;
 mod walk_to;
 mod walkers;
@@ -25,6 +26,7 @@ use crate::commands::{Called, OperatorCall};
 use crate::output::OutputError;
 use crate::recording::CallerRecord;
 use commands::CommandList;
+use outcomes::Outcomes;
 use walkers::Walkers;
 
 /// A plan in execution.
@@ -58,6 +60,7 @@ enum PlanStage {
 struct PlanProgress {
     replies: u32,
     executed_steps: u32,
+    outcomes: Outcomes,
     last: Option<CommandReply>,
 }
 
@@ -76,6 +79,9 @@ impl PlanRun {
     pub fn take(&mut self, reply: CommandReply) -> Option<String> {
         self.progress.replies += 1;
         self.progress.executed_steps += reply.executed_steps;
+        if let PlanStage::Commands(list) = &self.stage {
+            self.progress.outcomes.add(list.place(), &reply);
+        }
         let (stop, falls) = (reply.stop_reason, reply.fallen.iter().any(|robot| robot.fallen));
         self.progress.last = Some(reply);
         match stop {
@@ -97,7 +103,7 @@ impl PlanRun {
 
     /// Returns the reply to a plan with at least one executed command.
     fn reply(self, tool_calls: u32, stopped: Option<String>) -> Result<PlanReply, EpisodeError> {
-        let PlanProgress { replies, executed_steps, last } = self.progress;
+        let PlanProgress { replies, executed_steps, outcomes, last } = self.progress;
         let (commands, is_short) = match self.stage {
             PlanStage::Commands(list) => (list.begun(), list.is_short()),
             PlanStage::Walk(_) => (replies, false),
@@ -109,7 +115,7 @@ impl PlanRun {
         if is_short {
             shorten_report(&mut last);
         }
-        Ok(PlanReply { commands, tool_calls, executed_steps, stopped, last })
+        Ok(PlanReply { commands, tool_calls, executed_steps, stopped, outcomes: outcomes.lines(), last })
     }
 }
 

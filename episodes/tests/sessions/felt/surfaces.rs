@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use serde_json::{Value, json};
 use tandem_episodes::{A, Session};
 use tandem_sim::Pose;
-use tandem_tools_spec::{Call, DepthReply, JoinedBy, LookReply, Protocol, ToolReply};
+use tandem_tools_spec::{Call, Color, DepthReply, JoinedBy, LookReply, Protocol, ToolReply};
 
 use crate::common::*;
 
@@ -78,7 +78,7 @@ fn a_pixel_on_a_bottle_tells_of_all_of_it() {
 #[test]
 fn surfaces_of_a_colour_are_things() {
     let mut session = start("cart_service", 2011, Protocol::Agentic);
-    for color in ["red", "orange", "yellow", "green", "blue", "purple", "white", "grey", "black"] {
+    for color in Color::ALL {
         let call =
             Call::parse("query_depth", json!({ "robot": "A", "surface": { "color": color } })).unwrap();
         let Ok(reply) = session.ask(None, call) else { continue };
@@ -86,7 +86,10 @@ fn surfaces_of_a_colour_are_things() {
         assert!((1..=3).contains(&reply.surfaces.len()) && reply.points.is_empty());
         assert!(reply.surfaces.iter().all(|surface| surface.joined_by == JoinedBy::Color));
         for surface in &reply.surfaces {
-            println!("{color}: {} px, {:?} m at {:?}", surface.pixels, surface.extent_m, surface.centroid_m);
+            println!(
+                "{color:?}: {} px, {:?} m at {:?}",
+                surface.pixels, surface.extent_m, surface.centroid_m
+            );
         }
     }
     // The trolley's bar in front of A is the nearest yellow object.

@@ -1,0 +1,105 @@
+//! Outcomes of a plan's commands, in a line each.
+
+use std::collections::BTreeSet;
+
+use tandem_tools_spec::{BaseState, CommandReply, Grip, HandReport, HandState, RobotReport};
+
+/// Outcomes of the commands that have been begun, in their order.
+#[derive(Debug, Default)]
+pub struct Outcomes(Vec<Outcome>);
+
+/// A command with its pieces so far.
+#[derive(Debug)]
+struct Outcome {
+    place: String,
+    steps: u32,
+    /// Robots that have walked during it.
+    walked: BTreeSet<String>,
+    /// States of its robots at its end.
+    states: String,
+}
+
+/// Displacement of a pelvis in one piece above which its robot has walked.
+const MIN_WALKED_M: f64 = 0.02;
+
+impl Outcomes {
+    /// Adds the reply to a command, or to a further piece of the last one.
+    pub fn add(&mut self, place: &str, reply: &CommandReply) {
+        if self.0.last().is_none_or(|last| last.place != place) {
+            let (place, walked) = (place.into(), BTreeSet::new());
+            self.0.push(Outcome { place, steps: 0, walked, states: String::new() });
+        }
+        if let Some(outcome) = self.0.last_mut() {
+            outcome.add(reply);
+        }
+    }
+
+    /// Returns a line for each command, for example "command 1 of 3, 25 steps: A left arrived, right blocked
+    /// 0.031 m off"; none for a single command.
+    pub fn lines(self) -> Vec<String> {
+        let Outcomes(outcomes) = self;
+        if outcomes.len() < 2 {
+            return Vec::new();
+        }
+        let line = |Outcome { place, steps, states, .. }: Outcome| {
+            let states = if states.is_empty() { states } else { format!(": {states}") };
+            format!("{place}, {steps} steps{states}")
+        };
+        outcomes.into_iter().map(line).collect()
+    }
+}
+
+impl Outcome {
+    fn add(&mut self, reply: &CommandReply) {
+        self.steps += reply.executed_steps;
+        let has_walked = |report: &&RobotReport| {
+            let moved_m = report.base_motion.map_or(0.0, |motion| motion.forward_m.hypot(motion.left_m));
+            moved_m > MIN_WALKED_M
+        };
+        self.walked.extend(reply.robots.iter().filter(has_walked).map(|report| report.robot.clone()));
+        let states = reply.robots.iter().filter_map(|report| self.state(report));
+        self.states = states.collect::<Vec<String>>().join("; ");
+    }
+
+    /// Describes a robot; `None` if it stands where it was and no wrist has a target.
+    fn state(&self, report: &RobotReport) -> Option<String> {
+        let hands = [("left", &report.left), ("right", &report.right)];
+        let hands = hands.into_iter().filter_map(|(side, hand)| hand_state(side, hand));
+        let base = report.base.and_then(|base| base.state).and_then(base_state);
+        let pelvis = report.pelvis_in_start.filter(|_| self.walked.contains(&report.robot));
+        let pelvis = pelvis.map(|pose| {
+            let [x_m, y_m, _] = pose.position_m;
+            format!("pelvis at [{x_m:.2}, {y_m:.2}] m in start")
+        });
+        let parts: Vec<String> = hands.chain(base.map(str::to_owned)).chain(pelvis).collect();
+        (!parts.is_empty()).then(|| format!("{} {}", report.robot, parts.join(", ")))
+    }
+}
+
+fn hand_state(side: &str, hand: &HandReport) -> Option<String> {
+    let state = match hand.state? {
+        HandState::Idle => return None,
+        HandState::Arrived => "arrived",
+        HandState::Moving => "moving",
+        HandState::Blocked => "blocked",
+        HandState::OutOfReach => "out_of_reach",
+    };
+    let off = hand.position_error_m.filter(|_| hand.state != Some(HandState::Arrived));
+    let off = off.map_or_else(String::new, |off_m| format!(" {off_m:.3} m off"));
+    let grip = match hand.grip {
+        Some(Grip::TwoSided) => " two_sided",
+        Some(Grip::OneSided) => " one_sided",
+        Some(Grip::Touching) => " touching",
+        Some(Grip::None) | None => "",
+    };
+    Some(format!("{side} {state}{off}{grip}"))
+}
+
+fn base_state(state: BaseState) -> Option<&'static str> {
+    match state {
+        BaseState::Standing => None,
+        BaseState::Stepping => Some("stepping"),
+        BaseState::Settling => Some("settling"),
+        BaseState::Pushed => Some("pushed"),
+    }
+}
