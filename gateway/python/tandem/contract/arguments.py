@@ -37,6 +37,7 @@ def plain(value: Any) -> Any:
 Color: TypeAlias = Literal[
     "red",
     "orange",
+    "brown",
     "yellow",
     "green",
     "blue",

@@ -375,6 +375,11 @@ class PlanReply:
     stopped: str | None
     """Why no more were; null where all was done."""
 
+    outcomes: tuple[str, ...]
+    """A line for each command of a plan that was begun: its steps, and where that left the robots. Left out where
+    there is one command.
+    """
+
     last: CommandReply
     """The reply to the last command that was carried out."""
 
@@ -386,6 +391,7 @@ class PlanReply:
             tool_calls=value["tool_calls"],
             executed_steps=value["executed_steps"],
             stopped=value.get("stopped"),
+            outcomes=tuple(value.get("outcomes", ())),
             last=CommandReply.of(value["last"]),
         )
 
