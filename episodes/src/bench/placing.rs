@@ -25,11 +25,13 @@ static TASK: LazyLock<&'static Task> =
 
 /// Number of successive places, each relative to the end of the last walk.
 const PLACES: usize = 3;
-/// Range of the distance between places; `TURN_RAD` and `CARRIED_TURN_RAD` limit the turn of a robot and of
-/// a team.
+/// Range of the distance between places, and limit of the turn, of a robot on an empty floor.
 const AWAY_M: [f32; 2] = [0.05, 0.6];
 const TURN_RAD: f32 = FRAC_PI_2;
-const CARRIED_TURN_RAD: f32 = 0.3;
+/// The same of a team in the room of its task. It goes forth and back along the load's free way, since
+/// there is furniture beside it.
+const CARRIED_AWAY_M: [f32; 2] = [0.05, 0.35];
+const CARRIED_TURN_RAD: f32 = 0.2;
 const MAX_STEPS: u32 = 1500;
 
 /// Worst figures over the calls of a robot or a team.
@@ -97,12 +99,11 @@ fn trial(spec: &EpisodeSpec, load: Option<&SharedLoad>) -> Result<Option<PlaceRe
     let mut random = SplitMix64(spec.seed.into());
     let wrists = pelvis_from_wrists(session, &team);
     let mut result = PlaceResult::default();
-    for _ in 0..PLACES {
-        let turn_rad = if load.is_some() { CARRIED_TURN_RAD } else { TURN_RAD };
-        let (away_m, angle_rad) = (random.uniform(AWAY_M), random.uniform([0.0, TAU]));
-        let turn_rad = f64::from(random.uniform([-turn_rad, turn_rad]));
-        let (sine, cosine) = f64::from(angle_rad).sin_cos();
-        let by_m = f64::from(away_m) * Vector3::new(cosine, sine, 0.0);
+    for place in 0..PLACES {
+        let (by_m, turn_rad) = match load {
+            None => drawn(&mut random),
+            Some(load) => drawn_along(load, place, &mut random),
+        };
         let goals = goals(session, &team, by_m, turn_rad);
         send(session, &team, &goals, load.is_some())?;
         for (robot, goal) in team.iter().zip(&goals) {
@@ -122,6 +123,23 @@ fn trial(spec: &EpisodeSpec, load: Option<&SharedLoad>) -> Result<Option<PlaceRe
         }
     }
     Ok(Some(result))
+}
+
+/// Draws a displacement in any direction, and a turn.
+fn drawn(random: &mut SplitMix64) -> (Vector3<f64>, f64) {
+    let (away_m, angle_rad) = (random.uniform(AWAY_M), random.uniform([0.0, TAU]));
+    let turn_rad = random.uniform([-TURN_RAD, TURN_RAD]);
+    let (sine, cosine) = f64::from(angle_rad).sin_cos();
+    (f64::from(away_m) * Vector3::new(cosine, sine, 0.0), turn_rad.into())
+}
+
+/// Draws a displacement forth or back along the way of a load, and a turn: to the left and back.
+fn drawn_along(load: &SharedLoad, place: usize, random: &mut SplitMix64) -> (Vector3<f64>, f64) {
+    let sign = if place.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let (away_m, turn_rad) = (random.uniform(CARRIED_AWAY_M), random.uniform([0.0, CARRIED_TURN_RAD]));
+    let [x_m, y_m] = load.way_m.map(f64::from);
+    let way_m = Vector3::new(x_m, y_m, 0.0).normalize();
+    (sign * f64::from(away_m) * way_m, sign * f64::from(turn_rad))
 }
 
 /// Returns the goals of the pelvises for a displacement, and a turn about the middle of the team.

@@ -26,7 +26,7 @@ pub(in crate::bench) struct SharedLoad {
     pelvis_m: Option<[f32; 2]>,
     lift_m: f32,
     /// Displacement of the object when it is carried: x and y in the world frame.
-    way_m: [f32; 2],
+    pub way_m: [f32; 2],
 }
 
 const TWO_THIRDS_RAD: f32 = 2.0 * PI / 3.0;

@@ -5,6 +5,8 @@
 //! body. Robots that hold one load, with places that fit it, thus move as one body with it, without
 //! knowledge of each other's poses. The wrists keep their poses relative to the robot's planned place,
 //! which are those of the first step. So an error of the base does not carry over to the next leg.
+//! Robots walk half a second behind their commands, so base commands are ahead of the planned places by
+//! that time.
 
 use nalgebra::{Isometry3, Rotation2, Vector2};
 use tandem_sim::{CONTROL_HZ, Side, Sides};
@@ -31,8 +33,10 @@ const LAGS_COMMANDS: u32 = 16;
 const TURNED_RAD: [f64; 2] = [0.12, 0.2];
 /// Number of commands with a robot turned away, or a wrist out of reach, after which the path is given up.
 const STRAYS_COMMANDS: u32 = 3;
-/// Gain on the distance from the path, and limits of the total speed and of the yaw rate. Robots walk half a
-/// second behind their commands, and twice this gain makes them oscillate with a growing amplitude.
+/// Number of commands by which robots walk behind their commands.
+const BEHIND_COMMANDS: usize = 2;
+/// Gain on the distance from the path, and limits of the total speed and of the yaw rate. Twice this gain
+/// makes robots oscillate with a growing amplitude, since they walk behind their commands.
 const GAIN_1_S: f64 = 0.5;
 const MAX_SPEED_M_S: f64 = 0.3;
 const TURN_RAD_S: f64 = 0.4;
@@ -97,7 +101,10 @@ pub struct CarryPlan {
 /// Progress along a path, and its speed.
 #[derive(Debug, Default)]
 struct PathPace {
+    /// Distance that bases have been commanded to go.
     gone_m: f64,
+    /// The same of the latest commands, the oldest first.
+    latest_m: [f64; BEHIND_COMMANDS + 1],
     pace_m_s: f64,
     waited: u32,
 }
@@ -116,6 +123,23 @@ impl PathPace {
         }
         self.pace_m_s = self.pace_m_s.min(left_m / time_s);
         self.gone_m += self.pace_m_s * time_s;
+        self.follow();
+    }
+
+    /// Stands for a command, while robots catch up with earlier ones.
+    fn stand(&mut self) {
+        self.pace_m_s = 0.0;
+        self.follow();
+    }
+
+    fn follow(&mut self) {
+        self.latest_m.rotate_left(1);
+        self.latest_m[BEHIND_COMMANDS] = self.gone_m;
+    }
+
+    /// Returns the distance that robots are expected to have gone.
+    fn expected_m(&self) -> f64 {
+        self.latest_m[0]
     }
 }
 
@@ -140,9 +164,13 @@ impl CarryPlan {
         self.ways_m.iter().sum()
     }
 
-    /// Returns the current leg, and the completed fraction of it.
+    /// Returns the leg on which robots are expected, and the completed fraction of it.
     fn leg(&self) -> (usize, f64) {
-        let mut left_m = self.pace.gone_m;
+        self.leg_at(self.pace.expected_m())
+    }
+
+    /// Returns the leg at a distance along the path, and the completed fraction of it.
+    fn leg_at(&self, mut left_m: f64) -> (usize, f64) {
         for (leg, way_m) in self.ways_m.iter().enumerate() {
             if left_m < *way_m {
                 return (leg, left_m / way_m);
@@ -153,7 +181,7 @@ impl CarryPlan {
     }
 
     fn is_at_end(&self) -> bool {
-        self.length_m() - self.pace.gone_m < 1e-6
+        self.length_m() - self.pace.expected_m() < 1e-6
     }
 
     /// Gives up and lets the robots come to rest.
@@ -217,15 +245,15 @@ impl Session {
             let share = self.share_of_pace(plan, &off_m);
             plan.pace.go(plan.length_m(), share, f64::from(steps) / CONTROL_HZ);
         } else {
-            plan.pace.pace_m_s = 0.0;
+            plan.pace.stand();
         }
-        let leg = plan.leg();
+        let (leg, commanded) = (plan.leg(), plan.leg_at(plan.pace.gone_m));
         let several = plan.carriers.iter().filter(|carrier| carrier.carries).count() > 1;
         let robots = plan.carriers.iter_mut().zip(&off_m).map(|(carrier, off_m)| {
             let base = match plan.stage {
                 CarryStage::OnWay | CarryStage::Correcting(_) => {
-                    let rate_1_s = plan.pace.pace_m_s / plan.ways_m[leg.0].max(1e-9);
-                    self.velocity(carrier, leg, rate_1_s, off_m)
+                    let rate_1_s = plan.pace.pace_m_s / plan.ways_m[commanded.0].max(1e-9);
+                    self.velocity(carrier, [leg, commanded], rate_1_s, off_m)
                 }
                 CarryStage::Pulse => {
                     let missing = self.missing_to_end(carrier);
@@ -264,21 +292,22 @@ impl Session {
         wrapped(carrier.at(leg).heading_rad - self.stands_at(carrier.robot).heading_rad).abs()
     }
 
-    /// Returns the base command of a robot that is `off_m` from the path and advances on its leg by
-    /// `rate_1_s`: ahead, left, turning.
+    /// Returns the base command of a robot that is `off_m` from its place on the expected leg and advances on
+    /// the commanded one by `rate_1_s`: ahead, left, turning.
     fn velocity(
         &self,
         carrier: &Carrier,
-        leg: (usize, f64),
+        [expected, commanded]: [(usize, f64); 2],
         rate_1_s: f64,
         off_m: &Vector2<f64>,
     ) -> [f64; 3] {
-        let Way { shift_m, turn_rad, .. } = carrier.ways[leg.0];
-        let to_be = carrier.at(leg);
+        let Way { shift_m, turn_rad, .. } = carrier.ways[commanded.0];
         let heading_rad = self.stands_at(carrier.robot).heading_rad;
-        let in_start_m_s = Rotation2::new(to_be.heading_rad) * shift_m * rate_1_s + GAIN_1_S * off_m;
+        let shift_m = Rotation2::new(carrier.at(commanded).heading_rad) * shift_m;
+        let in_start_m_s = shift_m * rate_1_s + GAIN_1_S * off_m;
         let own_m_s = (Rotation2::new(-heading_rad) * in_start_m_s).cap_magnitude(MAX_SPEED_M_S);
-        let turning = turn_rad * rate_1_s + GAIN_1_S * wrapped(to_be.heading_rad - heading_rad);
+        let off_rad = wrapped(carrier.at(expected).heading_rad - heading_rad);
+        let turning = turn_rad * rate_1_s + GAIN_1_S * off_rad;
         [own_m_s.x, own_m_s.y, turning.clamp(-TURN_RAD_S, TURN_RAD_S)]
     }
 
@@ -444,11 +473,14 @@ mod tests {
             paces.push(pace.pace_m_s);
         }
         assert!((pace.gone_m - 1.0).abs() < 1e-9 && paces.len() < 40, "{paces:?}");
+        assert!(pace.expected_m() < 0.99, "robots are behind: {pace:?}");
+        (0..BEHIND_COMMANDS).for_each(|_| pace.stand());
+        assert!((pace.expected_m() - 1.0).abs() < 1e-9, "and catch up: {pace:?}");
         assert!(paces[0] < 0.06 && paces.iter().all(|pace| *pace <= PACE_M_S), "{paces:?}");
-        let mut slowed = PathPace { gone_m: 0.3, pace_m_s: 0.2, waited: 0 };
+        let mut slowed = PathPace { gone_m: 0.3, pace_m_s: 0.2, ..PathPace::default() };
         slowed.go(1.0, 0.4, 0.26);
         assert!((slowed.pace_m_s - 0.4 * PACE_M_S).abs() < 1e-9, "{}", slowed.pace_m_s);
-        let mut held_up = PathPace { gone_m: 0.5, pace_m_s: 0.2, waited: 0 };
+        let mut held_up = PathPace { gone_m: 0.5, pace_m_s: 0.2, ..PathPace::default() };
         for _ in 0..10 {
             held_up.go(1.0, 0.0, 0.26);
         }
