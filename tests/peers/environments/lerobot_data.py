@@ -62,12 +62,12 @@ def compare(name, folder, recordings, stride, robot=None):
         a_recording = 1 if robot is None else 2
         recording, step = recordings[episode // a_recording], frame * stride
         own = slice(None) if robot is None else episode % a_recording
-        assert np.array_equal(item["observation.state"].numpy(), np.ravel(recording.q_rad[step, own])), (name, row)
+        assert np.array_equal(item["observation.state"].numpy(), np.ravel(recording.states[step, own])), (name, row)
         assert item["task"] == (recording.instruction if robot is None else recording.instructions[recording.robots[own]]), (
             item["task"]
         )
         for key in data_set.meta.camera_keys:
-            camera = key.removeprefix("observation.images.").removesuffix("_depth").removesuffix("_egocentric")
+            camera = key.removeprefix("observation.images.").removesuffix("_depth")
             if camera == "egocentric":
                 camera = recording.robots[own]
             height, width = item[key].shape[1:]

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use tandem_episodes::{
     joint_names,
+    rows::velocities,
     tasks::{self, Task},
 };
 use tandem_tools_spec::{ACTION_ROW_LEN, BASE_COLUMNS, ExtraInformation, Pose, RobotState};
@@ -146,11 +147,6 @@ pub fn held_row(state_values: &[f64]) -> Vec<f64> {
     // The height is the only persistent part of a base command.
     row[velocities()].fill(0.0);
     row
-}
-
-/// Returns the columns of an action row that are velocities rather than positions.
-pub fn velocities() -> Range<usize> {
-    ACTION_BASE..ACTION_ROW_LEN - 1
 }
 
 /// Returns true for a column of arms or waist, which inverse kinematics controls if wrist poses are
