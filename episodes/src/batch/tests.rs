@@ -73,7 +73,7 @@ fn a_state_is_within_the_ranges_of_its_columns_at_the_start() {
     assert_eq!(contract.state.len(), STATE_COLUMNS);
     for row in seen.chunks_exact(STATE_COLUMNS) {
         for (value, column) in row.iter().zip(&contract.state) {
-            assert!((column.range[0]..=column.range[1]).contains(value), "{column:?}: {value}");
+            assert!((column.min..=column.max).contains(value), "{column:?}: {value}");
         }
     }
 }

@@ -123,7 +123,8 @@ fn pose_columns() -> impl Iterator<Item = RowColumn> {
         parts.map(|(part, unit, limit)| RowColumn {
             name: format!("{side}_wrist_{part}"),
             unit,
-            range: [-limit, limit],
+            min: -limit,
+            max: limit,
         })
     })
 }

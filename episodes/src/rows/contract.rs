@@ -67,7 +67,7 @@ fn base_columns(limits: &BaseLimits) -> impl Iterator<Item = RowColumn> {
     let BaseLimits { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m } = *limits;
     let ranges = [vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m];
     let named = BASE_COLUMNS.into_iter().zip(BASE_UNITS).zip(ranges);
-    named.map(|((name, unit), range)| RowColumn { name: name.into(), unit, range })
+    named.map(|((name, unit), [min, max])| RowColumn { name: name.into(), unit, min, max })
 }
 
 /// Yields the values of a robot's state in the order of [`RowContract::state`].
@@ -94,7 +94,7 @@ mod tests {
             for columns in [&contract.state, &contract.action] {
                 let names: BTreeSet<_> = columns.iter().map(|column| &column.name).collect();
                 assert_eq!(names.len(), columns.len());
-                assert!(columns.iter().all(|column| column.range[0] < column.range[1]));
+                assert!(columns.iter().all(|column| column.min < column.max));
             }
         }
     }

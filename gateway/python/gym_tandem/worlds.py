@@ -195,7 +195,7 @@ class Worlds:
 
     def action_box(self) -> gym.Space[NDArray[np.float32]]:
         """An action of the contract. What lies beyond a limit is moved there."""
-        limits = np.array([column.range for column in self.contract.action], np.float32)
+        limits = np.array([(column.min, column.max) for column in self.contract.action], np.float32)
         box: gym.Space[Any] = gym.spaces.Box(limits[:, 0], limits[:, 1], dtype=np.float32)
         return box
 

@@ -42,8 +42,11 @@ class RowColumn:
 
     name: str
     unit: str
-    range: tuple[float, float]
-    """Minimum and maximum. Actions are clamped to them."""
+    min: float
+    """Minimum of the range to which actions are clamped, in the unit."""
+
+    max: float
+    """Maximum."""
 
 
 @dataclass(frozen=True)
@@ -150,8 +153,7 @@ def check_contract(data_set: str | PathLike[str], environment: RowContract) -> N
 
 
 def _column(entry: dict[str, Any], prefix: str = "") -> RowColumn:
-    low, high = entry["range"]
-    return RowColumn(prefix + entry["name"], entry["unit"], (low, high))
+    return RowColumn(prefix + entry["name"], entry["unit"], entry["min"], entry["max"])
 
 
 def _names(columns: Sequence[RowColumn]) -> tuple[str, ...]:
@@ -164,6 +166,6 @@ def _column_difference(own: Sequence[RowColumn], other: Sequence[RowColumn]) -> 
         if one.name != another.name:
             return f"number {index} is {one.name} in the data set and {another.name} in the environment"
         if one != another:
-            ranges = [f"{column.range[0]:g} to {column.range[1]:g} {column.unit}" for column in (one, another)]
+            ranges = [f"{column.min:g} to {column.max:g} {column.unit}" for column in (one, another)]
             return f"{one.name} is {ranges[0]} in the data set and {ranges[1]} in the environment"
     return None if len(own) == len(other) else f"{len(own)} numbers in the data set and {len(other)} in the environment"

@@ -128,13 +128,13 @@ def test_a_data_set_that_does_not_fit_is_refused_with_what_differs(runs: Path, t
     ):
         assert words in str(refused.value)
     fitting: dict[str, Any] = {"fps": 10, **SIZED}
-    with pytest.raises(tandem.TandemError, match="0 numbers in the environment"):
+    with pytest.raises(tandem.TandemError, match="94 numbers in the data set and 0 in the environment"):
         made(data_set=data_set, obs_type="pixels", **fitting)
     with pytest.raises(ValueError, match="no fps 30; have: 50, 25, 10"):
         made(fps=30)
     path = data_set / "meta/tandem.json"
     about = json.loads(path.read_text(encoding="utf-8"))
-    about["contract"]["action"][0]["range"][1] = 9.0
+    about["contract"]["action"][0]["max"] = 9.0
     path.write_text(json.dumps(about), encoding="utf-8")
     with pytest.raises(tandem.TandemError, match=r"A\.left_shoulder_pitch_joint_rad is -.* to 9 rad in the data set"):
         made(data_set=data_set, **fitting)
@@ -155,7 +155,8 @@ def test_names_of_rows_are_those_of_recordings_and_episodes(runs: Path) -> None:
     for robot, columns in (("A", env.contract.action[:35]), ("B", env.contract.action[35:])):
         assert [column.name for column in columns] == [f"{robot}.{name}" for name in recording.action_columns]
     assert [column.name for column in env.contract.state[:43]] == [f"A.{joint}_rad" for joint in recording.joints]
-    assert env.action_space.high.tolist() == [column.range[1] for column in env.contract.action]
+    limits = np.array([(column.min, column.max) for column in env.contract.action], np.float32)
+    assert np.array_equal(env.action_space.low, limits[:, 0]) and np.array_equal(env.action_space.high, limits[:, 1])
     assert {column.unit for column in env.contract.state} == {"rad", "m/s", "rad/s", "m"}
     env.close()
 

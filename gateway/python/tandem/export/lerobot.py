@@ -170,6 +170,7 @@ def _export(
     sources: Sequence[Source], out: Path, settings: ExportSettings, workers: int, tell: Callable[[int], None]
 ) -> Exported:
     plan = {
+        "row_contract": _native.row_contract_version(),
         "settings": settings.as_json(),
         "recordings": [{"recording": source.name, "state_hash": source.state_hash} for source in sources],
     }
