@@ -38,6 +38,7 @@ mod recording;
 pub mod replay;
 pub mod reports;
 pub mod results;
+pub mod rows;
 mod scoring;
 mod session;
 mod spec;

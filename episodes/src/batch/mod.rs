@@ -1,27 +1,24 @@
 //! Batches for learners: worlds of one task that step together, one call for all, with numbers in and
 //! numbers out.
 
-mod actions;
 mod parallel;
 mod world;
 
-pub use actions::{ActionKind, wrist_columns};
 pub use world::{RewardKind, WorldStep};
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use tandem_sim::JOINTS;
 use tandem_sim::render::render_colours_together;
 use tandem_tools_spec::ToolCall;
 
+use crate::observation::scaled_colours;
+use crate::rows::{ActionKind, STATE_COLUMNS};
 use crate::spec::EpisodeSpec;
 use crate::{EpisodeError, Session};
 use parallel::Threads;
 use world::{BatchWorld, SeenStep, SeenWorld};
 
-/// Number of values of a robot's state: its joints' angles (rad), then the base command in force.
-pub const STATE_COLUMNS: usize = JOINTS + 4;
 /// Default size of an image from a robot's own camera.
 pub const PICTURE_PX: [u32; 2] = [320, 240];
 
@@ -47,6 +44,8 @@ pub struct BatchSpec {
     /// Number of threads that step the worlds.
     pub threads: usize,
     pub actions: ActionKind,
+    /// Number of control steps in which robots carry out a row.
+    pub steps_per_row: u32,
     pub reward: RewardKind,
     /// Width and height of each robot's camera image; `None` for no images.
     pub pictures_px: Option<[u32; 2]>,
@@ -86,7 +85,7 @@ pub struct SeenArrays<'a> {
     pub pictures: &'a mut [u8],
 }
 
-/// A step of a batch.
+/// A step of a batch: one row for each robot.
 #[derive(Clone, Copy, Debug)]
 pub struct BatchStep<'a> {
     /// World after world, robot after robot, columns of the action.
@@ -136,7 +135,7 @@ impl Batch {
         outcomes.into_iter().map(Option::transpose).collect()
     }
 
-    /// Takes one control step in each world, or begins its next episode. `last` receives the final
+    /// Carries out a row of each robot in each world, or begins its next episode. `last` receives the final
     /// observation of an episode whose world begins anew in the same step. If any action is invalid, no
     /// world steps.
     ///
@@ -199,12 +198,16 @@ impl Batch {
             if let (Some(session), Some(Ok(step))) = (&mut world.session, step)
                 && step.undrawn
             {
-                requests.push(session.eyes(size_px));
-                places.push(&mut step.seen.pictures);
+                let request = session.eyes(size_px);
+                let drawn_px: Vec<_> =
+                    request.cameras.iter().map(|camera| [camera.width, camera.height]).collect();
+                requests.push(request);
+                places.push((&mut step.seen.pictures, drawn_px));
             }
         }
-        for (place, pictures) in places.into_iter().zip(render_colours_together(requests)) {
-            *place = pictures;
+        for ((place, drawn_px), pictures) in places.into_iter().zip(render_colours_together(requests)) {
+            let scaled = |(rgb, drawn_px)| scaled_colours(rgb, drawn_px, size_px);
+            *place = pictures.into_iter().zip(drawn_px).map(scaled).collect();
         }
     }
 
@@ -213,11 +216,12 @@ impl Batch {
         if let Some(world) = self.worlds.iter().position(|world| !held(world).takes(step.autoreset)) {
             return Err(BatchError::NotBegun { world });
         }
-        let columns = self.spec.actions.columns();
-        let task = self.spec.episode.task;
-        let rows = step.action_rows.chunks_exact(columns * task.robots.len());
-        let asked = rows.take(self.worlds.len()).map(|row| {
-            let call = ToolCall::Act(self.spec.actions.call(task.robot_names(), row));
+        let BatchSpec { actions, steps_per_row, ref episode, .. } = *self.spec;
+        let rows = step.action_rows.chunks_exact(actions.row_len() * episode.task.robots.len());
+        let asked = self.worlds.iter().zip(rows).map(|(world, row)| {
+            let before_rows = held(world).joint_rows(episode.task.robots.len());
+            let act = actions.call(episode.task.robot_names(), row, &before_rows, steps_per_row);
+            let call = ToolCall::Act(act);
             call.validate().map_err(EpisodeError::from)?;
             Ok(call)
         });

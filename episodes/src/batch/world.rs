@@ -3,11 +3,11 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-use tandem_tools_spec::ToolCall;
+use tandem_tools_spec::{ACTION_ROW_LEN, ToolCall};
 
 use super::{Autoreset, BatchError, BatchSpec, STATE_COLUMNS};
 use crate::Session;
-use crate::commands::base_row;
+use crate::rows::{joint_row, state_row};
 use crate::spec::EpisodeSpec;
 
 /// Default seed of the first world: the first seed that is neither reported nor held out.
@@ -139,7 +139,15 @@ impl BatchWorld {
         Ok(look(spec, session, outcome, true))
     }
 
-    /// Takes one control step, or begins the next episode.
+    /// Returns the joint rows of the commands in force; zeros without an episode.
+    pub fn joint_rows(&self, robots: usize) -> Vec<Vec<f64>> {
+        match &self.session {
+            Some(session) => session.present().robots.iter().map(|robot| joint_row(&robot.command)).collect(),
+            None => vec![vec![0.0; ACTION_ROW_LEN]; robots],
+        }
+    }
+
+    /// Carries out a row of each robot, or begins the next episode.
     pub fn step(
         &mut self,
         spec: &BatchSpec,
@@ -168,7 +176,7 @@ impl BatchWorld {
         Ok(step)
     }
 
-    /// Takes one control step and returns its outcome. An error in a world is reported for this world
+    /// Makes the call of a step and returns its outcome. An error in a world is reported for this world
     /// alone.
     fn advance(&mut self, spec: &BatchSpec, call: &ToolCall) -> WorldStep {
         let Some(session) = &mut self.session else { return WorldStep::default() };
@@ -231,8 +239,7 @@ impl BatchWorld {
 fn look(spec: &BatchSpec, session: &mut Session, outcome: WorldStep, draws: bool) -> SeenStep {
     let mut state_rows = Vec::with_capacity(session.present().robots.len() * STATE_COLUMNS);
     for robot in &session.present().robots {
-        state_rows.extend(robot.sensed.joints.q_rad);
-        state_rows.extend(base_row(&robot.command.base));
+        state_rows.extend(state_row(robot));
     }
     let draws = draws && spec.pictures_px.is_some();
     let undrawn = draws && session.draws_together();

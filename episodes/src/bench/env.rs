@@ -11,9 +11,8 @@ use tandem_tools_spec::Protocol;
 
 use super::BenchError;
 use crate::EpisodeError;
-use crate::batch::{
-    ActionKind, Autoreset, Batch, BatchError, BatchSpec, BatchStep, RewardKind, STATE_COLUMNS, SeenArrays,
-};
+use crate::batch::{Autoreset, Batch, BatchError, BatchSpec, BatchStep, RewardKind, SeenArrays};
+use crate::rows::{ActionKind, STATE_COLUMNS};
 use crate::session::build;
 use crate::spec::EpisodeSpec;
 use crate::tasks::{self, Task};
@@ -169,6 +168,7 @@ fn batch_pace(episode: &EpisodeSpec, threads: usize) -> Result<(f64, Pace), Benc
         worlds: WORLDS,
         threads,
         actions: ActionKind::Joints,
+        steps_per_row: 1,
         reward: RewardKind::Sparse,
         pictures_px: None,
         record: None,

@@ -13,6 +13,7 @@ use tandem_tools_spec::{
 
 use super::fit;
 use super::proprioception::{Detail, Proprioception, calibration, robot_state};
+use super::scaling::{drawing_camera, scaled_colours};
 use super::surface::{self, CameraPoses};
 use super::{Picture, RobotObservation, RobotView, TeamObservation};
 use crate::EpisodeError;
@@ -77,9 +78,9 @@ impl Observer {
     }
 
     /// Renders the colours of the view of robot number `robot` after `step`, in this size.
-    pub fn eye(&mut self, step: &Step, robot: usize, [width, height]: [u32; 2]) -> Vec<u8> {
-        let camera = Camera { width, height, ..self.cameras.egocentric(step, robot) };
-        self.colours(step, &camera)
+    pub fn eye(&mut self, step: &Step, robot: usize, size_px: [u32; 2]) -> Vec<u8> {
+        let camera = drawing_camera(self.cameras.egocentric(step, robot), size_px);
+        scaled_colours(self.colours(step, &camera), [camera.width, camera.height], size_px)
     }
 
     /// Returns true if [`Observer::eyes`] is the faster way to render several worlds.
@@ -87,12 +88,12 @@ impl Observer {
         self.renderer.draws_together()
     }
 
-    /// Returns a request for the views of all robots after `step` in this size, to be rendered together
-    /// with other requests.
-    pub fn eyes<'a>(&'a mut self, step: &'a Step, [width, height]: [u32; 2]) -> RenderRequest<'a> {
+    /// Returns a request for the views of all robots after `step`, to be rendered together with other
+    /// requests, and to be scaled to this size.
+    pub fn eyes<'a>(&'a mut self, step: &'a Step, size_px: [u32; 2]) -> RenderRequest<'a> {
         let robots = 0..step.robots.len();
         let cameras =
-            robots.map(|robot| Camera { width, height, ..self.cameras.egocentric(step, robot) }).collect();
+            robots.map(|robot| drawing_camera(self.cameras.egocentric(step, robot), size_px)).collect();
         RenderRequest { renderer: &mut *self.renderer, step, cameras }
     }
 

@@ -2,11 +2,27 @@
 
 use fast_image_resize::{FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer, images::ImageRef};
 use image::{ImageBuffer, Rgb, RgbImage};
+use tandem_sim::render::Camera;
 
 use super::Picture;
 
 /// An image, for the functions of the library `image`.
 pub type Pixels<'a> = ImageBuffer<Rgb<u8>, &'a [u8]>;
+
+/// Returns the camera that renders images of this size. A size of the same shape that is no larger gives
+/// the camera's own image, scaled: that is what a policy sees that requests this size.
+pub fn drawing_camera(own: Camera, [width, height]: [u32; 2]) -> Camera {
+    let same_shape = u64::from(width) * u64::from(own.height) == u64::from(height) * u64::from(own.width);
+    if same_shape && width <= own.width { own } else { Camera { width, height, ..own } }
+}
+
+/// Returns the colours of an image, scaled from the size in which it was rendered to another.
+pub fn scaled_colours(rgb: Vec<u8>, drawn_px: [u32; 2], size_px: [u32; 2]) -> Vec<u8> {
+    if drawn_px == size_px {
+        return rgb;
+    }
+    Picture::new(drawn_px[0], drawn_px[1], rgb).scaled(size_px).into_raw()
+}
 
 impl Picture {
     /// Returns the unscaled pixels.

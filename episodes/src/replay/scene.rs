@@ -4,7 +4,7 @@ use tandem_sim::Step;
 use tandem_sim::render::{Camera, Frame};
 
 use crate::EpisodeError;
-use crate::observation::{Observer, Picture};
+use crate::observation::{Observer, Picture, drawing_camera, scaled_colours};
 use crate::session::build;
 use crate::spec::EpisodeSpec;
 use crate::tasks::Task;
@@ -87,21 +87,11 @@ impl EpisodeRenderer {
     /// that requests this size.
     pub fn colours(&mut self, view: EpisodeCamera, step: &Step, size: Option<PictureSize>) -> Picture {
         let own = self.camera(view, step, None);
-        let scaled = size.filter(|size| {
-            let same_shape = u64::from(size.width) * u64::from(own.height)
-                == u64::from(size.height) * u64::from(own.width);
-            same_shape && size.width <= own.width
-        });
-        let camera = if scaled.is_some() { own } else { self.camera(view, step, size) };
-        let Camera { width, height, .. } = camera;
-        let picture = Picture::new(width, height, self.observer.colours(step, &camera));
-        match scaled {
-            Some(size) if [size.width, size.height] != [width, height] => {
-                let rgb = picture.scaled([size.width, size.height]).into_raw();
-                Picture::new(size.width, size.height, rgb)
-            }
-            _ => picture,
-        }
+        let [width, height] =
+            size.map_or([own.width, own.height], |PictureSize { width, height }| [width, height]);
+        let camera = drawing_camera(own, [width, height]);
+        let rgb = self.observer.colours(step, &camera);
+        Picture::new(width, height, scaled_colours(rgb, [camera.width, camera.height], [width, height]))
     }
 
     /// Renders the view of `camera` after `step`.

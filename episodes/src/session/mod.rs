@@ -403,8 +403,8 @@ impl Session {
         self.observer.draws_together()
     }
 
-    /// Returns a request for the images of [`Session::eye`] of all robots, to be rendered together with
-    /// those of other episodes.
+    /// Returns a request for the images of [`Session::eye`] of all robots before they are scaled, to be
+    /// rendered together with those of other episodes.
     pub fn eyes(&mut self, size_px: [u32; 2]) -> RenderRequest<'_> {
         self.observer.eyes(&self.present, size_px)
     }

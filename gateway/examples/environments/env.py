@@ -11,6 +11,7 @@ from typing import Any
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from gym_tandem import TandemVectorEnv
+from tandem.rows import DEFAULT_DATA_RATE_HZ
 
 TASKS = ("handover", "co_carry")
 
@@ -21,6 +22,7 @@ class FilmedVectorEnv(TandemVectorEnv, SyncVectorEnv):  # pyright: ignore[report
 
 def make_env(n_envs: int = 1, use_async_envs: bool = False, cfg: Any = None) -> dict[str, dict[int, TandemVectorEnv]]:
     """Vector environments of `TASKS`."""
-    options: dict[str, Any] = {"render_mode": "rgb_array"} if cfg is None else cfg.gym_kwargs
+    as_exported: dict[str, Any] = {"fps": DEFAULT_DATA_RATE_HZ, "render_mode": "rgb_array"}
+    options: dict[str, Any] = as_exported if cfg is None else cfg.gym_kwargs
     made = [FilmedVectorEnv(task, n_envs, autoreset_mode=AutoresetMode.SAME_STEP, **options) for task in TASKS]
     return {"tandem": dict(enumerate(made))}

@@ -13,13 +13,14 @@ from .worlds import Observation, Options, Outcome, Worlds
 
 
 class TandemEnv(gym.Env[Observation, NDArray[np.float32]]):
-    """An episode under the benchmark protocol; a step is one control step of 20 ms.
+    """An episode under the benchmark protocol; a step is one control step of 20 ms, or with `fps` as long as a data set's row.
 
     Observations: `agent_pos`, float32, for each robot in turn 43 joint angles in radians and the base command (m/s, m/s, rad/s,
     m), and `pixels`: by robot what its head camera sees, height by width by 3, uint8.
     Actions: float32, for each robot in turn 31 joint targets in radians and the base command; with `action_type="wrists"` both
     wrists' poses in its pelvis frame (x, y, z in metres, then w, x, y, z), both hands' fingers (7 angles in radians each) and
     the base command.
+    `contract` names every number, with its unit and range.
     Rewards: 1 for each phase in the step that reaches it. With `reward_type="dense"` what a step adds to the progress: phases
     reached, and how near the next one is, from 0 to 1. A whole episode gives at most 3 either way.
     An episode terminates with the last phase or with a fall, and is truncated when its steps are used up.
@@ -40,9 +41,11 @@ class TandemEnv(gym.Env[Observation, NDArray[np.float32]]):
         self.task = task
         self.task_description = self._worlds.task.instruction
         self._max_episode_steps = self._worlds.max_episode_steps
+        self.contract = self._worlds.contract
+        self.metadata = {**type(self).metadata, "render_fps": self.contract.rate_hz}
         self.render_mode = render_mode
-        self.action_space = self._worlds.action_box(len(self._worlds.robots))
-        self.observation_space = self._worlds.observation_dict(self._worlds.robots)
+        self.action_space = self._worlds.action_box()
+        self.observation_space = self._worlds.observation_dict()
         self._has_begun = False
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Observation, dict[str, Any]]:

@@ -18,7 +18,8 @@ Stepped = tuple[dict[str, Observation], dict[str, float], dict[str, bool], dict[
 class TandemParallelEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
     """An episode as `TandemEnv` has it, with agents `A`, `B` and, in tasks of three, `C`.
 
-    Each agent has its own robot's part of observation and action. All of them get the same rewards, and their episode
+    Each agent has its own robot's part of observation and action, as in a data set of single robots: its picture is called
+    `egocentric`, and `contract` names every number. All of them get the same rewards, and their episode
     ends for all at once. `instructions` has what each is asked to do.
 
     task: A task's id, as "handover".
@@ -35,15 +36,17 @@ class TandemParallelEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
     def __init__(
         self, task: str = "handover", *, render_mode: Literal["rgb_array"] | None = None, **options: Unpack[Options]
     ) -> None:
-        self._worlds = Worlds(task, 1, threads=1, options=options, keeps_last=False)
+        self._worlds = Worlds(task, 1, threads=1, options=options, keeps_last=False, apart=True)
         self.task = task
         self.task_description = self._worlds.task.instruction
         self.instructions = {told.robot: told.instruction for told in self._worlds.task.robots}
+        self.contract = self._worlds.contract
+        self.metadata = {**type(self).metadata, "render_fps": self.contract.rate_hz}
         self.render_mode = render_mode
         self.possible_agents = list(self._worlds.robots)
         self.agents: list[str] = []
-        self.observation_spaces = {agent: self._worlds.observation_dict((agent,)) for agent in self.possible_agents}
-        self.action_spaces = {agent: self._worlds.action_box(1) for agent in self.possible_agents}
+        self.observation_spaces = {agent: self._worlds.observation_dict() for agent in self.possible_agents}
+        self.action_spaces = {agent: self._worlds.action_box() for agent in self.possible_agents}
 
     def observation_space(self, agent: str) -> gym.Space[Any]:
         return self.observation_spaces[agent]

@@ -73,10 +73,11 @@ class TandemVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]])
         self.task_description = self._worlds.task.instruction
         self.max_episode_steps = self._worlds.max_episode_steps
         self.render_mode = render_mode
-        self.metadata = {**type(self).metadata, "autoreset_mode": mode}
-        actions: Any = self._worlds.action_box(len(self._worlds.robots))
+        self.contract = self._worlds.contract
+        self.metadata = {**type(self).metadata, "render_fps": self.contract.rate_hz, "autoreset_mode": mode}
+        actions: Any = self._worlds.action_box()
         self.single_action_space = actions
-        self.single_observation_space = self._worlds.observation_dict(self._worlds.robots)
+        self.single_observation_space = self._worlds.observation_dict()
         self.action_space = batch_space(actions, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
 

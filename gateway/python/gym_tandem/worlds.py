@@ -17,11 +17,9 @@ import tandem
 from tandem import _native
 from tandem.base import StressAxis, StressLevel, integer
 from tandem.contract.start import TaskInfo
+from tandem.rows import DEFAULT_SIZE_PX, EGOCENTRIC, RATES_HZ, RowContract, check_contract
 
 Observation = dict[str, Any]
-
-STATE_COLUMNS = 47
-"""Numbers of a robot's state: 43 joint angles (rad) and the base command in force (m/s, m/s, rad/s, m)."""
 
 LARGEST_SEED = 2**32 - 1
 
@@ -49,6 +47,12 @@ class Options(TypedDict, total=False):
 
     observation_height: int
     """Height of pictures, which see as high an angle at any size, and as wide as they are; 240."""
+
+    fps: int
+    """Steps per second: 50, 25 or 10. Joint targets are reached at the end of a step, on a straight line; 50."""
+
+    data_set: str | PathLike[str] | None
+    """Folder of a data set, of `tandem export lerobot`, whose rows the environment must have; what differs is refused."""
 
     look_every: int
     """Pictures are drawn at every so manieth step, and where an episode begins or ends; in between they stay the same. 1."""
@@ -102,10 +106,34 @@ def _reworded(told: TaskInfo, options: Options) -> TaskInfo:
         return replace(told, instruction=episode.briefing.instruction, robots=episode.briefing.instructions)
 
 
+def environment_contract(task: TaskInfo, options: Options, *, apart: bool = False) -> RowContract:
+    """Returns the layout of an environment's rows.
+
+    apart: True for rows of one robot, of which every robot has its own.
+    """
+    fps = integer(options.get("fps", RATES_HZ[0]), "fps")
+    if fps not in RATES_HZ:
+        raise ValueError(f"no fps {fps}; have: {', '.join(map(str, RATES_HZ))}")
+    settings = {key: value for key, value in options.items() if key in EPISODE_SETTINGS}
+    layout = _native.row_contract(task.id, json.dumps(settings), options.get("action_type", "joints"))
+    robots = None if apart else tuple(robot.robot for robot in task.robots)
+    observed = options.get("obs_type", "pixels_agent_pos")
+    images = {} if observed == "state" else dict.fromkeys(robots or (EGOCENTRIC,), picture_size(options))
+    contract = RowContract.from_native(layout, robots, fps, images)
+    return replace(contract, state=()) if observed == "pixels" else contract
+
+
+def picture_size(options: Options) -> tuple[int, int]:
+    """Returns width and height of pictures."""
+    width, height = DEFAULT_SIZE_PX
+    sides = options.get("observation_width", width), options.get("observation_height", height)
+    return integer(sides[0], "observation_width"), integer(sides[1], "observation_height")
+
+
 class Worlds:
     """Worlds of one task, their spaces, and what is seen of them."""
 
-    def __init__(self, task: str, count: int, *, threads: int, options: Options, keeps_last: bool) -> None:
+    def __init__(self, task: str, count: int, *, threads: int, options: Options, keeps_last: bool, apart: bool = False) -> None:
         told = next((entry for entry in tandem.tasks().tasks if entry.id == task), None)
         if told is None:
             have = ", ".join(entry.id for entry in tandem.tasks().tasks)
@@ -119,15 +147,18 @@ class Worlds:
         rules = next(rules for rules in told.protocols if rules.protocol == "benchmark")
         self.count = count
         self.task = _reworded(told, options) if options.get("stress") == "words" else told
-        self.max_episode_steps = rules.episode_steps - rules.initial_hold_steps
         self.robots = tuple(instruction.robot for instruction in told.robots)
-        width, height = options.get("observation_width", 320), options.get("observation_height", 240)
-        self.size = integer(width, "observation_width"), integer(height, "observation_height")
+        self.size = picture_size(options)
         self.look_every = integer(options.get("look_every", 1), "look_every")
         if min(self.size) < 1 or self.look_every < 1:
             raise ValueError(f"pictures of {self.size} at every step of {self.look_every}; give numbers from 1 on")
-        observed = options.get("obs_type", "pixels_agent_pos")
-        self.sees, self.senses = observed != "state", observed != "pixels"
+        self.contract = environment_contract(told, options, apart=apart)
+        if (data_set := options.get("data_set")) is not None:
+            check_contract(data_set, self.contract)
+        steps_per_row = RATES_HZ[0] // self.contract.rate_hz
+        self.max_episode_steps = -(-(rules.episode_steps - rules.initial_hold_steps) // steps_per_row)
+        self.sees, self.senses = bool(self.contract.images), bool(self.contract.state)
+        self._action_columns = len(self.contract.action) // (1 if apart else len(self.robots))
         settings = {key: value for key, value in options.items() if key in EPISODE_SETTINGS}
         record = options.get("record")
         self._native = _native.Worlds(
@@ -136,6 +167,7 @@ class Worlds:
             count,
             threads,
             options.get("action_type", "joints"),
+            self.contract.rate_hz,
             options.get("reward_type", "sparse"),
             self.size if self.sees else None,
             record,
@@ -156,26 +188,26 @@ class Worlds:
 
     def _arrays(self) -> tuple[NDArray[np.float32], NDArray[np.uint8] | None]:
         width, height = self.size
-        states = np.zeros((self.count, len(self.robots), STATE_COLUMNS), np.float32)
+        states = np.zeros((self.count, len(self.robots), _native.row_state_columns()), np.float32)
         if not self.sees:
             return states, None
         return states, np.zeros((self.count, len(self.robots), height, width, 3), np.uint8)
 
-    def action_box(self, robots: int) -> gym.Space[NDArray[np.float32]]:
-        """Rows of so many robots, one after another. What lies beyond a limit is moved there."""
-        limits = np.tile(self._native.action_limits(), (robots, 1))
+    def action_box(self) -> gym.Space[NDArray[np.float32]]:
+        """An action of the contract. What lies beyond a limit is moved there."""
+        limits = np.array([(column.min, column.max) for column in self.contract.action], np.float32)
         box: gym.Space[Any] = gym.spaces.Box(limits[:, 0], limits[:, 1], dtype=np.float32)
         return box
 
-    def observation_dict(self, robots: tuple[str, ...]) -> gym.spaces.Dict:
-        """What is seen of these robots."""
+    def observation_dict(self) -> gym.spaces.Dict:
+        """An observation of the contract."""
         spaces: dict[str, gym.Space[Any]] = {}
         if self.senses:
-            spaces["agent_pos"] = gym.spaces.Box(-np.inf, np.inf, (len(robots) * STATE_COLUMNS,), np.float32)
+            spaces["agent_pos"] = gym.spaces.Box(-np.inf, np.inf, (len(self.contract.state),), np.float32)
         if self.sees:
             width, height = self.size
             picture = gym.spaces.Box(0, 255, (height, width, 3), np.uint8)
-            spaces["pixels"] = gym.spaces.Dict({robot: picture for robot in robots})
+            spaces["pixels"] = gym.spaces.Dict(dict.fromkeys(self.contract.images, picture))
         return gym.spaces.Dict(spaces)
 
     def reset(self, seeds: list[int | None], chosen: list[bool] | None = None) -> Outcome:
@@ -190,9 +222,9 @@ class Worlds:
         return Outcome(*self._native.reset(chosen, begun, self._seen))
 
     def step(self, actions: ArrayLike, autoreset: str) -> Outcome:
-        """One control step of each world, or the beginning of its next episode."""
+        """A row of each world, or the beginning of its next episode."""
         rows: NDArray[np.float32] = np.ascontiguousarray(actions, np.float32)
-        robots, width = len(self.robots), self._native.action_limits().shape[0]
+        robots, width = len(self.robots), self._action_columns
         shape = (self.count, robots, width)
         shapes = [(self.count, robots * width), shape]
         if self.count == 1:
@@ -225,7 +257,7 @@ class Worlds:
         states, pictures = self._seen
         seen: Observation = {"agent_pos": states[0, index].copy()} if self.senses else {}
         if pictures is not None:
-            seen["pixels"] = {self.robots[index]: pictures[0, index].copy()}
+            seen["pixels"] = {EGOCENTRIC: pictures[0, index].copy()}
         return seen
 
     def draw(self, world: int) -> NDArray[np.uint8]:

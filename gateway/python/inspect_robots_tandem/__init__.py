@@ -29,23 +29,11 @@ from numpy.typing import NDArray
 import tandem
 from gym_tandem import Options, TandemEnv
 from gym_tandem.worlds import LARGEST_SEED
-from tandem import _native
-
-_JOINTS = [name for name in _native.state_columns() if name.endswith("_joint_rad")]
-_ROW = _native.action_columns()
-_STATE_ROW = [*_JOINTS, *_ROW[-4:]]
-_IN_STATE = [_STATE_ROW.index(name) for name in _ROW]
 
 # How far a target may be from the one before it: as far as the experts' go in one step of 20 ms.
 _ARM_STEP_RAD = 0.08
 _FINGER_STEP_RAD = 0.35
 _HEIGHT_STEP_M = 0.06
-
-_WRIST_ROW = [
-    *(f"{side}_wrist_{part}" for side in ("left", "right") for part in ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")),
-    *(name for name in _ROW if "_hand_" in name),
-    *_ROW[-4:],
-]
 
 _NOTES = """{robots} Unitree G1 humanoids with Dex3 hands, which have to work together; dimensions begin with a robot's name.
 {parts}
@@ -110,7 +98,9 @@ class TandemEmbodiment(EmbodimentBase):
         self._tells_joints = action_type == "joints"
         size = {"height": observation_height, "width": observation_width}
         action_space = self._action_space()
-        fields = [StateField("joint_pos_all", (len(self._robots) * len(_STATE_ROW),), "rad")]
+        state = [column.name for column in self._env.contract.state]
+        self._in_state = [state.index(column.name) for column in self._env.contract.action if column.name in state]
+        fields = [StateField("joint_pos_all", (len(state),), "rad")]
         if self._tells_joints:
             fields.insert(0, StateField("joint_pos", action_space.shape, "rad"))
         parts = "\n".join(f"- {robot.robot}: {robot.instruction}" for robot in told.robots)
@@ -131,7 +121,7 @@ class TandemEmbodiment(EmbodimentBase):
     def _action_space(self) -> Box:
         bounds: Any = self._env.action_space
         low, high = np.asarray(bounds.low, np.float64), np.asarray(bounds.high, np.float64)
-        row = _ROW if self._tells_joints else _WRIST_ROW
+        row = [column.name for column in self._env.contract.action]
         return Box(
             low.shape,
             low,
@@ -139,10 +129,8 @@ class TandemEmbodiment(EmbodimentBase):
             ActionSemantics(
                 "joint_pos" if self._tells_joints else "eef_abs_pose",
                 "none" if self._tells_joints else "quat_wxyz",
-                dim_labels=tuple(f"{robot}_{name.removesuffix('_rad')}" for robot in self._robots for name in row),
-                max_step=tuple(
-                    _largest_step(name, float(width)) for name, width in zip(row * len(self._robots), high - low, strict=True)
-                ),
+                dim_labels=tuple(name.replace(".", "_").removesuffix("_rad") for name in row),
+                max_step=tuple(_largest_step(name, float(width)) for name, width in zip(row, high - low, strict=True)),
             ),
         )
 
@@ -173,7 +161,7 @@ class TandemEmbodiment(EmbodimentBase):
         measured = np.asarray(observed["agent_pos"], np.float64)
         state = {"joint_pos_all": measured}
         if self._tells_joints:
-            state["joint_pos"] = np.reshape(measured, (len(self._robots), -1))[:, _IN_STATE].ravel()
+            state["joint_pos"] = measured[self._in_state]
         time_s = 0.02 * self._steps
         looked_s = 0.02 * (self._steps - self._steps % self._look_every)
         return Observation(self._images, state, self._instruction, dict.fromkeys(self._images, looked_s), time_s)
@@ -188,7 +176,7 @@ def _largest_step(name: str, width: float) -> float:
     if name.endswith("_joint_rad"):
         return _ARM_STEP_RAD
     # Velocities are told at once, and the base controller takes its time; poses have no limit for each number.
-    return _HEIGHT_STEP_M if name == "pelvis_height_m" else width
+    return _HEIGHT_STEP_M if name.endswith("pelvis_height_m") else width
 
 
 @dataclass(frozen=True)

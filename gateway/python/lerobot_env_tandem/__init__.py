@@ -1,4 +1,4 @@
-"""Tandem's tasks as environments of LeRobot.
+"""Tandem's tasks as environments of LeRobot, with the rows of data sets of `tandem export lerobot`.
 
 lerobot-eval --env.discover_packages_path=lerobot_env_tandem --env.type=tandem --env.task=Handover-v0 --policy.path=...
 """
@@ -12,23 +12,26 @@ from lerobot.configs.types import FeatureType, PolicyFeature
 from lerobot.envs.configs import EnvConfig
 
 import tandem
-from gym_tandem import env_id
-from gym_tandem.worlds import STATE_COLUMNS
-
-_ACTION = "action"
-_STATE = "observation.state"
+from gym_tandem import Options, env_id
+from gym_tandem.worlds import environment_contract
+from tandem.rows import ACTION, DEFAULT_DATA_RATE_HZ, DEFAULT_SIZE_PX, IMAGES, STATE, check_contract
 
 
 @EnvConfig.register_subclass("tandem")
 @dataclass
 class TandemEnvConfig(EnvConfig):
-    """What `lerobot-eval` and `lerobot-train` have to know of a task; options are those of `gym_tandem.Options`."""
+    """What `lerobot-eval` and `lerobot-train` have to know of a task; options are those of `gym_tandem.Options`.
+
+    Rate and size of pictures are by default those of `tandem export lerobot`. With `data_set`, whatever differs from the rows
+    of the data set is refused.
+    """
 
     task: str | None = "Handover-v0"
-    fps: int = 50
+    fps: int = DEFAULT_DATA_RATE_HZ
+    data_set: str | None = None
     obs_type: str = "pixels_agent_pos"
-    observation_height: int = 240
-    observation_width: int = 320
+    observation_height: int = DEFAULT_SIZE_PX[1]
+    observation_width: int = DEFAULT_SIZE_PX[0]
     look_every: int = 1
     action_type: str = "joints"
     reward_type: str = "sparse"
@@ -39,18 +42,19 @@ class TandemEnvConfig(EnvConfig):
     features_map: dict[str, str] = field(default_factory=dict[str, str])
 
     def __post_init__(self) -> None:
-        robots = [robot.robot for robot in self.told.robots]
-        width = 35 if self.action_type == "joints" else 32
-        self.features[_ACTION] = PolicyFeature(type=FeatureType.ACTION, shape=(len(robots) * width,))
-        self.features_map[_ACTION] = _ACTION
-        if self.obs_type != "pixels":
-            self.features["agent_pos"] = PolicyFeature(type=FeatureType.STATE, shape=(len(robots) * STATE_COLUMNS,))
-            self.features_map["agent_pos"] = _STATE
-        if self.obs_type != "state":
-            shape = (self.observation_height, self.observation_width, 3)
-            for robot in robots:
-                self.features[f"pixels/{robot}"] = PolicyFeature(type=FeatureType.VISUAL, shape=shape)
-                self.features_map[f"pixels/{robot}"] = f"observation.images.{robot}"
+        options: Any = {name: getattr(self, name) for name in Options.__annotations__ if hasattr(self, name)}
+        contract = environment_contract(self.told, options)
+        if self.data_set is not None:
+            check_contract(self.data_set, contract)
+        self._add("action", ACTION, FeatureType.ACTION, (len(contract.action),))
+        if contract.state:
+            self._add("agent_pos", STATE, FeatureType.STATE, (len(contract.state),))
+        for name, (width, height) in contract.images.items():
+            self._add(f"pixels/{name}", IMAGES + name, FeatureType.VISUAL, (height, width, 3))
+
+    def _add(self, name: str, key: str, kind: FeatureType, shape: tuple[int, ...]) -> None:
+        self.features[name] = PolicyFeature(type=kind, shape=shape)
+        self.features_map[name] = key
 
     @property
     def told(self) -> Any:
@@ -68,6 +72,7 @@ class TandemEnvConfig(EnvConfig):
     @property
     def gym_kwargs(self) -> dict[str, Any]:
         names = (
+            "fps",
             "obs_type",
             "observation_height",
             "observation_width",

@@ -32,7 +32,7 @@ mod _native {
     #[pymodule_export]
     use crate::recording::NativeRecording;
     #[pymodule_export]
-    use crate::worlds::{NativeWorlds, row_columns};
+    use crate::worlds::{NativeWorlds, row_contract, row_contract_version, row_rates_hz, row_state_columns};
 
     /// Sets the path of this library as the build that made episodes, recordings and checkpoints, instead
     /// of the Python interpreter.

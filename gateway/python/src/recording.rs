@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
 use tandem_episodes::replay::{EpisodeCamera, EpisodeRenderer, PictureSize};
+use tandem_episodes::rows::{ActionKind, STATE_COLUMNS, state_row};
 use tandem_episodes::{Grip, Recording, RecordingError};
 use tandem_sim::render::Frame;
 use tandem_sim::{JOINTS, Side, Step};
@@ -16,6 +17,7 @@ use tandem_tools_spec::ACTION_ROW_LEN;
 
 use crate::arrays::{Colours, Depths, action_row, pose_row, shaped, vector_row};
 use crate::refusal::{failed, refused};
+use crate::worlds::contract_json;
 
 /// A recording in memory.
 #[pyclass(frozen, name = "Recording", module = "tandem._native")]
@@ -73,6 +75,11 @@ impl NativeRecording {
             "calls": calls.collect::<Vec<_>>(),
         });
         Ok(about.to_string())
+    }
+
+    /// Returns the layout of a robot's rows as JSON.
+    fn row_contract(&self, py: Python) -> PyResult<String> {
+        contract_json(py, &self.recording.spec, ActionKind::Joints)
     }
 
     /// Returns the hash of every state, including the one before the first step.
@@ -192,6 +199,7 @@ struct Columns {
     qd_rad_s: Vec<f32>,
     torque_n_m: Vec<f32>,
     action: Vec<f32>,
+    state: Vec<f32>,
     pelvis_in_world: Vec<f32>,
     pelvis_in_start: Vec<f32>,
     wrists_in_pelvis: Vec<f32>,
@@ -220,6 +228,7 @@ impl Columns {
             self.qd_rad_s.extend(sensed.joints.qd_rad_s);
             self.torque_n_m.extend(sensed.joints.torque_n_m);
             self.action.extend(action_row(&robot.command));
+            self.state.extend(state_row(robot));
             self.pelvis_in_world.extend(pose_row(&truth.world_from_pelvis()));
             self.pelvis_in_start.extend(pose_row(&sensed.start_from_pelvis));
             let forces_n = robot.hand_force_in_world_n();
@@ -251,6 +260,7 @@ impl Columns {
         arrays.set_item("qd_rad_s", shaped(py, &self.qd_rad_s, [steps, robots, JOINTS])?)?;
         arrays.set_item("torque_n_m", shaped(py, &self.torque_n_m, [steps, robots, JOINTS])?)?;
         arrays.set_item("actions", shaped(py, &self.action, [steps, robots, ACTION_ROW_LEN])?)?;
+        arrays.set_item("states", shaped(py, &self.state, [steps, robots, STATE_COLUMNS])?)?;
         arrays.set_item("pelvis_in_world", shaped(py, &self.pelvis_in_world, [steps, robots, 7])?)?;
         arrays.set_item("pelvis_in_start", shaped(py, &self.pelvis_in_start, [steps, robots, 7])?)?;
         arrays.set_item("wrists_in_pelvis", shaped(py, &self.wrists_in_pelvis, [steps, robots, 2, 7])?)?;

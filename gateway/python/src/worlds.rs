@@ -1,4 +1,4 @@
-//! Many worlds of one task that step together, for learning environments.
+//! Many worlds of one task that step together, for learning environments, and the layout of their rows.
 
 use std::path::PathBuf;
 use std::process;
@@ -10,12 +10,14 @@ use pyo3::prelude::*;
 use tandem::settings::{Layer, Settings};
 use tandem_episodes::EpisodeSpec;
 use tandem_episodes::batch::{
-    ActionKind, Autoreset, Batch, BatchError, BatchSpec, BatchStep, RewardKind, STATE_COLUMNS, SeenArrays,
-    WorldStep, wrist_columns,
+    Autoreset, Batch, BatchError, BatchSpec, BatchStep, RewardKind, SeenArrays, WorldStep,
+};
+use tandem_episodes::rows::{
+    ActionKind, ROW_CONTRACT_VERSION, ROW_RATES_HZ, RowContract, STATE_COLUMNS, steps_per_row,
 };
 use tandem_tools_spec::{Protocol, StartEpisode};
 
-use crate::arrays::{action_columns, shaped};
+use crate::arrays::shaped;
 use crate::refusal::{failed, forked, refused};
 
 /// Worlds of one task. They may be used from any thread; concurrent calls are serialized.
@@ -27,7 +29,7 @@ pub struct NativeWorlds {
     process: u32,
     worlds: usize,
     robots: usize,
-    limits: Vec<[f32; 2]>,
+    actions: ActionKind,
 }
 
 /// Outcomes by world: reward, terminated, truncated, phases, fallen (by robot), steps, the episode's
@@ -54,7 +56,7 @@ type Seen<'py> = (PyReadwriteArray3<'py, f32>, Option<PyReadwriteArray5<'py, u8>
 impl NativeWorlds {
     /// Creates worlds without episodes. With `threads` = 0 there are as many threads as cores.
     #[new]
-    #[pyo3(signature = (task, settings, worlds, threads, actions, reward, pictures, record))]
+    #[pyo3(signature = (task, settings, worlds, threads, actions, rate_hz, reward, pictures, record))]
     #[allow(clippy::too_many_arguments)]
     fn new(
         py: Python,
@@ -63,32 +65,25 @@ impl NativeWorlds {
         worlds: usize,
         threads: usize,
         actions: &str,
+        rate_hz: u32,
         reward: &str,
         pictures: Option<[u32; 2]>,
         record: Option<PathBuf>,
     ) -> PyResult<NativeWorlds> {
         let text = |error: &dyn std::fmt::Display| failed(py, error);
-        let layer: Layer = serde_json::from_str(settings).map_err(|error| text(&error))?;
-        let settings = Settings::resolve(layer, None).map_err(|error| text(&error))?;
-        let start = StartEpisode { task, seed: 0, protocol: Some(Protocol::Benchmark), short: false };
-        let episode = settings.spec(&start).map_err(|error| refused(py, &error.into()))?;
+        let episode = benchmark_episode(py, task, settings)?;
         let robots = episode.task.robots.len();
-        let actions =
-            one_of("actions", actions, &ActionKind::ALL, ActionKind::name).map_err(|error| text(&error))?;
+        let actions = action_kind(py, actions)?;
+        let steps_per_row = steps_per_row(rate_hz).map_err(|error| text(&error))?;
         let reward =
             one_of("reward", reward, &RewardKind::ALL, RewardKind::name).map_err(|error| text(&error))?;
-        let limits = limits(&episode, actions).map_err(|error| text(&error))?;
         let cores = || std::thread::available_parallelism().map_or(1, usize::from);
         let threads = if threads == 0 { cores() } else { threads };
-        let spec = BatchSpec { episode, worlds, threads, actions, reward, pictures_px: pictures, record };
+        let pictures_px = pictures;
+        let spec =
+            BatchSpec { episode, worlds, threads, actions, steps_per_row, reward, pictures_px, record };
         let batch = Mutex::new(Some(Batch::new(spec)));
-        Ok(NativeWorlds { batch, process: process::id(), worlds, robots, limits })
-    }
-
-    /// Returns the minimum and maximum of each value of a robot's row.
-    fn action_limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let numbers: Vec<f32> = self.limits.concat();
-        shaped(py, &numbers, [self.limits.len(), 2])
+        Ok(NativeWorlds { batch, process: process::id(), worlds, robots, actions })
     }
 
     /// Begins an episode in each chosen world, with its seed, or with that of the next round if the seed
@@ -112,7 +107,7 @@ impl NativeWorlds {
         self.outcomes(py, begun)
     }
 
-    /// Executes one control step of each world: worlds by robots by columns.
+    /// Carries out a row of each robot in each world: worlds by robots by columns.
     fn step<'py>(
         &self,
         py: Python<'py>,
@@ -122,7 +117,7 @@ impl NativeWorlds {
         seen: Seen<'py>,
         last: Option<Seen<'py>>,
     ) -> PyResult<Outcomes<'py>> {
-        let expected = [self.worlds, self.robots, self.limits.len()];
+        let expected = [self.worlds, self.robots, self.actions.row_len()];
         let shape = numpy::PyUntypedArrayMethods::shape(&*actions);
         if shape != expected {
             return Err(failed(py, &format!("actions have the shape {shape:?}; give {expected:?}: {SHAPE}")));
@@ -242,16 +237,46 @@ impl Drop for NativeWorlds {
     }
 }
 
-/// Returns the names of the columns of an action.
+/// Returns the layout of a robot's rows in environments of a task, as JSON.
 #[pyfunction]
-pub fn row_columns(actions: &str) -> Vec<String> {
-    if actions == ActionKind::Wrists.name() { wrist_columns() } else { action_columns() }
+pub fn row_contract(py: Python, task: String, settings: &str, actions: &str) -> PyResult<String> {
+    let episode = benchmark_episode(py, task, settings)?;
+    contract_json(py, &episode, action_kind(py, actions)?)
 }
 
-fn limits(episode: &EpisodeSpec, actions: ActionKind) -> Result<Vec<[f32; 2]>, tandem_episodes::RobotError> {
-    let model = episode.robot.model()?;
-    let base = episode.locomotion.limits(&episode.robot)?;
-    Ok(actions.limits(&model, &base))
+/// Returns the rates at which rows are written and played, in Hz, the control rate first.
+#[pyfunction]
+pub fn row_rates_hz() -> Vec<u32> {
+    ROW_RATES_HZ.to_vec()
+}
+
+/// Returns the number of values of a robot's state.
+#[pyfunction]
+pub fn row_state_columns() -> usize {
+    STATE_COLUMNS
+}
+
+/// Returns the version of the layout.
+#[pyfunction]
+pub fn row_contract_version() -> u32 {
+    ROW_CONTRACT_VERSION
+}
+
+/// Returns the layout of the rows of an episode's robots, as JSON.
+pub fn contract_json(py: Python, episode: &EpisodeSpec, actions: ActionKind) -> PyResult<String> {
+    let contract = RowContract::of(episode, actions).map_err(|error| failed(py, &error))?;
+    serde_json::to_string(&contract).map_err(|error| failed(py, &error))
+}
+
+fn benchmark_episode(py: Python, task: String, settings: &str) -> PyResult<EpisodeSpec> {
+    let layer: Layer = serde_json::from_str(settings).map_err(|error| failed(py, &error))?;
+    let settings = Settings::resolve(layer, None).map_err(|error| failed(py, &error))?;
+    let start = StartEpisode { task, seed: 0, protocol: Some(Protocol::Benchmark), short: false };
+    settings.spec(&start).map_err(|error| refused(py, &error.into()))
+}
+
+fn action_kind(py: Python, actions: &str) -> PyResult<ActionKind> {
+    one_of("actions", actions, &ActionKind::ALL, ActionKind::name).map_err(|error| failed(py, &error))
 }
 
 fn one_of<T: Copy>(what: &str, asked: &str, all: &[T], name: fn(T) -> &'static str) -> Result<T, String> {

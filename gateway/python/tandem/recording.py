@@ -140,6 +140,11 @@ class Recording:
         return tuple(_native.action_columns())
 
     @cached_property
+    def row_layout(self) -> str:
+        """Names, units and ranges of the columns of a robot's rows, as JSON; `tandem.rows` reads it."""
+        return self._native.row_contract()
+
+    @cached_property
     def _arrays(self) -> dict[str, NDArray[Any]]:
         return cast(dict[str, NDArray[Any]], self._native.arrays())
 
@@ -167,6 +172,13 @@ class Recording:
     def actions(self) -> NDArray[np.float32]:
         """Commands for each step, steps by robots by 35: joint targets in radians, then the base command."""
         return self._arrays["actions"]
+
+    @property
+    def states(self) -> NDArray[np.float32]:
+        """Sensed joint angles and the base command in force, steps by robots by 47: the states of rows in data sets
+        and environments.
+        """
+        return self._arrays["states"]
 
     @property
     def pelvis_in_world(self) -> NDArray[np.float32]:

@@ -26,7 +26,7 @@ parquet: Any = pytest.importorskip("pyarrow.parquet")
 
 SIZE = (160, 120)
 SETTINGS = ExportSettings(cameras=("egocentric", "third_person"), size=SIZE, codec="h264")
-EYES = "observation.images.A_egocentric"
+EYES = "observation.images.A"
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def test_rows_are_what_the_recording_holds(runs: Path, whole: Path) -> None:
     info = json.loads((whole / "meta/info.json").read_text())
     assert (info["codebase_version"], info["fps"], info["robot_type"]) == ("v3.0", 10, "unitree_g1_dex3")
     assert (info["total_episodes"], info["total_frames"], info["splits"]) == (2, 13, {"train": "0:2"})
-    assert rows["observation.state"].shape == (13, 86)
+    assert rows["observation.state"].shape == (13, 94)
     assert rows["action"].shape == (13, 70)
     for key, feature in info["features"].items():
         assert not key.startswith("observation.images") or feature["dtype"] == "video"
@@ -83,7 +83,7 @@ def test_rows_are_what_the_recording_holds(runs: Path, whole: Path) -> None:
     assert rows["episode_index"].tolist() == [0] * 5 + [1] * 8
     assert rows["index"].tolist() == list(range(13))
     second = tandem.Recording(runs / "handover-2011")
-    assert np.array_equal(rows["observation.state"][7], np.ravel(second.q_rad[10]))
+    assert np.array_equal(rows["observation.state"][7], np.ravel(second.states[10]))
     # Joint targets are those of the step at which the next row begins, and velocities the mean until then.
     names = info["features"]["action"]["names"]
     told = dict(zip(names, rows["action"][7], strict=True))
@@ -174,7 +174,7 @@ def test_a_robot_has_episodes_of_its_own_and_pictures_in_the_table(runs: Path, t
     assert info["features"]["observation.images.egocentric"]["dtype"] == "image"
     rows = rows_of(exported.folder)
     recording = tandem.Recording(runs / "handover-2011")
-    assert np.array_equal(rows["observation.state"][20], recording.q_rad[0, 1])
+    assert np.array_equal(rows["observation.state"][20], recording.states[0, 1])
     pictures = parquet.read_table(exported.folder / "data/chunk-000/file-000.parquet")["observation.images.egocentric"]
     with av.open(BytesIO(pictures[23].as_py()["bytes"])) as container:
         (frame,) = container.decode(video=0)

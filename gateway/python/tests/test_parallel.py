@@ -34,7 +34,7 @@ def test_agents_are_the_robots() -> None:
     assert env.possible_agents == ["A", "B", "C"]
     seen, infos = env.reset(seed=2003)
     assert env.agents == ["A", "B", "C"]
-    assert {agent: list(of["pixels"]) for agent, of in seen.items()} == {"A": ["A"], "B": ["B"], "C": ["C"]}
+    assert {agent: list(of["pixels"]) for agent, of in seen.items()} == {agent: ["egocentric"] for agent in "ABC"}
     assert all(env.observation_space(agent).contains(seen[agent]) for agent in env.agents)
     assert infos["C"]["seed"] == 2003
     rows = np.zeros((3, 35), np.float32)

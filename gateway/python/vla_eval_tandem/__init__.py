@@ -15,11 +15,11 @@ from vla_eval.types import Action, EpisodeResult, Observation, Task
 
 import tandem
 from gym_tandem import Options, TandemEnv
-from gym_tandem.worlds import STATE_COLUMNS
+from gym_tandem.worlds import environment_contract
 
 
 class TandemBenchmark(StepBenchmark):
-    """All tasks under the benchmark protocol; a step is one control step of 20 ms, or one for each row of a chunk.
+    """All tasks under the benchmark protocol; a step is one row, or one for each row of a chunk.
 
     Observations: `images`, by robot what its head camera sees; `task_description`, what the robots do together, and
     `instructions`, by robot what its own part is; `state` (and `states`, as some servers call it): for each robot in turn 43
@@ -46,6 +46,7 @@ class TandemBenchmark(StepBenchmark):
         seed: int = 2000,
         observation_width: int = 320,
         observation_height: int = 240,
+        fps: int = 50,
         look_every: int = 1,
         action_type: Literal["joints", "wrists"] = "joints",
         sensors: Literal["ideal", "g1"] = "ideal",
@@ -57,6 +58,7 @@ class TandemBenchmark(StepBenchmark):
         self._options: Options = {
             "observation_width": observation_width,
             "observation_height": observation_height,
+            "fps": fps,
             "look_every": look_every,
             "action_type": action_type,
             "sensors": sensors,
@@ -120,7 +122,7 @@ class TandemBenchmark(StepBenchmark):
             rules.episode_steps for told in self._tasks.values() for rules in told.protocols if rules.protocol == "benchmark"
         ]
         # An episode ends by its own budget, which is never more.
-        return {"max_steps": max(budgets), "fps": 50}
+        return {"max_steps": max(budgets), "fps": self._options.get("fps")}
 
     def get_action_spec(self) -> dict[str, DimSpec]:
         joints = self._options.get("action_type") == "joints"
@@ -129,7 +131,9 @@ class TandemBenchmark(StepBenchmark):
         return {"robots": DimSpec("robots", 0, form, description=f"for each robot in turn {what}")}
 
     def get_observation_spec(self) -> dict[str, DimSpec]:
-        state = f"for each robot in turn {STATE_COLUMNS} numbers: 43 joint angles (rad) and the base command"
+        task = next(iter(self._tasks.values()))
+        columns = len(environment_contract(task, self._options).state) // len(task.robots)
+        state = f"for each robot in turn {columns} numbers: 43 joint angles (rad) and the base command"
         return {
             "image": IMAGE_RGB,
             "state": DimSpec("state", 0, "joint_positions", description=state),

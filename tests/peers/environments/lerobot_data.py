@@ -7,9 +7,10 @@
 Two demonstrations of Handover are recorded and exported with both codecs, as PNG, for each robot, with depth as films and as
 files, and as version 2.1, which LeRobot's own converter takes over. Ten rows of each are drawn again from the recording and
 compared with what LeRobot reads; its statistics of the same rows are compared with ours; the actions are played in a new episode
-of the seed; `lerobot-train` trains an ACT for two steps.
+of the seed; `lerobot-train` trains an ACT for twenty steps, and `lerobot-eval` plays it in the environment with the same rows.
 """
 
+import json
 import subprocess
 import sys
 import tempfile
@@ -62,12 +63,12 @@ def compare(name, folder, recordings, stride, robot=None):
         a_recording = 1 if robot is None else 2
         recording, step = recordings[episode // a_recording], frame * stride
         own = slice(None) if robot is None else episode % a_recording
-        assert np.array_equal(item["observation.state"].numpy(), np.ravel(recording.q_rad[step, own])), (name, row)
+        assert np.array_equal(item["observation.state"].numpy(), np.ravel(recording.states[step, own])), (name, row)
         assert item["task"] == (recording.instruction if robot is None else recording.instructions[recording.robots[own]]), (
             item["task"]
         )
         for key in data_set.meta.camera_keys:
-            camera = key.removeprefix("observation.images.").removesuffix("_depth").removesuffix("_egocentric")
+            camera = key.removeprefix("observation.images.").removesuffix("_depth")
             if camera == "egocentric":
                 camera = recording.robots[own]
             height, width = item[key].shape[1:]
@@ -129,14 +130,40 @@ def train(folder, out):
         "--policy.type=act",
         *(f"--policy.{name}={value}" for name, value in ACT.items()),
         "--batch_size=2",
-        "--steps=2",
+        "--steps=20",
         "--num_workers=0",
-        "--save_checkpoint=false",
         f"--output_dir={out}",
     ]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0 and "End of training" in done.stderr + done.stdout, done.stderr
-    print("lerobot-train: two steps of ACT")
+    print("lerobot-train: twenty steps of ACT")
+    return out / "checkpoints/last/pretrained_model"
+
+
+def evaluate(folder, settings, policy, out):
+    """The policy in the environment with the rows of its data set; at another rate, it is refused."""
+    command = [
+        PROGRAMS / "lerobot-eval",
+        "--env.discover_packages_path=lerobot_env_tandem",
+        "--env.type=tandem",
+        "--env.task=Handover-v0",
+        f"--env.data_set={folder}",
+        f"--env.observation_width={settings.size[0]}",
+        f"--env.observation_height={settings.size[1]}",
+        f"--policy.path={policy}",
+        "--policy.device=cpu",
+        "--eval.n_episodes=1",
+        "--eval.batch_size=1",
+        f"--output_dir={out}",
+        "--seed=2002",
+    ]
+    refused = subprocess.run([*command, "--env.fps=10"], capture_output=True, text=True)
+    assert refused.returncode != 0 and f"set fps={settings.rate_hz}" in refused.stderr, refused.stderr
+    done = subprocess.run([*command, f"--env.fps={settings.rate_hz}"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    overall = json.loads((out / "eval_info.json").read_text())["overall"]
+    assert overall["n_episodes"] == 1, overall
+    print("lerobot-eval:", overall["pc_success"], "% of one episode")
 
 
 def converted(folder):
@@ -173,10 +200,11 @@ def main():
             if name == "av1":
                 compare_statistics(data_set)
                 play(data_set, recordings, settings.rate_hz)
-                train(folder, scratch / "trained")
                 rows = datasets.load_dataset(str(folder), split="train")
                 assert len(rows) == len(data_set) and len(rows[0]["action"]) == 70, rows
                 print("datasets:", rows.column_names)
+            if name == "h264":
+                evaluate(folder, settings, train(folder, scratch / "trained"), scratch / "evaluated")
 
 
 if __name__ == "__main__":

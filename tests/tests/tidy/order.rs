@@ -36,7 +36,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
             &["stress"],
             &["spec"],
             &["commands", "results"],
-            &["observation"],
+            &["observation", "rows"],
             &["describe", "recording"],
             &["live", "reports"],
             &["instructions", "session"],

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TandemError
-from ..export.columns import ACTION, BASE_VELOCITIES, IMAGES, POSE, PRIVILEGED, STATE
+from ..export.columns import POSE, PRIVILEGED
 from ..export.settings import library
+from ..rows import ABOUT_FILE, ACTION, IMAGES, STATE, read_contract
 
 PELVES = f"{PRIVILEGED}pelvis_in_world"
 OBJECTS = f"{PRIVILEGED}objects_in_world"
@@ -29,7 +30,9 @@ JOINTS = 43
 """Number of sensed joint angles of a robot."""
 
 STATES = JOINTS + BASE + 1
-"""Number of inputs from a robot's state: joint angles, the base command in force, and the time since the start."""
+"""Number of inputs from a robot's state: the state of a row (joint angles and the base command in force), and the time
+since the start.
+"""
 
 CLOCK_S = 20.0
 """Unit of the clock in seconds, chosen so that an episode lasts about one unit."""
@@ -76,13 +79,14 @@ def read(data_set: Path, chunk_rows: int, every: int) -> Demonstrations:
     chunk_rows: Rows of actions for each moment.
     every: One row in `every` becomes a moment.
     """
-    info, about = (_json(data_set / f"meta/{name}.json") for name in ("info", "tandem"))
+    read_contract(data_set)
+    info, about = _json(data_set / "meta/info.json"), _json(data_set / ABOUT_FILE)
     settings = about["plan"]["settings"]
     if (settings["version"], settings["view"]) != ("v3", "joint"):
         raise TandemError(f"{data_set} is of version {settings['version']}, view {settings['view']}; export v3, view joint")
     features: dict[str, Any] = info["features"]
     robots = tuple(dict.fromkeys(name.split(".")[0] for name in features[STATE]["names"]))
-    keys = [f"{IMAGES}{robot}_egocentric" for robot in robots]
+    keys = [IMAGES + robot for robot in robots]
     if missing := [key for key in keys if key not in features]:
         raise TandemError(f"{data_set} has no {missing[0]}; export it with --cameras egocentric")
     columns = _columns(data_set, (STATE, ACTION, PELVES, OBJECTS, "episode_index"))
@@ -99,7 +103,7 @@ def read(data_set: Path, chunk_rows: int, every: int) -> Demonstrations:
         rate_hz=info["fps"],
         size=(settings["size"][0], settings["size"][1]),
         pictures=_pictures(data_set, features, keys, kept),
-        states=_states(columns[STATE], actions, number, info["fps"])[kept],
+        states=_states(np.reshape(columns[STATE], (len(episodes), len(robots), -1)), number, info["fps"])[kept],
         chunks=actions[later],
         told=np.arange(chunk_rows) <= left[kept, None],
         objects_in_pelvis_m=_in_pelvis(columns, len(robots), len(objects))[kept],
@@ -109,7 +113,7 @@ def read(data_set: Path, chunk_rows: int, every: int) -> Demonstrations:
 
 def task_of(data_set: Path) -> str:
     """Returns the task's id."""
-    return _json(data_set / "meta/tandem.json")["task"]
+    return _json(data_set / ABOUT_FILE)["task"]
 
 
 def _json(path: Path) -> dict[str, Any]:
@@ -145,18 +149,11 @@ def _places(episodes: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64
     return number, np.repeat(lengths, lengths) - 1 - number
 
 
-def _states(joints: NDArray[Any], actions: NDArray[np.float32], number: NDArray[np.int64], rate_hz: int) -> NDArray[np.float32]:
-    """Returns rows by robots by `STATES`. The base command in force is that of the previous row; at the beginning,
-    it is standing.
-    """
-    rows, robots = actions.shape[:2]
-    base = np.roll(actions[..., -BASE:], 1, axis=0)
-    first = np.flatnonzero(number == 0)
-    base[first, :, : len(BASE_VELOCITIES)] = 0.0
-    base[first, :, -1] = actions[first, :, -1]
+def _states(rows: NDArray[np.float32], number: NDArray[np.int64], rate_hz: int) -> NDArray[np.float32]:
+    """Returns the states of rows with the clock: rows by robots by `STATES`."""
     since = number.astype(np.float32) / np.float32(rate_hz * CLOCK_S)
-    clock = np.reshape(np.repeat(since, robots), (rows, robots, 1))
-    return np.concatenate([np.reshape(joints, (rows, robots, JOINTS)), base, clock], axis=-1, dtype=np.float32)
+    clock = np.broadcast_to(since[:, None, None], (*rows.shape[:2], 1))
+    return np.concatenate([rows, clock], axis=-1, dtype=np.float32)
 
 
 def _in_pelvis(columns: dict[str, NDArray[Any]], robots: int, objects: int) -> NDArray[np.float32]:

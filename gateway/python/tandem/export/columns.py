@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..recording import Recording
-from .settings import EGOCENTRIC, THIRD_PERSON, ExportSettings
+from ..rows import ACTION, EGOCENTRIC, IMAGES, RATES_HZ, STATE, RowContract
+from .settings import DEPTH, THIRD_PERSON, ExportSettings
 
-STATE = "observation.state"
-ACTION = "action"
-IMAGES = "observation.images."
 PRIVILEGED = "privileged."
 
 POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
@@ -61,7 +59,7 @@ def views(recording: Recording, settings: ExportSettings) -> tuple[View, ...]:
     """Returns the episodes that a recording becomes."""
     robots, cameras = recording.robots, settings.cameras_of(recording.robots)
     if settings.view == "joint":
-        named = {IMAGES + (camera if camera == THIRD_PERSON else f"{camera}_egocentric"): camera for camera in cameras}
+        named = {IMAGES + camera: camera for camera in cameras}
         return (View(tuple(range(len(robots))), None, recording.instruction, named),)
     return tuple(
         View(
@@ -76,6 +74,14 @@ def views(recording: Recording, settings: ExportSettings) -> tuple[View, ...]:
         )
         for index, robot in enumerate(robots)
     )
+
+
+def contract_of(recording: Recording, view: View, settings: ExportSettings) -> RowContract:
+    """Returns the contract of an episode's rows."""
+    robots = None if view.name is not None else [recording.robots[index] for index in view.robots]
+    images = {key.removeprefix(IMAGES): settings.size for key in view.cameras}
+    images |= {f"{name}{DEPTH}": size for name, size in images.items() if settings.depth}
+    return RowContract.of_recording(recording, robots, settings.rate_hz, images)
 
 
 def moments(recording: Recording, settings: ExportSettings) -> NDArray[np.int64]:
@@ -95,9 +101,14 @@ def told(recording: Recording, rows: NDArray[np.int64], stride: int) -> NDArray[
     return actions
 
 
-def columns(recording: Recording, view: View, rows: NDArray[np.int64], stride: int) -> dict[str, Column]:
+def columns(recording: Recording, view: View, contract: RowContract, rows: NDArray[np.int64]) -> dict[str, Column]:
     """Returns the columns of an episode, except its images."""
+    stride = RATES_HZ[0] // contract.rate_hz
     robots = [recording.robots[index] for index in view.robots]
+
+    def of_contract(key: str, values: NDArray[np.float32]) -> Column:
+        chosen = np.reshape(values[:, list(view.robots)], (len(rows), -1))
+        return Column(np.ascontiguousarray(chosen), contract.features[key])
 
     def of_robots(values: NDArray[Any], *parts: tuple[str, ...]) -> Column:
         """Returns a column of robots by parts, flattened."""
@@ -114,7 +125,6 @@ def columns(recording: Recording, view: View, rows: NDArray[np.int64], stride: i
         return Column(np.ascontiguousarray(np.reshape(values, (len(rows), -1))), tuple(".".join(name) for name in names))
 
     objects = recording.objects
-    joints = tuple(f"{name}_rad" for name in recording.joints)
     reached_s = [phase.time_s for phase in recording.phases]
     time_s = recording.time_s[rows]
     # A phase counts as reached in the step that reaches it.
@@ -124,8 +134,8 @@ def columns(recording: Recording, view: View, rows: NDArray[np.int64], stride: i
     wrists = [index for index, joint in enumerate(recording.joints) if "_wrist_" in joint]
     wrist_joints = tuple(recording.joints[index] for index in wrists)
     return {
-        STATE: of_robots(recording.q_rad[rows], joints),
-        ACTION: of_robots(told(recording, rows, stride), recording.action_columns),
+        STATE: of_contract(STATE, recording.states[rows]),
+        ACTION: of_contract(ACTION, told(recording, rows, stride)),
         **{f"{PRIVILEGED}joint_{name}": of_robots(values[rows], recording.joints) for name, values in of_joints.items()},
         f"{PRIVILEGED}pelvis_in_world": of_robots(recording.pelvis_in_world[rows], POSE),
         f"{PRIVILEGED}wrists_in_world": of_robots(recording.wrists_in_world[rows], HANDS, POSE),

@@ -8,8 +8,9 @@ import time
 from collections.abc import Sequence
 
 from ..errors import TandemError
+from ..rows import DEFAULT_DATA_RATE_HZ, RATES_HZ
 from .lerobot import export_lerobot
-from .settings import RATES_HZ, ExportSettings, library
+from .settings import ExportSettings, library
 
 INTERRUPTED = 130
 """Exit status that shells report for a process that SIGINT has ended."""
@@ -30,7 +31,7 @@ def parser() -> argparse.ArgumentParser:
     lerobot.add_argument("--codec", choices=("h264", "av1"), default="h264")
     lerobot.add_argument("--depth", action="store_true")
     lerobot.add_argument("--size", default="320x240", metavar="WIDTHxHEIGHT")
-    lerobot.add_argument("--rate", type=int, choices=RATES_HZ, default=10)
+    lerobot.add_argument("--rate", type=int, choices=RATES_HZ, default=DEFAULT_DATA_RATE_HZ)
     lerobot.add_argument("--only-successful", action="store_true")
     lerobot.add_argument("--only-good", action="store_true")
     lerobot.add_argument("--jobs", type=int, metavar="N")

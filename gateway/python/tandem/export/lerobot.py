@@ -20,6 +20,7 @@ from typing import Any
 from .. import _native
 from ..errors import TandemError
 from ..recording import Recording
+from ..rows import ABOUT_FILE
 from .columns import is_successful
 from .parts import Part, Stopped, make_parts, write_whole
 from .settings import ExportSettings, library
@@ -28,7 +29,6 @@ from .v3 import write_v3
 
 RECORDING_FILE = "episode.mcap"
 GOOD_FILE = "good"
-ABOUT_FILE = "meta/tandem.json"
 PLAN_FILE = "plan.json"
 
 _NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)
@@ -170,6 +170,7 @@ def _export(
     sources: Sequence[Source], out: Path, settings: ExportSettings, workers: int, tell: Callable[[int], None]
 ) -> Exported:
     plan = {
+        "row_contract": _native.row_contract_version(),
         "settings": settings.as_json(),
         "recordings": [{"recording": source.name, "state_hash": source.state_hash} for source in sources],
     }
@@ -279,6 +280,9 @@ def _check_alike(parts: Sequence[Part]) -> None:
             if first.features.get(key) != part.features.get(key):
                 one, other = first.about["recording"], part.about["recording"]
                 raise TandemError(f"{other} has another {key} than {one}; export them apart")
+        if first.about["contract"] != part.about["contract"]:
+            one, other = first.about["recording"], part.about["recording"]
+            raise TandemError(f"{other} has other ranges of joints or base than {one}; export them apart")
 
 
 def _write_about(
@@ -298,8 +302,10 @@ def _write_about(
     for part in parts:
         if part.about["instructions"] not in told:
             told.append(part.about["instructions"])
+    contract: dict[str, Any] = parts[0].about["contract"]
     about = {
         "task": sources[0].task,
+        "contract": contract,
         "episodes": len(parts),
         "rows": rows,
         "successes": sum(source.success for source in sources),
@@ -321,6 +327,7 @@ def _write_about(
         made="; ".join(_played(spec) for spec in specs),
         told="\n\n".join(" ".join(f"{robot}: {words}" for robot, words in words_of.items()) for words_of in told),
         builds=", ".join(builds),
+        contract=f"version {contract['version']}, {contract['rate_hz']} rows per second",
         settings=", ".join(f"{name} {value}" for name, value in plan["settings"].items()),
         splits=", ".join(f"{name} {span}" for name, span in names.items()),
     )
@@ -362,6 +369,7 @@ G1 robots with Dex3 hands, recorded and exported by Tandem (`tandem export lerob
 * Episodes: {made}
 * Seeds: {seeds}
 * Builds: {builds}
+* Row contract: {contract}; `meta/tandem.json` has names, units and ranges of all numbers
 * Settings: {settings}
 * Episodes of each split: {splits}
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..recording import Recording
-from .columns import Column, View, columns, is_successful, moments, views
+from .columns import Column, View, columns, contract_of, is_successful, moments, views
 from .pictures.shown import counted, shown
 from .settings import ExportSettings, library
 from .statistics import Levels, sampled
@@ -95,7 +95,8 @@ def write_whole(path: Path, text: str) -> None:
 
 def _make(recording: Recording, view: View, source: str, folder: Path, settings: ExportSettings, stop: threading.Event) -> None:
     rows = moments(recording, settings)
-    held = columns(recording, view, rows, settings.stride)
+    contract = contract_of(recording, view, settings)
+    held = columns(recording, view, contract, rows)
     features = {key: column.feature() for key, column in held.items()}
     seen = shown(view, folder, settings)
     features |= {column.key: column.feature() for column in seen}
@@ -122,6 +123,7 @@ def _make(recording: Recording, view: View, source: str, folder: Path, settings:
         "build": recording.build,
         "length": len(rows),
         "features": features,
+        "contract": contract.as_json(),
         "counted": {
             column.key: {"pictures": column.counted.pictures, "levels": column.counted.levels.tolist()} for column in seen
         },

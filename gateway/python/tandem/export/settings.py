@@ -8,17 +8,17 @@ from importlib import import_module
 from typing import Any, Literal, TypeAlias, get_args
 
 from ..errors import TandemError
+from ..rows import DEFAULT_DATA_RATE_HZ, DEFAULT_SIZE_PX, EGOCENTRIC, RATES_HZ
 
 Version: TypeAlias = Literal["v3", "v2"]
 View: TypeAlias = Literal["joint", "robot"]
 Images: TypeAlias = Literal["video", "png"]
 Codec: TypeAlias = Literal["h264", "av1"]
 
-RATES_HZ = (50, 25, 10)
-CONTROL_HZ = 50
-
-EGOCENTRIC = "egocentric"
 THIRD_PERSON = "third_person"
+
+DEPTH = "_depth"
+"""Suffix of a depth column's name, as in LeRobot."""
 
 SIDES_PX = range(16, 3841)
 
@@ -49,10 +49,10 @@ class ExportSettings:
     depth: bool = False
     """True to write depth beside the images of every camera, in the format of LeRobot 0.6 or later."""
 
-    size: tuple[int, int] = (320, 240)
+    size: tuple[int, int] = DEFAULT_SIZE_PX
     """Width and height of images in pixels."""
 
-    rate_hz: int = 10
+    rate_hz: int = DEFAULT_DATA_RATE_HZ
     """Rows per second: 50, 25 or 10."""
 
     def __post_init__(self) -> None:
@@ -73,7 +73,7 @@ class ExportSettings:
     @property
     def stride(self) -> int:
         """Number of control steps per row."""
-        return CONTROL_HZ // self.rate_hz
+        return RATES_HZ[0] // self.rate_hz
 
     def as_json(self) -> dict[str, Any]:
         """Returns the settings in the form for files."""

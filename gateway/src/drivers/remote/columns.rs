@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use tandem_episodes::{
     joint_names,
+    rows::velocities,
     tasks::{self, Task},
 };
 use tandem_tools_spec::{ACTION_ROW_LEN, BASE_COLUMNS, ExtraInformation, Pose, RobotState};
@@ -148,11 +149,6 @@ pub fn held_row(state_values: &[f64]) -> Vec<f64> {
     row
 }
 
-/// Returns the columns of an action row that are velocities rather than positions.
-pub fn velocities() -> Range<usize> {
-    ACTION_BASE..ACTION_ROW_LEN - 1
-}
-
 /// Returns true for a column of arms or waist, which inverse kinematics controls if wrist poses are
 /// commanded.
 pub fn is_of_arm_or_waist(column: usize) -> bool {
@@ -271,7 +267,11 @@ fn action_singles() -> Vec<(String, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tandem_episodes::read_task;
+    use tandem_episodes::{
+        EpisodeSpec, read_task,
+        rows::{ActionKind, RowColumn, RowContract},
+    };
+    use tandem_tools_spec::Protocol;
 
     fn names(text: &str) -> Vec<String> {
         text.split(' ').map(String::from).collect()
@@ -291,6 +291,19 @@ mod tests {
         assert_eq!(text, "\"left_elbow_joint\" is told twice");
         let text = action_columns(&names("right_wrist right_wrist_position")).unwrap_err();
         assert_eq!(text, "\"right_wrist_position\" is told twice");
+    }
+
+    #[test]
+    fn blocks_have_the_order_of_rows_in_data_sets() {
+        let spec = EpisodeSpec::new(tasks::find("handover").unwrap(), 0, Protocol::Benchmark);
+        let contract = RowContract::of(&spec, ActionKind::Joints).unwrap();
+        let check = |expected: &[RowColumn], found: Vec<usize>, singles: Vec<(String, usize)>| {
+            let name = |at: &usize| singles.iter().find(|(_, single)| single == at).unwrap().0.clone();
+            let expected = expected.iter().map(|column| column.name.replace("_joint_rad", "_joint"));
+            assert_eq!(found.iter().map(name).collect::<Vec<_>>(), expected.collect::<Vec<_>>());
+        };
+        check(&contract.state, state_columns(&names("joints base_command")).unwrap(), state_singles());
+        check(&contract.action, action_columns(&names("row")).unwrap(), action_singles());
     }
 
     #[test]

@@ -7,13 +7,10 @@ from typing import Any
 
 from ...recording import Recording
 from ..columns import View
-from ..settings import ExportSettings
+from ..settings import DEPTH, ExportSettings
 from ..statistics import Colours, Levels
 from . import depth
 from .encoding import ENCODINGS, Film, Pixels, png
-
-DEPTH = "_depth"
-"""Suffix of a depth column's name, as in LeRobot."""
 
 
 class Shown:

@@ -1,9 +1,9 @@
 //! Rows at a policy's rate, and the control steps that they last.
 
-use tandem_episodes::CONTROL_HZ;
+use tandem_episodes::{CONTROL_HZ, rows::between_rows};
 
 use super::ActionRow;
-use crate::drivers::remote::{columns::velocities, map::Between};
+use crate::drivers::remote::map::Between;
 
 /// A row with the number of control steps in which robots move to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,18 +54,6 @@ pub fn control_rows(
         before = goal;
     }
     control_rows
-}
-
-/// Interpolates between two rows at the fraction `share`. Velocities are those of the goal throughout,
-/// because they are not positions.
-fn between_rows(before_row: &[f64], goal_row: &[f64], share: f64) -> Vec<f64> {
-    let value = |(column, (before, goal)): (usize, (&f64, &f64))| match velocities().contains(&column) {
-        true => *goal,
-        // Returns the goal exactly, to the last bit.
-        false if share == 1.0 => *goal,
-        false => before + (goal - before) * share,
-    };
-    before_row.iter().zip(goal_row).enumerate().map(value).collect()
 }
 
 #[cfg(test)]

@@ -1,11 +1,12 @@
 //! Conversion of wrist poses from a policy's frame to the frame in which they are executed.
 
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use tandem_episodes::rows::velocities;
 use tandem_tools_spec::WristMove;
 
 use super::ActionRow;
 use crate::drivers::remote::{
-    columns::{WRISTS, hand, velocities, wrist_position, wrist_rotation},
+    columns::{WRISTS, hand, wrist_position, wrist_rotation},
     map::WristFrame,
     poses::RotationForm,
 };

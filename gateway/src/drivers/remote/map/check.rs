@@ -2,13 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use tandem_episodes::tasks;
+use tandem_episodes::{rows::velocities, tasks};
 
 use super::{AnswerScope, CameraName, HistorySpan, PolicyMap, ROBOT, Scope, WristFrame};
 use crate::drivers::remote::{
     columns::{
-        WRISTS, action_columns, action_name, is_of_arm_or_waist, state_columns, velocities, wrist_named,
-        wrist_position, wrist_rotation,
+        WRISTS, action_columns, action_name, is_of_arm_or_waist, state_columns, wrist_named, wrist_position,
+        wrist_rotation,
     },
     poses::RotationForm,
     values::path,
