@@ -214,7 +214,7 @@ impl Batch {
             return Err(BatchError::NotBegun { world });
         }
         let columns = self.spec.actions.columns();
-        let task = self.spec.episode.task;
+        let task = &self.spec.episode.task;
         let rows = step.action_rows.chunks_exact(columns * task.robots.len());
         let asked = rows.take(self.worlds.len()).map(|row| {
             let call = ToolCall::Act(self.spec.actions.call(task.robot_names(), row));
