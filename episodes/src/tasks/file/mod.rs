@@ -28,8 +28,8 @@ pub use error::TaskFileError;
 use crate::tasks::task::TaskFile;
 use crate::tasks::{self, Task, TaskDefinition, TaskSource};
 
-/// The files in use. Reading one takes milliseconds, and the results of a run refer to the same file
-/// thousands of times.
+/// The files in use. Reading one takes about 5 ms for each of its variants, and the results of a run may
+/// refer to the same file thousands of times.
 static IN_USE: Mutex<Vec<Weak<TaskFile>>> = Mutex::new(Vec::new());
 
 /// Reads a task file and the MJCF files that it names.
