@@ -10,7 +10,7 @@ use tandem_tools_spec::{Color, EndReason, Refusal, RefusalClass, ResultReply, Sp
 #[derive(Debug, thiserror::Error)]
 pub enum EpisodeError {
     #[error("no task {id:?}; have: {}", .have.join(", "))]
-    UnknownTask { id: String, have: Vec<&'static str> },
+    UnknownTask { id: String, have: Vec<String> },
     #[error("no robot {name:?} in this episode; have: {}", .have.join(", "))]
     UnknownRobot { name: String, have: Vec<String> },
     #[error(
@@ -151,18 +151,18 @@ pub enum SceneError {
         "the scene {} has no site \"task\" on what never moves: give it one where the origin of {task} is to be, its z axis up; sites {} may place robots and objects one by one; have: {have}",
         path.display(), .may.join(", ")
     )]
-    NoPlace { path: PathBuf, task: &'static str, may: Vec<String>, have: String },
+    NoPlace { path: PathBuf, task: String, may: Vec<String>, have: String },
     #[error("site {site:?} of the scene {} is tilted by {tilt_deg:.1} degrees; its z axis has to be up", path.display())]
     Tilted { path: PathBuf, site: String, tilt_deg: f32 },
     #[error("the scene {} has a body {name:?}, as {task} calls an object of its own; rename it", path.display())]
-    SameName { path: PathBuf, task: &'static str, name: String },
+    SameName { path: PathBuf, task: String, name: String },
     #[error(
         "in the scene {}, {name} does not stay where {task} puts it, ({:.2}, {:.2}, {:.2}) m from site \"task\": in {trial_s:.0} s it goes {moved_m:.2} m; it needs something to stand on and nothing in its way; a site {site:?} puts it elsewhere",
         path.display(), .at_m[0], .at_m[1], .at_m[2]
     )]
     Unsteady {
         path: PathBuf,
-        task: &'static str,
+        task: String,
         name: String,
         site: String,
         at_m: [f32; 3],

@@ -7,7 +7,7 @@
 //! use tandem_episodes::{EpisodeError, EpisodeSpec, Session, tasks};
 //! use tandem_tools_spec::{GetStatus, Protocol, Wait};
 //!
-//! let spec = EpisodeSpec::new(tasks::find("handover")?, 0, Protocol::Benchmark);
+//! let spec = EpisodeSpec::new(&tasks::find("handover")?, 0, Protocol::Benchmark);
 //! let mut session = Session::start(&spec, None)?;
 //! session.call(Wait { steps: 10 }.into())?;
 //! session.call(GetStatus::default().into())?;

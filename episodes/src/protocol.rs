@@ -71,11 +71,11 @@ mod tests {
     #[test]
     fn budgets_are_the_benchmarks() {
         let handover = tasks::find("handover").unwrap();
-        let agentic = rules(Protocol::Agentic, handover);
+        let agentic = rules(Protocol::Agentic, &handover);
         assert_eq!((agentic.steps_per_command, agentic.episode_steps), (25, 6000));
         assert_eq!((agentic.initial_hold_steps, agentic.seeds), (300, (0, 9)));
         assert_eq!(agentic.thinking, Some(Duration::from_secs(1800)));
-        let benchmark = rules(Protocol::Benchmark, handover);
+        let benchmark = rules(Protocol::Benchmark, &handover);
         assert_eq!((benchmark.steps_per_command, benchmark.episode_steps), (50, 1000));
         assert_eq!((benchmark.initial_hold_steps, benchmark.seeds), (0, (1, 100)));
         assert_eq!(benchmark.thinking, None);

@@ -35,7 +35,7 @@ pub const OWN_WORDS: &str = "instructions: Tandem's own";
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EpisodeSpec {
     #[serde(with = "crate::tasks::by_id_or_file")]
-    pub task: &'static Task,
+    pub task: Task,
     pub seed: u32,
     pub protocol: Protocol,
     /// Scene in place of the task's own.
@@ -152,7 +152,7 @@ pub struct PhaseStart {
 
 impl EpisodeSpec {
     /// Returns the spec of an episode with the embedded robot and our own controller, from the task's start.
-    pub fn new(task: &'static Task, seed: u32, protocol: Protocol) -> EpisodeSpec {
+    pub fn new(task: &Task, seed: u32, protocol: Protocol) -> EpisodeSpec {
         EpisodeSpec {
             task: task.under(seed),
             seed,
@@ -192,16 +192,16 @@ impl EpisodeSpec {
 
     /// Returns the wording of the task for the policy.
     pub fn task_words(&self) -> TaskWords {
-        let words = stress::task_words(self.stress, self.task);
+        let words = stress::task_words(self.stress, &self.task);
         match &self.instructions {
-            Some(own) => own.over(self.task, words),
+            Some(own) => own.over(&self.task, words),
             None => words,
         }
     }
 
     /// Returns the protocol's rules for the task, with the spec's own limit of thinking time if it has one.
     pub fn rules(&self) -> Rules {
-        let rules = rules(self.protocol, self.task);
+        let rules = rules(self.protocol, &self.task);
         let own = self.thinking_limit_s.map(|limit_s| Duration::from_secs(limit_s.into()));
         Rules { thinking: own.or(rules.thinking), ..rules }
     }
@@ -228,7 +228,7 @@ impl EpisodeSpec {
 
     /// Returns true if a peculiarity matches the benchmark.
     fn is_the_benchmarks(&self, what: &str) -> bool {
-        let words = self.instructions.as_ref().filter(|words| words.are_the_benchmarks(self.task));
+        let words = self.instructions.as_ref().filter(|words| words.are_the_benchmarks(&self.task));
         let of_file = matches!(self.locomotion, Controller::File(_));
         (of_file && what.starts_with(CONTROLLER)) || (words.is_some() && what.starts_with(INSTRUCTIONS))
     }
@@ -377,7 +377,7 @@ impl RobotFile {
         if !task.needs_fingers() || model.has_fingers() {
             return Ok(());
         }
-        Err(RobotError::NoFingers { task: task.id.into(), robot: self.kind() })
+        Err(RobotError::NoFingers { task: task.id.clone(), robot: self.kind() })
     }
 
     /// Returns a name that distinguishes files of different content.
@@ -461,7 +461,7 @@ mod tests {
         assert_eq!(asked(Some("a/walk.onnx")), Controller::File("a/walk.onnx".into()));
         assert_eq!(asked(Some("looped:a/walk.onnx")), Controller::Looped("a/walk.onnx".into()));
 
-        let own = EpisodeSpec::new(tasks::cohub()[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
+        let own = EpisodeSpec::new(&tasks::cohub()[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
         let named = |file: Option<&str>| {
             let spec = EpisodeSpec { locomotion: asked(file), ..own.clone() };
             (spec.peculiarities(), spec.departures())
@@ -476,7 +476,7 @@ mod tests {
 
     #[test]
     fn other_words_are_named() {
-        let own = EpisodeSpec::new(tasks::cohub()[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
+        let own = EpisodeSpec::new(&tasks::cohub()[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
         let words = OwnWords { xxh3: "00ff".into(), ..OwnWords::default() };
         let told = EpisodeSpec { instructions: Some(words), ..own };
         assert_eq!(told.peculiarities(), ["instructions: 00ff"]);
@@ -485,7 +485,7 @@ mod tests {
 
     #[test]
     fn what_varies_as_in_the_benchmark_leaves_no_trace_and_what_does_not_is_named() {
-        let own = EpisodeSpec::new(tasks::cohub()[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
+        let own = EpisodeSpec::new(&tasks::cohub()[0], 0, Protocol::Benchmark).assisted(Assistance::Paper);
         assert_eq!(serde_json::to_value(&own).unwrap().get("variation"), None);
         let variation = Variation { spread: Spread::Double, variety: 1, disturb: 0.8 };
         let wide = EpisodeSpec { variation, ..own };

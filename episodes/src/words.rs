@@ -91,7 +91,7 @@ mod tests {
     #[test]
     fn the_benchmarks_words_are_known_where_a_file_has_them() {
         assert_eq!(BENCHMARK_WORDS.len(), tasks::cohub().len());
-        let handover = tasks::cohub()[0];
+        let handover = &tasks::cohub()[0];
         let joint = "Pass the bottle directly from Robot A's right hand to Robot B's right hand, then place it on the target.";
         let of_a = "Pick up the bottle directly in front of you with your right hand and hand it to your partner's right hand.";
         let of_b = "Receive the bottle with your right hand, place it on the target directly in front of you, and release it.";

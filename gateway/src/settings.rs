@@ -468,9 +468,9 @@ fn read_layer(path: &Path) -> Result<Layer, SettingsError> {
 }
 
 /// Reads a task's file and tries the task. Problems that may be intended are logged.
-pub fn read_task_file(path: &Path) -> Result<&'static Task, SettingsError> {
+pub fn read_task_file(path: &Path) -> Result<Task, SettingsError> {
     let task = read_task(path)?;
-    let check = check_task(task, &[FIRST_SEED], None)
+    let check = check_task(&task, &[FIRST_SEED], None)
         .map_err(|source| SettingsError::Task { path: path.into(), source: source.into() })?;
     check.falls.iter().chain(&check.notes).for_each(|line| tracing::warn!("{}: {line}", task.id));
     Ok(task)

@@ -11,7 +11,7 @@ const ROBOTS: usize = 2;
 
 fn spec(reward: RewardKind) -> BatchSpec {
     BatchSpec {
-        episode: EpisodeSpec::new(tasks::find("handover").unwrap(), 0, Protocol::Benchmark),
+        episode: EpisodeSpec::new(&tasks::find("handover").unwrap(), 0, Protocol::Benchmark),
         worlds: WORLDS,
         threads: 2,
         actions: ActionKind::Joints,

@@ -56,7 +56,7 @@ const PACE_M_S: f32 = 0.2;
 const WAY_POINTS: usize = 200;
 
 /// Task of two robots and a bar.
-pub(super) static TASK: LazyLock<&'static Task> =
+pub(super) static TASK: LazyLock<Task> =
     LazyLock::new(|| embedded_task("carry_bar.toml", include_str!("tasks/carry_bar.toml")));
 
 /// Plays one case on these seeds.
@@ -109,7 +109,7 @@ fn trial(
         locomotion: controller.clone(),
         sensing,
         renderer: RendererKind::Cpu,
-        ..EpisodeSpec::new(*TASK, seed, Protocol::Benchmark)
+        ..EpisodeSpec::new(&TASK, seed, Protocol::Benchmark)
     };
     let aloft = Cell::new(None);
     let session = Session::start(&spec, None).map_err(Box::new)?;
@@ -130,7 +130,7 @@ fn carry(
     episode: &mut dyn PrivilegedEpisode,
     aloft: &Cell<Option<Pose>>,
 ) -> Result<(), PlayerError> {
-    let commander = &mut Commander::new(*TASK, episode)?;
+    let commander = &mut Commander::new(&TASK, episode)?;
     let [a_left, a_right] = HandGrasp::with_both_hands(A, "bar", ["a_left", "a_right"], 0.0, &Hold::BAR);
     let [b_left, b_right] = HandGrasp::with_both_hands(B, "bar", ["b_left", "b_right"], 0.0, &Hold::BAR);
     let grasps = [a_left, a_right, b_left, b_right];

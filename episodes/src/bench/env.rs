@@ -33,7 +33,7 @@ pub struct EnvReport {
 /// Environments of one task on `threads` threads.
 #[derive(Clone, Debug, Serialize)]
 pub struct EnvCase {
-    pub task: &'static str,
+    pub task: String,
     pub robots: usize,
     pub worlds: usize,
     pub threads: usize,
@@ -63,7 +63,7 @@ pub fn env(mut done: impl FnMut(&EnvCase)) -> Result<EnvReport, BenchError> {
     threads.extend((most > 2).then_some(most));
     let mut cases = Vec::new();
     // The first task has two robots, the last three.
-    for task in [tasks::cohub().first(), tasks::cohub().last()].into_iter().flatten().copied() {
+    for task in [tasks::cohub().first(), tasks::cohub().last()].into_iter().flatten() {
         for threads in threads.iter().copied() {
             let case = measure(task, threads)?;
             done(&case);
@@ -73,9 +73,9 @@ pub fn env(mut done: impl FnMut(&EnvCase)) -> Result<EnvReport, BenchError> {
     Ok(EnvReport { cases })
 }
 
-fn measure(task: &'static Task, threads: usize) -> Result<EnvCase, BenchError> {
+fn measure(task: &Task, threads: usize) -> Result<EnvCase, BenchError> {
     let episode = EpisodeSpec::new(task, FIRST_SEED, Protocol::Benchmark);
-    let (task, robots) = (task.id, task.robots.len());
+    let (task, robots) = (task.id.clone(), task.robots.len());
     let [mut steps, mut core, mut of_core, mut busy, mut reset_ms] = [const { Vec::new() }; 5];
     for _ in 0..ROUNDS {
         let alone = core_pace(&episode)?;

@@ -56,9 +56,9 @@ fn trial(case: &FallCase, number: usize, seed: u32) -> Result<FallTrial, BenchEr
     let episode = seed - FIRST_SEED;
     let (mut world, budget_steps, place) = match case.place {
         FallPlace::Task | FallPlace::TaskFromAbove => {
-            let task = tasks::cohub()[(number + episode as usize) % tasks::cohub().len()];
+            let task = &tasks::cohub()[(number + episode as usize) % tasks::cohub().len()];
             let built = build(&EpisodeSpec::new(task, seed, Protocol::Benchmark)).map_err(Box::new)?;
-            (built.world, task.benchmark_steps, task.id)
+            (built.world, task.benchmark_steps, task.id.as_str())
         }
         FallPlace::Floor | FallPlace::OnRobot | FallPlace::TableOnRobot | FallPlace::Door => {
             (case.world()?, 0, case.name)

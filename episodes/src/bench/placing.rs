@@ -20,8 +20,7 @@ use crate::spec::{Controller, EpisodeSpec, RobotFile};
 use crate::tasks::{Task, embedded_task};
 
 /// Task of a robot alone on a floor.
-static TASK: LazyLock<&'static Task> =
-    LazyLock::new(|| embedded_task("place.toml", include_str!("tasks/place.toml")));
+static TASK: LazyLock<Task> = LazyLock::new(|| embedded_task("place.toml", include_str!("tasks/place.toml")));
 
 /// Number of successive places, each relative to the end of the last walk.
 const PLACES: usize = 3;
@@ -65,7 +64,7 @@ pub fn run(
                 locomotion: controller.clone(),
                 sensing,
                 renderer: RendererKind::Cpu,
-                ..EpisodeSpec::new(load.map_or(*TASK, |load| load.task()), seed, Protocol::Agentic)
+                ..EpisodeSpec::new(load.map_or(&TASK, SharedLoad::task), seed, Protocol::Agentic)
             };
             trial(&spec.assisted(Assistance::Full), load)
         });

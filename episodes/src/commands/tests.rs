@@ -28,7 +28,7 @@ fn standing() -> Motion {
 
 /// Returns A's action for `entry`, in a command of 50 steps.
 fn action(entry: WristMove, motion: &Motion) -> RobotAction {
-    let rules = rules(Protocol::Benchmark, tasks::find("handover").unwrap());
+    let rules = rules(Protocol::Benchmark, &tasks::find("handover").unwrap());
     let ToolCall::Act(call) = MoveWrists { steps: 50, robots: vec![entry] }.into() else { panic!("a look") };
     let command = Command::read(&call, &rules, std::slice::from_ref(motion)).unwrap();
     command.orders.into_iter().next().unwrap().action

@@ -25,13 +25,13 @@ use crate::tasks::{Task, TaskSet, TaskWords};
 /// Returns the reply to `list_tasks`: these tasks in their wording under `stress`, for robots that follow
 /// base commands within `limits`.
 pub fn task_list(tasks: &TaskSet, stress: Option<Stress>, limits: &BaseLimits) -> TaskList {
-    let info = |task: &'static Task| task_info(task, stress::task_words(stress, task));
+    let info = |task: &Task| task_info(task, stress::task_words(stress, task));
     TaskList { tasks: tasks.all().map(info).collect(), base_limits: wire_limits(limits) }
 }
 
 fn task_info(task: &Task, words: TaskWords) -> TaskInfo {
     TaskInfo {
-        id: task.id.into(),
+        id: task.id.clone(),
         suite: task.suite().map(str::to_owned),
         robots: instructions(task, &words),
         instruction: words.joint,
@@ -43,9 +43,9 @@ fn task_info(task: &Task, words: TaskWords) -> TaskInfo {
 /// Returns the phases of a task in the order in which they must be reached.
 pub fn phases(task: &Task) -> Vec<PhaseInfo> {
     let info = |(index, phase): (usize, &Phase)| PhaseInfo {
-        id: phase.id.into(),
+        id: phase.id.clone(),
         number: Phase::number(index),
-        description: phase.description.into(),
+        description: phase.description.clone(),
         collaborative: phase.collaborative,
     };
     task.phases.iter().enumerate().map(info).collect()

@@ -36,7 +36,7 @@ pub(super) fn places(task: &Task, at_m: [f32; 2]) -> String {
 /// Returns the other robots' start poses relative to the first, for example "B begins at [1.26, 0.00] m
 /// in A's start frame, turned by 3.14 rad".
 fn partners(task: &Task) -> Vec<String> {
-    let [first, others @ ..] = task.robots else { return Vec::new() };
+    let [first, others @ ..] = &task.robots[..] else { return Vec::new() };
     let line = |robot: &RobotSpot| {
         let (ahead_m, left_m) = seen_from(first, robot.position_m);
         let turned_rad = wrapped_rad(robot.yaw_rad - first.yaw_rad);
@@ -86,7 +86,7 @@ fn place(robot: &RobotSpot, at_m: [f32; 2]) -> String {
 
 /// Returns the size of an object along the axes of a frame with z up, in which the object has this yaw.
 fn size_m(spot: &ObjectSpot, yaw_rad: f32) -> Result<Vector, SimError> {
-    let parts = ObjectModel::parts(&spot.source(), spot.name)?;
+    let parts = ObjectModel::parts(&spot.source(), &spot.name)?;
     let corners = parts.iter().flat_map(|part| {
         let visible = part.model.geoms.iter().filter(|geom| geom.drawn || geom.collides);
         visible.flat_map(|geom| corners_m(geom, &part.object_from_part))
@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     fn things_are_as_large_and_as_far_as_people_would_say() {
-        let lines = |id: &str| room(tasks::find(id).unwrap(), Spread::Single, &[]).unwrap();
+        let lines = |id: &str| room(&tasks::find(id).unwrap(), Spread::Single, &[]).unwrap();
         let cart = lines("cart_service");
         assert!(
             cart[0].starts_with("service trolley, ") && cart[0].contains("0.85 m ahead of A"),
@@ -158,8 +158,8 @@ mod tests {
             handover[0].starts_with("bottle, 0.07 m along A's x, 0.07 m along its y, 0."),
             "{handover:?}"
         );
-        for &task in tasks::cohub() {
-            let lines = lines(task.id);
+        for task in tasks::cohub() {
+            let lines = lines(&task.id);
             assert_eq!(lines.len(), task.objects.len() + task.robots.len() - 1);
             for (index, line) in lines.iter().enumerate() {
                 println!("{}: {line}", task.id);

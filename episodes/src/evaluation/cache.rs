@@ -122,7 +122,7 @@ impl EpisodeCache<'_> {
         let same = by == (&self.plan.player.card(), &self.locomotion)
             && self.builds.contains(&cached.build)
             && cached.spec == *spec
-            && (cached.result.task.as_str(), cached.result.seed) == (spec.task.id, Some(spec.seed));
+            && (cached.result.task.as_str(), cached.result.seed) == (spec.task.id.as_str(), Some(spec.seed));
         let keep_failed = self.keeps_failure(&cached.result, &cached.attempts);
         same.then_some(PlayedEpisode { keep_failed, ..cached })
     }
@@ -224,12 +224,12 @@ fn forget_result(folder: &Path) -> Result<(), EvaluationError> {
 }
 
 fn unrecorded(spec: &EpisodeSpec, reason: String) -> EvaluationError {
-    EvaluationError::Recording { task: spec.task.id, seed: spec.seed, reason }
+    EvaluationError::Recording { task: spec.task.id.clone(), seed: spec.seed, reason }
 }
 
 /// Returns the name of the episode's file and folder.
 fn name(spec: &EpisodeSpec) -> String {
-    let (task, seed) = (spec.task.id, spec.seed);
+    let (task, seed) = (&spec.task.id, spec.seed);
     match &spec.start {
         Start::Phase(start) => format!("{task}-{seed}-{}", start.phase),
         Start::Moment(_) => again_name(spec),

@@ -51,9 +51,9 @@ impl RunIdentity {
     /// Returns the identity of the run that plays `plan` on `build`, whose base controller has this name.
     pub fn of_plan(plan: &EvaluationPlan, controller: &str, build: &str) -> RunIdentity {
         let seed = plan.seeds.first().copied().unwrap_or_default();
-        let planned = |task: &'static Task| plan.spec(task, seed, Start::Task);
+        let planned = |task: &Task| plan.spec(task, seed, Start::Task);
         let specs: Vec<EpisodeSpec> = match &plan.starts {
-            Starts::Task | Starts::Phases { .. } => plan.tasks.iter().map(|task| planned(task)).collect(),
+            Starts::Task | Starts::Phases { .. } => plan.tasks.iter().map(planned).collect(),
             Starts::Moments { failed, .. } => failed.iter().map(|failed| failed.spec.clone()).collect(),
         };
         let seeds = match &plan.starts {
@@ -79,7 +79,7 @@ impl RunIdentity {
             policy: plan.player.card(),
             controller: controller.into(),
             rules: specs.first().map(rules).unwrap_or_default(),
-            tasks: specs.iter().map(|spec| (spec.task.id.into(), words(spec))).collect(),
+            tasks: specs.iter().map(|spec| (spec.task.id.clone(), words(spec))).collect(),
             seeds: SeedList(seeds),
             starts,
             builds: vec![build.into()],
@@ -95,7 +95,7 @@ impl RunIdentity {
             policy: played.policy.clone(),
             controller: played.locomotion.clone(),
             rules: rules(spec),
-            tasks: BTreeMap::from([(spec.task.id.into(), words(spec))]),
+            tasks: BTreeMap::from([(spec.task.id.clone(), words(spec))]),
             seeds: SeedList(BTreeSet::from([spec.seed])),
             starts: None,
             builds: vec![played.build.clone()],

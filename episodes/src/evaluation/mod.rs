@@ -39,7 +39,7 @@ pub enum EvaluationError {
     #[error(
         "{task} seed {seed} could not be recorded: {reason}; what was played before is kept, and the same command goes on from there"
     )]
-    Recording { task: &'static str, seed: u32, reason: String },
+    Recording { task: String, seed: u32, reason: String },
     #[error("an episode cannot be written as JSON: {0}")]
     Json(#[from] serde_json::Error),
     #[error("{0}")]

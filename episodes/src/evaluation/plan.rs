@@ -44,7 +44,7 @@ pub struct EvaluationPlan<'a> {
     pub stress: Option<Stress>,
     /// Limit of a policy's thinking time in an episode; `None` for the protocol's own.
     pub thinking_limit_s: Option<u32>,
-    pub tasks: Vec<&'static Task>,
+    pub tasks: Vec<Task>,
     pub seeds: Vec<u32>,
     pub starts: Starts,
     pub shard: Shard,
@@ -145,7 +145,7 @@ impl EvaluationPlan<'_> {
     pub const DEFAULT_RETRIES: u32 = 2;
 
     /// Returns the spec of one of the episodes.
-    pub fn spec(&self, task: &'static Task, seed: u32, start: Start) -> EpisodeSpec {
+    pub fn spec(&self, task: &Task, seed: u32, start: Start) -> EpisodeSpec {
         EpisodeSpec {
             robot: self.robot.clone(),
             scene: self.scene.clone(),
@@ -155,7 +155,7 @@ impl EvaluationPlan<'_> {
             assistance: self.assistance,
             disclosure: self.disclosure,
             hints: self.hints,
-            instructions: self.instructions.own_words(task.id),
+            instructions: self.instructions.own_words(&task.id),
             variation: self.variation,
             stress: self.stress,
             thinking_limit_s: self.thinking_limit_s,
@@ -182,7 +182,7 @@ impl EvaluationPlan<'_> {
             sensing: spec.sensing,
             variation: spec.variation,
             stress: spec.stress,
-            ..self.spec(spec.task, spec.seed, start)
+            ..self.spec(&spec.task, spec.seed, start)
         }
         .keyed(spec.keyed_seed.clone())
     }
@@ -227,7 +227,7 @@ impl EvaluationPlan<'_> {
             return (own.map(|(_, failed)| self.again(failed, *before_s)).collect(), left_out);
         }
         let of_tasks =
-            self.tasks.iter().flat_map(|task| self.seeds_of(task).into_iter().map(|seed| (*task, seed)));
+            self.tasks.iter().flat_map(|task| self.seeds_of(task).into_iter().map(move |seed| (task, seed)));
         let everything = of_tasks
             .flat_map(|(task, seed)| self.starts_of(task).into_iter().map(move |phase| (task, seed, phase)));
         let own = everything.enumerate().filter(|(number, _)| is_own(number));
@@ -262,12 +262,11 @@ impl EvaluationPlan<'_> {
         match &self.starts {
             Starts::Task | Starts::Moments { .. } => vec![None],
             Starts::Phases { phases, .. } => {
-                let of_task =
-                    task.phases.iter().enumerate().map(|(index, phase)| (Phase::number(index), phase.id));
-                let named = |(number, id): (String, &str)| {
-                    phases.iter().any(|name| *name == number || name == id).then_some(number)
+                let named = |(index, phase): (usize, &Phase)| {
+                    let number = Phase::number(index);
+                    phases.iter().any(|name| *name == number || *name == phase.id).then_some(number)
                 };
-                of_task.filter_map(named).map(Some).collect()
+                task.phases.iter().enumerate().filter_map(named).map(Some).collect()
             }
         }
     }
@@ -281,7 +280,7 @@ const MAX_TRAINING_DEMONSTRATIONS: usize = 50;
 ///
 /// `collect` and `serve` write them in this layout.
 fn demonstration_folders(folder: &Path, task: &Task) -> [(PathBuf, String); 3] {
-    let id = task.id;
+    let id = &task.id;
     let (collected, served) = (format!("{id}-"), format!("{id}-seed"));
     [(folder.join("episodes"), collected.clone()), (folder.into(), collected), (folder.into(), served)]
 }

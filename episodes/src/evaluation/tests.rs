@@ -49,7 +49,7 @@ pub(super) fn played(cache: &EpisodeCache, spec: &EpisodeSpec) -> PlayedEpisode 
         spec: spec.clone(),
         locomotion: cache.locomotion.clone(),
         build: cache.build.into(),
-        result: result(spec.task.id, spec.seed, vec![("p1".into(), Some(4.2))]),
+        result: result(&spec.task.id, spec.seed, vec![("p1".into(), Some(4.2))]),
         thought_s: 1.5,
         note: None,
         keep_failed: false,
@@ -82,7 +82,7 @@ fn the_first_phase_that_was_missed_is_noted() {
     );
 }
 
-pub(super) fn plan(tasks: Vec<&'static Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {
+pub(super) fn plan(tasks: Vec<Task>, seeds: Vec<u32>) -> EvaluationPlan<'static> {
     EvaluationPlan {
         player: players::find("expert").unwrap(),
         protocol: Protocol::Agentic,
@@ -120,14 +120,13 @@ fn shares_are_fair_and_together_the_whole() {
     for index in 0..3 {
         let (share, _) = EvaluationPlan { shard: Shard { index, of: 3 }, ..whole.clone() }.episodes();
         assert!(share.len().abs_diff(all.len() / 3) <= 1, "{index}: {}", share.len());
-        for &task in tasks::cohub() {
-            let of_task = share.iter().filter(|spec| spec.task == task).count();
+        for task in tasks::cohub() {
+            let of_task = share.iter().filter(|spec| spec.task == *task).count();
             assert!((3..=4).contains(&of_task), "{index}: {of_task} of {}", task.id);
         }
         joined.extend(share);
     }
-    joined
-        .sort_by_key(|spec| (tasks::cohub().iter().copied().position(|task| *task == *spec.task), spec.seed));
+    joined.sort_by_key(|spec| (tasks::cohub().iter().position(|task| *task == spec.task), spec.seed));
     assert_eq!(joined, all);
 }
 
@@ -202,7 +201,7 @@ fn phases_on_their_own_are_averaged_by_who_works_on_them() {
     };
     let from = |id: &str, seed: u32, phase: usize, reached: bool| {
         let start = PhaseStart { recording: "demonstration".into(), phase: Phase::number(phase) };
-        let spec = plan.spec(tasks::find(id).unwrap(), seed, Start::Phase(start));
+        let spec = plan.spec(&tasks::find(id).unwrap(), seed, Start::Phase(start));
         let times = vec![(Phase::number(phase), reached.then_some(4.2))];
         PlayedEpisode { result: result(id, seed, times), ..played(&cache, &spec) }
     };
@@ -213,7 +212,7 @@ fn phases_on_their_own_are_averaged_by_who_works_on_them() {
     episodes.push(from("handover", 0, 2, false));
     let level = PhaseLevel::of(episodes.iter()).unwrap();
     let rates: Vec<_> =
-        level.phases.iter().map(|rate| (rate.task, &*rate.number, rate.reached, rate.episodes)).collect();
+        level.phases.iter().map(|rate| (&*rate.task, &*rate.number, rate.reached, rate.episodes)).collect();
     let handover = [("handover", "p1", 2, 2), ("handover", "p2", 1, 4), ("handover", "p3", 0, 1)];
     assert_eq!(rates, [&handover[..], &[("co_pouring", "p3", 3, 4)]].concat());
     assert_eq!(
@@ -229,7 +228,7 @@ fn phases_on_their_own_are_averaged_by_who_works_on_them() {
     assert_eq!(with_three.two_robots, level.two_robots);
     let three = with_three.three_robots.unwrap();
     assert_eq!((three.non_collaborative_share, three.collaborative_share), (None, Some(0.5)));
-    let whole = played(&cache, &plan.spec(tasks::find("handover").unwrap(), 0, Start::Task));
+    let whole = played(&cache, &plan.spec(&tasks::find("handover").unwrap(), 0, Start::Task));
     assert_eq!(PhaseLevel::of([whole].iter()), None);
 }
 
@@ -237,8 +236,8 @@ fn phases_on_their_own_are_averaged_by_who_works_on_them() {
 fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
     let folder = tempfile::tempdir().unwrap();
     let task = crate::tasks::find("pouring").unwrap();
-    let plan = plan(vec![task], vec![7]);
-    let spec = plan.spec(task, 7, Start::Task);
+    let plan = plan(vec![task.clone()], vec![7]);
+    let spec = plan.spec(&task, 7, Start::Task);
     let build = fingerprint::build().unwrap();
     let cache = EpisodeCache {
         plan: &plan,
@@ -376,7 +375,7 @@ fn what_was_played_before_is_kept_where_no_other_episode_can_be() {
     // A player that does not know a task plays none of its episodes.
     let player = players::find("no_words").unwrap();
     let refused = player.play_episode(
-        &EpisodeSpec::new(tasks::find("handover").unwrap(), 1, Protocol::Benchmark),
+        &EpisodeSpec::new(&tasks::find("handover").unwrap(), 1, Protocol::Benchmark),
         EpisodeOutput { folder: folder.path(), record: false, pages: false },
     );
     let Err(PlayError::NotReady(reason)) = refused else { panic!("it cannot play that") };
@@ -395,7 +394,7 @@ fn what_was_played_before_is_kept_where_no_other_episode_can_be() {
 
 fn failed(cache: &EpisodeCache, spec: &EpisodeSpec, ended: EndReason, reached: usize) -> PlayedEpisode {
     let times = (0..3).map(|index| (Phase::number(index), (index < reached).then_some(4.2)));
-    let result = ResultReply { ended, ..result(spec.task.id, spec.seed, times.collect()) };
+    let result = ResultReply { ended, ..result(&spec.task.id, spec.seed, times.collect()) };
     PlayedEpisode { result, ..played(cache, spec) }
 }
 
@@ -403,7 +402,7 @@ fn failed(cache: &EpisodeCache, spec: &EpisodeSpec, ended: EndReason, reached: u
 fn what_failed_itself_is_counted_apart_and_played_again() {
     let folder = tempfile::tempdir().unwrap();
     let handover = tasks::find("handover").unwrap();
-    let plan = plan(vec![handover], vec![1, 2, 3, 4, 5]);
+    let plan = plan(vec![handover.clone()], vec![1, 2, 3, 4, 5]);
     let build = fingerprint::build().unwrap();
     let cache = EpisodeCache {
         plan: &plan,
@@ -414,7 +413,7 @@ fn what_failed_itself_is_counted_apart_and_played_again() {
     };
     let keeping_plan = EvaluationPlan { retries: 0, ..plan.clone() };
     let keeping = EpisodeCache { plan: &keeping_plan, ..cache.clone() };
-    let spec = |seed: u32| plan.spec(handover, seed, Start::Task);
+    let spec = |seed: u32| plan.spec(&handover, seed, Start::Task);
     let outcomes = [
         (EndReason::Finished, 2),
         (EndReason::PolicyFailed, 2),

@@ -33,7 +33,7 @@ pub struct OpenLoop {
 /// Action rows of one recorded episode.
 #[derive(Debug)]
 struct RecordedRows {
-    task: &'static Task,
+    task: Task,
     seed: u32,
     /// Hash of the file.
     xxh3: String,
@@ -66,7 +66,7 @@ impl OpenLoop {
             return Ok(OpenLoop { demonstrations: vec![RecordedRows::read(path)?.0] });
         }
         let mut demonstrations = Vec::new();
-        for &task in tasks::cohub() {
+        for task in tasks::cohub() {
             let mut chosen: Vec<(RecordedRows, bool)> = Vec::new();
             for path in recordings(path, task)?.into_values() {
                 if chosen.iter().filter(|(_, succeeded)| *succeeded).count() == PER_TASK {
@@ -119,7 +119,7 @@ fn recordings(folder: &Path, task: &Task) -> Result<BTreeMap<u32, PathBuf>, Open
     for entry in std::fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let seed = name.strip_prefix(task.id).and_then(|rest| rest.strip_prefix('-'));
+        let seed = name.strip_prefix(task.id.as_str()).and_then(|rest| rest.strip_prefix('-'));
         let seed = seed.and_then(|rest| rest.strip_prefix("seed").unwrap_or(rest).parse::<u32>().ok());
         let recording = path.join(Recorder::FILE_NAME);
         if let Some(seed) = seed.filter(|_| recording.exists()) {
@@ -154,12 +154,12 @@ impl RecordedRows {
         let last = Phase::number(task.phases.len() - 1);
         let succeeded =
             recording.result.as_ref().is_some_and(|result| result.phases.reached_s(&last).is_some());
-        Ok((RecordedRows { task, seed: *seed, xxh3, step_rows: steps }, succeeded))
+        Ok((RecordedRows { task: task.clone(), seed: *seed, xxh3, step_rows: steps }, succeeded))
     }
 
     /// Plays until the episode ends, or all phases have been reached.
     fn play(&self, episode: &mut InProcess) -> Result<(), PlayerError> {
-        let most = rules(episode.session.spec().protocol, self.task).steps_per_command as usize;
+        let most = rules(episode.session.spec().protocol, &self.task).steps_per_command as usize;
         let Some(last) = self.step_rows.last() else { return Ok(()) };
         let mut done = 0;
         while episode.session.reached_phases() < self.task.phases.len() {

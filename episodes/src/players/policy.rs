@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn a_panic_of_a_player_ends_its_episode_as_a_failed_policy() {
-        let spec = EpisodeSpec::new(tasks::find("handover").unwrap(), 2000, Protocol::Benchmark);
+        let spec = EpisodeSpec::new(&tasks::find("handover").unwrap(), 2000, Protocol::Benchmark);
         let output = EpisodeOutput { folder: Path::new(""), record: false, pages: false };
         let played = play_in_process(&spec, output, |_| panic!("no plan for seed {}", 2000)).unwrap();
         assert_eq!(played.result.ended, EndReason::PolicyFailed);

@@ -81,7 +81,7 @@ pub enum RecordingError {
     #[error("{}: {source}", path.display())]
     Step { path: PathBuf, source: StepError },
     #[error("{}: {what} are not those of an episode of {task}", path.display())]
-    OtherTask { path: PathBuf, what: &'static str, task: &'static str },
+    OtherTask { path: PathBuf, what: &'static str, task: String },
     #[error("the objects of the episode cannot be read: {0}")]
     Sim(#[from] SimError),
     #[error(transparent)]
@@ -266,7 +266,7 @@ impl Recording {
 
     /// Checks that a step has the robots of the task, each with `links` links.
     pub(crate) fn check_fit(&self, step: &Step, links: usize) -> Result<(), RecordingError> {
-        let task = self.spec.task;
+        let task = &self.spec.task;
         let robots = &step.robots;
         if robots.len() != task.robots.len()
             || robots.iter().any(|robot| robot.truth.world_from_link.len() != links)
@@ -277,7 +277,7 @@ impl Recording {
     }
 
     fn of_another_task(&self, what: &'static str) -> RecordingError {
-        RecordingError::OtherTask { path: self.path.clone(), what, task: self.spec.task.id }
+        RecordingError::OtherTask { path: self.path.clone(), what, task: self.spec.task.id.clone() }
     }
 
     /// Returns the JSON messages of a topic, each with its simulated time.

@@ -51,7 +51,7 @@ fn world() -> World {
 }
 
 fn spec() -> EpisodeSpec {
-    EpisodeSpec::new(tasks::find("handover").unwrap(), 7, Protocol::Agentic)
+    EpisodeSpec::new(&tasks::find("handover").unwrap(), 7, Protocol::Agentic)
 }
 
 fn sheet(robot: &Robot) -> RobotSheet {
@@ -69,7 +69,7 @@ fn seen(world: &World) -> TeamObservation {
 fn recorder(folder: &Path, world: &World) -> (Recorder, Scores) {
     let start = world.present();
     let scores = Scores::new(
-        spec().task.phases,
+        spec().task.phases.clone(),
         [("bottle", "bottle".into())].into_iter(),
         &world.robots()[0].model,
         &start,

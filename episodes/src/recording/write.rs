@@ -207,7 +207,7 @@ fn write_header(file: &mut McapFile, header: &RecordingHeader) -> Result<(), Out
     let instructions: BTreeMap<&str, &String> = header.spec.task.robot_names().zip(&words.robots).collect();
     let scores = postcard::to_stdvec(&header.scores).map_err(|source| OutputError::Encode(source.into()))?;
     let entries = [
-        ("task", header.spec.task.id),
+        ("task", header.spec.task.id.as_str()),
         ("seed", &header.spec.seed.to_string()),
         ("protocol", header.spec.protocol.name()),
         (metadata::LOCOMOTION, header.locomotion.as_str()),

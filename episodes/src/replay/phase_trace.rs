@@ -11,13 +11,13 @@ use crate::tasks::{PhaseCondition, PhaseSetting};
 #[derive(Debug)]
 pub struct PhaseTrace {
     pub number: String,
-    pub id: &'static str,
+    pub id: String,
     pub from_s: f64,
     pub to_s: f64,
     /// Greatest nearness, from 0 to 1, and its time.
     pub nearest: Moment<f32>,
     /// Description of when the phase counts as reached.
-    pub description: &'static str,
+    pub description: String,
     pub conditions: Vec<ConditionTrace>,
 }
 
@@ -106,18 +106,18 @@ impl PhaseTrace {
     ///
     /// If the recording cannot be read.
     pub fn of(recording: &Recording) -> Result<Option<PhaseTrace>, RecordingError> {
-        let task = recording.spec.task;
+        let task = &recording.spec.task;
         let reached = recording.phases()?;
         let Some(phase) = task.phases.get(reached.len()) else { return Ok(None) };
         let since_s = reached.last().map_or(f64::NEG_INFINITY, |last| last.time_s);
         let asked = &task.conditions[reached.len()];
         let mut trace = PhaseTrace {
             number: Phase::number(reached.len()),
-            id: phase.id,
+            id: phase.id.clone(),
             from_s: f64::INFINITY,
             to_s: 0.0,
             nearest: Moment { best: 0.0, time_s: 0.0 },
-            description: phase.description,
+            description: phase.description.clone(),
             conditions: asked.iter().map(ConditionTrace::begin).collect(),
         };
         recording.score_with(|StepScore { facts, .. }| {

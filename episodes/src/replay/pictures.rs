@@ -147,7 +147,7 @@ pub fn draw_all(
     progress: &(dyn Fn() + Sync),
 ) -> Result<DrawnPictures, PicturesError> {
     let steps = moments(recording, plan.rate_hz)?;
-    let task = recording.spec.task;
+    let task = &recording.spec.task;
     let views = plan.views(task)?;
     let spec = plan.spec(recording);
     let scene = EpisodeRenderer::of(&spec).map_err(ReplayError::from)?;
@@ -214,7 +214,7 @@ fn prepare(
     scene: &EpisodeRenderer,
     steps: &[Step],
 ) -> Result<(), PicturesError> {
-    let task = recording.spec.task;
+    let task = &recording.spec.task;
     let entry = |view: EpisodeCamera, step: &Step| {
         let Intrinsics { width, height, focal_px, cx, cy } = scene.camera(view, step, plan.size).intrinsics();
         CameraEntry { name: view.name(task).into(), width, height, focal_px, cx, cy }

@@ -289,7 +289,7 @@ mod tests {
         for policy in [card, "agent".into()] {
             let played = PlayedEpisode {
                 policy,
-                spec: EpisodeSpec::new(crate::tasks::find("handover").unwrap(), 3, Protocol::Agentic),
+                spec: EpisodeSpec::new(&crate::tasks::find("handover").unwrap(), 3, Protocol::Agentic),
                 locomotion: "balance".into(),
                 build: "test".into(),
                 result: result.clone(),

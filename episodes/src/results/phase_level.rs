@@ -36,11 +36,11 @@ pub struct PhaseMeans {
 /// One phase of one task.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseRate {
-    pub task: &'static str,
+    pub task: String,
     /// Number of robots of the task.
     pub robots: usize,
     /// The phase's id, for example `transfer`.
-    pub id: &'static str,
+    pub id: String,
     /// The phase's number, for example `p2`.
     pub number: String,
     pub collaborative: bool,
@@ -59,9 +59,9 @@ impl PhaseLevel {
     pub fn of<'a>(episodes: impl Iterator<Item = &'a PlayedEpisode>) -> Option<PhaseLevel> {
         let mut counts: BTreeMap<(usize, usize), [usize; 2]> = BTreeMap::new();
         let counted: Vec<&PlayedEpisode> = episodes.filter(|played| played.counts()).collect();
-        let order = tasks::in_order(counted.iter().map(|played| played.spec.task));
+        let order = tasks::in_order(counted.iter().map(|played| &played.spec.task));
         for played in counted {
-            let task = order.iter().position(|task| *task == played.spec.task);
+            let task = order.iter().position(|task| **task == played.spec.task);
             let Some((key, phase)) = task.zip(played.start_phase()) else { continue };
             let [episodes, reached] = counts.entry((key, phase)).or_default();
             *episodes += 1;
@@ -69,14 +69,13 @@ impl PhaseLevel {
         }
         let rate = |((task, phase), [episodes, reached]): ((usize, usize), [usize; 2])| {
             let task = order[task];
-            let Phase { id, collaborative, .. } = task.phases[phase];
-            let robots = task.robots.len();
+            let Phase { id, collaborative, .. } = &task.phases[phase];
             PhaseRate {
-                task: task.id,
-                robots,
-                id,
+                task: task.id.clone(),
+                robots: task.robots.len(),
+                id: id.clone(),
                 number: Phase::number(phase),
-                collaborative,
+                collaborative: *collaborative,
                 episodes,
                 reached,
             }

@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn a_hand_comes_nearer_touches_and_holds() {
-        let rest = Facts::at_rest(tasks::find("handover").unwrap());
+        let rest = Facts::at_rest(&tasks::find("handover").unwrap());
         // The bottle is 7 cm thick and stands at x = 0.30 m, y = -0.07 m; wrists are in the pelvis.
         let pelvis = rest.robots[A].pelvis_in_world.translation;
         let apart = Vector::new(0.30 - 0.035 - 0.12, -0.07 + 0.035 - 0.055, 0.0);
@@ -103,7 +103,7 @@ mod tests {
     fn what_is_lifted_counts_in_hands_that_hold_it() {
         let handover = tasks::find("handover").unwrap();
         let nearness = |f: &Facts| (handover.phases[0].nearness)(f);
-        let touched = Facts::at_rest(handover).grip(A, Right, "bottle", Grip::Touching);
+        let touched = Facts::at_rest(&handover).grip(A, Right, "bottle", Grip::Touching);
         let mut knocked = touched.clone();
         knocked.object_mut("bottle").pose_in_world.translation.z += 0.02;
         assert_eq!(nearness(&knocked), nearness(&touched));
@@ -115,7 +115,7 @@ mod tests {
         for (value, expected) in [(-1.0, 0.0), (0.0, 0.0), (0.015, 0.5), (0.03, 1.0), (1.0, 1.0)] {
             assert!((come(value, 0.0, 0.03) - expected).abs() < 1e-6, "{value}");
         }
-        let rest = Facts::at_rest(tasks::find("handover").unwrap());
+        let rest = Facts::at_rest(&tasks::find("handover").unwrap());
         assert_eq!(standing(&rest, "bottle"), 1.0);
         let leaning = rest.turned("bottle", Vector::X, 0.6);
         assert!((0.6..0.95).contains(&standing(&leaning, "bottle")));
@@ -123,9 +123,9 @@ mod tests {
 
     #[test]
     fn every_phase_says_how_near_it_is() {
-        for &task in tasks::cohub() {
+        for task in tasks::cohub() {
             let rest = Facts::at_rest(task);
-            for phase in task.phases {
+            for phase in task.phases.iter() {
                 let nearness = (phase.nearness)(&rest);
                 assert!((0.0..1.0).contains(&nearness), "{} {}: {nearness}", task.id, phase.id);
             }

@@ -35,7 +35,7 @@ impl Scores {
     /// Begins to score `phases` with the state before the first control step. Their conditions may refer to
     /// `objects`, given by name and file, and to robots of this model.
     pub fn new<'a>(
-        phases: &'static [Phase],
+        phases: Arc<[Phase]>,
         objects: impl Iterator<Item = (&'a str, ObjectFile)>,
         robot: &Arc<RobotModel>,
         start: &Step,
@@ -62,7 +62,7 @@ impl Scores {
     }
 
     /// Returns the phases reached up to now, in order, with the simulated time of each.
-    pub fn reached(&self) -> impl Iterator<Item = (&'static Phase, f64)> {
+    pub fn reached(&self) -> impl Iterator<Item = (&Phase, f64)> {
         self.phases.reached()
     }
 

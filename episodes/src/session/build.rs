@@ -43,12 +43,12 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
     let locomotion = spec.locomotion.load()?;
     let source = spec.robot.load()?;
     let model = Arc::new(source.model.clone());
-    spec.robot.check_task(&model, spec.task)?;
+    spec.robot.check_task(&model, &spec.task)?;
     let fits = locomotion.check_robot(&model);
     fits.map_err(|what| RobotError::Controller { robot: spec.robot.kind(), what })?;
-    if !stress::is_possible(spec.stress, spec.task) {
+    if !stress::is_possible(spec.stress, &spec.task) {
         return Err(EpisodeError::NoOtherWords {
-            task: spec.task.id.into(),
+            task: spec.task.id.clone(),
             have: stress::reworded_tasks().collect(),
         });
     }
@@ -57,7 +57,7 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
     try_scene(spec, &world_spec, &model)?;
     let mut world = World::with_robot(&world_spec, model)?;
     if let Some(stress) = spec.stress {
-        stress.alter(&mut world, spec.task, spec.world_seed(), spec.rules().initial_hold_steps);
+        stress.alter(&mut world, &spec.task, spec.world_seed(), spec.rules().initial_hold_steps);
     }
     for robot in 0..world.robots().len() {
         world.set_locomotion(robot, locomotion.controller());
@@ -80,10 +80,10 @@ pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
 
 /// Returns the spec of the episode's world.
 fn world_spec(spec: &EpisodeSpec) -> Result<WorldSpec, EpisodeError> {
-    let own = own_spec(spec.task, spec.world_seed(), spec.spread())?;
+    let own = own_spec(&spec.task, spec.world_seed(), spec.spread())?;
     match &spec.scene {
         None => Ok(own),
-        Some(file) => Ok(elsewhere(own, spec.task, &file.path, file.load()?)?),
+        Some(file) => Ok(elsewhere(own, &spec.task, &file.path, file.load()?)?),
     }
 }
 
@@ -96,7 +96,7 @@ fn add_distractors(
     let most = spec.stress.map_or(0, |stress| stress.distractors());
     if most > 0 {
         let world = World::with_robot(world_spec, model.clone())?;
-        world_spec.objects.extend(stress::distractors(most, spec.world_seed(), spec.task, &world)?);
+        world_spec.objects.extend(stress::distractors(most, spec.world_seed(), &spec.task, &world)?);
     }
     Ok(())
 }
@@ -109,7 +109,7 @@ fn own_spec(task: &Task, seed: u32, spread: Spread) -> Result<WorldSpec, SimErro
     });
     let objects =
         task.objects.iter().zip(task.start_poses(seed, spread)).map(|(spot, start)| ObjectPlacement {
-            name: spot.name.into(),
+            name: spot.name.clone(),
             file: spot.source(),
             world_from_object: Pose::from_parts(
                 start.position_m.into(),
@@ -117,7 +117,7 @@ fn own_spec(task: &Task, seed: u32, spread: Spread) -> Result<WorldSpec, SimErro
             ),
         });
     let scene = match scene_of_file(task) {
-        None => task.scene.into(),
+        None => task.scene.as_str().into(),
         Some(document) => {
             SceneSource::Read { document: Arc::new(document?), world_from_scene: Pose::IDENTITY }
         }
@@ -127,14 +127,14 @@ fn own_spec(task: &Task, seed: u32, spread: Spread) -> Result<WorldSpec, SimErro
 
 /// Returns the scene in the task's own file; `None` if the file has none.
 fn scene_of_file(task: &Task) -> Option<Result<Document, SimError>> {
-    task.scene_mjcf.map(|mjcf| Document::parse_alone(task.scene, mjcf))
+    task.scene_mjcf.as_deref().map(|mjcf| Document::parse_alone(&task.scene, mjcf))
 }
 
 /// Places a task in another scene. The scene is moved so that its site `task` is at the origin; tasks and
 /// experts keep their coordinates.
 fn elsewhere(
     mut spec: WorldSpec,
-    task: &'static Task,
+    task: &Task,
     path: &Path,
     mut document: Document,
 ) -> Result<WorldSpec, SceneError> {
@@ -142,9 +142,14 @@ fn elsewhere(
     let find = |name: &str| sites.iter().find(|site| site.name == name);
     let Some(origin) = find(TASK_SITE) else {
         let robots = task.robot_names().map(robot_site);
-        let may = robots.chain(task.objects.iter().map(|spot| spot.name.into())).collect();
+        let may = robots.chain(task.objects.iter().map(|spot| spot.name.clone())).collect();
         let have: Vec<&str> = sites.iter().map(|site| site.name.as_str()).collect();
-        return Err(SceneError::NoPlace { path: path.into(), task: task.id, may, have: have.join(", ") });
+        return Err(SceneError::NoPlace {
+            path: path.into(),
+            task: task.id.clone(),
+            may,
+            have: have.join(", "),
+        });
     };
     let world_from_scene = upright(path, origin)?.inverse();
     for robot in &mut spec.robots {
@@ -154,8 +159,8 @@ fn elsewhere(
             robot.yaw_rad = heading_rad(&at);
         }
     }
-    for (object, spot) in spec.objects.iter_mut().zip(task.objects) {
-        if let Some(site) = find(spot.name) {
+    for (object, spot) in spec.objects.iter_mut().zip(&task.objects) {
+        if let Some(site) = find(&spot.name) {
             // The seed's offset is kept.
             let spot_m = Vector::from(spot.position_m);
             let by_m = object.world_from_object.translation - spot_m;
@@ -166,7 +171,7 @@ fn elsewhere(
     }
     if document.cameras.iter().all(|camera| camera.name != THIRD_PERSON) {
         let own = match scene_of_file(task) {
-            None => Document::parse(task.scene, assets::scene(task.scene)?)?,
+            None => Document::parse(&task.scene, assets::scene(&task.scene)?)?,
             Some(document) => document?,
         };
         let seen = own.cameras.iter().filter(|camera| camera.name == THIRD_PERSON);
@@ -183,15 +188,15 @@ fn try_scene(
     model: &Arc<RobotModel>,
 ) -> Result<(), EpisodeError> {
     let Some(file) = &spec.scene else { return Ok(()) };
-    let (path, task) = (file.path.clone(), spec.task.id);
+    let (path, task) = (file.path.clone(), spec.task.id.clone());
     let mut world = World::with_robot(world_spec, model.clone())?;
-    for spot in spec.task.objects {
+    for spot in &spec.task.objects {
         if world.object_models().filter(|(name, _)| *name == spot.name).count() > 1 {
-            return Err(SceneError::SameName { path, task, name: spot.name.into() }.into());
+            return Err(SceneError::SameName { path, task, name: spot.name.clone() }.into());
         }
     }
     let commands: Vec<_> = (0..world.robots().len()).map(|robot| world.rest_command(robot)).collect();
-    let start = places_m(&world.present(), spec.task);
+    let start = places_m(&world.present(), &spec.task);
     let mut end = start.clone();
     let trial_s = f64::from(TRIAL_STEPS) / CONTROL_HZ;
     for _ in 0..TRIAL_STEPS {
@@ -200,7 +205,7 @@ fn try_scene(
             trial_s,
             source,
         })?;
-        end = places_m(&present, spec.task);
+        end = places_m(&present, &spec.task);
     }
     let moved = start.iter().zip(&end).map(|(start, end)| (start, (end.at_m - start.at_m).length()));
     match moved.into_iter().find(|(_, moved_m)| *moved_m > STAYS_M) {
@@ -235,8 +240,8 @@ fn places_m(step: &Step, task: &Task) -> Vec<Place> {
         at_m: robot.truth.world_from_pelvis().translation,
     });
     let objects = task.objects.iter().filter_map(|spot| {
-        let at_m = step.object(spot.name)?.world_from_object.translation;
-        Some(Place { name: spot.name.into(), site: spot.name.into(), at_m })
+        let at_m = step.object(&spot.name)?.world_from_object.translation;
+        Some(Place { name: spot.name.clone(), site: spot.name.clone(), at_m })
     });
     robots.chain(objects).collect()
 }

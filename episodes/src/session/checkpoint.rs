@@ -161,7 +161,7 @@ impl Checkpoint {
 impl Origin {
     /// Describes everything that must be equal for progress to fit.
     fn episode(&self) -> String {
-        let (task, seed, protocol) = (self.spec.task.id, self.spec.world_seed(), self.spec.protocol.name());
+        let (task, seed, protocol) = (&self.spec.task.id, self.spec.world_seed(), self.spec.protocol.name());
         let (machine, told) = (self.machine(), self.told());
         format!("task {task} seed {seed} under the {protocol} protocol with {machine}, and {told}")
     }

@@ -242,7 +242,7 @@ impl Session {
         }
         let mut result = self.result();
         if let Some(files) = &mut self.files {
-            files.finish(&mut result, self.origin.spec.task);
+            files.finish(&mut result, &self.origin.spec.task);
         }
         self.result = Some(result);
         self.show_end();

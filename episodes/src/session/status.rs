@@ -69,7 +69,7 @@ impl Session {
         let reached = self.scores.reached().enumerate();
         reached
             .map(|(index, (phase, time_s))| PhaseReached {
-                id: phase.id.into(),
+                id: phase.id.clone(),
                 number: Phase::number(index),
                 time_s,
             })
@@ -80,7 +80,7 @@ impl Session {
     pub fn status(&self) -> StatusReply {
         let EpisodeSpec { assistance, disclosure, .. } = *self.spec();
         StatusReply {
-            task: self.spec().task.id.into(),
+            task: self.spec().task.id.clone(),
             seed: self.spec().told_seed(),
             protocol: self.spec().protocol,
             time_s: self.present.time_s,
@@ -101,7 +101,7 @@ impl Session {
 
     /// Returns the information needed to start.
     pub fn briefing(&self) -> Briefing {
-        let task = self.spec().task;
+        let task = &self.spec().task;
         let words = self.spec().task_words();
         // All robots of an episode have the same file.
         let kind = self.spec().robot.kind();
@@ -157,7 +157,7 @@ impl Session {
         let phases = (0..self.spec().task.phases.len()).map(|index| (Phase::number(index), times_s.next()));
         let physics_s = self.physics.as_secs_f64();
         ResultReply {
-            task: self.spec().task.id.into(),
+            task: self.spec().task.id.clone(),
             seed: Some(self.spec().seed),
             protocol: self.spec().protocol,
             phases: PhaseTimes(phases.collect()),

@@ -11,7 +11,7 @@ use crate::tasks::Task;
 const LEFT: [f64; 3] = [0.85, 0.7, 0.55];
 
 pub fn alter(world: &mut World, task: &Task, level: StressLevel) {
-    for spot in task.objects {
-        world.leave_friction(spot.name, level.of(LEFT));
+    for spot in &task.objects {
+        world.leave_friction(&spot.name, level.of(LEFT));
     }
 }

@@ -10,7 +10,7 @@ const TIMES: [f64; 3] = [1.25, 1.5, 2.0];
 
 pub fn alter(world: &mut World, task: &Task, level: StressLevel, seed: u32) {
     for (index, spot) in task.objects.iter().enumerate() {
-        world.scale_mass(spot.name, times(level, seed, index));
+        world.scale_mass(&spot.name, times(level, seed, index));
     }
 }
 

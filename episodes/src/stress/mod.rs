@@ -227,14 +227,14 @@ pub fn cameras(stress: Option<Stress>, seed: u32, world: &World) -> Cameras {
 }
 
 /// Returns the instructions that the policies of an episode receive.
-pub fn task_words(stress: Option<Stress>, task: &'static Task) -> TaskWords {
+pub fn task_words(stress: Option<Stress>, task: &Task) -> TaskWords {
     let reworded =
         stress.and_then(|stress| stress.on(StressAxis::Words)).and_then(|level| reworded(task, level));
     reworded.unwrap_or_else(|| TaskWords::of(task))
 }
 
 /// Returns `true` if `stress` can be applied to `task`. Reworded instructions exist only for some tasks.
-pub fn is_possible(stress: Option<Stress>, task: &'static Task) -> bool {
+pub fn is_possible(stress: Option<Stress>, task: &Task) -> bool {
     let words = stress.and_then(|stress| stress.on(StressAxis::Words));
     words.is_none_or(|level| reworded(task, level).is_some())
 }

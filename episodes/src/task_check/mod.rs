@@ -13,7 +13,7 @@ use crate::replay::{EpisodeCamera, EpisodeRenderer};
 use crate::scoring::{Done, Facts, Phase};
 use crate::session::{Built, build};
 use crate::spec::EpisodeSpec;
-use crate::tasks::{Task, TaskWords};
+use crate::tasks::{Task, TaskDefinition, TaskWords};
 
 /// Length of the trial. It is longer than any fall from a table, and than the time after which an object
 /// counts as released.
@@ -40,16 +40,16 @@ pub struct TaskCheck {
 #[derive(Debug, thiserror::Error)]
 pub enum TaskCheckError {
     #[error("{task} cannot be played: {source}")]
-    Episode { task: &'static str, source: Box<EpisodeError> },
+    Episode { task: String, source: Box<EpisodeError> },
     #[error(
         "{task} goes wrong while nobody acts, with seed {seed}: {source}; look for shapes that begin within each other"
     )]
-    Diverged { task: &'static str, seed: u32, source: tandem_sim::dynamics::Diverged },
+    Diverged { task: String, seed: u32, source: tandem_sim::dynamics::Diverged },
     #[error(
         "{task}: phase {phase} is reached {time_s:.2} s after the start with seed {seed}, and nobody has acted; ask for something \
          that a robot has to do, as holds(...) or lift_m(...) >= 0.03"
     )]
-    ReachedByNobody { task: &'static str, phase: &'static str, time_s: f64, seed: u32 },
+    ReachedByNobody { task: String, phase: String, time_s: f64, seed: u32 },
     #[error(transparent)]
     Output(#[from] OutputError),
 }
@@ -59,11 +59,7 @@ pub enum TaskCheckError {
 /// # Errors
 ///
 /// If an episode cannot be started or fails.
-pub fn check_task(
-    task: &'static Task,
-    seeds: &[u32],
-    folder: Option<&Path>,
-) -> Result<TaskCheck, TaskCheckError> {
+pub fn check_task(task: &Task, seeds: &[u32], folder: Option<&Path>) -> Result<TaskCheck, TaskCheckError> {
     let mut check = TaskCheck::default();
     check.note_secrets(task);
     let mut falls = Falls::default();
@@ -83,13 +79,13 @@ pub fn check_task(
 /// Things that do not stay where they are put: the name, the description of the first case, and the number
 /// of seeds.
 #[derive(Default)]
-struct Falls(Vec<(&'static str, String, usize)>);
+struct Falls(Vec<(String, String, usize)>);
 
 impl Falls {
-    fn add(&mut self, what: &'static str, how: impl FnOnce() -> String) {
-        match self.0.iter_mut().find(|(known, ..)| *known == what) {
+    fn add(&mut self, what: &str, how: impl FnOnce() -> String) {
+        match self.0.iter_mut().find(|(known, ..)| known == what) {
             Some((_, _, seeds)) => *seeds += 1,
-            None => self.0.push((what, how(), 1)),
+            None => self.0.push((what.to_owned(), how(), 1)),
         }
     }
 
@@ -110,7 +106,7 @@ impl Falls {
         first_pressed: &[Option<RobotPress>],
     ) {
         let trial_s = f64::from(TRIAL_STEPS) / CONTROL_HZ;
-        let robots = start.robots.iter().zip(&end.robots).zip(task.robots).zip(first_pressed);
+        let robots = start.robots.iter().zip(&end.robots).zip(&task.robots).zip(first_pressed);
         for (((before, after), spot), pressed) in robots {
             let by_m =
                 after.truth.world_from_pelvis().translation - before.truth.world_from_pelvis().translation;
@@ -129,8 +125,8 @@ impl Falls {
                 });
             }
         }
-        for spot in task.objects {
-            let (Some(before), Some(after)) = (start.object(spot.name), end.object(spot.name)) else {
+        for spot in &task.objects {
+            let (Some(before), Some(after)) = (start.object(&spot.name), end.object(&spot.name)) else {
                 continue;
             };
             let (before, after) = (before.world_from_object, after.world_from_object);
@@ -143,7 +139,7 @@ impl Falls {
                     let [x_m, y_m, z_m] = place.map(round);
                     format!("({x_m:.2}, {y_m:.2}, {z_m:.2})")
                 };
-                self.add(spot.name, || {
+                self.add(&spot.name, || {
                     format!(
                         "seed {seed}: {} does not stay at {}: within {trial_s:.0} s it comes to {} and turns by {:.0} degrees; put \
                          it where it touches what it stands on",
@@ -168,8 +164,9 @@ fn told_press(press: &RobotPress) -> String {
 
 impl TaskCheck {
     fn stand_still(&mut self, spec: &EpisodeSpec, falls: &mut Falls) -> Result<(), TaskCheckError> {
-        let (task, seed) = (spec.task, spec.seed);
-        let failed = |source: EpisodeError| TaskCheckError::Episode { task: task.id, source: source.into() };
+        let (task, seed) = (&spec.task, spec.seed);
+        let failed =
+            |source: EpisodeError| TaskCheckError::Episode { task: task.id.clone(), source: source.into() };
         let Built { mut world, motions, .. } = build(spec).map_err(failed)?;
         let start = world.present();
         let scores = task.scores(&motions[0].robot.model, &start);
@@ -179,7 +176,7 @@ impl TaskCheck {
         let mut step = start.clone();
         let mut first_pressed = vec![None; commands.len()];
         for _ in 0..TRIAL_STEPS {
-            let diverged = |source| TaskCheckError::Diverged { task: task.id, seed, source };
+            let diverged = |source| TaskCheckError::Diverged { task: task.id.clone(), seed, source };
             step = world.control_step(&commands).map_err(diverged)?;
             scores.update(&step);
             for (robot, pressed) in first_pressed.iter_mut().enumerate() {
@@ -188,7 +185,8 @@ impl TaskCheck {
             }
         }
         if let Some((phase, time_s)) = scores.reached().next() {
-            return Err(TaskCheckError::ReachedByNobody { task: task.id, phase: phase.id, time_s, seed });
+            let (task, phase) = (task.id.clone(), phase.id.clone());
+            return Err(TaskCheckError::ReachedByNobody { task, phase, time_s, seed });
         }
         falls.find(task, seed, [&start, &step], &first_pressed);
         Ok(())
@@ -196,24 +194,24 @@ impl TaskCheck {
 
     /// Notes the seed's choices that a robot's operator reads although its own instruction holds them back.
     fn note_secrets(&mut self, task: &Task) {
-        let Some(ways) = task.variants.get() else { return };
+        let ways = task.variants();
         let chosen =
-            |text: &dyn Fn(&'static Task) -> &'static str| ways.iter().any(|way| text(way) != text(ways[0]));
+            |text: &dyn Fn(&TaskDefinition) -> &str| ways.iter().any(|way| text(way) != text(&ways[0]));
         let (told, kept): (Vec<usize>, Vec<usize>) =
-            (0..task.robots.len()).partition(|robot| chosen(&|way| way.robots[*robot].instruction));
+            (0..task.robots.len()).partition(|robot| chosen(&|way| &way.robots[*robot].instruction));
         if kept.is_empty() || told.is_empty() {
             return;
         }
         let names: Vec<&str> = kept.iter().map(|robot| task.robots[*robot].name).collect();
         let who = names.join(" and ");
-        if chosen(&|way| way.shared_instruction.unwrap_or(way.instruction)) {
+        if chosen(&|way| way.shared_instruction.as_ref().unwrap_or(&way.instruction)) {
             self.notes.push(format!(
                 "what the seed chooses is not in the own instruction of {who}, but an operator of that robot alone reads it in the \
                  joint one; give shared_instruction without it"
             ));
         }
         for (index, phase) in task.phases.iter().enumerate() {
-            if chosen(&|way| way.phases[index].description) {
+            if chosen(&|way| &way.phases[index].description) {
                 self.notes.push(format!(
                     "what the seed chooses is not in the own instruction of {who}, but the description of {} {} tells it to whoever is \
                      told phases; word it without",
@@ -226,14 +224,13 @@ impl TaskCheck {
     }
 
     /// Notes rewordings that reveal the seed's choices to other robots than the task's own wording does.
-    fn note_rewordings(&mut self, ways: &[&'static Task], [told, kept]: [&[usize]; 2]) {
-        let words = |way: &'static Task| way.rewordings.as_ref();
-        let levels = words(ways[0]).map_or(0, |levels| levels.len());
+    fn note_rewordings(&mut self, ways: &[TaskDefinition], [told, kept]: [&[usize]; 2]) {
+        let levels = ways[0].rewordings.as_ref().map_or(0, |levels| levels.len());
         for level in 0..levels {
-            let chosen = |text: &dyn Fn(&'static TaskWords) -> &'static str| {
-                let text = |way: &'static Task| words(way).map(|levels| text(&levels[level]));
-                ways.iter().any(|way| text(way) != text(ways[0]))
-            };
+            let words: Vec<&TaskWords> =
+                ways.iter().filter_map(|way| Some(&way.rewordings.as_ref()?[level])).collect();
+            let chosen =
+                |text: &dyn Fn(&TaskWords) -> &str| words.iter().any(|way| text(way) != text(words[0]));
             let tells = |robot: &usize| chosen(&|words| &words.robots[*robot]);
             let shared = chosen(&|words| words.shared.as_ref().unwrap_or(&words.joint));
             if shared || kept.iter().any(tells) || !told.iter().all(tells) {
@@ -262,13 +259,15 @@ impl TaskCheck {
     }
 
     fn draw(&mut self, spec: &EpisodeSpec, folder: &Path) -> Result<(), TaskCheckError> {
-        let failed =
-            |source: EpisodeError| TaskCheckError::Episode { task: spec.task.id, source: source.into() };
+        let failed = |source: EpisodeError| TaskCheckError::Episode {
+            task: spec.task.id.clone(),
+            source: source.into(),
+        };
         let start = build(spec).map_err(failed)?.world.present();
         let mut renderer = EpisodeRenderer::of(spec).map_err(failed)?;
-        for view in EpisodeCamera::all(spec.task) {
+        for view in EpisodeCamera::all(&spec.task) {
             let picture = renderer.colours(view, &start, None);
-            let path = folder.join(format!("start_{}.png", view.name(spec.task)));
+            let path = folder.join(format!("start_{}.png", view.name(&spec.task)));
             write_whole(&path, &picture.png().map_err(|error| failed(error.into()))?)?;
             self.pictures.push(path);
         }

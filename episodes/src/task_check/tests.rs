@@ -5,7 +5,7 @@ use crate::tasks::TaskSource;
 use crate::tasks::task_of;
 
 /// Returns a task with a box on the floor, one robot, and phases of these conditions.
-fn task(z_m: f32, conditions: [&str; 2]) -> &'static Task {
+fn task(z_m: f32, conditions: [&str; 2]) -> Task {
     let [first, second] = conditions;
     let text = format!(
         r#"
@@ -40,7 +40,7 @@ const LIFTED: &str = r#"lift_m("box") >= 0.03"#;
 fn what_stands_is_drawn_from_every_camera() {
     let folder = tempfile::tempdir().unwrap();
     let check =
-        check_task(task(0.05, [LIFTED, r#"hands_off("A", "box")"#]), &[0, 1], Some(folder.path())).unwrap();
+        check_task(&task(0.05, [LIFTED, r#"hands_off("A", "box")"#]), &[0, 1], Some(folder.path())).unwrap();
     assert_eq!(check.falls, Vec::<String>::new());
     assert!(check.notes.len() == 1 && check.notes[0].contains("p2 two"), "{:?}", check.notes);
     let names: Vec<_> = check.pictures.iter().filter_map(|path| path.file_name()?.to_str()).collect();
@@ -52,7 +52,7 @@ fn what_stands_is_drawn_from_every_camera() {
 
 #[test]
 fn what_falls_is_named() {
-    let check = check_task(task(0.5, [LIFTED, LIFTED]), &[3, 4, 5], None).unwrap();
+    let check = check_task(&task(0.5, [LIFTED, LIFTED]), &[3, 4, 5], None).unwrap();
     let [line] = &check.falls[..] else { panic!("{:?}", check.falls) };
     let told = "seed 3: box does not stay at (1.00, 0.00, 0.50): within 2 s it comes to (1.00, 0.00, 0.05)";
     assert!(line.starts_with(told) && line.ends_with("(so it is with 2 other seeds, too)"), "{line}");
@@ -64,7 +64,7 @@ fn what_is_in_a_robots_way_is_named() {
         <geom type="box" size="0.3 0.3 0.02" pos="0.25 0 0.7"/></worldbody></mujoco>"#;
     let mut source = task(0.05, [LIFTED, LIFTED]).source.clone();
     source.text = source.text.replace("scene = \"floor\"", &format!("scene_mjcf = '''{table}'''"));
-    let check = check_task(task_of(source).unwrap(), &[0], None).unwrap();
+    let check = check_task(&task_of(source).unwrap(), &[0], None).unwrap();
     let told = check.falls.iter().find(|line| line.contains("robot A")).expect("it stands in a table");
     assert!(told.contains(": first its ") && told.contains("presses on the room, at (0."), "{told}");
 }
@@ -102,7 +102,7 @@ done = '"{{way}}" == "left" ? time_s() > 100 : time_s() > 200'
             beside: Default::default(),
         };
         let task = task_of(source).unwrap_or_else(|error| panic!("{error}"));
-        check_task(task, &[0], None).unwrap().notes
+        check_task(&task, &[0], None).unwrap().notes
     };
     let kept = "instruction = \"Go to the {way}.\"\nshared_instruction = \"Go where A sends you.\"";
     assert_eq!(notes(kept, "B is there."), Vec::<String>::new());
@@ -127,7 +127,7 @@ done = '"{{way}}" == "left" ? time_s() > 100 : time_s() > 200'
 
 #[test]
 fn a_phase_that_nobody_has_to_work_for_is_refused() {
-    let error = check_task(task(0.05, [r#"released_for_s("box") >= 0.2"#, LIFTED]), &[0], None).unwrap_err();
+    let error = check_task(&task(0.05, [r#"released_for_s("box") >= 0.2"#, LIFTED]), &[0], None).unwrap_err();
     let text = error.to_string();
     assert!(text.contains("box: phase one is reached 0.2") && text.contains("nobody has acted"), "{text}");
 }

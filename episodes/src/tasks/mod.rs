@@ -8,6 +8,7 @@ mod embedded;
 mod file;
 mod randomize;
 mod set;
+mod task;
 #[cfg(test)]
 mod tests;
 
@@ -15,38 +16,36 @@ pub use embedded::TANDEM_PLUS;
 pub use file::{TaskFileError, by_id_or_file, read_task, task_of};
 pub use randomize::{Offset, Spread, StartPose};
 pub(crate) use set::embedded_task;
-pub use set::{TaskSet, built_in, cohub, find, in_order, tandem_plus};
+pub use set::{TaskSet, cohub, find, in_order, tandem_plus};
+pub use task::Task;
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::{ObjectFile, RobotModel, SimError, SplitMix64, Step};
+use tandem_sim::{ObjectFile, RobotModel, SimError, Step};
 
 use crate::conditions::{ConditionPart, OF_FINGERS, Truth};
 use crate::scoring::{Phase, Scores};
 
-/// Separates the random stream of choices from the stream of offsets.
-const CHOICES_STREAM: u64 = 0x6368_6f69_6365_7331;
-
 /// A task as its file defines it.
-#[derive(Debug)]
-pub struct Task {
-    pub id: &'static str,
+#[derive(Clone, Debug)]
+pub struct TaskDefinition {
+    pub id: String,
     /// File name of the scene under `sim/assets/scenes`, or the name that messages use for a scene from
     /// the task's own files.
-    pub scene: &'static str,
+    pub scene: String,
     /// MJCF of the scene; `None` for an embedded one.
-    pub scene_mjcf: Option<&'static str>,
-    pub robots: &'static [RobotSpot],
-    pub objects: &'static [ObjectSpot],
+    pub scene_mjcf: Option<String>,
+    pub robots: Vec<RobotSpot>,
+    pub objects: Vec<ObjectSpot>,
     /// Offsets drawn from the seed, in drawing order.
-    pub randomize: &'static [Offset],
+    pub randomize: Vec<Offset>,
     /// Instruction for a policy that directs all robots.
-    pub instruction: &'static str,
+    pub instruction: String,
     /// Instruction for operators of one robot each. Set when the joint instruction contains information
     /// not meant for every robot.
-    pub shared_instruction: Option<&'static str>,
+    pub shared_instruction: Option<String>,
     /// Rewordings of the instructions, one for each stress level; `None` if the file has none.
     pub rewordings: Option<[TaskWords; 3]>,
     /// Control steps of an episode under the benchmark protocol.
@@ -56,7 +55,7 @@ pub struct Task {
     /// Limit of a policy's thinking time under the agentic protocol.
     pub thinking_s: u32,
     /// Phases p1, p2, ... in the order in which they must be reached.
-    pub phases: &'static [Phase],
+    pub phases: Arc<[Phase]>,
     /// Conditions of each phase with their expressions.
     pub conditions: Vec<Vec<PhaseCondition>>,
     /// True when the file requires closing hands, whatever its conditions require.
@@ -69,8 +68,6 @@ pub struct Task {
     pub xxh3: String,
     /// Options chosen by the seed; empty while no seed is set.
     pub chosen: Vec<ChosenOption>,
-    /// The task for each combination of options; unset for a task without choices.
-    pub variants: Arc<OnceLock<Vec<&'static Task>>>,
 }
 
 /// A grip that the brief can explain, by the object that it suits.
@@ -111,11 +108,11 @@ pub struct TaskWords {
 
 impl TaskWords {
     /// Returns the instructions of the task's own wording.
-    pub fn of(task: &Task) -> TaskWords {
+    pub fn of(task: &TaskDefinition) -> TaskWords {
         TaskWords {
-            joint: task.instruction.into(),
-            shared: task.shared_instruction.map(str::to_owned),
-            robots: task.robots.iter().map(|robot| robot.instruction.into()).collect(),
+            joint: task.instruction.clone(),
+            shared: task.shared_instruction.clone(),
+            robots: task.robots.iter().map(|robot| robot.instruction.clone()).collect(),
         }
     }
 }
@@ -178,44 +175,45 @@ pub struct TaskSource {
 }
 
 /// Start pose of a robot, and its instruction.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct RobotSpot {
     pub name: &'static str,
     pub position_m: [f32; 2],
     /// Yaw in the world frame; 0 faces along x.
     pub yaw_rad: f32,
     /// Instruction for a policy that directs this robot alone.
-    pub instruction: &'static str,
+    pub instruction: String,
 }
 
 /// Nominal pose of an object, before randomisation.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct ObjectSpot {
-    pub name: &'static str,
+    pub name: String,
     /// File name under `sim/assets/objects`, or the name that messages use for an MJCF from the task's
     /// own files.
-    pub file: &'static str,
+    pub file: String,
     pub position_m: [f32; 3],
     pub yaw_rad: f32,
     /// MJCF of the object; `None` for an embedded one.
-    pub mjcf: Option<&'static str>,
+    pub mjcf: Option<String>,
 }
 
 impl ObjectSpot {
     /// Returns the source of the object's model.
     pub fn source(&self) -> ObjectFile {
-        match self.mjcf {
-            None => ObjectFile::Embedded(self.file.into()),
-            Some(mjcf) => ObjectFile::Text { name: self.file.into(), mjcf: mjcf.into() },
+        match &self.mjcf {
+            None => ObjectFile::Embedded(self.file.clone()),
+            Some(mjcf) => ObjectFile::Text { name: self.file.clone(), mjcf: mjcf.clone() },
         }
     }
 }
 
-impl Task {
+impl TaskDefinition {
     /// Starts to score an episode of this task with robots of this model, from the state before the first
     /// control step.
     pub fn scores(&self, robot: &Arc<RobotModel>, start: &Step) -> Result<Scores, SimError> {
-        Scores::new(self.phases, self.objects.iter().map(|spot| (spot.name, spot.source())), robot, start)
+        let objects = self.objects.iter().map(|spot| (spot.name.as_str(), spot.source()));
+        Scores::new(self.phases.clone(), objects, robot, start)
     }
 
     /// Returns true for one of the benchmark's ten tasks.
@@ -226,18 +224,6 @@ impl Task {
     /// Returns the hash of the task's file; `None` for a benchmark task.
     pub fn file_xxh3(&self) -> Option<&str> {
         (!self.is_benchmark()).then_some(self.xxh3.as_str())
-    }
-
-    /// Returns this task with the options that the seed chooses. A task without choices returns itself.
-    pub fn under(&'static self, seed: u32) -> &'static Task {
-        let Some(variants) = self.variants.get() else { return self };
-        let drawn = SplitMix64(u64::from(seed) ^ CHOICES_STREAM).uniform([0.0, variants.len() as f32]);
-        variants.get(drawn as usize).copied().unwrap_or(self)
-    }
-
-    /// Returns true if the file has choices.
-    pub fn has_choices(&self) -> bool {
-        self.variants.get().is_some()
     }
 
     /// Returns the chosen option of the choice with this name.
@@ -262,14 +248,6 @@ impl Task {
     /// Returns the names of the robots, in order.
     pub fn robot_names(&self) -> impl Iterator<Item = &'static str> {
         self.robots.iter().map(|robot| robot.name)
-    }
-}
-
-/// Tasks are equal if both id and file are. The benchmark has one task for each id; a file may define
-/// another with the same id.
-impl PartialEq for Task {
-    fn eq(&self, other: &Task) -> bool {
-        self.id == other.id && self.file_xxh3() == other.file_xxh3()
     }
 }
 

@@ -6,13 +6,13 @@ use std::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
 use tandem_sim::SplitMix64;
 
-use super::Task;
+use super::{ObjectSpot, TaskDefinition};
 
 /// A displacement shared by several objects: uniform along each world axis and about the vertical.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Offset {
     /// Objects that move together.
-    pub objects: &'static [&'static str],
+    pub objects: Vec<String>,
     pub x_m: RangeInclusive<f32>,
     pub y_m: RangeInclusive<f32>,
     pub z_m: RangeInclusive<f32>,
@@ -99,7 +99,7 @@ impl Offset {
     }
 }
 
-impl Task {
+impl TaskDefinition {
     /// Returns the start pose of every object for a seed, in the order of [`Task::objects`].
     pub fn start_poses(&self, seed: u32, spread: Spread) -> Vec<StartPose> {
         let mut random = SplitMix64(seed.into());
@@ -108,12 +108,12 @@ impl Task {
             .iter()
             .map(|spot| StartPose { position_m: spot.position_m, yaw_rad: spot.yaw_rad })
             .collect();
-        for offset in self.randomize {
+        for offset in &self.randomize {
             let [x_m, y_m, z_m, yaw_rad] = offset.ranges(spread).map(|range| random.uniform(range));
-            let moved = |spot: &super::ObjectSpot| offset.objects.contains(&spot.name);
+            let moved = |spot: &ObjectSpot| offset.objects.contains(&spot.name);
             let first = self.objects.iter().position(|spot| offset.objects.first() == Some(&spot.name));
             let centre_m = first.map(|first| start_poses[first].position_m).unwrap_or_default();
-            for (start, _) in start_poses.iter_mut().zip(self.objects).filter(|(_, spot)| moved(spot)) {
+            for (start, _) in start_poses.iter_mut().zip(&self.objects).filter(|(_, spot)| moved(spot)) {
                 start.position_m = turned(start.position_m, centre_m, yaw_rad);
                 start.position_m =
                     [start.position_m[0] + x_m, start.position_m[1] + y_m, start.position_m[2] + z_m];
@@ -204,10 +204,10 @@ mod tests {
                     .iter()
                     .map(|spot| [spot.position_m[0], spot.position_m[1], spot.position_m[2], spot.yaw_rad])
                     .collect();
-                for offset in task.randomize {
+                for offset in &task.randomize {
                     let drawn = [&offset.x_m, &offset.y_m, &offset.z_m, &offset.yaw_rad]
                         .map(|range| random.uniform([*range.start(), *range.end()]));
-                    for (place, spot) in expected.iter_mut().zip(task.objects) {
+                    for (place, spot) in expected.iter_mut().zip(&task.objects) {
                         if offset.objects.contains(&spot.name) {
                             *place = std::array::from_fn(|axis| place[axis] + drawn[axis]);
                         }
@@ -239,9 +239,9 @@ mod tests {
             let [one, two, three, four] = Spread::ALL.map(farthest);
             assert!(two > 1.3 * one && four > 1.3 * two, "{}: {one} {two} {four}", task.id);
             assert!(three > two && four > three, "{}: {two} {three} {four}", task.id);
-            let turned = |start: &StartPose, spot: &super::super::ObjectSpot| start.yaw_rad != spot.yaw_rad;
+            let turned = |start: &StartPose, spot: &ObjectSpot| start.yaw_rad != spot.yaw_rad;
             let any = task.start_poses(7, Spread::Double);
-            assert!(any.iter().zip(task.objects).any(|(start, spot)| turned(start, spot)), "{}", task.id);
+            assert!(any.iter().zip(&task.objects).any(|(start, spot)| turned(start, spot)), "{}", task.id);
         }
         // The bottle keeps its place on the trolley's tray.
         let task = crate::tasks::find("cart_service").unwrap();

@@ -6,9 +6,9 @@ use tandem_tools_spec::Protocol;
 
 #[test]
 fn scenes_settle_within_a_second_and_start_again_bit_for_bit() {
-    for &task in tasks::cohub() {
+    for task in tasks::cohub() {
         // This protocol has no initial hold.
-        let [mut session, mut again] = [(); 2].map(|()| start(task.id, 1, Protocol::Benchmark));
+        let [mut session, mut again] = [(); 2].map(|()| start(&task.id, 1, Protocol::Benchmark));
         assert_eq!(session.state_hash(), again.state_hash(), "{}", task.id);
         wait(&mut session, 50);
         wait(&mut again, 50);
@@ -22,8 +22,8 @@ fn scenes_settle_within_a_second_and_start_again_bit_for_bit() {
 
 /// Waits in every task: objects move less than `drift_m`, no robot falls, no phase is reached.
 fn idle(wait_s: u32, drift_m: f32) {
-    for &task in tasks::cohub() {
-        let mut session = start(task.id, 1, Protocol::Agentic);
+    for task in tasks::cohub() {
+        let mut session = start(&task.id, 1, Protocol::Agentic);
         let before = session.facts();
         (0..2 * wait_s).for_each(|_| drop(wait(&mut session, 25)));
         for (before, after) in before.objects.iter().zip(&session.facts().objects) {

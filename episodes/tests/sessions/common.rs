@@ -7,7 +7,7 @@ use tandem_tools_spec::{
 };
 
 pub fn spec(task: &str, seed: u32, protocol: Protocol) -> EpisodeSpec {
-    EpisodeSpec::new(tasks::find(task).unwrap(), seed, protocol)
+    EpisodeSpec::new(&tasks::find(task).unwrap(), seed, protocol)
 }
 
 pub fn start(task: &str, seed: u32, protocol: Protocol) -> Session {

@@ -59,7 +59,7 @@ fn films_have_a_picture_for_every_moment() {
     }
     let text = make("a.avi", EpisodeCamera::ThirdPerson, 25).unwrap_err().to_string();
     assert!(text.contains("ends in .webp, .gif or .mp4"), "{text}");
-    let text = EpisodeCamera::find("C", recording.spec.task).unwrap_err();
+    let text = EpisodeCamera::find("C", &recording.spec.task).unwrap_err();
     assert!(text.ends_with("have: third_person, A, B"), "{text}");
     let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
     assert!(left.iter().all(|path| path.extension().is_none_or(|e| e != "partial")), "{left:?}");

@@ -7,7 +7,7 @@ use crate::common::*;
 use std::path::{Path, PathBuf};
 use tandem_episodes::players::{self, InProcess};
 
-use tandem_episodes::{FAILED_STEP_FILE, Recorder, Recording, Session, recover};
+use tandem_episodes::{FAILED_STEP_FILE, Recorder, Recording, Session, recover, tasks};
 use tandem_tools_spec::{EndReason, Finish, Observe, Protocol};
 
 #[test]
@@ -44,9 +44,9 @@ fn recorded_steps_are_the_steps_bit_for_bit() {
 /// Plays every expert, then scores its recording without a world.
 #[test]
 fn a_recording_scored_again_reaches_the_phases_that_the_episode_reached() {
-    for task in players::experts::solved() {
+    for task in tasks::cohub().iter().filter(|task| players::experts::solves(task)) {
         let folder = tempfile::tempdir().unwrap();
-        let spec = spec(task.id, 3, Protocol::Agentic);
+        let spec = spec(&task.id, 3, Protocol::Agentic);
         let mut episode = InProcess::new(Session::start(&spec, Some(folder.path())).unwrap());
         players::find("expert").unwrap().play(&spec, &mut episode).unwrap();
         let result = episode.session.close();
@@ -177,7 +177,7 @@ fn a_torn_end_is_left_out() {
 fn recordings_of_earlier_versions_are_read() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/sessions/recordings/whole_steps.mcap");
     let recording = Recording::read(&path).unwrap();
-    assert_eq!((recording.spec.task.id, recording.spec.seed), ("pouring", 2000));
+    assert_eq!((recording.spec.task.id.as_str(), recording.spec.seed), ("pouring", 2000));
     let steps: Vec<_> = recording.steps().map(Result::unwrap).collect();
     assert_eq!(steps.iter().map(|step| step.control_step).collect::<Vec<_>>(), [0, 1, 2, 3, 4]);
     let heights_m = steps.iter().map(|step| step.object("cup").unwrap().world_from_object.translation.z);

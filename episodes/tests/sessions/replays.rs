@@ -35,9 +35,9 @@ fn demonstration(task: &str, folder: &Path) -> Option<PathBuf> {
 
 #[test]
 fn every_task_is_verified_and_goes_on_where_each_phase_begins() {
-    for &task in tasks::cohub() {
+    for task in tasks::cohub() {
         let folder = tempfile::tempdir().unwrap();
-        let Some(recording) = demonstration(task.id, folder.path()) else { continue };
+        let Some(recording) = demonstration(&task.id, folder.path()) else { continue };
         let found = verified(&recording);
         let steps = Recording::read(&recording).unwrap().state_hashes().count();
         assert_eq!((found.outcome, found.steps), (Verdict::Same, steps), "{}", task.id);
@@ -49,7 +49,7 @@ fn every_task_is_verified_and_goes_on_where_each_phase_begins() {
         for index in 0..task.phases.len().min(reached + 1) {
             let phase = Phase::number(index);
             let start = Start::Phase(PhaseStart { recording: recording.clone(), phase: phase.clone() });
-            let spec = EpisodeSpec { start, ..spec(task.id, 3, Protocol::Benchmark) };
+            let spec = EpisodeSpec { start, ..spec(&task.id, 3, Protocol::Benchmark) };
             let mut episode = InProcess::new(Session::start(&spec, None).unwrap());
             let begun = episode.session.result();
             assert_eq!((begun.env_steps, begun.tool_calls), (0, 0), "the whole budget is ahead");

@@ -89,7 +89,7 @@ fn plan_of<'a>(
 ) -> PyResult<EvaluationPlan<'a>> {
     let layer: Layer = serde_json::from_str(settings).map_err(|error| failed(py, &error))?;
     let settings = Settings::resolve(layer, None).map_err(|error| failed(py, &error))?;
-    let found: Result<Vec<_>, _> = tasks.iter().map(|task| settings.tasks.find(task)).collect();
+    let found: Result<Vec<_>, _> = tasks.iter().map(|task| settings.tasks.find(task).cloned()).collect();
     let protocol: Protocol =
         serde_json::from_value(Value::from(protocol)).map_err(|error| failed(py, &error))?;
     let key = seed_key.map(|file| read_seed_key(&file, &seeds)).transpose();

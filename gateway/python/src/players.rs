@@ -180,7 +180,7 @@ impl PythonPolicy {
         let is_interrupted =
             PyCFunction::new_closure(py, None, None, move |_, _| interrupted.load(Ordering::Relaxed))?;
         let (played, said): (bool, Bound<PyAny>) =
-            play.bind(py).call1((spec.task.id, spec.seed, is_interrupted))?.extract()?;
+            play.bind(py).call1((spec.task.id.as_str(), spec.seed, is_interrupted))?.extract()?;
         if !played {
             return Ok(Elsewhere::NotPlayed { reason: said.extract()? });
         }

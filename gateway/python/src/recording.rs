@@ -60,7 +60,7 @@ impl NativeRecording {
             })
         });
         let objects = self.steps.first().map_or(&[][..], |step| &step.objects[..]);
-        let words = spec.task_words();
+        let (task, words) = (&spec.task, spec.task_words());
         let about = json!({
             "spec": spec,
             "locomotion": locomotion,
@@ -68,10 +68,10 @@ impl NativeRecording {
             "result": result,
             "phases": self.recording.phases().map_err(|error| failed(py, &error))?,
             "instruction": words.joint,
-            "instructions": spec.task.robot_names().zip(&words.robots).collect::<BTreeMap<_, _>>(),
-            "robots": spec.task.robots.iter().map(|robot| robot.name).collect::<Vec<_>>(),
+            "instructions": task.robot_names().zip(&words.robots).collect::<BTreeMap<_, _>>(),
+            "robots": task.robots.iter().map(|robot| robot.name).collect::<Vec<_>>(),
             "objects": objects.iter().map(|object| &object.name).collect::<Vec<_>>(),
-            "cameras": EpisodeCamera::all(spec.task).iter().map(|camera| camera.name(spec.task)).collect::<Vec<_>>(),
+            "cameras": EpisodeCamera::all(task).iter().map(|camera| camera.name(task)).collect::<Vec<_>>(),
             "calls": calls.collect::<Vec<_>>(),
         });
         Ok(about.to_string())
@@ -147,7 +147,7 @@ impl NativeRecording {
         draw: impl FnOnce(&mut EpisodeRenderer, EpisodeCamera, &Step, Option<PictureSize>) -> T + Send,
     ) -> PyResult<T> {
         let spec = &self.recording.spec;
-        let camera = EpisodeCamera::find(camera, spec.task).map_err(|text| failed(py, &text))?;
+        let camera = EpisodeCamera::find(camera, &spec.task).map_err(|text| failed(py, &text))?;
         let Some(step) = self.steps.get(step) else {
             let last = self.steps.len().saturating_sub(1);
             return Err(failed(py, &format!("no step {step} in this recording; have 0 to {last}")));

@@ -116,8 +116,8 @@ fn play(args: AgentArgs) -> CommandResult {
     let layer = Layer { runs: Some(args.runs), assistance: Some(args.assistance), ..world };
     let settings = Settings::resolve(on_this_machine(layer, token), None)?;
     let task = match &args.task {
-        Some(id) => settings.tasks.find(id)?,
-        None => settings.tasks.first_of_files().map_or_else(|| tasks::find(demo::TASK), Ok)?,
+        Some(id) => settings.tasks.find(id)?.clone(),
+        None => settings.tasks.first_of_files().cloned().map_or_else(|| tasks::find(demo::TASK), Ok)?,
     };
     let kept = [
         format!("--runs={}", settings.runs.display()),
@@ -126,7 +126,7 @@ fn play(args: AgentArgs) -> CommandResult {
     ];
     let switches = [(args.per_robot, "--per-robot"), (args.talk, "--talk")];
     let plays = args.seeds.0.map(|seed| {
-        let episode = ["--task".into(), task.id.into(), "--seed".into(), seed.to_string()];
+        let episode = ["--task".into(), task.id.clone(), "--seed".into(), seed.to_string()];
         let switches = switches.iter().filter(|(given, _)| *given).map(|(_, flag)| (*flag).into());
         kept.iter().cloned().chain(episode).chain(switches).collect()
     });

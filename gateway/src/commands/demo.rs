@@ -57,7 +57,7 @@ pub struct DemoArgs {
 /// Plays every seed. The program fails if too few episodes reach the last phase.
 pub fn run(args: DemoArgs) -> CommandResult {
     log_to_stderr(LevelFilter::WARN);
-    let known = args.world.read_task_files()?.first().is_none_or(|task| experts::solves(task));
+    let known = args.world.read_task_files()?.first().is_none_or(experts::solves);
     let results = play_all(&args.runs, args.seeds, args.stress.over(args.world.layer()))?;
     let recorded = results.iter().all(|result| result.recording_failed.is_none());
     Ok(if recorded && (!known || passed(&results)) { ExitCode::SUCCESS } else { ExitCode::FAILURE })
@@ -72,9 +72,9 @@ pub fn play_all(runs: &Path, seeds: Seeds, flags: Layer) -> Result<Vec<ResultRep
     };
     let settings = Settings::resolve(flags, None)?;
     try_runs_folder(&settings.runs)?;
-    let task = settings.tasks.first_of_files().map_or_else(|| tasks::find(TASK), Ok)?;
+    let task = settings.tasks.first_of_files().cloned().map_or_else(|| tasks::find(TASK), Ok)?;
     let server = Server::start(settings)?;
-    let results = seeds.0.map(|seed| play(&server, task, seed)).collect::<Result<Vec<_>, _>>()?;
+    let results = seeds.0.map(|seed| play(&server, &task, seed)).collect::<Result<Vec<_>, _>>()?;
     server.stop();
     if results.len() > 1 {
         println!("p{} on {} of {}", task.phases.len(), count_last_phase(&results), results.len());
@@ -92,9 +92,9 @@ fn count_last_phase(results: &[ResultReply]) -> usize {
     results.iter().filter(|result| last_s(result).is_some()).count()
 }
 
-fn play(server: &Server, task: &'static Task, seed: u32) -> Result<ResultReply, Box<dyn Error>> {
+fn play(server: &Server, task: &Task, seed: u32) -> Result<ResultReply, Box<dyn Error>> {
     let spec = EpisodeSpec::new(task, seed, Protocol::Agentic);
-    let args = StartEpisode { task: task.id.into(), seed, protocol: Some(spec.protocol), short: false };
+    let args = StartEpisode { task: task.id.clone(), seed, protocol: Some(spec.protocol), short: false };
     let (http, started) = HttpEpisode::start(server.address(), &args)?;
     let assistance = started.briefing.status.assistance;
     println!("{}, seed {seed}, over http://{}, assistance {assistance}", task.id, server.address());
@@ -114,7 +114,7 @@ fn play(server: &Server, task: &'static Task, seed: u32) -> Result<ResultReply, 
 }
 
 fn print_result(task: &Task, result: &ResultReply, folder: &Path) {
-    for ((number, time_s), phase) in result.phases.0.iter().zip(task.phases) {
+    for ((number, time_s), phase) in result.phases.0.iter().zip(task.phases.iter()) {
         match time_s {
             Some(time_s) => println!("  {number} {} reached at {time_s:.2} s", phase.id),
             None => println!("  {number} {} not reached", phase.id),

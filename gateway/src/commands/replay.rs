@@ -105,7 +105,7 @@ pub fn run(args: ReplayArgs) -> CommandResult {
         }
         let size = args.size.map(|SizeFlag(size)| size);
         if let Some(video) = &args.video {
-            let view = EpisodeCamera::find(&args.camera, recording.spec.task)?;
+            let view = EpisodeCamera::find(&args.camera, &recording.spec.task)?;
             let pictures = film(&recording, view, size, args.rate, video)?;
             println!("  {}: {pictures} pictures, {} a second", video.display(), args.rate);
         }
@@ -141,7 +141,7 @@ fn failed_step(path: &Path, args: &ReplayArgs) -> Result<bool, Box<dyn std::erro
         );
     };
     let spec = checkpoint.spec();
-    let (task, seed, protocol) = (spec.task.id, spec.seed, spec.protocol);
+    let (task, seed, protocol) = (&spec.task.id, spec.seed, spec.protocol);
     println!("{}: {task} seed {seed}, {protocol}", path.display());
     println!("  the simulator failed {}", printable(&failed.failure));
     if !args.verify {
@@ -156,7 +156,7 @@ fn failed_step(path: &Path, args: &ReplayArgs) -> Result<bool, Box<dyn std::erro
 
 fn describe(recording: &Recording) {
     let spec = &recording.spec;
-    let (task, seed, protocol) = (spec.task.id, spec.seed, spec.protocol);
+    let (task, seed, protocol) = (&spec.task.id, spec.seed, spec.protocol);
     let (task, build) = (printable(task), printable(&recording.build));
     println!("{}: {task} seed {seed}, {protocol}, build {build}", recording.path().display());
     println!("  {}", printable(&told(spec, recording.result.as_ref())));
@@ -280,7 +280,7 @@ mod tests {
         let handover = tasks::find("handover").unwrap();
         let spec = EpisodeSpec {
             robot: RobotFile::of(&robot).unwrap(),
-            ..EpisodeSpec::new(handover, 0, Protocol::Benchmark)
+            ..EpisodeSpec::new(&handover, 0, Protocol::Benchmark)
         };
         let mut session = Session::start(&spec, Some(folder)).unwrap();
         let reach = WristMove { right_position_m: Some([0.28, -0.24, 0.22]), ..WristMove::hold("A") };
@@ -290,7 +290,7 @@ mod tests {
 
     #[test]
     fn what_policies_were_told_is_said() {
-        let own = EpisodeSpec::new(tasks::find("handover").unwrap(), 0, Protocol::Benchmark);
+        let own = EpisodeSpec::new(&tasks::find("handover").unwrap(), 0, Protocol::Benchmark);
         assert_eq!(told(&own, None), "assistance: full");
         let paper = EpisodeSpec { hints: Hints::On, ..own.assisted(Assistance::Paper) };
         assert_eq!(told(&paper, None), "assistance: paper, hints: on");

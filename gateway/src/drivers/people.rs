@@ -46,7 +46,7 @@ pub struct People {
     server: Server,
     collection: Arc<Collection>,
     /// Episodes to play, by task and seed.
-    planned: Vec<(&'static str, u32)>,
+    planned: Vec<(String, u32)>,
     /// Folder of the episodes that were marked bad.
     aside: PathBuf,
     base_url: String,
@@ -59,7 +59,7 @@ impl People {
     pub fn start(
         settings: Settings,
         robots: &[&str],
-        planned: Vec<(&'static str, u32)>,
+        planned: Vec<(String, u32)>,
         aside: PathBuf,
     ) -> Result<People, PlayError> {
         let (token, host_token) = Token::random().map_err(HostingError::from)?;
@@ -141,10 +141,10 @@ impl Policy for People {
         if let Some(reason) = start.briefing.recording_failed {
             return Err(PlayError::Lost(reason));
         }
-        let number = self.planned.iter().position(|episode| *episode == (spec.task.id, spec.seed));
+        let number = self.planned.iter().position(|(task, seed)| (task, *seed) == (&spec.task.id, spec.seed));
         self.collection.begin(CollectedEpisode {
             episode_id: id.clone(),
-            task: spec.task.id.into(),
+            task: spec.task.id.clone(),
             seed: spec.seed,
             number: number.map_or(0, |before| before + 1),
         });

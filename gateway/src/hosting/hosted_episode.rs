@@ -213,7 +213,7 @@ impl HostedEpisode {
         let spec = self.thread.spec();
         EpisodeEntry {
             episode_id: self.id.clone(),
-            task: spec.task.id.into(),
+            task: spec.task.id.clone(),
             seed: Some(spec.seed),
             protocol: spec.protocol,
             operators: if self.team().is_some() { Operators::PerRobot } else { Operators::One },

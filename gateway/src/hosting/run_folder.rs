@@ -43,7 +43,7 @@ pub fn look_at_runs_folder(runs: &Path) -> Result<(), String> {
 /// Returns the public name of an episode: its task and its seed, or a random text in place of a hidden
 /// seed.
 pub fn episode_name(spec: &EpisodeSpec) -> Result<String, TokenError> {
-    let task = spec.task.id;
+    let task = &spec.task.id;
     Ok(match spec.told_seed() {
         Some(seed) => format!("{task}-seed{seed}"),
         None => format!("{task}-{}", &Token::random()?.1[..RANDOM_NAME_CHARS]),

@@ -27,7 +27,7 @@ pub fn alone(folder: &Path, place: OwnedSemaphorePermit) -> Surroundings {
 }
 
 async fn start(id: &str, folder: &Path, clock: Clock) -> (Arc<EpisodeThread>, Arc<Semaphore>, Briefing) {
-    let spec = EpisodeSpec::new(tasks::find("handover").unwrap(), 0, Protocol::Benchmark);
+    let spec = EpisodeSpec::new(&tasks::find("handover").unwrap(), 0, Protocol::Benchmark);
     let places = Arc::new(Semaphore::new(1));
     let permit = places.clone().try_acquire_owned().unwrap();
     let (episode, briefing) =

@@ -20,7 +20,7 @@ fn hold(server: &Server, id: &str, robot: &Path, folder: &Path) {
     let handover = tasks::find("handover").unwrap();
     let spec = EpisodeSpec {
         robot: RobotFile::of(robot).unwrap(),
-        ..EpisodeSpec::new(handover, 0, Protocol::Benchmark)
+        ..EpisodeSpec::new(&handover, 0, Protocol::Benchmark)
     };
     let permit = Arc::new(Semaphore::new(1)).try_acquire_owned().unwrap();
     let started = EpisodeThread::start(id, spec, alone(folder, permit));

@@ -94,9 +94,9 @@ const PACE_M_S: f32 = 0.2;
 
 impl SharedLoad {
     /// Returns the task in which the object is carried.
-    pub(in crate::bench) fn task(&self) -> &'static Task {
-        let has_it = |task: &&'static Task| task.objects.iter().any(|spot| spot.name == self.object);
-        tasks::cohub().iter().copied().find(has_it).unwrap_or(*carrying::TASK)
+    pub(in crate::bench) fn task(&self) -> &Task {
+        let has_it = |task: &&Task| task.objects.iter().any(|spot| spot.name == self.object);
+        tasks::cohub().iter().find(has_it).unwrap_or(&carrying::TASK)
     }
 
     /// Returns the number of robots that hold the object.

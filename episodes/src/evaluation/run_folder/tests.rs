@@ -27,7 +27,7 @@ fn with_episodes<'a>(plan: &'a EvaluationPlan, folder: &'a Path, count: usize) -
 fn another_run_is_refused_with_what_differs_and_left_as_it_is() {
     let folder = tempfile::tempdir().unwrap();
     let [handover, pouring] = ["handover", "pouring"].map(|id| tasks::find(id).unwrap());
-    let own = plan(vec![handover], vec![1, 2, 3]);
+    let own = plan(vec![handover.clone()], vec![1, 2, 3]);
     drop(with_episodes(&own, folder.path(), 2));
     let before = std::fs::read(folder.path().join("episodes/handover-1.json")).unwrap();
     let refused = |other: EvaluationPlan| {
@@ -61,7 +61,7 @@ fn another_run_is_refused_with_what_differs_and_left_as_it_is() {
         assert!(told.contains("--out") && told.contains("--overwrite"), "{told}");
         assert!(!told.contains("--resume-with-new-build"), "another policy is no other build: {told}");
     }
-    let told = refused(EvaluationPlan { tasks: vec![pouring], ..own.clone() });
+    let told = refused(EvaluationPlan { tasks: vec![pouring.clone()], ..own.clone() });
     assert!(told.contains("tasks are pouring, and were handover"), "{told}");
     assert!(told.contains("further ones, which are added to it (--shard I/N"), "{told}");
     assert_eq!(std::fs::read(folder.path().join("episodes/handover-1.json")).unwrap(), before);
@@ -168,7 +168,7 @@ impl Policy for CountingPolicy {
         self.0.fetch_add(1, Ordering::Relaxed);
         // Long enough for the others to reach this episode.
         std::thread::sleep(Duration::from_millis(20));
-        let result = result(spec.task.id, spec.seed, vec![("p1".into(), Some(4.2))]);
+        let result = result(&spec.task.id, spec.seed, vec![("p1".into(), Some(4.2))]);
         Ok(PlayOutcome { result, thought: Default::default(), stopped: None })
     }
 }

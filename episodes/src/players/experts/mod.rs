@@ -20,7 +20,7 @@ mod trash_collection;
 
 use super::{PlayerError, PrivilegedEpisode, PrivilegedPlayer};
 use crate::spec::EpisodeSpec;
-use crate::tasks::{self, ObjectSpot, Task, TaskSet};
+use crate::tasks::{ObjectSpot, Task, TaskSet};
 use skills::{Commander, Variety};
 
 /// Constant that separates the seed of guesses from the episode's own.
@@ -42,14 +42,9 @@ const ALL: &[(&str, ExpertScript)] = &[
     ("big_table", big_table::perform),
 ];
 
-/// Returns the benchmark's tasks that have an expert, in their order.
-pub fn solved() -> impl Iterator<Item = &'static Task> {
-    tasks::cohub().iter().copied().filter(|task| Expert::of(task).is_ok())
-}
-
 /// The script of one task.
 pub struct Expert {
-    task: &'static Task,
+    task: Task,
     script: ExpertScript,
     /// Variation of the demonstration; `None` for the plain one.
     variety: Option<Variety>,
@@ -62,26 +57,27 @@ impl Expert {
     /// # Errors
     ///
     /// If no expert knows the task.
-    pub fn of(task: &'static Task) -> Result<Expert, PlayerError> {
+    pub fn of(task: &Task) -> Result<Expert, PlayerError> {
         let known = ALL.iter().chain(plus::ALL);
         match known.clone().find(|(id, _)| *id == task.id && has_what_it_needs(task)) {
-            Some((_, script)) => Ok(Expert { task, script: *script, variety: None }),
+            Some((_, script)) => Ok(Expert { task: task.clone(), script: *script, variety: None }),
             None => {
-                Err(PlayerError::NoExpert { task: task.id.into(), have: known.map(|(id, _)| *id).collect() })
+                Err(PlayerError::NoExpert { task: task.id.clone(), have: known.map(|(id, _)| *id).collect() })
             }
         }
     }
 }
 
 /// Returns `true` if there is an expert of `task`.
-pub fn solves(task: &'static Task) -> bool {
+pub fn solves(task: &Task) -> bool {
     Expert::of(task).is_ok()
 }
 
 /// Returns `true` if `task` has the robots and objects of the built-in task with its id, which its expert
 /// asks for by name.
 fn has_what_it_needs(task: &Task) -> bool {
-    let Ok(own) = TaskSet::default().find(task.id) else { return false };
+    let set = TaskSet::default();
+    let Ok(own) = set.find(&task.id) else { return false };
     let has = |spot: &ObjectSpot| {
         let same = |other: &ObjectSpot| other.name == spot.name && other.source() == spot.source();
         task.objects.iter().any(same)
@@ -90,7 +86,7 @@ fn has_what_it_needs(task: &Task) -> bool {
 }
 
 /// Returns the task with a guess in place of the seed's choices, for robots that do not communicate.
-pub fn guessed(spec: &EpisodeSpec) -> &'static Task {
+pub fn guessed(spec: &EpisodeSpec) -> Task {
     spec.task.under(spec.world_seed() ^ GUESSES)
 }
 
@@ -98,7 +94,7 @@ impl Expert {
     /// Returns the expert of an episode, with the variety that its spec asks for.
     pub fn for_episode(spec: &EpisodeSpec) -> Result<Expert, PlayerError> {
         let variety = Variety::new(spec.variation.variety, spec.world_seed());
-        Ok(Expert { variety, ..Expert::of(spec.task)? })
+        Ok(Expert { variety, ..Expert::of(&spec.task)? })
     }
 
     /// Returns the expert of an episode whose robots do not communicate: another draw replaces the seed's
@@ -110,13 +106,13 @@ impl Expert {
     pub fn without_words(spec: &EpisodeSpec) -> Result<Expert, PlayerError> {
         match spec.task.has_choices() {
             true => Ok(Expert { task: guessed(spec), ..Expert::for_episode(spec)? }),
-            false => Err(PlayerError::NothingToSay { task: spec.task.id.into() }),
+            false => Err(PlayerError::NothingToSay { task: spec.task.id.clone() }),
         }
     }
 }
 
 impl PrivilegedPlayer for Expert {
     fn play(&mut self, episode: &mut dyn PrivilegedEpisode) -> Result<(), PlayerError> {
-        (self.script)(&mut Commander::new(self.task, episode)?.varied(self.variety.clone()))
+        (self.script)(&mut Commander::new(&self.task, episode)?.varied(self.variety.clone()))
     }
 }

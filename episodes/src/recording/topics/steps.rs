@@ -266,7 +266,7 @@ mod tests {
     /// Returns steps of a world at rest, with varied numbers and varied counts of them.
     fn steps() -> Vec<Step> {
         let spec = crate::EpisodeSpec::new(
-            crate::tasks::find("pouring").unwrap(),
+            &crate::tasks::find("pouring").unwrap(),
             2000,
             tandem_tools_spec::Protocol::Benchmark,
         );

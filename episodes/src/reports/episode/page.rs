@@ -176,7 +176,7 @@ impl EpisodePage<'_> {
             };
             let name = escape(&phase.id.replace('_', " "));
             let who = if phase.collaborative { "together" } else { "alone" };
-            let condition = escape(phase.description);
+            let condition = escape(&phase.description);
             rows += &format!(
                 r#"<tr><td>{number} {name}</td><td class="{class}">{reached}</td><td>{who}</td><td class="long">{condition}</td></tr>"#
             );

@@ -23,7 +23,7 @@ pub struct Comparison {
 #[derive(Debug, Serialize)]
 pub struct PairedRow {
     /// `None` for all tasks together.
-    pub task: Option<&'static str>,
+    pub task: Option<String>,
     /// The phase's number, for example `p2`.
     pub phase: String,
     /// True if it is the task's last phase.
@@ -38,21 +38,21 @@ pub struct PairedRow {
 }
 
 /// Episodes by task, hash of its file, seed and start phase; the first of several.
-type Episodes<'a> = BTreeMap<(&'static str, Option<&'static str>, u32, Option<usize>), &'a PlayedEpisode>;
+type Episodes<'a> = BTreeMap<(&'a str, Option<&'a str>, u32, Option<usize>), &'a PlayedEpisode>;
 
 impl Comparison {
     pub fn of(first: &PolicyGroup, second: &PolicyGroup) -> Comparison {
         let (ones, others) = (episodes(first), episodes(second));
         let shared: Vec<(&PlayedEpisode, &PlayedEpisode)> =
             ones.iter().filter_map(|(key, one)| Some((*one, *others.get(key)?))).collect();
-        let order = tasks::in_order(shared.iter().map(|(one, _)| one.spec.task));
+        let order = tasks::in_order(shared.iter().map(|(one, _)| &one.spec.task));
         let most = order.iter().map(|task| task.phases.len()).max().unwrap_or_default();
         let mut rows = Vec::new();
         for task in order {
-            let of_task = shared.iter().filter(|(one, _)| one.spec.task == task).copied();
+            let of_task = shared.iter().filter(|(one, _)| one.spec.task == *task).copied();
             let of_task: Vec<_> = of_task.collect();
             let last = task.phases.len() - 1;
-            rows.extend((0..=last).filter_map(|phase| row(Some(task.id), phase, phase == last, &of_task)));
+            rows.extend((0..=last).filter_map(|phase| row(Some(&task.id), phase, phase == last, &of_task)));
         }
         let everything = (0..most).filter_map(|phase| row(None, phase, phase + 1 == most, &shared));
         rows.extend(everything);
@@ -63,8 +63,8 @@ impl Comparison {
 fn episodes<'a>(group: &'a PolicyGroup) -> Episodes<'a> {
     let mut found = Episodes::new();
     for played in group.episodes.iter().map(|found| &found.played) {
-        let task = played.spec.task;
-        let key = (task.id, task.file_xxh3(), played.spec.seed, played.start_phase());
+        let task = &played.spec.task;
+        let key = (task.id.as_str(), task.file_xxh3(), played.spec.seed, played.start_phase());
         found.entry(key).or_insert(played);
     }
     found
@@ -73,7 +73,7 @@ fn episodes<'a>(group: &'a PolicyGroup) -> Episodes<'a> {
 /// Returns the row of a phase; `None` if the two policies share no such episode. An episode that began at a
 /// phase counts for that phase alone.
 fn row(
-    task: Option<&'static str>,
+    task: Option<&str>,
     phase: usize,
     last: bool,
     shared: &[(&PlayedEpisode, &PlayedEpisode)],
@@ -89,7 +89,7 @@ fn row(
         }
     }
     Some(PairedRow {
-        task,
+        task: task.map(str::to_owned),
         phase: Phase::number(phase),
         last,
         difference_share: pairs.difference_share()?,

@@ -195,7 +195,7 @@ mod tests {
         let watch = "http://127.0.0.1:8700/watch?run=a&at=11.5";
         report.failure_moments = vec![FailureMoment {
             policy: "agent".into(),
-            task: "handover",
+            task: "handover".into(),
             seed: 9,
             phase: "p1".into(),
             what: "A fell".into(),

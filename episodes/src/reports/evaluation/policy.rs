@@ -62,7 +62,7 @@ pub struct PolicyReport {
 /// One task.
 #[derive(Debug, Serialize)]
 pub struct TaskReport {
-    pub task: &'static str,
+    pub task: String,
     pub robots: usize,
     /// Number of episodes that began at the task's own beginning.
     pub episodes: usize,
@@ -80,7 +80,7 @@ pub struct TaskReport {
 #[derive(Debug, Serialize)]
 pub struct PhaseReport {
     /// The phase's id, for example `transfer`.
-    pub id: &'static str,
+    pub id: String,
     /// The phase's number, for example `p2`.
     pub number: String,
     pub collaborative: bool,
@@ -123,7 +123,7 @@ pub struct ShownReport {
 /// A cause of failed episodes.
 #[derive(Debug, Serialize)]
 pub struct FailureReason {
-    pub task: &'static str,
+    pub task: String,
     /// Number of the first phase that counts and was not reached.
     pub phase: String,
     pub why: String,
@@ -133,7 +133,7 @@ pub struct FailureReason {
 /// Episodes that do not count, for one reason.
 #[derive(Debug, Serialize)]
 pub struct ExcludedEpisodes {
-    pub task: &'static str,
+    pub task: String,
     pub what: Exclusion,
     pub why: String,
     pub seeds: Vec<u32>,
@@ -142,7 +142,7 @@ pub struct ExcludedEpisodes {
 /// An episode that was played more than once.
 #[derive(Debug, Serialize)]
 pub struct RepeatedEpisode {
-    pub task: &'static str,
+    pub task: String,
     pub seed: u32,
     /// Causes of the earlier attempts' failures, the oldest first.
     pub earlier: Vec<String>,
@@ -183,7 +183,8 @@ pub fn groups<'a>(episodes: impl Iterator<Item = &'a FoundEpisode>) -> Vec<Polic
 impl<'a> PolicyGroup<'a> {
     fn new(name: String, found: Vec<&'a FoundEpisode>) -> PolicyGroup<'a> {
         let (episodes, excluded): (Vec<_>, Vec<_>) = found.into_iter().partition(|one| one.played.counts());
-        let key = |played: &PlayedEpisode| (played.spec.task.id, played.spec.seed, played.start_phase());
+        let key =
+            |played: &PlayedEpisode| (played.spec.task.id.clone(), played.spec.seed, played.start_phase());
         let again: BTreeSet<_> = episodes.iter().map(|one| key(&one.played)).collect();
         let excluded = excluded.into_iter().map(|one| &one.played);
         let (superseded, excluded) = excluded.partition(|one| again.contains(&key(one)));
@@ -236,7 +237,7 @@ impl PolicyReport {
     pub fn of(group: &PolicyGroup) -> PolicyReport {
         let played: Vec<&PlayedEpisode> = group.episodes.iter().map(|found| &found.played).collect();
         let first = played.first().or(group.excluded.first());
-        let order = tasks::in_order(played.iter().map(|played| played.spec.task));
+        let order = tasks::in_order(played.iter().map(|played| &played.spec.task));
         let of_tasks = order.into_iter().map(|task| TaskReport::of(task, &played));
         let tasks: Vec<TaskReport> = of_tasks.flatten().collect();
         PolicyReport {
@@ -262,16 +263,16 @@ impl PolicyReport {
 
 impl TaskReport {
     /// Creates the report of a task; `None` if it was not played.
-    fn of(task: &'static Task, played: &[&PlayedEpisode]) -> Option<TaskReport> {
+    fn of(task: &Task, played: &[&PlayedEpisode]) -> Option<TaskReport> {
         let of_task: Vec<&PlayedEpisode> =
-            played.iter().copied().filter(|one| one.spec.task == task).collect();
+            played.iter().copied().filter(|one| one.spec.task == *task).collect();
         let whole: Vec<&PlayedEpisode> =
             of_task.iter().copied().filter(|one| one.start_phase().is_none()).collect();
-        let phase = |(index, phase): (usize, &'static Phase)| {
+        let phase = |(index, phase): (usize, &Phase)| {
             let before = whole.iter().filter(|one| index == 0 || one.reached(index - 1)).copied();
             let from_it = of_task.iter().filter(|one| one.start_phase() == Some(index)).copied();
             PhaseReport {
-                id: phase.id,
+                id: phase.id.clone(),
                 number: Phase::number(index),
                 collaborative: phase.collaborative,
                 cumulative: Rate::of(count(whole.iter().copied(), index)),
@@ -280,7 +281,7 @@ impl TaskReport {
             }
         };
         (!of_task.is_empty()).then(|| TaskReport {
-            task: task.id,
+            task: task.id.clone(),
             robots: task.robots.len(),
             episodes: whole.len(),
             phases: task.phases.iter().enumerate().map(phase).collect(),
@@ -355,20 +356,19 @@ fn reasons(episodes: &[&PlayedEpisode]) -> Vec<FailureReason> {
     for played in episodes.iter().filter(|played| !played.succeeded()) {
         let (phase, why) = (first_missed_phase(played), failure_cause(played));
         let same = |known: &&mut FailureReason| {
-            (known.task, &known.phase, &known.why) == (played.spec.task.id, &phase, &why)
+            (&known.task, &known.phase, &known.why) == (&played.spec.task.id, &phase, &why)
         };
         match reasons.iter_mut().find(same) {
             Some(known) => known.seeds.push(played.spec.seed),
             None => reasons.push(FailureReason {
-                task: played.spec.task.id,
+                task: played.spec.task.id.clone(),
                 phase,
                 why,
                 seeds: vec![played.spec.seed],
             }),
         }
     }
-    let rank =
-        |reason: &FailureReason| tasks::cohub().iter().copied().position(|task| task.id == reason.task);
+    let rank = |reason: &FailureReason| tasks::cohub().iter().position(|task| task.id == reason.task);
     reasons.sort_by_key(|reason| (rank(reason), reason.phase.clone()));
     reasons
 }
@@ -408,16 +408,15 @@ pub fn failed<'a>(group: &PolicyGroup<'a>) -> Vec<&'a FoundEpisode> {
 fn excluded(episodes: &[&PlayedEpisode]) -> Vec<ExcludedEpisodes> {
     let mut listed: Vec<ExcludedEpisodes> = Vec::new();
     for (played, what) in episodes.iter().filter_map(|played| Some((played, played.exclusion()?))) {
-        let (task, seed, why) = (played.spec.task.id, played.spec.seed, failure_cause(played));
-        let same = |known: &&mut ExcludedEpisodes| (known.task, known.what, &known.why) == (task, what, &why);
+        let (task, seed, why) = (&played.spec.task.id, played.spec.seed, failure_cause(played));
+        let same =
+            |known: &&mut ExcludedEpisodes| (&known.task, known.what, &known.why) == (task, what, &why);
         match listed.iter_mut().find(same) {
             Some(known) => known.seeds.push(seed),
-            None => listed.push(ExcludedEpisodes { task, what, why, seeds: vec![seed] }),
+            None => listed.push(ExcludedEpisodes { task: task.clone(), what, why, seeds: vec![seed] }),
         }
     }
-    listed.sort_by_key(|entry| {
-        (tasks::cohub().iter().copied().position(|task| task.id == entry.task), entry.what)
-    });
+    listed.sort_by_key(|entry| (tasks::cohub().iter().position(|task| task.id == entry.task), entry.what));
     listed
 }
 
@@ -426,7 +425,8 @@ fn excluded(episodes: &[&PlayedEpisode]) -> Vec<ExcludedEpisodes> {
 fn played_again(group: &PolicyGroup) -> Vec<RepeatedEpisode> {
     let counted = group.episodes.iter().map(|found| &found.played);
     let repeated = counted.chain(group.excluded.iter().copied()).filter_map(|played| {
-        let key = |played: &PlayedEpisode| (played.spec.task.id, played.spec.seed, played.start_phase());
+        let key =
+            |played: &PlayedEpisode| (played.spec.task.id.clone(), played.spec.seed, played.start_phase());
         let elsewhere = group.superseded.iter().filter(|other| key(other) == key(played));
         let noted = |note: &Option<String>| note.clone().unwrap_or_else(|| "it failed".into());
         let earlier: Vec<String> = elsewhere
@@ -447,7 +447,7 @@ fn played_again(group: &PolicyGroup) -> Vec<RepeatedEpisode> {
                 | EndReason::Abandoned,
             ) => "failure",
         };
-        let (task, seed) = (played.spec.task.id, played.spec.seed);
+        let (task, seed) = (played.spec.task.id.clone(), played.spec.seed);
         (!earlier.is_empty()).then(|| RepeatedEpisode { task, seed, earlier, last: last.into() })
     });
     repeated.collect()

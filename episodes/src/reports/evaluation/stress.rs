@@ -34,7 +34,7 @@ pub struct StressReport {
 #[derive(Debug, Serialize)]
 pub struct StressRow {
     /// `None` for all tasks together.
-    pub task: Option<&'static str>,
+    pub task: Option<String>,
     pub axis: StressAxis,
     pub level: u8,
     /// Variant of the axis, for example "drops what it holds"; `None` if the axis has none.
@@ -67,7 +67,7 @@ pub struct AxisLoss {
 }
 
 /// A task, the hash of its file, and a seed.
-type EpisodeKey = (&'static str, Option<&'static str>, u32);
+type EpisodeKey<'a> = (&'a str, Option<&'a str>, u32);
 
 /// Reports on the policies that were played under stress, in the order in which they were found.
 pub fn stress_reports<'a>(episodes: impl Iterator<Item = &'a FoundEpisode> + Clone) -> Vec<StressReport> {
@@ -111,11 +111,12 @@ impl StressReport {
                 None => &mut plain,
                 Some(stress) => stressed.entry(stress).or_default(),
             };
-            of.entry((one.spec.task.id, one.spec.task.file_xxh3(), one.spec.seed)).or_insert(one);
+            let task = &one.spec.task;
+            of.entry((task.id.as_str(), task.file_xxh3(), one.spec.seed)).or_insert(one);
         }
-        let row = |task: Option<&'static Task>, kind: Option<&'static str>, stress: &Stress| {
+        let row = |task: Option<&Task>, kind: Option<&'static str>, stress: &Stress| {
             let is_of = |one: &PlayedEpisode| {
-                task.is_none_or(|task| one.spec.task == task)
+                task.is_none_or(|task| one.spec.task == *task)
                     && kind.is_none_or(|kind| kind_of(one) == Some(kind))
             };
             let episodes = stressed.get(stress)?.iter().filter(|(_, one)| is_of(one));
@@ -137,7 +138,7 @@ impl StressReport {
             kinds.dedup();
             rows.extend(kinds.into_iter().filter_map(|kind| row(None, Some(kind), stress)));
         }
-        let all = played.iter().filter(|one| one.spec.stress.is_some()).map(|one| one.spec.task);
+        let all = played.iter().filter(|one| one.spec.stress.is_some()).map(|one| &one.spec.task);
         for task in tasks::in_order(all) {
             rows.extend(stresses.iter().filter_map(|stress| row(Some(task), None, stress)));
         }
@@ -169,7 +170,7 @@ fn rate<'a>(episodes: impl Iterator<Item = &'a PlayedEpisode>) -> Option<Rate> {
 impl StressRow {
     /// Creates a row; `None` without episodes.
     fn of(
-        task: Option<&'static Task>,
+        task: Option<&Task>,
         kind: Option<&'static str>,
         stress: Stress,
         episodes: &[(EpisodeKey, &PlayedEpisode)],
@@ -186,7 +187,7 @@ impl StressRow {
             }
         }
         Some(StressRow {
-            task: task.map(|task| task.id),
+            task: task.map(|task| task.id.clone()),
             axis: stress.axis,
             level: stress.level.number(),
             kind,
@@ -285,11 +286,13 @@ fn task_table(report: &StressReport) -> Table {
     levels.dedup();
     table.head.extend(levels.iter().map(|level| format!("Level {level}")));
     let of_tasks = || report.rows.iter().filter(|row| row.task.is_some());
-    let mut places: Vec<(Option<&str>, StressAxis)> = of_tasks().map(|row| (row.task, row.axis)).collect();
+    let mut places: Vec<(Option<&str>, StressAxis)> =
+        of_tasks().map(|row| (row.task.as_deref(), row.axis)).collect();
     places.dedup();
     for (task, axis) in places {
         let cell = |level: &u8| {
-            let row = of_tasks().find(|row| (row.task, row.axis, row.level) == (task, axis, *level));
+            let row =
+                of_tasks().find(|row| (row.task.as_deref(), row.axis, row.level) == (task, axis, *level));
             row.map_or(NONE.into(), |row| match &row.paired {
                 Some(paired) => format!("{}, {}", row.rate.fraction(), paired.text()),
                 None => row.rate.fraction(),
@@ -304,7 +307,7 @@ fn task_table(report: &StressReport) -> Table {
 /// Returns a line for each rate of each task, in the format of the CSV's other lines.
 pub fn csv_lines(report: &StressReport, quoted: &dyn Fn(&str) -> String) -> Vec<String> {
     let line = |row: &StressRow| {
-        let task = tasks::cohub().iter().copied().find(|task| Some(task.id) == row.task)?;
+        let task = tasks::cohub().iter().find(|task| row.task.as_ref() == Some(&task.id))?;
         let last = task.phases.len() - 1;
         let Rate { successes, trials, share, interval_share: [low_share, high_share] } = row.rate;
         let of = format!("{},{},{},{}", quoted(&report.policy), report.protocol, task.id, task.robots.len());
@@ -328,7 +331,7 @@ mod tests {
     fn under_stress() -> EvaluationReport {
         let task = tasks::find("handover").unwrap();
         let episode = |stress: Option<(StressAxis, StressLevel)>, seed: u32, succeeds: bool| {
-            let mut one = played("agent", task, seed, if succeeds { 3 } else { 1 });
+            let mut one = played("agent", &task, seed, if succeeds { 3 } else { 1 });
             one.spec.stress = stress.map(|(axis, level)| Stress { axis, level });
             one
         };
@@ -371,7 +374,7 @@ mod tests {
         for (place, level) in [("", None), ("stress/push-1", Some(StressLevel::One))] {
             let episodes = folder.path().join(place).join("episodes");
             std::fs::create_dir_all(&episodes).unwrap();
-            let mut one = played("agent", task, 7, 3);
+            let mut one = played("agent", &task, 7, 3);
             one.spec.stress = level.map(|level| Stress { axis: StressAxis::Push, level });
             std::fs::write(episodes.join("handover-7.json"), serde_json::to_string(&one).unwrap()).unwrap();
         }

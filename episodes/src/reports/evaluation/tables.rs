@@ -49,8 +49,8 @@ fn clamped(policies: &[PolicyReport]) -> Table {
         2,
     );
     for policy in policies {
-        let shares = policy.tasks.iter().filter_map(|task| Some((task.task, task.joints_clamped_share?)));
-        let row = |(task, share): (&str, f64)| vec![policy.name.clone(), task.into(), percent(share)];
+        let shares = policy.tasks.iter().filter_map(|task| Some((&task.task, task.joints_clamped_share?)));
+        let row = |(task, share): (&String, f64)| vec![policy.name.clone(), task.clone(), percent(share)];
         table.rows.extend(shares.map(row));
     }
     table
@@ -69,7 +69,7 @@ pub fn rates(policy: &PolicyReport) -> Table {
     for task in &policy.tasks {
         for phase in &task.phases {
             table.rows.push(vec![
-                task.task.into(),
+                task.task.clone(),
                 format!("{} {}", phase.number, phase.id.replace('_', " ")),
                 if phase.collaborative { "together" } else { "alone" }.into(),
                 text(phase.cumulative),
@@ -109,7 +109,7 @@ fn floors(floors: &[TaskFloor]) -> Table {
 
 /// Returns the task, with its departures from the benchmark.
 fn task_of(floor: &TaskFloor) -> String {
-    named(floor.task, &floor.departures)
+    named(&floor.task, &floor.departures)
 }
 
 fn averages(policies: &[PolicyReport]) -> Table {
@@ -220,7 +220,7 @@ fn effort(policies: &[PolicyReport]) -> Table {
         };
         vec![
             policy.name.clone(),
-            task.task.into(),
+            task.task.clone(),
             task.episodes.to_string(),
             text(&effort.steps, 0),
             text(&effort.calls, 0),
@@ -247,7 +247,7 @@ fn reasons(policies: &[PolicyReport]) -> Table {
             let seeds: Vec<String> = reason.seeds.iter().map(u32::to_string).collect();
             table.rows.push(vec![
                 policy.name.clone(),
-                reason.task.into(),
+                reason.task.clone(),
                 reason.phase.clone(),
                 reason.why.clone(),
                 seeds.len().to_string(),
@@ -272,7 +272,7 @@ fn went_wrong(moments: &[FailureMoment], policies: &[PolicyReport]) -> Table {
     moments.sort_by_key(|moment| order(&moment.policy));
     for moment in moments {
         let FailureMoment { policy, task, seed, phase, what, time_s, watch } = moment;
-        let row = [policy, *task, &seed.to_string(), phase, what, &format!("{time_s:.1}")];
+        let row = [policy.as_str(), task, &seed.to_string(), phase, what, &format!("{time_s:.1}")];
         table.rows.push(row.map(str::to_owned).to_vec());
         table.links.push(watch.clone());
     }
@@ -292,7 +292,7 @@ fn excluded(policies: &[PolicyReport]) -> Table {
             let seeds: Vec<String> = entry.seeds.iter().map(u32::to_string).collect();
             table.rows.push(vec![
                 policy.name.clone(),
-                entry.task.into(),
+                entry.task.clone(),
                 entry.what.name().into(),
                 entry.why.clone(),
                 seeds.len().to_string(),
@@ -315,7 +315,7 @@ fn played_again(policies: &[PolicyReport]) -> Table {
         for again in &policy.played_again {
             table.rows.push(vec![
                 policy.name.clone(),
-                again.task.into(),
+                again.task.clone(),
                 again.seed.to_string(),
                 again.earlier.len().to_string(),
                 again.earlier.join("; "),
@@ -344,7 +344,7 @@ fn paired_row(row: &PairedRow) -> Vec<String> {
     let pairs = row.pairs;
     let counts = [pairs.total(), pairs.both, pairs.first_only, pairs.second_only, pairs.neither];
     let [low, high] = row.interval_share.map(signed);
-    let words = [row.task.unwrap_or("all tasks").to_owned(), row.phase.clone()];
+    let words = [row.task.as_deref().unwrap_or("all tasks").to_owned(), row.phase.clone()];
     let figures = [format!("{} [{low}, {high}]", signed(row.difference_share)), p_text(row.mcnemar_p_value)];
     words.into_iter().chain(counts.map(|count| count.to_string())).chain(figures).collect()
 }

@@ -12,7 +12,7 @@ use crate::spec::{EpisodeSpec, PhaseStart, Start};
 use crate::tasks::{self, Task};
 
 /// Returns an episode that reached the first `phases` phases.
-pub fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> PlayedEpisode {
+pub fn played(policy: &str, task: &Task, seed: u32, phases: usize) -> PlayedEpisode {
     let reached = |index: usize| (index < phases).then_some(4.0 * (index as f64 + 1.0));
     let times = (0..task.phases.len()).map(|index| (crate::Phase::number(index), reached(index)));
     let ended = if phases == task.phases.len() { EndReason::TaskComplete } else { EndReason::Finished };
@@ -22,7 +22,7 @@ pub fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Pl
         locomotion: "balance".into(),
         build: "0.1.0+test".into(),
         result: ResultReply {
-            task: task.id.into(),
+            task: task.id.clone(),
             seed: Some(seed),
             protocol: Protocol::Benchmark,
             phases: PhaseTimes(times.collect()),
@@ -55,7 +55,7 @@ pub fn played(policy: &str, task: &'static Task, seed: u32, phases: usize) -> Pl
 pub fn nine_six_three(policy: &str) -> Vec<PlayedEpisode> {
     let task = tasks::find("handover").unwrap();
     let reached = [3, 3, 3, 2, 2, 2, 1, 1, 1, 0];
-    (0..).zip(reached).map(|(seed, phases)| played(policy, task, seed, phases)).collect()
+    (0..).zip(reached).map(|(seed, phases)| played(policy, &task, seed, phases)).collect()
 }
 
 fn write(folder: &Path, episodes: &[PlayedEpisode]) {
@@ -119,20 +119,19 @@ fn rates_are_counted_by_phase() {
 
 #[test]
 fn averages_are_by_number_of_robots() {
-    let everything = tasks::cohub().iter().copied().flat_map(|task| {
+    let everything = tasks::cohub().iter().flat_map(|task| {
         (0..4).map(move |seed| played("agent", task, seed, if seed == 0 { 0 } else { task.phases.len() }))
     });
     let report = EvaluationReport::of(&found(everything.collect()));
     let averages = &report.policies[0].averages;
     assert_eq!(averages.iter().map(|average| average.tasks).sum::<usize>(), tasks::cohub().len());
     for average in averages {
-        let of_robots =
-            tasks::cohub().iter().copied().filter(|task| task.robots.len() == average.robots).count();
+        let of_robots = tasks::cohub().iter().filter(|task| task.robots.len() == average.robots).count();
         assert_eq!(average.tasks, of_robots);
         assert!(average.phases.iter().flatten().all(|mean| mean.mean_share == 0.75), "{average:?}");
     }
     let published = published::rows();
-    for &task in tasks::cohub() {
+    for task in tasks::cohub() {
         assert!(published.iter().any(|row| row.task == task.id), "nothing is published of {}", task.id);
     }
     assert!(published.iter().all(|row| row.phases_share.is_sorted_by(|one, next| one >= next)));
@@ -144,7 +143,7 @@ fn policies_are_compared_on_the_seeds_that_both_played() {
     let handover = tasks::find("handover").unwrap();
     // Seed 0 is worse, seeds 3 to 8 are better, and the first policy did not play the last one.
     let others = [(0, 2), (1, 3), (3, 3), (4, 3), (5, 3), (6, 3), (7, 3), (8, 3), (9, 0), (70, 3)];
-    episodes.extend(others.map(|(seed, phases)| played("other", handover, seed, phases)));
+    episodes.extend(others.map(|(seed, phases)| played("other", &handover, seed, phases)));
     let report = EvaluationReport::of(&found(episodes));
     let last = report.comparisons[0].rows.iter().find(|row| row.last && row.task.is_some()).unwrap();
     let pairs = last.pairs;
@@ -152,7 +151,7 @@ fn policies_are_compared_on_the_seeds_that_both_played() {
     assert!((last.difference_share - 5.0 / 9.0).abs() < 1e-12, "{last:?}");
     assert!((last.mcnemar_p_value - 0.125).abs() < 1e-12, "{last:?}");
     let all = report.comparisons[0].rows.last().unwrap();
-    assert_eq!((all.task, all.pairs), (None, pairs));
+    assert_eq!((&all.task, all.pairs), (&None, pairs));
 }
 
 #[test]
@@ -204,7 +203,7 @@ fn what_was_shown_beyond_the_benchmark_is_told() {
         played.result.extra_information = vec!["pixel_depth".into()];
         played.result.extra_information_replies = [("pixel_depth".to_owned(), replies(3))].into();
     }
-    let mut told_all = played("other", tasks::find("handover").unwrap(), 0, 2);
+    let mut told_all = played("other", &tasks::find("handover").unwrap(), 0, 2);
     told_all.spec = told_all.spec.assisted(Assistance::Full);
     told_all.result.extra_information = vec!["depth_images".into(), "odometry".into()];
     episodes.push(told_all);
@@ -229,14 +228,14 @@ fn what_was_shown_beyond_the_benchmark_is_told() {
 #[test]
 fn means_of_phases_are_by_number_of_robots() {
     let begun = |task: &str, seed: u32, phase: usize, phases: usize| {
-        let mut played = played("agent", tasks::find(task).unwrap(), seed, phases);
+        let mut played = played("agent", &tasks::find(task).unwrap(), seed, phases);
         let recording = "demonstration".into();
         played.spec.start = Start::Phase(PhaseStart { recording, phase: crate::Phase::number(phase) });
         played
     };
     let mut episodes = nine_six_three("agent");
     episodes.extend([begun("handover", 0, 1, 2), begun("big_table", 0, 0, 1), begun("big_table", 1, 0, 0)]);
-    episodes.push(played("agent", tasks::find("big_table").unwrap(), 2, 1));
+    episodes.push(played("agent", &tasks::find("big_table").unwrap(), 2, 1));
     let report = EvaluationReport::of(&found(episodes));
     let policy = &report.policies[0];
     let conditional: Vec<(usize, Option<f64>)> =
@@ -265,7 +264,7 @@ fn means_of_phases_are_by_number_of_robots() {
 fn reports_quote_what_they_are_told() {
     let mut episodes = nine_six_three("a<b>&\"|_,%");
     let start = PhaseStart { recording: "demonstration".into(), phase: "p2".into() };
-    let mut begun = played("a<b>&\"|_,%", tasks::find("handover").unwrap(), 0, 2);
+    let mut begun = played("a<b>&\"|_,%", &tasks::find("handover").unwrap(), 0, 2);
     begun.spec.start = Start::Phase(start);
     episodes.push(begun);
     let report = EvaluationReport::of(&found(episodes));
@@ -314,7 +313,7 @@ fn reports_quote_what_they_are_told() {
 fn an_episode_that_was_played_again_is_listed() {
     let handover = tasks::find("handover").unwrap();
     let failed = |seed: u32, why: &str| {
-        let mut played = played("one", handover, seed, 1);
+        let mut played = played("one", &handover, seed, 1);
         (played.result.ended, played.note) = (EndReason::PolicyFailed, Some(why.into()));
         played
     };
@@ -337,7 +336,7 @@ fn an_episode_that_was_played_again_is_listed() {
 fn what_failed_itself_is_told_apart_and_in_no_rate() {
     let handover = tasks::find("handover").unwrap();
     let failed = |policy: &str, seed: u32, ended: EndReason, why: &str| {
-        let mut played = played(policy, handover, seed, 1);
+        let mut played = played(policy, &handover, seed, 1);
         played.result.ended = ended;
         played.note = Some(why.into());
         played
@@ -392,7 +391,7 @@ fn what_failed_itself_is_told_apart_and_in_no_rate() {
 #[test]
 fn results_of_earlier_versions_are_read() {
     let folder = tempfile::tempdir().unwrap();
-    let mut old = serde_json::json!(played("agent", tasks::find("handover").unwrap(), 4, 1));
+    let mut old = serde_json::json!(played("agent", &tasks::find("handover").unwrap(), 4, 1));
     assert_eq!(
         old.as_object_mut().unwrap().remove("keep_failed"),
         None,
@@ -423,14 +422,14 @@ fn failures_are_shown_by_turns() {
     let mut loaded = found(nine_six_three("agent"));
     let other = tasks::find("pouring").unwrap();
     loaded.episodes.push(FoundEpisode {
-        played: played("agent", other, 1, 0),
+        played: played("agent", &other, 1, 0),
         strip: None,
         recording: None,
         run: String::new(),
     });
     loaded.episodes.iter_mut().for_each(|found| found.strip = Some(strip.clone()));
     let shown = gallery(&loaded, 2);
-    let seeds: Vec<_> = shown.iter().map(|failure| (failure.task, failure.seed, &*failure.phase)).collect();
+    let seeds: Vec<_> = shown.iter().map(|failure| (&*failure.task, failure.seed, &*failure.phase)).collect();
     assert_eq!(seeds, [("handover", 3, "p3"), ("pouring", 1, "p1")]);
     let file = &shown[0].moments[0].views[0].file;
     let decoder = webp_animation::Decoder::new(file).unwrap();

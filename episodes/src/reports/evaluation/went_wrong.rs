@@ -17,7 +17,7 @@ const DROPPED_M_S: f32 = 0.8;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FailureMoment {
     pub policy: String,
-    pub task: &'static str,
+    pub task: String,
     pub seed: u32,
     /// Number of the first phase that counts and was not reached.
     pub phase: String,
@@ -42,7 +42,7 @@ fn moment(policy: &str, found: &FoundEpisode) -> Option<FailureMoment> {
     let spec = &found.played.spec;
     Some(FailureMoment {
         policy: policy.into(),
-        task: spec.task.id,
+        task: spec.task.id.clone(),
         seed: spec.seed,
         phase: first_missed_phase(&found.played),
         what,
@@ -120,7 +120,7 @@ mod tests {
 
     /// Returns the failure that is found in these moments.
     fn found(moments: &[WatchedMoment]) -> Option<(f64, String)> {
-        let rest = Facts::at_rest(tasks::find("handover").unwrap());
+        let rest = Facts::at_rest(&tasks::find("handover").unwrap());
         let mut watcher = Watcher::default();
         for (time_s, reached, so) in moments {
             watcher.look(&Facts { time_s: *time_s, ..so(rest.clone()) }, *reached, &["A", "B"]);

@@ -39,7 +39,7 @@ impl Facts {
         let object = |spot: &crate::tasks::ObjectSpot| {
             let heading = Rotation::from_rotation_z(spot.yaw_rad);
             let world_from_object = Pose::from_parts(spot.position_m.into(), heading);
-            let parts = ObjectModel::parts(&spot.source(), spot.name).unwrap();
+            let parts = ObjectModel::parts(&spot.source(), &spot.name).unwrap();
             parts.into_iter().map(move |found| part(world_from_object, found))
         };
         Facts {
@@ -102,7 +102,7 @@ fn standing([x_m, y_m]: [f32; 2], yaw_rad: f32) -> Vec<Pose> {
 fn quantities_are_those_of_the_constructed_world() {
     let handover = tasks::find("handover").unwrap();
     let close = |a: f32, b: f32| (a - b).abs() < 1e-5;
-    let rest = Facts::at_rest(handover);
+    let rest = Facts::at_rest(&handover);
     assert!(close(rest.lift_m("bottle"), 0.0) && close(rest.tilt_rad("bottle"), 0.0));
     assert!(close(rest.clone().raised("bottle", 0.07).lift_m("bottle"), 0.07));
     for (axis, angle_rad, tilt_rad) in
@@ -116,7 +116,7 @@ fn quantities_are_those_of_the_constructed_world() {
 #[test]
 fn bodies_reach_as_far_as_their_shapes() {
     let close = |a: f32, b: f32| (a - b).abs() < 1e-4;
-    let rest = Facts::at_rest(tasks::find("handover").unwrap());
+    let rest = Facts::at_rest(&tasks::find("handover").unwrap());
     // The bottle is 70 mm thick and 0.30 m tall, and stands on the counter of 0.80 m at x = 0.30 m.
     assert!(
         close(rest.reach_m("bottle", Vector::X), 0.335)
@@ -137,7 +137,7 @@ fn bodies_reach_as_far_as_their_shapes() {
 #[test]
 fn a_hold_is_of_one_hand_and_a_touch_is_no_hold() {
     use Side::{Left, Right};
-    let rest = Facts::at_rest(tasks::find("handover").unwrap());
+    let rest = Facts::at_rest(&tasks::find("handover").unwrap());
     assert!(rest.hands_off(A, "bottle") && !rest.holds_any(A, "bottle"));
     let held = rest.clone().grip(A, Right, "bottle", Grip::Holding);
     assert!(held.holds(A, Right, "bottle") && held.holds_any(A, "bottle") && !held.hands_off(A, "bottle"));
@@ -149,5 +149,5 @@ fn a_hold_is_of_one_hand_and_a_touch_is_no_hold() {
 #[test]
 #[should_panic(expected = "name \"vase\"")]
 fn a_condition_on_something_that_is_not_there_is_a_bug() {
-    Facts::at_rest(tasks::find("handover").unwrap()).lift_m("vase");
+    Facts::at_rest(&tasks::find("handover").unwrap()).lift_m("vase");
 }

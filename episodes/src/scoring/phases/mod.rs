@@ -29,9 +29,9 @@ pub type Nearness = Arc<dyn Fn(&Facts) -> f32 + Send + Sync>;
 /// One scored phase.
 #[derive(Clone)]
 pub struct Phase {
-    pub id: &'static str,
+    pub id: String,
     /// Description of when the phase counts as reached, for people and policies.
-    pub description: &'static str,
+    pub description: String,
     /// True if more than one robot has to work on it.
     pub collaborative: bool,
     pub done: Done,
@@ -83,7 +83,7 @@ impl Phase {
 /// The progress of one episode.
 #[derive(Clone, Debug)]
 pub struct PhaseTracker {
-    phases: &'static [Phase],
+    phases: Arc<[Phase]>,
     memory: PhaseMemory,
 }
 
@@ -111,7 +111,7 @@ struct MilestoneMemory {
 }
 
 impl PhaseTracker {
-    pub fn new(phases: &'static [Phase]) -> PhaseTracker {
+    pub fn new(phases: Arc<[Phase]>) -> PhaseTracker {
         PhaseTracker { phases, memory: PhaseMemory::default() }
     }
 
@@ -147,7 +147,7 @@ impl PhaseTracker {
     }
 
     /// Returns the phases reached up to now, in order, with the time of each.
-    pub fn reached(&self) -> impl Iterator<Item = (&'static Phase, f64)> {
+    pub fn reached(&self) -> impl Iterator<Item = (&Phase, f64)> {
         self.phases.iter().zip(self.memory.reached_s.iter().copied())
     }
 

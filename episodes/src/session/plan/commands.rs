@@ -60,8 +60,8 @@ impl Session {
 
     fn check_phase(&self, step: &PlanStep) -> Result<(), String> {
         let phases = self.spec().task.phases.iter().enumerate();
-        let numbered: Vec<_> = phases.map(|(number, phase)| (Phase::number(number), phase.id)).collect();
-        let is_known = |name: &&String| numbered.iter().any(|(number, id)| number == *name || id == *name);
+        let numbered: Vec<_> = phases.map(|(number, phase)| (Phase::number(number), &phase.id)).collect();
+        let is_known = |name: &&String| numbered.iter().any(|(number, id)| number == *name || id == name);
         match step.expects.phase_reached.as_ref().filter(|name| !is_known(name)) {
             Some(name) => {
                 let have: Vec<String> =

@@ -16,15 +16,15 @@ impl Session {
         if !self.spec().disclosure.tells(self.ended.is_some()) {
             return None;
         }
-        let (task, index) = (self.spec().task, self.scores.reached().count());
+        let (task, index) = (&self.spec().task, self.scores.reached().count());
         let phase = task.phases.get(index)?;
         let lacks = lacks(task, index, self.scores.next_phase(), &self.facts());
-        Some(NextPhase { id: phase.id.into(), number: Phase::number(index), lacks })
+        Some(NextPhase { id: phase.id.clone(), number: Phase::number(index), lacks })
     }
 }
 
 /// Returns what phase number `index` of a task lacks, one sentence each.
-fn lacks(task: &'static Task, index: usize, memory: &PhaseMemory, facts: &Facts) -> Vec<String> {
+fn lacks(task: &Task, index: usize, memory: &PhaseMemory, facts: &Facts) -> Vec<String> {
     let conditions = &task.conditions[index];
     let told = |number: usize| told_parts(task, index, number);
     let missing = |number: usize| told(number).flat_map(|part| part.lacks(facts)).collect::<Vec<_>>();
@@ -70,19 +70,14 @@ fn lacks(task: &'static Task, index: usize, memory: &PhaseMemory, facts: &Facts)
 
 /// Returns the parts of a condition that do not depend on the seed's choice. An operator of a robot may
 /// read no others.
-fn told_parts(
-    task: &'static Task,
-    phase: usize,
-    condition: usize,
-) -> impl Iterator<Item = &'static ConditionPart> {
-    let variants = task.variants.get().map(Vec::as_slice).unwrap_or_default();
-    let parts =
-        move |task: &'static Task| task.conditions[phase][condition].parts.iter().map(|(_, part)| part);
+fn told_parts(task: &Task, phase: usize, condition: usize) -> impl Iterator<Item = &ConditionPart> {
     let same = move |number: usize, part: &ConditionPart| {
-        let mut others = variants.iter().map(|variant| parts(variant).nth(number));
-        others.all(|other| other.is_some_and(|other| other.asks_the_same(part)))
+        let variants = task.variants().iter();
+        let mut others = variants.map(|variant| variant.conditions[phase][condition].parts.get(number));
+        others.all(|other| other.is_some_and(|(_, other)| other.asks_the_same(part)))
     };
-    parts(task).enumerate().filter(move |(number, part)| same(*number, part)).map(|(_, part)| part)
+    let numbered = task.conditions[phase][condition].parts.iter().map(|(_, part)| part).enumerate();
+    numbered.filter(move |(number, part)| same(*number, part)).map(|(_, part)| part)
 }
 
 fn after(when: &str, lacks: Vec<String>) -> impl Iterator<Item = String> {
@@ -106,7 +101,7 @@ mod tests {
 
     fn lacking(id: &str, phase: usize, change: impl Fn(Facts) -> Facts) -> Vec<String> {
         let task = tasks::find(id).unwrap();
-        lacks(task, phase, &PhaseMemory::default(), &change(Facts::at_rest(task)))
+        lacks(&task, phase, &PhaseMemory::default(), &change(Facts::at_rest(&task)))
     }
 
     #[test]
@@ -147,7 +142,7 @@ mod tests {
         let opened = lacking("move_house", 0, |facts| facts.turned("lever_door leaf", Vector::Z, 1.5));
         let last = opened.last().map(String::as_str);
         assert_eq!(last, Some("that has to hold for 0.5 s without a break: so far 0.00 s"), "{opened:?}");
-        let facts = Facts::at_rest(tasks::find("pouring").unwrap());
+        let facts = Facts::at_rest(&tasks::find("pouring").unwrap());
         let held = lasting(0.5, Some(facts.time_s - 0.2), true, &facts).unwrap();
         assert!(held.ends_with("so far 0.20 s"), "{held}");
     }
@@ -155,12 +150,13 @@ mod tests {
     /// Only A knows the pad for the bottle, but C also reads what the phase lacks.
     #[test]
     fn what_the_seed_chooses_is_kept_back() {
-        let relay = TaskSet::default().find("relay").unwrap();
+        let set = TaskSet::default();
+        let relay = set.find("relay").unwrap();
         for seed in 0..6 {
             let task = relay.under(seed);
-            let place = lacks(task, 2, &PhaseMemory::default(), &Facts::at_rest(task));
+            let place = lacks(&task, 2, &PhaseMemory::default(), &Facts::at_rest(&task));
             assert_eq!(place, [KEPT_BACK]);
-            let passed = lacks(task, 0, &PhaseMemory::default(), &Facts::at_rest(task));
+            let passed = lacks(&task, 0, &PhaseMemory::default(), &Facts::at_rest(&task));
             assert!(!passed.contains(&KEPT_BACK.to_owned()) && passed.len() > 2, "{passed:?}");
         }
     }

@@ -2,22 +2,23 @@
 //! only the first.
 
 use std::ops::RangeInclusive;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use tandem_sim::mjcf::Document;
 use tandem_sim::{ObjectModel, assets};
 use toml::Spanned;
 
-use super::choices::{ways, with_options};
+use super::choices::{Choice, ways, with_options};
 use super::error::{Mistakes, TaskFileError};
 use super::phases;
-use super::reading::{Reading, lasting, place_in_file};
+use super::reading::{Reading, place_in_file};
 use super::rewordings::in_words;
 use super::table::{Extent, ObjectTable, OffsetTable, RobotTable, TaskTable};
 use crate::conditions::Names;
 use crate::scoring::{Phase, ROBOT_NAMES};
 use crate::tasks::embedded::origin_of;
-use crate::tasks::{ChosenOption, ObjectSpot, Offset, RobotSpot, Task, TaskOrigin, TaskSource};
+use crate::tasks::task::TaskFile;
+use crate::tasks::{ChosenOption, ObjectSpot, Offset, RobotSpot, TaskDefinition, TaskOrigin, TaskSource};
 
 const MAX_OBJECTS: usize = 64;
 const MAX_PHASES: usize = 12;
@@ -53,70 +54,59 @@ fn is_file(name: &str) -> bool {
     name.ends_with(".xml")
 }
 
-/// Returns the task that a source describes. For a file with choices this is the undecided task, with one
-/// variant for each combination of options.
-pub(super) fn task(source: &TaskSource, xxh3: &str) -> Result<&'static Task, TaskFileError> {
+/// Returns the definitions of the task that a source describes.
+pub(super) fn file(source: &TaskSource, xxh3: &str) -> Result<TaskFile, TaskFileError> {
     let table = parse(source)?;
     let mut reading = Reading::new(source, &[]);
-    let choices = reading.choices(table.choices);
+    let choices = reading.choices(&table.choices);
     reading.checked()?;
-    let variants = Arc::new(OnceLock::new());
-    let made: Vec<Task> = ways(&choices)
-        .into_iter()
-        .map(|way| one_way(source, xxh3, way, &variants))
-        .collect::<Result<_, _>>()?;
-    let mut made: Vec<&'static Task> = made.into_iter().map(leaked).collect();
-    if choices.is_empty() {
-        return Ok(made.swap_remove(0));
-    }
-    let with_all = |text: &Spanned<String>| lasting(&with_options(text.as_ref(), &choices));
-    let robots = made[0].robots.iter().zip(table.robots.as_ref());
-    let robots: Vec<RobotSpot> = robots
-        .map(|(spot, table)| RobotSpot { instruction: with_all(&table.instruction), ..*spot })
-        .collect();
-    let phases = made[0].phases.iter().zip(table.phases.as_ref());
-    let phases: Vec<Phase> = phases
-        .map(|(phase, table)| Phase { description: with_all(&table.description), ..phase.clone() })
-        .collect();
-    let undecided = Task {
-        instruction: with_all(&table.instruction),
-        shared_instruction: table.shared_instruction.as_ref().map(with_all),
-        rewordings: table.rewordings.as_ref().and_then(|rewordings| {
-            in_words(rewordings.as_ref(), |text| with_options(text.as_ref(), &choices))
-        }),
-        robots: Vec::leak(robots),
-        phases: Vec::leak(phases),
-        chosen: Vec::new(),
-        ..one_way(source, xxh3, ways(&choices).swap_remove(0), &variants)?
-    };
-    // No other thread has access to the task yet.
-    let _ = variants.set(made);
-    Ok(leaked(undecided))
+    let definitions = ways(&choices).into_iter().map(|way| one_way(source, xxh3, way));
+    let mut definitions: Vec<TaskDefinition> = definitions.collect::<Result<_, _>>()?;
+    Ok(match choices.is_empty() {
+        true => TaskFile { undecided: definitions.swap_remove(0), variants: Vec::new() },
+        false => TaskFile { undecided: undecided(&definitions[0], &table, &choices), variants: definitions },
+    })
 }
 
-/// Builds the task for one combination of options.
+/// Returns the definition whose texts name all options, from that of any variant.
+fn undecided(variant: &TaskDefinition, table: &TaskTable, choices: &[Choice]) -> TaskDefinition {
+    let with_all = |text: &Spanned<String>| with_options(text.as_ref(), choices);
+    let robots = variant.robots.iter().zip(table.robots.as_ref());
+    let phases = variant.phases.iter().zip(table.phases.as_ref());
+    let rewordings = table.rewordings.as_ref();
+    TaskDefinition {
+        instruction: with_all(&table.instruction),
+        shared_instruction: table.shared_instruction.as_ref().map(with_all),
+        rewordings: rewordings.and_then(|rewordings| in_words(rewordings.as_ref(), with_all)),
+        robots: robots
+            .map(|(spot, table)| RobotSpot { instruction: with_all(&table.instruction), ..spot.clone() })
+            .collect(),
+        phases: phases
+            .map(|(phase, table)| Phase { description: with_all(&table.description), ..phase.clone() })
+            .collect(),
+        chosen: Vec::new(),
+        ..variant.clone()
+    }
+}
+
+/// Returns the definition for one combination of options.
 fn one_way(
     source: &TaskSource,
     xxh3: &str,
     chosen: Vec<ChosenOption>,
-    variants: &Arc<OnceLock<Vec<&'static Task>>>,
-) -> Result<Task, TaskFileError> {
+) -> Result<TaskDefinition, TaskFileError> {
     let mut reading = Reading::new(source, &chosen);
     let table = parse(&reading.source)?;
-    let read = reading.task(table);
+    let read = reading.definition(table);
     reading.checked()?;
-    let Some(task) = read else { return Err(reading.mistakes()) };
-    let (source, variants) = (source.clone(), variants.clone());
-    Ok(Task { origin: origin_of(&source), source, xxh3: xxh3.into(), chosen, variants, ..task })
-}
-
-fn leaked(task: Task) -> &'static Task {
-    Box::leak(Box::new(task))
+    let Some(definition) = read else { return Err(reading.mistakes()) };
+    let source = source.clone();
+    Ok(TaskDefinition { origin: origin_of(&source), source, xxh3: xxh3.into(), chosen, ..definition })
 }
 
 impl Reading<'_> {
-    /// Returns the task without its source; `None` if it cannot be built.
-    fn task(&mut self, table: TaskTable) -> Option<Task> {
+    /// Returns the definition without its source; `None` if it cannot be built.
+    fn definition(&mut self, table: TaskTable) -> Option<TaskDefinition> {
         self.id(&table.id, "the task");
         self.words(&table.instruction);
         table.shared_instruction.iter().for_each(|text| self.words(text));
@@ -138,20 +128,20 @@ impl Reading<'_> {
         let rewordings = self.rewordings(&table.rewordings, &table.shared_instruction, &robots);
         let (phases, conditions): (Vec<_>, Vec<_>) = phases.into_iter().unzip();
         let (scene, scene_mjcf) = scene?;
-        Some(Task {
-            id: lasting(table.id.as_ref()),
+        Some(TaskDefinition {
+            id: table.id.into_inner(),
             scene,
             scene_mjcf,
-            robots: Vec::leak(robots),
-            objects: Vec::leak(objects),
-            randomize: Vec::leak(randomize),
-            instruction: lasting(table.instruction.as_ref()),
-            shared_instruction: table.shared_instruction.as_ref().map(|text| lasting(text.as_ref())),
+            robots,
+            objects,
+            randomize,
+            instruction: table.instruction.into_inner(),
+            shared_instruction: table.shared_instruction.map(Spanned::into_inner),
             rewordings,
             benchmark_steps,
             agentic_steps,
             thinking_s,
-            phases: Vec::leak(phases),
+            phases: phases.into(),
             conditions,
             says_needs_fingers: table.needs_fingers,
             grips: table.grips,
@@ -159,7 +149,6 @@ impl Reading<'_> {
             source: TaskSource::default(),
             xxh3: String::new(),
             chosen: Vec::new(),
-            variants: Arc::default(),
         })
     }
 
@@ -180,7 +169,7 @@ impl Reading<'_> {
     }
 
     /// Returns the scene's display name for messages, and its MJCF unless the scene is built in.
-    fn scene(&mut self, table: &TaskTable) -> Option<(&'static str, Option<&'static str>)> {
+    fn scene(&mut self, table: &TaskTable) -> Option<(String, Option<String>)> {
         let (at, (name, mjcf)) = match (&table.scene, &table.scene_mjcf) {
             (Some(name), None) => (name.span(), self.named(name, assets::scene)?),
             (None, Some(text)) => (text.span(), self.inline(text)),
@@ -199,8 +188,8 @@ impl Reading<'_> {
                 return None;
             }
         };
-        if let Some(mjcf) = mjcf
-            && let Err(error) = Document::parse_alone(name, mjcf)
+        if let Some(mjcf) = &mjcf
+            && let Err(error) = Document::parse_alone(&name, mjcf)
         {
             self.wrong_mjcf(at, error.to_string());
         }
@@ -212,11 +201,11 @@ impl Reading<'_> {
         &mut self,
         name: &Spanned<String>,
         embedded: impl Fn(&str) -> Result<&'static str, tandem_sim::SimError>,
-    ) -> Option<(&'static str, Option<&'static str>)> {
+    ) -> Option<(String, Option<String>)> {
         let text = name.as_ref().as_str();
         if is_file(text) {
             return match self.source.beside.get(text) {
-                Some(mjcf) => Some((lasting(text), Some(lasting(mjcf)))),
+                Some(mjcf) => Some((text.to_owned(), Some(mjcf.clone()))),
                 None => {
                     self.wrong(name.span(), format!("there is no {text} beside the task's file"));
                     None
@@ -224,7 +213,7 @@ impl Reading<'_> {
             };
         }
         match embedded(text) {
-            Ok(_) => Some((lasting(text), None)),
+            Ok(_) => Some((text.to_owned(), None)),
             Err(error) => {
                 let what = format!("{error}; or a file beside this one, whose name ends in .xml");
                 self.wrong(name.span(), what);
@@ -235,12 +224,12 @@ impl Reading<'_> {
 
     /// Returns inline MJCF from the task file. Padding lines before it make its mistakes carry the task
     /// file's line numbers.
-    fn inline(&self, text: &Spanned<String>) -> (&'static str, Option<&'static str>) {
+    fn inline(&self, text: &Spanned<String>) -> (String, Option<String>) {
         let mjcf = text.as_ref();
         let at = place_in_file(&self.source.text, text);
         let lines = self.source.text[..at].matches('\n').count();
         let padding = if mjcf.starts_with("<?xml") { 0 } else { lines };
-        (lasting(&self.source.name), Some(String::leak("\n".repeat(padding) + mjcf)))
+        (self.source.name.clone(), Some("\n".repeat(padding) + mjcf))
     }
 
     fn robots(&mut self, tables: &Spanned<Vec<RobotTable>>) -> Vec<RobotSpot> {
@@ -275,7 +264,7 @@ impl Reading<'_> {
             name,
             position_m: robot.position_m.as_ref().map(|value| value as f32),
             yaw_rad: angle_rad(robot.yaw_deg.as_ref()),
-            instruction: lasting(robot.instruction.as_ref()),
+            instruction: robot.instruction.as_ref().clone(),
         };
         tables.iter().zip(ROBOT_NAMES).map(spot).collect()
     }
@@ -312,7 +301,7 @@ impl Reading<'_> {
                 continue;
             };
             let spot = ObjectSpot {
-                name: lasting(name),
+                name: name.to_owned(),
                 file,
                 position_m: table.position_m.as_ref().map(|value| value as f32),
                 yaw_rad: angle_rad(table.yaw_deg.as_ref()),
@@ -337,13 +326,13 @@ impl Reading<'_> {
     }
 
     fn offset(&mut self, table: &OffsetTable, objects: &[ObjectSpot], names: &Names) -> Offset {
-        let mut moved: Vec<&'static str> = Vec::new();
+        let mut moved: Vec<String> = Vec::new();
         for name in table.objects.as_ref() {
-            match objects.iter().find(|spot| spot.name == name.as_ref()) {
-                Some(spot) => moved.push(spot.name),
+            match objects.iter().find(|spot| spot.name == *name.as_ref()) {
+                Some(spot) => moved.push(spot.name.clone()),
                 None if names.mistaken_objects.contains(name.as_ref()) => {}
                 None => {
-                    let have: Vec<&str> = objects.iter().map(|spot| spot.name).collect();
+                    let have: Vec<&str> = objects.iter().map(|spot| spot.name.as_str()).collect();
                     let what = format!("no object {:?} to move; have: {}", name.as_ref(), have.join(", "));
                     self.wrong(name.span(), what);
                 }
@@ -376,7 +365,7 @@ impl Reading<'_> {
             self.finite(given, &[*given.as_ref()], 360.0);
         }
         Offset {
-            objects: Vec::leak(moved),
+            objects: moved,
             x_m,
             y_m,
             z_m,

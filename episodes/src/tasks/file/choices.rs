@@ -19,7 +19,7 @@ pub(super) struct Choice {
 
 impl Reading<'_> {
     /// Returns the choices of a file and records their mistakes.
-    pub fn choices(&mut self, tables: Vec<ChoiceTable>) -> Vec<Choice> {
+    pub fn choices(&mut self, tables: &[ChoiceTable]) -> Vec<Choice> {
         let mut found: Vec<Choice> = Vec::new();
         for table in tables {
             self.id(&table.name, "a choice");
@@ -41,8 +41,8 @@ impl Reading<'_> {
                 let what = format!("nothing in the file asks for it; write {placeholder} where it belongs");
                 self.wrong(table.name.span(), what);
             }
-            let options = table.options.into_inner().into_iter().map(Spanned::into_inner).collect();
-            found.push(Choice { name: table.name.into_inner(), options });
+            let options = options.iter().map(|option| option.as_ref().clone()).collect();
+            found.push(Choice { name: table.name.as_ref().clone(), options });
             if found.iter().map(|choice| choice.options.len().max(1)).product::<usize>() > MAX_COMBINATIONS {
                 self.wrong(0..0, format!("there are at most {MAX_COMBINATIONS} ways to choose in a file"));
                 break;

@@ -17,7 +17,7 @@ mod tests;
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use tandem_sim::{MAX_TEXT_BYTES, read_text, with_own_separators};
@@ -25,18 +25,19 @@ use xxhash_rust::xxh3::xxh3_64;
 
 pub use error::TaskFileError;
 
-use crate::tasks::{self, Task, TaskSource};
+use crate::tasks::task::TaskFile;
+use crate::tasks::{self, Task, TaskDefinition, TaskSource};
 
-/// Cache of all tasks. Tasks live as long as the program, and a server or a report may read the same task
-/// thousands of times.
-static MADE: Mutex<Vec<&'static Task>> = Mutex::new(Vec::new());
+/// The files in use. Reading one takes about 5 ms for each of its variants, and the results of a run may
+/// refer to the same file thousands of times.
+static IN_USE: Mutex<Vec<Weak<TaskFile>>> = Mutex::new(Vec::new());
 
 /// Reads a task file and the MJCF files that it names.
 ///
 /// # Errors
 ///
 /// An unreadable file, or the mistakes in the task file.
-pub fn read_task(path: &Path) -> Result<&'static Task, TaskFileError> {
+pub fn read_task(path: &Path) -> Result<Task, TaskFileError> {
     let read = |path: &Path| {
         read_text(path, MAX_TEXT_BYTES).map_err(|source| TaskFileError::Read { path: path.into(), source })
     };
@@ -49,28 +50,30 @@ pub fn read_task(path: &Path) -> Result<&'static Task, TaskFileError> {
     task_of(source)
 }
 
-/// Returns the task that a source describes; equal sources share one task.
+/// Returns the task that a source describes; equal sources share one file while it is in use.
 ///
 /// # Errors
 ///
 /// The mistakes in the task file.
-pub fn task_of(source: TaskSource) -> Result<&'static Task, TaskFileError> {
-    let known = |made: &[&'static Task]| {
-        let same = |task: &&&'static Task| task.source == source;
-        made.iter().find(same).copied()
-    };
-    if let Some(task) = known(&made()) {
-        return Ok(task);
+pub fn task_of(source: TaskSource) -> Result<Task, TaskFileError> {
+    if let Some(file) = in_use(|file| file.undecided.source == source) {
+        return Ok(Task::undecided(file));
     }
-    let xxh3 = fingerprint(&source);
-    let task = build::task(&source, &xxh3)?;
-    made().push(task);
-    Ok(task)
+    let file = Arc::new(build::file(&source, &fingerprint(&source))?);
+    files_in_use().push(Arc::downgrade(&file));
+    Ok(Task::undecided(file))
 }
 
-fn made() -> std::sync::MutexGuard<'static, Vec<&'static Task>> {
+/// Returns the file in use that `is_wanted` accepts, and forgets those no longer in use.
+fn in_use(is_wanted: impl Fn(&TaskFile) -> bool) -> Option<Arc<TaskFile>> {
+    let mut files = files_in_use();
+    files.retain(|file| file.strong_count() > 0);
+    files.iter().filter_map(Weak::upgrade).find(|file| is_wanted(file))
+}
+
+fn files_in_use() -> MutexGuard<'static, Vec<Weak<TaskFile>>> {
     // No code panics while it holds the lock.
-    MADE.lock().unwrap_or_else(PoisonError::into_inner)
+    IN_USE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn fingerprint(source: &TaskSource) -> String {
@@ -102,7 +105,7 @@ pub mod by_id_or_file {
     }
 
     pub fn serialize<S: Serializer>(task: &Task, serializer: S) -> Result<S::Ok, S::Error> {
-        let id = task.id.to_owned();
+        let id = task.id.clone();
         let named = match task.is_benchmark() {
             true => NamedTask::Id(id),
             false => {
@@ -114,7 +117,7 @@ pub mod by_id_or_file {
         named.serialize(serializer)
     }
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<&'static Task, D::Error> {
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Task, D::Error> {
         let RecordedTask { id: _, xxh3, chosen, source } = match NamedTask::deserialize(deserializer)? {
             NamedTask::Id(id) => return tasks::find(&id).map_err(de::Error::custom),
             NamedTask::File(recorded) => recorded,
@@ -125,10 +128,9 @@ pub mod by_id_or_file {
             return Err(de::Error::custom(changed));
         }
         let task = task_of(source).map_err(de::Error::custom)?;
-        let variants = task.variants.get();
-        let is_chosen = |task: &&&'static Task| {
-            chosen.iter().all(|(name, option)| task.chosen(name) == Some(option.as_str()))
+        let is_chosen = |variant: &TaskDefinition| {
+            chosen.iter().all(|(name, option)| variant.chosen(name) == Some(option.as_str()))
         };
-        Ok(variants.and_then(|variants| variants.iter().find(is_chosen)).copied().unwrap_or(task))
+        Ok(task.variant(is_chosen))
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use toml::Spanned;
 
-use super::reading::{Reading, lasting, place_in_file};
+use super::reading::{Reading, place_in_file};
 use super::table::{MilestoneTable, PhaseTable};
 use crate::conditions::{self, ConditionPart, Meaning, Mistake, Names, Truth};
 use crate::scoring::{Condition, Done, Facts, Milestone, Nearness, Phase};
@@ -44,7 +44,7 @@ pub(super) fn phases(
     for table in tables {
         reading.id(&table.id, "a phase");
         reading.words(&table.description);
-        if found.iter().any(|(phase, _)| phase.id == table.id.as_ref()) {
+        if found.iter().any(|(phase, _)| phase.id == *table.id.as_ref()) {
             reading.wrong(table.id.span(), "there is a phase of this id already");
         }
         found.extend(reading.phase(&table, names));
@@ -76,8 +76,8 @@ impl Reading<'_> {
             }
         };
         let phase = Phase {
-            id: lasting(table.id.as_ref()),
-            description: lasting(table.description.as_ref()),
+            id: table.id.as_ref().clone(),
+            description: table.description.as_ref().clone(),
             collaborative: table.collaborative,
             done,
             nearness,

@@ -108,8 +108,3 @@ pub(super) fn place_in_file(file: &str, text: &Spanned<String>) -> usize {
     let written = file.get(span.clone()).and_then(|written| written.find(text.as_ref().as_str()));
     span.start + written.unwrap_or_default()
 }
-
-/// Leaks a text, so that it lives as long as the program.
-pub(super) fn lasting(text: &str) -> &'static str {
-    String::leak(text.to_owned())
-}

@@ -19,7 +19,7 @@ fn over_goal(mut facts: Facts, beside_m: Vector) -> Facts {
 
 #[test]
 fn lift_on_both_sides_of_3_cm_and_with_all_three() {
-    let held_by = |robots: &[usize]| Facts::at_rest(task()).held_by(robots, "round_table");
+    let held_by = |robots: &[usize]| Facts::at_rest(&task()).held_by(robots, "round_table");
     assert!(lifted(&held_by(&[A, B, C]).raised("round_table", 0.0301)));
     assert!(!lifted(&held_by(&[A, B, C]).raised("round_table", 0.0299)));
     for two in [[A, B], [A, C], [B, C]] {
@@ -35,7 +35,7 @@ fn lift_on_both_sides_of_3_cm_and_with_all_three() {
 
 #[test]
 fn carry_on_both_sides_of_the_disc_and_of_1_cm() {
-    let held = || Facts::at_rest(task()).held_by(&[A, B, C], "round_table");
+    let held = || Facts::at_rest(&task()).held_by(&[A, B, C], "round_table");
     for (beside_m, expected) in [
         (Vector::new(0.0, 0.0, 0.0101), true),
         (Vector::new(0.0, 0.0, 0.0099), false),
@@ -47,13 +47,13 @@ fn carry_on_both_sides_of_the_disc_and_of_1_cm() {
     ] {
         assert_eq!(carried(&over_goal(held(), beside_m)), expected, "{beside_m}");
     }
-    let by_two = Facts::at_rest(task()).held_by(&[A, C], "round_table");
+    let by_two = Facts::at_rest(&task()).held_by(&[A, C], "round_table");
     assert!(!carried(&over_goal(by_two, Vector::Z * 0.05)));
 }
 
 #[test]
 fn release_on_both_sides_of_every_threshold() {
-    let placed = |beside_m: Vector| over_goal(Facts::at_rest(task()), beside_m);
+    let placed = |beside_m: Vector| over_goal(Facts::at_rest(&task()), beside_m);
     let tilted = |degrees: f32| placed(Vector::ZERO).turned("round_table", Vector::Y, degrees.to_radians());
     for (what, inside, outside) in [
         ("beside", placed(Vector::Y * 0.1499), placed(Vector::Y * 0.1501)),

@@ -16,7 +16,7 @@ conditions! { "cart_service":
 }
 
 fn bottle_at(beside_m: Vector) -> Facts {
-    let mut facts = Facts::at_rest(task());
+    let mut facts = Facts::at_rest(&task());
     let patch_m = facts.position_m("serving_patch");
     facts.object_mut("bottle").pose_in_world.translation = patch_m + beside_m;
     facts
@@ -25,7 +25,7 @@ fn bottle_at(beside_m: Vector) -> Facts {
 #[test]
 fn park_on_both_sides_of_35_cm() {
     let trolley_at = |x_m: f32, y_m: f32| {
-        let mut facts = Facts::at_rest(task());
+        let mut facts = Facts::at_rest(&task());
         facts.object_mut("service_trolley").pose_in_world.translation = Vector::new(x_m, y_m, 0.0);
         facts
     };
@@ -38,7 +38,7 @@ fn park_on_both_sides_of_35_cm() {
 #[test]
 fn bottle_is_lifted_by_b_on_both_sides_of_10_cm() {
     let held = |robot, side, lift_m| {
-        Facts::at_rest(task()).grip(robot, side, "bottle", Holding).raised("bottle", lift_m)
+        Facts::at_rest(&task()).grip(robot, side, "bottle", Holding).raised("bottle", lift_m)
     };
     assert!(bottle_lifted(&held(B, Right, 0.1001)) && bottle_lifted(&held(B, Left, 0.1001)));
     assert!(!bottle_lifted(&held(B, Right, 0.0999)));

@@ -14,7 +14,7 @@ conditions! { "co_carry":
 }
 
 fn held() -> Facts {
-    Facts::at_rest(task()).grip(A, Left, "basket", Holding).grip(B, Right, "basket", Holding)
+    Facts::at_rest(&task()).grip(A, Left, "basket", Holding).grip(B, Right, "basket", Holding)
 }
 
 /// Places the basket's base on the patch, offset by `beside_m` from its middle.
@@ -54,7 +54,7 @@ fn carry_on_both_sides_of_every_bound() {
 
 #[test]
 fn release_on_both_sides_of_every_threshold() {
-    let placed = |beside_m: Vector| at_patch(Facts::at_rest(task()), beside_m);
+    let placed = |beside_m: Vector| at_patch(Facts::at_rest(&task()), beside_m);
     let tilted = |degrees: f32| placed(Vector::ZERO).turned("basket", Vector::Y, degrees.to_radians());
     for (what, inside, outside) in [
         ("x", placed(Vector::X * 0.1499), placed(Vector::X * 0.1501)),

@@ -15,7 +15,7 @@ conditions! { "co_pouring":
 }
 
 fn held() -> Facts {
-    Facts::at_rest(task()).grip(A, Left, "tub", Holding).grip(B, Right, "tub", Holding)
+    Facts::at_rest(&task()).grip(A, Left, "tub", Holding).grip(B, Right, "tub", Holding)
 }
 
 #[test]

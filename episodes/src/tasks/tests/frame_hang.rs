@@ -15,12 +15,12 @@ conditions! { "frame_hang":
 }
 
 fn held() -> Facts {
-    Facts::at_rest(task()).grip(A, Left, "frame", Holding).grip(B, Right, "frame", Holding)
+    Facts::at_rest(&task()).grip(A, Left, "frame", Holding).grip(B, Right, "frame", Holding)
 }
 
 /// Places the loop's centre at `offset_m` from the middle of the peg's free part.
 fn on_peg(offset_m: Vector) -> Facts {
-    let mut facts = Facts::at_rest(task());
+    let mut facts = Facts::at_rest(&task());
     let middle_m = (facts.site_m("wall_peg", "root") + facts.site_m("wall_peg", "tip")) * 0.5;
     let loop_m = facts.site("frame", "loop").position_m();
     facts.object_mut("frame").pose_in_world.translation = middle_m + offset_m - loop_m;
@@ -30,10 +30,10 @@ fn on_peg(offset_m: Vector) -> Facts {
 #[test]
 fn both_robots_hold_and_lift_on_both_sides_of_10_cm() {
     assert!(held_by_both(&held()));
-    assert!(!held_by_both(&Facts::at_rest(task()).grip(A, Left, "frame", Holding)));
+    assert!(!held_by_both(&Facts::at_rest(&task()).grip(A, Left, "frame", Holding)));
     assert!(lifted(&held().raised("frame", 0.1001)));
     assert!(!lifted(&held().raised("frame", 0.0999)));
-    assert!(!lifted(&Facts::at_rest(task()).grip(B, Right, "frame", Holding).raised("frame", 0.1001)));
+    assert!(!lifted(&Facts::at_rest(&task()).grip(B, Right, "frame", Holding).raised("frame", 0.1001)));
 }
 
 #[test]

@@ -15,7 +15,7 @@ conditions! { "handover":
 }
 
 fn at_rest() -> Facts {
-    Facts::at_rest(task())
+    Facts::at_rest(&task())
 }
 
 fn gripped(grips: &[(usize, Side, Grip)]) -> Facts {

@@ -7,7 +7,7 @@ use crate::scoring::{Facts, Predicate};
 /// selects among several conditions of the same setting.
 macro_rules! conditions {
     ($task:literal: $($name:ident = $phase:literal $setting:ident $([$index:literal])?,)*) => {
-        fn task() -> &'static $crate::tasks::Task {
+        fn task() -> $crate::tasks::Task {
             $crate::tasks::find($task).unwrap()
         }
 

@@ -17,7 +17,7 @@ conditions! { "move_house":
 }
 
 fn held() -> Facts {
-    Facts::at_rest(task()).held_by(&[B, C], "console_table")
+    Facts::at_rest(&task()).held_by(&[B, C], "console_table")
 }
 
 /// Places the table's middle on that of the marks, offset by `beside_m` and rotated by `degrees`.
@@ -51,7 +51,7 @@ fn lift_on_both_sides_of_3_cm_of_every_foot_and_by_b_and_c() {
 
 #[test]
 fn the_door_is_open_on_both_sides_of_its_angle() {
-    let turned = |angle_rad: f32| Facts::at_rest(task()).turned("lever_door leaf", Vector::Z, angle_rad);
+    let turned = |angle_rad: f32| Facts::at_rest(&task()).turned("lever_door leaf", Vector::Z, angle_rad);
     assert!(open(&turned(1.4501)));
     assert!(!open(&turned(1.4499)));
     assert!(!open(&turned(0.0)));
@@ -119,7 +119,7 @@ fn table_is_carried_to_15_cm_and_is_away_beyond() {
 
 #[test]
 fn place_on_both_sides_of_every_threshold() {
-    let stands = |beside_m: Vector, degrees: f32| at_marks(Facts::at_rest(task()), beside_m, degrees);
+    let stands = |beside_m: Vector, degrees: f32| at_marks(Facts::at_rest(&task()), beside_m, degrees);
     for (what, inside, outside) in [
         // Feet 28 mm wide on marks of 100 mm.
         ("x", stands(Vector::X * 0.0359, 0.0), stands(Vector::X * 0.0361, 0.0)),

@@ -13,7 +13,7 @@ conditions! { "pouring":
 }
 
 fn lifted(cup_m: f32, glass_m: f32) -> Facts {
-    Facts::at_rest(task()).raised("cup", cup_m).raised("glass", glass_m)
+    Facts::at_rest(&task()).raised("cup", cup_m).raised("glass", glass_m)
 }
 
 #[test]

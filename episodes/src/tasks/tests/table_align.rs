@@ -16,13 +16,13 @@ conditions! { "table_align":
 }
 
 fn held() -> Facts {
-    Facts::at_rest(task()).held_by(&[A, B], "office_table")
+    Facts::at_rest(&task()).held_by(&[A, B], "office_table")
 }
 
 /// Places the table `before_m` in front of the chair and `across_m` to its side, rotated by `degrees`
 /// from square.
 fn placed(before_m: f32, across_m: f32, degrees: f32) -> Facts {
-    let mut facts = Facts::at_rest(task());
+    let mut facts = Facts::at_rest(&task());
     let turn = Rotation::from_rotation_z(FRAC_PI_2 + degrees.to_radians());
     let chair = facts.object("office_chair").pose_in_world;
     facts.object_mut("office_table").pose_in_world =
@@ -34,7 +34,7 @@ fn placed(before_m: f32, across_m: f32, degrees: f32) -> Facts {
 fn lift_on_both_sides_of_3_cm_and_with_both_robots() {
     assert!(lifted(&held().raised("office_table", 0.0301)));
     assert!(!lifted(&held().raised("office_table", 0.0299)));
-    let by_b_alone = Facts::at_rest(task()).held_by(&[B], "office_table");
+    let by_b_alone = Facts::at_rest(&task()).held_by(&[B], "office_table");
     assert!(!lifted(&by_b_alone.raised("office_table", 0.0301)));
     let by_a_alone = held().held_by(&[A], "office_table").grip(B, Left, "office_table", Touching);
     assert!(lifted(&by_a_alone.raised("office_table", 0.0301)), "one hand is enough");

@@ -36,7 +36,7 @@ const CLOSE_RAD: [f64; 7] = [-0.5, -0.9, -1.2, 1.3, 1.3, 1.3, 1.3];
 /// Position of the apple's middle relative to the wrist: ahead, and to the left.
 const PLACE_M: [f64; 2] = [0.16, 0.065];
 
-fn apple() -> &'static Task {
+fn apple() -> Task {
     let source = TaskSource { name: "hold_apple.toml".into(), text: TEXT.into(), beside: BTreeMap::new() };
     task_of(source).expect("a task")
 }
@@ -64,7 +64,7 @@ fn approach(session: &mut Session, beside_m: f64, fingers_rad: [f64; 7]) {
 #[test]
 fn a_pinch_that_is_not_scored_is_told_as_no_hold() {
     let mut session =
-        Session::start(&EpisodeSpec::new(apple(), 0, Protocol::Agentic), None).expect("an episode");
+        Session::start(&EpisodeSpec::new(&apple(), 0, Protocol::Agentic), None).expect("an episode");
     (0..3).for_each(|_| approach(&mut session, 0.1, OPEN_RAD));
     (0..3).for_each(|_| approach(&mut session, 0.0, OPEN_RAD));
     (0..2).for_each(|_| approach(&mut session, 0.0, CLOSE_RAD));

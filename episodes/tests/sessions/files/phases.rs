@@ -9,13 +9,13 @@ use tandem_tools_spec::Protocol;
 
 use crate::common::*;
 
-fn parcel() -> &'static Task {
+fn parcel() -> Task {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../gateway/examples/tasks/pass_the_parcel.toml");
     read_task(Path::new(path)).expect("a task")
 }
 
 /// Returns the trace of an episode in which the robots stand still.
-fn stood_still(task: &'static Task) -> PhaseTrace {
+fn stood_still(task: &Task) -> PhaseTrace {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let spec = EpisodeSpec::new(task, 0, Protocol::Benchmark);
     let mut session = Session::start(&spec, Some(folder.path())).expect("an episode");
@@ -27,7 +27,7 @@ fn stood_still(task: &'static Task) -> PhaseTrace {
 }
 
 /// Returns the task with another condition of its first phase.
-fn with(done: &str) -> &'static Task {
+fn with(done: &str) -> Task {
     let mut source = parcel().source.clone();
     let own = "done = 'x_m(\"parcel\") >= line_m && released_for_s(\"parcel\") >= 0.2'";
     assert!(source.text.contains(own));
@@ -37,8 +37,8 @@ fn with(done: &str) -> &'static Task {
 
 #[test]
 fn each_part_says_when_it_held_or_how_near_it_came() {
-    let trace = stood_still(parcel());
-    assert_eq!((trace.number.as_str(), trace.id), ("p1", "push"));
+    let trace = stood_still(&parcel());
+    assert_eq!((trace.number.as_str(), trace.id.as_str()), ("p1", "push"));
     let [condition] = &trace.conditions[..] else { panic!("one condition: {trace:?}") };
     let [pushed, released] = &condition.parts[..] else { panic!("two parts: {condition:?}") };
     assert_eq!((pushed.place, pushed.text.as_str()), ([51, 9], "x_m(\"parcel\") >= line_m"));
@@ -57,7 +57,7 @@ fn each_part_says_when_it_held_or_how_near_it_came() {
 #[test]
 fn terms_are_taken_apart_and_durations_are_counted() {
     let trace =
-        stood_still(with("lasting = 'nobody_fell && time_s() < 0.99'\nfor_s = 1\nat_end = 'fallen(\"A\")'"));
+        stood_still(&with("lasting = 'nobody_fell && time_s() < 0.99'\nfor_s = 1\nat_end = 'fallen(\"A\")'"));
     let [lasting, at_end] = &trace.conditions[..] else { panic!("two conditions: {trace:?}") };
     assert_eq!((lasting.setting, at_end.setting), (PhaseSetting::Lasting, PhaseSetting::AtEnd));
     let texts: Vec<(&str, [usize; 2])> =
@@ -71,7 +71,7 @@ fn terms_are_taken_apart_and_durations_are_counted() {
 
 #[test]
 fn a_hand_that_comes_nearer_is_a_share() {
-    let trace = stood_still(with("done = 'holds(\"A\", \"right\", \"parcel\")'"));
+    let trace = stood_still(&with("done = 'holds(\"A\", \"right\", \"parcel\")'"));
     let nearest = trace.conditions[0].parts[0].nearest.map(|nearest| nearest.best);
     assert!(matches!(nearest, Some(Closest::Share(share)) if share > 0.2 && share < 0.5), "{nearest:?}");
 }
@@ -79,7 +79,7 @@ fn a_hand_that_comes_nearer_is_a_share() {
 #[test]
 fn conditions_of_the_benchmark_say_when_they_held() {
     let settings = |task: &str| {
-        let trace = stood_still(tasks::find(task).expect("a task"));
+        let trace = stood_still(&tasks::find(task).expect("a task"));
         assert!(!trace.description.is_empty() && trace.nearest.best < 1.0, "{trace:?}");
         trace.conditions
     };
@@ -89,8 +89,8 @@ fn conditions_of_the_benchmark_say_when_they_held() {
     assert_eq!(texts(open), ["opened_deg >= 83.07888029396936"]);
     assert_eq!((open.setting, open.for_s, lifted.for_s), (PhaseSetting::Milestone, 0.5, 0.0));
     assert_eq!((open.held.of, open.held.steps, lifted.held.first_s), (50, 0, None));
-    for &task in tasks::cohub() {
-        let conditions = settings(task.id);
+    for task in tasks::cohub() {
+        let conditions = settings(&task.id);
         let explained = conditions.iter().all(|condition| !condition.parts.is_empty());
         assert!(explained && !conditions.is_empty(), "{}: {conditions:?}", task.id);
     }

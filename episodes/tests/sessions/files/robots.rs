@@ -14,12 +14,12 @@ fn walker() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../gateway/examples/robots/walker.toml")
 }
 
-fn spec(task: &'static Task) -> EpisodeSpec {
+fn spec(task: &Task) -> EpisodeSpec {
     let robot = RobotFile::of(&walker()).expect("a robot");
     EpisodeSpec { robot, ..EpisodeSpec::new(task, 0, Protocol::Benchmark) }
 }
 
-fn parcel() -> &'static Task {
+fn parcel() -> Task {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../gateway/examples/tasks/pass_the_parcel.toml");
     read_task(Path::new(path)).expect("a task")
 }
@@ -27,7 +27,7 @@ fn parcel() -> &'static Task {
 /// With an arm of four joints a hand reaches a position, in whatever orientation these joints allow.
 #[test]
 fn a_described_robot_reaches_and_results_name_it() {
-    let spec = spec(parcel());
+    let spec = spec(&parcel());
     assert!(spec.departures().contains(&"robot: walker".into()), "{:?}", spec.departures());
     let mut session = Session::start(&spec, None).expect("an episode");
     let began_m = session.present().robots[0].sensed.pelvis_from_wrist.left.translation;
@@ -62,7 +62,7 @@ fn a_described_robot_reaches_and_results_name_it() {
 
 #[test]
 fn tasks_that_need_fingers_are_refused_with_one_that_does_not() {
-    for task in tasks::built_in() {
+    for task in tasks::cohub().iter().chain(tasks::tandem_plus()) {
         let error = Session::start(&spec(task), None).map(|_| ()).expect_err("no fingers");
         assert!(matches!(error, EpisodeError::Robot(_)), "{error:?}");
         let text = error.to_string();

@@ -97,10 +97,10 @@ fn a_robot_takes_its_camera_to_be_where_its_file_has_it() {
 /// them are at rest.
 #[test]
 fn distractors_stand_in_every_task_and_rest() {
-    for &task in tasks::cohub() {
+    for task in tasks::cohub() {
         let mut most = 0;
         for (level, distance) in StressLevel::ALL.into_iter().zip([2, 3, 4]) {
-            let spec = under(task.id, SEED, Some((StressAxis::Layout, level)));
+            let spec = under(&task.id, SEED, Some((StressAxis::Layout, level)));
             assert_eq!(spec.spread().times(), distance);
             let mut session = Session::start(&spec, None).unwrap();
             let names: Vec<String> = (1..=3).map(|number| format!("distractor_{number}")).collect();

@@ -63,16 +63,16 @@ pub fn run(args: TasksArgs) -> CommandResult {
 fn check(args: CheckArgs) -> CommandResult {
     let task = read_task(&args.file)?;
     let own = tandem_episodes::task_list(
-        &TaskSet::with_files(vec![task]),
+        &TaskSet::with_files(vec![task.clone()]),
         None,
         &LocomotionChoice::default().limits(&BodyScale::G1),
     );
     let own = TaskList { tasks: own.tasks.into_iter().filter(|info| info.id == task.id).collect(), ..own };
     print(&told(&own))?;
-    let folder = args.out.unwrap_or_else(|| Path::new("runs/tasks").join(task.id));
+    let folder = args.out.unwrap_or_else(|| Path::new("runs/tasks").join(&task.id));
     create_private_folder(&folder)?;
     let seeds: Vec<u32> = args.seeds.0.collect();
-    let found = check_task(task, &seeds, Some(&folder))?;
+    let found = check_task(&task, &seeds, Some(&folder))?;
     let mut text = String::new();
     for note in &found.notes {
         let _ = writeln!(text, "note: {note}");

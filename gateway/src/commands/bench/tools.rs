@@ -71,7 +71,7 @@ pub fn tools() -> Result<ToolsReport, Box<dyn Error>> {
         ..Layer::default()
     };
     let server = Server::start(Settings::resolve(flags, None)?)?;
-    let task = tasks::cohub()[0].id.into();
+    let task = tasks::cohub()[0].id.clone();
     let args = StartEpisode { task, seed: 0, protocol: Some(Protocol::Benchmark), short: false };
     let (mut episode, _) = HttpEpisode::start(server.address(), &args)?;
     let looks = [GetStatus::default().into(), GetRobotState { robot: "A".into() }.into()];

@@ -96,10 +96,10 @@ impl PeopleFlags {
 }
 
 /// Returns the robots of all these tasks, one for each of `operators`.
-fn robots_of(tasks: &[&'static Task], operators: Option<u8>) -> Result<Vec<&'static str>, String> {
+fn robots_of(tasks: &[Task], operators: Option<u8>) -> Result<Vec<&'static str>, String> {
     let wanted = usize::from(operators.unwrap_or_default());
     if let Some(task) = tasks.iter().find(|task| task.robots.len() != wanted) {
-        let (id, robots) = (task.id, task.robots.len());
+        let (id, robots) = (&task.id, task.robots.len());
         return Err(format!(
             "{id} has {robots} robots, and each has its person; give --operators {robots}, or --tasks with {wanted} robots"
         ));
@@ -108,8 +108,8 @@ fn robots_of(tasks: &[&'static Task], operators: Option<u8>) -> Result<Vec<&'sta
 }
 
 /// Lists the episodes of a plan, in order.
-fn planned(plan: &EvaluationPlan) -> Vec<(&'static str, u32)> {
-    plan.episodes().0.iter().map(|spec| (spec.task.id, spec.seed)).collect()
+fn planned(plan: &EvaluationPlan) -> Vec<(String, u32)> {
+    plan.episodes().0.iter().map(|spec| (spec.task.id.clone(), spec.seed)).collect()
 }
 
 /// Returns the folder for bad episodes. It is beside the run's folder, so that no data set includes them.

@@ -50,7 +50,7 @@ fn physics(spec: &EpisodeSpec) -> Result<String, String> {
         Ok((simulated_s / session.physics().as_secs_f64(), began.elapsed()))
     };
     let (factor, look) = play().map_err(|error: EpisodeError| format!("{error}; please report it"))?;
-    let (task, robots) = (spec.task.id, spec.task.robots.len());
+    let (task, robots) = (&spec.task.id, spec.task.robots.len());
     let text = format!(
         "{task} at {factor:.0} times real time, {} ms for a look of its {robots} robots",
         look.as_millis()

@@ -96,7 +96,7 @@ fn specs(layer: &Layer) -> impl Iterator<Item = EpisodeSpec> {
     let scene = scene.and_then(Result::ok);
     let robot = layer.read_robot().unwrap_or_default();
     let (locomotion, sensing, renderer) = (layer.controller(), layer.sensing(), layer.renderer());
-    tasks::cohub().iter().copied().map(move |task| EpisodeSpec {
+    tasks::cohub().iter().map(move |task| EpisodeSpec {
         scene: scene.clone(),
         robot: robot.clone(),
         locomotion: locomotion.clone(),

@@ -64,7 +64,7 @@ pub struct EpisodeFlags {
 /// Tasks on the command line. The type's name keeps clap from taking it for a flag that can be given
 /// several times.
 #[derive(Debug, Clone)]
-struct TaskList(Vec<&'static Task>);
+struct TaskList(Vec<Task>);
 
 /// Parses built-in tasks: `all` of the benchmark's, those of a suite, or ids separated by commas.
 fn parse_tasks(text: &str) -> Result<TaskList, String> {
@@ -73,7 +73,7 @@ fn parse_tasks(text: &str) -> Result<TaskList, String> {
         TANDEM_PLUS => Ok(tandem_plus().to_vec()),
         ids => {
             let known = TaskSet::default();
-            ids.split(',').map(|id| known.find(id.trim())).collect()
+            ids.split(',').map(|id| known.find(id.trim()).cloned()).collect()
         }
     };
     let told = |error: EpisodeError| format!("{error}; those of --task-file are played without being named");
@@ -82,14 +82,14 @@ fn parse_tasks(text: &str) -> Result<TaskList, String> {
 
 /// Returns the tasks to play: those of files, and the named built-in ones that no file replaces. Without
 /// any, it returns all tasks of the benchmark.
-fn played(named: Option<TaskList>, of_files: Vec<&'static Task>) -> Vec<&'static Task> {
+fn played(named: Option<TaskList>, of_files: Vec<Task>) -> Vec<Task> {
     let named = match named {
         Some(TaskList(named)) => named,
         None if of_files.is_empty() => tasks::cohub().to_vec(),
         None => Vec::new(),
     };
-    let replaced = |task: &&'static Task| of_files.iter().any(|other| other.id == task.id);
-    let built_in: Vec<&'static Task> = named.into_iter().filter(|task| !replaced(task)).collect();
+    let replaced = |task: &Task| of_files.iter().any(|other| other.id == task.id);
+    let built_in: Vec<Task> = named.into_iter().filter(|task| !replaced(task)).collect();
     built_in.into_iter().chain(of_files).collect()
 }
 

@@ -45,7 +45,7 @@ impl WorldFlags {
     }
 
     /// Reads the tasks from the files that the flag names.
-    pub fn read_task_files(&self) -> Result<Vec<&'static Task>, SettingsError> {
+    pub fn read_task_files(&self) -> Result<Vec<Task>, SettingsError> {
         self.task_file.iter().flatten().map(|path| read_task_file(path)).collect()
     }
 

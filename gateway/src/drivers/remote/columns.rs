@@ -105,12 +105,12 @@ impl EpisodeMoment {
         const SEEDS: u32 = 1_000_000;
         /// First number that a float does not distinguish from the next one.
         const END: u32 = 1 << 24;
-        let built_in: Vec<&str> = tasks::built_in().map(|known| known.id).collect();
+        let built_in = tasks::cohub().iter().chain(tasks::tandem_plus());
         let own_file = task.file_xxh3().filter(|_| task.suite().is_none());
-        match (own_file, built_in.iter().position(|id| *id == task.id)) {
+        match (own_file, built_in.clone().position(|known| known.id == task.id)) {
             (None, Some(index)) => (index as u32 + 1) * SEEDS + seed % SEEDS,
             (file, _) => {
-                let first = (built_in.len() as u32 + 1) * SEEDS;
+                let first = (built_in.count() as u32 + 1) * SEEDS;
                 let hash = file.and_then(|xxh3| u64::from_str_radix(xxh3, 16).ok()).unwrap_or_default();
                 // The golden ratio spreads consecutive seeds.
                 let spread = hash.wrapping_add(u64::from(seed).wrapping_mul(0x9e37_79b9_7f4a_7c15)) >> 20;
@@ -295,7 +295,7 @@ mod tests {
 
     #[test]
     fn blocks_have_the_order_of_rows_in_data_sets() {
-        let spec = EpisodeSpec::new(tasks::find("handover").unwrap(), 0, Protocol::Benchmark);
+        let spec = EpisodeSpec::new(&tasks::find("handover").unwrap(), 0, Protocol::Benchmark);
         let contract = RowContract::of(&spec, ActionKind::Joints).unwrap();
         let check = |expected: &[RowColumn], found: Vec<usize>, singles: Vec<(String, usize)>| {
             let name = |at: &usize| singles.iter().find(|(_, single)| single == at).unwrap().0.clone();
@@ -317,14 +317,13 @@ mod tests {
             std::fs::write(&path, text).unwrap();
             read_task(&path).unwrap()
         });
-        let built_in = tasks::built_in();
-        for task in built_in.chain(own) {
+        for task in tasks::cohub().iter().chain(tasks::tandem_plus()).chain(&own) {
             for seed in [0, 1, 2000, 999_999] {
                 let own = number(task, seed);
                 assert!(own > 0 && (own as f32) as u32 == own && numbers.insert(own), "{own}");
             }
         }
-        assert_eq!(number(tasks::cohub()[1], 42), 2_000_042);
+        assert_eq!(number(&tasks::cohub()[1], 42), 2_000_042);
         let columns = state_columns(&names("episode step reset")).unwrap();
         assert_eq!(columns, [STATE_MOMENT, STATE_MOMENT + 1, STATE_MOMENT + 2]);
         assert_eq!(extra_columns(&columns), [], "no sensor of the robot's tells it");

@@ -76,7 +76,7 @@ impl RemotePolicy {
     /// counter if the seed is hidden.
     fn number_of(&self, spec: &EpisodeSpec) -> u32 {
         let number = spec.told_seed().unwrap_or_else(|| self.untold.fetch_add(1, Ordering::Relaxed));
-        EpisodeMoment::number_of(spec.task, number)
+        EpisodeMoment::number_of(&spec.task, number)
     }
 
     fn urls(&self) -> Vec<&str> {
@@ -94,7 +94,7 @@ impl RemotePolicy {
         self.waits().push(began);
         let session = {
             let (words, most_steps) =
-                (instructions(spec.task, spec.task_words()), spec.rules().steps_per_command);
+                (instructions(&spec.task, spec.task_words()), spec.rules().steps_per_command);
             PolicySession::open(self.protocol, &self.servers, &self.map, words, most_steps)
         };
         let mut waits = self.waits();
@@ -141,7 +141,7 @@ impl Policy for RemotePolicy {
     }
 
     fn play_episode(&self, spec: &EpisodeSpec, place: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
-        self.check(spec.task).map_err(PlayError::NotReady)?;
+        self.check(&spec.task).map_err(PlayError::NotReady)?;
         let mut session = self.open(spec)?;
         Ok(play_in_process(spec, place, |episode| session.play(episode, self.number_of(spec)))?)
     }
@@ -163,7 +163,7 @@ impl PartnerPolicy for RemotePolicy {
         episode: &mut dyn LocalEpisode,
         connected: &mut dyn FnMut(),
     ) -> Result<Result<(), PlayerError>, PlayError> {
-        self.check(spec.task).map_err(PlayError::NotReady)?;
+        self.check(&spec.task).map_err(PlayError::NotReady)?;
         let mut session = self.open(spec)?;
         connected();
         Ok(session.play(episode, self.number_of(spec)))
@@ -172,7 +172,7 @@ impl PartnerPolicy for RemotePolicy {
 
 fn instructions(task: &Task, words: TaskWords) -> TaskInstructions {
     TaskInstructions {
-        task: task.id.into(),
+        task: task.id.clone(),
         robots: task.robot_names().map(String::from).collect(),
         per_robot: words.robots,
         joint: words.joint,

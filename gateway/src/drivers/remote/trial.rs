@@ -30,7 +30,7 @@ const MAX_TRIAL_ROWS: usize = 100;
 pub fn try_map(map: &PolicyMap) -> Result<String, RemoteError> {
     check_execute(map)?;
     let by_robots: BTreeMap<usize, &Task> =
-        tasks::cohub().iter().copied().rev().map(|task| (task.robots.len(), task)).collect();
+        tasks::cohub().iter().rev().map(|task| (task.robots.len(), task)).collect();
     let trials = by_robots.values().map(|task| Ok(MapTrial::new(map, task)?.text()));
     Ok(trials.collect::<Result<Vec<_>, RemoteError>>()?.join("\n"))
 }

@@ -70,7 +70,7 @@ impl Target {
     }
 
     fn start(&mut self) {
-        let task = tasks::cohub()[0].id.into();
+        let task = tasks::cohub()[0].id.clone();
         let args = StartEpisode { task, seed: 0, protocol: Some(Protocol::Benchmark), short: false };
         self.id = self.runtime.block_on(self.table.start(args)).unwrap().episode_id;
     }

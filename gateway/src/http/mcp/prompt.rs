@@ -18,7 +18,7 @@ pub fn prompts(tasks: &TaskSet) -> Vec<Prompt> {
     let argument = |name: &str, text: &str, required: bool| {
         PromptArgument::new(name).with_description(text).with_required(required)
     };
-    let ids: Vec<&str> = tasks.all().map(|task| task.id).collect();
+    let ids: Vec<&str> = tasks.all().map(|task| task.id.as_str()).collect();
     let arguments = vec![
         argument("task", &format!("What to play: {}.", ids.join(", ")), true),
         argument("seed", "Decides where the objects stand; 0 if it is not given.", false),

@@ -57,7 +57,7 @@ pub async fn take_over(
         assistance: settings.assistance,
         disclosure: settings.disclosure,
         hints: settings.hints,
-        instructions: settings.instructions.own_words(recorded.task.id),
+        instructions: settings.instructions.own_words(&recorded.task.id),
         thinking_limit_s: settings.thinking_limit_s,
         ..recorded
     };

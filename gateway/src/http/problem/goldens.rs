@@ -106,7 +106,7 @@ fn result() -> ResultReply {
 
 fn episode_refusals() -> Vec<EpisodeError> {
     vec![
-        EpisodeError::UnknownTask { id: "x".into(), have: vec!["handover"] },
+        EpisodeError::UnknownTask { id: "x".into(), have: vec!["handover".into()] },
         EpisodeError::UnknownRobot { name: "Z".into(), have: vec!["A".into(), "B".into()] },
         EpisodeError::ForeignRobot { name: "B".into(), own: "A".into() },
         EpisodeError::DepthImage { protocol: "agentic" },

@@ -136,11 +136,11 @@ fn play(task: &str, seed: u64, kill_after: Option<Duration>) -> (Vec<Value>, Vec
 
 fn kill_and_compare(kills: usize, seed: u64) {
     let mut delays = Delays(seed);
-    for (round, task) in (0..kills).zip(tasks::cohub().iter().copied().cycle()) {
+    for (round, task) in (0..kills).zip(tasks::cohub().iter().cycle()) {
         let delay = delays.next(LATEST_KILL_MS);
         let episode_seed = seed + round as u64;
-        let (answers, hashes) = play(task.id, episode_seed, Some(delay));
-        let (as_ever, undisturbed) = play(task.id, episode_seed, None);
+        let (answers, hashes) = play(&task.id, episode_seed, Some(delay));
+        let (as_ever, undisturbed) = play(&task.id, episode_seed, None);
         assert_eq!(hashes, undisturbed, "{} killed after {delay:?}", task.id);
         for (answer, expected) in answers.iter().zip(&as_ever) {
             assert_eq!(answer["step"], expected["step"], "{}: {answer}", task.id);

@@ -9,10 +9,10 @@ use super::pages::{BOOK, page, root};
 
 #[test]
 fn documents_weigh_objects_as_their_files_do() {
-    for &task in tasks::cohub() {
+    for task in tasks::cohub() {
         let parts =
-            |spot: &ObjectSpot| ObjectModel::parts(&spot.source(), spot.name).expect("an object of a task");
-        let file = |spot: &ObjectSpot| assets::object(spot.file).expect("an object of a task");
+            |spot: &ObjectSpot| ObjectModel::parts(&spot.source(), &spot.name).expect("an object of a task");
+        let file = |spot: &ObjectSpot| assets::object(&spot.file).expect("an object of a task");
         let all: Vec<ObjectPart> = task.objects.iter().flat_map(parts).collect();
         let whole_kg = |spot: &ObjectSpot| parts(spot).iter().map(|part| part.model.mass_kg).sum();
         let mut masses_kg: Vec<f32> = all.iter().map(|part| part.model.mass_kg).collect();
@@ -25,7 +25,7 @@ fn documents_weigh_objects_as_their_files_do() {
             let known = masses_kg.iter().any(|mass_kg| stated.is(*mass_kg));
             assert!(known, "the file of {} says {} kg; objects have {masses_kg:?}", task.id, stated.text);
         }
-        for spot in task.objects {
+        for spot in &task.objects {
             let weighed = format!("`{}`", spot.name);
             let row = page.lines().find(|line| line.starts_with("| `") && line.contains(&weighed));
             let cell = row.and_then(|row| row.trim_end_matches(['|', ' ']).rsplit('|').next());

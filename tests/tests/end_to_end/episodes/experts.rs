@@ -29,7 +29,7 @@ const SEEDS: [u32; 3] = [7030, 7054, 7081];
 
 /// Plays the experts of `tasks`. Checks that phases are reached in order, and that at most `may_fail`
 /// episodes fail in total and at most one of each task. No robot may fall, whether the task is solved or not.
-fn solve(tasks: Vec<&'static Task>, may_fail: usize) {
+fn solve(tasks: Vec<Task>, may_fail: usize) {
     let plan = EvaluationPlan {
         player: players::find("expert").expect("a player"),
         protocol: Protocol::Benchmark,
@@ -67,23 +67,29 @@ fn solve(tasks: Vec<&'static Task>, may_fail: usize) {
         let times_s: Vec<f64> = result.phases.0.iter().filter_map(|(_, time_s)| *time_s).collect();
         assert!(times_s.is_sorted() && times_s.iter().all(|time_s| *time_s > 0.0), "{episode:?}");
         if times_s.len() < task.phases.len() {
-            failed.push((task.id, episode.spec.seed, times_s.len()));
+            failed.push((&task.id, episode.spec.seed, times_s.len()));
         }
         assert_eq!(result.falls, 0, "{episode:?}");
     }
-    let twice = |task: &&Task| failed.iter().filter(|(id, ..)| *id == task.id).count() > 1;
+    let twice = |task: &Task| failed.iter().filter(|(id, ..)| **id == task.id).count() > 1;
     let fails_too_often = failed.len() > may_fail || tasks.iter().any(twice);
     assert!(!fails_too_often, "task, seed, phases reached: {failed:?}");
 }
 
+/// Returns the benchmark's tasks that have an expert and are played standing, or walking.
+fn solved(standing: bool) -> Vec<Task> {
+    let is_wanted = |task: &&Task| STANDING.contains(&task.id.as_str()) == standing && experts::solves(task);
+    tasks::cohub().iter().filter(is_wanted).cloned().collect()
+}
+
 #[test]
 fn experts_that_stand_solve_their_tasks() {
-    solve(experts::solved().filter(|task| STANDING.contains(&task.id)).collect(), 1);
+    solve(solved(true), 1);
 }
 
 #[test]
 fn experts_that_walk_solve_their_tasks() {
-    solve(experts::solved().filter(|task| !STANDING.contains(&task.id)).collect(), 2);
+    solve(solved(false), 2);
 }
 
 #[test]
@@ -105,7 +111,7 @@ fn tandem_plus_needs_somebody_who_acts_and_words() {
         };
         let is_right = |seed: &u32| {
             let spec = EpisodeSpec::new(task, *seed, Protocol::Benchmark);
-            std::ptr::eq(experts::guessed(&spec), spec.task)
+            experts::guessed(&spec).chosen == spec.task.chosen
         };
         assert_eq!(reached("idle", 2000), 0, "{}", task.id);
         let right = (2000..2100).find(is_right).expect("a right guess");
@@ -153,7 +159,7 @@ impl PrivilegedEpisode for Slip {
 
 #[test]
 fn a_hand_that_slips_off_a_load_takes_it_again() {
-    let spec = EpisodeSpec::new(tasks::find("table_align").expect("a task"), 6100, Protocol::Agentic);
+    let spec = EpisodeSpec::new(&tasks::find("table_align").expect("a task"), 6100, Protocol::Agentic);
     let session = Session::start(&spec, None).expect("a session");
     let mut slip = Slip { episode: InProcess::new(session), slipped: false, took_again: false };
     players::find("expert").expect("a player").play(&spec, &mut slip).expect("an expert that goes on");
@@ -200,7 +206,7 @@ impl PrivilegedEpisode for Lift {
 #[test]
 fn carriers_stand_where_they_are_to_when_they_lift() {
     for seed in [2009, 2103] {
-        let spec = EpisodeSpec::new(tasks::find("move_house").expect("a task"), seed, Protocol::Benchmark);
+        let spec = EpisodeSpec::new(&tasks::find("move_house").expect("a task"), seed, Protocol::Benchmark);
         let session = Session::start(&spec, None).expect("a session");
         let mut lift = Lift { episode: InProcess::new(session), most_off_m: None };
         players::find("expert").expect("a player").play(&spec, &mut lift).expect("an expert that carries on");
@@ -243,7 +249,7 @@ impl PrivilegedEpisode for Carry {
 /// the table, which turned it by 45 degrees in the hand. The opening fingers then knocked it over.
 #[test]
 fn a_bottle_is_carried_over_the_edge_of_the_table() {
-    let spec = EpisodeSpec::new(tasks::find("cart_service").expect("a task"), 2029, Protocol::Benchmark);
+    let spec = EpisodeSpec::new(&tasks::find("cart_service").expect("a task"), 2029, Protocol::Benchmark);
     let session = Session::start(&spec, None).expect("a session");
     let mut carry = Carry { episode: InProcess::new(session), most_tilt_rad: 0.0 };
     players::find("expert").expect("a player").play(&spec, &mut carry).expect("an expert that carries on");
@@ -258,7 +264,7 @@ fn hands_give_way_while_the_picture_is_let_down() {
     for seed in [2004, 2021] {
         let spec = EpisodeSpec {
             sensing: Sensing { sensors: SensorModel::G1, ..Sensing::default() },
-            ..EpisodeSpec::new(tasks::find("frame_hang").expect("a task"), seed, Protocol::Benchmark)
+            ..EpisodeSpec::new(&tasks::find("frame_hang").expect("a task"), seed, Protocol::Benchmark)
         };
         let mut episode = InProcess::new(Session::start(&spec, None).expect("a session"));
         players::find("expert").expect("a player").play(&spec, &mut episode).expect("an expert that goes on");

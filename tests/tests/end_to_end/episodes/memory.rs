@@ -72,7 +72,7 @@ fn episodes_side_by_side() {
             server.tool(id, "observe", &json!({})).ok();
         }
     };
-    let cast = || tasks::cohub().iter().copied().cycle().take(EPISODES).enumerate();
+    let cast = || tasks::cohub().iter().cycle().take(EPISODES).enumerate();
     let ids: Vec<String> = cast().map(|(seed, task)| start(seed, task)).collect();
     ids.iter().for_each(|id| play(id));
     let each_kb = (memory_kb("VmRSS") - before_kb) / EPISODES as u64;

@@ -10,7 +10,7 @@ use tandem_tools_spec::{Assistance, PhaseTimes, Protocol};
 const SEEDS: [u32; 5] = [2000, 2001, 2002, 2003, 2004];
 
 /// Returns the phase times and the final state hash for each seed, with the task's expert.
-fn played(task: &'static Task) -> Vec<(PhaseTimes, Option<String>)> {
+fn played(task: &Task) -> Vec<(PhaseTimes, Option<String>)> {
     let plan = EvaluationPlan {
         player: players::find("expert").expect("a player"),
         protocol: Protocol::Benchmark,
@@ -26,7 +26,7 @@ fn played(task: &'static Task) -> Vec<(PhaseTimes, Option<String>)> {
         stress: None,
         thinking_limit_s: None,
         renderer: RendererKind::Cpu,
-        tasks: vec![task],
+        tasks: vec![task.clone()],
         seeds: SEEDS.into(),
         starts: Starts::Task,
         shard: Shard::WHOLE,
@@ -59,9 +59,10 @@ fn a_copy_of_a_task_is_scored_as_the_task_itself() {
         };
         assert!(same(tasks::Spread::Single), "{id}");
         let words = |task: &Task| {
-            (task.instruction, task.phases.iter().map(|phase| phase.description).collect::<Vec<_>>())
+            let phases = task.phases.iter().map(|phase| phase.description.clone());
+            (task.instruction.clone(), phases.collect::<Vec<_>>())
         };
-        assert_eq!(words(of_file), words(own));
-        assert_eq!(played(of_file), played(own), "{id}");
+        assert_eq!(words(&of_file), words(&own));
+        assert_eq!(played(&of_file), played(&own), "{id}");
     }
 }

@@ -10,7 +10,7 @@ use super::table::{self, Moves, TASKS};
 
 #[test]
 fn tasks_are_set_as_published() {
-    let ids: Vec<&str> = tasks::cohub().iter().copied().map(|task| task.id).collect();
+    let ids: Vec<&str> = tasks::cohub().iter().map(|task| task.id.as_str()).collect();
     assert_eq!(ids, TASKS.each_ref().map(|published| published.id));
     for published in &TASKS {
         let task = tasks::find(published.id).unwrap();
@@ -28,11 +28,14 @@ fn seeds_move_what_the_benchmark_moves_and_as_far() {
     for published in &TASKS {
         let task = tasks::find(published.id).unwrap();
         let ends = |range: &std::ops::RangeInclusive<f32>| [*range.start(), *range.end()];
+        let groups = task.randomize.iter().map(|offset| offset.objects.iter().map(String::as_str).collect());
+        let groups: Vec<Vec<&str>> = groups.collect();
         let drawn: Vec<Moves> = task
             .randomize
             .iter()
-            .map(|offset| Moves {
-                objects: offset.objects,
+            .zip(&groups)
+            .map(|(offset, objects)| Moves {
+                objects,
                 x_m: ends(&offset.x_m),
                 y_m: ends(&offset.y_m),
                 z_m: ends(&offset.z_m),
@@ -48,13 +51,13 @@ fn seeds_move_what_the_benchmark_moves_and_as_far() {
 fn budgets_are_as_published() {
     for published in &TASKS {
         let task = tasks::find(published.id).unwrap();
-        let agentic = rules(Protocol::Agentic, task);
+        let agentic = rules(Protocol::Agentic, &task);
         assert_eq!(agentic.steps_per_command, table::AGENTIC_STEPS_PER_COMMAND);
         assert_eq!(agentic.episode_steps, table::AGENTIC_EPISODE_STEPS);
         assert_eq!(agentic.initial_hold_steps, table::AGENTIC_HOLD_STEPS);
         assert_eq!(agentic.thinking, Some(Duration::from_secs(table::AGENTIC_THINKING_S)));
         assert_eq!(agentic.seeds, table::AGENTIC_SEEDS);
-        let benchmark = rules(Protocol::Benchmark, task);
+        let benchmark = rules(Protocol::Benchmark, &task);
         assert_eq!(benchmark.episode_steps, published.episode_steps, "{}", task.id);
         assert_eq!(benchmark.steps_per_command, table::BENCHMARK_STEPS_PER_COMMAND);
         assert_eq!((benchmark.initial_hold_steps, benchmark.thinking), (0, None));
@@ -67,7 +70,7 @@ fn budgets_are_as_published() {
 #[test]
 fn the_camera_and_the_joints_are_as_published() {
     let task = tasks::find("handover").unwrap();
-    let mut session = Session::start(&EpisodeSpec::new(task, 0, Protocol::Benchmark), None).unwrap();
+    let mut session = Session::start(&EpisodeSpec::new(&task, 0, Protocol::Benchmark), None).unwrap();
     let ToolReply::Look(LookReply::Observe(seen)) =
         session.call(Observe { robots: None, short: None, frame: None }.into()).unwrap()
     else {

@@ -12,14 +12,14 @@ const OUTSIDE: f32 = 1.001;
 
 /// A task's world at its start.
 pub struct Scene {
-    pub task: &'static tasks::Task,
+    pub task: tasks::Task,
     start: Facts,
 }
 
 impl Scene {
     pub fn of(id: &str) -> Scene {
         let task = tasks::find(id).unwrap();
-        let session = Session::start(&EpisodeSpec::new(task, 0, Protocol::Benchmark), None).unwrap();
+        let session = Session::start(&EpisodeSpec::new(&task, 0, Protocol::Benchmark), None).unwrap();
         Scene { task, start: session.facts() }
     }
 

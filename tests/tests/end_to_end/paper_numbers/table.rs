@@ -8,26 +8,26 @@ pub struct Published {
     /// Number of the scene in its source collection.
     pub scene: &'static str,
     pub episode_steps: u32,
-    pub moves: &'static [Moves],
+    pub moves: &'static [Moves<'static>],
     /// True for each of p1, p2 and p3 that needs more than one robot; published for tasks of two robots.
     pub collaborative: Option<[bool; 3]>,
 }
 
 /// Ranges from which one displacement is drawn uniformly for a group of objects.
 #[derive(Debug, PartialEq)]
-pub struct Moves {
-    pub objects: &'static [&'static str],
+pub struct Moves<'a> {
+    pub objects: &'a [&'a str],
     pub x_m: [f32; 2],
     pub y_m: [f32; 2],
     pub z_m: [f32; 2],
     pub yaw_deg: [f32; 2],
 }
 
-const fn moves(objects: &'static [&'static str], x_m: [f32; 2], y_m: [f32; 2]) -> Moves {
+const fn moves(objects: &'static [&'static str], x_m: [f32; 2], y_m: [f32; 2]) -> Moves<'static> {
     Moves { objects, x_m, y_m, z_m: [0.0, 0.0], yaw_deg: [0.0, 0.0] }
 }
 
-const fn apple_in_tub(apple: &'static [&'static str]) -> Moves {
+const fn apple_in_tub(apple: &'static [&'static str]) -> Moves<'static> {
     moves(apple, [-0.008, 0.008], [-0.008, 0.008])
 }
 

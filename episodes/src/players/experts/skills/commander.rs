@@ -84,7 +84,7 @@ pub struct CommandedTargets {
 
 /// Commander of an episode's robots, with their last commanded targets.
 pub struct Commander<'a> {
-    task: &'static Task,
+    task: &'a Task,
     episode: &'a mut dyn PrivilegedEpisode,
     /// Last commanded targets of each robot.
     targets: Vec<CommandedTargets>,
@@ -95,10 +95,7 @@ pub struct Commander<'a> {
 }
 
 impl<'a> Commander<'a> {
-    pub fn new(
-        task: &'static Task,
-        episode: &'a mut dyn PrivilegedEpisode,
-    ) -> Result<Commander<'a>, PlayerError> {
+    pub fn new(task: &'a Task, episode: &'a mut dyn PrivilegedEpisode) -> Result<Commander<'a>, PlayerError> {
         let facts = episode.facts()?;
         let targets = |robot: usize| CommandedTargets {
             hands: Sides::from_fn(|side| HandTarget {
@@ -130,14 +127,14 @@ impl<'a> Commander<'a> {
     /// Creates the commander of one of several scripts that are played at once, with the robots' earlier
     /// targets.
     pub fn in_step(
-        task: &'static Task,
+        task: &'a Task,
         targets: Vec<CommandedTargets>,
         episode: &'a mut dyn PrivilegedEpisode,
     ) -> Commander<'a> {
         Commander { task, episode, targets, in_step: true, variety: None }
     }
 
-    pub fn task(&self) -> &'static Task {
+    pub fn task(&self) -> &'a Task {
         self.task
     }
 

@@ -51,12 +51,11 @@ fn page_of(begin_s: f64, result: &ResultReply) -> String {
     let task = tasks::find("handover").unwrap();
     let views = vec![LabelledPicture { label: "what A sees".into(), file: b"png".into() }];
     let moments = [KeyMoment { caption: ["p1 <grasp>".into(), "4.0 s".into()], views }];
-    let rules = rules(protocol, task);
+    let rules = rules(protocol, &task);
     let said = [SaidWords { time_s: 1.5, robot: "A".into(), text: "the <red> one".into() }];
-    let instruction = task.instruction;
     EpisodePage {
-        task,
-        instruction,
+        task: &task,
+        instruction: &task.instruction,
         result,
         calls: &calls,
         said: &said,

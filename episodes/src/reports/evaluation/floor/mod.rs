@@ -26,7 +26,7 @@ const HIGH_SHARE: f64 = 0.5;
 /// The floor of one task.
 #[derive(Debug, Serialize)]
 pub struct TaskFloor {
-    pub task: &'static str,
+    pub task: String,
     /// Departures of its episodes from the benchmark, without those on information for policies.
     pub departures: Vec<String>,
     pub players: Vec<FloorRate>,
@@ -46,7 +46,7 @@ pub struct FloorRate {
 }
 
 /// Task and departures for which a floor is measured or needed.
-type FloorKey = (&'static str, Vec<String>);
+type FloorKey = (String, Vec<String>);
 
 /// Returns the floors of all played tasks in the order of the list of tasks, without tasks whose floor is
 /// unknown.
@@ -54,21 +54,19 @@ pub fn floors(groups: &[PolicyGroup], policies: &[PolicyReport]) -> Vec<TaskFloo
     let places: BTreeSet<FloorKey> =
         groups.iter().flat_map(|group| &group.episodes).map(|found| place(&found.played)).collect();
     let shipped = shipped();
-    let of_place = |(task, departures): FloorKey| {
+    let of_place = |key: FloorKey| {
         let players: Vec<FloorRate> = PLAYERS
             .into_iter()
             .filter_map(|player| {
                 let beside = groups.iter().zip(policies);
                 let beside = beside.filter(|(group, _)| plays_as(group, player));
                 let mut beside = beside.filter_map(|(group, policy)| {
-                    let same = |played: &PlayedEpisode| place(played) == (task, departures.clone());
+                    let same = |played: &PlayedEpisode| place(played) == key;
                     let measured = group.episodes.iter().any(|found| same(&found.played));
-                    measured.then(|| FloorRate::beside(player, task, policy)).flatten()
+                    measured.then(|| FloorRate::beside(player, &key.0, policy)).flatten()
                 });
                 let earlier = || {
-                    let same = |(at, rate): &&(FloorKey, FloorRate)| {
-                        rate.player == player && *at == (task, departures.clone())
-                    };
+                    let same = |(at, rate): &&(FloorKey, FloorRate)| rate.player == player && *at == key;
                     shipped.iter().find(same).map(|(_, rate)| rate.clone())
                 };
                 beside.next().or_else(earlier)
@@ -76,10 +74,11 @@ pub fn floors(groups: &[PolicyGroup], policies: &[PolicyReport]) -> Vec<TaskFloo
             .collect();
         let solved = |rate: &FloorRate| rate.phases.last().is_some_and(|last| last.share > HIGH_SHARE);
         let is_high = players.iter().any(solved);
+        let (task, departures) = key;
         (!players.is_empty()).then_some(TaskFloor { task, departures, players, is_high })
     };
     let mut floors: Vec<TaskFloor> = places.into_iter().filter_map(of_place).collect();
-    floors.sort_by_key(|floor| tasks::cohub().iter().copied().position(|task| task.id == floor.task));
+    floors.sort_by_key(|floor| tasks::cohub().iter().position(|task| task.id == floor.task));
     floors
 }
 
@@ -87,7 +86,7 @@ pub fn floors(groups: &[PolicyGroup], policies: &[PolicyReport]) -> Vec<TaskFloo
 /// not affect a policy without perception.
 fn place(played: &PlayedEpisode) -> FloorKey {
     let spec = EpisodeSpec { instructions: None, ..played.spec.clone() }.assisted(Assistance::Paper);
-    (spec.task.id, spec.peculiarities())
+    (spec.task.id.clone(), spec.peculiarities())
 }
 
 fn plays_as(group: &PolicyGroup, player: &str) -> bool {
@@ -131,7 +130,7 @@ fn shipped_row(line: &str) -> Option<(FloorKey, FloorRate)> {
     let rate = |cell: &&str| Rate::of(Count { successes: cell.parse().ok()?, trials });
     let spec = EpisodeSpec {
         variation: Variation { spread, ..Variation::default() },
-        ..EpisodeSpec::new(task, 0, tandem_tools_spec::Protocol::Benchmark).assisted(Assistance::Paper)
+        ..EpisodeSpec::new(&task, 0, tandem_tools_spec::Protocol::Benchmark).assisted(Assistance::Paper)
     };
     let rate = FloorRate {
         player: PLAYERS.into_iter().find(|known| known == player)?,
@@ -139,7 +138,7 @@ fn shipped_row(line: &str) -> Option<(FloorKey, FloorRate)> {
         measured: format!("earlier: seeds {first_seed}-{last_seed}, build {build}"),
         phases: reached.iter().map(rate).collect::<Option<_>>()?,
     };
-    Some(((task.id, spec.peculiarities()), rate))
+    Some(((spec.task.id.clone(), spec.peculiarities()), rate))
 }
 
 #[cfg(test)]
@@ -151,7 +150,7 @@ mod tests {
     use crate::tasks::Task;
 
     /// Returns an episode of the player that replays a demonstration without observations.
-    fn blind(task: &'static Task, seed: u32, phases: usize) -> PlayedEpisode {
+    fn blind(task: &Task, seed: u32, phases: usize) -> PlayedEpisode {
         let settings = Some(serde_json::json!({ OPEN_LOOP: ["handover 2000 0123456789abcdef"] }));
         let played = played(OPEN_LOOP, task, seed, phases);
         PlayedEpisode { policy: PolicyCard { settings, ..OPEN_LOOP.into() }, ..played }
@@ -161,8 +160,8 @@ mod tests {
     fn a_report_has_the_floor_of_its_tasks_and_names_those_where_it_is_high() {
         let handover = tasks::find("handover").unwrap();
         let mut episodes = nine_six_three("agent");
-        episodes.extend((0..10).map(|seed| blind(handover, seed, if seed < 6 { 3 } else { 1 })));
-        episodes.extend((0..4).map(|seed| played("idle", handover, seed, 0)));
+        episodes.extend((0..10).map(|seed| blind(&handover, seed, if seed < 6 { 3 } else { 1 })));
+        episodes.extend((0..4).map(|seed| played("idle", &handover, seed, 0)));
         let floor = |episodes: Vec<PlayedEpisode>| EvaluationReport::of(&found(episodes));
         let report = floor(episodes.clone());
         let [of_task] = &report.floors[..] else { panic!("{:?}", report.floors) };
@@ -182,13 +181,13 @@ mod tests {
         let wide = nine_six_three("agent");
         let mut wide: Vec<_> =
             wide.into_iter().map(|played| PlayedEpisode { spec: spec(&played), ..played }).collect();
-        wide.extend((0..10).map(|seed| blind(handover, seed, 3)));
+        wide.extend((0..10).map(|seed| blind(&handover, seed, 3)));
         let of_wide = |report: &EvaluationReport| {
             let floors = report.floors.iter().filter(|floor| floor.departures == ["spread: 2"]);
             floors.flat_map(|floor| &floor.players).filter(|rate| rate.measured == "in this report").count()
         };
         assert_eq!(of_wide(&floor(wide.clone())), 0);
-        let still = played("idle", handover, 1, 0);
+        let still = played("idle", &handover, 1, 0);
         wide.push(PlayedEpisode { spec: spec(&still), ..still });
         assert_eq!(of_wide(&floor(wide)), 1);
     }
@@ -198,7 +197,7 @@ mod tests {
         let rows = shipped();
         assert_eq!(rows.len(), SHIPPED.lines().count() - 1);
         for ((task, departures), rate) in rows {
-            let task = tasks::find(task).unwrap();
+            let task = tasks::find(&task).unwrap();
             assert_eq!(rate.phases.len(), task.phases.len(), "{rate:?}");
             assert!(rate.phases.is_sorted_by(|one, next| one.successes >= next.successes), "{rate:?}");
             assert!(departures.iter().all(|text| text.starts_with("spread: ")), "{departures:?}");

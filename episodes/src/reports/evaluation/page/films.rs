@@ -12,7 +12,7 @@ use crate::tasks;
 /// The place of a video on the page.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmPlace {
-    pub task: &'static str,
+    pub task: String,
     /// True for the video of a successful episode.
     pub success: bool,
     /// The episode to show, or the reason why there is none.
@@ -52,15 +52,15 @@ pub fn film_places(loaded: &LoadedEpisodes) -> Vec<FilmPlace> {
         .flat_map(|group| group.episodes.iter().map(|found| (group.name.as_str(), *found)))
         .collect();
     let mut places = Vec::new();
-    for task in tasks::in_order(episodes.iter().map(|(_, found)| found.played.spec.task)) {
+    for task in tasks::in_order(episodes.iter().map(|(_, found)| &found.played.spec.task)) {
         let played: Vec<_> =
-            episodes.iter().copied().filter(|(_, found)| found.played.spec.task == task).collect();
+            episodes.iter().copied().filter(|(_, found)| found.played.spec.task == *task).collect();
         if played.is_empty() {
             continue;
         }
         for success in [true, false] {
             let such = played.iter().copied().filter(|(_, found)| found.played.succeeded() == success);
-            places.push(FilmPlace { task: task.id, success, episode: choose(success, such) });
+            places.push(FilmPlace { task: task.id.clone(), success, episode: choose(success, such) });
         }
     }
     places
@@ -95,7 +95,7 @@ pub fn html(films: &[Film]) -> String {
     let mut cards = String::new();
     for of_task in films.chunk_by(|one, other| one.place.task == other.place.task) {
         let pair: String = of_task.iter().map(figure).collect();
-        let task = of_task.first().map_or("", |film| film.place.task);
+        let task = of_task.first().map_or("", |film| film.place.task.as_str());
         cards += &format!(
             r#"<section class="card"><h3>{}</h3><div class="pair">{pair}</div></section>"#,
             escape(task)
@@ -121,7 +121,7 @@ fn figure(Film { place, content }: &Film) -> String {
     };
     let of = format!("{}, seed {}", escape(&episode.policy), episode.seed);
     let why = episode.why.as_ref().map(|why| format!(": {}", escape(why))).unwrap_or_default();
-    let picture = moments::picture(&film.webp, &format!("A {what} at {}, {of}", escape(place.task)));
+    let picture = moments::picture(&film.webp, &format!("A {what} at {}, {of}", escape(&place.task)));
     format!(
         r#"<figure>{picture}<figcaption><span class="{class}">{what}</span> <span class="soft">{of}{why} ({} times as fast)</span></figcaption></figure>"#,
         (10.0 * film.speed_ratio).round() / 10.0

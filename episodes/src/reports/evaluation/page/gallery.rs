@@ -12,7 +12,7 @@ use crate::reports::evaluation::policy::{
 #[derive(Clone, Debug, PartialEq)]
 pub struct Failure {
     pub policy: String,
-    pub task: &'static str,
+    pub task: String,
     pub seed: u32,
     /// Number of the first phase that counts and was not reached.
     pub phase: String,
@@ -44,7 +44,7 @@ fn failure(policy: &str, found: &FoundEpisode) -> Failure {
     let spec = &found.played.spec;
     Failure {
         policy: policy.into(),
-        task: spec.task.id,
+        task: spec.task.id.clone(),
         seed: spec.seed,
         phase: first_missed_phase(&found.played),
         why: failure_cause(&found.played),
@@ -72,7 +72,7 @@ pub fn html(pictures: &ReportPictures, policies: &[PolicyReport]) -> String {
     };
     let mut shown = String::new();
     for failure in failures.iter().filter(|failure| !failure.moments.is_empty()) {
-        let (task, policy, why) = (escape(failure.task), escape(&failure.policy), escape(&failure.why));
+        let (task, policy, why) = (escape(&failure.task), escape(&failure.policy), escape(&failure.why));
         shown += &format!(
             r#"<p><b>{task}, seed {}</b> {policy}, stuck before {}: {why}</p>{}"#,
             failure.seed,

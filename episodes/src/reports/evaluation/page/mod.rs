@@ -83,10 +83,10 @@ fn played(episodes: usize, tasks: &[&str]) -> String {
 }
 
 /// Returns the tasks that any policy has played, in the order of the list of tasks, then those of files.
-fn tasks(report: &EvaluationReport) -> Vec<&'static str> {
-    let played = || report.policies.iter().flat_map(|policy| &policy.tasks).map(|task| task.task);
-    let known = crate::tasks::cohub().iter().copied().map(|task| task.id);
-    let mut found: Vec<&'static str> = known.filter(|id| played().any(|one| one == *id)).collect();
+fn tasks(report: &EvaluationReport) -> Vec<&str> {
+    let played = || report.policies.iter().flat_map(|policy| &policy.tasks).map(|task| task.task.as_str());
+    let known = crate::tasks::cohub().iter().map(|task| task.id.as_str());
+    let mut found: Vec<&str> = known.filter(|id| played().any(|one| one == *id)).collect();
     for id in played() {
         if !found.contains(&id) {
             found.push(id);

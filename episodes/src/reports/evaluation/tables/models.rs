@@ -51,7 +51,7 @@ fn agents_row(policy: &PolicyReport, task: &TaskReport) -> Option<Vec<String>> {
     let of_success = models.and_then(|models| models.total_usd).filter(|_| success.successes > 0);
     Some(vec![
         policy.name.clone(),
-        task.task.into(),
+        task.task.clone(),
         success.fraction(),
         format!("{reached:.1} of {}", task.phases.len()),
         median(Some(&effort.steps), 1.0, 0),

@@ -7,7 +7,7 @@ use super::*;
 fn films_are_of_one_success_and_one_failure() {
     let mut loaded = found(nine_six_three("agent"));
     let succeeding = tasks::find("pouring").unwrap();
-    loaded.episodes.extend(found(vec![played("agent", succeeding, 4, succeeding.phases.len())]).episodes);
+    loaded.episodes.extend(found(vec![played("agent", &succeeding, 4, succeeding.phases.len())]).episodes);
     // Seeds 0 to 2 of Handover succeeded. The first of these, and of the failed ones, was not recorded.
     for (index, recorded) in [(1, "one"), (2, "two"), (4, "four")] {
         loaded.episodes[index].recording = Some(recorded.into());

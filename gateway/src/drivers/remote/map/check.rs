@@ -198,7 +198,7 @@ impl PolicyMap {
 /// Checks that no key leads through another or to the same place, for any robot.
 fn check_paths(keys: &[&String]) -> Result<(), String> {
     let robots: BTreeSet<&str> =
-        tasks::cohub().iter().copied().flat_map(|task| task.robots).map(|robot| robot.name).collect();
+        tasks::cohub().iter().flat_map(|task| &task.robots).map(|robot| robot.name).collect();
     let paths = |key: &str| -> Vec<Vec<String>> {
         let path = |key: &str| path(key).map(String::from).collect();
         robots.iter().map(|robot| path(&key.replace(ROBOT, robot))).collect()
