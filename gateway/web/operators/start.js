@@ -89,7 +89,7 @@ export function start(main, from = null, wanted = null) {
     ? element("p", {}, `Goes on where ${from.run} stood at ${Number(from.at).toFixed(1)} s: ${words(from.task)}, seed ${from.seed}. It becomes an episode of its own, with a whole budget ahead.`)
     : null;
   main.replaceChildren(
-    element("p", {}, element("a", { href: "/" }, "All episodes")),
+    element("p", {}, element("a", { href: "/" }, "Start page")),
     element("h1", {}, from ? "Take over" : "Operate robots together"),
     element("p", {}, "Each person drives one robot, on a page of their own. Time passes while everybody's page is open and in view, and stands still while one is away. If you are alone, let the expert drive the others."),
     element("form", { onsubmit: begin, class: "operate-form" }, place ?? labelled("Task", task, what),
