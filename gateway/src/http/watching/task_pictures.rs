@@ -20,14 +20,17 @@ const PICTURED_SEED: u32 = 2000;
 /// Size of a picture.
 const SIZE: PictureSize = PictureSize { width: 640, height: 400 };
 
+/// A PNG file.
+type PngBytes = Arc<[u8]>;
+
 /// The pictures rendered so far, by task.
 #[derive(Debug, Clone, Default)]
-pub struct TaskPictures(Arc<Mutex<BTreeMap<&'static str, Arc<[u8]>>>>);
+pub struct TaskPictures(Arc<Mutex<BTreeMap<&'static str, PngBytes>>>);
 
 impl TaskPictures {
     /// Returns the picture of a task as a PNG file. Callers wait for each other, so that at most one
     /// picture is rendered at a time.
-    pub fn of(&self, task: &'static Task) -> Result<Arc<[u8]>, ApiError> {
+    pub fn of(&self, task: &'static Task) -> Result<PngBytes, ApiError> {
         let mut drawn = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(picture) = drawn.get(task.id) {
             return Ok(picture.clone());
