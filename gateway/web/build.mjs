@@ -1,4 +1,4 @@
-// Makes dist/page.js of src/ and operators/. With --check, says whether the committed file is what the sources give, and changes nothing.
+// Makes dist/page.js of src/, home/ and operators/. With --check, says whether the committed file is what the sources give, and changes nothing.
 import { readFile, writeFile } from "node:fs/promises";
 import { gzipSync } from "node:zlib";
 import { build } from "esbuild";

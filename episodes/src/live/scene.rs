@@ -35,6 +35,9 @@ struct Drawing {
 }
 
 impl LiveScene {
+    /// Name of the camera that sees the room.
+    pub const THIRD_PERSON: &str = "third_person";
+
     /// Returns the scene of the episode `spec`, which runs in `world` with the robots of `motions`.
     pub(crate) fn of(spec: &EpisodeSpec, world: &World, motions: &[Motion]) -> LiveScene {
         let scenery = stress::scenery(spec.stress, spec.world_seed(), world);
@@ -96,10 +99,13 @@ impl LiveScene {
     }
 
     /// Renders the view of robot `name` after `step` as a PNG file; `None` if there is no such robot. The
-    /// episode does not wait for it.
+    /// name [`LiveScene::THIRD_PERSON`] is that of the room's camera. The episode does not wait for it.
     pub fn picture(&self, step: &Step, name: &str) -> Option<Result<Vec<u8>, PictureError>> {
-        let robot = self.robots.iter().position(|robot| robot.name == name)?;
-        let camera: Camera = self.cameras.egocentric(step, robot);
+        let camera: Camera = match self.robots.iter().position(|robot| robot.name == name) {
+            Some(robot) => self.cameras.egocentric(step, robot),
+            None if name == LiveScene::THIRD_PERSON => self.cameras.third_person(),
+            None => return None,
+        };
         let mut drawing = self.drawing.lock().unwrap_or_else(PoisonError::into_inner);
         let Drawing { kind, scenery, renderer } = &mut *drawing;
         let renderer = match renderer {

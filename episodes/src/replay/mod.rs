@@ -10,7 +10,7 @@ mod video;
 pub use look_back::RecordedEpisode;
 pub use phase_trace::{Closest, ConditionTrace, Held, Moment, PartTrace, PhaseTrace};
 pub use pictures::{DrawnPictures, PicturesError, PicturesPlan, draw_all};
-pub use scene::{EpisodeCamera, EpisodeRenderer, PictureSize};
+pub use scene::{EpisodeCamera, EpisodeRenderer, PictureSize, start_picture};
 pub use verify::{Difference, Verdict, Verification, verify};
 pub use video::{ShortFilm, VideoError, VideoFormat, film, short_film};
 

@@ -1,5 +1,7 @@
 //! Cameras of a recorded episode, and images of its steps. Nothing is simulated.
 
+use std::sync::Arc;
+
 use tandem_sim::Step;
 use tandem_sim::render::{Camera, Frame};
 
@@ -52,6 +54,18 @@ impl EpisodeCamera {
             format!("no camera {name:?} in an episode of {}; have: {}", task.id, have.join(", "))
         })
     }
+}
+
+/// Renders the start of the episode `spec`, seen by its third-person camera, as a PNG file.
+///
+/// # Errors
+///
+/// If the world cannot be built or the image cannot be encoded.
+pub fn start_picture(spec: &EpisodeSpec, size: PictureSize) -> Result<Arc<[u8]>, EpisodeError> {
+    let world = build(spec)?.world;
+    let mut renderer = EpisodeRenderer { observer: Observer::new(spec, &world) };
+    let picture = renderer.colours(EpisodeCamera::ThirdPerson, &world.present(), Some(size));
+    Ok(picture.png()?)
 }
 
 /// Renderer of the steps of one episode.

@@ -45,7 +45,8 @@ pub fn run(args: ServeArgs) -> CommandResult {
         Server::start_for(settings, Guests { partner: args.partner.policy()?, ..Guests::default() })?;
     // The links are secret, so they are not logged. If they cannot be printed, for example on a full
     // disk, the server runs all the same.
-    let _ = print(&format!("watch at {}\noperate at {}\n", server.watch_link(), server.operate_link()));
+    let [start, watch, operate] = [&server.start_link(), server.watch_link(), &server.operate_link()];
+    let _ = print(&format!("start at {start}\nwatch at {watch}\noperate at {operate}\n"));
     let left = server.run_until_signal();
     Ok(if left.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

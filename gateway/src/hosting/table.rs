@@ -339,6 +339,13 @@ impl EpisodeTable {
         EpisodeList { episodes: self.lock().episodes.values().map(HostedEpisode::entry).collect() }
     }
 
+    /// Lists the episodes that are put aside until somebody asks for them, by id. A picture would wake them.
+    pub fn asleep(&self) -> Vec<String> {
+        let held = self.lock();
+        let asleep = held.episodes.values().filter(|episode| episode.thread.sleeps());
+        asleep.map(|episode| episode.id().to_owned()).collect()
+    }
+
     /// Returns true if `who` is an operator that may talk to others.
     pub fn may_talk(&self, who: &Caller) -> bool {
         match who {

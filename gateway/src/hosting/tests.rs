@@ -182,6 +182,7 @@ async fn an_episode_that_was_put_aside_is_as_it_was() {
             }
             assert!(!hosted.thread.ended());
         }
+        assert_eq!(table.asleep(), if sleeps { vec![id.clone()] } else { Vec::new() });
         let again = table.awake(&id).await.unwrap();
         let again = again.call(&Caller::Host, wait().into(), Some("second")).await.unwrap();
         assert!(again.replayed && again.reply.step == first.reply.step);

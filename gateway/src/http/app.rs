@@ -12,7 +12,7 @@ use tokio::sync::Semaphore;
 
 use super::{
     problem::ApiError,
-    watching::{KnownEvaluations, MAX_WATCHERS, RecordingReader, WatchKey},
+    watching::{KnownEvaluations, MAX_WATCHERS, RecordingReader, TaskPictures, WatchKey},
 };
 use crate::{
     hosting::{Caller, EpisodeTable},
@@ -39,6 +39,8 @@ pub struct AppState {
     pub films: RecordingReader,
     /// Evaluations in the runs folder, as of their last listing.
     pub evaluations: KnownEvaluations,
+    /// Pictures of the tasks for the start page.
+    pub task_pictures: TaskPictures,
 }
 
 impl AppState {
@@ -46,8 +48,8 @@ impl AppState {
     pub fn new(table: Arc<EpisodeTable>, settings: Arc<Settings>, watch_key: WatchKey) -> AppState {
         let watchers = Arc::new(Semaphore::new(MAX_WATCHERS));
         let (recordings, films) = (RecordingReader::start(), RecordingReader::start());
-        let evaluations = KnownEvaluations::default();
-        AppState { table, settings, watch_key, watchers, recordings, films, evaluations }
+        let (evaluations, task_pictures) = (KnownEvaluations::default(), TaskPictures::default());
+        AppState { table, settings, watch_key, watchers, recordings, films, evaluations, task_pictures }
     }
 
     /// Returns the tools that `caller` may use. Talking is only for operators that may talk.

@@ -27,6 +27,7 @@ pub fn router(app: AppState, gate: Gate, limits: Limits) -> Router {
     let operating = if app.table.is_evaluation() { Router::new() } else { pages::operate::router() };
     let routed = rest::router()
         .merge(pages::router())
+        .merge(pages::home::router())
         .merge(operating)
         .nest_service("/mcp", mcp::router(app.clone()))
         .fallback(no_route)

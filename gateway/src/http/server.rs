@@ -115,8 +115,16 @@ impl Server {
 
     /// Returns the link of the page on which people start episodes and drive robots.
     pub fn operate_link(&self) -> String {
-        let (origin, _) = self.watch_link.split_once(WATCH).unwrap_or((&self.watch_link, ""));
-        format!("{origin}{OPERATE}")
+        format!("{}{OPERATE}", self.origin())
+    }
+
+    /// Returns the link of the start page.
+    pub fn start_link(&self) -> String {
+        format!("{}/", self.origin())
+    }
+
+    fn origin(&self) -> &str {
+        self.watch_link.split_once(WATCH).map_or(&self.watch_link, |(origin, _)| origin)
     }
 
     /// Starts `spec` under the name `id` with its files in `folder`, for an evaluation in this process.

@@ -1,20 +1,11 @@
 // A link for a person at this screen, and as a QR code for one with a telephone or a headset.
 
-import { element, say } from "../src/dom.js";
+import { copying, element } from "../src/dom.js";
 
 /** A row of a list: the link, its QR code below, and further text. `token` is that of whoever shows it. */
 export async function linkRow(name, href, token, text = "") {
   const link = element("a", { href, target: "_blank", rel: "noopener" }, name);
-  return element("li", {}, link, " ", copying(href), text && element("div", { class: "soft" }, text), await code(href, token));
-}
-
-/** What puts a link where it can be pasted from; browsers let pages do so that came over HTTPS or from their own machine. */
-function copying(href) {
-  if (!navigator.clipboard) return "";
-  const copy = element("button", { type: "button", class: "small", onclick: () => {
-    navigator.clipboard.writeText(href).then(() => say(copy, "Copied"), () => say(copy, "Not copied: use the link's menu"));
-  } }, "Copy link");
-  return copy;
+  return element("li", {}, link, " ", copying(() => href, "Copy link"), text && element("div", { class: "soft" }, text), await code(href, token));
 }
 
 /** Whom the links of this page are for, where they name this machine by an address that each machine calls itself by. */

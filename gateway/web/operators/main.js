@@ -24,6 +24,7 @@ export function operate(main) {
   addEventListener("hashchange", () => location.hash.includes("token=") && (seat(), location.reload()));
   const asked = new URLSearchParams(location.search);
   if (asked.has("run")) return start(main, Object.fromEntries(asked));
+  if (asked.has("task")) return start(main, null, asked.get("task"));
   const held = seat();
   if (!held) return start(main);
   if (held.collection) return held.robot ? collect(main, held) : overview(main, held);

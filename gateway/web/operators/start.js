@@ -19,8 +19,8 @@ const playersWith = (policy) => [
   ["program", "a program or an agent of yours"], ["still", "nobody: it stands still"],
 ];
 
-/** Shows the form: of a new episode, or of one that goes on where `from`, a finished one, stood at a moment. */
-export function start(main, from = null) {
+/** Shows the form: of a new episode, of the task `wanted` if one was chosen, or of one that goes on where `from`, a finished one, stood at a moment. */
+export function start(main, from = null, wanted = null) {
   const task = element("select", { name: "task", required: true });
   const seed = element("input", { name: "seed", type: "number", min: 0, max: 4294967295, step: 1, value: 0, required: true });
   const protocol = element("select", { name: "protocol" });
@@ -54,7 +54,7 @@ export function start(main, from = null) {
       return;
     }
     const offered = from ? tasks.filter(({ id }) => id === from.task) : tasks;
-    task.replaceChildren(...offered.map(({ id, instruction }) => element("option", { value: id, title: instruction }, id)));
+    task.replaceChildren(...offered.map(({ id, instruction }) => element("option", { value: id, title: instruction, selected: id === wanted }, id)));
     offer();
   };
   task.addEventListener("change", offer);
@@ -89,7 +89,7 @@ export function start(main, from = null) {
     ? element("p", {}, `Goes on where ${from.run} stood at ${Number(from.at).toFixed(1)} s: ${words(from.task)}, seed ${from.seed}. It becomes an episode of its own, with a whole budget ahead.`)
     : null;
   main.replaceChildren(
-    element("p", {}, element("a", { href: "/" }, "All episodes")),
+    element("p", {}, element("a", { href: "/" }, "Start page")),
     element("h1", {}, from ? "Take over" : "Operate robots together"),
     element("p", {}, "Each person drives one robot, on a page of their own. Time passes while everybody's page is open and in view, and stands still while one is away. If you are alone, let the expert drive the others."),
     element("form", { onsubmit: begin, class: "operate-form" }, place ?? labelled("Task", task, what),

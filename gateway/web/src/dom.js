@@ -38,5 +38,18 @@ export async function ask(path) {
   throw new Error(problem.detail ?? `the server answers ${answer.status}`);
 }
 
+/** A small label of a state; `kind` is its colour. */
+export const badge = (text, kind) => element("span", { class: `badge ${kind}` }, text);
+
+/** A button that copies a text. Browsers let pages copy that came over HTTPS or from their own machine; others get no button. */
+export function copying(text, label = "Copy") {
+  if (!navigator.clipboard) return null;
+  const copy = element("button", { type: "button", class: "small", onclick: () => {
+    navigator.clipboard.writeText(text()).then(() => say(copy, "Copied"), () => say(copy, "Not copied: select the text"));
+    setTimeout(() => say(copy, label), 2000);
+  } }, label);
+  return copy;
+}
+
 /** Colours of robots, which are those of their accents. */
 export const robotColour = (robot) => colour(["--a", "--b", "--c"][robot % 3]);

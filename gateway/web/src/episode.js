@@ -1,8 +1,8 @@
 // The page of one episode, running or finished.
 
-import { badge } from "./cards.js";
-import { ask, element, endOf, say, words } from "./dom.js";
+import { ask, badge, element, endOf, say, words } from "./dom.js";
 import { Frame, readScene } from "./message.js";
+import { Player } from "./player.js";
 import { BudgetPlots, Plots } from "./plots.js";
 import { Pace, Stage } from "./stage.js";
 import { Story } from "./story.js";
@@ -119,25 +119,9 @@ class EpisodePage {
   }
 
   scrubber() {
-    const { time } = this;
-    this.play = element("button", { class: "play", onclick: () => this.toggle() }, "Play");
-    const step = (way, text, title) => element("button", { title, "aria-label": title, onclick: () => this.timeline.step(way) }, text);
-    this.moment = element("output");
-    const speed = element("select", { "aria-label": "Speed", onchange: (event) => { time.speed = Number(event.target.value); } },
-      ...[0.25, 1, 4, 10].map((factor) => element("option", { value: factor, selected: factor === 1 }, `${factor}x`)));
-    addEventListener("keydown", (event) => {
-      if (event.target.closest("input, select, button, summary, a, textarea")) return;
-      if (event.key === " ") this.toggle();
-      else if (event.key === "ArrowLeft") time.seek(time.time - 0.1);
-      else if (event.key === "ArrowRight") time.seek(time.time + 0.1);
-      else if (event.key === "p") this.timeline.step(-1);
-      else if (event.key === "n") this.timeline.step(1);
-      else return;
-      event.preventDefault();
-    });
-    return element("div", { class: "scrubber" },
-      element("div", { class: "tools" }, step(-1, "◀", "The call before"), this.play, step(1, "▶", "The next call"), speed, this.moment, this.taking()),
-      this.timeline.node);
+    this.player = new Player(this.time, (way) => this.timeline.step(way));
+    this.player.node.append(this.taking());
+    return element("div", { class: "scrubber" }, this.player.node, this.timeline.node);
   }
 
   /** Goes on from the moment that is shown, as an episode of its own whose robots people drive. */
@@ -148,10 +132,6 @@ class EpisodePage {
       location.assign(`/operate?${from}`);
     };
     return element("button", { class: "take", title: "People drive the robots from here on, in an episode of its own", onclick: go }, "Take over here");
-  }
-
-  toggle() {
-    this.time.play(!this.time.playing);
   }
 
   files() {
@@ -234,8 +214,7 @@ class EpisodePage {
     if (this.recorded) {
       this.timeline.show();
       this.story.follow(this.time.time);
-      say(this.moment, `${this.time.time.toFixed(2)} of ${this.time.end.toFixed(1)} s`);
-      say(this.play, this.time.playing ? "Pause" : "Play");
+      this.player.show();
     }
     return this.stage.draw();
   }

@@ -1,6 +1,7 @@
-// `/watch`: the episodes as cards, and each on a page of its own. `/operate`: people drive robots.
+// `/`: the start page. `/watch`: the episodes as cards, each on a page of its own, and two side by side. `/operate`: people drive robots.
 
-import { cards } from "./cards.js";
+import { episodes, home } from "../home/main.js";
+import { besideEachOther } from "./beside.js";
 import { element } from "./dom.js";
 import { episode } from "./episode.js";
 import { operate } from "../operators/main.js";
@@ -10,9 +11,11 @@ const wanted = new URLSearchParams(location.search);
 
 const page = async () => {
   if (location.pathname.startsWith("/operate")) return operate(main);
+  if (location.pathname === "/") return home(main);
   if (wanted.has("episode")) return episode(main, { episode: wanted.get("episode") });
+  if (wanted.has("beside")) return besideEachOther(main, [wanted.get("run"), wanted.get("beside")], Number(wanted.get("at")) || 0);
   if (wanted.has("run")) return episode(main, { run: wanted.get("run"), at: Number(wanted.get("at")) || 0 });
-  return cards(main);
+  return episodes(main);
 };
 
 page().catch((error) => {

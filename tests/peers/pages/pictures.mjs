@@ -90,7 +90,7 @@ await pictures(page, "take-over");
 
 // One that went wrong.
 await page.goto(`${base}/watch`);
-await page.locator("a.card", { has: page.locator(".badge.bad"), hasText: "replayed" }).first().click();
+await page.locator(".card", { has: page.locator(".badge.bad"), hasText: "replayed" }).first().click();
 await page.waitForSelector(".scrubber");
 await pictures(page, "failed", SCENE);
 await page.goto(`${base}/watch?run=nothing`);

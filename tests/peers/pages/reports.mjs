@@ -31,7 +31,7 @@ await pictures(page, "from-report", { heights: { 400: 640, 1400: 1400, 2500: 140
 
 // A card of a failed episode opens where it failed, which is its end.
 await page.goto(`${base}/watch`);
-await page.locator("a.card", { has: page.locator(".badge.bad") }).first().click();
+await page.locator(".card", { has: page.locator(".badge.bad") }).first().click();
 const moment = page.locator(".scrubber output");
 await moment.waitFor({ timeout: PATIENCE_MS });
 const [at, end] = (await moment.innerText()).match(/[\d.]+/g).map(Number);

@@ -20,7 +20,7 @@ await accessible(stranger, "the door");
 // A live one.
 const { episode_id: id } = await call("/v1/episodes", { task: "handover", seed: 2000, protocol: "benchmark" });
 await page.waitForSelector(".card .live");
-await page.click(".card");
+await page.click(".card h3 a");
 await page.waitForSelector(".view canvas");
 await page.check("#look");
 const tool = (name, body) => call(`/v1/episodes/${id}/tools/${name}`, body);

@@ -236,6 +236,8 @@ fn a_finished_episode_can_be_looked_at_again() {
     assert_eq!(story.len(), 3);
     assert_eq!((&story[2]["number"], &story[2]["seen"]), (&json!(3), &json!(["B"])));
     let again = get(&server, &format!("/watch/camera?run={id}&robot=B&time_s=0.2"));
+    let room = get(&server, &format!("/watch/camera?run={id}&robot=third_person&time_s=0.2"));
+    assert!(room.0 == 200 && room.1.starts_with(b"\x89PNG") && room != again);
     assert!(again == seen && again.0 == 200, "the robot's picture is the same, live and drawn again");
     let (status, film) = get(&server, &format!("/watch/film?run={id}"));
     assert!(status == 200 && film.starts_with(b"RIFF"));

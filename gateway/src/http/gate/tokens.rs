@@ -18,7 +18,7 @@ use crate::{
         pages::{
             WATCH, door,
             drive::{DRIVE, ENTER, GivenToken, drivers},
-            operate,
+            home, operate,
         },
         problem::ApiError,
         watching::{Host, Watcher},
@@ -28,8 +28,8 @@ use crate::{
 /// Adds the [`Caller`] to a request and removes the token from it.
 pub async fn identify(State(app): State<AppState>, mut request: Request, next: Next) -> Response {
     let watches = is_watching(request.uri().path()) && app.watch_key.opens(request.headers());
-    // The operators' page has only public content.
-    if operate::is_open(request.uri().path()) {
+    // The start page and the operators' page have only public content.
+    if operate::is_open(request.uri().path()) || home::is_open(request.uri().path(), request.headers()) {
         request.headers_mut().remove(header::COOKIE);
         request.headers_mut().remove(header::AUTHORIZATION);
         // No page reads a body, so it is not awaited.

@@ -11,7 +11,7 @@ use axum::{
     http::header,
     response::{IntoResponse, Response},
 };
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use tandem_episodes::{EpisodeError, RESULT_FILE, Recording, replay::short_film};
 
 use super::Wanted;
@@ -25,10 +25,14 @@ use crate::{
 };
 
 /// Maximum number of listed episodes, newest first.
-const MAX_LISTED: usize = 200;
+const MAX_LISTED: usize = 500;
 
 /// Depth of the search for episodes below the runs folder; an evaluation nests its own in subfolders.
 const DEPTH: usize = 4;
+
+/// Fields of a result that a list has; hundreds of results with all their fields would be megabytes.
+const LISTED_FIELDS: [&str; 10] =
+    ["task", "seed", "protocol", "phases", "success", "ended", "env_steps", "tool_calls", "falls", "usage"];
 
 /// Files of an episode's folder that may be fetched, with their media types.
 const FILES: [(&str, &str); 4] = [
@@ -48,15 +52,33 @@ pub fn list(runs: &Path, running: &[String]) -> Vec<Value> {
         if running.contains(&run) {
             return None;
         }
-        let result: Value = serde_json::from_slice(&fs::read(folder.join(RESULT_FILE)).ok()?).ok()?;
+        let mut result = read_object(&folder.join(RESULT_FILE))?;
+        result.retain(|field, _| LISTED_FIELDS.contains(&field.as_str()));
+        let policy = policy_of(&folder, &result);
         let ended_s = at.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |since| since.as_secs());
         let recorded = folder.join(RECORDING).is_file();
         let strip = folder.join("strip.png").is_file();
-        Some(
-            json!({ "run": run, "result": result, "ended_unix_s": ended_s, "recorded": recorded, "strip": strip }),
-        )
+        Some(json!({
+            "run": run, "policy": policy, "result": result, "ended_unix_s": ended_s, "recorded": recorded, "strip": strip,
+        }))
     };
     found.into_iter().filter_map(entry).take(MAX_LISTED).collect()
+}
+
+fn read_object(path: &Path) -> Option<Map<String, Value>> {
+    serde_json::from_slice(&fs::read(path).ok()?).ok()
+}
+
+/// Returns the name of the policy that played an episode: its evaluation's entry, which is a file beside the
+/// episode's folder, has it. An episode without one may have notes that name models.
+fn policy_of(folder: &Path, result: &Map<String, Value>) -> Option<String> {
+    let entry = read_object(&folder.with_added_extension("json"));
+    let named = entry.and_then(|entry| entry.get("policy")?.as_str().map(str::to_owned));
+    named.or_else(|| {
+        let models = result.get("usage")?["models"].as_array()?;
+        let models: Vec<&str> = models.iter().filter_map(Value::as_str).collect();
+        (!models.is_empty()).then(|| models.join(", "))
+    })
 }
 
 fn collect(folder: &Path, depth: usize, found: &mut Vec<(SystemTime, PathBuf)>) {
@@ -137,4 +159,39 @@ pub async fn file(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> 
         (header::CONTENT_DISPOSITION, format!("inline; filename=\"{name}\"")),
     ];
     Ok((headers, bytes).into_response())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the policies of the list of a folder with one finished episode and these files.
+    fn listed(result: &Value, entry: Option<&Value>) -> Vec<Value> {
+        let runs = tempfile::tempdir().unwrap();
+        let folder = runs.path().join("run/episodes/handover.v1-7");
+        fs::create_dir_all(&folder).unwrap();
+        fs::write(folder.join(RESULT_FILE), result.to_string()).unwrap();
+        if let Some(entry) = entry {
+            fs::write(runs.path().join("run/episodes/handover.v1-7.json"), entry.to_string()).unwrap();
+        }
+        list(runs.path(), &[])
+    }
+
+    #[test]
+    fn an_episode_names_who_played_it() {
+        let result = json!({ "task": "handover", "state_hash": "12ab" });
+        let models = json!({ "task": "handover", "usage": { "models": ["one", "other"] } });
+        let entry = json!({ "policy": "expert", "task": "handover" });
+        for (result, entry, policy) in [
+            (&result, None, Value::Null),
+            (&models, None, json!("one, other")),
+            (&models, Some(&entry), json!("expert")),
+        ] {
+            let listed = listed(result, entry);
+            assert_eq!((listed.len(), &listed[0]["policy"]), (1, &policy));
+            assert_eq!(listed[0]["run"], "run/episodes/handover.v1-7");
+            assert_eq!(listed[0]["result"]["task"], "handover");
+            assert!(listed[0]["result"].get("state_hash").is_none(), "{listed:?}");
+        }
+    }
 }

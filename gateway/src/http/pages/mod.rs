@@ -1,9 +1,10 @@
-//! Web pages: `/watch` shows running and finished episodes. A page gets its data over a WebSocket; its
-//! script and style are embedded in this binary from `gateway/web`.
+//! Web pages: `/` is the start page, `/watch` shows running and finished episodes. A page gets its data over
+//! a WebSocket; its script and style are embedded in this binary from `gateway/web`.
 
 mod collecting;
 pub mod drive;
 mod finished;
+pub mod home;
 mod live;
 pub mod operate;
 pub mod qr;
@@ -130,7 +131,7 @@ async fn episodes(State(app): State<AppState>) -> Result<Response, ApiError> {
     let found = blocking(move || Ok((finished::list(&runs, &running), app.evaluations.list(&runs)))).await?;
     let (finished, evaluations) = found;
     let told = json!({
-        "version": super::app::VERSION, "held": held.episodes, "evaluations": evaluations, "finished": finished,
+        "version": super::app::VERSION, "held": held.episodes, "asleep": app.table.asleep(), "evaluations": evaluations, "finished": finished,
     });
     Ok(axum::Json(told).into_response())
 }

@@ -22,6 +22,7 @@ use tandem_tools_spec::{
 use super::{
     app::{AppState, VERSION, counted},
     encoding::Encoding,
+    pages::{self, home::wants_page},
     problem::ApiError,
 };
 use crate::{
@@ -29,6 +30,9 @@ use crate::{
     metrics::MetricsPage,
 };
 use idempotency::{IdempotencyKey, mark_replayed};
+
+/// Header of answers that are a page for browsers and a text for programs.
+const BY_ACCEPT: (header::HeaderName, &str) = (header::VARY, "accept");
 
 /// Returns every route: path, methods, handlers.
 fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>); 14] {
@@ -110,35 +114,31 @@ async fn openapi(State(app): State<AppState>, Extension(caller): Extension<Calle
     Json(app.openapi(&caller))
 }
 
-/// Returns the description of the interface as a page.
+/// Returns the description of the interface, as a page or as text.
 async fn docs(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
     headers: HeaderMap,
 ) -> Response {
     let document = app.openapi(&caller);
-    page(&headers, || docs::page(&document), || docs::brief(&document))
+    let answer = match wants_page(&headers) {
+        true => {
+            let policy = (header::CONTENT_SECURITY_POLICY, "default-src 'none'; style-src 'unsafe-inline'");
+            ([policy], Html(docs::page(&document))).into_response()
+        }
+        false => docs::brief(&document).into_response(),
+    };
+    ([BY_ACCEPT], answer).into_response()
 }
 
-/// Returns the start page.
-async fn home(
-    State(app): State<AppState>,
-    Extension(caller): Extension<Caller>,
-    headers: HeaderMap,
-) -> Response {
-    page(&headers, || home::page(VERSION, &app.table.list(&caller), &caller), || home::brief(VERSION))
-}
-
-/// Returns a self-contained page. A client that does not ask for HTML, such as a language model, gets a
-/// short text instead.
-fn page(headers: &HeaderMap, html: impl Fn() -> String, text: impl Fn() -> String) -> Response {
-    let vary = (header::VARY, "accept");
-    let accepts = headers.get_all(header::ACCEPT).iter().filter_map(|value| value.to_str().ok());
-    if !accepts.into_iter().any(|accept| accept.contains("text/html")) {
-        return ([vary], text()).into_response();
-    }
-    let policy = (header::CONTENT_SECURITY_POLICY, "default-src 'none'; style-src 'unsafe-inline'");
-    ([policy, vary], Html(html())).into_response()
+/// Returns the start page. A client that does not ask for HTML, such as a language model, gets a short
+/// text instead.
+async fn home(State(app): State<AppState>, headers: HeaderMap) -> Response {
+    let answer = match wants_page(&headers) {
+        true => pages::home::page(&app),
+        false => home::brief(VERSION).into_response(),
+    };
+    ([BY_ACCEPT], answer).into_response()
 }
 
 async fn episodes(

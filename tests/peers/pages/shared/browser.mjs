@@ -53,7 +53,7 @@ export async function open(link, { before, ...options } = {}) {
   });
   if (sources) {
     // The page itself stays the server's: one that came from elsewhere may open no socket to this machine.
-    await context.route(/\/(watch|operate)\/page\./, (route) => {
+    await context.route(/\/(home|watch|operate)\/page\./, (route) => {
       const name = new URL(route.request().url()).pathname.endsWith("css") ? "style.css" : "dist/page.js";
       return route.fulfill({ path: join(sources, name) });
     });

@@ -1,4 +1,4 @@
-//! Tests of the episodes that each caller sees: in the list, and on the start page for browsers.
+//! Tests of the episodes that each caller sees in the list, and of the start page.
 
 use serde_json::{Value, json};
 use tandem::{settings::Layer, token::Token};
@@ -93,15 +93,14 @@ fn who_has_a_token_sees_its_own_episodes() {
     assert_eq!(ids(&list(TOKEN)), [own, team_id]);
     assert_eq!(ids(&list(operator)), [team_id], "the other episode is not an operator's to know of");
     let stranger = "nobody-has-this-token";
-    for path in ["/v1/episodes", "/"] {
+    for path in ["/v1/episodes", "/home/picture?task=handover"] {
         let (status, text) = asked(&server, stranger, path);
-        assert!(status == 401 && !text.contains("handover"), "{path}: {text}");
+        assert!(status == 401 && !text.contains(own), "{path}: {text}");
     }
-    let (_, host) = asked(&server, TOKEN, "/");
-    assert!([own, team_id].iter().all(|id| host.contains(&format!(">{id}</a>"))), "{host}");
-    let (_, page) = asked(&server, operator, "/");
-    assert!(page.contains(&format!(">{team_id}</a>")) && !page.contains(&format!(">{own}</a>")), "{page}");
-    assert!(![&host, &page].iter().any(|page| page.contains(operator) || page.contains(TOKEN)));
+    // The start page is the same for everybody.
+    let pages = [stranger, TOKEN, operator].map(|token| asked(&server, token, "/"));
+    assert!(pages[0].0 == 200 && pages.iter().all(|page| *page == pages[0]), "{pages:?}");
+    assert!(![own, team_id, operator, TOKEN].iter().any(|text| pages[0].1.contains(text)), "{pages:?}");
 }
 
 /// A language model reads pages with a program that does not ask for HTML.
@@ -133,13 +132,25 @@ fn a_browser_finds_a_page_that_leads_on() {
             .to_str()
             .is_ok_and(|policy| policy.starts_with("default-src 'none'"))
     );
-    assert!(page.contains("None runs"), "{page}");
-    let links: Vec<&str> = page.split("href=\"").skip(1).filter_map(|rest| rest.split('"').next()).collect();
-    assert!(links.contains(&"/docs") && links.len() > 3, "{links:?}");
+    let named = |attribute: &str| -> Vec<String> {
+        let values = page.split(attribute).skip(1).filter_map(|rest| rest.split('"').next());
+        values.filter(|value| value.starts_with('/')).map(str::to_owned).collect()
+    };
+    let links = [named("href=\""), named("src=\"")].concat();
+    for expected in ["/docs", "/home/page.css", "/home/page.js"] {
+        assert!(links.iter().any(|link| link == expected), "{expected}: {links:?}");
+    }
     links.iter().for_each(|link| drop(server.page(link)));
-    let id = server.episode("benchmark");
-    let (_, page) = server.page("/");
-    assert!(page.contains(&format!("<a href=\"/v1/episodes/{id}\">{id}</a>")), "{page}");
-    server.page(&format!("/v1/episodes/{id}"));
+    assert!(page.contains(" data-starts") && !page.contains("http://") && !page.contains("https://"), "{page}");
     assert!(server.page("/docs").1.contains("id=\"list_episodes\""));
+}
+
+#[test]
+fn each_task_has_a_picture() {
+    let server = TestServer::start();
+    let (status, headers, picture) = server.ask("GET", "/home/picture?task=table_align", &[], b"");
+    assert_eq!((status, &headers["content-type"]), (200, &"image/png".parse().unwrap()));
+    assert!(picture.starts_with(b"\x89PNG"));
+    let (status, _, problem) = server.ask("GET", "/home/picture?task=nope", &[], b"");
+    assert!(status == 404 && String::from_utf8_lossy(&problem).contains("handover"), "{status}");
 }

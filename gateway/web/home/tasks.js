@@ -1,0 +1,152 @@
+// The tasks with their pictures, and the start of an episode.
+
+import { call } from "../operators/call.js";
+import { element, say, words } from "../src/dom.js";
+
+const CONTROL_HZ = 50;
+
+export class Tasks {
+  /** `onStart` is given the id, the task and the seed of an episode that was started. */
+  constructor(token, onStart) {
+    Object.assign(this, { token, onStart });
+    this.seed = element("input", {
+      type: "number",
+      name: "seed",
+      min: 0,
+      max: 4294967295,
+      step: 1,
+      value: 0,
+      required: true,
+    });
+    this.protocol = element(
+      "select",
+      { name: "protocol" },
+      element("option", {}, "agentic"),
+      element("option", {}, "benchmark"),
+    );
+    this.grid = element("div", { class: "cards" });
+    this.node = element(
+      "section",
+      { id: "tasks", "aria-labelledby": "tasks-title", hidden: true },
+      element("h2", { id: "tasks-title" }, "Tasks"),
+      element(
+        "p",
+        { class: "soft" },
+        "Start an episode for an agent or a program, or drive the robots yourself. Equal seeds give equal starts.",
+      ),
+      element(
+        "form",
+        { class: "filters", "aria-label": "Start of an episode", onsubmit: (event) => event.preventDefault() },
+        element("label", {}, element("span", {}, "Seed"), this.seed),
+        element("label", {}, element("span", {}, "Rules"), this.protocol),
+      ),
+      this.grid,
+    );
+  }
+
+  /** Takes over the list of tasks, and asks for their pictures. The first one's is shown in `front`, too. */
+  take(tasks, front) {
+    this.node.hidden = false;
+    if (tasks.length) this.draw(front, tasks[0].id);
+    const cards = tasks.map((task) => this.card(task));
+    this.grid.replaceChildren(...cards.map(({ node }) => node));
+    // A picture is rendered at its first request: those at the top come first.
+    const seen = new IntersectionObserver(
+      (changes) => {
+        for (const { isIntersecting, target } of changes) {
+          if (!isIntersecting) continue;
+          seen.unobserve(target);
+          cards.find(({ node }) => node === target).draw();
+        }
+      },
+      { rootMargin: "300px" },
+    );
+    for (const { node } of cards) seen.observe(node);
+  }
+
+  card(task) {
+    const { id, suite, instruction, robots, phases, protocols } = task;
+    const picture = element("img", { alt: "" });
+    const told = element("p", { class: "bad", role: "alert" });
+    const done = element("p", { role: "status" });
+    const start = element(
+      "button",
+      {
+        type: "button",
+        class: "primary",
+        "aria-label": `Start ${words(id)}`,
+        onclick: () => this.start(task, start, told, done),
+      },
+      "Start",
+    );
+    const longest = Math.max(...protocols.map(({ episode_steps: steps }) => steps)) / CONTROL_HZ;
+    const facts = [
+      `${robots.length} robots`,
+      phases.length ? `${phases.length} phases` : null,
+      `up to ${longest.toFixed(0)} s`,
+      suite,
+    ].filter(Boolean);
+    const node = element(
+      "article",
+      { class: "card task" },
+      element("div", { class: "picture" }, picture),
+      element("h3", { class: "name" }, words(id)),
+      element("div", { class: "soft" }, facts.join(" · ")),
+      element("p", { class: "goal" }, instruction),
+      element(
+        "div",
+        { class: "tools" },
+        start,
+        element(
+          "a",
+          {
+            class: "action",
+            href: `/operate?task=${encodeURIComponent(id)}`,
+            "aria-label": `Drive ${words(id)}`,
+          },
+          "Drive",
+        ),
+      ),
+      told,
+      done,
+    );
+    return { node, draw: () => this.draw(picture, id) };
+  }
+
+  async draw(picture, id) {
+    const headers = this.token.value ? { authorization: `Bearer ${this.token.value}` } : {};
+    const answer = await fetch(`/home/picture?task=${encodeURIComponent(id)}`, { headers });
+    if (!answer.ok) return;
+    picture.src = URL.createObjectURL(await answer.blob());
+    await picture.decode().catch(() => null);
+    URL.revokeObjectURL(picture.src);
+  }
+
+  async start({ id }, press, told, done) {
+    if (!this.seed.reportValidity()) return;
+    const seed = Number(this.seed.value);
+    say(told, "");
+    // A second press would begin a second episode.
+    press.disabled = true;
+    try {
+      const { episode_id: episode } = await call("/v1/episodes", this.token.value, {
+        task: id,
+        seed,
+        protocol: this.protocol.value,
+        short: true,
+      });
+      done.replaceChildren(
+        element("strong", {}, episode),
+        " waits for its first command. ",
+        element("a", { href: `/watch?episode=${encodeURIComponent(episode)}` }, "Watch it"),
+        " or ",
+        element("a", { href: "#connect" }, "connect an agent"),
+        ".",
+      );
+      this.onStart({ episode, task: id, seed });
+    } catch (error) {
+      say(told, error.message);
+    }
+    press.disabled = false;
+  }
+}

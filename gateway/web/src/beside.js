@@ -1,0 +1,133 @@
+// Two finished episodes side by side on one clock.
+
+import { ask, badge, element, endOf, words } from "./dom.js";
+import { readScene } from "./message.js";
+import { Player } from "./player.js";
+import { Pace, Stage } from "./stage.js";
+import { Targets } from "./targets.js";
+import { RecordedTime } from "./time.js";
+
+/** Where drawing both takes longer, it is made simpler. */
+const SLOW_FRAME_MS = 80;
+
+/** Shows the episodes of two folders from a moment. @param {string[]} runs */
+export async function besideEachOther(main, runs, at) {
+  const sides = [];
+  for (const run of runs)
+    sides.push(
+      new Side(
+        run,
+        readScene(await (await ask(`/watch/run?run=${encodeURIComponent(run)}`)).arrayBuffer()),
+        at,
+      ),
+    );
+  document.title = `${sides.map(({ title }) => title).join(" beside ")}`;
+  const clock = sides.map(({ time }) => time).reduce((one, other) => (one.end >= other.end ? one : other));
+  const slider = element("input", {
+    type: "range",
+    min: clock.begin,
+    max: clock.end,
+    step: 0.02,
+    "aria-label": "Moment",
+    oninput: () => {
+      clock.play(false);
+      clock.seek(Number(slider.value));
+    },
+  });
+  const player = new Player(clock);
+  main.replaceChildren(
+    element(
+      "header",
+      { class: "top" },
+      element("a", { href: "/watch" }, "All episodes"),
+      element("h1", {}, "Side by side"),
+    ),
+    element("div", { class: "beside" }, ...sides.map(({ node }) => node)),
+    element("div", { class: "scrubber" }, player.node, element("div", { class: "track" }, slider)),
+  );
+  for (const side of sides) side.begin();
+  turnTogether(sides.map(({ stage }) => stage));
+  const pace = new Pace(SLOW_FRAME_MS);
+  let last = performance.now();
+  const tick = (now) => {
+    const { moved } = clock.pass(Math.min((now - last) / 1000, 0.5));
+    const drawn = sides.map((side) => side.draw(clock.time, moved));
+    if (drawn.some(Boolean) && pace.isSlow(now - last)) for (const { stage } of sides) stage.simplify();
+    if (document.activeElement !== slider || clock.playing) slider.value = clock.time;
+    player.show();
+    last = now;
+    requestAnimationFrame(tick);
+  };
+  requestAnimationFrame(tick);
+}
+
+/** One of the two. */
+class Side {
+  constructor(run, scene, at) {
+    const { head, frames } = scene;
+    Object.assign(this, { scene, head, time: new RecordedTime(frames, at), targets: new Targets(scene) });
+    this.title = `${words(head.task)}, seed ${head.seed}`;
+    this.view = element("div", { class: "view" });
+    this.phases = element("ol", { class: "phases" }, ...head.phases.map((phase) => this.phase(phase)));
+    const done = head.reached.length === head.phases.length;
+    this.node = element(
+      "section",
+      { "aria-label": `${this.title}, ${run}` },
+      element(
+        "div",
+        { class: "top" },
+        element("h2", {}, element("a", { href: `/watch?run=${encodeURIComponent(run)}` }, this.title)),
+        badge(head.result ? endOf(head.result) : "interrupted", done ? "good" : "bad"),
+      ),
+      element("p", { class: "soft id" }, `${run}, ${head.protocol}, ${frames.at(-1).time.toFixed(1)} s`),
+      this.view,
+      this.phases,
+    );
+  }
+
+  phase({ number, id }) {
+    const at = this.head.reached.find((reached) => reached.number === number)?.time_s;
+    return element(
+      "li",
+      { "data-at": at ?? Infinity },
+      element("span", {}, `${number} ${words(id)}`),
+      element("span", { class: "soft" }, at === undefined ? "not reached" : `${at.toFixed(2)} s`),
+    );
+  }
+
+  /** Begins to draw; the view has to be in the page. */
+  begin() {
+    this.stage = new Stage(this.view, this.scene);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.stage.paint());
+  }
+
+  /** Shows a moment of the clock; an episode that is over stays at its end. Returns whether it was drawn. */
+  draw(moment, moved) {
+    if (moved || !this.drawn) {
+      this.time.seek(moment);
+      const { from, to, share } = this.time.pass(0);
+      this.stage.show(from, to, share, this.targets);
+      for (const phase of this.phases.children)
+        phase.classList.toggle("done", Number(phase.dataset.at) <= moment + 1e-6);
+      this.drawn = true;
+    }
+    return this.stage.draw();
+  }
+}
+
+/** Lets the camera of each view follow that of the other. */
+function turnTogether(stages) {
+  let following = false;
+  stages.forEach(({ free, controls }, index) => {
+    const other = stages[1 - index];
+    controls.addEventListener("change", () => {
+      if (following) return;
+      following = true;
+      other.free.position.copy(free.position);
+      other.controls.target.copy(controls.target);
+      other.controls.update();
+      other.stale = true;
+      following = false;
+    });
+  });
+}
