@@ -93,7 +93,7 @@ mod tests {
         let mjcf = format!("<mujoco><worldbody>{geoms}</worldbody></mujoco>");
         let room = Document::parse_alone("room.xml", &mjcf).unwrap().trees().unwrap();
         let fixed: Vec<Geom> = room.iter().flat_map(|tree| tree.links[0].geoms.clone()).collect();
-        furniture(tasks::find("handover").unwrap(), &fixed)
+        furniture(&tasks::find("handover").unwrap(), &fixed)
     }
 
     #[test]

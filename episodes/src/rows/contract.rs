@@ -87,7 +87,7 @@ mod tests {
     #[test]
     fn every_column_has_its_own_name_and_a_range() {
         let task = tasks::find("handover").unwrap();
-        let spec = EpisodeSpec::new(task, 2000, Protocol::Benchmark);
+        let spec = EpisodeSpec::new(&task, 2000, Protocol::Benchmark);
         for kind in ActionKind::ALL {
             let contract = RowContract::of(&spec, kind).unwrap();
             assert_eq!(contract.action.len(), kind.row_len());
