@@ -7,8 +7,8 @@ use clap::{CommandFactory, Parser, Subcommand};
 use crate::commands::{
     CommandResult,
     about::{completions, man, tasks},
-    agent, bench, collect, demo, doctor, evaluate, export, locomotion, policy_map, recover, replay, report,
-    serve,
+    agent, bench, collect, demo, doctor, evaluate, export, leaderboard, locomotion, policy_map, recover,
+    replay, report, serve,
 };
 
 /// Physics of humanoids that must work together, behind an HTTP API.
@@ -35,6 +35,7 @@ enum CliCommand {
     Replay(replay::ReplayArgs),
     Export(export::ExportArgs),
     Report(report::ReportArgs),
+    Leaderboard(leaderboard::LeaderboardArgs),
     Bench(bench::BenchArgs),
     Doctor(doctor::DoctorArgs),
     Completions(completions::CompletionsArgs),
@@ -62,6 +63,7 @@ impl Cli {
             CliCommand::Replay(args) => replay::run(args),
             CliCommand::Export(args) => export::run(args),
             CliCommand::Report(args) => report::run(args),
+            CliCommand::Leaderboard(args) => leaderboard::run(args),
             CliCommand::Bench(args) => bench::run(args),
             CliCommand::Doctor(args) => doctor::run(args),
             CliCommand::Completions(args) => completions::run(&args, Cli::command()),

@@ -3,6 +3,7 @@
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use tandem_tools_spec::{EndReason, ResultReply};
 
@@ -12,7 +13,7 @@ use crate::locks::{FileLock, LockKind, Locking};
 use crate::output::write_whole;
 use crate::players::{EpisodeOutput, PlayError, PlayOutcome};
 use crate::recording::Recorder;
-use crate::results::{Attempt, PlayedEpisode, RESULT_FILE, episode_note, failures_of_policy};
+use crate::results::{Attempt, PlayedEpisode, RESULT_FILE, episode_note, failures_of_policy, utc_text};
 use crate::spec::{EpisodeSpec, Start};
 use crate::{CheckpointError, EpisodeError};
 
@@ -184,6 +185,7 @@ impl EpisodeCache<'_> {
             thought_s: thought.as_secs_f64(),
             keep_failed: self.keeps_failure(&result, &attempts),
             attempts,
+            ended_at: Some(utc_text(SystemTime::now())),
             result,
         };
         if let Some(folder) = self.recording(spec).filter(|_| self.is_not_kept(&played)) {

@@ -14,13 +14,14 @@ mod workers;
 use std::path::{Path, PathBuf};
 
 use crate::output::{OutputError, write_whole};
-use crate::results::{EPISODES, PlayedEpisode};
+use crate::results::{EPISODES, PlayedEpisode, ProcessRecord};
 use crate::spec::EpisodeSpec;
 use crate::{EpisodeError, fingerprint};
 use cache::EpisodeCache;
 use run_folder::EvaluationFolder;
 
-pub use identity::{RunIdentity, SeedList, default_folder};
+pub use crate::results::SeedList;
+pub use identity::{RunIdentity, default_folder};
 pub use plan::{EvaluationPlan, ExistingRun, KeptFiles, SeedKey, Shard, Starts, training_seeds};
 pub use planned::{PlannedEpisodes, RunState};
 pub use retry::{FailedEpisode, failed_episodes};
@@ -182,6 +183,9 @@ impl<'a> EvaluationRun<'a> {
         let planned =
             PlannedEpisodes { episodes: self.work.len(), left_out: 0, state: Some(RunState::Playing) };
         planned.write(self.folder, shard)?;
+        if self.kept().to_play > 0 {
+            ProcessRecord::here(self.cache.build).append(self.folder)?;
+        }
         let mut left_out = self.undemonstrated.clone();
         let played = workers::play_all(&self.cache, &self.work, &mut left_out, progress);
         let state = if played.is_ok() { RunState::Complete } else { RunState::Stopped };

@@ -12,7 +12,7 @@ use super::planned::is_planned_file;
 use super::{EvaluationError, ExistingRun};
 use crate::locks::{FileLock, LockKind, Locking};
 use crate::output::{create_private_folder, write_whole};
-use crate::results::{EPISODES, PlayedEpisode, STRESS};
+use crate::results::{EPISODES, PROCESSES_FILE, PlayedEpisode, STRESS};
 
 /// The file with the run's identity.
 const IDENTITY_FILE: &str = "run.json";
@@ -225,7 +225,7 @@ fn clear(folder: &Path) -> io::Result<()> {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         match name.as_str() {
             EPISODES | STRESS => fs::remove_dir_all(&path)?,
-            IDENTITY_FILE => fs::remove_file(&path)?,
+            IDENTITY_FILE | PROCESSES_FILE => fs::remove_file(&path)?,
             name if name.ends_with(".json") && (name.starts_with("results") || is_planned_file(name)) => {
                 fs::remove_file(&path)?;
             }

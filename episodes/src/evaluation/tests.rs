@@ -54,6 +54,7 @@ pub(super) fn played(cache: &EpisodeCache, spec: &EpisodeSpec) -> PlayedEpisode 
         note: None,
         keep_failed: false,
         attempts: Vec::new(),
+        ended_at: None,
     }
 }
 

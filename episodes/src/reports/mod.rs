@@ -1,14 +1,19 @@
-//! Pages for people: of one episode, and of evaluations.
+//! Pages for people: of one episode, of evaluations, and of many runs.
 
 pub(crate) mod episode;
 mod evaluation;
+mod leaderboard;
+mod links;
+mod table;
 
 pub(crate) use evaluation::moment_of_failure;
 pub use evaluation::{
-    AskedCosts, AxisLoss, ByCollaboration, Comparison, CostSum, EpisodeCosts, EvaluationReport,
+    AskedCosts, AxisLoss, ByCollaboration, Comparison, CostSum, EpisodeCosts, EpisodeRow, EvaluationReport,
     ExcludedEpisodes, Failure, FailureMoment, FailureReason, Film, FilmContent, FilmPlace, FilmedEpisode,
-    FloorRate, FoundEpisode, LoadError, LoadedEpisodes, MeanRate, ModelCosts, PairedLoss, PairedRow,
-    PhaseReport, PolicyReport, PublishedAverages, PublishedRates, Rate, ReportFormat, ReportPictures,
-    ShownReport, StressReport, StressRow, TaskAverage, TaskFloor, TaskReport, ValueRange, failure_moments,
-    film_places, gallery, load, pictured_failures,
+    FloorRate, FolderProcess, FoundEpisode, LoadError, LoadedEpisodes, MeanRate, ModelCosts, PairedLoss,
+    PairedRow, PhaseReport, PolicyReport, PublishedAverages, PublishedRates, Rate, ReportFormat,
+    ReportHeader, ReportOrigin, ReportPictures, RunSettings, ShownReport, StressReport, StressRow,
+    TaskAverage, TaskFloor, TaskReport, ValueRange, failure_moments, film_places, gallery, load,
+    pictured_failures,
 };
+pub use leaderboard::{BoardCosts, BoardRow, Leaderboard, TranscriptLink};

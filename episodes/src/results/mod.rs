@@ -1,6 +1,10 @@
 //! Results of episodes, as files and as counts.
 
+mod machine;
 mod phase_level;
+mod process_record;
+mod seed_list;
+mod utc;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -9,7 +13,11 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tandem_tools_spec::{Assistance, EndReason, ExtraInformation, PhaseTimes, ResultReply, Usage};
 
+pub use machine::Machine;
 pub use phase_level::{PhaseLevel, PhaseMeans, PhaseRate};
+pub use process_record::{PROCESSES_FILE, ProcessRecord, command_line};
+pub use seed_list::SeedList;
+pub use utc::utc_text;
 
 use crate::output::{OutputError, write_whole};
 use crate::scoring::Phase;
@@ -68,6 +76,10 @@ pub struct PlayedEpisode {
     /// Earlier attempts at this episode, which did not count; the oldest first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub attempts: Vec<Attempt>,
+    /// Time at which it ended, in UTC; of a served episode, that of its file. `None` in results of earlier
+    /// builds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ended_at: Option<String>,
 }
 
 /// An attempt at an episode that did not count, so that the episode was played again.
@@ -297,6 +309,7 @@ mod tests {
                 note: None,
                 keep_failed: false,
                 attempts: Vec::new(),
+                ended_at: Some("2026-11-28T01:20:00Z".into()),
             };
             let text = serde_json::to_string(&played).unwrap();
             assert_eq!(serde_json::from_str::<PlayedEpisode>(&text).unwrap(), played);

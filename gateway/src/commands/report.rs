@@ -1,14 +1,14 @@
 //! `tandem report`: results of episodes, for people and for programs.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use tandem_episodes::replay::{ShortFilm, short_film};
 use tandem_episodes::reports::{
-    EvaluationReport, Film, FilmContent, FilmPlace, FilmedEpisode, ReportFormat, ReportPictures,
-    failure_moments, film_places, gallery, load, pictured_failures,
+    EvaluationReport, Film, FilmContent, FilmPlace, FilmedEpisode, ReportFormat, ReportOrigin,
+    ReportPictures, failure_moments, film_places, gallery, load, pictured_failures,
 };
-use tandem_episodes::{Recording, printable, write_whole};
+use tandem_episodes::{Recording, build, printable, write_whole};
 
 use super::CommandResult;
 use crate::settings::one_of;
@@ -20,8 +20,8 @@ pub struct ReportArgs {
     /// Folders written by `evaluate`, `collect` or `serve`; results of one policy are joined.
     #[arg(value_name = "DIR", required = true)]
     folders: Vec<PathBuf>,
-    /// Format of the report: a self-contained page, Markdown, a line for each rate, all figures, or tables
-    /// for LaTeX.
+    /// Format of the report: a self-contained page, Markdown, a line for each rate, all figures, tables for
+    /// LaTeX, a line for each episode, a figure of the rates, or a figure of the times of phases.
     #[arg(long, default_value = ReportFormat::Html.name(), value_parser = one_of(ReportFormat::ALL, ReportFormat::name))]
     format: ReportFormat,
     /// File to write [default: report.FORMAT in the first folder].
@@ -35,21 +35,27 @@ pub struct ReportArgs {
 /// Reads the results and writes the report.
 pub fn run(args: ReportArgs) -> CommandResult {
     let loaded = load(&args.folders)?;
+    let default = args.folders.first().map(|folder| folder.join(format!("report.{}", args.format.name())));
+    let path = args.out.or(default).unwrap_or_else(|| "report.html".into());
+    let folder = path.parent().unwrap_or(Path::new(""));
     let mut report = EvaluationReport::of(&loaded);
-    report.failure_moments = failure_moments(&loaded, args.failures);
+    report.header.made = Some(ReportOrigin::here(build()?));
+    report.failure_moments = failure_moments(&loaded, args.failures, folder);
     let pictures = match args.format {
         ReportFormat::Html => ReportPictures {
             films: film_places(&loaded).into_iter().map(film).collect(),
             failures: gallery(&loaded, args.failures),
             pictured_failures: pictured_failures(&loaded),
         },
-        ReportFormat::Markdown | ReportFormat::Csv | ReportFormat::Json | ReportFormat::Tex => {
-            ReportPictures::default()
-        }
+        ReportFormat::Markdown
+        | ReportFormat::Csv
+        | ReportFormat::Json
+        | ReportFormat::Tex
+        | ReportFormat::EpisodesCsv
+        | ReportFormat::Svg
+        | ReportFormat::TimesSvg => ReportPictures::default(),
     };
     let text = report.write(args.format, &pictures)?;
-    let default = args.folders.first().map(|folder| folder.join(format!("report.{}", args.format.name())));
-    let path = args.out.or(default).unwrap_or_else(|| "report.html".into());
     write_whole(&path, text.as_bytes())?;
     let films = pictures.films.iter().filter(|film| film.content.is_ok()).count();
     let films = if films > 0 { format!(", {films} films") } else { String::new() };

@@ -7,6 +7,7 @@ mod evaluations;
 mod killed;
 mod logs;
 mod people;
+mod reports;
 mod server;
 #[path = "../../../tests/src/skipped.rs"]
 mod skipped;

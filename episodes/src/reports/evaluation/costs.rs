@@ -17,7 +17,7 @@ pub struct EpisodeCosts {
 }
 
 /// Minimum, median and maximum of some values.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ValueRange {
     pub min: f64,
     pub median_value: f64,
@@ -201,13 +201,16 @@ mod tests {
             what: "A fell".into(),
             time_s: 12.5,
             watch: watch.into(),
+            page: Some("episodes/handover-9/report.html".into()),
         }];
         let write =
             |report: &EvaluationReport, format| report.write(format, &ReportPictures::default()).unwrap();
         let text = write(&report, ReportFormat::Markdown);
         let agent = "| agent | handover | 3/10 | 1.8 of 3 | 504 | 60 | 4.5 | 12.5 | 10.0 | 40 % | 0.5 | 0.060 | 0.100 |";
         let expert = "| expert | handover | 3/10 | 1.8 of 3 | 504 | 60 | 4.5 | - | - | - | - | - | - |";
-        let moment = format!("| agent | handover | 9 | p1 | A fell | [12.5]({watch}) |");
+        let moment = format!(
+            "| agent | handover | 9 | p1 | A fell | [page](episodes/handover-9/report.html) | [12.5]({watch}) |"
+        );
         for line in [agent, expert, &moment] {
             assert!(text.contains(line), "no {line}: {text}");
         }
@@ -221,6 +224,6 @@ mod tests {
         let models = &json["policies"][0]["tasks"][0]["models"];
         assert_eq!((&models["episodes"], &models["models"][0]), (&5.into(), &"a-model".into()));
         assert_eq!(json["failure_moments"][0]["watch"], watch);
-        assert!(write(&report, ReportFormat::Tex).contains("A fell & 12.5"));
+        assert!(write(&report, ReportFormat::Tex).contains("A fell & page & 12.5"));
     }
 }

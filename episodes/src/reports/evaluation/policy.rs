@@ -86,6 +86,8 @@ pub struct PhaseReport {
     pub collaborative: bool,
     /// Rate among all episodes.
     pub cumulative: Option<Rate>,
+    /// Simulated times at which these episodes reached it, in ascending order.
+    pub reached_s: Vec<f64>,
     /// Rate among the episodes that reached the phase before it.
     pub conditional: Option<Rate>,
     /// Rate among the episodes that began at it.
@@ -190,6 +192,12 @@ impl<'a> PolicyGroup<'a> {
         let (superseded, excluded) = excluded.partition(|one| again.contains(&key(one)));
         PolicyGroup { name, excluded, superseded, episodes }
     }
+
+    /// Returns all episodes: those that count, then the others.
+    pub fn all(&self) -> impl Iterator<Item = &'a PlayedEpisode> {
+        let counted = self.episodes.iter().map(|found| &found.played);
+        counted.chain(self.excluded.iter().copied()).chain(self.superseded.iter().copied())
+    }
 }
 
 /// Returns the properties that episodes of one policy share: its name first, then all that may distinguish
@@ -270,12 +278,16 @@ impl TaskReport {
             of_task.iter().copied().filter(|one| one.start_phase().is_none()).collect();
         let phase = |(index, phase): (usize, &Phase)| {
             let before = whole.iter().filter(|one| index == 0 || one.reached(index - 1)).copied();
+            let mut reached_s: Vec<f64> =
+                whole.iter().filter_map(|one| one.result.phases.reached_s(&Phase::number(index))).collect();
+            reached_s.sort_by(f64::total_cmp);
             let from_it = of_task.iter().filter(|one| one.start_phase() == Some(index)).copied();
             PhaseReport {
                 id: phase.id.clone(),
                 number: Phase::number(index),
                 collaborative: phase.collaborative,
                 cumulative: Rate::of(count(whole.iter().copied(), index)),
+                reached_s,
                 conditional: Rate::of(count(before, index)),
                 from_its_beginning: Rate::of(count(from_it, index)),
             }

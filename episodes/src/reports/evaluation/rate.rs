@@ -63,6 +63,17 @@ fn with_interval(share: f64, [low_share, high_share]: [f64; 2]) -> String {
     format!("{} [{}, {}]", percent(share), percent(low_share), percent(high_share))
 }
 
+/// Formats a share in percent, with its sign.
+pub fn signed(share: f64) -> String {
+    let text = percent(share);
+    if share > 0.0 && text != "0" { format!("+{text}") } else { text }
+}
+
+/// Formats a p value.
+pub fn p_text(p_value: f64) -> String {
+    if p_value < 0.0001 { "< 0.0001".into() } else { format!("{p_value:.4}") }
+}
+
 /// Formats a share in percent with one decimal, which is left out if it is zero.
 pub fn percent(share: f64) -> String {
     let text = format!("{:.1}", 100.0 * share);

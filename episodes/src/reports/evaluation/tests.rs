@@ -1,6 +1,9 @@
 //! Counts, groups, comparisons and texts of a report.
 
+mod figures;
 mod films;
+mod header;
+mod tex;
 
 use std::path::Path;
 
@@ -48,6 +51,7 @@ pub fn played(policy: &str, task: &Task, seed: u32, phases: usize) -> PlayedEpis
         note: None,
         keep_failed: false,
         attempts: Vec::new(),
+        ended_at: None,
     }
 }
 
@@ -70,9 +74,9 @@ fn write(folder: &Path, episodes: &[PlayedEpisode]) {
 pub fn found(episodes: Vec<PlayedEpisode>) -> LoadedEpisodes {
     let episodes = episodes
         .into_iter()
-        .map(|played| FoundEpisode { played, strip: None, recording: None, run: String::new() })
+        .map(|played| FoundEpisode { played, strip: None, recording: None, page: None, run: String::new() })
         .collect();
-    LoadedEpisodes { episodes, skipped: Vec::new() }
+    LoadedEpisodes { episodes, ..LoadedEpisodes::default() }
 }
 
 #[test]
@@ -302,7 +306,11 @@ fn reports_quote_what_they_are_told() {
         ],
         &[],
     );
-    check(ReportFormat::Tex, &["a$<$b$>$\\&\"|\\_,\\%", "\\toprule", "60 [26.2, 87.8] 6/10"], &["a<b>"]);
+    check(
+        ReportFormat::Tex,
+        &["a$<$b$>$\\&\"\\textbar{}\\_,\\%", "\\toprule", "60 [26.2, 87.8] 6/10"],
+        &["a<b>"],
+    );
     let json: serde_json::Value =
         serde_json::from_str(&report.write(ReportFormat::Json, &ReportPictures::default()).unwrap()).unwrap();
     assert_eq!(json["policies"][0]["tasks"][0]["phases"][1]["cumulative"]["successes"], 6);
@@ -376,6 +384,9 @@ fn what_failed_itself_is_told_apart_and_in_no_rate() {
         let text = report.write(format, &ReportPictures::default()).unwrap();
         match format {
             ReportFormat::Csv => assert!(text.contains("cumulative,9,10,0.9,"), "{text}"),
+            ReportFormat::EpisodesCsv => assert!(text.contains(crash), "{text}"),
+            ReportFormat::Svg => assert!(text.contains(">9/10</text>"), "{text}"),
+            ReportFormat::TimesSvg => assert!(text.contains("p1 grasp_and_lift: 9 of 10, half"), "{text}"),
             ReportFormat::Html | ReportFormat::Markdown | ReportFormat::Json | ReportFormat::Tex => {
                 let kept = text.replace("\\_", "_");
                 assert!(
@@ -425,6 +436,7 @@ fn failures_are_shown_by_turns() {
         played: played("agent", &other, 1, 0),
         strip: None,
         recording: None,
+        page: None,
         run: String::new(),
     });
     loaded.episodes.iter_mut().for_each(|found| found.strip = Some(strip.clone()));

@@ -1,11 +1,14 @@
 //! Failure moments of recorded episodes: the moment to look at first, and the address of the page that
 //! shows it.
 
+use std::path::Path;
+
 use serde::Serialize;
 
 use super::load::{FoundEpisode, LoadedEpisodes};
-use super::policy::{failed_by_turns, first_missed_phase};
+use super::policy::{PolicyGroup, failed, failed_by_turns, first_missed_phase};
 use crate::recording::{Recording, RecordingError};
+use crate::reports::links::{encoded, relative};
 use crate::scoring::{Facts, Grip};
 
 /// Default address of `tandem serve`.
@@ -27,16 +30,24 @@ pub struct FailureMoment {
     pub time_s: f64,
     /// Address of the page that shows it, on a server whose runs folder has the recording.
     pub watch: String,
+    /// Link from the report to the episode's own page; `None` if there is none.
+    pub page: Option<String>,
 }
 
-/// Returns the moments of at most `most` recorded failures, in turns from every policy and task.
-pub fn failure_moments(loaded: &LoadedEpisodes, most: usize) -> Vec<FailureMoment> {
+/// Returns the moments of at most `most` recorded failures, in turns from every policy and task. Links are
+/// those of a report in `folder`.
+pub fn failure_moments(loaded: &LoadedEpisodes, most: usize, folder: &Path) -> Vec<FailureMoment> {
     let failures = failed_by_turns(loaded, most, |found| found.recording.is_some());
-    failures.into_iter().filter_map(|(policy, found)| moment(&policy, found)).collect()
+    failures.into_iter().filter_map(|(policy, found)| moment(&policy, found, folder)).collect()
+}
+
+/// Returns the number of failures that were recorded.
+pub fn recorded_failures(groups: &[PolicyGroup]) -> usize {
+    groups.iter().flat_map(failed).filter(|found| found.recording.is_some()).count()
 }
 
 /// Returns the moment of a failure; `None` if the recording cannot be read.
-fn moment(policy: &str, found: &FoundEpisode) -> Option<FailureMoment> {
+fn moment(policy: &str, found: &FoundEpisode, folder: &Path) -> Option<FailureMoment> {
     let recording = Recording::read(found.recording.as_deref()?).ok()?;
     let (time_s, what) = moment_of_failure(&recording).ok()?;
     let spec = &found.played.spec;
@@ -48,6 +59,7 @@ fn moment(policy: &str, found: &FoundEpisode) -> Option<FailureMoment> {
         what,
         time_s,
         watch: watch_address(&found.run, time_s),
+        page: found.page.as_ref().and_then(|page| relative(folder, page)),
     })
 }
 
@@ -101,12 +113,7 @@ impl Watcher {
 
 /// Returns the address of a run's page, slightly before a moment.
 fn watch_address(run: &str, time_s: f64) -> String {
-    let plain = |byte: u8| byte.is_ascii_alphanumeric() || b"-_.~/".contains(&byte);
-    let run: String = run
-        .bytes()
-        .map(|byte| if plain(byte) { char::from(byte).to_string() } else { format!("%{byte:02X}") })
-        .collect();
-    format!("{SERVED_AT}/watch?run={run}&at={:.1}", (time_s - 1.0).max(0.0))
+    format!("{SERVED_AT}/watch?run={}&at={:.1}", encoded(run), (time_s - 1.0).max(0.0))
 }
 
 #[cfg(test)]

@@ -1,17 +1,15 @@
 //! The machine on which a figure was measured.
 
-use std::{env::consts, fs, path::Path, thread::available_parallelism};
+use std::{fs, path::Path};
 
 use serde::Serialize;
+use tandem_episodes::results::Machine;
 
 /// Facts about this machine and this program. Unknown facts are `None`.
 #[derive(Debug, Serialize)]
-pub struct Machine {
-    cpu: Option<String>,
-    cores: Option<usize>,
-    /// Names of the system and of its kernel.
-    os: String,
-    architecture: &'static str,
+pub struct BenchMachine {
+    #[serde(flatten)]
+    machine: Machine,
     tandem: &'static str,
     rustc: &'static str,
     profile: &'static str,
@@ -22,7 +20,7 @@ pub struct Machine {
 /// A report with the machine on which it was measured.
 #[derive(Debug, Serialize)]
 pub struct WithMachine<R> {
-    machine: Machine,
+    machine: BenchMachine,
     #[serde(flatten)]
     report: R,
 }
@@ -30,7 +28,7 @@ pub struct WithMachine<R> {
 impl<R> WithMachine<R> {
     /// Adds this machine and its present load to `report`.
     pub fn here(report: R) -> WithMachine<R> {
-        WithMachine { machine: Machine::here(), report }
+        WithMachine { machine: BenchMachine::here(), report }
     }
 }
 
@@ -41,33 +39,17 @@ impl<R: Serialize> WithMachine<R> {
     }
 }
 
-impl Machine {
-    /// Describes the machine on which this program runs, as far as Linux does.
-    pub fn here() -> Machine {
-        let read = |path: &str| fs::read_to_string(path).unwrap_or_default();
-        let name = value_of(&read("/etc/os-release"), "PRETTY_NAME", '=');
-        let kernel = read("/proc/sys/kernel/osrelease");
-        let words = [name.as_deref().unwrap_or(consts::OS), kernel.trim()];
-        Machine {
-            cpu: value_of(&read("/proc/cpuinfo"), "model name", ':'),
-            cores: available_parallelism().ok().map(|cores| cores.get()),
-            os: words.join(" ").trim().into(),
-            architecture: consts::ARCH,
+impl BenchMachine {
+    /// Describes the machine on which this program runs, its load, and the program.
+    pub fn here() -> BenchMachine {
+        BenchMachine {
+            machine: Machine::here(),
             tandem: env!("CARGO_PKG_VERSION"),
             rustc: env!("TANDEM_RUSTC"),
             profile: env!("TANDEM_PROFILE"),
-            load_values: load(&read("/proc/loadavg")),
+            load_values: load(&fs::read_to_string("/proc/loadavg").unwrap_or_default()),
         }
     }
-}
-
-/// Returns the value in the first line `key = "value"`, with `sign` as the separator.
-fn value_of(text: &str, key: &str, sign: char) -> Option<String> {
-    let line = |line: &str| {
-        let (name, value) = line.split_once(sign)?;
-        (name.trim() == key).then(|| value.trim().trim_matches('"').to_owned())
-    };
-    text.lines().find_map(line)
 }
 
 fn load(text: &str) -> Option<[f64; 3]> {
@@ -80,12 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn facts_are_read_from_the_systems_own_files() {
-        let cpus = "processor\t: 0\nmodel name\t: Brand X @ 2.50GHz\nprocessor\t: 1\nmodel name\t: Y\n";
-        assert_eq!(value_of(cpus, "model name", ':').as_deref(), Some("Brand X @ 2.50GHz"));
-        let release = "NAME=\"Debian\"\nPRETTY_NAME=\"Debian GNU/Linux 12\"\n";
-        assert_eq!(value_of(release, "PRETTY_NAME", '=').as_deref(), Some("Debian GNU/Linux 12"));
-        assert_eq!(value_of("", "model name", ':'), None);
+    fn the_load_is_read_from_the_systems_own_file() {
         assert_eq!(load("2.18 1.50 0.25 3/411 77\n"), Some([2.18, 1.5, 0.25]));
         assert_eq!(load("no numbers"), None);
     }

@@ -68,9 +68,9 @@ async fn picture(
     if app.table.is_evaluation() {
         return Err(HostingError::OneEpisode.into());
     }
-    let task = app.settings.tasks.find(&task).map_err(HostingError::from)?;
+    let task = app.settings.tasks.find(&task).map_err(HostingError::from)?.clone();
     let pictures = app.task_pictures.clone();
-    let png = blocking(move || pictures.of(task)).await?;
+    let png = blocking(move || pictures.of(&task)).await?;
     let headers = [(header::CONTENT_TYPE, "image/png"), (header::CACHE_CONTROL, "no-cache")];
     Ok((headers, axum::body::Bytes::from_owner(png)).into_response())
 }

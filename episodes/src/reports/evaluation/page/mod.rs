@@ -2,19 +2,18 @@
 
 pub mod films;
 pub mod gallery;
-mod plot;
 mod stress;
 
 use super::EvaluationReport;
+use super::figure::{Figure, SERIES, rates, times};
 use super::policy::PolicyReport;
 use super::rate::percent;
-use super::table::Table;
 use super::tables;
 use crate::html::{self, escape};
+use crate::reports::table::{self, marked};
 use crate::results::PhaseLevel;
 use films::Film;
 use gallery::Failure;
-use plot::{SERIES, task_plot};
 
 /// Images and videos of a page.
 #[derive(Clone, Debug, Default)]
@@ -32,24 +31,32 @@ pub fn html(report: &EvaluationReport, pictures: &ReportPictures) -> String {
     let title = in_words(&names);
     let body = format!(
         r#"<h1>{}</h1>
-<p class="soft">{played}, played in Tandem.</p>
+<p class="soft">{played}, played in Tandem.{made}</p>
 <div class="cards">{cards}</div>
 {films}
 <h2>How far episodes got</h2>
 {legend}
 <div class="plots">{plots}</div>
+{times}
 {stress}
 {tables}
 {gallery}
 {skipped}"#,
         escape(&title),
-        played = played(policies.iter().map(|policy| policy.episodes).sum(), &tasks(report)),
+        made = report
+            .header
+            .made
+            .iter()
+            .map(|made| format!(" {}", marked(&made.in_words())))
+            .collect::<String>(),
+        played = played(policies.iter().map(|policy| policy.episodes).sum(), &report.tasks()),
         cards = policies.iter().enumerate().map(|(index, policy)| card(index, policy)).collect::<String>(),
         films = films::html(&pictures.films),
         legend = legend(policies),
-        plots = tasks(report).iter().map(|task| task_plot(task, policies)).collect::<String>(),
+        plots = cards(report, rates::figure),
+        times = phase_times(report),
         stress = stress::html(&report.stress),
-        tables = tables::all(report).iter().map(table).collect::<String>(),
+        tables = tables::all(report).iter().map(table::html).collect::<String>(),
         gallery = gallery::html(pictures, policies),
         skipped = skipped(report),
     );
@@ -64,15 +71,6 @@ fn in_words(names: &[&str]) -> String {
     }
 }
 
-/// Converts a text to HTML, with code for the parts between backticks.
-fn marked(text: &str) -> String {
-    let part = |(index, part): (usize, &str)| match index % 2 {
-        0 => escape(part),
-        _ => format!("<code>{}</code>", escape(part)),
-    };
-    text.split('`').enumerate().map(part).collect()
-}
-
 /// Describes the number of episodes and their tasks.
 fn played(episodes: usize, tasks: &[&str]) -> String {
     let counted = if episodes == 1 { "1 episode".to_owned() } else { format!("{episodes} episodes") };
@@ -82,17 +80,21 @@ fn played(episodes: usize, tasks: &[&str]) -> String {
     }
 }
 
-/// Returns the tasks that any policy has played, in the order of the list of tasks, then those of files.
-fn tasks(report: &EvaluationReport) -> Vec<&str> {
-    let played = || report.policies.iter().flat_map(|policy| &policy.tasks).map(|task| task.task.as_str());
-    let known = crate::tasks::cohub().iter().map(|task| task.id.as_str());
-    let mut found: Vec<&str> = known.filter(|id| played().any(|one| one == *id)).collect();
-    for id in played() {
-        if !found.contains(&id) {
-            found.push(id);
-        }
+/// Draws every task of which there is a drawing.
+fn cards(report: &EvaluationReport, draw: fn(&str, &[PolicyReport]) -> Option<Figure>) -> String {
+    let drawings = report.tasks().into_iter().filter_map(|task| draw(task, &report.policies));
+    drawings.map(|drawing| drawing.card()).collect()
+}
+
+/// Renders the curves of the times at which phases were reached; empty if none was.
+fn phase_times(report: &EvaluationReport) -> String {
+    let curves = cards(report, times::figure);
+    if curves.is_empty() {
+        return String::new();
     }
-    found
+    format!(
+        r#"<h2>When phases were reached</h2><p class="soft">Share of the episodes from the task's beginning that had reached a phase by then: p1 solid, p2 dashed, p3 dotted. Tasks of which no phase was reached have no curves.</p><div class="plots">{curves}</div>"#
+    )
 }
 
 /// Renders a policy's summary: whole tasks by number of robots, phases by collaboration, rules and build.
@@ -139,9 +141,8 @@ fn card(index: usize, policy: &PolicyReport) -> String {
 
 /// Renders the legend of marks and colours.
 fn legend(policies: &[PolicyReport]) -> String {
-    let begun = policies.iter().any(|policy| policy.phase_level.is_some());
     let mut marks = String::new();
-    for (mark, text) in plot::MARKS.iter().take(if begun { 3 } else { 2 }) {
+    for (mark, text) in rates::marks(policies) {
         marks += &format!(
             r#"<span><svg viewBox="0 0 16 12" width="16" height="12" aria-hidden="true">{}</svg>{text}</span>"#,
             mark(8.0, 6.0)
@@ -157,39 +158,6 @@ fn legend(policies: &[PolicyReport]) -> String {
     }
     format!(
         r#"<div class="legend">{marks}<span><i class="bar"></i>exact interval of 95 %</span>{series}</div>"#
-    )
-}
-
-fn table(table: &Table) -> String {
-    let class = |column: usize| if column < table.figures_from { "" } else { r#" class="number""# };
-    let cell = |tag: &str, (column, text): (usize, &String)| {
-        format!("<{tag}{}>{}</{tag}>", class(column), escape(text))
-    };
-    let head: String = table.head.iter().enumerate().map(|of| cell("th", of)).collect();
-    let mut rows = String::new();
-    // First columns with the same text as in the row above are not repeated.
-    let same = |index: usize| {
-        let above = index.checked_sub(1).map_or(&[][..], |above| &table.rows[above][..table.figures_from]);
-        let same = table.rows[index].iter().zip(above).take_while(|(one, other)| one == other).count();
-        same.min(table.figures_from.saturating_sub(1))
-    };
-    let grouped = (0..table.rows.len()).any(|index| same(index) > 0);
-    for (index, row) in table.rows.iter().enumerate() {
-        let same = same(index);
-        let said = |column: usize, text: &String| if column < same { String::new() } else { text.clone() };
-        let last = row.len() - 1;
-        let leads = |column: usize| table.links.get(index).filter(|_| column == last);
-        let cells = row.iter().enumerate().map(|(column, text)| match leads(column) {
-            Some(to) => format!(r#"<td class="number"><a href="{}">{}</a></td>"#, escape(to), escape(text)),
-            None => cell("td", (column, &said(column, text))),
-        });
-        let class = if same == 0 && index > 0 && grouped { r#" class="first""# } else { "" };
-        rows += &format!("<tr{class}>{}</tr>", cells.collect::<String>());
-    }
-    format!(
-        r#"<h2>{title}</h2><p class="soft">{}</p><div class="scroll" tabindex="0" role="region" aria-label="{title}"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"#,
-        marked(&table.note),
-        title = escape(&table.title),
     )
 }
 

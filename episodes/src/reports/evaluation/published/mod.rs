@@ -3,6 +3,9 @@
 
 use serde::Serialize;
 
+/// Name of the publication.
+pub const PUBLISHED_IN: &str = "CoHuB's paper";
+
 const PHASES: &str = include_str!("phases.csv");
 const PHASE_LEVEL: &str = include_str!("phase_level.csv");
 

@@ -3,7 +3,7 @@
 use super::super::costs::{CostSum, ValueRange};
 use super::super::policy::{PolicyReport, TaskReport};
 use super::super::rate::percent;
-use super::super::table::{NONE, Table};
+use crate::reports::table::{NONE, Table};
 
 /// Compares policies task by task; only tasks with notes of any policy have rows.
 pub fn agents(policies: &[PolicyReport]) -> Table {

@@ -6,10 +6,10 @@ use super::compare::{Comparison, PairedRow};
 use super::costs::{EpisodeCosts, ValueRange};
 use super::floor::TaskFloor;
 use super::policy::{PolicyReport, TaskReport};
-use super::rate::{MeanRate, Rate, percent};
-use super::table::{NONE, Table, p_text, signed};
+use super::rate::{MeanRate, Rate, p_text, percent, signed};
 use super::went_wrong::FailureMoment;
-use super::{EvaluationReport, PublishedRates, stress};
+use super::{EvaluationReport, PublishedRates, header, stress};
+use crate::reports::table::{NONE, Table};
 use crate::results::named;
 use crate::statistics::Count;
 use models::{agents, asked, endings};
@@ -17,7 +17,8 @@ use models::{agents, asked, endings};
 /// Returns every table that has rows.
 pub fn all(report: &EvaluationReport) -> Vec<Table> {
     let policies = &report.policies;
-    let mut tables: Vec<Table> = policies.iter().map(rates).collect();
+    let mut tables = vec![header::settings(&report.header), header::processes(&report.header)];
+    tables.extend(policies.iter().map(rates));
     tables.extend(report.stress.iter().flat_map(stress::tables));
     tables.push(floors(&report.floors));
     tables.push(averages(policies));
@@ -29,7 +30,7 @@ pub fn all(report: &EvaluationReport) -> Vec<Table> {
     tables.push(effort(policies));
     tables.push(clamped(policies));
     tables.push(reasons(policies));
-    tables.push(went_wrong(&report.failure_moments, policies));
+    tables.push(went_wrong(report));
     tables.push(excluded(policies));
     tables.push(played_again(policies));
     tables.extend(report.comparisons.iter().map(comparison));
@@ -258,23 +259,37 @@ fn reasons(policies: &[PolicyReport]) -> Table {
     table
 }
 
-fn went_wrong(moments: &[FailureMoment], policies: &[PolicyReport]) -> Table {
+fn went_wrong(report: &EvaluationReport) -> Table {
+    let (listed, recorded) = (report.failure_moments.len(), report.recorded_failures);
+    let most = match recorded > listed {
+        true => format!(
+            " Listed are {listed} of {recorded} that were recorded; `report --failures {recorded}` lists all."
+        ),
+        false => String::new(),
+    };
+    let note = format!(
+        "The first fall of a robot, or the first drop of an object, after the last phase that was reached; else the end. Times open the \
+         episode's page a second before, on a `tandem serve` whose runs folder has the recording, once its link has been opened. Pages \
+         are files beside the report.{most}"
+    );
     let mut table = Table::new(
         "Where episodes went wrong",
-        "The first fall of a robot, or the first drop of an object, after the last phase that was reached; else the end. Times open the \
-         episode's page a second before, on a `tandem serve` whose runs folder has the recording, once its link has been opened.",
-        &["Policy", "Task", "Seed", "Stuck before", "What", "At (s)"],
-        5,
+        &note,
+        &["Policy", "Task", "Seed", "Stuck before", "What", "Page", "At (s)"],
+        6,
     );
-    let order =
-        |name: &String| policies.iter().position(|policy| policy.name == *name).unwrap_or(policies.len());
-    let mut moments: Vec<&FailureMoment> = moments.iter().collect();
+    let order = |name: &String| {
+        report.policies.iter().position(|policy| policy.name == *name).unwrap_or(report.policies.len())
+    };
+    let mut moments: Vec<&FailureMoment> = report.failure_moments.iter().collect();
     moments.sort_by_key(|moment| order(&moment.policy));
-    for moment in moments {
-        let FailureMoment { policy, task, seed, phase, what, time_s, watch } = moment;
-        let row = [policy.as_str(), task, &seed.to_string(), phase, what, &format!("{time_s:.1}")];
-        table.rows.push(row.map(str::to_owned).to_vec());
-        table.links.push(watch.clone());
+    for (row, moment) in moments.into_iter().enumerate() {
+        let FailureMoment { policy, task, seed, phase, what, time_s, watch, page } = moment;
+        let named = if page.is_some() { "page" } else { NONE };
+        let cells = [policy.as_str(), task, &seed.to_string(), phase, what, named, &format!("{time_s:.1}")];
+        table.rows.push(cells.map(str::to_owned).to_vec());
+        table.links.extend(page.iter().map(|page| ((row, 5), page.clone())));
+        table.links.insert((row, 6), watch.clone());
     }
     table
 }

@@ -1,12 +1,10 @@
-//! Plot of the rates of one task's phases: a mark for each rate on a line from 0 to 100 %, and its
+//! Figure of the rates of one task's phases: a mark for each rate on a line from 0 to 100 %, and its
 //! interval.
 
+use super::{Figure, colour_class};
 use crate::html::escape;
 use crate::reports::evaluation::policy::{PhaseReport, PolicyReport};
 use crate::reports::evaluation::rate::Rate;
-
-/// Number of colours; more policies share them.
-pub const SERIES: usize = 6;
 
 /// Function that draws a mark about a point.
 type Mark = fn(f64, f64) -> String;
@@ -18,6 +16,12 @@ pub const MARKS: [(Mark, &str); 3] = [
     (square, "from the phase's own beginning"),
 ];
 
+/// Returns the marks that occur in drawings of these policies.
+pub fn marks(policies: &[PolicyReport]) -> &'static [(Mark, &'static str)] {
+    let begun = policies.iter().any(|policy| policy.phase_level.is_some());
+    if begun { &MARKS } else { &MARKS[..2] }
+}
+
 const WIDTH_PX: f64 = 360.0;
 /// Position of 0 %; `RIGHT_PX` is that of 100 %.
 const LEFT_PX: f64 = 8.0;
@@ -27,8 +31,8 @@ const LANE_PX: f64 = 13.0;
 const GAP_PX: f64 = 5.0;
 const AXIS_PX: f64 = 20.0;
 
-/// Renders a card with the plot of one task.
-pub fn task_plot(task: &str, policies: &[PolicyReport]) -> String {
+/// Draws the rates of one task; `None` if no policy has played it.
+pub fn figure(task: &str, policies: &[PolicyReport]) -> Option<Figure> {
     let played: Vec<(usize, &[PhaseReport])> = policies
         .iter()
         .enumerate()
@@ -37,14 +41,14 @@ pub fn task_plot(task: &str, policies: &[PolicyReport]) -> String {
             Some((index, of_task.phases.as_slice()))
         })
         .collect();
-    let Some((_, phases)) = played.first() else { return String::new() };
+    let (_, phases) = played.first()?;
     let (mut drawn, mut y_px) = (String::new(), 0.0);
     for (number, phase) in phases.iter().enumerate() {
         drawn += &heading(phase, y_px);
         y_px += HEADING_PX;
         for (index, phases) in &played {
             let lanes = lanes(&policies[*index].name, &phases[number]);
-            drawn += &format!(r#"<g style="--c: var(--s{})">"#, index % SERIES);
+            drawn += &format!(r#"<g class="{}">"#, colour_class(*index));
             for (mark, label, rate) in lanes {
                 drawn += &lane(mark, &label, rate, y_px + LANE_PX / 2.0);
                 y_px += LANE_PX;
@@ -53,12 +57,13 @@ pub fn task_plot(task: &str, policies: &[PolicyReport]) -> String {
             y_px += GAP_PX;
         }
     }
-    let height_px = y_px + AXIS_PX;
-    let grid = axis(y_px);
-    let title = escape(task);
-    format!(
-        r#"<section class="card"><h3>{title}</h3><svg viewBox="0 0 {WIDTH_PX} {height_px}" role="img" aria-label="Rates of the phases of {title}">{grid}{drawn}</svg></section>"#
-    )
+    Some(Figure {
+        title: task.into(),
+        label: format!("Rates of the phases of {task}"),
+        width_px: WIDTH_PX,
+        height_px: y_px + AXIS_PX,
+        shapes: axis(y_px) + &drawn,
+    })
 }
 
 fn heading(phase: &PhaseReport, y_px: f64) -> String {

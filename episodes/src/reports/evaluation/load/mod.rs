@@ -1,11 +1,15 @@
 //! Loading of episodes from folders: single results by `evaluate` and `collect`, and recordings by `serve`.
 
+mod agent_file;
+
 use std::io;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+
 use crate::recording::{Recorder, Recording};
-use crate::reports::episode::STRIP_FILE;
-use crate::results::{EPISODES, PlayedEpisode, STRESS, episode_note};
+use crate::reports::episode::{PAGE_FILE, STRIP_FILE};
+use crate::results::{EPISODES, PlayedEpisode, PolicyCard, ProcessRecord, STRESS, episode_note, utc_text};
 
 /// One episode.
 #[derive(Clone, Debug)]
@@ -15,6 +19,8 @@ pub struct FoundEpisode {
     pub strip: Option<PathBuf>,
     /// Path of its recording; `None` if there is none.
     pub recording: Option<PathBuf>,
+    /// Path of its own page; `None` if there is none.
+    pub page: Option<PathBuf>,
     /// Its folder relative to the runs folder. The runs folder is assumed to be the parent of the reported
     /// folder, or the reported folder itself.
     pub run: String,
@@ -26,7 +32,8 @@ impl FoundEpisode {
         let file = |name: &str| Some(folder.join(name)).filter(|path| path.exists());
         let absolute = folder.canonicalize().unwrap_or_else(|_| folder.into());
         let run = absolute.strip_prefix(runs).unwrap_or(&absolute).to_string_lossy().replace('\\', "/");
-        FoundEpisode { played, strip: file(STRIP_FILE), recording: file(Recorder::FILE_NAME), run }
+        let (strip, recording, page) = (file(STRIP_FILE), file(Recorder::FILE_NAME), file(PAGE_FILE));
+        FoundEpisode { played, strip, recording, page, run }
     }
 }
 
@@ -34,8 +41,19 @@ impl FoundEpisode {
 #[derive(Clone, Debug, Default)]
 pub struct LoadedEpisodes {
     pub episodes: Vec<FoundEpisode>,
+    /// Processes that have played in the folders.
+    pub processes: Vec<FolderProcess>,
     /// Files that are no episodes, with the reasons.
     pub skipped: Vec<String>,
+}
+
+/// A process that has played in a folder.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FolderProcess {
+    /// Path of the folder.
+    pub folder: String,
+    #[serde(flatten)]
+    pub process: ProcessRecord,
 }
 
 /// Reason why there is nothing to report on.
@@ -59,12 +77,14 @@ pub fn load(folders: &[PathBuf]) -> Result<LoadedEpisodes, LoadError> {
         let kept = folder.join(EPISODES);
         if kept.is_dir() {
             load_results(&kept, folder, &mut loaded)?;
+            loaded.add_processes(folder);
         }
         let stressed = folder.join(STRESS);
         if stressed.is_dir() {
             // Output of `evaluate --stress` beside the plain run, a folder per axis and level.
             for plan in entries(&stressed)?.into_iter().filter(|plan| plan.join(EPISODES).is_dir()) {
                 load_results(&plan.join(EPISODES), folder, &mut loaded)?;
+                loaded.add_processes(&plan);
             }
         } else if !kept.is_dir() {
             load_recordings(folder, &mut loaded)?;
@@ -83,6 +103,13 @@ impl LoadedEpisodes {
             self.episodes.push(found);
         }
     }
+
+    /// Adds the processes that have played in a run's folder.
+    fn add_processes(&mut self, run: &Path) {
+        let folder = run.display().to_string();
+        let processes = ProcessRecord::read_all(run).into_iter();
+        self.processes.extend(processes.map(|process| FolderProcess { folder: folder.clone(), process }));
+    }
 }
 
 /// Loads the results of single episodes of the evaluation in `evaluation`, each in a file.
@@ -99,8 +126,8 @@ fn load_results(folder: &Path, evaluation: &Path, loaded: &mut LoadedEpisodes) -
     Ok(())
 }
 
-/// Loads the recordings of a server, each in a folder. The policy's name is that of the folder which
-/// contains them.
+/// Loads the recordings of a server, each in a folder. The policy is that of `tandem agent`, if it has
+/// played, and otherwise has the name of the folder which contains them.
 fn load_recordings(folder: &Path, loaded: &mut LoadedEpisodes) -> Result<(), LoadError> {
     let absolute = folder.canonicalize().unwrap_or_else(|_| folder.into());
     let policy = absolute.file_name().map_or("policy".into(), |name| name.to_string_lossy().into_owned());
@@ -116,12 +143,13 @@ fn load_recordings(folder: &Path, loaded: &mut LoadedEpisodes) -> Result<(), Loa
     Ok(())
 }
 
-fn recorded(path: &Path, policy: &str) -> Result<PlayedEpisode, String> {
+fn recorded(path: &Path, folder_name: &str) -> Result<PlayedEpisode, String> {
     let recording = Recording::read(path).map_err(|error| error.to_string())?;
     let calls = recording.tool_calls().map_err(|error| error.to_string())?;
     let result = recording.result.clone().ok_or_else(|| format!("{} was interrupted", path.display()))?;
+    let written = std::fs::metadata(path).and_then(|file| file.modified());
     Ok(PlayedEpisode {
-        policy: policy.into(),
+        policy: path.parent().and_then(agent_file::card).unwrap_or_else(|| PolicyCard::from(folder_name)),
         spec: recording.spec.clone(),
         locomotion: recording.locomotion.clone(),
         build: recording.build.clone(),
@@ -129,6 +157,7 @@ fn recorded(path: &Path, policy: &str) -> Result<PlayedEpisode, String> {
         thought_s: calls.last().map_or(0.0, |call| call.thought.as_secs_f64()),
         keep_failed: false,
         attempts: Vec::new(),
+        ended_at: written.ok().map(utc_text),
         result,
     })
 }
