@@ -141,7 +141,10 @@ fn a_browser_finds_a_page_that_leads_on() {
         assert!(links.iter().any(|link| link == expected), "{expected}: {links:?}");
     }
     links.iter().for_each(|link| drop(server.page(link)));
-    assert!(page.contains(" data-starts") && !page.contains("http://") && !page.contains("https://"), "{page}");
+    assert!(
+        page.contains(" data-starts") && !page.contains("http://") && !page.contains("https://"),
+        "{page}"
+    );
     assert!(server.page("/docs").1.contains("id=\"list_episodes\""));
 }
 
