@@ -28,7 +28,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "action_type": ("joints", "wrists"),
     "reward_type": ("sparse", "dense"),
     "sensors": ("ideal", "g1"),
-    "renderer": ("auto", "cpu", "gpu"),
+    "renderer": ("auto", "cpu", "gpu", "path"),
 }
 """What options may be, the default first."""
 
@@ -72,7 +72,7 @@ class Options(TypedDict, total=False):
     level: StressLevel
     """How much of it; 1."""
 
-    renderer: Literal["auto", "cpu", "gpu"]
+    renderer: Literal["auto", "cpu", "gpu", "path"]
     """Who draws; "auto"."""
 
     record: str | PathLike[str] | None

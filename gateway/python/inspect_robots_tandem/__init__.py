@@ -76,7 +76,7 @@ class TandemEmbodiment(EmbodimentBase):
         look_every: int = 1,
         action_type: Literal["joints", "wrists"] = "joints",
         sensors: Literal["ideal", "g1"] = "ideal",
-        renderer: Literal["auto", "cpu", "gpu"] = "auto",
+        renderer: Literal["auto", "cpu", "gpu", "path"] = "auto",
         record: str | None = None,
     ) -> None:
         told = _told(task)

@@ -11,7 +11,7 @@ use serde_json::json;
 use tandem_episodes::replay::{EpisodeCamera, EpisodeRenderer, PictureSize};
 use tandem_episodes::rows::{ActionKind, STATE_COLUMNS, state_row};
 use tandem_episodes::{Grip, Recording, RecordingError};
-use tandem_sim::render::Frame;
+use tandem_sim::render::{Frame, RendererKind};
 use tandem_sim::{JOINTS, Side, Step};
 use tandem_tools_spec::ACTION_ROW_LEN;
 
@@ -30,11 +30,13 @@ pub struct NativeRecording {
 
 #[pymethods]
 impl NativeRecording {
-    /// Reads a file and checks every byte.
+    /// Reads a file and checks every byte. Images are drawn by the named renderer, or by the episode's.
     #[staticmethod]
-    fn read(py: Python, path: PathBuf) -> PyResult<NativeRecording> {
+    fn read(py: Python, path: PathBuf, renderer: Option<&str>) -> PyResult<NativeRecording> {
+        let renderer = renderer.map(|name| found_renderer(py, name)).transpose()?;
         let read = || {
-            let recording = Recording::read(&path)?;
+            let mut recording = Recording::read(&path)?;
+            recording.spec.renderer = renderer.unwrap_or(recording.spec.renderer);
             let steps = recording.steps().collect::<Result<_, _>>()?;
             Ok(NativeRecording { recording, steps, renderer: Mutex::default() })
         };
@@ -134,6 +136,12 @@ impl NativeRecording {
         })?;
         shaped(py, picture.rgb(), [picture.height as usize, picture.width as usize, 3])
     }
+}
+
+fn found_renderer(py: Python, name: &str) -> PyResult<RendererKind> {
+    let names = RendererKind::ALL.map(RendererKind::name).join(", ");
+    let found = RendererKind::ALL.into_iter().find(|kind| kind.name() == name);
+    found.ok_or_else(|| failed(py, &format!("no renderer {name:?}; have: {names}")))
 }
 
 impl NativeRecording {

@@ -21,8 +21,8 @@ from .contract.start import Briefing
 from .contract.tools import Tools
 from .errors import TandemError
 
-Renderer: TypeAlias = Literal["auto", "cpu", "gpu"]
-"""Renderer of images: the GPU, the embedded CPU renderer, or whichever is available."""
+Renderer: TypeAlias = Literal["auto", "cpu", "gpu", "path"]
+"""Renderer of images: a GPU, the embedded one, path tracing on the CPU, or "auto": a GPU if there is one."""
 
 StateEstimate: TypeAlias = Literal["estimator", "truth"]
 """Source of the robots' own state: an estimator on their sensors, or the simulator."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
+from .base import Renderer
 from .contract.commands import PhaseReached
 from .contract.result import ResultReply
 
@@ -59,12 +60,13 @@ class Recording:
     entry i is that after step i. It includes privileged information: poses in the world, contacts, falls.
 
     path: The file, or its folder.
+    renderer: Renderer of its images. None: that of the episode.
     """
 
-    def __init__(self, path: str | PathLike[str]) -> None:
+    def __init__(self, path: str | PathLike[str], *, renderer: Renderer | None = None) -> None:
         given = Path(path)
         self.path = given / "episode.mcap" if given.is_dir() else given
-        self._native = _native.Recording.read(self.path)
+        self._native = _native.Recording.read(self.path, renderer)
         self._about: dict[str, Any] = json.loads(self._native.about())
 
     @property

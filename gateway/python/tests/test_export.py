@@ -237,6 +237,18 @@ def test_version_2_has_files_for_each_episode(runs: Path, whole: Path, tmp_path:
         assert len((exported.folder / f"meta/{name}.jsonl").read_text().splitlines()) == lines
 
 
+def test_images_are_drawn_by_the_chosen_renderer(runs: Path, tmp_path: Path) -> None:
+    folder, size = runs / "handover-2010", (64, 48)
+    embedded = tandem.Recording(folder, renderer="cpu").picture("A", 5, size=size)
+    traced = tandem.Recording(folder, renderer="path").picture("A", 5, size=size)
+    assert not np.array_equal(embedded.rgb, traced.rgb)
+    assert traced.rgb.mean() == pytest.approx(embedded.rgb.mean(), rel=0.15)
+    assert np.mean(np.isclose(embedded.depth_m, traced.depth_m, atol=1e-3)) > 0.99
+    settings = ExportSettings(cameras=("A",), images="png", size=size, renderer="path")
+    (exported,) = export_lerobot(folder, tmp_path / "set", settings)
+    assert "renderer path" in (exported.folder / "README.md").read_text(encoding="utf-8")
+
+
 def test_what_cannot_be_exported_is_said(runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(tandem.TandemError, match="reached its last phase; all would"):
         export_lerobot(runs, tmp_path / "set", only_successful=True)
@@ -248,6 +260,8 @@ def test_what_cannot_be_exported_is_said(runs: Path, tmp_path: Path, capsys: pyt
         ExportSettings(version="v2", depth=True)
     with pytest.raises(tandem.TandemError, match="name cameras"):
         ExportSettings(cameras=(), depth=True)
+    with pytest.raises(tandem.TandemError, match="have: auto, cpu, gpu, path"):
+        ExportSettings(renderer="paint")  # pyright: ignore[reportArgumentType]
     assert main(["lerobot", "--cameras=none", str(tmp_path / "nothing"), str(tmp_path / "set2")]) == 1
     assert "no episode.mcap in" in capsys.readouterr().err
     assert not (tmp_path / "set2").exists()

@@ -3,9 +3,11 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Subcommand;
+use tandem_episodes::RendererKind;
 
 use super::CommandResult;
 use crate::drivers::{PythonModule, PythonPart};
+use crate::settings::one_of;
 
 /// Convert recordings to data sets for training policies. This needs the Python package: pip install
 /// './gateway/python[lerobot]' in a checkout of the repository.
@@ -61,6 +63,9 @@ struct LerobotArgs {
     /// Rows per second.
     #[arg(long, value_name = "HZ", default_value = "10", value_parser = ["50", "25", "10"])]
     rate: String,
+    /// Renderer of the images [default: that of the episode].
+    #[arg(long, value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
+    renderer: Option<RendererKind>,
     /// Convert only episodes that reached their last phase.
     #[arg(long)]
     only_successful: bool,
@@ -93,8 +98,9 @@ impl LerobotArgs {
         ];
         let switches = switches.into_iter().filter(|(given, _)| *given).map(|(_, flag)| flag.into());
         let jobs = self.jobs.map(|jobs| format!("--jobs={jobs}"));
+        let renderer = self.renderer.map(|kind| format!("--renderer={}", kind.name()));
         let paths = [runs, out].map(|path| path.display().to_string());
-        let given = texts.chain(switches).chain(jobs);
+        let given = texts.chain(switches).chain(renderer).chain(jobs);
         ["lerobot".into()].into_iter().chain(given).chain(["--".into()]).chain(paths).collect()
     }
 }

@@ -26,16 +26,24 @@ pub struct PicturesCase {
     pub width: u32,
     pub height: u32,
     /// CPU time of the thread that requests them; if the system does not report it, the same as `wall_ms`.
+    /// The path tracer uses other threads, too, unless only colours are requested.
     pub busy_ms: Spread,
     pub wall_ms: Spread,
 }
 
 /// Common input size of learned policies.
 const SMALL_PX: [u32; 2] = [128, 128];
-/// Number of measured batches, and of states in each. CPU time is counted in ticks of some milliseconds,
-/// so a batch needs many states.
+/// Number of measured batches. CPU time is counted in ticks of some milliseconds, so a batch needs many
+/// states, unless one takes long.
 const BATCHES: usize = 9;
-const STATES: usize = 10;
+
+/// Returns the number of states in a batch.
+fn states(kind: RendererKind) -> usize {
+    match kind {
+        RendererKind::Auto | RendererKind::Cpu | RendererKind::Gpu => 10,
+        RendererKind::Path => 1,
+    }
+}
 
 /// Times all sets; `done` is called after each.
 ///
@@ -94,7 +102,7 @@ fn measure(
     // The first batch warms up.
     for _ in 0..=BATCHES {
         let (mut busy, mut wall) = (Duration::ZERO, Duration::ZERO);
-        for _ in 0..STATES {
+        for _ in 0..states(kind) {
             let step = world.control_step(&commands)?;
             let (cameras, started) = (views(&step), Instant::now());
             let before = busy_since(started);
@@ -102,7 +110,7 @@ fn measure(
             busy += busy_since(started) - before;
             wall += started.elapsed();
         }
-        let each_ms = |whole: Duration| whole.as_secs_f64() * 1e3 / STATES as f64;
+        let each_ms = |whole: Duration| whole.as_secs_f64() * 1e3 / states(kind) as f64;
         busy_ms.push(each_ms(busy));
         wall_ms.push(each_ms(wall));
     }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Renderer, Scenery, cpu};
+use super::{Renderer, Scenery, cpu, path};
 use crate::SimError;
 
 /// Renderer of camera images. No state of a world depends on it.
@@ -16,16 +16,20 @@ pub enum RendererKind {
     Cpu,
     /// A GPU, or software in its place.
     Gpu,
+    /// Path tracing on the CPU.
+    Path,
 }
 
 impl RendererKind {
-    pub const ALL: [RendererKind; 3] = [RendererKind::Auto, RendererKind::Cpu, RendererKind::Gpu];
+    pub const ALL: [RendererKind; 4] =
+        [RendererKind::Auto, RendererKind::Cpu, RendererKind::Gpu, RendererKind::Path];
 
     pub fn name(self) -> &'static str {
         match self {
             RendererKind::Auto => "auto",
             RendererKind::Cpu => "cpu",
             RendererKind::Gpu => "gpu",
+            RendererKind::Path => "path",
         }
     }
 
@@ -39,6 +43,7 @@ impl RendererKind {
             RendererKind::Cpu => Ok(EMBEDDED.into()),
             RendererKind::Auto => Ok(on_real_gpu().unwrap_or_else(|| EMBEDDED.into())),
             RendererKind::Gpu => on_gpu(),
+            RendererKind::Path => Ok("pictures are drawn by path tracing on the CPU".into()),
         }
     }
 
@@ -48,6 +53,7 @@ impl RendererKind {
             RendererKind::Auto if on_real_gpu().is_some() => gpu(scenery),
             RendererKind::Auto | RendererKind::Cpu => cpu(scenery),
             RendererKind::Gpu => gpu(scenery),
+            RendererKind::Path => path(scenery),
         }
     }
 }

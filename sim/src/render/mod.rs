@@ -8,6 +8,7 @@ mod cpu;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod kind;
+mod path;
 mod scene;
 mod shading;
 
@@ -108,6 +109,11 @@ pub struct Frame {
 /// of a state.
 pub fn cpu(scenery: Scenery) -> Box<dyn Renderer> {
     Box::new(cpu::CpuRenderer::new(scenery))
+}
+
+/// Creates the path tracer. It draws on all processor cores, and colours alone on the calling thread.
+pub fn path(scenery: Scenery) -> Box<dyn Renderer> {
+    Box::new(path::PathRenderer::new(scenery))
 }
 
 /// Error of encoding an image.

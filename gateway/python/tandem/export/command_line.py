@@ -6,7 +6,9 @@ import argparse
 import sys
 import time
 from collections.abc import Sequence
+from typing import get_args
 
+from ..base import Renderer
 from ..errors import TandemError
 from ..rows import DEFAULT_DATA_RATE_HZ, RATES_HZ
 from .lerobot import export_lerobot
@@ -32,6 +34,7 @@ def parser() -> argparse.ArgumentParser:
     lerobot.add_argument("--depth", action="store_true")
     lerobot.add_argument("--size", default="320x240", metavar="WIDTHxHEIGHT")
     lerobot.add_argument("--rate", type=int, choices=RATES_HZ, default=DEFAULT_DATA_RATE_HZ)
+    lerobot.add_argument("--renderer", choices=get_args(Renderer))
     lerobot.add_argument("--only-successful", action="store_true")
     lerobot.add_argument("--only-good", action="store_true")
     lerobot.add_argument("--jobs", type=int, metavar="N")
@@ -72,6 +75,7 @@ def settings_of(given: argparse.Namespace) -> ExportSettings:
         depth=given.depth,
         size=(int(sides[0]), int(sides[1])),
         rate_hz=given.rate,
+        renderer=given.renderer,
     )
 
 

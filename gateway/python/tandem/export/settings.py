@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from importlib import import_module
 from typing import Any, Literal, TypeAlias, get_args
 
+from ..base import Renderer
 from ..errors import TandemError
 from ..rows import DEFAULT_DATA_RATE_HZ, DEFAULT_SIZE_PX, EGOCENTRIC, RATES_HZ
 
@@ -55,10 +56,15 @@ class ExportSettings:
     rate_hz: int = DEFAULT_DATA_RATE_HZ
     """Rows per second: 50, 25 or 10."""
 
+    renderer: Renderer | None = None
+    """Renderer of the images. None: that of each episode."""
+
     def __post_init__(self) -> None:
         for name, kind in (("version", Version), ("view", View), ("images", Images), ("codec", Codec)):
             if (value := getattr(self, name)) not in get_args(kind):
                 raise TandemError(f"no {name} {value!r}; have: {', '.join(get_args(kind))}")
+        if self.renderer is not None and self.renderer not in get_args(Renderer):
+            raise TandemError(f"no renderer {self.renderer!r}; have: {', '.join(get_args(Renderer))}")
         if self.rate_hz not in RATES_HZ:
             raise TandemError(f"no rate of {self.rate_hz} Hz; have: {', '.join(map(str, RATES_HZ))}")
         if len(self.size) != 2 or any(side not in SIDES_PX for side in self.size):
@@ -77,7 +83,9 @@ class ExportSettings:
 
     def as_json(self) -> dict[str, Any]:
         """Returns the settings in the form for files."""
-        return {**asdict(self), "cameras": list(self.cameras), "size": list(self.size)}
+        settings = {**asdict(self), "cameras": list(self.cameras), "size": list(self.size)}
+        # Exports without it have settings as they were before there was a choice, and can be continued.
+        return {name: value for name, value in settings.items() if name != "renderer" or value is not None}
 
     def cameras_of(self, robots: Sequence[str]) -> tuple[str, ...]:
         """Returns the cameras for a recording with these robots, by their names in `Recording.picture`."""

@@ -56,7 +56,7 @@ enum BenchPart {
     },
     /// Rendering: the images of both robots' head cameras in one state, and the third-person image.
     Render {
-        /// Renderer: `cpu`, `gpu`, or `auto`.
+        /// Renderer: `cpu`, `gpu`, `path`, or `auto`.
         #[arg(long, default_value = "cpu", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
         renderer: RendererKind,
         /// Also write the cases to this file as JSON.

@@ -18,12 +18,13 @@ use pulp::{Arch, Simd, WithSimd};
 use crate::Step;
 use crate::render::blur::blurred;
 use crate::render::scene::prepared::Prepared;
+use crate::render::shading::srgb::SrgbTable;
 use crate::render::{Camera, Frame, PlacedScenery, Renderer, Scenery, Wanted};
 use contact::ContactMap;
 use shade::{Facet, Rays};
 use shadow::ShadowMap;
 use target::RenderTarget;
-use view::{Row, SrgbTable, View};
+use view::{Row, View};
 use workspace::Workspace;
 
 /// Renderer on the calling thread, and several images of a state in parallel. It holds its buffers only

@@ -3,6 +3,7 @@
 
 pub mod lanes;
 pub mod pattern;
+pub mod srgb;
 
 use rapier3d::math::Vector;
 

@@ -1,0 +1,165 @@
+//! The light that surfaces of one state send along a ray.
+
+use std::f32::consts::PI;
+
+use rapier3d::math::Vector;
+
+use super::directions::{cosine_about, facet_about};
+use super::lights::{Beam, Lights};
+use super::sequence::IndependentNumbers;
+use super::space::body::MetSides;
+use super::space::{Space, Spot};
+use crate::render::scene::prepared::Prepared;
+use crate::render::shading::lanes::Affine;
+use crate::render::{Pattern, PlacedScenery};
+
+/// Most surfaces that light is reflected by after the one that is seen.
+const MAX_BOUNCES: u32 = 4;
+/// Number of bounces after which a path may end early, by chance, and the greatest probability to go on.
+const SURE_BOUNCES: u32 = 1;
+const MAX_SURVIVAL: f32 = 0.9;
+/// Limit of the light that a path brings: more would be a bright speck.
+const MAX_PATH_VALUE: f32 = 6.0;
+/// Reflectance of the clear coat over all surfaces, looked at along the normal, and the square of the width
+/// of the distribution of its facets.
+const COAT: f32 = 0.04;
+const COAT_WIDTH_2: f32 = 0.015;
+
+/// A state of a scenery, ready to be traced.
+pub struct Scene<'a> {
+    pub space: Space<'a>,
+    pub prepared: &'a Prepared,
+    pub lights: &'a Lights,
+    /// Map from the world to the frame of each part's pattern.
+    pub patterns: Vec<Affine>,
+}
+
+/// Layers of the light at a seen point. They are filtered separately.
+pub const LAYERS: usize = 3;
+/// Light of the lamps, that of everything else, both without the surface's colour, and the reflection in
+/// its coat.
+pub const DIRECT: usize = 0;
+pub const INDIRECT: usize = 1;
+pub const COATED: usize = 2;
+
+/// Returns the map from the world to the frame of each part's pattern.
+pub fn patterns(prepared: &Prepared, placed: &PlacedScenery) -> Vec<Affine> {
+    let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).zip(&prepared.grain);
+    parts.map(|((part, pose), grain)| part.pattern.frame(*pose, *grain)).collect()
+}
+
+impl Scene<'_> {
+    /// Returns the linear colour of a surface, without light.
+    pub fn albedo(&self, part: u32, point_m: Vector) -> Vector {
+        let part = part as usize;
+        let [first, second] = self.prepared.linear_rgb[part];
+        match self.prepared.scenery.parts[part].pattern {
+            Pattern::Plain => first,
+            pattern => {
+                let point_m = self.patterns[part].map(point_m).map(|coordinate_m| [coordinate_m]);
+                first + (second - first) * pattern.shares(point_m)[0]
+            }
+        }
+    }
+
+    /// Adds the light of one point of a lamp to the layers of a seen point.
+    pub fn light_directly(
+        &self,
+        spot: &Spot,
+        view_ray: Vector,
+        pair_values: [f32; 2],
+        layers_rgb: &mut [Vector; LAYERS],
+    ) {
+        let beam = self.lights.beam(spot.start_m, pair_values);
+        let lit_rgb = self.lit_rgb(spot, &beam);
+        if lit_rgb == Vector::ZERO {
+            return;
+        }
+        let half_way = (beam.direction - view_ray).normalize();
+        let reflected = fresnel(half_way.dot(beam.direction));
+        let along_2 = half_way.dot(spot.normal).max(0.0).powi(2);
+        let spread = along_2 * (COAT_WIDTH_2 - 1.0) + 1.0;
+        let density = COAT_WIDTH_2 / (PI * spread * spread);
+        layers_rgb[DIRECT] += lit_rgb * (1.0 - reflected);
+        layers_rgb[COATED] += lit_rgb * (PI * density * reflected * 0.25);
+    }
+
+    /// Adds the light of one path to the layers of a seen point: through the coat and, if `coated`, that
+    /// which the coat reflects.
+    pub fn light_indirectly(
+        &self,
+        spot: &Spot,
+        view_ray: Vector,
+        [through, mirrored]: [[f32; 2]; 2],
+        numbers: &mut IndependentNumbers,
+        layers_rgb: &mut [Vector; LAYERS],
+    ) {
+        let reflected = fresnel(-spot.normal.dot(view_ray));
+        let direction = cosine_about(spot.normal, through);
+        if direction.dot(spot.face_normal) > 0.0 {
+            layers_rgb[INDIRECT] += self.arriving_rgb(spot.start_m, direction, numbers) * (1.0 - reflected);
+        }
+        // The less the coat reflects, the fewer paths follow it.
+        let followed = (reflected * 5.0).min(1.0);
+        if numbers.uniform() < followed {
+            let facet = facet_about(spot.normal, COAT_WIDTH_2, mirrored);
+            let direction = view_ray - facet * (2.0 * view_ray.dot(facet));
+            if direction.dot(spot.face_normal) > 0.0 {
+                let arriving_rgb = self.arriving_rgb(spot.start_m, direction, numbers);
+                layers_rgb[COATED] += arriving_rgb * (reflected / followed);
+            }
+        }
+    }
+
+    /// Returns the light that arrives at a point from a direction, of one path. Coats of what it meets
+    /// are left out, except for the light that they keep out.
+    pub fn arriving_rgb(
+        &self,
+        mut start_m: Vector,
+        mut direction: Vector,
+        numbers: &mut IndependentNumbers,
+    ) -> Vector {
+        let (mut sum_rgb, mut carried_rgb) = (Vector::ZERO, Vector::ONE);
+        for bounce in 0..MAX_BOUNCES {
+            let Some((_, hit)) = self.space.nearest(start_m, direction, 0.0, MetSides::Both) else {
+                sum_rgb += carried_rgb * self.lights.sky_rgb(direction);
+                break;
+            };
+            let spot = self.space.spot(start_m, direction, &hit);
+            carried_rgb *= self.albedo(spot.part, spot.point_m);
+            let beam = self.lights.beam(spot.start_m, numbers.pair());
+            sum_rgb += carried_rgb * self.lit_rgb(&spot, &beam);
+            if bounce >= SURE_BOUNCES {
+                let survival = carried_rgb.max_element().min(MAX_SURVIVAL);
+                if numbers.uniform() >= survival {
+                    break;
+                }
+                carried_rgb /= survival;
+            }
+            direction = cosine_about(spot.normal, numbers.pair());
+            if direction.dot(spot.face_normal) <= 0.0 {
+                break;
+            }
+            start_m = spot.start_m;
+        }
+        sum_rgb.min(Vector::splat(MAX_PATH_VALUE))
+    }
+
+    /// Returns the irradiance by a beam, divided by pi.
+    fn lit_rgb(&self, spot: &Spot, beam: &Beam) -> Vector {
+        let facing = spot.normal.dot(beam.direction);
+        if facing <= 0.0
+            || beam.rgb == Vector::ZERO
+            || self.space.is_blocked(spot.start_m, beam.direction, beam.reach_m)
+        {
+            return Vector::ZERO;
+        }
+        beam.rgb * facing
+    }
+}
+
+/// Returns the share of light that the coat reflects. Source: Schlick 1994.
+fn fresnel(cosine_value: f32) -> f32 {
+    let rest = 1.0 - cosine_value.clamp(0.0, 1.0);
+    COAT + (1.0 - COAT) * rest * rest * rest * rest * rest
+}

@@ -1,0 +1,150 @@
+//! Surfaces that a camera sees: one at each pixel's centre, which is lit, and a few around it, for smooth
+//! edges.
+
+use rapier3d::math::{Pose, Vector};
+
+use super::scene::{LAYERS, Scene};
+use super::sequence::{PixelSeed, SampleCount};
+use super::space::Spot;
+use super::space::body::MetSides;
+use crate::render::scene::camera::NEAR_M;
+use crate::render::shading::SAMPLES;
+use crate::render::{Camera, Intrinsics};
+
+/// Points of a lamp to which each path of a pixel looks.
+const LAMP_POINTS: u32 = 2;
+/// Distance from the plane of a surface, as a share of the distance on it, at which a point is on another
+/// one; and the least such distance.
+const ASIDE_SHARE: f32 = 0.15;
+const MIN_ASIDE_M: f32 = 0.002;
+/// Purposes of a pixel's numbers.
+const FOR_LAMPS: u32 = 0;
+const FOR_LIGHT: u32 = 1;
+const FOR_COAT: u32 = 2;
+
+/// A seen surface.
+#[derive(Clone, Copy, Default)]
+pub struct SeenSurface {
+    /// Id in images; 0 for nothing.
+    pub id: u32,
+    pub point_m: Vector,
+    pub normal: Vector,
+    pub albedo: Vector,
+}
+
+/// The surface at the centre of a pixel.
+#[derive(Clone, Copy, Default)]
+pub struct Pixel {
+    pub depth_m: f32,
+    pub seen: SeenSurface,
+    spot: Option<Spot>,
+}
+
+/// A camera in a scene.
+pub struct PathView<'a> {
+    pub scene: &'a Scene<'a>,
+    world_from_camera: Pose,
+    lens: Intrinsics,
+    paths: SampleCount,
+}
+
+impl<'a> PathView<'a> {
+    /// Places a camera, with this number of paths at each pixel.
+    pub fn new(scene: &'a Scene<'a>, camera: &Camera, paths: SampleCount) -> PathView<'a> {
+        PathView { scene, world_from_camera: camera.world_from_camera, lens: camera.intrinsics(), paths }
+    }
+
+    /// Finds the surfaces at the centres of a row of pixels.
+    pub fn look(&self, row: usize, pixels: &mut [Pixel]) {
+        for (column, pixel) in pixels.iter_mut().enumerate() {
+            let met = self.spot([column as f32, row as f32]);
+            *pixel = Pixel {
+                depth_m: met.map_or(f32::INFINITY, |(depth_m, _)| depth_m),
+                seen: met.map_or(SeenSurface::default(), |(_, spot)| self.seen(&spot)),
+                spot: met.map(|(_, spot)| spot),
+            };
+        }
+    }
+
+    /// Finds the surfaces at points that are evenly spread over a pixel.
+    pub fn look_around(&self, row: usize, column: usize) -> [SeenSurface; SAMPLES * SAMPLES] {
+        let at_px = |pixel: usize, i: usize| pixel as f32 + (i as f32 + 0.5) / SAMPLES as f32 - 0.5;
+        std::array::from_fn(|i| {
+            let met = self.spot([at_px(column, i % SAMPLES), at_px(row, i / SAMPLES)]);
+            met.map_or(SeenSurface::default(), |(_, spot)| self.seen(&spot))
+        })
+    }
+
+    /// Computes the light at the centres of a row of pixels.
+    pub fn light(&self, row: usize, pixels: &[Pixel], light_rgb: &mut [[Vector; LAYERS]]) {
+        for ((column, pixel), layers_rgb) in pixels.iter().enumerate().zip(light_rgb) {
+            let Some(spot) = &pixel.spot else { continue };
+            let ray = (spot.point_m - self.eye_m()).normalize();
+            let seed = PixelSeed::of([column as u32, row as u32]);
+            *layers_rgb = self.scene.lit_layers(spot, ray, seed, self.paths);
+        }
+    }
+
+    /// Returns the point that the camera looks from.
+    pub fn eye_m(&self) -> Vector {
+        self.world_from_camera.translation
+    }
+
+    /// Returns the surface at a point of the image and its depth. The centre of the first pixel is (0, 0).
+    pub fn spot(&self, uv_px: [f32; 2]) -> Option<(f32, Spot)> {
+        let eye_m = self.eye_m();
+        // To a depth of 1 m, so that distances along it are depths.
+        let ray = self.world_from_camera.rotation * self.lens.unproject(uv_px, 1.0);
+        let (depth_m, hit) = self.scene.space.nearest(eye_m, ray, NEAR_M, MetSides::Front)?;
+        Some((depth_m, self.scene.space.spot(eye_m, ray, &hit)))
+    }
+
+    fn seen(&self, spot: &Spot) -> SeenSurface {
+        SeenSurface {
+            id: self.scene.prepared.scenery.parts[spot.part as usize].id,
+            point_m: spot.point_m,
+            normal: spot.normal,
+            albedo: self.scene.albedo(spot.part, spot.point_m),
+        }
+    }
+}
+
+impl SeenSurface {
+    /// Returns 1 for a point of the same surface, less for another, and 0 for that of another thing.
+    pub fn likeness(&self, other: &SeenSurface) -> f32 {
+        if self.id != other.id {
+            return 0.0;
+        }
+        let between_m = other.point_m - self.point_m;
+        let tolerance_m = between_m.length() * ASIDE_SHARE + MIN_ASIDE_M;
+        let aside = (between_m.dot(self.normal).abs() / tolerance_m).min(1.0);
+        let turned = self.normal.dot(other.normal).max(0.0);
+        let turned_4 = turned * turned * turned * turned;
+        (1.0 - aside * aside) * (turned_4 * turned_4) * (turned_4 * turned_4)
+    }
+}
+
+impl Scene<'_> {
+    /// Returns the light at a seen point, layer by layer.
+    pub fn lit_layers(
+        &self,
+        spot: &Spot,
+        view_ray: Vector,
+        seed: PixelSeed,
+        paths: SampleCount,
+    ) -> [Vector; LAYERS] {
+        let mut layers_rgb = [Vector::ZERO; LAYERS];
+        let lamp_points = SampleCount(paths.0 * LAMP_POINTS);
+        for sample in 0..lamp_points.0 {
+            let pair_values = seed.spread(FOR_LAMPS, sample, lamp_points);
+            self.light_directly(spot, view_ray, pair_values, &mut layers_rgb);
+        }
+        let mut sum_rgb = layers_rgb.map(|rgb| rgb / LAMP_POINTS as f32);
+        for sample in 0..paths.0 {
+            let pairs = [FOR_LIGHT, FOR_COAT].map(|purpose| seed.spread(purpose, sample, paths));
+            let mut numbers = seed.independent(FOR_LIGHT, sample);
+            self.light_indirectly(spot, view_ray, pairs, &mut numbers, &mut sum_rgb);
+        }
+        sum_rgb.map(|rgb| rgb / paths.0 as f32)
+    }
+}
