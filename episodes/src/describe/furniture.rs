@@ -3,7 +3,8 @@
 use tandem_sim::mjcf::Geom;
 use tandem_sim::{Pose, Rotation, Vector};
 
-use super::room::{corners_m, extent_m, places};
+use super::extents::{corners_m, extent_m};
+use super::relative::places;
 use crate::tasks::Task;
 
 /// Maximum horizontal distance of furniture from a robot's start position or from an object of the task.

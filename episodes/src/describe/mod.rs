@@ -1,8 +1,10 @@
 //! Descriptions of tasks, protocols and robots for policies.
 
 mod brief;
+mod extents;
 mod furniture;
 mod grips;
+mod relative;
 mod room;
 
 pub use brief::{brief, teamwork};

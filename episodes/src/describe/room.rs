@@ -1,15 +1,17 @@
 //! Description of the room: the sizes of objects, their approximate nominal positions relative to each
 //! robot, the furniture near them, and the start poses of partners.
 
-use tandem_sim::mjcf::{Geom, Primitive};
-use tandem_sim::{ObjectModel, Pose, Rotation, SimError, Vector, wrapped_rad};
+use tandem_sim::mjcf::Geom;
+use tandem_sim::{ObjectModel, SimError, Vector, wrapped_rad};
 
+use super::extents::{corners_m, extent_m};
 use super::furniture::furniture;
+use super::relative::{places, seen_from};
 use crate::tasks::{ObjectSpot, RobotSpot, Spread, Task};
 
 /// Returns one line for each object of a task, for example "service trolley, 0.72 m along A's x, 0.44 m along
-/// its y, 0.92 m high: middle 0.85 m ahead of A, 3.65 m ahead of B (from the pelvis, give or take 0.32 m)"; then one for each piece of furniture among the
-/// room's fixed geoms, and one for each partner.
+/// its y, 0.92 m high: middle 0.85 m ahead of A, 3.65 m ahead of B (from the pelvis, give or take 0.32 m)".
+/// Lines for the furniture among the room's fixed geoms follow, and one for each partner.
 pub fn room(task: &Task, spread: Spread, fixed: &[Geom]) -> Result<Vec<String>, SimError> {
     let line = |spot: &ObjectSpot| {
         let first = &task.robots[0];
@@ -25,12 +27,6 @@ pub fn room(task: &Task, spread: Spread, fixed: &[Geom]) -> Result<Vec<String>, 
     };
     let things = task.objects.iter().map(line);
     things.chain(furniture(task, fixed).into_iter().chain(partners(task)).map(Ok)).collect()
-}
-
-/// Describes a point relative to each robot at the start.
-pub(super) fn places(task: &Task, at_m: [f32; 2]) -> String {
-    let places: Vec<String> = task.robots.iter().map(|robot| place(robot, at_m)).collect();
-    places.join(", ")
 }
 
 /// Returns the other robots' start poses relative to the first, for example "B begins at [1.26, 0.00] m
@@ -53,13 +49,6 @@ fn partners(task: &Task) -> Vec<String> {
     others.iter().map(line).collect()
 }
 
-/// Returns the position of a point relative to a robot at the start: ahead of it, and to its left.
-fn seen_from(robot: &RobotSpot, [x_m, y_m]: [f32; 2]) -> (f32, f32) {
-    let (east_m, north_m) = (x_m - robot.position_m[0], y_m - robot.position_m[1]);
-    let (sine, cosine) = robot.yaw_rad.sin_cos();
-    (cosine * east_m + sine * north_m, cosine * north_m - sine * east_m)
-}
-
 /// Returns the largest horizontal displacement of an object by the seed, as a text; empty if it is
 /// negligible.
 fn give_or_take(task: &Task, spot: &ObjectSpot, spread: Spread) -> String {
@@ -73,17 +62,6 @@ fn give_or_take(task: &Task, spot: &ObjectSpot, spread: Spread) -> String {
     if most_m < 0.005 { String::new() } else { format!(", give or take {most_m:.2} m") }
 }
 
-fn place(robot: &RobotSpot, at_m: [f32; 2]) -> String {
-    let (ahead_m, left_m) = seen_from(robot, at_m);
-    let part = |part_m: f32, towards: &str, away: &str| {
-        let words = if part_m < 0.0 { away } else { towards };
-        (part_m.abs() >= 0.005).then(|| format!("{:.2} m {words} {}", part_m.abs(), robot.name))
-    };
-    let parts = [part(ahead_m, "ahead of", "behind"), part(left_m, "to the left of", "to the right of")];
-    let told: Vec<String> = parts.into_iter().flatten().collect();
-    if told.is_empty() { format!("where {} stands", robot.name) } else { told.join(" and ") }
-}
-
 /// Returns the size of an object along the axes of a frame with z up, in which the object has this yaw.
 fn size_m(spot: &ObjectSpot, yaw_rad: f32) -> Result<Vector, SimError> {
     let parts = ObjectModel::parts(&spot.source(), &spot.name)?;
@@ -93,42 +71,6 @@ fn size_m(spot: &ObjectSpot, yaw_rad: f32) -> Result<Vector, SimError> {
     });
     let [low_m, high_m] = extent_m(corners, yaw_rad);
     Ok(high_m - low_m)
-}
-
-/// Returns the lowest and highest coordinates of points along the axes of a frame that is turned by
-/// `-yaw_rad` about z.
-pub(super) fn extent_m(points_m: impl Iterator<Item = Vector>, yaw_rad: f32) -> [Vector; 2] {
-    let turn = Rotation::from_rotation_z(yaw_rad);
-    points_m
-        .map(|point_m| turn * point_m)
-        .fold([Vector::INFINITY, Vector::NEG_INFINITY], |[low_m, high_m], point_m| {
-            [low_m.min(point_m), high_m.max(point_m)]
-        })
-}
-
-/// Returns the corners of a geom's box, or its vertices.
-pub(super) fn corners_m(geom: &Geom, frame_from_body: &Pose) -> Vec<Vector> {
-    let pose = *frame_from_body * geom.body_from_geom;
-    let of_box = |half_m: Vector| -> Vec<Vector> {
-        let sign = |corner: usize, axis: usize| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
-        let signs = |corner: usize| Vector::new(sign(corner, 0), sign(corner, 1), sign(corner, 2));
-        (0..8).map(|corner| signs(corner) * half_m).collect()
-    };
-    let points_m: Vec<Vector> = match &geom.primitive {
-        Primitive::Sphere { radius_m } => of_box(Vector::splat(*radius_m)),
-        Primitive::Capsule { radius_m, half_length_m } => {
-            of_box(Vector::new(*radius_m, *radius_m, half_length_m + radius_m))
-        }
-        Primitive::Cylinder { radius_m, half_length_m } => {
-            of_box(Vector::new(*radius_m, *radius_m, *half_length_m))
-        }
-        Primitive::Box { half_extents_m } => of_box(*half_extents_m),
-        Primitive::Ellipsoid { radii_m } => of_box(*radii_m),
-        Primitive::Convex { vertices_m } => vertices_m.clone(),
-        Primitive::Mesh(mesh) => mesh.vertices_m.clone(),
-        Primitive::Plane { .. } => Vec::new(),
-    };
-    points_m.into_iter().map(|point_m| pose * point_m).collect()
 }
 
 #[cfg(test)]
