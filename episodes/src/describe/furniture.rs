@@ -104,7 +104,7 @@ mod tests {
             lines(counter),
             [
                 "counter top, fixed, 0.40 m along A's x, 0.84 m along its y, from 0.76 to 0.80 m above the floor: middle 0.37 m \
-                 ahead of A and 0.12 m to the right of A, 0.37 m ahead of B and 0.12 m to the left of B"
+                 ahead of A and 0.12 m to the right of A, 0.37 m ahead of B"
             ]
         );
     }

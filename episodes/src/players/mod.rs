@@ -168,11 +168,13 @@ impl PlayerEntry {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::results::PLAYERS;
     use crate::tasks;
     use tandem_tools_spec::Protocol;
 
     #[test]
     fn every_player_can_be_made_for_every_task_or_says_for_which() {
+        assert_eq!(ALL.iter().map(|entry| entry.name).collect::<Vec<_>>(), PLAYERS);
         for entry in ALL {
             assert_eq!(find(entry.name).unwrap().name, entry.name);
             for task in tasks::cohub() {

@@ -178,6 +178,9 @@ pub fn failures_of_policy(attempts: &[Attempt]) -> usize {
     attempts.iter().filter(|attempt| attempt.ended == EndReason::PolicyFailed).count()
 }
 
+/// Names of the built-in players, which act in the simulator's process and read no replies as text.
+pub const PLAYERS: [&str; 4] = ["expert", "no_words", "idle", "demonstration"];
+
 /// Description of a policy in results. Episodes of policies with different cards are never mixed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PolicyCard {

@@ -41,11 +41,12 @@ impl Encrypted {
             .stderr(Stdio::null())
             .spawn()
             .expect("the program starts");
-        let said = BufReader::new(child.stdout.take().unwrap()).lines().next().unwrap().unwrap();
-        let (address, watch_key) = said
-            .strip_prefix("watch at https://")
-            .and_then(|link| link.split_once("/watch#"))
-            .unwrap_or_else(|| panic!("no link of HTTPS: {said}"));
+        let links = BufReader::new(child.stdout.take().unwrap()).lines().take(3).map(Result::unwrap);
+        let links: Vec<String> = links.collect();
+        let (address, watch_key) = links
+            .iter()
+            .find_map(|link| link.strip_prefix("watch at https://")?.split_once("/watch#"))
+            .unwrap_or_else(|| panic!("no link of HTTPS: {links:?}"));
         Encrypted {
             address: address.into(),
             watch_key: watch_key.into(),

@@ -9,7 +9,7 @@ use super::{BoardCosts, BoardRow, TranscriptLink};
 use crate::recording::{Recording, RecordingError, TranscriptEntry};
 use crate::reports::evaluation::{FoundEpisode, LoadedEpisodes, Rate, ValueRange, ended_between};
 use crate::reports::links::relative;
-use crate::results::PlayedEpisode;
+use crate::results::{PLAYERS, PlayedEpisode};
 use crate::statistics::Count;
 use crate::tasks;
 
@@ -52,7 +52,9 @@ pub fn rows(loaded: &LoadedEpisodes, folder: &Path) -> Rows {
     let whole = loaded.episodes.iter().filter(|found| found.played.start_phase().is_none());
     let episodes: Vec<BoardEpisode> = whole
         .map(|found| {
-            let read = found.recording.as_deref().map_or(Ok(None), reply_bytes);
+            let reads_text = !PLAYERS.contains(&found.played.policy.name.as_str());
+            let recording = found.recording.as_deref().filter(|_| reads_text);
+            let read = recording.map_or(Ok(None), reply_bytes);
             let reply_bytes = read.unwrap_or_else(|error| {
                 unreadable.push(error.to_string());
                 None
