@@ -98,8 +98,8 @@ pub struct Layer {
     /// Level of the stress, from 1 to 3 [default: 1].
     #[arg(long, env = "TANDEM_LEVEL", value_name = "LEVEL")]
     pub level: Option<StressLevel>,
-    /// Renderer of images: `gpu`, `cpu` (embedded), `path` (path tracing on the CPU, a second per look), or `auto`
-    /// (a GPU if there is one, otherwise `cpu`) [default: auto].
+    /// Renderer of images: `gpu`, `cpu` (embedded), `path` (path tracing on the CPU, a second per look), or
+    /// `auto` (a GPU if there is one, otherwise `cpu`) [default: auto].
     #[arg(long, env = "TANDEM_RENDERER", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
     pub renderer: Option<RendererKind>,
     /// Information for policies: `paper` as in the benchmark, with success reported at the end; `full` with

@@ -95,7 +95,8 @@ const STEPS: &[Step] = &[
         folder: "sim/src/render",
         extension: "rs",
         says: "impl Renderer for",
-        may: &["sim/src/render/"],
+        // In OpenAPI, "path" is where a parameter stands.
+        may: &["sim/src/render/", "tools_spec/src/schema/openapi.rs"],
     },
 ];
 

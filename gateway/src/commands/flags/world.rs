@@ -27,8 +27,8 @@ pub struct WorldFlags {
     locomotion: LocomotionFlag,
     #[command(flatten)]
     sensing: SensingFlags,
-    /// Renderer of images: `gpu`, `cpu` (embedded), `path` (path tracing on the CPU, a second per look), or `auto`
-    /// (a GPU if there is one, otherwise `cpu`).
+    /// Renderer of images: `gpu`, `cpu` (embedded), `path` (path tracing on the CPU, a second per look), or
+    /// `auto` (a GPU if there is one, otherwise `cpu`).
     #[arg(long, env = "TANDEM_RENDERER", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name),
           default_value = RendererKind::default().name())]
     renderer: RendererKind,

@@ -53,7 +53,7 @@ pub fn circle(turn_share: f32) -> [f32; 2] {
 mod tests {
     use super::*;
 
-    /// The middles of a grid's cells in the unit square.
+    /// Returns the middles of a grid's cells in the unit square.
     fn grid() -> impl Iterator<Item = [f32; 2]> {
         (0..64).flat_map(|u| (0..64).map(move |v| [(u as f32 + 0.5) / 64.0, (v as f32 + 0.5) / 64.0]))
     }
