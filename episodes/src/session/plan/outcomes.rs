@@ -6,11 +6,11 @@ use tandem_tools_spec::{BaseState, CommandReply, Grip, HandReport, HandState, Ro
 
 /// Outcomes of the commands that have been begun, in their order.
 #[derive(Debug, Default)]
-pub struct Outcomes(Vec<CommandOutcome>);
+pub struct Outcomes(Vec<PlanOutcome>);
 
 /// A command with its pieces so far.
 #[derive(Debug)]
-struct CommandOutcome {
+struct PlanOutcome {
     place: String,
     steps: u32,
     /// Robots that have walked during it.
@@ -27,7 +27,7 @@ impl Outcomes {
     pub fn add(&mut self, place: &str, reply: &CommandReply) {
         if self.0.last().is_none_or(|last| last.place != place) {
             let (place, walked) = (place.into(), BTreeSet::new());
-            self.0.push(CommandOutcome { place, steps: 0, walked, states: String::new() });
+            self.0.push(PlanOutcome { place, steps: 0, walked, states: String::new() });
         }
         if let Some(outcome) = self.0.last_mut() {
             outcome.add(reply);
@@ -41,7 +41,7 @@ impl Outcomes {
         if outcomes.len() < 2 {
             return Vec::new();
         }
-        let line = |CommandOutcome { place, steps, states, .. }: CommandOutcome| {
+        let line = |PlanOutcome { place, steps, states, .. }: PlanOutcome| {
             let states = if states.is_empty() { states } else { format!(": {states}") };
             format!("{place}, {steps} steps{states}")
         };
@@ -49,7 +49,7 @@ impl Outcomes {
     }
 }
 
-impl CommandOutcome {
+impl PlanOutcome {
     fn add(&mut self, reply: &CommandReply) {
         self.steps += reply.executed_steps;
         let has_walked = |report: &&RobotReport| {

@@ -42,7 +42,14 @@ pub struct WaitingConnections {
 struct WaitingEntry {
     number: u64,
     is_trusted: bool,
-    close: Arc<Notify>,
+    crowding: Arc<Crowding>,
+}
+
+/// Tells a connection that it has to make room.
+#[derive(Debug, Default)]
+struct Crowding {
+    is_out: AtomicBool,
+    told: Notify,
 }
 
 impl WaitingConnections {
@@ -64,7 +71,7 @@ impl WaitingConnections {
             is_trusted: AtomicBool::new(false),
             header_limit,
             wait: Mutex::new(RequestWait { since: Instant::now(), header_since: None }),
-            close: Arc::default(),
+            crowding: Arc::default(),
         };
         connection.wait();
         Arc::new(connection)
@@ -85,18 +92,26 @@ impl WaitingConnections {
         }
     }
 
-    /// Adds a connection. If its address has too many, the one with the longest wait is closed,
-    /// preferably one without a good call.
+    /// Adds a connection; one that waits already keeps its place, and one that has to close gets none. If its
+    /// address has too many, the one with the longest wait is closed, preferably one without a good call.
     fn add(&self, connection: &Connection) {
         let mut waiting = self.lock();
+        if connection.crowding.is_out.load(Ordering::Relaxed) {
+            return;
+        }
         let entries = waiting.entry(connection.address).or_default();
-        entries.retain(|entry| entry.number != connection.number);
+        if let Some(entry) = entries.iter_mut().find(|entry| entry.number == connection.number) {
+            entry.is_trusted = connection.is_trusted();
+            return;
+        }
         if entries.len() >= self.max_per_address {
             let longest = entries.iter().position(|entry| !entry.is_trusted).unwrap_or(0);
-            entries.remove(longest).close.notify_one();
+            let crowding = entries.remove(longest).crowding;
+            crowding.is_out.store(true, Ordering::Relaxed);
+            crowding.told.notify_one();
         }
-        let (number, close) = (connection.number, connection.close.clone());
-        entries.push(WaitingEntry { number, is_trusted: connection.is_trusted(), close });
+        let (number, crowding) = (connection.number, connection.crowding.clone());
+        entries.push(WaitingEntry { number, is_trusted: connection.is_trusted(), crowding });
     }
 }
 
@@ -109,7 +124,7 @@ pub struct Connection {
     is_trusted: AtomicBool,
     header_limit: Duration,
     wait: Mutex<RequestWait>,
-    close: Arc<Notify>,
+    crowding: Arc<Crowding>,
 }
 
 /// Times of the current wait for a request.
@@ -128,7 +143,7 @@ impl Connection {
 
     /// Returns once this connection has to close because too many of its address wait.
     pub async fn crowded_out(&self) {
-        self.close.notified().await;
+        self.crowding.told.notified().await;
     }
 
     /// Counts the connection as busy, because its request has arrived and is admitted.
@@ -311,12 +326,16 @@ mod tests {
         trusted.wait();
         let (first, other) = (enter(&all, 1), enter(&all, 2));
         let second = enter(&all, 1);
+        first.wait();
         assert!(is_closed(&first).await, "it has made no good call");
         assert!(!is_closed(&trusted).await && !is_closed(&other).await && !is_closed(&second).await);
         second.is_served();
         let third = enter(&all, 1);
         assert!(!is_closed(&trusted).await && !is_closed(&second).await, "who is served does not wait");
-        drop(third);
+        third.wait();
+        let fourth = enter(&all, 1);
+        assert!(is_closed(&third).await && !is_closed(&trusted).await, "who waits keeps its place");
+        drop((third, fourth));
         assert_eq!(all.lock().len(), 2);
         drop((trusted, first, second, other));
         assert!(all.lock().is_empty());
