@@ -100,7 +100,7 @@ impl Offset {
 }
 
 impl TaskDefinition {
-    /// Returns the start pose of every object for a seed, in the order of [`Task::objects`].
+    /// Returns the start pose of every object for a seed, in the order of the field `objects`.
     pub fn start_poses(&self, seed: u32, spread: Spread) -> Vec<StartPose> {
         let mut random = SplitMix64(seed.into());
         let mut start_poses: Vec<StartPose> = self
