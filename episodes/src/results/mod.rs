@@ -167,6 +167,11 @@ impl PlayedEpisode {
         failed.filter(|_| !self.succeeded())
     }
 
+    /// Returns the number of requests; results of earlier builds have only that of tool calls.
+    pub fn requests(&self) -> u32 {
+        self.result.requests.unwrap_or(self.result.tool_calls)
+    }
+
     /// Returns `true` if the episode counts in rates and averages.
     pub fn counts(&self) -> bool {
         self.exclusion().is_none()

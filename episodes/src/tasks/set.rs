@@ -35,6 +35,11 @@ pub fn tandem_plus() -> &'static [Task] {
     &TANDEM_PLUS_TASKS
 }
 
+/// Returns every built-in task: the benchmark's, then those of our own suite.
+pub fn built_in() -> impl Iterator<Item = &'static Task> + Clone {
+    cohub().iter().chain(tandem_plus())
+}
+
 /// The available tasks: the built-in ones and those of files.
 #[derive(Clone, Debug, Default)]
 pub struct TaskSet {

@@ -20,7 +20,7 @@ from tandem.rows import ACTION, DEFAULT_DATA_RATE_HZ, DEFAULT_SIZE_PX, IMAGES, S
 @EnvConfig.register_subclass("tandem")
 @dataclass
 class TandemEnvConfig(EnvConfig):
-    """What `lerobot-eval` and `lerobot-train` have to know of a task; options are those of `gym_tandem.Options`.
+    """Description of a task for `lerobot-eval` and `lerobot-train`; options are those of `gym_tandem.Options`.
 
     Rate and size of pictures are by default those of `tandem export lerobot`. With `data_set`, whatever differs from the rows
     of the data set is refused.

@@ -237,7 +237,7 @@ impl Drop for NativeWorlds {
     }
 }
 
-/// Returns the layout of a robot's rows in environments of a task, as JSON.
+/// Returns the JSON of the layout of a robot's rows in environments of a task.
 #[pyfunction]
 pub fn row_contract(py: Python, task: String, settings: &str, actions: &str) -> PyResult<String> {
     let episode = benchmark_episode(py, task, settings)?;
@@ -262,7 +262,7 @@ pub fn row_contract_version() -> u32 {
     ROW_CONTRACT_VERSION
 }
 
-/// Returns the layout of the rows of an episode's robots, as JSON.
+/// Returns the JSON of the layout of the rows of an episode's robots.
 pub fn contract_json(py: Python, episode: &EpisodeSpec, actions: ActionKind) -> PyResult<String> {
     let contract = RowContract::of(episode, actions).map_err(|error| failed(py, &error))?;
     serde_json::to_string(&contract).map_err(|error| failed(py, &error))

@@ -143,7 +143,7 @@ class Recording:
 
     @cached_property
     def row_layout(self) -> str:
-        """Names, units and ranges of the columns of a robot's rows, as JSON; `tandem.rows` reads it."""
+        """JSON of the names, units and ranges of the columns of a robot's rows; `tandem.rows` reads it."""
         return self._native.row_contract()
 
     @cached_property

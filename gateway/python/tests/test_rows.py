@@ -25,7 +25,7 @@ SEED = 2003
 SIZE = (48, 36)
 SIZED: dict[str, Any] = {"observation_width": SIZE[0], "observation_height": SIZE[1], "renderer": "cpu"}
 STATE_TOLERANCE_RAD = {50: 0.0, 25: 0.05, 10: 0.05}
-"""How far joints may be from the recorded ones: between rows, experts do not move on straight lines."""
+"""Maximum difference between a joint and its recorded angle. Between rows, experts do not move on straight lines."""
 
 
 @pytest.fixture(scope="module")

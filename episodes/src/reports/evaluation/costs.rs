@@ -123,7 +123,7 @@ impl EpisodeCosts {
         };
         Some(EpisodeCosts {
             steps: spread(|played| played.result.env_steps.into())?,
-            calls: spread(|played| played.result.requests.unwrap_or(played.result.tool_calls).into())?,
+            calls: spread(|played| played.requests().into())?,
             thought: spread(|played| played.thought_s)?,
         })
     }

@@ -8,8 +8,8 @@ use super::{EvaluationReport, stress};
 /// Returns a line for each rate of each phase, for further computation.
 pub fn rates(report: &EvaluationReport) -> String {
     let mut text = String::from(
-        "policy,protocol,task,robots,phase_number,phase_id,collaborative,rate,successes,trials,share,low_share,high_share,\
-         median_steps,median_calls,median_thinking_s,median_input_tokens,median_output_tokens,median_usd\n",
+        "policy,protocol,task,robots,phase_number,phase_id,collaborative,rate,successes,trials,share,\
+         low_share,high_share,median_steps,median_calls,median_thinking_s,median_input_tokens,median_output_tokens,median_usd\n",
     );
     for policy in &report.policies {
         for task in &policy.tasks {

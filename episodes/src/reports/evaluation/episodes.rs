@@ -73,7 +73,7 @@ impl EpisodeRow {
             phases_s: result.phases.0.iter().cloned().collect(),
             ended: result.ended,
             steps: result.env_steps,
-            requests: result.requests.unwrap_or(result.tool_calls),
+            requests: played.requests(),
             thinking_s: played.thought_s,
             falls: result.falls,
             input_tokens: usage.map(|usage| usage.input_tokens),

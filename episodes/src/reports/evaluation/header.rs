@@ -117,7 +117,8 @@ pub fn days([first, last]: &[String; 2]) -> String {
 pub fn settings(header: &ReportHeader) -> Table {
     let mut table = Table::new(
         "Settings",
-        "Episodes that count, and how they were played. `auto` is the renderer that the machine has; days are in UTC.",
+        "Episodes that count, and how they were played. `auto` is the renderer that the machine has; days are \
+         in UTC.",
         &[
             "Policy",
             "Tasks",

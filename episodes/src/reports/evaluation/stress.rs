@@ -307,10 +307,7 @@ fn task_table(report: &StressReport) -> Table {
 /// Returns a line for each rate of each task, in the format of the CSV's other lines.
 pub fn csv_lines(report: &StressReport, quoted: &dyn Fn(&str) -> String) -> Vec<String> {
     let line = |row: &StressRow| {
-        let task = tasks::cohub()
-            .iter()
-            .chain(tasks::tandem_plus())
-            .find(|task| row.task.as_ref() == Some(&task.id))?;
+        let task = tasks::built_in().find(|task| row.task.as_ref() == Some(&task.id))?;
         let last = task.phases.len() - 1;
         let Rate { successes, trials, share, interval_share: [low_share, high_share] } = row.rate;
         let of = format!("{},{},{},{}", quoted(&report.policy), report.protocol, task.id, task.robots.len());

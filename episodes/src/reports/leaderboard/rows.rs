@@ -181,17 +181,13 @@ fn costs(episodes: &[&BoardEpisode]) -> BoardCosts {
         range(&|episode| episode.found.played.result.usage.as_ref().and_then(of))
     };
     BoardCosts {
-        requests: range(&|episode| Some(f64::from(requests(&episode.found.played)))),
+        requests: range(&|episode| Some(f64::from(episode.found.played.requests()))),
         reply_kilobytes: range(&|episode| Some(episode.reply_bytes? as f64 / 1e3)),
         thinking: range(&|episode| Some(episode.found.played.thought_s)),
         input_tokens: usage(|usage| Some(usage.input_tokens as f64)),
         output_tokens: usage(|usage| Some(usage.output_tokens as f64)),
         usd: usage(|usage| usage.usd),
     }
-}
-
-fn requests(played: &PlayedEpisode) -> u32 {
-    played.result.requests.unwrap_or(played.result.tool_calls)
 }
 
 impl BoardEpisode<'_> {
@@ -207,7 +203,7 @@ impl BoardEpisode<'_> {
             seed: played.spec.seed,
             phases: played.result.phases.clone(),
             ended: played.result.ended,
-            requests: requests(played),
+            requests: played.requests(),
             reply_bytes: self.reply_bytes?,
             thinking_s: played.thought_s,
             ended_at: played.ended_at.clone(),

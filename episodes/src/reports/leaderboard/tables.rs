@@ -1,4 +1,4 @@
-//! The leaderboard's tables, as Markdown and as a page.
+//! Tables of the leaderboard in Markdown and HTML.
 
 use super::{BoardRow, Leaderboard, TranscriptLink};
 use crate::html::{self, escape};
@@ -25,10 +25,12 @@ const COLUMNS: [&str; 16] = [
     "Price ($)",
 ];
 
-const NOTE: &str = "Success: episodes that reached the last phase, with the exact 95 % interval (Clopper-Pearson). Phases: those reached, \
-     of all phases of all episodes. Costs are medians of an episode. Requests include the commands of plans. Replies are the texts of all \
-     of them as recorded, without images; a policy that asks for short ones reads less. Tokens and price are those that notes state. Rows \
-     of CoHuB's paper are from another simulator, on another scale. An empty cell is unknown.";
+const NOTE: &str = "\
+    Success: episodes that reached the last phase, with the exact 95 % interval (Clopper-Pearson). \
+    Phases: those reached, of all phases of all episodes. Costs are medians of an episode. Requests \
+    include the commands of plans. Replies are the texts of all of them as recorded, without images; a \
+    policy that asks for short ones reads less. Tokens and price are those that notes state. Rows of \
+    CoHuB's paper are from another simulator, on another scale. An empty cell is unknown.";
 
 /// Renders the leaderboard as Markdown.
 pub fn markdown(board: &Leaderboard) -> String {
@@ -100,8 +102,8 @@ fn cells(row: &BoardRow, tasks: String) -> Vec<String> {
 fn transcripts(links: &[TranscriptLink]) -> Table {
     let mut table = Table::new(
         "Transcripts",
-        "Episodes whose policies read replies outside of the simulator, each with its page. Phases are simulated times in seconds; \
-         `none` was not reached.",
+        "Episodes whose policies read replies outside of the simulator, each with its page. Phases are \
+         simulated times in seconds; `none` was not reached.",
         &[
             "Policy",
             "Protocol",

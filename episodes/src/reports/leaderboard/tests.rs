@@ -104,8 +104,10 @@ fn costs_are_medians_and_unknown_ones_empty() {
     episodes.push(played("silent", &tasks::find("handover").unwrap(), 0, 0));
     let board = board(episodes);
     let text = tables::markdown(&board);
-    let spent = "| agent | 0.1.0+test | benchmark | paper |  | 2026-11-28 to 2026-11-29 | 1 | 10 | 1 | 18/30 | 30 [6.7, 65.2] | 60 |  | 4.5 | 20.0 | 0.5 | 0.060 |";
-    let silent = "| silent | 0.1.0+test | benchmark | paper |  |  | 1 | 1 | 0 | 0/3 | 0 [0, 97.5] | 60 |  | 0.0 |  |  |  |";
+    let spent = "| agent | 0.1.0+test | benchmark | paper |  | 2026-11-28 to 2026-11-29 | 1 | 10 | 1 | \
+                 18/30 | 30 [6.7, 65.2] | 60 |  | 4.5 | 20.0 | 0.5 | 0.060 |";
+    let silent = "| silent | 0.1.0+test | benchmark | paper |  |  | 1 | 1 | 0 | 0/3 | 0 [0, 97.5] | \
+                   60 |  | 0.0 |  |  |  |";
     for line in [spent, silent] {
         assert!(text.contains(line), "no {line}: {text}");
     }

@@ -59,7 +59,12 @@ pub fn list(runs: &Path, running: &[String]) -> Vec<Value> {
         let recorded = folder.join(RECORDING).is_file();
         let strip = folder.join("strip.png").is_file();
         Some(json!({
-            "run": run, "policy": policy, "result": result, "ended_unix_s": ended_s, "recorded": recorded, "strip": strip,
+            "run": run,
+            "policy": policy,
+            "result": result,
+            "ended_unix_s": ended_s,
+            "recorded": recorded,
+            "strip": strip,
         }))
     };
     found.into_iter().filter_map(entry).take(MAX_LISTED).collect()

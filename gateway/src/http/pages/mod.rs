@@ -131,7 +131,11 @@ async fn episodes(State(app): State<AppState>) -> Result<Response, ApiError> {
     let found = blocking(move || Ok((finished::list(&runs, &running), app.evaluations.list(&runs)))).await?;
     let (finished, evaluations) = found;
     let told = json!({
-        "version": super::app::VERSION, "held": held.episodes, "asleep": app.table.asleep(), "evaluations": evaluations, "finished": finished,
+        "version": super::app::VERSION,
+        "held": held.episodes,
+        "asleep": app.table.asleep(),
+        "evaluations": evaluations,
+        "finished": finished,
     });
     Ok(axum::Json(told).into_response())
 }

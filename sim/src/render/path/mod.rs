@@ -47,6 +47,7 @@ pub(super) struct PathRenderer {
     movers: Vec<Mover>,
     lights: Lights,
     paths: SampleCount,
+    srgb: SrgbTable,
 }
 
 /// Parts that move together.
@@ -64,7 +65,8 @@ impl PathRenderer {
         let of_room = |number: &usize| scenery.parts[*number].carrier == Carrier::Room;
         let room = Body::of(scenery, (0..scenery.parts.len()).filter(of_room));
         let lights = Lights::of(scenery, &room);
-        PathRenderer { room, movers: movers(scenery), lights, paths: PATHS, prepared }
+        let (movers, srgb) = (movers(scenery), SrgbTable::default());
+        PathRenderer { room, movers, lights, paths: PATHS, srgb, prepared }
     }
 
     /// Returns the scenery at its poses.
@@ -84,12 +86,12 @@ impl PathRenderer {
     /// Returns the image of a camera, drawn on `threads` threads.
     fn draw(&self, scene: &Scene, camera: &Camera, threads: usize) -> Frame {
         let negative = self.negative(scene, camera, threads);
-        let (width, srgb) = (camera.width as usize, SrgbTable::default());
+        let width = camera.width as usize;
         let mut rgb = vec![0; negative.guides.len() * 3];
         for_each_row(&mut rgb, width * 3, threads, |row, bytes| {
             let colours: Vec<Vector> = (0..width).map(|column| negative.linear_rgb(row, column)).collect();
             let planes = [0, 1, 2].map(|axis| colours.iter().map(|rgb| rgb[axis]).collect());
-            srgb.encode(&planes, bytes);
+            self.srgb.encode(&planes, bytes);
         });
         Frame {
             width: camera.width,

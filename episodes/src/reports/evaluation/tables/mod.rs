@@ -268,9 +268,9 @@ fn went_wrong(report: &EvaluationReport) -> Table {
         false => String::new(),
     };
     let note = format!(
-        "The first fall of a robot, or the first drop of an object, after the last phase that was reached; else the end. Times open the \
-         episode's page a second before, on a `tandem serve` whose runs folder has the recording, once its link has been opened. Pages \
-         are files beside the report.{most}"
+        "The first fall of a robot, or the first drop of an object, after the last phase that was reached; \
+         else the end. Times open the episode's page a second before, on a `tandem serve` whose runs folder \
+         has the recording, once its link has been opened. Pages are files beside the report.{most}"
     );
     let mut table = Table::new(
         "Where episodes went wrong",

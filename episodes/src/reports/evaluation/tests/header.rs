@@ -25,7 +25,8 @@ fn a_header_names_commands_machines_and_settings() {
     };
     report.header.made = Some(origin);
     let write = |format| report.write(format, &ReportPictures::default()).unwrap();
-    let settings = "| agent | handover | 0-9 | benchmark | paper | balance | auto | estimator | ideal | 0.1.0+test | 2026-11-28 | 10 |";
+    let settings = "| agent | handover | 0-9 | benchmark | paper | balance | auto | estimator | ideal | \
+                    0.1.0+test | 2026-11-28 | 10 |";
     let text = write(ReportFormat::Markdown);
     for part in [
         settings,
@@ -53,10 +54,12 @@ fn every_episode_is_a_row() {
     episodes.extend([failed, begun]);
     let report = EvaluationReport::of(&found(episodes));
     let text = report.write(ReportFormat::EpisodesCsv, &ReportPictures::default()).unwrap();
-    let head = "policy,task,seed,protocol,assistance,start,counted,success,p1_s,p2_s,p3_s,ended,steps,requests,\
-                thinking_s,falls,input_tokens,output_tokens,usd,model_s,earlier_attempts,controller,build,state_hash,ended_at,note";
+    let head = "policy,task,seed,protocol,assistance,start,counted,success,p1_s,p2_s,p3_s,ended,steps,\
+                requests,thinking_s,falls,input_tokens,output_tokens,usd,model_s,earlier_attempts,\
+                controller,build,state_hash,ended_at,note";
     assert_eq!(text.lines().next(), Some(head));
-    let seventh = "\"a, \"\"b\"\"\",handover,6,benchmark,paper,task,true,false,4,,,finished,506,60,6,0,,,,,0,balance,0.1.0+test,0000000000000006,,\n";
+    let seventh = "\"a, \"\"b\"\"\",handover,6,benchmark,paper,task,true,false,4,,,finished,506,60,6,0,\
+                   ,,,,0,balance,0.1.0+test,0000000000000006,,\n";
     assert!(text.contains(seventh), "{text}");
     assert!(text.contains(",handover,20,benchmark,paper,task,false,false,4,,,policy_failed,"), "{text}");
     assert!(text.contains(",\"two\nlines\"\n") && text.contains(",paper,p2,true,true,4,8,,"), "{text}");
