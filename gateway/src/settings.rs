@@ -1,11 +1,13 @@
 //! Settings. Flags precede the environment (`TANDEM_*`), then a TOML file, then defaults.
 
+mod check;
 mod durability;
 mod error;
+mod foxglove;
 mod tls;
 
 use std::{
-    net::{IpAddr, SocketAddr},
+    net::SocketAddr,
     path::{Path, PathBuf},
     sync::Arc,
     time::Duration,
@@ -18,8 +20,8 @@ use clap::{
 use serde::Deserialize;
 use tandem_episodes::{
     BaseLimits, Controller, EpisodeError, EpisodeSpec, Instructions, InstructionsError, MAX_TEXT_BYTES,
-    RendererKind, RobotFile, SceneFile, Sensing, SensorModel, SimError, StateSource, Visibility, check_task,
-    read_task, read_text,
+    RendererKind, RobotFile, RunFolder, SceneFile, Sensing, SensorModel, SimError, StateSource, Visibility,
+    check_task, read_task, read_text,
     stress::{Stress, StressAxis, StressLevel},
     tasks::{Task, TaskSet},
 };
@@ -28,6 +30,7 @@ use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, StartEpisode, W
 use crate::token::{Token, TokenError};
 pub use durability::Durability;
 pub use error::SettingsError;
+pub use foxglove::FoxgloveView;
 pub use tls::{Certificate, TlsError};
 
 /// One source of settings; missing ones come from the next source. The doc comments are help texts.
@@ -65,6 +68,10 @@ pub struct Layer {
     /// memory until then [default: live].
     #[arg(long, env = "TANDEM_RECORD")]
     pub record: Option<Record>,
+    /// Port on which Foxglove shows the episode that began last, live; it is open to this machine alone and
+    /// needs no token, so a policy that runs here could read it; 0 picks a free one [default: none].
+    #[arg(long, env = "TANDEM_FOXGLOVE", value_name = "PORT")]
+    pub foxglove: Option<u16>,
     /// JSON file with instructions in place of the tasks' own: {"handover": {"joint": "...", "robots": {"A":
     /// "..."}}}.
     #[arg(long, env = "TANDEM_INSTRUCTIONS", value_name = "FILE")]
@@ -173,6 +180,7 @@ impl Layer {
             token: self.token.or(next.token),
             runs: self.runs.or(next.runs),
             record: self.record.or(next.record),
+            foxglove: self.foxglove.or(next.foxglove),
             instructions: self.instructions.or(next.instructions),
             scene: self.scene.or(next.scene),
             robot: self.robot.or(next.robot),
@@ -202,32 +210,6 @@ impl Layer {
     /// Returns these settings, with missing ones from the file at `config`.
     pub fn over_file(self, config: &Path) -> Result<Layer, SettingsError> {
         Ok(self.or(read_layer(config)?))
-    }
-
-    /// Refuses values with which no server could be used.
-    pub fn check(&self) -> Result<(), SettingsError> {
-        let numbers = [
-            ("thinking_limit", self.thinking_limit.map(u64::from), "3600"),
-            ("max_episodes", self.max_episodes.map(u64::from), "8"),
-            ("max_body_bytes", self.max_body_bytes.map(|bytes| bytes as u64), "2000000"),
-            ("request_timeout", self.request_timeout.map(u64::from), "30"),
-            ("max_requests", self.max_requests.map(|requests| requests as u64), "256"),
-            ("rate_limit", self.rate_limit.map(u64::from), "100"),
-            ("idle_timeout", self.idle_timeout.map(u64::from), "900"),
-        ];
-        if let Some((setting, _, example)) = numbers.into_iter().find(|(_, given, _)| *given == Some(0)) {
-            return Err(SettingsError::Zero { setting, example });
-        }
-        if self.level.is_some() && self.stress.is_none() {
-            return Err(SettingsError::LevelAlone);
-        }
-        if self.stress == Some(StressAxis::Words) && self.instructions.is_some() {
-            return Err(SettingsError::TwoWordings);
-        }
-        match self.allowed_host.iter().flatten().find(|name| !is_host(name)) {
-            Some(name) => Err(SettingsError::NoHost { name: name.clone() }),
-            None => Ok(()),
-        }
     }
 
     /// Returns the address to serve on.
@@ -303,14 +285,6 @@ impl Layer {
     }
 }
 
-/// Returns true if a text is a host name without a port.
-fn is_host(name: &str) -> bool {
-    let part = |part: &str| {
-        !part.is_empty() && part.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte))
-    };
-    name.split('.').all(part) || name.parse::<IpAddr>().is_ok()
-}
-
 /// All settings, resolved.
 #[derive(Debug, Clone)]
 pub struct Settings {
@@ -326,6 +300,8 @@ pub struct Settings {
     pub runs: PathBuf,
     /// Time from which recordings are readable.
     pub record: Visibility,
+    /// Live view in Foxglove.
+    pub foxglove: Option<FoxgloveView>,
     /// Tasks that can be played.
     pub tasks: TaskSet,
     /// Instructions in place of the tasks' own.
@@ -378,6 +354,12 @@ impl Settings {
         Wording { assistance: self.assistance, hints: self.hints }
     }
 
+    /// Returns the destination of an episode's files.
+    pub fn run_folder(&self, path: PathBuf, visibility: Visibility) -> RunFolder {
+        let live = self.foxglove.as_ref().map(|view| view.channels.clone());
+        RunFolder { path, visibility, pages: true, live }
+    }
+
     /// Returns the specification of an episode with these settings.
     pub fn spec(&self, start: &StartEpisode) -> Result<EpisodeSpec, EpisodeError> {
         let protocol = start.protocol.unwrap_or(Protocol::Agentic);
@@ -425,6 +407,7 @@ impl Settings {
                 None | Some(Record::Live) => Visibility::Live,
                 Some(Record::After) => Visibility::After,
             },
+            foxglove: layer.foxglove.map(FoxgloveView::on),
             instructions: layer.read_instructions(&tasks)?,
             tasks,
             scene: layer.scene.as_deref().map(read_scene).transpose()?,

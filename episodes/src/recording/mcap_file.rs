@@ -15,6 +15,7 @@ use mcap::Attachment;
 use mcap::records::MessageHeader;
 use serde::{Deserialize, Serialize};
 
+use super::live_channels::{LiveChannels, LiveRecording};
 use super::{data_section::LIBRARY, metadata};
 use crate::locks::{FileLock, LockKind, Locking};
 use crate::output::{OutputError, partial_path, put_in_place, write_whole};
@@ -28,10 +29,13 @@ pub struct McapFile {
     path: PathBuf,
     /// Buffer that messages share.
     buffer: Vec<u8>,
+    /// The same channels for those who watch.
+    live: Option<LiveRecording>,
 }
 
 /// A channel that carries messages of one type.
 pub struct Topic<M> {
+    name: String,
     channel: u16,
     messages: u32,
     message: PhantomData<fn(M)>,
@@ -39,11 +43,15 @@ pub struct Topic<M> {
 
 impl McapFile {
     /// Begins the file that will be `path`, in an existing folder.
-    pub fn create(path: &Path, visibility: Visibility) -> Result<McapFile, OutputError> {
+    pub fn create(
+        path: &Path,
+        visibility: Visibility,
+        live: Option<&LiveChannels>,
+    ) -> Result<McapFile, OutputError> {
         let store = RecordingStore::create(path, visibility)
             .map_err(|source| OutputError::Io { path: path.into(), source })?;
         let writer = writer(store).map_err(|source| OutputError::of_recording(path, source))?;
-        Ok(McapFile { writer, path: path.into(), buffer: Vec::new() })
+        Ok(McapFile { writer, path: path.into(), buffer: Vec::new(), live: live.map(LiveChannels::begin) })
     }
 
     /// Opens a topic. `metadata` describes the channel, for example the names of an array's columns.
@@ -52,14 +60,17 @@ impl McapFile {
         topic: &str,
         metadata: &[(&str, &str)],
     ) -> Result<Topic<M>, OutputError> {
+        let (encoding, metadata) = (M::get_message_encoding(), string_map(metadata));
         let schema = match M::get_schema() {
             Some(schema) => self.writer.add_schema(&schema.name, &schema.encoding, &schema.data),
             None => Ok(0),
         };
-        let channel = schema.and_then(|schema| {
-            self.writer.add_channel(schema, topic, &M::get_message_encoding(), &string_map(metadata))
-        });
-        Ok(Topic { channel: channel.map_err(|e| self.failed(e))?, messages: 0, message: PhantomData })
+        let channel = schema.and_then(|schema| self.writer.add_channel(schema, topic, &encoding, &metadata));
+        let channel = channel.map_err(|e| self.failed(e))?;
+        if let Some(live) = &self.live {
+            live.open(topic, &encoding, M::get_schema(), metadata);
+        }
+        Ok(Topic { name: topic.into(), channel, messages: 0, message: PhantomData })
     }
 
     /// Appends one message at a simulated time.
@@ -83,6 +94,9 @@ impl McapFile {
         };
         let written = self.writer.write_to_known_channel(&header, &self.buffer);
         topic.messages += 1;
+        if let Some(live) = &self.live {
+            live.send(&topic.name, time_ns, &self.buffer);
+        }
         written.map_err(|e| self.failed(e))
     }
 

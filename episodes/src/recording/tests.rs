@@ -84,7 +84,7 @@ fn recorder(folder: &Path, world: &World) -> (Recorder, Scores) {
         scores: scores.memory(),
         executes_otherwise: false,
     };
-    (Recorder::create(folder, Visibility::Live, header, &start, world.state_hash()).unwrap(), scores)
+    (Recorder::create(folder, Visibility::Live, None, header, &start, world.state_hash()).unwrap(), scores)
 }
 
 fn moment(world: &World) -> CallMoment {

@@ -8,6 +8,7 @@ use foxglove::messages::{FrameTransforms, SceneUpdate};
 use tandem_sim::{RobotCommand, Step, mjcf::Geom, render::robot_rgba};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
+use super::live_channels::LiveChannels;
 use super::mcap_file::{McapFile, Topic, Visibility};
 use super::topics::messages::{BudgetMessage, Json, PhaseMessage, ToolCallMessage, ToolCallRecord};
 use super::topics::notes::NoteMessage;
@@ -66,7 +67,7 @@ impl Recorder {
     pub const FILE_NAME: &str = "episode.mcap";
 
     /// Opens a recording in an existing run folder. Writes the episode's description, the robots' shapes,
-    /// and `start`, the state before the first recorded step.
+    /// and `start`, the state before the first recorded step. `live` shows it from then on.
     ///
     /// # Errors
     ///
@@ -74,11 +75,12 @@ impl Recorder {
     pub fn create(
         folder: &Path,
         visibility: Visibility,
+        live: Option<&LiveChannels>,
         header: RecordingHeader,
         start: &Step,
         state_hash: u64,
     ) -> Result<Recorder, OutputError> {
-        let mut file = McapFile::create(&folder.join(Self::FILE_NAME), visibility)?;
+        let mut file = McapFile::create(&folder.join(Self::FILE_NAME), visibility, live)?;
         write_header(&mut file, &header)?;
         let robot_topics = header
             .robots
@@ -89,7 +91,7 @@ impl Recorder {
             steps: file.topic(topics::STEPS, &[])?,
             step_encoder: StepEncoder::default(),
             transforms: file.topic("/tf", &[])?,
-            scene: file.topic("/scene", &[])?,
+            scene: file.topic(topics::SCENE, &[])?,
             phases: file.topic(topics::PHASES, &[])?,
             budget: file.topic("/budget", &[])?,
             tool_calls: file.topic(topics::TOOL_CALLS, &[])?,

@@ -16,7 +16,9 @@ use crate::EpisodeError;
 use crate::observation::Observer;
 use crate::output::{OutputError, create_private_folder, write_whole};
 use crate::protocol::Rules;
-use crate::recording::{NoteMessage, Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility};
+use crate::recording::{
+    LiveChannels, NoteMessage, Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility,
+};
 use crate::reports::episode::{
     CELL_HEIGHT, CELL_WIDTH, CallCounts, EpisodePage, KeyMoment, LabelledPicture, PAGE_FILE, STRIP_FILE,
     SaidWords, strip,
@@ -32,11 +34,13 @@ pub struct RunFolder {
     pub visibility: Visibility,
     /// True to make a strip of images and a page, for people.
     pub pages: bool,
+    /// Channels that show the recording live.
+    pub live: Option<LiveChannels>,
 }
 
 impl From<&Path> for RunFolder {
     fn from(path: &Path) -> RunFolder {
-        RunFolder { path: path.into(), visibility: Visibility::default(), pages: true }
+        RunFolder { path: path.into(), visibility: Visibility::default(), pages: true, live: None }
     }
 }
 
@@ -217,7 +221,7 @@ impl RunFiles {
 
 /// Starts the recording, so that write errors are known from the beginning.
 fn begin(folder: &RunFolder, session: &Session) -> Result<RecorderThread, EpisodeError> {
-    let RunFolder { path, visibility, .. } = folder;
+    let RunFolder { path, visibility, live, .. } = folder;
     let failed = |source| OutputError::Io { path: path.clone(), source };
     create_private_folder(path).map_err(failed)?;
     match fs::remove_file(path.join(FAILED_STEP_FILE)) {
@@ -234,8 +238,14 @@ fn begin(folder: &RunFolder, session: &Session) -> Result<RecorderThread, Episod
         scores: session.scores.memory(),
         executes_otherwise: session.execution.is_some(),
     };
-    let mut recorder =
-        Recorder::create(path, *visibility, header, &session.present, session.world.state_hash())?;
+    let mut recorder = Recorder::create(
+        path,
+        *visibility,
+        live.as_ref(),
+        header,
+        &session.present,
+        session.world.state_hash(),
+    )?;
     recorder.draw("world", session.world.room())?;
     for (name, model) in session.world.object_models() {
         recorder.draw(name, &model.geoms)?;

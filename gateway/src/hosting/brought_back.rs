@@ -118,8 +118,7 @@ impl EpisodeTable {
             entries.append(&mut commit.asked);
         }
         let heading = reader.heading;
-        let folder =
-            RunFolder { path: self.settings.runs.join(id), visibility: heading.visibility, pages: true };
+        let folder = self.settings.run_folder(self.settings.runs.join(id), heading.visibility);
         if heading.build != build().map_err(EpisodeError::Build)? {
             tracing::warn!(
                 episode = id,

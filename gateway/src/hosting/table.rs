@@ -200,7 +200,7 @@ impl EpisodeTable {
     ) -> Result<StartReply, HostingError> {
         let place = self.take_place().await?;
         let (id, path) = self.folders.create(&self.settings.runs, &episode_name(&spec)?);
-        let folder = RunFolder { path, visibility: self.settings.record, pages: true };
+        let folder = self.settings.run_folder(path, self.settings.record);
         let (episode, start) = self.begin(&id, spec, driving, folder, place).await?;
         if self.journals.get().is_some() {
             let build = build().map_err(EpisodeError::Build)?;

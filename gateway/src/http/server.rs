@@ -71,6 +71,9 @@ impl Server {
             )
         })?;
         let address = listener.local_addr()?;
+        if let Some(view) = &settings.foxglove {
+            runtime.block_on(view.serve())?;
+        }
         let table = Arc::new(EpisodeTable::for_guests(settings.clone(), guests));
         let watch_key = WatchKey::random().map_err(io::Error::other)?;
         let scheme = if settings.certificate.is_some() { "https" } else { "http" };

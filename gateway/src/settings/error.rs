@@ -49,6 +49,9 @@ pub enum SettingsError {
     /// Two settings change the wording of tasks.
     #[error("the stress words tells tasks in other words, and so does instructions; give one of them")]
     TwoWordings,
+    /// A live view of recordings that are readable only after their episodes.
+    #[error("foxglove shows recordings during episodes, and record is \"after\"; leave one of them out")]
+    LiveAfter,
     /// An allowed host is not a host name.
     #[error(
         "allowed_host {name:?} is no name of a host; give it alone, as lab.example, without http:// and port"

@@ -4,6 +4,7 @@
 mod agents;
 mod command_line;
 mod evaluations;
+mod foxglove;
 mod killed;
 mod logs;
 mod people;

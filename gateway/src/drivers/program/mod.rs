@@ -267,7 +267,8 @@ impl Policy for Program {
         let server = Server::start_for(self.settings_for(spec, token)?, guests);
         let server = server.map_err(|error| lost("no server", error))?;
         let id = episode_name(spec).map_err(HostingError::from)?;
-        let files = RunFolder { path: absolute.clone(), visibility: Visibility::After, pages: true };
+        let files =
+            RunFolder { path: absolute.clone(), visibility: Visibility::After, pages: true, live: None };
         let (episode, start) = server.host(&id, spec.clone(), &self.driving, files)?;
         if let Some(reason) = start.briefing.recording_failed {
             return Err(PlayError::Lost(reason));
