@@ -108,7 +108,8 @@ pub(super) fn installed(interpreter: &str, answer: &str) -> Finding {
     if !found.contains(&"tandem") {
         return Finding::Note(format!(
             "{interpreter} ({version}) has no tandem; pip install tandem-sim (in a checkout \
-             ./gateway/python) for language models, data sets and environments, or name another interpreter in TANDEM_PYTHON"
+             ./gateway/python) for language models, data sets and environments, or name another \
+             interpreter in TANDEM_PYTHON"
         ));
     }
     let has = |modules: &[&str]| modules.iter().all(|module| found.contains(module));
