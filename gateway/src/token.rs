@@ -5,7 +5,7 @@ use std::{
     env,
     ffi::OsStr,
     fmt::{self, Write},
-    fs, io,
+    io,
     path::{Path, PathBuf},
 };
 
@@ -117,7 +117,7 @@ impl Token {
 
 #[cfg(unix)]
 fn readable_by_others(path: &Path) -> bool {
-    use std::os::unix::fs::PermissionsExt;
+    use std::{fs, os::unix::fs::PermissionsExt};
     fs::metadata(path).is_ok_and(|file| file.permissions().mode() & 0o077 != 0)
 }
 
@@ -150,7 +150,7 @@ impl PartialEq for Token {
 
 #[cfg(test)]
 mod tests {
-    use std::os::unix::fs::PermissionsExt;
+    use std::{fs, os::unix::fs::PermissionsExt};
 
     use super::*;
 

@@ -31,7 +31,7 @@ try:
     # Its types are partly unknown.
     ray: Any = import_module("ray")
 except ModuleNotFoundError as missing:
-    raise ModuleNotFoundError("Ray is not installed; pip install './gateway/python[ray]' adds it", name="ray") from missing
+    raise ModuleNotFoundError("Ray is not installed; pip install 'tandem-sim[ray]' adds it", name="ray") from missing
 
 _LOOK_S = 0.2
 """Interval between two checks whether the user wants to stop."""

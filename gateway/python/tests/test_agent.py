@@ -401,7 +401,7 @@ def test_wrong_flags_and_missing_packages_say_what_would_work(
         assert says in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "anthropic", None)
     assert main(["--model", "m", "--api", "anthropic"]) == 1
-    assert "pip install './gateway/python[agents]'" in capsys.readouterr().err
+    assert "pip install 'tandem-sim[agents]'" in capsys.readouterr().err
 
 
 def test_the_program_knows_the_flags_that_say_which_model_plays(capsys: pytest.CaptureFixture[str]) -> None:

@@ -48,8 +48,8 @@ const INTERRUPTED: i32 = 130;
 const AGENT_FILE: &str = "agent.json";
 
 /// Let a language model play a task through any endpoint with OpenAI's or Anthropic's formats. This needs the
-/// Python package: pip install './gateway/python[agents]' in a checkout of the repository. API keys are read
-/// from the environment: OPENAI_API_KEY, ANTHROPIC_API_KEY.
+/// Python package: pip install 'tandem-sim[agents]' (in a checkout './gateway/python[agents]'). API keys are
+/// read from the environment: OPENAI_API_KEY, ANTHROPIC_API_KEY.
 #[allow(
     rustdoc::broken_intra_doc_links,
     reason = "the command line's help names an extra of the wheel, and no link"

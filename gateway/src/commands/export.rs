@@ -10,7 +10,7 @@ use crate::drivers::{PythonModule, PythonPart};
 use crate::settings::one_of;
 
 /// Convert recordings to data sets for training policies. This needs the Python package: pip install
-/// './gateway/python[lerobot]' in a checkout of the repository.
+/// 'tandem-sim[lerobot]' (in a checkout './gateway/python[lerobot]').
 #[allow(
     rustdoc::broken_intra_doc_links,
     reason = "the command line's help names an extra of the wheel, and no link"

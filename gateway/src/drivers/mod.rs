@@ -18,7 +18,7 @@ pub use http_episode::HttpEpisode;
 pub use interruption::with_last_words;
 pub use people::People;
 pub use program::Program;
-pub use python::{PythonError, PythonModule, PythonPart};
+pub use python::{PythonError, PythonModule, PythonPart, interpreter};
 pub use remote::{
     MapError, PRESETS, PolicyKey, PolicyKeyError, PolicyMap, PolicyProtocol, RemoteError, RemotePolicy,
     preset, try_map,

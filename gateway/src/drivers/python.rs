@@ -27,8 +27,8 @@ pub enum PythonError {
     /// The interpreter cannot be started.
     #[error(
         "{} by Python, and {python} cannot be started ({source}); install Python 3.10 or later and \
-         pip install './gateway/python[{}]' in a checkout of the repository, or name an interpreter that has it by {PYTHON_VARIABLE}",
-        part.what(), part.extra()
+         pip install 'tandem-sim[{}]' (in a checkout './gateway/python[{}]'), or name an interpreter that has it by {PYTHON_VARIABLE}",
+        part.what(), part.extra(), part.extra()
     )]
     NoPython {
         /// Requested part.
@@ -40,9 +40,9 @@ pub enum PythonError {
     },
     /// The interpreter does not have the package.
     #[error(
-        "{} by Python's package, which {python} does not have; pip install './gateway/python[{}]' in a checkout of the \
-         repository, or name an interpreter that has it by {PYTHON_VARIABLE}",
-        part.what(), part.extra()
+        "{} by Python's package, which {python} does not have; pip install 'tandem-sim[{}]' (in a checkout \
+         './gateway/python[{}]'), or name an interpreter that has it by {PYTHON_VARIABLE}",
+        part.what(), part.extra(), part.extra()
     )]
     NoPackage {
         /// Requested part.
@@ -99,8 +99,7 @@ impl PythonModule {
     /// Creates the module with these arguments, after checking that its package and requirements are
     /// there.
     pub fn new(part: PythonPart, arguments: Vec<String>) -> Result<PythonModule, PythonError> {
-        let python = env::var(PYTHON_VARIABLE).ok().filter(|python| !python.is_empty());
-        let module = PythonModule { python: python.unwrap_or_else(|| PYTHON.into()), part, arguments };
+        let module = PythonModule { python: interpreter(), part, arguments };
         let checked = module.command(&[CHECK]).output();
         let checked = checked.map_err(|source| PythonError::NoPython {
             part,
@@ -137,6 +136,12 @@ impl PythonModule {
         let words = words.chain(self.arguments.iter().map(String::as_str));
         words.map(quoted).collect::<Vec<_>>().join(" ")
     }
+}
+
+/// Returns the interpreter that runs Python parts.
+pub fn interpreter() -> String {
+    let named = env::var(PYTHON_VARIABLE).ok().filter(|python| !python.is_empty());
+    named.unwrap_or_else(|| PYTHON.into())
 }
 
 /// Quotes a word for a shell.

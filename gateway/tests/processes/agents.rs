@@ -45,11 +45,11 @@ fn what_is_missing_is_said_before_an_episode_begins() {
         }
     };
     check(Path::new("/no/python"), "/no/python cannot be started");
-    check(Path::new("/no/python"), "pip install './gateway/python[agents]'");
+    check(Path::new("/no/python"), "pip install 'tandem-sim[agents]'");
     #[cfg(unix)]
     {
         let missing = "echo 'python: No module named tandem' >&2; exit 1";
-        check(&interpreter(folder.path(), missing, "exit 9"), "pip install './gateway/python[agents]'");
+        check(&interpreter(folder.path(), missing, "exit 9"), "pip install 'tandem-sim[agents]'");
         let refused = "echo 'tandem agent: no key for m; set OPENAI_API_KEY' >&2; exit 1";
         check(&interpreter(folder.path(), refused, "exit 9"), "tandem: no key for m; set OPENAI_API_KEY");
     }

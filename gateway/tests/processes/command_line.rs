@@ -62,6 +62,13 @@ fn the_doctor_takes_what_the_server_takes_and_fails_with_it() {
     };
     let works = told(doctor("disclosure = \"end\"\n", &[]));
     assert!(!works.contains("WRONG") && works.contains("settings.toml is read"), "{works}");
+    let missing =
+        [("PATH", ""), ("TANDEM_PYTHON", "/no/python"), ("HTTP_PROXY", "http://p"), ("NO_PROXY", "")];
+    let noted = told(doctor("", &missing));
+    for subject in ["ffmpeg", "python", "proxy"] {
+        assert!(noted.contains(&format!("{subject:14}note")), "{subject}: {noted}");
+    }
+    assert!(noted.contains("disk          ") && noted.contains("date          ok"), "{noted}");
     for (settings, variables, says) in [
         ("scene = \"nowhere.xml\"\n", &[][..], "nowhere.xml"),
         ("instructions = \"nowhere.json\"\n", &[], "nowhere.json"),

@@ -8,8 +8,7 @@
 
 There are two kinds, `chunk` and `flow`. Both encode each robot's image with a network of its own, and predict a
 second of actions at once. `chunk` predicts one chunk of actions; `flow` samples one from the distribution of the
-demonstrations (flow matching). They need PyTorch, pyarrow and PyAV: `pip install './gateway/python[baselines]'` in
-a checkout of the repository.
+demonstrations (flow matching). They need PyTorch, pyarrow and PyAV: `pip install 'tandem-sim[baselines]'`.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 
     export_lerobot("runs/demonstrations", "data/handover", ExportSettings(rate_hz=10))
 
-It needs the packages of `pip install './gateway/python[lerobot]'`: pyarrow, and PyAV with its encoders.
+It needs the packages of `pip install 'tandem-sim[lerobot]'`: pyarrow, and PyAV with its encoders.
 """
 
 from __future__ import annotations

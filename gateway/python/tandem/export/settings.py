@@ -105,4 +105,4 @@ def library(name: str, what: str = "data sets are written by pyarrow and PyAV", 
     try:
         return import_module(name)
     except ImportError as error:
-        raise TandemError(f"{what}, and there is no {name}; pip install './gateway/python[{extra}]'") from error
+        raise TandemError(f"{what}, and there is no {name}; pip install 'tandem-sim[{extra}]'") from error

@@ -1,6 +1,7 @@
 //! `tandem doctor`: checks which of a server's settings work on this machine, with advice on those that
 //! do not.
 
+mod around;
 mod given;
 mod machine;
 
@@ -13,7 +14,7 @@ use super::{CommandResult, print, serve::ServeArgs};
 use crate::{settings::Layer, token::Token};
 
 /// Check this machine: the files in a server's settings, physics, rendering, the port, the runs folder,
-/// clocks and cores.
+/// clocks and cores, and what other commands need: GPU, ffmpeg, Python, proxies, free space and the date.
 #[derive(Debug, clap::Args)]
 pub struct DoctorArgs {
     /// Settings of the server that is to run here.
@@ -87,6 +88,7 @@ fn examine(args: ServeArgs, token: Result<Option<Token>, String>) -> Findings {
     findings.extend(given::check(&layer, token));
     findings.push(("renderer", Finding::of(layer.renderer().describe().map_err(|error| error.to_string()))));
     findings.extend(machine::check(&layer, specs(&layer).find_map(|spec| trial(&spec).ok().map(|_| spec))));
+    findings.extend(around::check(&layer));
     findings
 }
 

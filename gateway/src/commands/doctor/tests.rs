@@ -1,6 +1,11 @@
 //! Tests that settings which would not work are found, with advice on what would work.
 
-use std::{fs, net::TcpListener, path::Path};
+use std::{
+    fs,
+    net::TcpListener,
+    path::Path,
+    time::{Duration, SystemTime, UNIX_EPOCH},
+};
 
 use clap::Parser;
 
@@ -145,4 +150,91 @@ fn a_scene_is_tried_with_what_tasks_need_of_it() {
             .iter()
             .all(|finding| matches!(finding, Finding::Works(_)))
     );
+}
+
+#[track_caller]
+fn expect_note(finding: &Finding, says: &[&str]) {
+    let Finding::Note(text) = finding else { panic!("no note: {finding:?}") };
+    says.iter().for_each(|part| assert!(text.contains(part), "{text}"));
+}
+
+#[test]
+fn a_proxy_that_would_get_requests_for_this_machine_is_noted_without_its_password() {
+    let check = |set: &[(&str, &str)]| {
+        around::proxy(|name| set.iter().find(|(known, _)| *known == name).map(|(_, text)| text.to_string()))
+    };
+    let proxy = ("HTTP_PROXY", "http://me:secret@proxy:3128");
+    assert_eq!(check(&[("NO_PROXY", "")]), Finding::Works("none is set".into()));
+    assert_eq!(check(&[("HTTP_PROXY", " ")]), Finding::Works("none is set".into()));
+    expect_note(&check(&[proxy]), &["HTTP_PROXY is set", "lacks 127.0.0.1 and localhost", "export NO_PROXY"]);
+    expect_note(&check(&[("https_proxy", "http://proxy")]), &["HTTPS_PROXY is set"]);
+    expect_note(&check(&[proxy, ("no_proxy", "localhost, example.org")]), &["lacks 127.0.0.1:"]);
+    for direct in ["localhost, 127.0.0.1", "*"] {
+        assert!(matches!(check(&[proxy, ("NO_PROXY", direct)]), Finding::Works(_)), "{direct}");
+    }
+    assert!(!format!("{:?}", check(&[proxy])).contains("secret"));
+}
+
+#[test]
+fn a_full_disk_and_a_date_before_the_program_are_found() {
+    assert!(matches!(around::disk(Some(around::MIN_FREE_BYTES)), Finding::Works(_)));
+    expect_note(&around::disk(Some(around::MIN_FREE_BYTES - 1)), &["5.0 GB", "give another --runs"]);
+    expect_note(&around::disk(None), &["not known on this system"]);
+    #[cfg(unix)]
+    assert!(around::free_bytes(Path::new("no/such/folder")).is_some_and(|free_bytes| free_bytes > 0));
+
+    let (written, day) = (UNIX_EPOCH + around::PROGRAM_DATE, Duration::from_secs(86_400));
+    assert!(matches!(around::date(written - day, None), Finding::Works(_)));
+    expect_wrong(&[around::date(written - 2 * day, None)], &["2.0 days before", "timedatectl"]);
+    let built = SystemTime::now();
+    assert!(matches!(around::date(built, Some(built)), Finding::Works(_)));
+    expect_wrong(&[around::date(built - 400 * day, Some(built))], &["400.0 days before"]);
+}
+
+#[test]
+fn other_programs_that_are_missing_are_noted() {
+    expect_note(&around::ffmpeg("/no/ffmpeg"), &["FILE.mp4", "FILE.webp"]);
+    expect_note(&around::python("/no/python"), &["/no/python cannot be started", "TANDEM_PYTHON"]);
+    expect_note(&around::installed("py", "3.11.7 openai av\n"), &["py (3.11.7)", "pip install tandem-sim"]);
+
+    let some = around::installed("py", "3.12.1 tandem anthropic openai gymnasium av pyarrow\n");
+    let says =
+        "has tandem with the extras agents,gym,lerobot; pip install 'tandem-sim[baselines]' adds the others";
+    assert_eq!(some, Finding::Works(format!("py (3.12.1) {says}")));
+    let Finding::Works(none) = around::installed("py", "3.12.1 tandem") else { panic!("it has tandem") };
+    assert!(none.contains("'tandem-sim[agents,gym,lerobot,baselines]'") && !none.contains("with"), "{none}");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interpreter_is_asked_and_its_failure_is_shown() {
+    use std::os::unix::fs::PermissionsExt;
+    let place = tempfile::tempdir().unwrap();
+    let script = |name: &str, text: &str| {
+        let path = place.path().join(name);
+        fs::write(&path, format!("#!/bin/sh\n{text}\n")).unwrap();
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+        path.to_string_lossy().into_owned()
+    };
+    let films = script("ffmpeg", "echo 'ffmpeg version 7.1-x Copyright'");
+    assert_eq!(around::ffmpeg(&films), Finding::Works("version 7.1-x makes MP4 of films".into()));
+    let asked = script("asked", "shift 2; echo 3.13.0 $1 $2 $3");
+    assert_eq!(around::python(&asked), around::installed(&asked, "3.13.0 tandem anthropic openai"));
+    let broken = script("broken", "echo 'ImportError: _native' >&2; exit 1");
+    expect_note(&around::python(&broken), &["ImportError: _native", "--force-reinstall tandem-sim"]);
+}
+
+#[test]
+fn the_extras_are_those_of_the_wheel() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("python/pyproject.toml");
+    let wheel: toml::Table = fs::read_to_string(path).unwrap().parse().unwrap();
+    for (name, modules) in around::EXTRAS {
+        let packages: Vec<&str> = wheel["project"]["optional-dependencies"][name]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|package| package.as_str().unwrap().split(['>', '=', '<']).next().unwrap())
+            .collect();
+        assert_eq!(packages, modules, "{name}");
+    }
 }

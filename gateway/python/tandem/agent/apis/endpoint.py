@@ -13,7 +13,7 @@ from ..conversation import Reply, Turn
 from ..settings import AgentSettings
 from ..tools import Tool
 
-INSTALL = "pip install './gateway/python[agents]' in a checkout of the repository"
+INSTALL = "pip install 'tandem-sim[agents]'"
 
 RETRIES = 6
 """Number of retries of an SDK, with its own growing delays. They cover about half a minute of 429 and 500."""
