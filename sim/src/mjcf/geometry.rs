@@ -175,17 +175,21 @@ fn primitive(
     Ok(primitive)
 }
 
-/// Returns the geom's own colour, or its material's; an image on the material tints it.
+/// Returns the geom's own colour, or its material's; a flat texture or an image on the material
+/// tints it.
 fn rgba(
     document: &Document,
     geom: &mjcf_rs::body::Geom,
     material: Option<&mjcf_rs::assets::Material>,
 ) -> [f32; 4] {
-    let texture = material.and_then(|material| document.texture_rgb.get(material.texture.as_ref()?));
+    let texture = material.and_then(|material| {
+        let name = material.texture.as_ref()?;
+        document.texture_rgb.get(name).copied().or_else(|| flat_rgb(document.model.assets.texture(name)?))
+    });
     let plain = if texture.is_some() { [1.0; 4] } else { DEFAULT_RGBA };
     let [r, g, b, a] =
         geom.rgba.or(material.and_then(|material| material.rgba)).unwrap_or(plain).map(|c| c as f32);
-    let [x, y, z] = texture.copied().unwrap_or([1.0; 3]);
+    let [x, y, z] = texture.unwrap_or([1.0; 3]);
     [r * x, g * y, b * z, a]
 }
 
@@ -196,12 +200,29 @@ fn friction(geom: &mjcf_rs::body::Geom) -> Result<Friction, String> {
     Ok(Friction { directions, slide, spin_m, roll_m, priority: geom.priority, left: 1.0 })
 }
 
+/// Returns the mean colour of MuJoCo's builtin flat texture; `None` for other textures. It is `rgb1`, except
+/// for the bottom of a cube, which is `rgb2`.
+fn flat_rgb(texture: &mjcf_rs::assets::Texture) -> Option<[f32; 3]> {
+    if texture.builtin.as_deref() != Some("flat") {
+        return None;
+    }
+    let [first, second] = builtin_rgb(texture);
+    Some(match texture.type_.as_deref() {
+        Some("2d") => first,
+        _ => std::array::from_fn(|i| (5.0 * first[i] + second[i]) / 6.0),
+    })
+}
+
 fn checker_rgb(document: &Document, material: &mjcf_rs::assets::Material) -> Option<[[f32; 3]; 2]> {
     let texture = document.model.assets.texture(material.texture.as_ref()?)?;
     let checker = texture.builtin.as_deref() == Some("checker");
-    // MuJoCo's own colours if the file gives none.
+    checker.then(|| builtin_rgb(texture))
+}
+
+/// Returns the two colours of a builtin texture; MuJoCo's own if the file gives none.
+fn builtin_rgb(texture: &mjcf_rs::assets::Texture) -> [[f32; 3]; 2] {
     let rgb = [texture.rgb1.unwrap_or([0.8; 3]), texture.rgb2.unwrap_or([0.5; 3])];
-    checker.then(|| rgb.map(|rgb| rgb.map(|c| c as f32)))
+    rgb.map(|rgb| rgb.map(|c| c as f32))
 }
 
 /// Returns the pose with z from the first to the second end point, centred between them, and half the

@@ -123,6 +123,30 @@ mod tests {
         assert!(error.contains("`print_tex`; use a material and its pattern"), "{error}");
     }
 
+    /// MuJoCo fills the bottom of a flat cube with the second colour. A cube is the default type.
+    #[test]
+    fn a_flat_texture_colours_its_material() {
+        let rgba = |texture: &str, material: &str| {
+            let room = format!(
+                r#"<asset><texture name="paint" {texture}/><material name="wall" texture="paint"
+                {material}/></asset><worldbody><geom size="1" material="wall"/></worldbody>"#
+            );
+            geoms(&room).expect("a room")[0].rgba
+        };
+        let flat = r#"builtin="flat" rgb1="1 0.5 0" rgb2="0.4 0.5 0.6" width="8" height="8""#;
+        let plain = format!(r#"type="2d" {flat}"#);
+        assert_eq!(rgba(&plain, ""), [1.0, 0.5, 0.0, 1.0]);
+        assert_eq!(rgba(&plain, r#"rgba="0.5 0.5 0.5 0.8""#), [0.5, 0.25, 0.0, 0.8]);
+        for cube in [format!(r#"type="cube" {flat}"#), flat.to_string()] {
+            let [r, g, b, a] = rgba(&cube, "");
+            for (found, expected) in [(r, 0.9), (g, 0.5), (b, 0.1), (a, 1.0)] {
+                assert!((found - expected).abs() < 1e-6, "{found} instead of {expected}");
+            }
+        }
+        let default_rgb = rgba(r#"type="2d" builtin="flat" width="8" height="8""#, "");
+        assert_eq!(default_rgb, [0.8, 0.8, 0.8, 1.0]);
+    }
+
     #[test]
     fn what_is_see_through_or_in_a_hidden_group_is_not_drawn() {
         let drawn =

@@ -324,17 +324,17 @@ const MESH: &[Attribute] = &[
 
 const TEXTURE: &[Attribute] = &[
     mapped(&["file"], Takes::Text),
+    mapped(&["type"], Takes::Word(&["2d", "cube", "skybox"])),
     attribute(
         Support::Mapped,
         &["builtin"],
         Takes::Word(&["none", "gradient", "checker", "flat"]),
-        "`checker` is drawn, other patterns are not",
+        "`checker` is drawn, of `flat` the mean colour, `gradient` is not",
     ),
     mapped(&["rgb1", "rgb2"], numbers(3, 3)),
     ignored(
         &[
             "class",
-            "type",
             "colorspace",
             "content_type",
             "gridsize",
