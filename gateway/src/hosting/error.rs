@@ -182,8 +182,9 @@ impl HostingError {
         match self {
             HostingError::Episode(error) => error.refusal(),
             HostingError::UnknownEpisode { .. } => {
-                Refusal::new("unknown-episode", "Unknown episode", NotFound)
-                    .hint("start_episode (POST /v1/episodes) starts one")
+                Refusal::new("unknown-episode", "Unknown episode", NotFound).hint(
+                    "is this the server that started it? start_episode (POST /v1/episodes) starts another",
+                )
             }
             HostingError::TooManyEpisodes { .. } => {
                 Refusal::new("too-many-episodes", "Too many episodes", TooMany)

@@ -20,7 +20,7 @@ const MAX_WAYPOINTS: usize = 10;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WalkTo {
-    /// Most control steps, up to 1500: about 120 and 250 a metre and 150 a quarter turn; with `carry` 450 a
+    /// Most control steps, up to 1500: about 250 and 150 a metre and 250 a quarter turn; with `carry` 450 a
     /// metre.
     #[schemars(range(min = 1, max = MAX_STEPS))]
     pub steps: u32,

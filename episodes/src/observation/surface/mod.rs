@@ -192,7 +192,7 @@ fn name([red, green, blue]: [f32; 3]) -> Color {
         hue if hue < 70.0 => Color::Yellow,
         hue if hue < 170.0 => Color::Green,
         hue if hue < 260.0 => Color::Blue,
-        _ => Color::Purple,
+        _ => Color::Violet,
     }
 }
 
@@ -413,7 +413,7 @@ mod tests {
             ([0.9, 0.8, 0.1], Color::Yellow),
             ([0.1, 0.6, 0.2], Color::Green),
             ([0.1, 0.3, 0.9], Color::Blue),
-            ([0.6, 0.2, 0.8], Color::Purple),
+            ([0.6, 0.2, 0.8], Color::Violet),
             ([0.95, 0.95, 0.9], Color::White),
             ([0.5, 0.5, 0.5], Color::Grey),
             ([0.1, 0.05, 0.05], Color::Black),

@@ -41,7 +41,7 @@ Color: TypeAlias = Literal[
     "yellow",
     "green",
     "blue",
-    "purple",
+    "violet",
     "white",
     "grey",
     "black",
@@ -145,8 +145,8 @@ class PlannedCommand:
     """Conditions that have to hold after it."""
 
     until: bool | None = None
-    """True: it ends as soon as its `expects` hold, and the plan stops if they do not within its `steps`, here up
-    to 500. For move_wrists, walk and wait.
+    """True: it ends as soon as its `expects` hold (`arrived`: after its `steps`), or else the plan stops after its
+    `steps`, up to 500. For move_wrists, walk and wait.
     """
 
 

@@ -204,7 +204,7 @@ class Tools(ABC):
         commands, each counted as a tool call, take every robot to within 1.5 cm and 1.5 degrees of its place,
         unless one gets no nearer or the steps are used up. It does not look: go round obstacles by `waypoints`.
 
-        steps: Most control steps, up to 1500: about 120 and 250 a metre and 150 a quarter turn; with `carry` 450 a
+        steps: Most control steps, up to 1500: about 250 and 150 a metre and 250 a quarter turn; with `carry` 450 a
             metre.
         robots: One entry per robot that walks.
         """

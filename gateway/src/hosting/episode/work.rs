@@ -316,9 +316,10 @@ impl Desk<'_> {
                 self.commit(None);
             }
             Job::EndIfAbandoned { idle } => {
+                let goes_on = self.session.ended().is_none();
                 let _ = self.session.run(|session| session.end_if_abandoned(idle));
                 self.commit(None);
-                if self.session.ended().is_some() {
+                if goes_on && self.session.ended().is_some() {
                     tracing::info!("abandoned, and ended");
                 }
             }
