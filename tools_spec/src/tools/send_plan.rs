@@ -38,8 +38,8 @@ pub struct PlannedCommand {
     /// Conditions that have to hold after it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expects: Option<Expectation>,
-    /// True: it ends as soon as its `expects` hold (`arrived`: after its `steps`), or else the plan stops
-    /// after its `steps`, up to 500. For move_wrists, walk and wait.
+    /// True: it ends once its `expects` hold (`arrived`: after `steps`), or else the plan stops after
+    /// `steps`, up to 500. For move_wrists, walk and wait.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[schemars(extend("default" = false))]
     pub until: bool,

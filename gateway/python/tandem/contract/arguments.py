@@ -145,8 +145,8 @@ class PlannedCommand:
     """Conditions that have to hold after it."""
 
     until: bool | None = None
-    """True: it ends as soon as its `expects` hold (`arrived`: after its `steps`), or else the plan stops after its
-    `steps`, up to 500. For move_wrists, walk and wait.
+    """True: it ends once its `expects` hold (`arrived`: after `steps`), or else the plan stops after `steps`, up
+    to 500. For move_wrists, walk and wait.
     """
 
 
