@@ -63,9 +63,9 @@ pub use output::{
 };
 pub use protocol::{Rules, rules};
 pub use recording::{
-    Damage, Fault, FilePart, LeftOut, LiveChannels, NoteMessage, RecordedCall, RecordedCheckpoint, Recorder,
-    Recording, RecordingError, RecoverError, Recovered, ShownPicture, ToolCallMessage, TranscriptEntry,
-    Visibility, recover,
+    Damage, Fault, FilePart, LeftOut, LiveChannel, LiveRecording, LiveViewer, NoteMessage, RecordedCall,
+    RecordedCheckpoint, Recorder, Recording, RecordingError, RecoverError, Recovered, ShownPicture,
+    ToolCallMessage, TranscriptEntry, Visibility, recover,
 };
 pub use results::RESULT_FILE;
 pub use scoring::{

@@ -8,6 +8,7 @@ pub mod commands;
 pub mod drivers;
 pub mod hosting;
 pub mod http;
+mod live_view;
 pub mod metrics;
 pub mod settings;
 pub mod token;

@@ -3,7 +3,6 @@
 mod check;
 mod durability;
 mod error;
-mod foxglove;
 mod tls;
 
 use std::{
@@ -19,18 +18,18 @@ use clap::{
 };
 use serde::Deserialize;
 use tandem_episodes::{
-    BaseLimits, Controller, EpisodeError, EpisodeSpec, Instructions, InstructionsError, MAX_TEXT_BYTES,
-    RendererKind, RobotFile, RunFolder, SceneFile, Sensing, SensorModel, SimError, StateSource, Visibility,
-    check_task, read_task, read_text,
+    BaseLimits, Controller, EpisodeError, EpisodeSpec, Instructions, InstructionsError, LiveViewer,
+    MAX_TEXT_BYTES, RendererKind, RobotFile, RunFolder, SceneFile, Sensing, SensorModel, SimError,
+    StateSource, Visibility, check_task, read_task, read_text,
     stress::{Stress, StressAxis, StressLevel},
     tasks::{Task, TaskSet},
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, StartEpisode, Wording};
 
+use crate::live_view::FoxgloveServer;
 use crate::token::{Token, TokenError};
 pub use durability::Durability;
 pub use error::SettingsError;
-pub use foxglove::FoxgloveView;
 pub use tls::{Certificate, TlsError};
 
 /// One source of settings; missing ones come from the next source. The doc comments are help texts.
@@ -301,7 +300,7 @@ pub struct Settings {
     /// Time from which recordings are readable.
     pub record: Visibility,
     /// Live view in Foxglove.
-    pub foxglove: Option<FoxgloveView>,
+    pub foxglove: Option<FoxgloveServer>,
     /// Tasks that can be played.
     pub tasks: TaskSet,
     /// Instructions in place of the tasks' own.
@@ -356,7 +355,7 @@ impl Settings {
 
     /// Returns the destination of an episode's files.
     pub fn run_folder(&self, path: PathBuf, visibility: Visibility) -> RunFolder {
-        let live = self.foxglove.as_ref().map(|view| view.channels.clone());
+        let live = self.foxglove.clone().map(|server| Arc::new(server) as Arc<dyn LiveViewer>);
         RunFolder { path, visibility, pages: true, live }
     }
 
@@ -407,7 +406,7 @@ impl Settings {
                 None | Some(Record::Live) => Visibility::Live,
                 Some(Record::After) => Visibility::After,
             },
-            foxglove: layer.foxglove.map(FoxgloveView::on),
+            foxglove: layer.foxglove.map(FoxgloveServer::on),
             instructions: layer.read_instructions(&tasks)?,
             tasks,
             scene: layer.scene.as_deref().map(read_scene).transpose()?,

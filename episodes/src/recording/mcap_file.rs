@@ -15,8 +15,8 @@ use mcap::Attachment;
 use mcap::records::MessageHeader;
 use serde::{Deserialize, Serialize};
 
-use super::live_channels::{LiveChannels, LiveRecording};
-use super::{data_section::LIBRARY, metadata};
+use super::live::{LiveChannel, LiveRecording, LiveViewer};
+use super::{data_section::LIBRARY, metadata, topics};
 use crate::locks::{FileLock, LockKind, Locking};
 use crate::output::{OutputError, partial_path, put_in_place, write_whole};
 
@@ -30,7 +30,7 @@ pub struct McapFile {
     /// Buffer that messages share.
     buffer: Vec<u8>,
     /// The same channels for those who watch.
-    live: Option<LiveRecording>,
+    live: Option<Box<dyn LiveRecording>>,
 }
 
 /// A channel that carries messages of one type.
@@ -46,12 +46,12 @@ impl McapFile {
     pub fn create(
         path: &Path,
         visibility: Visibility,
-        live: Option<&LiveChannels>,
+        live: Option<&dyn LiveViewer>,
     ) -> Result<McapFile, OutputError> {
         let store = RecordingStore::create(path, visibility)
             .map_err(|source| OutputError::Io { path: path.into(), source })?;
         let writer = writer(store).map_err(|source| OutputError::of_recording(path, source))?;
-        Ok(McapFile { writer, path: path.into(), buffer: Vec::new(), live: live.map(LiveChannels::begin) })
+        Ok(McapFile { writer, path: path.into(), buffer: Vec::new(), live: live.map(LiveViewer::begin) })
     }
 
     /// Opens a topic. `metadata` describes the channel, for example the names of an array's columns.
@@ -67,8 +67,9 @@ impl McapFile {
         };
         let channel = schema.and_then(|schema| self.writer.add_channel(schema, topic, &encoding, &metadata));
         let channel = channel.map_err(|e| self.failed(e))?;
-        if let Some(live) = &self.live {
-            live.open(topic, &encoding, M::get_schema(), metadata);
+        if let Some(live) = &mut self.live {
+            let (name, is_scene) = (topic.to_owned(), topic == topics::SCENE);
+            live.open(LiveChannel { topic: name, encoding, schema: M::get_schema(), metadata, is_scene });
         }
         Ok(Topic { name: topic.into(), channel, messages: 0, message: PhantomData })
     }
@@ -94,7 +95,7 @@ impl McapFile {
         };
         let written = self.writer.write_to_known_channel(&header, &self.buffer);
         topic.messages += 1;
-        if let Some(live) = &self.live {
+        if let Some(live) = &mut self.live {
             live.send(&topic.name, time_ns, &self.buffer);
         }
         written.map_err(|e| self.failed(e))

@@ -18,7 +18,7 @@
 mod checked_file;
 mod damage;
 mod data_section;
-mod live_channels;
+mod live;
 mod mcap_file;
 mod metadata;
 mod read;
@@ -31,7 +31,7 @@ mod transcript;
 mod write;
 
 pub use damage::{Damage, Fault, FilePart};
-pub use live_channels::LiveChannels;
+pub use live::{LiveChannel, LiveRecording, LiveViewer};
 pub use mcap_file::Visibility;
 pub use read::{MAX_RECORDING_BYTES, RecordedCall, RecordedCheckpoint, Recording, RecordingError};
 pub use recover::{LeftOut, RecoverError, Recovered, recover};

@@ -8,7 +8,7 @@ use foxglove::messages::{FrameTransforms, SceneUpdate};
 use tandem_sim::{RobotCommand, Step, mjcf::Geom, render::robot_rgba};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
-use super::live_channels::LiveChannels;
+use super::live::LiveViewer;
 use super::mcap_file::{McapFile, Topic, Visibility};
 use super::topics::messages::{BudgetMessage, Json, PhaseMessage, ToolCallMessage, ToolCallRecord};
 use super::topics::notes::NoteMessage;
@@ -75,7 +75,7 @@ impl Recorder {
     pub fn create(
         folder: &Path,
         visibility: Visibility,
-        live: Option<&LiveChannels>,
+        live: Option<&dyn LiveViewer>,
         header: RecordingHeader,
         start: &Step,
         state_hash: u64,

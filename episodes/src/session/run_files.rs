@@ -17,7 +17,7 @@ use crate::observation::Observer;
 use crate::output::{OutputError, create_private_folder, write_whole};
 use crate::protocol::Rules;
 use crate::recording::{
-    LiveChannels, NoteMessage, Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility,
+    LiveViewer, NoteMessage, Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility,
 };
 use crate::reports::episode::{
     CELL_HEIGHT, CELL_WIDTH, CallCounts, EpisodePage, KeyMoment, LabelledPicture, PAGE_FILE, STRIP_FILE,
@@ -34,8 +34,8 @@ pub struct RunFolder {
     pub visibility: Visibility,
     /// True to make a strip of images and a page, for people.
     pub pages: bool,
-    /// Channels that show the recording live.
-    pub live: Option<LiveChannels>,
+    /// Viewer that shows the recording live.
+    pub live: Option<Arc<dyn LiveViewer>>,
 }
 
 impl From<&Path> for RunFolder {
@@ -241,7 +241,7 @@ fn begin(folder: &RunFolder, session: &Session) -> Result<RecorderThread, Episod
     let mut recorder = Recorder::create(
         path,
         *visibility,
-        live.as_ref(),
+        live.as_deref(),
         header,
         &session.present,
         session.world.state_hash(),

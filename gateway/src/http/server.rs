@@ -71,8 +71,8 @@ impl Server {
             )
         })?;
         let address = listener.local_addr()?;
-        if let Some(view) = &settings.foxglove {
-            runtime.block_on(view.serve())?;
+        if let Some(server) = &settings.foxglove {
+            runtime.block_on(server.serve())?;
         }
         let table = Arc::new(EpisodeTable::for_guests(settings.clone(), guests));
         let watch_key = WatchKey::random().map_err(io::Error::other)?;

@@ -1,26 +1,25 @@
-//! Live view of recordings in Foxglove: a WebSocket server with the channels of the recording that began
-//! last.
+//! Live view in Foxglove: a WebSocket server with the channels of the recording that began last.
 
-use std::collections::BTreeMap;
-use std::fmt;
-use std::net::{Ipv4Addr, SocketAddr};
+use std::net::Ipv4Addr;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError, Weak};
+use std::{fmt, io, mem};
 
 use foxglove::websocket::{Capability, ChannelView, Client, ServerListener};
-use foxglove::{ChannelBuilder, Context, FoxgloveError, PartialMetadata, RawChannel, Schema};
-use foxglove::{WebSocketServer, WebSocketServerHandle};
-
-use super::topics;
+use foxglove::{
+    ChannelBuilder, Context, PartialMetadata, RawChannel, WebSocketServer, WebSocketServerHandle,
+};
+use tandem_episodes::{LiveChannel, LiveRecording, LiveViewer};
 
 /// Messages that wait for a slow client before the oldest are dropped: about 40 s of an episode, which a
 /// long command plays at once.
 const MAX_WAITING_MESSAGES: usize = 16_384;
 
-/// Channels of the recording that began last, served to clients of Foxglove. Clones share them.
+/// Server of the recording that began last, for clients of Foxglove. Clones share it.
 #[derive(Clone)]
-pub struct LiveChannels(Arc<Shared>);
+pub struct FoxgloveServer(Arc<Shared>);
 
 struct Shared {
+    port: u16,
     context: Arc<Context>,
     server: OnceLock<WebSocketServerHandle>,
     shown: Mutex<Shown>,
@@ -37,73 +36,53 @@ struct Shown {
 
 struct ShownChannel {
     channel: Arc<RawChannel>,
+    is_scene: bool,
     /// Messages for clients that subscribe later, with their times: all of the scene, and the latest of
     /// every other channel, because physics is often paused.
     kept: Vec<(u64, Vec<u8>)>,
 }
 
-/// One recording in [`LiveChannels`], until the next one begins.
-pub struct LiveRecording {
-    channels: LiveChannels,
+/// One recording, until the next one begins.
+struct ShownRecording {
+    server: FoxgloveServer,
     number: u64,
 }
 
-impl Default for LiveChannels {
-    fn default() -> LiveChannels {
-        LiveChannels(Arc::new(Shared {
-            context: Context::new(),
-            server: OnceLock::new(),
-            shown: Mutex::default(),
-        }))
-    }
-}
-
-impl fmt::Debug for LiveChannels {
+impl fmt::Debug for FoxgloveServer {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.debug_struct("LiveChannels").finish_non_exhaustive()
+        f.debug_struct("FoxgloveServer").finish_non_exhaustive()
     }
 }
 
-impl LiveChannels {
-    /// Serves the channels on a port of this machine alone, since clients need no token; port 0 picks a
-    /// free one. Returns the address. Needs a Tokio runtime, on which the clients are served.
+impl FoxgloveServer {
+    /// Creates a server on a port of this machine alone, since clients need no token; 0 picks a free one.
+    pub fn on(port: u16) -> FoxgloveServer {
+        let (server, shown) = (OnceLock::new(), Mutex::default());
+        FoxgloveServer(Arc::new(Shared { port, context: Context::new(), server, shown }))
+    }
+
+    /// Begins to serve clients on the present Tokio runtime, and logs the URL that Foxglove opens.
     ///
     /// # Errors
     ///
-    /// Returns an error if the port cannot be used, or if the channels are served already.
-    pub async fn serve(&self, port: u16) -> Result<SocketAddr, FoxgloveError> {
-        let server = WebSocketServer::new()
+    /// If the port cannot be used.
+    pub async fn serve(&self) -> io::Result<()> {
+        let port = self.0.port;
+        let served = WebSocketServer::new()
             .name("tandem")
             .context(&self.0.context)
             .capabilities([Capability::Time])
             .listener(Arc::new(Latecomers(Arc::downgrade(&self.0))))
             .message_backlog_size(MAX_WAITING_MESSAGES)
             .bind(Ipv4Addr::LOCALHOST.to_string(), port)
-            .start()
-            .await?;
-        let address = SocketAddr::from((Ipv4Addr::LOCALHOST, server.port()));
-        match self.0.server.set(server) {
-            Ok(()) => Ok(address),
-            Err(second) => {
-                drop(second.stop());
-                Err(FoxgloveError::ServerAlreadyStarted)
-            }
-        }
-    }
-
-    /// Shows a new recording in place of the one before.
-    pub(super) fn begin(&self) -> LiveRecording {
-        let (number, before) = {
-            let mut shown = self.shown();
-            let number = shown.number + 1;
-            (number, std::mem::replace(&mut *shown, Shown { number, ..Shown::default() }))
-        };
-        // A channel that closes calls its clients, who may be asking for messages at the same time.
-        before.channels.iter().for_each(|shown| shown.channel.close());
-        if let Some(server) = self.0.server.get() {
-            server.clear_session(None);
-        }
-        LiveRecording { channels: self.clone(), number }
+            .start();
+        let server = served.await.map_err(|error| {
+            io::Error::other(format!("cannot serve Foxglove on port {port}: {error}; try --foxglove 0"))
+        })?;
+        tracing::info!("Foxglove shows episodes from ws://{}:{}", Ipv4Addr::LOCALHOST, server.port());
+        // The settings are served once, so there is no server yet.
+        let _ = self.0.server.set(server);
+        Ok(())
     }
 
     fn shown(&self) -> MutexGuard<'_, Shown> {
@@ -111,47 +90,56 @@ impl LiveChannels {
     }
 }
 
-impl LiveRecording {
-    /// Opens a channel, unless another recording has begun.
-    pub fn open(
-        &self,
-        topic: &str,
-        encoding: &str,
-        schema: Option<Schema>,
-        metadata: BTreeMap<String, String>,
-    ) {
+impl LiveViewer for FoxgloveServer {
+    /// Shows a new recording in place of the one before.
+    fn begin(&self) -> Box<dyn LiveRecording> {
+        let (number, before) = {
+            let mut shown = self.shown();
+            let number = shown.number + 1;
+            (number, mem::replace(&mut *shown, Shown { number, ..Shown::default() }))
+        };
+        // A channel that closes calls its clients, who may be asking for messages at the same time.
+        before.channels.iter().for_each(|shown| shown.channel.close());
+        if let Some(server) = self.0.server.get() {
+            server.clear_session(None);
+        }
+        Box::new(ShownRecording { server: self.clone(), number })
+    }
+}
+
+impl LiveRecording for ShownRecording {
+    fn open(&mut self, LiveChannel { topic, encoding, schema, metadata, is_scene }: LiveChannel) {
         let channel = ChannelBuilder::new(topic)
-            .context(&self.channels.0.context)
+            .context(&self.server.0.context)
             .message_encoding(encoding)
             .schema(schema)
             .metadata(metadata)
             .build_raw()
             .expect("the only error is a missing encoding");
-        let mut shown = self.channels.shown();
+        let mut shown = self.server.shown();
         if shown.number == self.number {
-            shown.channels.push(ShownChannel { channel, kept: Vec::new() });
+            shown.channels.push(ShownChannel { channel, is_scene, kept: Vec::new() });
         } else {
             drop(shown);
             channel.close();
         }
     }
 
-    /// Sends a message on the channel `topic`, unless another recording has begun.
-    pub fn send(&self, topic: &str, time_ns: u64, message: &[u8]) {
-        let mut guard = self.channels.shown();
+    fn send(&mut self, topic: &str, time_ns: u64, message: &[u8]) {
+        let mut guard = self.server.shown();
         let shown = &mut *guard;
         if shown.number != self.number {
             return;
         }
         let Some(of) = shown.channels.iter_mut().find(|shown| shown.channel.topic() == topic) else { return };
-        if topic != topics::SCENE {
+        if !of.is_scene {
             of.kept.clear();
         }
         of.kept.push((time_ns, message.to_vec()));
         of.channel.log_with_meta(message, PartialMetadata::with_log_time(time_ns));
         if time_ns > shown.time_ns {
             shown.time_ns = time_ns;
-            if let Some(server) = self.channels.0.server.get() {
+            if let Some(server) = self.server.0.server.get() {
                 server.broadcast_time(time_ns);
             }
         }
