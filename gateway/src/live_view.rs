@@ -14,6 +14,9 @@ use tandem_episodes::{LiveChannel, LiveRecording, LiveViewer};
 /// long command plays at once.
 const MAX_WAITING_MESSAGES: usize = 16_384;
 
+/// Schema of shapes. All messages describe the present, and not only the latest.
+const SCENE_SCHEMA: &str = "foxglove.SceneUpdate";
+
 /// Server of the recording that began last, for clients of Foxglove. Clones share it.
 #[derive(Clone)]
 pub struct FoxgloveServer(Arc<Shared>);
@@ -108,7 +111,8 @@ impl LiveViewer for FoxgloveServer {
 }
 
 impl LiveRecording for ShownRecording {
-    fn open(&mut self, LiveChannel { topic, encoding, schema, metadata, is_scene }: LiveChannel) {
+    fn open(&mut self, LiveChannel { topic, encoding, schema, metadata }: LiveChannel) {
+        let is_scene = schema.as_ref().is_some_and(|schema| schema.name == SCENE_SCHEMA);
         let channel = ChannelBuilder::new(topic)
             .context(&self.server.0.context)
             .message_encoding(encoding)

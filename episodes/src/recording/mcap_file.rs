@@ -3,6 +3,7 @@
 
 use std::{
     collections::BTreeMap,
+    fmt::Debug,
     fs::{self, File},
     io::{self, Seek, SeekFrom, Write},
     marker::PhantomData,
@@ -10,13 +11,12 @@ use std::{
     process,
 };
 
-use foxglove::Encode;
+use foxglove::{Encode, Schema};
 use mcap::Attachment;
 use mcap::records::MessageHeader;
 use serde::{Deserialize, Serialize};
 
-use super::live::{LiveChannel, LiveRecording, LiveViewer};
-use super::{data_section::LIBRARY, metadata, topics};
+use super::{data_section::LIBRARY, metadata};
 use crate::locks::{FileLock, LockKind, Locking};
 use crate::output::{OutputError, partial_path, put_in_place, write_whole};
 
@@ -68,8 +68,7 @@ impl McapFile {
         let channel = schema.and_then(|schema| self.writer.add_channel(schema, topic, &encoding, &metadata));
         let channel = channel.map_err(|e| self.failed(e))?;
         if let Some(live) = &mut self.live {
-            let (name, is_scene) = (topic.to_owned(), topic == topics::SCENE);
-            live.open(LiveChannel { topic: name, encoding, schema: M::get_schema(), metadata, is_scene });
+            live.open(LiveChannel { topic: topic.into(), encoding, schema: M::get_schema(), metadata });
         }
         Ok(Topic { name: topic.into(), channel, messages: 0, message: PhantomData })
     }
@@ -137,6 +136,31 @@ impl McapFile {
     fn failed(&self, source: mcap::McapError) -> OutputError {
         OutputError::of_recording(&self.path, source)
     }
+}
+
+/// Viewer of recordings, for example a server. It is told of every recording that begins.
+pub trait LiveViewer: Debug + Send + Sync {
+    /// Returns the view of a recording that begins.
+    fn begin(&self) -> Box<dyn LiveRecording>;
+}
+
+/// View of one recording. Calls come from the recorder's thread, in the order of the file.
+pub trait LiveRecording: Send {
+    /// Opens a channel.
+    fn open(&mut self, channel: LiveChannel);
+
+    /// Shows a message of a channel.
+    fn send(&mut self, topic: &str, time_ns: u64, message: &[u8]);
+}
+
+/// Description of a channel of a recording, as in the file.
+#[derive(Clone, Debug)]
+pub struct LiveChannel {
+    pub topic: String,
+    pub encoding: String,
+    pub schema: Option<Schema>,
+    /// Names of an array's columns, for example.
+    pub metadata: BTreeMap<String, String>,
 }
 
 /// Creates a writer of whole chunks, so that no flush ends in the middle of one.

@@ -18,7 +18,6 @@
 mod checked_file;
 mod damage;
 mod data_section;
-mod live;
 mod mcap_file;
 mod metadata;
 mod read;
@@ -31,8 +30,7 @@ mod transcript;
 mod write;
 
 pub use damage::{Damage, Fault, FilePart};
-pub use live::{LiveChannel, LiveRecording, LiveViewer};
-pub use mcap_file::Visibility;
+pub use mcap_file::{LiveChannel, LiveRecording, LiveViewer, Visibility};
 pub use read::{MAX_RECORDING_BYTES, RecordedCall, RecordedCheckpoint, Recording, RecordingError};
 pub use recover::{LeftOut, RecoverError, Recovered, recover};
 pub use thread::RecorderThread;

@@ -8,8 +8,7 @@ use foxglove::messages::{FrameTransforms, SceneUpdate};
 use tandem_sim::{RobotCommand, Step, mjcf::Geom, render::robot_rgba};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
-use super::live::LiveViewer;
-use super::mcap_file::{McapFile, Topic, Visibility};
+use super::mcap_file::{LiveViewer, McapFile, Topic, Visibility};
 use super::topics::messages::{BudgetMessage, Json, PhaseMessage, ToolCallMessage, ToolCallRecord};
 use super::topics::notes::NoteMessage;
 use super::topics::robot::RobotTopics;
@@ -91,7 +90,7 @@ impl Recorder {
             steps: file.topic(topics::STEPS, &[])?,
             step_encoder: StepEncoder::default(),
             transforms: file.topic("/tf", &[])?,
-            scene: file.topic(topics::SCENE, &[])?,
+            scene: file.topic("/scene", &[])?,
             phases: file.topic(topics::PHASES, &[])?,
             budget: file.topic("/budget", &[])?,
             tool_calls: file.topic(topics::TOOL_CALLS, &[])?,

@@ -7,9 +7,6 @@ pub mod scene;
 pub mod steps;
 pub mod transforms;
 
-/// Shapes, which are drawn once.
-pub const SCENE: &str = "/scene";
-
 /// Topics that are read back.
 pub const STEPS: &str = "/steps";
 pub const PHASES: &str = "/phases";

@@ -41,7 +41,7 @@ const PROXIES: [&str; 3] = ["HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"];
 /// Checks everything around the program. Episodes run without it, except for a correct date and free space.
 pub fn check(layer: &Layer) -> Findings {
     vec![
-        ("gpu", gpu(layer.renderer())),
+        (RendererKind::Gpu.name(), gpu(layer.renderer())),
         ("ffmpeg", ffmpeg("ffmpeg")),
         ("python", python(&interpreter())),
         ("proxy", proxy(|name| std::env::var(name).ok())),
