@@ -48,7 +48,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "gateway",
         &[
-            &["token", "metrics"],
+            &["token", "metrics", "live_view"],
             &["settings"],
             &["hosting"],
             &["http"],
