@@ -60,15 +60,16 @@ impl McapFile {
         topic: &str,
         metadata: &[(&str, &str)],
     ) -> Result<Topic<M>, OutputError> {
-        let (encoding, metadata) = (M::get_message_encoding(), string_map(metadata));
-        let schema = match M::get_schema() {
+        let (schema, encoding) = (M::get_schema(), M::get_message_encoding());
+        let metadata = string_map(metadata);
+        let schema_id = match &schema {
             Some(schema) => self.writer.add_schema(&schema.name, &schema.encoding, &schema.data),
             None => Ok(0),
         };
-        let channel = schema.and_then(|schema| self.writer.add_channel(schema, topic, &encoding, &metadata));
+        let channel = schema_id.and_then(|id| self.writer.add_channel(id, topic, &encoding, &metadata));
         let channel = channel.map_err(|e| self.failed(e))?;
         if let Some(live) = &mut self.live {
-            live.open(LiveChannel { topic: topic.into(), encoding, schema: M::get_schema(), metadata });
+            live.open(LiveChannel { topic: topic.into(), encoding, schema, metadata });
         }
         Ok(Topic { name: topic.into(), channel, messages: 0, message: PhantomData })
     }

@@ -26,9 +26,8 @@ pub enum PythonPart {
 pub enum PythonError {
     /// The interpreter cannot be started.
     #[error(
-        "{} by Python, and {python} cannot be started ({source}); install Python 3.10 or later and \
-         pip install 'tandem-sim[{}]' (in a checkout './gateway/python[{}]'), or name an interpreter that has it by {PYTHON_VARIABLE}",
-        part.what(), part.extra(), part.extra()
+        "{} by Python, and {python} cannot be started ({source}); install Python 3.10 or later and {}",
+        part.what(), part.remedy()
     )]
     NoPython {
         /// Requested part.
@@ -40,9 +39,7 @@ pub enum PythonError {
     },
     /// The interpreter does not have the package.
     #[error(
-        "{} by Python's package, which {python} does not have; pip install 'tandem-sim[{}]' (in a checkout \
-         './gateway/python[{}]'), or name an interpreter that has it by {PYTHON_VARIABLE}",
-        part.what(), part.extra(), part.extra()
+        "{} by Python's package, which {python} does not have; {}", part.what(), part.remedy()
     )]
     NoPackage {
         /// Requested part.
@@ -77,6 +74,15 @@ impl PythonPart {
             PythonPart::Agent => "agents",
             PythonPart::Export => "lerobot",
         }
+    }
+
+    /// Returns how to get the package with the extra.
+    fn remedy(self) -> String {
+        let extra = self.extra();
+        format!(
+            "pip install 'tandem-sim[{extra}]' (in a checkout './gateway/python[{extra}]'), or name an \
+             interpreter that has it by {PYTHON_VARIABLE}"
+        )
     }
 
     fn what(self) -> &'static str {

@@ -9,7 +9,8 @@ use super::{EvaluationReport, stress};
 pub fn rates(report: &EvaluationReport) -> String {
     let mut text = String::from(
         "policy,protocol,task,robots,phase_number,phase_id,collaborative,rate,successes,trials,share,\
-         low_share,high_share,median_steps,median_calls,median_thinking_s,median_input_tokens,median_output_tokens,median_usd\n",
+         low_share,high_share,median_steps,median_calls,median_thinking_s,median_input_tokens,\
+         median_output_tokens,median_usd\n",
     );
     for policy in &report.policies {
         for task in &policy.tasks {

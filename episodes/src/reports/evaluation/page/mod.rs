@@ -92,8 +92,8 @@ fn phase_times(report: &EvaluationReport) -> String {
     if curves.is_empty() {
         return String::new();
     }
-    let about = "Share of the episodes from the task's beginning that had reached a phase by then: p1 solid, p2 \
-                 dashed, p3 dotted. Tasks of which no phase was reached have no curves.";
+    let about = "Share of the episodes from the task's beginning that had reached a phase by then: p1 solid, \
+                 p2 dashed, p3 dotted. Tasks of which no phase was reached have no curves.";
     format!(
         r#"<h2>When phases were reached</h2><p class="soft">{about}</p><div class="plots">{curves}</div>"#
     )
