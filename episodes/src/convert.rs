@@ -15,6 +15,7 @@ pub fn unit_quaternion([w, i, j, k]: [f64; 4]) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k))
 }
 
+/// Converts a pose of the simulator to a rigid transform, in m.
 pub fn isometry_from_sim(pose: &Pose) -> Isometry3<f64> {
     let (t, r) = (pose.translation, pose.rotation);
     isometry([t.x, t.y, t.z].map(f64::from), [r.w, r.x, r.y, r.z].map(f64::from))

@@ -17,14 +17,11 @@
 //! # Ok::<(), EpisodeError>(())
 //! ```
 
-pub mod batch;
-pub mod bench;
 mod commands;
 mod conditions;
 mod convert;
 mod describe;
 mod error;
-pub mod evaluation;
 mod fingerprint;
 pub mod html;
 mod instructions;
@@ -32,48 +29,48 @@ pub mod live;
 mod locks;
 mod observation;
 mod output;
+pub mod pages;
 pub mod players;
 mod protocol;
 mod recording;
 pub mod replay;
-pub mod reports;
-pub mod results;
+mod result_file;
 pub mod rows;
 mod scoring;
 mod session;
 mod spec;
-pub mod statistics;
 pub mod stress;
-mod task_check;
 pub mod tasks;
 mod variation;
 mod words;
 
-pub use commands::{Called, OperatorCall, OperatorCommand};
+pub use commands::{Called, OperatorCall, OperatorCommand, upper_body};
 pub use conditions::{FUNCTIONS, Function};
+pub use convert::isometry_from_sim;
 pub use describe::{brief, task_list, teamwork};
 pub use error::{CheckpointError, EpisodeError, RobotError, SceneError};
 pub use fingerprint::{build, name_program};
 pub use instructions::{Instructions, InstructionsError};
 pub use locks::{FileLock, LockKind, Locking};
-pub use observation::{Picture, RobotObservation, RobotView, TeamObservation};
+pub use observation::{Picture, RobotObservation, RobotView, TeamObservation, scaled_colours};
 pub use output::{
     OutputError, create_new_private_folder, create_private_folder, partial_path, printable, shell_word,
     write_whole,
 };
 pub use protocol::{Rules, rules};
 pub use recording::{
-    Damage, Fault, FilePart, LeftOut, LiveChannel, LiveRecording, LiveViewer, NoteMessage, RecordedCall,
-    RecordedCheckpoint, Recorder, Recording, RecordingError, RecoverError, Recovered, ShownPicture,
-    ToolCallMessage, TranscriptEntry, Visibility, recover,
+    Damage, Fault, FilePart, LeftOut, LiveChannel, LiveRecording, LiveViewer, MAX_RECORDING_BYTES,
+    NoteMessage, RecordedCall, RecordedCheckpoint, Recorder, Recording, RecordingError, RecoverError,
+    Recovered, ShownPicture, ToolCallMessage, TranscriptEntry, Visibility, recover,
 };
-pub use results::RESULT_FILE;
+pub use result_file::{RESULT_FILE, write_result};
 pub use scoring::{
     A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, Predicate, RobotFacts, Scores, StepScore,
 };
 pub use session::{
-    Audience, BringBack, CallReply, Caller, Checkpoint, Clock, FAILED_STEP_FILE, FailedStep, JournalEntry,
-    Outcome, PlanAdvance, PlanRun, Request, RunFiles, RunFolder, Session, monotonic,
+    Audience, BringBack, Built, CallReply, Caller, Checkpoint, Clock, FAILED_STEP_FILE, FailedStep,
+    JournalEntry, Outcome, PlanAdvance, PlanRun, Request, RunFiles, RunFolder, Session, build_world,
+    monotonic,
 };
 pub use spec::{
     Controller, EpisodeSpec, KeyedSeed, MomentStart, OwnRobot, PhaseStart, RobotFile, SceneFile, Start,
@@ -85,7 +82,6 @@ pub use tandem_sim::{
     joint_names, read_bytes, read_text,
     render::RendererKind,
 };
-pub use task_check::{TaskCheck, TaskCheckError, check_task};
 pub use tasks::{TANDEM_PLUS, TaskFileError, read_task, tandem_plus, task_of};
 pub use variation::Variation;
 pub use words::OwnWords;

@@ -20,10 +20,11 @@ use serde::Deserialize;
 use tandem_episodes::{
     BaseLimits, Controller, EpisodeError, EpisodeSpec, Instructions, InstructionsError, LiveViewer,
     MAX_TEXT_BYTES, RendererKind, RobotFile, RunFolder, SceneFile, Sensing, SensorModel, SimError,
-    StateSource, Visibility, check_task, read_task, read_text,
+    StateSource, Visibility, read_task, read_text,
     stress::{Stress, StressAxis, StressLevel},
     tasks::{Task, TaskSet},
 };
+use tandem_evaluation::check_task;
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, StartEpisode, Wording};
 
 use crate::live_view::FoxgloveServer;

@@ -39,7 +39,7 @@ impl Player for Demonstration {
         let most = self.spec.rules().steps_per_command;
         for steps in self.steps()?.chunks(most as usize) {
             let names = self.spec.task.robot_names().enumerate();
-            let rows = |robot: usize| steps.iter().map(|step| action(step, robot)).collect();
+            let rows = |robot: usize| steps.iter().map(|step| recorded_action(step, robot)).collect();
             let robots = names.map(|(robot, name)| JointChunk { robot: name.into(), rows: rows(robot) });
             episode.call(SendJointChunk { robots: robots.collect() }.into())?;
         }
@@ -48,7 +48,7 @@ impl Player for Demonstration {
 }
 
 /// Returns the action row of robot number `robot` in `step`.
-pub fn action(step: &Step, robot: usize) -> Vec<f64> {
+pub fn recorded_action(step: &Step, robot: usize) -> Vec<f64> {
     let command = &step.robots[robot].command;
     command.upper_rad.into_iter().chain(base_row(&command.base)).map(f64::from).collect()
 }

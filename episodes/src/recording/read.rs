@@ -19,7 +19,7 @@ use super::topics::steps::{StepDecoder, state_of};
 use super::{Recorder, checkpoint_name, metadata, topics};
 use crate::error::RobotError;
 use crate::output::{partial_path, shell_word};
-use crate::results::RESULT_FILE;
+use crate::result_file::RESULT_FILE;
 use crate::scoring::{ScoreMemory, Scores, StepScore};
 use crate::spec::EpisodeSpec;
 

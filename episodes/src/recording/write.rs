@@ -18,7 +18,7 @@ use super::topics::{self, scene};
 use super::{checkpoint_name, metadata};
 use crate::commands::RobotSheet;
 use crate::output::OutputError;
-use crate::results::RESULT_FILE;
+use crate::result_file::RESULT_FILE;
 use crate::scoring::{Facts, ScoreMemory};
 use crate::spec::EpisodeSpec;
 

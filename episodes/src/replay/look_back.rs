@@ -14,7 +14,7 @@ use crate::commands::Motion;
 use crate::convert::isometry_from_sim;
 use crate::live::{LiveScene, LiveStep, told_transcript};
 use crate::recording::{Recording, TranscriptEntry};
-use crate::session::build;
+use crate::session::build_world;
 use crate::spec::EpisodeSpec;
 
 /// Control steps per displayed step: ten are shown a second, and the page interpolates between them.
@@ -38,7 +38,7 @@ impl RecordedEpisode {
     /// If it cannot be read or its world cannot be built.
     pub fn read(path: &Path) -> Result<RecordedEpisode, ReplayError> {
         let recording = Recording::read(path)?;
-        let built = build(&recording.spec)?;
+        let built = build_world(&recording.spec)?;
         let links = built.motions[0].robot.model.links.len();
         let transcript = recording.transcript()?;
         let looks: BTreeSet<u64> = transcript.iter().filter_map(looked_at).collect();

@@ -7,7 +7,7 @@ use tandem_sim::render::{Camera, Frame};
 
 use crate::EpisodeError;
 use crate::observation::{Observer, Picture, drawing_camera, scaled_colours};
-use crate::session::build;
+use crate::session::build_world;
 use crate::spec::EpisodeSpec;
 use crate::tasks::Task;
 
@@ -62,7 +62,7 @@ impl EpisodeCamera {
 ///
 /// If the world cannot be built or the image cannot be encoded.
 pub fn start_picture(spec: &EpisodeSpec, size: PictureSize) -> Result<Arc<[u8]>, EpisodeError> {
-    let world = build(spec)?.world;
+    let world = build_world(spec)?.world;
     let mut renderer = EpisodeRenderer { observer: Observer::new(spec, &world) };
     let picture = renderer.colours(EpisodeCamera::ThirdPerson, &world.present(), Some(size));
     Ok(picture.png()?)
@@ -80,7 +80,7 @@ impl EpisodeRenderer {
     ///
     /// If the world cannot be built.
     pub fn of(spec: &EpisodeSpec) -> Result<EpisodeRenderer, EpisodeError> {
-        Ok(EpisodeRenderer { observer: Observer::new(spec, &build(spec)?.world) })
+        Ok(EpisodeRenderer { observer: Observer::new(spec, &build_world(spec)?.world) })
     }
 
     /// Returns the camera after `step`, with the given image size or its own. The vertical angle stays the

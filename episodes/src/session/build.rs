@@ -39,7 +39,11 @@ pub struct Built {
 }
 
 /// Reads all files and builds the world.
-pub fn build(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
+///
+/// # Errors
+///
+/// If a file cannot be read, or robot, controller, task and scene do not fit together.
+pub fn build_world(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
     let locomotion = spec.locomotion.load()?;
     let source = spec.robot.load()?;
     let model = Arc::new(source.model.clone());

@@ -16,8 +16,8 @@ use crate::EpisodeError;
 use crate::commands::{Called, OperatorCall, OperatorCommand};
 use crate::observation::TeamObservation;
 use crate::output::OutputError;
+use crate::pages::SaidWords;
 use crate::recording::{CallMoment, CallOutcome, CallerRecord, ToolCallRecord};
-use crate::reports::episode::SaidWords;
 
 /// A request to an episode.
 #[derive(Clone, Debug)]

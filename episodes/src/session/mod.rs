@@ -16,7 +16,7 @@ mod run_files;
 mod status;
 mod told;
 
-pub(crate) use build::{Built, build};
+pub use build::{Built, build_world};
 pub use calls::{Audience, CallReply, Caller, Outcome, Request};
 pub use checkpoint::{Checkpoint, FailedStep};
 pub use clock::{Clock, monotonic};
@@ -128,7 +128,7 @@ impl Session {
 
     /// Builds the world of `spec` at the task's own start.
     fn build(spec: &EpisodeSpec, clock: Clock) -> Result<Session, EpisodeError> {
-        let Built { world, motions, robot, locomotion } = build(spec)?;
+        let Built { world, motions, robot, locomotion } = build_world(spec)?;
         let rules = spec.rules();
         let present = Arc::new(world.present());
         let rest = (0..motions.len()).map(|robot| world.rest_command(robot)).collect();

@@ -15,15 +15,15 @@ use super::{Session, this_build};
 use crate::EpisodeError;
 use crate::observation::Observer;
 use crate::output::{OutputError, create_private_folder, write_whole};
+use crate::pages::{
+    CELL_HEIGHT, CELL_WIDTH, CallCounts, EpisodePage, KeyMoment, LabelledPicture, PAGE_FILE, STRIP_FILE,
+    SaidWords, strip,
+};
 use crate::protocol::Rules;
 use crate::recording::{
     LiveViewer, NoteMessage, Recorder, RecorderThread, RecordingHeader, ToolCallRecord, Visibility,
 };
-use crate::reports::episode::{
-    CELL_HEIGHT, CELL_WIDTH, CallCounts, EpisodePage, KeyMoment, LabelledPicture, PAGE_FILE, STRIP_FILE,
-    SaidWords, strip,
-};
-use crate::results::write_result;
+use crate::result_file::write_result;
 use crate::scoring::Facts;
 use crate::tasks::Task;
 

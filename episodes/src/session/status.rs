@@ -16,7 +16,7 @@ use crate::spec::EpisodeSpec;
 
 impl Session {
     /// Returns the world, for benches that control robots in ways that no command can.
-    pub(crate) fn world_mut(&mut self) -> &mut tandem_sim::World {
+    pub fn world_mut(&mut self) -> &mut tandem_sim::World {
         &mut self.world
     }
 

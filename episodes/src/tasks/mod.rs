@@ -15,7 +15,7 @@ mod tests;
 pub use embedded::TANDEM_PLUS;
 pub use file::{TaskFileError, by_id_or_file, read_task, task_of};
 pub use randomize::{Offset, Spread, StartPose};
-pub(crate) use set::embedded_task;
+pub use set::embedded_task;
 pub use set::{TaskSet, built_in, cohub, find, in_order, tandem_plus};
 pub use task::Task;
 

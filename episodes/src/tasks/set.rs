@@ -20,7 +20,7 @@ fn read(files: &[Embedded]) -> Vec<Task> {
 /// # Panics
 ///
 /// If the file has a mistake.
-pub(crate) fn embedded_task(name: &str, text: &str) -> Task {
+pub fn embedded_task(name: &str, text: &str) -> Task {
     let source = TaskSource { name: name.into(), text: text.into(), beside: BTreeMap::new() };
     task_of(source).unwrap_or_else(|error| panic!("a task of the program: {error}"))
 }

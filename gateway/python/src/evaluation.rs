@@ -11,10 +11,10 @@ use serde_json::{Value, json};
 use tandem::commands::read_seed_key;
 use tandem::settings::{Layer, Settings};
 use tandem_episodes::Variation;
-use tandem_episodes::evaluation::{
+use tandem_evaluation::evaluation::{
     self, EpisodeEvent, EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts,
 };
-use tandem_episodes::results::PlayedEpisode;
+use tandem_evaluation::results::PlayedEpisode;
 use tandem_tools_spec::Protocol;
 
 use crate::players::{PlayedBy, PythonPolicy};

@@ -9,12 +9,10 @@ use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyCFunction, PyTracebackMethods};
 use serde_json::json;
-use tandem_episodes::players::{
-    self, Episode, EpisodeOutput, PlayError, PlayOutcome, PlayerEntry, PlayerError, Policy,
-    PrivilegedEpisode, play_in_process,
-};
-use tandem_episodes::results::{PlayedEpisode, PolicyCard};
+use tandem_episodes::players::{self, Episode, PlayerEntry, PlayerError, PrivilegedEpisode};
 use tandem_episodes::{EpisodeSpec, Facts, RESULT_FILE, Session, build, create_private_folder, write_whole};
+use tandem_evaluation::policies::{EpisodeOutput, PlayError, PlayOutcome, Policy, play_in_process};
+use tandem_evaluation::results::{PlayedEpisode, PolicyCard};
 use tandem_tools_spec::{EndReason, ToolCall, ToolReply};
 
 use crate::episode::{Course, NativeEpisode};

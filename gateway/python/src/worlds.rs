@@ -9,11 +9,11 @@ use numpy::{PyArray1, PyArray2, PyArray4, PyReadonlyArray3, PyReadwriteArray3, P
 use pyo3::prelude::*;
 use tandem::settings::{Layer, Settings};
 use tandem_episodes::EpisodeSpec;
-use tandem_episodes::batch::{
-    Autoreset, Batch, BatchError, BatchSpec, BatchStep, RewardKind, SeenArrays, WorldStep,
-};
 use tandem_episodes::rows::{
     ActionKind, ROW_CONTRACT_VERSION, ROW_RATES_HZ, RowContract, STATE_COLUMNS, steps_per_row,
+};
+use tandem_evaluation::batch::{
+    Autoreset, Batch, BatchError, BatchSpec, BatchStep, RewardKind, SeenArrays, WorldStep,
 };
 use tandem_tools_spec::{Protocol, StartEpisode};
 

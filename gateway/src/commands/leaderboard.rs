@@ -2,11 +2,8 @@
 
 use std::{fs, path::PathBuf, process::ExitCode};
 
-use tandem_episodes::{
-    build, printable,
-    reports::{Leaderboard, ReportOrigin, load},
-    write_whole,
-};
+use tandem_episodes::{build, printable, write_whole};
+use tandem_evaluation::reports::{Leaderboard, ReportOrigin, load};
 
 use super::CommandResult;
 

@@ -6,10 +6,8 @@ use std::{
 };
 
 use clap::Subcommand;
-use tandem_episodes::{
-    DEFAULT_ROBOT, ROBOTS, RobotFile,
-    bench::{self, CaseReport},
-};
+use tandem_episodes::{DEFAULT_ROBOT, ROBOTS, RobotFile};
+use tandem_evaluation::bench::{self, CaseReport};
 
 use crate::settings::read_robot;
 

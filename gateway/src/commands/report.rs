@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use tandem_episodes::replay::{ShortFilm, short_film};
-use tandem_episodes::reports::{
+use tandem_episodes::{Recording, build, printable, write_whole};
+use tandem_evaluation::reports::{
     EvaluationReport, Film, FilmContent, FilmPlace, FilmedEpisode, ReportFormat, ReportOrigin,
     ReportPictures, failure_moments, film_places, gallery, load, pictured_failures,
 };
-use tandem_episodes::{Recording, build, printable, write_whole};
 
 use super::CommandResult;
 use crate::settings::one_of;

@@ -9,7 +9,7 @@ mod remote;
 
 use std::{fs, io, path::Path};
 
-use tandem_episodes::players::PlayError;
+use tandem_evaluation::policies::PlayError;
 use tandem_tools_spec::ResultReply;
 
 use crate::hosting::{EpisodeThread, HostingError};

@@ -13,9 +13,9 @@ use std::{
 };
 
 use serde_json::json;
-use tandem_episodes::{
-    EpisodeSpec, RunFolder,
-    players::{EpisodeOutput, PlayError, PlayOutcome, Policy},
+use tandem_episodes::{EpisodeSpec, RunFolder};
+use tandem_evaluation::{
+    policies::{EpisodeOutput, PlayError, PlayOutcome, Policy},
     results::PolicyCard,
 };
 use tandem_tools_spec::{Driving, Operators};

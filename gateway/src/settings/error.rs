@@ -2,7 +2,8 @@
 
 use std::{net::SocketAddr, path::PathBuf};
 
-use tandem_episodes::{InstructionsError, RobotError, SimError, TaskCheckError, TaskFileError};
+use tandem_episodes::{InstructionsError, RobotError, SimError, TaskFileError};
+use tandem_evaluation::TaskCheckError;
 
 use super::tls::TlsError;
 use crate::token::TokenError;

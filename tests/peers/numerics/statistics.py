@@ -1,7 +1,7 @@
 """The figures of reports as scipy and statsmodels compute them.
 
     pip install -r tests/peers/numerics/statistics.txt
-    python tests/peers/numerics/statistics.py                        # writes episodes/src/statistics/peers.json, which a test holds us to
+    python tests/peers/numerics/statistics.py                        # writes episodes/evaluation/src/statistics/peers.json, which a test holds us to
     python tests/peers/numerics/statistics.py report.json            # checks every figure of `tandem report --format json`
 
 Newcombe's interval for paired differences is put together from statsmodels' Wilson limits by the formulas of his paper.
@@ -16,7 +16,7 @@ from scipy.stats import binomtest
 from statsmodels.stats.contingency_tables import mcnemar
 from statsmodels.stats.proportion import proportion_confint
 
-PEERS = pathlib.Path(__file__).parents[3] / "episodes/src/statistics/peers.json"
+PEERS = pathlib.Path(__file__).parents[3] / "episodes/evaluation/src/statistics/peers.json"
 COUNTS = [(0, 1), (1, 1), (0, 10), (1, 10), (5, 10), (10, 10), (17, 20), (49, 50), (95, 100), (99, 100), (100, 100), (3, 7), (400, 1000)]
 # Both, only the first, only the second, neither. The second row is Altman et al., Statistics with Confidence (2000), table 6.2.
 PAIRS = [(10, 0, 0, 0), (14, 5, 0, 22), (3, 1, 6, 0), (0, 10, 0, 0), (0, 0, 0, 10), (40, 3, 12, 45), (5, 5, 5, 5), (1, 0, 1, 8), (2, 9, 9, 0), (97, 1, 2, 0)]

@@ -5,7 +5,8 @@ use std::sync::Mutex;
 
 use serde_json::{Value, json};
 use tandem::{settings::Layer, token::Token};
-use tandem_episodes::{Recorder, Recording, evaluation::evaluate, players, replay};
+use tandem_episodes::{Recorder, Recording, players, replay};
+use tandem_evaluation::evaluation::evaluate;
 use tandem_tests::TestServer;
 use tandem_tools_spec::Png;
 use tungstenite::{Message, WebSocket, client::IntoClientRequest};

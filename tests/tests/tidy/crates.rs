@@ -14,8 +14,12 @@ const ARROWS: &[(&str, &[&str])] = &[
     // The same sources with every extra.
     ("tests/extras", &[]),
     ("episodes", &["tandem-sim", "tandem-ik", "tandem-tools-spec"]),
-    ("gateway", &["tandem-episodes", "tandem-tools-spec"]),
-    ("tests", &["tandem", "tandem-episodes", "tandem-ik", "tandem-sim", "tandem-tools-spec"]),
+    ("episodes/evaluation", &["tandem-episodes", "tandem-sim", "tandem-ik", "tandem-tools-spec"]),
+    ("gateway", &["tandem-episodes", "tandem-evaluation", "tandem-tools-spec"]),
+    (
+        "tests",
+        &["tandem", "tandem-episodes", "tandem-evaluation", "tandem-ik", "tandem-sim", "tandem-tools-spec"],
+    ),
 ];
 
 /// Returns the folders of the crates with sources of their own.

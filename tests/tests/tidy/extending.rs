@@ -50,7 +50,7 @@ const STEPS: &[Step] = &[
         folder: "sim/assets/scenes",
         extension: "xml",
         says: "<mujoco",
-        may: &["episodes/src/tasks/", "episodes/src/bench/", "sim/src/bench/"],
+        may: &["episodes/src/tasks/", "episodes/evaluation/src/bench/", "sim/src/bench/"],
     },
     Step {
         what: "object",
@@ -62,7 +62,7 @@ const STEPS: &[Step] = &[
         may: &[
             "episodes/src/tasks/",
             "episodes/src/players/experts/",
-            "episodes/src/bench/",
+            "episodes/evaluation/src/bench/",
             "sim/src/bench/",
             "sim/src/mjcf/support/",
         ],
@@ -88,7 +88,7 @@ const STEPS: &[Step] = &[
         extension: "rs",
         says: "impl Player for",
         // The baseline in a report is the idle player, by its name in results.
-        may: &["episodes/src/players/", "episodes/src/results/mod.rs"],
+        may: &["episodes/src/players/", "episodes/evaluation/src/results/mod.rs"],
     },
     Step {
         what: "renderer",
@@ -100,7 +100,7 @@ const STEPS: &[Step] = &[
     },
 ];
 
-const CRATES: [&str; 4] = ["tools_spec", "sim", "episodes", "gateway"];
+const CRATES: [&str; 5] = ["tools_spec", "sim", "episodes", "episodes/evaluation", "gateway"];
 
 /// Texts in a file with their lines, including those in macros.
 #[derive(Default)]

@@ -29,20 +29,26 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "episodes",
         &[
-            &["output", "locks", "html", "fingerprint", "scoring", "convert", "statistics"],
+            &["output", "locks", "html", "fingerprint", "scoring", "convert", "result_file"],
             &["error", "conditions"],
             &["tasks"],
             &["variation", "words", "protocol"],
             &["stress"],
             &["spec"],
-            &["commands", "results"],
+            &["commands"],
             &["observation", "rows"],
             &["describe", "recording"],
-            &["live", "reports"],
+            &["live", "pages"],
             &["instructions", "session"],
             &["players", "replay"],
-            &["batch", "evaluation", "task_check"],
-            &["bench"],
+        ],
+    ),
+    (
+        "episodes/evaluation",
+        &[
+            &["batch", "results", "statistics", "task_check"],
+            &["bench", "policies", "reports"],
+            &["evaluation"],
         ],
     ),
     (

@@ -11,7 +11,7 @@ use super::{modules::modules, sources::expect_none};
 
 /// Crates in which numbers are physical. `ik` is left out: its vectors hold coordinates of any joint, in
 /// rad or m, and its costs and errors are weighted.
-const CRATES: [&str; 4] = ["tools_spec", "sim", "episodes", "gateway"];
+const CRATES: [&str; 5] = ["tools_spec", "sim", "episodes", "episodes/evaluation", "gateway"];
 
 /// Files with coordinates of any joint, in rad or m as in `ik`, or with rows of a solver or a filter, which
 /// mix units.

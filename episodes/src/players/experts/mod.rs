@@ -14,7 +14,7 @@ mod handover;
 mod move_house;
 mod plus;
 mod pouring;
-pub(crate) mod skills;
+pub mod skills;
 mod table_align;
 mod trash_collection;
 

@@ -7,7 +7,8 @@ use std::{
 };
 
 use tandem_episodes::tasks::TaskSet;
-use tandem_episodes::{BodyScale, LocomotionChoice, check_task, create_private_folder, read_task};
+use tandem_episodes::{BodyScale, LocomotionChoice, create_private_folder, read_task};
+use tandem_evaluation::check_task;
 use tandem_tools_spec::TaskList;
 
 use crate::commands::{CommandResult, Seeds, print};

@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use serde::Serialize;
-use tandem_episodes::results::Machine;
+use tandem_evaluation::results::Machine;
 
 /// Facts about this machine and this program. Unknown facts are `None`.
 #[derive(Debug, Serialize)]

@@ -4,11 +4,8 @@ mod people;
 
 use std::process::ExitCode;
 
-use tandem_episodes::{
-    Variation,
-    evaluation::{EvaluationPlan, KeptFiles},
-    players,
-};
+use tandem_episodes::{Variation, players};
+use tandem_evaluation::evaluation::{EvaluationPlan, KeptFiles};
 use tandem_tools_spec::Assistance;
 
 use people::PeopleFlags;

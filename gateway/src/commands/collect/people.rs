@@ -9,7 +9,8 @@ use std::{
 };
 
 use clap::Args;
-use tandem_episodes::{evaluation::EvaluationPlan, tasks::Task};
+use tandem_episodes::tasks::Task;
+use tandem_evaluation::evaluation::EvaluationPlan;
 
 use crate::{
     commands::{evaluate::play_and_print, print},

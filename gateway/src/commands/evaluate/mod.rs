@@ -13,13 +13,13 @@ use std::{
 
 use tandem_episodes::{
     Phase,
-    evaluation::{
-        EvaluationPlan, EvaluationRun, KeptEpisodes, Shard, Starts, failed_episodes, training_seeds,
-    },
-    results::STRESS,
     stress::{Stress, StressAxis},
     tasks::Task,
 };
+use tandem_evaluation::evaluation::{
+    EvaluationPlan, EvaluationRun, KeptEpisodes, Shard, Starts, failed_episodes, training_seeds,
+};
+use tandem_evaluation::results::STRESS;
 
 use tandem_tools_spec::Assistance;
 

@@ -7,10 +7,8 @@ use std::{
 };
 
 use indicatif::{ProgressBar, ProgressStyle};
-use tandem_episodes::{
-    evaluation::{EpisodeEvent, EvaluationPlan},
-    results::PlayedEpisode,
-};
+use tandem_evaluation::evaluation::{EpisodeEvent, EvaluationPlan};
+use tandem_evaluation::results::PlayedEpisode;
 
 /// Interval between two checks for pending output.
 const TICK: Duration = Duration::from_secs(1);

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use tandem_episodes::{
+use tandem_episodes::printable;
+use tandem_evaluation::results::{Exclusion, PhaseLevel, PlayedEpisode};
+use tandem_evaluation::{
     evaluation::Evaluation,
-    printable,
-    results::{Exclusion, PhaseLevel, PlayedEpisode},
     statistics::{Count, clopper_pearson},
 };
 use tandem_tools_spec::{AgentEnding, Usage};

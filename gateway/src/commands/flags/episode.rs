@@ -4,12 +4,11 @@ use std::{error::Error, ops::RangeInclusive, path::PathBuf, str::FromStr};
 
 use clap::Args;
 use tandem_episodes::{
-    EpisodeError, Instructions, TANDEM_PLUS, Variation,
-    evaluation::{EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts},
-    players::Policy,
-    tandem_plus,
+    EpisodeError, Instructions, TANDEM_PLUS, Variation, tandem_plus,
     tasks::{self, Spread, Task, TaskSet},
 };
+use tandem_evaluation::evaluation::{EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts};
+use tandem_evaluation::policies::Policy;
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 
 use super::{WorldFlags, read_seed_key};

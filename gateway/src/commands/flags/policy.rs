@@ -2,9 +2,9 @@
 
 use std::{error::Error, path::PathBuf, sync::Arc, time::Duration};
 
-use tandem_episodes::{
-    EpisodeSpec,
-    players::{self, EpisodeOutput, OpenLoop, PlayError, PlayOutcome, Policy, PolicyWait},
+use tandem_episodes::{EpisodeSpec, players};
+use tandem_evaluation::{
+    policies::{EpisodeOutput, OpenLoop, PlayError, PlayOutcome, Policy, PolicyWait},
     results::PolicyCard,
 };
 use tandem_tools_spec::{Driving, Operators};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use tandem_episodes::evaluation::{EvaluationPlan, ExistingRun, default_folder};
+use tandem_evaluation::evaluation::{EvaluationPlan, ExistingRun, default_folder};
 
 /// Folder of the folders of runs.
 const RUNS: &str = "runs";

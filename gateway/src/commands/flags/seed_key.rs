@@ -4,7 +4,7 @@
 use std::{error::Error, fs, path::Path};
 
 use ring::hmac::{self, HMAC_SHA256};
-use tandem_episodes::evaluation::SeedKey;
+use tandem_evaluation::evaluation::SeedKey;
 
 /// Minimum length in bytes; a shorter key could be guessed.
 const MIN_KEY_BYTES: usize = 16;

@@ -18,10 +18,11 @@ use std::{
 
 use serde_json::{Value, json};
 use tandem_episodes::{
-    EpisodeError, EpisodeSpec, RunFolder, Visibility, create_private_folder,
-    players::{EpisodeOutput, PlayError, PlayOutcome, Policy},
-    printable,
-    results::{PolicyCard, write_result},
+    EpisodeError, EpisodeSpec, RunFolder, Visibility, create_private_folder, printable, write_result,
+};
+use tandem_evaluation::{
+    policies::{EpisodeOutput, PlayError, PlayOutcome, Policy},
+    results::PolicyCard,
 };
 use tandem_tools_spec::{Driving, EndReason, ModelEnding, ResultReply, StartReply, Usage};
 

@@ -4,7 +4,8 @@
 
 use std::{env, fs, io, path::Path};
 
-use tandem_episodes::{EpisodeError, OutputError, create_private_folder, players::PlayError, write_whole};
+use tandem_episodes::{EpisodeError, OutputError, create_private_folder, write_whole};
+use tandem_evaluation::policies::PlayError;
 use tandem_tools_spec::{Driving, StartReply};
 use tempfile::TempDir;
 

@@ -24,11 +24,12 @@ use std::{
 use serde_json::json;
 use tandem_episodes::{
     EpisodeSpec,
-    players::{
-        EpisodeOutput, LocalEpisode, PlayError, PlayOutcome, PlayerError, Policy, PolicyWait, play_in_process,
-    },
-    results::PolicyCard,
+    players::{LocalEpisode, PlayerError},
     tasks::{Task, TaskWords},
+};
+use tandem_evaluation::{
+    policies::{EpisodeOutput, PlayError, PlayOutcome, Policy, PolicyWait, play_in_process},
+    results::PolicyCard,
 };
 
 use client::PolicyAddress;

@@ -8,8 +8,9 @@ use std::{fmt, sync::Arc, thread};
 
 use tandem_episodes::{
     EpisodeSpec,
-    players::{Episode, LocalEpisode, PlayError, PlayerError, PrivilegedPlayer, experts::Expert},
+    players::{Episode, LocalEpisode, PlayerError, PrivilegedPlayer, experts::Expert},
 };
+use tandem_evaluation::policies::PlayError;
 use tandem_tools_spec::{Finish, Note, Wait};
 use tokio::{runtime::Handle, sync::oneshot};
 

@@ -9,10 +9,8 @@ use std::{
 };
 
 use serde::Serialize;
-use tandem_episodes::{
-    evaluation::{PlannedEpisodes, RunState, is_being_played},
-    results::{EPISODES, PlayedEpisode},
-};
+use tandem_evaluation::evaluation::{PlannedEpisodes, RunState, is_being_played};
+use tandem_evaluation::results::{EPISODES, PlayedEpisode};
 
 /// Depth of the search below the runs folder.
 const DEPTH: usize = 3;

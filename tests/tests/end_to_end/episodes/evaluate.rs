@@ -3,17 +3,17 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use serde_json::json;
-use tandem_episodes::evaluation::{
-    EpisodeEvent, EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate,
-};
-use tandem_episodes::players::OpenLoop;
 use tandem_episodes::replay::{Verdict, verify};
-use tandem_episodes::reports::{EvaluationReport, load};
-use tandem_episodes::results::PlayedEpisode;
 use tandem_episodes::{
     Controller, EpisodeSpec, Instructions, Recording, RendererKind, RobotFile, Sensing, Variation, players,
     tasks,
 };
+use tandem_evaluation::evaluation::{
+    EpisodeEvent, EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate,
+};
+use tandem_evaluation::policies::OpenLoop;
+use tandem_evaluation::reports::{EvaluationReport, load};
+use tandem_evaluation::results::PlayedEpisode;
 use tandem_tools_spec::{Assistance, Disclosure, EndReason, Hints, Protocol};
 use tempfile::TempDir;
 

@@ -4,15 +4,14 @@
 use std::ops::RangeInclusive;
 use std::thread::available_parallelism;
 
-use tandem_episodes::evaluation::{EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate};
-use tandem_episodes::players::{
-    self, Episode, EpisodeOutput, InProcess, PlayerError, Policy, PrivilegedEpisode, experts,
-};
+use tandem_episodes::players::{self, Episode, InProcess, PlayerError, PrivilegedEpisode, experts};
 use tandem_episodes::tasks::{self, Task};
 use tandem_episodes::{
     A, B, C, Controller, EpisodeSpec, Facts, Instructions, RendererKind, RobotFile, Sensing, Session,
     Variation, tandem_plus,
 };
+use tandem_evaluation::evaluation::{EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate};
+use tandem_evaluation::policies::{EpisodeOutput, Policy};
 use tandem_sim::{SensorModel, Side};
 use tandem_tools_spec::{ActCall, Assistance, Protocol, ToolCall, ToolReply};
 

@@ -1,9 +1,9 @@
 //! Tests of users' task files against the same built-in tasks, and of the stored copy of a file.
 
-use tandem_episodes::evaluation::{EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate};
 use tandem_episodes::players;
 use tandem_episodes::tasks::{self, Task};
 use tandem_episodes::{Controller, Instructions, RendererKind, RobotFile, Sensing, Variation, read_task};
+use tandem_evaluation::evaluation::{EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate};
 use tandem_tools_spec::{Assistance, PhaseTimes, Protocol};
 
 /// Seeds named in the book.

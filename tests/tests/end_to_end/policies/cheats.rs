@@ -10,7 +10,7 @@ use std::{
 
 use serde_json::{Value, json};
 use tandem::drivers::Program;
-use tandem_episodes::evaluation::{EvaluationPlan, SeedKey};
+use tandem_evaluation::evaluation::{EvaluationPlan, SeedKey};
 use tandem_tools_spec::{Driving, EndReason, Operators};
 
 use super::plans::{plan, play};
@@ -258,7 +258,7 @@ fn a_key_of_the_evaluators_draws_other_worlds() {
     let public = play(&plain, &folder.path().join("public"));
     let keyed = play(&private, &folder.path().join("keyed"));
     let drawn = play(&EvaluationPlan { seeds: vec![77], ..plain }, &folder.path().join("drawn"));
-    let hash = |evaluation: &tandem_episodes::evaluation::Evaluation| {
+    let hash = |evaluation: &tandem_evaluation::evaluation::Evaluation| {
         evaluation.episodes[0].result.state_hash.clone()
     };
     assert_ne!(hash(&keyed), hash(&public));

@@ -9,8 +9,8 @@ use tandem::drivers::{PolicyProtocol, RemotePolicy};
 use tandem_episodes::{
     Recorder, Recording,
     replay::{Verdict, verify},
-    results::PlayedEpisode,
 };
+use tandem_evaluation::results::PlayedEpisode;
 use tandem_tools_spec::EndReason;
 
 use super::{

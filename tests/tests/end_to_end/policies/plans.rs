@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use tandem_episodes::{
-    Controller, Instructions, Recorder, Recording, RendererKind, RobotFile, Sensing, Variation,
-    evaluation::{Evaluation, EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate},
-    players::Policy,
-    tasks,
+    Controller, Instructions, Recorder, Recording, RendererKind, RobotFile, Sensing, Variation, tasks,
 };
+use tandem_evaluation::evaluation::{
+    Evaluation, EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate,
+};
+use tandem_evaluation::policies::Policy;
 use tandem_tools_spec::{Assistance, Protocol};
 
 /// Returns a plan for Handover on `seeds`, under the benchmark protocol.

@@ -4,10 +4,10 @@ use std::{env, fs, io::Read, path::Path, time::Duration};
 
 use serde_json::{Value, json};
 use tandem::drivers::Program;
-use tandem_episodes::{
+use tandem_evaluation::results::{Exclusion, PlayedEpisode};
+use tandem_evaluation::{
     evaluation::{Evaluation, EvaluationPlan, evaluate},
     reports::{EvaluationReport, ReportFormat, ReportPictures, load},
-    results::{Exclusion, PlayedEpisode},
 };
 use tandem_tools_spec::{Driving, EndReason, Operators};
 

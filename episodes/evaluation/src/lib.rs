@@ -1,0 +1,13 @@
+//! Evaluation: many episodes that policies play, their results as reports, and the tools around tasks and
+//! training. A session and its recording know nothing of this crate.
+
+pub mod batch;
+pub mod bench;
+pub mod evaluation;
+pub mod policies;
+pub mod reports;
+pub mod results;
+pub mod statistics;
+mod task_check;
+
+pub use task_check::{TaskCheck, TaskCheckError, check_task};

@@ -1,0 +1,165 @@
+//! Policies that play the episodes of an evaluation: a built-in player, or an external policy.
+
+mod open_loop;
+
+use std::any::Any;
+use std::fmt::{self, Debug};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::time::Duration;
+
+use tandem_episodes::players::{InProcess, PlayerEntry, PlayerError};
+use tandem_episodes::{EpisodeError, EpisodeSpec, RunFolder, Session, monotonic};
+use tandem_tools_spec::{EndReason, ResultReply};
+
+pub use open_loop::{OpenLoop, OpenLoopError};
+
+use crate::results::PolicyCard;
+
+/// A policy that plays episodes, several of them side by side.
+pub trait Policy: Debug + Send + Sync {
+    /// Returns the description that results include.
+    fn card(&self) -> PolicyCard;
+
+    /// Plays `spec` from its start to its result.
+    fn play_episode(&self, spec: &EpisodeSpec, output: EpisodeOutput) -> Result<PlayOutcome, PlayError>;
+
+    /// Returns what the policy is waiting for before an episode can begin; `None` if it is not waiting.
+    fn waiting(&self) -> Option<PolicyWait> {
+        None
+    }
+
+    /// Returns `true` if the policy's user wants it to end.
+    fn is_interrupted(&self) -> bool {
+        false
+    }
+}
+
+/// A wait of a policy, and its duration.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PolicyWait {
+    /// The target, for example the addresses of its servers.
+    pub target: String,
+    pub lasted: Duration,
+}
+
+impl fmt::Display for PolicyWait {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "waiting for {}, {} s", self.target, self.lasted.as_secs())
+    }
+}
+
+/// Output of an episode's files.
+#[derive(Clone, Copy, Debug)]
+pub struct EpisodeOutput<'a> {
+    /// The episode's own folder, which does not exist yet.
+    pub folder: &'a Path,
+    /// True if the episode is to be recorded there.
+    pub record: bool,
+    /// True if a recorded episode also gets a strip of images and a page.
+    pub pages: bool,
+}
+
+impl<'a> EpisodeOutput<'a> {
+    /// Returns the folder of the recording; `None` if the episode is not recorded.
+    pub fn recording(self) -> Option<&'a Path> {
+        self.record.then_some(self.folder)
+    }
+
+    /// Returns the run folder of the recording, with its pages option.
+    fn run_folder(self) -> Option<RunFolder> {
+        self.recording().map(|folder| RunFolder { pages: self.pages, ..RunFolder::from(folder) })
+    }
+}
+
+/// Outcome of an episode that a policy played.
+#[derive(Debug)]
+pub struct PlayOutcome {
+    pub result: ResultReply,
+    /// The policy's thinking time.
+    pub thought: Duration,
+    /// Reason why it stopped before the episode's end; `None` if it did not.
+    pub stopped: Option<String>,
+}
+
+/// Reason why an episode has no result.
+#[derive(Debug, thiserror::Error)]
+pub enum PlayError {
+    #[error(transparent)]
+    Episode(#[from] EpisodeError),
+    /// The policy was not ready, and nothing was played; a later attempt may succeed.
+    #[error("{0}")]
+    NotReady(String),
+    /// No policy is there that could play this episode, or any other.
+    #[error("{0}")]
+    Absent(String),
+    /// The episode was played, and its outcome is lost.
+    #[error("{0}")]
+    Lost(String),
+}
+
+impl Policy for PlayerEntry {
+    fn card(&self) -> PolicyCard {
+        self.name.into()
+    }
+
+    fn play_episode(&self, spec: &EpisodeSpec, output: EpisodeOutput) -> Result<PlayOutcome, PlayError> {
+        self.check(spec).map_err(|error| PlayError::NotReady(error.to_string()))?;
+        Ok(play_in_process(spec, output, |episode| self.play(spec, episode))?)
+    }
+}
+
+/// Plays `spec` in this process: `act` makes the calls. An episode that ends under way is no error. A panic
+/// is a failure of the policy, which ends this episode and no other.
+pub fn play_in_process(
+    spec: &EpisodeSpec,
+    output: EpisodeOutput,
+    act: impl FnOnce(&mut InProcess) -> Result<(), PlayerError>,
+) -> Result<PlayOutcome, EpisodeError> {
+    let session = Session::start_with_clock(spec, output.run_folder(), monotonic())?;
+    let mut episode = match spec.start_phase() {
+        Some(phase) => InProcess::until(phase + 1, session),
+        None => InProcess::new(session),
+    };
+    let acted = match episode.session.recording_failed() {
+        // A caller that wants a recording has no use for an unrecorded episode.
+        Some(reason) => Err(PlayerError::GaveUp(reason.into())),
+        None => catch_unwind(AssertUnwindSafe(|| act(&mut episode))).unwrap_or_else(|panic| {
+            Err(PlayerError::Failed(format!("it panicked: {}", panic_text(&*panic))))
+        }),
+    };
+    let stopped = match acted {
+        Ok(()) | Err(PlayerError::EpisodeOver) => None,
+        Err(error) => {
+            if let PlayerError::Failed(_) = error {
+                episode.session.end(EndReason::PolicyFailed);
+            }
+            Some(error.to_string())
+        }
+    };
+    let thought = episode.session.thought();
+    Ok(PlayOutcome { result: episode.session.close(), thought, stopped })
+}
+
+/// Returns the message of a panic.
+fn panic_text(panic: &(dyn Any + Send)) -> &str {
+    let literal = || panic.downcast_ref::<&str>().copied();
+    panic.downcast_ref::<String>().map(String::as_str).or_else(literal).unwrap_or("without a word")
+}
+
+#[cfg(test)]
+mod tests {
+    use tandem_tools_spec::Protocol;
+
+    use super::*;
+    use tandem_episodes::tasks;
+
+    #[test]
+    fn a_panic_of_a_player_ends_its_episode_as_a_failed_policy() {
+        let spec = EpisodeSpec::new(&tasks::find("handover").unwrap(), 2000, Protocol::Benchmark);
+        let output = EpisodeOutput { folder: Path::new(""), record: false, pages: false };
+        let played = play_in_process(&spec, output, |_| panic!("no plan for seed {}", 2000)).unwrap();
+        assert_eq!(played.result.ended, EndReason::PolicyFailed);
+        assert_eq!(played.stopped.as_deref(), Some("it panicked: no plan for seed 2000"));
+    }
+}

@@ -1,0 +1,265 @@
+//! Results of episodes, as files and as counts.
+
+mod machine;
+mod phase_level;
+mod process_record;
+mod seed_list;
+mod utc;
+
+use std::collections::BTreeSet;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use tandem_episodes::{EpisodeSpec, Phase};
+use tandem_tools_spec::{Assistance, EndReason, ExtraInformation, PhaseTimes, ResultReply, Usage};
+
+pub use machine::Machine;
+pub use phase_level::{PhaseLevel, PhaseMeans, PhaseRate};
+pub use process_record::{PROCESSES_FILE, ProcessRecord, command_line};
+pub use seed_list::SeedList;
+pub use utc::utc_text;
+
+/// Name in results of the player that holds still.
+pub const IDLE: &str = "idle";
+
+/// Name in results of the policy that replays a demonstration without observations.
+pub const OPEN_LOOP: &str = "open-loop";
+
+/// Folder of single episodes in the folder of an evaluation.
+pub const EPISODES: &str = "episodes";
+
+/// Folder of the evaluations under stress in the folder of an evaluation.
+pub const STRESS: &str = "stress";
+
+/// One played episode, as stored in a file of its own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlayedEpisode {
+    /// The policy.
+    #[serde(flatten)]
+    pub policy: PolicyCard,
+    pub spec: EpisodeSpec,
+    /// Name of the robots' base controller; files of different content have different names.
+    pub locomotion: String,
+    /// Version and fingerprint of the program. An episode of another build is played again.
+    pub build: String,
+    #[serde(flatten)]
+    pub result: ResultReply,
+    /// The policy's thinking time.
+    #[serde(default)]
+    pub thought_s: f64,
+    /// Reason why the episode fell short: what stopped the policy, or the first missed phase.
+    pub note: Option<String>,
+    /// True if a failure of the policy itself counts as a failed episode, because the episode has been
+    /// retried as often as requested.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub keep_failed: bool,
+    /// Earlier attempts at this episode, which did not count; the oldest first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub attempts: Vec<Attempt>,
+    /// Time at which it ended, in UTC; of a served episode, that of its file. `None` in results of earlier
+    /// builds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ended_at: Option<String>,
+}
+
+/// An attempt at an episode that did not count, so that the episode was played again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Attempt {
+    pub ended: EndReason,
+    pub phases: PhaseTimes,
+    pub env_steps: u32,
+    pub tool_calls: u32,
+    pub thought_s: f64,
+    pub note: Option<String>,
+    /// Usage that the notes report.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub usage: Option<Usage>,
+}
+
+/// Reason why an episode says nothing about its policy's performance. It is listed apart from failures, and
+/// played again by the next run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Exclusion {
+    PolicyFailed,
+    SimulatorFailed,
+}
+
+impl Exclusion {
+    /// Returns the name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Exclusion::PolicyFailed => "policy failed",
+            Exclusion::SimulatorFailed => "simulator failed",
+        }
+    }
+}
+
+impl PlayedEpisode {
+    /// Returns every attempt at the episode, this one as the last.
+    pub fn into_attempts(self) -> Vec<Attempt> {
+        let PlayedEpisode { result, thought_s, note, mut attempts, .. } = self;
+        let ResultReply { ended, phases, env_steps, tool_calls, usage, .. } = result;
+        attempts.push(Attempt { ended, phases, env_steps, tool_calls, thought_s, note, usage });
+        attempts
+    }
+
+    /// Returns the index of the phase that the episode began at and that alone counts; `None` if it began
+    /// at the task's beginning.
+    pub fn start_phase(&self) -> Option<usize> {
+        self.spec.start_phase()
+    }
+
+    /// Returns `true` if phase number `phase`, from 0, was reached.
+    pub fn reached(&self, phase: usize) -> bool {
+        self.result.phases.reached_s(&Phase::number(phase)).is_some()
+    }
+
+    /// Returns the extra information beyond the benchmark's own policies, without the part that the
+    /// assistance level implies.
+    fn shown(&self) -> impl Iterator<Item = &String> {
+        let is_said = |what: &&String| {
+            let of_full = ExtraInformation::ALL.into_iter().filter(|kind| kind.is_of_full_assistance());
+            self.spec.assistance == Assistance::Full && of_full.into_iter().any(|kind| kind.name() == **what)
+        };
+        let asked = &self.policy.extra_information;
+        asked.iter().chain(self.result.extra_information.iter().filter(move |what| !is_said(what)))
+    }
+
+    /// Returns `true` if the phase that counts was reached: the one that the episode began at, or the last.
+    pub fn succeeded(&self) -> bool {
+        self.reached(self.start_phase().unwrap_or(self.spec.task.phases.len() - 1))
+    }
+
+    /// Returns the reason why the episode does not count; `None` if it counts. Phases reached before a
+    /// failure stay reached.
+    pub fn exclusion(&self) -> Option<Exclusion> {
+        let failed = match self.result.ended {
+            EndReason::PolicyFailed if self.keep_failed => None,
+            EndReason::PolicyFailed => Some(Exclusion::PolicyFailed),
+            EndReason::SimulatorFailed => Some(Exclusion::SimulatorFailed),
+            EndReason::TaskComplete
+            | EndReason::StepBudgetExhausted
+            | EndReason::WallClockExhausted
+            | EndReason::Finished
+            | EndReason::Abandoned => None,
+        };
+        failed.filter(|_| !self.succeeded())
+    }
+
+    /// Returns the number of requests; results of earlier builds have only that of tool calls.
+    pub fn requests(&self) -> u32 {
+        self.result.requests.unwrap_or(self.result.tool_calls)
+    }
+
+    /// Returns `true` if the episode counts in rates and averages.
+    pub fn counts(&self) -> bool {
+        self.exclusion().is_none()
+    }
+}
+
+/// Returns the number of these attempts that ended because the policy itself failed.
+pub fn failures_of_policy(attempts: &[Attempt]) -> usize {
+    attempts.iter().filter(|attempt| attempt.ended == EndReason::PolicyFailed).count()
+}
+
+/// Names of the built-in players, which act in the simulator's process and read no replies as text.
+pub const PLAYERS: [&str; 4] = ["expert", "no_words", "idle", "demonstration"];
+
+/// Description of a policy in results. Episodes of policies with different cards are never mixed.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PolicyCard {
+    /// The policy's name in results.
+    #[serde(rename = "policy")]
+    pub name: String,
+    /// Settings of how it is reached and driven that its name does not express.
+    #[serde(rename = "policy_settings", default, skip_serializing_if = "Option::is_none")]
+    pub settings: Option<Value>,
+    /// Extra information that the policy requests beyond the benchmark's own policies. The result, in the
+    /// same JSON object, lists under the plain name the information that was shown.
+    #[serde(rename = "policy_extra_information", default, skip_serializing_if = "Vec::is_empty")]
+    pub extra_information: Vec<String>,
+}
+
+impl PolicyCard {
+    /// Returns the name, followed by the extra information that the policy is shown.
+    pub fn full_name(&self) -> String {
+        named(&self.name, &self.extra_information)
+    }
+}
+
+/// Returns a policy's name followed by the attributes that belong with it.
+pub fn named(policy: &str, beside: &[String]) -> String {
+    std::iter::once(policy.to_owned()).chain(beside.iter().map(|what| format!(" + {what}"))).collect()
+}
+
+/// Returns the extra information that the policy was shown in any of these episodes, for display after its
+/// name.
+pub fn shown_in<'a>(episodes: impl Iterator<Item = &'a PlayedEpisode>) -> Vec<String> {
+    let shown: BTreeSet<&String> = episodes.flat_map(PlayedEpisode::shown).collect();
+    shown.into_iter().cloned().collect()
+}
+
+impl From<&str> for PolicyCard {
+    /// Creates the card of a policy known by name only.
+    fn from(name: &str) -> PolicyCard {
+        PolicyCard { name: name.into(), ..PolicyCard::default() }
+    }
+}
+
+/// Returns the simulator's failure, or else the first phase that was not reached.
+pub fn episode_note(result: &ResultReply, counts: Option<usize>) -> Option<String> {
+    let failed = result.simulator_failure.as_ref().map(|failure| format!("the simulator failed {failure}"));
+    failed.or_else(|| missed_phase_note(result, counts))
+}
+
+/// Returns a note on the first phase that was not reached; if one phase counts, on that one.
+pub fn missed_phase_note(result: &ResultReply, counts: Option<usize>) -> Option<String> {
+    let counted = |index: usize| counts.is_none_or(|only| only == index);
+    let phases = result.phases.0.iter().enumerate();
+    let (_, (phase, _)) =
+        phases.filter(|(index, _)| counted(*index)).find(|(_, (_, time_s))| time_s.is_none())?;
+    Some(format!("{phase} was not reached in {} steps", result.env_steps))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+    use tandem_episodes::{players, tasks};
+    use tandem_tools_spec::Protocol;
+
+    use super::*;
+
+    /// A policy's card and its result are in one JSON object.
+    #[test]
+    fn what_a_policy_asks_for_and_what_it_was_shown_are_kept_apart() {
+        let result: ResultReply = serde_json::from_value(json!({
+            "task": "handover", "seed": 3, "protocol": "agentic", "phases": {"p1": 4.2, "p2": null},
+            "assistance": "full", "extra_information": ["odometry", "third_person"], "ended": "finished",
+            "env_steps": 812, "tool_calls": 61, "thinking_s": 0.0, "falls": 0, "realtime_factor": 3.5,
+        }))
+        .unwrap();
+        let card = PolicyCard { extra_information: vec!["third_person".into()], ..PolicyCard::from("agent") };
+        for policy in [card, "agent".into()] {
+            let played = PlayedEpisode {
+                policy,
+                spec: EpisodeSpec::new(&tasks::find("handover").unwrap(), 3, Protocol::Agentic),
+                locomotion: "balance".into(),
+                build: "test".into(),
+                result: result.clone(),
+                thought_s: 0.0,
+                note: None,
+                keep_failed: false,
+                attempts: Vec::new(),
+                ended_at: Some("2026-11-28T01:20:00Z".into()),
+            };
+            let text = serde_json::to_string(&played).unwrap();
+            assert_eq!(serde_json::from_str::<PlayedEpisode>(&text).unwrap(), played);
+        }
+    }
+
+    #[test]
+    fn the_built_in_players_are_all_named() {
+        assert_eq!(players::ALL.iter().map(|entry| entry.name).collect::<Vec<_>>(), PLAYERS);
+    }
+}

@@ -1,0 +1,11 @@
+//! Output of an episode for people: a page and a strip of images.
+
+pub mod moments;
+mod page;
+pub mod strip;
+
+pub use moments::{KeyMoment, LabelledPicture};
+pub use page::PAGE_FILE;
+pub(crate) use page::{CallCounts, EpisodePage, SaidWords};
+pub use strip::STRIP_FILE;
+pub(crate) use strip::{CELL_HEIGHT, CELL_WIDTH};
