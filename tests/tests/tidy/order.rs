@@ -29,8 +29,8 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "episodes",
         &[
-            &["output", "locks", "html", "fingerprint", "scoring", "convert", "result_file"],
-            &["error", "conditions"],
+            &["output", "locks", "html", "fingerprint", "scoring", "convert"],
+            &["error", "conditions", "result_file"],
             &["tasks"],
             &["variation", "words", "protocol"],
             &["stress"],
