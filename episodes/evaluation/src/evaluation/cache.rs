@@ -5,13 +5,14 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use crate::policies::{EpisodeOutput, PlayError, PlayOutcome};
-use crate::results::{Attempt, PlayedEpisode, episode_note, failures_of_policy, utc_text};
 use tandem_episodes::{
     CheckpointError, EpisodeError, EpisodeSpec, FileLock, LockKind, Locking, RESULT_FILE, Recorder, Start,
     write_whole,
 };
 use tandem_tools_spec::{EndReason, ResultReply};
+
+use crate::policies::{EpisodeOutput, PlayError, PlayOutcome};
+use crate::results::{Attempt, PlayedEpisode, episode_note, failures_of_policy, utc_text};
 
 use super::retry::again_name;
 use super::{EvaluationError, EvaluationPlan, KeptFiles};

@@ -4,11 +4,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use crate::results::{PlayedEpisode, PolicyCard, SeedList};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use tandem_episodes::{EpisodeSpec, Start, tasks::Task};
 use xxhash_rust::xxh3::xxh3_64;
+
+use crate::results::{PlayedEpisode, PolicyCard, SeedList};
 
 use super::{EvaluationPlan, Starts};
 

@@ -13,8 +13,9 @@ mod workers;
 
 use std::path::{Path, PathBuf};
 
-use crate::results::{EPISODES, PlayedEpisode, ProcessRecord};
 use tandem_episodes::{EpisodeError, EpisodeSpec, OutputError, write_whole};
+
+use crate::results::{EPISODES, PlayedEpisode, ProcessRecord};
 
 use cache::EpisodeCache;
 use run_folder::EvaluationFolder;

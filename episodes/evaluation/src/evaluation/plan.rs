@@ -4,13 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::policies::Policy;
 use tandem_episodes::{
     Controller, EpisodeSpec, Instructions, KeyedSeed, MomentStart, Phase, PhaseStart, Recorder, RobotFile,
     SceneFile, Start, Variation, stress::Stress, tasks::Task,
 };
 use tandem_sim::{Sensing, render::RendererKind};
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
+
+use crate::policies::Policy;
 
 use super::retry::FailedEpisode;
 

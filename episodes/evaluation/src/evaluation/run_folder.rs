@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 
-use crate::results::{EPISODES, PROCESSES_FILE, PlayedEpisode, STRESS};
 use tandem_episodes::{FileLock, LockKind, Locking, create_private_folder, write_whole};
+
+use crate::results::{EPISODES, PROCESSES_FILE, PlayedEpisode, STRESS};
 
 use super::identity::RunIdentity;
 use super::planned::is_planned_file;

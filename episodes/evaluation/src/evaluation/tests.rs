@@ -4,8 +4,6 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 
-use crate::policies::{EpisodeOutput, PlayError, PlayOutcome, Policy};
-use crate::results::{PhaseLevel, PolicyCard, episode_note, missed_phase_note};
 use tandem_episodes::{
     Controller, EpisodeSpec, Instructions, Phase, PhaseStart, RobotFile, Start, Variation, players,
     tasks::{self, Task},
@@ -13,6 +11,9 @@ use tandem_episodes::{
 };
 use tandem_sim::{Sensing, dynamics::Diverged, render::RendererKind};
 use tandem_tools_spec::{Assistance, Disclosure, EndReason, Hints, PhaseTimes, Protocol, ResultReply};
+
+use crate::policies::{EpisodeOutput, PlayError, PlayOutcome, Policy};
+use crate::results::{PhaseLevel, PolicyCard, episode_note, missed_phase_note};
 
 use super::*;
 

@@ -4,8 +4,9 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, mpsc};
 
-use crate::results::PlayedEpisode;
 use tandem_episodes::EpisodeSpec;
+
+use crate::results::PlayedEpisode;
 
 use super::cache::{EpisodeCache, PlannedOutcome};
 use super::{EpisodeEvent, EvaluationError};

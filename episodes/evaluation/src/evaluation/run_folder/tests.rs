@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use crate::policies::{EpisodeOutput, PlayError, PlayOutcome, Policy};
-use crate::results::PolicyCard;
 use tandem_episodes::{Variation, players, tasks};
 use tandem_tools_spec::Protocol;
+
+use crate::policies::{EpisodeOutput, PlayError, PlayOutcome, Policy};
+use crate::results::PolicyCard;
 
 use super::super::tests::{plan, played, result};
 use super::super::*;

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::results::PlayedEpisode;
 use serde::Serialize;
 use tandem_episodes::{Phase, tasks};
+
+use crate::results::PlayedEpisode;
 
 use super::policy::PolicyGroup;
 use crate::statistics::{Pairs, mcnemar, newcombe};

@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::results::PlayedEpisode;
 use serde::Serialize;
 use tandem_episodes::{Phase, Start};
 use tandem_tools_spec::{Assistance, EndReason, Protocol};
+
+use crate::results::PlayedEpisode;
 
 use super::csv::quoted;
 use super::load::LoadedEpisodes;

@@ -3,10 +3,11 @@
 
 use std::time::SystemTime;
 
-use crate::results::{PlayedEpisode, SeedList, command_line, utc_text};
 use serde::Serialize;
 use tandem_episodes::tasks;
 use tandem_tools_spec::{Assistance, Protocol};
+
+use crate::results::{PlayedEpisode, SeedList, command_line, utc_text};
 
 use super::load::FolderProcess;
 use super::policy::PolicyGroup;

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, missed_phase_note, named, shown_in};
 use serde::Serialize;
 use serde_json::Value;
 use tandem_episodes::{
@@ -11,6 +10,8 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::EndReason;
 use xxhash_rust::xxh3::xxh3_64;
+
+use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, missed_phase_note, named, shown_in};
 
 use super::costs::{AskedCosts, EpisodeCosts, ModelCosts};
 use super::load::{FoundEpisode, LoadedEpisodes};

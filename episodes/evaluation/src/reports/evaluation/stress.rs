@@ -3,13 +3,14 @@
 
 use std::collections::BTreeMap;
 
-use crate::results::PlayedEpisode;
 use serde::Serialize;
 use tandem_episodes::{
     EpisodeSpec, Phase, Start,
     stress::{Stress, StressAxis},
     tasks::{self, Task},
 };
+
+use crate::results::PlayedEpisode;
 
 use super::load::FoundEpisode;
 use super::policy::{PolicyGroup, groups, rules_of};

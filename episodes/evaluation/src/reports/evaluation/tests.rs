@@ -7,12 +7,13 @@ mod tex;
 
 use std::path::Path;
 
-use crate::results::PlayedEpisode;
 use tandem_episodes::{
     EpisodeSpec, PhaseStart, Start,
     tasks::{self, Task},
 };
 use tandem_tools_spec::{Assistance, EndReason, PhaseTimes, Protocol, ResultReply};
+
+use crate::results::PlayedEpisode;
 
 use super::*;
 

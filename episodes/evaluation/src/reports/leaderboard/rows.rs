@@ -3,9 +3,10 @@
 
 use std::path::Path;
 
-use crate::results::{PLAYERS, PlayedEpisode};
 use tandem_episodes::{Recording, RecordingError, TranscriptEntry, tasks};
 use tandem_tools_spec::{Assistance, Protocol, Usage};
+
+use crate::results::{PLAYERS, PlayedEpisode};
 
 use super::{BoardCosts, BoardRow, TranscriptLink};
 use crate::reports::evaluation::{FoundEpisode, LoadedEpisodes, Rate, ValueRange, ended_between};

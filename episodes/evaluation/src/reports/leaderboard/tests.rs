@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
-use crate::results::PlayedEpisode;
 use tandem_episodes::tasks;
 use tandem_tools_spec::{Assistance, EndReason, Protocol, Usage};
+
+use crate::results::PlayedEpisode;
 
 use super::*;
 use crate::reports::evaluation::tests::{found, nine_six_three, played};

@@ -3,13 +3,14 @@
 
 use std::collections::BTreeSet;
 
-use crate::results::{IDLE, OPEN_LOOP, PlayedEpisode};
 use serde::Serialize;
 use tandem_episodes::{
     EpisodeSpec, Variation,
     tasks::{self, Spread},
 };
 use tandem_tools_spec::Assistance;
+
+use crate::results::{IDLE, OPEN_LOOP, PlayedEpisode};
 
 use super::policy::{PhaseReport, PolicyGroup, PolicyReport};
 use super::rate::Rate;

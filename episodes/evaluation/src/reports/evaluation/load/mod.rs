@@ -5,12 +5,13 @@ mod agent_file;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::results::{EPISODES, PlayedEpisode, PolicyCard, ProcessRecord, STRESS, episode_note, utc_text};
 use serde::Serialize;
 use tandem_episodes::{
     Recorder, Recording,
     pages::{PAGE_FILE, STRIP_FILE},
 };
+
+use crate::results::{EPISODES, PlayedEpisode, PolicyCard, ProcessRecord, STRESS, episode_note, utc_text};
 
 /// One episode.
 #[derive(Clone, Debug)]

@@ -4,8 +4,9 @@ pub mod films;
 pub mod gallery;
 mod stress;
 
-use crate::results::PhaseLevel;
 use tandem_episodes::html::{self, escape};
+
+use crate::results::PhaseLevel;
 
 use super::EvaluationReport;
 use super::figure::{Figure, SERIES, rates, times};
