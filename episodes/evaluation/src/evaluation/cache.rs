@@ -11,11 +11,10 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{EndReason, ResultReply};
 
-use crate::policies::{EpisodeOutput, PlayError, PlayOutcome};
-use crate::results::{Attempt, PlayedEpisode, episode_note, failures_of_policy, utc_text};
-
 use super::retry::again_name;
 use super::{EvaluationError, EvaluationPlan, KeptFiles};
+use crate::policies::{EpisodeOutput, PlayError, PlayOutcome};
+use crate::results::{Attempt, PlayedEpisode, episode_note, failures_of_policy, utc_text};
 
 /// Outcome of a planned episode.
 pub enum PlannedOutcome {

@@ -9,9 +9,8 @@ use serde_json::{Value, json};
 use tandem_episodes::{EpisodeSpec, Start, tasks::Task};
 use xxhash_rust::xxh3::xxh3_64;
 
-use crate::results::{PlayedEpisode, PolicyCard, SeedList};
-
 use super::{EvaluationPlan, Starts};
+use crate::results::{PlayedEpisode, PolicyCard, SeedList};
 
 /// Largest number of differences that an error names.
 const MAX_DIFFERENCES: usize = 6;

@@ -16,7 +16,6 @@ use std::path::{Path, PathBuf};
 use tandem_episodes::{EpisodeError, EpisodeSpec, OutputError, write_whole};
 
 use crate::results::{EPISODES, PlayedEpisode, ProcessRecord};
-
 use cache::EpisodeCache;
 use run_folder::EvaluationFolder;
 

@@ -11,9 +11,8 @@ use tandem_episodes::{
 use tandem_sim::{Sensing, render::RendererKind};
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 
-use crate::policies::Policy;
-
 use super::retry::FailedEpisode;
+use crate::policies::Policy;
 
 /// The plan of an evaluation.
 #[derive(Clone, Debug)]

@@ -9,11 +9,10 @@ use std::time::Duration;
 
 use tandem_episodes::{FileLock, LockKind, Locking, create_private_folder, write_whole};
 
-use crate::results::{EPISODES, PROCESSES_FILE, PlayedEpisode, STRESS};
-
 use super::identity::RunIdentity;
 use super::planned::is_planned_file;
 use super::{EvaluationError, ExistingRun};
+use crate::results::{EPISODES, PROCESSES_FILE, PlayedEpisode, STRESS};
 
 /// The file with the run's identity.
 const IDENTITY_FILE: &str = "run.json";

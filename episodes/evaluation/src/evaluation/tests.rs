@@ -12,10 +12,9 @@ use tandem_episodes::{
 use tandem_sim::{Sensing, dynamics::Diverged, render::RendererKind};
 use tandem_tools_spec::{Assistance, Disclosure, EndReason, Hints, PhaseTimes, Protocol, ResultReply};
 
+use super::*;
 use crate::policies::{EpisodeOutput, PlayError, PlayOutcome, Policy};
 use crate::results::{PhaseLevel, PolicyCard, episode_note, missed_phase_note};
-
-use super::*;
 
 pub(super) fn result(task: &str, seed: u32, phases: Vec<(String, Option<f64>)>) -> ResultReply {
     ResultReply {

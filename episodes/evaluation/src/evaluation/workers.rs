@@ -6,10 +6,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError, mpsc};
 
 use tandem_episodes::EpisodeSpec;
 
-use crate::results::PlayedEpisode;
-
 use super::cache::{EpisodeCache, PlannedOutcome};
 use super::{EpisodeEvent, EvaluationError};
+use crate::results::PlayedEpisode;
 
 /// Plays or loads every episode of `work`, and returns them in its order. Episodes that could not be
 /// started are added to `left_out`.

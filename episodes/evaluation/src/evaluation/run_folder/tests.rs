@@ -7,11 +7,10 @@ use std::time::Duration;
 use tandem_episodes::{Variation, players, tasks};
 use tandem_tools_spec::Protocol;
 
-use crate::policies::{EpisodeOutput, PlayError, PlayOutcome, Policy};
-use crate::results::PolicyCard;
-
 use super::super::tests::{plan, played, result};
 use super::super::*;
+use crate::policies::{EpisodeOutput, PlayError, PlayOutcome, Policy};
+use crate::results::PolicyCard;
 
 /// Returns the run of `plan` in `folder`, with the first `count` of its episodes played.
 fn with_episodes<'a>(plan: &'a EvaluationPlan, folder: &'a Path, count: usize) -> EvaluationRun<'a> {

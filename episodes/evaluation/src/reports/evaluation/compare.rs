@@ -5,9 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use tandem_episodes::{Phase, tasks};
 
-use crate::results::PlayedEpisode;
-
 use super::policy::PolicyGroup;
+use crate::results::PlayedEpisode;
 use crate::statistics::{Pairs, mcnemar, newcombe};
 
 /// The second policy against the first.

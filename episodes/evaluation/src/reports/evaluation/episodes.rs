@@ -6,11 +6,10 @@ use serde::Serialize;
 use tandem_episodes::{Phase, Start};
 use tandem_tools_spec::{Assistance, EndReason, Protocol};
 
-use crate::results::PlayedEpisode;
-
 use super::csv::quoted;
 use super::load::LoadedEpisodes;
 use super::policy::groups;
+use crate::results::PlayedEpisode;
 
 /// One episode.
 #[derive(Debug, Serialize)]

@@ -7,11 +7,10 @@ use serde::Serialize;
 use tandem_episodes::tasks;
 use tandem_tools_spec::{Assistance, Protocol};
 
-use crate::results::{PlayedEpisode, SeedList, command_line, utc_text};
-
 use super::load::FolderProcess;
 use super::policy::PolicyGroup;
 use crate::reports::table::{NONE, Table};
+use crate::results::{PlayedEpisode, SeedList, command_line, utc_text};
 
 /// Origin of a report and of its episodes.
 #[derive(Debug, Serialize)]

@@ -11,11 +11,10 @@ use tandem_episodes::{
 use tandem_tools_spec::EndReason;
 use xxhash_rust::xxh3::xxh3_64;
 
-use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, missed_phase_note, named, shown_in};
-
 use super::costs::{AskedCosts, EpisodeCosts, ModelCosts};
 use super::load::{FoundEpisode, LoadedEpisodes};
 use super::rate::{MeanRate, Rate};
+use crate::results::{Exclusion, PhaseLevel, PlayedEpisode, PolicyCard, missed_phase_note, named, shown_in};
 use crate::statistics::Count;
 
 /// Episodes of one policy, under one set of rules and on one build.

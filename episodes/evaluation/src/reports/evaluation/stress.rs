@@ -10,12 +10,11 @@ use tandem_episodes::{
     tasks::{self, Task},
 };
 
-use crate::results::PlayedEpisode;
-
 use super::load::FoundEpisode;
 use super::policy::{PolicyGroup, groups, rules_of};
 use super::rate::{Rate, p_text, percent, signed};
 use crate::reports::table::{NONE, Table};
+use crate::results::PlayedEpisode;
 use crate::statistics::{Count, Pairs, mcnemar, newcombe};
 
 /// Results of one policy under stress. Rates refer to the last phase.

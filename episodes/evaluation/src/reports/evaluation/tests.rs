@@ -13,9 +13,8 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{Assistance, EndReason, PhaseTimes, Protocol, ResultReply};
 
-use crate::results::PlayedEpisode;
-
 use super::*;
+use crate::results::PlayedEpisode;
 
 /// Returns an episode that reached the first `phases` phases.
 pub fn played(policy: &str, task: &Task, seed: u32, phases: usize) -> PlayedEpisode {

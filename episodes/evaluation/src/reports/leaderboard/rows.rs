@@ -6,11 +6,10 @@ use std::path::Path;
 use tandem_episodes::{Recording, RecordingError, TranscriptEntry, tasks};
 use tandem_tools_spec::{Assistance, Protocol, Usage};
 
-use crate::results::{PLAYERS, PlayedEpisode};
-
 use super::{BoardCosts, BoardRow, TranscriptLink};
 use crate::reports::evaluation::{FoundEpisode, LoadedEpisodes, Rate, ValueRange, ended_between};
 use crate::reports::links::relative;
+use crate::results::{PLAYERS, PlayedEpisode};
 use crate::statistics::Count;
 
 /// Departures that are columns of their own, or follow from the task.

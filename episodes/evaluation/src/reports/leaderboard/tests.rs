@@ -5,10 +5,9 @@ use std::path::Path;
 use tandem_episodes::tasks;
 use tandem_tools_spec::{Assistance, EndReason, Protocol, Usage};
 
-use crate::results::PlayedEpisode;
-
 use super::*;
 use crate::reports::evaluation::tests::{found, nine_six_three, played};
+use crate::results::PlayedEpisode;
 
 fn board(episodes: Vec<PlayedEpisode>) -> Leaderboard {
     Leaderboard::of(&found(episodes), Path::new("."))

@@ -10,10 +10,9 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::Assistance;
 
-use crate::results::{IDLE, OPEN_LOOP, PlayedEpisode};
-
 use super::policy::{PhaseReport, PolicyGroup, PolicyReport};
 use super::rate::Rate;
+use crate::results::{IDLE, OPEN_LOOP, PlayedEpisode};
 use crate::statistics::Count;
 
 /// Earlier measurements, for reports that include no such policy.

@@ -6,14 +6,13 @@ mod stress;
 
 use tandem_episodes::html::{self, escape};
 
-use crate::results::PhaseLevel;
-
 use super::EvaluationReport;
 use super::figure::{Figure, SERIES, rates, times};
 use super::policy::PolicyReport;
 use super::rate::percent;
 use super::tables;
 use crate::reports::table::{self, marked};
+use crate::results::PhaseLevel;
 use films::Film;
 use gallery::Failure;
 

@@ -2,8 +2,6 @@
 
 mod models;
 
-use crate::results::named;
-
 use super::compare::{Comparison, PairedRow};
 use super::costs::{EpisodeCosts, ValueRange};
 use super::floor::TaskFloor;
@@ -12,6 +10,7 @@ use super::rate::{MeanRate, Rate, p_text, percent, signed};
 use super::went_wrong::FailureMoment;
 use super::{EvaluationReport, PublishedRates, header, stress};
 use crate::reports::table::{NONE, Table};
+use crate::results::named;
 use crate::statistics::Count;
 use models::{agents, asked, endings};
 

@@ -1,8 +1,7 @@
 //! Headers, and rows of single episodes.
 
-use crate::results::ProcessRecord;
-
 use super::*;
+use crate::results::ProcessRecord;
 
 #[test]
 fn a_header_names_commands_machines_and_settings() {
