@@ -33,7 +33,7 @@ from .server import Server, serve
 
 _native.loaded_from(_native.__file__ or "")
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "BaseEpisode",
