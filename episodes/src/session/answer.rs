@@ -3,8 +3,8 @@
 use tandem_sim::Pose;
 use tandem_tools_spec::{
     ActCall, CommandReply, DepthReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall,
-    ManageReply, Observe, PoseFrame, RobotReport, SpecError, StatusReply, StopReason, TalkCall, TalkReply,
-    ToolCall, ToolReply,
+    ManageReply, Observe, PoseFrame, RobotReport, SpecError, StatusReply, StopReason, TalkCall,
+    TalkReply, ToolCall, ToolReply,
 };
 
 use super::Session;
@@ -46,7 +46,12 @@ impl<'a> From<&'a Answer> for CallOutcome<'a> {
 }
 
 impl Session {
-    pub(super) fn answer(&mut self, allowed: Allowed) -> Result<Answer, EpisodeError> {
+    /// Answers a call of the operator of a robot, or of the policy of all.
+    pub(super) fn answer(
+        &mut self,
+        operator: Option<&str>,
+        allowed: Allowed,
+    ) -> Result<Answer, EpisodeError> {
         let call = match allowed.called() {
             Called::One(call) => call,
             Called::Together(calls) => {
@@ -70,7 +75,7 @@ impl Session {
                     reason: "its commands are made and recorded one by one".into(),
                 }))
             }
-            ToolCall::Manage(manage) => Ok(ToolReply::Manage(self.manage(manage)).into()),
+            ToolCall::Manage(manage) => Ok(ToolReply::Manage(self.manage(operator, manage)).into()),
             ToolCall::Talk(TalkCall::Say(_)) => {
                 self.expect_underway()?;
                 Ok(ToolReply::Talk(TalkReply::Say(self.status())).into())
@@ -161,10 +166,10 @@ impl Session {
         }
     }
 
-    fn manage(&mut self, call: &ManageCall) -> ManageReply {
+    fn manage(&mut self, operator: Option<&str>, call: &ManageCall) -> ManageReply {
         match call {
             ManageCall::GetStatus(asked) => {
-                let next_phase = if asked.explain { self.next_phase() } else { None };
+                let next_phase = if asked.explain { self.next_phase(operator) } else { None };
                 ManageReply::GetStatus(StatusReply { next_phase, ..self.status() })
             }
             ManageCall::Finish(_) => {
