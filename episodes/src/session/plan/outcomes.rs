@@ -61,7 +61,7 @@ impl PlanOutcome {
         self.states = states.collect::<Vec<String>>().join("; ");
     }
 
-    /// Describes a robot; `None` if it stands where it was and no wrist has a target.
+    /// Describes a robot; `None` if it stands where it was and no hand has a target or feels anything.
     fn state(&self, report: &RobotReport) -> Option<String> {
         let hands = [("left", &report.left), ("right", &report.right)];
         let hands = hands.into_iter().filter_map(|(side, hand)| hand_state(side, hand));
@@ -76,22 +76,25 @@ impl PlanOutcome {
     }
 }
 
+/// Describes a hand; `None` for one without a wrist target that feels nothing.
 fn hand_state(side: &str, hand: &HandReport) -> Option<String> {
+    let grip = match hand.grip {
+        Some(Grip::TwoSided) => ", grip two_sided",
+        Some(Grip::OneSided) => ", grip one_sided",
+        Some(Grip::Touching) => ", grip touching",
+        Some(Grip::None) | None => "",
+    };
     let state = match hand.state? {
-        HandState::Idle => return None,
+        HandState::Idle if grip.is_empty() => return None,
+        HandState::Idle => "idle",
         HandState::Arrived => "arrived",
         HandState::Moving => "moving",
         HandState::Blocked => "blocked",
         HandState::OutOfReach => "out_of_reach",
     };
-    let off = hand.position_error_m.filter(|_| hand.state != Some(HandState::Arrived));
+    let is_off = !matches!(hand.state, Some(HandState::Arrived | HandState::Idle));
+    let off = hand.position_error_m.filter(|_| is_off);
     let off = off.map_or_else(String::new, |off_m| format!(" {off_m:.3} m off"));
-    let grip = match hand.grip {
-        Some(Grip::TwoSided) => " two_sided",
-        Some(Grip::OneSided) => " one_sided",
-        Some(Grip::Touching) => " touching",
-        Some(Grip::None) | None => "",
-    };
     Some(format!("{side} {state}{off}{grip}"))
 }
 
@@ -101,5 +104,27 @@ fn base_state(state: BaseState) -> Option<&'static str> {
         BaseState::Stepping => Some("stepping"),
         BaseState::Settling => Some("settling"),
         BaseState::Pushed => Some("pushed"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+
+    #[test]
+    fn a_hand_says_what_it_grips_with_a_target_or_without() {
+        let check = |hand: Value, expected: Option<&str>| {
+            let hand = serde_json::from_value(hand).unwrap();
+            assert_eq!(hand_state("left", &hand).as_deref(), expected);
+        };
+        check(json!({ "state": "idle", "grip": "none" }), None);
+        check(json!({ "state": "idle", "grip": "two_sided" }), Some("left idle, grip two_sided"));
+        check(json!({ "state": "arrived", "grip": "none", "position_error_m": 0.004 }), Some("left arrived"));
+        check(
+            json!({ "state": "blocked", "grip": "touching", "position_error_m": 0.031 }),
+            Some("left blocked 0.031 m off, grip touching"),
+        );
     }
 }
