@@ -43,6 +43,8 @@ pub struct RobotSheet {
     pub model: Arc<RobotModel>,
     /// Limits of the base commands that its controller follows.
     pub base_limits: BaseLimits,
+    /// Pose of the room frame, which is the first robot's start frame, in its own start frame.
+    pub start_from_room: Isometry3<f64>,
 }
 
 /// Motion of one robot.
@@ -191,6 +193,7 @@ impl Motion {
                 Isometry3::from_parts(Translation3::identity(), pelvis.rotation.inverse() * self.heading())
             }
             PoseFrame::Start => self.state.footing.pelvis_from_start,
+            PoseFrame::Room => self.state.footing.pelvis_from_start * self.robot.start_from_room,
         }
     }
 
