@@ -69,7 +69,8 @@ fn give_or_take(task: &Task, spot: &ObjectSpot, spread: Spread) -> String {
     if most_m < 0.005 { String::new() } else { format!(", give or take {most_m:.2} m") }
 }
 
-/// Returns the size of an object of these parts along the axes of a frame with z up, in which the object has this yaw.
+/// Returns the size of an object of these parts along the axes of a frame with z up, in which the object has
+/// this yaw.
 fn size_m(parts: &[ObjectPart], yaw_rad: f32) -> Vector {
     let corners = parts.iter().flat_map(|part| {
         let visible = part.model.geoms.iter().filter(|geom| geom.drawn || geom.collides);

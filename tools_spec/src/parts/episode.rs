@@ -300,7 +300,8 @@ pub struct NextPhase {
     /// Conditions that do not hold yet, one sentence each. Empty where the next control step reaches the
     /// phase.
     pub lacks: Vec<String>,
-    /// What hands hold by the simulator's contact forces, as phases ask for; of an operator its own robot's.
+    /// Objects in hands, held as phases ask for by the simulator's contact forces; for an operator those of its
+    /// own robot.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub held: Vec<HeldObject>,
 }
@@ -316,8 +317,8 @@ pub struct HeldObject {
     pub object: String,
     /// Middle of the object, [x, y, z] in metres in the robot's level frame.
     pub middle_m: [f64; 3],
-    /// The direction of its own upward axis in that frame, length 1: [0, 0, 1] when it is upright.
-    pub up: [f64; 3],
+    /// Direction of its own z axis in that frame, length 1: [0, 0, 1] when it is upright.
+    pub axis: [f64; 3],
     /// Height of its lowest point above the floor, in metres.
     pub lowest_m: f64,
 }

@@ -76,26 +76,26 @@ impl PlanOutcome {
     }
 }
 
-/// Describes a hand; `None` for one without a wrist target that feels nothing.
+/// Describes a hand: its wrist if that has a target, and its grip if it feels one. `None` without either.
 fn hand_state(side: &str, hand: &HandReport) -> Option<String> {
     let grip = match hand.grip {
-        Some(Grip::TwoSided) => ", grip two_sided",
-        Some(Grip::OneSided) => ", grip one_sided",
-        Some(Grip::Touching) => ", grip touching",
-        Some(Grip::None) | None => "",
+        Some(Grip::TwoSided) => Some("grip two_sided"),
+        Some(Grip::OneSided) => Some("grip one_sided"),
+        Some(Grip::Touching) => Some("grip touching"),
+        Some(Grip::None) | None => None,
     };
     let state = match hand.state? {
-        HandState::Idle if grip.is_empty() => return None,
-        HandState::Idle => "idle",
-        HandState::Arrived => "arrived",
-        HandState::Moving => "moving",
-        HandState::Blocked => "blocked",
-        HandState::OutOfReach => "out_of_reach",
+        HandState::Idle => None,
+        HandState::Arrived => Some("arrived"),
+        HandState::Moving => Some("moving"),
+        HandState::Blocked => Some("blocked"),
+        HandState::OutOfReach => Some("out_of_reach"),
     };
     let is_off = !matches!(hand.state, Some(HandState::Arrived | HandState::Idle));
-    let off = hand.position_error_m.filter(|_| is_off);
-    let off = off.map_or_else(String::new, |off_m| format!(" {off_m:.3} m off"));
-    Some(format!("{side} {state}{off}{grip}"))
+    let off = hand.position_error_m.filter(|_| is_off).map(|off_m| format!("{off_m:.3} m off"));
+    let parts = [state.map(str::to_owned), off, grip.map(str::to_owned)];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    (!parts.is_empty()).then(|| format!("{side} {}", parts.join(" ")))
 }
 
 fn base_state(state: BaseState) -> Option<&'static str> {
@@ -119,12 +119,13 @@ mod tests {
             let hand = serde_json::from_value(hand).unwrap();
             assert_eq!(hand_state("left", &hand).as_deref(), expected);
         };
-        check(json!({ "state": "idle", "grip": "none" }), None);
-        check(json!({ "state": "idle", "grip": "two_sided" }), Some("left idle, grip two_sided"));
+        let still = |grip: &str| json!({ "state": HandState::Idle, "grip": grip, "position_error_m": 0.02 });
+        check(still("none"), None);
+        check(still("two_sided"), Some("left grip two_sided"));
         check(json!({ "state": "arrived", "grip": "none", "position_error_m": 0.004 }), Some("left arrived"));
         check(
             json!({ "state": "blocked", "grip": "touching", "position_error_m": 0.031 }),
-            Some("left blocked 0.031 m off, grip touching"),
+            Some("left blocked 0.031 m off grip touching"),
         );
     }
 }

@@ -33,7 +33,7 @@ impl Session {
             hand: side.name().into(),
             object: object.into(),
             middle_m: wire(level_from_object * middle_m(&found.model)),
-            up: wire(level_from_object.rotation * Vector::Z),
+            axis: wire(level_from_object.rotation * Vector::Z),
             lowest_m: coarse(facts.lowest_m(object).into()),
         }
     }
@@ -71,7 +71,7 @@ mod tests {
             assert!((found - expected).abs() < 0.01, "{held:?}");
         }
         assert!((held.lowest_m - f64::from(pelvis_in_world.translation.z)).abs() < 0.002, "{held:?}");
-        assert!(held.up[2] > 0.999, "{held:?}");
+        assert!(held.axis[2] > 0.999, "{held:?}");
         assert_eq!(session.held(&facts, Some("A")).len(), 1);
         assert_eq!(session.held(&facts, Some("B")), []);
     }

@@ -48,8 +48,8 @@ fn a_wrist_says_how_it_stands_to_its_target() {
     assert_eq!(right.state, Some(HandState::OutOfReach), "{right:?}");
 }
 
-/// Sends `resent` of A's state eight times to its right hand, which holds a bottle of 0.5 kg aloft. Returns by how
-/// much the hand has sunk, in metres.
+/// Sends `resent` of A's state eight times to its right hand, which holds a bottle of 0.5 kg aloft. Returns by
+/// how much the hand has sunk, in metres.
 fn sunk_m(resent: impl Fn(&RobotState) -> WirePose) -> f64 {
     let own = spec("handover", 2000, Protocol::Benchmark);
     let mut episode = InProcess::until(1, Session::start(&own, None).unwrap());
@@ -83,7 +83,6 @@ fn a_hand_is_held_by_its_target_and_sinks_by_its_measured_pose() {
     );
     let by_target_m = sunk_m(|state| state.right_wrist_target.expect("it has a target"));
     let by_measured_m = sunk_m(|state| state.right_wrist);
-    println!("{by_target_m} {by_measured_m}");
     assert!(by_target_m.abs() < 0.003, "{by_target_m} m");
     assert!(by_measured_m > 0.01, "{by_measured_m} m");
 }
