@@ -158,8 +158,8 @@ class HeldObject:
     middle_m: tuple[float, float, float]
     """Middle of the object, [x, y, z] in metres in the robot's level frame."""
 
-    up: tuple[float, float, float]
-    """The direction of its own upward axis in that frame, length 1: [0, 0, 1] when it is upright."""
+    axis: tuple[float, float, float]
+    """Direction of its own z axis in that frame, length 1: [0, 0, 1] when it is upright."""
 
     lowest_m: float
     """Height of its lowest point above the floor, in metres."""
@@ -172,7 +172,7 @@ class HeldObject:
             hand=value["hand"],
             object=value["object"],
             middle_m=tuple(value["middle_m"]),
-            up=tuple(value["up"]),
+            axis=tuple(value["axis"]),
             lowest_m=value["lowest_m"],
         )
 
@@ -191,7 +191,9 @@ class NextPhase:
     """Conditions that do not hold yet, one sentence each. Empty where the next control step reaches the phase."""
 
     held: tuple[HeldObject, ...]
-    """What hands hold by the simulator's contact forces, as phases ask for; of an operator its own robot's."""
+    """Objects in hands, held as phases ask for by the simulator's contact forces; for an operator those of its own
+    robot.
+    """
 
     @staticmethod
     def of(value: Mapping[str, Any]) -> NextPhase:
