@@ -31,10 +31,10 @@ pub use listing::{EpisodeEntry, EpisodeList};
 pub use parts::{
     AgentEnding, Assistance, BASE_COLUMNS, BaseCommand, BaseLimits, BaseMotion, BaseReport, BaseState,
     Budget, Bytes, CameraArrays, CommandReply, DepthFormat, Disclosure, Driving, Effort, ExtraInformation,
-    FingerReport, Formats, Grip, HandPart, HandReport, HandState, Heard, Hints, ImageFormat, JointValues,
-    ModelEnding, NextPhase, Note, NoteKind, OperatorToken, Operators, Partner, PartnerDid, PhaseReached,
-    PixelRegion, PlanReply, Png, Pose, PoseFrame, Protocol, Range, RobotFallen, RobotReport, StopReason,
-    TokenCount, Touch, Usage, Wording,
+    FingerReport, Formats, Grip, HandPart, HandReport, HandState, Heard, HeldObject, Hints, ImageFormat,
+    JointValues, ModelEnding, NextPhase, Note, NoteKind, OperatorToken, Operators, Partner, PartnerDid,
+    PhaseReached, PixelRegion, PlanReply, Png, Pose, PoseFrame, Protocol, Range, RobotFallen, RobotReport,
+    StopReason, TokenCount, Touch, Usage, Wording,
 };
 pub use refusal::{ProblemBody, Refusal, RefusalClass};
 pub use schema::{EpisodeToolSpec, Format, ToolSpec, TypedTool, TypedTools};

@@ -20,8 +20,7 @@ use crate::convert::isometry_from_sim;
 const GAIN: f64 = 0.5;
 /// Control steps in which wrists get as close to their targets as they can.
 const GOING_STEPS: u32 = 75;
-/// Limits of the hands' yielding ahead and to the side (m) and about the vertical (rad). The hands creep
-/// back at `LEAK_1_S` while they may yield, and return at `RETURN_1_S` when they may not.
+/// Limits of yielding. Hands creep back at `LEAK_1_S` while they may yield, and return at `RETURN_1_S` else.
 const MAX_YIELD_M: f64 = 0.06;
 const MAX_YIELD_RAD: f64 = 0.15;
 const LEAK_1_S: f64 = 0.1;
@@ -43,6 +42,8 @@ pub struct RobotSheet {
     pub model: Arc<RobotModel>,
     /// Limits of the base commands that its controller follows.
     pub base_limits: BaseLimits,
+    /// Pose of the room frame, the first robot's start frame, in its own start frame.
+    pub start_from_room: Isometry3<f64>,
 }
 
 /// Motion of one robot.
@@ -106,8 +107,7 @@ pub struct Reach {
     pub ahead_m: f64,
 }
 
-/// Compliance of the pair of hands: the force at which it moves at 1 m/s, or the moment at which it turns
-/// at 1 rad/s. `None` for stiff hands.
+/// Force at which the pair of hands moves at 1 m/s, or moment at which it turns at 1 rad/s; `None` if stiff.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Compliance {
     pub ahead_n_s_m: Option<f64>,
@@ -191,6 +191,7 @@ impl Motion {
                 Isometry3::from_parts(Translation3::identity(), pelvis.rotation.inverse() * self.heading())
             }
             PoseFrame::Start => self.state.footing.pelvis_from_start,
+            PoseFrame::Room => self.state.footing.pelvis_from_start * self.robot.start_from_room,
         }
     }
 
@@ -215,8 +216,7 @@ impl Motion {
         one(yielded_rad, *turning_n_m, turn_n_m_s_rad, MAX_YIELD_RAD);
     }
 
-    /// Returns the transform from commanded to yielded wrists in the pelvis frame. It rotates about
-    /// `middle_m`, the commanded midpoint of the wrists.
+    /// Returns the transform from commanded to yielded wrists (pelvis frame), about their commanded middle.
     fn yielding(&self, middle_m: Vector3<f64>) -> Isometry3<f64> {
         let pelvis_from_world = self.state.world_from_pelvis.rotation.inverse();
         let up = pelvis_from_world * Vector3::z_axis();

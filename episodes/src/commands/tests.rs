@@ -22,7 +22,7 @@ fn standing() -> Motion {
     let range = [-1.0, 1.0];
     let base_limits =
         BaseLimits { vx_m_s: range, vy_m_s: range, yaw_rate_rad_s: range, pelvis_height_m: range };
-    let robot = RobotSheet { name: "A".into(), model, base_limits };
+    let robot = RobotSheet { name: "A".into(), model, base_limits, start_from_room: Isometry3::identity() };
     Motion::new(robot, &body, &rest, Isometry3::translation(0.0, 0.0, 0.78))
 }
 

@@ -43,7 +43,7 @@ pub struct Names {
 pub struct ConditionPart {
     /// Byte offset in the file.
     pub at: usize,
-    /// Text of the part in the file.
+    /// Text of the part in the file, for readers: white space is single, and numbers have five digits at most.
     pub text: String,
     pub truth: Arc<Truth>,
 }
@@ -130,12 +130,32 @@ pub fn parts(text: &str, starts_at: usize, names: &Names) -> Result<Vec<Conditio
             Some(parts) => found.extend_from_slice(parts),
             None => found.push(ConditionPart {
                 at: starts_at + node.at.start,
-                text: text[node.at.clone()].split_whitespace().collect::<Vec<_>>().join(" "),
+                text: readable(&text[node.at.clone()]),
                 truth: check::truth(node, names)?,
             }),
         }
     }
     Ok(found)
+}
+
+/// Returns an expression with single spaces, and with five digits of numbers that have more than four
+/// decimals.
+fn readable(text: &str) -> String {
+    let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let is_digit = |letter: char| letter.is_ascii_digit() || letter == '.';
+    let mut shown = String::new();
+    let mut rest = &text[..];
+    while let Some(start) = rest.find(is_digit) {
+        let length = rest[start..].find(|letter| !is_digit(letter)).unwrap_or(rest.len() - start);
+        let (before, number) = (&rest[..start], &rest[start..start + length]);
+        let has_more = number.split_once('.').is_some_and(|(_, decimals)| decimals.len() > 4);
+        let value: Option<f64> = number.parse().ok().filter(|_| has_more);
+        let short: Option<f64> = value.and_then(|value: f64| format!("{value:.4e}").parse().ok());
+        shown += before;
+        shown += &short.map_or_else(|| number.to_owned(), |short| short.to_string());
+        rest = &rest[start + length..];
+    }
+    shown + rest
 }
 
 #[cfg(test)]

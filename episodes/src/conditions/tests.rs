@@ -46,6 +46,21 @@ fn conditions_hold_as_they_are_written() {
 }
 
 #[test]
+fn readers_get_five_digits_of_a_number() {
+    let check = |text: &str, expected: &str| assert_eq!(readable(text), expected);
+    check("opened_deg  >=\n 83.07888029396936", "opened_deg >= 83.079");
+    check(
+        "tilt_rad(\"cup_2\") <= 0.0005235987755982988e1 && 1.45 > 0.03",
+        "tilt_rad(\"cup_2\") <= 0.0005236e1 && 1.45 > 0.03",
+    );
+    let [part] = &parts("time_s() >= 83.07888029396936", 0, &names()).unwrap()[..] else {
+        panic!("one part")
+    };
+    let at_s = |time_s: f64| part.truth.holds(&Facts { time_s, ..rest() });
+    assert!(!at_s(83.078_88) && at_s(83.078_881), "the condition itself is not rounded");
+}
+
+#[test]
 fn mistakes_say_where_and_what_would_be_right() {
     let check = |text: &str, at: &str, says: &str| {
         let mistake = condition(text, &names()).expect_err(text);

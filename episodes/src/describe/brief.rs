@@ -19,8 +19,10 @@ const PARTNERS: &str = "The pelvis frames of different robots are unrelated. To 
     With a lowered pelvis or far-reaching arms a robot leans ahead by 5 to 20 degrees: then turn its \
     points upright first, by the plane of floor or table.";
 
-const PARTNERS_MOVE: &str = " In frame \"level\" they are upright exactly, and pelvis_in_start keeps the \
-    relation valid while robots move.";
+/// Text for policies whose tools take frames.
+const ROOM_FRAME: &str = "The pelvis frames of different robots are unrelated, and lean ahead by 5 to 20 degrees \
+    with a lowered pelvis or far-reaching arms. Frame \"room\" is the same for all robots, as far as their \
+    odometry is right.";
 
 const ODOMETRY: &str = "pelvis_in_start is where a robot's own IMU and joints have it: the pose of its pelvis \
     in a frame that lies on the floor under where the pelvis was when the episode began, z up, x where the \
@@ -35,7 +37,9 @@ const HANDS: &str = "A wrist's x axis points along its fingers, and its z axis a
     faces along its y axis, the left palm against it. All in the wrist's frame, in metres, of a right hand \
     (negate y for a left one): a hand closes on what is at [0.12, 0.055, 0]. The palm reaches from x = \
     0.04 to 0.13, and from z = -0.045 to 0.045, and is 0.04 thick. Straight fingers reach to x = 0.22. The \
-    thumb, with its angles at 0, stands off the palm at x = 0.065, to y = 0.115.";
+    thumb, with its angles at 0, stands off the palm at x = 0.065, to y = 0.115. Arms sag by millimetres: a \
+    hand that is sent its measured pose again and again sinks, so to hold it send its last target, or leave \
+    its pose out.";
 
 /// Text for policies that receive the hands' sensor readings.
 const GRIP: &str = "A hand holds something, as phases ask for, while its thumb presses on one side of it and \
@@ -77,10 +81,11 @@ const CARRYING: &str = " To push, and to carry together: grip, and lift what is 
 
 const NAMED_FRAMES: &str = " Tools that take `frame` know \"pelvis\"; \"level\", the same but upright: z \
     against gravity, x the way the robot faces (a robot that crouches or carries leans by up to 0.1 rad, \
-    which is 7 cm at arm's length); and \"start\", which lies on the floor under where the pelvis was when \
-    the episode began, z up, x where the robot faced, and stays in the room while the robot moves. Targets \
-    that are to be held while a robot is pushed or walks are best given in \"start\". Of a quaternion, q \
-    and -q are the same rotation.";
+    which is 7 cm at arm's length); \"start\", which lies on the floor under where the pelvis was when the \
+    episode began, z up, x where the robot faced, and stays in the room while the robot moves; and \"room\", \
+    which is A's \"start\" for every robot, so that a place has the same numbers for all of them. Targets \
+    that are to be held while a robot is pushed or walks are best given in \"start\" or \"room\". Of a \
+    quaternion, q and -q are the same rotation.";
 
 /// Text on how our own controller walks.
 const WALKING: &str = "A robot that is told to walk gains way after 0.3 to 0.5 s. Told to stop within 2.5 s, \
@@ -101,8 +106,7 @@ const TEAMWORK: &str = "Each robot has an operator of its own; your tools see an
 
 const TALKING: &str = " `say` reaches the others with their next reply, where `heard` has it. Agree on a few \
     words at once and use them when they are true, for example IN PLACE, HOLDING, FREE; give places in a \
-    frame that you share, for example one robot's start frame (`room` says how robots begin to each \
-    other).";
+    frame that you share";
 
 /// Text for policies that have plans.
 const WAITING: &str = " To wait for a partner, send a plan of one `wait` of up to 500 steps with `until` and a \
@@ -118,7 +122,9 @@ pub fn teamwork(assistance: Assistance, may_talk: bool) -> String {
     let waiting = if assistance == Assistance::Full { WAITING } else { "" };
     // Without messages there is nothing to hear.
     let waiting = if may_talk { waiting.into() } else { waiting.replace("{\"heard\": true}, ", "") };
-    [TEAMWORK, if may_talk { TALKING } else { "" }, &waiting].concat()
+    let sharing = if assistance == Assistance::Full { ": best in frame \"room\"." } else { "." };
+    let talking = if may_talk { [TALKING, sharing].concat() } else { String::new() };
+    [TEAMWORK, &talking, &waiting].concat()
 }
 
 /// Returns the brief of an episode in its wording, for robots that follow base commands within `limits`.
@@ -130,7 +136,7 @@ pub fn brief(wording: Wording, limits: &BaseLimits, kinds: Option<&[GripKind]>) 
     Brief {
         frames: [FRAMES, if squats { BENT_KNEES } else { "" }, if is_full { NAMED_FRAMES } else { "" }]
             .concat(),
-        partners: [PARTNERS, if is_full { PARTNERS_MOVE } else { "" }].concat(),
+        partners: if is_full { ROOM_FRAME } else { PARTNERS }.into(),
         teamwork: None,
         odometry: is_full.then(|| ODOMETRY.into()),
         camera: CAMERA.into(),

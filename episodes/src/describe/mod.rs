@@ -4,6 +4,7 @@ mod brief;
 mod extents;
 mod furniture;
 mod grips;
+mod moving;
 mod relative;
 mod room;
 

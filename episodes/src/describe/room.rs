@@ -2,31 +2,38 @@
 //! robot, the furniture near them, and the start poses of partners.
 
 use tandem_sim::mjcf::Geom;
-use tandem_sim::{ObjectModel, SimError, Vector, wrapped_rad};
+use tandem_sim::{ObjectModel, ObjectPart, SimError, Vector, wrapped_rad};
 
 use super::extents::{corners_m, extent_m};
 use super::furniture::furniture;
+use super::moving::moving;
 use super::relative::{places, seen_from};
 use crate::tasks::{ObjectSpot, RobotSpot, Spread, Task};
 
 /// Returns one line for each object of a task, for example "service trolley, 0.72 m along A's x, 0.44 m along
 /// its y, 0.92 m high: middle 0.85 m ahead of A, 3.65 m ahead of B (from the pelvis, give or take 0.32 m)".
-/// Lines for the furniture among the room's fixed geoms follow, and one for each partner.
+/// Lines for parts that move on the objects and for the furniture among the room's fixed geoms follow, and one
+/// for each partner.
 pub fn room(task: &Task, spread: Spread, fixed: &[Geom]) -> Result<Vec<String>, SimError> {
+    let first = &task.robots[0];
     let line = |spot: &ObjectSpot| {
-        let first = &task.robots[0];
-        let [x_m, y_m, z_m] = size_m(spot, spot.yaw_rad - first.yaw_rad)?.to_array();
+        let parts = ObjectModel::parts(&spot.source(), &spot.name)?;
+        let [x_m, y_m, z_m] = size_m(&parts, spot.yaw_rad - first.yaw_rad).to_array();
         let [spot_x_m, spot_y_m, _] = spot.position_m;
         let places = places(task, [spot_x_m, spot_y_m]);
         let name = spot.name.replace('_', " ");
-        Ok(format!(
+        let whole = format!(
             "{name}, {x_m:.2} m along {}'s x, {y_m:.2} m along its y, {z_m:.2} m high: middle {places} (from the pelvis{})",
             first.name,
             give_or_take(task, spot, spread)
-        ))
+        );
+        Ok((whole, moving(spot, &parts, first)))
     };
-    let things = task.objects.iter().map(line);
-    things.chain(furniture(task, fixed).into_iter().chain(partners(task)).map(Ok)).collect()
+    let things: Vec<(String, Vec<String>)> =
+        task.objects.iter().map(line).collect::<Result<_, SimError>>()?;
+    let (things, moving): (Vec<String>, Vec<Vec<String>>) = things.into_iter().unzip();
+    let others = moving.into_iter().flatten().chain(furniture(task, fixed)).chain(partners(task));
+    Ok(things.into_iter().chain(others).collect())
 }
 
 /// Returns the other robots' start poses relative to the first, for example "B begins at [1.26, 0.00] m
@@ -62,15 +69,15 @@ fn give_or_take(task: &Task, spot: &ObjectSpot, spread: Spread) -> String {
     if most_m < 0.005 { String::new() } else { format!(", give or take {most_m:.2} m") }
 }
 
-/// Returns the size of an object along the axes of a frame with z up, in which the object has this yaw.
-fn size_m(spot: &ObjectSpot, yaw_rad: f32) -> Result<Vector, SimError> {
-    let parts = ObjectModel::parts(&spot.source(), &spot.name)?;
+/// Returns the size of an object of these parts along the axes of a frame with z up, in which the object has
+/// this yaw.
+fn size_m(parts: &[ObjectPart], yaw_rad: f32) -> Vector {
     let corners = parts.iter().flat_map(|part| {
         let visible = part.model.geoms.iter().filter(|geom| geom.drawn || geom.collides);
         visible.flat_map(|geom| corners_m(geom, &part.object_from_part))
     });
     let [low_m, high_m] = extent_m(corners, yaw_rad);
-    Ok(high_m - low_m)
+    high_m - low_m
 }
 
 #[cfg(test)]
@@ -102,7 +109,8 @@ mod tests {
         );
         for task in tasks::cohub() {
             let lines = lines(&task.id);
-            assert_eq!(lines.len(), task.objects.len() + task.robots.len() - 1);
+            let moving = if task.id == "move_house" { 2 } else { 0 };
+            assert_eq!(lines.len(), task.objects.len() + moving + task.robots.len() - 1);
             for (index, line) in lines.iter().enumerate() {
                 println!("{}: {line}", task.id);
                 assert!(!line.contains("inf") && !line.contains("NaN"), "{line}");

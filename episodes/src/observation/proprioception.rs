@@ -43,7 +43,7 @@ impl<'a> Proprioception<'a> {
     }
 }
 
-/// Returns the state of the robot described by `sheet`.
+/// Returns the state of the robot described by `sheet`, without its wrist targets.
 pub fn robot_state(own: &Proprioception, sheet: &RobotSheet, detail: Detail) -> RobotState {
     let Proprioception { time_s, sensed, base, fallen } = *own;
     let named = |values: &[f32]| {
@@ -60,6 +60,8 @@ pub fn robot_state(own: &Proprioception, sheet: &RobotSheet, detail: Detail) -> 
         joint_torques_n_m: in_full(&sensed.joints.torque_n_m),
         left_wrist: wire_pose_from_sim(&sensed.pelvis_from_wrist.left),
         right_wrist: wire_pose_from_sim(&sensed.pelvis_from_wrist.right),
+        left_wrist_target: None,
+        right_wrist_target: None,
         gravity_in_pelvis: Some(wire_vector(sensed.gravity_in_pelvis)),
         pelvis_in_start: Some(wire_pose_from_sim(&sensed.start_from_pelvis)),
         base_command: wire_base(base),

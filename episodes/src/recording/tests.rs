@@ -55,7 +55,12 @@ fn spec() -> EpisodeSpec {
 }
 
 fn sheet(robot: &Robot) -> RobotSheet {
-    RobotSheet { name: robot.name.clone(), model: robot.model.clone(), base_limits: robot.base_limits() }
+    RobotSheet {
+        name: robot.name.clone(),
+        model: robot.model.clone(),
+        base_limits: robot.base_limits(),
+        start_from_room: nalgebra::Isometry3::identity(),
+    }
 }
 
 /// Returns the observation of robot A.

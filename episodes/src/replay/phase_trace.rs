@@ -46,7 +46,7 @@ pub struct ConditionTrace {
 pub struct PartTrace {
     /// Line and column in the task's file.
     pub place: [usize; 2],
-    /// The text in that file.
+    /// The text in that file, with numbers of five digits at most.
     pub text: String,
     pub held: Held,
     /// Its closest value, if it never held and has a numeric one.

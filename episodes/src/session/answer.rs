@@ -1,15 +1,16 @@
 //! Execution of tool calls: observations, commands, and calls about the episode as a whole.
 
-use tandem_sim::Pose;
+use tandem_sim::{Pose, Side};
 use tandem_tools_spec::{
     ActCall, CommandReply, DepthReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall,
-    ManageReply, Observe, PoseFrame, RobotReport, SpecError, StatusReply, StopReason, TalkCall, TalkReply,
-    ToolCall, ToolReply,
+    ManageReply, Observe, PoseFrame, RobotReport, RobotState, SpecError, StatusReply, StopReason, TalkCall,
+    TalkReply, ToolCall, ToolReply,
 };
 
 use super::Session;
 use crate::EpisodeError;
-use crate::commands::{self, Allowed, Called, Command, RobotSheet, check_reach, report};
+use crate::commands::{self, Allowed, Called, Command, Motion, RobotSheet, check_reach, report};
+use crate::convert::wire_pose;
 use crate::observation::{Detail, Proprioception, TeamObservation, check_formats, robot_state};
 use crate::recording::CallOutcome;
 
@@ -46,7 +47,12 @@ impl<'a> From<&'a Answer> for CallOutcome<'a> {
 }
 
 impl Session {
-    pub(super) fn answer(&mut self, allowed: Allowed) -> Result<Answer, EpisodeError> {
+    /// Answers a call of the operator of a robot, or of the policy of all.
+    pub(super) fn answer(
+        &mut self,
+        operator: Option<&str>,
+        allowed: Allowed,
+    ) -> Result<Answer, EpisodeError> {
         let call = match allowed.called() {
             Called::One(call) => call,
             Called::Together(calls) => {
@@ -70,7 +76,7 @@ impl Session {
                     reason: "its commands are made and recorded one by one".into(),
                 }))
             }
-            ToolCall::Manage(manage) => Ok(ToolReply::Manage(self.manage(manage)).into()),
+            ToolCall::Manage(manage) => Ok(ToolReply::Manage(self.manage(operator, manage)).into()),
             ToolCall::Talk(TalkCall::Say(_)) => {
                 self.expect_underway()?;
                 Ok(ToolReply::Talk(TalkReply::Say(self.status())).into())
@@ -95,12 +101,11 @@ impl Session {
             LookCall::Observe(args) => return self.seen(args, formats).map(Answer::Observation),
             LookCall::GetRobotState(args) => {
                 let robot = find(&args.robot)?;
-                let sheet = &self.motions[robot].robot;
-                LookReply::GetRobotState(robot_state(
-                    &Proprioception::of(&self.present, robot),
-                    sheet,
-                    Detail::Full,
-                ))
+                let motion = &self.motions[robot];
+                let own = Proprioception::of(&self.present, robot);
+                let mut state = robot_state(&own, &motion.robot, Detail::Full);
+                tell_targets(&mut state, motion);
+                LookReply::GetRobotState(state)
             }
             LookCall::QueryDepth(args) => {
                 let robot = find(&args.robot)?;
@@ -138,11 +143,13 @@ impl Session {
         let robots = self.looked_through(args, formats)?;
         let sheets: Vec<&RobotSheet> = self.motions.iter().map(|motion| &motion.robot).collect();
         let mut seen = self.observer.observe(&self.present, &robots, &sheets, Detail::of(args));
-        if let Some(frame) = args.frame {
-            for (observed, robot) in seen.robots.iter_mut().zip(robots) {
+        for (observed, robot) in seen.robots.iter_mut().zip(robots) {
+            let motion = &self.motions[robot];
+            if let Some(frame) = args.frame {
                 let sensed = &self.present.robots[robot].sensed;
-                observed.tell_in(frame, &self.motions[robot].pelvis_from(frame), sensed);
+                observed.tell_in(frame, &motion.pelvis_from(frame), sensed);
             }
+            tell_targets(&mut observed.state, motion);
         }
         Ok(seen)
     }
@@ -161,10 +168,10 @@ impl Session {
         }
     }
 
-    fn manage(&mut self, call: &ManageCall) -> ManageReply {
+    fn manage(&mut self, operator: Option<&str>, call: &ManageCall) -> ManageReply {
         match call {
             ManageCall::GetStatus(asked) => {
-                let next_phase = if asked.explain { self.next_phase() } else { None };
+                let next_phase = if asked.explain { self.next_phase(operator) } else { None };
                 ManageReply::GetStatus(StatusReply { next_phase, ..self.status() })
             }
             ManageCall::Finish(_) => {
@@ -221,4 +228,13 @@ impl Session {
             StopReason::StepsDone
         }
     }
+}
+
+/// Adds the commanded poses of wrists that have some, in the state's own frame.
+fn tell_targets(state: &mut RobotState, motion: &Motion) {
+    let frame_from_pelvis = motion.pelvis_from(state.frame.unwrap_or_default()).inverse();
+    let wrists = motion.told_wrists();
+    let target =
+        |side: Side| motion.aims_at_pose(side).then(|| wire_pose(&(frame_from_pelvis * wrists[side])));
+    (state.left_wrist_target, state.right_wrist_target) = (target(Side::Left), target(Side::Right));
 }

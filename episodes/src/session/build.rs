@@ -4,6 +4,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use nalgebra::Isometry3;
 use tandem_sim::mjcf::{Document, Site};
 use tandem_sim::{
     CONTROL_HZ, ObjectPlacement, Pose, Robot, RobotModel, RobotPlacement, Rotation, SceneSource, SimError,
@@ -74,12 +75,25 @@ pub fn build_world(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
             name: robot.name.clone(),
             model: robot.model.clone(),
             base_limits: robot.base_limits(),
+            start_from_room: start_from_room(&world_spec.robots, index),
         };
         let world_from_pelvis = isometry_from_sim(&present.robots[index].estimate.world_from_pelvis);
         Motion::new(sheet, &body, &world.rest_command(index), world_from_pelvis)
     };
     let motions = world.robots().iter().enumerate().map(motion).collect();
     Ok(Built { world, motions, robot: spec.robot.identity(), locomotion: locomotion.name() })
+}
+
+/// Returns the pose of the first robot's start frame in that of robot number `index`.
+fn start_from_room(robots: &[RobotPlacement], index: usize) -> Isometry3<f64> {
+    let start = |robot: &RobotPlacement| {
+        let [x_m, y_m] = robot.position_m;
+        isometry_from_sim(&Pose::from_parts(
+            Vector::new(x_m, y_m, 0.0),
+            Rotation::from_rotation_z(robot.yaw_rad),
+        ))
+    };
+    start(&robots[index]).inv_mul(&start(&robots[0]))
 }
 
 /// Returns the spec of the episode's world.

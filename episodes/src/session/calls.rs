@@ -294,7 +294,7 @@ impl Session {
     pub(super) fn make(&mut self, caller: CallerRecord, called: &Called) -> Result<Answer, EpisodeError> {
         let counts = self.ended.is_none();
         let underway = self.arrived(caller, called.is_look());
-        let whole = self.allow(called).and_then(|allowed| self.answer(allowed));
+        let whole = self.allow(called).and_then(|allowed| self.answer(caller.operator(), allowed));
         let assistance = self.spec().assistance;
         let mut told = whole.as_ref().map(|answer| answer.told(assistance));
         if let (true, Ok(told)) = (counts, &told) {

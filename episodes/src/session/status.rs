@@ -1,5 +1,6 @@
 //! Status of an episode: budget, phases, falls, result.
 
+mod held;
 mod next_phase;
 
 use tandem_tools_spec::{

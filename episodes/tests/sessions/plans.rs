@@ -1,7 +1,7 @@
 //! Tests of plans: several commands in one call have the same effect as separate calls, also in a replay.
 
 use serde_json::json;
-use tandem_episodes::{A, Session};
+use tandem_episodes::{A, B, Session};
 use tandem_tools_spec::{Assistance, BaseState, Call, PlanReply, Protocol, ToolCall, ToolReply};
 
 use crate::common::*;
@@ -204,6 +204,24 @@ fn a_robot_that_did_nothing_is_told_of_in_a_line() {
     let told = json!(b);
     assert_eq!((&told["left"], &told["right"]), (&idle, &idle), "{told}");
     assert!(told.get("pelvis_in_start").is_none() && told.to_string().len() < 160, "{told}");
+}
+
+/// B faces A, and goes away from it along A's x.
+#[test]
+fn a_place_in_the_room_is_the_same_for_every_robot() {
+    let mut session = agentic();
+    let task = tandem_episodes::tasks::find("handover").unwrap();
+    let [[a_x_m, a_y_m], [b_x_m, b_y_m]] = [A, B].map(|robot| task.robots[robot].position_m);
+    let to_m = [b_x_m - a_x_m + 0.25, b_y_m - a_y_m];
+    let heading_rad = std::f64::consts::PI;
+    let destination = json!({ "robot": "B", "to_m": to_m, "heading_rad": heading_rad });
+    let to = json!({ "steps": 800, "frame": "room", "robots": [destination] });
+    let reply = plan(&mut session, "walk_to", to).unwrap();
+    assert_eq!(reply.stopped, None, "{reply:?}");
+    let stands = session.facts().robots[B].pelvis_in_world;
+    let off_m = stands.translation - tandem_sim::Vector::new(b_x_m + 0.25, b_y_m, stands.translation.z);
+    assert!(off_m.length() < 0.04, "{off_m}");
+    assert!((stands.rotation * tandem_sim::Vector::X).x < -0.99, "{stands:?}");
 }
 
 /// Walks back from the counter via a waypoint, then sideways with a turn. The odometry and the simulator

@@ -88,6 +88,49 @@ fn a_model_plays_as_a_program_does() {
 
 #[cfg(unix)]
 #[test]
+fn a_run_costs_no_more_than_its_limit() {
+    if Command::new("curl").arg("--version").output().is_err() {
+        return skipped("there is no curl");
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let episode = "\"$TANDEM_URL/v1/episodes/$TANDEM_EPISODE";
+    let post =
+        "curl -sf -X POST -H \"Authorization: Bearer $TANDEM_TOKEN\" -H 'content-type: application/json'";
+    let note = r#"{"kind": "message", "text": "so", "tokens": {"input": 400000, "output": 10000, "cached": 300000}, "usd": 0.7}"#;
+    let play = format!(
+        "{post} -d '{note}' {episode}/notes\" > /dev/null; {post} -d '{{}}' {episode}/tools/finish\" > /dev/null"
+    );
+    let python = interpreter(folder.path(), "exit 0", &play);
+    let out = folder.path().join("out");
+    let out = out.to_str().expect("UTF-8");
+    let evaluate = |policy: &str, others: &[&str]| {
+        let seeds =
+            ["evaluate", "--policy", policy, "--tasks", "handover", "--seeds", "2000-2002", "--jobs", "1"];
+        tandem(&python, &[&seeds, others].concat())
+    };
+    let priced = "agent:m?usd-per-million-input=2&usd-per-million-output=10";
+    let (output, printed) = evaluate("agent:m", &["--max-usd", "1", "--out", out]);
+    assert!(!output.status.success() && printed.contains("--max-usd needs prices"), "{printed}");
+    let (output, printed) = evaluate(priced, &["--max-usd", "1.5", "--out", out]);
+    assert!(!output.status.success() && printed.contains("of 3 episodes 2 are played and kept"), "{printed}");
+    assert!(printed.contains("the run has cost 1.40 US dollars, and another episode may pass --max-usd 1.5"));
+    // Kept episodes count.
+    let (output, printed) = evaluate(priced, &["--max-usd", "2", "--out", out]);
+    assert!(!output.status.success() && printed.contains("of 3 episodes 2 are played and kept"), "{printed}");
+    let (output, printed) = evaluate(priced, &["--dry-run", out]);
+    assert!(output.status.success(), "{printed}");
+    let says = "3 to play; in 2 recorded, models read 400 thousand tokens an episode (300 from a cache) and wrote 10: \
+                0.90 US dollars an episode, 2.70 for all";
+    assert!(printed.contains(says), "{printed}");
+    let nothing = tempfile::tempdir().expect("a temporary folder");
+    let (output, printed) = evaluate(priced, &["--dry-run", nothing.path().to_str().expect("UTF-8")]);
+    assert!(!output.status.success(), "{printed}");
+    let (output, printed) = evaluate(priced, &["--max-usd", "3", "--out", out]);
+    assert!(output.status.success(), "{printed}");
+}
+
+#[cfg(unix)]
+#[test]
 fn the_command_gives_a_model_its_server() {
     if Command::new("curl").arg("--version").output().is_err() {
         return skipped("there is no curl");

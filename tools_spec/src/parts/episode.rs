@@ -141,7 +141,7 @@ pub enum ExtraInformation {
     Odometry,
     /// Direction of gravity.
     Gravity,
-    /// Conditions that the next phase lacks, as the simulator measures them.
+    /// Conditions that the next phase lacks, and poses of held objects, as the simulator measures them.
     PhaseConditions,
 }
 
@@ -300,6 +300,27 @@ pub struct NextPhase {
     /// Conditions that do not hold yet, one sentence each. Empty where the next control step reaches the
     /// phase.
     pub lacks: Vec<String>,
+    /// Objects in hands, held as phases ask for by the simulator's contact forces; for an operator those of its
+    /// own robot.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub held: Vec<HeldObject>,
+}
+
+/// An object in a hand, in the robot's level frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct HeldObject {
+    /// The robot, as "A".
+    pub robot: String,
+    /// `left` or `right`.
+    pub hand: String,
+    /// The object.
+    pub object: String,
+    /// Middle of the object, [x, y, z] in metres in the robot's level frame.
+    pub middle_m: [f64; 3],
+    /// Direction of its own z axis in that frame, length 1: [0, 0, 1] when it is upright.
+    pub axis: [f64; 3],
+    /// Height of its lowest point above the floor, in metres.
+    pub lowest_m: f64,
 }
 
 /// Fall of a robot.

@@ -16,6 +16,13 @@ pub enum PoseFrame {
     /// On the floor under the pelvis as it was when the episode began, z up, x where the robot faced: it
     /// stays in the room while the robot moves, as far as its odometry is right.
     Start,
+    /// The first robot's start frame, for every robot: a place in the room is the same to all of them.
+    Room,
+}
+
+impl PoseFrame {
+    /// Every frame.
+    const ALL: [PoseFrame; 4] = [PoseFrame::Pelvis, PoseFrame::Level, PoseFrame::Start, PoseFrame::Room];
 }
 
 impl JsonSchema for PoseFrame {
@@ -24,6 +31,6 @@ impl JsonSchema for PoseFrame {
     }
 
     fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
-        schemars::json_schema!({ "type": "string", "enum": [PoseFrame::Pelvis, PoseFrame::Level, PoseFrame::Start] })
+        schemars::json_schema!({ "type": "string", "enum": PoseFrame::ALL })
     }
 }

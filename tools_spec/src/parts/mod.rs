@@ -15,8 +15,8 @@ pub use command::{
 };
 pub use driving::{Driving, Heard, OperatorToken, Operators, Partner, PartnerDid};
 pub use episode::{
-    Assistance, Budget, Disclosure, ExtraInformation, Hints, NextPhase, PhaseReached, Protocol, RobotFallen,
-    Wording,
+    Assistance, Budget, Disclosure, ExtraInformation, HeldObject, Hints, NextPhase, PhaseReached, Protocol,
+    RobotFallen, Wording,
 };
 pub use frames::PoseFrame;
 pub use note::{AgentEnding, ModelEnding, Note, NoteKind, TokenCount, Usage};

@@ -59,6 +59,14 @@ pub struct RobotState {
     pub left_wrist: Pose,
     /// Measured pose of the right wrist (`right_wrist_yaw_link`) in the same frame.
     pub right_wrist: Pose,
+    /// Pose that the left wrist was commanded to, in the same frame, to be sent again to hold the hand: arms
+    /// sag, and one that is sent its measured pose again and again sinks. Left out where the arm keeps its
+    /// joints instead, and where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub left_wrist_target: Option<Pose>,
+    /// The same of the right wrist.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub right_wrist_target: Option<Pose>,
     /// The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright. Left out where the
     /// assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -13,7 +13,7 @@ use crate::tool::Tool;
     Costs no steps."))]
 #[serde(deny_unknown_fields)]
 pub struct GetStatus {
-    /// True: also what the next phase lacks, part by part, as measured.
+    /// True: also what the next phase lacks, and where held things are.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[schemars(extend("full_only" = true, "default" = false))]
     pub explain: bool,

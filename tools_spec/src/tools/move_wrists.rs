@@ -53,8 +53,8 @@ pub struct WristMove {
     /// Right wrist orientation.
     #[schemars(extend("contains" = limits::direction()))]
     pub right_quaternion_wxyz: Option<[f64; 4]>,
-    /// Frame of the poses. "level": the pelvis frame, but upright; "start": fixed in the room, for targets
-    /// that are repeated while the pelvis moves.
+    /// Frame of the poses. "level": the pelvis frame, but upright; "start", "room": fixed in the room, for
+    /// targets that are repeated.
     #[schemars(extend("full_only" = true, "default" = PoseFrame::Pelvis))]
     pub frame: Option<PoseFrame>,
     /// True: targets move with the pelvis, to carry something.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::checks;
 use crate::limits;
-use crate::parts::PlanReply;
+use crate::parts::{PlanReply, PoseFrame};
 use crate::tool::Tool;
 
 /// The most control steps of one call: thirty seconds.
@@ -14,9 +14,9 @@ const MAX_STEPS: u32 = 1500;
 /// The most waypoints of a robot.
 const MAX_WAYPOINTS: usize = 10;
 
-/// Walk to places in the start frame by odometry; arms go along, or push and carry with `carry`. Short
-/// commands, each counted as a tool call, take every robot to within 1.5 cm and 1.5 degrees of its place,
-/// unless one gets no nearer or the steps are used up. It does not look: go round obstacles by `waypoints`.
+/// Walk to places by odometry; arms go along, or push and carry with `carry`. Short commands, each a tool
+/// call, take every robot to within 1.5 cm and 1.5 degrees of its place, unless one gets no nearer or
+/// steps run out. It does not look: go round obstacles by `waypoints`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WalkTo {
@@ -24,9 +24,21 @@ pub struct WalkTo {
     /// metre.
     #[schemars(range(min = 1, max = MAX_STEPS))]
     pub steps: u32,
+    /// Frame of places and headings.
+    #[serde(default = "start_frame", skip_serializing_if = "is_start_frame")]
+    #[schemars(extend("default" = PoseFrame::Start))]
+    pub frame: PoseFrame,
     /// One entry per robot that walks.
     #[schemars(length(min = 1, max = limits::ROBOT_NAMES.len()), extend("not" = limits::a_robot_twice()))]
     pub robots: Vec<Destination>,
+}
+
+fn start_frame() -> PoseFrame {
+    PoseFrame::Start
+}
+
+fn is_start_frame(frame: &PoseFrame) -> bool {
+    *frame == PoseFrame::Start
 }
 
 /// A place to come to rest at.
@@ -36,16 +48,16 @@ pub struct Destination {
     /// The robot, for example "A".
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
-    /// [x, y] in the robot's own start frame, as pelvis_in_start.
+    /// [x, y], as of pelvis_in_start.
     pub to_m: [f64; 2],
-    /// Final heading, counter-clockwise from the one at the start. Null: unchanged.
+    /// Final heading, counter-clockwise from the frame's x. Null: unchanged.
     pub heading_rad: Option<f64>,
     /// Places to pass in order, without a stop. Robots that carry together need equally many.
     #[schemars(length(max = MAX_WAYPOINTS))]
     pub waypoints: Option<Vec<Waypoint>>,
     /// True: to push or carry, wrists keep their places to the robot and their height. Robots that carry in
     /// one call go together at 0.2 m/s and give way to each other (compliance_n_s_m 250); all stop where
-    /// one lags by 18 cm, is turned away by 0.2 rad, or a wrist is out of reach.
+    /// one lags or a wrist is out of reach.
     #[schemars(extend("default" = false))]
     pub carry: Option<bool>,
 }
@@ -54,7 +66,7 @@ pub struct Destination {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Waypoint {
-    /// [x, y] in the start frame.
+    /// [x, y].
     pub at_m: [f64; 2],
     /// Heading there. Null: unchanged.
     pub heading_rad: Option<f64>,
@@ -69,6 +81,7 @@ impl Tool for WalkTo {
     fn example() -> Self {
         WalkTo {
             steps: 500,
+            frame: PoseFrame::Start,
             robots: vec![Destination {
                 robot: "A".into(),
                 to_m: [-0.2, 0.1],

@@ -14,7 +14,7 @@ use tandem_episodes::{
 use tandem_sim::bench::{CaseReport, is_asked, over_seeds};
 use tandem_sim::render::RendererKind;
 use tandem_sim::{Sensing, Side, Sides, SplitMix64};
-use tandem_tools_spec::{Assistance, Destination, Protocol, ToolCall, WalkTo};
+use tandem_tools_spec::{Assistance, Destination, PoseFrame, Protocol, ToolCall, WalkTo};
 
 use super::BenchError;
 use super::holding::loads::{BASKET, LEGS, ROUND_TABLE, SharedLoad, TABLE};
@@ -169,7 +169,7 @@ fn send(
         }
     };
     let robots = team.iter().zip(goals).map(destination).collect();
-    let call = ToolCall::from(WalkTo { steps: MAX_STEPS, robots });
+    let call = ToolCall::from(WalkTo { steps: MAX_STEPS, frame: PoseFrame::Start, robots });
     session.call(call).map_err(Box::new)?;
     Ok(())
 }

@@ -11,7 +11,8 @@
 use nalgebra::{Isometry3, Rotation2, Vector2};
 use tandem_sim::{CONTROL_HZ, Side, Sides};
 use tandem_tools_spec::{
-    ActCall, CommandReply, Destination, Grip, HandState, MoveWrists, RobotReport, WalkTo, WristMove,
+    ActCall, CommandReply, Destination, Grip, HandState, MoveWrists, PoseFrame, RobotReport, WalkTo,
+    WristMove,
 };
 
 use super::PlanAdvance;
@@ -214,11 +215,11 @@ impl CarryPlan {
 impl Session {
     /// Starts a walk of robots, some of which carry or push a load, to their places.
     pub(super) fn carry_plan(&self, walk: &WalkTo) -> Result<CarryPlan, EpisodeError> {
-        let carriers = walk.robots.iter().map(|entry| self.carrier(entry));
+        let carriers = walk.robots.iter().map(|entry| self.carrier(entry, walk.frame));
         Ok(CarryPlan::new(carriers.collect::<Result<_, _>>()?, walk.steps))
     }
 
-    fn carrier(&self, entry: &Destination) -> Result<Carrier, EpisodeError> {
+    fn carrier(&self, entry: &Destination, frame: PoseFrame) -> Result<Carrier, EpisodeError> {
         let robot = commands::find(&entry.robot, &self.motions)?;
         let start_from_pelvis = &self.present.robots[robot].sensed.start_from_pelvis;
         let mut from = Stand::of(start_from_pelvis);
@@ -228,7 +229,7 @@ impl Session {
             name: entry.robot.clone(),
             robot,
             carries: entry.carry == Some(true),
-            ways: self.stands_at(robot).places(entry).into_iter().map(way).collect(),
+            ways: self.places(robot, entry, frame).into_iter().map(way).collect(),
             stand_from_wrist: self.motions[robot].told_wrists().map(|wrist| stand_from_pelvis * wrist),
             before_m: None,
             empty: Sides::both(None),

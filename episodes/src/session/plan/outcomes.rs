@@ -61,7 +61,7 @@ impl PlanOutcome {
         self.states = states.collect::<Vec<String>>().join("; ");
     }
 
-    /// Describes a robot; `None` if it stands where it was and no wrist has a target.
+    /// Describes a robot; `None` if it stands where it was and no hand has a target or feels anything.
     fn state(&self, report: &RobotReport) -> Option<String> {
         let hands = [("left", &report.left), ("right", &report.right)];
         let hands = hands.into_iter().filter_map(|(side, hand)| hand_state(side, hand));
@@ -76,23 +76,26 @@ impl PlanOutcome {
     }
 }
 
+/// Describes a hand: its wrist if that has a target, and its grip if it feels one. `None` without either.
 fn hand_state(side: &str, hand: &HandReport) -> Option<String> {
-    let state = match hand.state? {
-        HandState::Idle => return None,
-        HandState::Arrived => "arrived",
-        HandState::Moving => "moving",
-        HandState::Blocked => "blocked",
-        HandState::OutOfReach => "out_of_reach",
-    };
-    let off = hand.position_error_m.filter(|_| hand.state != Some(HandState::Arrived));
-    let off = off.map_or_else(String::new, |off_m| format!(" {off_m:.3} m off"));
     let grip = match hand.grip {
-        Some(Grip::TwoSided) => " two_sided",
-        Some(Grip::OneSided) => " one_sided",
-        Some(Grip::Touching) => " touching",
-        Some(Grip::None) | None => "",
+        Some(Grip::TwoSided) => Some("grip two_sided"),
+        Some(Grip::OneSided) => Some("grip one_sided"),
+        Some(Grip::Touching) => Some("grip touching"),
+        Some(Grip::None) | None => None,
     };
-    Some(format!("{side} {state}{off}{grip}"))
+    let state = match hand.state? {
+        HandState::Idle => None,
+        HandState::Arrived => Some("arrived"),
+        HandState::Moving => Some("moving"),
+        HandState::Blocked => Some("blocked"),
+        HandState::OutOfReach => Some("out_of_reach"),
+    };
+    let is_off = !matches!(hand.state, Some(HandState::Arrived | HandState::Idle));
+    let off = hand.position_error_m.filter(|_| is_off).map(|off_m| format!("{off_m:.3} m off"));
+    let parts = [state.map(str::to_owned), off, grip.map(str::to_owned)];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    (!parts.is_empty()).then(|| format!("{side} {}", parts.join(" ")))
 }
 
 fn base_state(state: BaseState) -> Option<&'static str> {
@@ -101,5 +104,28 @@ fn base_state(state: BaseState) -> Option<&'static str> {
         BaseState::Stepping => Some("stepping"),
         BaseState::Settling => Some("settling"),
         BaseState::Pushed => Some("pushed"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+
+    #[test]
+    fn a_hand_says_what_it_grips_with_a_target_or_without() {
+        let check = |hand: Value, expected: Option<&str>| {
+            let hand = serde_json::from_value(hand).unwrap();
+            assert_eq!(hand_state("left", &hand).as_deref(), expected);
+        };
+        let still = |grip: &str| json!({ "state": HandState::Idle, "grip": grip, "position_error_m": 0.02 });
+        check(still("none"), None);
+        check(still("two_sided"), Some("left grip two_sided"));
+        check(json!({ "state": "arrived", "grip": "none", "position_error_m": 0.004 }), Some("left arrived"));
+        check(
+            json!({ "state": "blocked", "grip": "touching", "position_error_m": 0.031 }),
+            Some("left blocked 0.031 m off grip touching"),
+        );
     }
 }

@@ -4,7 +4,9 @@
 use std::collections::VecDeque;
 
 use nalgebra::Vector2;
-use tandem_tools_spec::{ActCall, BaseState, CommandReply, Destination, Wait, Walk, WalkMove, WalkTo};
+use tandem_tools_spec::{
+    ActCall, BaseState, CommandReply, Destination, PoseFrame, Wait, Walk, WalkMove, WalkTo,
+};
 
 use super::PlanAdvance;
 use super::way::{Corrections, Missing, Stand, WALK_STEPS};
@@ -135,17 +137,18 @@ impl Session {
     ///
     /// A robot that the episode does not have.
     pub(super) fn walk_plan(&self, walk: &WalkTo) -> Result<WalkPlan, EpisodeError> {
-        let walkers = walk.robots.iter().map(|entry| self.walker(entry)).collect::<Result<_, _>>()?;
+        let walkers =
+            walk.robots.iter().map(|entry| self.walker(entry, walk.frame)).collect::<Result<_, _>>()?;
         let left_steps = walk.steps;
         Ok(WalkPlan { walkers, left_steps, attempts: 0, calm: 0, walks: false })
     }
 
-    fn walker(&self, entry: &Destination) -> Result<Walker, EpisodeError> {
+    fn walker(&self, entry: &Destination, frame: PoseFrame) -> Result<Walker, EpisodeError> {
         let robot = commands::find(&entry.robot, &self.motions)?;
         Ok(Walker {
             name: entry.robot.clone(),
             robot,
-            places: self.stands_at(robot).places(entry).into(),
+            places: self.places(robot, entry, frame).into(),
             stage: WalkerStage::Walks,
             before_m: None,
             nearest_m: f64::INFINITY,
@@ -157,6 +160,19 @@ impl Session {
     /// Returns the place of a robot by its odometry.
     pub(super) fn stands_at(&self, robot: usize) -> Stand {
         Stand::of(&self.present.robots[robot].sensed.start_from_pelvis)
+    }
+
+    /// Returns the places of a robot's destination, given in `frame`, in its start frame.
+    pub(super) fn places(&self, robot: usize, entry: &Destination, frame: PoseFrame) -> Vec<Stand> {
+        let motion = &self.motions[robot];
+        let frame = match frame {
+            // A conversion would change the places by rounding.
+            PoseFrame::Start => Stand::START,
+            PoseFrame::Pelvis | PoseFrame::Level | PoseFrame::Room => {
+                Stand::below(&motion.pelvis_from(PoseFrame::Start).inv_mul(&motion.pelvis_from(frame)))
+            }
+        };
+        self.stands_at(robot).places(entry, &frame)
     }
 
     fn missing_of(&self, walker: &Walker) -> Missing {

@@ -50,22 +50,31 @@ pub struct Corrections {
 }
 
 impl Stand {
+    /// The start frame itself.
+    pub const START: Stand = Stand { at_m: Vector2::new(0.0, 0.0), heading_rad: 0.0 };
+
     pub fn of(start_from_pelvis: &Pose) -> Stand {
-        let pelvis = isometry_from_sim(start_from_pelvis);
-        let ahead = pelvis.rotation * Vector3::x();
-        Stand { at_m: pelvis.translation.vector.xy(), heading_rad: ahead.y.atan2(ahead.x) }
+        Stand::below(&isometry_from_sim(start_from_pelvis))
+    }
+
+    /// Returns the place below a pose in the start frame.
+    pub fn below(pose: &Isometry3<f64>) -> Stand {
+        let ahead = pose.rotation * Vector3::x();
+        Stand { at_m: pose.translation.vector.xy(), heading_rad: ahead.y.atan2(ahead.x) }
     }
 
     /// Returns the places of a destination for a robot that stands here: its waypoints, then the destination.
-    pub fn places(&self, entry: &Destination) -> Vec<Stand> {
+    /// `frame` is the place of the destination's frame.
+    pub fn places(&self, entry: &Destination, frame: &Stand) -> Vec<Stand> {
         let mut heading_rad = self.heading_rad;
         let waypoints =
             entry.waypoints.iter().flatten().map(|waypoint| (waypoint.at_m, waypoint.heading_rad));
         waypoints
             .chain([(entry.to_m, entry.heading_rad)])
             .map(|(at_m, told_rad)| {
-                heading_rad = told_rad.unwrap_or(heading_rad);
-                Stand { at_m: at_m.into(), heading_rad }
+                heading_rad = told_rad.map_or(heading_rad, |told_rad| frame.heading_rad + told_rad);
+                let way_m = Rotation2::new(frame.heading_rad) * Vector2::from(at_m);
+                Stand { at_m: frame.at_m + way_m, heading_rad }
             })
             .collect()
     }
@@ -208,8 +217,18 @@ mod tests {
             "robot": "A", "to_m": [1.0, 1.0],
             "waypoints": [{ "at_m": [0.5, 0.0] }, { "at_m": [1.0, 0.0], "heading_rad": 1.5 }],
         });
-        let places = stand(0.0, 0.0, 0.2).places(&serde_json::from_value(entry).unwrap());
-        let told: Vec<(f64, f64)> = places.iter().map(|place| (place.at_m.x, place.heading_rad)).collect();
-        assert_eq!(told, [(0.5, 0.2), (1.0, 1.5), (1.0, 1.5)]);
+        let entry = serde_json::from_value(entry).unwrap();
+        let told = |frame: Stand| -> Vec<[f64; 3]> {
+            let places = stand(0.0, 0.0, 0.2).places(&entry, &frame);
+            places.iter().map(|place| [place.at_m.x, place.at_m.y, place.heading_rad]).collect()
+        };
+        assert_eq!(told(Stand::START), [[0.5, 0.0, 0.2], [1.0, 0.0, 1.5], [1.0, 1.0, 1.5]]);
+        // A frame that faces left: what is ahead in it is to the left. The present heading stays as it is.
+        let quarter_rad = std::f64::consts::FRAC_PI_2;
+        let expected = [[2.0, 0.5, 0.2], [2.0, 1.0, 1.5 + quarter_rad], [1.0, 1.0, 1.5 + quarter_rad]];
+        let found = told(stand(2.0, 0.0, quarter_rad));
+        for (found, expected) in found.as_flattened().iter().zip(expected.as_flattened()) {
+            assert!((found - expected).abs() < 1e-9, "{found:?}, {expected:?}");
+        }
     }
 }

@@ -5,56 +5,91 @@ use tandem_tools_spec::NextPhase;
 use super::super::Session;
 use crate::conditions::ConditionPart;
 use crate::scoring::{Facts, Phase, PhaseMemory, Predicate};
-use crate::tasks::{PhaseCondition, PhaseSetting, Task};
-
-const KEPT_BACK: &str =
-    "the rest depends on what the seed has chosen for this episode, which only the instructions say";
+use crate::tasks::{PhaseCondition, PhaseSetting, Task, TaskDefinition};
 
 impl Session {
-    /// Returns the next phase and what it lacks. `None` after the last phase, or if phases are not disclosed.
-    pub(in crate::session) fn next_phase(&self) -> Option<NextPhase> {
+    /// Returns the next phase, what it lacks and what hands hold, for the operator of a robot or for the policy
+    /// of all. `None` after the last phase, or if phases are not disclosed.
+    pub(in crate::session) fn next_phase(&self, operator: Option<&str>) -> Option<NextPhase> {
         if !self.spec().disclosure.tells(self.ended.is_some()) {
             return None;
         }
         let (task, index) = (&self.spec().task, self.scores.reached().count());
         let phase = task.phases.get(index)?;
-        let lacks = lacks(task, index, self.scores.next_phase(), &self.facts());
-        Some(NextPhase { id: phase.id.clone(), number: Phase::number(index), lacks })
+        let alike = alike(task, operator);
+        let facts = self.facts();
+        Some(NextPhase {
+            id: phase.id.clone(),
+            number: Phase::number(index),
+            lacks: lacks(task, &alike, index, self.scores.next_phase(), &facts),
+            held: self.held(&facts, operator),
+        })
     }
 }
 
-/// Returns what phase number `index` of a task lacks, one sentence each.
-fn lacks(task: &Task, index: usize, memory: &PhaseMemory, facts: &Facts) -> Vec<String> {
+/// Returns the variants of a task that the instructions of an operator, or of the policy of all robots, do
+/// not tell from it.
+fn alike<'a>(task: &'a Task, operator: Option<&str>) -> Vec<&'a TaskDefinition> {
+    let read = |variant: &TaskDefinition| match operator {
+        None => vec![variant.instruction.clone()],
+        Some(operator) => {
+            let shared = variant.shared_instruction.as_ref().unwrap_or(&variant.instruction);
+            let own = variant.robots.iter().filter(|robot| robot.name == operator);
+            own.map(|robot| robot.instruction.clone()).chain([shared.clone()]).collect()
+        }
+    };
+    let own = read(task);
+    task.variants().iter().filter(|variant| read(variant) == own).collect()
+}
+
+/// Returns what phase number `index` of a task lacks, one sentence each, for a reader who cannot tell the
+/// task from the variants `alike`.
+fn lacks(
+    task: &Task,
+    alike: &[&TaskDefinition],
+    index: usize,
+    memory: &PhaseMemory,
+    facts: &Facts,
+) -> Vec<String> {
     let conditions = &task.conditions[index];
-    let told = |number: usize| told_parts(task, index, number);
-    let missing = |number: usize| told(number).flat_map(|part| part.lacks(facts)).collect::<Vec<_>>();
-    let keeps_back = |number: usize| told(number).count() < conditions[number].parts.len();
+    let others = |number: usize, place: usize| others(alike, index, number, place);
+    let is_told = |number: usize, place: usize| {
+        let (_, part) = &conditions[number].parts[place];
+        others(number, place).iter().all(|other| other.is_some_and(|other| other.asks_the_same(part)))
+    };
+    // Whether a condition has held in the past would reveal its withheld parts, too.
+    let missing = |number: usize, has_held: bool| -> Vec<String> {
+        let parts = conditions[number].parts.iter().enumerate();
+        let sentences = parts.flat_map(|(place, (_, part))| match is_told(number, place) {
+            true if has_held => Vec::new(),
+            true => part.lacks(facts),
+            false => vec![kept_back(&others(number, place))],
+        });
+        sentences.collect()
+    };
     // The duration would reveal whether withheld parts of the condition hold.
     let lasts = |number: usize, since_s: Option<f64>| {
-        let PhaseCondition { for_s, truth, .. } = &conditions[number];
-        let told = (!keeps_back(number)).then(|| lasting(*for_s, since_s, truth.holds(facts), facts));
-        told.flatten()
+        let PhaseCondition { for_s, truth, parts, .. } = &conditions[number];
+        let told = (0..parts.len()).all(|place| is_told(number, place));
+        told.then(|| lasting(*for_s, since_s, truth.holds(facts), facts)).flatten()
     };
     let mut found = Vec::new();
     let mut milestones = 0;
     for (number, condition) in conditions.iter().enumerate() {
         match condition.setting {
-            PhaseSetting::Done => found.extend(missing(number)),
-            PhaseSetting::First if memory.underway() => {}
-            PhaseSetting::First => found.extend(after("first", missing(number))),
-            PhaseSetting::Then => found.extend(after("then", missing(number))),
+            PhaseSetting::Done => found.extend(missing(number, false)),
+            PhaseSetting::First => found.extend(after("first", missing(number, memory.underway()))),
+            PhaseSetting::Then => found.extend(after("then", missing(number, false))),
             PhaseSetting::Lasting => {
-                found.extend(missing(number));
+                found.extend(missing(number, false));
                 found.extend(lasts(number, memory.since_s()));
             }
-            PhaseSetting::AtEnd => found.extend(after("at the end of that", missing(number))),
+            PhaseSetting::AtEnd => found.extend(after("at the end of that", missing(number, false))),
             PhaseSetting::Milestone => {
                 let (since_s, passed) = memory.milestone(milestones);
                 milestones += 1;
-                if !passed {
-                    found.extend(missing(number));
-                    found.extend(lasts(number, since_s));
-                }
+                found.extend(missing(number, passed));
+                found.extend(lasts(number, since_s).filter(|_| !passed));
             }
             PhaseSetting::Spoiled if memory.spoiled() => {
                 found.push("it can no longer be reached: what its description forbids has happened".into());
@@ -62,22 +97,63 @@ fn lacks(task: &Task, index: usize, memory: &PhaseMemory, facts: &Facts) -> Vec<
             PhaseSetting::Broken | PhaseSetting::Spoiled => {}
         }
     }
-    if (0..conditions.len()).any(keeps_back) {
-        found.push(KEPT_BACK.into());
-    }
     found
 }
 
-/// Returns the parts of a condition that do not depend on the seed's choice. An operator of a robot may
-/// read no others.
-fn told_parts(task: &Task, phase: usize, condition: usize) -> impl Iterator<Item = &ConditionPart> {
-    let same = move |number: usize, part: &ConditionPart| {
-        let variants = task.variants().iter();
-        let mut others = variants.map(|variant| variant.conditions[phase][condition].parts.get(number));
-        others.all(|other| other.is_some_and(|(_, other)| other.asks_the_same(part)))
+/// Returns what `variants` have in the place of a part of a condition. A condition of the same setting may have
+/// other parts in another variant.
+fn others<'a>(
+    variants: &[&'a TaskDefinition],
+    phase: usize,
+    condition: usize,
+    part: usize,
+) -> Vec<Option<&'a ConditionPart>> {
+    let conditions = variants.iter().map(|variant| &variant.conditions[phase][condition]);
+    conditions.map(|condition| condition.parts.get(part).map(|(_, part)| part)).collect()
+}
+
+/// Returns the sentence about a part that differs between the variants which a reader cannot tell apart. It
+/// names all of their options, and not whether the part holds.
+fn kept_back(parts: &[Option<&ConditionPart>]) -> String {
+    let mut texts: Vec<&str> = Vec::new();
+    for text in parts.iter().flatten().map(|part| part.text.as_str()) {
+        if !texts.contains(&text) {
+            texts.push(text);
+        }
+    }
+    let whole = with_options(&texts);
+    format!("{whole}: not told, since your instructions do not say what the seed has chosen")
+}
+
+/// Joins texts that differ in one place: "the [red / blue] pad".
+fn with_options(texts: &[&str]) -> String {
+    let [first, others @ ..] = texts else { return String::new() };
+    if others.is_empty() {
+        return (*first).into();
+    }
+    let words: Vec<Vec<&str>> = texts.iter().map(|text| words(text)).collect();
+    let shortest = words.iter().map(Vec::len).min().unwrap_or(0);
+    let all_have = |place: &dyn Fn(&[&str]) -> usize| {
+        words.iter().all(|one| one[place(one)] == words[0][place(&words[0])])
     };
-    let numbered = task.conditions[phase][condition].parts.iter().map(|(_, part)| part).enumerate();
-    numbered.filter(move |(number, part)| same(*number, part)).map(|(_, part)| part)
+    let begin = (0..shortest).take_while(|word| all_have(&|_| *word)).count();
+    let end = (0..shortest - begin).take_while(|word| all_have(&|one| one.len() - 1 - word)).count();
+    let options = words.iter().map(|one| one[begin..one.len() - end].concat());
+    let [before, after] = [&words[0][..begin], &words[0][words[0].len() - end..]].map(|part| part.concat());
+    format!("{before}[{}]{after}", options.collect::<Vec<_>>().join(" / "))
+}
+
+/// Splits a text into runs of letters and digits, and the single characters in between.
+fn words(text: &str) -> Vec<&str> {
+    let mut words = Vec::new();
+    let mut rest = text;
+    while let Some(letter) = rest.chars().next() {
+        let run = rest.find(|letter: char| !letter.is_alphanumeric()).unwrap_or(rest.len());
+        let (word, after) = rest.split_at(run.max(letter.len_utf8()));
+        words.push(word);
+        rest = after;
+    }
+    words
 }
 
 fn after(when: &str, lacks: Vec<String>) -> impl Iterator<Item = String> {
@@ -101,7 +177,7 @@ mod tests {
 
     fn lacking(id: &str, phase: usize, change: impl Fn(Facts) -> Facts) -> Vec<String> {
         let task = tasks::find(id).unwrap();
-        lacks(&task, phase, &PhaseMemory::default(), &change(Facts::at_rest(&task)))
+        lacks(&task, &alike(&task, None), phase, &PhaseMemory::default(), &change(Facts::at_rest(&task)))
     }
 
     #[test]
@@ -147,17 +223,58 @@ mod tests {
         assert!(held.ends_with("so far 0.20 s"), "{held}");
     }
 
-    /// Only A knows the pad for the bottle, but C also reads what the phase lacks.
+    /// Returns what a phase of a tandem+ task lacks at rest, for a reader of its instructions.
+    fn at_rest(id: &str, seed: u32, phase: usize, operator: Option<&str>) -> Vec<String> {
+        let task = TaskSet::default().find(id).unwrap().under(seed);
+        let alike = alike(&task, operator);
+        lacks(&task, &alike, phase, &PhaseMemory::default(), &Facts::at_rest(&task))
+    }
+
+    /// Only A, and a policy of all robots, are told the pad for the bottle.
     #[test]
-    fn what_the_seed_chooses_is_kept_back() {
-        let set = TaskSet::default();
-        let relay = set.find("relay").unwrap();
+    fn what_the_seed_chooses_is_told_to_whose_instructions_name_it() {
+        let kept_back = "within_box(\"bottle\", \"[red / yellow / blue]_pad\", 0.06): not told, since your \
+            instructions do not say what the seed has chosen";
         for seed in 0..6 {
-            let task = relay.under(seed);
-            let place = lacks(&task, 2, &PhaseMemory::default(), &Facts::at_rest(&task));
-            assert_eq!(place, [KEPT_BACK]);
-            let passed = lacks(&task, 0, &PhaseMemory::default(), &Facts::at_rest(&task));
-            assert!(!passed.contains(&KEPT_BACK.to_owned()) && passed.len() > 2, "{passed:?}");
+            let task = TaskSet::default().find("relay").unwrap().under(seed);
+            let wanted = &task.chosen[0].option;
+            for informed in [None, Some("A")] {
+                let told = at_rest("relay", seed, 2, informed);
+                assert!(told.iter().any(|lack| lack.contains(&format!("from {wanted}_pad"))), "{told:?}");
+                assert!(!told.contains(&kept_back.to_owned()), "{told:?}");
+            }
+            for uninformed in ["B", "C"] {
+                assert_eq!(at_rest("relay", seed, 2, Some(uninformed)), [kept_back]);
+                let passed = at_rest("relay", seed, 0, Some(uninformed));
+                assert!(
+                    passed.len() > 2 && passed.iter().all(|lack| !lack.contains("not told")),
+                    "{passed:?}"
+                );
+            }
         }
+    }
+
+    /// The facts about an object would tell B whether it is the one that is wanted.
+    #[test]
+    fn what_is_kept_back_depends_on_nothing_that_the_reader_can_change() {
+        let told: Vec<_> = (0..6).map(|seed| at_rest("which_one", seed, 0, Some("B"))).collect();
+        assert!(told.iter().all(|lacks| *lacks == told[0] && lacks.len() == 2), "{told:?}");
+        assert!(
+            told[0][0].starts_with("holds(\"B\", \"right\", \"[red / green / blue]_bottle\"): "),
+            "{told:?}"
+        );
+        // Terms are named without their meaning.
+        let count = at_rest("set_the_table", 0, 0, Some("B"));
+        assert!(count[0].starts_with("in_place >= 1: not told"), "{count:?}");
+        assert_eq!(at_rest("set_the_table", 0, 0, Some("A")), ["in_place >= 1: it is 0"]);
+    }
+
+    #[test]
+    fn texts_are_joined_where_they_differ() {
+        let check = |texts: &[&str], expected: &str| assert_eq!(with_options(texts), expected);
+        check(&["on_left_pad >= 1", "on_right_pad >= 1"], "on_[left / right]_pad >= 1");
+        check(&["f(1)", "f(1, 2)"], "f(1[ / , 2])");
+        check(&["aloft"], "aloft");
+        check(&["lifted", "held"], "[lifted / held]");
     }
 }

@@ -168,12 +168,15 @@ fn withhold_state(state: &mut RobotState) {
         joint_torques_n_m,
         left_wrist: _,
         right_wrist: _,
+        left_wrist_target,
+        right_wrist_target,
         gravity_in_pelvis,
         pelvis_in_start,
         base_command: _,
         fallen,
     } = state;
     (*joint_velocities_rad_s, *joint_torques_n_m) = (None, None);
+    (*left_wrist_target, *right_wrist_target) = (None, None);
     (*gravity_in_pelvis, *pelvis_in_start, *fallen) = (None, None, None);
 }
 

@@ -5,8 +5,8 @@ use tandem_episodes::players::{self, Episode, PlayerError, PrivilegedEpisode};
 use tandem_episodes::{A, B, Facts, Grip as Truth, Session};
 use tandem_sim::{Side, Vector};
 use tandem_tools_spec::{
-    Assistance, BaseState, Call, Grip, HandState, MoveWrists, PoseFrame, Protocol, ToolCall, ToolReply,
-    Touch, Walk, WalkMove, WristMove,
+    Assistance, BaseState, Call, Grip, HandState, LookReply, MoveWrists, Observe, PoseFrame, Protocol,
+    ToolCall, ToolReply, Touch, Walk, WalkMove, WristMove,
 };
 
 /// An episode that compares each hand's reported grip with its contacts.
@@ -302,6 +302,30 @@ fn targets_are_read_in_the_frame_that_they_name() {
     let robot = &facts.robots[A];
     let ahead = (robot.pelvis_in_world * robot.wrist_in_pelvis.right).rotation * Vector::X;
     assert!(ahead.z.abs() < 0.03, "level fingers: {ahead}, {report:?}");
+}
+
+/// B faces A across the counter. Both know a place in the room by the same numbers.
+#[test]
+fn the_room_frame_is_the_same_for_all_robots() {
+    let mut session = handover(2011);
+    let mut wrist_m = |robot: usize, frame: PoseFrame| {
+        let look = Observe { robots: None, short: Some(true), frame: Some(frame) };
+        let ToolReply::Look(LookReply::Observe(seen)) = session.call(look.into()).unwrap() else { panic!() };
+        assert_eq!(seen.states[robot].frame, Some(frame));
+        seen.states[robot].right_wrist.position_m
+    };
+    assert_eq!(wrist_m(A, PoseFrame::Room), wrist_m(A, PoseFrame::Start));
+    let (own_m, found_m) = (wrist_m(B, PoseFrame::Start), wrist_m(B, PoseFrame::Room));
+    let facts = session.facts();
+    let task = tandem_episodes::tasks::find("handover").unwrap();
+    let in_world = facts.robots[B].pelvis_in_world * facts.robots[B].wrist_in_pelvis.right.translation;
+    let [x_m, y_m] = task.robots[A].position_m;
+    assert_eq!(task.robots[A].yaw_rad, 0.0);
+    let expected_m = [in_world.x - x_m, in_world.y - y_m, in_world.z].map(f64::from);
+    for (found_m, expected_m) in found_m.iter().zip(expected_m) {
+        assert!((found_m - expected_m).abs() < 0.01, "{found_m} m, {expected_m} m");
+    }
+    assert!((own_m[0] - found_m[0]).abs() > 0.1, "{own_m:?}");
 }
 
 #[test]

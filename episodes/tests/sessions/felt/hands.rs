@@ -1,11 +1,12 @@
 //! Tests of replies on hands and base motion, and of the hand forces during an expert's episode.
 
 use crate::common::*;
-use tandem_episodes::players::{self, Episode, PlayerError, PrivilegedEpisode};
+use tandem_episodes::players::{self, Episode, InProcess, PlayerError, PrivilegedEpisode};
 use tandem_episodes::{A, B, Facts, Session};
 use tandem_sim::{Pose, Side, Sides, Vector};
 use tandem_tools_spec::{
-    Grip, HandReport, HandState, MoveWrists, Protocol, ToolCall, ToolReply, Walk, WalkMove, WristMove,
+    Grip, HandReport, HandState, MoveWrists, Pose as WirePose, Protocol, RobotState, ToolCall, ToolReply,
+    Walk, WalkMove, WristMove,
 };
 
 /// Moves A's right hand in 25 steps, waits `still` steps, and returns the report on it.
@@ -45,6 +46,45 @@ fn a_wrist_says_how_it_stands_to_its_target() {
     moved_to(&mut session, up_m, 50);
     let right = moved_to(&mut session, [0.2, -1.1, 0.2], 150);
     assert_eq!(right.state, Some(HandState::OutOfReach), "{right:?}");
+}
+
+/// Sends `resent` of A's state eight times to its right hand, which holds a bottle of 0.5 kg aloft. Returns by
+/// how much the hand has sunk, in metres.
+fn sunk_m(resent: impl Fn(&RobotState) -> WirePose) -> f64 {
+    let own = spec("handover", 2000, Protocol::Benchmark);
+    let mut episode = InProcess::until(1, Session::start(&own, None).unwrap());
+    let _ = players::find("expert").unwrap().play(&own, &mut episode);
+    let mut session = episode.session;
+    let height_m = |session: &Session| {
+        let robot = &session.facts().robots[A];
+        (robot.pelvis_in_world * robot.wrist_in_pelvis.right).translation.z
+    };
+    assert!(session.facts().holds(A, Side::Right, "bottle"));
+    wait(&mut session, 50);
+    let before_m = height_m(&session);
+    for _ in 0..8 {
+        let WirePose { position_m, quaternion_wxyz } = resent(&state(&mut session, "A"));
+        let again = WristMove {
+            right_position_m: Some(position_m),
+            right_quaternion_wxyz: Some(quaternion_wxyz),
+            ..WristMove::hold("A")
+        };
+        command(&mut session, MoveWrists { steps: 25, robots: vec![again] }.into());
+    }
+    f64::from(before_m - height_m(&session))
+}
+
+#[test]
+fn a_hand_is_held_by_its_target_and_sinks_by_its_measured_pose() {
+    assert_eq!(
+        state(&mut handover(0), "A").right_wrist_target,
+        None,
+        "an arm without a target keeps its joints"
+    );
+    let by_target_m = sunk_m(|state| state.right_wrist_target.expect("it has a target"));
+    let by_measured_m = sunk_m(|state| state.right_wrist);
+    assert!(by_target_m.abs() < 0.003, "{by_target_m} m");
+    assert!(by_measured_m > 0.01, "{by_measured_m} m");
 }
 
 #[test]

@@ -86,7 +86,7 @@ fn conditions_of_the_benchmark_say_when_they_held() {
     let [lifted, open] = &settings("move_house")[..] else { panic!("two milestones") };
     let texts = |of: &ConditionTrace| of.parts.iter().map(|part| part.text.clone()).collect::<Vec<_>>();
     assert_eq!(texts(lifted)[1], "clearance_m(\"console_table\") >= 0.03");
-    assert_eq!(texts(open), ["opened_deg >= 83.07888029396936"]);
+    assert_eq!(texts(open), ["opened_deg >= 83.079"]);
     assert_eq!((open.setting, open.for_s, lifted.for_s), (PhaseSetting::Milestone, 0.5, 0.0));
     assert_eq!((open.held.of, open.held.steps, lifted.held.first_s), (50, 0, None));
     for task in tasks::cohub() {

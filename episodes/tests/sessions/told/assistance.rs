@@ -97,6 +97,8 @@ const FULL_AT_TIMES: &[(&str, &str)] = &[
          robots.base.comes_to_rest_m robots.base.displaced_m robots.base.stepped",
     ),
     ("check_reach", "needs_a_step"),
+    ("get_robot_state", "SIDE_wrist_target.position_m SIDE_wrist_target.quaternion_wxyz"),
+    ("observe", "states.SIDE_wrist_target.position_m states.SIDE_wrist_target.quaternion_wxyz"),
 ];
 
 /// Fields by tool.

@@ -56,18 +56,18 @@ class Destination:
     """The robot, for example "A"."""
 
     to_m: Numbers
-    """[x, y] in the robot's own start frame, as pelvis_in_start."""
+    """[x, y], as of pelvis_in_start."""
 
     heading_rad: float | None = None
-    """Final heading, counter-clockwise from the one at the start. None: unchanged."""
+    """Final heading, counter-clockwise from the frame's x. None: unchanged."""
 
     waypoints: Sequence[Waypoint] | None = None
     """Places to pass in order, without a stop. Robots that carry together need equally many."""
 
     carry: bool | None = None
     """True: to push or carry, wrists keep their places to the robot and their height. Robots that carry in one
-    call go together at 0.2 m/s and give way to each other (compliance_n_s_m 250); all stop where one lags by 18
-    cm, is turned away by 0.2 rad, or a wrist is out of reach.
+    call go together at 0.2 m/s and give way to each other (compliance_n_s_m 250); all stop where one lags or a
+    wrist is out of reach.
     """
 
 
@@ -194,7 +194,7 @@ class Waypoint:
     """A place to pass within 10 cm."""
 
     at_m: Numbers
-    """[x, y] in the start frame."""
+    """[x, y]."""
 
     heading_rad: float | None = None
     """Heading there. None: unchanged."""
@@ -224,8 +224,8 @@ class WristMove:
     """Right wrist orientation."""
 
     frame: PoseFrame | None = None
-    """Frame of the poses. "level": the pelvis frame, but upright; "start": fixed in the room, for targets that are
-    repeated while the pelvis moves.
+    """Frame of the poses. "level": the pelvis frame, but upright; "start", "room": fixed in the room, for targets
+    that are repeated.
     """
 
     carried: bool | None = None

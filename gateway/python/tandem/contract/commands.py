@@ -48,6 +48,7 @@ PoseFrame: TypeAlias = Literal[
     "pelvis",
     "level",
     "start",
+    "room",
 ]
 
 StopReason: TypeAlias = Literal[

@@ -143,6 +143,41 @@ class HandReach:
 
 
 @dataclass(frozen=True)
+class HeldObject:
+    """An object in a hand, in the robot's level frame."""
+
+    robot: str
+    """The robot, as "A"."""
+
+    hand: str
+    """`left` or `right`."""
+
+    object: str
+    """The object."""
+
+    middle_m: tuple[float, float, float]
+    """Middle of the object, [x, y, z] in metres in the robot's level frame."""
+
+    axis: tuple[float, float, float]
+    """Direction of its own z axis in that frame, length 1: [0, 0, 1] when it is upright."""
+
+    lowest_m: float
+    """Height of its lowest point above the floor, in metres."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> HeldObject:
+        """Reads what JSON has."""
+        return HeldObject(
+            robot=value["robot"],
+            hand=value["hand"],
+            object=value["object"],
+            middle_m=tuple(value["middle_m"]),
+            axis=tuple(value["axis"]),
+            lowest_m=value["lowest_m"],
+        )
+
+
+@dataclass(frozen=True)
 class NextPhase:
     """The phase to reach next."""
 
@@ -155,6 +190,11 @@ class NextPhase:
     lacks: tuple[str, ...]
     """Conditions that do not hold yet, one sentence each. Empty where the next control step reaches the phase."""
 
+    held: tuple[HeldObject, ...]
+    """Objects in hands, held as phases ask for by the simulator's contact forces; for an operator those of its own
+    robot.
+    """
+
     @staticmethod
     def of(value: Mapping[str, Any]) -> NextPhase:
         """Reads what JSON has."""
@@ -162,6 +202,7 @@ class NextPhase:
             id=value["id"],
             number=value["number"],
             lacks=tuple(value["lacks"]),
+            held=tuple(HeldObject.of(item) for item in value.get("held", ())),
         )
 
 
@@ -236,6 +277,15 @@ class RobotState:
     right_wrist: Pose
     """Measured pose of the right wrist (`right_wrist_yaw_link`) in the same frame."""
 
+    left_wrist_target: Pose | None
+    """Pose that the left wrist was commanded to, in the same frame, to be sent again to hold the hand: arms sag,
+    and one that is sent its measured pose again and again sinks. Left out where the arm keeps its joints
+    instead, and where the assistance is "paper".
+    """
+
+    right_wrist_target: Pose | None
+    """The same of the right wrist."""
+
     gravity_in_pelvis: tuple[float, float, float] | None
     """The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright. Left out where the
     assistance is "paper".
@@ -265,6 +315,8 @@ class RobotState:
             joint_torques_n_m=value.get("joint_torques_n_m"),
             left_wrist=Pose.of(value["left_wrist"]),
             right_wrist=Pose.of(value["right_wrist"]),
+            left_wrist_target=None if (got := value.get("left_wrist_target")) is None else Pose.of(got),
+            right_wrist_target=None if (got := value.get("right_wrist_target")) is None else Pose.of(got),
             gravity_in_pelvis=None if (got := value.get("gravity_in_pelvis")) is None else tuple(got),
             pelvis_in_start=None if (got := value.get("pelvis_in_start")) is None else Pose.of(got),
             base_command=BaseCommand.of(value["base_command"]),

@@ -199,18 +199,22 @@ class Tools(ABC):
         self,
         steps: int,
         robots: Sequence[Destination],
+        *,
+        frame: PoseFrame | None = None,
     ) -> PlanReply:
-        """Walk to places in the start frame by odometry; arms go along, or push and carry with `carry`. Short
-        commands, each counted as a tool call, take every robot to within 1.5 cm and 1.5 degrees of its place,
-        unless one gets no nearer or the steps are used up. It does not look: go round obstacles by `waypoints`.
+        """Walk to places by odometry; arms go along, or push and carry with `carry`. Short commands, each a tool
+        call, take every robot to within 1.5 cm and 1.5 degrees of its place, unless one gets no nearer or steps
+        run out. It does not look: go round obstacles by `waypoints`.
 
         steps: Most control steps, up to 1500: about 250 and 150 a metre and 250 a quarter turn; with `carry` 450 a
             metre.
         robots: One entry per robot that walks.
+        frame: Frame of places and headings.
         """
         arguments: dict[str, Any] = {
             "steps": steps,
             "robots": robots,
+            "frame": frame,
         }
         return PlanReply.of(self.call("walk_to", plain(arguments)))
 
@@ -221,7 +225,7 @@ class Tools(ABC):
     ) -> StatusReply:
         """Ask how the episode is going: time, phases reached, fallen robots, and the budget left. Costs no steps.
 
-        explain: True: also what the next phase lacks, part by part, as measured.
+        explain: True: also what the next phase lacks, and where held things are.
         """
         arguments: dict[str, Any] = {
             "explain": explain,

@@ -1,5 +1,6 @@
 //! `tandem evaluate`: a policy's success over tasks and seeds.
 
+mod costs;
 mod progress;
 mod table;
 
@@ -29,6 +30,7 @@ use super::{
     logging::log_evaluation,
 };
 use crate::{drivers::with_last_words, settings::SettingsError};
+use costs::{SpendingLimit, expected};
 use progress::with_progress;
 
 /// Play tasks over seeds in parallel worlds and count the phases reached. An interrupted run is continued.
@@ -74,6 +76,14 @@ pub struct EvaluateArgs {
     /// The same as --retries 0.
     #[arg(long, conflicts_with = "retries")]
     keep_failed: bool,
+    /// Maximum cost of the run in US dollars, by the prices of its language models: no further episode begins
+    /// that may pass it if it costs as much as the dearest one. Kept episodes count [default: unlimited].
+    #[arg(long, value_name = "USD")]
+    max_usd: Option<f64>,
+    /// Play nothing and print what a language model's run would cost, by the tokens of the episodes in this
+    /// folder of `agent` or `evaluate`.
+    #[arg(long, value_name = "DIR")]
+    dry_run: Option<PathBuf>,
     #[command(flatten)]
     run: RunFlags,
 }
@@ -130,8 +140,15 @@ impl FromStr for ShardFlag {
 pub fn run(args: EvaluateArgs) -> CommandResult {
     log_evaluation();
     let ShardFlag(shard) = args.shard;
-    let policy = args.policy.policy()?;
-    let plan = args.episodes.plan(&*policy, args.record, Assistance::Paper)?;
+    let prices = args.policy.prices();
+    if args.max_usd.is_some() && prices.is_some_and(|prices| !prices.are_given()) {
+        return Err(
+            "--max-usd needs prices: give usd-per-million-input and usd-per-million-output with the model"
+                .into(),
+        );
+    }
+    let policy = SpendingLimit::new(args.policy.policy()?, args.max_usd);
+    let plan = args.episodes.plan(&policy, args.record, Assistance::Paper)?;
     let starts = match (&args.retry_from, args.demos, args.from) {
         (Some(folder), ..) => begin_again(folder, args.before)?,
         (None, Some(demonstrations), Some(phases)) => {
@@ -150,12 +167,23 @@ pub fn run(args: EvaluateArgs) -> CommandResult {
         ..plan
     };
     check_words(&plan, args.stress.stresses())?;
+    if let Some(recorded) = args.dry_run {
+        let episodes = plan.episodes().0.len() * (1 + args.stress.stresses().into_iter().count());
+        println!("{}", expected(episodes, &recorded, &prices.unwrap_or_default())?);
+        return Ok(ExitCode::SUCCESS);
+    }
     let folder = args.run.folder(&plan, None);
-    let mut counted = play_and_print(&plan, &folder)?;
+    let play = |plan: &EvaluationPlan, folder: &Path| {
+        if policy.is_limited() {
+            policy.add_kept(&EvaluationRun::begin(plan, folder)?.so_far());
+        }
+        play_and_print(plan, folder)
+    };
+    let mut counted = play(&plan, &folder)?;
     for stress in args.stress.stresses() {
         println!("\nunder stress: {stress}");
         let plan = EvaluationPlan { stress: Some(stress), ..plan.clone() };
-        counted += play_and_print(&plan, &folder.join(STRESS).join(stress.to_string()))?;
+        counted += play(&plan, &folder.join(STRESS).join(stress.to_string()))?;
     }
     Ok(match counted {
         0 if !plan.episodes().0.is_empty() => ExitCode::FAILURE,

@@ -5,6 +5,7 @@ use std::iter;
 
 use clap::{CommandFactory, Parser};
 use serde_json::Value;
+use tandem_tools_spec::Usage;
 
 /// Part of a program's time limit after which a model finishes by itself, in twelfths.
 const OWN_TWELFTHS: u32 = 11;
@@ -72,6 +73,32 @@ pub struct AgentFlags {
     million_cached_usd: Option<f64>,
 }
 
+/// Prices of a million tokens in US dollars; `None` if they are not given.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct AgentPrices {
+    pub input_usd: Option<f64>,
+    pub output_usd: Option<f64>,
+    pub cached_usd: Option<f64>,
+}
+
+impl AgentPrices {
+    /// Returns true if the prices of input and output are given.
+    pub fn are_given(&self) -> bool {
+        self.input_usd.is_some() && self.output_usd.is_some()
+    }
+
+    /// Returns the price of a usage; `None` without the prices of input and output. Writing to a cache is
+    /// priced as reading.
+    pub fn usd(&self, usage: &Usage) -> Option<f64> {
+        let (input_usd, output_usd) = (self.input_usd?, self.output_usd?);
+        let cached_usd = self.cached_usd.unwrap_or(input_usd);
+        let fresh_tokens = usage.input_tokens.saturating_sub(usage.cached_tokens);
+        let parts =
+            [(fresh_tokens, input_usd), (usage.cached_tokens, cached_usd), (usage.output_tokens, output_usd)];
+        Some(parts.into_iter().map(|(tokens, usd)| tokens as f64 / 1e6 * usd).sum())
+    }
+}
+
 fn parse_amount(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|number: &f64| number.is_finite() && *number >= 0.0);
     number.ok_or_else(|| "give a number from 0 up".into())
@@ -117,6 +144,14 @@ impl AgentFlags {
     /// Returns the model's name; empty if none is given, as in a resumed episode.
     pub fn model(&self) -> &str {
         self.model.as_deref().unwrap_or_default()
+    }
+
+    pub fn prices(&self) -> AgentPrices {
+        AgentPrices {
+            input_usd: self.million_input_usd,
+            output_usd: self.million_output_usd,
+            cached_usd: self.million_cached_usd,
+        }
     }
 
     /// Returns the time limit of a program whose default is `usual_s`.

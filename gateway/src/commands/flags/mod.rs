@@ -9,7 +9,7 @@ mod seed_key;
 mod stress;
 mod world;
 
-pub use agent::AgentFlags;
+pub use agent::{AgentFlags, AgentPrices};
 pub use episode::{EpisodeFlags, Seeds};
 pub use given::GivenFlags;
 pub use policy::{PartnerFlags, PolicyFlags};

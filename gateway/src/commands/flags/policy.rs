@@ -9,7 +9,7 @@ use tandem_evaluation::{
 };
 use tandem_tools_spec::{Driving, Operators};
 
-use super::agent::AgentFlags;
+use super::agent::{AgentFlags, AgentPrices};
 use crate::{
     drivers::{
         PRESETS, PolicyKey, PolicyMap, PolicyProtocol, Program, PythonModule, PythonPart, RemotePolicy,
@@ -143,6 +143,17 @@ fn port_of(url: &str) -> Option<u16> {
 }
 
 impl PolicyFlags {
+    /// Returns the prices that a language model's flags give; `None` for another policy.
+    pub fn prices(&self) -> Option<AgentPrices> {
+        match &self.policy {
+            PolicyChoice::Agent(flags) => Some(flags.prices()),
+            PolicyChoice::Player(_)
+            | PolicyChoice::Program(_)
+            | PolicyChoice::OpenLoop(_)
+            | PolicyChoice::Remote(..) => None,
+        }
+    }
+
     /// Creates the policy and reads its inputs. No server is contacted yet.
     pub fn policy(self) -> Result<Box<dyn Policy>, Box<dyn Error>> {
         let misplaced = |flag: &str, who: &str| Err(format!("{flag} is for {who}").into());

@@ -1,9 +1,9 @@
 //! The model of an object from its file, independent of the world that it is put into.
 
-use rapier3d::math::{Pose, Vector};
+use rapier3d::math::{Pose, Rotation, Vector};
 
 use crate::mechanism::{Solid, rounded};
-use crate::mjcf::{BodyLink, BodyTree, Document, Geom, LinkJoint, Site};
+use crate::mjcf::{AxisJoint, BodyLink, BodyTree, Document, Geom, LinkJoint, Site};
 use crate::{SimError, assets};
 
 /// Source of an object.
@@ -40,6 +40,9 @@ pub struct ObjectPart {
     pub name: String,
     /// Pose in the object's frame, which is that of its first part.
     pub object_from_part: Pose,
+    /// The same with its own joint at the end of its range that is farther from 0; `None` for a part whose
+    /// joint has no range.
+    pub object_from_moved_part: Option<Pose>,
     pub model: ObjectModel,
 }
 
@@ -55,9 +58,11 @@ impl ObjectModel {
         let mut parts: Vec<ObjectPart> = Vec::with_capacity(tree.links.len());
         for link in &tree.links {
             let on_parent = |parent: usize| parts[parent].object_from_part * rounded(&link.parent_from_link);
+            let object_from_part = link.parent.map_or(Pose::IDENTITY, on_parent);
             parts.push(ObjectPart {
                 name: part_name(name, link),
-                object_from_part: link.parent.map_or(Pose::IDENTITY, on_parent),
+                object_from_part,
+                object_from_moved_part: farthest(&link.joint).map(|moved| object_from_part * moved),
                 model: ObjectModel::of(link),
             });
         }
@@ -119,6 +124,23 @@ impl ObjectModel {
             sites: link.sites.clone(),
             mass_kg: link.mass.mass(),
             solid: Solid::of(&link.geoms),
+        }
+    }
+}
+
+/// Returns the pose of a part, in its own frame with the joint at 0, at the end of the joint's range that is
+/// farther from 0; `None` if there is no range.
+fn farthest(joint: &LinkJoint) -> Option<Pose> {
+    let end = |[low, high]: [f64; 2]| if low.abs() > high.abs() { low } else { high } as f32;
+    match joint {
+        LinkJoint::Fixed | LinkJoint::Free { .. } => None,
+        LinkJoint::Hinge(AxisJoint { axis, .. }) => {
+            let (anchor_m, direction) = (axis.anchor_m.as_vec3(), axis.direction.as_vec3());
+            let turned = Rotation::from_axis_angle(direction, end(axis.range?));
+            Some(Pose::from_parts(anchor_m - turned * anchor_m, turned))
+        }
+        LinkJoint::Slide(AxisJoint { axis, .. }) => {
+            Some(Pose::from_translation(axis.direction.as_vec3() * end(axis.range?)))
         }
     }
 }
