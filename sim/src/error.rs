@@ -1,5 +1,7 @@
 //! Errors of a world.
 
+use std::path::Path;
+
 use crate::dynamics::{Diverged, OtherWorld, TreeError};
 
 /// Error of loading or of a step. The text names the file or body and a remedy.
@@ -67,6 +69,11 @@ impl SimError {
             0 | 1 => errors.pop(),
             _ => Some(SimError::Several(errors)),
         }
+    }
+
+    /// Returns the error of a file that cannot be read.
+    pub(crate) fn unreadable(path: &Path, source: std::io::Error) -> SimError {
+        SimError::Read { path: path.display().to_string(), source }
     }
 }
 

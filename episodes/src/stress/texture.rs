@@ -43,6 +43,7 @@ fn repaint_room(part: &mut Part, paint: usize, level: StressLevel, seed: u32) {
         *second = std::array::from_fn(|i| second[i] + (other[i] * CHECKER_DARK - second[i]) * share);
     }
     if chance < level.of(NEW_PATTERN) {
+        part.image = None;
         part.pattern = match kind {
             ..1.0 => Pattern::Wood,
             ..2.0 => Pattern::Fabric,

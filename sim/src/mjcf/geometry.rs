@@ -6,7 +6,8 @@ use mjcf_rs::body::GeomType;
 use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::prelude::SharedShape;
 
-use super::{Document, Mesh, SurfacePattern, pose, vector};
+use super::assets::surface::MappedShape;
+use super::{Document, Mesh, SurfaceImage, SurfacePattern, pose, vector};
 use crate::SimError;
 use crate::dynamics::{Directions, Friction, Mask};
 
@@ -49,6 +50,8 @@ pub struct Geom {
     pub body_from_geom: Pose,
     pub rgba: [f32; 4],
     pub material: Option<String>,
+    /// The image of the material's texture, if it has one. `rgba` is its mean colour then.
+    pub image: Option<SurfaceImage>,
     /// The two colours of the material's texture if it is MuJoCo's builtin checker.
     pub checker_rgb: Option<[[f32; 3]; 2]>,
     pub friction: Friction,
@@ -71,6 +74,30 @@ const DEFAULT_RGBA: [f64; 4] = [0.5, 0.5, 0.5, 1.0];
 const PLANE_THICKNESS_M: f32 = 2.0;
 const PLANE_REACH_M: f32 = 50.0;
 
+impl Primitive {
+    fn mapped(&self) -> MappedShape {
+        let around = |points_m: &[Vector], has_uv: bool| {
+            let low_m = points_m.iter().copied().fold(Vector::INFINITY, Vector::min);
+            let high_m = points_m.iter().copied().fold(Vector::NEG_INFINITY, Vector::max);
+            let (half_m, centre_m) = ((high_m - low_m) * 0.5, (high_m + low_m) * 0.5);
+            MappedShape { half_m, centre_m, is_mesh: true, has_uv }
+        };
+        let half_m = match self {
+            Primitive::Sphere { radius_m } => Vector::splat(*radius_m),
+            Primitive::Capsule { radius_m, half_length_m }
+            | Primitive::Cylinder { radius_m, half_length_m } => {
+                Vector::new(*radius_m, *radius_m, *half_length_m)
+            }
+            Primitive::Box { half_extents_m } => *half_extents_m,
+            Primitive::Ellipsoid { radii_m } => *radii_m,
+            Primitive::Plane { half_extents_m: [x, y] } => Vector::new(*x, *y, 1.0),
+            Primitive::Convex { vertices_m } => return around(vertices_m, false),
+            Primitive::Mesh(mesh) => return around(&mesh.vertices_m, !mesh.corner_uv.is_empty()),
+        };
+        MappedShape { half_m, centre_m: Vector::ZERO, is_mesh: false, has_uv: false }
+    }
+}
+
 impl Geom {
     /// Reads geom `index` of a body.
     pub(super) fn read(document: &Document, body: usize, index: usize) -> Result<Geom, SimError> {
@@ -86,9 +113,11 @@ impl Geom {
             true => Mask { kinds: geom.contype, touched: geom.conaffinity },
             false => Mask { kinds: 0, touched: 0 },
         };
+        let primitive = primitive(document, geom, half_length_m).map_err(|what| refuse(&what))?;
         Ok(Geom {
             name: geom.name.clone(),
-            primitive: primitive(document, geom, half_length_m).map_err(|what| refuse(&what))?,
+            image: material.and_then(|material| SurfaceImage::of(document, material, &primitive.mapped())),
+            primitive,
             body_from_geom,
             rgba,
             material: geom.material.clone(),
@@ -184,7 +213,8 @@ fn rgba(
 ) -> [f32; 4] {
     let texture = material.and_then(|material| {
         let name = material.texture.as_ref()?;
-        document.texture_rgb.get(name).copied().or_else(|| flat_rgb(document.model.assets.texture(name)?))
+        let file = document.textures.get(name).map(|texture| texture.mean_rgb);
+        file.or_else(|| flat_rgb(document.model.assets.texture(name)?))
     });
     let plain = if texture.is_some() { [1.0; 4] } else { DEFAULT_RGBA };
     let [r, g, b, a] =

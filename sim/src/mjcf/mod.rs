@@ -18,6 +18,8 @@ mod text;
 
 pub use assets::files::Mesh;
 pub use assets::looks::SurfacePattern;
+pub use assets::surface::{SurfaceImage, TextureMapping};
+pub use assets::texture::{Texture, TextureLevel};
 pub use bodies::{BodyLink, BodyTree, PlacedBody};
 pub use equality::{EqualityConstraint, EqualityKind};
 pub use frames::{MjcfCamera, Site};
@@ -36,6 +38,7 @@ use crate::SimError;
 use crate::user_file::{MAX_TEXT_BYTES, read_text};
 use assets::kept;
 use assets::looks::Looks;
+use assets::surface::TextureRepeats;
 use joints::UnreadRanges;
 use text::check::{self, Checked};
 use text::plain::plain;
@@ -59,7 +62,8 @@ pub struct Document {
     folder: PathBuf,
     /// Content of the files that assets name, by asset.
     meshes: BTreeMap<String, Arc<Mesh>>,
-    texture_rgb: BTreeMap<String, [f32; 3]>,
+    textures: BTreeMap<String, Arc<Texture>>,
+    repeats: TextureRepeats,
     looks: Looks,
     settings: FileSettings,
     /// All files that were read, each with a hash of its bytes.
@@ -125,7 +129,8 @@ impl Document {
             split: split_bodies,
             folder: folder.into(),
             meshes: BTreeMap::new(),
-            texture_rgb: BTreeMap::new(),
+            textures: BTreeMap::new(),
+            repeats: TextureRepeats::of(&source)?,
             looks: Looks::of(&source)?,
             settings: FileSettings::of(&source)?,
             files: source.included(),
@@ -206,7 +211,9 @@ impl Document {
         if let Some(known) = self.known_fingerprint {
             return known;
         }
-        let read = (&self.model, &self.cameras, &self.meshes, &self.texture_rgb, &self.speed_limit_values);
+        let texture_rgb: BTreeMap<_, _> =
+            self.textures.iter().map(|(name, texture)| (name, texture.mean_rgb)).collect();
+        let read = (&self.model, &self.cameras, &self.meshes, texture_rgb, &self.speed_limit_values);
         let mut content = format!("{read:?}");
         // Fields that older versions did not read keep the hash unchanged where a file does not use them.
         if self.unread != UnreadRanges::default() {
@@ -214,6 +221,9 @@ impl Document {
         }
         if self.looks != Looks::default() {
             content += &format!("{:?}", self.looks);
+        }
+        if self.repeats != TextureRepeats::default() {
+            content += &format!("{:?}", self.repeats);
         }
         if self.settings != FileSettings::default() {
             content += &format!("{:?}", self.settings);

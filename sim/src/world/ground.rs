@@ -45,6 +45,7 @@ impl World {
             body_from_geom: Pose::from_translation(Vector::Z * bottom_m),
             rgba: [0.0; 4],
             material: None,
+            image: None,
             checker_rgb: None,
             friction,
             density_kg_m3: 0.0,

@@ -3,6 +3,7 @@
 mod allocation;
 mod falls;
 mod hand_forces;
+mod images;
 mod locomotion;
 mod motors;
 mod odometry;

@@ -16,6 +16,7 @@ fn scenery(parts: Vec<(TriangleMesh, Pose)>) -> Scenery {
         carrier: Carrier::Room,
         carrier_from_mesh,
         rgb: GREY,
+        image: None,
         pattern: Pattern::Plain,
         id,
         casts_shadow: true,

@@ -82,6 +82,9 @@ const DIMENSIONLESS: &[&str] = &[
     "rgba",
     "albedo",
     "colour",
+    // Texture coordinates; also per metre.
+    "uv",
+    "uv_1_m",
     // Fractions, multiples and tangents.
     "share",
     "tan",

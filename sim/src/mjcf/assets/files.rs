@@ -1,17 +1,16 @@
-//! Files that an MJCF file refers to: meshes (OBJ, STL and MSH), and images of materials, of which only the
-//! colour is used.
+//! Files that an MJCF file refers to: meshes (OBJ, STL and MSH), and images of textures.
 
 use std::fmt;
 use std::io::{self, Cursor};
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
-use image::ImageReader;
 use mjcf_rs::assets::MeshInertia;
 use rapier3d::math::{Rotation, Vector};
 use rapier3d::prelude::{MassProperties, SharedShape};
 use xxhash_rust::xxh3::xxh3_64;
 
+use super::texture::Texture;
 use crate::mjcf::{Document, pose, vector};
 use crate::{
     SimError,
@@ -29,6 +28,11 @@ const STL_TRIANGLE_BYTES: usize = 50;
 pub struct Mesh {
     pub vertices_m: Vec<Vector>,
     pub triangles: Vec<[u32; 3]>,
+    /// Normals at the corners of each triangle; empty if the file gives none.
+    pub corner_normal: Vec<[Vector; 3]>,
+    /// Texture coordinates at the corners of each triangle, to the right and down from an image's top left
+    /// corner, of which 1 is the opposite one; empty if the file gives none.
+    pub corner_uv: Vec<[[f32; 2]; 3]>,
     /// True if mass and inertia are those of the volume inside the triangles, and not of the hull.
     pub weighs_exactly: bool,
     hull: OnceLock<Option<SharedShape>>,
@@ -38,11 +42,14 @@ impl PartialEq for Mesh {
     fn eq(&self, other: &Mesh) -> bool {
         self.vertices_m == other.vertices_m
             && self.triangles == other.triangles
+            && self.corner_normal == other.corner_normal
+            && self.corner_uv == other.corner_uv
             && self.weighs_exactly == other.weighs_exactly
     }
 }
 
-/// Input of the fingerprint. It omits `weighs_exactly`, which the asset states.
+/// Input of the fingerprint. It omits `weighs_exactly`, which the asset states, and what only concerns
+/// images.
 impl fmt::Debug for Mesh {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Mesh { vertices_m, triangles, .. } = self;
@@ -88,7 +95,7 @@ impl Document {
             let Some(path) = self.model.resolve_mesh_file(asset, &self.folder) else { continue };
             let path = self.source.beside_including(with_own_separators(path));
             let bytes = check_kind(&path)
-                .and_then(|()| read_mesh_bytes(&path).map_err(|source| unreadable(&path, source)));
+                .and_then(|()| read_mesh_bytes(&path).map_err(|source| SimError::unreadable(&path, source)));
             match bytes.and_then(|bytes| Ok((self.read_mesh(asset, &path, &bytes)?, xxh3_64(&bytes)))) {
                 Ok((mesh, hash)) => {
                     self.files.push((path, hash));
@@ -100,13 +107,14 @@ impl Document {
         SimError::of_all(refused).map_or(Ok(()), Err)
     }
 
-    /// Reads the mean colours of textures that name a file.
+    /// Reads the images of textures that name a file.
     pub(in crate::mjcf) fn read_textures(&mut self) -> Result<(), SimError> {
         for asset in &self.model.assets.textures {
             if let Some(path) = self.model.resolve_texture_file(asset, &self.folder) {
                 let path = self.source.beside_including(with_own_separators(path));
-                let bytes = read_mesh_bytes(&path).map_err(|source| unreadable(&path, source))?;
-                self.texture_rgb.insert(asset.name.clone().unwrap_or_default(), mean_rgb(&path, &bytes)?);
+                let bytes = read_mesh_bytes(&path).map_err(|source| SimError::unreadable(&path, source))?;
+                let texture = Texture::decode(&path, &bytes)?;
+                self.textures.insert(asset.name.clone().unwrap_or_default(), Arc::new(texture));
                 self.files.push((path, xxh3_64(&bytes)));
             }
         }
@@ -119,16 +127,20 @@ impl Document {
             return Err(self.unsupported(format!("mesh `{}` has no triangles", path.display())));
         }
         let scale = vector(asset.scale);
+        let reference = pose(&asset.refpose);
+        let turn: Rotation = reference.rotation.inverse();
         if asset.refpose != mjcf_rs::Pose::default() {
-            let reference = pose(&asset.refpose);
-            let turn: Rotation = reference.rotation.inverse();
             let place = |vertex_m: &mut Vector| *vertex_m = turn * (*vertex_m - reference.translation);
             mesh.vertices_m.iter_mut().for_each(place);
         }
         mesh.vertices_m.iter_mut().for_each(|vertex_m| *vertex_m *= scale);
+        let normals = mesh.corner_normal.as_flattened_mut().iter_mut();
+        normals.for_each(|normal| *normal = (turn * *normal / scale).normalize_or_zero());
         // A reflection turns surfaces inside out.
         if scale.x * scale.y * scale.z < 0.0 {
             mesh.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+            mesh.corner_normal.iter_mut().for_each(|corners| corners.swap(1, 2));
+            mesh.corner_uv.iter_mut().for_each(|corners| corners.swap(1, 2));
         }
         mesh.weighs_exactly = asset.inertia == MeshInertia::Exact || self.model.compiler.exact_mesh_inertia;
         Ok(mesh)
@@ -178,13 +190,37 @@ fn read_obj(path: &Path, mut bytes: &[u8]) -> Result<Mesh, SimError> {
     let (models, _) = tobj::load_obj_buf(&mut bytes, &options, without_materials)
         .map_err(|source| SimError::Mesh { path: path.display().to_string(), source: Box::new(source) })?;
     let mut found = Mesh::default();
-    for tobj::Model { mesh, .. } in models {
+    for tobj::Model { mesh, .. } in &models {
         let first = found.vertices_m.len() as u32;
         found.vertices_m.extend(mesh.positions.chunks_exact(3).map(Vector::from_slice));
         let corners = mesh.indices.chunks_exact(3);
         found.triangles.extend(corners.map(|corner| [corner[0], corner[1], corner[2]].map(|i| first + i)));
     }
+    found.corner_normal = corners(&models, |mesh| (&mesh.normal_indices, &mesh.normals), Vector::from_array);
+    let downwards = |[u, v]: [f32; 2]| [u, 1.0 - v];
+    found.corner_uv = corners(&models, |mesh| (&mesh.texcoord_indices, &mesh.texcoords), downwards);
     Ok(found)
+}
+
+/// Returns a property of the corners of all triangles, given by indices into values of `N` numbers; empty
+/// if no model has it, and zero for models without it.
+fn corners<T: Copy + Default, const N: usize>(
+    models: &[tobj::Model],
+    of: fn(&tobj::Mesh) -> (&Vec<u32>, &Vec<f32>),
+    convert: fn([f32; N]) -> T,
+) -> Vec<[T; 3]> {
+    if models.iter().all(|model| of(&model.mesh).0.is_empty()) {
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    for tobj::Model { mesh, .. } in models {
+        let (indices, numbers) = of(mesh);
+        let (values, count) = (numbers.as_chunks::<N>().0, mesh.indices.len() / 3);
+        let value = |index: &u32| values.get(*index as usize).map_or(T::default(), |value| convert(*value));
+        found.extend(indices.as_chunks::<3>().0.iter().map(|corners| corners.each_ref().map(value)));
+        found.resize(found.len() - indices.len() / 3 + count, [T::default(); 3]);
+    }
+    found
 }
 
 fn read_stl(path: &Path, bytes: &[u8]) -> Result<Mesh, SimError> {
@@ -223,34 +259,33 @@ fn read_msh(bytes: &[u8]) -> Option<Mesh> {
     let corner =
         |index: usize| number(bytes, first_face + 4 * index).filter(|corner| (*corner as usize) < vertices);
     let triangle = |i: usize| Some([corner(3 * i)?, corner(3 * i + 1)?, corner(3 * i + 2)?]);
+    let triangles = (0..faces).map(triangle).collect::<Option<Vec<_>>>()?;
+    // Normals and texture coordinates are those of the vertices.
+    let numbers =
+        |first: usize, count: usize| (0..count).map(|i| coordinate(first + i)).collect::<Option<Vec<f32>>>();
+    let normals = numbers(3 * vertices, 3 * normals)?;
+    let normals: Vec<Vector> = normals.as_chunks::<3>().0.iter().copied().map(Vector::from_array).collect();
+    let uvs = numbers(3 * vertices + normals.len() * 3, 2 * coordinates)?;
     Some(Mesh {
         vertices_m: (0..vertices).map(vertex).collect::<Option<_>>()?,
-        triangles: (0..faces).map(triangle).collect::<Option<_>>()?,
+        corner_normal: of_corners(&triangles, &normals, vertices),
+        corner_uv: of_corners(&triangles, uvs.as_chunks::<2>().0, vertices),
+        triangles,
         ..Mesh::default()
     })
+}
+
+/// Returns values of vertices for the corners of triangles; empty unless each vertex has one.
+fn of_corners<T: Copy>(triangles: &[[u32; 3]], values: &[T], vertices: usize) -> Vec<[T; 3]> {
+    if values.len() != vertices {
+        return Vec::new();
+    }
+    triangles.iter().map(|corners| corners.map(|corner| values[corner as usize])).collect()
 }
 
 /// Reads a little-endian number of four bytes; `None` beyond the end.
 fn number(bytes: &[u8], at: usize) -> Option<u32> {
     Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?))
-}
-
-fn mean_rgb(path: &Path, bytes: &[u8]) -> Result<[f32; 3], SimError> {
-    let name = || path.display().to_string();
-    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
-    let reader = reader.map_err(|source| unreadable(path, source))?;
-    let picture = reader.decode().map_err(|source| SimError::Texture { path: name(), source })?.into_rgb8();
-    let mut sum = [0.0f64; 3];
-    for pixel in picture.pixels() {
-        for (sum, value) in sum.iter_mut().zip(pixel.0) {
-            *sum += f64::from(value) / 255.0;
-        }
-    }
-    Ok(sum.map(|sum| (sum / picture.pixels().len().max(1) as f64) as f32))
-}
-
-fn unreadable(path: &Path, source: io::Error) -> SimError {
-    SimError::Read { path: path.display().to_string(), source }
 }
 
 #[cfg(test)]
@@ -311,6 +346,29 @@ mod tests {
             assert_eq!(mesh.vertices_m, corners.map(Vector::from));
             assert_eq!(mesh.triangles, [[0, 1, 2]]);
         }
+    }
+
+    /// A triangle whose corners have texture coordinates and normals of their own, and one without.
+    #[test]
+    fn corners_have_the_texture_coordinates_and_normals_of_their_file() {
+        let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.25 0.25\nvt 1 0\nvn 0 0 2\nvn 0 2 2\n\
+            f 1/1/1 2/2/1 3/1/2\n";
+        let mesh = read_geom("tent.obj", obj, r#"scale="1 2 -1""#).expect("an OBJ file");
+        // The reflection swaps two corners. Rows of an image go down.
+        assert_eq!(mesh.corner_uv, [[[0.25, 0.75], [0.25, 0.75], [1.0, 1.0]]]);
+        let slanted = Vector::new(0.0, 0.5, -1.0).normalize();
+        let [first, second, third] = mesh.corner_normal[0];
+        assert_eq!([first, third], [Vector::NEG_Z; 2]);
+        assert!((second - slanted).length() < 1e-6, "{second}");
+        let plain = read_geom("tent.obj", OBJ, "").expect("an OBJ file");
+        assert!(plain.corner_uv.is_empty() && plain.corner_normal.len() == 3);
+
+        let mut msh: Vec<u8> = [3i32, 0, 3, 1].into_iter().flat_map(i32::to_le_bytes).collect();
+        let floats: [f32; 15] = std::array::from_fn(|i| i as f32);
+        msh.extend(floats.iter().flat_map(|number| number.to_le_bytes()));
+        msh.extend([2i32, 1, 0].into_iter().flat_map(i32::to_le_bytes));
+        let mesh = read_geom("tent.msh", msh, "").expect("an MSH file");
+        assert_eq!(mesh.corner_uv, [[[13.0, 14.0], [11.0, 12.0], [9.0, 10.0]]]);
     }
 
     /// MuJoCo subtracts the reference position, rotates the mesh back, and then scales it.

@@ -31,7 +31,7 @@ pub(in crate::mjcf) fn find(path: &Path) -> Option<Document> {
 
 /// Caches a document that names meshes or images. All others are fast to read.
 pub(in crate::mjcf) fn keep(path: &Path, document: &Document) {
-    if document.meshes.is_empty() && document.texture_rgb.is_empty() {
+    if document.meshes.is_empty() && document.textures.is_empty() {
         return;
     }
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);

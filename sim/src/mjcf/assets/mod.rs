@@ -4,3 +4,5 @@ mod concave;
 pub mod files;
 pub mod kept;
 pub mod looks;
+pub mod surface;
+pub mod texture;

@@ -69,14 +69,7 @@ pub(super) const ELEMENTS: &[Element] = &[
         &[&[NAME, CLASS], MESH],
         "files are OBJ, STL and MSH; they lie where the compiler says, or beside an included file",
     ),
-    named(
-        Support::Mapped,
-        "texture",
-        &["asset"],
-        "texture",
-        &[&[NAME], TEXTURE],
-        "of a picture its mean colour is taken",
-    ),
+    named(Support::Mapped, "texture", &["asset"], "texture", &[&[NAME], TEXTURE], "images are PNG"),
     named(Support::Mapped, "material", &["asset", "default"], "material", &[&[NAME, CLASS], MATERIAL], ""),
     element(Support::Ignored, "layer", &["material"], &[], "of a material its colour and texture are taken"),
     element(Support::Refused, "hfield", &["asset"], &[], "write a height field as boxes or as meshes"),
@@ -319,7 +312,8 @@ const MESH: &[Attribute] = &[
     refused(&["builtin", "params"], "write the mesh to a file"),
     refused(&["material"], "state it on the geoms"),
     ignored(&["content_type"], "the file's name says it"),
-    ignored(&["normal", "texcoord", "smoothnormal"], "faces are drawn flat, in one colour"),
+    ignored(&["normal", "texcoord"], "those of files are drawn"),
+    ignored(&["smoothnormal"], "faces without normals in their file are drawn flat"),
 ];
 
 const TEXTURE: &[Attribute] = &[
@@ -354,24 +348,17 @@ const TEXTURE: &[Attribute] = &[
             "vflip",
             "nchannel",
         ],
-        "of a texture its mean colour or its checker is drawn",
+        "a file's image is drawn as it is; on a cube, each face shows the whole",
     ),
 ];
 
 const MATERIAL: &[Attribute] = &[
     mapped(&["texture"], Takes::NameOf("texture")),
     mapped(&["rgba"], COLOR),
+    attribute(Support::Mapped, &["texrepeat"], numbers(1, 2), "for images of files"),
+    attribute(Support::Mapped, &["texuniform"], BOOLEAN, "for images of files"),
     ignored(
-        &[
-            "texrepeat",
-            "texuniform",
-            "emission",
-            "specular",
-            "shininess",
-            "reflectance",
-            "metallic",
-            "roughness",
-        ],
+        &["emission", "specular", "shininess", "reflectance", "metallic", "roughness"],
         "of a material its colour and texture are taken",
     ),
 ];

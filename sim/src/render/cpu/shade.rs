@@ -6,6 +6,7 @@ use rapier3d::math::{Matrix, Pose, Vector};
 use super::contact::ContactMap;
 use super::shadow::ShadowMap;
 use crate::render::scene::prepared::{Prepared, Sheet};
+use crate::render::shading::image::Image;
 use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
 use crate::render::shading::{CONTACT, HIGHLIGHT, LAMP, SAMPLES};
 use crate::render::{Camera, Carrier, Light, Pattern, PlacedScenery};
@@ -24,6 +25,7 @@ pub(super) struct Facet {
     pub slope_1_m: Option<Matrix>,
     pub linear_rgb: [Vector; 2],
     pub pattern: Pattern,
+    /// Map to the frame of the pattern, or to the coordinates of the image.
     pub pattern_from_world: Affine,
     /// True if it belongs to the room, and is darkened by things on it.
     pub carries: bool,
@@ -41,6 +43,8 @@ pub(super) struct Rays {
 /// Adjacent pixels that show one sheet.
 pub(super) struct Strip<'a> {
     pub facet: &'a Facet,
+    /// Image of the facet's part.
+    pub image: Option<&'a Image>,
     /// Column and row of the first sample.
     pub sample: [usize; 2],
     /// Nearness of the samples, from the first one to the right.
@@ -135,18 +139,25 @@ pub(super) fn place(
 fn place_part(facets: &mut [Facet], sheets: &[Sheet], prepared: &Prepared, number: usize, pose: Pose) {
     let part = &prepared.scenery.parts[number];
     let rotation = Matrix::from_quat(pose.rotation);
+    let image_from_mesh = prepared.images[number].as_ref().and_then(|image| image.from_mesh);
     let common = Facet {
         normal: Vector::ZERO,
         slope_1_m: None,
         linear_rgb: prepared.linear_rgb[number],
         pattern: part.pattern,
-        pattern_from_world: part.pattern.frame(pose, prepared.grain[number]),
+        pattern_from_world: match image_from_mesh {
+            Some(from_mesh) => from_mesh.after(pose.inverse()),
+            None => part.pattern.frame(pose, prepared.grain[number]),
+        },
         carries: part.carrier == Carrier::Room,
     };
     for (facet, sheet) in facets.iter_mut().zip(sheets) {
         let slope_1_m = sheet.bend.slope_1_m.map(|slope_1_m| rotation * slope_1_m * rotation.transpose());
         let at_origin = slope_1_m.map_or(Vector::ZERO, |slope_1_m| slope_1_m * pose.translation);
         *facet = Facet { normal: rotation * sheet.bend.normal - at_origin, slope_1_m, ..common };
+        if let Some(uv) = sheet.uv {
+            facet.pattern_from_world = uv.affine().after(pose.inverse());
+        }
     }
 }
 
@@ -224,8 +235,15 @@ impl Surfaces {
             );
             self.ray.set(at, ray);
             self.point_m.set(at, point_m);
-            self.normal.set(at, strip.facet.normals(&point_m));
-            self.albedo.set(at, strip.facet.albedo(&point_m));
+            let normal = strip.facet.normals(&point_m);
+            self.normal.set(at, normal);
+            self.albedo.set(
+                at,
+                match strip.image {
+                    None => strip.facet.albedo(&point_m),
+                    Some(image) => strip.facet.image_rgb(image, rays, [&ray, &point_m, &normal], &depth_m),
+                },
+            );
             *block_mut(&mut self.pixel_share, at) = [strip.share; N];
             *block_mut(&mut self.open_share, at) = [1.0; N];
             *block_mut(&mut self.pixels, at) = lanes::<u32, N>(|i| (strip.first_pixel + start + i) as u32);
@@ -341,6 +359,62 @@ impl Facet {
         axes(
             #[inline(always)]
             |axis| lanes(|i| normal[axis][i] + (x[axis] * x_m[i] + y[axis] * y_m[i] + z[axis] * z_m[i])),
+        )
+    }
+
+    /// Returns the linear colours of the image on the surface, without light, of points that have rays,
+    /// places, normals and depths.
+    #[inline(always)]
+    fn image_rgb<const N: usize>(
+        &self,
+        image: &Image,
+        rays: &Rays,
+        [ray, point_m, normal]: [&[Lanes<N>; 3]; 3],
+        depth_m: &Lanes<N>,
+    ) -> [Lanes<N>; 3] {
+        let at = self.pattern_from_world.map_lanes(point_m);
+        let along_ray = self.pattern_from_world.derivatives(ray);
+        let facing: Lanes<N> = lanes(|i| {
+            let facing = normal[0][i] * ray[0][i] + normal[1][i] * ray[1][i] + normal[2][i] * ray[2][i];
+            if facing == 0.0 { f32::INFINITY } else { facing }
+        });
+        let by = |step: Vector| self.image_step(step, [&along_ray, normal], &facing, depth_m);
+        let (x, y) = (by(rays.right_ray * SAMPLES as f32), by(rays.down_ray * SAMPLES as f32));
+        let mut albedo = [[0.0; N]; 3];
+        for i in 0..N {
+            let place = image.place(
+                [at[0][i], at[1][i], at[2][i]],
+                [x[0][i], x[1][i], x[2][i]],
+                [y[0][i], y[1][i], y[2][i]],
+            );
+            let rgb = image.rgb(&place);
+            for (axis, albedo) in albedo.iter_mut().enumerate() {
+                albedo[i] = rgb[axis] * self.linear_rgb[0][axis];
+            }
+        }
+        albedo
+    }
+
+    /// Returns the differences of image coordinates between points and those that rays meet on the same
+    /// plane which are turned by `step_ray`. Points have derivatives of the coordinates along their rays,
+    /// normals, and scalar products of both.
+    #[inline(always)]
+    fn image_step<const N: usize>(
+        &self,
+        step_ray: Vector,
+        [along_ray, normal]: [&[Lanes<N>; 3]; 2],
+        facing: &Lanes<N>,
+        depth_m: &Lanes<N>,
+    ) -> [Lanes<N>; 3] {
+        let deeper: Lanes<N> = lanes(|i| {
+            (normal[0][i] * step_ray.x + normal[1][i] * step_ray.y + normal[2][i] * step_ray.z) / facing[i]
+        });
+        axes(
+            #[inline(always)]
+            |row| {
+                let along_step = self.pattern_from_world.0[row].0.dot(step_ray);
+                lanes(|i| (along_step - along_ray[row][i] * deeper[i]) * depth_m[i])
+            },
         )
     }
 

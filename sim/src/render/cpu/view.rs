@@ -104,8 +104,10 @@ impl View<'_> {
             }
             return;
         }
+        let part = self.prepared.sheets[sheet as usize].part;
         let strip = Strip {
             facet: &self.facets[sheet as usize],
+            image: self.prepared.images[part as usize].as_ref(),
             sample,
             nearness_1_m: &self.target.nearness_1_m(sample[1])[sample[0]..],
             first_pixel: pixels.start,

@@ -2,6 +2,7 @@
 //! triangle that each sample sees, then its colour. The two check each other.
 
 mod device;
+mod images;
 mod passes;
 mod proof;
 mod scene;

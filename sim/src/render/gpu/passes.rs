@@ -14,6 +14,9 @@ pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 /// Format of triangle numbers.
 pub(super) const TRIANGLES: TextureFormat = TextureFormat::R32Uint;
 
+/// Number of storage buffers of a scene.
+const SCENE_BUFFERS: usize = 6;
+
 pub(super) struct Passes {
     /// Bindings of the scene and the view.
     pub scene: BindGroupLayout,
@@ -35,11 +38,9 @@ impl Passes {
         });
         let all = ShaderStages::VERTEX_FRAGMENT | ShaderStages::COMPUTE;
         let storage = |read_only| buffer(BufferBindingType::Storage { read_only });
-        let scene = layout(
-            device,
-            all,
-            &[buffer(BufferBindingType::Uniform), storage(true), storage(true), storage(true), storage(true)],
-        );
+        let mut of_scene = vec![buffer(BufferBindingType::Uniform)];
+        of_scene.extend([storage(true); SCENE_BUFFERS]);
+        let scene = layout(device, all, &of_scene);
         let targets = layout(
             device,
             ShaderStages::COMPUTE,

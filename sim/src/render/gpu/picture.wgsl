@@ -33,7 +33,8 @@ struct Part {
     // Linear colours, with the pattern between them and the axis of the mesh that its grain runs along.
     rgb: vec4f,
     second_rgb: vec4f,
-    // Id, whether it casts a shadow, and whether things stand on it.
+    // Id, whether it casts a shadow, whether things stand on it, and where its image's head is in `texels`; 0
+    // without an image.
     flags: vec4u,
 }
 
@@ -52,6 +53,17 @@ struct Face {
 @group(0) @binding(3) var<storage, read> parts: array<Part>;
 // Heights of what carries things, and how dark it is there.
 @group(0) @binding(4) var<storage, read> contacts: array<vec2f>;
+
+// Of each triangle, for images: gradients of its three coordinates in its mesh's frame, with their values at the
+// first corner.
+struct Coordinates {
+    u: vec4f,
+    v: vec4f,
+    w: vec4f,
+}
+@group(0) @binding(5) var<storage, read> coordinates: array<Coordinates>;
+// Of each image: width, height, number of levels, whether it is on a cube; then the levels, the largest first.
+@group(0) @binding(6) var<storage, read> texels: array<u32>;
 
 @group(1) @binding(0) var shadow: texture_depth_2d;
 @group(1) @binding(1) var samples: texture_2d<u32>;
@@ -206,18 +218,132 @@ fn albedo(part: Part, point_m: vec3f) -> vec3f {
     return mix(part.rgb.xyz, part.second_rgb.xyz, second_share(part, point_m));
 }
 
+// Place on an image, and its derivatives in the picture's x and y.
+struct ImagePlace {
+    uv: vec2f,
+    by_x: vec2f,
+    by_y: vec2f,
+}
+
+fn coordinates_of(triangle: u32, direction: vec3f) -> vec3f {
+    let rows = coordinates[triangle];
+    return vec3f(dot(rows.u.xyz, direction), dot(rows.v.xyz, direction), dot(rows.w.xyz, direction));
+}
+
+// Step on a surface's plane for a step of the ray.
+fn surface_step_m(ray: vec3f, ray_step: vec3f, depth_m: f32, normal: vec3f) -> vec3f {
+    let towards = dot(normal, ray);
+    let along = select(dot(normal, ray_step) / towards, 0.0, towards == 0.0);
+    return (ray_step - ray * along) * depth_m;
+}
+
+fn on_cube(at: vec3f, by_x: vec3f, by_y: vec3f) -> ImagePlace {
+    let size = abs(at);
+    let sides = select(vec3f(1.0), vec3f(-1.0), at < vec3f(0.0));
+    var across = vec3f(sides.z, 0.0, 0.0);
+    var down = vec3f(0.0, -1.0, 0.0);
+    var along = vec3f(0.0, 0.0, sides.z);
+    if size.x >= size.y && size.x >= size.z {
+        across = vec3f(0.0, 0.0, -sides.x);
+        along = vec3f(sides.x, 0.0, 0.0);
+    } else if size.y >= size.z {
+        across = vec3f(1.0, 0.0, 0.0);
+        down = vec3f(0.0, 0.0, sides.y);
+        along = vec3f(0.0, sides.y, 0.0);
+    }
+    let per_along = 1.0 / max(dot(along, at), 1e-30);
+    let place = vec2f(dot(across, at), dot(down, at)) * per_along;
+    let step_x = vec2f(dot(across, by_x), dot(down, by_x)) - place * dot(along, by_x);
+    let step_y = vec2f(dot(across, by_y), dot(down, by_y)) - place * dot(along, by_y);
+    return ImagePlace(0.5 * place + 0.5, 0.5 * step_x * per_along, 0.5 * step_y * per_along);
+}
+
+// sRGB values of a texel, 0 to 1.
+fn values_of(texel: u32) -> vec3f {
+    return vec3f(vec3u(texel, texel >> 8u, texel >> 16u) & vec3u(255u)) / 255.0;
+}
+
+fn decoded(value: vec3f) -> vec3f {
+    return select(pow((value + 0.055) / 1.055, vec3f(2.4)), value / 12.92, value <= vec3f(0.04045));
+}
+
+// sRGB values at a place on one level, whose first texel has this number.
+fn blend(first: u32, size: vec2u, place: vec2f, is_cube: bool) -> vec3f {
+    var at = place * vec2f(size) - 0.5;
+    if is_cube {
+        at = clamp(at, vec2f(0.0), vec2f(size - 1u));
+    }
+    let low = floor(at);
+    let share = at - low;
+    let corner = vec2i(low);
+    let left = vec2u(corner) & (size - 1u);
+    let right = vec2u(corner + 1) & (size - 1u);
+    let upper = first + left.y * size.x;
+    let lower = first + right.y * size.x;
+    return mix(
+        mix(values_of(texels[upper + left.x]), values_of(texels[upper + right.x]), share.x),
+        mix(values_of(texels[lower + left.x]), values_of(texels[lower + right.x]), share.x),
+        share.y,
+    );
+}
+
+// Binary logarithm, linear between powers of two.
+fn stepped_log2(x: f32) -> f32 {
+    return f32(bitcast<u32>(x)) / 8388608.0 - 127.0;
+}
+
+fn image_rgb(head: u32, place: ImagePlace) -> vec3f {
+    var size = vec2u(texels[head], texels[head + 1u]);
+    let is_cube = texels[head + 3u] != 0u;
+    let by_x = place.by_x * vec2f(size);
+    let by_y = place.by_y * vec2f(size);
+    let last = f32(texels[head + 2u] - 1u);
+    let level = clamp(0.5 * stepped_log2(max(dot(by_x, by_x), dot(by_y, by_y))), 0.0, last);
+    var first = head + 4u;
+    for (var i = 0u; i < u32(level); i++) {
+        first += size.x * size.y;
+        size = max(size / 2u, vec2u(1u));
+    }
+    let nearer = blend(first, size, place.uv, is_cube);
+    let share = clamp((fract(level) - 0.5) / BLENDED_SHARE + 0.5, 0.0, 1.0);
+    if share == 0.0 {
+        return decoded(nearer);
+    }
+    let farther = blend(first + size.x * size.y, max(size / 2u, vec2u(1u)), place.uv, is_cube);
+    return decoded(mix(nearer, farther, share));
+}
+
+// Linear colour of the image on a triangle, where a ray meets it.
+fn image_at(triangle: u32, part: Part, ray: vec3f, depth_m: f32, normal: vec3f, from_corner_m: vec3f) -> vec3f {
+    let step_x = turned_back(part, surface_step_m(ray, 2.0 * view.right_ray.xyz, depth_m, normal));
+    let step_y = turned_back(part, surface_step_m(ray, 2.0 * view.down_ray.xyz, depth_m, normal));
+    let rows = coordinates[triangle];
+    let at = coordinates_of(triangle, from_corner_m) + vec3f(rows.u.w, rows.v.w, rows.w.w);
+    let by_x = coordinates_of(triangle, step_x);
+    let by_y = coordinates_of(triangle, step_y);
+    var place = ImagePlace(at.xy, by_x.xy, by_y.xy);
+    if texels[part.flags.w + 3u] != 0u {
+        place = on_cube(at, by_x, by_y);
+    }
+    return part.rgb.xyz * image_rgb(part.flags.w, place);
+}
+
 // Linear colour of what a ray sees.
 fn colour(triangle: u32, ray: vec3f) -> vec3f {
     let part = part_of(triangle);
     let face = faces[triangle];
-    let point_m = view.eye_m.xyz + ray / nearness_1_m(triangle, ray);
+    let depth_m = 1.0 / nearness_1_m(triangle, ray);
+    let point_m = view.eye_m.xyz + ray * depth_m;
     let from_corner_m = turned_back(part, point_m - in_world(part, corner_m(3u * triangle)));
     let bend = mat3x3f(face.bend_x.xyz, face.bend_y.xyz, face.bend_z.xyz);
     let eye_direction = -normalize(ray);
     let outwards = normalize(turned(part, face.normal.xyz + bend * from_corner_m));
     let towards_eye = dot(outwards, eye_direction);
     let normal = outwards * select(1.0, -1.0, towards_eye < 0.0);
-    let base = albedo(part, point_m);
+    var base = albedo(part, point_m);
+    if part.flags.w != 0u {
+        base = image_at(triangle, part, ray, depth_m, normal, from_corner_m);
+    }
     let ambient = mix(view.from_below.xyz, view.from_above.xyz, normal.z * 0.5 + 0.5);
     let unlit = base * (ambient + LAMP * abs(towards_eye));
     let open = select(1.0, 1.0 - CONTACT * darkness(point_m), part.flags.z != 0u);

@@ -18,6 +18,7 @@ pub fn scenery() -> Scenery {
         carrier: Carrier::Room,
         carrier_from_mesh: Pose::IDENTITY,
         rgb,
+        image: None,
         pattern,
         id,
         casts_shadow: true,

@@ -5,6 +5,7 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{BindGroup, Buffer, BufferUsages};
 
 use super::device::Gpu;
+use super::images::SceneImages;
 use super::targets::bind;
 use crate::render::cpu::contact::ContactMap;
 use crate::render::scene::bend::Bend;
@@ -22,6 +23,10 @@ pub(super) struct SceneBuffers {
     faces: Buffer,
     parts: Buffer,
     contacts: Buffer,
+    coordinates: Buffer,
+    texels: Buffer,
+    /// Index of the head of each part's image in `texels`.
+    heads: Vec<u32>,
     views: Vec<SceneView>,
     /// Number of corners of all triangles.
     pub corners: u32,
@@ -41,12 +46,16 @@ impl SceneBuffers {
         let bends = prepared.sheet_of.iter().map(|sheet| prepared.sheets[*sheet as usize].bend);
         let firsts = corners.iter().step_by(3);
         let faces: Vec<[u32; 16]> = bends.zip(firsts).map(|(bend, corner)| face(bend, *corner)).collect();
+        let images = SceneImages::of(prepared, gpu.device.limits().max_storage_buffer_binding_size.into());
         let written = BufferUsages::COPY_DST | BufferUsages::STORAGE;
         SceneBuffers {
             corner_numbers: initialised(gpu, corners.as_flattened(), BufferUsages::STORAGE),
             faces: initialised(gpu, faces.as_flattened(), BufferUsages::STORAGE),
             parts: initialised(gpu, &vec![0; prepared.scenery.parts.len() * PART_NUMBERS], written),
             contacts: initialised(gpu, &vec![0; 2 * CONTACT_TEXELS * CONTACT_TEXELS], written),
+            coordinates: initialised(gpu, images.coordinates.as_flattened(), BufferUsages::STORAGE),
+            texels: initialised(gpu, &images.texels, BufferUsages::STORAGE),
+            heads: images.heads,
             views: Vec::new(),
             corners: corners.len() as u32,
         }
@@ -60,17 +69,28 @@ impl SceneBuffers {
     fn add_view(&mut self, gpu: &Gpu) {
         let usage = BufferUsages::COPY_DST | BufferUsages::UNIFORM;
         let numbers = initialised(gpu, &[0; VIEW_NUMBERS], usage);
-        let buffers = [&numbers, &self.corner_numbers, &self.faces, &self.parts, &self.contacts];
+        let buffers = [
+            &numbers,
+            &self.corner_numbers,
+            &self.faces,
+            &self.parts,
+            &self.contacts,
+            &self.coordinates,
+            &self.texels,
+        ];
         let group = bind(gpu, &gpu.passes.scene, buffers.map(|buffer| buffer.as_entire_binding()));
         self.views.push(SceneView { numbers, group });
     }
 
     /// Uploads the pose of every part.
     pub(super) fn place(&self, gpu: &Gpu, prepared: &Prepared, placed: &PlacedScenery, contact: &ContactMap) {
-        let colours = prepared.linear_rgb.iter().zip(&prepared.grain);
-        let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).zip(colours);
-        let numbers: Vec<[u32; PART_NUMBERS]> =
-            parts.map(|((part, pose), (rgb, grain))| placed_part(part, *pose, *rgb, *grain)).collect();
+        let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).enumerate();
+        let numbers: Vec<[u32; PART_NUMBERS]> = parts
+            .map(|(number, (part, pose))| {
+                let (rgb, grain) = (prepared.linear_rgb[number], prepared.grain[number]);
+                placed_part(part, *pose, rgb, grain, self.heads[number])
+            })
+            .collect();
         gpu.queue.write_buffer(&self.parts, 0, &bytes(numbers.as_flattened()));
         gpu.queue.write_buffer(&self.contacts, 0, &bytes(&bits(contact.texel_values.as_flattened())));
     }
@@ -146,7 +166,13 @@ fn face(bend: Bend, [x, y, z, _]: [u32; 4]) -> [u32; 16] {
     numbers
 }
 
-fn placed_part(part: &Part, pose: Pose, [first, second]: [Vector; 2], grain: usize) -> [u32; PART_NUMBERS] {
+fn placed_part(
+    part: &Part,
+    pose: Pose,
+    [first, second]: [Vector; 2],
+    grain: usize,
+    image_head: u32,
+) -> [u32; PART_NUMBERS] {
     let (matrix, t) = (Matrix::from_quat(pose.rotation), pose.translation);
     let (x, y, z) = (matrix.row(0), matrix.row(1), matrix.row(2));
     let pattern = match part.pattern {
@@ -164,7 +190,7 @@ fn placed_part(part: &Part, pose: Pose, [first, second]: [Vector; 2], grain: usi
         [second.x, second.y, second.z, grain as f32],
     ];
     let mut numbers = [0; PART_NUMBERS];
-    let flags = [part.id, part.casts_shadow.into(), (part.carrier == Carrier::Room).into(), 0];
+    let flags = [part.id, part.casts_shadow.into(), (part.carrier == Carrier::Room).into(), image_head];
     for (number, bits) in numbers.iter_mut().zip(rows.as_flattened().iter().map(|x| x.to_bits()).chain(flags))
     {
         *number = bits;

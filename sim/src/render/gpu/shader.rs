@@ -5,6 +5,7 @@ use rapier3d::math::Vector;
 use crate::render::cpu::contact::SINK_M;
 use crate::render::scene::camera::NEAR_M;
 use crate::render::scene::prepared::NOTHING;
+use crate::render::shading::image::BLENDED_SHARE;
 use crate::render::shading::pattern::{
     BANDS_PER_M, CHECKER_PER_M, LINES_PER_M, STRAY, TEXT_GAP, TEXT_PER_M, THREADS_PER_M, WORD_GAP,
     WORD_STRAY, WORDS_PER_M,
@@ -38,6 +39,7 @@ pub(super) fn text() -> String {
         ("OUTLINE", OUTLINE),
         ("OUTLINE_DEPTH_STEP", OUTLINE_DEPTH_STEP),
         ("SRGB_STEPS", SRGB_STEPS as f32),
+        ("BLENDED_SHARE", BLENDED_SHARE),
     ];
     let Vector { x, y, z } = SKY;
     let sky = format!("const SKY = vec3f({x:?}f, {y:?}f, {z:?}f);\n");

@@ -4,6 +4,7 @@
 use std::f32::consts::PI;
 
 use super::together::counts;
+use crate::mjcf::Document;
 use crate::render::{
     Camera, Cameras, Frame, RenderRequest, Renderer, RendererKind, Scenery, cpu, render_colours_together,
 };
@@ -92,6 +93,48 @@ fn both_renderers_draw_the_same() {
         }
     }
     assert_ne!(gpu.name(), embedded.name(), "the device did not fail");
+}
+
+/// A kitchen with images on meshes.
+const KITCHEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../episodes/tests/scenes/kitchen");
+/// The image of its floor, along z and on cubes.
+const SHAPES: &str = r#"<asset>
+        <texture name="flat" type="2d" file="kitchen_floor_floor_texture.png"/>
+        <texture name="cube" type="cube" file="kitchen_floor_floor_texture.png"/>
+        <material name="flat" texture="flat" texrepeat="3 5" rgba="0.5 1 1 1"/>
+        <material name="cube" texture="cube" texuniform="true"/>
+    </asset>
+    <worldbody>
+        <geom type="plane" size="3 3 1" material="flat"/>
+        <geom type="box" size="0.3 0.2 0.4" pos="2.2 1.4 0.4" euler="0 0 40" material="cube"/>
+        <geom type="ellipsoid" size="0.3 0.4 0.5" pos="1.4 1.6 0.5" material="cube"/>
+    </worldbody>"#;
+
+#[test]
+fn images_on_surfaces_are_the_same() {
+    let shapes = format!(r#"<mujoco><compiler texturedir="{KITCHEN}/meshes"/>{SHAPES}</mujoco>"#);
+    let documents = [
+        Document::read(format!("{KITCHEN}/scene.xml").as_ref()).expect("a scene"),
+        Document::parse("shapes.xml", &shapes).expect("a scene"),
+    ];
+    let eye_m = Vector::new(0.6, 0.2, 1.5);
+    let camera = Camera {
+        world_from_camera: Pose::look_at_rh(eye_m, Vector::new(2.2, 1.7, 0.7), Vector::Z).inverse(),
+        vertical_fov_rad: 0.9,
+        width: 320,
+        height: 240,
+        blur_px: 0.0,
+    };
+    for document in documents {
+        let world = World::of_scene(document).expect("a world");
+        let scenery = Scenery::of(&world);
+        assert!(scenery.parts.iter().any(|part| part.image.is_some()));
+        let Some(mut gpu) = gpu(scenery) else { return };
+        let expected = cpu(Scenery::of(&world)).render(&world.present(), &camera);
+        let psnr_db = psnr_db(&gpu.render(&world.present(), &camera), &expected);
+        assert!(psnr_db >= MIN_PSNR_DB, "{psnr_db:.1} dB");
+        assert_ne!(gpu.name(), RendererKind::Cpu.name(), "the device did not fail");
+    }
 }
 
 #[test]

@@ -2,16 +2,17 @@
 
 use std::f32::consts::PI;
 
-use rapier3d::math::Vector;
+use rapier3d::math::{Pose, Vector};
 
 use super::directions::{cosine_about, facet_about};
 use super::lights::{Beam, Lights};
 use super::sequence::IndependentNumbers;
-use super::space::body::MetSides;
+use super::space::body::{MetSides, PointUv};
 use super::space::{Space, Spot};
 use crate::render::scene::prepared::Prepared;
+use crate::render::shading::image::{Image, ImagePlace};
 use crate::render::shading::lanes::Affine;
-use crate::render::{Pattern, PlacedScenery};
+use crate::render::{Part, Pattern, PlacedScenery};
 
 /// Most surfaces that light is reflected by after the one that is seen.
 const MAX_BOUNCES: u32 = 4;
@@ -25,12 +26,15 @@ const MAX_PATH_VALUE: f32 = 6.0;
 const COAT: f32 = 0.04;
 const COAT_WIDTH_2: f32 = 0.015;
 
+/// Width of the spots that reflect light on others, for images on them.
+const REFLECTED_WIDTH_M: f32 = 0.02;
+
 /// A state of a scenery, ready to be traced.
 pub struct Scene<'a> {
     pub space: Space<'a>,
     pub prepared: &'a Prepared,
     pub lights: &'a Lights,
-    /// Map from the world to the frame of each part's pattern.
+    /// Map from the world to the frame of each part's pattern, or to the coordinates of its image.
     pub patterns: Vec<Affine>,
 }
 
@@ -42,17 +46,28 @@ pub const DIRECT: usize = 0;
 pub const INDIRECT: usize = 1;
 pub const COATED: usize = 2;
 
-/// Returns the map from the world to the frame of each part's pattern.
+/// Returns the map from the world to the frame of each part's pattern, or to the coordinates of its image.
 pub fn patterns(prepared: &Prepared, placed: &PlacedScenery) -> Vec<Affine> {
-    let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).zip(&prepared.grain);
-    parts.map(|((part, pose), grain)| part.pattern.frame(*pose, *grain)).collect()
+    let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).enumerate();
+    let map = |(number, (part, pose)): (usize, (&Part, &Pose))| {
+        let image_from_mesh = prepared.images[number].as_ref().and_then(|image| image.from_mesh);
+        image_from_mesh.map_or_else(
+            || part.pattern.frame(*pose, prepared.grain[number]),
+            |from_mesh| from_mesh.after(pose.inverse()),
+        )
+    };
+    parts.map(map).collect()
 }
 
 impl Scene<'_> {
-    /// Returns the linear colour of a surface, without light.
-    pub fn albedo(&self, part: u32, point_m: Vector) -> Vector {
-        let part = part as usize;
+    /// Returns the linear colour of a surface, without light, as a mean over about `width_m`.
+    pub fn albedo(&self, spot: &Spot, width_m: f32) -> Vector {
+        let (part, point_m) = (spot.part as usize, spot.point_m);
         let [first, second] = self.prepared.linear_rgb[part];
+        if let Some(image) = &self.prepared.images[part] {
+            let place = self.image_place(image, spot, width_m);
+            return first * Vector::from(image.rgb(&place));
+        }
         match self.prepared.scenery.parts[part].pattern {
             Pattern::Plain => first,
             pattern => {
@@ -60,6 +75,17 @@ impl Scene<'_> {
                 first + (second - first) * pattern.shares(point_m)[0]
             }
         }
+    }
+
+    fn image_place(&self, image: &Image, spot: &Spot, width_m: f32) -> ImagePlace {
+        if image.from_mesh.is_none() {
+            let PointUv { uv, uv_1_m } = spot.uv;
+            return ImagePlace { uv, x_step_uv: [uv_1_m * width_m, 0.0], y_step_uv: [0.0, uv_1_m * width_m] };
+        }
+        let map = &self.patterns[spot.part as usize];
+        let across = spot.face_normal.any_orthonormal_vector();
+        let by = |direction: Vector| map.0.map(|(axis, _)| axis.dot(direction * width_m));
+        image.place(map.map(spot.point_m), by(across), by(spot.face_normal.cross(across)))
     }
 
     /// Adds the light of one point of a lamp to the layers of a seen point.
@@ -126,7 +152,7 @@ impl Scene<'_> {
                 break;
             };
             let spot = self.space.spot(start_m, direction, &hit);
-            carried_rgb *= self.albedo(spot.part, spot.point_m);
+            carried_rgb *= self.albedo(&spot, REFLECTED_WIDTH_M);
             let beam = self.lights.beam(spot.start_m, numbers.pair());
             sum_rgb += carried_rgb * self.lit_rgb(&spot, &beam);
             if bounce >= SURE_BOUNCES {

@@ -105,6 +105,7 @@ fn red_wall() -> (Scenery, Camera) {
         carrier: Carrier::Room,
         carrier_from_mesh: Pose::from_translation(at_m),
         rgb,
+        image: None,
         pattern: Pattern::Plain,
         id: 1,
         casts_shadow: true,
@@ -156,7 +157,7 @@ fn reference(view: &PathView, camera: &Camera, exposure_factor: f32) -> Vec<u8> 
                 let ray = (spot.point_m - view.eye_m()).normalize();
                 let seed = PixelSeed::of([column as u32 + 512 * sample, row as u32 + 64]);
                 let [direct, indirect, coated] = view.scene.lit_layers(&spot, ray, seed, SampleCount(1));
-                lit_rgb += view.scene.albedo(spot.part, spot.point_m) * (direct + indirect) + coated;
+                lit_rgb += view.scene.albedo(&spot, 0.0) * (direct + indirect) + coated;
                 lit += 1.0;
             }
             let lit_share = lit / REFERENCE_PATHS as f32;

@@ -99,12 +99,17 @@ impl<'a> PathView<'a> {
         Some((depth_m, self.scene.space.spot(eye_m, ray, &hit)))
     }
 
+    /// Returns the width of a pixel at the distance of a surface.
+    fn pixel_m(&self, spot: &Spot) -> f32 {
+        (spot.point_m - self.eye_m()).length() / self.lens.focal_px
+    }
+
     fn seen(&self, spot: &Spot) -> SeenSurface {
         SeenSurface {
             id: self.scene.prepared.scenery.parts[spot.part as usize].id,
             point_m: spot.point_m,
             normal: spot.normal,
-            albedo: self.scene.albedo(spot.part, spot.point_m),
+            albedo: self.scene.albedo(spot, self.pixel_m(spot)),
         }
     }
 }

@@ -4,13 +4,21 @@ use std::f32::consts::{PI, TAU};
 
 use rapier3d::math::Vector;
 
-use crate::mjcf::Primitive;
+use crate::mjcf::{Mesh, Primitive};
 
 /// A corner of a triangle, in the mesh's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vertex {
     pub position_m: Vector,
     pub normal: Vector,
+    /// Texture coordinates: to the right and down from an image's top left corner; 0 without.
+    pub uv: [f32; 2],
+}
+
+impl Vertex {
+    fn new(position_m: Vector, normal: Vector) -> Vertex {
+        Vertex { position_m, normal, uv: [0.0; 2] }
+    }
 }
 
 /// Triangles, counter-clockwise seen from outside.
@@ -48,7 +56,7 @@ impl TriangleMesh {
                 let (points_m, triangles) = rapier3d::parry::transformation::convex_hull(vertices_m);
                 TriangleMesh::faceted(&points_m, &triangles)
             }
-            Primitive::Mesh(mesh) => TriangleMesh::faceted(&mesh.vertices_m, &mesh.triangles),
+            Primitive::Mesh(mesh) => TriangleMesh::of_file(mesh),
         }
     }
 
@@ -81,13 +89,13 @@ impl TriangleMesh {
             })
         };
         for z in [half_length_m, -half_length_m] {
-            mesh.vertices.extend(rim(z).map(|(position_m, normal)| Vertex { position_m, normal }));
+            mesh.vertices.extend(rim(z).map(|(position_m, normal)| Vertex::new(position_m, normal)));
         }
         mesh.join(0, segments + 1, segments);
         for z in [half_length_m, -half_length_m] {
             let normal = Vector::Z * z.signum();
             let first = mesh.vertices.len() as u32;
-            mesh.vertices.extend(rim(z).map(|(position_m, _)| Vertex { position_m, normal }));
+            mesh.vertices.extend(rim(z).map(|(position_m, _)| Vertex::new(position_m, normal)));
             for i in 1..segments - 1 {
                 let fan = if z > 0.0 { [0, i, i + 1] } else { [0, i + 1, i] };
                 mesh.triangles.push(fan.map(|corner| first + corner));
@@ -108,7 +116,7 @@ impl TriangleMesh {
                 let first = mesh.vertices.len() as u32;
                 for (a, b) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
                     let corner = normal + u * a + v * b;
-                    mesh.vertices.push(Vertex { position_m: corner * half_extents_m, normal });
+                    mesh.vertices.push(Vertex::new(corner * half_extents_m, normal));
                 }
                 mesh.triangles.push([first, first + 1, first + 2]);
                 mesh.triangles.push([first, first + 2, first + 3]);
@@ -121,7 +129,7 @@ impl TriangleMesh {
     pub fn plane(half_extents_m: [f32; 2]) -> TriangleMesh {
         let [x, y] = half_extents_m.map(|half_m| if half_m > 0.0 { half_m } else { PLANE_M });
         let corners = [(-x, -y), (x, -y), (x, y), (-x, y)];
-        let vertex = |(x, y)| Vertex { position_m: Vector::new(x, y, 0.0), normal: Vector::Z };
+        let vertex = |(x, y)| Vertex::new(Vector::new(x, y, 0.0), Vector::Z);
         TriangleMesh { vertices: corners.map(vertex).to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]] }
     }
 
@@ -132,10 +140,30 @@ impl TriangleMesh {
             let [a, b, c] = triangle.map(|corner| points_m[corner as usize]);
             let normal = (b - a).cross(c - a).normalize_or_zero();
             let first = mesh.vertices.len() as u32;
-            mesh.vertices.extend([a, b, c].map(|position_m| Vertex { position_m, normal }));
+            mesh.vertices.extend([a, b, c].map(|position_m| Vertex::new(position_m, normal)));
             mesh.triangles.push([first, first + 1, first + 2]);
         }
         mesh
+    }
+
+    /// Returns the triangles of a file. They are flat where the file gives no normals.
+    fn of_file(file: &Mesh) -> TriangleMesh {
+        let mut mesh = TriangleMesh::faceted(&file.vertices_m, &file.triangles);
+        for (vertex, normal) in mesh.vertices.iter_mut().zip(file.corner_normal.as_flattened()) {
+            if *normal != Vector::ZERO {
+                vertex.normal = *normal;
+            }
+        }
+        for (vertex, uv) in mesh.vertices.iter_mut().zip(file.corner_uv.as_flattened()) {
+            vertex.uv = *uv;
+        }
+        mesh
+    }
+
+    /// Removes the texture coordinates.
+    pub fn without_uvs(mut self) -> TriangleMesh {
+        self.vertices.iter_mut().for_each(|vertex| vertex.uv = [0.0; 2]);
+        self
     }
 
     /// Returns the centre and the radius of a sphere around the mesh.
@@ -182,7 +210,7 @@ impl TriangleMesh {
             let (sin, cos) = (TAU * i as f32 / segments as f32).sin_cos();
             let normal = Vector::new(across * cos, across * sin, polar_rad.cos());
             let position_m = normal * radius_m + Vector::new(0.0, 0.0, shift_m);
-            self.vertices.push(Vertex { position_m, normal });
+            self.vertices.push(Vertex::new(position_m, normal));
         }
     }
 

@@ -7,11 +7,12 @@ mod hidden;
 pub mod mesh;
 pub mod prepared;
 pub mod shared;
+pub mod sheets;
 mod visible;
 
 use rapier3d::math::{Pose, Vector};
 
-use crate::mjcf::{Geom, Primitive};
+use crate::mjcf::{Geom, Primitive, SurfaceImage};
 use crate::render::{Light, Pattern, SharedMesh};
 use crate::{Step, World};
 
@@ -30,8 +31,10 @@ pub struct Part {
     pub mesh: SharedMesh,
     pub carrier: Carrier,
     pub carrier_from_mesh: Pose,
-    /// sRGB, 0 to 1.
+    /// sRGB, 0 to 1. With an image it is the mean colour.
     pub rgb: [f32; 3],
+    /// Image on the surface, in place of a pattern.
+    pub image: Option<SurfaceImage>,
     pub pattern: Pattern,
     /// Id in [`crate::render::Frame::ids`]; parts of one thing share one. 0 is the background.
     pub id: u32,
@@ -143,6 +146,7 @@ fn part(geom: &Geom, mesh: SharedMesh, carrier: Carrier, [r, g, b, _]: [f32; 4],
         mesh,
         carrier,
         carrier_from_mesh: geom.body_from_geom,
+        image: geom.image.clone(),
         rgb: geom.checker_rgb.map_or([r, g, b], |[first, _]| first),
         pattern: match geom.checker_rgb {
             Some([_, second]) => Pattern::Checker(second),

@@ -4,8 +4,14 @@ use rapier3d::math::Vector;
 
 use super::bend::Bend;
 use super::shared::MeshGeometry;
+use super::sheets::{MeshSheet, UvMap};
+use crate::render::shading::image::Image;
 use crate::render::shading::linear;
 use crate::render::{Part, Pattern, Scenery};
+
+/// Limits of the factor by which an image's texels are multiplied: nearly black images stay so.
+const MIN_MEAN: f32 = 1e-6;
+const MAX_TINT: f32 = 8.0;
 
 /// Mark of a sample without a surface.
 pub const NOTHING: u32 = u32::MAX;
@@ -13,13 +19,15 @@ pub const NOTHING: u32 = u32::MAX;
 pub struct Prepared {
     pub scenery: Scenery,
     pub sheets: Vec<Sheet>,
+    /// The image of each part.
+    pub images: Vec<Option<Image>>,
     /// The number of each triangle's sheet, with triangles counted part by part.
     pub sheet_of: Vec<u32>,
     /// Number of the first triangle of each part.
     first: Vec<usize>,
     /// Id in images of each sheet.
     ids: Vec<u32>,
-    /// The two colours of each part.
+    /// The two colours of each part. With an image, its texels are multiplied by the first.
     pub linear_rgb: Vec<[Vector; 2]>,
     /// Axis of each part's mesh that comes first in its pattern: the one that a grain runs along.
     pub grain: Vec<usize>,
@@ -30,6 +38,8 @@ pub struct Prepared {
 pub struct Sheet {
     pub part: u32,
     pub bend: Bend,
+    /// `None` without texture coordinates.
+    pub uv: Option<UvMap>,
 }
 
 impl Prepared {
@@ -37,16 +47,18 @@ impl Prepared {
         let (mut sheets, mut sheet_of, mut first) = (Vec::new(), Vec::new(), Vec::new());
         for (part, number) in scenery.parts.iter().zip(0..) {
             first.push(sheet_of.len());
-            let MeshGeometry { bends, bend_of, .. } = part.mesh.geometry();
+            let geometry = part.mesh.geometry();
             let first_sheet = sheets.len() as u32;
-            sheet_of.extend(bend_of.iter().map(|bend| first_sheet + bend));
-            sheets.extend(bends.iter().map(|bend| Sheet { part: number, bend: *bend }));
+            sheet_of.extend(geometry.sheet_of.iter().map(|sheet| first_sheet + sheet));
+            let sheet = |MeshSheet { bend, uv }: &MeshSheet| Sheet { part: number, bend: *bend, uv: *uv };
+            sheets.extend(geometry.sheets.iter().map(sheet));
         }
         first.push(sheet_of.len());
         let id = |sheet: &Sheet| scenery.parts[sheet.part as usize].id;
         Prepared {
             ids: sheets.iter().map(id).collect(),
             sheets,
+            images: scenery.parts.iter().map(|part| part.image.as_ref().map(Image::of)).collect(),
             sheet_of,
             first,
             linear_rgb: scenery.parts.iter().map(colours).collect(),
@@ -82,5 +94,9 @@ fn grain(part: &Part) -> usize {
 /// Returns the two linear colours of a part.
 fn colours(part: &Part) -> [Vector; 2] {
     let first = linear(part.rgb);
+    if let Some(image) = &part.image {
+        let tint = first / linear(image.texture.mean_rgb).max(Vector::splat(MIN_MEAN));
+        return [tint.min(Vector::splat(MAX_TINT)); 2];
+    }
     [first, part.pattern.second_rgb(first)]
 }

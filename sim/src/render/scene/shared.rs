@@ -6,8 +6,8 @@ use std::sync::{Arc, OnceLock};
 
 use rapier3d::math::Vector;
 
-use super::bend::Bend;
 use super::faces::Faces;
+use super::sheets::MeshSheet;
 use crate::render::TriangleMesh;
 use crate::render::shading::lanes::Points;
 
@@ -30,9 +30,9 @@ pub struct MeshGeometry {
     pub triangles: Vec<[u32; 3]>,
     /// Planes of the triangles.
     pub faces: Faces,
-    pub bends: Vec<Bend>,
-    /// Index of each triangle's bend.
-    pub bend_of: Vec<u32>,
+    pub sheets: Vec<MeshSheet>,
+    /// Index of each triangle's sheet.
+    pub sheet_of: Vec<u32>,
     /// Centre and radius of a sphere around the mesh.
     pub bounds: (Vector, f32),
     /// Index of the longest axis of the mesh.
@@ -68,14 +68,14 @@ impl PartialEq for SharedMesh {
 
 impl MeshGeometry {
     fn of(mesh: &TriangleMesh) -> MeshGeometry {
-        let (bends, bend_of) = mesh.bends();
+        let (sheets, sheet_of) = mesh.sheets();
         let (points, triangles) = joined(mesh);
         MeshGeometry {
             points,
             triangles,
             faces: Faces::of(mesh),
-            bends,
-            bend_of,
+            sheets,
+            sheet_of,
             bounds: mesh.bounds(),
             longest_axis: mesh.longest_axis(),
         }

@@ -8,7 +8,7 @@ use xxhash_rust::xxh3::Xxh3;
 
 use super::hidden;
 use super::shared::SharedMesh;
-use crate::mjcf::{Geom, Primitive};
+use crate::mjcf::{Geom, Primitive, TextureMapping};
 use crate::render::TriangleMesh;
 
 /// Maximum number of cached triangles, of about 200 bytes each. The meshes of the latest body are always
@@ -50,11 +50,19 @@ pub fn meshes(geoms: &[&Geom]) -> Vec<Option<SharedMesh>> {
 }
 
 fn made(geoms: &[&Geom]) -> Vec<Option<SharedMesh>> {
-    let placed = |geom: &&Geom| (TriangleMesh::of(&geom.primitive), geom.body_from_geom);
+    let placed = |geom: &&Geom| {
+        let mesh = TriangleMesh::of(&geom.primitive);
+        (if uses_uvs(geom) { mesh } else { mesh.without_uvs() }, geom.body_from_geom)
+    };
     let mut meshes: Vec<(TriangleMesh, Pose)> = geoms.iter().map(placed).collect();
     hidden::take_out(&mut meshes);
     let shown = |(mesh, _): (TriangleMesh, Pose)| (!mesh.triangles.is_empty()).then(|| mesh.into());
     meshes.into_iter().map(shown).collect()
+}
+
+/// Returns true if an image is mapped by the texture coordinates of the mesh.
+fn uses_uvs(geom: &Geom) -> bool {
+    geom.image.as_ref().is_some_and(|image| image.mapping == TextureMapping::Corners)
 }
 
 impl KeptBodies {
@@ -83,7 +91,7 @@ impl KeptBodies {
     }
 }
 
-/// Returns a hash of the shapes and poses of geoms.
+/// Returns a hash of the shapes and poses of geoms, and of whether their texture coordinates are used.
 fn key(geoms: &[&Geom]) -> u128 {
     let mut content = Content(Xxh3::new());
     for geom in geoms {
@@ -91,6 +99,7 @@ fn key(geoms: &[&Geom]) -> u128 {
         content.points(&[translation]);
         content.numbers(&rotation.to_array());
         content.shape(&geom.primitive);
+        content.0.update(&[uses_uvs(geom).into()]);
     }
     content.0.digest128()
 }
@@ -124,6 +133,8 @@ impl Content {
                 self.points(&mesh.vertices_m);
                 let corners = mesh.triangles.iter().flatten();
                 corners.for_each(|corner| self.0.update(&corner.to_ne_bytes()));
+                self.points(mesh.corner_normal.as_flattened());
+                self.numbers(mesh.corner_uv.as_flattened().as_flattened());
             }
         }
     }

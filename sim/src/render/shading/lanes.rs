@@ -71,6 +71,18 @@ impl Affine {
             },
         )
     }
+
+    /// Returns the derivatives of the coordinates in directions.
+    #[inline(always)]
+    pub fn derivatives<const N: usize>(&self, [x, y, z]: &[Lanes<N>; 3]) -> [Lanes<N>; 3] {
+        axes(
+            #[inline(always)]
+            |row| {
+                let (axis, _) = self.0[row];
+                lanes(|i| axis.x * x[i] + axis.y * y[i] + axis.z * z[i])
+            },
+        )
+    }
 }
 
 impl Points {

@@ -35,6 +35,8 @@ pub struct Body {
     bvh: CwBvh,
     corners: Vec<CornerAndEdges>,
     looks: Vec<Look>,
+    /// Texture coordinates at the corners of each triangle; empty if no part has any.
+    corner_uv: Vec<[[f32; 2]; 3]>,
     /// Corners of the bounding box, with the least coordinates and the greatest.
     pub box_m: [Vector; 2],
 }
@@ -71,12 +73,20 @@ pub struct BodyPoint {
     pub normal: Vec3A,
     /// Outwards, of the flat triangle.
     pub face_normal: Vec3A,
+    pub uv: PointUv,
+}
+
+/// Texture coordinates at a point, and their mean change per metre.
+#[derive(Clone, Copy, Default)]
+pub struct PointUv {
+    pub uv: [f32; 2],
+    pub uv_1_m: f32,
 }
 
 impl Body {
     /// Collects the triangles of some of a scenery's parts, by their numbers.
     pub fn of(scenery: &Scenery, parts: impl Iterator<Item = usize>) -> Body {
-        let (mut corners_m, mut looks) = (Vec::new(), Vec::new());
+        let (mut corners_m, mut looks, mut corner_uv) = (Vec::new(), Vec::new(), Vec::new());
         for number in parts {
             let Part { mesh, carrier_from_mesh, .. } = &scenery.parts[number];
             for triangle in &mesh.triangles {
@@ -84,6 +94,7 @@ impl Body {
                 corners_m.push(vertices.map(|vertex| Vec3A::from(*carrier_from_mesh * vertex.position_m)));
                 let normals = vertices.map(|vertex| (carrier_from_mesh.rotation * vertex.normal).into());
                 looks.push(Look { normals, part: number as u32 });
+                corner_uv.push(vertices.map(|vertex| vertex.uv));
             }
         }
         // By arrays, because the two libraries may use different versions of one for vectors.
@@ -102,6 +113,10 @@ impl Body {
         Body {
             corners: order().map(|number| CornerAndEdges::of(&corners_m[number])).collect(),
             looks: order().map(|number| looks[number]).collect(),
+            corner_uv: match corner_uv.as_flattened().iter().all(|uv| *uv == [0.0; 2]) {
+                true => Vec::new(),
+                false => order().map(|number| corner_uv[number]).collect(),
+            },
             bvh,
             box_m,
         }
@@ -141,7 +156,22 @@ impl Body {
         }
         let face_normal = first_m.cross(second_m).normalize_or_zero();
         let normal = normal.normalize_or(face_normal);
-        BodyPoint { part, point_m, curved_m, normal, face_normal }
+        let uv = self.corner_uv.get(hit.triangle as usize);
+        let uv = uv.map(|uvs| PointUv::of(uvs, weights, first_m.cross(second_m).length()));
+        BodyPoint { part, point_m, curved_m, normal, face_normal, uv: uv.unwrap_or_default() }
+    }
+}
+
+impl PointUv {
+    /// Blends the coordinates at the corners of a triangle with twice this area.
+    fn of([a, b, c]: &[[f32; 2]; 3], [at_a, at_b, at_c]: [f32; 3], twice_area_m2: f32) -> PointUv {
+        let edge = |to: &[f32; 2]| [to[0] - a[0], to[1] - a[1]];
+        let (first, second) = (edge(b), edge(c));
+        let twice_area = (first[0] * second[1] - first[1] * second[0]).abs();
+        PointUv {
+            uv: std::array::from_fn(|axis| a[axis] * at_a + b[axis] * at_b + c[axis] * at_c),
+            uv_1_m: (twice_area / twice_area_m2.max(f32::MIN_POSITIVE)).sqrt(),
+        }
     }
 }
 

@@ -13,7 +13,7 @@ use obvhs::ray::RayHit;
 use rapier3d::glamx::{Mat3A, Vec3A};
 use rapier3d::math::{Pose, Vector};
 
-use body::{Body, BodyHit, BodyPoint, MetSides, TracedRay};
+use body::{Body, BodyHit, BodyPoint, MetSides, PointUv, TracedRay};
 
 /// Distance from a surface at which rays start that leave it.
 const OFF_M: f32 = 2e-4;
@@ -48,6 +48,7 @@ pub struct Spot {
     /// Towards the ray's origin, as [`Spot::face_normal`].
     pub normal: Vector,
     pub face_normal: Vector,
+    pub uv: PointUv,
 }
 
 impl<'a> Space<'a> {
@@ -102,7 +103,7 @@ impl<'a> Space<'a> {
     pub fn spot(&self, origin_m: Vector, direction: Vector, Hit { thing, hit }: &Hit) -> Spot {
         let (origin_m, direction) = (origin_m.into(), direction.into());
         let ray = TracedRay { origin_m, direction, least_m: 0.0, most_m: f32::INFINITY };
-        let BodyPoint { part, point_m, curved_m, normal, face_normal } = match thing {
+        let BodyPoint { part, point_m, curved_m, normal, face_normal, uv } = match thing {
             None => self.room.point(&ray, *hit),
             Some(number) => {
                 let thing = &self.things[*number as usize];
@@ -120,6 +121,7 @@ impl<'a> Space<'a> {
             start_m: start_m.into(),
             normal: normal.into(),
             face_normal: face_normal.into(),
+            uv,
         }
     }
 }
@@ -149,6 +151,7 @@ impl Thing<'_> {
             curved_m: world_from_body * point.curved_m + self.body_in_world_m,
             normal: world_from_body * point.normal,
             face_normal: world_from_body * point.face_normal,
+            uv: point.uv,
         }
     }
 

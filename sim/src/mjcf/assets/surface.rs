@@ -1,0 +1,122 @@
+//! Mapping of textures to surfaces. Source: MuJoCo's `render_gl3.c`, version 3.3.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use rapier3d::math::Vector;
+
+use super::texture::Texture;
+use crate::SimError;
+use crate::mjcf::Document;
+use crate::mjcf::text::source::MjcfText;
+use crate::mjcf::text::stated::Classes;
+
+/// Image on the surface of a geom.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurfaceImage {
+    pub texture: Arc<Texture>,
+    pub mapping: TextureMapping,
+}
+
+/// Mapping from points of a geom's surface, in the geom's frame, to an image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TextureMapping {
+    /// By the texture coordinates of the mesh's corners.
+    Corners,
+    /// Along z: `scale_1_m * (point - centre_m) - 0.5` in x and y are the coordinates to the right and down,
+    /// of which a whole number more is the same place.
+    Along { scale_1_m: [f32; 2], centre_m: [f32; 2] },
+    /// Onto a cube whose six faces show the image, in the direction `scale_1_m * (point - centre_m)`.
+    Cube { scale_1_m: Vector, centre_m: Vector },
+}
+
+/// Shape of a geom, as far as mappings depend on it.
+pub(in crate::mjcf) struct MappedShape {
+    /// Half the size along each axis; 0 where a plane is unbounded.
+    pub half_m: Vector,
+    pub centre_m: Vector,
+    pub is_mesh: bool,
+    /// True if its corners have texture coordinates.
+    pub has_uv: bool,
+}
+
+/// Repetitions of the images of materials, by the names of the materials whose texture names a file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(in crate::mjcf) struct TextureRepeats(BTreeMap<String, TextureRepeat>);
+
+/// Attributes `texrepeat` and `texuniform` of a material.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct TextureRepeat {
+    repeats_factor: [f32; 2],
+    /// True for repetitions per 2 m rather than per object.
+    is_uniform: bool,
+}
+
+const ONCE: TextureRepeat = TextureRepeat { repeats_factor: [1.0; 2], is_uniform: false };
+
+impl TextureRepeats {
+    pub fn of(source: &MjcfText) -> Result<TextureRepeats, SimError> {
+        let xml = source.xml()?;
+        let classes = Classes::of(&xml);
+        let named = |tag: &'static str| {
+            let elements = xml.descendants().filter(move |node| node.has_tag_name(tag));
+            elements.filter_map(|node| Some((node.attribute("name")?, node)))
+        };
+        let files: BTreeMap<_, _> = named("texture").filter(|(_, node)| node.has_attribute("file")).collect();
+        let mut found = BTreeMap::new();
+        for (name, material) in named("material") {
+            let texture = classes.stated(&material, "texture");
+            let mut repeat = ONCE;
+            let words = classes.stated(&material, "texrepeat").unwrap_or_default().split_ascii_whitespace();
+            for (factor, word) in repeat.repeats_factor.iter_mut().zip(words) {
+                *factor = word.parse().unwrap_or(1.0);
+            }
+            repeat.is_uniform = classes.stated(&material, "texuniform") == Some("true");
+            if texture.is_some_and(|texture| files.contains_key(texture)) && repeat != ONCE {
+                found.insert(name.into(), repeat);
+            }
+        }
+        Ok(TextureRepeats(found))
+    }
+}
+
+impl SurfaceImage {
+    /// Returns the image of a material on a shape; `None` if its texture names no file.
+    pub(in crate::mjcf) fn of(
+        document: &Document,
+        material: &mjcf_rs::assets::Material,
+        shape: &MappedShape,
+    ) -> Option<SurfaceImage> {
+        let name = material.texture.as_ref()?;
+        let texture = document.textures.get(name)?.clone();
+        let kind = document.model.assets.texture(name)?.type_.as_deref();
+        let repeat = material.name.as_ref().and_then(|name| document.repeats.0.get(name));
+        let repeat = repeat.copied().unwrap_or(ONCE);
+        let mapping = match kind {
+            _ if shape.has_uv => TextureMapping::Corners,
+            Some("2d") => along(repeat, shape),
+            _ => cube(repeat, shape),
+        };
+        Some(SurfaceImage { texture, mapping })
+    }
+}
+
+fn along(TextureRepeat { repeats_factor, is_uniform }: TextureRepeat, shape: &MappedShape) -> TextureMapping {
+    let MappedShape { half_m, centre_m, .. } = shape;
+    let scale = |axis: usize| {
+        let size_m = if is_uniform || half_m[axis] <= 0.0 { 1.0 } else { half_m[axis] };
+        0.5 * repeats_factor[axis] / size_m
+    };
+    TextureMapping::Along { scale_1_m: [scale(0), -scale(1)], centre_m: [centre_m.x, centre_m.y] }
+}
+
+fn cube(TextureRepeat { is_uniform, .. }: TextureRepeat, shape: &MappedShape) -> TextureMapping {
+    let MappedShape { half_m, centre_m, .. } = *shape;
+    // MuJoCo scales its own shapes to a cube, and meshes only if they are to be uniform.
+    let scale_1_m = match (shape.is_mesh, is_uniform) {
+        (false, false) => 1.0 / half_m.max(Vector::splat(f32::EPSILON)),
+        (true, true) => half_m,
+        (false, true) | (true, false) => Vector::ONE,
+    };
+    TextureMapping::Cube { scale_1_m, centre_m }
+}

@@ -1,0 +1,150 @@
+//! Images of textures: reduced to powers of two, with mip levels down to one texel.
+
+use std::io::Cursor;
+use std::path::Path;
+
+use image::imageops::{FilterType, resize};
+use image::{ImageReader, RgbImage};
+
+use crate::SimError;
+
+/// Maximum width and height of a kept image. The cameras of robots show no more of a surface.
+const MAX_SIDE: u32 = 1024;
+
+/// Image of a texture, at its size and halved again and again down to one texel.
+#[derive(PartialEq)]
+pub struct Texture {
+    /// Never empty; the largest level first. Sides are powers of two.
+    pub levels: Vec<TextureLevel>,
+    /// Mean of the file's sRGB values, each 0 to 1.
+    pub mean_rgb: [f32; 3],
+}
+
+/// Image at one size.
+#[derive(PartialEq)]
+pub struct TextureLevel {
+    pub width: usize,
+    pub height: usize,
+    /// Width and height once more.
+    pub size: [f32; 2],
+    /// sRGB, row by row from the top left; the fourth byte is 0.
+    pub texels: Vec<[u8; 4]>,
+}
+
+impl std::fmt::Debug for Texture {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let TextureLevel { width, height, .. } = &self.levels[0];
+        write!(f, "Texture of {width} x {height} texels")
+    }
+}
+
+impl Texture {
+    /// Decodes an image file.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error that names the file if the bytes are no image of a supported format.
+    pub(in crate::mjcf) fn decode(path: &Path, bytes: &[u8]) -> Result<Texture, SimError> {
+        let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+        let decoded = reader.map_err(|source| SimError::unreadable(path, source))?.decode();
+        let image = decoded
+            .map_err(|source| SimError::Texture { path: path.display().to_string(), source })?
+            .into_rgb8();
+        Ok(Texture::of(&image))
+    }
+
+    /// Reduces an image of at least one pixel to its levels.
+    fn of(image: &RgbImage) -> Texture {
+        let side = |pixels: u32| pixels.next_power_of_two().min(MAX_SIDE);
+        let (width, height) = (side(image.width()), side(image.height()));
+        let whole = match image.dimensions() == (width, height) {
+            true => TextureLevel::of(image),
+            false => TextureLevel::of(&resize(image, width, height, FilterType::Triangle)),
+        };
+        let mut levels = vec![whole];
+        while let Some(half) = levels.last().and_then(TextureLevel::halved) {
+            levels.push(half);
+        }
+        Texture { levels, mean_rgb: mean_rgb(image) }
+    }
+}
+
+impl TextureLevel {
+    fn new(width: usize, height: usize, texels: Vec<[u8; 4]>) -> TextureLevel {
+        TextureLevel { width, height, size: [width as f32, height as f32], texels }
+    }
+
+    /// Returns the column of a texel of the repeated image.
+    #[inline(always)]
+    pub fn column(&self, x: usize) -> usize {
+        x & (self.width - 1)
+    }
+
+    /// Returns the index of the first texel of a row of the repeated image.
+    #[inline(always)]
+    pub fn row(&self, y: usize) -> usize {
+        (y & (self.height - 1)) * self.width
+    }
+
+    fn of(image: &RgbImage) -> TextureLevel {
+        let texels = image.pixels().map(|pixel| [pixel.0[0], pixel.0[1], pixel.0[2], 0]).collect();
+        TextureLevel::new(image.width() as usize, image.height() as usize, texels)
+    }
+
+    /// Returns the level of half the size; `None` for a single texel. A texel has the mean light of those
+    /// that it replaces, by a gamma of 2.
+    fn halved(&self) -> Option<TextureLevel> {
+        if self.texels.len() == 1 {
+            return None;
+        }
+        let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
+        let (across, down) = (self.width / width, self.height / height);
+        let texel = |index: usize| {
+            let corner = index / width * down * self.width + index % width * across;
+            let mut sum = [0; 4];
+            for row in 0..down {
+                for texel in &self.texels[corner + row * self.width..][..across] {
+                    sum = std::array::from_fn(|axis| sum[axis] + u32::from(texel[axis]).pow(2));
+                }
+            }
+            sum.map(|sum| (sum as f32 / (across * down) as f32).sqrt().round() as u8)
+        };
+        Some(TextureLevel::new(width, height, (0..width * height).map(texel).collect()))
+    }
+}
+
+fn mean_rgb(image: &RgbImage) -> [f32; 3] {
+    let mut sum = [0.0f64; 3];
+    for pixel in image.pixels() {
+        for (sum, value) in sum.iter_mut().zip(pixel.0) {
+            *sum += f64::from(value) / 255.0;
+        }
+    }
+    sum.map(|sum| (sum / image.pixels().len().max(1) as f64) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use image::Rgb;
+
+    use super::*;
+
+    #[test]
+    fn levels_halve_down_to_the_mean_light() {
+        let striped =
+            RgbImage::from_fn(4, 2, |x, _| if x % 2 == 0 { Rgb([255, 0, 40]) } else { Rgb([0, 0, 40]) });
+        let texture = Texture::of(&striped);
+        let sizes: Vec<_> = texture.levels.iter().map(|level| (level.width, level.height)).collect();
+        assert_eq!(sizes, [(4, 2), (2, 1), (1, 1)]);
+        assert_eq!(texture.levels[1].texels, [[180, 0, 40, 0]; 2], "half the light is 71 % of the value");
+        assert_eq!(texture.mean_rgb, [0.5, 0.0, (40.0f64 / 255.0) as f32]);
+    }
+
+    #[test]
+    fn sides_become_powers_of_two_within_the_limit() {
+        for (size, expected) in [((3, 5), (4, 8)), ((1, 1), (1, 1)), ((2000, 6), (1024, 8))] {
+            let level = &Texture::of(&RgbImage::new(size.0, size.1)).levels[0];
+            assert_eq!((level.width as u32, level.height as u32), expected);
+        }
+    }
+}

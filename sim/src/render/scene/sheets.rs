@@ -1,0 +1,109 @@
+//! Sheets of a mesh: neighbouring triangles that are shaded alike, since one formula gives their normals and
+//! one their texture coordinates.
+
+use rapier3d::math::Vector;
+
+use super::bend::Bend;
+use crate::render::shading::lanes::Affine;
+use crate::render::{TriangleMesh, Vertex};
+
+/// Triangles of a mesh, in its frame.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshSheet {
+    pub bend: Bend,
+    /// `None` without texture coordinates.
+    pub uv: Option<UvMap>,
+}
+
+/// Texture coordinates at a point: each is a scalar product plus a constant.
+#[derive(Clone, Copy, Debug)]
+pub struct UvMap(pub [(Vector, f32); 2]);
+
+/// Tolerance on texture coordinates that a map gives.
+const UV_TOLERANCE: f32 = 1e-4;
+/// Number of the latest sheets that are tried for a triangle.
+const TRIED: usize = 8;
+
+impl TriangleMesh {
+    /// Returns the sheets of the mesh, and for each triangle the index of its sheet.
+    pub(in crate::render) fn sheets(&self) -> (Vec<MeshSheet>, Vec<u32>) {
+        let (bends, bend_of) = self.bends();
+        if self.vertices.iter().all(|vertex| vertex.uv == [0.0; 2]) {
+            return (bends.into_iter().map(|bend| MeshSheet { bend, uv: None }).collect(), bend_of);
+        }
+        let (mut sheets, mut of_bend): (Vec<(u32, UvMap)>, _) = (Vec::new(), Vec::new());
+        for (corners, bend) in self.triangles.iter().zip(&bend_of) {
+            let corners = corners.map(|corner| self.vertices[corner as usize]);
+            let fits = |(other, map): &(u32, UvMap)| other == bend && map.fits(&corners);
+            let latest = sheets.len().saturating_sub(TRIED);
+            let found = sheets[latest..].iter().rposition(fits).map(|index| latest + index);
+            of_bend.push(found.unwrap_or(sheets.len()) as u32);
+            if found.is_none() {
+                sheets.push((*bend, UvMap::between(&corners)));
+            }
+        }
+        let sheet = |(bend, map): (u32, UvMap)| MeshSheet { bend: bends[bend as usize], uv: Some(map) };
+        (sheets.into_iter().map(sheet).collect(), of_bend)
+    }
+}
+
+impl UvMap {
+    /// Returns the map that interpolates the corners of a triangle, as [`Bend`] does for normals; that of its
+    /// first corner if it has no area.
+    fn between([a, b, c]: &[Vertex; 3]) -> UvMap {
+        let (ab, ac) = (b.position_m - a.position_m, c.position_m - a.position_m);
+        let face = ab.cross(ac);
+        let per_area = face.length_squared().recip();
+        UvMap(std::array::from_fn(|axis| {
+            let (by_b, by_c) = (b.uv[axis] - a.uv[axis], c.uv[axis] - a.uv[axis]);
+            let along = (ac.cross(face) * by_b + face.cross(ab) * by_c) * per_area;
+            let along = if along.is_finite() { along } else { Vector::ZERO };
+            (along, a.uv[axis] - along.dot(a.position_m))
+        }))
+    }
+
+    /// Returns the map with a third coordinate that is 0.
+    pub fn affine(&self) -> Affine {
+        let [u, v] = self.0;
+        Affine([u, v, (Vector::ZERO, 0.0)])
+    }
+
+    fn fits(&self, corners: &[Vertex; 3]) -> bool {
+        corners.iter().all(|corner| {
+            self.0.iter().zip(corner.uv).all(|((along, constant), uv)| {
+                (along.dot(corner.position_m) + constant - uv).abs() < UV_TOLERANCE
+            })
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns a square in z = 0 of two triangles, whose corners have these texture coordinates.
+    fn square(uvs: [[f32; 2]; 6]) -> TriangleMesh {
+        let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
+        let vertices = corners.iter().zip(uvs).map(|([x, y], uv)| Vertex {
+            position_m: Vector::new(*x, *y, 0.0),
+            normal: Vector::Z,
+            uv,
+        });
+        TriangleMesh { vertices: vertices.collect(), triangles: vec![[0, 1, 2], [3, 4, 5]] }
+    }
+
+    #[test]
+    fn triangles_with_one_map_are_one_sheet_and_those_with_two_are_two() {
+        let whole = square([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.0]]);
+        let (sheets, sheet_of) = whole.sheets();
+        assert_eq!(sheet_of, [0, 0]);
+        let [u, v] = sheets[0].uv.expect("a map").0.map(|(along, constant)| (along.to_array(), constant));
+        assert_eq!((u, v), (([0.5, 0.0, 0.0], 0.0), ([0.0, -0.5, 0.0], 1.0)));
+
+        let torn = square([[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.5]]);
+        assert_eq!(torn.sheets().1, [0, 1]);
+        let plain = torn.without_uvs().sheets();
+        assert_eq!((plain.0.len(), plain.1), (1, vec![0, 0]));
+        assert!(plain.0[0].uv.is_none());
+    }
+}

@@ -1,0 +1,157 @@
+//! Images on surfaces: the texels at a point, blended between texels and between mip levels.
+
+use std::sync::{Arc, LazyLock};
+
+use rapier3d::math::Vector;
+
+use super::lanes::{Affine, Lanes, axes, lanes};
+use super::linear;
+use crate::mjcf::{SurfaceImage, Texture, TextureLevel, TextureMapping};
+
+/// Image of a part, with the map to it.
+#[derive(Clone)]
+pub struct Image {
+    pub texture: Arc<Texture>,
+    /// Map from the part's mesh to coordinates that [`Image::place`] takes; `None` if the mesh gives
+    /// texture coordinates.
+    pub from_mesh: Option<Affine>,
+    /// True if the coordinates are a direction from the middle of a cube.
+    pub is_cube: bool,
+    /// Number of the smallest level.
+    last_level: f32,
+}
+
+/// Place on an image: coordinates to the right and down, and their differences over a step in x and in y.
+#[derive(Clone, Copy)]
+pub struct ImagePlace {
+    pub uv: [f32; 2],
+    pub x_step_uv: [f32; 2],
+    pub y_step_uv: [f32; 2],
+}
+
+/// Steps of the table from sRGB to linear light between one byte and the next.
+const LIGHT_STEPS: usize = 4;
+const LIGHT_VALUES: usize = 256 * LIGHT_STEPS;
+/// Linear light of sRGB values between bytes.
+static LIGHT: LazyLock<[f32; LIGHT_VALUES]> =
+    LazyLock::new(|| std::array::from_fn(|step| linear([step as f32 / (255 * LIGHT_STEPS) as f32; 3]).x));
+
+/// Part of the way from one level to the next in which both are blended.
+pub const BLENDED_SHARE: f32 = 0.5;
+
+impl Image {
+    pub fn of(image: &SurfaceImage) -> Image {
+        let from_mesh = match image.mapping {
+            TextureMapping::Corners => None,
+            TextureMapping::Along { scale_1_m: [x, y], centre_m: [centre_x, centre_y] } => Some(Affine([
+                (Vector::X * x, -x * centre_x - 0.5),
+                (Vector::Y * y, -y * centre_y - 0.5),
+                (Vector::ZERO, 0.0),
+            ])),
+            TextureMapping::Cube { scale_1_m, centre_m } => {
+                let from_centre = scale_1_m * centre_m;
+                Some(Affine([
+                    (Vector::X * scale_1_m.x, -from_centre.x),
+                    (Vector::Y * scale_1_m.y, -from_centre.y),
+                    (Vector::Z * scale_1_m.z, -from_centre.z),
+                ]))
+            }
+        };
+        let is_cube = matches!(image.mapping, TextureMapping::Cube { .. });
+        let last_level = (image.texture.levels.len() - 1) as f32;
+        Image { texture: image.texture.clone(), from_mesh, is_cube, last_level }
+    }
+
+    /// Returns the place on the image of three coordinates with their differences over a step in x and in y.
+    #[inline(always)]
+    pub fn place(&self, values: [f32; 3], x_step_values: [f32; 3], y_step_values: [f32; 3]) -> ImagePlace {
+        if self.is_cube {
+            return on_cube(values, [x_step_values, y_step_values]);
+        }
+        let flat = |[u, v, _]: [f32; 3]| [u, v];
+        ImagePlace { uv: flat(values), x_step_uv: flat(x_step_values), y_step_uv: flat(y_step_values) }
+    }
+
+    /// Returns the linear colour at a place, as a mean over about a step in x and in y.
+    #[inline(always)]
+    pub fn rgb(&self, place: &ImagePlace) -> [f32; 3] {
+        let levels = &self.texture.levels;
+        let [width, height] = levels[0].size;
+        let texels_2 = |[u, v]: [f32; 2]| (u * width) * (u * width) + (v * height) * (v * height);
+        let level = 0.5 * log2(texels_2(place.x_step_uv).max(texels_2(place.y_step_uv)));
+        let level = level.max(0.0).min(self.last_level);
+        let (whole, part) = (level.floor(), level - level.floor());
+        let share = ((part - 0.5) / BLENDED_SHARE + 0.5).max(0.0).min(1.0);
+        let nearer = index(whole) + usize::from(share == 1.0);
+        let mut texel = blend(&levels[nearer], place.uv, self.is_cube);
+        if share > 0.0 && share < 1.0 {
+            let farther = blend(&levels[nearer + 1], place.uv, self.is_cube);
+            texel = lanes(|i| texel[i] + (farther[i] - texel[i]) * share);
+        }
+        let light = &*LIGHT;
+        axes(
+            #[inline(always)]
+            |axis| light[index((texel[axis] * LIGHT_STEPS as f32).round_ties_even()) % LIGHT_VALUES],
+        )
+    }
+}
+
+/// Returns the sRGB values, 0 to 255, at coordinates on one level, blended between four texels.
+#[inline(always)]
+fn blend(level: &TextureLevel, [u, v]: [f32; 2], is_cube: bool) -> Lanes<4> {
+    let [width, height] = level.size;
+    let (mut x, mut y) = (u * width - 0.5, v * height - 0.5);
+    if is_cube {
+        // Faces of a cube do not continue on their own other side.
+        (x, y) = (x.max(0.0).min(width - 1.0), y.max(0.0).min(height - 1.0));
+    }
+    let (left, top) = (x.floor(), y.floor());
+    let (across, down) = (x - left, y - top);
+    let (left, top) = (index(left), index(top));
+    let (column, next_column) = (level.column(left), level.column(left + 1));
+    let (row, next_row) = (level.row(top), level.row(top + 1));
+    let texels = level.texels.as_slice();
+    let upper = between(texels[row + column], texels[row + next_column], across);
+    let lower = between(texels[next_row + column], texels[next_row + next_column], across);
+    lanes(|i| upper[i] + (lower[i] - upper[i]) * down)
+}
+
+/// Returns a whole number, modulo 2^22; so negative ones are right modulo smaller powers of two.
+#[inline(always)]
+fn index(whole_value: f32) -> usize {
+    const ALL_BITS_WHOLE: f32 = (3 << 22) as f32;
+    (whole_value + ALL_BITS_WHOLE).to_bits() as usize % (1 << 22)
+}
+
+#[inline(always)]
+fn between(first: [u8; 4], second: [u8; 4], share: f32) -> Lanes<4> {
+    let first: Lanes<4> = lanes(|i| f32::from(first[i]));
+    let second: Lanes<4> = lanes(|i| f32::from(second[i]));
+    lanes(|i| first[i] + (second[i] - first[i]) * share)
+}
+
+/// Returns the place on the face of a cube that a direction meets. Source: OpenGL 4.6, section 8.13.
+#[inline]
+fn on_cube([x, y, z]: [f32; 3], step_values: [[f32; 3]; 2]) -> ImagePlace {
+    let (across, down, along): ([f32; 3], [f32; 3], [f32; 3]) = if x.abs() >= y.abs() && x.abs() >= z.abs() {
+        ([0.0, 0.0, -1f32.copysign(x)], [0.0, -1.0, 0.0], [1f32.copysign(x), 0.0, 0.0])
+    } else if y.abs() >= z.abs() {
+        ([1.0, 0.0, 0.0], [0.0, 0.0, 1f32.copysign(y)], [0.0, 1f32.copysign(y), 0.0])
+    } else {
+        ([1f32.copysign(z), 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1f32.copysign(z)])
+    };
+    let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let per_along = 1.0 / dot(along, [x, y, z]).max(f32::MIN_POSITIVE);
+    let place = [across, down].map(|axis| dot(axis, [x, y, z]) * per_along);
+    let [x_step_uv, y_step_uv] = step_values.map(|step| {
+        [(across, place[0]), (down, place[1])]
+            .map(|(axis, at)| 0.5 * (dot(axis, step) - at * dot(along, step)) * per_along)
+    });
+    ImagePlace { uv: place.map(|at| 0.5 * at + 0.5), x_step_uv, y_step_uv }
+}
+
+/// Returns the binary logarithm of a positive number, exact for powers of two and linear between them.
+#[inline(always)]
+fn log2(value: f32) -> f32 {
+    value.to_bits() as f32 * (1.0 / (1 << 23) as f32) - 127.0
+}
