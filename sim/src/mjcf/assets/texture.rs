@@ -26,7 +26,7 @@ pub struct TextureLevel {
     pub width: usize,
     pub height: usize,
     /// Width and height once more.
-    pub size: [f32; 2],
+    pub size_px: [f32; 2],
     /// sRGB, row by row from the top left; the fourth byte is 0.
     pub texels: Vec<[u8; 4]>,
 }
@@ -71,7 +71,7 @@ impl Texture {
 
 impl TextureLevel {
     fn new(width: usize, height: usize, texels: Vec<[u8; 4]>) -> TextureLevel {
-        TextureLevel { width, height, size: [width as f32, height as f32], texels }
+        TextureLevel { width, height, size_px: [width as f32, height as f32], texels }
     }
 
     /// Returns the column of a texel of the repeated image.

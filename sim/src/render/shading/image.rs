@@ -76,7 +76,7 @@ impl Image {
     #[inline(always)]
     pub fn rgb(&self, place: &ImagePlace) -> [f32; 3] {
         let levels = &self.texture.levels;
-        let [width, height] = levels[0].size;
+        let [width, height] = levels[0].size_px;
         let texels_2 = |[u, v]: [f32; 2]| (u * width) * (u * width) + (v * height) * (v * height);
         let level = 0.5 * log2(texels_2(place.x_step_uv).max(texels_2(place.y_step_uv)));
         let level = level.max(0.0).min(self.last_level);
@@ -99,7 +99,7 @@ impl Image {
 /// Returns the sRGB values, 0 to 255, at coordinates on one level, blended between four texels.
 #[inline(always)]
 fn blend(level: &TextureLevel, [u, v]: [f32; 2], is_cube: bool) -> Lanes<4> {
-    let [width, height] = level.size;
+    let [width, height] = level.size_px;
     let (mut x, mut y) = (u * width - 0.5, v * height - 0.5);
     if is_cube {
         // Faces of a cube do not continue on their own other side.
