@@ -6,10 +6,10 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
-use tandem_episodes::{
-    EpisodeSpec,
+use tandem_episodes::EpisodeSpec;
+use tandem_evaluation::{
     evaluation::Evaluation,
-    players::{EpisodeOutput, PlayError, PlayOutcome, Policy, PolicyWait},
+    policies::{EpisodeOutput, PlayError, PlayOutcome, Policy, PolicyWait},
     reports::load,
     results::PolicyCard,
 };
