@@ -96,7 +96,7 @@ fn both_renderers_draw_the_same() {
 }
 
 /// A kitchen with images on meshes.
-const KITCHEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../episodes/tests/scenes/kitchen");
+const KITCHEN: &str = concat!(env!("TANDEM_SIM_ASSETS"), "/../../episodes/tests/scenes/kitchen");
 /// The image of its floor, along z and on cubes.
 const SHAPES: &str = r#"<asset>
         <texture name="flat" type="2d" file="kitchen_floor_floor_texture.png"/>
