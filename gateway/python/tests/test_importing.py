@@ -54,6 +54,41 @@ def test_a_scene_is_written_plainly_with_a_report(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "LICENSE").read_text() == "as you like"
 
 
+PICTURES = """<mujoco>
+  <asset>
+    <texture name="flat" type="2d" file="four.png"/>
+    <texture name="cube" type="cube" file="four.png"/>
+    <material name="flat" texture="flat" texrepeat="2 3"/>
+    <material name="cube" texture="cube" texuniform="true"/>
+    <mesh name="wedge" file="wedge.obj"/>
+  </asset>
+  <worldbody>
+    <geom type="mesh" mesh="wedge" material="flat"/>
+    <geom type="box" size="1 1 1" material="cube"/>
+  </worldbody>
+</mujoco>
+"""
+
+
+def test_pictures_are_placed_on_surfaces_as_in_the_source(tmp_path: Path) -> None:
+    import mujoco
+    import numpy as np
+
+    from tandem.importing.files import write_png
+
+    write_png(tmp_path / "four.png", np.arange(12).reshape(2, 2, 3) * 20)
+    faces = "f 1/1 3/3 2/2\nf 1/1 2/2 4/3\nf 2/2 3/3 4/1\nf 3/3 1/1 4/2\n"
+    vertices = "v 0 0 1\nv 1 0 1\nv 0 1 1\nv 0 0 2\nvt 0 0.25\nvt 1 0.5\nvt 0 1\n"
+    (tmp_path / "wedge.obj").write_text(vertices + faces)
+    (tmp_path / "scene.xml").write_text(PICTURES)
+    import_file(tmp_path / "scene.xml", tmp_path / "out")
+    source, written = (mujoco.MjModel.from_xml_path(str(tmp_path / file)) for file in ("scene.xml", "out/scene.xml"))
+    for name in ("tex_type", "tex_data", "mat_texrepeat", "mat_texuniform", "mesh_texcoord"):
+        assert np.allclose(getattr(source, name), getattr(written, name), atol=1e-5), name
+    text = (tmp_path / "out" / "meshes" / "mesh_0.obj").read_text()
+    assert text.count("\nvn ") == source.mesh_normal.shape[0]
+
+
 def test_what_is_not_imported_says_what_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(tmp_path / "scene.usd"), str(tmp_path / "out")]) == 1
     assert "these are: .xml, .mjcf, .urdf" in capsys.readouterr().err

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .engine import mujoco
 from .files import Array, escaped, numbers, write_obj, write_png
 from .names import Names
@@ -35,19 +37,21 @@ def meshes(model: Any, used: list[int], out: Path, report: Report) -> list[str]:
     for mesh in used:
         first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
         face, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
-        uv: Array | None = None
-        uv_faces: Array | None = None
+        uv: tuple[Array, Array] | None = None
         if model.mesh_texcoordadr[mesh] >= 0:
             begin = model.mesh_texcoordadr[mesh]
-            uv = model.mesh_texcoord[begin : begin + model.mesh_texcoordnum[mesh]]
-            uv_faces = model.mesh_facetexcoord[face : face + faces]
+            values: Any = model.mesh_texcoord[begin : begin + model.mesh_texcoordnum[mesh]]
+            # The first row of an image is at 0 in MuJoCo, and at 1 in OBJ files.
+            uv = (values * [1, -1] + [0, 1], model.mesh_facetexcoord[face : face + faces])
+        begin = model.mesh_normaladr[mesh]
+        normals = (model.mesh_normal[begin : begin + model.mesh_normalnum[mesh]], model.mesh_facenormal[face : face + faces])
         file = f"{mesh_name(mesh)}.obj"
         write_obj(
             out / "meshes" / file,
             model.mesh_vert[first : first + count],
             model.mesh_face[face : face + faces],
             uv,
-            uv_faces,
+            normals,
         )
         rows.append(f'<mesh name="{mesh_name(mesh)}" file="{file}"/>')
         report.meshes += 1
@@ -64,7 +68,7 @@ def materials(model: Any, names: Names, out: Path, report: Report) -> list[str]:
         picture = ""
         if texture >= 0:
             if texture not in written:
-                rows.append(write_texture(model, texture, out))
+                rows.append(write_texture(model, texture, out, report))
                 written.add(texture)
             repeat = numbers(model.mat_texrepeat[material])
             uniform = "true" if model.mat_texuniform[material] else "false"
@@ -79,11 +83,16 @@ def materials(model: Any, names: Names, out: Path, report: Report) -> list[str]:
     return rows
 
 
-def write_texture(model: Any, texture: int, out: Path) -> str:
+def write_texture(model: Any, texture: int, out: Path, report: Report) -> str:
     (out / "textures").mkdir(exist_ok=True)
     height, width, channels = (int(a[texture]) for a in (model.tex_height, model.tex_width, model.tex_nchannel))
     first = int(model.tex_adr[texture])
     pixels: Any = model.tex_data[first : first + height * width * channels].reshape(height, width, channels)
-    # The first row of MuJoCo is the lowest.
-    write_png(out / "textures" / f"texture_{texture}.png", pixels[::-1])
-    return f'<texture name="texture_{texture}" type="2d" file="texture_{texture}.png"/>'
+    kind = "2d" if model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D else "cube"
+    if kind == "cube" and height == 6 * width:
+        sides = np.split(pixels, 6)
+        if any((side != sides[0]).any() for side in sides[1:]):
+            report.drop("images of a cube's other five sides")
+        pixels = sides[0]
+    write_png(out / "textures" / f"texture_{texture}.png", pixels)
+    return f'<texture name="texture_{texture}" type="{kind}" file="texture_{texture}.png"/>'

@@ -21,15 +21,26 @@ def escaped(text: str) -> str:
     return text.replace("&", "&amp;").replace("<", "&lt;").replace('"', "&quot;")
 
 
-def write_obj(path: Path, vertices: Array, faces: Array, uv: Array | None = None, uv_faces: Array | None = None) -> None:
-    """Writes triangles, optionally with texture coordinates."""
+def write_obj(
+    path: Path,
+    vertices: Array,
+    faces: Array,
+    uv: tuple[Array, Array] | None = None,
+    normals: tuple[Array, Array] | None = None,
+) -> None:
+    """Writes triangles, optionally with texture coordinates and normals.
+
+    Each of the two is a pair of values and, for each triangle, the indices of its corners' values.
+    """
     lines = [f"v {x:.8g} {y:.8g} {z:.8g}" for x, y, z in vertices]
-    if uv is not None and uv_faces is not None:
-        lines += [f"vt {u:.6g} {v:.6g}" for u, v in uv]
-        corners = zip(faces + 1, uv_faces + 1, strict=True)
-        lines += [f"f {a}/{ta} {b}/{tb} {c}/{tc}" for (a, b, c), (ta, tb, tc) in corners]
-    else:
-        lines += [f"f {a} {b} {c}" for a, b, c in faces + 1]
+    lines += [f"vt {u:.6g} {v:.6g}" for u, v in uv[0]] if uv else []
+    lines += [f"vn {x:.5g} {y:.5g} {z:.5g}" for x, y, z in normals[0]] if normals else []
+    of_corners = [faces, uv[1] if uv else None, normals[1] if normals else None]
+    while of_corners[-1] is None:
+        of_corners.pop()
+    for triangle in range(len(faces)):
+        indices = [["", "", ""] if each is None else [str(corner + 1) for corner in each[triangle]] for each in of_corners]
+        lines.append("f " + " ".join("/".join(corner) for corner in zip(*indices, strict=True)))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

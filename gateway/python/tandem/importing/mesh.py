@@ -55,7 +55,7 @@ def mass_kg(pieces: list[Any]) -> float:
 def write_piece(piece: Any, number: int, out: Path, assets: list[str], geoms: list[str], report: Report) -> None:
     uv = getattr(piece.visual, "uv", None)
     faces = np.asarray(piece.faces)
-    write_obj(out / "meshes" / f"piece_{number}.obj", piece.vertices, faces, uv, faces if uv is not None else None)
+    write_obj(out / "meshes" / f"piece_{number}.obj", piece.vertices, faces, None if uv is None else (uv, faces))
     material: Any = getattr(piece.visual, "material", None)
     picture: Any = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
     factor: Any = getattr(material, "baseColorFactor", None)
