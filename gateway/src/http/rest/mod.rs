@@ -194,7 +194,7 @@ async fn briefing(
     encoding: Encoding,
     Path(id): Path<String>,
 ) -> Result<Response, ApiError> {
-    encoding.write(StatusCode::OK, &app.table.briefing(&id, &caller).await?)
+    encoding.write(StatusCode::OK, &app.table.briefing(&id, &caller).await?.over_http(&id))
 }
 
 async fn call(

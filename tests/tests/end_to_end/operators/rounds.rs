@@ -45,6 +45,8 @@ fn an_operator_sees_and_commands_its_own_robot_alone() {
     let (_, _, briefing) = team.server.ask("GET", &format!("{episode}/briefing"), &own, b"");
     let briefing: Value = serde_json::from_slice(&briefing).expect("JSON");
     assert_eq!(names(&briefing["instructions"], "robot"), ["B"]);
+    assert_eq!(briefing["http"][0], format!("GET {episode}/tools lists your tools, each with the schema of its body."));
+    assert!(briefing["http"][1].as_str().is_some_and(|line| line.starts_with(&format!("POST {episode}/tools/NAME "))));
     assert!(briefing["brief"]["frames"].is_string() && !briefing.to_string().contains(&team.tokens[0]));
     assert_eq!(status("DELETE", &episode), 403);
     assert_eq!(status("GET", "/metrics"), 403);
