@@ -108,7 +108,9 @@ impl Briefing {
     pub fn over_http(self, id: &str) -> Briefing {
         let tools = format!("/v1/episodes/{id}/tools");
         let list = format!("GET {tools} lists your tools, each with the schema of its body.");
-        let call = format!("POST {tools}/NAME calls one. The JSON body has its arguments, as {{\"steps\": 25}} for wait.");
+        let call = format!(
+            "POST {tools}/NAME calls one. The JSON body has its arguments, as {{\"steps\": 25}} for wait."
+        );
         Briefing { http: vec![list, call], ..self }
     }
 
