@@ -213,7 +213,7 @@ impl EpisodeSpec {
 
     /// Returns the selection of texts for the policy.
     pub fn wording(&self) -> Wording {
-        Wording { assistance: self.assistance, hints: self.hints }
+        Wording { hints: self.hints, ..self.assistance.into() }
     }
 
     /// Lists the departures from the benchmark, each as results name it. Tandem's own base controller and

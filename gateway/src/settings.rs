@@ -351,7 +351,7 @@ pub struct Settings {
 impl Settings {
     /// Returns the choice of texts for policies.
     pub fn wording(&self) -> Wording {
-        Wording { assistance: self.assistance, hints: self.hints }
+        Wording { hints: self.hints, ..self.assistance.into() }
     }
 
     /// Returns the destination of an episode's files.

@@ -107,13 +107,16 @@ fn equal_rows(most_steps: u32) -> Value {
     (1..=most_steps).map(each).collect::<Vec<_>>().into()
 }
 
-/// Lets every name of a robot be one of `robots`, which an episode has.
+/// Lets every name of a robot be one of `robots`, and lists with an entry per robot have as many at most.
 pub fn bound_robots(schema: &mut Value, robots: &[String]) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(|item| bound_robots(item, robots)),
         Value::Object(object) => {
             if let Some(pattern) = object.get_mut("pattern").filter(|pattern| **pattern == ROBOT_PATTERN) {
                 *pattern = format!("^[{}]$", robots.concat()).into();
+            }
+            if let Some(list) = object.get_mut("robots").and_then(|list| list.get_mut("maxItems")) {
+                *list = robots.len().into();
             }
             object.values_mut().for_each(|value| bound_robots(value, robots));
         }

@@ -71,7 +71,7 @@ const CARRYING: &str = " To push, and to carry together: grip, and lift what is 
     compliance_n_s_m 250; then call walk_to with carry, once, with every robot that holds the load, each \
     with its own place: where it stands now, moved by what the load is to move, in its own start frame \
     (room says how these lie to each other: a partner who faces you goes to its left where you go to your \
-    right). Hands keep their places to the robots and their height; 450 steps a metre. As long as several \
+    right). Hands keep their places to the robots and their height; about 300 steps and 270 a metre. As long as several \
     hold it, name each of them in every command, with compliance_n_s_m 250: the hands of one that is not \
     named stay stiff, and lead it away. To set down, bring the wrists down again by steps of 0.03 m with \
     compliance_n_s_m 250 once both stand: a thing has touched when force_n along z falls towards 0, as \
@@ -104,14 +104,15 @@ const TEAMWORK: &str = "Each robot has an operator of its own; your tools see an
     with stop_reason \"partner_done\", so repeat it. `partners` in a reply says what the others' robots \
     did. When your part is done call finish: your robot then holds still, and the others play on.";
 
-const TALKING: &str = " `say` reaches the others with their next reply, where `heard` has it. Agree on a few \
-    words at once and use them when they are true, for example IN PLACE, HOLDING, FREE; give places in a \
-    frame that you share";
+const TALKING: &str = " `say` reaches the others with their next reply, where `heard` has it. The operator of the \
+    first robot, A, proposes who does what, places, heights and a few words, for example IN PLACE, HOLDING, FREE; \
+    the others answer or correct. Use the words when they are true; give places in a frame that you share";
 
 /// Text for policies that have plans.
 const WAITING: &str = " To wait for a partner, send a plan of one `wait` of up to 500 steps with `until` and a \
     condition, for example {\"heard\": true}, {\"touching\": true}, {\"force_above_n\": 5} or \
-    {\"phase_reached\": \"p1\"}: it is answered once, and the partner's commands go on meanwhile. To carry \
+    {\"phase_reached\": \"p1\"}, or {\"any_of\": [...]} with several of which one suffices: it is answered once, \
+    and the partner's commands go on meanwhile. To carry \
     one thing with an operator for each robot, go by chunks that both begin at a word: a plan of four \
     move_wrists of 25 steps with the base velocity and, in frame \"start\", the hands going along as far, \
     compliance_n_s_m and side_compliance_n_s_m 250, then two waits of 25; say DONE, and begin the next \
@@ -129,7 +130,7 @@ pub fn teamwork(assistance: Assistance, may_talk: bool) -> String {
 
 /// Returns the brief of an episode in its wording, for robots that follow base commands within `limits`.
 pub fn brief(wording: Wording, limits: &BaseLimits, kinds: Option<&[GripKind]>) -> Brief {
-    let Wording { assistance, hints } = wording;
+    let Wording { assistance, hints, .. } = wording;
     let is_full = assistance == Assistance::Full;
     let is_hinted = hints == Hints::On;
     let squats = limits.pelvis_height_m.min < limits.pelvis_height_m.max;

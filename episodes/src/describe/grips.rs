@@ -28,7 +28,7 @@ fn wrapped() -> Vec<(GripKind, WorkedGrip)> {
             WorkedGrip {
                 stand_behind_m: None,
                 ..grip(
-                    "upright round things of 7 cm: bottle, cup",
+                    "upright round things of 7 cm: bottle below its neck, cup",
                     "its axis",
                     AHEAD,
                     [0.12, 0.055, 0.0],

@@ -10,6 +10,9 @@ use super::moving::moving;
 use super::relative::{places, seen_from};
 use crate::tasks::{ObjectSpot, RobotSpot, Spread, Task};
 
+/// Solids that end this near the top of an object belong to its top.
+const NECKS_TOP_M: f32 = 0.01;
+
 /// Returns one line for each object of a task, for example "service trolley, 0.72 m along A's x, 0.44 m along
 /// its y, 0.92 m high: middle 0.85 m ahead of A, 3.65 m ahead of B (from the pelvis, give or take 0.32 m)".
 /// Lines for parts that move on the objects and for the furniture among the room's fixed geoms follow, and one
@@ -23,8 +26,9 @@ pub fn room(task: &Task, spread: Spread, fixed: &[Geom]) -> Result<Vec<String>, 
         let places = places(task, [spot_x_m, spot_y_m]);
         let name = spot.name.replace('_', " ");
         let whole = format!(
-            "{name}, {x_m:.2} m along {}'s x, {y_m:.2} m along its y, {z_m:.2} m high: middle {places} (from the pelvis{})",
+            "{name}, {x_m:.2} m along {}'s x, {y_m:.2} m along its y, {z_m:.2} m high{}: middle {places} (from the pelvis{})",
             first.name,
+            neck(&parts).unwrap_or_default(),
             give_or_take(task, spot, spread)
         );
         Ok((whole, moving(spot, &parts, first)))
@@ -80,6 +84,28 @@ fn size_m(parts: &[ObjectPart], yaw_rad: f32) -> Vector {
     high_m - low_m
 }
 
+/// Returns the width and the neck of an object in one piece whose top is less than half as wide as the rest, as
+/// a bottle's.
+fn neck(parts: &[ObjectPart]) -> Option<String> {
+    let [part] = parts else { return None };
+    let solid = part.model.geoms.iter().filter(|geom| geom.collides);
+    let extents: Vec<[Vector; 2]> =
+        solid.map(|geom| extent_m(corners_m(geom, &part.object_from_part).into_iter(), 0.0)).collect();
+    let top_m = extents.iter().map(|[_, high_m]| high_m.z).fold(f32::MIN, f32::max);
+    let (neck, rest): (Vec<_>, Vec<_>) =
+        extents.into_iter().partition(|[_, high_m]| top_m - high_m.z < NECKS_TOP_M);
+    let joined = |extents: Vec<[Vector; 2]>| extent_m(extents.into_iter().flatten(), 0.0);
+    let ([neck_low_m, neck_high_m], [low_m, high_m]) = (joined(neck), joined(rest));
+    let (neck_m, rest_m) = (neck_high_m - neck_low_m, high_m - low_m);
+    let is_neck = rest_m.x.is_finite() && 2.0 * neck_m.x < rest_m.x && 2.0 * neck_m.y < rest_m.y;
+    is_neck.then(|| {
+        let (wide_m, narrow_m, to_m) = (rest_m.x, neck_m.x, rest_m.z);
+        format!(
+            " ({wide_m:.2} m wide up to {to_m:.2} m above its foot, above that a neck of {narrow_m:.2} m)"
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -104,9 +130,16 @@ mod tests {
         assert_eq!(basket[2], "B begins at [1.26, 0.00] m in A's start frame, turned by -3.14 rad");
         let handover = lines("handover");
         assert!(
-            handover[0].starts_with("bottle, 0.07 m along A's x, 0.07 m along its y, 0."),
+            handover[0].starts_with(
+                "bottle, 0.07 m along A's x, 0.07 m along its y, 0.30 m high (0.07 m wide up to 0.20 m above \
+                 its foot, above that a neck of 0.03 m): middle"
+            ),
             "{handover:?}"
         );
+        let with_necks = |id: &&str| lines(id).iter().any(|line| line.contains(" neck of "));
+        let ids: Vec<String> = tasks::cohub().iter().map(|task| task.id.clone()).collect();
+        let found: Vec<&str> = ids.iter().map(String::as_str).filter(with_necks).collect();
+        assert_eq!(found, ["handover"], "of CoHub's things only the bottle has one");
         for task in tasks::cohub() {
             let lines = lines(&task.id);
             let moving = if task.id == "move_house" { 2 } else { 0 };

@@ -125,6 +125,7 @@ impl Session {
                 }
             },
             ending: describe::ending(self.spec().disclosure).into(),
+            http: Vec::new(),
             brief: describe::brief(
                 self.spec().wording(),
                 &wire_limits(&self.motions[0].robot.base_limits),

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 use tandem_episodes::{A, B, Session};
-use tandem_tools_spec::{Assistance, BaseState, Call, PlanReply, Protocol, ToolCall, ToolReply};
+use tandem_tools_spec::{Assistance, BaseState, Call, HandState, PlanReply, Protocol, ToolCall, ToolReply};
 
 use crate::common::*;
 
@@ -125,6 +125,16 @@ fn a_command_lasts_until_what_it_expects_holds() {
     let reply = plan(&mut session, "send_plan", json!({ "commands": [still] })).unwrap();
     assert_eq!(reply.executed_steps, 12);
     assert!(reply.stopped.unwrap().contains("its steps are done and p1 has not been reached"));
+    let either = |force_n: f64| {
+        let any_of = json!([{ "phase_reached": "p3" }, { "force_below_n": force_n }]);
+        json!({ "tool": "wait", "arguments": { "steps": 12 }, "expects": { "any_of": any_of }, "until": true })
+    };
+    let reply = plan(&mut session, "send_plan", json!({ "commands": [either(1e3)] })).unwrap();
+    assert_eq!((reply.stopped, reply.executed_steps), (None, 5), "one of two suffices");
+    let reply = plan(&mut session, "send_plan", json!({ "commands": [either(-1.0)] })).unwrap();
+    let stopped = reply.stopped.unwrap();
+    assert!(stopped.contains("none of any_of holds: p3 has not been reached; get_status"), "{stopped}");
+    assert!(stopped.contains("what p1, the next phase, lacks; a hand feels"), "{stopped}");
     let until = |command: serde_json::Value| {
         let mut command = command;
         (command["expects"], command["until"]) = (json!({ "arrived": true }), json!(true));
@@ -139,8 +149,12 @@ fn a_command_lasts_until_what_it_expects_holds() {
         (json!({ "tool": "wait", "arguments": { "steps": 5 }, "until": true }), "needs a condition"),
         (until(json!({ "tool": "wait", "arguments": { "steps": 501 } })), "at most 500"),
         (
-            json!({ "tool": "wait", "arguments": { "steps": 5 }, "expects": { "heard": true } }),
+            json!({ "tool": "wait", "arguments": { "steps": 5 }, "expects": { "any_of": [{ "heard": true }] } }),
             "for operators",
+        ),
+        (
+            json!({ "tool": "wait", "arguments": { "steps": 5 }, "expects": { "any_of": [{}] } }),
+            "any_of has no condition, or an entry without one",
         ),
         (until(json!({ "tool": "send_joint_chunk", "arguments": { "robots": [] } })), "cannot have `until`"),
     ] {
@@ -252,6 +266,19 @@ fn a_robot_walks_to_a_place() {
     let reply = plan(&mut session, "walk_to", few).unwrap();
     assert_eq!(reply.executed_steps, 20);
     assert!(reply.stopped.unwrap().contains("the steps are used up; A is"), "its place is half a metre off");
+}
+
+/// Arms without a target keep their joints, also where the place of the hand would be out of reach.
+#[test]
+fn an_empty_hand_without_a_target_is_not_carried() {
+    let mut session = agentic();
+    let turn = json!({ "steps": 1500, "robots": [
+        { "robot": "A", "to_m": [-0.6, 0.0], "heading_rad": 3.0, "carry": true },
+    ] });
+    let reply = plan(&mut session, "walk_to", turn).unwrap();
+    assert_eq!(reply.stopped, None);
+    let right = &reply.last.robots[A].right;
+    assert_eq!(right.state, Some(HandState::Idle), "{right:?}");
 }
 
 /// A robot that carries, with a wrist target out of reach, stops at once and reports the reason.

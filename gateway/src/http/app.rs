@@ -5,7 +5,7 @@ use std::{sync::Arc, time::Instant};
 
 use serde_json::Value;
 use tandem_tools_spec::{
-    EPISODE_TOOLS, ListTasks, StartEpisode, Tool as _, ToolSpec, operator_tool_specs, tool_specs,
+    EPISODE_TOOLS, ListTasks, StartEpisode, Tool as _, ToolSpec, Wording, operator_tool_specs, tool_specs,
 };
 
 use tokio::sync::Semaphore;
@@ -52,22 +52,31 @@ impl AppState {
         AppState { table, settings, watch_key, watchers, recordings, films, evaluations, task_pictures }
     }
 
+    /// Returns the texts about tools for `caller`.
+    pub fn wording(&self, caller: &Caller) -> Wording {
+        let wording = self.settings.wording();
+        match caller {
+            Caller::Host => wording,
+            Caller::Operator { .. } => wording.for_operator(),
+        }
+    }
+
     /// Returns the tools that `caller` may use. Talking is only for operators that may talk.
     pub fn tool_specs(&self, caller: &Caller) -> Vec<ToolSpec> {
         let mut specs = match self.table.may_talk(caller) {
-            true => operator_tool_specs(self.settings.wording()),
-            false => tool_specs(self.settings.wording()),
+            true => operator_tool_specs(self.wording(caller)),
+            false => tool_specs(self.wording(caller)),
         };
         if let Caller::Operator { .. } = caller {
             // An operator's episode goes on already, and no other can be begun.
-            specs.retain(|spec| spec.name != StartEpisode::NAME);
+            specs.retain(|spec| spec.on_episode);
         }
         specs
     }
 
     /// Returns the description of the REST interface for `caller`.
     pub fn openapi(&self, caller: &Caller) -> Value {
-        tandem_tools_spec::openapi(VERSION, self.settings.wording(), self.table.may_talk(caller))
+        tandem_tools_spec::openapi(VERSION, self.wording(caller), self.table.may_talk(caller))
     }
 }
 

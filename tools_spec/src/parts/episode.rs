@@ -5,6 +5,8 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::driving::Operators;
+
 /// Rules of an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -107,17 +109,26 @@ pub struct Wording {
     pub assistance: Assistance,
     /// Hints on grasping.
     pub hints: Hints,
+    /// Operator of one robot, or the policy of all.
+    pub operators: Operators,
+}
+
+impl Wording {
+    /// Returns the texts for the operator of a robot.
+    pub fn for_operator(self) -> Wording {
+        Wording { operators: Operators::PerRobot, ..self }
+    }
 }
 
 impl From<Assistance> for Wording {
     fn from(assistance: Assistance) -> Wording {
-        Wording { assistance, hints: assistance.hints() }
+        Wording { assistance, hints: assistance.hints(), operators: Operators::One }
     }
 }
 
 impl From<Hints> for Wording {
     fn from(hints: Hints) -> Wording {
-        Wording { assistance: Assistance::Full, hints }
+        Wording { assistance: Assistance::Full, hints, operators: Operators::One }
     }
 }
 

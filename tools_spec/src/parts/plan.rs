@@ -10,7 +10,8 @@ use super::command::CommandReply;
 pub struct PlanReply {
     /// Commands that were carried out: of a plan, those that it lists; of a walk, each short one.
     pub commands: u32,
-    /// Tool calls of the episode up to now.
+    /// Tool calls of all robots up to now, as results count them: each command of a plan or walk is one, and
+    /// each slice of 5 steps with `until`. No budget limits them.
     pub tool_calls: u32,
     /// Control steps of 20 ms that they took together.
     pub executed_steps: u32,

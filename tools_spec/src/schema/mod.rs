@@ -5,6 +5,7 @@ mod format;
 mod nullable;
 mod openapi;
 mod plain;
+mod readable;
 mod spec;
 mod strict;
 mod typed;

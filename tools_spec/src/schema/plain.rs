@@ -4,7 +4,7 @@ use schemars::{JsonSchema, generate::SchemaSettings};
 use serde_json::{Map, Value};
 
 use crate::limits::bound_numbers;
-use crate::parts::{Assistance, Wording};
+use crate::parts::{Assistance, Operators, Wording};
 
 /// Returns the schema of `T` as it is, for replies: nothing has to be strict about what the server itself
 /// sends.
@@ -38,11 +38,10 @@ pub fn word(schema: &mut Value, wording: Wording) {
                 true => object.remove(name)?.as_str().map(str::to_owned),
                 false => None,
             };
-            let of_paper = text_of("paper");
-            if let (Some(of_paper), Assistance::Paper) = (of_paper, wording.assistance)
-                && let Some(Value::String(text)) = object.get_mut("description")
-            {
-                *text = of_paper;
+            let of_paper = text_of("paper").filter(|_| wording.assistance == Assistance::Paper);
+            let of_operator = text_of("operator").filter(|_| wording.operators == Operators::PerRobot);
+            if let Some(own) = of_operator.or(of_paper) {
+                object.insert("description".into(), own.into());
             }
             object.values_mut().for_each(|value| word(value, wording));
         }

@@ -5,10 +5,12 @@ use serde_json::{Map, Value, json};
 
 use super::nullable::leave_out;
 use super::plain::{body_schema, plain_schema};
+use super::readable::{make_readable, refer_to_list};
 use super::strict::{SHORT, SHORTLY, require_episode_id, require_short, strict_schema};
 use crate::limits::{bound_robots, bound_steps};
 use crate::parts::Wording;
 use crate::tool::{Route, Tool};
+use crate::tools::{Observe, SendPlan};
 
 /// A tool as a policy's host needs it: for OpenAI, Anthropic and MCP alike.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -49,14 +51,19 @@ pub struct ToolSpec {
     pub route: Route,
 }
 
-/// A tool of an episode that runs: its route names the episode, and its body is described as the episode's
-/// rules have it.
+/// A tool of an episode that runs, for a reader: its route names the episode, and its body is described as
+/// the episode's rules have it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EpisodeToolSpec {
-    /// The tool.
-    #[serde(flatten)]
-    pub spec: ToolSpec,
-    /// See [`ToolSpec::body_schema`].
+    /// The name a caller uses.
+    pub name: &'static str,
+    /// Description of the tool for the model.
+    pub description: String,
+    /// True if the call leaves the world as it was.
+    pub read_only: bool,
+    /// Its REST route.
+    pub route: Route,
+    /// JSON Schema of the body without what a refusal says when it matters.
     pub body_schema: Value,
 }
 
@@ -108,11 +115,20 @@ impl ToolSpec {
         self.marked_body["anyOf"] = conditions;
     }
 
-    /// Returns the schema of a plan's command that names this tool.
+    /// Returns the schema of a plan's command that names this tool. Its steps may be more with `until`.
     pub(crate) fn as_planned(&self) -> Value {
         let mut arguments = self.marked_body.clone();
         arguments.as_object_mut().and_then(|arguments| arguments.shift_remove("$schema"));
-        json!({ "properties": { "tool": { "const": self.name }, "arguments": arguments } })
+        let mut command = json!({ "properties": { "tool": { "const": self.name } } });
+        if SendPlan::UNTIL_COMMANDS.contains(&self.name) {
+            let steps = std::mem::replace(&mut arguments["properties"]["steps"], long_steps());
+            let short = json!({ "arguments": { "properties": { "steps": steps } } });
+            let until = json!({ "until": { "const": true } });
+            command["anyOf"] =
+                json!([{ "properties": short }, { "properties": until, "required": ["until"] }]);
+        }
+        command["properties"]["arguments"] = arguments;
+        command
     }
 
     /// Lets the commands of a plan be only what fits one of these schemas, too.
@@ -142,13 +158,31 @@ impl ToolSpec {
         leaving_out(&self.input_schema, false)
     }
 
-    /// Returns the tool as the running episode `id` with these `robots` has it.
+    /// Returns the tool as the running episode `id` has it, for a caller who commands these `robots`.
     pub fn of_episode(self, id: &str, robots: &[String], most_steps: u32) -> EpisodeToolSpec {
         let mut body_schema = self.body_schema(most_steps);
         bound_robots(&mut body_schema, robots);
-        let route = Route::of_episode(id, self.name);
-        EpisodeToolSpec { spec: ToolSpec { route, ..self }, body_schema }
+        make_readable(&mut body_schema);
+        if let Value::Object(body) = &mut body_schema {
+            // The tool's own.
+            body.remove("description");
+        }
+        if let Some(properties) = body_schema["properties"].as_object_mut() {
+            refer_to_list(properties, Observe::NAME);
+        }
+        EpisodeToolSpec {
+            name: self.name,
+            description: self.description,
+            read_only: self.read_only,
+            route: Route::of_episode(id, self.name),
+            body_schema,
+        }
     }
+}
+
+/// Returns the schema of the steps of a command with `until`.
+fn long_steps() -> Value {
+    json!({ "type": "integer", "minimum": 1, "maximum": SendPlan::MAX_UNTIL_STEPS })
 }
 
 fn leaving_out(schema: &Map<String, Value>, own_fields: bool) -> Map<String, Value> {

@@ -116,7 +116,7 @@ fn make_strict(schema: &mut Value) {
 }
 
 /// Joins the lines of descriptions, which break where the source does.
-fn unwrap_lines(object: &mut Map<String, Value>) {
+pub fn unwrap_lines(object: &mut Map<String, Value>) {
     if let Some(Value::String(text)) = object.get_mut("description") {
         *text = text.replace("\n\n", "\u{1}").replace('\n', " ").replace('\u{1}', "\n\n");
     }
@@ -125,7 +125,7 @@ fn unwrap_lines(object: &mut Map<String, Value>) {
 /// Replaces `oneOf`, which strict hosts refuse and which is how schemars writes an enum whose variants are
 /// described: the names become an `enum` and their descriptions part of the enum's own. Of any other
 /// `oneOf` only the texts are left.
-fn list_choices(object: &mut Map<String, Value>) {
+pub fn list_choices(object: &mut Map<String, Value>) {
     let Some(Value::Array(choices)) = object.remove("oneOf") else {
         return;
     };

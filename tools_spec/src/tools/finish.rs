@@ -12,6 +12,8 @@ use crate::tool::Tool;
 /// End the episode and get its result. After that no command is executed; reads still answer.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(extend("operator" = "Leave the rest to the others: your robot holds still from then on, and they play on. \
+    Once all operators have finished, the episode ends and the reply is its result."))]
 pub struct Finish {}
 
 impl Tool for Finish {
@@ -66,7 +68,8 @@ pub struct ResultReply {
     pub ended: EndReason,
     /// Control steps of 20 ms, the initial hold included.
     pub env_steps: u32,
-    /// Calls of tools up to the end, reads, refused calls and the one that ended the episode included.
+    /// Calls of tools of all robots up to the end, reads, refused calls and the one that ended the episode
+    /// included. Each command of a plan or walk is one, and each slice of 5 steps with `until`.
     pub tool_calls: u32,
     /// Requests of the policy itself: like tool_calls, but a plan or a walk, whose commands are a call each,
     /// counts once. Left out in results of earlier versions.

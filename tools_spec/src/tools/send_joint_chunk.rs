@@ -45,8 +45,7 @@ pub struct JointChunk {
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
     /// Rows of 35 numbers: joint targets in radians for left_arm 7, right_arm 7, left_hand 7, right_hand 7,
-    /// waist 3, then vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m. start_episode names the columns
-    /// unless its reply is short.
+    /// waist 3, then vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m.
     #[schemars(length(min = 1), inner(length(equal = ACTION_ROW_LEN)), extend("most_steps" = "maxItems"))]
     pub rows: Vec<Vec<f64>>,
 }

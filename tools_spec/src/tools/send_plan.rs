@@ -11,11 +11,8 @@ use crate::tools::{MoveWrists, SendJointChunk, Wait, Walk, WalkTo};
 
 /// Commands of one plan.
 const MAX_COMMANDS: usize = 20;
-/// Control steps of a command that goes on until something is so: ten seconds.
-const MAX_UNTIL_STEPS: u32 = 500;
 
-/// Carry out up to 20 commands in order, each with its own steps and counted as a tool call, until one's
-/// `expects` does not hold. With `until`, a command lasts until it does: lower a hand until it touches,
+/// Carry out up to 20 commands in order, each counted as a tool call, until one's `expects` does not hold. With `until`, a command lasts until it does: lower a hand until it touches,
 /// wait until a phase is reached. Returns the last command's reply, how many were carried out, and why no
 /// more. If one is invalid, none is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -38,8 +35,8 @@ pub struct PlannedCommand {
     /// Conditions that have to hold after it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expects: Option<Expectation>,
-    /// True: it ends once its `expects` hold (`arrived`: after `steps`), or else the plan stops after
-    /// `steps`, up to 500. For move_wrists, walk and wait.
+    /// True: it ends once its `expects` hold (`arrived`: after `steps`); else the plan stops after `steps`,
+    /// up to 500. For move_wrists, walk, wait.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[schemars(extend("default" = false))]
     pub until: bool,
@@ -58,30 +55,56 @@ pub struct Expectation {
     /// A hand presses on something.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub touching: Option<bool>,
-    /// A hand holds something between thumb and fingers.
+    /// A hand holds something by thumb and fingers.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub holding: Option<bool>,
-    /// A hand feels more than this force in newtons.
+    /// A hand feels more than this, in newtons.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_above_n: Option<f64>,
     /// No hand feels more.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_below_n: Option<f64>,
-    /// This phase has been reached, for example "p1".
+    /// This phase is reached, for example "p1".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub phase_reached: Option<String>,
     /// A robot steps, or settles after a walk.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_stepping: Option<bool>,
-    /// Another operator has said something since the plan began.
+    /// Another operator has spoken since the plan began.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub heard: Option<bool>,
+    /// One of these holds, each like `expects`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Vec<Map<String, Value>>>")]
+    pub any_of: Option<Vec<Expectation>>,
 }
 
 impl Expectation {
     /// Returns true where no condition is given.
     pub fn is_empty(&self) -> bool {
         *self == Expectation::default()
+    }
+
+    /// Returns these conditions and all that `any_of` holds.
+    pub fn with_alternatives(&self) -> Vec<&Expectation> {
+        let inner = self.any_of.iter().flatten().flat_map(Expectation::with_alternatives);
+        [self].into_iter().chain(inner).collect()
+    }
+
+    /// Checks that forces are finite and that every alternative has a condition.
+    fn validate(&self) -> Result<(), String> {
+        for (name, force_n) in [("force_above_n", self.force_above_n), ("force_below_n", self.force_below_n)]
+        {
+            checks::finite(&format!("expects.{name}"), force_n.as_slice())?;
+        }
+        let Some(any_of) = &self.any_of else { return Ok(()) };
+        match any_of.is_empty() || any_of.iter().any(Expectation::is_empty) {
+            true => {
+                Err("any_of has no condition, or an entry without one; give some, as [{\"heard\": true}]"
+                    .into())
+            }
+            false => any_of.iter().try_for_each(Expectation::validate),
+        }
     }
 }
 
@@ -90,7 +113,9 @@ impl SendPlan {
     pub const COMMANDS: [&str; 5] =
         [MoveWrists::NAME, Walk::NAME, SendJointChunk::NAME, Wait::NAME, WalkTo::NAME];
     /// Commands that may go on until something is so.
-    const UNTIL_COMMANDS: [&str; 3] = [MoveWrists::NAME, Walk::NAME, Wait::NAME];
+    pub const UNTIL_COMMANDS: [&str; 3] = [MoveWrists::NAME, Walk::NAME, Wait::NAME];
+    /// Control steps of a command that goes on until something is so: ten seconds.
+    pub const MAX_UNTIL_STEPS: u32 = 500;
 
     /// Returns what messages call the command at `index`.
     pub fn place(&self, index: usize) -> String {
@@ -137,14 +162,10 @@ impl Tool for SendPlan {
             }
             _ => {}
         }
-        for (index, command) in self.commands.iter().enumerate() {
-            let Some(Expectation { force_above_n, force_below_n, .. }) = &command.expects else { continue };
-            for (name, force_n) in [("force_above_n", force_above_n), ("force_below_n", force_below_n)] {
-                checks::finite(&format!("{}: expects.{name}", self.place(index)), force_n.as_slice())?;
-            }
-        }
         self.commands.iter().enumerate().try_for_each(|(index, command)| {
-            command.check_name().map_err(|why| format!("{}: {why}", self.place(index)))
+            let expected = command.expects.as_ref().map_or(Ok(()), Expectation::validate);
+            let checked = expected.and_then(|()| command.check_name());
+            checked.map_err(|why| format!("{}: {why}", self.place(index)))
         })
     }
 }
@@ -168,8 +189,8 @@ impl PlannedCommand {
             return Err("`until` needs a condition in `expects`, for example {\"touching\": true}".into());
         }
         match self.arguments.get("steps").and_then(Value::as_u64) {
-            Some(steps) if steps > u64::from(MAX_UNTIL_STEPS) => {
-                Err(format!("steps is {steps}; with `until` give at most {MAX_UNTIL_STEPS}"))
+            Some(steps) if steps > u64::from(SendPlan::MAX_UNTIL_STEPS) => {
+                Err(format!("steps is {steps}; with `until` give at most {}", SendPlan::MAX_UNTIL_STEPS))
             }
             _ => Ok(()),
         }

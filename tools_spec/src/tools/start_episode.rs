@@ -78,6 +78,9 @@ pub struct Briefing {
     pub room: Vec<String>,
     /// Ways in which the episode ends, and disclosure of phases.
     pub ending: String,
+    /// Routes of the tools, for clients over HTTP; left out for all others.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub http: Vec<String>,
     /// Commands and joints of each kind of robot.
     pub kinds: Vec<RobotKind>,
     /// Facts for seeing and acting.
@@ -99,6 +102,16 @@ impl Briefing {
         self.status.fallen.retain(|entry| entry.robot == robot);
         self.instruction = self.shared_instruction.take().unwrap_or(self.instruction);
         self
+    }
+
+    /// Returns the briefing of the episode `id` for a client over HTTP.
+    pub fn over_http(self, id: &str) -> Briefing {
+        let tools = format!("/v1/episodes/{id}/tools");
+        let list = format!("GET {tools} lists your tools, each with the schema of its body.");
+        let call = format!(
+            "POST {tools}/NAME calls one. The JSON body has its arguments, as {{\"steps\": 25}} for wait."
+        );
+        Briefing { http: vec![list, call], ..self }
     }
 
     /// Returns the short briefing.

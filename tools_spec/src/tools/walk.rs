@@ -22,7 +22,7 @@ pub struct Walk {
     pub robots: Vec<WalkMove>,
 }
 
-/// Values beyond the ranges that start_episode gives are clamped and reported.
+/// Values beyond the briefing's ranges are clamped and reported.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("not" = limits::all_of(&[("waist_yaw_rad", "number"), ("look_at_m", "array")])))]

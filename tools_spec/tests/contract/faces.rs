@@ -212,18 +212,39 @@ fn every_tool_names_its_route_and_openapi_has_it() {
 fn a_running_episode_says_how_many_steps_a_command_may_have() {
     let specs = episode_tool_specs(Hints::On, "handover-seed0", &["A".into(), "B".into()], 25, false);
     let body = |name: &str| {
-        let found = specs.iter().find(|tool| tool.spec.name == name).expect("a tool");
-        assert_eq!(found.spec.route.path, format!("/v1/episodes/handover-seed0/tools/{name}"));
+        let found = specs.iter().find(|tool| tool.name == name).expect("a tool");
+        assert_eq!(found.route.path, format!("/v1/episodes/handover-seed0/tools/{name}"));
         &found.body_schema["properties"]
     };
     for name in ["wait", "walk", "move_wrists"] {
         assert_eq!(body(name)["steps"]["maximum"], 25, "{name}");
     }
-    let robots = &body("send_joint_chunk")["robots"];
-    assert_eq!(robots["items"]["properties"]["rows"]["maxItems"], 25);
-    let lengths: Vec<&Value> = robots["anyOf"].as_array().into_iter().flatten().collect();
-    assert_eq!(lengths.len(), 25);
-    let rows = json!({ "minItems": 3, "maxItems": 3 });
-    assert_eq!(lengths[2], &json!({ "items": { "properties": { "rows": rows } } }));
-    assert!(specs.iter().all(|tool| tool.spec.on_episode));
+    let rows = &body("send_joint_chunk")["robots"]["items"]["properties"]["rows"];
+    assert_eq!((&rows["maxItems"], &rows["items"]["maxItems"]), (&json!(25), &json!(35)));
+    assert!(specs.iter().all(|tool| tool.name != "list_tasks"));
+}
+
+/// A model reads the list of its episode once; validators have OpenAPI.
+#[test]
+fn the_list_of_an_episode_is_for_a_reader() {
+    let specs = episode_tool_specs(Hints::On, "handover-seed0", &["B".into()], 25, true);
+    let list = json!(specs);
+    let bytes = list.to_string().len();
+    assert!(bytes <= 24_000, "{bytes} bytes");
+    for_each_object(&list, &mut |object| {
+        for keyword in ["input_schema", "not", "anyOf", "prefixItems", "$schema"] {
+            assert!(!object.contains_key(keyword), "{keyword} in {object:?}");
+        }
+        let least = object.get("minimum").and_then(Value::as_f64);
+        assert!(least.is_none_or(|least| least > -1e6), "{object:?}");
+    });
+    let plan = specs.iter().find(|tool| tool.name == "send_plan").expect("plans");
+    let command = &plan.body_schema["properties"]["commands"]["items"]["properties"];
+    assert_eq!(command["tool"]["enum"].as_array().map(Vec::len), Some(5));
+    assert!(
+        !command["arguments"].to_string().contains("maximum"),
+        "each tool's own schema says it: {command}"
+    );
+    let walk = specs.iter().find(|tool| tool.name == "walk").expect("walks");
+    assert_eq!(walk.body_schema["properties"]["robots"]["maxItems"], 1, "an operator has one robot");
 }

@@ -317,9 +317,15 @@ fn openapi_says_what_is_refused() {
     let planned = field("send_plan", "/commands/items/anyOf");
     let wait =
         planned.as_array().into_iter().flatten().find(|of| of["properties"]["tool"]["const"] == "wait");
-    let arguments = &wait.expect("a plan may wait")["properties"]["arguments"];
+    let wait = wait.expect("a plan may wait");
+    let arguments = &wait["properties"]["arguments"];
     assert_eq!(arguments["required"], json!(["steps"]));
-    assert_eq!(arguments["properties"]["steps"]["maximum"], 50);
+    assert_eq!(arguments["properties"]["steps"]["maximum"], 500);
+    let [short, until] = wait["anyOf"].as_array().map(Vec::as_slice).expect("two choices") else {
+        panic!("{wait}")
+    };
+    assert_eq!(short["properties"]["arguments"]["properties"]["steps"]["maximum"], 50);
+    assert_eq!(until["properties"]["until"]["const"], true);
     let note = &document["paths"]["/v1/episodes/{episode_id}/notes"]["post"]["requestBody"];
     let says = &note["content"]["application/json"]["schema"]["anyOf"];
     assert_eq!(says[0]["properties"]["text"]["minLength"], 1);
@@ -353,7 +359,7 @@ fn bodies_of_an_episode_name_its_own_robots() {
     let robots = ["A".to_owned(), "B".to_owned()];
     let patterns = |tool: &str| {
         let specs = episode_tool_specs(Hints::On, "x", &robots, 25, true);
-        let spec = specs.iter().find(|spec| spec.spec.name == tool).unwrap();
+        let spec = specs.iter().find(|spec| spec.name == tool).unwrap();
         let text = spec.body_schema.to_string();
         let found: Vec<String> = text
             .split("\"pattern\":\"")

@@ -30,6 +30,11 @@ const TOUCHED_N: f32 = 3.0;
 /// Tolerance within which free fingers reach their targets.
 const FINGER_TOLERANCE_RAD: f64 = 0.06;
 
+/// Returns the grip of a hand, as its own drives feel it.
+pub fn grip(side: Side, sensed: &RobotSensed, motion: &Motion) -> Grip {
+    feel::felt(side, sensed, &motion.robot.model).grip
+}
+
 /// Returns the report on an order. `clamped` are its clamped values, `sensed` is the robot's sensing after
 /// it, and `began` is the pelvis before it by odometry. Wrist poses are in the frame of the latest wrist
 /// targets.
@@ -143,9 +148,7 @@ pub fn wrist_state(
     let tolerance = motion.tolerance(side);
     let near = |factor: f64| is_near(measured, target, &tolerance, factor);
     // An arm sags under its load.
-    if near(1.0)
-        || (near(HOLDING_FACTOR) && feel::felt(side, sensed, &motion.robot.model).grip == Grip::TwoSided)
-    {
+    if near(1.0) || (near(HOLDING_FACTOR) && grip(side, sensed, motion) == Grip::TwoSided) {
         HandState::Arrived
     } else if motion.comes_nearer(side).unwrap_or_else(turns) {
         HandState::Moving

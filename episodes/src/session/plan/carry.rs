@@ -16,6 +16,7 @@ use tandem_tools_spec::{
 };
 
 use super::PlanAdvance;
+use super::pace::PathPace;
 use super::walk_to::{ATTEMPTS, CALM_COMMANDS, THERE_M, THERE_RAD, WELL_M, WELL_RAD, all_stand};
 use super::way::{Corrections, Missing, Stand, WALK_STEPS, Way, wrapped};
 use crate::EpisodeError;
@@ -23,10 +24,6 @@ use crate::commands;
 use crate::convert::isometry_from_sim;
 use crate::session::Session;
 
-/// Speed along a path, its acceleration, and its minimum.
-const PACE_M_S: f64 = 0.2;
-const ACCELERATION_M_S2: f64 = 0.2;
-const CREEP_M_S: f64 = 0.02;
 /// The path slows down for a robot that lags by the first distance, and waits at the second. It is given
 /// up after waiting for this many commands. The angles apply to robots turned away from the path.
 const LAG_M: [f64; 2] = [0.13, 0.18];
@@ -34,8 +31,6 @@ const LAGS_COMMANDS: u32 = 16;
 const TURNED_RAD: [f64; 2] = [0.12, 0.2];
 /// Number of commands with a robot turned away, or a wrist out of reach, after which the path is given up.
 const STRAYS_COMMANDS: u32 = 3;
-/// Number of commands by which robots walk behind their commands.
-const BEHIND_COMMANDS: usize = 2;
 /// Gain on the distance from the path, and limits of the total speed and of the yaw rate. Twice this gain
 /// makes robots oscillate with a growing amplitude, since they walk behind their commands.
 const GAIN_1_S: f64 = 0.5;
@@ -55,6 +50,8 @@ struct Carrier {
     name: String,
     robot: usize,
     carries: bool,
+    /// Hands that go along: those with a wrist target or a grip. The arms of the others keep their joints.
+    hands: Sides<bool>,
     ways: Vec<Way>,
     /// Fixed wrist poses in the frame of the robot's planned place.
     stand_from_wrist: Sides<Isometry3<f64>>,
@@ -97,51 +94,6 @@ pub struct CarryPlan {
     strays: u32,
     /// Reason why the robots stop early.
     stopped: Option<String>,
-}
-
-/// Progress along a path, and its speed.
-#[derive(Debug, Default)]
-struct PathPace {
-    /// Distance that bases have been commanded to go.
-    gone_m: f64,
-    /// The same of the latest commands, the oldest first.
-    latest_m: [f64; BEHIND_COMMANDS + 1],
-    pace_m_s: f64,
-    waited: u32,
-}
-
-impl PathPace {
-    /// Advances for `time_s` along a path of `length_m`, at a fraction of the normal speed.
-    fn go(&mut self, length_m: f64, share: f64, time_s: f64) {
-        let left_m = length_m - self.gone_m;
-        if share > 0.0 {
-            let can_stop_m_s = (2.0 * ACCELERATION_M_S2 * left_m).sqrt().max(CREEP_M_S);
-            let most_m_s = (PACE_M_S * share).max(CREEP_M_S);
-            self.pace_m_s = (self.pace_m_s + ACCELERATION_M_S2 * time_s).min(can_stop_m_s).min(most_m_s);
-            self.waited = 0;
-        } else {
-            (self.pace_m_s, self.waited) = (0.5 * self.pace_m_s, self.waited + 1);
-        }
-        self.pace_m_s = self.pace_m_s.min(left_m / time_s);
-        self.gone_m += self.pace_m_s * time_s;
-        self.follow();
-    }
-
-    /// Stands for a command, while robots catch up with earlier ones.
-    fn stand(&mut self) {
-        self.pace_m_s = 0.0;
-        self.follow();
-    }
-
-    fn follow(&mut self) {
-        self.latest_m.rotate_left(1);
-        self.latest_m[BEHIND_COMMANDS] = self.gone_m;
-    }
-
-    /// Returns the distance that robots are expected to have gone.
-    fn expected_m(&self) -> f64 {
-        self.latest_m[0]
-    }
 }
 
 impl CarryPlan {
@@ -229,6 +181,11 @@ impl Session {
             name: entry.robot.clone(),
             robot,
             carries: entry.carry == Some(true),
+            hands: Sides::from_fn(|side| {
+                let motion = &self.motions[robot];
+                let sensed = &self.present.robots[robot].sensed;
+                motion.aims_at_pose(side) || commands::grip(side, sensed, motion) != Grip::None
+            }),
             ways: self.places(robot, entry, frame).into_iter().map(way).collect(),
             stand_from_wrist: self.motions[robot].told_wrists().map(|wrist| stand_from_pelvis * wrist),
             before_m: None,
@@ -341,7 +298,7 @@ impl Session {
         }
         stray
             .filter(|_| plan.strays >= STRAYS_COMMANDS)
-            .map(|why| format!("they stopped with what they hold: {why}; {}", self.how_far_off(plan)))
+            .map(|why| format!("stopped with the load in hand: {why}; {}", self.how_far_off(plan)))
     }
 
     /// Advances to the next stage after a command; `stand` is true if all robots stand. Returns true at
@@ -425,11 +382,11 @@ impl Carrier {
         if !self.carries {
             return base;
         }
-        let wrist = |side: Side| stand.start_from_stand() * self.stand_from_wrist[side];
-        let position_m = |side: Side| Some(wrist(side).translation.vector.into());
+        let wrist =
+            |side: Side| self.hands[side].then(|| stand.start_from_stand() * self.stand_from_wrist[side]);
+        let position_m = |side: Side| wrist(side).map(|wrist| wrist.translation.vector.into());
         let quaternion_wxyz = |side: Side| {
-            let turned = wrist(side).rotation;
-            Some([turned.w, turned.i, turned.j, turned.k])
+            wrist(side).map(|Isometry3 { rotation, .. }| [rotation.w, rotation.i, rotation.j, rotation.k])
         };
         WristMove {
             frame: Some(tandem_tools_spec::PoseFrame::Start),
@@ -451,13 +408,18 @@ impl Carrier {
                 Side::Right => report.right.grip,
             };
             let empty = &mut self.empty[*side];
-            *empty = match (grip, *empty) {
-                (Some(Grip::TwoSided), _) => Some(0),
-                (Some(Grip::None), Some(commands)) => Some(commands + 1),
-                (_, before) => before,
-            };
+            *empty = commands_without_hold(*empty, grip);
             empty.is_some_and(|commands| commands >= LOST_COMMANDS)
         })
+    }
+}
+
+/// Counts the commands since a hand has lost its hold; `None` before its first one.
+fn commands_without_hold(before: Option<u32>, grip: Option<Grip>) -> Option<u32> {
+    match (grip, before) {
+        (Some(Grip::TwoSided), _) => Some(0),
+        (Some(Grip::None | Grip::Touching), Some(commands)) => Some(commands + 1),
+        (Some(Grip::None | Grip::Touching | Grip::OneSided) | None, before) => before,
     }
 }
 
@@ -466,25 +428,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_path_is_gone_from_rest_to_rest_and_waits() {
-        let mut pace = PathPace::default();
-        let mut paces = Vec::new();
-        while 1.0 - pace.gone_m > 1e-9 {
-            pace.go(1.0, 1.0, 0.26);
-            paces.push(pace.pace_m_s);
-        }
-        assert!((pace.gone_m - 1.0).abs() < 1e-9 && paces.len() < 40, "{paces:?}");
-        assert!(pace.expected_m() < 0.99, "robots are behind: {pace:?}");
-        (0..BEHIND_COMMANDS).for_each(|_| pace.stand());
-        assert!((pace.expected_m() - 1.0).abs() < 1e-9, "and catch up: {pace:?}");
-        assert!(paces[0] < 0.06 && paces.iter().all(|pace| *pace <= PACE_M_S), "{paces:?}");
-        let mut slowed = PathPace { gone_m: 0.3, pace_m_s: 0.2, ..PathPace::default() };
-        slowed.go(1.0, 0.4, 0.26);
-        assert!((slowed.pace_m_s - 0.4 * PACE_M_S).abs() < 1e-9, "{}", slowed.pace_m_s);
-        let mut held_up = PathPace { gone_m: 0.5, pace_m_s: 0.2, ..PathPace::default() };
-        for _ in 0..10 {
-            held_up.go(1.0, 0.0, 0.26);
-        }
-        assert!(held_up.waited == 10 && held_up.gone_m < 0.56, "{}", held_up.gone_m);
+    fn a_hand_that_only_touches_has_lost_its_hold() {
+        let count = |grips: &[Grip]| {
+            grips.iter().fold(None, |before, grip| commands_without_hold(before, Some(*grip)))
+        };
+        assert_eq!(count(&[Grip::Touching, Grip::None]), None, "it has held nothing yet");
+        assert_eq!(count(&[Grip::TwoSided, Grip::Touching, Grip::None]), Some(2));
+        assert_eq!(
+            count(&[Grip::TwoSided, Grip::Touching, Grip::OneSided]),
+            Some(1),
+            "one side still presses"
+        );
+        assert_eq!(count(&[Grip::TwoSided, Grip::None, Grip::TwoSided]), Some(0));
     }
 }

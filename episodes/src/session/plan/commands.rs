@@ -3,7 +3,7 @@
 use tandem_tools_spec::{ActCall, CommandReply, PlanStep, PlannedCall, SendPlan, SpecError, Tool as _};
 
 use super::PlanAdvance;
-use super::expectation::unexpected;
+use super::expectation::{PlanMoment, unexpected};
 use super::pieces::Pieces;
 use super::walkers::Walkers;
 use crate::EpisodeError;
@@ -51,7 +51,7 @@ impl Session {
                 PlannedCall::WalkTo(walk) => drop(self.walkers(walk)?),
             }
             self.check_phase(step).map_err(refused)?;
-            if step.expects.heard.is_some() && operator.is_none() {
+            if step.expects.with_alternatives().iter().any(|one| one.heard.is_some()) && operator.is_none() {
                 return Err(refused("`heard` is for operators, each of whom has a robot".into()).into());
             }
         }
@@ -62,7 +62,8 @@ impl Session {
         let phases = self.spec().task.phases.iter().enumerate();
         let numbered: Vec<_> = phases.map(|(number, phase)| (Phase::number(number), &phase.id)).collect();
         let is_known = |name: &&String| numbered.iter().any(|(number, id)| number == *name || id == name);
-        match step.expects.phase_reached.as_ref().filter(|name| !is_known(name)) {
+        let expected = step.expects.with_alternatives();
+        match expected.iter().filter_map(|one| one.phase_reached.as_ref()).find(|name| !is_known(name)) {
             Some(name) => {
                 let have: Vec<String> =
                     numbered.iter().map(|(number, id)| format!("{number} ({id})")).collect();
@@ -148,14 +149,13 @@ impl CurrentCommand {
     }
 
     fn go_on(self, session: &Session, step: &PlanStep, reply: &CommandReply, heard: bool) -> CommandProgress {
-        let missing = || unexpected(&step.expects, reply, heard);
+        let missing = |is_way_done: bool| unexpected(&step.expects, reply, PlanMoment { heard, is_way_done });
         match self {
-            CurrentCommand::Whole => CommandProgress::Over(missing()),
+            CurrentCommand::Whole => CommandProgress::Over(missing(true)),
             CurrentCommand::Until(mut pieces) => {
-                // Wrists that have arrived at an intermediate target are only on their way.
-                let is_on_way = step.expects.arrived == Some(true) && !pieces.is_way_done();
-                match (missing(), pieces.next_piece()) {
-                    (None, _) if !is_on_way => CommandProgress::Over(None),
+                let missing = missing(pieces.is_way_done());
+                match (missing, pieces.next_piece()) {
+                    (None, _) => CommandProgress::Over(None),
                     (_, Some(call)) => CommandProgress::Make(call, CurrentCommand::Until(pieces)),
                     (missing, None) => {
                         CommandProgress::Over(missing.map(|why| format!("its steps are done and {why}")))
@@ -164,7 +164,7 @@ impl CurrentCommand {
             }
             CurrentCommand::Walk(mut walkers) => match walkers.advance(session, Some(reply)) {
                 PlanAdvance::Make(call) => CommandProgress::Make(call, CurrentCommand::Walk(walkers)),
-                PlanAdvance::Done(stopped) => CommandProgress::Over(stopped.or_else(missing)),
+                PlanAdvance::Done(stopped) => CommandProgress::Over(stopped.or_else(|| missing(true))),
             },
         }
     }

@@ -4,8 +4,19 @@ use tandem_tools_spec::{
     BaseState, CommandReply, Expectation, Grip, HandReport, HandState, RobotReport, Touch,
 };
 
+use crate::scoring::Phase;
+
+/// State of a plan after a command, beside the command's reply.
+#[derive(Debug, Clone, Copy)]
+pub struct PlanMoment {
+    /// True once another operator has sent a message.
+    pub heard: bool,
+    /// True once wrists have their last targets: one that has arrived before is only on its way.
+    pub is_way_done: bool,
+}
+
 /// Returns the first condition of `expected` that does not hold after a command, in words; `None` if all hold.
-pub fn unexpected(expected: &Expectation, reply: &CommandReply, heard: bool) -> Option<String> {
+pub fn unexpected(expected: &Expectation, reply: &CommandReply, moment: PlanMoment) -> Option<String> {
     let hands: Vec<(String, &HandReport)> = reply.robots.iter().flat_map(hands_of).collect();
     let find = |is: fn(&HandReport) -> bool| hands.iter().find(|(_, hand)| is(hand));
     let under_way = find(|hand| !matches!(hand.state, Some(HandState::Arrived | HandState::Idle)));
@@ -19,7 +30,8 @@ pub fn unexpected(expected: &Expectation, reply: &CommandReply, heard: bool) -> 
         format!("{name} is {:.3} m off", hand.position_error_m.unwrap_or_default())
     };
     let name = |(name, _): &(String, &HandReport)| name.clone();
-    differs("arrived", expected.arrived, under_way.is_none(), under_way.map(off))
+    let has_arrived = under_way.is_none() && moment.is_way_done;
+    differs("arrived", expected.arrived, has_arrived, under_way.map(off))
         .or_else(|| differs("blocked", expected.blocked, stopped.is_some(), stopped.map(off)))
         .or_else(|| differs("touching", expected.touching, touches.is_some(), touches.map(name)))
         .or_else(|| differs("holding", expected.holding, holds.is_some(), holds.map(name)))
@@ -27,9 +39,16 @@ pub fn unexpected(expected: &Expectation, reply: &CommandReply, heard: bool) -> 
             let robot = steps.map(|robot| robot.robot.clone());
             differs("base_stepping", expected.base_stepping, steps.is_some(), robot)
         })
-        .or_else(|| differs("heard", expected.heard, heard, None))
+        .or_else(|| differs("heard", expected.heard, moment.heard, None))
         .or_else(|| force_differs(expected, &hands))
         .or_else(|| phase_missing(expected, reply))
+        .or_else(|| none_holds(expected.any_of.as_deref()?, reply, moment))
+}
+
+/// Returns what every one of the alternatives lacks; `None` if one of them holds.
+fn none_holds(any_of: &[Expectation], reply: &CommandReply, moment: PlanMoment) -> Option<String> {
+    let lacks: Option<Vec<String>> = any_of.iter().map(|one| unexpected(one, reply, moment)).collect();
+    lacks.map(|lacks| format!("none of any_of holds: {}", lacks.join("; ")))
 }
 
 fn differs(name: &str, wanted: Option<bool>, is: bool, which: Option<String>) -> Option<String> {
@@ -55,7 +74,10 @@ fn force_differs(expected: &Expectation, hands: &[(String, &HandReport)]) -> Opt
 fn phase_missing(expected: &Expectation, reply: &CommandReply) -> Option<String> {
     let phase = expected.phase_reached.as_ref()?;
     let is_reached = reply.phases.iter().any(|reached| reached.number == *phase || reached.id == *phase);
-    (!is_reached).then(|| format!("{phase} has not been reached; get_status with explain says what it lacks"))
+    let next = Phase::number(reply.phases.len());
+    let lacking = if *phase == next { "it".into() } else { format!("{next}, the next phase,") };
+    (!is_reached)
+        .then(|| format!("{phase} has not been reached; get_status with explain says what {lacking} lacks"))
 }
 
 /// Returns both hands of a robot with their names.

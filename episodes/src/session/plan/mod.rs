@@ -8,6 +8,7 @@ mod carry;
 mod commands;
 mod expectation;
 mod outcomes;
+mod pace;
 mod pieces;
 mod walk_to;
 mod walkers;

@@ -85,22 +85,25 @@ class Expectation:
     """A hand presses on something."""
 
     holding: bool | None = None
-    """A hand holds something between thumb and fingers."""
+    """A hand holds something by thumb and fingers."""
 
     force_above_n: float | None = None
-    """A hand feels more than this force in newtons."""
+    """A hand feels more than this, in newtons."""
 
     force_below_n: float | None = None
     """No hand feels more."""
 
     phase_reached: str | None = None
-    """This phase has been reached, for example "p1"."""
+    """This phase is reached, for example "p1"."""
 
     base_stepping: bool | None = None
     """A robot steps, or settles after a walk."""
 
     heard: bool | None = None
-    """Another operator has said something since the plan began."""
+    """Another operator has spoken since the plan began."""
+
+    any_of: Sequence[Any] | None = None
+    """One of these holds, each like `expects`."""
 
 
 @dataclass(frozen=True)
@@ -112,8 +115,7 @@ class JointChunk:
 
     rows: Numbers
     """Rows of 35 numbers: joint targets in radians for left_arm 7, right_arm 7, left_hand 7, right_hand 7, waist
-    3, then vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m. start_episode names the columns unless its reply is
-    short.
+    3, then vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m.
     """
 
 
@@ -145,8 +147,8 @@ class PlannedCommand:
     """Conditions that have to hold after it."""
 
     until: bool | None = None
-    """True: it ends once its `expects` hold (`arrived`: after `steps`), or else the plan stops after `steps`, up
-    to 500. For move_wrists, walk and wait.
+    """True: it ends once its `expects` hold (`arrived`: after `steps`); else the plan stops after `steps`, up to
+    500. For move_wrists, walk, wait.
     """
 
 
@@ -163,7 +165,7 @@ class SurfaceQuery:
 
 @dataclass(frozen=True)
 class WalkMove:
-    """Values beyond the ranges that start_episode gives are clamped and reported."""
+    """Values beyond the briefing's ranges are clamped and reported."""
 
     robot: str
     """The robot, for example "A"."""

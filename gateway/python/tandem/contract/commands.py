@@ -368,7 +368,9 @@ class PlanReply:
     """Commands that were carried out: of a plan, those that it lists; of a walk, each short one."""
 
     tool_calls: int
-    """Tool calls of the episode up to now."""
+    """Tool calls of all robots up to now, as results count them: each command of a plan or walk is one, and each
+    slice of 5 steps with `until`. No budget limits them.
+    """
 
     executed_steps: int
     """Control steps of 20 ms that they took together."""

@@ -78,7 +78,9 @@ class ResultReply:
     """Control steps of 20 ms, the initial hold included."""
 
     tool_calls: int
-    """Calls of tools up to the end, reads, refused calls and the one that ended the episode included."""
+    """Calls of tools of all robots up to the end, reads, refused calls and the one that ended the episode
+    included. Each command of a plan or walk is one, and each slice of 5 steps with `until`.
+    """
 
     requests: int | None
     """Requests of the policy itself: like tool_calls, but a plan or a walk, whose commands are a call each, counts

@@ -115,6 +115,9 @@ class Briefing:
     ending: str
     """Ways in which the episode ends, and disclosure of phases."""
 
+    http: tuple[str, ...]
+    """Routes of the tools, for clients over HTTP; left out for all others."""
+
     kinds: tuple[RobotKind, ...]
     """Commands and joints of each kind of robot."""
 
@@ -141,6 +144,7 @@ class Briefing:
             phases=tuple(PhaseInfo.of(item) for item in value.get("phases", ())),
             room=tuple(value.get("room", ())),
             ending=value["ending"],
+            http=tuple(value.get("http", ())),
             kinds=tuple(RobotKind.of(item) for item in value["kinds"]),
             brief=Brief.of(value["brief"]),
             action_row=tuple(value.get("action_row", ())),

@@ -183,10 +183,10 @@ class Tools(ABC):
         self,
         commands: Sequence[PlannedCommand],
     ) -> PlanReply:
-        """Carry out up to 20 commands in order, each with its own steps and counted as a tool call, until one's
-        `expects` does not hold. With `until`, a command lasts until it does: lower a hand until it touches,
-        wait until a phase is reached. Returns the last command's reply, how many were carried out, and why no
-        more. If one is invalid, none is.
+        """Carry out up to 20 commands in order, each counted as a tool call, until one's `expects` does not hold.
+        With `until`, a command lasts until it does: lower a hand until it touches, wait until a phase is
+        reached. Returns the last command's reply, how many were carried out, and why no more. If one is
+        invalid, none is.
 
         commands: The commands in order.
         """
@@ -206,8 +206,7 @@ class Tools(ABC):
         call, take every robot to within 1.5 cm and 1.5 degrees of its place, unless one gets no nearer or steps
         run out. It does not look: go round obstacles by `waypoints`.
 
-        steps: Most control steps, up to 1500: about 250 and 150 a metre and 250 a quarter turn; with `carry` 450 a
-            metre.
+        steps: Most steps, up to 1500: about 250, 150 a metre and 250 a quarter turn; with `carry` 300, 270 and 220.
         robots: One entry per robot that walks.
         frame: Frame of places and headings.
         """

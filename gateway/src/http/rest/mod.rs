@@ -105,9 +105,11 @@ async fn episode_tools(
 ) -> Result<Json<Vec<EpisodeToolSpec>>, ApiError> {
     let episode = app.table.awake(&id).await?;
     episode.admit(&caller)?;
-    let (wording, talk) = (app.settings.wording(), app.table.may_talk(&caller));
+    let (wording, talk) = (app.wording(&caller), app.table.may_talk(&caller));
     let thread = &episode.thread;
-    Ok(Json(episode_tool_specs(wording, &id, thread.robots(), thread.steps_per_command(), talk)))
+    let own = caller.robot().map(|robot| vec![robot.to_owned()]);
+    let robots = own.as_deref().unwrap_or(thread.robots());
+    Ok(Json(episode_tool_specs(wording, &id, robots, thread.steps_per_command(), talk)))
 }
 
 async fn openapi(State(app): State<AppState>, Extension(caller): Extension<Caller>) -> Json<Value> {
@@ -194,7 +196,7 @@ async fn briefing(
     encoding: Encoding,
     Path(id): Path<String>,
 ) -> Result<Response, ApiError> {
-    encoding.write(StatusCode::OK, &app.table.briefing(&id, &caller).await?)
+    encoding.write(StatusCode::OK, &app.table.briefing(&id, &caller).await?.over_http(&id))
 }
 
 async fn call(

@@ -45,6 +45,15 @@ fn an_operator_sees_and_commands_its_own_robot_alone() {
     let (_, _, briefing) = team.server.ask("GET", &format!("{episode}/briefing"), &own, b"");
     let briefing: Value = serde_json::from_slice(&briefing).expect("JSON");
     assert_eq!(names(&briefing["instructions"], "robot"), ["B"]);
+    assert_eq!(
+        briefing["http"][0],
+        format!("GET {episode}/tools lists your tools, each with the schema of its body.")
+    );
+    assert!(
+        briefing["http"][1]
+            .as_str()
+            .is_some_and(|line| line.starts_with(&format!("POST {episode}/tools/NAME ")))
+    );
     assert!(briefing["brief"]["frames"].is_string() && !briefing.to_string().contains(&team.tokens[0]));
     assert_eq!(status("DELETE", &episode), 403);
     assert_eq!(status("GET", "/metrics"), 403);
@@ -169,6 +178,9 @@ fn operators_talk_where_they_may() {
     let reply = team.ask(1, "wait", json!({ "steps": 2 })).ok();
     assert_eq!(reply["heard"], json!(heard));
     assert!(team.ask(1, "get_status", json!({})).ok().get("heard").is_none(), "once is enough");
+    team.ask(1, "say", json!({ "text": "Yes." })).ok();
+    let reply = team.ask(0, "say", json!({ "text": "Now." })).ok();
+    assert_eq!(reply["heard"][0]["text"], "Yes.", "who speaks hears, too");
     let (path, bearer) = (format!("/v1/episodes/{}/tools", team.id), format!("Bearer {}", team.tokens[0]));
     let (_, _, tools) = team.server.ask("GET", &path, &[("authorization", &bearer)], b"");
     let tools: Value = serde_json::from_slice(&tools).expect("JSON");
@@ -185,7 +197,7 @@ fn operators_talk_where_they_may() {
     let (_, recording) = team.verified();
     let calls = recording.tool_calls().expect("its calls");
     let said: Vec<_> = calls.iter().filter(|call| call.tool == "say").collect();
-    assert_eq!((said.len(), said[1].operator.as_deref()), (2, Some("A")));
+    assert_eq!((said.len(), said[1].operator.as_deref()), (4, Some("A")));
     assert_eq!(said[1].arguments["text"], words[1]);
 }
 
@@ -290,6 +302,30 @@ fn only_who_asks_for_operators_gets_them() {
     }
     start(json!({ "patience_s": 5 })).refused(422, &["patience_s is for operators", "leave patience_s out"]);
     assert_eq!(server.get("/healthz").ok()["episodes"], 1);
+}
+
+/// An operator's texts are about its own robot and what it may do.
+#[test]
+fn an_operators_tools_are_its_own() {
+    let team = Team::start(json!({ "talk": true }));
+    let bearer = format!("Bearer {}", team.tokens[1]);
+    for path in ["/v1/tools".to_owned(), format!("/v1/episodes/{}/tools", team.id)] {
+        let (_, _, list) = team.server.ask("GET", &path, &[("authorization", &*bearer)], b"");
+        let list: Value = serde_json::from_slice(&list).expect("JSON");
+        let text = list.to_string();
+        assert!(!text.contains("start_episode") && !text.contains("End the episode"), "{path}: {text}");
+        assert!(text.contains("your robot holds still from then on"), "{path}: {text}");
+    }
+    let list = team.server.get(&format!("/v1/episodes/{}/tools", team.id)).ok().to_string();
+    assert!(list.contains("End the episode and get its result"), "whoever started it may end it");
+    let (_, _, list) = team.server.ask(
+        "GET",
+        &format!("/v1/episodes/{}/tools", team.id),
+        &[("authorization", &*bearer)],
+        b"",
+    );
+    let list = String::from_utf8(list).expect("text");
+    assert!(list.contains("^[B]$") && !list.contains("^[AB]$"), "{list}");
 }
 
 /// Every list of tools, and every text that names tools, includes `say` if and only if the caller may use it.
