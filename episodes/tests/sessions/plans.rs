@@ -99,6 +99,21 @@ fn a_plan_that_cannot_be_carried_out_moves_nothing() {
     assert!(refused.contains("this episode has no plans"), "{refused}");
 }
 
+#[test]
+fn a_wait_ends_where_one_of_several_conditions_holds() {
+    let mut session = agentic();
+    let either = |force_n: f64| {
+        let any_of = json!([{ "phase_reached": "p3" }, { "force_below_n": force_n }]);
+        json!({ "tool": "wait", "arguments": { "steps": 12 }, "expects": { "any_of": any_of }, "until": true })
+    };
+    let reply = plan(&mut session, "send_plan", json!({ "commands": [either(1e3)] })).unwrap();
+    assert_eq!((reply.stopped, reply.executed_steps), (None, 5), "one of two suffices");
+    let reply = plan(&mut session, "send_plan", json!({ "commands": [either(-1.0)] })).unwrap();
+    let stopped = reply.stopped.unwrap();
+    assert!(stopped.contains("none of any_of holds: p3 has not been reached; get_status"), "{stopped}");
+    assert!(stopped.contains("what p1, the next phase, lacks; a hand feels"), "{stopped}");
+}
+
 /// A hand goes down at one speed until it touches, and a wait ends with what it is for.
 #[test]
 fn a_command_lasts_until_what_it_expects_holds() {
@@ -125,16 +140,6 @@ fn a_command_lasts_until_what_it_expects_holds() {
     let reply = plan(&mut session, "send_plan", json!({ "commands": [still] })).unwrap();
     assert_eq!(reply.executed_steps, 12);
     assert!(reply.stopped.unwrap().contains("its steps are done and p1 has not been reached"));
-    let either = |force_n: f64| {
-        let any_of = json!([{ "phase_reached": "p3" }, { "force_below_n": force_n }]);
-        json!({ "tool": "wait", "arguments": { "steps": 12 }, "expects": { "any_of": any_of }, "until": true })
-    };
-    let reply = plan(&mut session, "send_plan", json!({ "commands": [either(1e3)] })).unwrap();
-    assert_eq!((reply.stopped, reply.executed_steps), (None, 5), "one of two suffices");
-    let reply = plan(&mut session, "send_plan", json!({ "commands": [either(-1.0)] })).unwrap();
-    let stopped = reply.stopped.unwrap();
-    assert!(stopped.contains("none of any_of holds: p3 has not been reached; get_status"), "{stopped}");
-    assert!(stopped.contains("what p1, the next phase, lacks; a hand feels"), "{stopped}");
     let until = |command: serde_json::Value| {
         let mut command = command;
         (command["expects"], command["until"]) = (json!({ "arrived": true }), json!(true));

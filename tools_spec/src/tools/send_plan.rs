@@ -12,9 +12,10 @@ use crate::tools::{MoveWrists, SendJointChunk, Wait, Walk, WalkTo};
 /// Commands of one plan.
 const MAX_COMMANDS: usize = 20;
 
-/// Carry out up to 20 commands in order, each counted as a tool call, until one's `expects` does not hold. With `until`, a command lasts until it does: lower a hand until it touches,
-/// wait until a phase is reached. Returns the last command's reply, how many were carried out, and why no
-/// more. If one is invalid, none is.
+/// Carry out up to 20 commands in order, each counted as a tool call, until one's `expects` does not hold.
+/// With `until`, a command lasts until it does: lower a hand until it touches, wait until a phase is
+/// reached. Returns the last command's reply, how many were carried out, and why no more. If one is
+/// invalid, none is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SendPlan {

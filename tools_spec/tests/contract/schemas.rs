@@ -314,7 +314,19 @@ fn openapi_says_what_is_refused() {
         [&both[0]["required"], &both[1]["required"]],
         [&json!(["waist_yaw_rad"]), &json!(["look_at_m"])]
     );
-    let planned = field("send_plan", "/commands/items/anyOf");
+    let note = &document["paths"]["/v1/episodes/{episode_id}/notes"]["post"]["requestBody"];
+    let says = &note["content"]["application/json"]["schema"]["anyOf"];
+    assert_eq!(says[0]["properties"]["text"]["minLength"], 1);
+    assert_eq!(says[1]["required"], json!(["tokens"]));
+}
+
+/// With `until` a command of a plan may have more steps than alone.
+#[test]
+fn openapi_says_how_many_steps_a_planned_command_may_have() {
+    let document = tandem_tools_spec::openapi("1.2.3", Hints::On, false);
+    let post = &document["paths"]["/v1/episodes/{episode_id}/tools/send_plan"]["post"];
+    let body = &post["requestBody"]["content"]["application/json"]["schema"];
+    let planned = &body["properties"]["commands"]["items"]["anyOf"];
     let wait =
         planned.as_array().into_iter().flatten().find(|of| of["properties"]["tool"]["const"] == "wait");
     let wait = wait.expect("a plan may wait");
@@ -326,10 +338,6 @@ fn openapi_says_what_is_refused() {
     };
     assert_eq!(short["properties"]["arguments"]["properties"]["steps"]["maximum"], 50);
     assert_eq!(until["properties"]["until"]["const"], true);
-    let note = &document["paths"]["/v1/episodes/{episode_id}/notes"]["post"]["requestBody"];
-    let says = &note["content"]["application/json"]["schema"]["anyOf"];
-    assert_eq!(says[0]["properties"]["text"]["minLength"], 1);
-    assert_eq!(says[1]["required"], json!(["tokens"]));
 }
 
 #[test]
