@@ -12,6 +12,8 @@ use crate::tasks::{ObjectSpot, RobotSpot, Spread, Task};
 
 /// Solids that end this near the top of an object belong to its top.
 const NECKS_TOP_M: f32 = 0.01;
+/// Greatest difference between the two widths of what is round.
+const ROUND_M: f32 = 0.005;
 
 /// Returns one line for each object of a task, for example "service trolley, 0.72 m along A's x, 0.44 m along
 /// its y, 0.92 m high: middle 0.85 m ahead of A, 3.65 m ahead of B (from the pelvis, give or take 0.32 m)".
@@ -84,8 +86,8 @@ fn size_m(parts: &[ObjectPart], yaw_rad: f32) -> Vector {
     high_m - low_m
 }
 
-/// Returns the width and the neck of an object in one piece whose top is less than half as wide as the rest, as
-/// a bottle's.
+/// Returns the width and the neck of a round object in one piece whose top is less than half as wide as the
+/// rest, such as a bottle.
 fn neck(parts: &[ObjectPart]) -> Option<String> {
     let [part] = parts else { return None };
     let solid = part.model.geoms.iter().filter(|geom| geom.collides);
@@ -97,7 +99,8 @@ fn neck(parts: &[ObjectPart]) -> Option<String> {
     let joined = |extents: Vec<[Vector; 2]>| extent_m(extents.into_iter().flatten(), 0.0);
     let ([neck_low_m, neck_high_m], [low_m, high_m]) = (joined(neck), joined(rest));
     let (neck_m, rest_m) = (neck_high_m - neck_low_m, high_m - low_m);
-    let is_neck = rest_m.x.is_finite() && 2.0 * neck_m.x < rest_m.x && 2.0 * neck_m.y < rest_m.y;
+    let is_round = |extent_m: Vector| (extent_m.x - extent_m.y).abs() < ROUND_M;
+    let is_neck = is_round(rest_m) && is_round(neck_m) && 2.0 * neck_m.x < rest_m.x;
     is_neck.then(|| {
         let (wide_m, narrow_m, to_m) = (rest_m.x, neck_m.x, rest_m.z);
         format!(

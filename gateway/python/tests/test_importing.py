@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -71,12 +72,13 @@ PICTURES = """<mujoco>
 
 
 def test_pictures_are_placed_on_surfaces_as_in_the_source(tmp_path: Path) -> None:
-    import mujoco
     import numpy as np
 
+    from tandem.importing.engine import mujoco
     from tandem.importing.files import write_png
 
-    write_png(tmp_path / "four.png", np.arange(12).reshape(2, 2, 3) * 20)
+    pixels: Any = np.arange(12)
+    write_png(tmp_path / "four.png", pixels.reshape(2, 2, 3) * 20)
     faces = "f 1/1 3/3 2/2\nf 1/1 2/2 4/3\nf 2/2 3/3 4/1\nf 3/3 1/1 4/2\n"
     vertices = "v 0 0 1\nv 1 0 1\nv 0 1 1\nv 0 0 2\nvt 0 0.25\nvt 1 0.5\nvt 0 1\n"
     (tmp_path / "wedge.obj").write_text(vertices + faces)
