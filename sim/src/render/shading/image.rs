@@ -81,7 +81,7 @@ impl Image {
         let level = 0.5 * log2(texels_2(place.x_step_uv).max(texels_2(place.y_step_uv)));
         let level = level.max(0.0).min(self.last_level);
         let (whole, part) = (level.floor(), level - level.floor());
-        let share = ((part - 0.5) / BLENDED_SHARE + 0.5).max(0.0).min(1.0);
+        let share = ((part - 0.5) / BLENDED_SHARE + 0.5).clamp(0.0, 1.0);
         let nearer = index(whole) + usize::from(share == 1.0);
         let mut texel = blend(&levels[nearer], place.uv, self.is_cube);
         if share > 0.0 && share < 1.0 {
