@@ -168,7 +168,7 @@ pub fn run(args: EvaluateArgs) -> CommandResult {
     };
     check_words(&plan, args.stress.stresses())?;
     if let Some(recorded) = args.dry_run {
-        let episodes = plan.episodes().0.len() * (1 + args.stress.stresses().into_iter().count());
+        let episodes = plan.episodes().0.len() * (1 + args.stress.stresses().len());
         println!("{}", expected(episodes, &recorded, &prices.unwrap_or_default())?);
         return Ok(ExitCode::SUCCESS);
     }

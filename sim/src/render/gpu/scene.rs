@@ -46,7 +46,7 @@ impl SceneBuffers {
         let bends = prepared.sheet_of.iter().map(|sheet| prepared.sheets[*sheet as usize].bend);
         let firsts = corners.iter().step_by(3);
         let faces: Vec<[u32; 16]> = bends.zip(firsts).map(|(bend, corner)| face(bend, *corner)).collect();
-        let images = SceneImages::of(prepared, gpu.device.limits().max_storage_buffer_binding_size.into());
+        let images = SceneImages::of(prepared, gpu.device.limits().max_storage_buffer_binding_size);
         let written = BufferUsages::COPY_DST | BufferUsages::STORAGE;
         SceneBuffers {
             corner_numbers: initialised(gpu, corners.as_flattened(), BufferUsages::STORAGE),
