@@ -116,7 +116,7 @@ impl Geom {
         let primitive = primitive(document, geom, half_length_m).map_err(|what| refuse(&what))?;
         Ok(Geom {
             name: geom.name.clone(),
-            image: material.and_then(|material| SurfaceImage::of(document, material, &primitive.mapped())),
+            image: material.and_then(|material| SurfaceImage::of(document, material, || primitive.mapped())),
             primitive,
             body_from_geom,
             rgba,

@@ -215,10 +215,12 @@ fn corners<T: Copy + Default, const N: usize>(
     let mut found = Vec::new();
     for tobj::Model { mesh, .. } in models {
         let (indices, numbers) = of(mesh);
-        let (values, count) = (numbers.as_chunks::<N>().0, mesh.indices.len() / 3);
+        if indices.is_empty() {
+            found.resize(found.len() + mesh.indices.len() / 3, [T::default(); 3]);
+        }
+        let values = numbers.as_chunks::<N>().0;
         let value = |index: &u32| values.get(*index as usize).map_or(T::default(), |value| convert(*value));
         found.extend(indices.as_chunks::<3>().0.iter().map(|corners| corners.each_ref().map(value)));
-        found.resize(found.len() - indices.len() / 3 + count, [T::default(); 3]);
     }
     found
 }

@@ -85,17 +85,18 @@ impl SurfaceImage {
     pub(in crate::mjcf) fn of(
         document: &Document,
         material: &mjcf_rs::assets::Material,
-        shape: &MappedShape,
+        shape: impl FnOnce() -> MappedShape,
     ) -> Option<SurfaceImage> {
         let name = material.texture.as_ref()?;
         let texture = document.textures.get(name)?.clone();
         let kind = document.model.assets.texture(name)?.type_.as_deref();
         let repeat = material.name.as_ref().and_then(|name| document.repeats.0.get(name));
         let repeat = repeat.copied().unwrap_or(ONCE);
+        let shape = shape();
         let mapping = match kind {
             _ if shape.has_uv => TextureMapping::Corners,
-            Some("2d") => along(repeat, shape),
-            _ => cube(repeat, shape),
+            Some("2d") => along(repeat, &shape),
+            _ => cube(repeat, &shape),
         };
         Some(SurfaceImage { texture, mapping })
     }

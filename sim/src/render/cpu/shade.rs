@@ -139,16 +139,12 @@ pub(super) fn place(
 fn place_part(facets: &mut [Facet], sheets: &[Sheet], prepared: &Prepared, number: usize, pose: Pose) {
     let part = &prepared.scenery.parts[number];
     let rotation = Matrix::from_quat(pose.rotation);
-    let image_from_mesh = prepared.images[number].as_ref().and_then(|image| image.from_mesh);
     let common = Facet {
         normal: Vector::ZERO,
         slope_1_m: None,
         linear_rgb: prepared.linear_rgb[number],
         pattern: part.pattern,
-        pattern_from_world: match image_from_mesh {
-            Some(from_mesh) => from_mesh.after(pose.inverse()),
-            None => part.pattern.frame(pose, prepared.grain[number]),
-        },
+        pattern_from_world: prepared.pattern_from_world(number, pose),
         carries: part.carrier == Carrier::Room,
     };
     for (facet, sheet) in facets.iter_mut().zip(sheets) {

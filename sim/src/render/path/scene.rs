@@ -2,7 +2,7 @@
 
 use std::f32::consts::PI;
 
-use rapier3d::math::{Pose, Vector};
+use rapier3d::math::Vector;
 
 use super::directions::{cosine_about, facet_about};
 use super::lights::{Beam, Lights};
@@ -12,7 +12,7 @@ use super::space::{Space, Spot};
 use crate::render::scene::prepared::Prepared;
 use crate::render::shading::image::{Image, ImagePlace};
 use crate::render::shading::lanes::Affine;
-use crate::render::{Part, Pattern, PlacedScenery};
+use crate::render::{Pattern, PlacedScenery};
 
 /// Most surfaces that light is reflected by after the one that is seen.
 const MAX_BOUNCES: u32 = 4;
@@ -48,15 +48,8 @@ pub const COATED: usize = 2;
 
 /// Returns the map from the world to the frame of each part's pattern, or to the coordinates of its image.
 pub fn patterns(prepared: &Prepared, placed: &PlacedScenery) -> Vec<Affine> {
-    let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).enumerate();
-    let map = |(number, (part, pose)): (usize, (&Part, &Pose))| {
-        let image_from_mesh = prepared.images[number].as_ref().and_then(|image| image.from_mesh);
-        image_from_mesh.map_or_else(
-            || part.pattern.frame(*pose, prepared.grain[number]),
-            |from_mesh| from_mesh.after(pose.inverse()),
-        )
-    };
-    parts.map(map).collect()
+    let poses = placed.world_from_mesh.iter().enumerate();
+    poses.map(|(part, pose)| prepared.pattern_from_world(part, *pose)).collect()
 }
 
 impl Scene<'_> {

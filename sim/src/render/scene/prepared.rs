@@ -1,11 +1,12 @@
 //! A scenery with precomputed constant data for drawing.
 
-use rapier3d::math::Vector;
+use rapier3d::math::{Pose, Vector};
 
 use super::bend::Bend;
 use super::shared::MeshGeometry;
 use super::sheets::{MeshSheet, UvMap};
 use crate::render::shading::image::Image;
+use crate::render::shading::lanes::Affine;
 use crate::render::shading::linear;
 use crate::render::{Part, Pattern, Scenery};
 
@@ -71,6 +72,14 @@ impl Prepared {
     #[inline(always)]
     pub fn geometry(&self, part: usize) -> &MeshGeometry {
         self.scenery.parts[part].mesh.geometry()
+    }
+
+    /// Returns the map from the world to the frame of a part's pattern, or to the coordinates of its image.
+    pub fn pattern_from_world(&self, part: usize, world_from_mesh: Pose) -> Affine {
+        match self.images[part].as_ref().and_then(|image| image.from_mesh) {
+            Some(from_mesh) => from_mesh.after(world_from_mesh.inverse()),
+            None => self.scenery.parts[part].pattern.frame(world_from_mesh, self.grain[part]),
+        }
     }
 
     /// Numbers of the sheets of a part's triangles.
