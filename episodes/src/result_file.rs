@@ -47,6 +47,7 @@ mod tests {
             tool_calls: 61,
             requests: None,
             thinking_s: 0.0,
+            operators: Vec::new(),
             falls: 0,
             realtime_factor: 3.5,
             state_hash: Some("00c0ffee00c0ffee".into()),

@@ -1,6 +1,7 @@
 //! The complete definition of an episode in one value, from requests and flags to recordings and results.
 
 mod keyed_seed;
+mod start;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,7 +12,7 @@ use tandem_sim::{
     BaseLimits, CONTROL_HZ, LocomotionChoice, RobotModel, RobotSource, Sensing, SensorModel, SimError,
     StateSource, mjcf::Document, render::RendererKind,
 };
-use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol, Wording};
+use tandem_tools_spec::{Assistance, Disclosure, Hints, Operators, Protocol, Wording};
 
 use crate::error::{RobotError, SceneError};
 use crate::protocol::{Rules, rules};
@@ -22,6 +23,7 @@ use crate::variation::Variation;
 use crate::words::OwnWords;
 
 pub use keyed_seed::KeyedSeed;
+pub use start::{MomentStart, PhaseStart, Start};
 
 /// Prefixes of a base controller and of instructions in results.
 const CONTROLLER: &str = "controller: ";
@@ -73,6 +75,10 @@ pub struct EpisodeSpec {
     /// Seed drawn by an evaluator's key, if there is a key.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub keyed_seed: Option<KeyedSeed>,
+    /// By whom the robots are commanded. Where each has its own operator, each has a clock of its own, which
+    /// the host keeps.
+    #[serde(default, skip_serializing_if = "Operators::is_one")]
+    pub operators: Operators,
 }
 
 /// Source of the robot's description.
@@ -114,42 +120,6 @@ pub enum Controller {
     Looped(PathBuf),
 }
 
-/// Start state of an episode.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Start {
-    /// The task's own start under the seed.
-    #[default]
-    Task,
-    /// The state in a [`crate::Checkpoint`]'s file of the same task, seed, protocol, robot and controller.
-    Checkpoint(PathBuf),
-    /// The start of a recorded phase of the same task, seed, robot and controller, with the whole budget.
-    Phase(PhaseStart),
-    /// A moment of a recorded episode of the same task, seed, robot and controller, with the whole budget.
-    Moment(MomentStart),
-}
-
-/// A moment of a recorded episode. All calls answered by then are replayed.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct MomentStart {
-    /// Path of an `episode.mcap`.
-    pub recording: PathBuf,
-    /// Control step of the recorded episode.
-    pub control_step: u64,
-    /// Seconds before the failure of the recorded episode; `None` where an operator took over.
-    #[serde(default)]
-    pub before_s: Option<u32>,
-}
-
-/// The beginning of a phase of a recorded episode.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct PhaseStart {
-    /// Path of an `episode.mcap`.
-    pub recording: PathBuf,
-    /// Number of the phase, for example `p2`.
-    pub phase: String,
-}
-
 impl EpisodeSpec {
     /// Returns the spec of an episode with the embedded robot and our own controller, from the task's start.
     pub fn new(task: &Task, seed: u32, protocol: Protocol) -> EpisodeSpec {
@@ -171,6 +141,7 @@ impl EpisodeSpec {
             stress: None,
             thinking_limit_s: None,
             keyed_seed: None,
+            operators: Operators::One,
         }
     }
 
@@ -256,6 +227,7 @@ impl EpisodeSpec {
             stress,
             thinking_limit_s,
             keyed_seed,
+            operators: _,
         } = self;
         let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let found = [

@@ -217,6 +217,16 @@ pub enum PlannedCall {
     WalkTo(WalkTo),
 }
 
+impl PlannedCall {
+    /// Returns the name of its tool.
+    pub fn name(&self) -> &'static str {
+        match self {
+            PlannedCall::Act(call) => call.name(),
+            PlannedCall::WalkTo(_) => WalkTo::NAME,
+        }
+    }
+}
+
 /// Reads the arguments of `start_episode`, and by whom the episode is to be driven.
 pub fn parse_start(mut args: Value) -> Result<(StartEpisode, Driving), SpecError> {
     let driving: Driving = beside(StartEpisode::NAME, &mut args, &Driving::FIELDS)?;

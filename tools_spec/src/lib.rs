@@ -32,9 +32,9 @@ pub use parts::{
     AgentEnding, Assistance, BASE_COLUMNS, BaseCommand, BaseLimits, BaseMotion, BaseReport, BaseState,
     Budget, Bytes, CameraArrays, CommandReply, DepthFormat, Disclosure, Driving, Effort, ExtraInformation,
     FingerReport, Formats, Grip, HandPart, HandReport, HandState, Heard, HeldObject, Hints, ImageFormat,
-    JointValues, ModelEnding, NextPhase, Note, NoteKind, OperatorToken, Operators, Partner, PartnerDid,
-    PhaseReached, PixelRegion, PlanReply, Png, Pose, PoseFrame, Protocol, Range, RobotFallen, RobotReport,
-    StopReason, TokenCount, Touch, Usage, Wording,
+    JointValues, ModelEnding, NextPhase, Note, NoteKind, OperatorToken, OperatorUse, Operators, Partner,
+    PartnerDid, PhaseReached, PixelRegion, PlanReply, Png, Pose, PoseFrame, Protocol, Range, RobotFallen,
+    RobotReport, StopReason, TokenCount, Touch, Usage, Wording,
 };
 pub use refusal::{ProblemBody, Refusal, RefusalClass};
 pub use schema::{EpisodeToolSpec, Format, ToolSpec, TypedTool, TypedTools};

@@ -86,6 +86,13 @@ macro_rules! tools {
                 /// True if only operators that may talk are offered them.
                 pub const FOR_OPERATORS: bool = tools!(@for_operators $($audience)?);
 
+                /// Returns the tool's name.
+                pub fn name(&self) -> &'static str {
+                    match self {
+                        $( $call::$tool(_) => $tool::NAME, )*
+                    }
+                }
+
                 /// Returns the robots that the arguments name.
                 pub fn robots(&self) -> Vec<&str> {
                     match self {
@@ -149,7 +156,7 @@ macro_rules! tools {
             /// Returns the tool's name.
             pub fn name(&self) -> &'static str {
                 match self {
-                    $( $( ToolCall::$group($call::$tool(_)) => $tool::NAME, )* )*
+                    $( ToolCall::$group(call) => call.name(), )*
                 }
             }
 

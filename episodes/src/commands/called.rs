@@ -4,7 +4,8 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tandem_tools_spec::{
-    ActCall, Call, Formats, JointChunk, Look, MoveWrists, SendJointChunk, SpecError, ToolCall, Wait, Walk,
+    ActCall, Call, Formats, JointChunk, Look, MoveWrists, OperatorUse, SendJointChunk, SpecError, ToolCall,
+    Wait, Walk,
 };
 
 use super::{Command, Motion, RobotAction, RobotOrder, find};
@@ -27,8 +28,8 @@ pub enum Called {
 pub struct OperatorCall {
     robot: String,
     call: Call,
-    /// True for a command of a plan, which has been counted as a request already.
-    planned: bool,
+    /// Tool of the command of a plan to which it belongs. The plan has been counted as a request already.
+    planned: Option<&'static str>,
 }
 
 /// A command of an operator that the episode has read, to be executed together with those of others.
@@ -38,6 +39,8 @@ pub struct OperatorCommand {
     pub(crate) call: OperatorCall,
     /// Number of control steps requested.
     pub(crate) steps: u32,
+    /// What its operator has used up to now, as the host counts it.
+    pub(crate) used: Option<OperatorUse>,
 }
 
 /// Checked calls that show their callers no withheld information. Only [`Called::allowed`] makes them,
@@ -125,7 +128,7 @@ impl Called {
     pub(crate) fn continues_plans(&self) -> bool {
         match self {
             Called::One(_) => false,
-            Called::Together(calls) => calls.iter().all(|own| own.planned),
+            Called::Together(calls) => calls.iter().all(|own| own.planned.is_some()),
         }
     }
 
@@ -205,12 +208,17 @@ impl OperatorCall {
         if let Some(name) = call.robots().into_iter().find(|name| *name != robot) {
             return Err(EpisodeError::ForeignRobot { name: name.into(), own: robot.into() });
         }
-        Ok(OperatorCall { robot: robot.into(), call, planned: false })
+        Ok(OperatorCall { robot: robot.into(), call, planned: None })
     }
 
-    /// Returns the call as a command of a plan.
-    pub fn planned(self) -> OperatorCall {
-        OperatorCall { planned: true, ..self }
+    /// Returns the call as a part of a plan's command, which has the tool `tool`.
+    pub fn planned(self, tool: &'static str) -> OperatorCall {
+        OperatorCall { planned: Some(tool), ..self }
+    }
+
+    /// Returns the name of the tool; of a part of a plan, that of the plan's command.
+    pub fn tool(&self) -> &'static str {
+        self.planned.unwrap_or(self.call.name())
     }
 
     /// Returns the operator's robot.
@@ -296,6 +304,11 @@ impl OperatorCall {
 }
 
 impl OperatorCommand {
+    /// Sets what its operator has used up to now.
+    pub fn with_use(self, used: OperatorUse) -> OperatorCommand {
+        OperatorCommand { used: Some(used), ..self }
+    }
+
     /// Returns the operator's robot.
     pub fn robot(&self) -> &str {
         self.call.robot()
@@ -306,9 +319,9 @@ impl OperatorCommand {
         self.steps
     }
 
-    /// Returns the name of the tool.
+    /// Returns the name of the tool; of a part of a plan, that of the plan's command.
     pub fn tool(&self) -> &'static str {
-        self.call.call().name()
+        self.call.tool()
     }
 }
 

@@ -112,11 +112,12 @@ const TALKING: &str = " `say` reaches the others with their next reply, where `h
 const WAITING: &str = " To wait for a partner, send a plan of one `wait` of up to 500 steps with `until` and a \
     condition, for example {\"heard\": true}, {\"touching\": true}, {\"force_above_n\": 5} or \
     {\"phase_reached\": \"p1\"}, or {\"any_of\": [...]} with several of which one suffices: it is answered once, \
-    and the partner's commands go on meanwhile. To carry \
-    one thing with an operator for each robot, go by chunks that both begin at a word: a plan of four \
+    and the partner's commands go on meanwhile. {\"partners_wait\": true} holds once every other operator \
+    waits, too: end a plan with it to begin the next step together, without a word. To carry \
+    one thing with an operator for each robot, go by chunks that both begin together: a plan of four \
     move_wrists of 25 steps with the base velocity and, in frame \"start\", the hands going along as far, \
-    compliance_n_s_m and side_compliance_n_s_m 250, then two waits of 25; say DONE, and begin the next \
-    when the other has said it. A walk_to with carry pulls a partner who does not walk.";
+    compliance_n_s_m and side_compliance_n_s_m 250, then a wait of 25, and one until partners_wait. A walk_to \
+    with carry pulls a partner who does not walk.";
 
 /// Returns the part of an operator's brief about partners; `may_talk` is true if they may exchange messages.
 pub fn teamwork(assistance: Assistance, may_talk: bool) -> String {

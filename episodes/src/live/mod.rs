@@ -10,7 +10,7 @@ use std::sync::{Arc, OnceLock};
 
 use serde_json::{Value, json};
 use tandem_sim::Step;
-use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
+use tandem_tools_spec::{Budget, NextPhase, PhaseReached, ResultReply};
 
 use crate::commands::MotionState;
 use crate::observation::Picture;
@@ -33,6 +33,8 @@ pub trait Onlookers: Send {
 
 /// Control steps between two frames of the live view, which has 25 frames a simulated second.
 pub const STEPS_PER_FRAME: u64 = 2;
+/// Control steps between two messages on the next phase.
+pub(crate) const STEPS_PER_EXPLANATION: u64 = 50;
 
 /// An event of an episode.
 #[derive(Clone)]
@@ -41,6 +43,8 @@ pub enum LiveEvent {
     /// A tool call with its reply, or a note.
     Entry(Arc<LiveEntry>),
     Phase(PhaseReached),
+    /// The next phase, and what it lacks.
+    NextPhase(Arc<NextPhase>),
     /// The result. The episode takes no more commands.
     Ended(Arc<ResultReply>),
 }
@@ -125,6 +129,8 @@ pub struct LiveView {
     /// Latest calls and notes, the oldest first.
     pub entries: Vec<Arc<LiveEntry>>,
     pub phases: Vec<PhaseReached>,
+    /// Next phase, if there is one and phases are disclosed.
+    pub next_phase: Option<NextPhase>,
     /// Result of an episode that has ended.
     pub result: Option<ResultReply>,
 }

@@ -154,6 +154,7 @@ fn result() -> ResultReply {
         tool_calls: 2,
         requests: None,
         thinking_s: 0.0,
+        operators: Vec::new(),
         falls: 0,
         realtime_factor: 4.0,
         state_hash: Some("0123456789abcdef".into()),

@@ -207,7 +207,13 @@ impl Session {
     /// Executes the commands of several operators at the same time, then makes each one's requested
     /// observation.
     pub fn together(&mut self, commands: Vec<OperatorCommand>) -> Result<Vec<CallReply>, EpisodeError> {
-        let calls = commands.into_iter().map(|command| command.call).collect();
+        let mut calls = Vec::with_capacity(commands.len());
+        for OperatorCommand { call, used, .. } in commands {
+            if let Some(used) = used {
+                self.operators.insert(used.robot.clone(), used);
+            }
+            calls.push(call);
+        }
         self.perform(Request::of_policy(Called::Together(calls)))?.replies()
     }
 
@@ -229,7 +235,7 @@ impl Session {
         self.admit(caller, &called)?;
         let read = self.allow(&called).and_then(|_| self.expect_underway());
         match read.and_then(|()| call.order(&self.rules, &self.motions)) {
-            Ok(order) => Ok(OperatorCommand { call: call.at_any_step(), steps: order.steps }),
+            Ok(order) => Ok(OperatorCommand { call: call.at_any_step(), steps: order.steps, used: None }),
             Err(refusal) => {
                 self.refuse(CallerRecord::Operator(&operator), &called, &refusal);
                 Err(refusal)

@@ -31,7 +31,7 @@ pub(crate) use replay::Replay;
 use run_files::moment;
 pub use run_files::{RunFiles, RunFolder};
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -39,7 +39,7 @@ use std::time::{Duration, Instant};
 use nalgebra::Vector3;
 use tandem_sim::render::RenderRequest;
 use tandem_sim::{CONTROL_HZ, RobotCommand, Step, World};
-use tandem_tools_spec::{EndReason, ResultReply, Usage};
+use tandem_tools_spec::{EndReason, OperatorUse, ResultReply, Usage};
 
 use crate::commands::{Clamped, Command, Motion, MotionState, TargetCounts, Trajectory};
 use crate::convert::isometry_from_sim;
@@ -75,6 +75,8 @@ pub struct Session {
     /// Number of requests: calls, with one for each plan. `None` in a replay, where the calls of plans
     /// are not marked.
     requests: Option<u32>,
+    /// What the operators have used, by robot, as the host says with their commands.
+    operators: BTreeMap<String, OperatorUse>,
     /// True while the commands of a plan are made.
     planning: bool,
     /// Number of calls recorded or shown, including those that do not count.
@@ -138,7 +140,8 @@ impl Session {
             origin: Origin { spec: spec.clone(), robot, locomotion },
             rules,
             scores: spec.task.scores(&motions[0].robot.model, &present)?,
-            clock: ThinkingClock::new(rules.thinking, clock),
+            clock: ThinkingClock::new(rules.thinking.filter(|_| spec.operators.is_one()), clock),
+            operators: BTreeMap::new(),
             observer: Observer::new(spec, &world),
             files: None,
             spectators: Spectators::default(),

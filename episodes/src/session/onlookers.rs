@@ -8,7 +8,7 @@ use tandem_tools_spec::{Budget, ExtraInformation, Observe, PhaseReached};
 
 use super::Session;
 use crate::EpisodeError;
-use crate::live::{LiveEntry, LiveEvent, LiveScene, LiveStep, LiveView, Onlookers};
+use crate::live::{LiveEntry, LiveEvent, LiveScene, LiveStep, LiveView, Onlookers, STEPS_PER_EXPLANATION};
 use crate::output::OutputError;
 use crate::recording::{NoteMessage, ToolCallRecord};
 
@@ -57,6 +57,7 @@ impl Session {
             now: Arc::new(self.live_step(self.budget())),
             entries: self.spectators.entries.iter().cloned().collect(),
             phases: self.reached(),
+            next_phase: self.next_phase(None),
             result: self.result.clone(),
         }
     }
@@ -76,6 +77,16 @@ impl Session {
         let onlookers = self.spectators.onlookers.as_deref();
         if onlookers.is_some_and(|onlookers| onlookers.any() && onlookers.wants_step(step)) {
             self.tell_step(budget);
+        }
+        if step.is_multiple_of(STEPS_PER_EXPLANATION) {
+            self.show_next_phase();
+        }
+    }
+
+    fn show_next_phase(&self) {
+        let is_watched = self.spectators.onlookers.as_deref().is_some_and(|onlookers| onlookers.any());
+        if let (true, Some(next)) = (is_watched, self.next_phase(None)) {
+            self.spectators.tell(|| LiveEvent::NextPhase(Arc::new(next)));
         }
     }
 
@@ -105,6 +116,7 @@ impl Session {
     pub(super) fn show_call(&mut self, record: &Result<ToolCallRecord, OutputError>) {
         if self.spectators.told_step != Some(self.present.control_step) {
             self.tell_step(self.budget());
+            self.show_next_phase();
         }
         let Ok(record) = record else { return };
         self.spectators.counted_calls += u32::from(record.message.counted);

@@ -169,6 +169,7 @@ impl Session {
             tool_calls: self.tool_calls,
             requests: self.requests,
             thinking_s: rounded(self.clock.spent().as_secs_f64()),
+            operators: self.operators.values().cloned().collect(),
             falls: self.fallen().iter().filter(|robot| robot.fallen).count() as u32,
             realtime_factor: if physics_s > 0.0 { self.present.time_s / physics_s } else { 0.0 },
             state_hash: Some(self.state_hash()),

@@ -66,6 +66,22 @@ impl Answer {
         self
     }
 
+    /// Sets the seconds that an operator may still think.
+    pub fn with_clock_left(mut self, left_s: Option<f64>) -> Answer {
+        let budget = match &mut self.reply {
+            ToolReply::Act(reply) => &mut reply.budget,
+            ToolReply::Manage(ManageReply::GetStatus(status)) | ToolReply::Talk(TalkReply::Say(status)) => {
+                &mut status.budget
+            }
+            // The last reply of a plan has it already.
+            ToolReply::Look(_) | ToolReply::Plan(_) | ToolReply::Manage(ManageReply::Finish(_)) => {
+                return self;
+            }
+        };
+        budget.wall_clock_left_s = left_s;
+        self
+    }
+
     /// Returns the executed control steps of a command that a partner's command cut off.
     pub fn cut_off_steps(&self) -> Option<u32> {
         match &self.reply {

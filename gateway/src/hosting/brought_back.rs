@@ -17,8 +17,8 @@ use super::{
     Caller, EpisodeTable, EpisodeThread, HostedEpisode, HostingError,
     durable::{JournalReader, Lease, Leasing, LiveFolder, StartKey},
     hosted_episode::Beside,
-    table::{silence, unknown},
-    team::Team,
+    table::unknown,
+    team::{Team, TeamRules},
 };
 
 /// Maximum number of episodes kept awake, regardless of how long they have been idle. Each takes some
@@ -131,7 +131,7 @@ impl EpisodeTable {
         let place = self.places.clone().try_acquire_owned();
         let place = place.map_err(|_| HostingError::TooManyEpisodes { limit })?;
         let team = match heading.driving.is_per_robot() {
-            true => Some(Team::of(&heading.start.operators, &heading.driving, silence(&heading.spec))?),
+            true => Some(Team::of(&heading.start.operators, &heading.driving, TeamRules::of(&heading.spec))?),
             false => None,
         };
         let beside = Arc::new(Beside::new(team));
@@ -191,7 +191,7 @@ impl EpisodeTable {
 /// Reads the operators of the episode `id` from its journal.
 fn team_of(journals: &LiveFolder, id: &str) -> Option<Team> {
     let heading = JournalReader::open(&journals.journal(id)?).ok()?.heading;
-    Team::of(&heading.start.operators, &heading.driving, None).ok()
+    Team::of(&heading.start.operators, &heading.driving, TeamRules::default()).ok()
 }
 
 /// Turns a recording that was left unfinished into a readable one.

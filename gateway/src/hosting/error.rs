@@ -108,6 +108,16 @@ pub enum HostingError {
         /// The operator's robot.
         robot: String,
     },
+    /// An operator commanded after its thinking time had run out.
+    #[error(
+        "the operator of robot {robot:?} has thought for {limit_s} s, which is all that it may; its robot holds still, the others play on, and observe and get_status still answer"
+    )]
+    OperatorOutOfTime {
+        /// The operator's robot.
+        robot: String,
+        /// Limit of an operator's thinking time in seconds.
+        limit_s: u64,
+    },
     /// A call came without an operator's token, but each robot of the episode has an operator.
     #[error(
         "each robot of this episode is driven by its own operator; send its token, which the start of the episode returned, as Authorization: Bearer TOKEN"
@@ -216,6 +226,9 @@ impl HostingError {
             HostingError::OperatorFinished { .. } => {
                 Refusal::new("operator-finished", "Operator has finished", Conflict)
             }
+            HostingError::OperatorOutOfTime { .. } => {
+                Refusal::new("operator-out-of-time", "Operator is out of time", Conflict)
+            }
             HostingError::NeedsOperator => Refusal::new("needs-operator", "Driven by operators", Forbidden),
             HostingError::HostsBusiness => Refusal::new("hosts-business", "Not for operators", Forbidden),
             HostingError::OneEpisode => Refusal::new("one-episode", "No other episode", Forbidden),
@@ -243,6 +256,7 @@ impl HostingError {
             HostingError::DoubleCommand { .. }
             | HostingError::LateCommand { .. }
             | HostingError::OperatorFinished { .. }
+            | HostingError::OperatorOutOfTime { .. }
             | HostingError::NoTalk
             | HostingError::TooMuchSaid { .. }
             | HostingError::Episode(EpisodeError::ForeignRobot { .. }) => true,

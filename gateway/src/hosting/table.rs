@@ -7,7 +7,7 @@ use std::{
     time::Duration,
 };
 
-use tandem_episodes::{EpisodeError, EpisodeSpec, RunFolder, build, stress::Silence};
+use tandem_episodes::{EpisodeError, EpisodeSpec, RunFolder, build};
 use tandem_tools_spec::{
     Assistance, Briefing, Driving, EpisodeList, ResultReply, StartEpisode, StartReply, TaskList,
 };
@@ -24,7 +24,7 @@ use super::{
     hosted_episode::Beside,
     idempotency_cache::{IdempotencyCache, IdempotentReply},
     run_folder::{RunFolders, episode_name},
-    team::{Collection, PartnerPolicy, Team},
+    team::{Collection, PartnerPolicy, Team, TeamRules},
 };
 use crate::{metrics::Metrics, settings::Settings};
 
@@ -235,9 +235,9 @@ impl EpisodeTable {
         folder: RunFolder,
         place: OwnedSemaphorePermit,
     ) -> Result<(Arc<EpisodeThread>, StartReply), HostingError> {
-        let silence = silence(&spec);
+        let spec = EpisodeSpec { operators: driving.operators.unwrap_or_default(), ..spec };
         let (team, operators) = match driving.is_per_robot() {
-            true => Team::new(spec.task.robot_names(), driving, self.collection(), silence)
+            true => Team::new(spec.task.robot_names(), driving, self.collection(), TeamRules::of(&spec))
                 .map(|(team, tokens)| (Some(team), tokens))?,
             false => (None, Vec::new()),
         };
@@ -492,9 +492,4 @@ impl EpisodeTable {
 
 pub(super) fn unknown(id: &str) -> HostingError {
     HostingError::UnknownEpisode { id: id.into() }
-}
-
-/// Returns the loss of messages between operators that the stress of `spec` prescribes, if any.
-pub(super) fn silence(spec: &EpisodeSpec) -> Option<Silence> {
-    spec.stress.and_then(|stress| stress.silence(spec.world_seed(), spec.task.robots.len()))
 }

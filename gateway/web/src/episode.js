@@ -182,6 +182,10 @@ class EpisodePage {
       this.reached.set(event.phase.number, event.phase.time_s);
       this.showPhases();
     }
+    if (event.kind === "next_phase") {
+      this.next = event.phase;
+      this.showPhases();
+    }
     if (event.kind === "ended") {
       this.result = event.result;
       this.showEnd();
@@ -270,9 +274,15 @@ class EpisodePage {
     this.phases.replaceChildren(...this.head.phases.map(({ number, id, collaborative }) => {
       const at = this.reached.get(number);
       return element("li", { class: at === undefined ? "" : "done" },
-        element("span", {}, `${number} ${words(id)}`, collaborative ? element("span", { class: "soft" }, " together") : null),
+        element("span", {}, `${number} ${words(id)}`, collaborative ? element("span", { class: "soft" }, " together") : null,
+          at === undefined && this.next?.number === number ? this.lacks() : null),
         element("span", { class: at === undefined ? "soft" : "good" }, at === undefined ? "not yet" : `${at.toFixed(2)} s`));
     }));
+  }
+
+  /** What the next phase lacks, as the simulator measures it. */
+  lacks() {
+    return element("ul", { class: "lacks soft" }, ...this.next.lacks.map((lack) => element("li", {}, lack)));
   }
 
   showFacts(frame) {

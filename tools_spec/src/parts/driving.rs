@@ -66,13 +66,21 @@ impl Driving {
 }
 
 /// Operators of an episode.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Operators {
     /// One for all robots.
+    #[default]
     One,
     /// One for each robot.
     PerRobot,
+}
+
+impl Operators {
+    /// Returns true if one policy directs all robots.
+    pub fn is_one(&self) -> bool {
+        *self == Operators::One
+    }
 }
 
 /// Credentials of a robot's operator.
@@ -84,6 +92,17 @@ pub struct OperatorToken {
     pub token: String,
 }
 
+/// What the operator of a robot has used up to its last command.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct OperatorUse {
+    /// The robot, as "A".
+    pub robot: String,
+    /// Its operator's requests.
+    pub requests: u32,
+    /// Wall clock that the operator has thought since its first request, while no step was made, in seconds.
+    pub thinking_s: f64,
+}
+
 /// News for an operator with a reply.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Partner {
@@ -91,7 +110,8 @@ pub struct Partner {
     pub robot: String,
     /// Its activity during the command.
     pub did: PartnerDid,
-    /// The tool by which its operator commanded it; left out where none did.
+    /// The tool by which its operator commanded it, of a plan that of the plan's command; left out where none
+    /// did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tool: Option<String>,
 }

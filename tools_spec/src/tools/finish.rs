@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::Error as _};
 use serde_json::{Map, Value};
 
-use crate::parts::{AgentEnding, Assistance, Disclosure, ModelEnding, Protocol, Usage};
+use crate::parts::{AgentEnding, Assistance, Disclosure, ModelEnding, OperatorUse, Protocol, Usage};
 use crate::tool::Tool;
 
 /// End the episode and get its result. After that no command is executed; reads still answer.
@@ -78,6 +78,9 @@ pub struct ResultReply {
     /// Wall clock that the policy has thought between its calls, in seconds.
     #[serde(default)]
     pub thinking_s: f64,
+    /// Use by each operator that has commanded, where each robot has its own; left out otherwise.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub operators: Vec<OperatorUse>,
     /// Robots that fell.
     pub falls: u32,
     /// Simulated seconds per second that the physics took.

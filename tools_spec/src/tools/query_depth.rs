@@ -145,7 +145,7 @@ impl JsonSchema for Color {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JoinedBy {
-    /// By like colour.
+    /// By like colour; of a colour that was asked for, all of it on one thing.
     Color,
     /// By shape, whatever the colours: over edges that stand out, not over corners that go in, as where a
     /// thing stands on a table.

@@ -33,7 +33,7 @@ pub struct PlannedCommand {
     pub tool: String,
     /// Arguments of that tool, without episode_id.
     pub arguments: Map<String, Value>,
-    /// Conditions that have to hold after it.
+    /// Conditions after it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expects: Option<Expectation>,
     /// True: it ends once its `expects` hold (`arrived`: after `steps`); else the plan stops after `steps`,
@@ -56,7 +56,7 @@ pub struct Expectation {
     /// A hand presses on something.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub touching: Option<bool>,
-    /// A hand holds something by thumb and fingers.
+    /// A hand holds something.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub holding: Option<bool>,
     /// A hand feels more than this, in newtons.
@@ -68,12 +68,15 @@ pub struct Expectation {
     /// This phase is reached, for example "p1".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub phase_reached: Option<String>,
-    /// A robot steps, or settles after a walk.
+    /// A robot steps or settles.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_stepping: Option<bool>,
     /// Another operator has spoken since the plan began.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub heard: Option<bool>,
+    /// All other operators wait.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub partners_wait: Option<bool>,
     /// One of these holds, each like `expects`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "Option<Vec<Map<String, Value>>>")]
@@ -81,6 +84,13 @@ pub struct Expectation {
 }
 
 impl Expectation {
+    /// Returns the name of a condition on other operators; `None` if there is none.
+    pub fn names_partners(&self) -> Option<&'static str> {
+        let own = [("heard", self.heard), ("partners_wait", self.partners_wait)];
+        let named = own.into_iter().find(|(_, wanted)| wanted.is_some()).map(|(name, _)| name);
+        named.or_else(|| self.any_of.iter().flatten().find_map(Expectation::names_partners))
+    }
+
     /// Returns true where no condition is given.
     pub fn is_empty(&self) -> bool {
         *self == Expectation::default()

@@ -67,8 +67,10 @@ pub fn find(view: &RobotView, query: &SurfaceQuery, poses: &CameraPoses) -> Vec<
                 .collect()
         }
         (None, Some(color)) => {
+            let max_pixels = (BACKGROUND_PART * view.depth_m.len() as f64) as usize;
+            let regions = relief.unite(view, of_color(view, color), max_pixels);
             let mut found: Vec<Surface> =
-                of_color(view, color).iter().map(|pixels| describe(JoinedBy::Color, pixels)).collect();
+                regions.iter().map(|pixels| describe(JoinedBy::Color, pixels)).collect();
             let eye_m = poses.frame_from_camera.translation.vector;
             let away_m = |surface: &Surface| (Vector3::from(surface.centroid_m) - eye_m).norm();
             let order = |surface: &Surface| (is_background(view, surface), away_m(surface));
@@ -400,6 +402,23 @@ mod tests {
         view.picture = crate::observation::Picture::new(WIDTH as u32, HEIGHT as u32, rgb).into();
         let carpet = found_in(&view, None, Some(Color::Red));
         assert_eq!(told(&view), [221, 36, (9 * WIDTH + 4 * 20) as u32], "{carpet:?}");
+    }
+
+    /// A box with a band around its middle shows two red regions; the spot on the wall is none of its parts.
+    #[test]
+    fn regions_of_one_thing_are_one_surface() {
+        let mut view = view();
+        let mut rgb = view.picture.rgb().to_vec();
+        for pixel in (0..WIDTH * HEIGHT).filter(|pixel| (18..22).contains(&(pixel / WIDTH))) {
+            rgb[3 * pixel..3 * pixel + 3].copy_from_slice(&[30, 30, 200]);
+        }
+        view.picture = crate::observation::Picture::new(WIDTH as u32, HEIGHT as u32, rgb).into();
+        let told: Vec<_> = found_in(&view, None, Some(Color::Red))
+            .iter()
+            .map(|surface| (surface.pixels, surface.to))
+            .collect();
+        let band = 17 + 19 + 21 + 19;
+        assert_eq!(told, [(221 - band, [38, 30]), (36, [7, 7])]);
     }
 
     #[test]

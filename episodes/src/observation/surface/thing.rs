@@ -2,6 +2,8 @@
 //! convex edges but not across concave corners, such as that with a table below. After Stein et al.,
 //! "Object partitioning using local convexity", 2014.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Point3, Unit, Vector3};
 
 use super::grow;
@@ -64,6 +66,27 @@ impl Relief {
     /// Returns every pixel of the object at `seed`.
     pub fn thing(&self, view: &RobotView, seed: usize) -> Vec<usize> {
         grow(view, seed, &mut vec![false; view.depth_m.len()], &|one, other| self.are_of_one(one, other))
+    }
+
+    /// Unites the regions of one colour that belong to one object, for example a bottle's two rings. What is
+    /// larger than `max_pixels` is part of the room, and unites nothing.
+    pub fn unite(&self, view: &RobotView, regions: Vec<Vec<usize>>, max_pixels: usize) -> Vec<Vec<usize>> {
+        let mut left = regions;
+        left.sort_by_key(|region| region.len());
+        let mut united = Vec::new();
+        while let Some(mut region) = left.pop() {
+            let thing: BTreeSet<usize> = self.thing(view, region[region.len() / 2]).into_iter().collect();
+            if thing.len() <= max_pixels {
+                let is_part = |other: &Vec<usize>| {
+                    2 * other.iter().filter(|pixel| thing.contains(pixel)).count() > other.len()
+                };
+                let (parts, others): (Vec<_>, Vec<_>) = left.into_iter().partition(is_part);
+                left = others;
+                region.extend(parts.concat());
+            }
+            united.push(region);
+        }
+        united
     }
 
     /// Returns true if two neighbouring pixels belong to one object.

@@ -28,6 +28,7 @@ fn result(phase_times_s: [Option<f64>; 3], protocol: Protocol) -> ResultReply {
         tool_calls: 3,
         requests: None,
         thinking_s: 0.0,
+        operators: Vec::new(),
         falls: 0,
         realtime_factor: 3.5,
         state_hash: Some("<script>".into()),

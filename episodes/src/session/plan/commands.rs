@@ -3,7 +3,7 @@
 use tandem_tools_spec::{ActCall, CommandReply, PlanStep, PlannedCall, SendPlan, SpecError, Tool as _};
 
 use super::PlanAdvance;
-use super::expectation::{PlanMoment, unexpected};
+use super::expectation::{PartnerNews, PlanMoment, unexpected};
 use super::pieces::Pieces;
 use super::walkers::Walkers;
 use crate::EpisodeError;
@@ -51,8 +51,10 @@ impl Session {
                 PlannedCall::WalkTo(walk) => drop(self.walkers(walk)?),
             }
             self.check_phase(step).map_err(refused)?;
-            if step.expects.with_alternatives().iter().any(|one| one.heard.is_some()) && operator.is_none() {
-                return Err(refused("`heard` is for operators, each of whom has a robot".into()).into());
+            if let (Some(condition), None) = (step.expects.names_partners(), operator) {
+                return Err(
+                    refused(format!("`{condition}` is for operators, each of whom has a robot")).into()
+                );
             }
         }
         Ok(CommandList { steps, index: 0, begun: 0, current: None })
@@ -76,11 +78,16 @@ impl Session {
 
 impl CommandList {
     /// Returns the next command after the reply to the previous one.
-    pub fn advance(&mut self, session: &Session, last: Option<&CommandReply>, heard: bool) -> PlanAdvance {
+    pub fn advance(
+        &mut self,
+        session: &Session,
+        last: Option<&CommandReply>,
+        news: PartnerNews,
+    ) -> PlanAdvance {
         loop {
             let Some(step) = self.steps.get(self.index) else { return PlanAdvance::Done(None) };
             let stopped = match (self.current.take(), last) {
-                (Some(current), Some(reply)) => match current.go_on(session, step, reply, heard) {
+                (Some(current), Some(reply)) => match current.go_on(session, step, reply, news) {
                     CommandProgress::Make(call, current) => {
                         self.current = Some(current);
                         return PlanAdvance::Make(call);
@@ -110,6 +117,11 @@ impl CommandList {
     /// Returns the place of the last command that has been begun, for example "command 2 of 3".
     pub fn place(&self) -> &str {
         self.last_begun().map_or("", |step| &step.place)
+    }
+
+    /// Returns the tool of the last command that has been begun.
+    pub fn tool(&self) -> &'static str {
+        self.last_begun().map_or(SendPlan::NAME, |step| step.call.name())
     }
 
     /// Returns true if the last command asks for a short reply.
@@ -148,8 +160,14 @@ impl CurrentCommand {
         }
     }
 
-    fn go_on(self, session: &Session, step: &PlanStep, reply: &CommandReply, heard: bool) -> CommandProgress {
-        let missing = |is_way_done: bool| unexpected(&step.expects, reply, PlanMoment { heard, is_way_done });
+    fn go_on(
+        self,
+        session: &Session,
+        step: &PlanStep,
+        reply: &CommandReply,
+        news: PartnerNews,
+    ) -> CommandProgress {
+        let missing = |is_way_done: bool| unexpected(&step.expects, reply, PlanMoment { news, is_way_done });
         match self {
             CurrentCommand::Whole => CommandProgress::Over(missing(true)),
             CurrentCommand::Until(mut pieces) => {

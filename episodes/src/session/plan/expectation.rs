@@ -1,16 +1,36 @@
 //! Conditions of plans on the reply to a command.
 
 use tandem_tools_spec::{
-    BaseState, CommandReply, Expectation, Grip, HandReport, HandState, RobotReport, Touch,
+    BaseState, CommandReply, Expectation, Grip, HandReport, HandState, Partner, PartnerDid, RobotReport,
+    Tool as _, Touch, Wait,
 };
 
 use crate::scoring::Phase;
 
+/// What has come from other operators while a plan runs.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct PartnerNews {
+    /// True once one of them has sent a message.
+    pub heard: bool,
+    /// True if all of them waited during the last command.
+    pub partners_wait: bool,
+}
+
+/// Returns true if every partner lets time pass for the others: by `wait`, or because it has finished. One
+/// that has been silent for too long thinks.
+pub fn all_wait(partners: &[Partner]) -> bool {
+    let waits = |partner: &Partner| match partner.did {
+        PartnerDid::Acted => partner.tool.as_deref() == Some(Wait::NAME),
+        PartnerDid::HeldFinished => true,
+        PartnerDid::HeldSilent => false,
+    };
+    !partners.is_empty() && partners.iter().all(waits)
+}
+
 /// State of a plan after a command, beside the command's reply.
 #[derive(Debug, Clone, Copy)]
 pub struct PlanMoment {
-    /// True once another operator has sent a message.
-    pub heard: bool,
+    pub news: PartnerNews,
     /// True once wrists have their last targets: one that has arrived before is only on its way.
     pub is_way_done: bool,
 }
@@ -39,7 +59,8 @@ pub fn unexpected(expected: &Expectation, reply: &CommandReply, moment: PlanMome
             let robot = steps.map(|robot| robot.robot.clone());
             differs("base_stepping", expected.base_stepping, steps.is_some(), robot)
         })
-        .or_else(|| differs("heard", expected.heard, moment.heard, None))
+        .or_else(|| differs("heard", expected.heard, moment.news.heard, None))
+        .or_else(|| differs("partners_wait", expected.partners_wait, moment.news.partners_wait, None))
         .or_else(|| force_differs(expected, &hands))
         .or_else(|| phase_missing(expected, reply))
         .or_else(|| none_holds(expected.any_of.as_deref()?, reply, moment))
@@ -86,4 +107,23 @@ fn hands_of(report: &RobotReport) -> [(String, &HandReport); 2] {
         (format!("{}'s left wrist", report.robot), &report.left),
         (format!("{}'s right wrist", report.robot), &report.right),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn partners_wait_who_let_time_pass() {
+        let partner = |did, tool: Option<&str>| {
+            let tool = tool.map(str::to_owned);
+            Partner { robot: "B".into(), did, tool }
+        };
+        let waits = partner(PartnerDid::Acted, Some("wait"));
+        let is_done = partner(PartnerDid::HeldFinished, None);
+        assert!(all_wait(&[waits.clone(), is_done]));
+        assert!(!all_wait(&[waits, partner(PartnerDid::Acted, Some("walk"))]));
+        assert!(!all_wait(&[partner(PartnerDid::HeldSilent, None)]), "it thinks");
+        assert!(!all_wait(&[]), "there is nobody");
+    }
 }

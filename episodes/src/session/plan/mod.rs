@@ -15,8 +15,8 @@ mod walkers;
 mod way;
 
 use tandem_tools_spec::{
-    ActCall, Call, CommandReply, Formats, PlanCall, PlanReply, SendPlan, SpecError, StopReason, Tool as _,
-    ToolCall, ToolReply,
+    ActCall, Call, CommandReply, Formats, Partner, PlanCall, PlanReply, SendPlan, SpecError, StopReason,
+    Tool as _, ToolCall, ToolReply, WalkTo,
 };
 
 use super::Session;
@@ -27,6 +27,7 @@ use crate::commands::{Called, OperatorCall};
 use crate::output::OutputError;
 use crate::recording::CallerRecord;
 use commands::CommandList;
+use expectation::{PartnerNews, all_wait};
 use outcomes::Outcomes;
 use walkers::Walkers;
 
@@ -35,8 +36,8 @@ use walkers::Walkers;
 pub struct PlanRun {
     stage: PlanStage,
     progress: PlanProgress,
-    /// True once another operator has sent a message.
-    heard: bool,
+    /// What has come from the other operators.
+    news: PartnerNews,
     /// Robot of the plan's operator; `None` for the policy of all robots.
     operator: Option<String>,
 }
@@ -70,7 +71,7 @@ impl PlanRun {
     pub fn advance(&mut self, session: &Session) -> PlanAdvance {
         let last = self.progress.last.as_ref();
         match &mut self.stage {
-            PlanStage::Commands(list) => list.advance(session, last, self.heard),
+            PlanStage::Commands(list) => list.advance(session, last, self.news),
             PlanStage::Walk(walk) => walk.advance(session, last),
         }
     }
@@ -92,9 +93,22 @@ impl PlanRun {
         }
     }
 
+    /// Returns the tool of the command that is carried out.
+    pub fn tool(&self) -> &'static str {
+        match &self.stage {
+            PlanStage::Commands(list) => list.tool(),
+            PlanStage::Walk(_) => WalkTo::NAME,
+        }
+    }
+
     /// Notes a message from another operator.
     pub fn hear(&mut self) {
-        self.heard = true;
+        self.news.heard = true;
+    }
+
+    /// Notes what the other operators did during the last command.
+    pub fn see(&mut self, partners: &[Partner]) {
+        self.news.partners_wait = all_wait(partners);
     }
 
     /// Returns true while no command has been executed.
@@ -186,7 +200,12 @@ impl Session {
         match begun {
             Ok(stage) => {
                 let operator = caller.operator().map(str::to_owned);
-                Ok(PlanRun { stage, progress: PlanProgress::default(), heard: false, operator })
+                Ok(PlanRun {
+                    stage,
+                    progress: PlanProgress::default(),
+                    news: PartnerNews::default(),
+                    operator,
+                })
             }
             Err(refusal) => {
                 self.refuse(caller, called, &refusal);

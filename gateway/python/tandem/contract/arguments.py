@@ -85,7 +85,7 @@ class Expectation:
     """A hand presses on something."""
 
     holding: bool | None = None
-    """A hand holds something by thumb and fingers."""
+    """A hand holds something."""
 
     force_above_n: float | None = None
     """A hand feels more than this, in newtons."""
@@ -97,10 +97,13 @@ class Expectation:
     """This phase is reached, for example "p1"."""
 
     base_stepping: bool | None = None
-    """A robot steps, or settles after a walk."""
+    """A robot steps or settles."""
 
     heard: bool | None = None
     """Another operator has spoken since the plan began."""
+
+    partners_wait: bool | None = None
+    """All other operators wait."""
 
     any_of: Sequence[Any] | None = None
     """One of these holds, each like `expects`."""
@@ -144,7 +147,7 @@ class PlannedCommand:
     """Arguments of that tool, without episode_id."""
 
     expects: Expectation | None = None
-    """Conditions that have to hold after it."""
+    """Conditions after it."""
 
     until: bool | None = None
     """True: it ends once its `expects` hold (`arrived`: after `steps`); else the plan stops after `steps`, up to

@@ -51,6 +51,29 @@ class ModelEnding:
 
 
 @dataclass(frozen=True)
+class OperatorUse:
+    """What the operator of a robot has used up to its last command."""
+
+    robot: str
+    """The robot, as "A"."""
+
+    requests: int
+    """Its operator's requests."""
+
+    thinking_s: float
+    """Wall clock that the operator has thought since its first request, while no step was made, in seconds."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> OperatorUse:
+        """Reads what JSON has."""
+        return OperatorUse(
+            robot=value["robot"],
+            requests=value["requests"],
+            thinking_s=value["thinking_s"],
+        )
+
+
+@dataclass(frozen=True)
 class ResultReply:
     """The reply to `finish`, and the content of `result.json`."""
 
@@ -89,6 +112,9 @@ class ResultReply:
 
     thinking_s: float | None
     """Wall clock that the policy has thought between its calls, in seconds."""
+
+    operators: tuple[OperatorUse, ...]
+    """Use by each operator that has commanded, where each robot has its own; left out otherwise."""
 
     falls: int
     """Robots that fell."""
@@ -143,6 +169,7 @@ class ResultReply:
             tool_calls=value["tool_calls"],
             requests=value.get("requests"),
             thinking_s=value.get("thinking_s"),
+            operators=tuple(OperatorUse.of(item) for item in value.get("operators", ())),
             falls=value["falls"],
             realtime_factor=value["realtime_factor"],
             state_hash=value.get("state_hash"),

@@ -293,6 +293,11 @@ impl EpisodeThread {
 
     /// Ends the episode for an external reason after the calls already waiting, unless it has ended by
     /// then.
+    pub fn end(&self, reason: EndReason) -> Result<(), HostingError> {
+        self.send(Job::End { reason })
+    }
+
+    /// Does the same as [`EpisodeThread::end`], however many calls wait.
     ///
     /// It blocks while the queue is full, so it must not be called from async code.
     pub fn end_blocking(&self, reason: EndReason) {

@@ -2,16 +2,17 @@
 //!
 //! A step is made when every operator has commanded, or when the others' patience with the missing ones
 //! ends. Then the robots of the silent operators hold still, and nobody waits for them until they call
-//! again. The shortest of the commands ends them all. The policy's clock runs until the step is made,
-//! that is, while at least one operator thinks. An operator's call blocks until its robot's reply is
-//! there.
+//! again. The shortest of the commands ends them all. Each operator has a clock of its own. An operator's
+//! call blocks until its robot's reply is there.
 
+mod clock;
 mod collection;
 mod driving;
 mod one_robot;
 mod partner;
 mod planning;
 mod round;
+mod rules;
 
 use std::{
     collections::BTreeSet,
@@ -22,7 +23,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use tandem_episodes::{EpisodeError, OperatorCall, stress::Silence};
+use tandem_episodes::{EpisodeError, OperatorCall};
 use tandem_tools_spec::{
     Call, Driving, Finish, GetStatus, Heard, ManageCall, OperatorToken, Partner, PartnerDid, TalkCall,
     ToolCall,
@@ -38,6 +39,7 @@ pub use partner::PartnerPolicy;
 use planning::finish_all;
 pub use round::OperatorMemory;
 use round::{PartnerKind, Pending, Round};
+pub use rules::TeamRules;
 
 /// The operators of one episode.
 #[derive(Debug)]
@@ -45,8 +47,7 @@ pub struct Team {
     seats: Vec<Seat>,
     patience: Duration,
     talk: bool,
-    /// Message loss between operators under stress.
-    silence: Option<Silence>,
+    rules: TeamRules,
     round: Mutex<Round>,
     wheels: Mutex<Wheels>,
 }
@@ -94,7 +95,7 @@ impl Team {
         robots: impl Iterator<Item = &'a str>,
         driving: &Driving,
         collection: Option<&Collection>,
-        silence: Option<Silence>,
+        rules: TeamRules,
     ) -> Result<(Team, Vec<OperatorToken>), HostingError> {
         let mut tokens = Vec::new();
         for robot in robots {
@@ -102,15 +103,11 @@ impl Team {
             let (_, token) = kept.map_or_else(Token::random, Ok)?;
             tokens.push(OperatorToken { robot: robot.into(), token });
         }
-        Ok((Team::of(&tokens, driving, silence)?, tokens))
+        Ok((Team::of(&tokens, driving, rules)?, tokens))
     }
 
     /// Restores the operators that have these tokens.
-    pub fn of(
-        tokens: &[OperatorToken],
-        driving: &Driving,
-        silence: Option<Silence>,
-    ) -> Result<Team, HostingError> {
+    pub fn of(tokens: &[OperatorToken], driving: &Driving, rules: TeamRules) -> Result<Team, HostingError> {
         let mut seats = Vec::new();
         for OperatorToken { robot, token } in tokens {
             let token = Token::parse(token, "an operator")?;
@@ -121,7 +118,7 @@ impl Team {
         let (none, under_way) = (seats.iter().map(|_| None).collect(), vec![None; seats.len()]);
         let (partners, left) = (vec![None; seats.len()], vec![None; seats.len()]);
         let wheels = Mutex::new(Wheels { seats: none, under_way, partners, left, ..Wheels::default() });
-        Ok(Team { seats, patience, talk: driving.talk == Some(true), silence, round, wheels })
+        Ok(Team { seats, patience, talk: driving.talk == Some(true), rules, round, wheels })
     }
 
     /// Returns the robot whose operator has the token `text`. Every token is compared.
@@ -182,6 +179,10 @@ impl Team {
         let seat = self.seat(robot)?;
         self.check_robots(&call)?;
         let call = OperatorCall::new(robot, call)?;
+        self.round().arrive(seat);
+        if let ToolCall::Act(_) | ToolCall::Plan(_) = &call.call().tool {
+            self.check_clock(episode, seat)?;
+        }
         match &call.call().tool {
             ToolCall::Act(_) => self.act(episode, seat, call, keyed).await,
             ToolCall::Talk(TalkCall::Say(say)) => {
@@ -241,7 +242,7 @@ impl Team {
         self.ask(episode, seat, call.into_call(), keyed, move |team, answer| {
             let mut round = team.round();
             let said = round.count_said(seat);
-            if team.silence.is_none_or(|silence| silence.lets_hear(seat, said)) {
+            if team.rules.silence.is_none_or(|silence| silence.lets_hear(seat, said)) {
                 let step = answer.step.unwrap_or_default();
                 round.spread(seat, &Heard { step, number: said + 1, ..words });
             }
@@ -394,7 +395,7 @@ impl Team {
         let (mut replies, mut commands, mut asked) = (Vec::new(), Vec::new(), Vec::new());
         for (seat, Pending { command, keyed, reply }) in pending {
             asked.push((seat, command.steps(), command.tool()));
-            commands.push((command, keyed));
+            commands.push((command.with_use(self.round().used(seat)), keyed));
             replies.push(reply);
         }
         let (team, is_over) = (self.clone(), Arc::new(AtomicBool::new(false)));
@@ -434,7 +435,8 @@ impl Team {
     /// Restricts the answer to what the operator on `seat` may see.
     fn for_seat(&self, answer: Answer, seat: usize) -> Answer {
         let heard = self.round().take_heard(seat);
-        Answer { heard, ..answer.of_own_robot(&self.seats[seat].robot) }
+        let own = answer.of_own_robot(&self.seats[seat].robot).with_clock_left(self.clock_left_s(seat));
+        Answer { heard, ..own }
     }
 
     /// Returns the behaviour of the partners of `seat`, out of that of all robots in `did`.
@@ -483,7 +485,8 @@ mod tests {
 
     #[test]
     fn an_operator_takes_no_place_of_another() {
-        let (team, _) = Team::new(["A", "B"].into_iter(), &Driving::default(), None, None).unwrap();
+        let (team, _) =
+            Team::new(["A", "B"].into_iter(), &Driving::default(), None, TeamRules::default()).unwrap();
         let taken: Vec<_> = (0..WAITING_CALLS / 2).map(|_| team.take_place("A").unwrap()).collect();
         let refused = team.take_place("A").unwrap_err();
         assert!(matches!(refused, HostingError::TooManyWaiting { limit: 8 }), "{refused}");

@@ -62,11 +62,14 @@ impl Team {
                 PlanAdvance::Make(call) => call,
                 PlanAdvance::Done(stopped) => break stopped,
             };
-            let stopped = match self.make_planned(episode, own.robot(), seat, call, &mut under_way).await {
-                Ok(reply) => run.take(reply),
-                Err(error) if run.is_untouched() => return Err(error),
-                Err(error) => Some(error.to_string()),
-            };
+            let stopped =
+                match self.make_planned(episode, own.robot(), seat, (call, run.tool()), &mut under_way).await
+                {
+                    Ok(reply) => run.take(reply),
+                    Err(error) if run.is_untouched() => return Err(error),
+                    Err(error) => Some(error.to_string()),
+                };
+            run.see(&under_way.partners);
             if !under_way.heard.is_empty() {
                 run.hear();
             }
@@ -91,10 +94,10 @@ impl Team {
         episode: &Arc<EpisodeThread>,
         robot: &str,
         seat: usize,
-        call: ActCall,
+        (call, tool): (ActCall, &'static str),
         under_way: &mut PlanUnderWay,
     ) -> Result<CommandReply, HostingError> {
-        let command = OperatorCall::new(robot, Call::from(ToolCall::Act(call)))?.planned();
+        let command = OperatorCall::new(robot, Call::from(ToolCall::Act(call)))?.planned(tool);
         let Answer { reply, mut heard, partners, .. } = self.clone().act_on(episode, seat, command).await?;
         under_way.heard.append(&mut heard);
         under_way.partners = partners;

@@ -1,10 +1,13 @@
 //! The state of a round: the commands that operators have given for the next step.
 
+use std::time::Duration;
+
 use serde::{Deserialize, Serialize};
 use tandem_episodes::OperatorCommand;
-use tandem_tools_spec::{Heard, PartnerDid, ToolReply};
+use tandem_tools_spec::{Heard, OperatorUse, PartnerDid, ToolReply};
 use tokio::{sync::oneshot, task::AbortHandle};
 
+use super::clock::OperatorClock;
 use crate::hosting::{Answer, HostingError, durable::Keyed};
 
 /// Maximum number of unread messages for one operator.
@@ -29,6 +32,9 @@ struct Operator {
     heard: Vec<Heard>,
     /// Number of messages it has sent.
     said: u32,
+    /// Number of its requests.
+    requests: u32,
+    clock: OperatorClock,
 }
 
 /// Driver of a robot that runs in this process.
@@ -47,6 +53,10 @@ pub struct OperatorMemory {
     missed: Option<[u32; 2]>,
     heard: Vec<Heard>,
     said: u32,
+    #[serde(default)]
+    requests: u32,
+    #[serde(default)]
+    thought: Duration,
     /// Partner that drove in its place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partner: Option<PartnerKind>,
@@ -100,6 +110,8 @@ impl Round {
             missed: None,
             heard: Vec::new(),
             said: 0,
+            requests: 0,
+            clock: OperatorClock::default(),
         };
         Round { operators: robots.into_iter().map(operator).collect(), number: 0, patience: None }
     }
@@ -112,6 +124,8 @@ impl Round {
             missed: operator.missed,
             heard: operator.heard.clone(),
             said: operator.said,
+            requests: operator.requests,
+            thought: operator.clock.spent(),
             partner: None,
         };
         self.operators.iter().map(memory).collect()
@@ -120,8 +134,11 @@ impl Round {
     /// Restores what was remembered.
     pub fn restore(&mut self, memory: Vec<OperatorMemory>) {
         for (operator, memory) in self.operators.iter_mut().zip(memory) {
-            let OperatorMemory { silent, finished, missed, heard, said, partner: _ } = memory;
+            let OperatorMemory { silent, finished, missed, heard, said, requests, thought, partner: _ } =
+                memory;
             (operator.missed, operator.heard, operator.said) = (missed, heard, said);
+            operator.requests += requests;
+            operator.clock.add(thought);
             match operator.state {
                 // It has already called again.
                 OperatorState::Waiting(_) | OperatorState::Acting => {}
@@ -130,6 +147,28 @@ impl Round {
                 _ => operator.state = OperatorState::Thinking,
             }
         }
+    }
+
+    /// Counts a request of the operator on `seat`, whose clock begins with its first, and returns what it has
+    /// used.
+    pub fn arrive(&mut self, seat: usize) {
+        let operator = &mut self.operators[seat];
+        operator.requests += 1;
+        if let OperatorState::Thinking = operator.state {
+            operator.clock.run();
+        }
+    }
+
+    /// Returns what the operator on `seat` has used up to now.
+    pub fn used(&self, seat: usize) -> OperatorUse {
+        let Operator { robot, requests, clock, .. } = &self.operators[seat];
+        let thinking_s = (clock.thought().as_secs_f64() * 1e3).round() / 1e3;
+        OperatorUse { robot: robot.clone(), requests: *requests, thinking_s }
+    }
+
+    /// Returns the time that the operator on `seat` has thought.
+    pub fn thought(&self, seat: usize) -> Duration {
+        self.operators[seat].clock.thought()
     }
 
     pub fn number(&self) -> u64 {
@@ -157,7 +196,9 @@ impl Round {
     }
 
     pub fn command(&mut self, seat: usize, pending: Pending) {
-        self.operators[seat].state = OperatorState::Waiting(pending.into());
+        let operator = &mut self.operators[seat];
+        operator.state = OperatorState::Waiting(pending.into());
+        operator.clock.stop();
     }
 
     /// Records that the operator on `seat` has looked at the current state.
@@ -166,6 +207,7 @@ impl Round {
         operator.missed = None;
         if let OperatorState::Silent = operator.state {
             operator.state = OperatorState::Thinking;
+            operator.clock.run();
         }
     }
 
@@ -183,10 +225,7 @@ impl Round {
 
     /// Stops waiting for the operator on `seat` until it calls again.
     pub fn fall_silent(&mut self, seat: usize) {
-        let state = &mut self.operators[seat].state;
-        if let OperatorState::Thinking = state {
-            *state = OperatorState::Silent;
-        }
+        self.operators[seat].fall_silent();
     }
 
     /// Lets the operator on `seat` leave. Returns true if others play on.
@@ -197,6 +236,7 @@ impl Round {
             return Err(HostingError::DoubleCommand { robot: operator.robot.clone(), waits_for });
         }
         operator.state = OperatorState::Finished;
+        operator.clock.stop();
         Ok(self
             .operators
             .iter()
@@ -240,11 +280,7 @@ impl Round {
 
     /// Stops waiting for all operators that have not commanded.
     pub fn lose_patience(&mut self) {
-        for operator in &mut self.operators {
-            if let OperatorState::Thinking = operator.state {
-                operator.state = OperatorState::Silent;
-            }
-        }
+        self.operators.iter_mut().for_each(Operator::fall_silent);
     }
 
     /// Takes the commands of the step that is made now, by seat.
@@ -309,11 +345,20 @@ impl Round {
 }
 
 impl Operator {
+    /// Lets nobody wait for it any more, if it thinks.
+    fn fall_silent(&mut self) {
+        if let OperatorState::Thinking = self.state {
+            self.state = OperatorState::Silent;
+            self.clock.stop();
+        }
+    }
+
     /// Ends a step that was made from the first to the second of `made`.
     fn end(&mut self, made: Option<[u32; 2]>) -> PartnerDid {
         match self.state {
             OperatorState::Acting => {
                 self.state = OperatorState::Thinking;
+                self.clock.run();
                 PartnerDid::Acted
             }
             OperatorState::Finished => PartnerDid::HeldFinished,

@@ -226,7 +226,7 @@ impl DriversPage {
                 sender.text(json!({ "kind": "ended", "result": result }).to_string()).await
             }
             // The page gets the outcome of its own commands as any operator does.
-            LiveEvent::Entry(_) | LiveEvent::Phase(_) => Ok(()),
+            LiveEvent::Entry(_) | LiveEvent::Phase(_) | LiveEvent::NextPhase(_) => Ok(()),
         }
     }
 

@@ -9,6 +9,7 @@ use axum::{
 };
 use serde_json::{Value, json};
 use tandem_episodes::live::{LiveEntry, LiveEvent, LiveScene};
+use tandem_tools_spec::NextPhase;
 use tokio::sync::{OwnedSemaphorePermit, broadcast::error::RecvError};
 
 use super::{
@@ -79,6 +80,9 @@ async fn tell(sender: &mut PageSender, watch: LiveWatch) -> io::Result<()> {
     for phase in &view.phases {
         sender.text(json!({ "kind": "phase", "phase": phase }).to_string()).await?;
     }
+    if let Some(next) = &view.next_phase {
+        tell_next(sender, next).await?;
+    }
     sender.bytes(view.now.frame(&scene).to_vec()).await?;
     if let Some(result) = &view.result {
         sender.text(json!({ "kind": "ended", "result": result }).to_string()).await?;
@@ -93,6 +97,7 @@ async fn tell(sender: &mut PageSender, watch: LiveWatch) -> io::Result<()> {
             Ok(LiveEvent::Phase(phase)) => {
                 sender.text(json!({ "kind": "phase", "phase": phase }).to_string()).await?
             }
+            Ok(LiveEvent::NextPhase(next)) => tell_next(sender, &next).await?,
             Ok(LiveEvent::Ended(result)) => {
                 sender.text(json!({ "kind": "ended", "result": *result }).to_string()).await?
             }
@@ -100,6 +105,10 @@ async fn tell(sender: &mut PageSender, watch: LiveWatch) -> io::Result<()> {
             Err(RecvError::Closed) => return Ok(()),
         }
     }
+}
+
+async fn tell_next(sender: &mut PageSender, next: &NextPhase) -> io::Result<()> {
+    sender.text(json!({ "kind": "next_phase", "phase": next }).to_string()).await
 }
 
 async fn tell_entry(sender: &mut PageSender, scene: &LiveScene, entry: Arc<LiveEntry>) -> io::Result<()> {

@@ -78,6 +78,7 @@ fn hosting_refusals() -> Vec<HostingError> {
         HostingError::DoubleCommand { robot: robot(), waits_for: Vec::new() },
         HostingError::LateCommand { robot: robot(), from_step: 1, to_step: 9 },
         HostingError::OperatorFinished { robot: robot() },
+        HostingError::OperatorOutOfTime { robot: robot(), limit_s: 1800 },
         HostingError::NeedsOperator,
         HostingError::HostsBusiness,
         HostingError::OneEpisode,

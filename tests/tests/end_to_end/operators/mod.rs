@@ -1,5 +1,6 @@
 //! Tests of episodes with an operator for each robot.
 
+mod clocks;
 mod driving;
 mod page;
 mod partners;

@@ -54,3 +54,32 @@ fn an_operator_waits_in_one_call_until_it_hears() {
     team.ask(1, "send_plan", foreign).refused(409, &["yours is \"B\""]);
     team.verified();
 }
+
+/// A's walk is many short commands; B begins when it is over and A waits for B.
+#[test]
+fn operators_meet_where_both_wait() {
+    let team = Team::start(json!({ "patience_s": 20 }));
+    let meet = json!({
+        "tool": "wait", "arguments": { "steps": 500 }, "expects": { "partners_wait": true }, "until": true,
+    });
+    let walk = json!({
+        "tool": "walk_to",
+        "arguments": { "steps": 300, "robots": [{ "robot": "A", "to_m": [-0.1, 0.0] }] },
+    });
+    let [a, b] = std::thread::scope(|scope| {
+        let walks = scope.spawn(|| team.ask(0, "send_plan", json!({ "commands": [walk, &meet] })).ok());
+        let waits = scope.spawn(|| team.ask(1, "send_plan", json!({ "commands": [&meet] })).ok());
+        [walks, waits].map(|plan| plan.join().expect("a reply"))
+    });
+    for reply in [&a, &b] {
+        assert_eq!(reply["stopped"], json!(null), "{reply}");
+    }
+    let steps = [&a, &b].map(|reply| reply["executed_steps"].as_u64().expect("steps"));
+    assert!(steps[1] > 50 && steps[0].abs_diff(steps[1]) <= 5, "{steps:?}");
+    let alone = json!({ "commands": [meet] });
+    let single = Team::start(json!({ "patience_s": 0.2 }));
+    let reply = single.ask(1, "send_plan", alone).ok();
+    let why = reply["stopped"].as_str().expect("A thinks, and does not wait");
+    assert!(why.contains("partners_wait is false"), "{why}");
+    team.verified();
+}

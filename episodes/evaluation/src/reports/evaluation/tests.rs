@@ -37,6 +37,7 @@ pub fn played(policy: &str, task: &Task, seed: u32, phases: usize) -> PlayedEpis
             tool_calls: 60,
             requests: None,
             thinking_s: 0.0,
+            operators: Vec::new(),
             falls: u32::from(phases == 0),
             realtime_factor: 3.5,
             state_hash: Some(format!("{seed:016x}")),

@@ -1,0 +1,100 @@
+//! The clock of one operator: it runs while the operator thinks and the episode may have to wait for it.
+//!
+//! It begins with the operator's first request. It stands while the operator's command waits or is executed,
+//! and once nobody waits for the operator any more. Each operator has the whole limit of the protocol.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use tandem_tools_spec::EndReason;
+
+use super::Team;
+use crate::hosting::{EpisodeThread, HostingError};
+
+/// Thinking time of an operator.
+#[derive(Debug, Default)]
+pub struct OperatorClock {
+    spent: Duration,
+    /// Moment when it began to run; `None` while it stands.
+    since: Option<Instant>,
+}
+
+impl OperatorClock {
+    /// Runs from now on, if it does not yet.
+    pub fn run(&mut self) {
+        self.since.get_or_insert_with(Instant::now);
+    }
+
+    /// Stands from now on.
+    pub fn stop(&mut self) {
+        self.spent = self.thought();
+        self.since = None;
+    }
+
+    /// Returns the time for which it had run when it last stood.
+    pub fn spent(&self) -> Duration {
+        self.spent
+    }
+
+    /// Returns the time for which it has run.
+    pub fn thought(&self) -> Duration {
+        self.spent + self.since.map_or(Duration::ZERO, |since| since.elapsed())
+    }
+
+    /// Adds the time of an earlier process.
+    pub fn add(&mut self, earlier: Duration) {
+        self.spent += earlier;
+    }
+}
+
+impl Team {
+    /// Returns the seconds that the operator on `seat` may still think; `None` without a limit.
+    pub(super) fn clock_left_s(&self, seat: usize) -> Option<f64> {
+        let left = self.rules.thinking_limit?.saturating_sub(self.round().thought(seat));
+        Some((left.as_secs_f64() * 1e3).round() / 1e3)
+    }
+
+    /// Refuses a command of the operator on `seat` once its clock has run out. Its robot then holds still, as
+    /// if it had finished; the episode ends when nobody else plays.
+    pub(super) fn check_clock(
+        self: &Arc<Self>,
+        episode: &Arc<EpisodeThread>,
+        seat: usize,
+    ) -> Result<(), HostingError> {
+        let limit = self.rules.thinking_limit.filter(|limit| self.round().thought(seat) >= *limit);
+        let Some(limit) = limit else { return Ok(()) };
+        let others_play_on = self.round().finish(seat)?;
+        match others_play_on {
+            true => self.go_on(episode),
+            false => episode.end(EndReason::WallClockExhausted)?,
+        }
+        Err(HostingError::OperatorOutOfTime {
+            robot: self.seats[seat].robot.clone(),
+            limit_s: limit.as_secs(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_counts_the_time_for_which_it_runs() {
+        let mut clock = OperatorClock::default();
+        std::thread::sleep(Duration::from_millis(2));
+        assert_eq!(clock.thought(), Duration::ZERO, "it has not begun");
+        clock.run();
+        std::thread::sleep(Duration::from_millis(2));
+        assert!(clock.thought() >= Duration::from_millis(2));
+        assert_eq!(clock.spent(), Duration::ZERO);
+        clock.stop();
+        let spent = clock.spent();
+        std::thread::sleep(Duration::from_millis(2));
+        assert!(spent > Duration::ZERO && clock.thought() == spent, "it stands");
+        clock.add(Duration::from_secs(1));
+        assert_eq!(clock.thought(), spent + Duration::from_secs(1));
+    }
+}
