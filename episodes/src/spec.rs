@@ -229,7 +229,6 @@ impl EpisodeSpec {
             keyed_seed,
             operators: _,
         } = self;
-        let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let found = [
             match task.origin {
                 TaskOrigin::Benchmark => None,
@@ -239,13 +238,13 @@ impl EpisodeSpec {
             (*assistance != Assistance::Paper).then(|| format!("assistance: {assistance}")),
             (*disclosure != assistance.disclosure()).then(|| format!("phases told: {disclosure}")),
             (*hints != assistance.hints()).then(|| format!("hints: {hints}")),
-            scene.as_ref().map(|scene| format!("scene: {}", file(&scene.path))),
+            scene.as_ref().map(|scene| format!("scene: {}", file_name(&scene.path))),
             (*robot != RobotFile::default()).then(|| format!("robot: {}", robot.kind())),
             match locomotion {
                 Controller::Balance => None,
-                Controller::File(path) => Some(format!("{CONTROLLER}{}", file(path))),
+                Controller::File(path) => Some(format!("{CONTROLLER}{}", file_name(path))),
                 Controller::Looped(path) => {
-                    Some(format!("{CONTROLLER}{} in a loop over its place", file(path)))
+                    Some(format!("{CONTROLLER}{} in a loop over its place", file_name(path)))
                 }
             },
             (*state_estimate != StateSource::default())
@@ -419,6 +418,11 @@ impl Controller {
             Controller::Looped(path) => LocomotionChoice::from_file(path, true),
         }
     }
+}
+
+/// Returns the last part of a path, for readers.
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 #[cfg(test)]

@@ -39,7 +39,7 @@ pub struct OperatorCommand {
     pub(crate) call: OperatorCall,
     /// Number of control steps requested.
     pub(crate) steps: u32,
-    /// What its operator has used up to now, as the host counts it.
+    /// Requests and thinking time of its operator up to now, as the host counts them.
     pub(crate) used: Option<OperatorUse>,
 }
 

@@ -1,4 +1,4 @@
-//! Where an episode starts.
+//! Start states of episodes.
 
 use std::path::PathBuf;
 

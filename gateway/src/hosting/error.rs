@@ -219,16 +219,12 @@ impl HostingError {
             HostingError::EpisodePanicked => {
                 Refusal::new("episode-failed", "The simulator failed", Failed).hint(START_ANOTHER)
             }
-            HostingError::DoubleCommand { .. } => {
-                Refusal::new("double-command", "Commanded already", Conflict)
-            }
+            HostingError::DoubleCommand { .. } => Refusal::new("double-command", "Commanded twice", Conflict),
             HostingError::LateCommand { .. } => Refusal::new("late-command", "Commanded late", Conflict),
             HostingError::OperatorFinished { .. } => {
                 Refusal::new("operator-finished", "Operator has finished", Conflict)
             }
-            HostingError::OperatorOutOfTime { .. } => {
-                Refusal::new("operator-out-of-time", "Operator is out of time", Conflict)
-            }
+            HostingError::OperatorOutOfTime { .. } => Refusal::new("out-of-time", "Out of time", Conflict),
             HostingError::NeedsOperator => Refusal::new("needs-operator", "Driven by operators", Forbidden),
             HostingError::HostsBusiness => Refusal::new("hosts-business", "Not for operators", Forbidden),
             HostingError::OneEpisode => Refusal::new("one-episode", "No other episode", Forbidden),

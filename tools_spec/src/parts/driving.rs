@@ -92,7 +92,7 @@ pub struct OperatorToken {
     pub token: String,
 }
 
-/// What the operator of a robot has used up to its last command.
+/// Requests and thinking time of a robot's operator up to its last command.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OperatorUse {
     /// The robot, as "A".

@@ -7,7 +7,7 @@ use tandem_tools_spec::{
 
 use crate::scoring::Phase;
 
-/// What has come from other operators while a plan runs.
+/// News from other operators while a plan runs.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct PartnerNews {
     /// True once one of them has sent a message.

@@ -36,7 +36,7 @@ use walkers::Walkers;
 pub struct PlanRun {
     stage: PlanStage,
     progress: PlanProgress,
-    /// What has come from the other operators.
+    /// News from the other operators.
     news: PartnerNews,
     /// Robot of the plan's operator; `None` for the policy of all robots.
     operator: Option<String>,

@@ -52,7 +52,7 @@ class ModelEnding:
 
 @dataclass(frozen=True)
 class OperatorUse:
-    """What the operator of a robot has used up to its last command."""
+    """Requests and thinking time of a robot's operator up to its last command."""
 
     robot: str
     """The robot, as "A"."""

@@ -1,4 +1,4 @@
-//! What an episode's specification says of its operators.
+//! Rules for operators, from an episode's specification.
 
 use std::time::Duration;
 
