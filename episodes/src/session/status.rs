@@ -4,8 +4,8 @@ mod held;
 mod next_phase;
 
 use tandem_tools_spec::{
-    Assistance, Briefing, Budget, EndReason, PhaseReached, PhaseTimes, ResultReply, RobotFallen, RobotInfo,
-    StatusReply, Usage,
+    Assistance, Briefing, Budget, EndReason, Operators, PhaseReached, PhaseTimes, ResultReply, RobotFallen,
+    RobotInfo, StatusReply, Usage,
 };
 
 use super::Session;
@@ -31,9 +31,14 @@ impl Session {
     }
 
     pub(super) fn budget(&self) -> Budget {
+        // The host keeps the operators' clocks, and says in their replies what is left.
+        let clock_left = match self.spec().operators {
+            Operators::One => self.clock.left(),
+            Operators::PerRobot => self.rules.thinking,
+        };
         Budget {
             steps_left: self.steps_left(),
-            wall_clock_left_s: self.clock.left().map(|left| rounded(left.as_secs_f64())),
+            wall_clock_left_s: clock_left.map(|left| rounded(left.as_secs_f64())),
             steps_per_command: self.rules.steps_per_command,
         }
     }

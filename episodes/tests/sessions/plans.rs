@@ -152,7 +152,7 @@ fn a_command_lasts_until_what_it_expects_holds() {
     assert!((60..=85).contains(&reply.executed_steps), "{}", reply.executed_steps);
     for (command, says) in [
         (json!({ "tool": "wait", "arguments": { "steps": 5 }, "until": true }), "needs a condition"),
-        (until(json!({ "tool": "wait", "arguments": { "steps": 501 } })), "at most 500"),
+        (until(json!({ "tool": "wait", "arguments": { "steps": 1501 } })), "at most 1500"),
         (
             json!({ "tool": "wait", "arguments": { "steps": 5 }, "expects": { "any_of": [{ "heard": true }] } }),
             "for operators",

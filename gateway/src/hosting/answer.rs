@@ -28,7 +28,7 @@ pub struct Answer {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub recording_failed: Option<String>,
     /// True once the operator has left an episode that others still play; its result is not known yet.
-    #[serde(skip)]
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub others_play_on: bool,
 }
 

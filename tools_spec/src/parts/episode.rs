@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::driving::Operators;
+use super::frames::PoseFrame;
 
 /// Rules of an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -317,7 +318,7 @@ pub struct NextPhase {
     pub held: Vec<HeldObject>,
 }
 
-/// An object in a hand, in the robot's level frame.
+/// An object in a hand.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeldObject {
     /// The robot, as "A".
@@ -326,9 +327,11 @@ pub struct HeldObject {
     pub hand: String,
     /// The object.
     pub object: String,
-    /// Middle of the object, [x, y, z] in metres in the robot's level frame.
+    /// Frame of `middle_m` and `axis`: "level", the robot's pelvis frame, but upright.
+    pub frame: PoseFrame,
+    /// Middle of the object, [x, y, z] in metres.
     pub middle_m: [f64; 3],
-    /// Direction of its own z axis in that frame, length 1: [0, 0, 1] when it is upright.
+    /// Direction of its own z axis, length 1: [0, 0, 1] when it is upright.
     pub axis: [f64; 3],
     /// Height of its lowest point above the floor, in metres.
     pub lowest_m: f64,

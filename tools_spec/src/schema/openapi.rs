@@ -163,6 +163,10 @@ fn with_notice(mut reply: Value) -> Value {
         plain_schema::<Heard>(),
         "What the other operators have said since the last reply; left out where they have said nothing.",
     );
+    reply["properties"]["others_play_on"] = json!({
+        "type": "boolean",
+        "description": "True once an operator has called finish and others play on; left out otherwise.",
+    });
     reply["properties"]["recording_failed"] = json!({
         "type": ["string", "null"],
         "description": "Why the recording is not complete; left out where it is.",

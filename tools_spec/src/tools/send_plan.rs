@@ -37,7 +37,7 @@ pub struct PlannedCommand {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expects: Option<Expectation>,
     /// True: it ends once its `expects` hold (`arrived`: after `steps`); else the plan stops after `steps`,
-    /// up to 500. For move_wrists, walk, wait.
+    /// up to 1500. For move_wrists, walk, wait.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[schemars(extend("default" = false))]
     pub until: bool,
@@ -74,7 +74,7 @@ pub struct Expectation {
     /// Another operator has spoken since the plan began.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub heard: Option<bool>,
-    /// All other operators wait.
+    /// All others wait.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partners_wait: Option<bool>,
     /// One of these holds, each like `expects`.
@@ -125,8 +125,8 @@ impl SendPlan {
         [MoveWrists::NAME, Walk::NAME, SendJointChunk::NAME, Wait::NAME, WalkTo::NAME];
     /// Commands that may go on until something is so.
     pub const UNTIL_COMMANDS: [&str; 3] = [MoveWrists::NAME, Walk::NAME, Wait::NAME];
-    /// Control steps of a command that goes on until something is so: ten seconds.
-    pub const MAX_UNTIL_STEPS: u32 = 500;
+    /// Control steps of a command that goes on until something is so: as many as a walk's, half a minute.
+    pub const MAX_UNTIL_STEPS: u32 = 1500;
 
     /// Returns what messages call the command at `index`.
     pub fn place(&self, index: usize) -> String {

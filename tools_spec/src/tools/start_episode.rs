@@ -111,7 +111,9 @@ impl Briefing {
         let call = format!(
             "POST {tools}/NAME calls one. The JSON body has its arguments, as {{\"steps\": 25}} for wait."
         );
-        Briefing { http: vec![list, call], ..self }
+        let short = "\"short\": true leaves out of a reply what is as it should be. Images are base64 in \
+            `images[].png_base64`, 50 kB and more: write a reply of observe to a file.";
+        Briefing { http: vec![list, call, short.into()], ..self }
     }
 
     /// Returns the short briefing.

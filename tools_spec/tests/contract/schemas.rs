@@ -332,7 +332,7 @@ fn openapi_says_how_many_steps_a_planned_command_may_have() {
     let wait = wait.expect("a plan may wait");
     let arguments = &wait["properties"]["arguments"];
     assert_eq!(arguments["required"], json!(["steps"]));
-    assert_eq!(arguments["properties"]["steps"]["maximum"], 500);
+    assert_eq!(arguments["properties"]["steps"]["maximum"], 1500);
     let [short, until] = wait["anyOf"].as_array().map(Vec::as_slice).expect("two choices") else {
         panic!("{wait}")
     };

@@ -32,6 +32,7 @@ impl Session {
             robot: ROBOT_NAMES[robot].into(),
             hand: side.name().into(),
             object: object.into(),
+            frame: PoseFrame::Level,
             middle_m: wire(level_from_object * middle_m(&found.model)),
             axis: wire(level_from_object.rotation * Vector::Z),
             lowest_m: coarse(facts.lowest_m(object).into()),

@@ -103,7 +103,7 @@ class Expectation:
     """Another operator has spoken since the plan began."""
 
     partners_wait: bool | None = None
-    """All other operators wait."""
+    """All others wait."""
 
     any_of: Sequence[Any] | None = None
     """One of these holds, each like `expects`."""
@@ -151,7 +151,7 @@ class PlannedCommand:
 
     until: bool | None = None
     """True: it ends once its `expects` hold (`arrived`: after `steps`); else the plan stops after `steps`, up to
-    500. For move_wrists, walk, wait.
+    1500. For move_wrists, walk, wait.
     """
 
 

@@ -144,7 +144,7 @@ class HandReach:
 
 @dataclass(frozen=True)
 class HeldObject:
-    """An object in a hand, in the robot's level frame."""
+    """An object in a hand."""
 
     robot: str
     """The robot, as "A"."""
@@ -155,11 +155,14 @@ class HeldObject:
     object: str
     """The object."""
 
+    frame: PoseFrame
+    """Frame of `middle_m` and `axis`: "level", the robot's pelvis frame, but upright."""
+
     middle_m: tuple[float, float, float]
-    """Middle of the object, [x, y, z] in metres in the robot's level frame."""
+    """Middle of the object, [x, y, z] in metres."""
 
     axis: tuple[float, float, float]
-    """Direction of its own z axis in that frame, length 1: [0, 0, 1] when it is upright."""
+    """Direction of its own z axis, length 1: [0, 0, 1] when it is upright."""
 
     lowest_m: float
     """Height of its lowest point above the floor, in metres."""
@@ -171,6 +174,7 @@ class HeldObject:
             robot=value["robot"],
             hand=value["hand"],
             object=value["object"],
+            frame=value["frame"],
             middle_m=tuple(value["middle_m"]),
             axis=tuple(value["axis"]),
             lowest_m=value["lowest_m"],
