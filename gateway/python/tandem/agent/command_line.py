@@ -221,17 +221,15 @@ def _changed(flags: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
 def _resumed(given: argparse.Namespace) -> EpisodeFile:
     """Reads the episode to resume. Refuses flags that would change it."""
     episode = EpisodeFile.read(given.resume)
-    kept = {**episode.flags, **episode.server_flags, "runs": str(given.resume.resolve().parent)}
+    kept: dict[str, Any] = {**episode.flags, **episode.server_flags, "runs": str(given.resume.resolve().parent)}
     told = {**_given(given), **given.server_flags}
     if given.runs is not None:
         told["runs"] = str(Path(given.runs).resolve())
-    models = [
-        (f" of {robot}'s model", own, kept["robot_models"].get(robot, {}))
-        for robot, own in told.pop("robot_models", {}).items()
-    ]
+    models: dict[str, dict[str, Any]] = told.pop("robot_models", {})
+    own = [(f" of {robot}'s model", anew, kept["robot_models"].get(robot, {})) for robot, anew in models.items()]
     differing = [
         f"--{name.replace('_', '-')}{whose} {value} (it was {_or_not_given(before.get(name))})"
-        for whose, anew, before in [("", told, kept), *models]
+        for whose, anew, before in [("", told, kept), *own]
         for name, value in anew.items()
         if name not in MAY_CHANGE and value != before.get(name)
     ]

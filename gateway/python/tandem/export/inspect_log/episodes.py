@@ -35,6 +35,13 @@ class Conversation:
     events: tuple[Event, ...]
 
     @property
+    def begun(self) -> Begun:
+        """First event."""
+        begun = self.events[0]
+        assert isinstance(begun, Begun), "no other event is read as the first one"
+        return begun
+
+    @property
     def model(self) -> str:
         """Name of the model."""
         return str(self.settings.get("model", "unknown"))
@@ -54,6 +61,11 @@ class Episode:
     source: str
     """Source of the conversations: "conversation" files, or the "recording", which has only the calls."""
 
+    @property
+    def begun_at(self) -> datetime:
+        """Time when the first model began."""
+        return min(conversation.begun_at for conversation in self.conversations)
+
 
 def episodes(root: Path) -> list[Episode]:
     """Returns the ended episodes of agents in a folder and its subfolders, sorted by folder."""
@@ -62,7 +74,7 @@ def episodes(root: Path) -> list[Episode]:
     found = [episode for folder in sorted(_folders(root)) if (episode := _episode(folder)) is not None]
     if not found:
         raise TandemError(
-            f"no ended episode of an agent in {root}; give a folder that tandem agent, evaluate with agent:MODEL, or serve wrote"
+            f"no ended episode of an agent in {root}; give a folder that tandem agent, serve, or evaluate with agents wrote"
         )
     return found
 
@@ -88,7 +100,7 @@ def _episode(folder: Path) -> Episode | None:
     recording = Recording(folder) if (folder / RECORDING_FILE).exists() else None
     if conversations:
         seed = _seed(folder, result) if recording is None else recording.seed
-        task = _TASK.search(_begun(conversations[0]).instructions)
+        task = _TASK.search(conversations[0].begun.instructions)
         instruction = task.group(1) if task else ""
         return Episode(folder, result, seed, instruction, conversations, "conversation")
     if recording is None or not recording.calls:
@@ -119,12 +131,6 @@ def _read(path: Path, robot: str | None, folder: Path) -> Conversation:
     settings = begun.settings if begun.settings is not None else EpisodeFile.read(folder).flags
     at = time_of(begun.at) if begun.at is not None else _written_at(folder / "agent.json")
     return Conversation(robot, settings, at, events)
-
-
-def _begun(conversation: Conversation) -> Begun:
-    begun = conversation.events[0]
-    assert isinstance(begun, Begun), "every conversation begins with it"
-    return begun
 
 
 def _seed(folder: Path, result: dict[str, Any]) -> int:

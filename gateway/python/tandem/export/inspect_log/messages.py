@@ -106,7 +106,7 @@ def arguments_of(call: Call) -> tuple[dict[str, Any], str | None]:
     return cast("dict[str, Any]", given), None
 
 
-def content_of(answer: Answer) -> list[Content]:
+def content_of(answer: Answer) -> list[Any]:
     """Returns the text and the images of an answer, each image after its caption."""
     content: list[Content] = [ContentText(text=answer.text)]
     for picture in answer.pictures:

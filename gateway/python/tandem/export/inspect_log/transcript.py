@@ -11,7 +11,7 @@ from inspect_ai.tool import ToolInfo, ToolParams
 
 from ...agent.conversation import Reply, Told, Usage
 from ...agent.instructions import OPENING
-from ...agent.journal import Answered, Begun, Halved, Progress, Replied, Resumed
+from ...agent.journal import Answered, Halved, Progress, Replied, Resumed
 from ...agent.settings import AgentSettings
 from ...agent.tools import Tool
 from .episodes import Conversation, time_of
@@ -27,7 +27,8 @@ class Transcript:
     conversation.
     """
 
-    def __init__(self, conversation: Conversation, begun: Begun) -> None:
+    def __init__(self, conversation: Conversation) -> None:
+        begun = conversation.begun
         self._conversation = conversation
         self._robot = conversation.robot
         self._model = conversation.model
