@@ -214,11 +214,14 @@ impl EpisodePage<'_> {
         let Some(usage) = &self.result.usage else { return String::new() };
         let row = |robot: &str, model: &str, [input, cached, output]: [u64; 3], costs: [Option<f64>; 2]| {
             let [usd, time_s] = costs;
-            let usd = usd.map_or_else(|| "–".into(), |usd| format!("{usd:.4}"));
-            let time_s = time_s.map_or_else(|| "–".into(), |time_s| format!("{time_s:.1} s"));
+            let usd = usd.map(|usd| format!("{usd:.4} US dollars")).unwrap_or_default();
+            let time_s = time_s.map(|time_s| format!("{time_s:.1} s")).unwrap_or_default();
             let (robot, model) = (escape(robot), escape(model));
-            let numbers = [input.to_string(), cached.to_string(), output.to_string(), usd, time_s];
-            let numbers = numbers.map(|number| format!(r#"<td class="number">{number}</td>"#)).concat();
+            let tokens =
+                [format!("{input} tokens read"), format!("{cached} cached"), format!("{output} written")];
+            let numbers = tokens.into_iter().chain([usd, time_s]);
+            let numbers: String =
+                numbers.map(|number| format!(r#"<td class="number">{number}</td>"#)).collect();
             format!(r#"<tr><td>{robot}</td><td class="long">{model}</td>{numbers}</tr>"#)
         };
         let own = usage.robots.iter().map(|own| {
@@ -228,11 +231,9 @@ impl EpisodePage<'_> {
         let tokens = [usage.input_tokens, usage.cached_tokens, usage.output_tokens];
         let all = row("all", &usage.models.join(", "), tokens, [usage.usd, usage.model_s]);
         let rows: String = own.chain([all]).collect();
-        let numbers = ["Tokens read", "Of a cache", "Written", "US dollars", "Time"];
-        let numbers = numbers.map(|name| format!(r#"<th class="number">{name}</th>"#)).concat();
         format!(
             r#"<h2>Models</h2>
-<table class="words"><tr><th>Robots</th><th>Model</th>{numbers}</tr>{rows}</table>
+<table class="words"><tr><th>Robots</th><th>Model</th><th class="number" colspan="5">Used</th></tr>{rows}</table>
 "#
         )
     }

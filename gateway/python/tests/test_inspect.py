@@ -150,7 +150,7 @@ def test_a_log_says_what_was_played_and_how_it_is_scored(team: tuple[Path, EvalL
     assert "passes it straight into" in str(sample.input)
     assert sample.scores is not None
     assert {name: score.value for name, score in sample.scores.items()} == {"success": "I", "p1": "I", "p2": "I", "p3": "I"}
-    assert sample.scores["p1"].explanation == "not reached"
+    assert sample.scores["p1"].explanation == "p1 was not reached"
     assert {score.name: score.metrics["accuracy"].value for score in log.results.scores} == dict.fromkeys(sample.scores, 0)
     for name in ("env_steps", "tool_calls", "falls", "ended", "assistance"):
         assert sample.metadata[name] == result[name]
@@ -195,7 +195,12 @@ def test_a_log_has_the_episodes_of_a_model_by_seed_and_epoch(tmp_path: Path) -> 
     dropped: list[CompactionEvent] = events(samples[4], CompactionEvent)
     asked: list[ModelEvent] = events(samples[4], ModelEvent)
     assert len(dropped) == 6 and {event.type for event in dropped} == {"trim"}
-    assert len(asked[-1].input) == 4 and "What you did before" in asked[-1].input[1].text
+    sent = [request.body["messages"] for request in endpoint.requests]
+    assert [[message.text for message in event.input[:2]] for event in asked] == [
+        [message["content"] for message in messages[:2]] for messages in sent
+    ]
+    assert [len(event.input) for event in asked] == [len(messages) for messages in sent]
+    assert "What you did before" in asked[-1].input[1].text
     assert len(samples[4].messages) == 2 + 2 * 6, "what was dropped is still a message of the sample"
 
 
@@ -219,7 +224,7 @@ def test_a_model_that_reaches_a_phase_has_its_score(team: tuple[Path, EvalLog], 
     (sample,) = log.samples
     assert sample.id == 1 and sample.scores is not None
     assert (sample.scores["p1"].value, sample.scores["p1"].metadata) == ("C", {"time_s": 4.5})
-    assert sample.scores["p1"].explanation == "reached at 4.50 s of the simulation"
+    assert sample.scores["p1"].explanation == "p1 was reached at 4.50 s of the simulation"
     assert log.results.scores[1].metrics["accuracy"].value == 1
     told: list[InfoEvent] = events(sample, InfoEvent, "A")
     assert [event.data for event in told] == ["reached: p1 grasp_and_lift"]

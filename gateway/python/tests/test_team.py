@@ -12,10 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from inspect_ai.log import read_eval_log
 from scripted_endpoint import CACHED_TOKENS, INPUT_TOKENS, OUTPUT_TOKENS, Says, Script, ScriptedEndpoint
 
 import tandem
 from tandem.agent import main
+from tandem.export.inspect_log import export_inspect
 
 # Not where the sources lie, which Python would take for the package.
 AWAY = Path(__file__).parent
@@ -97,7 +99,7 @@ def test_each_robot_has_its_model_and_its_price(server: tandem.Server, runs: Pat
     folder = latest(runs)
     check_usage(json.loads((folder / "result.json").read_text())["usage"], (3, 3))
     page = (folder / "report.html").read_text()
-    assert f'<td>B</td><td class="long">other</td><td class="number">{3 * INPUT_TOKENS}</td>' in page
+    assert f'<td>B</td><td class="long">other</td><td class="number">{3 * INPUT_TOKENS} tokens read</td>' in page
     begun = [json.loads((folder / f"agent-{robot}.jsonl").read_text().splitlines()[0]) for robot in "AB"]
     assert [each["settings"]["model"] for each in begun] == ["scripted", "other"]
     assert [each["settings"]["limits"]["calls"] for each in begun] == [20, 3]
@@ -167,15 +169,19 @@ def test_an_evaluation_plays_teams_and_keeps_their_conversations(tmp_path: Path)
         team = flags(common, own)[-3:]
         policy = f"agent:scripted?api=openai-chat&base-url={common.base_url('openai-chat')}&{PRICE_A}"
         command = [sys.executable, "-m", "tandem", "evaluate", "--policy", policy, *team]
-        out = ["--tasks", "handover", "--seeds", str(SEED), "--no-reports", "--out", str(tmp_path / "run")]
+        out = ["--tasks", "handover", "--seeds", str(SEED), "--out", str(tmp_path / "run")]
         program = subprocess.run([*command, *out], cwd=AWAY, capture_output=True, text=True)
     assert program.returncode == 0, program.stderr
     (played,) = json.loads((tmp_path / "run" / "results.json").read_text())["episodes"]
     assert played["policy"] == "agent:scripted B=other per robot"
-    check_usage(played["result"]["usage"], (3, 3))
+    check_usage(played["usage"], (3, 3))
     (folder,) = (tmp_path / "run" / "episodes").glob(f"handover*{SEED}/")
     begun = [json.loads((folder / robot / "agent.jsonl").read_text().splitlines()[0]) for robot in "AB"]
     assert [each["settings"]["model"] for each in begun] == ["scripted", "other"]
+    (log,) = export_inspect(tmp_path / "run", tmp_path / "logs")
+    assert (log.task, log.model, log.samples) == ("handover", "scripted + other", 1)
+    (sample,) = read_eval_log(log.path).samples or []
+    assert (sample.id, list(sample.role_usage)) == (SEED, ["A", "B"])
 
 
 def test_the_program_knows_the_flag() -> None:

@@ -130,9 +130,13 @@ fn pages_count_each_robots_model_by_itself() {
         numbers.map(|number| format!(r#"<td class="number">{number}</td>"#)).concat() + "</tr>"
     };
     for (robot, model, own) in [
-        ("A", "a-model", ["5210", "4800", "84", "0.0040", "2.5 s"]),
-        ("B", "&lt;other&gt;", ["5210", "4800", "84", "–", "2.5 s"]),
-        ("all", "a-model, &lt;other&gt;", ["10420", "9600", "168", "0.0040", "5.0 s"]),
+        ("A", "a-model", ["5210 tokens read", "4800 cached", "84 written", "0.0040 US dollars", "2.5 s"]),
+        ("B", "&lt;other&gt;", ["5210 tokens read", "4800 cached", "84 written", "", "2.5 s"]),
+        (
+            "all",
+            "a-model, &lt;other&gt;",
+            ["10420 tokens read", "9600 cached", "168 written", "0.0040 US dollars", "5.0 s"],
+        ),
     ] {
         let row = format!(r#"<tr><td>{robot}</td><td class="long">{model}</td>{}"#, numbers(own));
         assert!(page.contains(&row), "no `{row}` in {page}");

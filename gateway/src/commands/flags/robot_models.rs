@@ -9,8 +9,8 @@ use super::agent::{AgentFlags, AgentPrices};
 #[derive(Debug, Clone, Default, clap::Args)]
 pub struct RobotModels {
     /// With --per-robot: model of one robot with its own flags, for example
-    /// "B=claude-opus-5-5?api=anthropic&max-usd=2". Only limits that it leaves out are those of the command.
-    /// Can be repeated; other robots have the model of the command.
+    /// "B=claude-opus-5-5?api=anthropic&max-usd=2". It shares only limits with the model of the others, unless
+    /// it has its own. Can be repeated.
     #[arg(long = "robot-model", value_name = "ROBOT=MODEL", requires = "per_robot", value_parser = parse_model)]
     models: Vec<RobotModel>,
 }

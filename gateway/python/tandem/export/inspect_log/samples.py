@@ -116,9 +116,11 @@ def _scores(result: dict[str, Any]) -> dict[str, Score]:
     success = result["success"] if result.get("success") is not None else None not in phases.values()
     reached = {SUCCESS: Score(value=CORRECT if success else INCORRECT, explanation=f"the episode ended: {result['ended']}")}
     for number, time_s in phases.items():
-        told = "not reached" if time_s is None else f"reached at {time_s:.2f} s of the simulation"
-        value = INCORRECT if time_s is None else CORRECT
-        reached[number] = Score(value=value, explanation=told, metadata={"time_s": time_s})
+        if time_s is None:
+            reached[number] = Score(value=INCORRECT, explanation=f"{number} was not reached")
+        else:
+            told = f"{number} was reached at {time_s:.2f} s of the simulation"
+            reached[number] = Score(value=CORRECT, explanation=told, metadata={"time_s": time_s})
     return reached
 
 
