@@ -251,6 +251,8 @@ def test_files_of_format_1_are_exported(team: tuple[Path, EvalLog], tmp_path: Pa
 def test_episodes_without_a_conversation_have_their_calls(tmp_path: Path) -> None:
     runs = tmp_path / "runs"
     with tandem.serve(runs=runs) as server, tandem.Client(server.url).episode("handover", SEED) as episode:
+        note = {"text": "I wait.", "model": "mine", "tokens": {"input": 1000, "output": 20, "cached": 400}, "usd": 0.5}
+        tandem.Client(server.url).request("POST", f"/v1/episodes/{episode.episode_id}/notes", note)
         episode.wait(5)
         with pytest.raises(tandem.Refused):
             episode.wait(99)
@@ -258,11 +260,37 @@ def test_episodes_without_a_conversation_have_their_calls(tmp_path: Path) -> Non
     (log,) = exported(runs, tmp_path / "logs").values()
     assert log.samples is not None
     (sample,) = log.samples
-    assert (sample.id, log.eval.model, sample.metadata["tandem"]) == (SEED, "unknown", "recording")
+    assert (sample.id, log.eval.model, sample.metadata["tandem"]) == (SEED, "mine", "recording")
     called: list[ToolEvent] = events(sample, ToolEvent)
     assert [event.function for event in called] == ["wait", "wait", "finish"]
     assert [event.error is not None for event in called] == [False, True, False]
     assert '"executed_steps":5' in str(sample.messages[3].text)
+    usage = sample.model_usage["mine"]
+    assert (usage.input_tokens, usage.input_tokens_cache_read, usage.output_tokens, usage.total_cost) == (600, 400, 20, 0.5)
+
+
+def test_a_recorded_team_has_the_calls_of_each_robot(team: tuple[Path, EvalLog], tmp_path: Path) -> None:
+    folder = tmp_path / "runs" / team[0].name
+    folder.mkdir(parents=True)
+    for name in ("episode.mcap", "result.json"):
+        (folder / name).write_bytes((team[0] / name).read_bytes())
+    (log,) = exported(tmp_path / "runs", tmp_path / "logs").values()
+    assert log.samples is not None
+    (sample,) = log.samples
+    for robot in "AB":
+        called: list[ToolEvent] = events(sample, ToolEvent, robot)
+        # Tools that do not exist never reach an episode, and only the last operator's finish ends it.
+        called = called[:3]
+        assert [event.function for event in called] == ["observe", "wait", "wait"]
+        assert [event.arguments.get("steps") for event in called] == [None, 99, 5]
+        assert [event.error is not None for event in called] == [False, True, False]
+
+
+def test_a_player_of_an_evaluation_has_its_name(tmp_path: Path) -> None:
+    tandem.evaluate("expert", tasks=["pouring"], seeds=[SEED], record=True, out=tmp_path / "run")
+    (log,) = exported(tmp_path / "run", tmp_path / "logs").values()
+    assert (log.eval.model, log.eval.task) == ("expert", "pouring")
+    assert log.results is not None and log.results.scores[0].metrics["accuracy"].value == 1
 
 
 def test_folders_without_agents_say_what_would_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

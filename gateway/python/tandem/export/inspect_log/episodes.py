@@ -5,18 +5,21 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 from typing import Any
 
-from ...agent.conversation import Answer, Call, Reply, Usage
+from ...agent.conversation import Answer, Call, Reply, Usage, listed
 from ...agent.journal import Answered, Begun, EpisodeFile, Event, Replied, read_result
 from ...agent.journal.events import read
 from ...errors import TandemError
 from ...recording import RecordedCall, Recording
 from ..lerobot import RECORDING_FILE
+
+COMBINED = "together"
+"""Tool of a recorded call that combines a command of each operator."""
 
 _TASK = re.compile(r"^Task: (.*)$", re.MULTILINE)
 
@@ -53,13 +56,17 @@ class Episode:
 
     folder: Path
     result: dict[str, Any]
-    seed: int
     instruction: str
     """Joint instruction of the task."""
 
     conversations: tuple[Conversation, ...]
     source: str
     """Source of the conversations: "conversation" files, or the "recording", which has only the calls."""
+
+    @property
+    def seed(self) -> int:
+        """Seed of the episode."""
+        return self.result["seed"]
 
     @property
     def begun_at(self) -> datetime:
@@ -97,15 +104,14 @@ def _episode(folder: Path) -> Episode | None:
     result = read_result(folder)
     assert result is not None, "only folders with a result are found"
     conversations = tuple(_read(path, robot, folder) for path, robot in _files(folder))
-    recording = Recording(folder) if (folder / RECORDING_FILE).exists() else None
     if conversations:
-        seed = _seed(folder, result) if recording is None else recording.seed
         task = _TASK.search(conversations[0].begun.instructions)
-        instruction = task.group(1) if task else ""
-        return Episode(folder, result, seed, instruction, conversations, "conversation")
-    if recording is None or not recording.calls:
+        return Episode(folder, result, task.group(1) if task else "", conversations, "conversation")
+    if not (folder / RECORDING_FILE).exists():
         return None
-    return Episode(folder, result, recording.seed, recording.instruction, tuple(_recorded(recording)), "recording")
+    recording = Recording(folder)
+    conversations = tuple(_recorded(recording, {"model": _player(folder, result)}))
+    return Episode(folder, result, recording.instruction, conversations, "recording") if conversations else None
 
 
 def _files(folder: Path) -> list[tuple[Path, str | None]]:
@@ -115,7 +121,8 @@ def _files(folder: Path) -> list[tuple[Path, str | None]]:
     own = [(path, None) for path in folder.glob("agent.jsonl")]
     beside = [(path, path.stem.removeprefix("agent-")) for path in folder.glob("agent-*.jsonl")]
     below = [(path, path.parent.name) for path in folder.glob("*/agent.jsonl")]
-    return [*own, *sorted([*beside, *below])]
+    # The file of a model that has never begun is empty.
+    return [each for each in [*own, *sorted([*beside, *below])] if each[0].stat().st_size > 0]
 
 
 def _read(path: Path, robot: str | None, folder: Path) -> Conversation:
@@ -133,33 +140,44 @@ def _read(path: Path, robot: str | None, folder: Path) -> Conversation:
     return Conversation(robot, settings, at, events)
 
 
-def _seed(folder: Path, result: dict[str, Any]) -> int:
-    """Returns the seed of an episode without a recording, from its result or from the evaluation's entry."""
-    if result.get("seed") is not None:
-        return result["seed"]
-    entry = folder.with_name(f"{folder.name}.json")
-    return json.loads(entry.read_text(encoding="utf-8"))["spec"]["seed"]
+def _player(folder: Path, result: dict[str, Any]) -> str:
+    """Names the player of an episode without conversations: by its notes, or by the evaluation's entry."""
+    models = listed(result.get("usage", {}).get("models"))
+    if models:
+        return " + ".join(models)
+    try:
+        return str(json.loads(folder.with_name(f"{folder.name}.json").read_text(encoding="utf-8"))["policy"])
+    except FileNotFoundError:
+        return "unknown"
 
 
-def _recorded(recording: Recording) -> Iterator[Conversation]:
+def _recorded(recording: Recording, settings: dict[str, Any]) -> Iterator[Conversation]:
     """Makes conversations of a recording's calls: one for each operator, or one for all robots."""
     ended_at = _written_at(recording.path)
-    for robot in dict.fromkeys(call.operator for call in recording.calls):
-        calls = [call for call in recording.calls if call.operator == robot]
+    own: dict[str | None, list[Event]] = {}
+    for call in recording.calls:
+        for robot, tool, arguments in _commands(call):
+            own.setdefault(robot, []).extend(_events(call, tool, arguments))
+    begun_at = ended_at - timedelta(seconds=max((call.thought_s for call in recording.calls), default=0.0))
+    for robot, events in own.items():
         instruction = recording.instruction if robot is None else recording.instructions[robot]
-        begun_at = ended_at - timedelta(seconds=calls[-1].thought_s)
-        yield Conversation(robot, {}, begun_at, (Begun("", instruction, ()), *_events(calls)))
+        yield Conversation(robot, settings, begun_at, (Begun("", instruction, ()), *events))
 
 
-def _events(calls: Sequence[RecordedCall]) -> Iterator[Event]:
-    """Yields the events of calls whose model is unknown, each a reply of its own."""
-    for recorded in calls:
-        call = Call("", recorded.tool, json.dumps(recorded.arguments))
-        reply = Reply("", "", (call,), Usage(0, 0), None)
-        yield Replied(reply, Usage(0, 0), None, 0.0, halves=False, seconds=recorded.thought_s)
-        refused = recorded.problem is not None
-        text = recorded.problem if refused else json.dumps(recorded.reply, separators=(",", ":"), ensure_ascii=False)
-        yield Answered(Answer(call, text or "", refused=refused), True, False, (), recorded.thought_s)
+def _commands(call: RecordedCall) -> list[tuple[str | None, str, Any]]:
+    """Returns robot, tool and arguments of the commands that a call combines, or of the call itself."""
+    if call.tool != COMBINED:
+        return [(call.operator, call.tool, call.arguments)]
+    return [(command["robot"], command["tool"], command["arguments"]) for command in call.arguments["commands"]]
+
+
+def _events(recorded: RecordedCall, tool: str, arguments: Any) -> Iterator[Event]:
+    """Yields the events of a call as if it were a reply of its own."""
+    call = Call("", tool, json.dumps(arguments))
+    yield Replied(Reply("", "", (call,), None, None), Usage(0, 0), None, 0.0, halves=False, seconds=recorded.thought_s)
+    refused = recorded.problem is not None
+    text = recorded.problem or json.dumps(recorded.reply, separators=(",", ":"), ensure_ascii=False)
+    yield Answered(Answer(call, text, refused=refused), True, False, (), recorded.thought_s)
 
 
 def _written_at(path: Path) -> datetime:

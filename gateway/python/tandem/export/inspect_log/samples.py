@@ -65,11 +65,13 @@ def sample_of(episode: Episode, epoch: int) -> PlayedSample:
     started_at = episode.begun_at
     ended_at = max(transcript.ended_at for transcript in transcripts)
     scores, limit = _scores(episode.result), _limit(episode)
+    pairs = list(zip(episode.conversations, transcripts, strict=True))
     model_usage: dict[str, ModelUsage] = {}
-    for conversation, transcript in zip(episode.conversations, transcripts, strict=True):
+    for conversation, transcript in pairs:
         model_usage[conversation.model] = model_usage.get(conversation.model, ModelUsage()) + transcript.usage
-    pairs = zip(episode.conversations, transcripts, strict=True)
     role_usage = {conversation.robot: transcript.usage for conversation, transcript in pairs if conversation.robot is not None}
+    if episode.source == "recording":
+        model_usage, role_usage = {episode.conversations[0].model: _noted_usage(episode)}, {}
     sample = EvalSample(
         id=episode.seed,
         epoch=epoch,
@@ -127,6 +129,19 @@ def _scores(result: dict[str, Any]) -> dict[str, Score]:
 def _endings(episode: Episode) -> list[dict[str, Any]]:
     usage = cast("dict[str, Any]", episode.result.get("usage", {}))
     return listed(usage.get("endings"))
+
+
+def _noted_usage(episode: Episode) -> ModelUsage:
+    """Returns the usage that notes on an episode report."""
+    usage = cast("dict[str, Any]", episode.result.get("usage", {}))
+    read, cached, written = (usage.get(f"{name}_tokens", 0) for name in ("input", "cached", "output"))
+    return ModelUsage(
+        input_tokens=read - cached,
+        output_tokens=written,
+        total_tokens=read + written,
+        input_tokens_cache_read=cached,
+        total_cost=usage.get("usd"),
+    )
 
 
 def _limit(episode: Episode) -> EvalSampleLimit | None:
