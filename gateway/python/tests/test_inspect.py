@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -304,3 +305,9 @@ def test_folders_without_agents_say_what_would_work(tmp_path: Path, capsys: pyte
     (folder / "agent.jsonl").write_text('{"event": "ended"}\n')
     assert export(["inspect", str(tmp_path), str(tmp_path / "logs")]) == 1
     assert "is no conversation of an agent (it does not begin with the event `begun`)" in capsys.readouterr().err
+
+
+def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setitem(sys.modules, "inspect_ai", None)
+    assert export(["--check", "inspect", "runs", "logs"]) == 1
+    assert "pip install 'tandem-sim[inspect]'" in capsys.readouterr().err
