@@ -318,10 +318,10 @@ impl RobotUsage {
 }
 
 /// Adds numbers that may be unknown; the sum is unknown if both are.
-fn added(sum: Option<f64>, more: Option<f64>) -> Option<f64> {
-    match (sum, more) {
+fn added(total_value: Option<f64>, more_value: Option<f64>) -> Option<f64> {
+    match (total_value, more_value) {
         (None, None) => None,
-        (sum, more) => Some(sum.unwrap_or_default() + more.unwrap_or_default()),
+        (total, more) => Some(total.unwrap_or_default() + more.unwrap_or_default()),
     }
 }
 

@@ -105,7 +105,7 @@ mod tests {
 
     #[derive(Debug, Parser)]
     #[command(no_binary_name = true)]
-    struct Line {
+    struct ModelLine {
         #[command(flatten)]
         models: RobotModels,
         #[arg(long)]
@@ -113,7 +113,7 @@ mod tests {
     }
 
     fn parse(flags: &[&str]) -> Result<RobotModels, String> {
-        let line = Line::try_parse_from(flags).map_err(|error| error.to_string())?;
+        let line = ModelLine::try_parse_from(flags).map_err(|error| error.to_string())?;
         Ok(line.models)
     }
 
