@@ -34,7 +34,7 @@ pub use parts::{
     FingerReport, Formats, Grip, HandPart, HandReport, HandState, Heard, HeldObject, Hints, ImageFormat,
     JointValues, ModelEnding, NextPhase, Note, NoteKind, OperatorToken, OperatorUse, Operators, Partner,
     PartnerDid, PhaseReached, PixelRegion, PlanReply, Png, Pose, PoseFrame, Protocol, Range, RobotFallen,
-    RobotReport, StopReason, TokenCount, Touch, Usage, Wording,
+    RobotReport, RobotUsage, StopReason, TokenCount, Touch, Usage, Wording,
 };
 pub use refusal::{ProblemBody, Refusal, RefusalClass};
 pub use schema::{EpisodeToolSpec, Format, ToolSpec, TypedTool, TypedTools};

@@ -67,7 +67,7 @@ impl EpisodePage<'_> {
 {moments}
 <h2>Budget</h2>
 {budget}
-{said}<h2>Tool calls</h2>
+{models}{said}<h2>Tool calls</h2>
 {calls}
 <h2>Recording</h2>
 {recording}"#,
@@ -79,6 +79,7 @@ impl EpisodePage<'_> {
             phases = self.phases(),
             moments = moments::html(self.moments, "moments"),
             budget = self.budget(),
+            models = self.models(),
             said = self.said(),
             calls = self.tool_calls(),
             recording = self.recording(),
@@ -208,6 +209,35 @@ impl EpisodePage<'_> {
     }
 
     /// Renders the messages; empty if there are none.
+    /// Renders the usage of language models: that of each robot's, if each has its own, and the sum.
+    fn models(&self) -> String {
+        let Some(usage) = &self.result.usage else { return String::new() };
+        let row = |robot: &str, model: &str, [input, cached, output]: [u64; 3], costs: [Option<f64>; 2]| {
+            let [usd, time_s] = costs;
+            let usd = usd.map(|usd| format!("{usd:.4} US dollars")).unwrap_or_default();
+            let time_s = time_s.map(|time_s| format!("{time_s:.1} s")).unwrap_or_default();
+            let (robot, model) = (escape(robot), escape(model));
+            let tokens =
+                [format!("{input} tokens read"), format!("{cached} cached"), format!("{output} written")];
+            let numbers = tokens.into_iter().chain([usd, time_s]);
+            let numbers: String =
+                numbers.map(|number| format!(r#"<td class="number">{number}</td>"#)).collect();
+            format!(r#"<tr><td>{robot}</td><td class="long">{model}</td>{numbers}</tr>"#)
+        };
+        let own = usage.robots.iter().map(|own| {
+            let tokens = [own.input_tokens, own.cached_tokens, own.output_tokens];
+            row(&own.robot, own.model.as_deref().unwrap_or_default(), tokens, [own.usd, own.model_s])
+        });
+        let tokens = [usage.input_tokens, usage.cached_tokens, usage.output_tokens];
+        let all = row("all", &usage.models.join(", "), tokens, [usage.usd, usage.model_s]);
+        let rows: String = own.chain([all]).collect();
+        format!(
+            r#"<h2>Models</h2>
+<table class="words"><tr><th>Robots</th><th>Model</th><th class="number" colspan="5">Used</th></tr>{rows}</table>
+"#
+        )
+    }
+
     fn said(&self) -> String {
         if self.said.is_empty() {
             return String::new();

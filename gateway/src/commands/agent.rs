@@ -21,7 +21,7 @@ use tracing_subscriber::filter::LevelFilter;
 
 use super::{
     CommandResult, Seeds, demo,
-    flags::{AgentFlags, GivenFlags, WorldFlags},
+    flags::{AgentFlags, GivenFlags, RobotModels, WorldFlags},
     logging::log_to_stderr,
 };
 use crate::{
@@ -77,6 +77,8 @@ pub struct AgentArgs {
     /// With --per-robot: let the models talk to each other with the tool `say`.
     #[arg(long, requires = "per_robot")]
     talk: bool,
+    #[command(flatten)]
+    robot_models: RobotModels,
     /// Folder for recordings, one folder per episode.
     #[arg(long, env = "TANDEM_RUNS", default_value = "runs", value_name = "DIR")]
     runs: PathBuf,
@@ -110,7 +112,9 @@ pub fn run(args: AgentArgs) -> CommandResult {
 }
 
 fn play(args: AgentArgs) -> CommandResult {
-    let agent = PythonModule::new(PythonPart::Agent, args.agent.arguments(args.agent.limit_s(LIMIT_S)))?;
+    let arguments = args.agent.arguments(args.agent.limit_s(LIMIT_S)).into_iter();
+    let arguments = arguments.chain(args.robot_models.arguments()).collect();
+    let agent = PythonModule::new(PythonPart::Agent, arguments)?;
     let (token, text) = Token::random()?;
     let world = args.world.layer();
     let layer = Layer { runs: Some(args.runs), assistance: Some(args.assistance), ..world };

@@ -1,4 +1,4 @@
-//! `tandem export`: data sets from recordings, which the Python package writes.
+//! `tandem export`: data sets and logs from recordings, which the Python package writes.
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -9,8 +9,9 @@ use super::CommandResult;
 use crate::drivers::{PythonModule, PythonPart};
 use crate::settings::one_of;
 
-/// Convert recordings to data sets for training policies. This needs the Python package: pip install
-/// 'tandem-sim[lerobot]' (in a checkout './gateway/python[lerobot]').
+/// Convert recordings to data sets for training policies, and agents' conversations to logs. This needs the
+/// Python package: pip install 'tandem-sim[lerobot]' or 'tandem-sim[inspect]' (in a checkout
+/// './gateway/python[lerobot]').
 #[allow(
     rustdoc::broken_intra_doc_links,
     reason = "the command line's help names an extra of the wheel, and no link"
@@ -21,10 +22,23 @@ pub struct ExportArgs {
     format: ExportFormat,
 }
 
-/// Formats of data sets.
+/// Formats of data sets and logs.
 #[derive(Debug, Subcommand)]
 enum ExportFormat {
     Lerobot(LerobotArgs),
+    Inspect(InspectArgs),
+}
+
+/// Write logs of Inspect (inspect-ai), one per task and set of models, with each message, image, call and
+/// score. Episodes of agents without a conversation file have the calls of their recording.
+#[derive(Debug, clap::Args)]
+struct InspectArgs {
+    /// An episode's folder, or a folder to search for episodes.
+    #[arg(value_name = "RUNS")]
+    runs: PathBuf,
+    /// Folder of the logs.
+    #[arg(value_name = "OUT")]
+    out: PathBuf,
 }
 
 /// Write a LeRobot data set. An interrupted run is continued, and OUT appears once it is complete; several
@@ -105,10 +119,20 @@ impl LerobotArgs {
     }
 }
 
-/// Lets Python write the data set.
+impl InspectArgs {
+    /// Returns the arguments for Python.
+    fn arguments(&self) -> Vec<String> {
+        let paths = [&self.runs, &self.out].map(|path| path.display().to_string());
+        ["inspect".into(), "--".into()].into_iter().chain(paths).collect()
+    }
+}
+
+/// Lets Python write the data set or the logs.
 pub fn run(args: ExportArgs) -> CommandResult {
-    let ExportFormat::Lerobot(args) = args.format;
-    let module = PythonModule::new(PythonPart::Export, args.arguments())?;
+    let module = match args.format {
+        ExportFormat::Lerobot(args) => PythonModule::new(PythonPart::Export, args.arguments()),
+        ExportFormat::Inspect(args) => PythonModule::new(PythonPart::Inspect, args.arguments()),
+    }?;
     let status = module.command(&[]).status()?;
     Ok(if status.success() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

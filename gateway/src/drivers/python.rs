@@ -19,6 +19,8 @@ pub enum PythonPart {
     Agent,
     /// Data sets of recordings.
     Export,
+    /// Logs of Inspect.
+    Inspect,
 }
 
 /// Reason why the Python part cannot run.
@@ -64,7 +66,7 @@ impl PythonPart {
     fn module(self) -> &'static str {
         match self {
             PythonPart::Agent => "tandem.agent",
-            PythonPart::Export => "tandem.export",
+            PythonPart::Export | PythonPart::Inspect => "tandem.export",
         }
     }
 
@@ -73,6 +75,7 @@ impl PythonPart {
         match self {
             PythonPart::Agent => "agents",
             PythonPart::Export => "lerobot",
+            PythonPart::Inspect => "inspect",
         }
     }
 
@@ -89,6 +92,7 @@ impl PythonPart {
         match self {
             PythonPart::Agent => "agents are played",
             PythonPart::Export => "data sets are written",
+            PythonPart::Inspect => "logs of Inspect are written",
         }
     }
 
@@ -96,7 +100,7 @@ impl PythonPart {
     fn command(self) -> &'static str {
         match self {
             PythonPart::Agent => "tandem agent: ",
-            PythonPart::Export => "tandem export: ",
+            PythonPart::Export | PythonPart::Inspect => "tandem export: ",
         }
     }
 }

@@ -19,7 +19,7 @@ pub use episode::{
     RobotFallen, Wording,
 };
 pub use frames::PoseFrame;
-pub use note::{AgentEnding, ModelEnding, Note, NoteKind, TokenCount, Usage};
+pub use note::{AgentEnding, ModelEnding, Note, NoteKind, RobotUsage, TokenCount, Usage};
 pub use pictures::{Bytes, CameraArrays, DepthFormat, Formats, ImageFormat, PixelRegion, Png};
 pub use plan::PlanReply;
 pub use quantities::{BASE_COLUMNS, BaseCommand, BaseLimits, JointValues, Pose, Range};

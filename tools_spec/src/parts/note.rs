@@ -162,6 +162,11 @@ impl Note {
         Ok(note)
     }
 
+    /// Returns true if the note says what was used.
+    fn reports_usage(&self) -> bool {
+        self.tokens.is_some() || self.usd.is_some() || self.seconds.is_some()
+    }
+
     /// Checks lengths and numbers. The text says what would work.
     pub fn validate(&self) -> Result<(), String> {
         let long = |name: &str, text: &str, most: usize| match text.chars().count() {
@@ -172,8 +177,7 @@ impl Note {
         };
         long("text", &self.text, MAX_CHARACTERS)?;
         long("model", self.model.as_deref().unwrap_or_default(), MAX_NAME_CHARACTERS)?;
-        let used = self.tokens.is_some() || self.usd.is_some() || self.seconds.is_some();
-        if self.text.is_empty() && !used && self.ending.is_none() {
+        if self.text.is_empty() && !self.reports_usage() && self.ending.is_none() {
             return Err("it says nothing; give a text, or the tokens, usd or seconds that were used".into());
         }
         let TokenCount { input, output, cached } = self.tokens.unwrap_or_default();
@@ -213,9 +217,34 @@ pub struct Usage {
     /// The models that notes name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub models: Vec<String>,
+    /// Parts of the sums that belong to one robot, of notes that name it; left out where none does.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub robots: Vec<RobotUsage>,
     /// Ends of the models' play: one for all robots, or one for each that has reported it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub endings: Vec<ModelEnding>,
+}
+
+/// Usage of the model of one robot.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RobotUsage {
+    /// The robot that it directed.
+    pub robot: String,
+    /// The model, as its latest note names it; left out where none does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<String>,
+    /// Tokens that it read, those from a cache included.
+    pub input_tokens: u64,
+    /// Tokens that it wrote.
+    pub output_tokens: u64,
+    /// Number of read tokens that came from a cache.
+    pub cached_tokens: u64,
+    /// Cost in US dollars; left out where no note has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub usd: Option<f64>,
+    /// Seconds that it took; left out where no note has them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_s: Option<f64>,
 }
 
 /// End of a model's play, in its own words, too.
@@ -246,14 +275,13 @@ impl Usage {
         self.input_tokens += u64::from(input);
         self.output_tokens += u64::from(output);
         self.cached_tokens += u64::from(cached);
-        let added = |sum: Option<f64>, more: Option<f64>| match (sum, more) {
-            (None, None) => None,
-            (sum, more) => Some(sum.unwrap_or_default() + more.unwrap_or_default()),
-        };
         self.usd = added(self.usd, note.usd);
         self.model_s = added(self.model_s, note.seconds);
         if let Some(model) = note.model.as_ref().filter(|model| !self.models.contains(model)) {
             self.models.push(model.clone());
+        }
+        if let Some(robot) = note.robot.as_deref().filter(|_| note.reports_usage()) {
+            self.robot_mut(robot).add(note);
         }
         if let Some(ending) = note.ending {
             let text = note.text.chars().take(MAX_ENDING_CHARACTERS).collect();
@@ -262,9 +290,38 @@ impl Usage {
         }
     }
 
+    /// Returns the part of a robot, which is added if it is missing.
+    fn robot_mut(&mut self, robot: &str) -> &mut RobotUsage {
+        let index = self.robots.iter().position(|known| known.robot == robot).unwrap_or(self.robots.len());
+        if index == self.robots.len() {
+            self.robots.push(RobotUsage { robot: robot.into(), ..RobotUsage::default() });
+        }
+        &mut self.robots[index]
+    }
+
     /// Returns the ends of models' play that the end of the episode does not say.
     pub fn own_endings(&self) -> impl Iterator<Item = &ModelEnding> {
         self.endings.iter().filter(|ended| !ended.ending.is_of_the_episode())
+    }
+}
+
+impl RobotUsage {
+    fn add(&mut self, note: &Note) {
+        let TokenCount { input, output, cached } = note.tokens.unwrap_or_default();
+        self.input_tokens += u64::from(input);
+        self.output_tokens += u64::from(output);
+        self.cached_tokens += u64::from(cached);
+        self.usd = added(self.usd, note.usd);
+        self.model_s = added(self.model_s, note.seconds);
+        self.model = note.model.clone().or(self.model.take());
+    }
+}
+
+/// Adds numbers that may be unknown; the sum is unknown if both are.
+fn added(total_value: Option<f64>, more_value: Option<f64>) -> Option<f64> {
+    match (total_value, more_value) {
+        (None, None) => None,
+        (total, more) => Some(total.unwrap_or_default() + more.unwrap_or_default()),
     }
 }
 
@@ -328,10 +385,22 @@ mod tests {
         assert_eq!((usage.usd, usage.model_s), (None, None));
         usage.add(&Note::example());
         usage.add(&Note::example());
-        let Usage { notes, input_tokens, output_tokens, cached_tokens, usd, model_s, models, endings } =
-            usage;
-        assert_eq!(endings, []);
-        assert_eq!((notes, input_tokens, output_tokens, cached_tokens), (3, 10420, 168, 9600));
-        assert_eq!((usd, model_s, models), (Some(0.008), Some(5.0), vec!["a-model".to_owned()]));
+        let mut partner = Note { robot: Some("B".into()), model: Some("other".into()), ..Note::example() };
+        usage.add(&partner);
+        partner.robot = None;
+        usage.add(&partner);
+        assert_eq!((usage.notes, usage.input_tokens, usage.output_tokens), (5, 20840, 336));
+        assert_eq!((usage.cached_tokens, usage.usd, usage.model_s), (19200, Some(0.016), Some(10.0)));
+        assert_eq!((usage.models, usage.endings), (vec!["a-model".into(), "other".into()], vec![]));
+        let part = |robot: &str, model: &str, notes: u32| RobotUsage {
+            robot: robot.into(),
+            model: Some(model.into()),
+            input_tokens: 5210 * u64::from(notes),
+            output_tokens: 84 * u64::from(notes),
+            cached_tokens: 4800 * u64::from(notes),
+            usd: Some(0.004 * f64::from(notes)),
+            model_s: Some(2.5 * f64::from(notes)),
+        };
+        assert_eq!(usage.robots, [part("A", "a-model", 2), part("B", "other", 1)]);
     }
 }

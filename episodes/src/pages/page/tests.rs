@@ -1,6 +1,6 @@
 //! Texts that the page has to show, and to leave out.
 
-use tandem_tools_spec::{Assistance, PhaseTimes, Protocol};
+use tandem_tools_spec::{Assistance, Note, PhaseTimes, Protocol};
 
 use super::*;
 use crate::pages::LabelledPicture;
@@ -119,6 +119,29 @@ fn pages_tell_what_happened() {
         ],
         &["p1 4.00 s</span>"],
     );
+}
+
+#[test]
+fn pages_count_each_robots_model_by_itself() {
+    let mut usage = Usage::default();
+    usage.add(&Note::example());
+    usage.add(&Note { robot: Some("B".into()), model: Some("<other>".into()), usd: None, ..Note::example() });
+    let page = page_of(0.0, &ResultReply { usage: Some(usage), ..result([None; 3], Protocol::Agentic) });
+    let numbers = |numbers: [&str; 5]| {
+        numbers.map(|number| format!(r#"<td class="number">{number}</td>"#)).concat() + "</tr>"
+    };
+    for (robot, model, own) in [
+        ("A", "a-model", ["5210 tokens read", "4800 cached", "84 written", "0.0040 US dollars", "2.5 s"]),
+        ("B", "&lt;other&gt;", ["5210 tokens read", "4800 cached", "84 written", "", "2.5 s"]),
+        (
+            "all",
+            "a-model, &lt;other&gt;",
+            ["10420 tokens read", "9600 cached", "168 written", "0.0040 US dollars", "5.0 s"],
+        ),
+    ] {
+        let row = format!(r#"<tr><td>{robot}</td><td class="long">{model}</td>{}"#, numbers(own));
+        assert!(page.contains(&row), "no `{row}` in {page}");
+    }
 }
 
 #[test]

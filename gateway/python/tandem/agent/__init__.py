@@ -7,6 +7,6 @@ from __future__ import annotations
 
 from .apis import EndpointError, MissingPackage
 from .command_line import main
-from .settings import AgentSettings, Api, Limits, Prices
+from .settings import AgentSettings, Api, Limits, Prices, Team
 
-__all__ = ["AgentSettings", "Api", "EndpointError", "Limits", "MissingPackage", "Prices", "main"]
+__all__ = ["AgentSettings", "Api", "EndpointError", "Limits", "MissingPackage", "Prices", "Team", "main"]

@@ -20,7 +20,7 @@ from ..server import serve
 from .apis import open_model, without_keys
 from .episodes import Hosting, Keeping, play_joined, play_own, resume
 from .journal import EpisodeFile
-from .settings import APIS, AgentSettings, Limits, Prices, Sampling
+from .settings import APIS, AgentSettings, Limits, Prices, Sampling, Team
 
 DEFAULTS: dict[str, Any] = {
     "api": "openai",
@@ -32,6 +32,7 @@ DEFAULTS: dict[str, Any] = {
     "assistance": "full",
     "per_robot": False,
     "talk": False,
+    "robot_models": {},
 }
 """Defaults for flags that neither the command line nor the resumed episode sets."""
 
@@ -48,6 +49,9 @@ MAY_CHANGE = (
 )
 """Flags that may change with --resume: the endpoint's address and the limits."""
 
+SHARED = ("context_tokens", "max_tokens_total", "max_usd", "max_calls", "max_seconds")
+"""Flags that also hold for a robot's own model, unless it has others."""
+
 NOT_KEPT = ("resume", "runs", "url", "server_flags", "check")
 """Flags that do not affect the play."""
 
@@ -57,13 +61,9 @@ INTERRUPTED = 130
 """Exit status that shells report for a process that SIGINT has ended."""
 
 
-def parser() -> argparse.ArgumentParser:
-    """Returns the parser of the flags. The flags for the model are the same as in `tandem agent`."""
-    flags = argparse.ArgumentParser(
-        prog="python -m tandem.agent",
-        description="Have a language model play an episode: the one that TANDEM_URL and TANDEM_EPISODE name, or, with --task, "
-        "a new one. Keys are read from the environment: OPENAI_API_KEY, ANTHROPIC_API_KEY.",
-    )
+def model_parser() -> argparse.ArgumentParser:
+    """Returns the parser of the flags for one model, which are the same as in `tandem agent`."""
+    flags = argparse.ArgumentParser(prog="--robot-model", add_help=False)
     model = flags.add_argument_group("the model")
     model.add_argument("--model", metavar="NAME", help="the model's name at its endpoint")
     model.add_argument(
@@ -99,6 +99,17 @@ def parser() -> argparse.ArgumentParser:
         limits.add_argument(
             f"--usd-per-million-{name}", type=_amount, metavar="USD", help=f"price of a million tokens that are {what}"
         )
+    return flags
+
+
+def parser() -> argparse.ArgumentParser:
+    """Returns the parser of all flags."""
+    flags = argparse.ArgumentParser(
+        prog="python -m tandem.agent",
+        description="Have a language model play an episode: the one that TANDEM_URL and TANDEM_EPISODE name, or, with --task, "
+        "a new one. Keys are read from the environment: OPENAI_API_KEY, ANTHROPIC_API_KEY.",
+        parents=[model_parser()],
+    )
     episode = flags.add_argument_group("a new episode")
     episode.add_argument("--task", metavar="TASK", help="what to play, as handover")
     episode.add_argument("--seed", type=int, metavar="N", help="decides where the objects stand [default: 0]")
@@ -115,6 +126,14 @@ def parser() -> argparse.ArgumentParser:
     )
     episode.add_argument(
         "--talk", action="store_true", default=None, help="with --per-robot: let them talk to each other by the tool say"
+    )
+    episode.add_argument(
+        "--robot-model",
+        dest="robot_models",
+        action="append",
+        type=_robot_model,
+        metavar="ROBOT=MODEL",
+        help="with --per-robot: the model of one robot with its own flags, as B=claude-opus-5-5?api=anthropic&max-usd=2",
     )
     flags.add_argument(
         "--resume",
@@ -143,20 +162,35 @@ def settings_of(given: argparse.Namespace) -> AgentSettings:
     return AgentSettings(given.model, given.api, given.base_url, given.effort, given.context_tokens, limits, price, sampling)
 
 
+def team_of(flags: dict[str, Any]) -> Team:
+    """Creates the settings of all models from the flags."""
+    blank = dict.fromkeys(vars(model_parser().parse_args([])))
+    shared = {name: flags[name] for name in SHARED}
+    robots: dict[str, AgentSettings] = {}
+    for robot, own in flags["robot_models"].items():
+        try:
+            robots[robot] = settings_of(argparse.Namespace(**{**blank, "api": DEFAULTS["api"], **shared, **own}))
+        except TandemError as error:
+            raise TandemError(f"--robot-model {robot}={own['model']}: {error}") from None
+    return Team(settings_of(argparse.Namespace(**flags)), robots)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command and returns its exit code: 1 if the model or the server gave no answer."""
     given = parser().parse_args(arguments)
+    given.robot_models = dict(given.robot_models) if given.robot_models else None
     _keep_loopback_off_proxies()
     try:
         episode = None if given.resume is None else _resumed(given)
-        flags = _flags(given) if episode is None else {**episode.flags, **_given(given)}
-        settings = settings_of(argparse.Namespace(**flags))
+        flags = _flags(given) if episode is None else _changed(episode.flags, _given(given))
+        team = team_of(flags)
         # Missing requirements are reported before an episode begins.
-        open_model(settings, "")
+        for settings in (team.common, *team.robots.values()):
+            open_model(settings, "")
         if given.check:
             return 0
         with _interruptible():
-            return _run(given, flags, settings) if episode is None else _resume(given, episode, settings)
+            return _run(given, flags, team) if episode is None else _resume(given, episode, team)
     except TandemError as error:
         print(f"tandem agent: {without_keys(str(error))}", file=sys.stderr)
         return 1
@@ -177,17 +211,27 @@ def _flags(given: argparse.Namespace) -> dict[str, Any]:
     return {**{name: value for name, value in vars(given).items() if name not in NOT_KEPT}, **DEFAULTS, **_given(given)}
 
 
+def _changed(flags: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+    """Returns the flags of an episode with those that are given anew."""
+    models: dict[str, dict[str, Any]] = flags["robot_models"]
+    anew = {robot: {**models[robot], **own} for robot, own in given.get("robot_models", {}).items()}
+    return {**flags, **given, "robot_models": {**models, **anew}}
+
+
 def _resumed(given: argparse.Namespace) -> EpisodeFile:
     """Reads the episode to resume. Refuses flags that would change it."""
     episode = EpisodeFile.read(given.resume)
-    kept = {**episode.flags, **episode.server_flags, "runs": str(given.resume.resolve().parent)}
+    kept: dict[str, Any] = {**episode.flags, **episode.server_flags, "runs": str(given.resume.resolve().parent)}
     told = {**_given(given), **given.server_flags}
     if given.runs is not None:
         told["runs"] = str(Path(given.runs).resolve())
+    models: dict[str, dict[str, Any]] = told.pop("robot_models", {})
+    own = [(f" of {robot}'s model", anew, kept["robot_models"].get(robot, {})) for robot, anew in models.items()]
     differing = [
-        f"--{name.replace('_', '-')} {value} (it was {_or_not_given(kept.get(name))})"
-        for name, value in told.items()
-        if name not in MAY_CHANGE and value != kept.get(name)
+        f"--{name.replace('_', '-')}{whose} {value} (it was {_or_not_given(before.get(name))})"
+        for whose, anew, before in [("", told, kept), *own]
+        for name, value in anew.items()
+        if name not in MAY_CHANGE and value != before.get(name)
     ]
     if differing:
         raise TandemError(f"{given.resume} was played otherwise: {', '.join(differing)}; leave out what differs")
@@ -198,12 +242,14 @@ def _or_not_given(value: Any) -> str:
     return "not given" if value is None or value is False else str(value)
 
 
-def _run(given: argparse.Namespace, flags: dict[str, Any], settings: AgentSettings) -> int:
+def _run(given: argparse.Namespace, flags: dict[str, Any], team: Team) -> int:
     if given.task is None:
         url, episode = os.environ.get("TANDEM_URL"), os.environ.get("TANDEM_EPISODE")
         if not url or not episode:
             raise TandemError("no episode; give --task, as handover, for a new one")
-        play_joined(Client(url), episode, os.environ.get("TANDEM_ROBOT"), settings)
+        start = os.environ.get("TANDEM_START")
+        folder = None if start is None else Path(start).parent
+        play_joined(Client(url), episode, os.environ.get("TANDEM_ROBOT"), team, folder)
         return 0
     with ExitStack() as stack:
         url, runs = given.url, given.runs
@@ -212,17 +258,17 @@ def _run(given: argparse.Namespace, flags: dict[str, Any], settings: AgentSettin
             url = stack.enter_context(serve(runs=runs, assistance=flags["assistance"])).url
         hosting = Hosting(flags["task"], flags["seed"], flags["per_robot"], flags["talk"])
         keeping = Keeping(None if runs is None else Path(runs), flags, given.server_flags)
-        play_own(url, hosting, settings, keeping)
+        play_own(url, hosting, team, keeping)
     return 0
 
 
-def _resume(given: argparse.Namespace, episode: EpisodeFile, settings: AgentSettings) -> int:
+def _resume(given: argparse.Namespace, episode: EpisodeFile, team: Team) -> int:
     folder = given.resume.resolve()
     with ExitStack() as stack:
         url = given.url
         if url is None:
             url = stack.enter_context(serve(runs=folder.parent, assistance=episode.flags["assistance"])).url
-        resume(url, folder, episode, settings)
+        resume(url, folder, episode, team)
     return 0
 
 
@@ -267,6 +313,16 @@ def _share(text: str) -> float:
     if not 0 <= value <= 1:
         raise argparse.ArgumentTypeError("give a number from 0 to 1")
     return value
+
+
+def _robot_model(text: str) -> tuple[str, dict[str, Any]]:
+    robot, _, model = text.partition("=")
+    name, _, options = model.partition("?")
+    if not robot or not name or "?" in robot:
+        raise argparse.ArgumentTypeError("give a robot and its model, as B=MODEL or B=MODEL?api=anthropic&max-usd=2")
+    words = [f"--{option}" for option in options.split("&") if option]
+    given = vars(model_parser().parse_args([f"--model={name}", *words]))
+    return robot, {flag: value for flag, value in given.items() if value is not None}
 
 
 def _object(text: str) -> dict[str, Any]:

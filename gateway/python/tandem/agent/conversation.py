@@ -126,6 +126,9 @@ class Reply:
     filtered: bool = False
     """True if a filter of the endpoint withheld the reply."""
 
+    retries: int = 0
+    """Number of failed requests before the one that got the reply."""
+
 
 @dataclass(frozen=True)
 class Answers:

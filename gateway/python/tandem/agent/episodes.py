@@ -17,10 +17,10 @@ from ..errors import Refused, TandemError
 from .apis import open_model
 from .conversation import listed
 from .instructions import instructions
-from .journal import Begun, EpisodeFile, Journal, LineFile, conversation_path, read_result
+from .journal import Begun, EpisodeFile, Journal, LineFile, conversation_path, now, read_result
 from .loop import Played, Player, Printer
 from .seat import Seat
-from .settings import AgentSettings
+from .settings import AgentSettings, Team
 
 
 @dataclass(frozen=True)
@@ -44,15 +44,22 @@ class Keeping:
     server_flags: dict[str, str]
 
 
-def play_joined(client: Client, episode_id: str, robot: str | None, settings: AgentSettings) -> Played:
-    """Plays an episode that another program has started and will end."""
-    seat = Seat(client, episode_id, robot)
-    return _play(seat, str(seat.briefing["status"]["task"]), settings, Journal())
+def play_joined(client: Client, episode_id: str, robot: str | None, team: Team, folder: Path | None) -> Played:
+    """Plays an episode that another program has started and will end.
+
+    folder: Folder of this process for the conversation. None: it is not kept.
+    """
+    with ExitStack() as stack:
+        lines = None if folder is None else stack.enter_context(closing(LineFile(conversation_path(folder, None))))
+        journal = Journal(lines)
+        seat = _take_seat(client, episode_id, robot, journal)
+        return _play(seat, str(seat.briefing["status"]["task"]), team.of(robot), journal)
 
 
-def play_own(url: str, hosting: Hosting, settings: AgentSettings, keeping: Keeping) -> dict[str, Any]:
+def play_own(url: str, hosting: Hosting, team: Team, keeping: Keeping) -> dict[str, Any]:
     """Starts an episode on a server, plays it, ends it, and returns its result."""
     host = Client(url)
+    _check_robots(host, hosting, team)
     body: dict[str, Any] = {"task": hosting.task, "seed": hosting.seed}
     if hosting.per_robot:
         body |= {"operators": "per_robot", "talk": hosting.talk}
@@ -63,10 +70,20 @@ def play_own(url: str, hosting: Hosting, settings: AgentSettings, keeping: Keepi
     with ExitStack() as stack:
         journals = _open_new(keeping.runs, episode, stack)
         print(f"{hosting.task}, seed {hosting.seed}: {episode_id} at {url}", flush=True)
-        return _play_through(host, episode, settings, journals)
+        return _play_through(host, episode, team, journals)
 
 
-def resume(url: str, folder: Path, episode: EpisodeFile, settings: AgentSettings) -> dict[str, Any]:
+def _check_robots(host: Client, hosting: Hosting, team: Team) -> None:
+    """Refuses models of robots that the task does not have."""
+    if team.robots and not hosting.per_robot:
+        raise TandemError("--robot-model needs --per-robot, a model for each robot")
+    robots = [each.robot for task in host.tasks().tasks if task.id == hosting.task for each in task.robots]
+    unknown = [robot for robot in team.robots if robots and robot not in robots]
+    if unknown:
+        raise TandemError(f"{hosting.task} has no robot {unknown[0]!r} for --robot-model; have: {', '.join(robots)}")
+
+
+def resume(url: str, folder: Path, episode: EpisodeFile, team: Team) -> dict[str, Any]:
     """Resumes an episode that an agent has left, unless it has ended, and returns its result."""
     host = Client(url)
     with ExitStack() as stack:
@@ -75,7 +92,7 @@ def resume(url: str, folder: Path, episode: EpisodeFile, settings: AgentSettings
         result = _ended(host, folder, episode)
         if result is None:
             print(f"{episode.flags['task']}, seed {episode.flags['seed']}: {episode.episode_id} at {url}", flush=True)
-            return _play_through(host, episode, settings, journals)
+            return _play_through(host, episode, team, journals)
     print("the episode has ended already")
     _print_result(result)
     return result
@@ -131,14 +148,14 @@ def _open(folder: Path, episode: EpisodeFile, stack: ExitStack) -> list[Journal]
     return [Journal(stack.enter_context(closing(LineFile(conversation_path(folder, robot))))) for robot in _robots(episode)]
 
 
-def _play_through(host: Client, episode: EpisodeFile, settings: AgentSettings, journals: Sequence[Journal]) -> dict[str, Any]:
+def _play_through(host: Client, episode: EpisodeFile, team: Team, journals: Sequence[Journal]) -> dict[str, Any]:
     """Plays an episode to its end, ends it, and returns its result."""
     try:
         if episode.operators:
-            _play_each(host.url, episode, settings, journals)
+            _play_each(host.url, episode, team, journals)
         else:
             seat = _take_seat(host, episode.episode_id, None, journals[0])
-            _play(seat, str(episode.flags["task"]), settings, journals[0])
+            _play(seat, str(episode.flags["task"]), team.common, journals[0])
     finally:
         result = host.request("DELETE", f"/v1/episodes/{episode.episode_id}")
     _print_result(result)
@@ -155,14 +172,14 @@ def _play(seat: Seat, task: str, settings: AgentSettings, journal: Journal) -> P
     model = open_model(settings, f"tandem-{task}")
     begun = journal.begun
     if begun is None:
-        begun = Begun(uuid4().hex, instructions(seat), seat.tools)
+        begun = Begun(uuid4().hex, instructions(seat), seat.tools, settings=settings.told, at=now())
         journal.write(begun)
     played = Player(seat, model, settings, show, begun, journal).play()
     show(played.ledger.summary())
     return played
 
 
-def _play_each(url: str, episode: EpisodeFile, settings: AgentSettings, journals: Sequence[Journal]) -> None:
+def _play_each(url: str, episode: EpisodeFile, team: Team, journals: Sequence[Journal]) -> None:
     """Plays with one model per robot in parallel. If one fails, the others play on, and the failure is raised at
     the end.
     """
@@ -171,7 +188,7 @@ def _play_each(url: str, episode: EpisodeFile, settings: AgentSettings, journals
     def operate(robot: str, token: str, journal: Journal) -> None:
         try:
             seat = _take_seat(Client(url, token=token), episode.episode_id, robot, journal)
-            _play(seat, str(episode.flags["task"]), settings, journal)
+            _play(seat, str(episode.flags["task"]), team.of(robot), journal)
         except BaseException as failure:
             failures.append(failure)
 

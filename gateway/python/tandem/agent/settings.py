@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, TypeAlias, get_args
 from urllib.parse import urlsplit
 
@@ -110,6 +110,26 @@ class AgentSettings:
         if self.base_url is not None:
             check_base_url(self.base_url)
         self.sampling.fields(self.api)
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """The settings in the form for files."""
+        return {**asdict(self), "sampling": self.sampling.told}
+
+
+@dataclass(frozen=True)
+class Team:
+    """Settings of the models of an episode."""
+
+    common: AgentSettings
+    """Model of all robots, or of each robot without a model of its own."""
+
+    robots: dict[str, AgentSettings] = field(default_factory=dict[str, AgentSettings])
+    """Models of single robots."""
+
+    def of(self, robot: str | None) -> AgentSettings:
+        """Returns the model of a robot; None: of all robots."""
+        return self.common if robot is None else self.robots.get(robot, self.common)
 
 
 def check_base_url(url: str) -> None:

@@ -185,6 +185,45 @@ class ResultReply:
 
 
 @dataclass(frozen=True)
+class RobotUsage:
+    """Usage of the model of one robot."""
+
+    robot: str
+    """The robot that it directed."""
+
+    model: str | None
+    """The model, as its latest note names it; left out where none does."""
+
+    input_tokens: int
+    """Tokens that it read, those from a cache included."""
+
+    output_tokens: int
+    """Tokens that it wrote."""
+
+    cached_tokens: int
+    """Number of read tokens that came from a cache."""
+
+    usd: float | None
+    """Cost in US dollars; left out where no note has it."""
+
+    model_s: float | None
+    """Seconds that it took; left out where no note has them."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> RobotUsage:
+        """Reads what JSON has."""
+        return RobotUsage(
+            robot=value["robot"],
+            model=value.get("model"),
+            input_tokens=value["input_tokens"],
+            output_tokens=value["output_tokens"],
+            cached_tokens=value["cached_tokens"],
+            usd=value.get("usd"),
+            model_s=value.get("model_s"),
+        )
+
+
+@dataclass(frozen=True)
 class Usage:
     """Sum of the usage in all notes of an episode."""
 
@@ -209,6 +248,9 @@ class Usage:
     models: tuple[str, ...]
     """The models that notes name."""
 
+    robots: tuple[RobotUsage, ...]
+    """Parts of the sums that belong to one robot, of notes that name it; left out where none does."""
+
     endings: tuple[ModelEnding, ...]
     """Ends of the models' play: one for all robots, or one for each that has reported it."""
 
@@ -223,5 +265,6 @@ class Usage:
             usd=value.get("usd"),
             model_s=value.get("model_s"),
             models=tuple(value.get("models", ())),
+            robots=tuple(RobotUsage.of(item) for item in value.get("robots", ())),
             endings=tuple(ModelEnding.of(item) for item in value.get("endings", ())),
         )

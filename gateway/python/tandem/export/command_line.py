@@ -6,6 +6,7 @@ import argparse
 import sys
 import time
 from collections.abc import Sequence
+from functools import partial
 from typing import get_args
 
 from ..base import Renderer
@@ -20,7 +21,9 @@ INTERRUPTED = 130
 
 def parser() -> argparse.ArgumentParser:
     """Returns the parser of the flags. They are those of `tandem export`, whose help explains them."""
-    flags = argparse.ArgumentParser(prog="tandem export", description="Make data sets of recordings; see tandem export --help.")
+    flags = argparse.ArgumentParser(
+        prog="tandem export", description="Make data sets of recordings, and logs of conversations; see tandem export --help."
+    )
     flags.add_argument("--check", action="store_true", help=argparse.SUPPRESS)
     formats = flags.add_subparsers(dest="kind", required=True)
     lerobot = formats.add_parser("lerobot", help="what LeRobot reads")
@@ -38,6 +41,9 @@ def parser() -> argparse.ArgumentParser:
     lerobot.add_argument("--only-successful", action="store_true")
     lerobot.add_argument("--only-good", action="store_true")
     lerobot.add_argument("--jobs", type=int, metavar="N")
+    inspect = formats.add_parser("inspect", help="logs that Inspect reads")
+    inspect.add_argument("runs", metavar="RUNS")
+    inspect.add_argument("out", metavar="OUT")
     return flags
 
 
@@ -45,12 +51,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the command and returns its exit code."""
     given = parser().parse_args(arguments)
     try:
-        settings = settings_of(given)
-        for name in ("pyarrow", "av"):
-            library(name)
-        if given.check:
-            return 0
-        _run(given, settings)
+        if given.kind == "inspect":
+            library("inspect_ai", "logs of Inspect are written by inspect-ai", "inspect")
+            run = _write_logs
+        else:
+            settings = settings_of(given)
+            for name in ("pyarrow", "av"):
+                library(name)
+            run = partial(_write_data_sets, settings=settings)
+        if not given.check:
+            run(given)
         return 0
     except TandemError as error:
         print(f"tandem export: {error}", file=sys.stderr)
@@ -79,7 +89,14 @@ def settings_of(given: argparse.Namespace) -> ExportSettings:
     )
 
 
-def _run(given: argparse.Namespace, settings: ExportSettings) -> None:
+def _write_logs(given: argparse.Namespace) -> None:
+    from .inspect_log import export_inspect
+
+    for log in export_inspect(given.runs, given.out):
+        print(f"{log.path}: {log.task}, {log.model}, {log.samples} episodes")
+
+
+def _write_data_sets(given: argparse.Namespace, settings: ExportSettings) -> None:
     begin = time.monotonic()
     shown = sys.stderr.isatty()
 

@@ -15,7 +15,7 @@ use tandem_evaluation::{
 };
 use tandem_tools_spec::Usage;
 
-use crate::commands::flags::AgentPrices;
+use crate::commands::flags::PolicyPrices;
 
 /// A policy that begins no further episode once the run might cost more than a limit.
 #[derive(Debug)]
@@ -121,7 +121,7 @@ impl Policy for SpendingLimit {
 /// # Errors
 ///
 /// If the folder cannot be read, or none of its episodes was played by a model.
-pub fn expected(episodes: usize, folder: &Path, prices: &AgentPrices) -> Result<String, Box<dyn Error>> {
+pub fn expected(episodes: usize, folder: &Path, prices: &PolicyPrices) -> Result<String, Box<dyn Error>> {
     let loaded = load(&[PathBuf::from(folder)])?;
     let used: Vec<&Usage> =
         loaded.episodes.iter().filter_map(|found| found.played.result.usage.as_ref()).collect();
@@ -135,7 +135,7 @@ pub fn expected(episodes: usize, folder: &Path, prices: &AgentPrices) -> Result<
     Ok(in_words(episodes, &used, prices))
 }
 
-fn in_words(episodes: usize, used: &[&Usage], prices: &AgentPrices) -> String {
+fn in_words(episodes: usize, used: &[&Usage], prices: &PolicyPrices) -> String {
     let mean = |of: fn(&Usage) -> u64| {
         used.iter().map(|usage| of(usage)).sum::<u64>() as f64 / used.len() as f64 / 1000.0
     };
@@ -160,6 +160,7 @@ fn in_words(episodes: usize, used: &[&Usage], prices: &AgentPrices) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::commands::flags::{AgentFlags, RobotModels};
 
     #[derive(Debug)]
     struct Nobody;
@@ -186,21 +187,25 @@ mod tests {
 
     #[test]
     fn a_run_is_priced_by_recorded_tokens() {
-        let check = |used: &[&Usage], prices: AgentPrices, says: &str| {
-            let told = in_words(30, used, &prices);
+        let prices = |options: &str| {
+            let flags = AgentFlags::parse_policy(&format!("m?{options}")).unwrap();
+            PolicyPrices::new(flags.prices(), &RobotModels::default())
+        };
+        let check = |used: &[&Usage], prices: &PolicyPrices, says: &str| {
+            let told = in_words(30, used, prices);
             assert!(told.ends_with(says), "{told}");
         };
-        let free = AgentPrices::default();
-        let given = AgentPrices { input_usd: Some(2.0), output_usd: Some(10.0), cached_usd: Some(0.2) };
+        let free = PolicyPrices::default();
+        let uncached = "usd-per-million-input=2&usd-per-million-output=10";
         let (unpriced, priced) = (usage(None), usage(Some(3.0)));
         // 0.5 million fresh tokens, 1.5 million cached ones and 10,000 written ones: 1 + 0.3 + 0.1.
-        check(&[&priced, &unpriced], given, "1.40 US dollars an episode, 42.00 for all");
-        let uncached = AgentPrices { cached_usd: None, ..given };
-        check(&[&unpriced], uncached, "4.10 US dollars an episode, 123.00 for all");
-        check(&[&priced, &priced], free, "3.00 US dollars an episode, 90.00 for all");
+        let given = prices(&format!("{uncached}&usd-per-million-cached=0.2"));
+        check(&[&priced, &unpriced], &given, "1.40 US dollars an episode, 42.00 for all");
+        check(&[&unpriced], &prices(uncached), "4.10 US dollars an episode, 123.00 for all");
+        check(&[&priced, &priced], &free, "3.00 US dollars an episode, 90.00 for all");
         check(
             &[&priced, &unpriced],
-            free,
+            &free,
             "give usd-per-million-input and usd-per-million-output with the model",
         );
         let told = in_words(30, &[&priced], &free);

@@ -141,7 +141,7 @@ pub fn run(args: EvaluateArgs) -> CommandResult {
     log_evaluation();
     let ShardFlag(shard) = args.shard;
     let prices = args.policy.prices();
-    if args.max_usd.is_some() && prices.is_some_and(|prices| !prices.are_given()) {
+    if args.max_usd.is_some() && prices.as_ref().is_some_and(|prices| !prices.are_given()) {
         return Err(
             "--max-usd needs prices: give usd-per-million-input and usd-per-million-output with the model"
                 .into(),

@@ -5,7 +5,6 @@ use std::iter;
 
 use clap::{CommandFactory, Parser};
 use serde_json::Value;
-use tandem_tools_spec::Usage;
 
 /// Part of a program's time limit after which a model finishes by itself, in twelfths.
 const OWN_TWELFTHS: u32 = 11;
@@ -87,14 +86,13 @@ impl AgentPrices {
         self.input_usd.is_some() && self.output_usd.is_some()
     }
 
-    /// Returns the price of a usage; `None` without the prices of input and output. Writing to a cache is
-    /// priced as reading.
-    pub fn usd(&self, usage: &Usage) -> Option<f64> {
+    /// Returns the price of input, the part of it that was cached, and output tokens; `None` without the
+    /// prices of input and output. Writing to a cache is priced as reading.
+    pub fn usd(&self, [input, cached, output]: [u64; 3]) -> Option<f64> {
         let (input_usd, output_usd) = (self.input_usd?, self.output_usd?);
         let cached_usd = self.cached_usd.unwrap_or(input_usd);
-        let fresh_tokens = usage.input_tokens.saturating_sub(usage.cached_tokens);
-        let parts =
-            [(fresh_tokens, input_usd), (usage.cached_tokens, cached_usd), (usage.output_tokens, output_usd)];
+        let fresh = input.saturating_sub(cached);
+        let parts = [(fresh, input_usd), (cached, cached_usd), (output, output_usd)];
         Some(parts.into_iter().map(|(tokens, usd)| tokens as f64 / 1e6 * usd).sum())
     }
 }

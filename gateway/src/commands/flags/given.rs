@@ -12,15 +12,21 @@ use clap::{ArgAction, ArgMatches, Args, Command, FromArgMatches, parser::ValueSo
 pub struct GivenFlags(BTreeMap<String, Vec<String>>);
 
 impl GivenFlags {
-    /// Returns the given flags that `A` has, each by its name on the command line. A switch has no value.
+    /// Returns the given flags that `A` has, each by its name on the command line. A switch has no value, and
+    /// a repeated flag is returned once for each value.
     pub fn of<A: Args>(&self) -> Vec<(String, Option<String>)> {
         let command = A::augment_args(Command::new(""));
         let given = command.get_arguments().filter_map(|argument| {
             let texts = self.0.get(argument.get_id().as_str())?;
-            let takes_value = !matches!(argument.get_action(), ArgAction::SetTrue);
-            Some((argument.get_long()?.to_owned(), takes_value.then(|| texts.join(","))))
+            let values = match (argument.get_action(), argument.get_value_delimiter()) {
+                (ArgAction::SetTrue, _) => vec![None],
+                (_, Some(_)) => vec![Some(texts.join(","))],
+                (_, None) => texts.iter().cloned().map(Some).collect(),
+            };
+            let flag = argument.get_long()?.to_owned();
+            Some(values.into_iter().map(move |value| (flag.clone(), value)))
         });
-        given.collect()
+        given.flatten().collect()
     }
 }
 
@@ -70,6 +76,8 @@ mod tests {
         talk: bool,
         #[arg(long, value_delimiter = ',')]
         file: Vec<String>,
+        #[arg(long)]
+        model: Vec<String>,
     }
 
     #[test]
@@ -84,5 +92,6 @@ mod tests {
         assert!(given(&[]).is_empty());
         assert_eq!(given(&["--seeds", "0", "--talk"]), ["seeds=0", "talk"]);
         assert_eq!(given(&["--file", "a,b", "--most", "3"]), ["most=3", "file=a,b"]);
+        assert_eq!(given(&["--model", "A=m,n", "--model", "B=o"]), ["model=A=m,n", "model=B=o"]);
     }
 }

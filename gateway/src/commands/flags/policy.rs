@@ -9,7 +9,8 @@ use tandem_evaluation::{
 };
 use tandem_tools_spec::{Driving, Operators};
 
-use super::agent::{AgentFlags, AgentPrices};
+use super::agent::AgentFlags;
+use super::robot_models::{PolicyPrices, RobotModels};
 use crate::{
     drivers::{
         PRESETS, PolicyKey, PolicyMap, PolicyProtocol, Program, PythonModule, PythonPart, RemotePolicy,
@@ -57,6 +58,8 @@ pub struct PolicyFlags {
     /// [default: 120].
     #[arg(long = "patience", value_name = "SECONDS", requires = "per_robot")]
     patience_s: Option<f64>,
+    #[command(flatten)]
+    robot_models: RobotModels,
     /// Name of the policy in results and reports, instead of the text of --policy.
     #[arg(long, value_name = "NAME")]
     policy_name: Option<String>,
@@ -144,9 +147,9 @@ fn port_of(url: &str) -> Option<u16> {
 
 impl PolicyFlags {
     /// Returns the prices that a language model's flags give; `None` for another policy.
-    pub fn prices(&self) -> Option<AgentPrices> {
+    pub fn prices(&self) -> Option<PolicyPrices> {
         match &self.policy {
-            PolicyChoice::Agent(flags) => Some(flags.prices()),
+            PolicyChoice::Agent(flags) => Some(PolicyPrices::new(flags.prices(), &self.robot_models)),
             PolicyChoice::Player(_)
             | PolicyChoice::Program(_)
             | PolicyChoice::OpenLoop(_)
@@ -158,7 +161,10 @@ impl PolicyFlags {
     pub fn policy(self) -> Result<Box<dyn Policy>, Box<dyn Error>> {
         let misplaced = |flag: &str, who: &str| Err(format!("{flag} is for {who}").into());
         let driving = self.driving()?;
-        let key_file = self.policy_key_file;
+        let (key_file, robots) = (self.policy_key_file, self.robot_models);
+        if !robots.is_empty() && !matches!(self.policy, PolicyChoice::Agent(_)) {
+            return misplaced("--robot-model", "language models, as agent:MODEL");
+        }
         if key_file.is_some() && !matches!(self.policy, PolicyChoice::Remote(..)) {
             return misplaced("--policy-key-file", "policies at a server");
         }
@@ -191,16 +197,8 @@ impl PolicyFlags {
                 Box::new(Program::new(command, driving, limit)?)
             }
             (PolicyChoice::Agent(flags), None, limit_s) => {
-                let limit_s = limit_s.unwrap_or_else(|| flags.limit_s(LIMIT_S));
-                let agent = PythonModule::new(PythonPart::Agent, flags.arguments(limit_s))?;
-                let limit = Duration::from_secs(limit_s.into());
-                Box::new(Program::agent(
-                    &agent,
-                    format!("{AGENT}{}", flags.model()),
-                    flags.card(),
-                    driving,
-                    limit,
-                )?)
+                let limit_s = limit_s.unwrap_or_else(|| robots.limit_s(flags.limit_s(LIMIT_S)));
+                Box::new(agent(&flags, &robots, driving, limit_s)?)
             }
             (PolicyChoice::Remote(protocol, urls), map, None) => Box::new(
                 remote_policy(protocol, urls, map, "--policy-map")?
@@ -218,6 +216,23 @@ impl PolicyFlags {
         let driving = Driving { operators, patience_s: self.patience_s, talk: self.talk.then_some(true) };
         driving.validate().map(|()| driving)
     }
+}
+
+/// Creates the policy of a language model, or of several.
+fn agent(
+    flags: &AgentFlags,
+    robots: &RobotModels,
+    driving: Driving,
+    limit_s: u32,
+) -> Result<Program, Box<dyn Error>> {
+    let arguments = flags.arguments(limit_s).into_iter().chain(robots.arguments());
+    let agent = PythonModule::new(PythonPart::Agent, arguments.collect())?;
+    let mut card = flags.card();
+    if let Some(cards) = robots.cards() {
+        card["robots"] = cards;
+    }
+    let name = format!("{AGENT}{}{}", flags.model(), robots.name());
+    Ok(Program::agent(&agent, name, card, driving, Duration::from_secs(limit_s.into()))?)
 }
 
 /// Creates the policy at `urls` with the map that `flag` gives, or else the protocol's default.
@@ -392,6 +407,7 @@ mod tests {
         check(&["--policy-map", "openpi"], "--policy-map is for policies at a server");
         check(&["--policy-limit", "5"], "--policy-limit is for programs");
         check(&["--per-robot"], "--per-robot is for programs");
+        check(&["--per-robot", "--robot-model", "A=m"], "--robot-model is for language models");
         check(&["--policy", "exec:true", "--talk"], "--per-robot");
         check(&["--policy", "exec:true", "--per-robot", "--patience", "0"], "give 0.05 to 600 seconds");
     }

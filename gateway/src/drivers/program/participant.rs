@@ -15,6 +15,9 @@ use crate::drivers::lost;
 /// File with the server's reply to the start, for programs that read JSON.
 const START_FILE: &str = "start.json";
 
+/// File of a language model's conversation, which Python writes beside [`START_FILE`].
+const CONVERSATION_FILE: &str = "agent.jsonl";
+
 /// A program that controls all robots, or one robot.
 #[derive(Debug)]
 pub struct Participant<'a> {
@@ -57,7 +60,7 @@ impl<'a> Participant<'a> {
     pub fn keep_files(&self, episode: &Path) -> io::Result<()> {
         let kept = self.robot.map_or_else(|| episode.to_owned(), |robot| episode.join(robot));
         create_private_folder(&kept)?;
-        for name in [BRIEF_FILE, START_FILE, STDOUT_FILE, STDERR_FILE] {
+        for name in [BRIEF_FILE, START_FILE, STDOUT_FILE, STDERR_FILE, CONVERSATION_FILE] {
             let (from, to) = (self.folder.path().join(name), kept.join(name));
             if !fs::symlink_metadata(&from).is_ok_and(|found| found.is_file()) {
                 continue;

@@ -9,7 +9,8 @@ use tandem::cli::Cli;
 use super::pages::root;
 
 /// External programs whose arguments are not checked.
-const OTHERS: [&str; 7] = ["claude", "export", "jupyter", "jupytext", "mdbook", "ollama", "openssl"];
+const OTHERS: [&str; 8] =
+    ["claude", "export", "inspect", "jupyter", "jupytext", "mdbook", "ollama", "openssl"];
 
 /// Values of a cluster's variables, with which a line can be parsed.
 const VARIABLES: [(&str, &str); 6] = [

@@ -185,7 +185,7 @@ mod tests {
                 usd: Some(0.06),
                 model_s: Some(12.5),
                 models: vec!["a-model".into()],
-                endings: Vec::new(),
+                ..Usage::default()
             });
         }
         let silent = EvaluationReport::of(&found(nine_six_three("agent")));

@@ -90,7 +90,7 @@ fn costs_are_medians_and_unknown_ones_empty() {
             usd: Some(0.06),
             model_s: None,
             models: vec!["a-model".into()],
-            endings: Vec::new(),
+            ..Usage::default()
         });
         played.ended_at = Some("2026-11-28T01:20:00Z".into());
     }

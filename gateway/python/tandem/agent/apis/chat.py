@@ -34,14 +34,14 @@ class ChatModel:
         def send(**optional: Any) -> Any:
             messages = [{"role": "system", "content": instructions}]
             messages += [message for turn in turns for message in _messages(turn, self._optional.returned)]
-            return self._client.chat.completions.create(
+            return self._client.chat.completions.with_raw_response.create(
                 model=self._settings.model, messages=messages, tools=for_chat(tools), **self._sampling, **optional
             )
 
-        completion = request(self._sdk, self._settings, self._optional, send)
+        completion, retries = request(self._sdk, self._settings, self._optional, send)
         if not getattr(completion, "choices", None):
             raise EndpointError(f"{self._settings.model} answers without a choice: {str(completion)[:300]}")
-        return understood(self._settings, lambda: _reply(completion, len(turns)))
+        return understood(self._settings, retries, lambda: _reply(completion, len(turns)))
 
 
 def _messages(turn: Turn, returned: Collection[str]) -> list[dict[str, Any]]:

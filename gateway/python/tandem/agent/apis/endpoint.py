@@ -6,6 +6,7 @@ import importlib
 import os
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
 from ...errors import TandemError
@@ -100,19 +101,26 @@ class OptionalFields:
         return bool(named or sent_back)
 
 
-def request(sdk: Any, settings: AgentSettings, optional: OptionalFields, send: Callable[..., Any]) -> Any:
-    """Sends a request, and repeats it without the fields that the endpoint does not support."""
+def request(sdk: Any, settings: AgentSettings, optional: OptionalFields, send: Callable[..., Any]) -> tuple[Any, int]:
+    """Sends a request, and repeats it without the fields that the endpoint does not support. Returns the answer and
+    the number of requests that failed before it.
+
+    send: Sends the request with these optional fields, and returns the SDK's raw response.
+    """
+    repeats = 0
     while True:
         try:
-            reply = send(**optional.fields)
+            response = send(**optional.fields)
+            reply = response.parse()
             if isinstance(reply, str):
                 raise EndpointError(
                     f"{_where(settings)} answers no JSON of the API {settings.api}; is --base-url right? Most end in /v1"
                 )
-            return reply
+            return reply, repeats + response.retries_taken
         except sdk.APIStatusError as error:
             told = f"{error.message} {error.body}"
             if error.status_code in _REFUSED and optional.drop_named(told):
+                repeats += 1
                 continue
             raise _status_error(settings, error.status_code, error.message, told) from None
         except sdk.APIError as error:
@@ -126,10 +134,13 @@ def request(sdk: Any, settings: AgentSettings, optional: OptionalFields, send: C
             raise EndpointError(without_keys(text[:_MAX_CHARACTERS])) from None
 
 
-def understood(settings: AgentSettings, read: Callable[[], Reply]) -> Reply:
-    """Reads a reply from an answer, in which fields promised by the API may be missing."""
+def understood(settings: AgentSettings, retries: int, read: Callable[[], Reply]) -> Reply:
+    """Reads a reply from an answer, in which fields promised by the API may be missing.
+
+    retries: Number of requests that failed before it.
+    """
     try:
-        return read()
+        return replace(read(), retries=retries)
     except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
         text = f"{_where(settings)} answers what is no reply of the API {settings.api}: {type(error).__name__}: {error}"
         raise EndpointError(without_keys(text[:_MAX_CHARACTERS])) from None

@@ -45,7 +45,7 @@ class MessagesModel:
             message["content"][-1] |= CACHED
 
         def send(**optional: Any) -> Any:
-            return self._client.messages.create(
+            return self._client.messages.with_raw_response.create(
                 model=self._settings.model,
                 max_tokens=REPLY_TOKENS,
                 system=[{"type": "text", "text": instructions, **CACHED}],
@@ -55,8 +55,8 @@ class MessagesModel:
                 **optional,
             )
 
-        message = request(self._sdk, self._settings, self._optional, send)
-        return understood(self._settings, lambda: _reply(message))
+        message, retries = request(self._sdk, self._settings, self._optional, send)
+        return understood(self._settings, retries, lambda: _reply(message))
 
 
 def _message(turn: Turn) -> dict[str, Any]:

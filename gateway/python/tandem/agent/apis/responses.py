@@ -34,7 +34,7 @@ class ResponsesModel:
         items = [item for turn in turns for item in _items(turn)]
 
         def send(**optional: Any) -> Any:
-            return self._client.responses.create(
+            return self._client.responses.with_raw_response.create(
                 model=self._settings.model,
                 instructions=instructions,
                 input=items,
@@ -43,10 +43,10 @@ class ResponsesModel:
                 **optional,
             )
 
-        response = request(self._sdk, self._settings, self._optional, send)
+        response, retries = request(self._sdk, self._settings, self._optional, send)
         if getattr(response, "status", None) == "failed":
             raise EndpointError(f"{self._settings.model} failed: {response.error}")
-        return understood(self._settings, lambda: _reply(response))
+        return understood(self._settings, retries, lambda: _reply(response))
 
 
 def _items(turn: Turn) -> list[dict[str, Any]]:

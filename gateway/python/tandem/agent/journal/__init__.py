@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .episode_file import EpisodeFile, conversation_path, read_result
-from .events import Answered, Begun, Ended, Event, Halved, Noted, Replied, Resumed
+from .events import Answered, Begun, Ended, Event, Halved, Noted, Replied, Resumed, now
 from .journal import Journal
 from .line_file import LineFile
 from .progress import Progress
@@ -22,5 +22,6 @@ __all__ = [
     "Replied",
     "Resumed",
     "conversation_path",
+    "now",
     "read_result",
 ]

@@ -14,8 +14,10 @@ from ...errors import TandemError
 FILE = "agent.json"
 RESULT_FILE = "result.json"
 
-FORMAT = 1
-"""Version of this file and of the conversation files; every change increases it."""
+FORMATS = (1, 2)
+"""Versions of this file and of the conversation files that can be read. The last one is written; every change adds
+one. Version 1 has no robots' own models, and in conversations neither settings, times nor retries.
+"""
 
 _MODE = 0o600
 
@@ -38,7 +40,7 @@ class EpisodeFile:
 
     def write(self, folder: Path) -> None:
         """Writes the file, whole or not at all. Raises OSError."""
-        content = {"format": FORMAT, "tandem": __version__, **asdict(self)}
+        content = {"format": FORMATS[-1], "tandem": __version__, **asdict(self)}
         temporary = folder / f".{FILE}-{os.getpid()}"
         descriptor = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NOFOLLOW, _MODE)
         with os.fdopen(descriptor, "w", encoding="utf-8") as file:
@@ -58,12 +60,13 @@ class EpisodeFile:
         path = folder / FILE
         try:
             fields = json.loads(path.read_text(encoding="utf-8"))
-            if fields["format"] != FORMAT:
+            if fields["format"] not in FORMATS:
                 raise TandemError(
                     f"{path} was kept by Tandem {fields['tandem']}, and this is {__version__}, which reads it otherwise; "
                     "resume the episode with that version"
                 )
             kept = {name: fields[name] for name in ("episode_id", "flags", "server_flags")}
+            kept["flags"] = {"robot_models": {}, **kept["flags"]}
             episode = EpisodeFile(**kept, operators=tuple(fields["operators"]))
         except FileNotFoundError:
             others = _others(folder.parent)

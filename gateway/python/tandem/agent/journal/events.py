@@ -11,6 +11,11 @@ from ..conversation import Answer, Call, Picture, Reply, Told, Usage
 from ..tools import Tool
 
 
+def now() -> str:
+    """Returns the current time in UTC, in the form for events."""
+    return datetime.now(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
 @dataclass(frozen=True)
 class Begun:
     """The conversation begins."""
@@ -22,6 +27,12 @@ class Begun:
     tools: tuple[Tool, ...]
     pid: int = field(default_factory=os.getpid)
     """Id of the process that plays."""
+
+    settings: dict[str, Any] | None = None
+    """Settings of the model; None in files of format 1."""
+
+    at: str | None = None
+    """Time in UTC; None in files of format 1."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +83,7 @@ class Halved:
 class Resumed:
     """Another process resumes the conversation."""
 
-    at: str = field(default_factory=lambda: datetime.now(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ"))
+    at: str = field(default_factory=now)
     pid: int = field(default_factory=os.getpid)
 
 
