@@ -6,7 +6,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands::{
     CommandResult,
-    about::{completions, man, tasks},
+    about::{completions, examples, man, tasks},
     agent, bench, collect, demo, doctor, evaluate, export, leaderboard, locomotion, policy_map, recover,
     replay, report, serve,
 };
@@ -38,6 +38,7 @@ enum CliCommand {
     Leaderboard(leaderboard::LeaderboardArgs),
     Bench(bench::BenchArgs),
     Doctor(doctor::DoctorArgs),
+    Examples(examples::ExamplesArgs),
     Completions(completions::CompletionsArgs),
     Man(man::ManArgs),
 }
@@ -66,6 +67,7 @@ impl Cli {
             CliCommand::Leaderboard(args) => leaderboard::run(args),
             CliCommand::Bench(args) => bench::run(args),
             CliCommand::Doctor(args) => doctor::run(args),
+            CliCommand::Examples(args) => examples::run(args),
             CliCommand::Completions(args) => completions::run(&args, Cli::command()),
             CliCommand::Man(args) => man::run(args, Cli::command()),
         }

@@ -12,7 +12,7 @@ pub use phase_trace::{Closest, ConditionTrace, Held, Moment, PartTrace, PhaseTra
 pub use pictures::{DrawnPictures, PicturesError, PicturesPlan, draw_all};
 pub use scene::{EpisodeCamera, EpisodeRenderer, PictureSize, start_picture};
 pub use verify::{Difference, Verdict, Verification, verify};
-pub use video::{ShortFilm, VideoError, VideoFormat, film, short_film};
+pub use video::{FilmPlan, ShortFilm, VideoError, VideoFormat, film, short_film};
 
 use crate::EpisodeError;
 use crate::recording::RecordingError;

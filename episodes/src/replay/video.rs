@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::time::Duration;
 
 use image::codecs::gif::{GifEncoder, Repeat};
 use image::{Delay, DynamicImage, RgbImage};
@@ -60,38 +61,53 @@ impl VideoFormat {
     }
 }
 
-/// Renders a whole recording at `rate_hz` frames a second, in real time. Returns the number of frames.
+/// Contents and speed of a video.
+#[derive(Clone, Copy, Debug)]
+pub struct FilmPlan {
+    pub view: EpisodeCamera,
+    /// `None`: the camera's own.
+    pub size: Option<PictureSize>,
+    /// Frames per second of simulated time.
+    pub rate_hz: u32,
+    /// Duration of the video, to a frame. `None`: that of the episode.
+    pub duration_s: Option<u32>,
+}
+
+impl FilmPlan {
+    /// Returns the frames per second of the video of an episode with this number of steps.
+    fn played_hz(&self, steps: usize) -> f64 {
+        let rate_hz = f64::from(self.rate_hz);
+        self.duration_s.map_or(rate_hz, |video_s| rate_hz * steps as f64 / CONTROL_HZ / f64::from(video_s))
+    }
+}
+
+/// Renders a whole recording as a video. Returns the number of frames.
 ///
 /// # Errors
 ///
 /// If the format is unknown, the recording cannot be replayed, or the video cannot be written.
-pub fn film(
-    recording: &Recording,
-    view: EpisodeCamera,
-    size: Option<PictureSize>,
-    rate_hz: u32,
-    path: &Path,
-) -> Result<usize, VideoError> {
+pub fn film(recording: &Recording, plan: &FilmPlan, path: &Path) -> Result<usize, VideoError> {
     let format = VideoFormat::of(path)?;
     let mut scene = EpisodeRenderer::of(&recording.spec).map_err(ReplayError::from)?;
     let mut writer: Option<FilmWriter> = None;
     let mut pictures = 0;
+    let played_hz = plan.played_hz(recording.state_hashes().count());
     for (index, step) in recording.steps().enumerate() {
         let step = step.map_err(ReplayError::from)?;
-        if index < step_of_picture(pictures, rate_hz) {
+        if index < step_of_picture(pictures, plan.rate_hz) {
             continue;
         }
-        let camera = scene.camera(view, &step, size);
+        let camera = scene.camera(plan.view, &step, plan.size);
         let frame = scene.draw(&step, &camera);
         let writer = match &mut writer {
             Some(writer) => writer,
-            unbegun => unbegun.insert(FilmWriter::begin(format, &frame, rate_hz, path)?),
+            unbegun => unbegun.insert(FilmWriter::begin(format, &frame, played_hz, path)?),
         };
-        writer.add(&frame, pictures, rate_hz, path)?;
+        writer.add(&frame, pictures, played_hz, path)?;
         pictures += 1;
     }
     if let Some(writer) = writer {
-        writer.finish(pictures, rate_hz, path)?;
+        writer.finish(pictures, played_hz, path)?;
     }
     Ok(pictures)
 }
@@ -105,7 +121,7 @@ pub struct ShortFilm {
 }
 
 const SHORT_PICTURES: usize = 60;
-const SHORT_RATE_HZ: u32 = 10;
+const SHORT_RATE_HZ: f64 = 10.0;
 const SHORT_SIZE: PictureSize = PictureSize { width: 320, height: 240 };
 /// Duration of the last frame.
 const SHORT_END_MS: i32 = 1500;
@@ -132,7 +148,7 @@ pub fn short_film(recording: &Recording) -> Result<ShortFilm, VideoError> {
         }
     }
     let webp = encoder.finalize(time_ms(pictures, SHORT_RATE_HZ) + SHORT_END_MS).map_err(failed)?.to_vec();
-    Ok(ShortFilm { webp, speed_ratio: stride as f64 * f64::from(SHORT_RATE_HZ) / CONTROL_HZ })
+    Ok(ShortFilm { webp, speed_ratio: stride as f64 * SHORT_RATE_HZ / CONTROL_HZ })
 }
 
 /// Returns the index of the step, from the recording's first, that frame number `picture` shows.
@@ -155,7 +171,7 @@ impl FilmWriter {
     fn begin(
         format: VideoFormat,
         frame: &Frame,
-        rate_hz: u32,
+        rate_hz: f64,
         path: &Path,
     ) -> Result<FilmWriter, VideoError> {
         let Frame { width, height, .. } = *frame;
@@ -174,7 +190,7 @@ impl FilmWriter {
         })
     }
 
-    fn add(&mut self, frame: &Frame, picture: usize, rate_hz: u32, path: &Path) -> Result<(), VideoError> {
+    fn add(&mut self, frame: &Frame, picture: usize, rate_hz: f64, path: &Path) -> Result<(), VideoError> {
         match self {
             FilmWriter::Webp(encoder) => encoder
                 .add_frame(&frame.rgb, time_ms(picture, rate_hz))
@@ -182,7 +198,7 @@ impl FilmWriter {
             FilmWriter::Gif { encoder, .. } => {
                 let picture = RgbImage::from_raw(frame.width, frame.height, frame.rgb.clone());
                 let rgba = DynamicImage::from(picture.unwrap_or_default()).into_rgba8();
-                let delay = Delay::from_numer_denom_ms(1000, rate_hz);
+                let delay = Delay::from_saturating_duration(Duration::from_secs_f64(1.0 / rate_hz));
                 Ok(encoder.encode_frame(image::Frame::from_parts(rgba, 0, 0, delay))?)
             }
             FilmWriter::Mp4(child) => {
@@ -195,7 +211,7 @@ impl FilmWriter {
         }
     }
 
-    fn finish(self, pictures: usize, rate_hz: u32, path: &Path) -> Result<(), VideoError> {
+    fn finish(self, pictures: usize, rate_hz: f64, path: &Path) -> Result<(), VideoError> {
         match self {
             FilmWriter::Webp(encoder) => {
                 let film = encoder.finalize(time_ms(pictures, rate_hz));
@@ -222,7 +238,7 @@ impl FilmWriter {
 }
 
 /// Starts an ffmpeg that reads raw frames and writes a video that every player supports.
-fn ffmpeg([width, height]: [u32; 2], rate_hz: u32, path: &Path) -> Result<Child, VideoError> {
+fn ffmpeg([width, height]: [u32; 2], rate_hz: f64, path: &Path) -> Result<Child, VideoError> {
     let (size, rate) = (format!("{width}x{height}"), rate_hz.to_string());
     let takes = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", &size, "-r", &rate, "-i", "-"];
     // Players need an even number of pixels each way, and the index in front.
@@ -240,8 +256,8 @@ fn ffmpeg([width, height]: [u32; 2], rate_hz: u32, path: &Path) -> Result<Child,
     ffmpeg.map_err(|source| VideoError::NoFfmpeg { path: path.into(), source })
 }
 
-fn time_ms(picture: usize, rate_hz: u32) -> i32 {
-    (picture as f64 * 1000.0 / f64::from(rate_hz)).round() as i32
+fn time_ms(picture: usize, rate_hz: f64) -> i32 {
+    (picture as f64 * 1000.0 / rate_hz).round() as i32
 }
 
 fn webp_failed(path: &Path, source: webp_animation::Error) -> VideoError {

@@ -8,7 +8,7 @@ use crate::common::*;
 use crate::skipped::skipped;
 use image::AnimationDecoder;
 use tandem_episodes::replay::{
-    EpisodeCamera, EpisodeRenderer, PictureSize, PicturesPlan, VideoError, draw_all, film,
+    EpisodeCamera, EpisodeRenderer, FilmPlan, PictureSize, PicturesPlan, VideoError, draw_all, film,
 };
 use tandem_episodes::{Recorder, Recording, Session};
 use tandem_tools_spec::Protocol;
@@ -30,7 +30,8 @@ fn films_have_a_picture_for_every_moment() {
     let recording = recorded(folder.path());
     let make = |name: &str, view: EpisodeCamera, rate_hz: u32| {
         let path = folder.path().join(name);
-        film(&recording, view, Some(SIZE), rate_hz, &path).map(|pictures| (pictures, path))
+        let plan = FilmPlan { view, size: Some(SIZE), rate_hz, duration_s: None };
+        film(&recording, &plan, &path).map(|pictures| (pictures, path))
     };
     let (pictures, gif) = make("a.gif", EpisodeCamera::ThirdPerson, 25).unwrap();
     assert_eq!(pictures, 7, "steps 0, 2, .. 12");
@@ -41,10 +42,7 @@ fn films_have_a_picture_for_every_moment() {
 
     let (pictures, webp) = make("a.webp", EpisodeCamera::Egocentric(1), 50).unwrap();
     assert_eq!(pictures, 13);
-    let bytes = std::fs::read(webp).unwrap();
-    let decoder = webp_animation::Decoder::new(&bytes).unwrap();
-    let times_ms: Vec<i32> = decoder.into_iter().map(|frame| frame.timestamp()).collect();
-    assert_eq!(times_ms.last(), Some(&(13 * 20)), "{times_ms:?}");
+    assert_eq!(end_ms(&webp), 13 * 20);
 
     match make("a.mp4", EpisodeCamera::Egocentric(0), 10) {
         Ok((pictures, mp4)) => {
@@ -63,6 +61,27 @@ fn films_have_a_picture_for_every_moment() {
     assert!(text.ends_with("have: third_person, A, B"), "{text}");
     let left: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
     assert!(left.iter().all(|path| path.extension().is_none_or(|e| e != "partial")), "{left:?}");
+}
+
+/// Returns the time at which a WebP's last picture ends.
+fn end_ms(webp: &Path) -> i32 {
+    let bytes = std::fs::read(webp).unwrap();
+    let decoder = webp_animation::Decoder::new(&bytes).unwrap();
+    decoder.into_iter().map(|frame| frame.timestamp()).last().unwrap()
+}
+
+#[test]
+fn films_play_within_the_seconds_that_are_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = recorded(folder.path());
+    for (rate_hz, pictures) in [(50, 13), (25, 7)] {
+        let path = folder.path().join("slow.webp");
+        let view = EpisodeCamera::ThirdPerson;
+        let plan = FilmPlan { view, size: Some(SIZE), rate_hz, duration_s: Some(2) };
+        assert_eq!(film(&recording, &plan, &path).unwrap(), pictures);
+        let frame_ms = 2000 / pictures as i32;
+        assert!((end_ms(&path) - 2000).abs() <= frame_ms, "{} ms", end_ms(&path));
+    }
 }
 
 /// Returns every file below `folder` with its modification time.

@@ -28,8 +28,9 @@ class TandemEnv(gym.Env[Observation, NDArray[np.float32]]):
     `reset(seed=n)` begins the episode of seed n; without a seed, that of the seed after the last one, and at first 2000: the
     episode's index alone says where it begins, however often anything was reset between.
 
-    task: A task's id, as "handover".
-    options: See `Options`.
+    Args:
+        task: A task's id, as "handover".
+        options: See `Options`.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012

@@ -22,8 +22,9 @@ class TandemParallelEnv(ParallelEnv[str, Observation, NDArray[np.float32]]):
     `egocentric`, and `contract` names every number. All of them get the same rewards, and their episode
     ends for all at once. `instructions` has what each is asked to do.
 
-    task: A task's id, as "handover".
-    options: See `Options`.
+    Args:
+        task: A task's id, as "handover".
+        options: See `Options`.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012

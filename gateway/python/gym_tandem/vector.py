@@ -42,13 +42,15 @@ class TandemVectorEnv(VectorEnv[Observation, NDArray[np.float32], NDArray[Any]])
     world has the seed that lies k times the number of worlds further; `reset()` without a seed begins the round after the
     last one. No episode depends on how soon another one ended.
 
-    task: A task's id, as "handover".
-    num_envs: How many worlds.
-    autoreset_mode: When the next episode begins in a world whose last one is over: in place of the next step, in the same
-        step (`final_obs` and `final_info` have the end of the last one), or not before `reset(options={"reset_mask": ...})`.
-    threads: On how many threads worlds step. 0: one a core.
-    copy: False: observations are the arrays that the next step writes into.
-    options: See `Options`.
+    Args:
+        task: A task's id, as "handover".
+        num_envs: How many worlds.
+        autoreset_mode: When the next episode begins in a world whose last one is over: in place of the next step, in
+            the same step (`final_obs` and `final_info` have the end of the last one), or not before
+            `reset(options={"reset_mask": ...})`.
+        threads: On how many threads worlds step. 0: one a core.
+        copy: False: observations are the arrays that the next step writes into.
+        options: See `Options`.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012

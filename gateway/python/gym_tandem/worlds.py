@@ -109,7 +109,8 @@ def _reworded(told: TaskInfo, options: Options) -> TaskInfo:
 def environment_contract(task: TaskInfo, options: Options, *, apart: bool = False) -> RowContract:
     """Returns the layout of an environment's rows.
 
-    apart: True for rows of one robot, of which every robot has its own.
+    Args:
+        apart: True for rows of one robot, of which every robot has its own.
     """
     fps = integer(options.get("fps", RATES_HZ[0]), "fps")
     if fps not in RATES_HZ:

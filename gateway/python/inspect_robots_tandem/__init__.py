@@ -63,7 +63,9 @@ class TandemEmbodiment(EmbodimentBase):
     Episodes: a scene's `init_seed` is Tandem's seed, so that its epochs begin alike; a scene without one begins by the trial's
     own. Success is the last phase; `info` has `success`, `phases` (how many were reached), `is_fallen` and Tandem's `seed`.
 
-    task: A task's id.
+    Args:
+        task: A task's id.
+
     The rest is as in `gym_tandem.Options`; with `look_every`, pictures stay what they were in between, and take no memory.
     """
 

@@ -13,6 +13,8 @@ noted otherwise. One control step is 20 ms.
 
 from __future__ import annotations
 
+import os
+
 from . import _native
 from ._native import Snapshot
 from .base import BaseEpisode, Observation, Stepped
@@ -32,6 +34,10 @@ from .recording import Picture, RecordedCall, Recording
 from .server import Server, serve
 
 _native.loaded_from(_native.__file__ or "")
+
+# Without a desktop, the layer of Mesa that orders graphics processors prints an error. Tandem ranks them itself.
+if "XDG_RUNTIME_DIR" not in os.environ:
+    os.environ.setdefault("NODEVICE_SELECT", "1")
 
 __version__ = "0.2.0"
 

@@ -154,8 +154,9 @@ class BaseEpisode(Tools):
         """Sends rows of joint targets and base commands to all robots, one row per control step, as
         `send_joint_chunk` does.
 
-        rows: Robots by 35 for one step, or robots by steps by 35; at most 25 steps in the agentic protocol, 50 in
-            the benchmark protocol. Columns are `action_columns`; targets beyond a limit are clamped.
+        Args:
+            rows: Robots by 35 for one step, or robots by steps by 35; at most 25 steps in the agentic protocol, 50 in
+                the benchmark protocol. Columns are `action_columns`; targets beyond a limit are clamped.
         """
 
     @abstractmethod
@@ -163,9 +164,10 @@ class BaseEpisode(Tools):
         """Returns images of the robots' head cameras, 320 by 240 pixels, and the robots' states, without using
         steps.
 
-        robots: Robots to include. None: all of them.
-        short: True: without joint angles, velocities and torques.
-        depth: True: with depth at every pixel, which only the benchmark protocol allows.
+        Args:
+            robots: Robots to include. None: all of them.
+            short: True: without joint angles, velocities and torques.
+            depth: True: with depth at every pixel, which only the benchmark protocol allows.
         """
 
     @abstractmethod

@@ -38,9 +38,10 @@ _BETWEEN = (502, 503, 504)
 class Client:
     """Client of a server that `tandem serve` or `tandem.serve()` has started. A client is for one thread.
 
-    url: URL of the server, for example "http://127.0.0.1:8700".
-    token: Token that the server requires. None: that of the environment variable TANDEM_TOKEN, if it is set.
-    timeout_s: Time limit for an answer; operators' calls may take up to 600 s.
+    Args:
+        url: URL of the server, for example "http://127.0.0.1:8700".
+        token: Token that the server requires. None: that of the environment variable TANDEM_TOKEN, if it is set.
+        timeout_s: Time limit for an answer; operators' calls may take up to 600 s.
     """
 
     def __init__(self, url: str, *, token: str | None = None, timeout_s: float = DEFAULT_TIMEOUT_S) -> None:
@@ -53,6 +54,8 @@ class Client:
             raise TandemError(f"{url!r} is no address of a server; give one as http://127.0.0.1:8700")
         kind = HTTPSConnection if parts.scheme == "https" else HTTPConnection
         self.url = url.rstrip("/")
+        """URL of the server, without a slash at its end."""
+
         self._path = parts.path.rstrip("/")
         self._connection = kind(parts.hostname, port, timeout=timeout_s)
         self._elsewhere: dict[str, HTTPConnection] = {}
@@ -67,17 +70,19 @@ class Client:
         """Creates an episode on this server; its assistance, renderer and sensors are the server's, which records
         it.
 
-        task: Id of a task, for example "handover".
-        seed: Seed of the objects' poses: 0 to 4294967295.
-        protocol: Rules of play: "agentic" for agents that think between commands, "benchmark" for learned policies.
+        Args:
+            task: Id of a task, for example "handover".
+            seed: Seed of the objects' poses: 0 to 4294967295.
+            protocol: Rules of play: "agentic" for agents that think between commands, "benchmark" for learned policies.
         """
         return RemoteEpisode(self, task, seed, protocol)
 
     def request(self, method: str, path: str, body: Mapping[str, Json] | None = None, *, key: str | None = None) -> Any:
         """Sends a request and returns its answer as parsed JSON; None for an empty one.
 
-        key: Idempotency-Key of the request, which makes the server execute it once, however often it is sent. None:
-            a new key, for requests that support one.
+        Args:
+            key: Idempotency-Key of the request, which makes the server execute it once, however often it is sent. None:
+                a new key, for requests that support one.
         """
         headers = {"content-type": "application/json"}
         if self._token:

@@ -38,20 +38,21 @@ from .errors import TandemError
 class Episode(BaseEpisode):
     """One episode in this process. Python's other threads run during physics and rendering.
 
-    task: Id of a task, for example "handover"; `tandem.tasks()` lists them.
-    seed: Seed of the objects' poses: 0 to 4294967295.
-    protocol: Rules of play: "agentic" for agents that think between commands, "benchmark" for learned policies.
-    assistance: Information for the policy: "full" with all sensor values, phases as they are reached and hints on
-        grasping; "paper" as in the benchmark.
-    record: Folder for `episode.mcap`, `result.json`, `strip.png` and `report.html`. None: nothing is written.
-    renderer: Renderer of images.
-    state_estimate: Source of the robots' own state.
-    sensors: Sensor model of the robots.
-    stress: Disturbance; results name it.
-    level: Level of the stress; 1 by default.
-    scene: MJCF file of a scene in place of the task's own.
-    robot: File with a robot in place of the embedded one.
-    task_file: TOML file with your own task, whose id `task` is.
+    Args:
+        task: Id of a task, for example "handover"; `tandem.tasks()` lists them.
+        seed: Seed of the objects' poses: 0 to 4294967295.
+        protocol: Rules of play: "agentic" for agents that think between commands, "benchmark" for learned policies.
+        assistance: Information for the policy: "full" with all sensor values, phases as they are reached and hints on
+            grasping; "paper" as in the benchmark.
+        record: Folder for `episode.mcap`, `result.json`, `strip.png` and `report.html`. None: nothing is written.
+        renderer: Renderer of images.
+        state_estimate: Source of the robots' own state.
+        sensors: Sensor model of the robots.
+        stress: Disturbance; results name it.
+        level: Level of the stress; 1 by default.
+        scene: MJCF file of a scene in place of the task's own.
+        robot: File with a robot in place of the embedded one.
+        task_file: TOML file with your own task, whose id `task` is.
     """
 
     def __init__(

@@ -12,20 +12,21 @@ class Unreachable(TandemError):
 
 
 class Refused(TandemError):
-    """An episode or a server refuses a request.
-
-    kind: Stable name of the kind of refusal, for example "unknown-robot".
-    title: The kind in words.
-    detail: Problem of this call and what would work; it is the exception's text.
-    retry_after_s: Seconds after which the same request may work. None: it will be refused again.
-    """
+    """An episode or a server refuses a request."""
 
     def __init__(self, kind: str, title: str, detail: str, retry_after_s: float | None = None) -> None:
         super().__init__(detail)
         self.kind = kind
+        """Stable name of the kind of refusal, for example "unknown-robot"."""
+
         self.title = title
+        """The kind in words."""
+
         self.detail = detail
+        """Problem of this call and what would work; it is the exception's text."""
+
         self.retry_after_s = retry_after_s
+        """Seconds after which the same request may work. None: it will be refused again."""
 
     def __reduce__(self) -> tuple[type[Refused], tuple[str, str, str, float | None]]:
         return type(self), (self.kind, self.title, self.detail, self.retry_after_s)

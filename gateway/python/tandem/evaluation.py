@@ -170,17 +170,18 @@ def evaluate(
 ) -> Evaluation:
     """Plays every seed of every task and counts the results, like `tandem evaluate`.
 
-    policy: Called with each episode after its start; it plays until it is done or the episode has ended. Its
-        exceptions end only the current episode, which is not counted. The first one is printed, and if the first
-        three episodes end with the same one, the evaluation ends. The end of an episode is not such an exception.
-        "expert" is the task's scripted expert, which sees object poses; "idle" holds still.
-    tasks: A task's id, or several; "all" for the benchmark's ten, "tandem+" for that suite.
-    seeds: A seed, or several.
-    jobs: Number of parallel episodes, each on its own thread, on which the policy is called. Physics and rendering
-        run in parallel; Python code of policies does not.
-    settings: `name`, `protocol`, `assistance`, `instructions`, `out`, `overwrite`, `resume_with_new_build`,
-        `record`, `progress`, `renderer`, `state_estimate`, `sensors`, `stress`, `level`, `scene`, `robot`,
-        `task_file`, `seed_key`: see `EvaluationSettings`.
+    Args:
+        policy: Called with each episode after its start; it plays until it is done or the episode has ended. Its
+            exceptions end only the current episode, which is not counted. The first one is printed, and if the first
+            three episodes end with the same one, the evaluation ends. The end of an episode is not such an exception.
+            "expert" is the task's scripted expert, which sees object poses; "idle" holds still.
+        tasks: A task's id, or several; "all" for the benchmark's ten, "tandem+" for that suite.
+        seeds: A seed, or several.
+        jobs: Number of parallel episodes, each on its own thread, on which the policy is called. Physics and rendering
+            run in parallel; Python code of policies does not.
+        settings: `name`, `protocol`, `assistance`, `instructions`, `out`, `overwrite`, `resume_with_new_build`,
+            `record`, `progress`, `renderer`, `state_estimate`, `sensors`, `stress`, `level`, `scene`, `robot`,
+            `task_file`, `seed_key`: see `EvaluationSettings`.
     """
     plan = Plan.of(policy, tasks, seeds, settings)
     return plan.evaluated(lambda folder: plan.play(folder, jobs))
@@ -421,10 +422,11 @@ def report(
     """Writes a report on the results of `evaluate`, `tandem evaluate`, `tandem collect` or servers, and returns its
     path.
 
-    folders: One or several; results of one policy are joined.
-    format: A self-contained page, Markdown, a line for each rate, all figures, tables for LaTeX, a line for each
-        episode, a figure of the rates, or a figure of the times of phases.
-    out: File to write. None: report.FORMAT in the first folder.
+    Args:
+        folders: One or several; results of one policy are joined.
+        format: A self-contained page, Markdown, a line for each rate, all figures, tables for LaTeX, a line for each
+            episode, a figure of the rates, or a figure of the times of phases.
+        out: File to write. None: report.FORMAT in the first folder.
     """
     several = [folders] if isinstance(folders, str | PathLike) else list(folders)
     paths = [str(Path(folder)) for folder in several]

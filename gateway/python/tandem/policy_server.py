@@ -72,13 +72,14 @@ def serve_policy(infer: Infer | Mapping[str, Infer], *, host: str = "127.0.0.1",
     """Starts a server for `tandem evaluate --policy act:...`, and returns at once. Requests are answered one after
     another.
 
-    infer: Called with the inputs of the policy map, by key, and with the policy's memory; returns arrays by the
-        map's action keys. The memory is a dictionary that is empty at an episode's first request and kept until the
-        episode ends. Each episode has its own dictionary if the map has `"moment" = ["episode", "step", "reset"]`
-        among its states; otherwise every request has an empty one. With a mapping, each robot's policy is served at
-        its own address, for maps with local scope.
-    host: Address to listen on.
-    port: Port; 0 picks a free one.
+    Args:
+        infer: Called with the inputs of the policy map, by key, and with the policy's memory; returns arrays by the
+            map's action keys. The memory is a dictionary that is empty at an episode's first request and kept until the
+            episode ends. Each episode has its own dictionary if the map has `"moment" = ["episode", "step", "reset"]`
+            among its states; otherwise every request has an empty one. With a mapping, each robot's policy is served at
+            its own address, for maps with local scope.
+        host: Address to listen on.
+        port: Port; 0 picks a free one.
     """
     policies = {"act": infer} if callable(infer) else dict(infer)
     if not policies:

@@ -13,8 +13,9 @@ from . import _native
 def main(arguments: list[str] | None = None) -> int:
     """Runs a command as the program `tandem` does, and returns its exit code.
 
-    arguments: Arguments after the program's name, for example ["demo", "--seeds", "3"]. None: those of this
-        process.
+    Args:
+        arguments: Arguments after the program's name, for example ["demo", "--seeds", "3"]. None: those of this
+            process.
     """
     given = sys.argv[1:] if arguments is None else arguments
     if threading.current_thread() is threading.main_thread():

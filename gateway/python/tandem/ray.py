@@ -59,15 +59,16 @@ def evaluate(
 ) -> Evaluation:
     """Does the same as `tandem.evaluate`, with the same results and hashes, in the processes of a cluster.
 
-    policy: As in `tandem.evaluate`. A process unpickles it once and calls it for one episode after another, so data
-        loaded in its first call stays loaded.
-    jobs: Number of parallel episodes. None: the number of processors of the cluster at the start.
-    retries: Number of retries of an episode whose process or machine was lost. After that, the episode is listed in
-        `left_out`, and the next evaluation into the same folder plays it.
-    task_options: Ray options of an episode's task, for example {"num_cpus": 2} or {"num_gpus": 0.25}; one processor
-        by default.
-    settings: As in `tandem.evaluate`. A `scene`, `robot`, `task_file`, `instructions` or `seed_key` has to be at
-        the same path on every machine.
+    Args:
+        policy: As in `tandem.evaluate`. A process unpickles it once and calls it for one episode after another, so data
+            loaded in its first call stays loaded.
+        jobs: Number of parallel episodes. None: the number of processors of the cluster at the start.
+        retries: Number of retries of an episode whose process or machine was lost. After that, the episode is listed in
+            `left_out`, and the next evaluation into the same folder plays it.
+        task_options: Ray options of an episode's task, for example {"num_cpus": 2} or {"num_gpus": 0.25}; one processor
+            by default.
+        settings: As in `tandem.evaluate`. A `scene`, `robot`, `task_file`, `instructions` or `seed_key` has to be at
+            the same path on every machine.
     """
     plan = Plan.of(policy, tasks, seeds, settings)
     options: dict[str, Any] = {"num_cpus": 1, "max_retries": retries, **(task_options or {})}

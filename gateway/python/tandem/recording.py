@@ -59,13 +59,16 @@ class Recording:
     """An `episode.mcap`, every byte of which is checked. Entry 0 of every array is the state before the first step;
     entry i is that after step i. It includes privileged information: poses in the world, contacts, falls.
 
-    path: The file, or its folder.
-    renderer: Renderer of its images. None: that of the episode.
+    Args:
+        path: The file, or its folder.
+        renderer: Renderer of its images. None: that of the episode.
     """
 
     def __init__(self, path: str | PathLike[str], *, renderer: Renderer | None = None) -> None:
         given = Path(path)
         self.path = given / "episode.mcap" if given.is_dir() else given
+        """Path of the recording's file."""
+
         self._native = _native.Recording.read(self.path, renderer)
         self._about: dict[str, Any] = json.loads(self._native.about())
 
@@ -247,9 +250,10 @@ class Recording:
     def picture(self, camera: str, step: int, *, size: tuple[int, int] | None = None) -> Picture:
         """Renders a camera's image.
 
-        camera: One of `cameras`.
-        step: Index into the arrays; negative ones count from the end.
-        size: Width and height in pixels. None: the camera's own.
+        Args:
+            camera: One of `cameras`.
+            step: Index into the arrays; negative ones count from the end.
+            size: Width and height in pixels. None: the camera's own.
         """
         rgb, depth_m = self._native.picture(camera, self._index(step), size)
         return Picture(rgb, depth_m)
@@ -258,9 +262,10 @@ class Recording:
         """Renders a camera's image without depth, as a policy gets it that requests this size. A smaller image with
         the same aspect ratio is scaled from the camera's own.
 
-        camera: One of `cameras`.
-        step: Index into the arrays; negative ones count from the end.
-        size: Width and height in pixels. None: the camera's own.
+        Args:
+            camera: One of `cameras`.
+            step: Index into the arrays; negative ones count from the end.
+            size: Width and height in pixels. None: the camera's own.
         """
         return self._native.colours(camera, self._index(step), size)
 

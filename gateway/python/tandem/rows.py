@@ -17,8 +17,13 @@ from .errors import TandemError
 from .recording import Recording
 
 STATE = "observation.state"
+"""Feature of a data set with the robots' state."""
+
 ACTION = "action"
+"""Feature with the rows of actions."""
+
 IMAGES = "observation.images."
+"""First part of the names of features with images; a camera's name follows."""
 
 EGOCENTRIC = "egocentric"
 """Name of a robot's own camera in rows of a single robot; in rows of all robots it has the robot's name."""
@@ -41,7 +46,11 @@ class RowColumn:
     """A number of a row."""
 
     name: str
+    """Name, for example "left_shoulder_pitch_joint_rad"; in rows of all robots after the robot's name."""
+
     unit: str
+    """Unit, for example "rad"."""
+
     min: float
     """Minimum of the range to which actions are clamped, in the unit."""
 
@@ -54,11 +63,17 @@ class RowContract:
     """Contents of a row: one moment of all robots, or of one."""
 
     version: int
+    """Version of the layout."""
+
     rate_hz: int
     """Rows per second. Joint targets are reached by the next row, on a straight line."""
 
     state: tuple[RowColumn, ...]
+    """Columns of the state."""
+
     action: tuple[RowColumn, ...]
+    """Columns of the actions."""
+
     images: dict[str, tuple[int, int]]
     """Width and height of each image."""
 
@@ -66,8 +81,9 @@ class RowContract:
     def from_native(layout: str, robots: Sequence[str] | None, rate_hz: int, images: dict[str, tuple[int, int]]) -> RowContract:
         """Creates a contract from the layout of one robot's rows.
 
-        layout: Layout as JSON.
-        robots: Names of the robots, which begin the columns' names. None: rows of a single robot.
+        Args:
+            layout: Layout as JSON.
+            robots: Names of the robots, which begin the columns' names. None: rows of a single robot.
         """
         one: dict[str, Any] = json.loads(layout)
         prefixes = ("",) if robots is None else tuple(f"{robot}." for robot in robots)
@@ -129,7 +145,8 @@ class RowContract:
 def read_contract(data_set: str | PathLike[str]) -> RowContract:
     """Reads the contract of a data set.
 
-    data_set: Folder from `tandem export lerobot`.
+    Args:
+        data_set: Folder from `tandem export lerobot`.
     """
     path = Path(data_set) / ABOUT_FILE
     try:

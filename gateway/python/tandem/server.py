@@ -53,20 +53,21 @@ def serve(
 ) -> Server:
     """Starts to serve episodes over HTTP, and returns at once.
 
-    listen: Address and port; port 0 picks a free one.
-    runs: Folder for recordings, one folder per episode.
-    assistance: Information for policies.
-    renderer: Renderer of images.
-    state_estimate: Source of the robots' own state.
-    sensors: Sensor model of the robots.
-    stress: Disturbance; results name it.
-    level: Level of the stress; 1 by default.
-    scene: MJCF file of a scene in place of the tasks' own.
-    robot: File with a robot in place of the embedded one.
-    task_file: TOML file with your own task, in addition to the built-in ones.
-    max_episodes: Maximum number of episodes held at once.
-    token_file: File with the token that every request has to send. Required if other machines can reach the
-        address.
+    Args:
+        listen: Address and port; port 0 picks a free one.
+        runs: Folder for recordings, one folder per episode.
+        assistance: Information for policies.
+        renderer: Renderer of images.
+        state_estimate: Source of the robots' own state.
+        sensors: Sensor model of the robots.
+        stress: Disturbance; results name it.
+        level: Level of the stress; 1 by default.
+        scene: MJCF file of a scene in place of the tasks' own.
+        robot: File with a robot in place of the embedded one.
+        task_file: TOML file with your own task, in addition to the built-in ones.
+        max_episodes: Maximum number of episodes held at once.
+        token_file: File with the token that every request has to send. Required if other machines can reach the
+            address.
     """
     settings = settings_json(
         listen=listen,

@@ -28,7 +28,9 @@ class TandemBenchmark(StepBenchmark):
     full); several rows are a chunk, played before the server is asked again.
     Results: `success`, `phases` (how many were reached), and `p1` to `p3`, whose means are the rates of the task's table.
 
-    seed: That of every task's first episode; episode i has the seed i further on. 0 to 100 are for results.
+    Args:
+        seed: That of every task's first episode; episode i has the seed i further on. 0 to 100 are for results.
+
     The rest is as in `gym_tandem.Options`.
     """
 

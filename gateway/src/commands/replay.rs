@@ -8,8 +8,8 @@ use std::str::FromStr;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use tandem_episodes::replay::{
-    Difference, DrawnPictures, EpisodeCamera, PictureSize, PicturesPlan, Verdict, Verification, draw_all,
-    film, verify,
+    Difference, DrawnPictures, EpisodeCamera, FilmPlan, PictureSize, PicturesPlan, Verdict, Verification,
+    draw_all, film, verify,
 };
 use tandem_episodes::{
     Checkpoint, EpisodeSpec, FAILED_STEP_FILE, Recording, RendererKind, Session, printable,
@@ -47,6 +47,10 @@ pub struct ReplayArgs {
     /// Images per second of simulated time.
     #[arg(long, value_name = "HZ", default_value_t = 25, value_parser = clap::value_parser!(u32).range(1..=50))]
     rate: u32,
+    /// Duration of the video in seconds, for example 4 for a film that plays faster than a long episode
+    /// [default: the episode's].
+    #[arg(long, value_name = "S", requires = "video", value_parser = clap::value_parser!(u32).range(1..=3600))]
+    seconds: Option<u32>,
     /// Size of the images, for example 640x480 [default: the camera's own].
     #[arg(long, value_name = "WIDTHxHEIGHT")]
     size: Option<SizeFlag>,
@@ -106,8 +110,11 @@ pub fn run(args: ReplayArgs) -> CommandResult {
         let size = args.size.map(|SizeFlag(size)| size);
         if let Some(video) = &args.video {
             let view = EpisodeCamera::find(&args.camera, &recording.spec.task)?;
-            let pictures = film(&recording, view, size, args.rate, video)?;
-            println!("  {}: {pictures} pictures, {} a second", video.display(), args.rate);
+            let plan = FilmPlan { view, size, rate_hz: args.rate, duration_s: args.seconds };
+            let pictures = film(&recording, &plan, video)?;
+            let pace =
+                args.seconds.map_or_else(|| format!("{} a second", args.rate), |s| format!("in {s} s"));
+            println!("  {}: {pictures} pictures, {pace}", video.display());
         }
         if let Some(folder) = &args.render {
             let plan = PicturesPlan {
@@ -266,6 +273,7 @@ mod tests {
             camera: "third_person".into(),
             render: None,
             rate: 25,
+            seconds: None,
             size: None,
             jobs: 1,
             cameras: vec![],

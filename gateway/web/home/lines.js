@@ -53,7 +53,7 @@ export function waysToConnect({ url, locked, task, seed, episode }) {
         `  [{"robot": "A", "right_position_m": [0.12, -0.2, 0.18]}]}'`,
       ),
     },
-    { name: "Python", hint: "With the package tandem.", text: python({ url, task, seed, episode }) },
+    { name: "Python", hint: "With the package tandem-sim.", text: python({ url, task, seed, episode }) },
     {
       name: "A language model",
       hint: "Any endpoint of OpenAI's or Anthropic's formats.",

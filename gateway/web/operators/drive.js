@@ -9,6 +9,7 @@ import { Hands } from "./hands.js";
 import { Headset } from "./headset/headset.js";
 import { CLOSED, OPEN, closedBy, listen, wanted, withHeadset } from "./inputs.js";
 import { layOut, nothing } from "./panel.js";
+import { Touch } from "./touch.js";
 import { Wheel, tokensOf } from "./wheel.js";
 
 const SAY_MS = 20;
@@ -37,8 +38,8 @@ export async function drive(main, seat) {
 
 class DrivePage {
   constructor(main, seat, root, briefing) {
-    Object.assign(this, { seat, root, hand: "right", fingers: {}, shares: {}, heightM: null, paused: null, stepwise: false, steps: 0, gone: new Set(), over: new AbortController(), left: false });
-    this.panel = layOut(main, seat, briefing, {
+    Object.assign(this, { seat, root, hand: "right", fingers: {}, shares: {}, heightM: null, paused: null, stepwise: false, steps: 0, gone: new Set(), over: new AbortController(), left: false, touch: new Touch() });
+    this.panel = layOut(main, seat, briefing, this.touch.parts, {
       act: (action) => this.act(action),
       speak: (text) => call(`${root}/tools/say`, seat.token, { text }),
       finish: () => this.finish(),
@@ -116,7 +117,8 @@ class DrivePage {
     if (!this.hands) return;
     const seen = !document.hidden || this.headset.session;
     const go = seen && !this.paused && !this.stepwise && !this.finishing;
-    const want = this.headset.session ? withHeadset(wanted(this.keys), this.headset.wanted()) : wanted(this.keys);
+    const own = wanted(this.keys, this.touch.wanted());
+    const want = this.headset.session ? withHeadset(own, this.headset.wanted()) : own;
     const moves = (values) => values.some((value) => value !== 0);
     if (want.clutch) {
       this.hands.letGo();
@@ -268,7 +270,7 @@ class DrivePage {
 
   /**
    * Dragging moves a wrist in the plane that faces the camera; with Shift, or by the wheel, along the line of sight. With Ctrl it turns the
-   * hand as a ball is turned that lies under the pointer, and the wheel turns it about the line of sight.
+   * hand as a ball is turned that lies under the pointer, and the wheel turns it about the line of sight. Fingers choose by buttons.
    */
   draggable(side) {
     const handle = this.panel.handles[side];
@@ -277,7 +279,13 @@ class DrivePage {
       this.hands.shift(side, this.hands.inPelvis(this.stage.way(this.hands.handle(side), right, down, away)));
       this.panel.handle(side, this.stage.project(this.hands.handle(side)));
     };
-    handle.addEventListener("pointerdown", (event) => { handle.setPointerCapture(event.pointerId); this.act(side); });
+    // Not every browser says of a finger how far it has moved.
+    let [x, y] = [0, 0];
+    handle.addEventListener("pointerdown", (event) => {
+      handle.setPointerCapture(event.pointerId);
+      [x, y] = [event.clientX, event.clientY];
+      this.act(side);
+    });
     const turn = (right, down, round) => {
       if (!this.hands) return;
       this.hands.rotate(side, this.hands.inPelvis(this.stage.axis(right, down, round)));
@@ -285,9 +293,11 @@ class DrivePage {
     handle.addEventListener("contextmenu", (event) => event.preventDefault());
     handle.addEventListener("pointermove", (event) => {
       if (!handle.hasPointerCapture(event.pointerId)) return;
-      if (event.ctrlKey) turn(event.movementX * 0.01, event.movementY * 0.01, 0);
-      else if (event.shiftKey) drag(0, 0, -event.movementY * 0.002);
-      else drag(event.movementX, event.movementY, 0);
+      const [right, down] = [event.clientX - x, event.clientY - y];
+      [x, y] = [event.clientX, event.clientY];
+      if (event.ctrlKey || this.touch.drag === "turn") turn(right * 0.01, down * 0.01, 0);
+      else if (event.shiftKey || this.touch.drag === "along") drag(0, 0, -down * 0.002);
+      else drag(right, down, 0);
     });
     handle.addEventListener("wheel", (event) => {
       event.preventDefault();

@@ -51,18 +51,18 @@ function gamepad() {
   return { base: [-y, -x, -turn], triggers: { left, right }, clutch: leftBumper + rightBumper > 0.5 };
 }
 
-/** What keys and gamepad ask for now: velocities of base, selected wrist and height, triggers and clutch. */
-export function wanted(keys) {
+/** What keys, gamepad and the pads for thumbs ask for now: velocities of base, selected wrist and height, triggers and clutch. */
+export function wanted(keys, thumbs) {
   const pad = gamepad();
   const most = (value) => Math.max(-1, Math.min(1, value));
-  const base = sum(keys, BASE_KEYS, 3).map((value, axis) => most(value + pad.base[axis]));
+  const base = sum(keys, BASE_KEYS, 3).map((value, axis) => most(value + pad.base[axis] + thumbs.base[axis]));
   return {
     vx_m_s: base[0] * WALK_M_S,
     vy_m_s: base[1] * WALK_M_S,
     yaw_rate_rad_s: base[2] * TURN_RAD_S,
     wristM_s: sum(keys, WRIST_KEYS, 3).map((value) => value * WRIST_M_S),
     wristRad_s: sum(keys, ROTATION_KEYS, 3).map((value) => value * WRIST_RAD_S),
-    heightM_s: HEIGHT_M_S * [...keys].reduce((total, key) => total + (HEIGHT_KEYS[key] ?? 0), 0),
+    heightM_s: HEIGHT_M_S * [...keys].reduce((total, key) => total + (HEIGHT_KEYS[key] ?? 0), thumbs.height),
     triggers: pad.triggers,
     clutch: pad.clutch,
   };

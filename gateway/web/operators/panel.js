@@ -2,6 +2,7 @@
 
 import { element, say, words } from "../src/dom.js";
 import { SIDES } from "../src/message.js";
+import { byTouch } from "./touch.js";
 
 /** How a person drives. */
 const WAYS = [
@@ -11,8 +12,14 @@ const WAYS = [
   ["Gamepad", "sticks walk and turn, triggers close the hands, bumpers rest the arms where they are"],
 ];
 
+/** The same by fingers. */
+const TOUCH_WAYS = [
+  ["Move a hand", "drag L or R: across what you see, in and out of it, or turning it, as the buttons between the pads say"],
+  ["Walk", "push the left pad; the right one turns, and lifts and lowers the body"],
+];
+
 /** No handle is nearer to the border. */
-const BORDER_PX = 26;
+const BORDER_PX = 32;
 
 /** There is nothing to drive, and why. */
 export function nothing(main, why) {
@@ -20,8 +27,9 @@ export function nothing(main, why) {
     element("p", {}, "The link may be of another start of the server, or the episode has ended. ", element("a", { href: "/operate" }, "Start another")));
 }
 
-/** Lays the page out; answers with what changes it. `on` hears what the person does beside driving. */
-export function layOut(main, { robot, episode, collection }, briefing, on) {
+/** Lays the page out; answers with what changes it. `pads` are for thumbs; `on` hears what the person does beside driving. */
+export function layOut(main, { robot, episode, collection }, briefing, pads, on) {
+  const touch = byTouch();
   const part = briefing.instructions.find((entry) => entry.robot === robot)?.instruction ?? "";
   const status = element("p", { role: "status", class: "operate-status" }, "Connecting.");
   const handles = Object.fromEntries(SIDES.map((side) => [side, element("button", { type: "button", class: `handle ${side}`, "aria-label": `${side} wrist: drag` }, side[0].toUpperCase())]));
@@ -30,7 +38,7 @@ export function layOut(main, { robot, episode, collection }, briefing, on) {
   const place = element("div", { class: "operate-view" }, view, border, ...Object.values(handles));
   const facts = element("p", { class: "soft" });
   const phases = new Phases(briefing.phases ?? []);
-  const button = (text, action, key, title) => element("button", { type: "button", title, onclick: () => on.act(action) }, key ? `${text} (${key})` : text);
+  const button = (text, action, key, title) => element("button", { type: "button", title, onclick: () => on.act(action) }, key && !touch ? `${text} (${key})` : text);
   const pause = button("Pause", "pause");
   const step = button("Step", "step", "Enter");
   const which = { left: button("Left hand", "left", "1", "Keys and buttons are for the left hand"), right: button("Right hand", "right", "2", "Keys and buttons are for the right hand") };
@@ -40,20 +48,22 @@ export function layOut(main, { robot, episode, collection }, briefing, on) {
   const wear = element("button", { type: "button", hidden: true, onclick: () => on.wear() }, "Enter VR");
   const stepwise = element("input", { type: "checkbox", onchange: (event) => on.stepwise(event.target.checked) });
   const after = element("div");
+  const fingers = element("div", { class: "tools fingers" },
+    button("Open", "open", "O", "Opens the fingers of this hand"), button("Close", "close", "C", "Closes the fingers of this hand"),
+    button("Level", "level", "H", "Turns this hand so that its fingers point ahead and its palm inwards"),
+    button("Rest here", "clutch", "space", "Both arms stay as they are: where the hands were to go is forgotten"));
+  const thumbs = touch ? [...pads, fingers] : [];
   const controls = element("div", {},
     element("div", { class: "tools" }, looks, element("label", {}, stepwise, " step by step"), step, wear),
     element("div", { class: "tools", role: "group", "aria-label": "The hand that keys and buttons are for" }, which.left, which.right),
-    element("div", { class: "tools" },
-      button("Open", "open", "O", "Opens the fingers of this hand"), button("Close", "close", "C", "Closes the fingers of this hand"),
-      button("Level", "level", "H", "Turns this hand so that its fingers point ahead and its palm inwards"),
-      button("Rest here", "clutch", "space", "Both arms stay as they are: where the hands were to go is forgotten")),
+    touch ? null : fingers,
     element("div", { class: "tools" }, pause,
       element("button", { type: "button", title: "Your part is done: the episode ends when everybody has finished", onclick: () => on.finish() }, "Finish")),
-    element("ul", { class: "ways soft" }, ...WAYS.map(([what, how]) => element("li", {}, element("strong", {}, `${what}: `), how))));
+    element("ul", { class: "ways soft" }, ...(touch ? TOUCH_WAYS : WAYS).map(([what, how]) => element("li", {}, element("strong", {}, `${what}: `), how))));
   main.replaceChildren(
     element("h1", {}, `You drive robot ${robot}`), element("p", {}, part), status, after,
-    element("div", { class: "columns operate", onmousedown: keepKeys },
-      element("div", {}, place, facts),
+    element("div", { class: `columns operate${touch ? " touch" : ""}`, onmousedown: keepKeys },
+      element("div", {}, element("div", { class: "cockpit" }, place, ...thumbs), facts),
       element("div", { class: "side" }, controls, element("h2", {}, "Talk"), ...chat.elements),
       phases.node));
   const cursors = new Map();
@@ -95,7 +105,7 @@ export function layOut(main, { robot, episode, collection }, briefing, on) {
       status.classList.toggle("good", isComplete);
       say(status, isComplete ? "Done: the task is complete." : `The episode has ended: ${words(result.ended)}.`);
       controls.hidden = true;
-      for (const handle of Object.values(handles)) handle.hidden = true;
+      for (const control of [...Object.values(handles), ...thumbs]) control.hidden = true;
       for (const cursor of cursors.values()) cursor.hidden = true;
       chat.close();
       if (!collection) after.replaceChildren(...whereFound(episode));

@@ -1,5 +1,5 @@
-// The page at /operate in a headless Chromium: two people start an episode, drive by handles, keys and a gamepad, talk, go away and come
-// back, take hold of the bottle and lift it. How it is run is said in shared/browser.mjs.
+// The page at /operate in a headless Chromium: two people start an episode, drive by handles, keys, a gamepad and the fingers of a hand that
+// holds a telephone, talk, go away and come back, take hold of the bottle and lift it. How it is run is said in shared/browser.mjs.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { join } from "node:path";
@@ -15,7 +15,8 @@ function pad() {
 }
 
 /** A person: a browser's context of their own. */
-const person = (path) => open(new URL(path, base).href, { before: [hear, pad, inPages] });
+const person = (path, device) => open(new URL(path, base).href, { before: [hear, pad, inPages], ...device });
+const TELEPHONE = { viewport: { width: 400, height: 800 }, deviceScaleFactor: 2, hasTouch: true, isMobile: true };
 
 const running = (page) => page.getByRole("status").filter({ hasText: "Running" }).waitFor({ timeout: PATIENCE_MS });
 
@@ -162,6 +163,41 @@ await withPad(pageA, [0, 0, 0, 0], { 5: 1 });
 await pageA.waitForTimeout(300);
 await withPad(pageA, [0, 0, 0, 0], {});
 assert.ok(await targetOf(pageA));
+
+// B drives on by a telephone: one thumb walks, then turns, while a finger drags a hand; the page stays where it is.
+await pageB.context().close();
+pageB = await person(b, TELEPHONE);
+await Promise.all([running(pageA), running(pageB)]);
+await accessible(pageB, "who drives by a telephone");
+assert.equal(await pageB.evaluate(() => document.documentElement.scrollWidth), TELEPHONE.viewport.width);
+const screen = await pageB.context().newCDPSession(pageB);
+const fingersAre = (type, ...touchPoints) => screen.send("Input.dispatchTouchEvent", { type, touchPoints });
+const middleOf = async (id, selector) => {
+  const { x: left, y: top, width, height } = await pageB.locator(selector).boundingBox();
+  assert.ok(Math.min(width, height) >= 44, `${selector} is ${width} by ${height} pixels`);
+  return { id, x: left + width / 2, y: top + height / 2 };
+};
+const [thumb, round, finger] = [await middleOf(0, ".pad.walk"), await middleOf(1, ".pad.turn"), await middleOf(2, ".handle.left")];
+const shifted = (point, right, down) => ({ ...point, x: point.x + right, y: point.y + down });
+const standing = await stateOf(b, "B");
+await fingersAre("touchStart", thumb);
+await fingersAre("touchMove", shifted(thumb, 0, 50));
+await until("by a thumb B walked [m]", () => walkedM(standing), 0.1);
+await fingersAre("touchEnd");
+const [halfTurn, reached] = await stateOf(b, "B").then(({ pelvis_in_start: pelvis, left_wrist: wrist }) => [pelvis.quaternion_wxyz, wrist]);
+await fingersAre("touchStart", shifted(round, -50, 0));
+await fingersAre("touchStart", shifted(round, -50, 0), finger);
+for (let step = 1; step <= 10; step += 1) await fingersAre("touchMove", shifted(round, -50, 0), shifted(finger, 0, -12 * step));
+const turnedRad = async () => {
+  const { quaternion_wxyz: turn } = (await stateOf(b, "B")).pelvis_in_start;
+  return 2 * Math.acos(Math.min(1, Math.abs(turn.reduce((sum, value, axis) => sum + value * halfTurn[axis], 0))));
+};
+await until("by a thumb B turned [rad]", turnedRad, 0.3);
+await until("by a finger B's left wrist moved [m]", async () => movedBy(reached, (await stateOf(b, "B")).left_wrist), 0.05);
+await pageB.screenshot({ path: "drive-telephone.png" });
+await fingersAre("touchEnd");
+assert.deepEqual(await pageB.evaluate(() => [scrollX, scrollY, visualViewport.scale]), [0, 0, 1], "a finger moved the page");
+assert.equal(await pageB.locator(".pad .knob").first().evaluate((knob) => knob.style.transform), "translate(0%, 0%)");
 
 // Step by step: time passes only when it is asked for.
 /** When it is once time stands still. */

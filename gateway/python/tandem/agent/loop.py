@@ -41,8 +41,9 @@ class Played:
 class Player:
     """A model that plays an episode.
 
-    begun: The first event, with the model's instructions.
-    journal: Journal of the events. If it has events of earlier processes, the play continues after them.
+    Args:
+        begun: The first event, with the model's instructions.
+        journal: Journal of the events. If it has events of earlier processes, the play continues after them.
     """
 
     def __init__(

@@ -48,8 +48,9 @@ class Note:
 class Seat:
     """One episode on a server, for a client that controls all robots or one of them.
 
-    robot: The only robot that is controlled; the client's token is then its operator's. None: all robots.
-    tools: Tools of the model. None: those that the server offers.
+    Args:
+        robot: The only robot that is controlled; the client's token is then its operator's. None: all robots.
+        tools: Tools of the model. None: those that the server offers.
     """
 
     def __init__(self, client: Client, episode_id: str, robot: str | None = None, tools: Sequence[Tool] | None = None) -> None:
@@ -70,7 +71,8 @@ class Seat:
     def call(self, call: Call, key: str) -> Answer:
         """Makes a tool call of the model. A refusal is also an answer, and says what would have worked.
 
-        key: Idempotency-Key of the call.
+        Args:
+            key: Idempotency-Key of the call.
         """
         tool = next((tool for tool in self.tools if tool.name == call.tool), None)
         if tool is None:

@@ -76,8 +76,9 @@ class Demonstrations:
 def read(data_set: Path, chunk_rows: int, every: int) -> Demonstrations:
     """Reads a data set of the joint view, version 3, with the robots' own images.
 
-    chunk_rows: Rows of actions for each moment.
-    every: One row in `every` becomes a moment.
+    Args:
+        chunk_rows: Rows of actions for each moment.
+        every: One row in `every` becomes a moment.
     """
     read_contract(data_set)
     info, about = _json(data_set / "meta/info.json"), _json(data_set / ABOUT_FILE)

@@ -34,8 +34,9 @@ def as_seen(
     """Converts byte images, ... by height by width by 3, to the input of eyes: ... by 3 by height by width in
     -1..1.
 
-    gain, offset: Factors and offsets of an image's colours in 0..1, ... by 1 by 1 by 3.
-    kind: Type of the result.
+    Args:
+        gain, offset: Factors and offsets of an image's colours in 0..1, ... by 1 by 1 by 3.
+        kind: Type of the result.
     """
     height, width, colours = pictures.shape[-3:]
 

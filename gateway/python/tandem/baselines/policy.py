@@ -83,10 +83,11 @@ class Baseline:
     def act(self, pictures: NDArray[np.uint8], states: NDArray[np.float32], robots: Sequence[int]) -> NDArray[np.float32]:
         """Returns the actions of robots: rows by robots by 35.
 
-        pictures: Image of each of `robots`, height by width by 3.
-        states: State of each of them: 43 joint angles, the base command in force and the time since the start over
-            20 s.
-        robots: Indices of the robots.
+        Args:
+            pictures: Image of each of `robots`, height by width by 3.
+            states: State of each of them: 43 joint angles, the base command in force and the time since the start over
+                20 s.
+            robots: Indices of the robots.
         """
         chunks = np.empty((self.settings.chunk_rows, len(robots), 35), np.float32)
         place = {robot: number for number, robot in enumerate(robots)}

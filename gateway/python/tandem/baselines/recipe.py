@@ -65,11 +65,12 @@ def run_recipe(
     """Makes all missing parts, command by command, and returns the report, which includes the folder's other
     policies. An interrupted recipe is continued.
 
-    task: Id of the task.
-    out: Folder for all parts.
-    settings: Settings of the training.
-    recipe: Amounts of data and evaluation.
-    tell: Called with each command, and with the output of the training.
+    Args:
+        task: Id of the task.
+        out: Folder for all parts.
+        settings: Settings of the training.
+        recipe: Amounts of data and evaluation.
+        tell: Called with each command, and with the output of the training.
     """
     from .policy import load
     from .training import train

@@ -42,13 +42,14 @@ def train(
     """Trains a policy and returns its folder with the weights, the policy map for `tandem evaluate` and the
     learning curve. An interrupted run continues from its last checkpoint; a complete one is left unchanged.
 
-    data_set: Folder from `tandem export lerobot`, of version 3 and view joint.
-    out: Folder of the policy.
-    settings: Settings that determine the weights, besides data and threads.
-    threads: Number of PyTorch threads. None: the number of processors of this process, limited by a container's
-        quota.
-    device: PyTorch device.
-    tell: Called with lines of progress.
+    Args:
+        data_set: Folder from `tandem export lerobot`, of version 3 and view joint.
+        out: Folder of the policy.
+        settings: Settings that determine the weights, besides data and threads.
+        threads: Number of PyTorch threads. None: the number of processors of this process, limited by a container's
+            quota.
+        device: PyTorch device.
+        tell: Called with lines of progress.
     """
     settings, folder = settings or TrainingSettings(), Path(out)
     torch.set_num_threads(threads or min(torch.get_num_threads(), _native.available_processors()))

@@ -46,6 +46,7 @@ Color: TypeAlias = Literal[
     "grey",
     "black",
 ]
+"""Colour of a surface."""
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,7 @@ PoseFrame: TypeAlias = Literal[
     "start",
     "room",
 ]
+"""Frame of points and poses; the briefing describes each."""
 
 StopReason: TypeAlias = Literal[
     "steps_done",

@@ -42,7 +42,8 @@ class Tools(ABC):
         odometry, the base command in force and, unless `short`, 43 joint angles, velocities and torques. Costs
         no steps.
 
-        robot: The robot, for example "A".
+        Args:
+            robot: The robot, for example "A".
         """
         arguments: dict[str, Any] = {
             "robot": robot,
@@ -63,12 +64,13 @@ class Tools(ABC):
         Returns a row [u, v, x, y, z] for each, in the pelvis frame as wrist targets. A pixel sees a surface;
         the middle of an object is a little behind it. Costs no steps.
 
-        robot: The robot, for example "A".
-        pixels: Pixels [u, v], column 0 to 319 from the left, row 0 to 239 from the top.
-        region: Pixels of a rectangle, row by row.
-        fit: True: also the largest plane in `region`, its straight edges and their corners.
-        surface: Returns middle, size, corners and, of an upright round thing, axis of a surface in place of points.
-        frame: Frame of the points.
+        Args:
+            robot: The robot, for example "A".
+            pixels: Pixels [u, v], column 0 to 319 from the left, row 0 to 239 from the top.
+            region: Pixels of a rectangle, row by row.
+            fit: True: also the largest plane in `region`, its straight edges and their corners.
+            surface: Returns middle, size, corners and, of an upright round thing, axis of a surface in place of points.
+            frame: Frame of the points.
         """
         arguments: dict[str, Any] = {
             "robot": robot,
@@ -94,13 +96,14 @@ class Tools(ABC):
         """Ask whether wrists could reach poses from where the robot stands, by the waist and the arms that are
         given a pose. Nothing moves; costs no steps. Poses are as in move_wrists.
 
-        robot: The robot, for example "A".
-        left_position_m: Left wrist [x, y, z]. None: the present target.
-        left_quaternion_wxyz: Left wrist orientation.
-        right_position_m: Right wrist.
-        right_quaternion_wxyz: Right wrist orientation.
-        frame: Frame of the poses.
-        keep_waist: True: with the waist as it is.
+        Args:
+            robot: The robot, for example "A".
+            left_position_m: Left wrist [x, y, z]. None: the present target.
+            left_quaternion_wxyz: Left wrist orientation.
+            right_position_m: Right wrist.
+            right_quaternion_wxyz: Right wrist orientation.
+            frame: Frame of the poses.
+            keep_waist: True: with the waist as it is.
         """
         arguments: dict[str, Any] = {
             "robot": robot,
@@ -123,8 +126,9 @@ class Tools(ABC):
         The reply says whether each wrist has arrived, is moving (repeat or wait), is blocked by load or
         contact, or is out of reach.
 
-        steps: Control steps: 1 up to the budget's steps_per_command.
-        robots: One entry per robot that moves.
+        Args:
+            steps: Control steps: 1 up to the budget's steps_per_command.
+            robots: One entry per robot that moves.
         """
         arguments: dict[str, Any] = {
             "steps": steps,
@@ -141,8 +145,9 @@ class Tools(ABC):
         hands keep their joints and go along. Velocities are in the robot's own frame and apply during this
         command; the height persists.
 
-        steps: Control steps: 1 up to the budget's steps_per_command.
-        robots: One entry per robot that moves. Others hold still.
+        Args:
+            steps: Control steps: 1 up to the budget's steps_per_command.
+            robots: One entry per robot that moves. Others hold still.
         """
         arguments: dict[str, Any] = {
             "steps": steps,
@@ -158,7 +163,8 @@ class Tools(ABC):
         each needs the same number: 1 up to the budget's steps_per_command. Other robots hold still. Targets
         beyond joint limits are clamped and reported.
 
-        robots: One entry per robot that moves.
+        Args:
+            robots: One entry per robot that moves.
         """
         arguments: dict[str, Any] = {
             "robots": robots,
@@ -172,7 +178,8 @@ class Tools(ABC):
         """Let all robots hold their targets for a number of control steps of 20 ms. The reply reports on every
         robot.
 
-        steps: Control steps: 1 up to the budget's steps_per_command.
+        Args:
+            steps: Control steps: 1 up to the budget's steps_per_command.
         """
         arguments: dict[str, Any] = {
             "steps": steps,
@@ -188,7 +195,8 @@ class Tools(ABC):
         reached. Returns the last command's reply, how many were carried out, and why no more. If one is
         invalid, none is.
 
-        commands: The commands in order.
+        Args:
+            commands: The commands in order.
         """
         arguments: dict[str, Any] = {
             "commands": commands,
@@ -206,9 +214,10 @@ class Tools(ABC):
         call, take every robot to within 1.5 cm and 1.5 degrees of its place, unless one gets no nearer or steps
         run out. It does not look: go round obstacles by `waypoints`.
 
-        steps: Most steps, up to 1500: about 250, 150 a metre and 250 a quarter turn; with `carry` 300, 270 and 220.
-        robots: One entry per robot that walks.
-        frame: Frame of places and headings.
+        Args:
+            steps: Most steps, up to 1500: about 250, 150 a metre and 250 a quarter turn; with `carry` 300, 270 and 220.
+            robots: One entry per robot that walks.
+            frame: Frame of places and headings.
         """
         arguments: dict[str, Any] = {
             "steps": steps,
@@ -224,7 +233,8 @@ class Tools(ABC):
     ) -> StatusReply:
         """Ask how the episode is going: time, phases reached, fallen robots, and the budget left. Costs no steps.
 
-        explain: True: also what the next phase lacks, and where held things are.
+        Args:
+            explain: True: also what the next phase lacks, and where held things are.
         """
         arguments: dict[str, Any] = {
             "explain": explain,

@@ -82,13 +82,14 @@ def export_lerobot(
     """Writes the recordings in a folder as a data set, or as one data set per task in its own folder. An
     interrupted export is continued, and a data set appears once it is complete.
 
-    runs: A recording, or a folder to search for recordings; those in it are taken in the order of their names.
-    out: Folder of the data set.
-    settings: Settings of the data set.
-    only_successful: Leaves out episodes that did not reach their last phase.
-    only_good: Leaves out episodes without a file `good` in their folder.
-    jobs: Number of recordings to convert in parallel. None: one per core.
-    progress: Called with the number of finished recordings, and of all.
+    Args:
+        runs: A recording, or a folder to search for recordings; those in it are taken in the order of their names.
+        out: Folder of the data set.
+        settings: Settings of the data set.
+        only_successful: Leaves out episodes that did not reach their last phase.
+        only_good: Leaves out episodes without a file `good` in their folder.
+        jobs: Number of recordings to convert in parallel. None: one per core.
+        progress: Called with the number of finished recordings, and of all.
     """
     settings = settings or ExportSettings()
     for name in ("pyarrow", "av"):

@@ -58,9 +58,10 @@ class Part:
 def make_parts(path: Path, source: str, folder: Path, settings: ExportSettings, stop: threading.Event) -> list[Part]:
     """Returns the episodes that a recording becomes. Missing ones are rendered and written.
 
-    path: The recording.
-    source: Name of the recording in the data set.
-    folder: Folder of the parts of this recording.
+    Args:
+        path: The recording.
+        source: Name of the recording in the data set.
+        folder: Folder of the parts of this recording.
     """
     recording: Recording | None = None
     names = part_names(folder)

@@ -100,7 +100,8 @@ class ExportSettings:
 def library(name: str, what: str = "data sets are written by pyarrow and PyAV", extra: str = "lerobot") -> Any:
     """Imports a library of an extra when it is needed; the rest of the package works without it.
 
-    what: Purpose of the library, for the error message.
+    Args:
+        what: Purpose of the library, for the error message.
     """
     try:
         return import_module(name)

@@ -104,9 +104,10 @@ def place(files: int) -> dict[str, int]:
 def numbered(part: Part, number: int, first: int, task: int, rate_hz: int) -> Any:
     """Returns the rows of an episode, with the columns that number them.
 
-    number: Number of the episode.
-    first: Number of rows before it.
-    task: Number of its task.
+    Args:
+        number: Number of the episode.
+        first: Number of rows before it.
+        task: Number of its task.
     """
     pa, pq = library("pyarrow"), library("pyarrow.parquet")
     rows = pq.read_table(part.rows_file)

@@ -207,7 +207,13 @@ impl<'a> Contract<'a> {
         lines.add(0, &format!("{name}: TypeAlias = Literal["));
         values.iter().for_each(|value| lines.add(1, &format!("\"{value}\",")));
         lines.add(0, "]");
-        docstring(lines, 0, &described(&self.types[name]), &[]);
+        let text = match name {
+            // Schemas only name these, so that lists of tools are short.
+            "Color" => "Colour of a surface.".to_owned(),
+            "PoseFrame" => "Frame of points and poses; the briefing describes each.".to_owned(),
+            _ => described(&self.types[name]),
+        };
+        docstring(lines, 0, &text, &[]);
     }
 
     fn reply_class(&self, lines: &mut Lines, name: &str) {

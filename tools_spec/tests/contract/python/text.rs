@@ -51,24 +51,25 @@ impl Lines {
     }
 }
 
-/// Returns a docstring, with a paragraph for each of `further`.
-pub fn docstring(lines: &mut Lines, level: usize, text: &str, further: &[String]) {
-    if text.is_empty() && further.is_empty() {
+/// Adds a docstring, with an entry for each argument of a function.
+pub fn docstring(lines: &mut Lines, level: usize, text: &str, arguments: &[String]) {
+    if text.is_empty() && arguments.is_empty() {
         return;
     }
     let width = LONGEST_LINE - 4 * level;
     let first = wrapped(text, width - 6, 0);
-    if let ([line], []) = (first.as_slice(), further) {
+    if let ([line], []) = (first.as_slice(), arguments) {
         return lines.add(level, &format!("\"\"\"{line}\"\"\""));
     }
     for (index, line) in first.iter().enumerate() {
         lines.add(level, &format!("{}{line}", if index == 0 { "\"\"\"" } else { "" }));
     }
-    if !further.is_empty() {
+    if !arguments.is_empty() {
         lines.add(0, "");
+        lines.add(level, "Args:");
     }
-    for paragraph in further {
-        wrapped(paragraph, width, 4).iter().for_each(|line| lines.add(level, line));
+    for argument in arguments {
+        wrapped(argument, width - 4, 4).iter().for_each(|line| lines.add(level + 1, line));
     }
     lines.add(level, "\"\"\"");
 }

@@ -84,7 +84,8 @@ class OptionalFields:
     """Optional fields of a request, which not every endpoint supports. A field that an endpoint refuses by name is
     left out from then on.
 
-    returned: Fields of the model's replies that are sent back, as some models require.
+    Args:
+        returned: Fields of the model's replies that are sent back, as some models require.
     """
 
     def __init__(self, returned: Sequence[str] = (), **fields: Any) -> None:

@@ -12,7 +12,8 @@ from .responses import ResponsesModel
 def open_model(settings: AgentSettings, cache_key: str) -> Model:
     """Creates the model of these settings; no request is made yet.
 
-    cache_key: Common key of conversations with the same beginning, for endpoints that cache by it.
+    Args:
+        cache_key: Common key of conversations with the same beginning, for endpoints that cache by it.
     """
     match settings.api:
         case "openai":

@@ -13,7 +13,8 @@ from .line_file import LineFile
 class Journal:
     """The events of a conversation, beginning with those of earlier processes.
 
-    lines: File for the events. None: they are not kept, and the play cannot be resumed.
+    Args:
+        lines: File for the events. None: they are not kept, and the play cannot be resumed.
     """
 
     def __init__(self, lines: LineFile | None = None) -> None:

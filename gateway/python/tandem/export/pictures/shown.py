@@ -78,8 +78,9 @@ def shown(view: View, folder: Path, settings: ExportSettings) -> list[Shown]:
 def counted(about: dict[str, Any], feature: dict[str, Any]) -> Levels:
     """Returns the histograms of a column's images.
 
-    about: Entry in a part's file.
-    feature: The column in the form of `meta/info.json`.
+    Args:
+        about: Entry in a part's file.
+        feature: The column in the form of `meta/info.json`.
     """
     kind = depth.Depths if feature.get("info", {}).get("is_depth_map") else Colours
     return kind(about["pictures"], about["levels"])
