@@ -10,7 +10,7 @@ import subprocess
 import sys
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -235,6 +235,29 @@ def test_version_2_has_files_for_each_episode(runs: Path, whole: Path, tmp_path:
             assert len(list(container.decode(video=0))) == length
     for name, lines in (("tasks", 1), ("episodes", 2), ("episodes_stats", 2)):
         assert len((exported.folder / f"meta/{name}.jsonl").read_text().splitlines()) == lines
+    # Isaac-GR00T takes the columns of a part from each of the statistics; a count has one number.
+    statistics = json.loads((exported.folder / "meta/stats.json").read_text())
+    assert {np.shape(found) for found in statistics["action"].values()} == {(70,)}
+    assert np.allclose(statistics["action"]["q99"], np.quantile(rows["action"].astype(float), 0.99, axis=0))
+
+
+@pytest.mark.parametrize("view", ["joint", "robot"])
+def test_parts_of_the_body_are_named_as_in_gr00t(view: Literal["joint", "robot"], runs: Path, tmp_path: Path) -> None:
+    (exported,) = export_lerobot(runs, tmp_path / "set", ExportSettings(view=view, size=SIZE, depth=True))
+    features = json.loads((exported.folder / "meta/info.json").read_text())["features"]
+    parts = json.loads((exported.folder / "meta/modality.json").read_text())
+    prefix, robot, eyes = ("B_", "B.", ["A_ego_view", "B_ego_view"]) if view == "joint" else ("", "", ["ego_view", "rs_view"])
+    for kind, column in (("state", "observation.state"), ("action", "action")):
+        names, ends = features[column]["names"], [span["end"] for span in parts[kind].values()]
+        assert [0, *ends] == [*(span["start"] for span in parts[kind].values()), len(names)]
+        for part, word, count in (("left_hand", "left_hand_", 7), ("waist", "waist_", 3), ("base_height_command", "pelvis", 1)):
+            span = parts[kind][prefix + part]
+            own = names[span["start"] : span["end"]]
+            assert len(own) == count and all(name.startswith(robot + word) for name in own), (part, own)
+    assert set(parts["action"]) < set(parts["state"])
+    assert list(parts["video"]) == eyes
+    assert {video["original_key"] for video in parts["video"].values()} < features.keys()
+    assert parts["annotation"] == {"human.task_description": {"original_key": "task_index"}}
 
 
 def test_images_are_drawn_by_the_chosen_renderer(runs: Path, tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from ..errors import TandemError
 from ..recording import Recording
 from ..rows import ABOUT_FILE
 from .columns import is_successful
+from .modality import MODALITY_FILE, modality
 from .parts import Part, Stopped, make_parts, write_whole
 from .settings import ExportSettings, library
 from .v2 import write_v2
@@ -192,6 +193,7 @@ def _export(
         a_recording = len(parts) // len(sources)
         write = write_v3 if settings.version == "v3" else write_v2
         write(whole, parts, splits(len(sources), a_recording), settings)
+        (whole / MODALITY_FILE).write_text(json.dumps(modality(parts[0].features), indent=4), encoding="utf-8")
         rows = sum(part.length for part in parts)
         _write_about(whole, plan, sources, parts, splits(len(sources), a_recording))
         if out.exists():

@@ -10,7 +10,8 @@ from typing import Any
 
 from .parts import Part
 from .settings import ExportSettings, library
-from .v3 import FILES_A_CHUNK, NUMBERING, ROBOT_TYPE, described_film, films_of, numbered, part_statistics
+from .statistics import Statistics
+from .v3 import FILES_A_CHUNK, NUMBERING, ROBOT_TYPE, described_film, films_of, numbered, part_statistics, whole_statistics
 
 DATA_PATH = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
 VIDEO_PATH = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4"
@@ -59,7 +60,15 @@ def write_v2(out: Path, parts: Sequence[Part], splits: dict[str, str], settings:
     _write_lines(meta / "tasks.jsonl", [{"task_index": number, "task": task} for number, task in enumerate(tasks)])
     _write_lines(meta / "episodes.jsonl", episodes)
     _write_lines(meta / "episodes_stats.jsonl", statistics)
+    (meta / "stats.json").write_text(json.dumps(_for_gr00t(whole_statistics(out, parts, features)), indent=4), encoding="utf-8")
     (meta / "info.json").write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
+
+
+def _for_gr00t(statistics: dict[str, Statistics]) -> dict[str, Statistics]:
+    """Returns the statistics without counts. Isaac-GR00T, unlike LeRobot, reads those of a whole data set in this version
+    of the format, and takes one number per column from each of them.
+    """
+    return {key: {name: found[name] for name in found if name != "count"} for key, found in statistics.items()}
 
 
 def _made(out: Path, pattern: str, episode: int, key: str = "") -> Path:

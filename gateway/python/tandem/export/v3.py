@@ -82,7 +82,7 @@ def write_v3(out: Path, parts: Sequence[Part], splits: dict[str, str], settings:
         "robot_type": ROBOT_TYPE,
         "splits": splits,
     }
-    (out / "meta/stats.json").write_text(json.dumps(_whole_statistics(out, parts, features), indent=4), encoding="utf-8")
+    (out / "meta/stats.json").write_text(json.dumps(whole_statistics(out, parts, features), indent=4), encoding="utf-8")
     (out / "meta/info.json").write_text(json.dumps(info, indent=4, ensure_ascii=False), encoding="utf-8")
 
 
@@ -202,7 +202,8 @@ def _flat(statistics: dict[str, Statistics]) -> dict[str, Any]:
     return {f"stats/{key}/{name}": value for key, found in statistics.items() for name, value in found.items()}
 
 
-def _whole_statistics(out: Path, parts: Sequence[Part], features: dict[str, Any]) -> dict[str, Statistics]:
+def whole_statistics(out: Path, parts: Sequence[Part], features: dict[str, Any]) -> dict[str, Statistics]:
+    """Returns the statistics of all rows of a data set whose rows are written."""
     pa, pq = library("pyarrow"), library("pyarrow.parquet")
     files = sorted(out.glob("data/*/*.parquet"))
     found: dict[str, Statistics] = {}
