@@ -52,7 +52,7 @@ pub struct Geom {
     pub material: Option<String>,
     /// The image of the material's texture, if it has one. `rgba` is its mean colour then.
     pub image: Option<SurfaceImage>,
-    /// The two colours of the material's texture if it is MuJoCo's builtin checker.
+    /// The two colours of the material's builtin texture if its pattern is tiles.
     pub checker_rgb: Option<[[f32; 3]; 2]>,
     pub friction: Friction,
     pub density_kg_m3: f32,
@@ -213,8 +213,7 @@ fn rgba(
 ) -> [f32; 4] {
     let texture = material.and_then(|material| {
         let name = material.texture.as_ref()?;
-        let file = document.textures.get(name).map(|texture| texture.mean_rgb);
-        file.or_else(|| flat_rgb(document.model.assets.texture(name)?))
+        Some(document.texture(name)?.mean_rgb)
     });
     let plain = if texture.is_some() { [1.0; 4] } else { DEFAULT_RGBA };
     let [r, g, b, a] =
@@ -230,23 +229,11 @@ fn friction(geom: &mjcf_rs::body::Geom) -> Result<Friction, String> {
     Ok(Friction { directions, slide, spin_m, roll_m, priority: geom.priority, left: 1.0 })
 }
 
-/// Returns the mean colour of MuJoCo's builtin flat texture; `None` for other textures. It is `rgb1`, except
-/// for the bottom of a cube, which is `rgb2`.
-fn flat_rgb(texture: &mjcf_rs::assets::Texture) -> Option<[f32; 3]> {
-    if texture.builtin.as_deref() != Some("flat") {
-        return None;
-    }
-    let [first, second] = builtin_rgb(texture);
-    Some(match texture.type_.as_deref() {
-        Some("2d") => first,
-        _ => std::array::from_fn(|i| (5.0 * first[i] + second[i]) / 6.0),
-    })
-}
-
+/// Returns the two colours of a material whose pattern is tiles.
 fn checker_rgb(document: &Document, material: &mjcf_rs::assets::Material) -> Option<[[f32; 3]; 2]> {
+    let pattern = document.looks.patterns.get(material.name.as_ref()?);
     let texture = document.model.assets.texture(material.texture.as_ref()?)?;
-    let checker = texture.builtin.as_deref() == Some("checker");
-    checker.then(|| builtin_rgb(texture))
+    (pattern == Some(&SurfacePattern::Tiles)).then(|| builtin_rgb(texture))
 }
 
 /// Returns the two colours of a builtin texture; MuJoCo's own if the file gives none.

@@ -63,6 +63,8 @@ pub struct Document {
     /// Content of the files that assets name, by asset.
     meshes: BTreeMap<String, Arc<Mesh>>,
     textures: BTreeMap<String, Arc<Texture>>,
+    /// Textures that MuJoCo draws itself, by name.
+    builtins: BTreeMap<String, Arc<Texture>>,
     repeats: TextureRepeats,
     looks: Looks,
     settings: FileSettings,
@@ -130,6 +132,7 @@ impl Document {
             folder: folder.into(),
             meshes: BTreeMap::new(),
             textures: BTreeMap::new(),
+            builtins: BTreeMap::new(),
             repeats: TextureRepeats::of(&source)?,
             looks: Looks::of(&source)?,
             settings: FileSettings::of(&source)?,
@@ -229,6 +232,11 @@ impl Document {
             content += &format!("{:?}", self.settings);
         }
         xxh3_64(content.as_bytes())
+    }
+
+    /// Returns the texture with this name, if it has an image.
+    fn texture(&self, name: &str) -> Option<&Arc<Texture>> {
+        self.textures.get(name).or_else(|| self.builtins.get(name))
     }
 
     pub(crate) fn unsupported(&self, what: impl Into<String>) -> SimError {

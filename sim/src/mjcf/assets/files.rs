@@ -1,4 +1,4 @@
-//! Files that an MJCF file refers to: meshes (OBJ, STL and MSH), and images of textures.
+//! Meshes that an MJCF file refers to: OBJ, STL and MSH.
 
 use std::fmt;
 use std::io::{self, Cursor};
@@ -10,7 +10,6 @@ use rapier3d::math::{Rotation, Vector};
 use rapier3d::prelude::{MassProperties, SharedShape};
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::texture::Texture;
 use crate::mjcf::{Document, pose, vector};
 use crate::{
     SimError,
@@ -105,20 +104,6 @@ impl Document {
             }
         }
         SimError::of_all(refused).map_or(Ok(()), Err)
-    }
-
-    /// Reads the images of textures that name a file.
-    pub(in crate::mjcf) fn read_textures(&mut self) -> Result<(), SimError> {
-        for asset in &self.model.assets.textures {
-            if let Some(path) = self.model.resolve_texture_file(asset, &self.folder) {
-                let path = self.source.beside_including(with_own_separators(path));
-                let bytes = read_mesh_bytes(&path).map_err(|source| SimError::unreadable(&path, source))?;
-                let texture = Texture::decode(&path, &bytes)?;
-                self.textures.insert(asset.name.clone().unwrap_or_default(), Arc::new(texture));
-                self.files.push((path, xxh3_64(&bytes)));
-            }
-        }
-        Ok(())
     }
 
     fn read_mesh(&self, asset: &mjcf_rs::assets::Mesh, path: &Path, bytes: &[u8]) -> Result<Mesh, SimError> {

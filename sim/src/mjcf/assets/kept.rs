@@ -29,9 +29,9 @@ pub(in crate::mjcf) fn find(path: &Path) -> Option<Document> {
     found.files.iter().all(is_same).then_some(found)
 }
 
-/// Caches a document that names meshes or images. All others are fast to read.
+/// Caches a document that has meshes or images. All others are fast to read.
 pub(in crate::mjcf) fn keep(path: &Path, document: &Document) {
-    if document.meshes.is_empty() && document.textures.is_empty() {
+    if document.meshes.is_empty() && document.textures.is_empty() && document.builtins.is_empty() {
         return;
     }
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);

@@ -14,6 +14,8 @@ pub enum SurfacePattern {
     Wood,
     Fabric,
     Print,
+    /// Squares of half a metre in the world's ground plane, in the two colours of a builtin checker.
+    Tiles,
 }
 
 /// Appearance settings for which MJCF has no attributes.
@@ -86,9 +88,12 @@ fn patterns(source: &MjcfText, text: &Node) -> Result<BTreeMap<String, SurfacePa
             [_, "wood"] => SurfacePattern::Wood,
             [_, "fabric"] => SurfacePattern::Fabric,
             [_, "print"] => SurfacePattern::Print,
+            [_, "tiles"] => SurfacePattern::Tiles,
             _ => {
-                let what =
-                    format!("`{}`; use a material and its pattern: wood, fabric or print", pair.join(" "));
+                let what = format!(
+                    "`{}`; use a material and its pattern: wood, fabric, print or tiles",
+                    pair.join(" ")
+                );
                 return Err(source.refuse(text, what));
             }
         };

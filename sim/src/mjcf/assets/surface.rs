@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use rapier3d::math::Vector;
+use roxmltree::Node;
 
+use super::looks::SurfacePattern;
 use super::texture::Texture;
 use crate::SimError;
 use crate::mjcf::Document;
@@ -40,7 +42,7 @@ pub(in crate::mjcf) struct MappedShape {
     pub has_uv: bool,
 }
 
-/// Repetitions of the images of materials, by the names of the materials whose texture names a file.
+/// Repetitions of the images of materials, by the names of the materials whose texture has an image.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(in crate::mjcf) struct TextureRepeats(BTreeMap<String, TextureRepeat>);
 
@@ -62,7 +64,11 @@ impl TextureRepeats {
             let elements = xml.descendants().filter(move |node| node.has_tag_name(tag));
             elements.filter_map(|node| Some((node.attribute("name")?, node)))
         };
-        let files: BTreeMap<_, _> = named("texture").filter(|(_, node)| node.has_attribute("file")).collect();
+        let has_image = |node: &Node| {
+            let attributes = node.attributes();
+            attributes.into_iter().any(|one| one.name().starts_with("file") || one.name() == "builtin")
+        };
+        let drawn: BTreeMap<_, _> = named("texture").filter(|(_, node)| has_image(node)).collect();
         let mut found = BTreeMap::new();
         for (name, material) in named("material") {
             let texture = classes.stated(&material, "texture");
@@ -72,7 +78,7 @@ impl TextureRepeats {
                 *factor = word.parse().unwrap_or(1.0);
             }
             repeat.is_uniform = classes.stated(&material, "texuniform") == Some("true");
-            if texture.is_some_and(|texture| files.contains_key(texture)) && repeat != ONCE {
+            if texture.is_some_and(|texture| drawn.contains_key(texture)) && repeat != ONCE {
                 found.insert(name.into(), repeat);
             }
         }
@@ -81,14 +87,18 @@ impl TextureRepeats {
 }
 
 impl SurfaceImage {
-    /// Returns the image of a material on a shape; `None` if its texture names no file.
+    /// Returns the image of a material on a shape; `None` if its texture has none, and for tiles.
     pub(in crate::mjcf) fn of(
         document: &Document,
         material: &mjcf_rs::assets::Material,
         shape: impl FnOnce() -> MappedShape,
     ) -> Option<SurfaceImage> {
         let name = material.texture.as_ref()?;
-        let texture = document.textures.get(name)?.clone();
+        let pattern = material.name.as_ref().and_then(|name| document.looks.patterns.get(name));
+        if pattern == Some(&SurfacePattern::Tiles) {
+            return None;
+        }
+        let texture = document.texture(name)?.clone();
         let kind = document.model.assets.texture(name)?.type_.as_deref();
         let repeat = material.name.as_ref().and_then(|name| document.repeats.0.get(name));
         let repeat = repeat.copied().unwrap_or(ONCE);

@@ -1,4 +1,5 @@
-//! Images of textures: reduced to powers of two, with mip levels down to one texel.
+//! Images of textures: reduced to powers of two, with mip levels down to one texel. A cube may have six
+//! images, one a face.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -11,7 +12,7 @@ use crate::SimError;
 /// Maximum width and height of a kept image. The cameras of robots show no more of a surface.
 const MAX_SIDE: u32 = 1024;
 
-/// Image of a texture, at its size and halved again and again down to one texel.
+/// Image of a texture, or the six of a cube, at their size and halved again and again down to one texel.
 #[derive(PartialEq)]
 pub struct Texture {
     /// Never empty; the largest level first. Sides are powers of two.
@@ -27,7 +28,8 @@ pub struct TextureLevel {
     pub height: usize,
     /// Width and height once more.
     pub size_px: [f32; 2],
-    /// sRGB, row by row from the top left; the fourth byte is 0.
+    /// sRGB, row by row from the top left; the fourth byte is 0. Of a cube with six images, all of them in the
+    /// order +x, -x, +y, -y, +z, -z.
     pub texels: Vec<[u8; 4]>,
 }
 
@@ -44,28 +46,35 @@ impl Texture {
     /// # Errors
     ///
     /// Returns an error that names the file if the bytes are no image of a supported format.
-    pub(in crate::mjcf) fn decode(path: &Path, bytes: &[u8]) -> Result<Texture, SimError> {
+    pub(in crate::mjcf) fn decode(path: &Path, bytes: &[u8]) -> Result<RgbImage, SimError> {
         let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
         let decoded = reader.map_err(|source| SimError::unreadable(path, source))?.decode();
-        let image = decoded
-            .map_err(|source| SimError::Texture { path: path.display().to_string(), source })?
-            .into_rgb8();
-        Ok(Texture::of(&image))
+        let image =
+            decoded.map_err(|source| SimError::Texture { path: path.display().to_string(), source })?;
+        Ok(image.into_rgb8())
     }
 
-    /// Reduces an image of at least one pixel to its levels.
-    fn of(image: &RgbImage) -> Texture {
-        let side = |pixels: u32| pixels.next_power_of_two().min(MAX_SIDE);
-        let (width, height) = (side(image.width()), side(image.height()));
-        let whole = match image.dimensions() == (width, height) {
-            true => TextureLevel::of(image),
-            false => TextureLevel::of(&resize(image, width, height, FilterType::Triangle)),
+    /// Reduces an image of at least one pixel, or the six of a cube, to its levels. All get the size of the
+    /// largest.
+    pub(in crate::mjcf) fn of(images: &[RgbImage]) -> Texture {
+        let side = |pixels: fn(&RgbImage) -> u32| {
+            images.iter().map(pixels).max().unwrap_or(1).next_power_of_two().min(MAX_SIDE)
         };
-        let mut levels = vec![whole];
+        let (width, height) = (side(RgbImage::width), side(RgbImage::height));
+        let texels = images.iter().flat_map(|image| match image.dimensions() == (width, height) {
+            true => texels(image),
+            false => texels(&resize(image, width, height, FilterType::Triangle)),
+        });
+        let mut levels = vec![TextureLevel::new(width as usize, height as usize, texels.collect())];
         while let Some(half) = levels.last().and_then(TextureLevel::halved) {
             levels.push(half);
         }
-        Texture { levels, mean_rgb: mean_rgb(image) }
+        Texture { levels, mean_rgb: mean_rgb(images) }
+    }
+
+    /// Returns the number of images: 1, or 6 for a cube with one a face.
+    pub fn images(&self) -> usize {
+        self.levels[0].texels.len() / self.levels[0].image_texels()
     }
 }
 
@@ -86,15 +95,17 @@ impl TextureLevel {
         (y & (self.height - 1)) * self.width
     }
 
-    fn of(image: &RgbImage) -> TextureLevel {
-        let texels = image.pixels().map(|pixel| [pixel.0[0], pixel.0[1], pixel.0[2], 0]).collect();
-        TextureLevel::new(image.width() as usize, image.height() as usize, texels)
+    /// Returns the number of texels of one image.
+    #[inline(always)]
+    pub fn image_texels(&self) -> usize {
+        self.width * self.height
     }
 
-    /// Returns the level of half the size; `None` for a single texel. A texel has the mean light of those
-    /// that it replaces, by a gamma of 2.
+    /// Returns the level of half the size; `None` if an image has a single texel. A texel has the mean light
+    /// of those that it replaces, by a gamma of 2.
     fn halved(&self) -> Option<TextureLevel> {
-        if self.texels.len() == 1 {
+        let images = self.texels.len() / self.image_texels();
+        if self.image_texels() == 1 {
             return None;
         }
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
@@ -109,18 +120,29 @@ impl TextureLevel {
             }
             sum.map(|sum| (sum as f32 / (across * down) as f32).sqrt().round() as u8)
         };
-        Some(TextureLevel::new(width, height, (0..width * height).map(texel).collect()))
+        Some(TextureLevel::new(width, height, (0..images * width * height).map(texel).collect()))
     }
 }
 
-fn mean_rgb(image: &RgbImage) -> [f32; 3] {
-    let mut sum = [0.0f64; 3];
-    for pixel in image.pixels() {
-        for (sum, value) in sum.iter_mut().zip(pixel.0) {
-            *sum += f64::from(value) / 255.0;
+fn texels(image: &RgbImage) -> Vec<[u8; 4]> {
+    image.pixels().map(|pixel| [pixel.0[0], pixel.0[1], pixel.0[2], 0]).collect()
+}
+
+fn mean_rgb(images: &[RgbImage]) -> [f32; 3] {
+    let (mut sum, mut count) = ([0.0f64; 3], 0);
+    for image in images {
+        let mut sum_of_image = [0.0f64; 3];
+        for pixel in image.pixels() {
+            for (sum, value) in sum_of_image.iter_mut().zip(pixel.0) {
+                *sum += f64::from(value) / 255.0;
+            }
         }
+        let pixels = image.pixels().len().max(1);
+        // Each image is as large as the others on the cube.
+        sum = std::array::from_fn(|i| sum[i] + sum_of_image[i] / pixels as f64);
+        count += 1;
     }
-    sum.map(|sum| (sum / image.pixels().len().max(1) as f64) as f32)
+    sum.map(|sum| (sum / f64::from(count.max(1))) as f32)
 }
 
 #[cfg(test)]
@@ -133,7 +155,7 @@ mod tests {
     fn levels_halve_down_to_the_mean_light() {
         let striped =
             RgbImage::from_fn(4, 2, |x, _| if x % 2 == 0 { Rgb([255, 0, 40]) } else { Rgb([0, 0, 40]) });
-        let texture = Texture::of(&striped);
+        let texture = Texture::of(&[striped]);
         let sizes: Vec<_> = texture.levels.iter().map(|level| (level.width, level.height)).collect();
         assert_eq!(sizes, [(4, 2), (2, 1), (1, 1)]);
         assert_eq!(texture.levels[1].texels, [[180, 0, 40, 0]; 2], "half the light is 71 % of the value");
@@ -143,8 +165,17 @@ mod tests {
     #[test]
     fn sides_become_powers_of_two_within_the_limit() {
         for (size, expected) in [((3, 5), (4, 8)), ((1, 1), (1, 1)), ((2000, 6), (1024, 8))] {
-            let level = &Texture::of(&RgbImage::new(size.0, size.1)).levels[0];
+            let level = &Texture::of(&[RgbImage::new(size.0, size.1)]).levels[0];
             assert_eq!((level.width as u32, level.height as u32), expected);
         }
+    }
+
+    #[test]
+    fn images_of_a_cube_are_halved_each_by_itself() {
+        let faces: Vec<_> = (0..6).map(|face| RgbImage::from_pixel(2, 2, Rgb([40 * face, 0, 0]))).collect();
+        let texture = Texture::of(&faces);
+        assert_eq!((texture.images(), texture.levels.len()), (6, 2));
+        let reds: Vec<u8> = texture.levels[1].texels.iter().map(|texel| texel[0]).collect();
+        assert_eq!(reds, [0, 40, 80, 120, 160, 200]);
     }
 }

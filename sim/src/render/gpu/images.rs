@@ -46,7 +46,8 @@ impl SceneImages {
             placed.push((image, texels.len() as u32));
             let levels = kept(image, left_out.unwrap_or(most_levels));
             let [width, height] = [levels[0].width, levels[0].height].map(|side| side as u32);
-            texels.extend([width, height, levels.len() as u32, image.is_cube.into()]);
+            let faces = if image.is_cube { image.texture.images() } else { 0 };
+            texels.extend([width, height, levels.len() as u32, faces as u32]);
             texels.extend(
                 levels.iter().flat_map(|level| &level.texels).map(|texel| u32::from_le_bytes(*texel)),
             );

@@ -62,7 +62,8 @@ struct Coordinates {
     w: vec4f,
 }
 @group(0) @binding(5) var<storage, read> coordinates: array<Coordinates>;
-// Of each image: width, height, number of levels, whether it is on a cube; then the levels, the largest first.
+// Of each image: width, height, number of levels, and 0, or on a cube its number of images, 1 or 6 (+x, -x, +y, -y,
+// +z, -z); then the levels, the largest first.
 @group(0) @binding(6) var<storage, read> texels: array<u32>;
 
 @group(1) @binding(0) var shadow: texture_depth_2d;
@@ -223,6 +224,8 @@ struct ImagePlace {
     uv: vec2f,
     by_x: vec2f,
     by_y: vec2f,
+    // Number of the face of a cube.
+    face: u32,
 }
 
 fn coordinates_of(triangle: u32, direction: vec3f) -> vec3f {
@@ -243,19 +246,23 @@ fn on_cube(at: vec3f, by_x: vec3f, by_y: vec3f) -> ImagePlace {
     var across = vec3f(sides.z, 0.0, 0.0);
     var down = vec3f(0.0, -1.0, 0.0);
     var along = vec3f(0.0, 0.0, sides.z);
+    var axis = 2u;
     if size.x >= size.y && size.x >= size.z {
         across = vec3f(0.0, 0.0, -sides.x);
         along = vec3f(sides.x, 0.0, 0.0);
+        axis = 0u;
     } else if size.y >= size.z {
         across = vec3f(1.0, 0.0, 0.0);
         down = vec3f(0.0, 0.0, sides.y);
         along = vec3f(0.0, sides.y, 0.0);
+        axis = 1u;
     }
     let per_along = 1.0 / max(dot(along, at), 1e-30);
     let place = vec2f(dot(across, at), dot(down, at)) * per_along;
     let step_x = vec2f(dot(across, by_x), dot(down, by_x)) - place * dot(along, by_x);
     let step_y = vec2f(dot(across, by_y), dot(down, by_y)) - place * dot(along, by_y);
-    return ImagePlace(0.5 * place + 0.5, 0.5 * step_x * per_along, 0.5 * step_y * per_along);
+    let face = 2u * axis + select(0u, 1u, sides[axis] < 0.0);
+    return ImagePlace(0.5 * place + 0.5, 0.5 * step_x * per_along, 0.5 * step_y * per_along, face);
 }
 
 // sRGB values of a texel, 0 to 1.
@@ -294,22 +301,27 @@ fn stepped_log2(x: f32) -> f32 {
 
 fn image_rgb(head: u32, place: ImagePlace) -> vec3f {
     var size = vec2u(texels[head], texels[head + 1u]);
-    let is_cube = texels[head + 3u] != 0u;
+    let images = texels[head + 3u];
+    let is_cube = images != 0u;
+    // Images before that of the face, on every level.
+    let before = select(0u, place.face, images > 1u);
     let by_x = place.by_x * vec2f(size);
     let by_y = place.by_y * vec2f(size);
     let last = f32(texels[head + 2u] - 1u);
     let level = clamp(0.5 * stepped_log2(max(dot(by_x, by_x), dot(by_y, by_y))), 0.0, last);
     var first = head + 4u;
     for (var i = 0u; i < u32(level); i++) {
-        first += size.x * size.y;
+        first += max(images, 1u) * size.x * size.y;
         size = max(size / 2u, vec2u(1u));
     }
-    let nearer = blend(first, size, place.uv, is_cube);
+    let nearer = blend(first + before * size.x * size.y, size, place.uv, is_cube);
     let share = clamp((fract(level) - 0.5) / BLENDED_SHARE + 0.5, 0.0, 1.0);
     if share == 0.0 {
         return decoded(nearer);
     }
-    let farther = blend(first + size.x * size.y, max(size / 2u, vec2u(1u)), place.uv, is_cube);
+    first += max(images, 1u) * size.x * size.y;
+    size = max(size / 2u, vec2u(1u));
+    let farther = blend(first + before * size.x * size.y, size, place.uv, is_cube);
     return decoded(mix(nearer, farther, share));
 }
 
@@ -321,7 +333,7 @@ fn image_at(triangle: u32, part: Part, ray: vec3f, depth_m: f32, normal: vec3f, 
     let at = coordinates_of(triangle, from_corner_m) + vec3f(rows.u.w, rows.v.w, rows.w.w);
     let by_x = coordinates_of(triangle, step_x);
     let by_y = coordinates_of(triangle, step_y);
-    var place = ImagePlace(at.xy, by_x.xy, by_y.xy);
+    var place = ImagePlace(at.xy, by_x.xy, by_y.xy, 0u);
     if texels[part.flags.w + 3u] != 0u {
         place = on_cube(at, by_x, by_y);
     }

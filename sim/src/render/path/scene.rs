@@ -73,7 +73,8 @@ impl Scene<'_> {
     fn image_place(&self, image: &Image, spot: &Spot, width_m: f32) -> ImagePlace {
         if image.from_mesh.is_none() {
             let PointUv { uv, uv_1_m } = spot.uv;
-            return ImagePlace { uv, x_step_uv: [uv_1_m * width_m, 0.0], y_step_uv: [0.0, uv_1_m * width_m] };
+            let step_uv = uv_1_m * width_m;
+            return ImagePlace { uv, x_step_uv: [step_uv, 0.0], y_step_uv: [0.0, step_uv], face: 0 };
         }
         let map = &self.patterns[spot.part as usize];
         let across = spot.face_normal.any_orthonormal_vector();

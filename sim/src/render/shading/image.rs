@@ -17,6 +17,8 @@ pub struct Image {
     pub from_mesh: Option<Affine>,
     /// True if the coordinates are a direction from the middle of a cube.
     pub is_cube: bool,
+    /// True if each face of the cube has an image of its own.
+    has_faces: bool,
     /// Number of the smallest level.
     last_level: f32,
 }
@@ -27,6 +29,8 @@ pub struct ImagePlace {
     pub uv: [f32; 2],
     pub x_step_uv: [f32; 2],
     pub y_step_uv: [f32; 2],
+    /// Number of the image; 0 if there is one.
+    pub face: usize,
 }
 
 /// Steps of the table from sRGB to linear light between one byte and the next.
@@ -58,18 +62,21 @@ impl Image {
             }
         };
         let is_cube = matches!(image.mapping, TextureMapping::Cube { .. });
+        let has_faces = is_cube && image.texture.images() > 1;
         let last_level = (image.texture.levels.len() - 1) as f32;
-        Image { texture: image.texture.clone(), from_mesh, is_cube, last_level }
+        Image { texture: image.texture.clone(), from_mesh, is_cube, has_faces, last_level }
     }
 
     /// Returns the place on the image of three coordinates with their differences over a step in x and in y.
     #[inline(always)]
     pub fn place(&self, values: [f32; 3], x_step_values: [f32; 3], y_step_values: [f32; 3]) -> ImagePlace {
         if self.is_cube {
-            return on_cube(values, [x_step_values, y_step_values]);
+            let place = on_cube(values, [x_step_values, y_step_values]);
+            return ImagePlace { face: if self.has_faces { place.face } else { 0 }, ..place };
         }
         let flat = |[u, v, _]: [f32; 3]| [u, v];
-        ImagePlace { uv: flat(values), x_step_uv: flat(x_step_values), y_step_uv: flat(y_step_values) }
+        let (x_step_uv, y_step_uv) = (flat(x_step_values), flat(y_step_values));
+        ImagePlace { uv: flat(values), x_step_uv, y_step_uv, face: 0 }
     }
 
     /// Returns the linear colour at a place, as a mean over about a step in x and in y.
@@ -83,9 +90,9 @@ impl Image {
         let (whole, part) = (level.floor(), level - level.floor());
         let share = ((part - 0.5) / BLENDED_SHARE + 0.5).clamp(0.0, 1.0);
         let nearer = index(whole) + usize::from(share == 1.0);
-        let mut texel = blend(&levels[nearer], place.uv, self.is_cube);
+        let mut texel = blend(&levels[nearer], place, self.is_cube);
         if share > 0.0 && share < 1.0 {
-            let farther = blend(&levels[nearer + 1], place.uv, self.is_cube);
+            let farther = blend(&levels[nearer + 1], place, self.is_cube);
             texel = lanes(|i| texel[i] + (farther[i] - texel[i]) * share);
         }
         let light = &*LIGHT;
@@ -96,9 +103,10 @@ impl Image {
     }
 }
 
-/// Returns the sRGB values, 0 to 255, at coordinates on one level, blended between four texels.
+/// Returns the sRGB values, 0 to 255, at a place on one level, blended between four texels.
 #[inline(always)]
-fn blend(level: &TextureLevel, [u, v]: [f32; 2], is_cube: bool) -> Lanes<4> {
+fn blend(level: &TextureLevel, place: &ImagePlace, is_cube: bool) -> Lanes<4> {
+    let [u, v] = place.uv;
     let [width, height] = level.size_px;
     let (mut x, mut y) = (u * width - 0.5, v * height - 0.5);
     if is_cube {
@@ -109,7 +117,8 @@ fn blend(level: &TextureLevel, [u, v]: [f32; 2], is_cube: bool) -> Lanes<4> {
     let (across, down) = (x - left, y - top);
     let (left, top) = (index(left), index(top));
     let (column, next_column) = (level.column(left), level.column(left + 1));
-    let (row, next_row) = (level.row(top), level.row(top + 1));
+    let first = place.face * level.image_texels();
+    let (row, next_row) = (first + level.row(top), first + level.row(top + 1));
     let texels = level.texels.as_slice();
     let upper = between(texels[row + column], texels[row + next_column], across);
     let lower = between(texels[next_row + column], texels[next_row + next_column], across);
@@ -130,16 +139,18 @@ fn between(first: [u8; 4], second: [u8; 4], share: f32) -> Lanes<4> {
     lanes(|i| first[i] + (second[i] - first[i]) * share)
 }
 
-/// Returns the place on the face of a cube that a direction meets. Source: OpenGL 4.6, section 8.13.
+/// Returns the place on the face of a cube that a direction meets; faces are in the order +x, -x, +y, -y, +z, -z.
+/// Source: OpenGL 4.6, section 8.13.
 #[inline]
 fn on_cube([x, y, z]: [f32; 3], step_values: [[f32; 3]; 2]) -> ImagePlace {
-    let (across, down, along): ([f32; 3], [f32; 3], [f32; 3]) = if x.abs() >= y.abs() && x.abs() >= z.abs() {
-        ([0.0, 0.0, -1f32.copysign(x)], [0.0, -1.0, 0.0], [1f32.copysign(x), 0.0, 0.0])
-    } else if y.abs() >= z.abs() {
-        ([1.0, 0.0, 0.0], [0.0, 0.0, 1f32.copysign(y)], [0.0, 1f32.copysign(y), 0.0])
-    } else {
-        ([1f32.copysign(z), 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1f32.copysign(z)])
-    };
+    let (across, down, along, axis): ([f32; 3], [f32; 3], [f32; 3], _) =
+        if x.abs() >= y.abs() && x.abs() >= z.abs() {
+            ([0.0, 0.0, -1f32.copysign(x)], [0.0, -1.0, 0.0], [1f32.copysign(x), 0.0, 0.0], 0)
+        } else if y.abs() >= z.abs() {
+            ([1.0, 0.0, 0.0], [0.0, 0.0, 1f32.copysign(y)], [0.0, 1f32.copysign(y), 0.0], 1)
+        } else {
+            ([1f32.copysign(z), 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1f32.copysign(z)], 2)
+        };
     let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let per_along = 1.0 / dot(along, [x, y, z]).max(f32::MIN_POSITIVE);
     let place = [across, down].map(|axis| dot(axis, [x, y, z]) * per_along);
@@ -147,7 +158,8 @@ fn on_cube([x, y, z]: [f32; 3], step_values: [[f32; 3]; 2]) -> ImagePlace {
         [(across, place[0]), (down, place[1])]
             .map(|(axis, at)| 0.5 * (dot(axis, step) - at * dot(along, step)) * per_along)
     });
-    ImagePlace { uv: place.map(|at| 0.5 * at + 0.5), x_step_uv, y_step_uv }
+    let face = 2 * axis + usize::from([x, y, z][axis].is_sign_negative());
+    ImagePlace { uv: place.map(|at| 0.5 * at + 0.5), x_step_uv, y_step_uv, face }
 }
 
 /// Returns the binary logarithm of a positive number, exact for powers of two and linear between them.

@@ -46,7 +46,8 @@ impl Pattern {
             Some(SurfacePattern::Wood) => Pattern::Wood,
             Some(SurfacePattern::Fabric) => Pattern::Fabric,
             Some(SurfacePattern::Print) => Pattern::Print,
-            None => Pattern::Plain,
+            // Without two colours there are no tiles.
+            Some(SurfacePattern::Tiles) | None => Pattern::Plain,
         }
     }
 

@@ -1,0 +1,112 @@
+//! Images of textures: files, a file or a part of one for each face of a cube, and MuJoCo's builtin ones.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use image::{Rgb, RgbImage};
+use roxmltree::Node;
+use xxhash_rust::xxh3::xxh3_64;
+
+use super::builtin;
+use super::files::read_mesh_bytes;
+use super::texture::Texture;
+use crate::SimError;
+use crate::mjcf::Document;
+use crate::user_file::with_own_separators;
+
+/// Attributes with the files of a cube's faces, +x, -x, +y, -y, +z and -z, and their letters in `gridlayout`.
+const FACES: [(&str, char); 6] = [
+    ("fileright", 'R'),
+    ("fileleft", 'L'),
+    ("fileup", 'U'),
+    ("filedown", 'D'),
+    ("filefront", 'F'),
+    ("fileback", 'B'),
+];
+
+/// Files that were read, each with a hash of its bytes.
+type Read = Vec<(PathBuf, u64)>;
+
+impl Document {
+    /// Reads the images of textures that name files, and draws those that MuJoCo draws itself.
+    pub(in crate::mjcf) fn read_textures(&mut self) -> Result<(), SimError> {
+        let (mut textures, mut builtins, mut read) = (Vec::new(), Vec::new(), Vec::new());
+        let xml = self.source.xml()?;
+        for node in xml.descendants().filter(|node| node.has_tag_name("texture")) {
+            let name = name(&node);
+            let of_files = self.images_of_files(&node, &mut read)?;
+            if !of_files.is_empty() {
+                textures.push((name, Arc::new(Texture::of(&of_files))));
+                continue;
+            }
+            let drawn = builtin::images(&node);
+            if !drawn.is_empty() {
+                builtins.push((name, Arc::new(Texture::of(&drawn))));
+            }
+        }
+        drop(xml);
+        self.textures.extend(textures);
+        self.builtins.extend(builtins);
+        self.files.append(&mut read);
+        Ok(())
+    }
+
+    /// Returns the image of a texture's file, or six for the faces of a cube; none if it names no file.
+    fn images_of_files(&self, node: &Node, read: &mut Read) -> Result<Vec<RgbImage>, SimError> {
+        let mut image = |file: &str| self.image_of_file(file, read);
+        if let Some(file) = node.attribute("file") {
+            let whole = image(file)?;
+            return Ok(faces_of_grid(node, &whole).unwrap_or_else(|| vec![whole]));
+        }
+        if FACES.iter().all(|(attribute, _)| node.attribute(*attribute).is_none()) {
+            return Ok(Vec::new());
+        }
+        let blank = blank(node);
+        let face =
+            |(attribute, _): &(&str, char)| node.attribute(*attribute).map_or(Ok(blank.clone()), &mut image);
+        FACES.iter().map(face).collect()
+    }
+
+    fn image_of_file(&self, file: &str, read: &mut Read) -> Result<RgbImage, SimError> {
+        let asset = mjcf_rs::assets::Texture { file: Some(file.into()), ..Default::default() };
+        let path = self.model.resolve_texture_file(&asset, &self.folder).unwrap_or_else(|| file.into());
+        let path = self.source.beside_including(with_own_separators(path));
+        let bytes = read_mesh_bytes(&path).map_err(|source| SimError::unreadable(&path, source))?;
+        let image = Texture::decode(&path, &bytes)?;
+        read.push((path, xxh3_64(&bytes)));
+        Ok(image)
+    }
+}
+
+/// Cuts the faces of a cube out of an image by `gridsize` and `gridlayout`; `None` without these. A face that
+/// the layout lacks has the colour `rgb1`.
+fn faces_of_grid(node: &Node, whole: &RgbImage) -> Option<Vec<RgbImage>> {
+    let mut sizes =
+        node.attribute("gridsize")?.split_ascii_whitespace().map_while(|word| word.parse::<u32>().ok());
+    let (rows, columns) =
+        (sizes.next().filter(|rows| *rows > 0)?, sizes.next().filter(|columns| *columns > 0)?);
+    let letters: Vec<char> = node.attribute("gridlayout")?.chars().collect();
+    let (width, height) = (whole.width() / columns, whole.height() / rows);
+    if rows * columns == 1 || width == 0 || height == 0 {
+        return None;
+    }
+    let face = |(_, letter): &(&str, char)| match letters.iter().position(|found| found == letter) {
+        Some(cell) if (cell as u32) < rows * columns => {
+            let (row, column) = (cell as u32 / columns, cell as u32 % columns);
+            image::imageops::crop_imm(whole, column * width, row * height, width, height).to_image()
+        }
+        _ => blank(node),
+    };
+    Some(FACES.iter().map(face).collect())
+}
+
+/// Returns an image of the colour `rgb1`.
+fn blank(node: &Node) -> RgbImage {
+    RgbImage::from_pixel(1, 1, Rgb(builtin::first_rgb(node)))
+}
+
+/// Returns the name of a texture: without one, that of its file.
+fn name(node: &Node) -> String {
+    let file = || Path::new(node.attribute("file")?).file_stem()?.to_str();
+    node.attribute("name").or_else(file).unwrap_or_default().to_owned()
+}
