@@ -24,6 +24,10 @@ fn drawn(kind: RendererKind, inside: &str, camera: &Camera) -> Frame {
         })
     });
     image.save(folder.path().join("four.png")).expect("an image");
+    for (file, rgb) in [("red.png", RED), ("green.png", GREEN), ("blue.png", BLUE), ("grey.png", GREY)] {
+        let plain = image::RgbImage::from_pixel(4, 4, image::Rgb(rgb));
+        plain.save(folder.path().join(file)).expect("an image");
+    }
     std::fs::write(folder.path().join("card.obj"), CARD).expect("a mesh");
     let file = folder.path().join("scene.xml");
     std::fs::write(&file, format!("<mujoco>{inside}</mujoco>")).expect("a scene");
@@ -148,4 +152,50 @@ fn the_colour_of_a_material_tints_its_image() {
     let tinted = drawn(RendererKind::Cpu, &(asset(r#"type="2d""#, r#"rgba="0 1 0 1""#) + floor), &above);
     let [_, green, _, grey] = QUARTERS.map(|at| pixel(&tinted, at));
     assert_eq!([name(green), name(grey)], ["green", "green"]);
+}
+
+/// The faces of +x, -x, +y, -y, +z and -z; what a layout lacks has the first colour of the texture.
+#[test]
+fn each_face_of_a_cube_may_have_an_image_of_its_own() {
+    let files = r#"fileright="red.png" fileleft="green.png" fileup="blue.png" filedown="grey.png"
+        filefront="green.png" fileback="red.png""#;
+    // Red and green are the upper cells of the grid, blue and grey the lower ones.
+    let grid = r#"file="four.png" gridsize="2 2" gridlayout="RLUB" rgb1="0 0.8 0""#;
+    let cube = |texture: &str| {
+        format!(
+            r#"<asset><texture name="cube" type="cube" {texture}/><material name="cube" texture="cube"/></asset>
+            <worldbody><geom type="box" size="0.5 0.5 0.5" material="cube"/></worldbody>"#
+        )
+    };
+    let sides = [Vector::X, -Vector::X, Vector::Y, -Vector::Y, Vector::Z, -Vector::Z];
+    for kind in [RendererKind::Cpu, RendererKind::Path] {
+        let seen = |texture: &str| {
+            let shown = |side: &Vector| drawn(kind, &cube(texture), &looking(*side * 2.2, Vector::ZERO));
+            sides.iter().map(|side| name(pixel(&shown(side), [48, 48]))).collect::<Vec<_>>()
+        };
+        assert_eq!(seen(files), ["red", "green", "blue", "grey", "green", "red"]);
+        assert_eq!(seen(grid), ["red", "green", "blue", "green", "green", "grey"]);
+    }
+}
+
+/// Own rooms ask for tiles of half a metre by their material's pattern; a checker is as large as its file says.
+#[test]
+fn builtin_textures_repeat_as_images_do() {
+    let above = looking(Vector::new(0.0, 0.0, 1.5), Vector::ZERO);
+    let floor = r#"<worldbody><geom type="plane" size="1 1 1" material="checker"/></worldbody>"#;
+    let asset = |material: &str| {
+        format!(
+            r#"<asset><texture name="checker" type="2d" builtin="checker" rgb1="1 0 0" rgb2="0 0 1" width="32"
+            height="32"/><material name="checker" texture="checker" {material}/></asset>"#
+        )
+    };
+    for kind in [RendererKind::Cpu, RendererKind::Path] {
+        let once = drawn(kind, &(asset("") + floor), &above);
+        assert_eq!(names(&once, QUARTERS), ["red", "blue", "blue", "red"]);
+        let twice = drawn(kind, &(asset(r#"texrepeat="2 2""#) + floor), &above);
+        assert_eq!(names(&twice, [[40, 40], [56, 40], [40, 56], [56, 56]]), ["red", "blue", "blue", "red"]);
+    }
+    let tiles = r#"<custom><text name="material_patterns" data="checker tiles"/></custom>"#;
+    let tiled = drawn(RendererKind::Cpu, &(tiles.to_owned() + &asset(r#"texrepeat="9 9""#) + floor), &above);
+    assert_eq!(names(&tiled, [[40, 40], [56, 40], [40, 56], [56, 56]]), ["blue", "red", "red", "blue"]);
 }

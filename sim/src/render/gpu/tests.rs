@@ -103,11 +103,14 @@ const SHAPES: &str = r#"<asset>
         <texture name="cube" type="cube" file="kitchen_floor_floor_texture.png"/>
         <material name="flat" texture="flat" texrepeat="3 5" rgba="0.5 1 1 1"/>
         <material name="cube" texture="cube" texuniform="true"/>
+        <texture name="faces" type="cube" builtin="gradient" mark="edge" rgb1="1 0.5 0" width="64" height="64"/>
+        <material name="faces" texture="faces"/>
     </asset>
     <worldbody>
         <geom type="plane" size="3 3 1" material="flat"/>
         <geom type="box" size="0.3 0.2 0.4" pos="2.2 1.4 0.4" euler="0 0 40" material="cube"/>
         <geom type="ellipsoid" size="0.3 0.4 0.5" pos="1.4 1.6 0.5" material="cube"/>
+        <geom type="sphere" size="0.25" pos="2.3 2.1 1" material="faces"/>
     </worldbody>"#;
 
 #[test]
