@@ -159,6 +159,14 @@ impl Session {
         }
     }
 
+    /// Returns the seconds that the policy has thought, or all operators together.
+    fn thinking_s(&self) -> f64 {
+        match self.spec().operators {
+            Operators::One => self.clock.spent().as_secs_f64(),
+            Operators::PerRobot => self.operators.values().map(|used| used.thinking_s).sum(),
+        }
+    }
+
     fn result_so_far(&self) -> ResultReply {
         let mut times_s = self.scores.reached().map(|(_, time_s)| time_s);
         let phases = (0..self.spec().task.phases.len()).map(|index| (Phase::number(index), times_s.next()));
@@ -173,7 +181,7 @@ impl Session {
             env_steps: self.env_steps(),
             tool_calls: self.tool_calls,
             requests: self.requests,
-            thinking_s: rounded(self.clock.spent().as_secs_f64()),
+            thinking_s: rounded(self.thinking_s()),
             operators: self.operators.values().cloned().collect(),
             falls: self.fallen().iter().filter(|robot| robot.fallen).count() as u32,
             realtime_factor: if physics_s > 0.0 { self.present.time_s / physics_s } else { 0.0 },

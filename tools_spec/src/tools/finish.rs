@@ -75,7 +75,8 @@ pub struct ResultReply {
     /// counts once. Left out in results of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub requests: Option<u32>,
-    /// Wall clock that the policy has thought between its calls, in seconds.
+    /// Wall clock that the policy has thought between its calls, in seconds; where each robot has its own
+    /// operator, that of all operators together.
     #[serde(default)]
     pub thinking_s: f64,
     /// Use by each operator that has commanded, where each robot has its own; left out otherwise.

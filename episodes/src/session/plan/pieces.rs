@@ -100,9 +100,10 @@ impl WristWay {
     fn new(entry: &WristMove, session: &Session) -> Result<WristWay, EpisodeError> {
         let motion = &session.motions[commands::find(&entry.robot, &session.motions)?];
         // Carried hands move with the pelvis; others stay in the room.
-        let frame = match entry.carried {
-            Some(true) => PoseFrame::Pelvis,
-            Some(false) | None => PoseFrame::Start,
+        let frame = match (entry.carried, entry.frame) {
+            (Some(true), _) => PoseFrame::Pelvis,
+            (_, Some(PoseFrame::Room)) => PoseFrame::Room,
+            _ => PoseFrame::Start,
         };
         let halves = Sides {
             left: (entry.left_position_m, entry.left_quaternion_wxyz),

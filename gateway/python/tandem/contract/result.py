@@ -111,7 +111,9 @@ class ResultReply:
     """
 
     thinking_s: float | None
-    """Wall clock that the policy has thought between its calls, in seconds."""
+    """Wall clock that the policy has thought between its calls, in seconds; where each robot has its own operator,
+    that of all operators together.
+    """
 
     operators: tuple[OperatorUse, ...]
     """Use by each operator that has commanded, where each robot has its own; left out otherwise."""

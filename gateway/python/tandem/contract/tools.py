@@ -69,7 +69,8 @@ class Tools(ABC):
             pixels: Pixels [u, v], column 0 to 319 from the left, row 0 to 239 from the top.
             region: Pixels of a rectangle, row by row.
             fit: True: also the largest plane in `region`, its straight edges and their corners.
-            surface: Returns middle, size, corners and, of an upright round thing, axis of a surface in place of points.
+            surface: Returns middle, size, corners and, of an upright round thing, axis of a surface in place of
+                points.
             frame: Frame of the points.
         """
         arguments: dict[str, Any] = {
@@ -215,7 +216,8 @@ class Tools(ABC):
         run out. It does not look: go round obstacles by `waypoints`.
 
         Args:
-            steps: Most steps, up to 1500: about 250, 150 a metre and 250 a quarter turn; with `carry` 300, 270 and 220.
+            steps: Most steps, up to 1500: about 250, 150 a metre and 250 a quarter turn; with `carry` 300, 270 and
+                220.
             robots: One entry per robot that walks.
             frame: Frame of places and headings.
         """

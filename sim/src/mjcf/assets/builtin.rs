@@ -14,8 +14,8 @@ const DEFAULT_RANDOM_SHARE: f64 = 0.01;
 /// A builtin texture as a file states it.
 struct Builtin {
     kind: Kind,
-    rgb_1: [f64; 3],
-    rgb_2: [f64; 3],
+    first_rgb: [f64; 3],
+    second_rgb: [f64; 3],
     mark: Mark,
     mark_rgb: [f64; 3],
     random_share: f64,
@@ -47,8 +47,8 @@ pub(super) fn images(texture: &Node) -> Vec<RgbImage> {
     };
     let builtin = Builtin {
         kind,
-        rgb_1: numbers(texture, "rgb1").unwrap_or(DEFAULT_RGB_1),
-        rgb_2: numbers(texture, "rgb2").unwrap_or([0.5; 3]),
+        first_rgb: numbers(texture, "rgb1").unwrap_or(DEFAULT_RGB_1),
+        second_rgb: numbers(texture, "rgb2").unwrap_or([0.5; 3]),
         mark: match texture.attribute("mark") {
             Some("edge") => Mark::Edge,
             Some("cross") => Mark::Cross,
@@ -64,6 +64,8 @@ pub(super) fn images(texture: &Node) -> Vec<RgbImage> {
     };
     let (width, height) = (side("width"), side("height"));
     match texture.attribute("type") {
+        // One texel says all of a plain colour.
+        Some("2d") if builtin.is_plain() => vec![builtin.flat_image(1, 1)],
         Some("2d") => vec![builtin.flat_image(width, height)],
         Some("skybox") => Vec::new(),
         _ => (0..6).map(|face| builtin.face(face, width)).collect(),
@@ -71,7 +73,7 @@ pub(super) fn images(texture: &Node) -> Vec<RgbImage> {
 }
 
 /// Returns the attribute `rgb1` as bytes.
-pub(super) fn first_rgb(texture: &Node) -> [u8; 3] {
+pub(super) fn first_colour(texture: &Node) -> [u8; 3] {
     bytes(numbers(texture, "rgb1").unwrap_or(DEFAULT_RGB_1)).0
 }
 
@@ -82,14 +84,18 @@ fn numbers<const N: usize>(node: &Node, name: &str) -> Option<[f64; N]> {
 }
 
 impl Builtin {
+    fn is_plain(&self) -> bool {
+        matches!((self.kind, self.mark), (Kind::Flat, Mark::None))
+    }
+
     /// Returns the image of a `2d` texture.
     fn flat_image(&self, width: u32, height: u32) -> RgbImage {
         let plain = |column: u32, row: u32| match self.kind {
-            Kind::Flat => bytes(self.rgb_1),
+            Kind::Flat => bytes(self.first_rgb),
             Kind::Checker => self.square(2 * column >= width, 2 * row >= height),
             Kind::Gradient => {
                 let (x, y) = (across(column, width), -across(row, height));
-                self.between(2.0 * x.hypot(y) - 1.0, [self.rgb_1, self.rgb_2])
+                self.between(2.0 * x.hypot(y) - 1.0, [self.first_rgb, self.second_rgb])
             }
         };
         RgbImage::from_fn(width, height, |column, row| {
@@ -101,8 +107,8 @@ impl Builtin {
     fn face(&self, face: u32, side: u32) -> RgbImage {
         let is_along_z = face >= 4;
         let plain = |column: u32, row: u32| match self.kind {
-            Kind::Flat if face == 3 => bytes(self.rgb_2),
-            Kind::Flat => bytes(self.rgb_1),
+            Kind::Flat if face == 3 => bytes(self.second_rgb),
+            Kind::Flat => bytes(self.first_rgb),
             Kind::Checker => self.square((2 * column >= side) != is_along_z, 2 * row >= side),
             Kind::Gradient => {
                 let (x, y) = (across(column, side), -across(row, side));
@@ -113,7 +119,7 @@ impl Builtin {
                     3 => -up_share,
                     _ => (y / along).asin() / FRAC_PI_2,
                 };
-                self.between(elevation_share, [self.rgb_2, self.rgb_1])
+                self.between(elevation_share, [self.second_rgb, self.first_rgb])
             }
         };
         RgbImage::from_fn(side, side, |column, row| {
@@ -122,7 +128,7 @@ impl Builtin {
     }
 
     fn square(&self, is_right: bool, is_low: bool) -> Rgb<u8> {
-        bytes(if is_right == is_low { self.rgb_1 } else { self.rgb_2 })
+        bytes(if is_right == is_low { self.first_rgb } else { self.second_rgb })
     }
 
     /// Returns a colour between two, the first at -1 and the second at 1, along a sigmoid.

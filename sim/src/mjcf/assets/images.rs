@@ -102,7 +102,7 @@ fn faces_of_grid(node: &Node, whole: &RgbImage) -> Option<Vec<RgbImage>> {
 
 /// Returns an image of the colour `rgb1`.
 fn blank(node: &Node) -> RgbImage {
-    RgbImage::from_pixel(1, 1, Rgb(builtin::first_rgb(node)))
+    RgbImage::from_pixel(1, 1, Rgb(builtin::first_colour(node)))
 }
 
 /// Returns the name of a texture: without one, that of its file.

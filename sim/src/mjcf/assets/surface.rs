@@ -98,7 +98,8 @@ impl SurfaceImage {
         if pattern == Some(&SurfacePattern::Tiles) {
             return None;
         }
-        let texture = document.texture(name)?.clone();
+        // A single texel is a plain colour, which the geom has.
+        let texture = document.texture(name).filter(|texture| texture.levels[0].texels.len() > 1)?.clone();
         let kind = document.model.assets.texture(name)?.type_.as_deref();
         let repeat = material.name.as_ref().and_then(|name| document.repeats.0.get(name));
         let repeat = repeat.copied().unwrap_or(ONCE);
