@@ -167,9 +167,11 @@ fn who_resumes_an_episode_hands_on_what_is_given_and_no_defaults() {
     .expect("a file");
     let folder_text = folder.to_str().expect("UTF-8");
     let given = ["--seed", "3", "--per-robot", "--scene", "room.xml", "--max-usd", "2"];
-    let resume = [&["agent", "--resume", folder_text][..], &given].concat();
+    let models = ["--robot-model", "B=m?max-usd=1", "--robot-model", "C=n"];
+    let resume = [&["agent", "--resume", folder_text][..], &given, &models].concat();
     let arguments = format!(
-        "--max-usd=2 --seed=3 --per-robot --resume={folder_text} --server-flags={{\"scene\":\"room.xml\"}} token "
+        "--max-usd=2 --seed=3 --per-robot --robot-model=B=m?max-usd=1 --robot-model=C=n --resume={folder_text} \
+         --server-flags={{\"scene\":\"room.xml\"}} token "
     );
     let (output, printed) = tandem(&python, &resume);
     assert!(output.status.success(), "{printed}");
