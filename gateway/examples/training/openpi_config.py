@@ -1,4 +1,4 @@
-"""openpi's configuration of a data set of `tandem export lerobot RUNS handover --format v2 --view robot --rate 50`.
+r"""openpi's configuration of a data set of `tandem export lerobot RUNS handover --format v2 --view robot --rate 50`.
 
 Copy this file to `src/openpi/training/misc/` of openpi. In `src/openpi/training/config.py`, import it as its
 neighbours are imported, and add `*openpi_config.get_tandem_configs(),` to `_CONFIGS`. With the data set in
@@ -6,9 +6,9 @@ neighbours are imported, and add `*openpi_config.get_tandem_configs(),` to `_CON
 
     uv run scripts/compute_norm_stats.py --config-name pi05_tandem
     uv run scripts/train.py pi05_tandem --exp-name handover
-    uv run scripts/serve_policy.py policy:checkpoint --policy.config=pi05_tandem \\
+    uv run scripts/serve_policy.py policy:checkpoint --policy.config=pi05_tandem \
         --policy.dir=checkpoints/pi05_tandem/handover/29999
-    tandem evaluate --policy openpi:ws://127.0.0.1:8000 --protocol benchmark \\
+    tandem evaluate --policy openpi:ws://127.0.0.1:8000 --protocol benchmark \
         --policy-map gateway/examples/training/openpi_map.toml
 
 openpi's checkpoints have 32 numbers for state and action. Here, both are the 14 joints of the arms, the 14 of
