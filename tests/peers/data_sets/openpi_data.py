@@ -1,9 +1,9 @@
 """openpi's own loader and transforms read what `tandem export lerobot --format v2` writes, by `gateway/examples/training`.
 
-    pip install -r tests/peers/environments/openpi_data.txt        (Python 3.11)
+    pip install -r tests/peers/data_sets/openpi_data.txt        (Python 3.11)
     pip install --no-deps lerobot==0.3.3
     pip install "./gateway/python[lerobot]"
-    PYTHONPATH=openpi/src:openpi/packages/openpi-client/src python tests/peers/environments/openpi_data.py
+    PYTHONPATH=openpi/src:openpi/packages/openpi-client/src python tests/peers/data_sets/openpi_data.py
 
 openpi is on no package registry: `openpi` is a checkout of its repository. LeRobot 0.3.3 has the version of the format that
 openpi's own has, and is imported under the older name. Two demonstrations of Handover are exported for each robot. openpi's

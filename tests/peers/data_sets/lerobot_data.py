@@ -1,8 +1,8 @@
 """LeRobot's own classes and trainer read what `tandem export lerobot` writes; so do `datasets` and PyArrow without LeRobot.
 
-    pip install -r tests/peers/environments/lerobot_data.txt        (Python 3.12)
+    pip install -r tests/peers/data_sets/lerobot_data.txt        (Python 3.12)
     pip install "./gateway/python[lerobot]"
-    python tests/peers/environments/lerobot_data.py
+    python tests/peers/data_sets/lerobot_data.py
 
 Two demonstrations of Handover are recorded and exported with both codecs, as PNG, for each robot, with depth as films and as
 files, and as version 2.1, which LeRobot's own converter takes over. Ten rows of each are drawn again from the recording and
