@@ -152,7 +152,8 @@ def read_contract(data_set: str | PathLike[str]) -> RowContract:
     try:
         about: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise TandemError(f"there is no {path}; give the folder that tandem export lerobot wrote") from None
+        given = "give the folder that tandem export lerobot wrote; if LeRobot's tools made a data set of it, give the original"
+        raise TandemError(f"there is no {path}; {given}") from None
     if "contract" not in about:
         raise TandemError(f"{data_set} names no row contract, because an older Tandem wrote it; export it again")
     contract = RowContract.from_json(about["contract"])

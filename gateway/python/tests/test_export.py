@@ -230,6 +230,8 @@ def test_version_2_has_files_for_each_episode(runs: Path, whole: Path, tmp_path:
         name = {"episode_chunk": 0, "episode_index": number, "video_key": EYES}
         table = parquet.read_table(exported.folder / info["data_path"].format(**name))
         assert table["index"].to_pylist() == list(range(number * 5, number * 5 + length))
+        # Programs that read this version have a `datasets` before 4.0, which knows no "List".
+        assert json.loads(table.schema.metadata[b"huggingface"])["info"]["features"]["action"]["_type"] == "Sequence"
         assert np.array_equal(np.array(table["action"].to_pylist()), rows["action"][rows["episode_index"] == number])
         with av.open(str(exported.folder / info["video_path"].format(**name))) as container:
             assert len(list(container.decode(video=0))) == length

@@ -133,7 +133,8 @@ def _described(feature: dict[str, Any]) -> dict[str, Any]:
         return {"_type": "Image"}
     value = {"dtype": feature["dtype"], "_type": "Value"}
     (length,) = feature["shape"]
-    return value if length == 1 else {"feature": value, "length": length, "_type": "List"}
+    # `datasets` since 4.0 calls it a list, and reads the older name, the only one that readers of version 2.1 know.
+    return value if length == 1 else {"feature": value, "length": length, "_type": "Sequence"}
 
 
 def _write_data(

@@ -121,7 +121,7 @@ pub fn is_installed(program: &str) -> bool {
 /// No other check compiles the Python files given to users.
 #[test]
 fn examples_are_python() {
-    let folders = ["agents", "bridges", "environments", "servers"]
+    let folders = ["agents", "bridges", "environments", "servers", "training"]
         .map(|folder| root().join("gateway/examples").join(folder));
     let files = folders.iter().flat_map(|folder| fs::read_dir(folder).expect("a folder of examples"));
     let files: Vec<_> = files.map(|file| file.expect("a file").path()).collect();

@@ -1,13 +1,14 @@
 """LeRobot's own classes and trainer read what `tandem export lerobot` writes; so do `datasets` and PyArrow without LeRobot.
 
-    pip install -r tests/peers/environments/lerobot_data.txt        (Python 3.12)
+    pip install -r tests/peers/data_sets/lerobot_data.txt        (Python 3.12)
     pip install "./gateway/python[lerobot]"
-    python tests/peers/environments/lerobot_data.py
+    python tests/peers/data_sets/lerobot_data.py
 
 Two demonstrations of Handover are recorded and exported with both codecs, as PNG, for each robot, with depth as films and as
 files, and as version 2.1, which LeRobot's own converter takes over. Ten rows of each are drawn again from the recording and
-compared with what LeRobot reads; its statistics of the same rows are compared with ours; the actions are played in a new episode
-of the seed; `lerobot-train` trains an ACT for twenty steps, and `lerobot-eval` plays it in the environment with the same rows.
+compared with what LeRobot reads; its statistics of the same rows are compared with ours; the actions are played in a new
+episode of the seed; `lerobot-edit-dataset` leaves out columns and merges; `lerobot-train` trains an ACT for twenty steps, and
+`lerobot-eval` plays it in the environment with the same rows.
 """
 
 import json
@@ -24,10 +25,12 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
 import tandem
 from tandem.export import ExportSettings, export_lerobot
+from tandem.rows import read_contract
 
 PROGRAMS = Path(sys.executable).parent
 SEEDS = (2000, 2001)
 SAMPLES = 10
+ROW = 40
 # What the codecs lose at their settings, small pictures more than large ones; PNG loses nothing.
 MIN_DB = {"av1": 30.0, "h264": 28.0, "png": 90.0, "depth_png": 90.0}
 # Half of a step at 10 m and of a millimetre, to which LeRobot rounds.
@@ -117,7 +120,8 @@ def play(data_set, recordings, rate_hz):
             if episode.step(told.astype(np.float32)).ended:
                 break
         reached = episode.finish().phases
-    assert all(abs(reached[name] - time_s) < 0.1 for name, time_s in recording.result.phases.items()), reached
+    # A phase may be reached one row later than in the recording.
+    assert all(abs(reached[name] - time_s) < 1.5 / rate_hz for name, time_s in recording.result.phases.items()), reached
     print("actions played again reach", reached, "- recorded", recording.result.phases)
 
 
@@ -166,6 +170,35 @@ def evaluate(folder, settings, policy, out):
     print("lerobot-eval:", overall["pc_success"], "% of one episode")
 
 
+def edited(operation, out, *more):
+    command = [PROGRAMS / "lerobot-edit-dataset", f"--operation.type={operation}", f"--new_root={out}", *more]
+    done = subprocess.run([*command, "--new_repo_id=local/edited"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+def edit(data_set, scratch):
+    """LeRobot's own tools leave out columns and merge data sets. Such a data set has the contract of those it is made of."""
+    folder = data_set.root
+    names = [key for key in data_set.meta.features if key.startswith("privileged.")]
+    given = ["--repo_id=local/handover", f"--root={folder}", f"--operation.feature_names={names}"]
+    plain = edited("remove_feature", scratch / "plain", *given)
+    merge = ["--operation.repo_ids=['local/a','local/b']", f"--operation.roots={[str(plain)] * 2}"]
+    merged = opened(edited("merge", scratch / "merged", *merge))
+    rows, length = merged.hf_dataset.with_format("numpy"), len(data_set)
+    assert len(merged) == 2 * length and not set(names) & set(merged.meta.features), merged
+    for key in ("observation.state", "action"):
+        assert np.array_equal(rows[length + ROW][key], data_set.hf_dataset.with_format("numpy")[ROW][key]), key
+    assert merged[length + ROW]["task"] == data_set[ROW]["task"]
+    try:
+        read_contract(merged.root)
+    except tandem.TandemError as error:
+        assert "give the original" in str(error), error
+    features = read_contract(folder).features
+    assert {key: tuple(merged.meta.features[key]["names"]) for key in features} == features
+    print("lerobot-edit-dataset: merged", merged.num_episodes, "episodes without", len(names), "columns")
+
+
 def converted(folder):
     """LeRobot's own converter makes version 3.0 of version 2.1."""
     module = "lerobot.scripts.convert_dataset_v21_to_v30"
@@ -204,6 +237,7 @@ def main():
                 assert len(rows) == len(data_set) and len(rows[0]["action"]) == 70, rows
                 print("datasets:", rows.column_names)
             if name == "h264":
+                edit(data_set, scratch)
                 evaluate(folder, settings, train(folder, scratch / "trained"), scratch / "evaluated")
 
 

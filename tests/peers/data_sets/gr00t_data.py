@@ -1,13 +1,13 @@
 """Isaac-GR00T's own classes read what `tandem export lerobot --format v2` writes, as it is.
 
-    pip install -r tests/peers/environments/gr00t_data.txt        (Python 3.12)
+    pip install -r tests/peers/data_sets/gr00t_data.txt        (Python 3.12)
     pip install "./gateway/python[lerobot]"
-    PYTHONPATH=Isaac-GR00T python tests/peers/environments/gr00t_data.py
+    PYTHONPATH=Isaac-GR00T python tests/peers/data_sets/gr00t_data.py
 
-GR00T is on no package registry: `Isaac-GR00T` is a checkout of its repository, of N1.5, N1.6 or N1.7; N1.5 also needs PyTorch3D.
-Two demonstrations of Handover are exported for each robot. GR00T's configuration of a Unitree G1 loads them without any change; a
-row's parts, image and instruction, and the statistics, are compared with the recordings. Then it loads the rows of both robots
-together, whose parts have the robots' names.
+GR00T is on no package registry: `Isaac-GR00T` is a checkout of its repository, of N1.5, N1.6 or N1.7; N1.5 also needs
+PyTorch3D. Two demonstrations of Handover are exported for each robot. GR00T's configuration of a Unitree G1 loads them without
+any change; a row's parts, image and instruction, and the statistics, are compared with the recordings. Then it loads the rows
+of both robots together, whose parts have the robots' names.
 """
 
 import sys
