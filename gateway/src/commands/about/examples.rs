@@ -17,7 +17,7 @@ macro_rules! examples {
 }
 
 /// Every example, by its path in the folder, with its text.
-const EXAMPLES: [(&str, &str); 17] = examples! {
+const EXAMPLES: [(&str, &str); 19] = examples! {
     "agents/agent.py"
     "agents/claude.sh"
     "agents/codex.sh"
@@ -35,6 +35,8 @@ const EXAMPLES: [(&str, &str); 17] = examples! {
     "robots/walker.xml"
     "servers/lerobot_act.py"
     "tasks/pass_the_parcel.toml"
+    "training/openpi_config.py"
+    "training/openpi_map.toml"
 };
 
 /// Writes the examples below the working folder.
