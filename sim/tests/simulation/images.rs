@@ -196,6 +196,11 @@ fn builtin_textures_repeat_as_images_do() {
         assert_eq!(names(&twice, [[40, 40], [56, 40], [40, 56], [56, 56]]), ["red", "blue", "blue", "red"]);
     }
     let tiles = r#"<custom><text name="material_patterns" data="checker tiles"/></custom>"#;
-    let tiled = drawn(RendererKind::Cpu, &(tiles.to_owned() + &asset(r#"texrepeat="9 9""#) + floor), &above);
-    assert_eq!(names(&tiled, [[40, 40], [56, 40], [40, 56], [56, 56]]), ["blue", "red", "red", "blue"]);
+    let tiled =
+        |material: &str| drawn(RendererKind::Cpu, &(tiles.to_owned() + &asset(material) + floor), &above);
+    let nine = r#"texrepeat="9 9""#;
+    assert_eq!(tiled(nine).rgb, tiled("").rgb);
+    assert_ne!(tiled(nine).rgb, drawn(RendererKind::Cpu, &(asset(nine) + floor), &above).rgb);
+    // At 0.12 m from the middle is a tile's corner, and at 0.6 m the next tile.
+    assert_eq!(names(&tiled(""), [[40, 40], [56, 40], [8, 40], [88, 40]]), ["red", "blue", "blue", "red"]);
 }

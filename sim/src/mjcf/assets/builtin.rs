@@ -132,8 +132,8 @@ impl Builtin {
     }
 
     /// Returns a colour between two, the first at -1 and the second at 1, along a sigmoid.
-    fn between(&self, place: f64, [first, second]: [[f64; 3]; 2]) -> Rgb<u8> {
-        let share = (0.5 + place / (2.0 * (1.0 + place * place)).sqrt()).clamp(0.0, 1.0);
+    fn between(&self, level: f64, [first, second]: [[f64; 3]; 2]) -> Rgb<u8> {
+        let share = (0.5 + level / (2.0 * (1.0 + level * level)).sqrt()).clamp(0.0, 1.0);
         bytes(std::array::from_fn(|i| share * second[i] + (1.0 - share) * first[i]))
     }
 
