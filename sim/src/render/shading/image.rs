@@ -139,8 +139,9 @@ fn between(first: [u8; 4], second: [u8; 4], share: f32) -> Lanes<4> {
     lanes(|i| first[i] + (second[i] - first[i]) * share)
 }
 
-/// Returns the place on the face of a cube that a direction meets. Faces are in the order +x, -x, +y, -y, +z and
-/// -z. Source: OpenGL 4.6, section 8.13.
+/// Returns the place on the face of a cube that a direction meets.
+/// Faces are in the order +x, -x, +y, -y, +z, -z.
+/// Source: OpenGL 4.6, section 8.13.
 #[inline]
 fn on_cube([x, y, z]: [f32; 3], step_values: [[f32; 3]; 2]) -> ImagePlace {
     let (across, down, along, axis): ([f32; 3], [f32; 3], [f32; 3], _) =
