@@ -33,8 +33,8 @@ pub use parts::{
     Budget, Bytes, CameraArrays, CommandReply, DepthFormat, Disclosure, Driving, Effort, ExtraInformation,
     FingerReport, Formats, Grip, HandPart, HandReport, HandState, Heard, HeldObject, Hints, ImageFormat,
     JointValues, ModelEnding, NextPhase, Note, NoteKind, OperatorToken, OperatorUse, Operators, Partner,
-    PartnerDid, PhaseReached, PixelRegion, PlanReply, Png, Pose, PoseFrame, Protocol, Range, RobotFallen,
-    RobotReport, RobotUsage, StopReason, TokenCount, Touch, Usage, Wording,
+    PartnerDid, PhaseReached, PixelRegion, PlanReply, Png, Pose, PoseFrame, Presence, PresenceState,
+    Protocol, Range, RobotFallen, RobotReport, RobotUsage, StopReason, TokenCount, Touch, Usage, Wording,
 };
 pub use refusal::{ProblemBody, Refusal, RefusalClass};
 pub use schema::{EpisodeToolSpec, Format, ToolSpec, TypedTool, TypedTools};

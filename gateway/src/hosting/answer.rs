@@ -2,7 +2,9 @@
 
 use serde::Serialize;
 use tandem_episodes::{CallReply, Session};
-use tandem_tools_spec::{Call, Heard, ManageReply, Observation, Partner, StopReason, TalkReply, ToolReply};
+use tandem_tools_spec::{
+    Call, Heard, ManageReply, Observation, Partner, Presence, StopReason, TalkReply, ToolReply,
+};
 
 /// A tool's reply with the information that goes with every reply.
 #[derive(Debug, Serialize)]
@@ -20,6 +22,9 @@ pub struct Answer {
     /// Behaviour of the other operators' robots during the command.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub partners: Vec<Partner>,
+    /// What the other operators do at the moment, with a status.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub presence: Vec<Presence>,
     /// Messages from the other operators.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub heard: Vec<Heard>,
@@ -43,6 +48,7 @@ impl Answer {
             step: (!is_result).then(|| session.env_steps()),
             observation,
             partners: Vec::new(),
+            presence: Vec::new(),
             heard: Vec::new(),
             recording_failed: failed.map(str::to_owned),
             others_play_on: false,

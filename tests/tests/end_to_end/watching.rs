@@ -127,6 +127,7 @@ fn who_watches_sees_steps_calls_and_pictures_until_the_end() {
     }
     server.delete(&format!("/v1/episodes/{id}")).ok();
     let (mut steps, mut tools, mut pictures, mut ended) = (Vec::new(), Vec::new(), 0, None);
+    let mut lacks = Vec::new();
     while let Ok(message) = socket.read() {
         match message {
             Message::Binary(bytes) => {
@@ -147,6 +148,7 @@ fn who_watches_sees_steps_calls_and_pictures_until_the_end() {
                 let told: Value = serde_json::from_str(&text).expect("JSON");
                 match told["kind"].as_str() {
                     Some("call") => tools.push(told["tool"].clone()),
+                    Some("next_phase") => lacks.push(told["phase"]["lacks"][0].clone()),
                     Some("ended") => ended = Some(told["result"]["ended"].clone()),
                     other => panic!("{other:?}"),
                 }
@@ -162,6 +164,8 @@ fn who_watches_sees_steps_calls_and_pictures_until_the_end() {
     );
     assert_eq!((tools, pictures), (vec![json!("wait"), json!("move_wrists"), json!("observe")], 1));
     assert_eq!(ended, Some(json!("finished")));
+    let first = "A's right hand does not hold bottle: the right one is off it";
+    assert!(lacks.len() > 1 && lacks.iter().all(|lack| lack == first), "{lacks:?}");
 }
 
 #[test]
@@ -382,11 +386,13 @@ fn notes_and_refusals_are_seen_as_they_come() {
         .map(|one| (one["kind"].as_str(), one["entry"].as_u64(), one["number"].as_u64()))
         .collect();
     let expected = [
+        (Some("next_phase"), None, None),
         (Some("note"), Some(1), None),
+        (Some("next_phase"), None, None),
         (Some("call"), Some(2), None),
         (Some("call"), Some(3), Some(1)),
         (Some("ended"), None, None),
     ];
     assert_eq!(kinds, expected);
-    assert_eq!((&told[0]["note"]["text"], &told[1]["ok"]), (&json!("I wait."), &json!(false)));
+    assert_eq!((&told[1]["note"]["text"], &told[3]["ok"]), (&json!("I wait."), &json!(false)));
 }

@@ -129,6 +129,36 @@ pub enum PartnerDid {
     HeldFinished,
 }
 
+/// Another operator at the moment, as `get_status` tells of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Presence {
+    /// Its robot, as "B".
+    pub robot: String,
+    /// What it does.
+    pub state: PresenceState,
+    /// For how long it has thought since its last reply, in seconds; left out unless it is thinking.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub thinking_s: Option<f64>,
+}
+
+/// What an operator does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PresenceState {
+    /// It has not called yet.
+    Absent,
+    /// It thinks, and the others wait for it.
+    Thinking,
+    /// Its command waits for those of the others.
+    Waiting,
+    /// Its command is executed.
+    Acting,
+    /// It has not commanded for longer than the others' patience, who go on without it.
+    Silent,
+    /// It has called finish.
+    Finished,
+}
+
 /// Words of another operator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Heard {

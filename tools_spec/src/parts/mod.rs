@@ -13,7 +13,9 @@ pub use command::{
     BaseMotion, BaseReport, BaseState, CommandReply, Effort, FingerReport, Grip, HandPart, HandReport,
     HandState, RobotReport, StopReason, Touch,
 };
-pub use driving::{Driving, Heard, OperatorToken, OperatorUse, Operators, Partner, PartnerDid};
+pub use driving::{
+    Driving, Heard, OperatorToken, OperatorUse, Operators, Partner, PartnerDid, Presence, PresenceState,
+};
 pub use episode::{
     Assistance, Budget, Disclosure, ExtraInformation, HeldObject, Hints, NextPhase, PhaseReached, Protocol,
     RobotFallen, Wording,

@@ -7,7 +7,7 @@ use super::plain::{body_schema, plain_schema};
 use super::spec::ToolSpec;
 use crate::limits::MAX_STEPS;
 use crate::listing::EpisodeList;
-use crate::parts::{Heard, Hints, Note, Partner, Wording};
+use crate::parts::{Heard, Hints, Note, Partner, Presence, Wording};
 use crate::refusal::ProblemBody;
 use crate::tool::Tool;
 use crate::tools::{Briefing, Finish, GetStatus, StartEpisode};
@@ -158,6 +158,10 @@ fn with_notice(mut reply: Value) -> Value {
     reply["properties"]["partners"] = list(
         plain_schema::<Partner>(),
         "What the robots of the other operators did meanwhile; left out where one policy directs all.",
+    );
+    reply["properties"]["presence"] = list(
+        plain_schema::<Presence>(),
+        "What the other operators do at the moment; in replies to get_status alone.",
     );
     reply["properties"]["heard"] = list(
         plain_schema::<Heard>(),

@@ -17,7 +17,9 @@ use serde_json::{
     value::{RawValue, to_raw_value},
 };
 use tandem_episodes::{EpisodeSpec, JournalEntry, Visibility};
-use tandem_tools_spec::{Call, Driving, Heard, Note, Observation, Partner, StartEpisode, StartReply};
+use tandem_tools_spec::{
+    Call, Driving, Heard, Note, Observation, Partner, Presence, StartEpisode, StartReply,
+};
 
 use crate::{hosting::Answer, settings::Durability};
 
@@ -91,6 +93,8 @@ pub struct KeptAnswer {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     partners: Vec<Partner>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    presence: Vec<Presence>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     heard: Vec<Heard>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     recording_failed: Option<String>,
@@ -145,6 +149,7 @@ impl KeptAnswer {
             step: answer.step,
             observation: answer.observation.clone(),
             partners: answer.partners.clone(),
+            presence: answer.presence.clone(),
             heard: answer.heard.clone(),
             recording_failed: answer.recording_failed.clone(),
             others_play_on: answer.others_play_on,
@@ -155,8 +160,12 @@ impl KeptAnswer {
     pub fn read(self) -> Result<(Call, Answer), Box<dyn Error>> {
         let request = Call::parse(&self.tool, serde_json::from_str(self.arguments.get())?)?;
         let reply = request.tool.parse_reply(serde_json::from_str(self.reply.get())?)?;
-        let KeptAnswer { step, observation, partners, heard, recording_failed, others_play_on, .. } = self;
-        Ok((request, Answer { reply, step, observation, partners, heard, recording_failed, others_play_on }))
+        let KeptAnswer {
+            step, observation, partners, presence, heard, recording_failed, others_play_on, ..
+        } = self;
+        let answer =
+            Answer { reply, step, observation, partners, presence, heard, recording_failed, others_play_on };
+        Ok((request, answer))
     }
 }
 

@@ -43,6 +43,11 @@ impl OperatorClock {
         self.spent + self.since.map_or(Duration::ZERO, |since| since.elapsed())
     }
 
+    /// Returns the time since it began to run; `None` while it stands.
+    pub fn running(&self) -> Option<Duration> {
+        self.since.map(|since| since.elapsed())
+    }
+
     /// Adds the time of an earlier process.
     pub fn add(&mut self, earlier: Duration) {
         self.spent += earlier;

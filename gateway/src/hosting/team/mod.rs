@@ -11,6 +11,7 @@ mod driving;
 mod one_robot;
 mod partner;
 mod planning;
+mod presence;
 mod round;
 mod rules;
 
@@ -197,8 +198,7 @@ impl Team {
             ToolCall::Look(_) | ToolCall::Manage(ManageCall::GetStatus(_)) => {
                 let _place = self.take_place(robot)?;
                 self.ask(episode, seat, call.into_call(), keyed, move |team, answer| {
-                    team.round().has_looked(seat);
-                    answer
+                    team.looked(seat, answer)
                 })
                 .await
             }

@@ -83,6 +83,7 @@ impl Team {
             step: Some(step),
             observation: None,
             partners: std::mem::take(&mut under_way.partners),
+            presence: Vec::new(),
             heard: std::mem::take(&mut under_way.heard),
             recording_failed: episode.recording_failed().map(str::to_owned),
             others_play_on: false,

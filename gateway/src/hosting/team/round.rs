@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use tandem_episodes::OperatorCommand;
-use tandem_tools_spec::{Heard, OperatorUse, PartnerDid, ToolReply};
+use tandem_tools_spec::{Heard, OperatorUse, PartnerDid, Presence, PresenceState, ToolReply};
 use tokio::{sync::oneshot, task::AbortHandle};
 
 use super::clock::OperatorClock;
@@ -164,6 +164,12 @@ impl Round {
         let Operator { robot, requests, clock, .. } = &self.operators[seat];
         let thinking_s = (clock.thought().as_secs_f64() * 1e3).round() / 1e3;
         OperatorUse { robot: robot.clone(), requests: *requests, thinking_s }
+    }
+
+    /// Returns what the operators on other seats than `seat` do.
+    pub fn presence(&self, seat: usize) -> Vec<Presence> {
+        let others = self.operators.iter().enumerate().filter(|(other, _)| *other != seat);
+        others.map(|(_, operator)| operator.presence()).collect()
     }
 
     /// Returns the time that the operator on `seat` has thought.
@@ -345,6 +351,19 @@ impl Round {
 }
 
 impl Operator {
+    fn presence(&self) -> Presence {
+        let state = match self.state {
+            OperatorState::Thinking | OperatorState::Silent if self.requests == 0 => PresenceState::Absent,
+            OperatorState::Thinking => PresenceState::Thinking,
+            OperatorState::Waiting(_) => PresenceState::Waiting,
+            OperatorState::Acting => PresenceState::Acting,
+            OperatorState::Silent => PresenceState::Silent,
+            OperatorState::Finished => PresenceState::Finished,
+        };
+        let thinking_s = self.clock.running().map(|thought| (thought.as_secs_f64() * 10.0).round() / 10.0);
+        Presence { robot: self.robot.clone(), state, thinking_s }
+    }
+
     /// Lets nobody wait for it any more, if it thinks.
     fn fall_silent(&mut self) {
         if let OperatorState::Thinking = self.state {

@@ -46,3 +46,25 @@ fn who_is_waited_for_pays() {
     assert!(used.iter().all(|one| one["requests"].as_u64() >= Some(2)), "{result}");
     assert!(used[0]["thinking_s"].as_f64() >= Some(1.99), "{result}");
 }
+
+#[test]
+fn a_status_tells_what_the_others_do() {
+    let team = Team::start(json!({ "patience_s": 60 }));
+    let presence = |robot: usize| team.ask(robot, "get_status", json!({})).ok()["presence"].clone();
+    assert_eq!(presence(1), json!([{ "robot": "A", "state": "absent" }]));
+    let told = presence(0);
+    assert_eq!(told[0]["state"], "thinking", "{told}");
+    assert!(told[0]["thinking_s"].is_number(), "{told}");
+    std::thread::scope(|scope| {
+        let waits = scope.spawn(|| team.ask(0, "wait", wait()).ok());
+        while presence(1) != json!([{ "robot": "A", "state": "waiting" }]) {
+            assert!(!waits.is_finished(), "B has not commanded");
+            sleep(Duration::from_millis(10));
+        }
+        team.ask(1, "finish", json!({})).ok();
+        let told = waits.join().expect("A's reply");
+        assert!(told.get("presence").is_none(), "{told}");
+    });
+    assert_eq!(presence(0), json!([{ "robot": "B", "state": "finished" }]));
+    team.verified();
+}
