@@ -40,6 +40,7 @@ await page.waitForSelector(".pictures img");
 await page.waitForFunction(() => /3\.0 s/.test(document.querySelector(".facts").textContent));
 assert.doesNotMatch(await page.locator("main").innerText(), /\b(null|undefined|NaN)\b/);
 assert.equal(await page.locator(".story .seen img").count(), 2, "the pictures that the policy was shown");
+assert.match(await page.locator(".phases .lacks").innerText(), /does not hold bottle/, "what the next phase lacks");
 await accessible(page, "a live episode");
 await page.selectOption(".tools select", "A");
 await page.waitForTimeout(500);
