@@ -22,7 +22,7 @@ pub struct Answer {
     /// Behaviour of the other operators' robots during the command.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub partners: Vec<Partner>,
-    /// What the other operators do at the moment, with a status.
+    /// The other operators at the moment, with a status.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub presence: Vec<Presence>,
     /// Messages from the other operators.

@@ -134,14 +134,14 @@ pub enum PartnerDid {
 pub struct Presence {
     /// Its robot, as "B".
     pub robot: String,
-    /// What it does.
+    /// Its activity.
     pub state: PresenceState,
     /// For how long it has thought since its last reply, in seconds; left out unless it is thinking.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thinking_s: Option<f64>,
 }
 
-/// What an operator does.
+/// Activity of an operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PresenceState {

@@ -1,4 +1,4 @@
-//! What the other operators do at the moment, for one that asks.
+//! The other operators at the moment, for one that asks.
 
 use tandem_tools_spec::{ManageReply, ToolReply};
 
