@@ -77,13 +77,14 @@ fn compile(folder: &Path, file: &str) {
         return skipped("there is no pdflatex");
     }
     let document = format!(
-        "\\documentclass{{article}}\n\\usepackage{{booktabs}}\n\\usepackage{{longtable}}\n\\begin{{document}}\n\
+        "\\documentclass{{article}}\n\\usepackage{{booktabs,graphicx,longtable}}\n\\begin{{document}}\n\
          \\input{{{file}}}\n\\end{{document}}\n"
     );
     fs::write(folder.join("document.tex"), document).expect("a document");
     let arguments = ["-interaction=nonstopmode", "-halt-on-error", "document.tex"];
     let output = Command::new("pdflatex").current_dir(folder).args(arguments).output().expect("it starts");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
+    let printed = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success() && !printed.contains("Overfull"), "{printed}");
 }
 
 #[cfg(unix)]

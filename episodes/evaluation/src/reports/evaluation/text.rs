@@ -19,7 +19,7 @@ pub fn markdown(report: &EvaluationReport) -> String {
 
 /// Returns the tables for LaTeX, to be included in a document.
 pub fn tex(report: &EvaluationReport) -> String {
-    let mut text = String::from("% Needs \\usepackage{booktabs} and \\usepackage{longtable}.\n");
+    let mut text = String::from("% Needs \\usepackage{booktabs,graphicx,longtable}.\n");
     let comment = |words: &str| format!("% {}\n", words.replace(['\n', '\r'], " "));
     text.extend(report.header.made.iter().map(|made| comment(&made.in_words())));
     text.extend(report.skipped.iter().map(|skipped| comment(&format!("Left out: {skipped}"))));

@@ -1,4 +1,4 @@
-//! Tables as LaTeX, for documents with the packages `booktabs` and `longtable`.
+//! Tables as LaTeX, for documents with the packages `booktabs`, `graphicx` and `longtable`.
 
 use super::Table;
 
@@ -6,6 +6,8 @@ use super::Table;
 const MAX_PAGE_ROWS: usize = 40;
 /// Length from which a column's texts are broken into lines, in characters.
 const LONG_TEXT_CHARS: usize = 36;
+/// Command that scales what follows down to the width of the text, and up never.
+const WITHIN_THE_PAGE: &str = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}";
 
 /// Renders a table with its title and note as the caption.
 pub fn tex(table: &Table) -> String {
@@ -20,8 +22,8 @@ pub fn tex(table: &Table) -> String {
              \\bottomrule\n    \\endfoot\n{rows}\\end{{longtable}}\n}}\n"
         ),
         false => format!(
-            "\n\\begin{{table}}\n  \\centering\n  {caption}\n  \\small\n  \\begin{{tabular}}{{{columns}}}\n{head}{rows}    \
-             \\bottomrule\n  \\end{{tabular}}\n\\end{{table}}\n"
+            "\n\\begin{{table}}\n  \\centering\n  {caption}\n  \\small\n  {WITHIN_THE_PAGE}{{%\n  \
+             \\begin{{tabular}}{{{columns}}}\n{head}{rows}    \\bottomrule\n  \\end{{tabular}}}}\n\\end{{table}}\n"
         ),
     }
 }
