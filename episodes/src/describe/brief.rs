@@ -101,18 +101,19 @@ const WALKING: &str = "A robot that is told to walk gains way after 0.3 to 0.5 s
 
 const TEAMWORK: &str = "Each robot has an operator of its own; your tools see and move your robot alone. Time \
     passes only while every operator has a command, or has kept the others waiting for longer than their \
-    patience: its robot then holds still, time passes without it (did \"held_silent\"), and its next command is \
-    refused once with the steps that it missed. So let your partner speak first before you wait long. The \
-    shortest command ends the step: a longer one stops with stop_reason \"partner_done\", so repeat it. \
-    `partners` in a reply says what the others' robots did. When your part is done call finish: your robot then holds still, and the others play on.";
+    patience: its robot then holds still, time passes without it (did \"held_silent\"), and its next \
+    command is refused once with the steps that it missed. So let your partner speak first before you wait \
+    long. The shortest command ends the step: a longer one stops with stop_reason \"partner_done\", so \
+    repeat it. `partners` in a reply says what the others' robots did. When your part is done call finish: \
+    your robot then holds still, and the others play on.";
 
 const TALKING: &str = " `say` reaches the others with their next reply, where `heard` has it. The operator of the \
     first robot, A, proposes who does what, places, heights and a few words, for example IN PLACE, HOLDING, FREE; \
     the others answer or correct. Use the words when they are true; give places in a frame that you share";
 
 /// Text for policies that have plans.
-const WAITING: &str = " To wait for a partner, send a plan of one `wait` of up to 1500 steps with `until` and a \
-    condition, for example {\"heard\": true}, {\"touching\": true}, {\"force_above_n\": 5} or \
+const WAITING: &str = " To wait for a partner, send a plan of one `wait` of up to 1500 steps with `until` \
+    and a condition, for example {\"heard\": true}, {\"touching\": true}, {\"force_above_n\": 5} or \
     {\"phase_reached\": \"p1\"}, or {\"any_of\": [...]} with several of which one suffices: it is answered once, \
     and the partner's commands go on meanwhile. {\"partners_wait\": true} holds once every other operator \
     waits, too: end a plan with it to begin the next step together, without a word. To carry \

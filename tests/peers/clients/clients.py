@@ -125,7 +125,7 @@ async def play(list_tools, call, get_prompt, mcp_error):
     tools = {tool.name: tool for tool in (await list_tools()).tools}
     hints = tools["observe"].annotations
     assert field(hints, "readOnlyHint", "read_only_hint") is True, hints
-    # Where it is left out, it is false.
+    # A hint that is left out is false.
     assert not field(tools["wait"].annotations, "readOnlyHint", "read_only_hint")
     started = json.loads((await call("start_episode", PLAY)).content[0].text)
     episode = {"episode_id": started["episode_id"]}

@@ -129,7 +129,7 @@ pub enum PartnerDid {
     HeldFinished,
 }
 
-/// Another operator at the moment, as `get_status` tells of it.
+/// Current activity of another operator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Presence {
     /// Its robot, as "B".

@@ -40,7 +40,7 @@ impl OperatorClock {
 
     /// Returns the time for which it has run.
     pub fn thought(&self) -> Duration {
-        self.spent + self.since.map_or(Duration::ZERO, |since| since.elapsed())
+        self.spent + self.running().unwrap_or_default()
     }
 
     /// Returns the time since it began to run; `None` while it stands.
@@ -54,11 +54,15 @@ impl OperatorClock {
     }
 }
 
+/// Returns seconds to the millisecond, as replies have them.
+pub(super) fn to_ms(time: Duration) -> f64 {
+    (time.as_secs_f64() * 1e3).round() / 1e3
+}
+
 impl Team {
     /// Returns the seconds that the operator on `seat` may still think; `None` without a limit.
     pub(super) fn clock_left_s(&self, seat: usize) -> Option<f64> {
-        let left = self.rules.thinking_limit?.saturating_sub(self.round().thought(seat));
-        Some((left.as_secs_f64() * 1e3).round() / 1e3)
+        Some(to_ms(self.rules.thinking_limit?.saturating_sub(self.round().thought(seat))))
     }
 
     /// Refuses a command of the operator on `seat` once its clock has run out. Its robot then holds still, as

@@ -7,7 +7,7 @@ use tandem_episodes::OperatorCommand;
 use tandem_tools_spec::{Heard, OperatorUse, PartnerDid, Presence, PresenceState, ToolReply};
 use tokio::{sync::oneshot, task::AbortHandle};
 
-use super::clock::OperatorClock;
+use super::clock::{OperatorClock, to_ms};
 use crate::hosting::{Answer, HostingError, durable::Keyed};
 
 /// Maximum number of unread messages for one operator.
@@ -149,8 +149,7 @@ impl Round {
         }
     }
 
-    /// Counts a request of the operator on `seat`, whose clock begins with its first, and returns what it has
-    /// used.
+    /// Counts a request of the operator on `seat`, whose clock begins with its first.
     pub fn arrive(&mut self, seat: usize) {
         let operator = &mut self.operators[seat];
         operator.requests += 1;
@@ -162,8 +161,7 @@ impl Round {
     /// Returns what the operator on `seat` has used up to now.
     pub fn used(&self, seat: usize) -> OperatorUse {
         let Operator { robot, requests, clock, .. } = &self.operators[seat];
-        let thinking_s = (clock.thought().as_secs_f64() * 1e3).round() / 1e3;
-        OperatorUse { robot: robot.clone(), requests: *requests, thinking_s }
+        OperatorUse { robot: robot.clone(), requests: *requests, thinking_s: to_ms(clock.thought()) }
     }
 
     /// Returns what the operators on other seats than `seat` do.
