@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import json
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,17 +19,6 @@ from tandem.agent import main as play
 from tandem.export.command_line import main as export
 
 SEED = 2000
-
-
-@pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("runs")
-
-
-@pytest.fixture(scope="module")
-def server(runs: Path) -> Iterator[tandem.Server]:
-    with tandem.serve(runs=runs) as server:
-        yield server
 
 
 def script(system: str) -> Script:

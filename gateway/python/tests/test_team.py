@@ -7,7 +7,6 @@ import math
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -39,17 +38,6 @@ def keys(monkeypatch: pytest.MonkeyPatch) -> None:
         "TANDEM_TOKEN",
     ):
         monkeypatch.delenv(name, raising=False)
-
-
-@pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("runs")
-
-
-@pytest.fixture(scope="module")
-def server(runs: Path) -> Iterator[tandem.Server]:
-    with tandem.serve(runs=runs) as server:
-        yield server
 
 
 def latest(runs: Path) -> Path:

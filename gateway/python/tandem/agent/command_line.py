@@ -133,7 +133,7 @@ def parser() -> argparse.ArgumentParser:
         action="append",
         type=_robot_model,
         metavar="ROBOT=MODEL",
-        help="with --per-robot: the model of one robot with its own flags, for example B=claude-opus-5-5?api=anthropic&max-usd=2",
+        help="with --per-robot: one robot's model with its own flags, for example B=claude-opus-5-5?api=anthropic&max-usd=2",
     )
     flags.add_argument(
         "--resume",
