@@ -29,10 +29,10 @@ pub enum EpisodeError {
     TooManySteps { asked: u32, most: u32, protocol: &'static str },
     #[error("pixel [{u}, {v}] is outside the image; u goes from 0 to {}, v from 0 to {}", .width - 1, .height - 1)]
     PixelOutside { u: i64, v: i64, width: u32, height: u32 },
-    #[error("{}; look with observe, and give a pixel that is on it", no_surface(query, seen))]
+    #[error("{}", no_surface(query, seen))]
     NoSurface {
         query: SurfaceQuery,
-        /// Colours that are visible in part.
+        /// Colours that are visible in part, where the query has one.
         seen: Vec<Color>,
     },
     #[error("the episode has ended ({}); observe, get_robot_state, get_status and finish still answer; start_episode begins another", reason_text(*.reason))]
@@ -220,16 +220,20 @@ pub enum CheckpointError {
 
 fn no_surface(query: &SurfaceQuery, seen: &[Color]) -> String {
     let name = |color: &Color| format!("{color:?}").to_lowercase();
-    match (query.color, query.pixel) {
-        (Some(color), _) => {
+    let advice = "look with observe, and give a pixel that is on it";
+    match (query.color, &query.object, query.pixel) {
+        (Some(color), _, _) => {
             let seen: Vec<String> = seen.iter().map(name).collect();
             format!(
-                "nothing of any size in the picture is {}; there is something {}",
+                "nothing of any size in the picture is {}; there is something {}; {advice}",
                 name(&color),
                 seen.join(", ")
             )
         }
-        (None, pixel) => format!("nothing is seen at pixel {:?}", pixel.unwrap_or_default()),
+        (None, Some(object), _) => format!(
+            "the robot does not see the {object} from here; turn to where `room` has it by walk, with look_at_m or yaw_rate_rad_s, or go round what hides it"
+        ),
+        (None, None, pixel) => format!("nothing is seen at pixel {:?}; {advice}", pixel.unwrap_or_default()),
     }
 }
 

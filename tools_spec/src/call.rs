@@ -301,7 +301,7 @@ mod tests {
     fn looking(robots: &[&str]) -> Look {
         let robots = Some(robots.iter().map(|robot| robot.to_string()).collect());
         let formats = Formats { images: Some(ImageFormat::Rgb), depth: None };
-        Look { observe: Observe { robots, short: None, frame: None }, formats }
+        Look { observe: Observe { robots, ..Observe::of_all() }, formats }
     }
 
     #[test]
@@ -314,7 +314,7 @@ mod tests {
         );
         assert_eq!(call.unwrap(), Call { expected_step: Some(300), then: Some(looking(&["A"])), ..plain });
         let call = Call::parse("observe", json!({ "depth": "float16", "short": true })).unwrap();
-        assert_eq!(call.tool, Observe { robots: None, short: Some(true), frame: None }.into());
+        assert_eq!(call.tool, Observe { short: Some(true), ..Observe::of_all() }.into());
         assert_eq!(call.formats, Formats { images: None, depth: Some(DepthFormat::Float16) });
         let (start, driving) =
             parse_start(json!({ "task": "handover", "seed": 0, "operators": "per_robot" })).unwrap();
@@ -363,13 +363,13 @@ mod tests {
 
     #[test]
     fn who_looks_for_itself_need_not_say_so() {
-        let all = || Observe { robots: None, short: None, frame: None };
+        let all = Observe::of_all;
         let look = || Look { observe: all(), formats: Formats::default() };
         let wait = Call { then: Some(look()), ..Call::from(ToolCall::from(Wait { steps: 1 })) };
         for call in [Call::from(look()), wait] {
             assert_eq!(call.looking_through("B").robots(), ["B"]);
         }
-        for named in [ToolCall::from(GetRobotState { robot: "A".into() }), Say { text: "B.".into() }.into()] {
+        for named in [ToolCall::from(GetRobotState::of("A")), Say { text: "B.".into() }.into()] {
             assert_eq!(Call::from(named.clone()).looking_through("B"), Call::from(named));
         }
     }

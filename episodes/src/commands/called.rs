@@ -396,7 +396,7 @@ mod tests {
         }
         let status = operator("B", GetStatus::default());
         assert_eq!((status.robot(), status.call().robots().len()), ("B", 0));
-        let all = operator("B", Observe { robots: None, short: None, frame: None }).into_call();
-        assert_eq!(all.tool, Observe { robots: Some(vec!["B".into()]), short: None, frame: None }.into());
+        let all = operator("B", Observe::of_all()).into_call();
+        assert_eq!(all.tool, Observe { robots: Some(vec!["B".into()]), ..Observe::of_all() }.into());
     }
 }

@@ -21,7 +21,7 @@ pub use called::{Called, OperatorCall, OperatorCommand};
 pub use check_reach::check_reach;
 pub use columns::{Clamped, TargetCounts, action_row, base_row};
 pub use motion::{Motion, MotionState, RobotSheet};
-pub use report::{grip, report, wrist_state};
+pub use report::{grip, report, tell_wrists_in, wrist_state};
 pub use upper_body::{UpperBody, upper_body};
 
 use tandem_sim::RobotCommand;

@@ -5,7 +5,7 @@ use tandem_sim::{ObjectPart, Pose, Rotation, Vector};
 
 use super::extents::{corners_m, extent_m};
 use super::relative::seen_from;
-use crate::tasks::{ObjectSpot, RobotSpot};
+use crate::tasks::{ObjectSpot, RobotSpot, told_name};
 
 /// Minimum travel of a part's far end.
 const MIN_TRAVEL_M: f32 = 0.05;
@@ -48,7 +48,7 @@ fn line(part: &ObjectPart, world_from_object: &Pose, first: &RobotSpot) -> Optio
     Some(format!(
         "{}, {:.2} m along {name}'s x, {:.2} m along its y, from {:.2} to {:.2} m above the floor: {way}, its far end from {} to {} m \
          in {name}'s start frame, z above the floor",
-        part.name.replace('_', " "),
+        told_name(&part.name),
         size_m.x,
         size_m.y,
         low_m.z,

@@ -8,7 +8,7 @@ use super::extents::{corners_m, extent_m};
 use super::furniture::furniture;
 use super::moving::moving;
 use super::relative::{places, seen_from};
-use crate::tasks::{ObjectSpot, RobotSpot, Spread, Task};
+use crate::tasks::{ObjectSpot, RobotSpot, Spread, Task, told_name};
 
 /// Solids that end this near the top of an object belong to its top.
 const NECKS_TOP_M: f32 = 0.01;
@@ -26,7 +26,7 @@ pub fn room(task: &Task, spread: Spread, fixed: &[Geom]) -> Result<Vec<String>, 
         let [x_m, y_m, z_m] = size_m(&parts, spot.yaw_rad - first.yaw_rad).to_array();
         let [spot_x_m, spot_y_m, _] = spot.position_m;
         let places = places(task, [spot_x_m, spot_y_m]);
-        let name = spot.name.replace('_', " ");
+        let name = told_name(&spot.name);
         let whole = format!(
             "{name}, {x_m:.2} m along {}'s x, {y_m:.2} m along its y, {z_m:.2} m high{}: middle {places} (from the pelvis{})",
             first.name,

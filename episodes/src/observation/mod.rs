@@ -1,6 +1,7 @@
 //! Observations of an episode's robots. A view is rendered once for each step and robot. It is encoded
 //! only when it leaves the process, in a reply or in the recording.
 
+mod depth_image;
 mod fit;
 mod formats;
 mod observer;
@@ -15,7 +16,7 @@ use tandem_tools_spec::{CameraCalibration, CameraImage, Formats, ImageFormat, Ob
 
 pub use formats::check_formats;
 pub use observer::Observer;
-pub use proprioception::{Detail, Proprioception, robot_state};
+pub use proprioception::{Detail, Proprioception, robot_state, tell_state_in};
 pub use scaling::{drawing_camera, scaled_colours};
 
 /// Observations of several robots at the same moment.
@@ -23,6 +24,8 @@ pub use scaling::{drawing_camera, scaled_colours};
 pub struct TeamObservation {
     pub time_s: f64,
     pub robots: Vec<RobotObservation>,
+    /// True to show images of depth, too.
+    pub shows_depth: bool,
 }
 
 /// Observation of one robot.
@@ -33,8 +36,7 @@ pub struct RobotObservation {
     pub view: Arc<RobotView>,
 }
 
-/// View of a robot's head camera. It reveals neither the camera's pose in the world nor the identity of
-/// objects.
+/// View of a robot's head camera. It does not reveal the camera's pose in the world.
 #[derive(Debug)]
 pub struct RobotView {
     pub intrinsics: Intrinsics,
@@ -43,6 +45,8 @@ pub struct RobotView {
     /// Depth as in [`Frame::depth_m`]. Some protocols withhold it at all pixels from policies, so they
     /// receive it through calls only. Empty in a view for the recording alone.
     pub(crate) depth_m: Vec<f32>,
+    /// Ids of visible things as in [`Frame::ids`], for [`surface`] alone. Empty like the depth.
+    ids: Vec<u32>,
 }
 
 /// Colours of a frame, and its PNG file once it has been requested.
@@ -85,8 +89,8 @@ impl Picture {
 
 impl RobotView {
     pub fn new(intrinsics: Intrinsics, frame: Frame) -> RobotView {
-        let Frame { width, height, rgb, depth_m, .. } = frame;
-        RobotView { intrinsics, picture: Picture::new(width, height, rgb).into(), depth_m }
+        let Frame { width, height, rgb, depth_m, ids } = frame;
+        RobotView { intrinsics, picture: Picture::new(width, height, rgb).into(), depth_m, ids }
     }
 }
 
@@ -103,18 +107,23 @@ impl TeamObservation {
     pub fn reply(&self, formats: &Formats) -> Result<Observation, PictureError> {
         let mut images = Vec::new();
         let mut arrays = Vec::new();
+        let mut depth_images = Vec::new();
         for RobotObservation { state, view, .. } in &self.robots {
             if formats.images != Some(ImageFormat::Rgb) {
                 let png_base64 = Png(view.picture.png()?.to_vec());
                 images.push(CameraImage { robot: state.robot.clone(), png_base64 });
             }
             arrays.extend(formats::arrays(&state.robot, view, formats)?);
+            if self.shows_depth {
+                depth_images.push(depth_image::depth_image(&state.robot, view)?);
+            }
         }
         Ok(Observation {
             time_s: self.time_s,
             states: self.robots.iter().map(|robot| robot.state.clone()).collect(),
             cameras: self.robots.iter().map(|robot| robot.calibration.clone()).collect(),
             images,
+            depth_images,
             arrays,
         })
     }

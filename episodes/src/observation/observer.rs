@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{Isometry3, Point3};
-use tandem_sim::render::{Camera, Cameras, Frame, RenderRequest, Renderer};
+use tandem_sim::render::{Camera, Cameras, Frame, RenderRequest, Renderer, object_id};
 use tandem_sim::{Step, World};
 use tandem_tools_spec::{
     Color, DepthReply, DepthRow, PixelRegion, PoseFrame, QueryDepth, RegionFit, SpecError, SurfaceQuery,
@@ -21,14 +21,25 @@ use crate::commands::RobotSheet;
 use crate::convert::{coarse, isometry_from_sim};
 use crate::spec::EpisodeSpec;
 use crate::stress;
+use crate::tasks::told_name;
 
 /// Renderer of one world's cameras.
 pub struct Observer {
     renderer: Box<dyn Renderer>,
     pub cameras: Cameras,
+    /// The task's objects and the parts that move on them.
+    objects: Vec<NamedObject>,
     drawn: Option<DrawnStep>,
     /// Renderer of views for the recording alone; `None` while callers need the views.
     for_recording: Option<Arc<Mutex<Box<dyn Renderer>>>>,
+}
+
+/// An object of the task, or a part that moves on one.
+struct NamedObject {
+    /// Name in the description of the room. That of a part begins with the object's.
+    name: String,
+    /// Id in [`Frame::ids`].
+    id: u32,
 }
 
 /// Rendered views of the latest observed step.
@@ -37,6 +48,19 @@ struct DrawnStep {
     step: Arc<Step>,
     /// View of each robot, once rendered.
     views: Vec<Option<Arc<RobotView>>>,
+}
+
+/// Returns the task's objects and the parts that move on them; a scene may have further ones.
+fn named_objects(spec: &EpisodeSpec, world: &World) -> Vec<NamedObject> {
+    let is_part_of = |own: &str, object: &str| {
+        own.strip_prefix(object).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
+    };
+    let models = world.object_models().enumerate();
+    let of_task =
+        models.filter(|(_, (own, _))| spec.task.objects.iter().any(|spot| is_part_of(own, &spot.name)));
+    of_task
+        .map(|(object, (own, _))| NamedObject { name: told_name(own), id: object_id(world, object) })
+        .collect()
 }
 
 /// Returns the renderer of the episode `spec`.
@@ -49,7 +73,8 @@ impl Observer {
     pub fn new(spec: &EpisodeSpec, world: &World) -> Observer {
         let renderer = renderer(spec, world);
         let cameras = stress::cameras(spec.stress, spec.world_seed(), world);
-        Observer { renderer, cameras, drawn: None, for_recording: None }
+        let objects = named_objects(spec, world);
+        Observer { renderer, cameras, objects, drawn: None, for_recording: None }
     }
 
     /// Switches to observations for the recording alone: its thread renders the images, without depth.
@@ -134,7 +159,7 @@ impl Observer {
         let picture = Picture::drawn_later(size_px, move || {
             renderer.lock().unwrap_or_else(PoisonError::into_inner).render_colours(&step, &camera)
         });
-        Arc::new(RobotView { intrinsics, picture: picture.into(), depth_m: Vec::new() })
+        Arc::new(RobotView { intrinsics, picture: picture.into(), depth_m: Vec::new(), ids: Vec::new() })
     }
 
     /// Observes these robots after `step`; `sheets` describe all robots.
@@ -159,7 +184,8 @@ impl Observer {
                 view,
             }
         };
-        TeamObservation { time_s: step.time_s, robots: robots.iter().zip(views).map(observe).collect() }
+        let robots = robots.iter().zip(views).map(observe).collect();
+        TeamObservation { time_s: step.time_s, robots, shows_depth: false }
     }
 
     /// Returns the reply to `query_depth` for robot number `robot`, called `name`. The points are in
@@ -233,12 +259,18 @@ impl Observer {
             frame_from_camera: pelvis_from_frame.inverse() * pelvis_from_camera,
             level_from_camera: pelvis_from_level.inverse() * pelvis_from_camera,
         };
-        let surfaces = surface::find(&view, query, &poses);
+        let surfaces = match &query.object {
+            Some(object) => {
+                surface::of_things(&view, &self.object_ids(object)?, &poses).into_iter().collect()
+            }
+            None => surface::find(&view, query, &poses),
+        };
         if surfaces.is_empty() {
-            let of = |color: &Color| SurfaceQuery { pixel: None, color: Some(*color) };
-            let seen =
-                Color::ALL.into_iter().filter(|color| !surface::find(&view, &of(color), &poses).is_empty());
-            return Err(EpisodeError::NoSurface { query: *query, seen: seen.collect() });
+            let of = |color: &Color| SurfaceQuery { pixel: None, color: Some(*color), object: None };
+            let seen = Color::ALL.into_iter().filter(|color| {
+                query.color.is_some() && !surface::find(&view, &of(color), &poses).is_empty()
+            });
+            return Err(EpisodeError::NoSurface { query: query.clone(), seen: seen.collect() });
         }
         Ok(DepthReply {
             robot: name.into(),
@@ -248,6 +280,22 @@ impl Observer {
             columns: DepthReply::COLUMNS.map(String::from),
             points: Vec::new(),
         })
+    }
+
+    /// Returns the ids of an object and its parts, or of a part, by its name.
+    fn object_ids(&self, name: &str) -> Result<BTreeSet<u32>, EpisodeError> {
+        let asked = told_name(name);
+        let part = format!("{asked} ");
+        let is_it = |object: &&NamedObject| object.name == asked || object.name.starts_with(&part);
+        let ids: BTreeSet<u32> = self.objects.iter().filter(is_it).map(|object| object.id).collect();
+        match ids.is_empty() {
+            false => Ok(ids),
+            true => {
+                let have: Vec<&str> = self.objects.iter().map(|object| object.name.as_str()).collect();
+                let reason = format!("surface.object: there is no {name:?}; have: {}", have.join(", "));
+                Err(SpecError::Invalid { tool: QueryDepth::NAME, reason }.into())
+            }
+        }
     }
 
     fn check_pixels(&self, step: &Step, robot: usize, pixels: &[[i64; 2]]) -> Result<(), EpisodeError> {

@@ -64,6 +64,7 @@ pub fn robot_state(own: &Proprioception, sheet: &RobotSheet, detail: Detail) -> 
         right_wrist_target: None,
         gravity_in_pelvis: Some(wire_vector(sensed.gravity_in_pelvis)),
         pelvis_in_start: Some(wire_pose_from_sim(&sensed.start_from_pelvis)),
+        pelvis_in_room: None,
         base_command: wire_base(base),
         fallen: Some(fallen),
     }
@@ -90,13 +91,26 @@ impl RobotObservation {
     /// Converts wrists and camera to `frame`, whose pose in the pelvis frame is `pelvis_from_frame`. The
     /// poses come from `sensed`.
     pub fn tell_in(&mut self, frame: PoseFrame, pelvis_from_frame: &Isometry3<f64>, sensed: &RobotSensed) {
-        let in_frame =
-            |pelvis_from: &Pose| wire_pose(&pelvis_from_frame.inv_mul(&isometry_from_sim(pelvis_from)));
-        self.calibration.camera_in_frame = Some(in_frame(&opencv_axes(&sensed.pelvis_from_camera)));
-        if frame != PoseFrame::Pelvis {
-            self.state.frame = Some(frame);
-            self.state.left_wrist = in_frame(&sensed.pelvis_from_wrist.left);
-            self.state.right_wrist = in_frame(&sensed.pelvis_from_wrist.right);
-        }
+        let pelvis_from_camera = isometry_from_sim(&opencv_axes(&sensed.pelvis_from_camera));
+        self.calibration.camera_in_frame = Some(wire_pose(&pelvis_from_frame.inv_mul(&pelvis_from_camera)));
+        tell_state_in(&mut self.state, frame, pelvis_from_frame, sensed);
     }
+}
+
+/// Converts the wrists of a state to `frame` like [`RobotObservation::tell_in`], and adds the pelvis in the room.
+pub fn tell_state_in(
+    state: &mut RobotState,
+    frame: PoseFrame,
+    pelvis_from_frame: &Isometry3<f64>,
+    sensed: &RobotSensed,
+) {
+    if frame == PoseFrame::Pelvis {
+        return;
+    }
+    let in_frame =
+        |pelvis_from: &Pose| wire_pose(&pelvis_from_frame.inv_mul(&isometry_from_sim(pelvis_from)));
+    state.frame = Some(frame);
+    state.left_wrist = in_frame(&sensed.pelvis_from_wrist.left);
+    state.right_wrist = in_frame(&sensed.pelvis_from_wrist.right);
+    state.pelvis_in_room = (frame == PoseFrame::Room).then(|| wire_pose(&pelvis_from_frame.inverse()));
 }

@@ -11,7 +11,9 @@ use super::Session;
 use crate::EpisodeError;
 use crate::commands::{self, Allowed, Called, Command, Motion, RobotSheet, check_reach, report};
 use crate::convert::wire_pose;
-use crate::observation::{Detail, Proprioception, TeamObservation, check_formats, robot_state};
+use crate::observation::{
+    Detail, Proprioception, TeamObservation, check_formats, robot_state, tell_state_in,
+};
 use crate::recording::CallOutcome;
 
 /// The answer to a call, with views not yet encoded.
@@ -104,14 +106,14 @@ impl Session {
                 let motion = &self.motions[robot];
                 let own = Proprioception::of(&self.present, robot);
                 let mut state = robot_state(&own, &motion.robot, Detail::Full);
+                tell_state_in(&mut state, args.frame, &motion.pelvis_from(args.frame), own.sensed);
                 tell_targets(&mut state, motion);
                 LookReply::GetRobotState(state)
             }
             LookCall::QueryDepth(args) => {
                 let robot = find(&args.robot)?;
                 let motion = &self.motions[robot];
-                let frame = args.frame.unwrap_or_default();
-                let frame = (frame, motion.pelvis_from(frame));
+                let frame = (args.frame, motion.pelvis_from(args.frame));
                 let name = &motion.robot.name;
                 LookReply::QueryDepth(match &args.surface {
                     Some(query) => {
@@ -151,6 +153,7 @@ impl Session {
             }
             tell_targets(&mut observed.state, motion);
         }
+        seen.shows_depth = args.depth_image;
         Ok(seen)
     }
 

@@ -250,7 +250,7 @@ impl Session {
         for robot in robots {
             match self.files {
                 Some(_) => {
-                    let called = Called::One(ToolCall::from(GetRobotState { robot }).into());
+                    let called = Called::One(ToolCall::from(GetRobotState::of(&robot)).into());
                     self.make(CallerRecord::Policy, &called)?;
                 }
                 None => self.count_state_read(&robot),
@@ -303,8 +303,10 @@ impl Session {
         let whole = self.allow(called).and_then(|allowed| self.answer(caller.operator(), allowed));
         let assistance = self.spec().assistance;
         let mut told = whole.as_ref().map(|answer| answer.told(assistance));
-        if let (true, Ok(told)) = (counts, &told) {
-            self.count(told, called, caller);
+        match &told {
+            Ok(told) if counts => self.count(told, called, caller),
+            Err(refusal) if counts => self.shown.count_refusal(refusal, called),
+            Ok(_) | Err(_) => {}
         }
         self.came_out(underway, caller, called, CallOutcome::of(&told));
         if let Ok(Answer::Reply(reply)) = &mut told

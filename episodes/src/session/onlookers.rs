@@ -66,7 +66,7 @@ impl Session {
     /// whole scene. It counts as an observation, so that recordings and results include it; its image is
     /// not used.
     pub fn drivers_view(&mut self, robot: &str) -> Result<LiveView, EpisodeError> {
-        let look = Observe { robots: Some(vec![robot.into()]), short: None, frame: None };
+        let look = Observe { robots: Some(vec![robot.into()]), ..Observe::of_all() };
         self.observe(&look, &[ExtraInformation::ThirdPerson])?;
         Ok(self.live_view())
     }

@@ -198,6 +198,11 @@ pub struct ObjectSpot {
     pub mjcf: Option<String>,
 }
 
+/// Returns the name of an object, or of a part that moves on it, in texts for policies.
+pub fn told_name(name: &str) -> String {
+    name.replace('_', " ")
+}
+
 impl ObjectSpot {
     /// Returns the source of the object's model.
     pub fn source(&self) -> ObjectFile {

@@ -9,7 +9,8 @@ use tandem_episodes::{A, B, Clock, EpisodeError, EpisodeSpec, RendererKind, Sess
 use tandem_sim::Vector;
 use tandem_tools_spec::{
     CheckReach, DepthRow, EndReason, Finish, JointChunk, LookReply, ManageReply, MoveWrists, Observe,
-    Protocol, QueryDepth, SendJointChunk, StopReason, ToolCall, ToolReply, Wait, Walk, WalkMove, WristMove,
+    PoseFrame, Protocol, QueryDepth, SendJointChunk, StopReason, ToolCall, ToolReply, Wait, Walk, WalkMove,
+    WristMove,
 };
 
 #[test]
@@ -156,7 +157,7 @@ fn depth_finds_the_bottle_where_it_is() {
     let label = pelvis_from_bottle * Vector::new(0.0, 0.0, 0.09);
 
     let ToolReply::Look(LookReply::Observe(seen)) =
-        session.call(Observe { robots: Some(vec!["A".into()]), short: None, frame: None }.into()).unwrap()
+        session.call(Observe { robots: Some(vec!["A".into()]), ..Observe::of_all() }.into()).unwrap()
     else {
         panic!("no observation")
     };
@@ -177,7 +178,7 @@ fn depth_finds_the_bottle_where_it_is() {
         region: None,
         fit: false,
         surface: None,
-        frame: None,
+        frame: PoseFrame::Pelvis,
     };
     let ToolReply::Look(LookReply::QueryDepth(reply)) = session.call(query.into()).unwrap() else {
         panic!("no depth")
@@ -290,7 +291,7 @@ fn episodes_go_the_same_way_whoever_draws() {
         let spec = EpisodeSpec { renderer, ..spec("handover", 5, Protocol::Benchmark) };
         let mut session = Session::start(&spec, None).unwrap();
         for _ in 0..2 {
-            session.call(Observe { robots: None, short: None, frame: None }.into()).unwrap();
+            session.call(Observe::of_all().into()).unwrap();
             command(&mut session, raise_hand(10));
         }
         session.close().state_hash

@@ -37,7 +37,7 @@ pub fn status(session: &mut Session) -> StatusReply {
 }
 
 pub fn state(session: &mut Session, robot: &str) -> RobotState {
-    match session.call(GetRobotState { robot: robot.into() }.into()).unwrap() {
+    match session.call(GetRobotState::of(robot).into()).unwrap() {
         ToolReply::Look(LookReply::GetRobotState(state)) => state,
         other => panic!("{other:?} is no state"),
     }

@@ -58,7 +58,7 @@ fn ask_everything(session: &mut Session, hands: &Hands) {
     let rows = vec![row(session, "B"); 5];
     command(session, SendJointChunk { robots: vec![JointChunk { robot: "B".into(), rows }] }.into());
     hands.pass(40);
-    let look = Observe { robots: Some(vec!["A".into()]), short: None, frame: None };
+    let look = Observe { robots: Some(vec!["A".into()]), ..Observe::of_all() };
     session.call(look.clone().into()).unwrap();
     session.observe(&look, &[ExtraInformation::ThirdPerson]).unwrap();
     hands.pass(5_000);
@@ -164,7 +164,7 @@ fn the_recording_is_made_again_with_its_pictures() {
     let entries = session.take_journal().unwrap();
     let mut again = bring_back_into(Some(RunFolder::from(&*second)), &spec, &entries, &hands, 0);
     // An observation at the same moment as an earlier one, answered after the restoration.
-    let look = Observe { robots: None, short: None, frame: None };
+    let look = Observe::of_all();
     let [seen, seen_again] = [&mut session, &mut again].map(|session| {
         let seen = session.observe(&look, &[]).unwrap();
         seen.robots.into_iter().map(|robot| robot.view.depth_m().to_vec()).collect::<Vec<_>>()

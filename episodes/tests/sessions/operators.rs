@@ -6,7 +6,7 @@ use tandem_tools_spec::{Call, Formats, Look, Observe, StopReason, TalkReply, Too
 use super::common::{command, handover, raise_hand, squat, status};
 
 fn look() -> Look {
-    Look { observe: Observe { robots: None, short: Some(true), frame: None }, formats: Formats::default() }
+    Look { observe: Observe { short: Some(true), ..Observe::of_all() }, formats: Formats::default() }
 }
 
 fn wait(steps: u32) -> Call {
@@ -23,8 +23,7 @@ fn what_stands_around_a_command_is_seen_to() {
     let ahead = Call { expected_step: Some(3), ..wait(2) };
     let refused = session.ask(None, ahead.clone()).unwrap_err();
     assert!(matches!(refused, EpisodeError::OtherStep { expected: 3, now: 0 }), "{refused}");
-    let nobody =
-        Look { observe: Observe { robots: Some(vec!["Z".into()]), short: None, frame: None }, ..look() };
+    let nobody = Look { observe: Observe { robots: Some(vec!["Z".into()]), ..Observe::of_all() }, ..look() };
     let refused = session.ask(None, Call { then: Some(nobody), ..wait(2) }).unwrap_err();
     assert!(matches!(refused, EpisodeError::UnknownRobot { .. }), "{refused}");
     assert_eq!((calls(&mut session), status(&mut session).env_steps), (0, 0), "neither counts");

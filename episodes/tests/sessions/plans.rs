@@ -2,7 +2,9 @@
 
 use serde_json::json;
 use tandem_episodes::{A, B, Session};
-use tandem_tools_spec::{Assistance, BaseState, Call, HandState, PlanReply, Protocol, ToolCall, ToolReply};
+use tandem_tools_spec::{
+    Assistance, BaseState, Call, HandState, LookReply, PlanReply, PoseFrame, Protocol, ToolCall, ToolReply,
+};
 
 use crate::common::*;
 
@@ -162,6 +164,16 @@ fn a_command_lasts_until_what_it_expects_holds() {
             "any_of has no condition, or an entry without one",
         ),
         (until(json!({ "tool": "send_joint_chunk", "arguments": { "robots": [] } })), "cannot have `until`"),
+        (
+            json!({ "tool": "wait", "arguments": { "steps": 5 }, "expects": { "heard_from": "B" } }),
+            "`heard_from` is for operators",
+        ),
+        (
+            json!({ "tool": "walk_to", "arguments": {
+                "steps": 5, "robots": [{ "robot": "A", "to_m": [0, 0] }], "until_heard": true,
+            } }),
+            "`until_heard` is for operators",
+        ),
     ] {
         let refused = plan(&mut session, "send_plan", json!({ "commands": [command] })).unwrap_err();
         assert!(refused.contains(says), "{refused}");
@@ -241,6 +253,44 @@ fn a_place_in_the_room_is_the_same_for_every_robot() {
     let off_m = stands.translation - tandem_sim::Vector::new(b_x_m + 0.25, b_y_m, stands.translation.z);
     assert!(off_m.length() < 0.04, "{off_m}");
     assert!((stands.rotation * tandem_sim::Vector::X).x < -0.99, "{stands:?}");
+    let told = &reply.last.robots[B];
+    assert_eq!(told.frame, Some(PoseFrame::Room));
+    let pelvis_m = told.pelvis_in_room.expect("the place that was asked for").position_m;
+    assert!((0..2).all(|axis| (pelvis_m[axis] - f64::from(to_m[axis])).abs() < 0.02), "{told:?}");
+    let wrist_m = told.right.measured.expect("a full reply").position_m;
+    assert!(wrist_m[0] < pelvis_m[0] && wrist_m[1] > pelvis_m[1], "it faces A: {told:?}");
+}
+
+/// Replies to a walk are in the frame of its places, whatever frame its commands are in.
+#[test]
+fn a_walk_replies_in_the_frame_that_it_was_asked_in() {
+    for (frame, carry) in [("room", true), ("start", false), ("level", true), ("pelvis", false)] {
+        let mut session = agentic();
+        let raise = json!({ "robot": "A", "right_position_m": [0.28, -0.24, 0.22] });
+        let raise = Call::parse("move_wrists", json!({ "steps": 25, "robots": [raise] })).unwrap();
+        session.call(raise.tool).unwrap();
+        let walk = json!({
+            "steps": 400, "frame": frame, "robots": [{ "robot": "A", "to_m": [-0.2, 0.0], "carry": carry }],
+        });
+        let walk = json!({ "tool": "walk_to", "arguments": walk });
+        let wait = json!({ "tool": "wait", "arguments": { "steps": 1 } });
+        let listed = json!({ "commands": [wait, walk] });
+        let reply = plan(&mut session, "send_plan", listed).unwrap();
+        let told = &reply.last.robots[A];
+        let named = told.frame.map(|frame| json!(frame)).unwrap_or(json!("pelvis"));
+        assert_eq!((named, told.pelvis_in_room.is_some()), (json!(frame), frame == "room"));
+        let pelvis_in = if frame == "room" { "m in room" } else { "m in start" };
+        assert!(reply.outcomes[1].ends_with(pelvis_in), "{:?}", reply.outcomes);
+        let ask = json!({ "robot": "A", "frame": frame });
+        let ToolReply::Look(LookReply::GetRobotState(state)) =
+            session.call(ToolCall::parse("get_robot_state", ask).unwrap()).unwrap()
+        else {
+            panic!("no state")
+        };
+        let found_m = told.right.measured.unwrap().position_m;
+        let off_m = |axis: usize| (found_m[axis] - state.right_wrist.position_m[axis]).abs();
+        assert!((0..3).all(|axis| off_m(axis) < 1e-3), "{frame}: {found_m:?}, {state:?}");
+    }
 }
 
 /// Walks back from the counter via a waypoint, then sideways with a turn. The odometry and the simulator

@@ -91,7 +91,7 @@ fn a_moment_is_pictured_once() {
     let spec = spec("handover", 3, Protocol::Benchmark);
     let mut session = Session::start(&spec, Some(folder.path())).unwrap();
     let look = |session: &mut Session, robots: Option<Vec<String>>| {
-        session.call(Observe { robots, short: None, frame: None }.into()).unwrap();
+        session.call(Observe { robots, ..Observe::of_all() }.into()).unwrap();
     };
     look(&mut session, Some(vec!["A".into()]));
     (0..5).for_each(|_| look(&mut session, None));

@@ -123,7 +123,7 @@ fn agentic(folder: &Path, thinking_s: u64) -> PathBuf {
     let spec = spec("handover", 5, Protocol::Agentic);
     let mut session = Session::start_with_clock(&spec, Some(folder.into()), clock).unwrap();
     policy_clock_ns.fetch_add(333_333_333, Relaxed);
-    session.call(Observe { robots: None, short: None, frame: None }.into()).unwrap();
+    session.call(Observe::of_all().into()).unwrap();
     policy_clock_ns.fetch_add(666_666_667, Relaxed);
     command(&mut session, raise_hand(25));
     wait(&mut session, 3);
@@ -213,7 +213,7 @@ fn a_result_that_hides_what_its_policy_was_told_differs() {
     let own = spec("handover", 5, Protocol::Benchmark);
     let mut episode = InProcess::new(Session::start(&own, Some(folder.path())).unwrap());
     state(&mut episode.session, "A");
-    let look = Observe { robots: None, short: Some(true), frame: None };
+    let look = Observe { short: Some(true), ..Observe::of_all() };
     episode.observe(&look, &[JointVelocities, ThirdPerson]).unwrap();
     episode.carry_out(Wait { steps: 3 }.into()).unwrap();
     wait(&mut episode.session, 2);

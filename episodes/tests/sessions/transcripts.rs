@@ -30,7 +30,7 @@ fn play(session: &mut Session, tells: bool) {
         }
     };
     note(session, thought("I look first."));
-    session.call(Observe { robots: Some(vec!["A".into()]), short: None, frame: None }.into()).unwrap();
+    session.call(Observe { robots: Some(vec!["A".into()]), ..Observe::of_all() }.into()).unwrap();
     if tells {
         session.refused_before(None, "move_wrists", "{\"steps\": \"five\"}", "steps: expected a number");
         let late = Call { expected_step: Some(900), ..Call::from(raise_hand(5)) };

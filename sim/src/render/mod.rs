@@ -16,7 +16,7 @@ pub use kind::RendererKind;
 pub use scene::camera::{Camera, Cameras, Intrinsics, LensFlaw};
 pub use scene::mesh::{TriangleMesh, Vertex};
 pub use scene::shared::SharedMesh;
-pub use scene::{Carrier, Part, PlacedScenery, Scenery, robot_rgba};
+pub use scene::{Carrier, Part, PlacedScenery, Scenery, object_id, robot_rgba};
 pub use shading::Light;
 pub use shading::pattern::Pattern;
 
@@ -132,6 +132,18 @@ pub fn encode_png(width: u32, height: u32, rgb: &[u8]) -> Result<Vec<u8>, Pictur
         height,
         ExtendedColorType::Rgb8,
     )?;
+    Ok(bytes)
+}
+
+/// Encodes 8-bit grey, one byte a pixel, as a PNG file.
+///
+/// # Errors
+///
+/// Returns an error if `grey` does not have the size of the image.
+pub fn encode_grey_png(width: u32, height: u32, grey: &[u8]) -> Result<Vec<u8>, PictureError> {
+    let mut bytes = Vec::with_capacity(grey.len() / 4);
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
+    encoder.write_image(grey, width, height, ExtendedColorType::L8)?;
     Ok(bytes)
 }
 

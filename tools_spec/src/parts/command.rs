@@ -50,7 +50,8 @@ pub enum StopReason {
 pub struct RobotReport {
     /// The robot, as "A".
     pub robot: String,
-    /// The frame of wrist poses where the command named another than that of the pelvis; left out otherwise.
+    /// The frame of wrist poses where the command named another than that of the pelvis, of a walk to a place
+    /// that of its places; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame: Option<PoseFrame>,
     /// Its left arm and hand.
@@ -65,6 +66,9 @@ pub struct RobotReport {
     /// way walked. Left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pelvis_in_start: Option<Pose>,
+    /// The same in the room frame, where `frame` is that; left out otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pelvis_in_room: Option<Pose>,
     /// Motion of the base during the command, by the same odometry. Left out where the assistance is "paper",
     /// and of a short reply where it is less than a centimetre and a hundredth of a radian.
     #[serde(default, skip_serializing_if = "Option::is_none")]

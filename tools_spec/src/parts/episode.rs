@@ -155,11 +155,13 @@ pub enum ExtraInformation {
     Gravity,
     /// Conditions that the next phase lacks, and poses of held objects, as the simulator measures them.
     PhaseConditions,
+    /// Pixels of an object by its name, as the simulator knows them.
+    ObjectPixels,
 }
 
 impl ExtraInformation {
     /// Every kind.
-    pub const ALL: [ExtraInformation; 9] = [
+    pub const ALL: [ExtraInformation; 10] = [
         ExtraInformation::DepthImages,
         ExtraInformation::PixelDepth,
         ExtraInformation::ThirdPerson,
@@ -169,6 +171,7 @@ impl ExtraInformation {
         ExtraInformation::Odometry,
         ExtraInformation::Gravity,
         ExtraInformation::PhaseConditions,
+        ExtraInformation::ObjectPixels,
     ];
 
     /// Returns the name in results and reports.
@@ -183,6 +186,7 @@ impl ExtraInformation {
             ExtraInformation::Odometry => "odometry",
             ExtraInformation::Gravity => "gravity",
             ExtraInformation::PhaseConditions => "phase_conditions",
+            ExtraInformation::ObjectPixels => "object_pixels",
         }
     }
 
@@ -192,7 +196,8 @@ impl ExtraInformation {
             ExtraInformation::DepthImages
             | ExtraInformation::PixelDepth
             | ExtraInformation::ThirdPerson
-            | ExtraInformation::PhaseConditions => false,
+            | ExtraInformation::PhaseConditions
+            | ExtraInformation::ObjectPixels => false,
             ExtraInformation::JointVelocities
             | ExtraInformation::JointTorques
             | ExtraInformation::HandForces

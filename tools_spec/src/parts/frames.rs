@@ -1,7 +1,7 @@
 //! The frames that points and poses may be given in.
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// A frame of a robot. The brief of a start says what each is, so schemas name them only.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,6 +23,20 @@ pub enum PoseFrame {
 impl PoseFrame {
     /// Every frame.
     const ALL: [PoseFrame; 4] = [PoseFrame::Pelvis, PoseFrame::Level, PoseFrame::Start, PoseFrame::Room];
+
+    /// Returns true for the pelvis frame.
+    pub(crate) fn is_pelvis(&self) -> bool {
+        *self == PoseFrame::Pelvis
+    }
+}
+
+/// Reads a field for which null stands for its default, too, as older schemas have it.
+pub fn null_is_default<'de, D, T>(deserializer: D) -> Result<T, D::Error>
+where
+    D: Deserializer<'de>,
+    T: Deserialize<'de> + Default,
+{
+    Ok(Option::deserialize(deserializer)?.unwrap_or_default())
 }
 
 impl JsonSchema for PoseFrame {

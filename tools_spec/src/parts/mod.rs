@@ -20,7 +20,7 @@ pub use episode::{
     Assistance, Budget, Disclosure, ExtraInformation, HeldObject, Hints, NextPhase, PhaseReached, Protocol,
     RobotFallen, Wording,
 };
-pub use frames::PoseFrame;
+pub use frames::{PoseFrame, null_is_default};
 pub use note::{AgentEnding, ModelEnding, Note, NoteKind, RobotUsage, TokenCount, Usage};
 pub use pictures::{Bytes, CameraArrays, DepthFormat, Formats, ImageFormat, PixelRegion, Png};
 pub use plan::PlanReply;

@@ -135,10 +135,10 @@ pub struct PixelRegion {
     /// Its top left pixel [u, v], as [100, 80].
     #[schemars(extend("prefixItems" = limits::pixel_range()))]
     pub from: [i64; 2],
-    /// Its bottom right pixel [u, v], as [220, 170].
+    /// Its bottom right one, as [220, 170].
     #[schemars(extend("prefixItems" = limits::pixel_range()))]
     pub to: [i64; 2],
-    /// 1 for every pixel, 10 for every tenth one across and down.
+    /// 10: every tenth pixel across and down.
     #[schemars(range(min = 1, max = u32::MAX))]
     pub stride: u32,
 }

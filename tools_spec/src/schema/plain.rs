@@ -6,6 +6,10 @@ use serde_json::{Map, Value};
 use crate::limits::bound_numbers;
 use crate::parts::{Assistance, Operators, Wording};
 
+/// Marks of fields for policies with full assistance, and for operators.
+const FULL_ONLY: &str = "full_only";
+const FOR_OPERATORS: &str = "for_operators";
+
 /// Returns the schema of `T` as it is, for replies: nothing has to be strict about what the server itself
 /// sends.
 pub fn plain_schema<T: JsonSchema>() -> Value {
@@ -13,10 +17,13 @@ pub fn plain_schema<T: JsonSchema>() -> Value {
     settings.into_generator().into_root_schema_for::<T>().to_value()
 }
 
-/// Returns the schema of `T` as arguments. Where a policy is told less, the text that a description has for
-/// that takes its place.
-pub fn argument_schema<T: JsonSchema>(wording: Wording) -> Value {
+/// Returns the schema of `T` as arguments that a list of tools describes: where a policy is told less, in the
+/// texts for that, and where one policy directs all robots, without the fields that are for operators.
+pub fn listed_schema<T: JsonSchema>(wording: Wording) -> Value {
     let mut schema = plain_schema::<T>();
+    if wording.operators == Operators::One {
+        leave_to_operators(&mut schema);
+    }
     word(&mut schema, wording);
     schema
 }
@@ -24,7 +31,8 @@ pub fn argument_schema<T: JsonSchema>(wording: Wording) -> Value {
 /// Returns the schema of `T` as a body that is read: what the checks refuse, it does not allow. How many
 /// control steps a command may have is still to be said.
 pub fn body_schema<T: JsonSchema>(wording: Wording) -> Value {
-    let mut schema = argument_schema::<T>(wording);
+    let mut schema = plain_schema::<T>();
+    word(&mut schema, wording);
     bound_numbers(&mut schema);
     schema
 }
@@ -33,7 +41,8 @@ pub fn word(schema: &mut Value, wording: Wording) {
     match schema {
         Value::Array(items) => items.iter_mut().for_each(|item| word(item, wording)),
         Value::Object(object) => {
-            leave_to_full(object, wording);
+            drop_marked(object, FULL_ONLY, wording.assistance == Assistance::Paper);
+            drop_marked(object, FOR_OPERATORS, false);
             let mut text_of = |name: &str| match object.get(name)?.is_string() {
                 true => object.remove(name)?.as_str().map(str::to_owned),
                 false => None,
@@ -49,13 +58,24 @@ pub fn word(schema: &mut Value, wording: Wording) {
     }
 }
 
-/// Removes the fields that are for full assistance.
-fn leave_to_full(object: &mut Map<String, Value>, wording: Wording) {
+fn leave_to_operators(schema: &mut Value) {
+    match schema {
+        Value::Array(items) => items.iter_mut().for_each(leave_to_operators),
+        Value::Object(object) => {
+            drop_marked(object, FOR_OPERATORS, true);
+            object.values_mut().for_each(leave_to_operators);
+        }
+        _ => {}
+    }
+}
+
+/// Removes a mark from the fields that have it, or, if `with_fields`, those fields.
+fn drop_marked(object: &mut Map<String, Value>, mark: &str, with_fields: bool) {
     let Some(Value::Object(properties)) = object.get_mut("properties") else { return };
     let mut left = Vec::new();
     for (name, property) in properties.iter_mut() {
-        let marked = property.as_object_mut().and_then(|property| property.shift_remove("full_only"));
-        if marked.is_some() && wording.assistance == Assistance::Paper {
+        let marked = property.as_object_mut().and_then(|property| property.shift_remove(mark));
+        if marked.is_some() && with_fields {
             left.push(name.clone());
         }
     }

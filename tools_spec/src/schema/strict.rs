@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde_json::{Map, Value, json};
 
 use super::nullable::as_choices;
-use super::plain::argument_schema;
+use super::plain::listed_schema;
 use crate::parts::Wording;
 
 /// Keywords that OpenAI's strict mode or common MCP clients refuse or warn about.
@@ -35,7 +35,7 @@ const DROPPED: &[&str] = &[
 /// Returns the description of `T` and its schema without it, with or without defaults, which strict hosts
 /// refuse.
 pub fn strict_schema<T: JsonSchema>(wording: Wording, defaults: bool) -> (String, Map<String, Value>) {
-    let mut schema = argument_schema::<T>(wording);
+    let mut schema = listed_schema::<T>(wording);
     if !defaults {
         drop_defaults(&mut schema);
     }

@@ -9,8 +9,8 @@ use crate::limits;
 use crate::parts::PoseFrame;
 use crate::tool::Tool;
 
-/// Ask whether wrists could reach poses from where the robot stands, by the waist and the arms that are
-/// given a pose. Nothing moves; costs no steps. Poses are as in move_wrists.
+/// Ask whether wrists could reach poses, as of move_wrists, from where the robot stands, by the waist and
+/// the arms that are given a pose. Nothing moves; costs no steps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[schemars(extend("allOf" = limits::at_least_one(&POSES)))]
 #[serde(deny_unknown_fields)]

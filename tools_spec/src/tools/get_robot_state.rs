@@ -18,6 +18,17 @@ pub struct GetRobotState {
     /// The robot, for example "A".
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
+    /// Frame of the wrists; "room": and pelvis.
+    #[serde(default, skip_serializing_if = "PoseFrame::is_pelvis")]
+    #[schemars(extend("full_only" = true, "default" = PoseFrame::Pelvis))]
+    pub frame: PoseFrame,
+}
+
+impl GetRobotState {
+    /// Returns the call for `robot` with poses in its pelvis frame.
+    pub fn of(robot: &str) -> GetRobotState {
+        GetRobotState { robot: robot.into(), frame: PoseFrame::Pelvis }
+    }
 }
 
 impl Tool for GetRobotState {
@@ -26,7 +37,7 @@ impl Tool for GetRobotState {
     const READ_ONLY: bool = true;
 
     fn example() -> Self {
-        GetRobotState { robot: "A".into() }
+        GetRobotState::of("A")
     }
 
     fn robots(&self) -> Vec<&str> {
@@ -76,6 +87,9 @@ pub struct RobotState {
     /// way walked. Left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pelvis_in_start: Option<Pose>,
+    /// The same in the room frame, where the call named that; left out otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pelvis_in_room: Option<Pose>,
     /// Base command in force.
     pub base_command: BaseCommand,
     /// True if the robot has fallen; left out where the assistance is "paper".

@@ -22,7 +22,7 @@ pub use get_robot_state::{GetRobotState, RobotState};
 pub use get_status::{GetStatus, StatusReply};
 pub use list_tasks::{ListTasks, ProtocolInfo, TaskInfo, TaskList};
 pub use move_wrists::{MoveWrists, WristMove};
-pub use observe::{CameraCalibration, CameraImage, Observation, Observe};
+pub use observe::{CameraCalibration, CameraImage, DepthImage, Observation, Observe};
 pub use query_depth::{
     Color, DepthReply, DepthRow, EdgeFit, JoinedBy, PlaneFit, QueryDepth, RegionFit, Surface, SurfaceQuery,
     UprightAxis,

@@ -25,7 +25,7 @@ const MIN_COMPLIANCE_N_M_S_RAD: f64 = 5.0;
     repeated, or by wait."))]
 #[serde(deny_unknown_fields)]
 pub struct MoveWrists {
-    /// Control steps: 1 up to the budget's steps_per_command.
+    /// 1 up to the budget's steps_per_command.
     #[schemars(range(min = 1), extend("most_steps" = "maximum"))]
     pub steps: u32,
     /// One entry per robot that moves.

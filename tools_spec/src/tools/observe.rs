@@ -9,7 +9,7 @@ use crate::limits;
 use crate::parts::{CameraArrays, Png, Pose, PoseFrame};
 use crate::tool::Tool;
 
-/// Look through head cameras: returns one PNG image of 320x240 pixels for each robot, its camera's
+/// Look through head cameras: one PNG image of 320x240 pixels for each robot, its camera's
 /// calibration and the numbers of get_robot_state. Costs no steps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -27,6 +27,17 @@ pub struct Observe {
     /// Frame of the wrists and, beside the pelvis frame, of the camera.
     #[schemars(extend("full_only" = true, "default" = PoseFrame::Pelvis))]
     pub frame: Option<PoseFrame>,
+    /// True: also a grey image of depth.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[schemars(extend("full_only" = true, "default" = false))]
+    pub depth_image: bool,
+}
+
+impl Observe {
+    /// Returns an observation of all robots, in full.
+    pub fn of_all() -> Observe {
+        Observe { robots: None, short: None, frame: None, depth_image: false }
+    }
 }
 
 impl Tool for Observe {
@@ -35,7 +46,7 @@ impl Tool for Observe {
     const READ_ONLY: bool = true;
 
     fn example() -> Self {
-        Observe { robots: Some(vec!["A".into()]), short: Some(true), frame: None }
+        Observe { robots: Some(vec!["A".into()]), short: Some(true), ..Observe::of_all() }
     }
 
     fn robots(&self) -> Vec<&str> {
@@ -62,6 +73,10 @@ pub struct Observation {
     /// The pictures, in the order of `cameras`. Over MCP they follow as image blocks and are left out here.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub images: Vec<CameraImage>,
+    /// Images of depth, in the same order, where `depth_image` was asked for; left out otherwise. Over MCP
+    /// they follow the pictures as image blocks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub depth_images: Vec<DepthImage>,
     /// Arrays that a program asked for beside PNGs or in place of them, one entry per robot; left out
     /// otherwise.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -108,6 +123,33 @@ impl Serialize for CameraImage {
         let file = if serializer.is_human_readable() { "png_base64" } else { "png" };
         let mut image = serializer.serialize_struct("CameraImage", 2)?;
         image.serialize_field("robot", &self.robot)?;
+        image.serialize_field(file, &self.png_base64)?;
+        image.end()
+    }
+}
+
+/// Depth of one picture as a grey image of the same size, for readers of images: its brightness is linear in
+/// 1 / depth. In MessagePack, the file is called `png` and no base64.
+#[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
+pub struct DepthImage {
+    /// The robot whose head camera measured.
+    pub robot: String,
+    /// Depth along the optical axis that is white (255), in metres; what is nearer is white, too.
+    pub white_m: f64,
+    /// Depth that is black (0); so is what is further, and where nothing is. Grey g is at the depth
+    /// 1 / (1 / black_m + g / 255 (1 / white_m - 1 / black_m)).
+    pub black_m: f64,
+    /// The image.
+    pub png_base64: Png,
+}
+
+impl Serialize for DepthImage {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let file = if serializer.is_human_readable() { "png_base64" } else { "png" };
+        let mut image = serializer.serialize_struct("DepthImage", 4)?;
+        image.serialize_field("robot", &self.robot)?;
+        image.serialize_field("white_m", &self.white_m)?;
+        image.serialize_field("black_m", &self.black_m)?;
         image.serialize_field(file, &self.png_base64)?;
         image.end()
     }

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::checks;
 use crate::limits;
-use crate::parts::{PixelRegion, PoseFrame};
+use crate::parts::{PixelRegion, PoseFrame, null_is_default};
 use crate::tool::Tool;
 
 /// Measure the points that a robot's head camera sees at up to 4096 pixels, listed or filling a region.
@@ -24,7 +24,7 @@ pub struct QueryDepth {
     pub pixels: Option<Vec<[i64; 2]>>,
     /// Pixels of a rectangle, row by row.
     pub region: Option<PixelRegion>,
-    /// True: also the largest plane in `region`, its straight edges and their corners.
+    /// True: also the largest plane in `region`, its straight edges and corners.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[schemars(extend("full_only" = true, "default" = false))]
     pub fit: bool,
@@ -32,8 +32,9 @@ pub struct QueryDepth {
     #[schemars(extend("full_only" = true))]
     pub surface: Option<SurfaceQuery>,
     /// Frame of the points.
+    #[serde(default, deserialize_with = "null_is_default", skip_serializing_if = "PoseFrame::is_pelvis")]
     #[schemars(extend("full_only" = true, "default" = PoseFrame::Pelvis))]
-    pub frame: Option<PoseFrame>,
+    pub frame: PoseFrame,
 }
 
 impl QueryDepth {
@@ -56,7 +57,7 @@ impl Tool for QueryDepth {
             region: None,
             fit: false,
             surface: None,
-            frame: None,
+            frame: PoseFrame::Pelvis,
         }
     }
 
@@ -71,12 +72,7 @@ impl Tool for QueryDepth {
         match (&self.pixels, &self.region, &self.surface) {
             (Some(pixels), None, None) => checks::pixels(pixels),
             (None, Some(region), None) => checks::region(region),
-            (None, None, Some(surface)) => match (surface.pixel, surface.color) {
-                (Some(_), None) | (None, Some(_)) => Ok(()),
-                (None, None) | (Some(_), Some(_)) => {
-                    Err("give either surface.pixel, as [160, 120], or surface.color, as \"red\"".into())
-                }
-            },
+            (None, None, Some(surface)) => surface.validate(),
             _ => Err(
                 "give either pixels, as [[160, 120]], or region, as {\"from\": [100, 80], \"to\": [220, 170], \"stride\": 10}, or \
                  surface, as {\"pixel\": [160, 120]}"
@@ -86,16 +82,31 @@ impl Tool for QueryDepth {
     }
 }
 
-/// Either a pixel or a color.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// Give one of these.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("oneOf" = limits::one_of(&[("pixel", "array"), ("color", "string")])))]
+#[schemars(extend("oneOf" = limits::one_of(&[("pixel", "array"), ("color", "string"), ("object", "string")])))]
 pub struct SurfaceQuery {
     /// A pixel on it: for the patch of its colour and the whole thing.
     #[schemars(extend("prefixItems" = limits::pixel_range()))]
     pub pixel: Option<[i64; 2]>,
     /// Its colour: for the nearest three.
     pub color: Option<Color>,
+    /// An object of `room`: for all that is seen of it.
+    pub object: Option<String>,
+}
+
+impl SurfaceQuery {
+    fn validate(&self) -> Result<(), String> {
+        let given = [self.pixel.is_some(), self.color.is_some(), self.object.is_some()];
+        match given.iter().filter(|is_given| **is_given).count() {
+            1 => Ok(()),
+            _ => Err(
+                "give either surface.pixel, as [160, 120], or surface.color, as \"red\", or surface.object, as \"bottle\""
+                    .into(),
+            ),
+        }
+    }
 }
 
 /// A colour by name.
@@ -141,7 +152,7 @@ impl JsonSchema for Color {
     }
 }
 
-/// By what pixels are joined to a surface. Neighbours of it are of about the same depth always.
+/// By what pixels are joined to a surface. Neighbours are of about the same depth, except of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum JoinedBy {
@@ -150,6 +161,9 @@ pub enum JoinedBy {
     /// By shape, whatever the colours: over edges that stand out, not over corners that go in, as where a
     /// thing stands on a table.
     Shape,
+    /// By the object that was named, whatever its colours and whatever hides parts of it. The simulator
+    /// knows which pixels see it.
+    Object,
 }
 
 /// The axis of a thing that is upright and round, as a bottle.
@@ -238,8 +252,8 @@ pub struct DepthReply {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame: Option<PoseFrame>,
     /// The surfaces that were found: at a pixel the patch of its colour and, where that is more, the whole
-    /// thing; of a colour up to three, the nearest first and what is of the room last. Left out where none
-    /// was asked for.
+    /// thing; of a colour up to three, the nearest first and what is of the room last; of an object one.
+    /// Left out where none was asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub surfaces: Vec<Surface>,
     /// Plane, edges and corners of the region; left out where `fit` was not asked for.
@@ -286,5 +300,42 @@ impl DepthRow {
     /// Returns the point, if the pixel sees one.
     pub fn point_m(&self) -> Option<[f64; 3]> {
         Some([self.2?, self.3?, self.4?])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::*;
+    use crate::tool::parse_args;
+
+    fn read(args: Value) -> Result<QueryDepth, String> {
+        parse_args(args).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_surface_is_named_in_one_way() {
+        let of = |surface: Value| read(json!({ "robot": "A", "surface": surface }));
+        for surface in
+            [json!({ "pixel": [160, 120] }), json!({ "color": "red" }), json!({ "object": "bottle" })]
+        {
+            assert!(of(surface.clone()).is_ok(), "{surface}");
+        }
+        for surface in [json!({}), json!({ "color": "red", "object": "bottle" })] {
+            assert!(of(surface).unwrap_err().contains("surface.object, as \"bottle\""));
+        }
+    }
+
+    /// Recordings and schemas of before have null.
+    #[test]
+    fn a_frame_of_null_is_the_pelvis() {
+        let pixel = json!([[160, 120]]);
+        for frame in [json!(null), json!("pelvis")] {
+            let query = read(json!({ "robot": "A", "pixels": pixel, "frame": frame })).unwrap();
+            assert_eq!((query.frame, json!(query).get("frame")), (PoseFrame::Pelvis, None));
+        }
+        let query = read(json!({ "robot": "A", "pixels": pixel, "frame": "room" })).unwrap();
+        assert_eq!(json!(query)["frame"], "room");
     }
 }

@@ -19,9 +19,13 @@ const MAX_COMMANDS: usize = 20;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SendPlan {
-    /// The commands in order.
+    /// Commands.
     #[schemars(length(min = 1, max = MAX_COMMANDS))]
     pub commands: Vec<PlannedCommand>,
+    /// True: words of another operator end it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[schemars(extend("for_operators" = true, "default" = false))]
+    pub until_heard: bool,
 }
 
 /// One command.
@@ -31,7 +35,7 @@ pub struct PlannedCommand {
     /// Its tool.
     #[schemars(extend("enum" = SendPlan::COMMANDS))]
     pub tool: String,
-    /// Arguments of that tool, without episode_id.
+    /// Its arguments, without episode_id.
     pub arguments: Map<String, Value>,
     /// Conditions after it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -73,9 +77,15 @@ pub struct Expectation {
     pub base_stepping: Option<bool>,
     /// Another operator has spoken since the plan began.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("for_operators" = true))]
     pub heard: Option<bool>,
+    /// The operator of this robot has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("for_operators" = true))]
+    pub heard_from: Option<String>,
     /// All others wait.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("for_operators" = true))]
     pub partners_wait: Option<bool>,
     /// One of these holds, each like `expects`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -86,8 +96,12 @@ pub struct Expectation {
 impl Expectation {
     /// Returns the name of a condition on other operators; `None` if there is none.
     pub fn names_partners(&self) -> Option<&'static str> {
-        let own = [("heard", self.heard), ("partners_wait", self.partners_wait)];
-        let named = own.into_iter().find(|(_, wanted)| wanted.is_some()).map(|(name, _)| name);
+        let own = [
+            ("heard", self.heard.is_some()),
+            ("heard_from", self.heard_from.is_some()),
+            ("partners_wait", self.partners_wait.is_some()),
+        ];
+        let named = own.into_iter().find(|(_, is_given)| *is_given).map(|(name, _)| name);
         named.or_else(|| self.any_of.iter().flatten().find_map(Expectation::names_partners))
     }
 
@@ -157,7 +171,7 @@ impl Tool for SendPlan {
             None,
         );
         let wait = command(Wait::NAME, json!({ "steps": 10 }), Some(arrived));
-        SendPlan { commands: vec![reach, wait] }
+        SendPlan { commands: vec![reach, wait], until_heard: false }
     }
 
     fn robots(&self) -> Vec<&str> {

@@ -12,7 +12,7 @@ use crate::tool::Tool;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Wait {
-    /// Control steps: 1 up to the budget's steps_per_command.
+    /// 1 up to the budget's steps_per_command.
     #[schemars(range(min = 1), extend("most_steps" = "maximum"))]
     pub steps: u32,
 }

@@ -30,6 +30,10 @@ pub struct WalkTo {
     /// One entry per robot that walks.
     #[schemars(length(min = 1, max = limits::ROBOT_NAMES.len()), extend("not" = limits::a_robot_twice()))]
     pub robots: Vec<Destination>,
+    /// True: words of another operator end it; with `carry` the robot comes to rest first.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    #[schemars(extend("for_operators" = true, "default" = false))]
+    pub until_heard: bool,
 }
 
 fn start_frame() -> PoseFrame {
@@ -47,7 +51,7 @@ pub struct Destination {
     /// The robot, for example "A".
     #[schemars(extend("pattern" = limits::ROBOT_PATTERN))]
     pub robot: String,
-    /// [x, y], as of pelvis_in_start.
+    /// [x, y] of the pelvis.
     pub to_m: [f64; 2],
     /// Final heading, counter-clockwise from the frame's x. Null: unchanged.
     pub heading_rad: Option<f64>,
@@ -88,6 +92,7 @@ impl Tool for WalkTo {
                 waypoints: None,
                 carry: None,
             }],
+            until_heard: false,
         }
     }
 

@@ -1,7 +1,7 @@
 //! The faces that one contract has: strict and lenient, of any episode and of one that runs.
 
 use serde_json::{Map, Value, json};
-use tandem_tools_spec::{Format, Hints, ToolSpec, episode_tool_specs, openapi, tool_specs};
+use tandem_tools_spec::{Format, Hints, ToolSpec, Wording, episode_tool_specs, openapi, tool_specs};
 
 /// Returns everything that a policy is told of the tools, face by face.
 fn faces(hints: Hints) -> Vec<String> {
@@ -30,6 +30,27 @@ fn every_face_tells_the_hands_geometry_and_no_recipe() {
         assert!(!text.contains("bottle: ") && !text.contains("most_steps"), "face {face}");
     }
     assert_eq!(faces(Hints::On), faces(Hints::Off), "hints are of the brief alone");
+}
+
+/// One policy of all robots has no partners to hear.
+#[test]
+fn lists_have_what_is_for_operators_for_operators_alone() {
+    let list = |wording: Wording| {
+        let specs = tool_specs(wording);
+        Format::ALL
+            .map(|format| specs.iter().map(|spec| spec.formatted(format)).collect::<Value>().to_string())
+    };
+    let one = Wording::from(Hints::On);
+    for field in ["until_heard", "heard", "heard_from", "partners_wait"] {
+        let named = format!("\"{field}\"");
+        for (of_one, of_operator) in list(one).iter().zip(list(one.for_operator())) {
+            assert!(!of_one.contains(&named) && of_operator.contains(&named), "{field}");
+        }
+        assert!(
+            openapi("1.2.3", one, false).to_string().contains(&named),
+            "both send the same bodies: {field}"
+        );
+    }
 }
 
 /// A host sends the list with every request to a model.
@@ -129,7 +150,7 @@ fn what_may_be_null_may_be_left_out_but_of_the_strict_schema() {
     check("move_wrists", "/properties/robots/items/required", json!(["robot"]));
     assert_eq!(
         json!(spec("observe").input_schema)["required"],
-        json!(["episode_id", "robots", "short", "frame"])
+        json!(["episode_id", "robots", "short", "frame", "depth_image"])
     );
     let body = |name: &str| spec(name).body_schema(50)["required"].clone();
     assert_eq!((body("query_depth"), body("observe")), (json!(["robot"]), Value::Null));

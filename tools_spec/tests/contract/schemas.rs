@@ -92,7 +92,7 @@ fn calls_survive_the_wire() {
         ("get_robot_state", json!({ "robot": "B" })),
         (
             "query_depth",
-            json!({ "robot": "A", "pixels": [[0, 0], [319, 239]], "region": null, "surface": null, "frame": null }),
+            json!({ "robot": "A", "pixels": [[0, 0], [319, 239]], "region": null, "surface": null, "frame": "level" }),
         ),
         ("wait", json!({ "steps": 25 })),
         ("get_status", json!({})),

@@ -169,7 +169,8 @@ fn send(
         }
     };
     let robots = team.iter().zip(goals).map(destination).collect();
-    let call = ToolCall::from(WalkTo { steps: MAX_STEPS, frame: PoseFrame::Start, robots });
+    let call =
+        ToolCall::from(WalkTo { steps: MAX_STEPS, frame: PoseFrame::Start, robots, until_heard: false });
     session.call(call).map_err(Box::new)?;
     Ok(())
 }

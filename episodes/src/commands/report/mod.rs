@@ -6,7 +6,8 @@ use nalgebra::Isometry3;
 use tandem_ik::Tolerance;
 use tandem_sim::{HAND_JOINTS, Pose, RobotSensed, Side, UPPER, Vector};
 use tandem_tools_spec::{
-    BaseMotion, Effort, FingerReport, Grip, HandReport, HandState, PoseFrame, RobotReport, Touch,
+    BaseMotion, Effort, FingerReport, Grip, HandReport, HandState, Pose as WirePose, PoseFrame, RobotReport,
+    Touch,
 };
 
 use feel::Felt;
@@ -47,6 +48,7 @@ pub fn report(clamped: &Clamped, began: &Pose, sensed: &RobotSensed, motion: &Mo
         right: hand_report(Side::Right, clamped, sensed, motion, frame),
         base: Some(motion.state().footing.report(&motion.state().base, motion.world_from_pelvis())),
         pelvis_in_start: Some(coarse_pose(&isometry_from_sim(&sensed.start_from_pelvis))),
+        pelvis_in_room: pelvis_in_room(frame, motion),
         base_motion: Some(base_motion(began, &sensed.start_from_pelvis)),
         waist_joints_clamped: names(
             robot,
@@ -83,24 +85,14 @@ fn hand_report(
     frame: PoseFrame,
 ) -> HandReport {
     let (arm, hand) = (columns::arm(side), columns::hand(side));
-    // The target is reported without the yielding, which is reported separately. Otherwise a repeated
-    // target would start from the yielded pose.
-    let asked = motion.state().aims[side].in_pelvis(motion.world_from_pelvis());
-    let asked = asked.unwrap_or_else(|| motion.commanded_wrists()[side]);
-    let measured = isometry_from_sim(&sensed.pelvis_from_wrist[side]);
+    let [asked, measured] = wrist_poses(side, sensed, motion);
     let missing = measured.inverse() * asked;
     let robot = &motion.robot;
     let force_n = sensed.hand_force_in_pelvis_n[side];
     let state = wrist_state(side, &motion.targets()[side], &measured, sensed, motion);
     let Felt { grip, presses, touch } = feel::felt(side, sensed, &robot.model);
     let is_pushed = state == HandState::Blocked && force_n.length() > TOUCHED_N;
-    let frame_from_pelvis = motion.pelvis_from(frame).inverse();
-    let [target_told, mut measured_told] =
-        [asked, measured].map(|wrist| coarse_pose(&(frame_from_pelvis * wrist)));
-    let signs = target_told.quaternion_wxyz.iter().zip(&measured_told.quaternion_wxyz);
-    if signs.map(|(one, other)| one * other).sum::<f64>() < 0.0 {
-        measured_told.quaternion_wxyz = measured_told.quaternion_wxyz.map(|part| 0.0 - part);
-    }
+    let [target_told, measured_told] = told_wrists(side, frame, sensed, motion);
     HandReport {
         state: Some(state),
         grip: Some(grip),
@@ -122,6 +114,40 @@ fn hand_report(
         ),
         // A finger of an open hand is always at a limit, which says nothing about reach.
         joints_at_limit: names(robot, arm.clone().filter(|column| at_limit(*column, robot, sensed))),
+    }
+}
+
+/// Returns the pose that a wrist was asked for and the measured one, both in the pelvis frame. The yielding
+/// is reported separately; otherwise a repeated target would start from the yielded pose.
+fn wrist_poses(side: Side, sensed: &RobotSensed, motion: &Motion) -> [Isometry3<f64>; 2] {
+    let asked = motion.state().aims[side].in_pelvis(motion.world_from_pelvis());
+    let asked = asked.unwrap_or_else(|| motion.commanded_wrists()[side]);
+    [asked, isometry_from_sim(&sensed.pelvis_from_wrist[side])]
+}
+
+/// Returns the target and the measured pose of a wrist as a report in `frame` has them.
+fn told_wrists(side: Side, frame: PoseFrame, sensed: &RobotSensed, motion: &Motion) -> [WirePose; 2] {
+    let frame_from_pelvis = motion.pelvis_from(frame).inverse();
+    let [target, mut measured] =
+        wrist_poses(side, sensed, motion).map(|wrist| coarse_pose(&(frame_from_pelvis * wrist)));
+    let signs = target.quaternion_wxyz.iter().zip(&measured.quaternion_wxyz);
+    if signs.map(|(one, other)| one * other).sum::<f64>() < 0.0 {
+        measured.quaternion_wxyz = measured.quaternion_wxyz.map(|part| 0.0 - part);
+    }
+    [target, measured]
+}
+
+fn pelvis_in_room(frame: PoseFrame, motion: &Motion) -> Option<WirePose> {
+    (frame == PoseFrame::Room).then(|| coarse_pose(&motion.pelvis_from(frame).inverse()))
+}
+
+/// Converts the wrists of a report on the robot as it is now to `frame`.
+pub fn tell_wrists_in(frame: PoseFrame, report: &mut RobotReport, sensed: &RobotSensed, motion: &Motion) {
+    report.frame = Some(frame).filter(|frame| *frame != PoseFrame::Pelvis);
+    report.pelvis_in_room = pelvis_in_room(frame, motion);
+    for (side, hand) in [(Side::Left, &mut report.left), (Side::Right, &mut report.right)] {
+        let [target, measured] = told_wrists(side, frame, sensed, motion);
+        (hand.target, hand.measured) = (Some(target), Some(measured));
     }
 }
 

@@ -1,6 +1,7 @@
 //! Surfaces in an image: the connected region of similar colour at a pixel, the object at a pixel, or the
 //! nearest surfaces of a colour. They are found from colours and depth that the policy may see itself,
-//! without knowledge of the object to which a pixel belongs.
+//! without knowledge of the object to which a pixel belongs; only the surface of an object by its name uses
+//! that knowledge.
 
 mod round;
 mod thing;
@@ -44,7 +45,14 @@ pub struct CameraPoses {
     pub level_from_camera: Isometry3<f64>,
 }
 
-/// Finds the surfaces of a query.
+/// Returns the surface of the things with these ids; `None` if no pixel sees them.
+pub fn of_things(view: &RobotView, ids: &BTreeSet<u32>, poses: &CameraPoses) -> Option<Surface> {
+    let seen = |pixel: &usize| ids.contains(&view.ids[*pixel]) && view.depth_m[*pixel].is_finite();
+    let pixels: Vec<usize> = (0..view.ids.len()).filter(seen).collect();
+    (!pixels.is_empty()).then(|| describe(view, &Relief::of(view), JoinedBy::Object, &pixels, poses))
+}
+
+/// Finds the surfaces of a query by pixel or colour.
 pub fn find(view: &RobotView, query: &SurfaceQuery, poses: &CameraPoses) -> Vec<Surface> {
     let relief = Relief::of(view);
     let describe = |joined_by: JoinedBy, pixels: &[usize]| describe(view, &relief, joined_by, pixels, poses);
@@ -342,7 +350,30 @@ mod tests {
     fn found_in(view: &RobotView, pixel: Option<[i64; 2]>, color: Option<Color>) -> Vec<Surface> {
         let still = Isometry3::identity();
         let poses = CameraPoses { frame_from_camera: still, level_from_camera: still };
-        find(view, &SurfaceQuery { pixel, color }, &poses)
+        find(view, &SurfaceQuery { pixel, color, object: None }, &poses)
+    }
+
+    /// The square is of two colours and hidden in the middle, and a door is of two parts.
+    #[test]
+    fn an_object_is_one_surface_whatever_hides_parts_of_it() {
+        let mut view = view();
+        let is_square = |pixel: usize| view.depth_m[pixel] < 1.5;
+        let band = |pixel: usize| (18..22).contains(&(pixel / WIDTH));
+        let id = |pixel: usize| match (is_square(pixel), band(pixel)) {
+            (true, false) => 4 + u32::from(pixel / WIDTH >= 22),
+            (true, true) => 2,
+            (false, _) => 1,
+        };
+        view.ids = (0..WIDTH * HEIGHT).map(id).collect();
+        let still = Isometry3::identity();
+        let poses = CameraPoses { frame_from_camera: still, level_from_camera: still };
+        let of = |ids: &[u32]| of_things(&view, &ids.iter().copied().collect(), &poses);
+        let square = of(&[4, 5]).unwrap();
+        let hidden = 17 + 19 + 21 + 19;
+        assert_eq!((square.joined_by, square.pixels), (JoinedBy::Object, 221 - hidden));
+        assert_eq!((square.from, square.to, square.cut_off), ([22, 10], [38, 30], false));
+        assert!(of(&[4]).unwrap().pixels < square.pixels);
+        assert_eq!(of(&[9]), None);
     }
 
     #[test]

@@ -138,7 +138,7 @@ impl CarryPlan {
     }
 
     /// Gives up and lets the robots come to rest.
-    fn stop(&mut self, why: String) {
+    pub fn stop(&mut self, why: String) {
         self.stopped.get_or_insert(why);
         if !matches!(self.stage, CarryStage::Resting { .. }) {
             self.stage = CarryStage::Resting { commands: 0, calm: 0 };

@@ -1,6 +1,8 @@
 //! `send_plan`: commands in sequence. Each runs until its steps are done, or until its expectation holds.
 
-use tandem_tools_spec::{ActCall, CommandReply, PlanStep, PlannedCall, SendPlan, SpecError, Tool as _};
+use tandem_tools_spec::{
+    ActCall, CommandReply, PlanStep, PlannedCall, PoseFrame, SendPlan, SpecError, Tool as _,
+};
 
 use super::PlanAdvance;
 use super::expectation::{PartnerNews, PlanMoment, unexpected};
@@ -18,6 +20,9 @@ pub struct CommandList {
     index: usize,
     begun: usize,
     current: Option<CurrentCommand>,
+    /// Robot of the plan's operator; `None` for the policy of all robots.
+    operator: Option<String>,
+    until_heard: bool,
 }
 
 /// The current command.
@@ -48,16 +53,32 @@ impl Session {
             match &step.call {
                 PlannedCall::Act(call) if step.until => drop(Pieces::new(call, self)?),
                 PlannedCall::Act(call) => drop(Command::read(call, &self.rules, &self.motions)?),
-                PlannedCall::WalkTo(walk) => drop(self.walkers(walk)?),
+                PlannedCall::WalkTo(walk) => drop(self.walkers(walk, operator)?),
             }
             self.check_phase(step).map_err(refused)?;
-            if let (Some(condition), None) = (step.expects.names_partners(), operator) {
-                return Err(
-                    refused(format!("`{condition}` is for operators, each of whom has a robot")).into()
-                );
-            }
+            self.check_partners(step, operator).map_err(refused)?;
         }
-        Ok(CommandList { steps, index: 0, begun: 0, current: None })
+        if plan.until_heard && operator.is_none() {
+            let reason = "`until_heard` is for operators, each of whom has a robot".into();
+            return Err(SpecError::Invalid { tool: SendPlan::NAME, reason }.into());
+        }
+        let operator = operator.map(str::to_owned);
+        Ok(CommandList { steps, index: 0, begun: 0, current: None, operator, until_heard: plan.until_heard })
+    }
+
+    /// Checks that conditions on other operators are those of an operator, and name another one.
+    fn check_partners(&self, step: &PlanStep, operator: Option<&str>) -> Result<(), String> {
+        let Some(condition) = step.expects.names_partners() else { return Ok(()) };
+        let own =
+            operator.ok_or_else(|| format!("`{condition}` is for operators, each of whom has a robot"))?;
+        let names = self.motions.iter().map(|motion| motion.robot.name.as_str());
+        let others: Vec<&str> = names.filter(|name| *name != own).collect();
+        let expected = step.expects.with_alternatives();
+        match expected.iter().filter_map(|one| one.heard_from.as_deref()).find(|from| !others.contains(from))
+        {
+            Some(from) => Err(format!("heard_from is {from:?}; the others are {}", others.join(", "))),
+            None => Ok(()),
+        }
     }
 
     fn check_phase(&self, step: &PlanStep) -> Result<(), String> {
@@ -82,19 +103,22 @@ impl CommandList {
         &mut self,
         session: &Session,
         last: Option<&CommandReply>,
-        news: PartnerNews,
+        news: &PartnerNews,
     ) -> PlanAdvance {
+        let words = news.words().filter(|_| self.until_heard);
         loop {
             let Some(step) = self.steps.get(self.index) else { return PlanAdvance::Done(None) };
             let stopped = match (self.current.take(), last) {
-                (Some(current), Some(reply)) => match current.go_on(session, step, reply, news) {
+                (Some(current), Some(reply)) => match current.go_on(session, step, reply, (news, &words)) {
                     CommandProgress::Make(call, current) => {
                         self.current = Some(current);
                         return PlanAdvance::Make(call);
                     }
-                    CommandProgress::Over(stopped) => stopped,
+                    CommandProgress::Over(stopped) => {
+                        stopped.or_else(|| words.clone().filter(|_| self.index + 1 < self.steps.len()))
+                    }
                 },
-                _ => match CurrentCommand::begin(session, step) {
+                _ => match CurrentCommand::begin(session, step, self.operator.as_deref()) {
                     Ok((call, current)) => {
                         (self.current, self.begun) = (Some(current), self.index + 1);
                         return PlanAdvance::Make(call);
@@ -129,6 +153,14 @@ impl CommandList {
         self.last_begun().is_some_and(|step| step.short)
     }
 
+    /// Returns the frame of the places of the last command, if it walks to some.
+    pub fn frame(&self) -> Option<PoseFrame> {
+        match &self.last_begun()?.call {
+            PlannedCall::WalkTo(walk) => Some(walk.frame),
+            PlannedCall::Act(_) => None,
+        }
+    }
+
     fn last_begun(&self) -> Option<&PlanStep> {
         self.steps.get(self.begun.checked_sub(1)?)
     }
@@ -142,7 +174,11 @@ enum CommandProgress {
 }
 
 impl CurrentCommand {
-    fn begin(session: &Session, step: &PlanStep) -> Result<(ActCall, CurrentCommand), String> {
+    fn begin(
+        session: &Session,
+        step: &PlanStep,
+        operator: Option<&str>,
+    ) -> Result<(ActCall, CurrentCommand), String> {
         match &step.call {
             PlannedCall::Act(call) if !step.until => Ok((call.clone(), CurrentCommand::Whole)),
             PlannedCall::Act(call) => {
@@ -151,8 +187,8 @@ impl CurrentCommand {
                 Ok((first, CurrentCommand::Until(pieces)))
             }
             PlannedCall::WalkTo(walk) => {
-                let mut walkers = session.walkers(walk).map_err(|error| error.to_string())?;
-                match walkers.advance(session, None) {
+                let mut walkers = session.walkers(walk, operator).map_err(|error| error.to_string())?;
+                match walkers.advance(session, None, &PartnerNews::default()) {
                     PlanAdvance::Make(call) => Ok((call, CurrentCommand::Walk(walkers))),
                     PlanAdvance::Done(why) => Err(why.unwrap_or_else(|| "it has no steps".into())),
                 }
@@ -165,7 +201,7 @@ impl CurrentCommand {
         session: &Session,
         step: &PlanStep,
         reply: &CommandReply,
-        news: PartnerNews,
+        (news, words): (&PartnerNews, &Option<String>),
     ) -> CommandProgress {
         let missing = |is_way_done: bool| unexpected(&step.expects, reply, PlanMoment { news, is_way_done });
         match self {
@@ -174,16 +210,23 @@ impl CurrentCommand {
                 let missing = missing(pieces.is_way_done());
                 match (missing, pieces.next_piece()) {
                     (None, _) => CommandProgress::Over(None),
+                    (_, Some(_)) if words.is_some() => CommandProgress::Over(words.clone()),
                     (_, Some(call)) => CommandProgress::Make(call, CurrentCommand::Until(pieces)),
                     (missing, None) => {
                         CommandProgress::Over(missing.map(|why| format!("its steps are done and {why}")))
                     }
                 }
             }
-            CurrentCommand::Walk(mut walkers) => match walkers.advance(session, Some(reply)) {
-                PlanAdvance::Make(call) => CommandProgress::Make(call, CurrentCommand::Walk(walkers)),
-                PlanAdvance::Done(stopped) => CommandProgress::Over(stopped.or_else(|| missing(true))),
-            },
+            CurrentCommand::Walk(mut walkers) => {
+                let next = match words {
+                    Some(words) => walkers.end(session, Some(reply), words.clone()),
+                    None => walkers.advance(session, Some(reply), news),
+                };
+                match next {
+                    PlanAdvance::Make(call) => CommandProgress::Make(call, CurrentCommand::Walk(walkers)),
+                    PlanAdvance::Done(stopped) => CommandProgress::Over(stopped.or_else(|| missing(true))),
+                }
+            }
         }
     }
 }

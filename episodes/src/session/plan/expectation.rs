@@ -1,5 +1,7 @@
 //! Conditions of plans on the reply to a command.
 
+use std::collections::BTreeSet;
+
 use tandem_tools_spec::{
     BaseState, CommandReply, Expectation, Grip, HandReport, HandState, Partner, PartnerDid, RobotReport,
     Tool as _, Touch, Wait,
@@ -8,12 +10,20 @@ use tandem_tools_spec::{
 use crate::scoring::Phase;
 
 /// News from other operators while a plan runs.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Default)]
 pub struct PartnerNews {
-    /// True once one of them has sent a message.
-    pub heard: bool,
+    /// Robots whose operators have sent a message.
+    pub heard: BTreeSet<String>,
     /// True if all of them waited during the last command.
     pub partners_wait: bool,
+}
+
+impl PartnerNews {
+    /// Returns who has spoken, as a reason to end; `None` if nobody has.
+    pub fn words(&self) -> Option<String> {
+        let speakers: Vec<&str> = self.heard.iter().map(String::as_str).collect();
+        (!speakers.is_empty()).then(|| format!("{} has spoken", speakers.join(" and ")))
+    }
 }
 
 /// Returns true if every partner lets time pass for the others: by `wait`, or because it has finished. One
@@ -29,8 +39,8 @@ pub fn all_wait(partners: &[Partner]) -> bool {
 
 /// State of a plan after a command, beside the command's reply.
 #[derive(Debug, Clone, Copy)]
-pub struct PlanMoment {
-    pub news: PartnerNews,
+pub struct PlanMoment<'a> {
+    pub news: &'a PartnerNews,
     /// True once wrists have their last targets: one that has arrived before is only on its way.
     pub is_way_done: bool,
 }
@@ -59,7 +69,8 @@ pub fn unexpected(expected: &Expectation, reply: &CommandReply, moment: PlanMome
             let robot = steps.map(|robot| robot.robot.clone());
             differs("base_stepping", expected.base_stepping, steps.is_some(), robot)
         })
-        .or_else(|| differs("heard", expected.heard, moment.news.heard, None))
+        .or_else(|| differs("heard", expected.heard, !moment.news.heard.is_empty(), None))
+        .or_else(|| unheard(expected.heard_from.as_deref()?, moment.news))
         .or_else(|| differs("partners_wait", expected.partners_wait, moment.news.partners_wait, None))
         .or_else(|| force_differs(expected, &hands))
         .or_else(|| phase_missing(expected, reply))
@@ -78,6 +89,10 @@ fn differs(name: &str, wanted: Option<bool>, is: bool, which: Option<String>) ->
         "{name} is {is}, not {wanted}{}",
         which.map(|which| format!(" ({which})")).unwrap_or_default()
     ))
+}
+
+fn unheard(from: &str, news: &PartnerNews) -> Option<String> {
+    (!news.heard.contains(from)).then(|| format!("{from} has not spoken"))
 }
 
 fn force_differs(expected: &Expectation, hands: &[(String, &HandReport)]) -> Option<String> {

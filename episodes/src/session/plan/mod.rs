@@ -15,15 +15,15 @@ mod walkers;
 mod way;
 
 use tandem_tools_spec::{
-    ActCall, Call, CommandReply, Formats, Partner, PlanCall, PlanReply, SendPlan, SpecError, StopReason,
-    Tool as _, ToolCall, ToolReply, WalkTo,
+    ActCall, Call, CommandReply, Formats, Partner, PlanCall, PlanReply, PoseFrame, SendPlan, SpecError,
+    StopReason, Tool as _, ToolCall, ToolReply, WalkTo,
 };
 
 use super::Session;
 use super::journal::KeptRequest;
 use super::told::shorten_report;
 use crate::EpisodeError;
-use crate::commands::{Called, OperatorCall};
+use crate::commands::{Called, OperatorCall, tell_wrists_in};
 use crate::output::OutputError;
 use crate::recording::CallerRecord;
 use commands::CommandList;
@@ -64,15 +64,18 @@ struct PlanProgress {
     executed_steps: u32,
     outcomes: Outcomes,
     last: Option<CommandReply>,
+    /// True while the last reply is not among the outcomes.
+    is_new: bool,
 }
 
 impl PlanRun {
     /// Returns the next command of the plan.
     pub fn advance(&mut self, session: &Session) -> PlanAdvance {
+        self.digest(session);
         let last = self.progress.last.as_ref();
         match &mut self.stage {
-            PlanStage::Commands(list) => list.advance(session, last, self.news),
-            PlanStage::Walk(walk) => walk.advance(session, last),
+            PlanStage::Commands(list) => list.advance(session, last, &self.news),
+            PlanStage::Walk(walk) => walk.advance(session, last, &self.news),
         }
     }
 
@@ -81,16 +84,29 @@ impl PlanRun {
     pub fn take(&mut self, reply: CommandReply) -> Option<String> {
         self.progress.replies += 1;
         self.progress.executed_steps += reply.executed_steps;
-        if let PlanStage::Commands(list) = &self.stage {
-            self.progress.outcomes.add(list.place(), &reply);
-        }
         let (stop, falls) = (reply.stop_reason, reply.fallen.iter().any(|robot| robot.fallen));
-        self.progress.last = Some(reply);
+        (self.progress.last, self.progress.is_new) = (Some(reply), true);
         match stop {
             StopReason::StepsDone | StopReason::PartnerDone => falls.then(|| "a robot has fallen".into()),
             StopReason::TaskComplete => Some("the task is complete".into()),
             StopReason::StepBudgetExhausted => Some("the episode's steps are used up".into()),
         }
+    }
+
+    /// Converts the last reply to the frame of the walk that it belongs to, and adds it to the outcomes.
+    fn digest(&mut self, session: &Session) {
+        let frame = match &self.stage {
+            PlanStage::Commands(list) => list.frame(),
+            PlanStage::Walk(walk) => Some(walk.frame),
+        };
+        let Some(last) = self.progress.last.as_mut().filter(|_| self.progress.is_new) else { return };
+        if let Some(frame) = frame {
+            session.tell_in(frame, last);
+        }
+        if let PlanStage::Commands(list) = &self.stage {
+            self.progress.outcomes.add(list.place(), last);
+        }
+        self.progress.is_new = false;
     }
 
     /// Returns the tool of the command that is carried out.
@@ -101,9 +117,9 @@ impl PlanRun {
         }
     }
 
-    /// Notes a message from another operator.
-    pub fn hear(&mut self) {
-        self.news.heard = true;
+    /// Notes a message from the operator of another robot.
+    pub fn hear(&mut self, from: &str) {
+        self.news.heard.insert(from.into());
     }
 
     /// Notes what the other operators did during the last command.
@@ -117,8 +133,10 @@ impl PlanRun {
     }
 
     /// Returns the reply to a plan with at least one executed command.
-    fn reply(self, tool_calls: u32, stopped: Option<String>) -> Result<PlanReply, EpisodeError> {
-        let PlanProgress { replies, executed_steps, outcomes, last } = self.progress;
+    fn reply(mut self, session: &Session, stopped: Option<String>) -> Result<PlanReply, EpisodeError> {
+        self.digest(session);
+        let tool_calls = session.tool_calls;
+        let PlanProgress { replies, executed_steps, outcomes, last, is_new: _ } = self.progress;
         let (commands, is_short) = match self.stage {
             PlanStage::Commands(list) => (list.begun(), list.is_short()),
             PlanStage::Walk(_) => (replies, false),
@@ -177,7 +195,7 @@ impl Session {
         stopped: Option<String>,
     ) -> Result<PlanReply, EpisodeError> {
         let operator = run.operator.clone();
-        let reply = run.reply(self.tool_calls, stopped);
+        let reply = run.reply(self, stopped);
         self.tell_plan(operator.as_deref(), &call.tool, reply.as_ref())?;
         let mut reply = reply?;
         if call.short {
@@ -195,7 +213,7 @@ impl Session {
         let allowed = self.allow(called).and_then(|_| self.expect_underway());
         let begun = allowed.and_then(|()| match plan {
             PlanCall::SendPlan(plan) => self.command_list(plan, caller.operator()).map(PlanStage::Commands),
-            PlanCall::WalkTo(walk) => self.walkers(walk).map(PlanStage::Walk),
+            PlanCall::WalkTo(walk) => self.walkers(walk, caller.operator()).map(PlanStage::Walk),
         });
         match begun {
             Ok(stage) => {
@@ -232,7 +250,16 @@ impl Session {
                 break stopped;
             }
         };
-        run.reply(self.tool_calls, stopped)
+        run.reply(self, stopped)
+    }
+
+    /// Converts the wrists in the reply to the last command to `frame`.
+    fn tell_in(&self, frame: PoseFrame, reply: &mut CommandReply) {
+        for (motion, robot) in self.motions.iter().zip(&self.present.robots) {
+            if let Some(report) = reply.robots.iter_mut().find(|report| report.robot == motion.robot.name) {
+                tell_wrists_in(frame, report, &robot.sensed, motion);
+            }
+        }
     }
 
     /// Records the plan after its commands, for readers of the requests.

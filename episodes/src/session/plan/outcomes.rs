@@ -66,10 +66,11 @@ impl PlanOutcome {
         let hands = [("left", &report.left), ("right", &report.right)];
         let hands = hands.into_iter().filter_map(|(side, hand)| hand_state(side, hand));
         let base = report.base.and_then(|base| base.state).and_then(base_state);
-        let pelvis = report.pelvis_in_start.filter(|_| self.walked.contains(&report.robot));
-        let pelvis = pelvis.map(|pose| {
+        let in_room = report.pelvis_in_room.map(|pose| (pose, "room"));
+        let pelvis = in_room.or(report.pelvis_in_start.map(|pose| (pose, "start")));
+        let pelvis = pelvis.filter(|_| self.walked.contains(&report.robot)).map(|(pose, frame)| {
             let [x_m, y_m, _] = pose.position_m;
-            format!("pelvis at [{x_m:.2}, {y_m:.2}] m in start")
+            format!("pelvis at [{x_m:.2}, {y_m:.2}] m in {frame}")
         });
         let parts: Vec<String> = hands.chain(base.map(str::to_owned)).chain(pelvis).collect();
         (!parts.is_empty()).then(|| format!("{} {}", report.robot, parts.join(", ")))

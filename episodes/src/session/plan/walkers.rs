@@ -1,26 +1,58 @@
 //! Walks to places: of robots that are free, and of those that carry or push a load.
 
-use tandem_tools_spec::{CommandReply, WalkTo};
+use tandem_tools_spec::{CommandReply, PoseFrame, SpecError, Tool as _, WalkTo};
 
 use super::PlanAdvance;
 use super::carry::CarryPlan;
+use super::expectation::PartnerNews;
 use super::walk_to::WalkPlan;
 use crate::EpisodeError;
 use crate::session::Session;
 
 /// Robots that walk to their places.
 #[derive(Debug)]
-pub enum Walkers {
+pub struct Walkers {
+    /// Frame of the places.
+    pub frame: PoseFrame,
+    until_heard: bool,
+    way: WalkersWay,
+}
+
+#[derive(Debug)]
+enum WalkersWay {
     Free(WalkPlan),
     Carrying(CarryPlan),
 }
 
 impl Walkers {
     /// Returns the next command after the reply to the previous one.
-    pub fn advance(&mut self, session: &Session, last: Option<&CommandReply>) -> PlanAdvance {
-        match self {
-            Walkers::Free(walk) => walk.advance(session, last),
-            Walkers::Carrying(carry) => carry.advance(session, last),
+    pub fn advance(
+        &mut self,
+        session: &Session,
+        last: Option<&CommandReply>,
+        news: &PartnerNews,
+    ) -> PlanAdvance {
+        match news.words().filter(|_| self.until_heard) {
+            Some(words) => self.end(session, last, words),
+            None => self.go_on(session, last),
+        }
+    }
+
+    fn go_on(&mut self, session: &Session, last: Option<&CommandReply>) -> PlanAdvance {
+        match &mut self.way {
+            WalkersWay::Free(walk) => walk.advance(session, last),
+            WalkersWay::Carrying(carry) => carry.advance(session, last),
+        }
+    }
+
+    /// Ends the walk before its places. Robots that carry come to rest first, and their hands with them.
+    pub fn end(&mut self, session: &Session, last: Option<&CommandReply>, why: String) -> PlanAdvance {
+        match &mut self.way {
+            WalkersWay::Free(_) => PlanAdvance::Done(Some(why)),
+            WalkersWay::Carrying(carry) => {
+                carry.stop(why);
+                carry.advance(session, last)
+            }
         }
     }
 }
@@ -30,11 +62,16 @@ impl Session {
     ///
     /// # Errors
     ///
-    /// A robot that the episode does not have.
-    pub(super) fn walkers(&self, walk: &WalkTo) -> Result<Walkers, EpisodeError> {
-        match walk.robots.iter().any(|entry| entry.carry == Some(true)) {
-            true => self.carry_plan(walk).map(Walkers::Carrying),
-            false => self.walk_plan(walk).map(Walkers::Free),
+    /// A robot that the episode does not have, or words that end the walk where nobody can speak.
+    pub(super) fn walkers(&self, walk: &WalkTo, operator: Option<&str>) -> Result<Walkers, EpisodeError> {
+        if walk.until_heard && operator.is_none() {
+            let reason = "`until_heard` is for operators, each of whom has a robot".into();
+            return Err(SpecError::Invalid { tool: WalkTo::NAME, reason }.into());
         }
+        let way = match walk.robots.iter().any(|entry| entry.carry == Some(true)) {
+            true => self.carry_plan(walk).map(WalkersWay::Carrying)?,
+            false => self.walk_plan(walk).map(WalkersWay::Free)?,
+        };
+        Ok(Walkers { frame: walk.frame, until_heard: walk.until_heard, way })
     }
 }

@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use tandem_tools_spec::{
-    ActCall, Assistance, CommandReply, ExtraInformation, FingerReport, Formats, HandReport, LookCall,
-    LookReply, ManageCall, ManageReply, PoseFrame, Protocol, RobotReport, RobotState, SpecError, ToolCall,
-    ToolReply,
+    ActCall, Assistance, CommandReply, ExtraInformation, FingerReport, Formats, HandReport, JoinedBy,
+    LookCall, LookReply, ManageCall, ManageReply, PoseFrame, Protocol, RobotReport, RobotState, SpecError,
+    ToolCall, ToolReply,
 };
 
 use super::Session;
@@ -57,9 +57,14 @@ impl ShownInformation {
                 // The commands have been counted one by one.
                 ToolReply::Plan(_) => {}
                 ToolReply::Look(LookReply::GetRobotState(state)) => self.count_state(state),
-                // Agents of the benchmark have this information; its learned policies do not.
-                ToolReply::Look(LookReply::QueryDepth(depth)) if protocol == Protocol::Benchmark => {
-                    self.count(ExtraInformation::PixelDepth, &depth.robot);
+                ToolReply::Look(LookReply::QueryDepth(depth)) => {
+                    let by_name = depth.surfaces.iter().any(|found| found.joined_by == JoinedBy::Object);
+                    let shown = [
+                        // Agents of the benchmark have this information; its learned policies do not.
+                        (ExtraInformation::PixelDepth, protocol == Protocol::Benchmark),
+                        (ExtraInformation::ObjectPixels, by_name),
+                    ];
+                    self.count_those(&shown, &depth.robot);
                 }
                 // The information belongs to no single robot.
                 ToolReply::Manage(ManageReply::GetStatus(status)) if status.next_phase.is_some() => {
@@ -68,12 +73,20 @@ impl ShownInformation {
                         .iter()
                         .for_each(|of| self.count(ExtraInformation::PhaseConditions, &of.robot));
                 }
-                ToolReply::Look(
-                    LookReply::QueryDepth(_) | LookReply::CheckReach(_) | LookReply::Observe(_),
-                )
+                ToolReply::Look(LookReply::CheckReach(_) | LookReply::Observe(_))
                 | ToolReply::Manage(_)
                 | ToolReply::Talk(_) => {}
             },
+        }
+    }
+
+    /// Counts the information in a refusal: that a robot does not see an object.
+    pub fn count_refusal(&mut self, refusal: &EpisodeError, called: &Called) {
+        if let EpisodeError::NoSurface { query, .. } = refusal
+            && query.object.is_some()
+        {
+            let robots = called.calls().into_iter().flat_map(|call| call.robots());
+            robots.for_each(|robot| self.count(ExtraInformation::ObjectPixels, robot));
         }
     }
 
@@ -81,7 +94,7 @@ impl ShownInformation {
     fn count_seen(&mut self, seen: &TeamObservation, formats: &Formats) {
         for robot in &seen.robots {
             self.count_state(&robot.state);
-            if formats.depth.is_some() {
+            if formats.depth.is_some() || seen.shows_depth {
                 self.count(ExtraInformation::DepthImages, &robot.state.robot);
             }
         }
@@ -172,12 +185,13 @@ fn withhold_state(state: &mut RobotState) {
         right_wrist_target,
         gravity_in_pelvis,
         pelvis_in_start,
+        pelvis_in_room,
         base_command: _,
         fallen,
     } = state;
     (*joint_velocities_rad_s, *joint_torques_n_m) = (None, None);
     (*left_wrist_target, *right_wrist_target) = (None, None);
-    (*gravity_in_pelvis, *pelvis_in_start, *fallen) = (None, None, None);
+    (*gravity_in_pelvis, *pelvis_in_start, *pelvis_in_room, *fallen) = (None, None, None, None);
 }
 
 fn withhold_report(reply: &mut CommandReply) {
@@ -201,12 +215,13 @@ fn withhold_report(reply: &mut CommandReply) {
             right,
             base,
             pelvis_in_start,
+            pelvis_in_room,
             base_motion,
             waist_joints_clamped: _,
             waist_joints_at_limit: _,
             base_command_clamped: _,
         } = report;
-        (*base, *pelvis_in_start, *base_motion) = (None, None, None);
+        (*base, *pelvis_in_start, *pelvis_in_room, *base_motion) = (None, None, None, None);
         withhold_hand(left);
         withhold_hand(right);
     }
@@ -270,7 +285,7 @@ impl Session {
             {
                 return Err(refused("this episode measures at pixels alone; leave fit out"));
             }
-            ToolCall::Look(LookCall::QueryDepth(args)) => vec![args.frame],
+            ToolCall::Look(LookCall::QueryDepth(args)) => vec![Some(args.frame)],
             ToolCall::Look(LookCall::CheckReach(args)) => vec![args.frame],
             ToolCall::Act(ActCall::MoveWrists(args))
                 if self.spec().assistance == Assistance::Paper
@@ -284,9 +299,16 @@ impl Session {
                 ));
             }
             ToolCall::Act(ActCall::MoveWrists(args)) => args.robots.iter().map(|entry| entry.frame).collect(),
+            ToolCall::Look(LookCall::Observe(args))
+                if args.depth_image && self.spec().assistance == Assistance::Paper =>
+            {
+                return Err(refused(
+                    "this episode shows no images of depth; leave depth_image out, and measure with query_depth",
+                ));
+            }
             ToolCall::Look(LookCall::Observe(args)) => vec![args.frame],
-            ToolCall::Look(LookCall::GetRobotState(_))
-            | ToolCall::Act(ActCall::Walk(_) | ActCall::SendJointChunk(_) | ActCall::Wait(_))
+            ToolCall::Look(LookCall::GetRobotState(args)) => vec![Some(args.frame)],
+            ToolCall::Act(ActCall::Walk(_) | ActCall::SendJointChunk(_) | ActCall::Wait(_))
             | ToolCall::Manage(_)
             | ToolCall::Talk(_) => Vec::new(),
         };

@@ -5,8 +5,8 @@ use tandem_episodes::players::{self, Episode, PlayerError, PrivilegedEpisode};
 use tandem_episodes::{A, B, Facts, Grip as Truth, Session};
 use tandem_sim::{Side, Vector};
 use tandem_tools_spec::{
-    Assistance, BaseState, Call, Grip, HandState, LookReply, MoveWrists, Observe, PoseFrame, Protocol,
-    ToolCall, ToolReply, Touch, Walk, WalkMove, WristMove,
+    Assistance, BaseState, Call, GetRobotState, Grip, HandState, LookReply, MoveWrists, Observe, PoseFrame,
+    Protocol, ToolCall, ToolReply, Touch, Walk, WalkMove, WristMove,
 };
 
 /// An episode that compares each hand's reported grip with its contacts.
@@ -309,7 +309,7 @@ fn targets_are_read_in_the_frame_that_they_name() {
 fn the_room_frame_is_the_same_for_all_robots() {
     let mut session = handover(2011);
     let mut wrist_m = |robot: usize, frame: PoseFrame| {
-        let look = Observe { robots: None, short: Some(true), frame: Some(frame) };
+        let look = Observe { short: Some(true), frame: Some(frame), ..Observe::of_all() };
         let ToolReply::Look(LookReply::Observe(seen)) = session.call(look.into()).unwrap() else { panic!() };
         assert_eq!(seen.states[robot].frame, Some(frame));
         seen.states[robot].right_wrist.position_m
@@ -326,6 +326,24 @@ fn the_room_frame_is_the_same_for_all_robots() {
         assert!((found_m - expected_m).abs() < 0.01, "{found_m} m, {expected_m} m");
     }
     assert!((own_m[0] - found_m[0]).abs() > 0.1, "{own_m:?}");
+    let in_frame = |session: &mut Session, frame: PoseFrame| {
+        let ask = GetRobotState { frame, ..GetRobotState::of("B") };
+        let ToolReply::Look(LookReply::GetRobotState(state)) = session.call(ask.into()).unwrap() else {
+            panic!()
+        };
+        state
+    };
+    let own = in_frame(&mut session, PoseFrame::Pelvis);
+    assert_eq!((own.frame, own.pelvis_in_room), (None, None));
+    let start = in_frame(&mut session, PoseFrame::Start);
+    assert_eq!((start.right_wrist.position_m, start.pelvis_in_room), (own_m, None));
+    let room = in_frame(&mut session, PoseFrame::Room);
+    assert_eq!((room.frame, room.right_wrist.position_m), (Some(PoseFrame::Room), found_m));
+    let pelvis = facts.robots[B].pelvis_in_world.translation;
+    let found_m = room.pelvis_in_room.unwrap().position_m;
+    for (found_m, expected_m) in found_m.iter().zip([pelvis.x - x_m, pelvis.y - y_m, pelvis.z]) {
+        assert!((found_m - f64::from(expected_m)).abs() < 0.01, "{found_m} m, {expected_m} m");
+    }
 }
 
 #[test]

@@ -39,7 +39,7 @@ fn recordings(folder: &Path) -> [PathBuf; 3] {
     let [looks, three, cut] = ["looks", "three", "cut"].map(|name| folder.join(name));
     let mut session = Session::start(&spec("handover", 3, Protocol::Benchmark), Some(&looks)).unwrap();
     command(&mut session, raise_hand(4));
-    session.call(Observe { robots: Some(vec!["A".into()]), short: None, frame: None }.into()).unwrap();
+    session.call(Observe { robots: Some(vec!["A".into()]), ..Observe::of_all() }.into()).unwrap();
     wait(&mut session, 3);
     session.call(Finish {}.into()).unwrap();
     let mut session =

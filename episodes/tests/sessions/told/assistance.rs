@@ -169,8 +169,8 @@ impl Episode for Listening {
         self.commands += 1;
         if self.commands % 8 == 1 {
             let looks: [ToolCall; 5] = [
-                GetRobotState { robot: "A".into() }.into(),
-                Observe { robots: None, short: None, frame: None }.into(),
+                GetRobotState::of("A").into(),
+                Observe::of_all().into(),
                 QueryDepth::example().into(),
                 CheckReach::example().into(),
                 GetStatus::default().into(),
@@ -225,7 +225,7 @@ fn what_is_shown_beyond_the_benchmark_is_counted() {
     use tandem_tools_spec::ExtraInformation::{Odometry, ThirdPerson};
     let spec = spec("handover", 0, Protocol::Benchmark).assisted(Assistance::Paper);
     let mut episode = InProcess::new(Session::start(&spec, None).unwrap());
-    let look = Observe { robots: None, short: Some(true), frame: None };
+    let look = Observe { short: Some(true), ..Observe::of_all() };
     let seen = episode.observe(&look, &[]).unwrap();
     assert!(seen.robots[0].state.pelvis_in_start.is_some(), "who asks a policy knows it");
     let ToolReply::Act(reply) = episode.carry_out(Wait { steps: 1 }.into()).unwrap() else { panic!() };

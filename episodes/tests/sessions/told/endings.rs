@@ -52,7 +52,7 @@ fn looking_goes_on_after_the_end_and_the_clock_does_not() {
     let ended = status(&mut session);
     assert_eq!((ended.budget.wall_clock_left_s, ended.ended), (Some(1700.0), Some(EndReason::Finished)));
     hands_s.fetch_add(1000, Relaxed);
-    let observe = Observe { robots: None, short: Some(true), frame: None };
+    let observe = Observe { short: Some(true), ..Observe::of_all() };
     let ToolReply::Look(LookReply::Observe(seen)) = session.call(observe.into()).unwrap() else {
         panic!("no observation")
     };

@@ -4,3 +4,4 @@ mod assistance;
 mod endings;
 mod explained;
 mod requests;
+mod shown;

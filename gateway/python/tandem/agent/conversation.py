@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
@@ -53,11 +54,17 @@ class Picture:
     robot: str
     time_s: float
     png_base64: str
+    depth_m: Sequence[float] | None = None
+    """Depths that are white and black in an image of depth."""
 
     @property
     def caption(self) -> str:
         """Caption of the image for the model."""
-        return f"Camera of {self.robot} at {self.time_s:.2f} s:"
+        if self.depth_m is None:
+            return f"Camera of {self.robot} at {self.time_s:.2f} s:"
+        white_m, black_m = self.depth_m
+        scale = f"grey linear in 1 / depth, white {white_m} m, black {black_m} m or nothing"
+        return f"Depth of {self.robot} at {self.time_s:.2f} s, {scale}:"
 
 
 @dataclass(frozen=True)

@@ -162,5 +162,10 @@ def _take_pictures(reply: dict[str, Any]) -> tuple[Picture, ...]:
 
 
 def _take_own(part: dict[str, Any]) -> list[Picture]:
-    images = listed(part.pop("images", None))
-    return [Picture(str(image["robot"]), float(part["time_s"]), str(image["png_base64"])) for image in images]
+    images = [*listed(part.pop("images", None)), *listed(part.pop("depth_images", None))]
+    return [_picture(image, float(part["time_s"])) for image in images]
+
+
+def _picture(image: dict[str, Any], time_s: float) -> Picture:
+    depth_m = (float(image["white_m"]), float(image["black_m"])) if "white_m" in image else None
+    return Picture(str(image["robot"]), time_s, str(image["png_base64"]), depth_m)

@@ -57,7 +57,7 @@ class Destination:
     """The robot, for example "A"."""
 
     to_m: Numbers
-    """[x, y], as of pelvis_in_start."""
+    """[x, y] of the pelvis."""
 
     heading_rad: float | None = None
     """Final heading, counter-clockwise from the frame's x. None: unchanged."""
@@ -103,6 +103,9 @@ class Expectation:
     heard: bool | None = None
     """Another operator has spoken since the plan began."""
 
+    heard_from: str | None = None
+    """The operator of this robot has."""
+
     partners_wait: bool | None = None
     """All others wait."""
 
@@ -131,10 +134,10 @@ class PixelRegion:
     """Its top left pixel [u, v], as [100, 80]."""
 
     to: Numbers
-    """Its bottom right pixel [u, v], as [220, 170]."""
+    """Its bottom right one, as [220, 170]."""
 
     stride: int
-    """1 for every pixel, 10 for every tenth one across and down."""
+    """10: every tenth pixel across and down."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +148,7 @@ class PlannedCommand:
     """Its tool."""
 
     arguments: Any
-    """Arguments of that tool, without episode_id."""
+    """Its arguments, without episode_id."""
 
     expects: Expectation | None = None
     """Conditions after it."""
@@ -158,13 +161,16 @@ class PlannedCommand:
 
 @dataclass(frozen=True)
 class SurfaceQuery:
-    """Either a pixel or a color."""
+    """Give one of these."""
 
     pixel: Numbers | None = None
     """A pixel on it: for the patch of its colour and the whole thing."""
 
     color: Color | None = None
     """Its colour: for the nearest three."""
+
+    object: str | None = None
+    """An object of `room`: for all that is seen of it."""
 
 
 @dataclass(frozen=True)

@@ -446,7 +446,9 @@ class RobotReport:
     """The robot, as "A"."""
 
     frame: PoseFrame | None
-    """The frame of wrist poses where the command named another than that of the pelvis; left out otherwise."""
+    """The frame of wrist poses where the command named another than that of the pelvis, of a walk to a place that
+    of its places; left out otherwise.
+    """
 
     left: HandReport
     """Its left arm and hand."""
@@ -462,6 +464,9 @@ class RobotReport:
     pelvis at the start of the episode, z up, x the robot's heading then. Drifts by up to 1 % of the way walked.
     Left out where the assistance is "paper".
     """
+
+    pelvis_in_room: Pose | None
+    """The same in the room frame, where `frame` is that; left out otherwise."""
 
     base_motion: BaseMotion | None
     """Motion of the base during the command, by the same odometry. Left out where the assistance is "paper", and
@@ -489,6 +494,7 @@ class RobotReport:
             right=HandReport.of(value["right"]),
             base=None if (got := value.get("base")) is None else BaseReport.of(got),
             pelvis_in_start=None if (got := value.get("pelvis_in_start")) is None else Pose.of(got),
+            pelvis_in_room=None if (got := value.get("pelvis_in_room")) is None else Pose.of(got),
             base_motion=None if (got := value.get("base_motion")) is None else BaseMotion.of(got),
             waist_joints_clamped=tuple(value.get("waist_joints_clamped", ())),
             waist_joints_at_limit=tuple(value.get("waist_joints_at_limit", ())),

@@ -14,8 +14,9 @@ from .commands import PoseFrame
 JoinedBy: TypeAlias = Literal[
     "color",
     "shape",
+    "object",
 ]
-"""By what pixels are joined to a surface. Neighbours of it are of about the same depth always."""
+"""By what pixels are joined to a surface. Neighbours are of about the same depth, except of an object."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class DepthReply:
 
     surfaces: tuple[Surface, ...]
     """The surfaces that were found: at a pixel the patch of its colour and, where that is more, the whole thing;
-    of a colour up to three, the nearest first and what is of the room last. Left out where none was asked for.
+    of a colour up to three, the nearest first and what is of the room last; of an object one. Left out where
+    none was asked for.
     """
 
     fit: RegionFit | None

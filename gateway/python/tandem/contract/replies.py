@@ -301,6 +301,9 @@ class RobotState:
     Left out where the assistance is "paper".
     """
 
+    pelvis_in_room: Pose | None
+    """The same in the room frame, where the call named that; left out otherwise."""
+
     base_command: BaseCommand
     """Base command in force."""
 
@@ -323,6 +326,7 @@ class RobotState:
             right_wrist_target=None if (got := value.get("right_wrist_target")) is None else Pose.of(got),
             gravity_in_pelvis=None if (got := value.get("gravity_in_pelvis")) is None else tuple(got),
             pelvis_in_start=None if (got := value.get("pelvis_in_start")) is None else Pose.of(got),
+            pelvis_in_room=None if (got := value.get("pelvis_in_room")) is None else Pose.of(got),
             base_command=BaseCommand.of(value["base_command"]),
             fallen=value.get("fallen"),
         )

@@ -37,6 +37,8 @@ class Tools(ABC):
     def get_robot_state(
         self,
         robot: str,
+        *,
+        frame: PoseFrame | None = None,
     ) -> RobotState:
         """Read one robot's proprioception without an image: wrist poses in the pelvis frame, which way is down,
         odometry, the base command in force and, unless `short`, 43 joint angles, velocities and torques. Costs
@@ -44,9 +46,11 @@ class Tools(ABC):
 
         Args:
             robot: The robot, for example "A".
+            frame: Frame of the wrists; "room": and pelvis.
         """
         arguments: dict[str, Any] = {
             "robot": robot,
+            "frame": frame,
         }
         return RobotState.of(self.call("get_robot_state", plain(arguments)))
 
@@ -68,7 +72,7 @@ class Tools(ABC):
             robot: The robot, for example "A".
             pixels: Pixels [u, v], column 0 to 319 from the left, row 0 to 239 from the top.
             region: Pixels of a rectangle, row by row.
-            fit: True: also the largest plane in `region`, its straight edges and their corners.
+            fit: True: also the largest plane in `region`, its straight edges and corners.
             surface: Returns middle, size, corners and, of an upright round thing, axis of a surface in place of
                 points.
             frame: Frame of the points.
@@ -94,8 +98,8 @@ class Tools(ABC):
         frame: PoseFrame | None = None,
         keep_waist: bool | None = None,
     ) -> ReachReply:
-        """Ask whether wrists could reach poses from where the robot stands, by the waist and the arms that are
-        given a pose. Nothing moves; costs no steps. Poses are as in move_wrists.
+        """Ask whether wrists could reach poses, as of move_wrists, from where the robot stands, by the waist and
+        the arms that are given a pose. Nothing moves; costs no steps.
 
         Args:
             robot: The robot, for example "A".
@@ -128,7 +132,7 @@ class Tools(ABC):
         contact, or is out of reach.
 
         Args:
-            steps: Control steps: 1 up to the budget's steps_per_command.
+            steps: 1 up to the budget's steps_per_command.
             robots: One entry per robot that moves.
         """
         arguments: dict[str, Any] = {
@@ -147,7 +151,7 @@ class Tools(ABC):
         command; the height persists.
 
         Args:
-            steps: Control steps: 1 up to the budget's steps_per_command.
+            steps: 1 up to the budget's steps_per_command.
             robots: One entry per robot that moves. Others hold still.
         """
         arguments: dict[str, Any] = {
@@ -180,7 +184,7 @@ class Tools(ABC):
         robot.
 
         Args:
-            steps: Control steps: 1 up to the budget's steps_per_command.
+            steps: 1 up to the budget's steps_per_command.
         """
         arguments: dict[str, Any] = {
             "steps": steps,
@@ -190,6 +194,8 @@ class Tools(ABC):
     def send_plan(
         self,
         commands: Sequence[PlannedCommand],
+        *,
+        until_heard: bool | None = None,
     ) -> PlanReply:
         """Carry out up to 20 commands in order, each counted as a tool call, until one's `expects` does not hold.
         With `until`, a command lasts until it does: lower a hand until it touches, wait until a phase is
@@ -197,10 +203,12 @@ class Tools(ABC):
         invalid, none is.
 
         Args:
-            commands: The commands in order.
+            commands: Commands.
+            until_heard: True: words of another operator end it.
         """
         arguments: dict[str, Any] = {
             "commands": commands,
+            "until_heard": until_heard,
         }
         return PlanReply.of(self.call("send_plan", plain(arguments)))
 
@@ -210,6 +218,7 @@ class Tools(ABC):
         robots: Sequence[Destination],
         *,
         frame: PoseFrame | None = None,
+        until_heard: bool | None = None,
     ) -> PlanReply:
         """Walk to places by odometry; arms go along, or push and carry with `carry`. Short commands, each a tool
         call, take every robot to within 1.5 cm and 1.5 degrees of its place, unless one gets no nearer or steps
@@ -220,11 +229,13 @@ class Tools(ABC):
                 220.
             robots: One entry per robot that walks.
             frame: Frame of places and headings.
+            until_heard: True: words of another operator end it; with `carry` the robot comes to rest first.
         """
         arguments: dict[str, Any] = {
             "steps": steps,
             "robots": robots,
             "frame": frame,
+            "until_heard": until_heard,
         }
         return PlanReply.of(self.call("walk_to", plain(arguments)))
 

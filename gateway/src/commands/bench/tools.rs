@@ -74,7 +74,7 @@ pub fn tools() -> Result<ToolsReport, Box<dyn Error>> {
     let task = tasks::cohub()[0].id.clone();
     let args = StartEpisode { task, seed: 0, protocol: Some(Protocol::Benchmark), short: false };
     let (mut episode, _) = HttpEpisode::start(server.address(), &args)?;
-    let looks = [GetStatus::default().into(), GetRobotState { robot: "A".into() }.into()];
+    let looks = [GetStatus::default().into(), GetRobotState::of("A").into()];
     let calls = looks.into_iter().map(|call| times(&mut episode, &call)).collect::<Result<_, _>>()?;
     let wait = waits(&mut episode, || server.table().metrics().physics())?;
     episode.delete()?;

@@ -44,7 +44,7 @@ fn physics(spec: &EpisodeSpec) -> Result<String, String> {
         session.call(Wait { steps: TRIED_STEPS }.into())?;
         let simulated_s = session.present().time_s;
         let began = Instant::now();
-        session.call(ToolCall::from(Observe { robots: None, short: None, frame: None }))?;
+        session.call(ToolCall::from(Observe::of_all()))?;
         Ok((simulated_s / session.physics().as_secs_f64(), began.elapsed()))
     };
     let (factor, look) = play().map_err(|error: EpisodeError| format!("{error}; please report it"))?;

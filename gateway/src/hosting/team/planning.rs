@@ -70,9 +70,7 @@ impl Team {
                     Err(error) => Some(error.to_string()),
                 };
             run.see(&under_way.partners);
-            if !under_way.heard.is_empty() {
-                run.hear();
-            }
+            under_way.heard.iter().for_each(|words| run.hear(&words.from));
             if stopped.is_some() {
                 break stopped;
             }

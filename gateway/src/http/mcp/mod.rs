@@ -29,8 +29,8 @@ use rmcp::{
 use serde::Serialize;
 use serde_json::Value;
 use tandem_tools_spec::{
-    Call, CameraImage, Format, ListTasks, LookReply, StartEpisode, TalkCall, Tool as _, ToolReply,
-    parse_args, parse_start,
+    Call, DepthImage, Format, ListTasks, LookReply, Observation, StartEpisode, TalkCall, Tool as _,
+    ToolReply, parse_args, parse_start,
 };
 
 use super::{
@@ -287,22 +287,25 @@ fn content(answer: &Answer) -> Result<Vec<ContentBlock>, ApiError> {
     let seen = match (&answer.reply, &answer.observation) {
         (ToolReply::Look(LookReply::Observe(seen)), _) => seen,
         (_, Some(seen)) => {
-            if let Value::Object(observation) = &mut text["observation"] {
-                observation.shift_remove("images");
-            }
+            remove_images(&mut text["observation"]);
             seen
         }
         _ => return json_block(&text),
     };
-    if let Value::Object(object) = &mut text {
-        object.shift_remove("images");
-    }
+    remove_images(&mut text);
     let mut content = json_block(&text)?;
-    content.push(ContentBlock::text(image_captions(&seen.images)));
-    content.extend(
-        seen.images.iter().map(|image| ContentBlock::image(image.png_base64.to_base64(), "image/png")),
-    );
+    content.push(ContentBlock::text(image_captions(seen)));
+    let depths = seen.depth_images.iter().map(|image| &image.png_base64);
+    let files = seen.images.iter().map(|image| &image.png_base64).chain(depths);
+    content.extend(files.map(|file| ContentBlock::image(file.to_base64(), "image/png")));
     Ok(content)
+}
+
+fn remove_images(seen: &mut Value) {
+    if let Value::Object(seen) = seen {
+        seen.shift_remove("images");
+        seen.shift_remove("depth_images");
+    }
 }
 
 /// Returns the caller that the gate has identified.
@@ -310,10 +313,15 @@ fn caller_of(context: &RequestContext<RoleServer>) -> Option<&Caller> {
     context.extensions.get::<Parts>()?.extensions.get()
 }
 
-/// Names the robot of each of the following images.
-fn image_captions(images: &[CameraImage]) -> String {
-    let of = |(index, image): (usize, &CameraImage)| format!(" Image {}: {}.", index + 1, image.robot);
-    format!("{} images follow.{}", images.len(), images.iter().enumerate().map(of).collect::<String>())
+/// Names the robot of each of the following images, and the range of depths.
+fn image_captions(seen: &Observation) -> String {
+    let depth = |DepthImage { robot, white_m, black_m, .. }: &DepthImage| {
+        format!("depth of {robot}, grey linear in 1 / depth, white {white_m} m, black {black_m} m or nothing")
+    };
+    let names = seen.images.iter().map(|image| image.robot.clone());
+    let names: Vec<String> = names.chain(seen.depth_images.iter().map(depth)).collect();
+    let of = |(index, name): (usize, &String)| format!(" Image {}: {name}.", index + 1);
+    format!("{} images follow.{}", names.len(), names.iter().enumerate().map(of).collect::<String>())
 }
 
 /// Returns a refusal as text for a model.

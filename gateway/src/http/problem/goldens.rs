@@ -113,8 +113,12 @@ fn episode_refusals() -> Vec<EpisodeError> {
         EpisodeError::DepthImage { protocol: "agentic" },
         EpisodeError::TooManySteps { asked: 60, most: 25, protocol: "agentic" },
         EpisodeError::NoSurface {
-            query: SurfaceQuery { pixel: None, color: Some(Color::Red) },
+            query: SurfaceQuery { pixel: None, color: Some(Color::Red), object: None },
             seen: vec![Color::Blue, Color::White],
+        },
+        EpisodeError::NoSurface {
+            query: SurfaceQuery { pixel: None, color: None, object: Some("bottle".into()) },
+            seen: Vec::new(),
         },
         EpisodeError::PixelOutside { u: 320, v: 0, width: 320, height: 240 },
         EpisodeError::Ended { reason: EndReason::Finished, result: result().into() },

@@ -91,8 +91,8 @@ impl Scenery {
                 add_parts(&mut parts, &model.geoms, carrier, id, |geom| robot_rgba(geom, robot));
             }
         }
-        let first_object = first_robot + world.robots().len() as u32;
-        for ((object, (_, model)), id) in world.object_models().enumerate().zip(first_object..) {
+        for (object, (_, model)) in world.object_models().enumerate() {
+            let id = object_id(world, object);
             add_parts(&mut parts, &model.geoms, Carrier::Object(object), id, |geom| geom.rgba);
         }
         Scenery { parts, focus_radius_m: FOCUS_RADIUS_M, light: Light::default() }
@@ -117,6 +117,11 @@ impl Scenery {
                 * FOCUS_STEP_M,
         }
     }
+}
+
+/// Returns the id of object number `object` of a world in [`crate::render::Frame::ids`].
+pub fn object_id(world: &World, object: usize) -> u32 {
+    ROOM_ID + 1 + (world.robots().len() + object) as u32
 }
 
 /// Returns the colour of a geom of robot number `robot`. Robots differ only in their accents, which

@@ -83,3 +83,51 @@ fn operators_meet_where_both_wait() {
     assert!(why.contains("partners_wait is false"), "{why}");
     team.verified();
 }
+
+/// Words end a walk, a plan, and a wait for one operator; those of a robot that carries, once it stands.
+#[test]
+fn words_end_what_was_asked_to_end_by_them() {
+    let team = Team::start(json!({ "talk": true, "patience_s": 5 }));
+    let until_words = |tool: &str, arguments: serde_json::Value| {
+        std::thread::scope(|scope| {
+            let plan = scope.spawn(|| team.ask(1, tool, arguments).ok());
+            for _ in 0..2 {
+                team.ask(0, "wait", json!({ "steps": 25 })).ok();
+            }
+            team.ask(0, "say", json!({ "text": "STOP" })).ok();
+            let mut waits = 0;
+            while !plan.is_finished() && waits < 20 {
+                team.ask(0, "wait", json!({ "steps": 25 }));
+                waits += 1;
+            }
+            plan.join().expect("B's reply")
+        })
+    };
+    let walk = |carry: bool| {
+        let robots = json!([{ "robot": "B", "to_m": [-1.0, 0.0], "carry": carry }]);
+        json!({ "steps": 900, "robots": robots, "until_heard": true })
+    };
+    let check = |reply: &serde_json::Value, place: &str| {
+        assert_eq!(reply["stopped"], json!(format!("{place}A has spoken")), "{reply}");
+        assert_eq!(reply["heard"][0]["text"], "STOP", "{reply}");
+        reply["executed_steps"].as_u64().expect("steps")
+    };
+    let reply = until_words("walk_to", walk(false));
+    assert!((50..=80).contains(&check(&reply, "")), "{reply}");
+    let reply = until_words("walk_to", walk(true));
+    assert!((80..=300).contains(&check(&reply, "")), "{reply}");
+    assert_eq!(reply["last"]["robots"][0]["base"]["state"], "standing", "{reply}");
+    let waits = vec![json!({ "tool": "wait", "arguments": { "steps": 25 } }); 8];
+    let reply = until_words("send_plan", json!({ "commands": waits, "until_heard": true }));
+    assert!((50..=100).contains(&check(&reply, "after command 3 of 8: ")), "{reply}");
+    let from = |robot: &str| {
+        let wait = json!({ "tool": "wait", "arguments": { "steps": 400 }, "expects": { "heard_from": robot }, "until": true });
+        json!({ "commands": [wait] })
+    };
+    let reply = until_words("send_plan", from("A"));
+    assert!(reply["stopped"].is_null() && reply["executed_steps"].as_u64() < Some(80), "{reply}");
+    for robot in ["B", "C"] {
+        team.ask(1, "send_plan", from(robot)).refused(422, &["heard_from", "the others are A"]);
+    }
+    team.verified();
+}

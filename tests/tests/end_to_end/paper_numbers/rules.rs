@@ -71,9 +71,7 @@ fn budgets_are_as_published() {
 fn the_camera_and_the_joints_are_as_published() {
     let task = tasks::find("handover").unwrap();
     let mut session = Session::start(&EpisodeSpec::new(&task, 0, Protocol::Benchmark), None).unwrap();
-    let ToolReply::Look(LookReply::Observe(seen)) =
-        session.call(Observe { robots: None, short: None, frame: None }.into()).unwrap()
-    else {
+    let ToolReply::Look(LookReply::Observe(seen)) = session.call(Observe::of_all().into()).unwrap() else {
         panic!("no observation")
     };
     for camera in &seen.cameras {

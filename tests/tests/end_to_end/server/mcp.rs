@@ -51,6 +51,15 @@ fn an_episode_can_be_played() {
     assert_eq!(seen["content"][1]["text"], "2 images follow. Image 1: A. Image 2: B.");
     assert!(!text(&seen).contains("png_base64"));
     assert!(seen["content"][2]["data"].as_str().is_some_and(|data| data.starts_with("iVBORw0KGgo")));
+
+    let asked = json!({ "episode_id": id, "robots": ["B"], "depth_image": true });
+    let seen = call(&server, "observe", asked);
+    let caption = seen["content"][1]["text"].as_str().expect("a caption");
+    let range = "2 images follow. Image 1: B. Image 2: depth of B, grey linear in 1 / depth, white ";
+    assert!(caption.starts_with(range) && caption.ends_with(" m or nothing."), "{caption}");
+    assert!(!text(&seen).contains("depth_images"));
+    let files = [2, 3].map(|block: usize| seen["content"][block]["data"].as_str().expect("a file"));
+    assert!(files[0] != files[1] && files[1].starts_with("iVBORw0KGgo"));
 }
 
 /// JSON readers differ in which of two fields with the same name they use, so duplicates are refused.

@@ -46,7 +46,7 @@ impl PolicyObservation {
         shown: &[ExtraInformation],
         moment: EpisodeMoment,
     ) -> Result<PolicyObservation, PlayerError> {
-        let seen = episode.observe(&Observe { robots: None, short: None, frame: None }, shown)?;
+        let seen = episode.observe(&Observe::of_all(), shown)?;
         let moment = EpisodeMoment { done_steps: (seen.time_s * CONTROL_HZ).round(), ..moment };
         let third_person = shown.contains(&ExtraInformation::ThirdPerson);
         let inputs = seen.robots.iter().map(|robot| {
