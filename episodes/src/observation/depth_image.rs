@@ -8,7 +8,7 @@ use crate::convert::coarse;
 
 /// Fraction of the pixels that may be nearer than white: a hand before the camera would leave little contrast
 /// to the rest.
-const NEARER_PART: f64 = 0.05;
+const NEARER_PART: f64 = 0.1;
 /// Depth that is black if everything is at one depth, relative to it.
 const SINGLE_DEPTH_FACTOR: f64 = 2.0;
 

@@ -97,7 +97,8 @@ impl RobotObservation {
     }
 }
 
-/// Converts the wrists of a state to `frame` like [`RobotObservation::tell_in`], and adds the pelvis in the room.
+/// Converts the wrists of a state to `frame` like [`RobotObservation::tell_in`], and adds the pelvis in the
+/// room.
 pub fn tell_state_in(
     state: &mut RobotState,
     frame: PoseFrame,

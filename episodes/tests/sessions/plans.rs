@@ -164,18 +164,29 @@ fn a_command_lasts_until_what_it_expects_holds() {
             "any_of has no condition, or an entry without one",
         ),
         (until(json!({ "tool": "send_joint_chunk", "arguments": { "robots": [] } })), "cannot have `until`"),
-        (
-            json!({ "tool": "wait", "arguments": { "steps": 5 }, "expects": { "heard_from": "B" } }),
-            "`heard_from` is for operators",
-        ),
-        (
-            json!({ "tool": "walk_to", "arguments": {
-                "steps": 5, "robots": [{ "robot": "A", "to_m": [0, 0] }], "until_heard": true,
-            } }),
-            "`until_heard` is for operators",
-        ),
     ] {
         let refused = plan(&mut session, "send_plan", json!({ "commands": [command] })).unwrap_err();
+        assert!(refused.contains(says), "{refused}");
+    }
+}
+
+#[test]
+fn one_policy_has_nobody_to_hear() {
+    let mut session = agentic();
+    let walk = json!({ "steps": 5, "robots": [{ "robot": "A", "to_m": [0, 0] }], "until_heard": true });
+    let wait = json!({ "tool": "wait", "arguments": { "steps": 5 } });
+    let from_b = json!({ "tool": "wait", "arguments": { "steps": 5 }, "expects": { "heard_from": "B" } });
+    for (tool, args, says) in [
+        ("walk_to", walk.clone(), "`until_heard` is for operators"),
+        (
+            "send_plan",
+            json!({ "commands": [{ "tool": "walk_to", "arguments": walk }] }),
+            "`until_heard` is for",
+        ),
+        ("send_plan", json!({ "commands": [wait], "until_heard": true }), "`until_heard` is for operators"),
+        ("send_plan", json!({ "commands": [from_b] }), "`heard_from` is for operators"),
+    ] {
+        let refused = plan(&mut session, tool, args).unwrap_err();
         assert!(refused.contains(says), "{refused}");
     }
 }

@@ -50,8 +50,7 @@ pub enum StopReason {
 pub struct RobotReport {
     /// The robot, as "A".
     pub robot: String,
-    /// The frame of wrist poses where the command named another than that of the pelvis, of a walk to a place
-    /// that of its places; left out otherwise.
+    /// The frame of wrist poses: the command's, or that of a walk's places; left out for that of the pelvis.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame: Option<PoseFrame>,
     /// Its left arm and hand.

@@ -263,32 +263,27 @@ impl Session {
         let refused = |reason: &str| {
             EpisodeError::Spec(SpecError::Invalid { tool: call.name(), reason: reason.into() })
         };
+        let is_paper = self.spec().assistance == Assistance::Paper;
         let frames: Vec<Option<PoseFrame>> = match call {
-            ToolCall::Plan(_) if self.spec().assistance == Assistance::Paper => {
+            ToolCall::Plan(_) if is_paper => {
                 return Err(refused(
                     "this episode has no plans; command by move_wrists, walk, wait and send_joint_chunk",
                 ));
             }
             ToolCall::Plan(_) => Vec::new(),
-            ToolCall::Look(LookCall::QueryDepth(args))
-                if args.surface.is_some() && self.spec().assistance == Assistance::Paper =>
-            {
+            ToolCall::Look(LookCall::QueryDepth(args)) if args.surface.is_some() && is_paper => {
                 return Err(refused("this episode measures at pixels alone; give pixels or region"));
             }
-            ToolCall::Manage(ManageCall::GetStatus(args))
-                if args.explain && self.spec().assistance == Assistance::Paper =>
-            {
+            ToolCall::Manage(ManageCall::GetStatus(args)) if args.explain && is_paper => {
                 return Err(refused("this episode does not tell what phases lack; leave explain out"));
             }
-            ToolCall::Look(LookCall::QueryDepth(args))
-                if args.fit && self.spec().assistance == Assistance::Paper =>
-            {
+            ToolCall::Look(LookCall::QueryDepth(args)) if args.fit && is_paper => {
                 return Err(refused("this episode measures at pixels alone; leave fit out"));
             }
             ToolCall::Look(LookCall::QueryDepth(args)) => vec![Some(args.frame)],
             ToolCall::Look(LookCall::CheckReach(args)) => vec![args.frame],
             ToolCall::Act(ActCall::MoveWrists(args))
-                if self.spec().assistance == Assistance::Paper
+                if is_paper
                     && args
                         .robots
                         .iter()
@@ -299,9 +294,7 @@ impl Session {
                 ));
             }
             ToolCall::Act(ActCall::MoveWrists(args)) => args.robots.iter().map(|entry| entry.frame).collect(),
-            ToolCall::Look(LookCall::Observe(args))
-                if args.depth_image && self.spec().assistance == Assistance::Paper =>
-            {
+            ToolCall::Look(LookCall::Observe(args)) if args.depth_image && is_paper => {
                 return Err(refused(
                     "this episode shows no images of depth; leave depth_image out, and measure with query_depth",
                 ));

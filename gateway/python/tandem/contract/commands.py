@@ -446,9 +446,7 @@ class RobotReport:
     """The robot, as "A"."""
 
     frame: PoseFrame | None
-    """The frame of wrist poses where the command named another than that of the pelvis, of a walk to a place that
-    of its places; left out otherwise.
-    """
+    """The frame of wrist poses: the command's, or that of a walk's places; left out for that of the pelvis."""
 
     left: HandReport
     """Its left arm and hand."""
