@@ -109,3 +109,23 @@ pub fn each<T>(
         .iter()
         .try_for_each(|entry| check(entry).map_err(|reason| format!("robot {:?}: {reason}", robot(entry))))
 }
+
+/// Returns the number of control steps of commands with a row each.
+pub fn row_steps(rows: Option<&Vec<Vec<f64>>>) -> u32 {
+    u32::try_from(rows.map_or(0, Vec::len)).unwrap_or(u32::MAX)
+}
+
+/// Checks that every robot has rows, and as many as the first one.
+pub fn equal_rows<'a>(robots: impl Iterator<Item = (&'a str, &'a Vec<Vec<f64>>)>) -> Result<(), String> {
+    let counts: Vec<(&str, usize)> = robots.map(|(robot, rows)| (robot, rows.len())).collect();
+    let Some((first, count)) = counts.first() else { return Ok(()) };
+    if *count == 0 {
+        return Err(format!("robot {first:?} has no rows; give at least 1, one per control step of 20 ms"));
+    }
+    match counts.iter().find(|(_, other)| other != count) {
+        Some((robot, other)) => Err(format!(
+            "robot {first:?} has {count} rows and robot {robot:?} has {other}; give every robot the same number of rows"
+        )),
+        None => Ok(()),
+    }
+}

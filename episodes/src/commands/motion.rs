@@ -6,8 +6,8 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use tandem_ik::{Configuration, FrameError, Outcome, Solver, Tolerance, frame_errors};
 use tandem_sim::{
-    BaseCommand, BaseLimits, CONTROL_HZ, HAND_JOINTS, RobotCommand, RobotModel, RobotSensed, Side, Sides,
-    UPPER_JOINTS,
+    BaseCommand, BaseLimits, CONTROL_HZ, HAND_JOINTS, MotorSetpoints, RobotCommand, RobotModel, RobotSensed,
+    Side, Sides, UPPER, UPPER_JOINTS,
 };
 use tandem_tools_spec::PoseFrame;
 
@@ -78,6 +78,9 @@ pub struct MotionState {
     /// Frame of the latest wrist targets, in which reports have the wrists.
     #[serde(default)]
     pub(super) frame: PoseFrame,
+    /// Setpoints of the motors in the current control step; empty while drives and base controller follow
+    /// joint targets and base command.
+    setpoints: Vec<MotorSetpoints>,
 }
 
 /// Restrictions on arms that move to their aims.
@@ -152,6 +155,7 @@ impl Motion {
             approaches: Sides::both(None),
             footing: Footing::new(world_from_pelvis),
             frame: PoseFrame::default(),
+            setpoints: Vec::new(),
         };
         Motion { robot, solver: body.solver(), body: body.clone(), state }
     }
@@ -169,6 +173,9 @@ impl Motion {
 
     /// Updates the reported state with the robot's sensing after a control step.
     pub fn feel(&mut self, sensed: &RobotSensed) {
+        if !self.state.setpoints.is_empty() {
+            self.stay_where(sensed);
+        }
         let asked = self.asked_wrists();
         let before = &self.state.approaches;
         self.state.approaches = Sides::from_fn(|side| {
@@ -335,6 +342,41 @@ impl Motion {
     pub(super) fn stand(&mut self) {
         let pelvis_height_m = self.state.base.pelvis_height_m;
         self.state.base = BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m };
+    }
+
+    /// Returns the setpoints of the motors in the current control step, which replace its command; empty
+    /// without them.
+    pub fn setpoints(&self) -> &[MotorSetpoints] {
+        &self.state.setpoints
+    }
+
+    /// Drives the motors in the current control step.
+    pub(super) fn drive(&mut self, setpoints: &[MotorSetpoints]) {
+        self.keep_joints();
+        self.state.setpoints = setpoints.to_vec();
+    }
+
+    /// Keeps the last setpoints of the motors. Returns false if there are none.
+    pub(super) fn keep_driving(&mut self) -> bool {
+        let last = self.state.setpoints.len().saturating_sub(1);
+        self.state.setpoints.drain(..last);
+        !self.state.setpoints.is_empty()
+    }
+
+    /// Hands a robot whose motors are driven back to its controller, in the posture in which it is.
+    pub(super) fn hand_back(&mut self) {
+        self.state.setpoints.clear();
+    }
+
+    /// Sets the targets under which the robot would stay as it is.
+    fn stay_where(&mut self, sensed: &RobotSensed) {
+        let joint_rad = |column: usize| {
+            let joint = &self.robot.model.joints[UPPER[column]];
+            sensed.joints.q_rad[UPPER[column]].clamp(joint.lower_rad, joint.upper_rad).into()
+        };
+        self.state.upper_rad = std::array::from_fn(joint_rad);
+        let base = BaseCommand::standing(sensed.start_from_pelvis.translation.z);
+        self.state.base = self.robot.base_limits.clamp(base);
     }
 
     pub(super) fn walk(&mut self, base: BaseCommand) {

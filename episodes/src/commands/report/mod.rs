@@ -45,7 +45,10 @@ pub fn report(clamped: &Clamped, began: &Pose, sensed: &RobotSensed, motion: &Mo
         frame: Some(frame).filter(|frame| *frame != PoseFrame::Pelvis),
         left: hand_report(Side::Left, clamped, sensed, motion, frame),
         right: hand_report(Side::Right, clamped, sensed, motion, frame),
-        base: Some(motion.state().footing.report(&motion.state().base, motion.world_from_pelvis())),
+        base: motion
+            .setpoints()
+            .is_empty()
+            .then(|| motion.state().footing.report(&motion.state().base, motion.world_from_pelvis())),
         pelvis_in_start: Some(coarse_pose(&isometry_from_sim(&sensed.start_from_pelvis))),
         base_motion: Some(base_motion(began, &sensed.start_from_pelvis)),
         waist_joints_clamped: names(

@@ -93,6 +93,7 @@ impl ShownInformation {
             (ExtraInformation::JointTorques, state.joint_torques_n_m.is_some()),
             (ExtraInformation::Gravity, state.gravity_in_pelvis.is_some()),
             (ExtraInformation::Odometry, state.pelvis_in_start.is_some()),
+            (ExtraInformation::InertialReadings, state.samples.is_some()),
         ];
         self.count_those(&shown, &state.robot);
     }
@@ -174,10 +175,12 @@ fn withhold_state(state: &mut RobotState) {
         pelvis_in_start,
         base_command: _,
         fallen,
+        samples,
     } = state;
     (*joint_velocities_rad_s, *joint_torques_n_m) = (None, None);
     (*left_wrist_target, *right_wrist_target) = (None, None);
     (*gravity_in_pelvis, *pelvis_in_start, *fallen) = (None, None, None);
+    *samples = None;
 }
 
 fn withhold_report(reply: &mut CommandReply) {
@@ -272,6 +275,11 @@ impl Session {
             }
             ToolCall::Look(LookCall::QueryDepth(args)) => vec![args.frame],
             ToolCall::Look(LookCall::CheckReach(args)) => vec![args.frame],
+            ToolCall::Act(ActCall::SendJointDrives(_)) if self.execution.is_some() => {
+                return Err(refused(
+                    "this episode's robots execute commands otherwise than told (stress, or disturb), which setpoints of motors do not show; use send_joint_chunk",
+                ));
+            }
             ToolCall::Act(ActCall::MoveWrists(args))
                 if self.spec().assistance == Assistance::Paper
                     && args
@@ -286,7 +294,12 @@ impl Session {
             ToolCall::Act(ActCall::MoveWrists(args)) => args.robots.iter().map(|entry| entry.frame).collect(),
             ToolCall::Look(LookCall::Observe(args)) => vec![args.frame],
             ToolCall::Look(LookCall::GetRobotState(_))
-            | ToolCall::Act(ActCall::Walk(_) | ActCall::SendJointChunk(_) | ActCall::Wait(_))
+            | ToolCall::Act(
+                ActCall::Walk(_)
+                | ActCall::SendJointChunk(_)
+                | ActCall::SendJointDrives(_)
+                | ActCall::Wait(_),
+            )
             | ToolCall::Manage(_)
             | ToolCall::Talk(_) => Vec::new(),
         };
