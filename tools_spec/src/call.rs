@@ -210,9 +210,11 @@ impl SendPlan {
             let with_all = beside::<WithAll>(SendPlan::NAME, &mut args, &WithAll::FIELDS)
                 .map_err(|error| refused(error.to_string()))?;
             let call = match ToolCall::parse(&command.tool, args) {
-                Ok(ToolCall::Act(call)) => PlannedCall::Act(call),
+                Ok(ToolCall::Act(call)) if SendPlan::COMMANDS.contains(&call.name()) => {
+                    PlannedCall::Act(call)
+                }
                 Ok(ToolCall::Plan(PlanCall::WalkTo(walk))) => PlannedCall::WalkTo(walk),
-                Ok(other) => return Err(refused(format!("{} is no command", other.name()))),
+                Ok(other) => return Err(refused(format!("{} is no command of a plan", other.name()))),
                 Err(error) => return Err(refused(error.to_string())),
             };
             let (expects, short) =

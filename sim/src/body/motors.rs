@@ -51,3 +51,62 @@ impl MotorSetpoints {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PHYSICS_DT_S;
+    use crate::body::posed::model;
+
+    /// Returns the amplitude ratio of successive swings of  I q'' + kd q' + kp q = 0  under the drive that
+    /// `drive` is in the simulator's step.
+    fn decay(drive: &JointDrive, inertia_kg_m2: f32, swings: u32) -> f32 {
+        let (mut q_rad, mut v_rad_s, mut turned, mut peak_rad) = (0.1f32, 0.0f32, 0, 0.1f32);
+        while turned < 2 * swings {
+            let before_rad_s = v_rad_s;
+            let implicit = PHYSICS_DT_S * (drive.kd_n_m_s_rad + PHYSICS_DT_S * drive.kp_n_m_rad);
+            v_rad_s = (inertia_kg_m2 * v_rad_s - PHYSICS_DT_S * drive.kp_n_m_rad * q_rad)
+                / (inertia_kg_m2 + implicit);
+            q_rad += PHYSICS_DT_S * v_rad_s;
+            if before_rad_s * v_rad_s < 0.0 {
+                (turned, peak_rad) = (turned + 1, q_rad.abs());
+            }
+        }
+        (peak_rad / 0.1).powf(1.0 / swings as f32)
+    }
+
+    /// Gains that LeRobot sends to a knee: the exact ratio is  exp(-2 pi zeta / sqrt(1 - zeta^2)).
+    #[test]
+    fn a_knee_is_damped_as_its_gains_say() {
+        let (kp, kd, inertia_kg_m2) = (300.0f32, 4.0f32, 0.5f32);
+        let knee = model().joints.iter().position(|joint| joint.name == "left_knee_joint").unwrap();
+        let mut setpoints = MotorSetpoints::LIMP;
+        (setpoints.kp_n_m_rad[knee], setpoints.kd_n_m_s_rad[knee]) = (kp, kd);
+        let ours = setpoints.drives(&model().joints, PHYSICS_DT_S)[knee];
+        let implicit = JointDrive { kd_n_m_s_rad: kd, ..ours };
+        let zeta = kd / (2.0 * (kp * inertia_kg_m2).sqrt());
+        let exact = (-std::f32::consts::TAU * zeta / (1.0 - zeta * zeta).sqrt()).exp();
+        let off = |drive: &JointDrive| (decay(drive, inertia_kg_m2, 2).ln() / exact.ln() - 1.0).abs();
+        assert!(off(&ours) < 0.05, "{} of {exact}", decay(&ours, inertia_kg_m2, 2));
+        assert!(off(&implicit) > 0.25, "an implicit spring damps more");
+    }
+
+    /// Springs that are stiffer than a step can follow explicitly stay stable.
+    #[test]
+    fn a_stiff_spring_of_a_light_finger_does_not_oscillate() {
+        let finger = model().joints.iter().position(|joint| joint.name == "left_hand_index_1_joint").unwrap();
+        let joint = &model().joints[finger];
+        let mut setpoints = MotorSetpoints::LIMP;
+        setpoints.kp_n_m_rad[finger] = 500.0;
+        let drive = setpoints.drives(&model().joints, PHYSICS_DT_S)[finger];
+        let (mut q_rad, mut v_rad_s) = (0.1f32, 0.0f32);
+        for _ in 0..200 {
+            let implicit = PHYSICS_DT_S * (drive.kd_n_m_s_rad + PHYSICS_DT_S * drive.kp_n_m_rad);
+            v_rad_s = (joint.armature_kg_m2 * v_rad_s - PHYSICS_DT_S * drive.kp_n_m_rad * q_rad)
+                / (joint.armature_kg_m2 + implicit);
+            q_rad += PHYSICS_DT_S * v_rad_s;
+            assert!(q_rad.abs() <= 0.1, "{q_rad}");
+        }
+        assert!(q_rad.abs() < 0.01, "it comes to rest: {q_rad}");
+    }
+}
