@@ -30,7 +30,7 @@ pub struct Call {
     /// Observation to make once a command is done.
     #[serde(rename = "observe", skip_serializing_if = "Option::is_none")]
     pub then: Option<Look>,
-    /// True for the readings of every physics step, where the tool is `get_robot_state`.
+    /// True for the readings of every physics step, where the tool is `get_robot_state` or `observe`.
     #[serde(skip_serializing_if = "is_false")]
     pub samples: bool,
     /// True for a reply without what is as expected. Observations have a field of their own for that.
@@ -65,11 +65,11 @@ pub struct Look {
     pub formats: Formats,
 }
 
-/// Fields beside those of `get_robot_state`.
+/// Fields beside those of `get_robot_state` and `observe`.
 #[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 struct WithState {
-    /// True: `samples` of the reply has the readings of its sensors in each physics step of 5 ms since the
+    /// True: `samples` of the state has the readings of its sensors in each physics step of 5 ms since the
     /// last control step.
     samples: Option<bool>,
 }
@@ -113,7 +113,10 @@ impl Call {
             return Ok(Call { expected_step: beside.expected_step, then, ..Call::from(call) });
         }
         match name {
-            Observe::NAME => Look::parse(args).map(Call::from),
+            Observe::NAME => {
+                let beside: WithState = beside(Observe::NAME, &mut args, &WithState::FIELDS)?;
+                Ok(Call { samples: beside.samples.unwrap_or(false), ..Look::parse(args)?.into() })
+            }
             GetRobotState::NAME => {
                 let beside: WithState = beside(GetRobotState::NAME, &mut args, &WithState::FIELDS)?;
                 let call = Call::from(ToolCall::parse(name, args)?);
@@ -296,10 +299,11 @@ pub fn specs_for_programs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
                 spec.allow(&properties::<Driving>(wording));
                 spec.demand_one_of(Driving::conditions());
             }
-            Observe::NAME => spec.allow(&properties::<Formats>(wording)),
-            GetRobotState::NAME if wording.assistance == Assistance::Full => {
-                spec.allow(&properties::<WithState>(wording));
+            Observe::NAME => {
+                spec.allow(&properties::<Formats>(wording));
+                allow_samples(spec, wording);
             }
+            GetRobotState::NAME => allow_samples(spec, wording),
             name if ActCall::TOOLS.contains(&name) => {
                 spec.allow(&properties::<WithCommand>(wording));
                 let mut observation = plain_schema::<Observation>();
@@ -311,6 +315,12 @@ pub fn specs_for_programs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
         }
     }
     specs
+}
+
+fn allow_samples(spec: &mut ToolSpec, wording: Wording) {
+    if wording.assistance == Assistance::Full {
+        spec.allow(&properties::<WithState>(wording));
+    }
 }
 
 fn properties<T: JsonSchema>(wording: Wording) -> Map<String, Value> {
@@ -365,7 +375,8 @@ mod tests {
         let whole = Call { expected_step: Some(300), then: Some(looking(&["A", "B"])), ..wait };
         let sampled =
             Call { samples: true, ..Call::from(ToolCall::from(GetRobotState { robot: "A".into() })) };
-        for call in examples.chain([whole, Call::from(looking(&["B"])), sampled]) {
+        let looked = Call { samples: true, ..Call::from(looking(&["A"])) };
+        for call in examples.chain([whole, Call::from(looking(&["B"])), sampled, looked]) {
             assert_eq!(Call::parse(call.name(), json!(call)), Ok(call));
         }
         assert_eq!(json!(Call::from(ToolCall::from(GetStatus::default()))), json!({}));

@@ -8,7 +8,8 @@ use tandem_tools_spec::{CameraCalibration, JointValues, Observe, PoseFrame, Robo
 use super::RobotObservation;
 use crate::commands::RobotSheet;
 use crate::convert::{
-    isometry_from_sim, opencv_axes, rounded, wire_base, wire_pose, wire_pose_from_sim, wire_vector,
+    isometry_from_sim, opencv_axes, rounded, rounded_to, wire_base, wire_pose, wire_pose_from_sim,
+    wire_vector,
 };
 
 /// Level of detail of a state.
@@ -70,13 +71,17 @@ pub fn robot_state(own: &Proprioception, sheet: &RobotSheet, detail: Detail) -> 
     }
 }
 
+/// Decimals of readings: 10 urad, and finer than a G1's sensors in every unit.
+const READING_DECIMALS: i32 = 5;
+
 /// Returns readings of a robot's sensors in the form of replies.
 pub fn samples(readings: &[SensorReadings]) -> SensorSamples {
+    let told = |value: f32| rounded_to(READING_DECIMALS, value.into());
     let joints = |of: fn(&SensorReadings) -> &[f32; JOINTS]| {
-        readings.iter().map(|reading| of(reading).iter().copied().map(f64::from).collect()).collect()
+        readings.iter().map(|reading| of(reading).iter().copied().map(told).collect()).collect()
     };
     let vector = |of: fn(&SensorReadings) -> Vector| {
-        readings.iter().map(|reading| of(reading).to_array().map(f64::from)).collect()
+        readings.iter().map(|reading| of(reading).to_array().map(told)).collect()
     };
     SensorSamples {
         joint_positions_rad: joints(|reading| &reading.joints.q_rad),

@@ -13,8 +13,9 @@ use tandem_tools_spec::{ExtraInformation, PhaseReached, ResultReply};
 
 use super::checked_file::CheckedFile;
 use super::damage::Damage;
-use super::topics::messages::{PhaseMessage, StepError, ToolCallMessage};
+use super::topics::messages::{PhaseMessage, SetpointsMessage, StepError, ToolCallMessage};
 use super::topics::notes::NoteMessage;
+use super::topics::robot::setpoints_topic;
 use super::topics::steps::{StepDecoder, state_of};
 use super::{Recorder, checkpoint_name, metadata, topics};
 use crate::error::RobotError;
@@ -230,6 +231,19 @@ impl Recording {
     /// Returns every note, with its time.
     pub(super) fn notes(&self) -> Result<Vec<(f64, NoteMessage)>, RecordingError> {
         self.messages(topics::NOTES).collect()
+    }
+
+    /// Returns the setpoints of a robot's motors: the simulated time of each control step in which it was
+    /// driven by any, and its rows of `send_joint_drives`: one, or one for each physics step.
+    ///
+    /// # Errors
+    ///
+    /// If a message cannot be read.
+    pub fn motor_setpoints(&self, robot: &str) -> Result<Vec<(f64, Vec<Vec<f32>>)>, RecordingError> {
+        let rows = |message: Result<(f64, SetpointsMessage), RecordingError>| {
+            message.map(|(time_s, message)| (time_s, message.rows))
+        };
+        self.messages(&setpoints_topic(robot)).map(rows).collect()
     }
 
     /// Scores the recorded steps by this build's conditions of the task.

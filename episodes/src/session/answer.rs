@@ -98,7 +98,16 @@ impl Session {
     fn look(&mut self, look: &LookCall, call: &Call) -> Result<Answer, EpisodeError> {
         let find = |name: &String| commands::find(name, &self.motions);
         let reply = match look {
-            LookCall::Observe(args) => return self.seen(args, &call.formats).map(Answer::Observation),
+            LookCall::Observe(args) => {
+                let mut seen = self.seen(args, &call.formats)?;
+                if call.samples {
+                    for state in seen.robots.iter_mut().map(|observed| &mut observed.state) {
+                        let robot = find(&state.robot)?;
+                        state.samples = Some(samples(self.world.robots()[robot].readings()));
+                    }
+                }
+                return Ok(Answer::Observation(seen));
+            }
             LookCall::GetRobotState(args) => {
                 let robot = find(&args.robot)?;
                 let motion = &self.motions[robot];

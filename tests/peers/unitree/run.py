@@ -47,6 +47,7 @@ CASES = {
     "book": Case(ONE, [("clients", "book.py", "1")]),
     "sdk": Case(ONE, [("clients", "sdk.py", "1")]),
     "far": Case([*ONE, "--domains", "A=0"], [("clients", "far.py")]),
+    "joint": Case([*ONE, "--joint-control"], [("clients", "joint.py", "1")]),
     "lerobot": Case(
         ["--task", "handover"],
         [("lerobot", "lerobot_g1.py", "127.0.0.2", "0.25"), ("lerobot", "lerobot_g1.py", "127.0.0.3", "-0.25")],

@@ -103,10 +103,10 @@ impl From<&RobotCommand> for Json<ActionMessage> {
 
 /// Setpoints of one robot's motors in one control step: a row of `send_joint_drives`, or one for each
 /// physics step. The action of such a step is the posture that the robot had.
-#[derive(Serialize, JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[schemars(rename = "MotorSetpoints")]
 pub struct SetpointsMessage {
-    rows: Vec<Vec<f32>>,
+    pub rows: Vec<Vec<f32>>,
 }
 
 impl JsonMessage for SetpointsMessage {

@@ -102,7 +102,7 @@ impl RobotTopics {
     ) -> Result<(), OutputError> {
         let topic = match &mut self.setpoints {
             Some(topic) => topic,
-            unopened => unopened.insert(file.topic(&format!("/{name}/motor_setpoints"), &[])?),
+            unopened => unopened.insert(file.topic(&setpoints_topic(name), &[])?),
         };
         file.write(topic, time_s, &Json::from(setpoints))
     }
@@ -142,6 +142,11 @@ impl RobotTopics {
         };
         file.write(&mut camera.image, time_s, &image)
     }
+}
+
+/// Returns the topic of the setpoints of a robot's motors.
+pub fn setpoints_topic(robot: &str) -> String {
+    format!("/{robot}/motor_setpoints")
 }
 
 fn joint_states(model: &RobotModel, time_s: f64, sensed: &RobotSensed) -> JointStates {

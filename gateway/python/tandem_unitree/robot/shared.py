@@ -77,7 +77,12 @@ class Robot:
         self.stepped.set()
 
     def shown(self) -> Moment:
-        """Returns the moment to publish. The last control step is played back within the 20 ms after it."""
+        """Returns the moment to publish. The last control step is played back within the 20 ms after it.
+
+        A program that balances the robot gets the latest moment at once, which its next command can still answer.
+        """
         with self.lock:
             previous, latest, sensed_s = self._previous, self.latest, self._sensed_s
+        if self.settings.joint_control:
+            return latest
         return previous.until(latest, min(1.0, (time.monotonic() - sensed_s) / STEP_S))
