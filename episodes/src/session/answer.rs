@@ -102,7 +102,7 @@ impl Session {
                 let mut seen = self.seen(args, &call.formats)?;
                 if call.samples {
                     for state in seen.robots.iter_mut().map(|observed| &mut observed.state) {
-                        let robot = find(&state.robot)?;
+                        let robot = commands::find(&state.robot, &self.motions)?;
                         state.samples = Some(samples(self.world.robots()[robot].readings()));
                     }
                 }

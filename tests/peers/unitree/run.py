@@ -36,6 +36,7 @@ class Case:
     bridge: list[str]
     clients: list[tuple[str, ...]]
     needs_library: str | None = None
+    needs_variable: str | None = None
     environments: set[str] = field(init=False)
 
     def __post_init__(self):
@@ -48,6 +49,7 @@ CASES = {
     "sdk": Case(ONE, [("clients", "sdk.py", "1")]),
     "far": Case([*ONE, "--domains", "A=0"], [("clients", "far.py")]),
     "joint": Case([*ONE, "--joint-control"], [("clients", "joint.py", "1")]),
+    "whole_body": Case([*ONE, "--joint-control"], [("clients", "whole_body.py", "1")], needs_variable="TANDEM_POLICY"),
     "lerobot": Case(
         ["--task", "handover"],
         [("lerobot", "lerobot_g1.py", "127.0.0.2", "0.25"), ("lerobot", "lerobot_g1.py", "127.0.0.3", "-0.25")],
@@ -174,6 +176,8 @@ def inside(case, pythons):
 def run(name, makers, made):
     """Runs one case in a namespace of its own; returns whether it has passed."""
     case = CASES[name]
+    if case.needs_variable is not None and case.needs_variable not in os.environ:
+        raise Skipped(f"{case.needs_variable} is not set")
     library = case.needs_library
     if library is not None and not (ctypes.util.find_library(library) or os.environ.get("TURBOJPEG")):
         raise Skipped(f"no lib{library}")
