@@ -4,6 +4,7 @@
 //! Each acting tool has a file of its own, from its arguments to joint targets: `move_wrists`, `walk`,
 //! `send_joint_chunk`, `send_joint_drives`, `wait`.
 
+mod aim;
 mod called;
 mod check_reach;
 pub(crate) mod columns;

@@ -59,6 +59,15 @@ pub struct RecordedCall {
     pub outcome: Result<String, String>,
 }
 
+/// Setpoints of a robot's motors in one control step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedSetpoints {
+    /// Simulated time at the end of the step.
+    pub time_s: f64,
+    /// Rows of `send_joint_drives`: one, or one for each physics step.
+    pub rows: Vec<Vec<f32>>,
+}
+
 /// A checkpoint of the episode in its recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RecordedCheckpoint {
@@ -233,17 +242,16 @@ impl Recording {
         self.messages(topics::NOTES).collect()
     }
 
-    /// Returns the setpoints of a robot's motors: the simulated time of each control step in which it was
-    /// driven by any, and its rows of `send_joint_drives`: one, or one for each physics step.
+    /// Returns the setpoints of a robot's motors in every control step in which it was driven by any.
     ///
     /// # Errors
     ///
     /// If a message cannot be read.
-    pub fn motor_setpoints(&self, robot: &str) -> Result<Vec<(f64, Vec<Vec<f32>>)>, RecordingError> {
-        let rows = |message: Result<(f64, SetpointsMessage), RecordingError>| {
-            message.map(|(time_s, message)| (time_s, message.rows))
+    pub fn motor_setpoints(&self, robot: &str) -> Result<Vec<RecordedSetpoints>, RecordingError> {
+        let setpoints = |message: Result<(f64, SetpointsMessage), RecordingError>| {
+            message.map(|(time_s, message)| RecordedSetpoints { time_s, rows: message.rows })
         };
-        self.messages(&setpoints_topic(robot)).map(rows).collect()
+        self.messages(&setpoints_topic(robot)).map(setpoints).collect()
     }
 
     /// Scores the recorded steps by this build's conditions of the task.

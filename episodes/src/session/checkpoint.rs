@@ -42,7 +42,7 @@ pub struct Checkpoint {
 pub struct FailedStep {
     /// Step number in the episode, and the error.
     pub failure: String,
-    /// What the robots had to do.
+    /// Commands of the step.
     #[serde(flatten)]
     pub executed: Executed,
 }

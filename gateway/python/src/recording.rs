@@ -10,7 +10,7 @@ use pyo3::types::PyDict;
 use serde_json::json;
 use tandem_episodes::replay::{EpisodeCamera, EpisodeRenderer, PictureSize};
 use tandem_episodes::rows::{ActionKind, STATE_COLUMNS, state_row};
-use tandem_episodes::{Grip, Recording, RecordingError};
+use tandem_episodes::{Grip, RecordedSetpoints, Recording, RecordingError};
 use tandem_sim::render::{Frame, RendererKind};
 use tandem_sim::{CONTROL_DT_S, JOINTS, Side, Step};
 use tandem_tools_spec::{ACTION_ROW_LEN, DRIVE_ROW_LEN};
@@ -109,7 +109,7 @@ impl NativeRecording {
         }
         let blocks = DRIVE_ROW_LEN / JOINTS;
         let mut setpoints = vec![f32::NAN; self.steps.len() * DRIVE_ROW_LEN];
-        for (time_s, rows) in &driven {
+        for RecordedSetpoints { time_s, rows } in &driven {
             let step =
                 self.steps.partition_point(|step| step.time_s < time_s - 0.5 * f64::from(CONTROL_DT_S));
             let place = setpoints.chunks_exact_mut(DRIVE_ROW_LEN).nth(step);

@@ -103,16 +103,16 @@ fn motors_exert_what_their_setpoints_say() {
         let readings = world.robots()[0].readings();
         assert_eq!(readings.len(), 4);
         for (setpoints, now) in setpoints.iter().zip(readings) {
-            for joint in 0..JOINTS {
-                let explicit = joints[joint].armature_kg_m2 / (PHYSICS_DT_S * PHYSICS_DT_S);
+            for (joint, model) in joints.iter().enumerate() {
+                let explicit = model.armature_kg_m2 / (PHYSICS_DT_S * PHYSICS_DT_S);
                 assert!(setpoints.kp_n_m_rad[joint] <= explicit, "the whole spring is explicit");
                 let told_n_m = setpoints.torque_n_m[joint]
                     + setpoints.kp_n_m_rad[joint] * (setpoints.q_rad[joint] - last.joints.q_rad[joint])
                     + setpoints.kd_n_m_s_rad[joint]
                         * (setpoints.qd_rad_s[joint] - now.joints.qd_rad_s[joint]);
-                let limit_n_m = joints[joint].effort_n_m;
+                let limit_n_m = model.effort_n_m;
                 let off_n_m = (now.joints.torque_n_m[joint] - told_n_m.clamp(-limit_n_m, limit_n_m)).abs();
-                assert!(off_n_m < 0.01, "step {step}, {}: {off_n_m} N m", joints[joint].name);
+                assert!(off_n_m < 0.01, "step {step}, {}: {off_n_m} N m", model.name);
             }
             last = now.clone();
         }

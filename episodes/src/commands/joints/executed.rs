@@ -1,4 +1,4 @@
-//! What robots execute in one control step.
+//! Execution of one control step by the robots.
 
 use serde::{Deserialize, Serialize};
 use tandem_sim::dynamics::Diverged;

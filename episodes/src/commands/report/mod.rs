@@ -11,8 +11,9 @@ use tandem_tools_spec::{
 
 use feel::Felt;
 
+use super::aim::Aim;
 use super::columns::{self, Clamped};
-use super::motion::{Aim, Motion, RobotSheet};
+use super::motion::{Motion, RobotSheet};
 use crate::convert::{coarse, coarse_pose, isometry_from_sim, rounded_to};
 
 /// Maximum distance from its limit of a measured joint that rests at it.

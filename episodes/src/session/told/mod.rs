@@ -246,8 +246,20 @@ impl Session {
         called.allowed(|tool| self.check_told(tool))
     }
 
-    /// Refuses a call that would show withheld information.
+    /// Refuses setpoints of motors where commands are executed otherwise than told.
+    fn check_drives(&self, call: &ToolCall) -> Result<(), EpisodeError> {
+        match call {
+            ToolCall::Act(ActCall::SendJointDrives(_)) if self.execution.is_some() => {
+                let reason = "this episode's robots execute commands otherwise than told (stress, or disturb), which setpoints of motors do not show; use send_joint_chunk";
+                Err(SpecError::Invalid { tool: call.name(), reason: reason.into() }.into())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses a call that would show withheld information, or that this episode cannot carry out.
     pub(super) fn check_told(&self, call: &ToolCall) -> Result<(), EpisodeError> {
+        self.check_drives(call)?;
         let refused = |reason: &str| {
             EpisodeError::Spec(SpecError::Invalid { tool: call.name(), reason: reason.into() })
         };
@@ -275,11 +287,6 @@ impl Session {
             }
             ToolCall::Look(LookCall::QueryDepth(args)) => vec![args.frame],
             ToolCall::Look(LookCall::CheckReach(args)) => vec![args.frame],
-            ToolCall::Act(ActCall::SendJointDrives(_)) if self.execution.is_some() => {
-                return Err(refused(
-                    "this episode's robots execute commands otherwise than told (stress, or disturb), which setpoints of motors do not show; use send_joint_chunk",
-                ));
-            }
             ToolCall::Act(ActCall::MoveWrists(args))
                 if self.spec().assistance == Assistance::Paper
                     && args

@@ -140,7 +140,7 @@ impl<'a> Executor<'a> {
         let command = |rows: &[usize]| {
             let part = |chunk: &RobotRows| JointDrives {
                 robot: chunk.robot.clone(),
-                rows: rows.iter().map(|row| chunk.rows[*row].motors.clone()).collect(),
+                rows: rows.iter().map(|row| chunk.rows[*row].motor_row.clone()).collect(),
             };
             PlannedCommand::Drives(SendJointDrives { robots: chunks.iter().map(part).collect() })
         };

@@ -34,7 +34,7 @@ pub struct ActionRow {
     /// Left and right wrist.
     pub wrists: [WristTarget; 2],
     /// Row of `send_joint_drives`, if the policy drives motors; empty otherwise.
-    pub motors: Vec<f64>,
+    pub motor_row: Vec<f64>,
 }
 
 /// Some columns of every row of one robot in a reply.
@@ -155,12 +155,12 @@ fn action_row(
     if positions_m.flat_map(<[f64; 3]>::from).any(|value| value.abs() > LARGEST_VALUE) {
         return Err(RemoteError::Misfit(format!("a wrist is sent beyond {LARGEST_VALUE} m; expected m")));
     }
-    let motors = match map.drives_motors() {
-        true => motor_row(told_values, row)?,
+    let motor_row = match map.drives_motors() {
+        true => read_motors(told_values, row)?,
         false => Vec::new(),
     };
     match whole.iter().position(|value| value.abs() > LARGEST_VALUE) {
-        None => Ok(ActionRow { row: whole, wrists, motors }),
+        None => Ok(ActionRow { row: whole, wrists, motor_row }),
         Some(column) => {
             let name = action_name(column);
             Err(RemoteError::Misfit(format!(
@@ -171,7 +171,7 @@ fn action_row(
 }
 
 /// Returns the setpoints of motors in row number `row`.
-fn motor_row(told_values: &[f64], row: usize) -> Result<Vec<f64>, RemoteError> {
+fn read_motors(told_values: &[f64], row: usize) -> Result<Vec<f64>, RemoteError> {
     let setpoints = told_values[motors()].to_vec();
     let gains = setpoints.len() * 2 / 5..setpoints.len() * 4 / 5;
     let wrong = |(index, value): (usize, &f64)| {
@@ -342,7 +342,7 @@ mod tests {
         let own = map("[action]\n\"m\" = [\"motors\"]\n[chunk]\nrate_hz = 25.0");
         let answer = keyed(&[("m", array(&[2, 215]))]);
         let chunks = read(&own, &answer, &[1]).unwrap();
-        assert_eq!((chunks[0].rows[1].motors.len(), chunks[0].rows[1].motors[0]), (215, 2.15));
+        assert_eq!((chunks[0].rows[1].motor_row.len(), chunks[0].rows[1].motor_row[0]), (215, 2.15));
         let executor = Executor::new(&own, 3, &PolicyObservation::blank(2));
         let commands = executor.commands(&chunks, 0..2).into_iter();
         let calls: Vec<_> = commands.map(|command| executor.call(command, &chunks)).collect();

@@ -82,7 +82,7 @@ mod tests {
         let row = |value: f64| ActionRow {
             row: vec![value; 35],
             wrists: [WristTarget::default(); 2],
-            motors: Vec::new(),
+            motor_row: Vec::new(),
         };
         let rows = [row(1.0), row(2.0)];
         let played = |between: Between, column: usize| -> Vec<f64> {
