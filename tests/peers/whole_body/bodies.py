@@ -10,9 +10,8 @@ import mujoco
 import numpy as np
 import tandem
 from numpy.typing import NDArray
-from policy import KD, KP, POSITION, TORQUE, VELOCITY, State
+from policy import KD, KP, POSITION, STEP_S, TORQUE, VELOCITY, State
 
-STEP_S = 0.02
 MUJOCO_STEP_S = 0.001
 HERE = Path(__file__).parent
 ASSETS = HERE.parents[2] / "sim/assets"

@@ -13,7 +13,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "whole_body"))
 
-from policy import KD, KP, POSITION, Policy, State  # noqa: E402
+from policy import KD, KP, POSITION, Agile, State  # noqa: E402
 from unitree_sdk2py.comm.motion_switcher.motion_switcher_client import MotionSwitcherClient  # noqa: E402
 from unitree_sdk2py.core.channel import ChannelFactoryInitialize, ChannelPublisher, ChannelSubscriber  # noqa: E402
 from unitree_sdk2py.idl.default import unitree_hg_msg_dds__LowCmd_  # noqa: E402
@@ -56,7 +56,7 @@ def place():
 while len(latest) < 2:
     time.sleep(0.1)
 time.sleep(1.0)
-policy = Policy(Path(os.environ["TANDEM_POLICY"]), NAMES, state().q_rad)
+policy = Agile(Path(os.environ["TANDEM_POLICY"]), NAMES, state().q_rad)
 message = unitree_hg_msg_dds__LowCmd_()
 message.mode_pr, message.mode_machine = 0, latest["rt/lowstate"].mode_machine
 while switcher.CheckMode()[1]["name"]:

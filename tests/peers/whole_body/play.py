@@ -1,10 +1,12 @@
-"""A published whole-body policy balances a robot by `send_joint_drives`, in its own control loop, here and in MuJoCo.
+"""A published policy balances a robot by `send_joint_drives`, in its own control loop, here and in MuJoCo.
 
 AGILE's velocity policy for the G1 (NVIDIA, `agile_g1_velocity_e2e.onnx`, from github.com/nvidia-isaac/WBC-AGILE) drives legs
-and waist with gains of its own. Arms, fingers and the yaw of the waist are held by the gains that LeRobot sends to a G1.
+and waist with gains of its own; Unitree's (`deploy/pre_train/g1/motion.pt`, from github.com/unitreerobotics/unitree_rl_gym)
+drives the legs. All other joints are held by the gains that LeRobot sends to a G1. Neither file is part of Tandem.
 
-    pip install WHEEL -r tests/peers/whole_body/agile.txt
-    python tests/peers/whole_body/agile.py agile_g1_velocity_e2e.onnx
+    pip install WHEEL -r tests/peers/whole_body/requirements.txt
+    python tests/peers/whole_body/play.py agile_g1_velocity_e2e.onnx
+    python tests/peers/whole_body/play.py motion.pt
 
 It prints a table. It fails if a robot falls here, does not stand for 60 s, walks less than 10 m, or turns less than 2.5 rad.
 """
@@ -17,8 +19,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bodies import STEP_S, Body, MujocoBody, TandemBody, heading_rad, tilt_rad
-from policy import Policy, State
+from bodies import Body, MujocoBody, TandemBody, heading_rad, tilt_rad
+from policy import STEP_S, State, policy_of
 
 Velocity = tuple[float, float, float]
 
@@ -70,7 +72,7 @@ class Outcome:
 
 def played(file: Path, case: Case, body: Body) -> Outcome:
     state = body.state()
-    policy = Policy(file, body.names, state.q_rad)
+    policy = policy_of(file, body.names, state.q_rad)
     farthest_m = turned_rad = tilted_rad = seconds = 0.0
     while seconds < case.seconds and not body.fallen():
         x_m, y_m = body.place()
@@ -101,7 +103,7 @@ def line(where: str, case: Case, outcomes: list[Outcome]) -> str:
 
 def main() -> None:
     own = argparse.ArgumentParser(description=__doc__)
-    own.add_argument("file", type=Path, help="the policy's ONNX file")
+    own.add_argument("file", type=Path, help="the policy's file")
     own.add_argument("--seeds", type=int, nargs="+", default=[4100, 4101, 4102])
     given = own.parse_args()
     print("| case | where | stands | distance, m | farthest, m | turned, rad | tilt, deg | time, s |")
