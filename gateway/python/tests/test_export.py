@@ -188,8 +188,9 @@ def test_setpoints_of_driven_motors_are_kept(tmp_path: Path) -> None:
     setpoints[2], setpoints[3] = 100.0, 2.0
     with tandem.Episode("handover", 2012, protocol="benchmark", record=tmp_path / "run") as episode:
         episode.wait(10)
-        angles = list(episode.get_robot_state("B").joint_positions_rad.values())
-        setpoints[0] = angles
+        angles = episode.get_robot_state("B").joint_positions_rad
+        assert angles is not None
+        setpoints[0] = list(angles.values())
         episode.send_joint_drives([tandem.JointDrives("B", np.tile(setpoints.ravel(), (5, 1)))])
         episode.walk(5, [tandem.WalkMove("B", 0.0, 0.0, 0.0)])
     recording = tandem.Recording(tmp_path / "run")

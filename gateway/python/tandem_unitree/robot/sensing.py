@@ -107,8 +107,9 @@ class Moment:
 def moment_of(state: Mapping[str, Any], before: Moment | None) -> Moment:
     """Returns the moment that a reply of `get_robot_state` describes.
 
-    Velocities and accelerations come from the difference to `before`. Under the assistance "paper" a reply has neither velocities nor torques nor
-    odometry: velocities come from differences, torques are zero and the pelvis seems to stand upright at its start.
+    Velocities and accelerations come from the difference to `before`. Under the assistance "paper" a reply has neither
+    velocities nor torques nor odometry: velocities come from differences, torques are zero and the pelvis seems to stand
+    upright at its start.
     """
     time_s = float(state["time_s"])
     step_s = STEP_S if before is None or time_s <= before.time_s else time_s - before.time_s
