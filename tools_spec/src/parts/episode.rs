@@ -326,7 +326,7 @@ pub struct NextPhase {
 /// An object in a hand.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeldObject {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     pub robot: String,
     /// `left` or `right`.
     pub hand: String,
@@ -345,7 +345,7 @@ pub struct HeldObject {
 /// Fall of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotFallen {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     pub robot: String,
     /// True from the moment it fell.
     pub fallen: bool,

@@ -37,7 +37,7 @@ impl Tool for GetRobotState {
 /// The reply to `get_robot_state`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotState {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     pub robot: String,
     /// Simulated seconds since the episode began.
     pub time_s: f64,

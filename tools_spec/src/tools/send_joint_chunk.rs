@@ -17,7 +17,7 @@ pub const ACTION_ROW_LEN: usize = 35;
 const JOINT_BLOCKS: [(&str, usize); 5] =
     [("left_arm", 7), ("right_arm", 7), ("left_hand", 7), ("right_hand", 7), ("waist", 3)];
 
-/// Returns the layout of a row in one line, as `left_arm 7, right_arm 7, ...`.
+/// Returns the layout of a row in one line, for example `left_arm 7, right_arm 7, ...`.
 pub fn action_row_layout() -> String {
     let blocks = JOINT_BLOCKS.into_iter().chain(BASE_COLUMNS.map(|column| (column, 1)));
     blocks.map(|(block, columns)| format!("{block} {columns}")).collect::<Vec<_>>().join(", ")

@@ -147,7 +147,7 @@ class HeldObject:
     """An object in a hand."""
 
     robot: str
-    """The robot, as "A"."""
+    """The robot, for example "A"."""
 
     hand: str
     """`left` or `right`."""
@@ -254,7 +254,7 @@ class RobotState:
     """The reply to `get_robot_state`."""
 
     robot: str
-    """The robot, as "A"."""
+    """The robot, for example "A"."""
 
     time_s: float
     """Simulated seconds since the episode began."""
