@@ -16,7 +16,7 @@ use tandem_tools_spec::{CameraCalibration, CameraImage, Formats, ImageFormat, Ob
 
 pub use formats::check_formats;
 pub use observer::Observer;
-pub use proprioception::{Detail, Proprioception, robot_state, tell_state_in};
+pub use proprioception::{Detail, Proprioception, robot_state, samples, tell_state_in};
 pub use scaling::{drawing_camera, scaled_colours};
 
 /// Observations of several robots at the same moment.

@@ -153,6 +153,8 @@ pub enum ExtraInformation {
     Odometry,
     /// Direction of gravity.
     Gravity,
+    /// Angular velocity and specific force of the pelvis.
+    InertialReadings,
     /// Conditions that the next phase lacks, and poses of held objects, as the simulator measures them.
     PhaseConditions,
     /// Pixels of an object by its name, as the simulator knows them.
@@ -161,7 +163,7 @@ pub enum ExtraInformation {
 
 impl ExtraInformation {
     /// Every kind.
-    pub const ALL: [ExtraInformation; 10] = [
+    pub const ALL: [ExtraInformation; 11] = [
         ExtraInformation::DepthImages,
         ExtraInformation::PixelDepth,
         ExtraInformation::ThirdPerson,
@@ -170,6 +172,7 @@ impl ExtraInformation {
         ExtraInformation::HandForces,
         ExtraInformation::Odometry,
         ExtraInformation::Gravity,
+        ExtraInformation::InertialReadings,
         ExtraInformation::PhaseConditions,
         ExtraInformation::ObjectPixels,
     ];
@@ -185,6 +188,7 @@ impl ExtraInformation {
             ExtraInformation::HandForces => "hand_forces",
             ExtraInformation::Odometry => "odometry",
             ExtraInformation::Gravity => "gravity",
+            ExtraInformation::InertialReadings => "inertial_readings",
             ExtraInformation::PhaseConditions => "phase_conditions",
             ExtraInformation::ObjectPixels => "object_pixels",
         }
@@ -202,7 +206,8 @@ impl ExtraInformation {
             | ExtraInformation::JointTorques
             | ExtraInformation::HandForces
             | ExtraInformation::Odometry
-            | ExtraInformation::Gravity => true,
+            | ExtraInformation::Gravity
+            | ExtraInformation::InertialReadings => true,
         }
     }
 }
@@ -326,7 +331,7 @@ pub struct NextPhase {
 /// An object in a hand.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeldObject {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     pub robot: String,
     /// `left` or `right`.
     pub hand: String,
@@ -345,7 +350,7 @@ pub struct HeldObject {
 /// Fall of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotFallen {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     pub robot: String,
     /// True from the moment it fell.
     pub fallen: bool,

@@ -67,15 +67,15 @@ impl Tool for QueryDepth {
 
     fn validate(&self) -> Result<(), String> {
         if self.fit && self.region.is_none() {
-            return Err("fit is of a region; give region, as {\"from\": [100, 80], \"to\": [220, 170], \"stride\": 10}".into());
+            return Err("fit is of a region; give region, for example {\"from\": [100, 80], \"to\": [220, 170], \"stride\": 10}".into());
         }
         match (&self.pixels, &self.region, &self.surface) {
             (Some(pixels), None, None) => checks::pixels(pixels),
             (None, Some(region), None) => checks::region(region),
             (None, None, Some(surface)) => surface.validate(),
             _ => Err(
-                "give either pixels, as [[160, 120]], or region, as {\"from\": [100, 80], \"to\": [220, 170], \"stride\": 10}, or \
-                 surface, as {\"pixel\": [160, 120]}"
+                "give either pixels, for example [[160, 120]], or region, for example {\"from\": [100, 80], \"to\": [220, 170], \"stride\": 10}, or \
+                 surface, for example {\"pixel\": [160, 120]}"
                     .into(),
             ),
         }
@@ -102,7 +102,8 @@ impl SurfaceQuery {
         match given.iter().filter(|is_given| **is_given).count() {
             1 => Ok(()),
             _ => Err(
-                "give either surface.pixel, as [160, 120], or surface.color, as \"red\", or surface.object, as \"bottle\""
+                "give either surface.pixel, for example [160, 120], or surface.color, for example \"red\", or surface.object, for \
+                 example \"bottle\""
                     .into(),
             ),
         }
@@ -323,7 +324,7 @@ mod tests {
             assert!(of(surface.clone()).is_ok(), "{surface}");
         }
         for surface in [json!({}), json!({ "color": "red", "object": "bottle" })] {
-            assert!(of(surface).unwrap_err().contains("surface.object, as \"bottle\""));
+            assert!(of(surface).unwrap_err().contains("example \"bottle\""));
         }
     }
 
