@@ -345,7 +345,12 @@ const MESH: &[Attribute] = &[
     refused(&["material"], "state it on the geoms"),
     ignored(&["content_type"], "the file's name says it"),
     ignored(&["normal", "texcoord"], "those of files are drawn"),
-    ignored(&["smoothnormal"], "faces without normals in their file are drawn flat"),
+    attribute(
+        Support::Approximated,
+        &["smoothnormal"],
+        Takes::Only(&["false"]),
+        "without normals in the file, edges of up to 37 degrees are smooth, and others sharp",
+    ),
 ];
 
 const TEXTURE: &[Attribute] = &[

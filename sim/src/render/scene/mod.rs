@@ -8,6 +8,7 @@ pub mod mesh;
 pub mod prepared;
 pub mod shared;
 pub mod sheets;
+mod smooth;
 mod visible;
 
 use std::sync::Arc;
