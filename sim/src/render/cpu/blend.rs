@@ -5,6 +5,7 @@ use super::target::RenderTarget;
 use super::view::{Row, View};
 use crate::render::scene::prepared::NOTHING;
 use crate::render::shading::SAMPLES;
+use crate::render::shading::power::blended;
 
 const PER_PIXEL: usize = SAMPLES * SAMPLES;
 
@@ -20,7 +21,9 @@ impl View<'_> {
             self.veil(layer, y, width, row);
             for (sum, veil) in row.sum_rgb.iter_mut().zip(&row.veil_rgb) {
                 for ((sum, veil), alpha) in sum.iter_mut().zip(veil).zip(&row.veil_alpha) {
-                    *sum = *sum * (1.0 - alpha) + veil;
+                    if *alpha > 0.0 {
+                        *sum = blended(*sum, veil / alpha, *alpha);
+                    }
                 }
             }
         }

@@ -10,10 +10,10 @@ use super::target::{RenderTarget, draw_casting};
 use crate::mjcf::{FileLight, Headlight, LightKind};
 use crate::render::scene::prepared::Prepared;
 use crate::render::shading::lamps::{
-    GAMMA, LAMP_BIAS_SHARE, LAMP_NORMAL_TEXELS, SHININESS, lamp_map, lamp_view, tilted,
+    LAMP_BIAS_SHARE, LAMP_NORMAL_TEXELS, SHININESS, lamp_map, lamp_view, tilted,
 };
 use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
-use crate::render::shading::power::power;
+use crate::render::shading::power::{file_value, linear_value, power};
 use crate::render::shading::{SAMPLES, TEXELS};
 use crate::render::{Camera, Lamps, PlacedScenery};
 
@@ -141,9 +141,9 @@ impl Surfaces {
             #[inline(always)]
             |axis| {
                 lanes(|i| {
-                    let surface = power(albedo[axis][i], 1.0 / GAMMA);
+                    let surface = file_value(albedo[axis][i]);
                     let value = surface * (sums.lit[axis][i] + emission[i]) + sums.glossy[axis][i];
-                    power(if value < 1.0 { value } else { 1.0 }, GAMMA) * shares[i]
+                    linear_value(if value < 1.0 { value } else { 1.0 }) * shares[i]
                 })
             },
         )

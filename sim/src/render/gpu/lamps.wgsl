@@ -47,6 +47,12 @@ fn in_cone(lamp: Lamp, layer: i32, point_m: vec3f, normal: vec3f) -> f32 {
     return sum / 9.0;
 }
 
+// The values that files have for linear light.
+fn encoded(linear: vec3f) -> vec3f {
+    let curve = 1.055 * pow(max(linear, vec3f(1e-12)), vec3f(1.0 / 2.4)) - 0.055;
+    return select(curve, 12.92 * linear, linear <= vec3f(0.0031308));
+}
+
 // Linear colour of a surface.
 fn lit_by_lamps(part: Part, base: vec3f, point_m: vec3f, normal: vec3f, to_eye: vec3f) -> vec3f {
     let exponent = part.gloss.z * SHININESS;
@@ -89,8 +95,7 @@ fn lit_by_lamps(part: Part, base: vec3f, point_m: vec3f, normal: vec3f, to_eye: 
             glossy += lamp.specular.xyz * (share * part.gloss.y * shine);
         }
     }
-    let surface = pow(max(base, vec3f(1e-12)), vec3f(1.0 / GAMMA));
-    return pow(clamp(surface * lit + glossy, vec3f(1e-12), vec3f(1.0)), vec3f(GAMMA));
+    return decoded(min(encoded(base) * lit + glossy, vec3f(1.0)));
 }
 
 // Colour where no surface is.

@@ -532,7 +532,9 @@ fn blended(pixel: vec2u, behind: vec3f) -> vec3f {
                 veil += vec4f(seen.xyz, 1.0) * share;
             }
         }
-        sum = sum * (1.0 - veil.w) + veil.xyz;
+        if veil.w > 0.0 {
+            sum = decoded(mix(encoded(sum), encoded(veil.xyz / veil.w), veil.w));
+        }
     }
     return sum;
 }

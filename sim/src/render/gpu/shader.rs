@@ -7,7 +7,7 @@ use crate::render::cpu::contact::SINK_M;
 use crate::render::scene::camera::NEAR_M;
 use crate::render::scene::prepared::NOTHING;
 use crate::render::shading::image::BLENDED_SHARE;
-use crate::render::shading::lamps::{GAMMA, LAMP_BIAS_SHARE, LAMP_NORMAL_TEXELS, SHININESS};
+use crate::render::shading::lamps::{LAMP_BIAS_SHARE, LAMP_NORMAL_TEXELS, SHININESS};
 use crate::render::shading::pattern::{
     BANDS_PER_M, CHECKER_PER_M, LINES_PER_M, STRAY, TEXT_GAP, TEXT_PER_M, THREADS_PER_M, WORD_GAP,
     WORD_STRAY, WORDS_PER_M,
@@ -42,7 +42,6 @@ pub(super) fn text() -> String {
         ("SRGB_STEPS", SRGB_STEPS as f32),
         ("BLENDED_SHARE", BLENDED_SHARE),
         ("MIN_SEEN_ALPHA", MIN_SEEN_ALPHA),
-        ("GAMMA", GAMMA),
         ("SHININESS", SHININESS),
         ("LAMP_NORMAL_TEXELS", LAMP_NORMAL_TEXELS),
         ("LAMP_BIAS_SHARE", LAMP_BIAS_SHARE),

@@ -10,6 +10,7 @@ use super::space::body::MetSides;
 use crate::mjcf::Gloss;
 use crate::render::scene::camera::NEAR_M;
 use crate::render::shading::lamps::{LitSurface, shown_rgb};
+use crate::render::shading::power::blended;
 use crate::render::shading::{LAMP, MIN_SEEN_ALPHA, SAMPLES, SKY, VEILS, opacity};
 use crate::render::{Camera, Intrinsics, Scenery};
 
@@ -100,7 +101,9 @@ impl<'a> PathView<'a> {
             if !part.is_cut_out() {
                 let (_, alpha) = self.scene.albedo_and_alpha(spot, self.pixel_m(spot));
                 let own_rgb = self.rasterised_rgb(&self.seen(spot));
-                rgb += (own_rgb - rgb) * opacity(part.alpha * alpha);
+                let share = opacity(part.alpha * alpha);
+                rgb =
+                    Vector::from_array(std::array::from_fn(|axis| blended(rgb[axis], own_rgb[axis], share)));
             }
         }
         rgb

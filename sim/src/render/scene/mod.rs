@@ -111,12 +111,15 @@ impl Lamps {
     /// Multiplies all light.
     pub fn tint(&mut self, tint_rgb: Vector) {
         let Headlight { ambient_rgb, diffuse_rgb, specular_rgb } = &mut self.headlight;
-        let of_lamp = |lamp: &'_ mut Lamp| {
-            let FileLight { ambient_rgb, diffuse_rgb, specular_rgb, .. } = &mut lamp.light;
-            [ambient_rgb, diffuse_rgb, specular_rgb].map(|rgb| *rgb *= tint_rgb);
-        };
-        [ambient_rgb, diffuse_rgb, specular_rgb].map(|rgb| *rgb *= tint_rgb);
-        self.lamps.iter_mut().for_each(of_lamp);
+        for rgb in [ambient_rgb, diffuse_rgb, specular_rgb] {
+            *rgb *= tint_rgb;
+        }
+        for Lamp { light, .. } in &mut self.lamps {
+            let FileLight { ambient_rgb, diffuse_rgb, specular_rgb, .. } = light;
+            for rgb in [ambient_rgb, diffuse_rgb, specular_rgb] {
+                *rgb *= tint_rgb;
+            }
+        }
     }
 }
 

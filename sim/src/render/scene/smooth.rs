@@ -72,11 +72,10 @@ mod tests {
         let (sin, cos) = angle_rad.sin_cos();
         let corners = [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [-1.0, 1.0, 0.0]];
         let folded = [[cos, 0.0, -sin], [cos, 1.0, -sin]];
-        Mesh {
-            vertices_m: corners.iter().chain(&folded).copied().map(Vector::from).collect(),
-            triangles: vec![[2, 0, 3], [0, 1, 3], [0, 4, 1], [4, 5, 1]],
-            ..Mesh::default()
-        }
+        let mut mesh = Mesh::default();
+        mesh.vertices_m = corners.iter().chain(&folded).copied().map(Vector::from).collect();
+        mesh.triangles = vec![[2, 0, 3], [0, 1, 3], [0, 4, 1], [4, 5, 1]];
+        mesh
     }
 
     #[test]

@@ -5,11 +5,9 @@ use rapier3d::math::{Pose, Vector};
 
 use super::TEXELS;
 use super::lanes::Affine;
-use super::power::power;
+use super::power::{file_value, linear_value, power};
 use crate::mjcf::{FileLight, Gloss, Headlight, LightKind};
 
-/// Exponent from the file's values to linear light, and back.
-pub const GAMMA: f32 = 2.2;
 /// Factor from shininess to the exponent of highlights.
 pub const SHININESS: f32 = 128.0;
 /// Maximum angle from the direction of a lamp in which it casts shadows.
@@ -79,15 +77,15 @@ pub fn shown_rgb(
         }
     }
     let shown = |axis: usize| {
-        let value = power(surface.albedo[axis], 1.0 / GAMMA) * lit[axis] + glossy[axis];
-        power(value.min(1.0), GAMMA)
+        let value = file_value(surface.albedo[axis]) * lit[axis] + glossy[axis];
+        linear_value(value.min(1.0))
     };
     Vector::new(shown(0), shown(1), shown(2))
 }
 
 /// Returns the value of the file as linear light.
 pub fn linear_light(rgb: Vector) -> Vector {
-    Vector::new(power(rgb.x, GAMMA), power(rgb.y, GAMMA), power(rgb.z, GAMMA))
+    Vector::new(linear_value(rgb.x), linear_value(rgb.y), linear_value(rgb.z))
 }
 
 /// Returns a direction to a sun that is not straight up or down, as maps of shadows need it.
