@@ -129,7 +129,7 @@ pub enum RobotError {
     )]
     Changed { path: PathBuf, was: String, now: String },
     #[error(
-        "{task} needs hands that close, and the robot {robot} has none; give by --task-file a task whose conditions ask for no grip, as \
+        "{task} needs hands that close, and the robot {robot} has none; give by --task-file a task whose conditions ask for no grip, for example \
          gateway/examples/tasks/pass_the_parcel.toml, or by --robot a robot with thumbs and fingers"
     )]
     NoFingers { task: String, robot: String },
@@ -154,7 +154,7 @@ pub enum SceneError {
     NoPlace { path: PathBuf, task: String, may: Vec<String>, have: String },
     #[error("site {site:?} of the scene {} is tilted by {tilt_deg:.1} degrees; its z axis has to be up", path.display())]
     Tilted { path: PathBuf, site: String, tilt_deg: f32 },
-    #[error("the scene {} has a body {name:?}, as {task} calls an object of its own; rename it", path.display())]
+    #[error("the scene {} has a body {name:?}, which is also the name of an object of {task}; rename it", path.display())]
     SameName { path: PathBuf, task: String, name: String },
     #[error(
         "in the scene {}, {name} does not stay where {task} puts it, ({:.2}, {:.2}, {:.2}) m from site \"task\": in {trial_s:.0} s it goes {moved_m:.2} m; it needs something to stand on and nothing in its way; a site {site:?} puts it elsewhere",

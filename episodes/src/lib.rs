@@ -60,8 +60,8 @@ pub use output::{
 pub use protocol::{Rules, rules};
 pub use recording::{
     Damage, Fault, FilePart, LeftOut, LiveChannel, LiveRecording, LiveViewer, MAX_RECORDING_BYTES,
-    NoteMessage, RecordedCall, RecordedCheckpoint, Recorder, Recording, RecordingError, RecoverError,
-    Recovered, ShownPicture, ToolCallMessage, TranscriptEntry, Visibility, recover,
+    NoteMessage, RecordedCall, RecordedCheckpoint, RecordedSetpoints, Recorder, Recording, RecordingError,
+    RecoverError, Recovered, ShownPicture, ToolCallMessage, TranscriptEntry, Visibility, recover,
 };
 pub use result_file::{RESULT_FILE, write_result};
 pub use scoring::{

@@ -71,11 +71,11 @@ mod user_file;
 pub mod world;
 
 pub use body::{
-    ARM_COLUMNS, ARM_JOINTS, BodyEstimate, HAND_COLUMNS, HAND_JOINTS, JOINTS, RobotModel, RobotSource, UPPER,
-    UPPER_JOINTS, WAIST_COLUMN, joint_names,
+    ARM_COLUMNS, ARM_JOINTS, BodyEstimate, HAND_COLUMNS, HAND_JOINTS, JOINTS, MotorSetpoints, RobotModel,
+    RobotSource, UPPER, UPPER_JOINTS, WAIST_COLUMN, joint_names,
 };
 pub use error::SimError;
-pub use estimate::JointReadings;
+pub use estimate::{JointReadings, SensorReadings};
 pub use locomotion::{BaseCommand, BaseLimits, BaseVelocity, LocomotionChoice};
 pub use plane::{heading_rad, wrapped_rad};
 pub use random::SplitMix64;

@@ -7,11 +7,13 @@ use serde_json::{Map, Value, json};
 
 use crate::error::SpecError;
 use crate::list::{ActCall, EPISODE_TOOLS, LookCall, PlanCall, ToolCall, every_tool_spec};
-use crate::parts::{Driving, Formats, Wording};
+use crate::parts::{Assistance, Driving, Formats, Wording};
 use crate::schema::{ToolSpec, body_schema, plain_schema};
 use crate::strict_value::StrictValue;
 use crate::tool::{Tool, parse_args};
-use crate::tools::{Expectation, Observation, Observe, PlannedCommand, SendPlan, StartEpisode, WalkTo};
+use crate::tools::{
+    Expectation, GetRobotState, Observation, Observe, PlannedCommand, SendPlan, StartEpisode, WalkTo,
+};
 
 /// A call on an episode. It serialises to what [`Call::parse`] reads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -28,6 +30,9 @@ pub struct Call {
     /// Observation to make once a command is done.
     #[serde(rename = "observe", skip_serializing_if = "Option::is_none")]
     pub then: Option<Look>,
+    /// True for the readings of every physics step, where the tool is `get_robot_state` or `observe`.
+    #[serde(skip_serializing_if = "is_false")]
+    pub samples: bool,
     /// True for a reply without what is as expected. Observations have a field of their own for that.
     #[serde(skip_serializing_if = "is_false")]
     pub short: bool,
@@ -58,6 +63,19 @@ pub struct Look {
     /// Formats of its images.
     #[serde(flatten)]
     pub formats: Formats,
+}
+
+/// Fields beside those of `get_robot_state` and `observe`.
+#[derive(Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default)]
+struct WithState {
+    /// True: `samples` of the state has the readings of its sensors in each physics step of 5 ms since the
+    /// last control step.
+    samples: Option<bool>,
+}
+
+impl WithState {
+    const FIELDS: [&str; 1] = ["samples"];
 }
 
 /// Fields beside those of a command.
@@ -95,7 +113,15 @@ impl Call {
             return Ok(Call { expected_step: beside.expected_step, then, ..Call::from(call) });
         }
         match name {
-            Observe::NAME => Look::parse(args).map(Call::from),
+            Observe::NAME => {
+                let beside: WithState = beside(Observe::NAME, &mut args, &WithState::FIELDS)?;
+                Ok(Call { samples: beside.samples.unwrap_or(false), ..Look::parse(args)?.into() })
+            }
+            GetRobotState::NAME => {
+                let beside: WithState = beside(GetRobotState::NAME, &mut args, &WithState::FIELDS)?;
+                let call = Call::from(ToolCall::parse(name, args)?);
+                Ok(Call { samples: beside.samples.unwrap_or(false), ..call })
+            }
             _ => ToolCall::parse(name, args).map(Call::from),
         }
     }
@@ -145,7 +171,14 @@ impl Call {
 
 impl From<ToolCall> for Call {
     fn from(tool: ToolCall) -> Call {
-        Call { tool, formats: Formats::default(), expected_step: None, then: None, short: false }
+        Call {
+            tool,
+            formats: Formats::default(),
+            expected_step: None,
+            then: None,
+            samples: false,
+            short: false,
+        }
     }
 }
 
@@ -180,9 +213,11 @@ impl SendPlan {
             let with_all = beside::<WithAll>(SendPlan::NAME, &mut args, &WithAll::FIELDS)
                 .map_err(|error| refused(error.to_string()))?;
             let call = match ToolCall::parse(&command.tool, args) {
-                Ok(ToolCall::Act(call)) => PlannedCall::Act(call),
+                Ok(ToolCall::Act(call)) if SendPlan::COMMANDS.contains(&call.name()) => {
+                    PlannedCall::Act(call)
+                }
                 Ok(ToolCall::Plan(PlanCall::WalkTo(walk))) => PlannedCall::WalkTo(walk),
-                Ok(other) => return Err(refused(format!("{} is no command", other.name()))),
+                Ok(other) => return Err(refused(format!("{} is no command of a plan", other.name()))),
                 Err(error) => return Err(refused(error.to_string())),
             };
             let (expects, short) =
@@ -264,7 +299,11 @@ pub fn specs_for_programs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
                 spec.allow(&properties::<Driving>(wording));
                 spec.demand_one_of(Driving::conditions());
             }
-            Observe::NAME => spec.allow(&properties::<Formats>(wording)),
+            Observe::NAME => {
+                spec.allow(&properties::<Formats>(wording));
+                allow_samples(spec, wording);
+            }
+            GetRobotState::NAME => allow_samples(spec, wording),
             name if ActCall::TOOLS.contains(&name) => {
                 spec.allow(&properties::<WithCommand>(wording));
                 let mut observation = plain_schema::<Observation>();
@@ -276,6 +315,12 @@ pub fn specs_for_programs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
         }
     }
     specs
+}
+
+fn allow_samples(spec: &mut ToolSpec, wording: Wording) {
+    if wording.assistance == Assistance::Full {
+        spec.allow(&properties::<WithState>(wording));
+    }
 }
 
 fn properties<T: JsonSchema>(wording: Wording) -> Map<String, Value> {
@@ -295,8 +340,8 @@ fn observe_properties() -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parts::{Assistance, DepthFormat, ImageFormat, Operators};
-    use crate::tools::{GetRobotState, GetStatus, MoveWrists, Say, Wait, WristMove};
+    use crate::parts::{DepthFormat, ImageFormat, Operators};
+    use crate::tools::{GetStatus, MoveWrists, Say, Wait, WristMove};
 
     fn looking(robots: &[&str]) -> Look {
         let robots = Some(robots.iter().map(|robot| robot.to_string()).collect());
@@ -316,6 +361,8 @@ mod tests {
         let call = Call::parse("observe", json!({ "depth": "float16", "short": true })).unwrap();
         assert_eq!(call.tool, Observe { robots: None, short: Some(true), frame: None }.into());
         assert_eq!(call.formats, Formats { images: None, depth: Some(DepthFormat::Float16) });
+        let call = Call::parse("get_robot_state", json!({ "robot": "A", "samples": true })).unwrap();
+        assert!(call.samples, "{call:?}");
         let (start, driving) =
             parse_start(json!({ "task": "handover", "seed": 0, "operators": "per_robot" })).unwrap();
         assert_eq!((start.seed, driving.operators), (0, Some(Operators::PerRobot)));
@@ -326,7 +373,10 @@ mod tests {
         let examples = ToolCall::examples().into_iter().map(Call::from);
         let wait = Call::from(ToolCall::from(Wait { steps: 5 }));
         let whole = Call { expected_step: Some(300), then: Some(looking(&["A", "B"])), ..wait };
-        for call in examples.chain([whole, Call::from(looking(&["B"]))]) {
+        let sampled =
+            Call { samples: true, ..Call::from(ToolCall::from(GetRobotState { robot: "A".into() })) };
+        let looked = Call { samples: true, ..Call::from(looking(&["A"])) };
+        for call in examples.chain([whole, Call::from(looking(&["B"])), sampled, looked]) {
             assert_eq!(Call::parse(call.name(), json!(call)), Ok(call));
         }
         assert_eq!(json!(Call::from(ToolCall::from(GetStatus::default()))), json!({}));
@@ -400,6 +450,7 @@ mod tests {
             let beside: &[&str] = match spec.name {
                 StartEpisode::NAME => &Driving::FIELDS,
                 Observe::NAME => &Formats::FIELDS,
+                GetRobotState::NAME => &WithState::FIELDS,
                 name if ActCall::TOOLS.contains(&name) => &WithCommand::FIELDS,
                 _ => &[],
             };

@@ -23,7 +23,7 @@ pub fn quaternion(place: &str, quaternion_wxyz: &[f64; 4]) -> Result<(), String>
     if quaternion_wxyz.iter().all(|part| part.abs() < SMALLEST_COMPONENT) {
         let norm = quaternion_wxyz.iter().map(|part| part * part).sum::<f64>().sqrt();
         return Err(format!(
-            "{place} has norm {norm}, so it has no direction; give [w, x, y, z] with norm 1, as [1, 0, 0, 0] for no rotation"
+            "{place} has norm {norm}, so it has no direction; give [w, x, y, z] with norm 1, for example [1, 0, 0, 0] for no rotation"
         ));
     }
     Ok(())
@@ -48,7 +48,9 @@ pub fn pose(
 /// episode knows.
 pub fn steps(steps: u32) -> Result<(), String> {
     if steps == 0 {
-        return Err("steps is 0; give at least 1 control step of 20 ms, as 25 for half a second".into());
+        return Err(
+            "steps is 0; give at least 1 control step of 20 ms, for example 25 for half a second".into()
+        );
     }
     Ok(())
 }
@@ -56,7 +58,7 @@ pub fn steps(steps: u32) -> Result<(), String> {
 /// Checks that there is at least one robot, none of them twice.
 pub fn robots(names: &[&str]) -> Result<(), String> {
     if names.is_empty() {
-        return Err("robots is empty; name at least one robot, as \"A\"".into());
+        return Err("robots is empty; name at least one robot, for example \"A\"".into());
     }
     let twice = names.iter().enumerate().find(|(index, name)| names[..*index].contains(name));
     match twice {
@@ -71,11 +73,11 @@ const WIDEST_STRIDE: u32 = 20;
 /// Checks that there is at least one pixel, and not too many. The episode checks that they are in the image.
 pub fn pixels(pixels: &[[i64; 2]]) -> Result<(), String> {
     if pixels.is_empty() {
-        return Err("pixels is empty; give at least one [u, v], as [[160, 120]]".into());
+        return Err("pixels is empty; give at least one [u, v], for example [[160, 120]]".into());
     }
     if pixels.len() > MAX_PIXELS {
         return Err(format!(
-            "pixels holds {}; give at most {MAX_PIXELS}, as every tenth one by a region with stride 10",
+            "pixels holds {}; give at most {MAX_PIXELS}, for example every tenth one by a region with stride 10",
             pixels.len()
         ));
     }
@@ -85,7 +87,10 @@ pub fn pixels(pixels: &[[i64; 2]]) -> Result<(), String> {
 /// Checks that a region names pixels, and not too many.
 pub fn region(region: &PixelRegion) -> Result<(), String> {
     if region.stride == 0 {
-        return Err("region.stride is 0; give at least 1, as 10 for every tenth pixel across and down".into());
+        return Err(
+            "region.stride is 0; give at least 1, for example 10 for every tenth pixel across and down"
+                .into(),
+        );
     }
     let fits = |stride: u32| region.count(stride) <= MAX_PIXELS as u128;
     if fits(region.stride) {
@@ -108,4 +113,24 @@ pub fn each<T>(
     entries
         .iter()
         .try_for_each(|entry| check(entry).map_err(|reason| format!("robot {:?}: {reason}", robot(entry))))
+}
+
+/// Returns the number of control steps of commands with a row each.
+pub fn row_steps(rows: Option<&Vec<Vec<f64>>>) -> u32 {
+    u32::try_from(rows.map_or(0, Vec::len)).unwrap_or(u32::MAX)
+}
+
+/// Checks that every robot has rows, and as many as the first one.
+pub fn equal_rows<'a>(robots: impl Iterator<Item = (&'a str, &'a Vec<Vec<f64>>)>) -> Result<(), String> {
+    let counts: Vec<(&str, usize)> = robots.map(|(robot, rows)| (robot, rows.len())).collect();
+    let Some((first, count)) = counts.first() else { return Ok(()) };
+    if *count == 0 {
+        return Err(format!("robot {first:?} has no rows; give at least 1, one per control step of 20 ms"));
+    }
+    match counts.iter().find(|(_, other)| other != count) {
+        Some((robot, other)) => Err(format!(
+            "robot {first:?} has {count} rows and robot {robot:?} has {other}; give every robot the same number of rows"
+        )),
+        None => Ok(()),
+    }
 }

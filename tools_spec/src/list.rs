@@ -37,17 +37,18 @@ macro_rules! tools {
             $group:ident($call:ident) -> $whose:ident $reply:ident $(for $audience:ident)? { $($tool:ident,)* }
         )*
     ) => {
-        /// Returns the tools of every policy, in the order it meets them, in the texts that it reads.
+        /// Returns the tools of every policy that a language model is offered, in the order it meets them,
+        /// in the texts that it reads.
         pub fn tool_specs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
             let wording = wording.into();
-            let specs = every_tool_spec(wording).into_iter().filter(|spec| !spec.for_operators);
-            specs.filter(|spec| !spec.full_only || wording.assistance == Assistance::Full).collect()
+            let specs = operator_tool_specs(wording).into_iter();
+            specs.filter(|spec| !spec.for_operators).collect()
         }
 
         /// Returns the tools of an operator who may talk: those of every policy, and those for talking.
         pub fn operator_tool_specs(wording: impl Into<Wording>) -> Vec<ToolSpec> {
             let wording = wording.into();
-            let specs = every_tool_spec(wording).into_iter();
+            let specs = every_tool_spec(wording).into_iter().filter(|spec| !spec.for_programs);
             specs.filter(|spec| !spec.full_only || wording.assistance == Assistance::Full).collect()
         }
 
@@ -235,6 +236,7 @@ tools! {
         MoveWrists,
         Walk,
         SendJointChunk,
+        SendJointDrives,
         Wait,
     }
 

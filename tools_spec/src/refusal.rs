@@ -8,7 +8,7 @@ use serde_json::Value;
 /// An error as its caller reads it. Each error enum gives one for every variant; its text is the error's own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Refusal {
-    /// A stable name for the kind of problem, as `unknown-robot`.
+    /// A stable name for the kind of problem, for example `unknown-robot`.
     pub kind: &'static str,
     /// The kind in words.
     pub title: &'static str,
@@ -68,7 +68,7 @@ impl Refusal {
 /// The body of every refusal: RFC 9457 problem details, served as `application/problem+json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ProblemBody {
-    /// A stable name for the kind of problem, as `urn:tandem:problem:unknown-robot`.
+    /// A stable name for the kind of problem, for example `urn:tandem:problem:unknown-robot`.
     #[serde(rename = "type")]
     pub kind: String,
     /// The kind in words; the same for all problems of one kind.

@@ -39,6 +39,8 @@ pub trait Tool: Serialize + DeserializeOwned + JsonSchema {
     const STRICT: bool = true;
     /// True if only policies with full assistance are offered it.
     const FULL_ONLY: bool = false;
+    /// True if it is for programs: language models are not offered it.
+    const FOR_PROGRAMS: bool = false;
 
     /// Arguments that work, shown to callers whose own did not.
     fn example() -> Self;

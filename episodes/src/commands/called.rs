@@ -4,8 +4,8 @@
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use tandem_tools_spec::{
-    ActCall, Call, Formats, JointChunk, Look, MoveWrists, OperatorUse, SendJointChunk, SpecError, ToolCall,
-    Wait, Walk,
+    ActCall, Call, Formats, JointChunk, JointDrives, Look, MoveWrists, OperatorUse, SendJointChunk,
+    SendJointDrives, SpecError, ToolCall, Wait, Walk,
 };
 
 use super::{Command, Motion, RobotAction, RobotOrder, find};
@@ -257,6 +257,13 @@ impl OperatorCall {
                     ..chunk
                 };
                 ActCall::SendJointChunk(SendJointChunk { robots: robots.into_iter().map(left).collect() })
+            }
+            ActCall::SendJointDrives(SendJointDrives { robots }) => {
+                let left = |drives: JointDrives| JointDrives {
+                    rows: drives.rows.into_iter().skip(executed_steps as usize).collect(),
+                    ..drives
+                };
+                ActCall::SendJointDrives(SendJointDrives { robots: robots.into_iter().map(left).collect() })
             }
         };
         let call = Call { tool: ToolCall::Act(rest), expected_step: None, ..self.call.clone() };

@@ -2,16 +2,17 @@
 //! of joint targets.
 //!
 //! Each acting tool has a file of its own, from its arguments to joint targets: `move_wrists`, `walk`,
-//! `send_joint_chunk`, `wait`.
+//! `send_joint_chunk`, `send_joint_drives`, `wait`.
 
+mod aim;
 mod called;
 mod check_reach;
 pub(crate) mod columns;
 mod footing;
+mod joints;
 mod motion;
 mod move_wrists;
 mod report;
-mod send_joint_chunk;
 mod upper_body;
 mod wait;
 mod walk;
@@ -20,18 +21,20 @@ pub(crate) use called::Allowed;
 pub use called::{Called, OperatorCall, OperatorCommand};
 pub use check_reach::check_reach;
 pub use columns::{Clamped, TargetCounts, action_row, base_row};
+pub use joints::Executed;
+pub(crate) use joints::drive_row;
 pub use motion::{Motion, MotionState, RobotSheet};
 pub use report::{grip, report, wrist_state};
 pub use upper_body::{UpperBody, upper_body};
 
 use tandem_sim::RobotCommand;
-use tandem_tools_spec::{ActCall, JointChunk, WalkMove, WristMove};
+use tandem_tools_spec::{ActCall, JointChunk, JointDrives, WalkMove, WristMove};
 
 use crate::EpisodeError;
 use crate::protocol::Rules;
+use joints::{DriveTrajectory, JointTrajectory};
 use move_wrists::WristTrajectory;
 pub(crate) use move_wrists::wrist_targets;
-use send_joint_chunk::JointTrajectory;
 use walk::WalkTrajectory;
 
 /// Orders to robots for a number of control steps. A robot without an order holds still.
@@ -54,6 +57,8 @@ pub struct RobotOrder {
 /// Departures from the benchmark of wrist commands with carried targets, or with compliance.
 const CARRIED: &str = "wrist commands: carried";
 const COMPLIANCE: &str = "wrist commands: compliance";
+/// Departure of commands that drive every joint; the robot's name follows.
+const JOINT_CONTROL: &str = "control: joint";
 
 /// Action of one robot, with the arguments of its tool.
 #[derive(Clone, Debug)]
@@ -61,23 +66,33 @@ pub enum RobotAction {
     MoveWrists(Box<WristMove>),
     Walk(WalkMove),
     SendJointChunk(JointChunk),
+    SendJointDrives(JointDrives),
     Wait,
 }
 
 impl RobotAction {
-    /// Yields the departures from the benchmark's wrist commands.
-    pub fn departures(&self) -> impl Iterator<Item = &'static str> {
-        let entry = match self {
-            RobotAction::MoveWrists(entry) => Some(entry),
-            RobotAction::Walk(_) | RobotAction::SendJointChunk(_) | RobotAction::Wait => None,
-        };
-        let gives_way = |entry: &WristMove| {
-            let compliances =
-                [entry.compliance_n_s_m, entry.side_compliance_n_s_m, entry.turn_compliance_n_m_s_rad];
-            compliances.iter().any(Option::is_some)
-        };
-        let carried = entry.filter(|entry| entry.carried == Some(true)).map(|_| CARRIED);
-        carried.into_iter().chain(entry.filter(|entry| gives_way(entry)).map(|_| COMPLIANCE))
+    /// Returns the departures from the benchmark's commands.
+    pub fn departures(&self) -> Vec<String> {
+        match self {
+            RobotAction::MoveWrists(entry) => {
+                let compliances =
+                    [entry.compliance_n_s_m, entry.side_compliance_n_s_m, entry.turn_compliance_n_m_s_rad];
+                let gives_way = compliances.iter().any(Option::is_some);
+                let departures = [(CARRIED, entry.carried == Some(true)), (COMPLIANCE, gives_way)];
+                departures.into_iter().filter(|(_, departs)| *departs).map(|(name, _)| name.into()).collect()
+            }
+            RobotAction::SendJointDrives(entry) => vec![format!("{JOINT_CONTROL} ({})", entry.robot)],
+            RobotAction::Walk(_) | RobotAction::SendJointChunk(_) | RobotAction::Wait => Vec::new(),
+        }
+    }
+
+    /// Returns true if the robot's drives and base controller carry it out, false for setpoints of its
+    /// motors, and for waiting, which changes nothing.
+    fn is_for_controller(&self) -> bool {
+        match self {
+            RobotAction::MoveWrists(_) | RobotAction::Walk(_) | RobotAction::SendJointChunk(_) => true,
+            RobotAction::SendJointDrives(_) | RobotAction::Wait => false,
+        }
     }
 }
 
@@ -88,6 +103,7 @@ pub enum Trajectory {
     Wrists(Box<WristTrajectory>),
     Walk(WalkTrajectory),
     Joints(JointTrajectory),
+    Drives(DriveTrajectory),
 }
 
 impl Command {
@@ -123,6 +139,9 @@ impl Trajectory {
     /// and the clamped values.
     pub fn begin(action: &RobotAction, steps: u32, motion: &mut Motion) -> (Trajectory, Clamped) {
         let mut clamped = Clamped::default();
+        if action.is_for_controller() {
+            motion.hand_back();
+        }
         let trajectory = match action {
             RobotAction::MoveWrists(entry) => {
                 Trajectory::Wrists(WristTrajectory::begin(entry, steps, motion, &mut clamped).into())
@@ -131,6 +150,7 @@ impl Trajectory {
             RobotAction::SendJointChunk(chunk) => {
                 Trajectory::Joints(JointTrajectory::begin(chunk, motion, &mut clamped))
             }
+            RobotAction::SendJointDrives(drives) => Trajectory::Drives(DriveTrajectory::begin(drives)),
             RobotAction::Wait => Trajectory::Hold,
         };
         (trajectory, clamped)
@@ -143,6 +163,7 @@ impl Trajectory {
             Trajectory::Wrists(wrists) => wrists.advance(step, motion),
             Trajectory::Walk(walk) => walk.advance(step, motion),
             Trajectory::Joints(joints) => joints.advance(step, motion),
+            Trajectory::Drives(drives) => drives.advance(step, motion),
         }
         motion.command()
     }
@@ -163,6 +184,12 @@ fn actions<'a>(call: &'a ActCall, motions: &'a [Motion]) -> Vec<(&'a str, RobotA
         ActCall::SendJointChunk(args) => {
             let action =
                 |chunk: &'a JointChunk| (chunk.robot.as_str(), RobotAction::SendJointChunk(chunk.clone()));
+            args.robots.iter().map(action).collect()
+        }
+        ActCall::SendJointDrives(args) => {
+            let action = |drives: &'a JointDrives| {
+                (drives.robot.as_str(), RobotAction::SendJointDrives(drives.clone()))
+            };
             args.robots.iter().map(action).collect()
         }
         ActCall::Wait(_) => {

@@ -6,11 +6,12 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use tandem_ik::{Configuration, FrameError, Outcome, Solver, Tolerance, frame_errors};
 use tandem_sim::{
-    BaseCommand, BaseLimits, CONTROL_HZ, HAND_JOINTS, RobotCommand, RobotModel, RobotSensed, Side, Sides,
-    UPPER_JOINTS,
+    BaseCommand, BaseLimits, CONTROL_HZ, HAND_JOINTS, MotorSetpoints, RobotCommand, RobotModel, RobotSensed,
+    Side, Sides, UPPER, UPPER_JOINTS,
 };
 use tandem_tools_spec::PoseFrame;
 
+use super::aim::Aim;
 use super::columns;
 use super::footing::Footing;
 use super::upper_body::{STEPS_AHEAD_M, UpperBody, ahead_m};
@@ -78,6 +79,9 @@ pub struct MotionState {
     /// Frame of the latest wrist targets, in which reports have the wrists.
     #[serde(default)]
     pub(super) frame: PoseFrame,
+    /// Setpoints of the motors in the current control step; empty while drives and base controller follow
+    /// joint targets and base command.
+    setpoints: Vec<MotorSetpoints>,
 }
 
 /// Restrictions on arms that move to their aims.
@@ -119,17 +123,6 @@ impl Compliance {
     pub const NONE: Compliance = Compliance { ahead_n_s_m: None, side_n_s_m: None, turn_n_m_s_rad: None };
 }
 
-/// Aim of a wrist.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Aim {
-    /// The arm's joints keep their targets.
-    Joints,
-    /// A pose in the world frame: the hand stays there while the pelvis sways or walks.
-    World(Isometry3<f64>),
-    /// A pose in the pelvis frame, which moves with the pelvis.
-    Carried(Isometry3<f64>),
-}
-
 impl Motion {
     /// Returns the motion of a robot that stands under `rest`, with its pelvis at `world_from_pelvis`.
     pub fn new(
@@ -152,6 +145,7 @@ impl Motion {
             approaches: Sides::both(None),
             footing: Footing::new(world_from_pelvis),
             frame: PoseFrame::default(),
+            setpoints: Vec::new(),
         };
         Motion { robot, solver: body.solver(), body: body.clone(), state }
     }
@@ -169,6 +163,9 @@ impl Motion {
 
     /// Updates the reported state with the robot's sensing after a control step.
     pub fn feel(&mut self, sensed: &RobotSensed) {
+        if !self.state.setpoints.is_empty() {
+            self.stay_where(sensed);
+        }
         let asked = self.asked_wrists();
         let before = &self.state.approaches;
         self.state.approaches = Sides::from_fn(|side| {
@@ -337,6 +334,41 @@ impl Motion {
         self.state.base = BaseCommand { vx_m_s: 0.0, vy_m_s: 0.0, yaw_rate_rad_s: 0.0, pelvis_height_m };
     }
 
+    /// Returns the setpoints of the motors in the current control step, which replace its command; empty
+    /// without them.
+    pub fn setpoints(&self) -> &[MotorSetpoints] {
+        &self.state.setpoints
+    }
+
+    /// Drives the motors in the current control step.
+    pub(super) fn drive(&mut self, setpoints: &[MotorSetpoints]) {
+        self.keep_joints();
+        self.state.setpoints = setpoints.to_vec();
+    }
+
+    /// Keeps the last setpoints of the motors. Returns false if there are none.
+    pub(super) fn keep_driving(&mut self) -> bool {
+        let last = self.state.setpoints.len().saturating_sub(1);
+        self.state.setpoints.drain(..last);
+        !self.state.setpoints.is_empty()
+    }
+
+    /// Hands a robot whose motors are driven back to its controller, in the posture in which it is.
+    pub(super) fn hand_back(&mut self) {
+        self.state.setpoints.clear();
+    }
+
+    /// Sets the targets under which the robot would stay as it is.
+    fn stay_where(&mut self, sensed: &RobotSensed) {
+        let joint_rad = |column: usize| {
+            let joint = &self.robot.model.joints[UPPER[column]];
+            sensed.joints.q_rad[UPPER[column]].clamp(joint.lower_rad, joint.upper_rad).into()
+        };
+        self.state.upper_rad = std::array::from_fn(joint_rad);
+        let base = BaseCommand::standing(sensed.start_from_pelvis.translation.z);
+        self.state.base = self.robot.base_limits.clamp(base);
+    }
+
     pub(super) fn walk(&mut self, base: BaseCommand) {
         self.state.base = base;
     }
@@ -464,37 +496,4 @@ impl Motion {
 fn configuration<'a>(body: &'a UpperBody, state: &MotionState) -> Configuration<'a> {
     let q: Vec<f64> = body.columns.iter().map(|column| state.upper_rad[*column]).collect();
     Configuration::new(&body.model, &q).expect("one finite target per joint")
-}
-
-impl Aim {
-    /// Returns the requested wrist pose in the frame of a pelvis at `world_from_pelvis`; `None` for joints.
-    pub fn in_pelvis(&self, world_from_pelvis: &Isometry3<f64>) -> Option<Isometry3<f64>> {
-        match self {
-            Aim::Joints => None,
-            Aim::World(world_from_wrist) => Some(world_from_pelvis.inv_mul(world_from_wrist)),
-            Aim::Carried(pelvis_from_wrist) => Some(*pelvis_from_wrist),
-        }
-    }
-
-    /// Returns an aim of the same kind that a wrist at `pelvis_from_wrist` has reached.
-    pub fn at(&self, world_from_pelvis: &Isometry3<f64>, pelvis_from_wrist: &Isometry3<f64>) -> Aim {
-        match self {
-            Aim::Joints => Aim::Joints,
-            Aim::World(_) => Aim::World(world_from_pelvis * pelvis_from_wrist),
-            Aim::Carried(_) => Aim::Carried(*pelvis_from_wrist),
-        }
-    }
-
-    /// Interpolates from this aim to `goal`, in its frame. Returns `goal` if the two are of different kinds.
-    pub fn towards(&self, goal: &Aim, share: f64) -> Aim {
-        match (self, goal) {
-            (Aim::World(from), Aim::World(to)) => Aim::World(between(from, to, share)),
-            (Aim::Carried(from), Aim::Carried(to)) => Aim::Carried(between(from, to, share)),
-            (Aim::Joints | Aim::World(_) | Aim::Carried(_), goal) => *goal,
-        }
-    }
-}
-
-fn between(from: &Isometry3<f64>, to: &Isometry3<f64>, share: f64) -> Isometry3<f64> {
-    from.try_lerp_slerp(to, share, 1e-9).unwrap_or(*to)
 }

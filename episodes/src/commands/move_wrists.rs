@@ -5,8 +5,9 @@ use nalgebra::{Isometry3, Translation3};
 use tandem_sim::{BaseCommand, HAND_JOINTS, Side, Sides, UPPER_JOINTS};
 use tandem_tools_spec::{PoseFrame, WristMove};
 
+use super::aim::Aim;
 use super::columns::{self, Clamped};
-use super::motion::{Aim, Compliance, Motion, Restraint};
+use super::motion::{Compliance, Motion, Restraint};
 use crate::convert::unit_quaternion;
 
 /// Trajectory of both wrists and their fingers.

@@ -169,7 +169,9 @@ impl Checker<'_> {
             return Err(Mistake::following(at.clone()));
         }
         let what = match FUNCTIONS.iter().find(|function| function.name == name) {
-            Some(function) => format!("{name} is asked for with brackets, as {}", function.signature()),
+            Some(function) => {
+                format!("{name} is asked for with brackets, for example {}", function.signature())
+            }
             None if self.names.objects.contains_key(name)
                 || self.names.robots.iter().any(|one| one == name) =>
             {

@@ -85,7 +85,7 @@ pub fn read(text: &str) -> Result<Node, Mistake> {
     reader.skip_space();
     match reader.rest().is_empty() {
         true => Ok(node),
-        false => Err(reader.unexpected("an operator, as && or >=, or the end")),
+        false => Err(reader.unexpected("an operator, for example && or >=, or the end")),
     }
 }
 
@@ -137,7 +137,7 @@ impl Reader<'_> {
         let hint = match found {
             Some('&' | '|') => "; and is &&, or is ||",
             Some('=') => "; equal is ==, at least is >=",
-            Some('.') => "; facts are functions, as lift_m(\"bottle\")",
+            Some('.') => "; facts are functions, for example lift_m(\"bottle\")",
             _ => "",
         };
         match found {

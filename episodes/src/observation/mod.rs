@@ -15,7 +15,7 @@ use tandem_tools_spec::{CameraCalibration, CameraImage, Formats, ImageFormat, Ob
 
 pub use formats::check_formats;
 pub use observer::Observer;
-pub use proprioception::{Detail, Proprioception, robot_state};
+pub use proprioception::{Detail, Proprioception, robot_state, samples};
 pub use scaling::{drawing_camera, scaled_colours};
 
 /// Observations of several robots at the same moment.

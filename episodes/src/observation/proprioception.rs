@@ -2,13 +2,14 @@
 
 use nalgebra::Isometry3;
 use tandem_sim::render::Intrinsics;
-use tandem_sim::{BaseCommand, Pose, RobotSensed, RobotStep, Step};
-use tandem_tools_spec::{CameraCalibration, JointValues, Observe, PoseFrame, RobotState};
+use tandem_sim::{BaseCommand, JOINTS, Pose, RobotSensed, RobotStep, SensorReadings, Step, Vector};
+use tandem_tools_spec::{CameraCalibration, JointValues, Observe, PoseFrame, RobotState, SensorSamples};
 
 use super::RobotObservation;
 use crate::commands::RobotSheet;
 use crate::convert::{
-    isometry_from_sim, opencv_axes, rounded, wire_base, wire_pose, wire_pose_from_sim, wire_vector,
+    isometry_from_sim, opencv_axes, rounded, rounded_to, wire_base, wire_pose, wire_pose_from_sim,
+    wire_vector,
 };
 
 /// Level of detail of a state.
@@ -66,6 +67,28 @@ pub fn robot_state(own: &Proprioception, sheet: &RobotSheet, detail: Detail) -> 
         pelvis_in_start: Some(wire_pose_from_sim(&sensed.start_from_pelvis)),
         base_command: wire_base(base),
         fallen: Some(fallen),
+        samples: None,
+    }
+}
+
+/// Decimals of readings: 10 urad, and finer than a G1's sensors in every unit.
+const READING_DECIMALS: i32 = 5;
+
+/// Returns readings of a robot's sensors in the form of replies.
+pub fn samples(readings: &[SensorReadings]) -> SensorSamples {
+    let told = |value: f32| rounded_to(READING_DECIMALS, value.into());
+    let joints = |of: fn(&SensorReadings) -> &[f32; JOINTS]| {
+        readings.iter().map(|reading| of(reading).iter().copied().map(told).collect()).collect()
+    };
+    let vector = |of: fn(&SensorReadings) -> Vector| {
+        readings.iter().map(|reading| of(reading).to_array().map(told)).collect()
+    };
+    SensorSamples {
+        joint_positions_rad: joints(|reading| &reading.joints.q_rad),
+        joint_velocities_rad_s: joints(|reading| &reading.joints.qd_rad_s),
+        joint_torques_n_m: joints(|reading| &reading.joints.torque_n_m),
+        gyro_rad_s: vector(|reading| reading.gyro_rad_s),
+        specific_force_m_s2: vector(|reading| reading.specific_force_m_s2),
     }
 }
 

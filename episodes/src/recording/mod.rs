@@ -31,7 +31,9 @@ mod write;
 
 pub use damage::{Damage, Fault, FilePart};
 pub use mcap_file::{LiveChannel, LiveRecording, LiveViewer, Visibility};
-pub use read::{MAX_RECORDING_BYTES, RecordedCall, RecordedCheckpoint, Recording, RecordingError};
+pub use read::{
+    MAX_RECORDING_BYTES, RecordedCall, RecordedCheckpoint, RecordedSetpoints, Recording, RecordingError,
+};
 pub use recover::{LeftOut, RecoverError, Recovered, recover};
 pub use thread::RecorderThread;
 pub use topics::messages::{

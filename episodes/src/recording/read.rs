@@ -13,8 +13,9 @@ use tandem_tools_spec::{ExtraInformation, PhaseReached, ResultReply};
 
 use super::checked_file::CheckedFile;
 use super::damage::Damage;
-use super::topics::messages::{PhaseMessage, StepError, ToolCallMessage};
+use super::topics::messages::{PhaseMessage, SetpointsMessage, StepError, ToolCallMessage};
 use super::topics::notes::NoteMessage;
+use super::topics::robot::setpoints_topic;
 use super::topics::steps::{StepDecoder, state_of};
 use super::{Recorder, checkpoint_name, metadata, topics};
 use crate::error::RobotError;
@@ -56,6 +57,15 @@ pub struct RecordedCall {
     pub shown: Option<Vec<ExtraInformation>>,
     /// The reply as JSON, without images; or the text of the problem.
     pub outcome: Result<String, String>,
+}
+
+/// Setpoints of a robot's motors in one control step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedSetpoints {
+    /// Simulated time at the end of the step.
+    pub time_s: f64,
+    /// Rows of `send_joint_drives`: one, or one for each physics step.
+    pub rows: Vec<Vec<f32>>,
 }
 
 /// A checkpoint of the episode in its recording.
@@ -230,6 +240,18 @@ impl Recording {
     /// Returns every note, with its time.
     pub(super) fn notes(&self) -> Result<Vec<(f64, NoteMessage)>, RecordingError> {
         self.messages(topics::NOTES).collect()
+    }
+
+    /// Returns the setpoints of a robot's motors in every control step in which it was driven by any.
+    ///
+    /// # Errors
+    ///
+    /// If a message cannot be read.
+    pub fn motor_setpoints(&self, robot: &str) -> Result<Vec<RecordedSetpoints>, RecordingError> {
+        let setpoints = |message: Result<(f64, SetpointsMessage), RecordingError>| {
+            message.map(|(time_s, message)| RecordedSetpoints { time_s, rows: message.rows })
+        };
+        self.messages(&setpoints_topic(robot)).map(setpoints).collect()
     }
 
     /// Scores the recorded steps by this build's conditions of the task.

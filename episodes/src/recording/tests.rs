@@ -22,7 +22,7 @@ use tandem_tools_spec::{
 };
 
 use super::*;
-use crate::commands::RobotSheet;
+use crate::commands::{Executed, RobotSheet};
 use crate::observation::{Detail, Observer, TeamObservation};
 use crate::scoring::Scores;
 use crate::spec::EpisodeSpec;
@@ -108,7 +108,9 @@ fn record_step(recorder: &mut Recorder, scores: &mut Scores, world: &mut World, 
         wall_clock_left_s: Some(1800.0),
         steps_per_command: 25,
     };
-    recorder.step(&step, &[], world.state_hash(), &scores.update(&step).facts, budget).unwrap();
+    recorder
+        .step(&step, &Executed::default(), world.state_hash(), &scores.update(&step).facts, budget)
+        .unwrap();
 }
 
 /// Records `STEPS` steps, a phase, a refused call and an observation with an image.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use base64::{Engine, prelude::BASE64_STANDARD};
 use foxglove::messages::{FrameTransforms, SceneUpdate};
-use tandem_sim::{RobotCommand, Step, mjcf::Geom, render::robot_rgba};
+use tandem_sim::{Step, mjcf::Geom, render::robot_rgba};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
 use super::mcap_file::{LiveViewer, McapFile, Topic, Visibility};
@@ -16,7 +16,7 @@ use super::topics::steps::{StepEncoder, StepRow};
 use super::topics::transforms::{self, robot_frame};
 use super::topics::{self, scene};
 use super::{checkpoint_name, metadata};
-use crate::commands::RobotSheet;
+use crate::commands::{Executed, RobotSheet};
 use crate::output::OutputError;
 use crate::result_file::RESULT_FILE;
 use crate::scoring::{Facts, ScoreMemory};
@@ -130,11 +130,12 @@ impl Recorder {
     }
 
     /// Appends one control step with the scoring's `facts`, and the hash of the whole state after it.
-    /// `executed` are the commands that the robots executed, which may differ from the policy's.
+    /// `executed` are the commands that the robots executed, which may differ from the policy's, and
+    /// setpoints of their motors.
     pub fn step(
         &mut self,
         step: &Step,
-        executed: &[RobotCommand],
+        executed: &Executed,
         state_hash: u64,
         facts: &Facts,
         budget: Budget,
@@ -148,8 +149,11 @@ impl Recorder {
         let robots = self.robots.iter().zip(&mut self.robot_topics).zip(&step.robots);
         for (index, ((robot, topics), moved)) in robots.enumerate() {
             topics.step(&mut self.file, robot, index, time_s, moved, facts)?;
-            if let Some(executed) = executed.get(index) {
+            if let Some(executed) = executed.commands.get(index) {
                 topics.executed(&mut self.file, time_s, executed)?;
+            }
+            if let Some(setpoints) = executed.setpoints.get(index).filter(|given| !given.is_empty()) {
+                topics.setpoints(&mut self.file, &robot.name, time_s, setpoints)?;
             }
         }
         self.last_s = time_s;

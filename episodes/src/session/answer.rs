@@ -2,7 +2,7 @@
 
 use tandem_sim::{Pose, Side};
 use tandem_tools_spec::{
-    ActCall, CommandReply, DepthReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall,
+    ActCall, Call, CommandReply, DepthReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall,
     ManageReply, Observe, PoseFrame, RobotReport, RobotState, SpecError, StatusReply, StopReason, TalkCall,
     TalkReply, ToolCall, ToolReply,
 };
@@ -11,7 +11,7 @@ use super::Session;
 use crate::EpisodeError;
 use crate::commands::{self, Allowed, Called, Command, Motion, RobotSheet, check_reach, report};
 use crate::convert::wire_pose;
-use crate::observation::{Detail, Proprioception, TeamObservation, check_formats, robot_state};
+use crate::observation::{Detail, Proprioception, TeamObservation, check_formats, robot_state, samples};
 use crate::recording::CallOutcome;
 
 /// The answer to a call, with views not yet encoded.
@@ -63,7 +63,7 @@ impl Session {
             }
         };
         match &call.tool {
-            ToolCall::Look(look) => self.look(look, &call.formats),
+            ToolCall::Look(look) => self.look(look, call),
             ToolCall::Act(act) => {
                 self.expect_underway()?;
                 let command = Command::read(act, &self.rules, &self.motions)?;
@@ -95,16 +95,26 @@ impl Session {
         }
     }
 
-    fn look(&mut self, call: &LookCall, formats: &Formats) -> Result<Answer, EpisodeError> {
+    fn look(&mut self, look: &LookCall, call: &Call) -> Result<Answer, EpisodeError> {
         let find = |name: &String| commands::find(name, &self.motions);
-        let reply = match call {
-            LookCall::Observe(args) => return self.seen(args, formats).map(Answer::Observation),
+        let reply = match look {
+            LookCall::Observe(args) => {
+                let mut seen = self.seen(args, &call.formats)?;
+                if call.samples {
+                    for state in seen.robots.iter_mut().map(|observed| &mut observed.state) {
+                        let robot = commands::find(&state.robot, &self.motions)?;
+                        state.samples = Some(samples(self.world.robots()[robot].readings()));
+                    }
+                }
+                return Ok(Answer::Observation(seen));
+            }
             LookCall::GetRobotState(args) => {
                 let robot = find(&args.robot)?;
                 let motion = &self.motions[robot];
                 let own = Proprioception::of(&self.present, robot);
                 let mut state = robot_state(&own, &motion.robot, Detail::Full);
                 tell_targets(&mut state, motion);
+                state.samples = call.samples.then(|| samples(self.world.robots()[robot].readings()));
                 LookReply::GetRobotState(state)
             }
             LookCall::QueryDepth(args) => {

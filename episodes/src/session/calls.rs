@@ -188,7 +188,9 @@ impl Session {
     ) -> Result<TeamObservation, EpisodeError> {
         let look = Look { observe: observe.clone(), formats: Formats::default() };
         let audience = Audience::Process(shown);
-        self.perform(Request { audience, ..Request::of_policy(Call::from(look)) })?.seen()
+        let sampled = [ExtraInformation::JointVelocities, ExtraInformation::InertialReadings];
+        let call = Call { samples: sampled.iter().any(|what| shown.contains(what)), ..Call::from(look) };
+        self.perform(Request { audience, ..Request::of_policy(call) })?.seen()
     }
 
     /// Observes like [`Session::call`] with `observe`, for a policy in this process. The observation has

@@ -10,13 +10,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
+use tandem_sim::Snapshot;
 use tandem_sim::read_bytes;
-use tandem_sim::{RobotCommand, Snapshot};
 use tandem_tools_spec::EndReason;
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::{Session, this_build, told::ShownInformation};
-use crate::commands::{MotionState, TargetCounts};
+use crate::commands::{Executed, MotionState, TargetCounts};
 use crate::error::{CheckpointError, EpisodeError};
 use crate::output::write_whole;
 use crate::recording::{Recording, RecordingError};
@@ -42,8 +42,9 @@ pub struct Checkpoint {
 pub struct FailedStep {
     /// Step number in the episode, and the error.
     pub failure: String,
-    /// Command of each robot.
-    pub commands: Vec<RobotCommand>,
+    /// Commands of the step.
+    #[serde(flatten)]
+    pub executed: Executed,
 }
 
 /// The episode to which progress belongs.

@@ -2,12 +2,12 @@
 //! a report, with the robots' next commands.
 
 use tandem_sim::dynamics::Diverged;
-use tandem_sim::{RobotCommand, SimError, Snapshot, World};
+use tandem_sim::{SimError, Snapshot, World};
 use tandem_tools_spec::EndReason;
 
 use super::{Checkpoint, FailedStep, Session, monotonic};
 use crate::EpisodeError;
-use crate::commands::MotionState;
+use crate::commands::{Executed, MotionState};
 
 /// Name of the file beside the recording: a [`Checkpoint`] of the last good step, with its [`FailedStep`].
 pub const FAILED_STEP_FILE: &str = "failed_step.checkpoint";
@@ -19,7 +19,7 @@ const KEPT_STEPS: usize = 50;
 #[derive(Default)]
 pub struct Rewind {
     kept: Option<Snapshot>,
-    since: Vec<Vec<RobotCommand>>,
+    since: Vec<Executed>,
 }
 
 impl Rewind {
@@ -36,8 +36,8 @@ impl Rewind {
     }
 
     /// Records the commands of a good step.
-    pub fn stepped(&mut self, commands: Vec<RobotCommand>) {
-        self.since.push(commands);
+    pub fn stepped(&mut self, executed: Executed) {
+        self.since.push(executed);
     }
 
     /// Restores the world to its last good step.
@@ -45,8 +45,8 @@ impl Rewind {
         if let Some(kept) = &self.kept {
             world.restore(kept)?;
         }
-        for commands in &self.since {
-            world.control_step(commands)?;
+        for executed in &self.since {
+            executed.step(world)?;
         }
         Ok(())
     }
@@ -54,11 +54,11 @@ impl Rewind {
 
 impl Session {
     /// Handles a divergence of physics: the episode ends in the state before this step, in which the
-    /// robots had `commands`. `motions` are from before the step.
+    /// robots had to do what is in `executed`. `motions` are from before the step.
     pub(super) fn fail(
         &mut self,
         diverged: Diverged,
-        commands: Vec<RobotCommand>,
+        executed: Executed,
         motions: Vec<MotionState>,
     ) -> EpisodeError {
         let step = u64::from(self.env_steps()) + 1;
@@ -69,7 +69,7 @@ impl Session {
         let rewound = self.rewind.back(&mut self.world).map_err(EpisodeError::from);
         let checkpoint = rewound.and_then(|()| {
             let mut checkpoint = self.checkpoint()?;
-            checkpoint.failed = Some(FailedStep { failure: failure.clone(), commands });
+            checkpoint.failed = Some(FailedStep { failure: failure.clone(), executed });
             checkpoint.to_bytes()
         });
         if let Some(files) = &mut self.files {
@@ -87,6 +87,6 @@ impl Session {
     ) -> Result<Option<Diverged>, EpisodeError> {
         let mut session = Session::build(checkpoint.spec(), monotonic())?;
         session.resume(checkpoint)?;
-        Ok(session.world.control_step(&failed.commands).err())
+        Ok(failed.executed.step(&mut session.world).err())
     }
 }

@@ -38,10 +38,10 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 use tandem_sim::render::RenderRequest;
-use tandem_sim::{CONTROL_HZ, RobotCommand, Step, World};
+use tandem_sim::{CONTROL_HZ, MotorSetpoints, RobotCommand, Step, World};
 use tandem_tools_spec::{EndReason, OperatorUse, ResultReply, Usage};
 
-use crate::commands::{Clamped, Command, Motion, MotionState, TargetCounts, Trajectory};
+use crate::commands::{Clamped, Command, Executed, Motion, MotionState, TargetCounts, Trajectory};
 use crate::convert::isometry_from_sim;
 use crate::observation::{Observer, Picture};
 use crate::protocol::Rules;
@@ -259,7 +259,7 @@ impl Session {
         let mut trajectories: Vec<Trajectory> = self.motions.iter().map(|_| Trajectory::Hold).collect();
         let mut clamped = Vec::with_capacity(command.orders.len());
         for order in &command.orders {
-            self.departures.extend(order.action.departures().map(str::to_owned));
+            self.departures.extend(order.action.departures());
             let motion = &mut self.motions[order.robot];
             let (trajectory, beyond) = Trajectory::begin(&order.action, order.steps.min(left), motion);
             trajectories[order.robot] = trajectory;
@@ -286,8 +286,8 @@ impl Session {
             moves.map(|(trajectory, motion)| trajectory.command(step, motion)).collect();
         self.rewind.before_step(&self.world);
         let remembered = self.execution.as_ref().map(|execution| execution.memory().clone());
-        let executed = self.executed(&commands);
-        let stepped = self.world.control_step(&executed);
+        let executed = Executed { commands: self.executed(&commands), setpoints: self.setpoints() };
+        let stepped = executed.step(&mut self.world);
         self.physics += started.elapsed();
         match stepped {
             Ok(mut present) => {
@@ -304,7 +304,7 @@ impl Session {
                 return Err(self.fail(diverged, executed, motions));
             }
         }
-        let otherwise = self.execution.is_some().then(|| executed.clone());
+        let recorded = self.files.is_some().then(|| self.recorded(&executed));
         self.rewind.stepped(executed);
         for (motion, robot) in self.motions.iter_mut().zip(&self.present.robots) {
             let hands_n =
@@ -319,8 +319,8 @@ impl Session {
         if let Some(hashes) = &mut self.hashes {
             hashes.push(self.world.state_hash());
         }
-        if let Some(files) = &mut self.files {
-            files.step(self.present.clone(), otherwise, self.world.state_hash(), scored.facts, budget);
+        if let (Some(files), Some(recorded)) = (&mut self.files, recorded) {
+            files.step(self.present.clone(), recorded, self.world.state_hash(), scored.facts, budget);
         }
         self.show_step(budget);
         if scored.reached {
@@ -336,6 +336,23 @@ impl Session {
         let Some(execution) = &mut self.execution else { return commands.to_vec() };
         let robots = self.motions.iter().map(|motion| (&*motion.robot.model, &motion.robot.base_limits));
         execution.execute(self.present.time_s, commands, robots)
+    }
+
+    /// Returns the setpoints of the robots' motors in the next step, by robot; empty if no robot has any.
+    fn setpoints(&self) -> Vec<Vec<MotorSetpoints>> {
+        match self.motions.iter().all(|motion| motion.setpoints().is_empty()) {
+            true => Vec::new(),
+            false => self.motions.iter().map(|motion| motion.setpoints().to_vec()).collect(),
+        }
+    }
+
+    /// Returns what a recording keeps of a step beside the commands: executed commands only if they may
+    /// differ from these.
+    fn recorded(&self, executed: &Executed) -> Executed {
+        match self.execution {
+            Some(_) => executed.clone(),
+            None => Executed { commands: Vec::new(), setpoints: executed.setpoints.clone() },
+        }
     }
 
     /// Records the phases reached in this step, which are those from number `first` on.

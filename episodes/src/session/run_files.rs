@@ -7,12 +7,13 @@ use std::sync::Arc;
 use std::{fs, io};
 
 use tandem_sim::render::{Frame, PictureError, encode_png};
-use tandem_sim::{CONTROL_HZ, RobotCommand, Step};
+use tandem_sim::{CONTROL_HZ, Step};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
 use super::failure::FAILED_STEP_FILE;
 use super::{Session, this_build};
 use crate::EpisodeError;
+use crate::commands::Executed;
 use crate::observation::Observer;
 use crate::output::{OutputError, create_private_folder, write_whole};
 use crate::pages::{
@@ -86,14 +87,13 @@ impl RunFiles {
     pub(super) fn step(
         &mut self,
         step: Arc<Step>,
-        executed: Option<Vec<RobotCommand>>,
+        executed: Executed,
         state_hash: u64,
         facts: Facts,
         budget: Budget,
     ) {
         self.budget_left = Some(budget);
         if let Some(recorder) = &self.recorder {
-            let executed = executed.unwrap_or_default();
             recorder.append_step(move |recorder| recorder.step(&step, &executed, state_hash, &facts, budget));
         }
     }

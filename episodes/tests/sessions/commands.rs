@@ -5,11 +5,13 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Duration;
 
 use crate::common::*;
+use tandem_episodes::stress::{Stress, StressAxis, StressLevel};
 use tandem_episodes::{A, B, Clock, EpisodeError, EpisodeSpec, RendererKind, Session};
 use tandem_sim::Vector;
 use tandem_tools_spec::{
-    CheckReach, DepthRow, EndReason, Finish, JointChunk, LookReply, ManageReply, MoveWrists, Observe,
-    Protocol, QueryDepth, SendJointChunk, StopReason, ToolCall, ToolReply, Wait, Walk, WalkMove, WristMove,
+    Assistance, Call, CheckReach, DRIVE_ROW_LEN, DepthRow, EndReason, Finish, GetRobotState, JointChunk,
+    JointDrives, LookReply, ManageReply, MoveWrists, Observe, Protocol, QueryDepth, SendJointChunk,
+    SendJointDrives, StopReason, ToolCall, ToolReply, Wait, Walk, WalkMove, WristMove,
 };
 
 #[test]
@@ -332,4 +334,80 @@ fn joint_targets_beyond_their_limits_are_counted() {
     // The 14 arm joints among 31.
     let share = told(0.1_f64.to_degrees()).expect("a share");
     assert!((share - 14.0 / 31.0).abs() < 1e-3, "{share}");
+}
+
+/// Returns a command that drives A's motors at its present joints: with gains as LeRobot sends them, or limp.
+fn drives(session: &mut Session, steps: usize, gain: f64) -> ToolCall {
+    let told = state(session, "A").joint_positions_rad;
+    let gains = |name: &str| match name {
+        name if name.contains("hand") => [2.0, 0.06],
+        name if name.contains("knee") => [300.0, 4.0],
+        name if name.contains("shoulder") || name.contains("elbow") || name.contains("wrist") => [80.0, 3.0],
+        _ => [250.0, 5.0],
+    };
+    let joints = || told.0.iter();
+    let mut row: Vec<f64> = joints().map(|(_, q_rad)| *q_rad).collect();
+    row.extend(joints().map(|_| 0.0));
+    row.extend(joints().map(|(name, _)| gain * gains(name)[0]));
+    row.extend(joints().map(|(name, _)| gain * gains(name)[1]));
+    row.extend(joints().map(|_| 0.0));
+    assert_eq!(row.len(), DRIVE_ROW_LEN);
+    SendJointDrives { robots: vec![JointDrives { robot: "A".into(), rows: vec![row; steps] }] }.into()
+}
+
+/// Whoever drives the motors balances the robot: limp, it falls while all wait. Handed back in time, it
+/// stands. The partner is not concerned.
+#[test]
+fn a_robot_whose_motors_are_driven_is_balanced_by_nobody_until_it_is_handed_back() {
+    let mut session = handover(2);
+    let limp = drives(&mut session, 5, 0.0);
+    command(&mut session, limp);
+    wait(&mut session, 25);
+    let reply = wait(&mut session, 50);
+    assert_eq!(reply.fallen.iter().map(|of| of.fallen).collect::<Vec<_>>(), [true, false]);
+    let mut session = handover(2);
+    let held = drives(&mut session, 10, 1.0);
+    let reply = command(&mut session, held);
+    assert!(reply.robots[0].base.is_none(), "its controller stands by");
+    for _ in 0..4 {
+        let reply = command(&mut session, raise_hand(50));
+        assert!(reply.fallen.iter().all(|of| !of.fallen) && reply.robots[0].base.is_some());
+    }
+    let departures = session.close().departures;
+    assert!(departures.contains(&"control: joint (A)".to_owned()), "{departures:?}");
+}
+
+/// Setpoints cannot be delayed or disturbed as commands are.
+#[test]
+fn motors_are_not_driven_where_commands_are_executed_otherwise() {
+    let stress = Some(Stress { axis: StressAxis::Latency, level: StressLevel::One });
+    let spec = EpisodeSpec { stress, ..spec("handover", 2, Protocol::Agentic) };
+    let mut session = Session::start(&spec, None).unwrap();
+    let held = drives(&mut session, 1, 1.0);
+    let refused = session.call(held).unwrap_err().to_string();
+    assert!(refused.contains("use send_joint_chunk"), "{refused}");
+}
+
+#[test]
+fn programs_are_told_the_readings_of_every_physics_step() {
+    let read = |assistance: Assistance| {
+        let spec = EpisodeSpec { assistance, ..spec("handover", 2, Protocol::Agentic) };
+        let mut session = Session::start(&spec, None).unwrap();
+        wait(&mut session, 2);
+        let call = Call { samples: true, ..Call::from(ToolCall::from(GetRobotState { robot: "A".into() })) };
+        let ToolReply::Look(LookReply::GetRobotState(state)) = session.ask(None, call).unwrap().reply else {
+            panic!("no state")
+        };
+        (state, session.close().extra_information)
+    };
+    let (state, shown) = read(Assistance::Full);
+    let samples = state.samples.unwrap();
+    assert_eq!(samples.joint_positions_rad.len(), 4);
+    for (told, (joint, q_rad)) in samples.joint_positions_rad[3].iter().zip(&state.joint_positions_rad.0) {
+        assert!((told - q_rad).abs() < 1e-5, "{joint}: {told} {q_rad}");
+    }
+    assert!(samples.specific_force_m_s2.iter().all(|force| (force[2] - 9.81).abs() < 1.0), "{samples:?}");
+    assert!(shown.contains(&"inertial_readings".to_owned()), "{shown:?}");
+    let (state, shown) = read(Assistance::Paper);
+    assert!(state.samples.is_none() && !shown.contains(&"inertial_readings".to_owned()));
 }

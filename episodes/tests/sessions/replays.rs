@@ -15,7 +15,9 @@ use tandem_episodes::{
     Variation, recover,
     tasks::{self, Spread},
 };
-use tandem_tools_spec::{EndReason, Finish, GetStatus, Observe, Protocol, Wait};
+use tandem_tools_spec::{
+    DRIVE_ROW_LEN, EndReason, Finish, GetStatus, JointDrives, Observe, Protocol, SendJointDrives, Wait,
+};
 
 fn verified(path: &Path) -> Verification {
     verify(&Recording::read(path).unwrap()).unwrap()
@@ -64,6 +66,22 @@ fn every_task_is_verified_and_goes_on_where_each_phase_begins() {
             );
         }
     }
+}
+
+/// Setpoints of motors are made again from the recorded calls.
+#[test]
+fn driven_motors_are_verified() {
+    let folder = tempfile::tempdir().unwrap();
+    let spec = spec("handover", 5, Protocol::Benchmark);
+    let mut session = Session::start(&spec, Some(folder.path())).unwrap();
+    let rows = vec![vec![0.5; 4 * DRIVE_ROW_LEN], vec![0.25; DRIVE_ROW_LEN]];
+    let driven = SendJointDrives { robots: vec![JointDrives { robot: "B".into(), rows }] };
+    command(&mut session, driven.into());
+    wait(&mut session, 5);
+    play(&mut session);
+    session.close();
+    let found = verified(&folder.path().join(Recorder::FILE_NAME));
+    assert_eq!((found.outcome, found.unanswered_steps), (Verdict::Same, 0));
 }
 
 /// Sensor noise is drawn from the episode's seed: the same seed yields the same noise, and another seed

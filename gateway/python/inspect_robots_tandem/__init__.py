@@ -200,7 +200,7 @@ def tandem_task(task: str = "handover", seeds: str | int = "2000-2009") -> Task:
     told = _told(task)
     first, _, last = str(seeds).partition("-")
     if not first.isdigit() or not (last.isdigit() or not last) or int(last or first) < int(first):
-        raise ValueError(f"no seeds {seeds!r}; give one, as 2000, or a range, as 2000-2009")
+        raise ValueError(f"no seeds {seeds!r}; give one, for example 2000, or a range, for example 2000-2009")
     rules = next(rules for rules in told.protocols if rules.protocol == "benchmark")
     return Task(
         name=f"tandem-{task}",

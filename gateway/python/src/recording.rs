@@ -4,16 +4,16 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
-use numpy::PyArray4;
+use numpy::{PyArray3, PyArray4};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde_json::json;
 use tandem_episodes::replay::{EpisodeCamera, EpisodeRenderer, PictureSize};
 use tandem_episodes::rows::{ActionKind, STATE_COLUMNS, state_row};
-use tandem_episodes::{Grip, Recording, RecordingError};
+use tandem_episodes::{Grip, RecordedSetpoints, Recording, RecordingError};
 use tandem_sim::render::{Frame, RendererKind};
-use tandem_sim::{JOINTS, Side, Step};
-use tandem_tools_spec::ACTION_ROW_LEN;
+use tandem_sim::{CONTROL_DT_S, JOINTS, Side, Step};
+use tandem_tools_spec::{ACTION_ROW_LEN, DRIVE_ROW_LEN};
 
 use crate::arrays::{Colours, Depths, action_row, pose_row, shaped, vector_row};
 use crate::refusal::{failed, refused};
@@ -94,6 +94,30 @@ impl NativeRecording {
     fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let columns = py.detach(|| Columns::of(&self.steps));
         columns.arrays(py)
+    }
+
+    /// Returns the setpoints of a robot's motors at the end of every step, 5 by 43; NaN where its own
+    /// controller drives it. Returns `None` if that is so throughout.
+    fn motor_setpoints<'py>(
+        &self,
+        py: Python<'py>,
+        robot: &str,
+    ) -> PyResult<Option<Bound<'py, PyArray3<f32>>>> {
+        let driven = self.recording.motor_setpoints(robot).map_err(|error| failed(py, &error))?;
+        if driven.is_empty() {
+            return Ok(None);
+        }
+        let blocks = DRIVE_ROW_LEN / JOINTS;
+        let mut setpoints = vec![f32::NAN; self.steps.len() * DRIVE_ROW_LEN];
+        for RecordedSetpoints { time_s, rows } in &driven {
+            let step =
+                self.steps.partition_point(|step| step.time_s < time_s - 0.5 * f64::from(CONTROL_DT_S));
+            let place = setpoints.chunks_exact_mut(DRIVE_ROW_LEN).nth(step);
+            if let (Some(place), Some(row)) = (place, rows.last().filter(|row| row.len() == DRIVE_ROW_LEN)) {
+                place.copy_from_slice(row);
+            }
+        }
+        shaped(py, &setpoints, [self.steps.len(), blocks, JOINTS]).map(Some)
     }
 
     /// Returns the grip of each hand of each robot on each object at every step, as the scorer sees it: 0

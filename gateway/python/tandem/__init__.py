@@ -19,7 +19,7 @@ from . import _native
 from ._native import Snapshot
 from .base import BaseEpisode, Observation, Stepped
 from .client import Client, RemoteEpisode
-from .contract.arguments import JointChunk, PixelRegion, SurfaceQuery, WalkMove, WristMove
+from .contract.arguments import JointChunk, JointDrives, PixelRegion, SurfaceQuery, WalkMove, WristMove
 from .contract.commands import CommandReply
 from .contract.depth import DepthReply
 from .contract.replies import ReachReply, RobotState, StatusReply
@@ -51,6 +51,7 @@ __all__ = [
     "EpisodeEnded",
     "Evaluation",
     "JointChunk",
+    "JointDrives",
     "Observation",
     "Picture",
     "PixelRegion",

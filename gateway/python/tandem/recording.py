@@ -178,6 +178,15 @@ class Recording:
         """Commands for each step, steps by robots by 35: joint targets in radians, then the base command."""
         return self._arrays["actions"]
 
+    @cached_property
+    def motor_setpoints(self) -> dict[str, NDArray[np.float32]]:
+        """Setpoints at the end of each step of the robots whose motors were driven by `send_joint_drives`, by robot: steps by
+        5 by 43, NaN where the robot's own controller drove it. The blocks are position [rad], velocity [rad/s], kp
+        [N m/rad], kd [N m s/rad] and torque [N m].
+        """
+        found = {robot: self._native.motor_setpoints(robot) for robot in self.robots}
+        return {robot: setpoints for robot, setpoints in found.items() if setpoints is not None}
+
     @property
     def states(self) -> NDArray[np.float32]:
         """Sensed joint angles and the base command in force, steps by robots by 47: the states of rows in data sets

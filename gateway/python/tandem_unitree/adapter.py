@@ -98,8 +98,9 @@ class Adapter:
             try:
                 with robot.lock:
                     passes = robot.clock.passes(robot.commands.walks(robot.latest.time_s))
+                    drives = robot.commands.drives()
                     row = robot.commands.row(robot.latest.time_s)
-                if passes and not self._link.command(row):
+                if passes and not (self._link.command(row) if drives is None else self._link.drive(drives)):
                     self.late += 1
                     continue
                 if not passes and not self._link.has_moved():
@@ -135,7 +136,8 @@ class Adapter:
         robot, clock = self._settings.robot, self._settings.clock
         self._link.note(
             f"Robot {robot} is driven over the interfaces of a Unitree G1 (tandem_unitree), clock {clock}. Its programs are "
-            "told joint velocities, torques, orientation and odometry, which observations of the benchmark do not have."
+            "told joint velocities, torques, orientation, inertial readings and odometry, which observations of the benchmark "
+            "do not have."
         )
 
     def _look(self) -> None:

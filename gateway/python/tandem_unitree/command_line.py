@@ -76,6 +76,11 @@ def parser() -> argparse.ArgumentParser:
     how.add_argument(
         "--released", action="store_true", help="begin with the mode released, so that rt/lowcmd moves joints at once"
     )
+    how.add_argument(
+        "--joint-control",
+        action="store_true",
+        help="let rt/lowcmd drive every motor by q, dq, kp, kd and tau, legs included; the program balances the robot",
+    )
     how.add_argument("--camera-fps", type=float, default=15.0, help="pictures a second while a client watches; default 15")
     how.add_argument("--verbose", action="store_true", help="log every service call")
     return own
@@ -93,6 +98,7 @@ def _robots(given: argparse.Namespace) -> list[RobotSettings]:
                 interface=given.interface,
                 clock=given.clock,
                 released=given.released,
+                joint_control=given.joint_control,
                 camera_fps=given.camera_fps,
             )
         )

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from tandem import Client, EpisodeEnded, Refused
 from tandem.base import ROW_COLUMNS
 
-from .robot.commands import BaseRange
+from .robot.commands import DRIVE_FIELDS, BaseRange
 from .robot.remarks import LOG
 from .robot.sensing import Moment, moment_of
+from .wire.joints import JOINTS
 
 _TOO_LATE = ("late-command", "double-command")
 """Kinds of refusal of a command that came after its step, or while another one of the same robot was waiting."""
@@ -68,7 +69,7 @@ class Link:
 
     def sense(self, before: Moment | None) -> Moment:
         """Returns the robot's present state."""
-        state = self._call("get_robot_state", {"robot": self.robot})
+        state = self._call("get_robot_state", {"robot": self.robot, "samples": True})
         self._step = int(state["step"])
         return moment_of(state, before)
 
@@ -83,9 +84,21 @@ class Link:
         """Executes one control step with an action row. Returns `False` if it came too late for this step and was refused."""
         if row.shape != (ROW_COLUMNS,):
             raise ValueError(f"a row has {ROW_COLUMNS} numbers, not {row.shape}")
+        return self._execute("send_joint_chunk", row)
+
+    def drive(self, drives: NDArray[np.float64]) -> bool:
+        """Executes one control step with setpoints of all motors, like `command`.
+
+        drives: 5 by 43: position [rad], velocity [rad/s], kp [N m/rad], kd [N m s/rad] and torque [N m] of each joint.
+        """
+        if drives.shape != (len(DRIVE_FIELDS), JOINTS):
+            raise ValueError(f"setpoints are {len(DRIVE_FIELDS)} by {JOINTS} numbers, not {drives.shape}")
+        return self._execute("send_joint_drives", drives.ravel())
+
+    def _execute(self, tool: str, row: NDArray[np.float64]) -> bool:
         try:
             rows = [[round(value, 6) for value in row.tolist()]]
-            self._call("send_joint_chunk", {"robots": [{"robot": self.robot, "rows": rows}], "short": True})
+            self._call(tool, {"robots": [{"robot": self.robot, "rows": rows}], "short": True})
         except Refused as refused:
             if refused.kind not in _TOO_LATE:
                 raise

@@ -183,6 +183,30 @@ def test_a_robot_has_episodes_of_its_own_and_pictures_in_the_table(runs: Path, t
     assert [row["task"] for row in tasks] == list(recording.instructions.values())
 
 
+def test_setpoints_of_driven_motors_are_kept(tmp_path: Path) -> None:
+    setpoints = np.zeros((5, 43), np.float32)
+    setpoints[2], setpoints[3] = 100.0, 2.0
+    with tandem.Episode("handover", 2012, protocol="benchmark", record=tmp_path / "run") as episode:
+        episode.wait(10)
+        angles = episode.get_robot_state("B").joint_positions_rad
+        assert angles is not None
+        setpoints[0] = list(angles.values())
+        episode.send_joint_drives([tandem.JointDrives("B", np.tile(setpoints.ravel(), (5, 1)))])
+        episode.walk(5, [tandem.WalkMove("B", 0.0, 0.0, 0.0)])
+    recording = tandem.Recording(tmp_path / "run")
+    assert list(recording.motor_setpoints) == ["B"]
+    kept = recording.motor_setpoints["B"]
+    assert kept.shape == (21, 5, 43) and np.isnan(kept[:11]).all() and np.isnan(kept[16:]).all()
+    assert np.allclose(kept[11:16], setpoints, atol=1e-5)
+    (exported,) = export_lerobot(tmp_path / "run", tmp_path / "set", SETTINGS, jobs=1)
+    rows = rows_of(exported.folder)
+    assert rows["motor_setpoints.B"].shape == (4, 215) and "motor_setpoints.A" not in rows
+    assert np.allclose(rows["motor_setpoints.B"][2], setpoints.ravel(), atol=1e-5), "the step after this row"
+    assert not rows["motor_setpoints.B"][[0, 1, 3]].any(), "its own controller drives it"
+    info = json.loads((exported.folder / "meta/info.json").read_text())
+    assert info["features"]["motor_setpoints.B"]["names"][86] == "left_hip_pitch_joint.kp_n_m_rad"
+
+
 def test_depth_lies_beside_the_pictures_as_lerobot_stores_it(runs: Path, tmp_path: Path) -> None:
     size = (64, 48)
     (exported,) = export_lerobot(runs, tmp_path / "films", ExportSettings(size=size, depth=True))

@@ -108,7 +108,7 @@ def test_inspect_robots_evaluates_episodes_by_their_seeds(tmp_path: Path) -> Non
     assert len(state) == 4 and state[0].shape == info.action_space.shape
     assert np.array_equal(pictures[0], pictures[1]) and np.array_equal(pictures[2], pictures[3])
     assert not np.array_equal(pictures[0], pictures[2])
-    with pytest.raises(ValueError, match="give one, as 2000, or a range"):
+    with pytest.raises(ValueError, match="give one, for example 2000, or a range"):
         resolve("task", "tandem", seeds="all")
     embodiment.close()
 

@@ -80,7 +80,7 @@ impl FromStr for SizeFlag {
         let side = |text: &str| text.parse().ok().filter(|side| SIDES_PX.contains(side));
         let sides = text.split_once('x').and_then(|(width, height)| Some((side(width)?, side(height)?)));
         let (width, height) = sides.ok_or(format!(
-            "no size; give width and height in pixels, each {} to {}, as 640x480",
+            "no size; give width and height in pixels, each {} to {}, for example 640x480",
             SIDES_PX.start(),
             SIDES_PX.end()
         ))?;

@@ -106,8 +106,7 @@ impl EpisodeTable {
     ///
     /// Returns [`HostingError::NoPolicy`] if the server was started without one.
     pub fn partner(&self) -> Result<Arc<dyn PartnerPolicy>, HostingError> {
-        let reason =
-            "no policy may drive here; start the server with --partner, as act:http://127.0.0.1:8500/act";
+        let reason = "no policy may drive here; start the server with --partner, for example act:http://127.0.0.1:8500/act";
         self.partner.clone().ok_or_else(|| HostingError::NoPolicy { reason: reason.into() })
     }
 

@@ -37,7 +37,7 @@ pub enum SettingsError {
         listen: SocketAddr,
     },
     /// A limit is zero.
-    #[error("{setting} is 0, and the server could not be used; give at least 1, as {example}")]
+    #[error("{setting} is 0, and the server could not be used; give at least 1, for example {example}")]
     Zero {
         /// Name of the setting in files.
         setting: &'static str,
@@ -45,7 +45,9 @@ pub enum SettingsError {
         example: &'static str,
     },
     /// A stress level is given without a stress axis.
-    #[error("a level says how much of what goes wrong; give stress, too, as camera, or leave level out")]
+    #[error(
+        "a level says how much of what goes wrong; give stress, too, for example camera, or leave level out"
+    )]
     LevelAlone,
     /// Two settings change the wording of tasks.
     #[error("the stress words tells tasks in other words, and so does instructions; give one of them")]
@@ -55,7 +57,7 @@ pub enum SettingsError {
     LiveAfter,
     /// An allowed host is not a host name.
     #[error(
-        "allowed_host {name:?} is no name of a host; give it alone, as lab.example, without http:// and port"
+        "allowed_host {name:?} is no name of a host; give it alone, for example lab.example, without http:// and port"
     )]
     NoHost {
         /// Given text.

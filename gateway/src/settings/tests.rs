@@ -52,7 +52,7 @@ fn settings_that_let_nobody_in_are_refused() {
         let text = Settings::resolve(Layer::default(), Some(&path)).unwrap_err().to_string();
         says.iter().for_each(|part| assert!(text.contains(part), "{line}: {text}"));
     };
-    check("max_episodes = 0", &["max_episodes is 0", "at least 1, as 8"]);
+    check("max_episodes = 0", &["max_episodes is 0", "at least 1, for example 8"]);
     for limit in
         ["max_body_bytes", "request_timeout", "max_requests", "rate_limit", "idle_timeout", "thinking_limit"]
     {

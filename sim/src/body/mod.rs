@@ -7,6 +7,7 @@ mod inverse_dynamics;
 pub(crate) mod joint_array;
 mod layout;
 mod model;
+mod motors;
 #[cfg(test)]
 pub(crate) mod posed;
 #[cfg(test)]
@@ -19,6 +20,7 @@ pub use layout::{
     WAIST_JOINTS, joint_names,
 };
 pub use model::{BodyScale, HandLinks, JointModel, LinkModel, RobotModel, RobotSource, SiteModel};
+pub use motors::MotorSetpoints;
 
 pub(crate) use estimate::{KnownOfBody, LinkMotion, PelvisMotion};
 pub(crate) use layout::{ARMS, HANDS, LEG_JOINTS, LEGS, MIRRORED_ARM, WAIST};

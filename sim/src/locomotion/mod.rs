@@ -93,6 +93,10 @@ pub trait Locomotion: Send {
         None
     }
 
+    /// Forgets everything, for a robot whose joints others drive. The next [`Locomotion::tick`] starts from
+    /// the posture in which it finds the robot.
+    fn let_go(&mut self);
+
     /// Serialises the internal state, for snapshots and the state hash.
     fn save(&self) -> Result<Vec<u8>, postcard::Error>;
 

@@ -19,10 +19,11 @@ pub use spawn::RobotPlacement;
 pub use state::{RobotEstimate, RobotSensed, RobotTruth};
 
 use crate::body::{
-    BodyEstimate, JOINTS, JointDrive, LEG_JOINTS, LEGS, RobotModel, UPPER, UPPER_JOINTS, WAIST, WAIST_COLUMN,
-    WAIST_JOINTS,
+    BodyEstimate, JOINTS, JointDrive, LEG_JOINTS, LEGS, MotorSetpoints, RobotModel, UPPER, UPPER_JOINTS,
+    WAIST, WAIST_COLUMN, WAIST_JOINTS,
 };
 use crate::dynamics::{DVec3, Dynamics, TreeId};
+use crate::estimate::SensorReadings;
 use crate::locomotion::{BaseCommand, BaseLimits, LegCommand, Locomotion};
 use crate::{CONTROL_DT_S, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError};
 use hand_loads::HandLoads;
@@ -46,6 +47,10 @@ pub struct Robot {
     memory: RobotMemory,
     /// The robot's estimate of its body since the last [`Robot::sense`].
     body: BodyEstimate,
+    /// Setpoints of the motors for the next control step, in place of its command; empty without them.
+    setpoints: Vec<MotorSetpoints>,
+    /// Sensor readings of the last control step, one for each physics step.
+    readings: Vec<SensorReadings>,
 }
 
 /// All state of a robot outside dynamics that outlasts a step.
@@ -79,13 +84,37 @@ impl Robot {
     pub(crate) fn set_sensing(&mut self, dynamics: &Dynamics, told: &Pose, sensing: Sensing, seed: u64) {
         let tree = dynamics.tree(self.tree);
         self.memory.knowledge = SelfKnowledge::new(&self.model, tree, told, sensing, seed);
+        self.readings.clear();
         self.recollect(dynamics);
+    }
+
+    /// Replaces drives and base controller by setpoints of the motors for the next control step: one for
+    /// each physics step, or one for all of them.
+    pub(crate) fn set_motors(&mut self, setpoints: &[MotorSetpoints]) {
+        let valid = [1, PHYSICS_STEPS_PER_CONTROL as usize].contains(&setpoints.len());
+        assert!(valid, "one setpoint for a control step, or one for each physics step");
+        self.setpoints = setpoints.to_vec();
+    }
+
+    /// Ends a control step, whose setpoints apply no longer.
+    pub(crate) fn end_step(&mut self) {
+        self.setpoints.clear();
+    }
+
+    /// Returns the sensor readings of the last control step in order of time, one for each physics step;
+    /// at the start and after a restore the last one alone.
+    pub fn readings(&self) -> &[SensorReadings] {
+        match self.readings.is_empty() {
+            true => std::slice::from_ref(self.memory.knowledge.readings()),
+            false => &self.readings,
+        }
     }
 
     /// Reads the sensors, once after every physics step.
     pub(crate) fn sense(&mut self, dynamics: &Dynamics) {
         let tree = dynamics.tree(self.tree);
         let body = self.memory.knowledge.update(&self.model, tree);
+        self.readings.push(self.memory.knowledge.readings().clone());
         self.take(body);
         // This uses the simulator's state rather than the robot's estimate: it is scored, and switches
         // off the legs.
@@ -112,18 +141,38 @@ impl Robot {
     /// Sets this robot's joint drives for one physics step, `substep` counting from 0 within the control
     /// step.
     pub(crate) fn drive(&mut self, dynamics: &mut Dynamics, command: &RobotCommand, substep: u32) {
+        if substep == 0 {
+            self.readings.clear();
+        }
         self.body.arms_told = self.arms_told(command);
         let torque_n_m = &self.memory.knowledge.readings().joints.torque_n_m;
         let load_n_m = self.memory.hand_loads.update(&self.body, torque_n_m, PHYSICS_DT_S);
+        let drives = match self.setpoints.get(substep as usize).or(self.setpoints.last()) {
+            Some(setpoints) => {
+                self.locomotion.let_go();
+                setpoints.drives(&self.model.joints, PHYSICS_DT_S)
+            }
+            None => self.commanded_drives(&load_n_m, command, substep),
+        };
+        joints::drive(dynamics.tree_mut(self.tree), &self.model, &drives);
+        self.remember(command, substep);
+    }
+
+    /// Returns the drives of a robot that follows its command, with the base controller's legs.
+    fn commanded_drives(
+        &mut self,
+        load_n_m: &[f32; JOINTS],
+        command: &RobotCommand,
+        substep: u32,
+    ) -> [JointDrive; JOINTS] {
         let legs = match self.memory.fallen {
             true => limp_legs(&self.model),
             false => self.locomotion.tick(&self.body, &command.base, PHYSICS_DT_S),
         };
         let mut drives = [JointDrive::default(); JOINTS];
-        self.set_upper_body(&mut drives, &load_n_m, command, substep);
+        self.set_upper_body(&mut drives, load_n_m, command, substep);
         set_legs(&mut drives, &legs);
-        joints::drive(dynamics.tree_mut(self.tree), &self.model, &drives);
-        self.remember(command, substep);
+        drives
     }
 
     /// Returns true if the command moves an arm or a finger.
@@ -182,6 +231,7 @@ impl Robot {
         let (memory, locomotion): (RobotMemory, Vec<u8>) = postcard::from_bytes(bytes)?;
         self.locomotion.load(&locomotion)?;
         self.memory = memory;
+        self.readings.clear();
         self.recollect(dynamics);
         Ok(())
     }

@@ -61,7 +61,8 @@ impl Robot {
         };
         let name = placement.name.clone();
         let locomotion = Box::new(Balance::default());
-        Ok(Robot { name, model: model.clone(), tree, locomotion, memory, body })
+        let (setpoints, readings) = (Vec::new(), Vec::new());
+        Ok(Robot { name, model: model.clone(), tree, locomotion, memory, body, setpoints, readings })
     }
 }
 

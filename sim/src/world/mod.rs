@@ -30,7 +30,7 @@ pub use watch::{
 
 use rapier3d::math::Pose;
 
-use crate::body::RobotModel;
+use crate::body::{MotorSetpoints, RobotModel};
 use crate::dynamics::{DVec3, Diverged, Dynamics, LinkId, Settings};
 use crate::mechanism::{Machinery, precise};
 use crate::mjcf::{Document, MjcfCamera, Texture};
@@ -185,8 +185,21 @@ impl World {
             self.sense();
         }
         self.pushes.clear();
+        self.robots.iter_mut().for_each(Robot::end_step);
         self.control_steps += 1;
         Ok(self.present())
+    }
+
+    /// Drives every joint of a robot by `setpoints` in the next control step: one for each physics step, or
+    /// one for all of them. The robot's command is then only recorded. The base controller lets go, no
+    /// torque is added against gravity, and a fallen robot is driven, too.
+    ///
+    /// # Panics
+    ///
+    /// Panics if there is no such robot, or the number of setpoints is neither 1 nor that of the physics
+    /// steps.
+    pub fn drive_motors(&mut self, robot: usize, setpoints: &[MotorSetpoints]) {
+        self.robots[robot].set_motors(setpoints);
     }
 
     /// Sets the drives and forces on the robots and the scene's joints for the next physics step.

@@ -24,7 +24,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-MAX_CLIENT_S = 120
+ENVIRONMENTS = ("bridge", "clients", "lerobot", "recorder")
+MAX_CLIENT_S = 180
 STARTING_S = 30
 SIOCSIFFLAGS, IFF_UP = 0x8914, 1
 
@@ -36,6 +37,7 @@ class Case:
     bridge: list[str]
     clients: list[tuple[str, ...]]
     needs_library: str | None = None
+    needs_variable: str | None = None
     environments: set[str] = field(init=False)
 
     def __post_init__(self):
@@ -47,9 +49,15 @@ CASES = {
     "book": Case(ONE, [("clients", "book.py", "1")]),
     "sdk": Case(ONE, [("clients", "sdk.py", "1")]),
     "far": Case([*ONE, "--domains", "A=0"], [("clients", "far.py")]),
+    "joint": Case([*ONE, "--joint-control"], [("clients", "joint.py", "1")]),
+    "whole_body": Case([*ONE, "--joint-control"], [("clients", "whole_body.py", "1")], needs_variable="TANDEM_POLICY"),
     "lerobot": Case(
         ["--task", "handover"],
         [("lerobot", "lerobot_g1.py", "127.0.0.2", "0.25"), ("lerobot", "lerobot_g1.py", "127.0.0.3", "-0.25")],
+    ),
+    "lerobot_record": Case(
+        ["--task", "handover", "--episodes", "3", "--camera-fps", "10"],
+        [("recorder", "lerobot_record.py", f"127.0.0.{2 + index}", robot) for index, robot in enumerate("AB")],
     ),
     "inspect": Case([*ONE, "--domains", "A=0"], [("clients", "inspect_g1.py")]),
     "teleimager": Case(ONE, [("clients", "teleimager_client.py")], needs_library="turbojpeg"),
@@ -124,6 +132,12 @@ def environments(given):
             ["-r", str(HERE / "lerobot.txt")],
             ["--no-deps", "-r", str(HERE / "lerobot_alone.txt")],
         ),
+        "recorder": lambda: environment(
+            folder / "recorder",
+            "3.12",
+            ["-r", str(HERE / "lerobot_record.txt")],
+            ["--no-deps", "-r", str(HERE / "lerobot_record_alone.txt")],
+        ),
     }
     for name in own:
         path = getattr(given, name)
@@ -173,6 +187,8 @@ def inside(case, pythons):
 def run(name, makers, made):
     """Runs one case in a namespace of its own; returns whether it has passed."""
     case = CASES[name]
+    if case.needs_variable is not None and case.needs_variable not in os.environ:
+        raise Skipped(f"{case.needs_variable} is not set")
     library = case.needs_library
     if library is not None and not (ctypes.util.find_library(library) or os.environ.get("TURBOJPEG")):
         raise Skipped(f"no lib{library}")
@@ -189,13 +205,13 @@ def main():
     own.add_argument("names", nargs="*", default=list(CASES), metavar="NAME", help=", ".join(CASES))
     own.add_argument("--wheel", help="Tandem's wheel")
     own.add_argument("--environments", default="target/unitree")
-    for which in ("bridge", "clients", "lerobot"):
+    for which in ENVIRONMENTS:
         own.add_argument(f"--{which}", help=f"interpreter of an environment {which} that is there already")
     own.add_argument("--inside", action="store_true", help=argparse.SUPPRESS)
     given = own.parse_args()
     if given.inside:
         [name] = given.names
-        sys.exit(inside(CASES[name], {which: getattr(given, which) for which in ("bridge", "clients", "lerobot")}))
+        sys.exit(inside(CASES[name], {which: getattr(given, which) for which in ENVIRONMENTS}))
     makers, made, failed = environments(given), {}, []
     for name in given.names:
         print(f"{name}:", flush=True)

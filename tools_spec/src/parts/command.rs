@@ -48,7 +48,7 @@ pub enum StopReason {
 /// Outcome of a command for one robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotReport {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     pub robot: String,
     /// The frame of wrist poses where the command named another than that of the pelvis; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -275,7 +275,7 @@ pub struct FingerReport {
 /// Effort of a joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Effort {
-    /// The joint, as `right_elbow_joint`.
+    /// The joint, for example `right_elbow_joint`.
     pub joint: String,
     /// Its torque as a share of its limit, from 0 to 1.
     pub share: f64,

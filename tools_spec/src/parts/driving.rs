@@ -58,7 +58,7 @@ impl Driving {
         let [shortest, longest] = PATIENCE_S;
         match self.patience_s {
             Some(given) if !(shortest..=longest).contains(&given) => Err(format!(
-                "patience_s is {given}; give {shortest} to {longest} seconds, as 120 for agents that think or 1 for learned policies"
+                "patience_s is {given}; give {shortest} to {longest} seconds, for example 120 for agents that think or 1 for learned policies"
             )),
             _ => Ok(()),
         }
@@ -86,16 +86,16 @@ impl Operators {
 /// Credentials of a robot's operator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OperatorToken {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     pub robot: String,
-    /// Token that its operator sends with every request, as `Authorization: Bearer TOKEN`.
+    /// Token that its operator sends with every request, for example `Authorization: Bearer TOKEN`.
     pub token: String,
 }
 
 /// Requests and thinking time of a robot's operator up to its last command.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OperatorUse {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     pub robot: String,
     /// Its operator's requests.
     pub requests: u32,

@@ -153,13 +153,15 @@ pub enum ExtraInformation {
     Odometry,
     /// Direction of gravity.
     Gravity,
+    /// Angular velocity and specific force of the pelvis.
+    InertialReadings,
     /// Conditions that the next phase lacks, and poses of held objects, as the simulator measures them.
     PhaseConditions,
 }
 
 impl ExtraInformation {
     /// Every kind.
-    pub const ALL: [ExtraInformation; 9] = [
+    pub const ALL: [ExtraInformation; 10] = [
         ExtraInformation::DepthImages,
         ExtraInformation::PixelDepth,
         ExtraInformation::ThirdPerson,
@@ -168,6 +170,7 @@ impl ExtraInformation {
         ExtraInformation::HandForces,
         ExtraInformation::Odometry,
         ExtraInformation::Gravity,
+        ExtraInformation::InertialReadings,
         ExtraInformation::PhaseConditions,
     ];
 
@@ -182,6 +185,7 @@ impl ExtraInformation {
             ExtraInformation::HandForces => "hand_forces",
             ExtraInformation::Odometry => "odometry",
             ExtraInformation::Gravity => "gravity",
+            ExtraInformation::InertialReadings => "inertial_readings",
             ExtraInformation::PhaseConditions => "phase_conditions",
         }
     }
@@ -197,7 +201,8 @@ impl ExtraInformation {
             | ExtraInformation::JointTorques
             | ExtraInformation::HandForces
             | ExtraInformation::Odometry
-            | ExtraInformation::Gravity => true,
+            | ExtraInformation::Gravity
+            | ExtraInformation::InertialReadings => true,
         }
     }
 }
@@ -321,7 +326,7 @@ pub struct NextPhase {
 /// An object in a hand.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeldObject {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     pub robot: String,
     /// `left` or `right`.
     pub hand: String,
@@ -340,7 +345,7 @@ pub struct HeldObject {
 /// Fall of a robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotFallen {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     pub robot: String,
     /// True from the moment it fell.
     pub fallen: bool,

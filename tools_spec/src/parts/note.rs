@@ -31,7 +31,7 @@ pub struct Note {
     pub text: String,
     /// Kind of the words. Null: a note.
     pub kind: Option<NoteKind>,
-    /// The robot that it is about, as "A". Null: all, and for the operator of a robot its own.
+    /// The robot that it is about, for example "A". Null: all, and for the operator of a robot its own.
     #[schemars(regex(pattern = ROBOT_PATTERN))]
     pub robot: Option<String>,
     /// Tokens that the model read and wrote for it. Null: not said.

@@ -44,6 +44,9 @@ pub struct ToolSpec {
     /// True if only policies with full assistance are offered it.
     #[serde(skip)]
     pub full_only: bool,
+    /// True if language models are not offered it.
+    #[serde(skip)]
+    pub for_programs: bool,
     /// True if its schema is strict.
     #[serde(skip)]
     pub strict: bool,
@@ -98,6 +101,7 @@ impl ToolSpec {
             on_episode: false,
             for_operators: false,
             full_only: T::FULL_ONLY,
+            for_programs: T::FOR_PROGRAMS,
             strict: T::STRICT,
             route: T::route(),
         }

@@ -68,7 +68,8 @@ impl Tool for CheckReach {
         ];
         if poses.iter().all(|(_, position_m, quaternion)| position_m.is_none() && quaternion.is_none()) {
             return Err(
-                "no pose is given; give at least one, as \"right_position_m\": [0.30, -0.20, 0.10]".into()
+                "no pose is given; give at least one, for example \"right_position_m\": [0.30, -0.20, 0.10]"
+                    .into(),
             );
         }
         poses.iter().try_for_each(|(side, position_m, quaternion_wxyz)| {

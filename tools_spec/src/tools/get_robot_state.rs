@@ -37,7 +37,7 @@ impl Tool for GetRobotState {
 /// The reply to `get_robot_state`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotState {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     pub robot: String,
     /// Simulated seconds since the episode began.
     pub time_s: f64,
@@ -81,4 +81,24 @@ pub struct RobotState {
     /// True if the robot has fallen; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fallen: Option<bool>,
+    /// Readings of its sensors in each physics step of the last control step, where the call asks for
+    /// `samples`; left out where the assistance is "paper".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub samples: Option<SensorSamples>,
+}
+
+/// Readings of a robot's sensors every 5 ms. The last ones are those of the reply's `time_s`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SensorSamples {
+    /// Angles of the 43 joints in radians, in the order of `joint_positions_rad`.
+    pub joint_positions_rad: Vec<Vec<f64>>,
+    /// Velocities of the joints in radians per second.
+    pub joint_velocities_rad_s: Vec<Vec<f64>>,
+    /// Torques of the joints in newton metres.
+    pub joint_torques_n_m: Vec<Vec<f64>>,
+    /// Angular velocities of the pelvis in its own frame, as its gyroscope measures them.
+    pub gyro_rad_s: Vec<[f64; 3]>,
+    /// Specific forces at the IMU in the pelvis frame, as its accelerometer measures them: 9.81 upwards at
+    /// rest.
+    pub specific_force_m_s2: Vec<[f64; 3]>,
 }

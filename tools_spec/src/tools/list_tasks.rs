@@ -59,7 +59,8 @@ impl TaskList {
 pub struct TaskInfo {
     /// Id for start_episode, for example `handover`.
     pub id: String,
-    /// The suite that it belongs to, as `tandem+`; left out of the benchmark's tasks and of those of files.
+    /// The suite that it belongs to, for example `tandem+`; left out of the benchmark's tasks and of those of
+    /// files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub suite: Option<String>,
     /// Instruction for a policy of all robots.

@@ -10,6 +10,7 @@ mod observe;
 mod query_depth;
 mod say;
 mod send_joint_chunk;
+mod send_joint_drives;
 mod send_plan;
 mod start_episode;
 mod wait;
@@ -18,7 +19,7 @@ mod walk_to;
 
 pub use check_reach::{CheckReach, HandReach, ReachReply};
 pub use finish::{EndReason, Finish, PhaseTimes, ResultReply};
-pub use get_robot_state::{GetRobotState, RobotState};
+pub use get_robot_state::{GetRobotState, RobotState, SensorSamples};
 pub use get_status::{GetStatus, StatusReply};
 pub use list_tasks::{ListTasks, ProtocolInfo, TaskInfo, TaskList};
 pub use move_wrists::{MoveWrists, WristMove};
@@ -29,6 +30,7 @@ pub use query_depth::{
 };
 pub use say::Say;
 pub use send_joint_chunk::{ACTION_ROW_LEN, JointChunk, SendJointChunk, action_row_layout};
+pub use send_joint_drives::{DRIVE_BLOCKS, DRIVE_JOINTS, DRIVE_ROW_LEN, JointDrives, SendJointDrives};
 pub use send_plan::{Expectation, PlannedCommand, SendPlan};
 pub use start_episode::{
     Brief, Briefing, Instruction, JointInfo, PhaseInfo, RobotInfo, RobotKind, StartEpisode, StartReply,

@@ -138,7 +138,7 @@ impl WristMove {
             checks::finite(name, given.as_slice())?;
             if let Some(soft) = given.filter(|given| *given < least) {
                 return Err(format!(
-                    "{name} is {soft}; give at least {least}, as {common}, or null for hands that do not give way"
+                    "{name} is {soft}; give at least {least}, for example {common}, or null for hands that do not give way"
                 ));
             }
         }

@@ -66,7 +66,7 @@ impl Tool for QueryDepth {
 
     fn validate(&self) -> Result<(), String> {
         if self.fit && self.region.is_none() {
-            return Err("fit is of a region; give region, as {\"from\": [100, 80], \"to\": [220, 170], \"stride\": 10}".into());
+            return Err("fit is of a region; give region, for example {\"from\": [100, 80], \"to\": [220, 170], \"stride\": 10}".into());
         }
         match (&self.pixels, &self.region, &self.surface) {
             (Some(pixels), None, None) => checks::pixels(pixels),
@@ -74,12 +74,12 @@ impl Tool for QueryDepth {
             (None, None, Some(surface)) => match (surface.pixel, surface.color) {
                 (Some(_), None) | (None, Some(_)) => Ok(()),
                 (None, None) | (Some(_), Some(_)) => {
-                    Err("give either surface.pixel, as [160, 120], or surface.color, as \"red\"".into())
+                    Err("give either surface.pixel, for example [160, 120], or surface.color, for example \"red\"".into())
                 }
             },
             _ => Err(
-                "give either pixels, as [[160, 120]], or region, as {\"from\": [100, 80], \"to\": [220, 170], \"stride\": 10}, or \
-                 surface, as {\"pixel\": [160, 120]}"
+                "give either pixels, for example [[160, 120]], or region, for example {\"from\": [100, 80], \"to\": [220, 170], \"stride\": 10}, or \
+                 surface, for example {\"pixel\": [160, 120]}"
                     .into(),
             ),
         }

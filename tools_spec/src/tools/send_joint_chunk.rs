@@ -1,5 +1,5 @@
 //! `send_joint_chunk`: the command of learned policies, one row of joint targets per control step.
-//! `episodes/src/commands/send_joint_chunk.rs` carries it out.
+//! `episodes/src/commands/joints/send_joint_chunk.rs` carries it out.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -17,7 +17,7 @@ pub const ACTION_ROW_LEN: usize = 35;
 const JOINT_BLOCKS: [(&str, usize); 5] =
     [("left_arm", 7), ("right_arm", 7), ("left_hand", 7), ("right_hand", 7), ("waist", 3)];
 
-/// Returns the layout of a row in one line, as `left_arm 7, right_arm 7, ...`.
+/// Returns the layout of a row in one line, for example `left_arm 7, right_arm 7, ...`.
 pub fn action_row_layout() -> String {
     let blocks = JOINT_BLOCKS.into_iter().chain(BASE_COLUMNS.map(|column| (column, 1)));
     blocks.map(|(block, columns)| format!("{block} {columns}")).collect::<Vec<_>>().join(", ")
@@ -83,29 +83,12 @@ impl Tool for SendJointChunk {
 
     /// Returns one a row; every robot has as many.
     fn steps(&self) -> u32 {
-        let rows = self.robots.first().map_or(0, |entry| entry.rows.len());
-        u32::try_from(rows).unwrap_or(u32::MAX)
+        checks::row_steps(self.robots.first().map(|entry| &entry.rows))
     }
 
     fn validate(&self) -> Result<(), String> {
         checks::robots(&self.robots())?;
         checks::each(&self.robots, |entry| &entry.robot, JointChunk::validate)?;
-        let first = &self.robots[0];
-        if first.rows.is_empty() {
-            return Err(format!(
-                "robot {:?} has no rows; give at least 1, one per control step of 20 ms",
-                first.robot
-            ));
-        }
-        match self.robots.iter().find(|entry| entry.rows.len() != first.rows.len()) {
-            Some(other) => Err(format!(
-                "robot {:?} has {} rows and robot {:?} has {}; give every robot the same number of rows",
-                first.robot,
-                first.rows.len(),
-                other.robot,
-                other.rows.len()
-            )),
-            None => Ok(()),
-        }
+        checks::equal_rows(self.robots.iter().map(|entry| (entry.robot.as_str(), &entry.rows)))
     }
 }

@@ -111,7 +111,7 @@ impl Expectation {
         let Some(any_of) = &self.any_of else { return Ok(()) };
         match any_of.is_empty() || any_of.iter().any(Expectation::is_empty) {
             true => {
-                Err("any_of has no condition, or an entry without one; give some, as [{\"heard\": true}]"
+                Err("any_of has no condition, or an entry without one; give some, for example [{\"heard\": true}]"
                     .into())
             }
             false => any_of.iter().try_for_each(Expectation::validate),

@@ -109,7 +109,7 @@ impl Briefing {
         let tools = format!("/v1/episodes/{id}/tools");
         let list = format!("GET {tools} lists your tools, each with the schema of its body.");
         let call = format!(
-            "POST {tools}/NAME calls one. The JSON body has its arguments, as {{\"steps\": 25}} for wait."
+            "POST {tools}/NAME calls one. The JSON body has its arguments, for example {{\"steps\": 25}} for wait."
         );
         let short = "\"short\": true leaves out of a reply what is as it should be. Images are base64 in \
             `images[].png_base64`, 50 kB and more: write a reply of observe to a file.";
@@ -140,7 +140,7 @@ pub struct PhaseInfo {
 /// Instruction of one robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Instruction {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     pub robot: String,
     /// Its part of the task.
     pub instruction: String,
@@ -149,7 +149,7 @@ pub struct Instruction {
 /// One robot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotInfo {
-    /// The robot, as "A".
+    /// The robot, for example "A".
     pub robot: String,
     /// Its kind, one of `kinds`.
     pub kind: String,
@@ -171,7 +171,7 @@ pub struct RobotKind {
 /// One joint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct JointInfo {
-    /// Unitree's name, as `left_elbow_joint`.
+    /// Unitree's name, for example `left_elbow_joint`.
     pub name: String,
     /// Lower limit in radians.
     pub lower_rad: f64,

@@ -97,7 +97,7 @@ impl Tool for WalkTo {
 
     fn validate(&self) -> Result<(), String> {
         if !(1..=MAX_STEPS).contains(&self.steps) {
-            return Err(format!("steps is {}; give 1 to {MAX_STEPS}, as 500", self.steps));
+            return Err(format!("steps is {}; give 1 to {MAX_STEPS}, for example 500", self.steps));
         }
         checks::robots(&self.robots())?;
         checks::each(

@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 use tandem_tools_spec::{
-    ActCall, EPISODE_TOOLS, Hints, LookCall, SendPlan, TalkCall, ToolCall, episode_tool_specs,
-    operator_tool_specs, tool_specs,
+    ActCall, EPISODE_TOOLS, Hints, LookCall, SendJointDrives, SendPlan, TalkCall, Tool as _, ToolCall,
+    episode_tool_specs, operator_tool_specs, tool_specs,
 };
 
 const REFUSED_KEYWORDS: &[&str] = &[
@@ -76,13 +76,20 @@ fn schemas_are_strict() {
 fn the_two_lists_name_the_same_tools() {
     let specs = operator_tool_specs(Hints::On);
     let on_episode: Vec<&str> = specs.iter().filter(|spec| spec.on_episode).map(|spec| spec.name).collect();
-    assert_eq!(on_episode, EPISODE_TOOLS, "operators who talk are offered every tool");
+    let for_models = |tools: &[&'static str]| -> Vec<&str> {
+        tools.iter().copied().filter(|tool| *tool != SendJointDrives::NAME).collect()
+    };
+    assert_eq!(
+        on_episode,
+        for_models(EPISODE_TOOLS),
+        "operators who talk are offered every tool but those for programs"
+    );
     let talks: Vec<&str> = TalkCall::TOOLS.to_vec();
     let of_all: Vec<&str> =
         tool_specs(Hints::On).iter().filter(|spec| spec.on_episode).map(|spec| spec.name).collect();
-    assert_eq!([of_all, talks].concat(), EPISODE_TOOLS, "others cannot talk");
-    let (commands, walk) = SendPlan::COMMANDS.split_at(ActCall::TOOLS.len());
-    assert_eq!((commands, walk), (ActCall::TOOLS, &["walk_to"][..]));
+    assert_eq!([of_all, talks].concat(), on_episode, "others cannot talk");
+    let planned = [for_models(ActCall::TOOLS), vec!["walk_to"]].concat();
+    assert_eq!(planned, SendPlan::COMMANDS);
 }
 
 #[test]
@@ -153,6 +160,20 @@ fn refusals_say_what_would_work() {
         "send_joint_chunk",
         json!({ "robots": [{ "robot": "A", "rows": [row(35)] }, { "robot": "B", "rows": [row(35), row(35)] }] }),
         &["same number of rows"],
+    );
+    let driven = |rows: Value| json!({ "robots": [{ "robot": "A", "rows": rows }] });
+    assert!(ToolCall::parse("send_joint_drives", driven(json!([row(215), row(860)]))).is_ok());
+    refused(
+        "send_joint_drives",
+        driven(json!([row(214)])),
+        &["row 0 holds 214", "215: position_rad 43", "torque_n_m 43, or 860"],
+    );
+    let mut negative = vec![0.0; 215];
+    negative[2 * 43] = -1.0;
+    refused(
+        "send_joint_drives",
+        driven(json!([negative])),
+        &["row 0 has the gain -1", "must not be negative"],
     );
     refused("check_reach", json!({ "robot": "A" }), &["no pose", "right_position_m"]);
     let pixels = |count: usize| json!({ "robot": "A", "pixels": vec![[160, 120]; count] });

@@ -11,8 +11,9 @@ use tandem_tools_spec::{
 
 use feel::Felt;
 
+use super::aim::Aim;
 use super::columns::{self, Clamped};
-use super::motion::{Aim, Motion, RobotSheet};
+use super::motion::{Motion, RobotSheet};
 use crate::convert::{coarse, coarse_pose, isometry_from_sim, rounded_to};
 
 /// Maximum distance from its limit of a measured joint that rests at it.
@@ -45,7 +46,10 @@ pub fn report(clamped: &Clamped, began: &Pose, sensed: &RobotSensed, motion: &Mo
         frame: Some(frame).filter(|frame| *frame != PoseFrame::Pelvis),
         left: hand_report(Side::Left, clamped, sensed, motion, frame),
         right: hand_report(Side::Right, clamped, sensed, motion, frame),
-        base: Some(motion.state().footing.report(&motion.state().base, motion.world_from_pelvis())),
+        base: motion
+            .setpoints()
+            .is_empty()
+            .then(|| motion.state().footing.report(&motion.state().base, motion.world_from_pelvis())),
         pelvis_in_start: Some(coarse_pose(&isometry_from_sim(&sensed.start_from_pelvis))),
         base_motion: Some(base_motion(began, &sensed.start_from_pelvis)),
         waist_joints_clamped: names(

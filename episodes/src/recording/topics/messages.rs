@@ -8,10 +8,10 @@ use base64::{DecodeError, Engine, prelude::BASE64_STANDARD};
 use foxglove::{Encode, Schema, bytes::BufMut};
 use schemars::{JsonSchema, generate::SchemaSettings};
 use serde::{Deserialize, Serialize};
-use tandem_sim::{BaseCommand, RobotCommand, RobotStep, Side, Step};
+use tandem_sim::{BaseCommand, MotorSetpoints, RobotCommand, RobotStep, Side, Step};
 use tandem_tools_spec::{Budget, ExtraInformation, PhaseReached, ToolReply};
 
-use crate::commands::{Called, base_row};
+use crate::commands::{Called, base_row, drive_row};
 use crate::observation::{Picture, TeamObservation};
 use crate::output::OutputError;
 use crate::scoring::{Facts, Grip};
@@ -98,6 +98,25 @@ impl JsonMessage for ActionMessage {
 impl From<&RobotCommand> for Json<ActionMessage> {
     fn from(command: &RobotCommand) -> Self {
         Json(ActionMessage { row: command.upper_rad.into_iter().chain(base_row(&command.base)).collect() })
+    }
+}
+
+/// Setpoints of one robot's motors in one control step: a row of `send_joint_drives`, or one for each
+/// physics step. The action of such a step is the posture that the robot had.
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[schemars(rename = "MotorSetpoints")]
+pub struct SetpointsMessage {
+    pub rows: Vec<Vec<f32>>,
+}
+
+impl JsonMessage for SetpointsMessage {
+    const SCHEMA_NAME: &str = "tandem.MotorSetpoints";
+}
+
+impl From<&[MotorSetpoints]> for Json<SetpointsMessage> {
+    fn from(setpoints: &[MotorSetpoints]) -> Self {
+        let rows = setpoints.iter().map(|setpoints| drive_row(setpoints).collect());
+        Json(SetpointsMessage { rows: rows.collect() })
     }
 }
 

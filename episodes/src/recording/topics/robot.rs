@@ -1,9 +1,11 @@
 //! The topics of one robot: joint states, commands, hand forces and camera images.
 
 use foxglove::messages::{CameraCalibration, CompressedImage, JointState, JointStates};
-use tandem_sim::{RobotCommand, RobotModel, RobotSensed, RobotStep, mjcf::MjcfCamera, render::Intrinsics};
+use tandem_sim::{
+    MotorSetpoints, RobotCommand, RobotModel, RobotSensed, RobotStep, mjcf::MjcfCamera, render::Intrinsics,
+};
 
-use super::messages::{ActionMessage, BaseCommandMessage, HandsMessage, Json};
+use super::messages::{ActionMessage, BaseCommandMessage, HandsMessage, Json, SetpointsMessage};
 use super::transforms::{EGOCENTRIC, robot_frame, rounded, timestamp};
 use crate::commands::{RobotSheet, action_row};
 use crate::observation::Picture;
@@ -24,6 +26,8 @@ pub struct RobotTopics {
     executed: Option<Topic<Json<ActionMessage>>>,
     base_command: Topic<Json<BaseCommandMessage>>,
     hands: Topic<Json<HandsMessage>>,
+    /// Setpoints of motors; opened by the first ones.
+    setpoints: Option<Topic<Json<SetpointsMessage>>>,
     /// Opened by the first image.
     camera: Option<CameraTopics>,
 }
@@ -51,6 +55,7 @@ impl RobotTopics {
             base_command: file.topic(&format!("/{}/base_command", robot.name), &[])?,
             hands: file.topic(&format!("/{}/hands", robot.name), &[])?,
             executed,
+            setpoints: None,
             camera: None,
         })
     }
@@ -84,6 +89,22 @@ impl RobotTopics {
             Some(topic) => file.write(topic, time_s, &Json::from(command)),
             None => Ok(()),
         }
+    }
+
+    /// Appends the setpoints of the motors of the robot called `name` in the control step that ended at
+    /// `time_s`.
+    pub fn setpoints(
+        &mut self,
+        file: &mut McapFile,
+        name: &str,
+        time_s: f64,
+        setpoints: &[MotorSetpoints],
+    ) -> Result<(), OutputError> {
+        let topic = match &mut self.setpoints {
+            Some(topic) => topic,
+            unopened => unopened.insert(file.topic(&setpoints_topic(name), &[])?),
+        };
+        file.write(topic, time_s, &Json::from(setpoints))
     }
 
     /// Appends an image from the robot's head camera, unless there is already one of this moment. Between
@@ -121,6 +142,11 @@ impl RobotTopics {
         };
         file.write(&mut camera.image, time_s, &image)
     }
+}
+
+/// Returns the topic of the setpoints of a robot's motors.
+pub fn setpoints_topic(robot: &str) -> String {
+    format!("/{robot}/motor_setpoints")
 }
 
 fn joint_states(model: &RobotModel, time_s: f64, sensed: &RobotSensed) -> JointStates {

@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 use tandem_sim::{HAND_JOINTS, Side, Sides};
-use tandem_tools_spec::{ActCall, MoveWrists, PoseFrame, SpecError, Tool as _, Wait, Walk, WristMove};
+use tandem_tools_spec::{ActCall, MoveWrists, PoseFrame, SpecError, Wait, Walk, WristMove};
 
 use crate::EpisodeError;
 use crate::commands::{self, Command, columns, wrist_targets};
@@ -53,11 +53,9 @@ impl Pieces {
                 let ways = wrists.robots.iter().map(|entry| WristWay::new(entry, session));
                 PieceKind::Wrists(ways.collect::<Result<_, _>>()?)
             }
-            ActCall::SendJointChunk(_) => {
+            ActCall::SendJointChunk(_) | ActCall::SendJointDrives(_) => {
                 let reason = "its rows are what it does; leave `until` out".into();
-                return Err(
-                    SpecError::Invalid { tool: tandem_tools_spec::SendJointChunk::NAME, reason }.into()
-                );
+                return Err(SpecError::Invalid { tool: call.name(), reason }.into());
             }
         };
         let mut pieces = Pieces { steps: call.steps(), done: 0, kind };

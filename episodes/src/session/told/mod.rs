@@ -93,6 +93,7 @@ impl ShownInformation {
             (ExtraInformation::JointTorques, state.joint_torques_n_m.is_some()),
             (ExtraInformation::Gravity, state.gravity_in_pelvis.is_some()),
             (ExtraInformation::Odometry, state.pelvis_in_start.is_some()),
+            (ExtraInformation::InertialReadings, state.samples.is_some()),
         ];
         self.count_those(&shown, &state.robot);
     }
@@ -174,10 +175,12 @@ fn withhold_state(state: &mut RobotState) {
         pelvis_in_start,
         base_command: _,
         fallen,
+        samples,
     } = state;
     (*joint_velocities_rad_s, *joint_torques_n_m) = (None, None);
     (*left_wrist_target, *right_wrist_target) = (None, None);
     (*gravity_in_pelvis, *pelvis_in_start, *fallen) = (None, None, None);
+    *samples = None;
 }
 
 fn withhold_report(reply: &mut CommandReply) {
@@ -243,8 +246,20 @@ impl Session {
         called.allowed(|tool| self.check_told(tool))
     }
 
-    /// Refuses a call that would show withheld information.
+    /// Refuses setpoints of motors where commands are executed otherwise than told.
+    fn check_drives(&self, call: &ToolCall) -> Result<(), EpisodeError> {
+        match call {
+            ToolCall::Act(ActCall::SendJointDrives(_)) if self.execution.is_some() => {
+                let reason = "this episode's robots execute commands otherwise than told (stress, or disturb), which setpoints of motors do not show; use send_joint_chunk";
+                Err(SpecError::Invalid { tool: call.name(), reason: reason.into() }.into())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses a call that would show withheld information, or that this episode cannot carry out.
     pub(super) fn check_told(&self, call: &ToolCall) -> Result<(), EpisodeError> {
+        self.check_drives(call)?;
         let refused = |reason: &str| {
             EpisodeError::Spec(SpecError::Invalid { tool: call.name(), reason: reason.into() })
         };
@@ -286,7 +301,12 @@ impl Session {
             ToolCall::Act(ActCall::MoveWrists(args)) => args.robots.iter().map(|entry| entry.frame).collect(),
             ToolCall::Look(LookCall::Observe(args)) => vec![args.frame],
             ToolCall::Look(LookCall::GetRobotState(_))
-            | ToolCall::Act(ActCall::Walk(_) | ActCall::SendJointChunk(_) | ActCall::Wait(_))
+            | ToolCall::Act(
+                ActCall::Walk(_)
+                | ActCall::SendJointChunk(_)
+                | ActCall::SendJointDrives(_)
+                | ActCall::Wait(_),
+            )
             | ToolCall::Manage(_)
             | ToolCall::Talk(_) => Vec::new(),
         };

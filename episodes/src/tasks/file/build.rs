@@ -155,7 +155,7 @@ impl Reading<'_> {
     fn within(&mut self, given: &Option<Spanned<u32>>, range: &RangeInclusive<u32>, default: u32) -> u32 {
         let Some(given) = given else { return default };
         if !range.contains(given.as_ref()) {
-            let what = format!("this may be {} to {}, as {default}", range.start(), range.end());
+            let what = format!("this may be {} to {}, for example {default}", range.start(), range.end());
             self.wrong(given.span(), what);
         }
         *given.as_ref()
@@ -339,7 +339,7 @@ impl Reading<'_> {
             }
         }
         if table.objects.as_ref().is_empty() {
-            self.wrong(table.objects.span(), "this moves nothing; name objects, as [\"bottle\"]");
+            self.wrong(table.objects.span(), "this moves nothing; name objects, for example [\"bottle\"]");
         }
         let mut range = |given: &Option<Spanned<Extent>>, most_value: f64| {
             let Some(given) = given else { return 0.0..=0.0 };

@@ -30,7 +30,7 @@ impl Reading<'_> {
             if options.len() < 2 {
                 self.wrong(
                     table.options.span(),
-                    "there is nothing to choose; give two options or more, as [\"left\", \"right\"]",
+                    "there is nothing to choose; give two options or more, for example [\"left\", \"right\"]",
                 );
             }
             for (index, option) in options.iter().enumerate() {
@@ -55,7 +55,8 @@ impl Reading<'_> {
     fn option(&mut self, option: &Spanned<String>, before: &[Spanned<String>]) {
         let text = option.as_ref();
         if text.is_empty() || text.contains(['"', '\'', '\\', '{', '}']) || text.contains(char::is_control) {
-            let what = "an option is a word or two without quotes, brackets and line breaks, as \"left\"";
+            let what =
+                "an option is a word or two without quotes, brackets and line breaks, for example \"left\"";
             self.wrong(option.span(), what);
         }
         if before.iter().any(|other| other.as_ref() == text) {

@@ -154,8 +154,7 @@ impl Reading<'_> {
             conditions.push(self.asked(PhaseSetting::Milestone, &table.condition, for_s, names)?);
         }
         if conditions.is_empty() {
-            let what =
-                "no milestones; give some, as [{ condition = '...' }, { condition = '...', for_s = 0.5 }]";
+            let what = "no milestones; give some, for example [{ condition = '...' }, { condition = '...', for_s = 0.5 }]";
             self.wrong(tables.span(), what);
             return None;
         }
@@ -198,7 +197,7 @@ impl Reading<'_> {
 
     fn duration_s(&mut self, for_s: &Spanned<f64>) -> f64 {
         if !(0.0..=LONGEST_S).contains(for_s.as_ref()) {
-            self.wrong(for_s.span(), format!("this may be 0 to {LONGEST_S} seconds, as 0.5"));
+            self.wrong(for_s.span(), format!("this may be 0 to {LONGEST_S} seconds, for example 0.5"));
         }
         *for_s.as_ref()
     }

@@ -80,7 +80,7 @@ impl<'a> Reading<'a> {
             text.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || byte == b'_');
         if text.is_empty() || text.len() > LONGEST_ID || !plain || text == "all" {
             let what = format!(
-                "{text:?} is no id of {whose}: give 1 to {LONGEST_ID} small letters, digits and _, as pass_the_bottle"
+                "{text:?} is no id of {whose}: give 1 to {LONGEST_ID} small letters, digits and _, for example pass_the_bottle"
             );
             self.wrong(id.span(), what);
         }

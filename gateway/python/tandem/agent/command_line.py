@@ -88,7 +88,7 @@ def model_parser() -> argparse.ArgumentParser:
         "--sampling-seed", type=int, metavar="N", help="seed of the sampling, for openai-chat [default: the endpoint's]"
     )
     model.add_argument(
-        "--extra-body", type=_object, metavar="JSON", help='further fields of requests, as {"top_k": 40} [default: none]'
+        "--extra-body", type=_object, metavar="JSON", help='further fields of requests, for example {"top_k": 40} [default: none]'
     )
     limits = flags.add_argument_group("limits, after which the episode is finished")
     limits.add_argument("--max-tokens-total", type=_count, metavar="N", help="tokens read and written [default: any number]")
@@ -319,7 +319,7 @@ def _robot_model(text: str) -> tuple[str, dict[str, Any]]:
     robot, _, model = text.partition("=")
     name, _, options = model.partition("?")
     if not robot or not name or "?" in robot:
-        raise argparse.ArgumentTypeError("give a robot and its model, as B=MODEL or B=MODEL?api=anthropic&max-usd=2")
+        raise argparse.ArgumentTypeError("give a robot and its model, for example B=MODEL or B=MODEL?api=anthropic&max-usd=2")
     words = [f"--{option}" for option in options.split("&") if option]
     given = vars(model_parser().parse_args([f"--model={name}", *words]))
     return robot, {flag: value for flag, value in given.items() if value is not None}
@@ -329,9 +329,9 @@ def _object(text: str) -> dict[str, Any]:
     try:
         value: Any = json.loads(text)
     except ValueError as error:
-        raise argparse.ArgumentTypeError(f'no JSON ({error}); give an object, as {{"top_k": 40}}') from error
+        raise argparse.ArgumentTypeError(f'no JSON ({error}); give an object, for example {{"top_k": 40}}') from error
     if not isinstance(value, dict):
-        raise argparse.ArgumentTypeError('give a JSON object, as {"top_k": 40}')
+        raise argparse.ArgumentTypeError('give a JSON object, for example {"top_k": 40}')
     return cast("dict[str, Any]", value)
 
 

@@ -124,6 +124,20 @@ class JointChunk:
 
 
 @dataclass(frozen=True)
+class JointDrives:
+    """One robot's rows."""
+
+    robot: str
+    """The robot, for example "A"."""
+
+    rows: Numbers
+    """Rows of 215 numbers: position_rad 43, velocity_rad_s 43, kp_n_m_rad 43, kd_n_m_s_rad 43, torque_n_m 43, each
+    in the joints' order of get_robot_state. Or of 860: four of these, one after another, for the physics steps
+    of 5 ms.
+    """
+
+
+@dataclass(frozen=True)
 class PixelRegion:
     """Pixels of a rectangle at a stride, beginning at `from`."""
 

@@ -209,7 +209,7 @@ class Effort:
     """Effort of a joint."""
 
     joint: str
-    """The joint, as `right_elbow_joint`."""
+    """The joint, for example `right_elbow_joint`."""
 
     share: float
     """Its torque as a share of its limit, from 0 to 1."""
@@ -424,7 +424,7 @@ class RobotFallen:
     """Fall of a robot."""
 
     robot: str
-    """The robot, as "A"."""
+    """The robot, for example "A"."""
 
     fallen: bool
     """True from the moment it fell."""
@@ -443,7 +443,7 @@ class RobotReport:
     """Outcome of a command for one robot."""
 
     robot: str
-    """The robot, as "A"."""
+    """The robot, for example "A"."""
 
     frame: PoseFrame | None
     """The frame of wrist poses where the command named another than that of the pelvis; left out otherwise."""

@@ -147,7 +147,7 @@ class HeldObject:
     """An object in a hand."""
 
     robot: str
-    """The robot, as "A"."""
+    """The robot, for example "A"."""
 
     hand: str
     """`left` or `right`."""
@@ -254,7 +254,7 @@ class RobotState:
     """The reply to `get_robot_state`."""
 
     robot: str
-    """The robot, as "A"."""
+    """The robot, for example "A"."""
 
     time_s: float
     """Simulated seconds since the episode began."""
@@ -307,6 +307,11 @@ class RobotState:
     fallen: bool | None
     """True if the robot has fallen; left out where the assistance is "paper"."""
 
+    samples: SensorSamples | None
+    """Readings of its sensors in each physics step of the last control step, where the call asks for `samples`;
+    left out where the assistance is "paper".
+    """
+
     @staticmethod
     def of(value: Mapping[str, Any]) -> RobotState:
         """Reads what JSON has."""
@@ -325,6 +330,38 @@ class RobotState:
             pelvis_in_start=None if (got := value.get("pelvis_in_start")) is None else Pose.of(got),
             base_command=BaseCommand.of(value["base_command"]),
             fallen=value.get("fallen"),
+            samples=None if (got := value.get("samples")) is None else SensorSamples.of(got),
+        )
+
+
+@dataclass(frozen=True)
+class SensorSamples:
+    """Readings of a robot's sensors every 5 ms. The last ones are those of the reply's `time_s`."""
+
+    joint_positions_rad: tuple[tuple[float, ...], ...]
+    """Angles of the 43 joints in radians, in the order of `joint_positions_rad`."""
+
+    joint_velocities_rad_s: tuple[tuple[float, ...], ...]
+    """Velocities of the joints in radians per second."""
+
+    joint_torques_n_m: tuple[tuple[float, ...], ...]
+    """Torques of the joints in newton metres."""
+
+    gyro_rad_s: tuple[tuple[float, float, float], ...]
+    """Angular velocities of the pelvis in its own frame, as its gyroscope measures them."""
+
+    specific_force_m_s2: tuple[tuple[float, float, float], ...]
+    """Specific forces at the IMU in the pelvis frame, as its accelerometer measures them: 9.81 upwards at rest."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> SensorSamples:
+        """Reads what JSON has."""
+        return SensorSamples(
+            joint_positions_rad=tuple(tuple(item) for item in value["joint_positions_rad"]),
+            joint_velocities_rad_s=tuple(tuple(item) for item in value["joint_velocities_rad_s"]),
+            joint_torques_n_m=tuple(tuple(item) for item in value["joint_torques_n_m"]),
+            gyro_rad_s=tuple(tuple(item) for item in value["gyro_rad_s"]),
+            specific_force_m_s2=tuple(tuple(item) for item in value["specific_force_m_s2"]),
         )
 
 

@@ -55,7 +55,7 @@ class OperatorUse:
     """Requests and thinking time of a robot's operator up to its last command."""
 
     robot: str
-    """The robot, as "A"."""
+    """The robot, for example "A"."""
 
     requests: int
     """Its operator's requests."""

@@ -158,7 +158,7 @@ class Instruction:
     """Instruction of one robot."""
 
     robot: str
-    """The robot, as "A"."""
+    """The robot, for example "A"."""
 
     instruction: str
     """Its part of the task."""
@@ -177,7 +177,7 @@ class JointInfo:
     """One joint."""
 
     name: str
-    """Unitree's name, as `left_elbow_joint`."""
+    """Unitree's name, for example `left_elbow_joint`."""
 
     lower_rad: float
     """Lower limit in radians."""
@@ -289,7 +289,7 @@ class RobotInfo:
     """One robot."""
 
     robot: str
-    """The robot, as "A"."""
+    """The robot, for example "A"."""
 
     kind: str
     """Its kind, one of `kinds`."""
@@ -346,7 +346,9 @@ class TaskInfo:
     """Id for start_episode, for example `handover`."""
 
     suite: str | None
-    """The suite that it belongs to, as `tandem+`; left out of the benchmark's tasks and of those of files."""
+    """The suite that it belongs to, for example `tandem+`; left out of the benchmark's tasks and of those of
+    files.
+    """
 
     instruction: str
     """Instruction for a policy of all robots."""

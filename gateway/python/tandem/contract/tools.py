@@ -12,6 +12,7 @@ from typing import Any
 from .arguments import (
     Destination,
     JointChunk,
+    JointDrives,
     Json,
     Numbers,
     PixelRegion,
@@ -171,6 +172,24 @@ class Tools(ABC):
             "robots": robots,
         }
         return CommandReply.of(self.call("send_joint_chunk", plain(arguments)))
+
+    def send_joint_drives(
+        self,
+        robots: Sequence[JointDrives],
+    ) -> CommandReply:
+        """Drive every joint yourself, legs included, one row per control step of 20 ms: a motor exerts torque_n_m
+        + kp (position - q) + kd (velocity - q'), within its limits. The robot's balance controller, the
+        compensation of gravity and the simulator's gains are off, and a robot that does not balance falls.
+        Afterwards the last row stays in force until the robot's next command; every other command but wait
+        hands the robot back to the balance controller, from the posture in which it is.
+
+        Args:
+            robots: One entry per robot that is driven. Each needs the same number of rows; other robots hold still.
+        """
+        arguments: dict[str, Any] = {
+            "robots": robots,
+        }
+        return CommandReply.of(self.call("send_joint_drives", plain(arguments)))
 
     def wait(
         self,

@@ -21,6 +21,7 @@ PRIVILEGED = "privileged."
 POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
 AXES = ("x", "y", "z")
 HANDS = ("left", "right")
+SETPOINTS = ("position_rad", "velocity_rad_s", "kp_n_m_rad", "kd_n_m_s_rad", "torque_n_m")
 PARTS = ("thumb", "fingers", "palm")
 BASE_VELOCITIES = ("vx_m_s", "vy_m_s", "yaw_rate_rad_s")
 
@@ -101,6 +102,13 @@ def told(recording: Recording, rows: NDArray[np.int64], stride: int) -> NDArray[
     return actions
 
 
+def _setpoints(recording: Recording, robots: list[str], rows: NDArray[np.int64]) -> dict[str, NDArray[np.float32]]:
+    """Returns the setpoints of the motors of driven robots in the step after each row; 0 where nobody drives them."""
+    steps = np.minimum(rows + 1, len(recording) - 1)
+    driven = recording.motor_setpoints
+    return {robot: np.nan_to_num(driven[robot][steps], nan=0.0) for robot in robots if robot in driven}
+
+
 def columns(recording: Recording, view: View, contract: RowContract, rows: NDArray[np.int64]) -> dict[str, Column]:
     """Returns the columns of an episode, except its images."""
     stride = RATES_HZ[0] // contract.rate_hz
@@ -124,6 +132,13 @@ def columns(recording: Recording, view: View, contract: RowContract, rows: NDArr
             names = [(*name, word) for name in names for word in part]
         return Column(np.ascontiguousarray(np.reshape(values, (len(rows), -1))), tuple(".".join(name) for name in names))
 
+    setpoints = {
+        f"motor_setpoints{'' if view.name is not None else '.' + robot}": Column(
+            np.ascontiguousarray(np.reshape(values, (len(rows), -1))),
+            tuple(f"{joint}.{block}" for block in SETPOINTS for joint in recording.joints),
+        )
+        for robot, values in _setpoints(recording, robots, rows).items()
+    }
     objects = recording.objects
     reached_s = [phase.time_s for phase in recording.phases]
     time_s = recording.time_s[rows]
@@ -136,6 +151,7 @@ def columns(recording: Recording, view: View, contract: RowContract, rows: NDArr
     return {
         STATE: of_contract(STATE, recording.states[rows]),
         ACTION: of_contract(ACTION, told(recording, rows, stride)),
+        **setpoints,
         **{f"{PRIVILEGED}joint_{name}": of_robots(values[rows], recording.joints) for name, values in of_joints.items()},
         f"{PRIVILEGED}pelvis_in_world": of_robots(recording.pelvis_in_world[rows], POSE),
         f"{PRIVILEGED}wrists_in_world": of_robots(recording.wrists_in_world[rows], HANDS, POSE),

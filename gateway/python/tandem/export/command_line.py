@@ -74,7 +74,7 @@ def settings_of(given: argparse.Namespace) -> ExportSettings:
     """Creates the settings from the flags."""
     sides = given.size.split("x")
     if len(sides) != 2 or not all(side.isdigit() for side in sides):
-        raise TandemError("no size; give width and height in pixels, as 320x240")
+        raise TandemError("no size; give width and height in pixels, for example 320x240")
     cameras = () if given.cameras == "none" else tuple(given.cameras.split(","))
     return ExportSettings(
         version=given.format,

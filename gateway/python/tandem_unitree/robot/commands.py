@@ -9,7 +9,11 @@ from numpy.typing import NDArray
 
 from ..wire.joints import (
     BASE_COLUMNS,
+    BODY,
+    BODY_MOTORS,
     HAND_COLUMNS,
+    HANDS,
+    JOINTS,
     LEGS,
     PARALLEL_WAIST,
     UPPER_BODY,
@@ -22,6 +26,12 @@ from .remarks import Remarks
 
 RELEASED = ""
 """Name of the mode in which `rt/lowcmd` drives the joints."""
+
+DRIVE_FIELDS = ("q", "dq", "kp", "kd", "tau")
+"""Blocks of a row of motor setpoints, each with a number for each joint, by their names in a motor's command."""
+
+IDLE_FINGER = {"kp": 2.0, "kd": 0.06}
+"""Gains of a finger that no program commands while programs drive the motors."""
 
 FACTORY_MODE = "ai"
 """Name of the mode in which the motion controller of the factory walks and `rt/arm_sdk` moves the arms."""
@@ -41,11 +51,21 @@ class Commands:
     """The commands in force of one robot.
 
     standing: The action row of the pose in which the robot was found; a joint that no program commands keeps it.
+    joint_control: True if `rt/lowcmd` drives every motor with its own gains, legs included.
     """
 
-    def __init__(self, standing: NDArray[np.float64], limits: BaseRange, remarks: Remarks, *, released: bool = False) -> None:
+    def __init__(
+        self,
+        standing: NDArray[np.float64],
+        limits: BaseRange,
+        remarks: Remarks,
+        *,
+        released: bool = False,
+        joint_control: bool = False,
+    ) -> None:
         self.limits = limits
         self.remarks = remarks
+        self.joint_control = joint_control
         self.mode = RELEASED if released else FACTORY_MODE
         self.bad_crcs = 0
         self.height_share = 1.0
@@ -59,6 +79,7 @@ class Commands:
         """Forgets all commands; the robot keeps the pose `standing`, as at the beginning of an episode."""
         self._rest: NDArray[np.float64] = np.array(standing)
         self._low = self._arm = None
+        self._fingers: dict[str, Record] = {}
         self._until_s = -np.inf
 
     def select_mode(self, name: str) -> None:
@@ -85,9 +106,13 @@ class Commands:
         motors = record["motors"]
         if record["mode_machine"] != MODE_MACHINE:
             self.remarks.once(f"rt/lowcmd should have mode_machine {MODE_MACHINE}, as LowState_ has; a G1 may not move without")
-        if (motors["kp"][LEGS] > 0).any() or (motors["tau"][LEGS] != 0).any():
-            self.remarks.once("rt/lowcmd moves the waist and the arms; the legs stay with the simulator's balance controller")
-        self._say_ignored_gains(record, "rt/lowcmd")
+        if not self.joint_control:
+            if (motors["kp"][LEGS] > 0).any() or (motors["tau"][LEGS] != 0).any():
+                self.remarks.once(
+                    "rt/lowcmd moves the waist and the arms; the legs stay with the simulator's balance controller, "
+                    "unless the bridge has --joint-control"
+                )
+            self._say_ignored_gains(record, "rt/lowcmd")
         self._low = record
 
     def arm_command(self, message: bytes) -> bool:
@@ -110,7 +135,8 @@ class Commands:
             return False
         motors = record["motors"]
         driven = motors["kp"] > 0
-        if (motors["tau"] != 0).any():
+        self._fingers[side] = record
+        if not self.joint_control and (motors["tau"] != 0).any():
             self.remarks.once("rt/dex3/*/cmd: kp, kd, dq and tau are ignored; fingers have the gains of the simulator's drives")
         self._rest[HAND_COLUMNS[side][driven]] = _finite(motors["q"], self._rest[HAND_COLUMNS[side]])[driven]
         return True
@@ -128,6 +154,31 @@ class Commands:
     def walks(self, time_s: float) -> bool:
         """Returns whether a velocity other than zero is in force at a simulated time."""
         return time_s < self._until_s and bool(self._velocity.any())
+
+    def drives(self) -> NDArray[np.float64] | None:
+        """Returns the setpoints of all motors in force, 5 by 43 as `DRIVE_FIELDS` has them; `None` while the simulator's own
+        controller drives the robot: without joint control, before the mode is released, and before the first `rt/lowcmd`.
+
+        A motor of the body that is disabled exerts nothing, as on a G1. Fingers that no program commands keep their pose.
+        """
+        if not self.joint_control or self.mode != RELEASED or self._low is None:
+            return None
+        if self._low["mode_pr"] != SERIES_ANKLE:
+            self.remarks.once("mode_pr 1 (parallel ankles and waist, A and B) cannot be simulated: rt/lowcmd is ignored")
+            return None
+        rows = np.zeros((len(DRIVE_FIELDS), JOINTS))
+        enabled = modes_of(self._low)[:BODY_MOTORS] == ENABLED
+        for row, field in zip(rows, DRIVE_FIELDS, strict=True):
+            row[BODY] = np.where(enabled, _finite(self._low["motors"][field][:BODY_MOTORS], np.zeros(BODY_MOTORS)), 0.0)
+        for side, joints in HANDS.items():
+            record = self._fingers.get(side)
+            idle = {"q": self._rest[HAND_COLUMNS[side]], **IDLE_FINGER}
+            driven = np.zeros(HAND_MOTORS, dtype=bool) if record is None else record["motors"]["kp"] > 0
+            for row, field in zip(rows, DRIVE_FIELDS, strict=True):
+                given = np.zeros(HAND_MOTORS, dtype=np.float32) if record is None else record["motors"][field]
+                row[joints] = np.where(driven, _finite(given, np.zeros(HAND_MOTORS)), idle.get(field, 0.0))
+        rows[2:4] = np.maximum(rows[2:4], 0.0)
+        return rows
 
     def row(self, time_s: float) -> NDArray[np.float64]:
         """Returns the action row in force at a simulated time."""

@@ -21,6 +21,27 @@ STEP_S = 0.02
 
 
 @dataclass(frozen=True)
+class Samples:
+    """Readings of a robot's sensors every 5 ms in a control step, oldest first."""
+
+    joints: NDArray[np.float64]
+    """N by 3 by 43: angle, velocity and torque of each joint."""
+
+    gyro_rad_s: NDArray[np.float64]
+    """N by 3: angular velocity of the pelvis in its own frame."""
+
+    specific_force_m_s2: NDArray[np.float64]
+    """N by 3: specific force at the IMU in the pelvis frame."""
+
+    @classmethod
+    def of(cls, told: Mapping[str, Any]) -> Samples:
+        """Returns the samples in a reply."""
+        columns = ("joint_positions_rad", "joint_velocities_rad_s", "joint_torques_n_m")
+        joints = np.stack([np.array(told[column], np.float64) for column in columns], axis=1)
+        return cls(joints, np.array(told["gyro_rad_s"], np.float64), np.array(told["specific_force_m_s2"], np.float64))
+
+
+@dataclass(frozen=True)
 class Moment:
     """State of a robot at one control step."""
 
@@ -37,7 +58,7 @@ class Moment:
     """Position of the pelvis in the start frame."""
 
     gyro_rad_s: Vector
-    """Angular velocity of the pelvis in its own frame, averaged over the last control step."""
+    """Angular velocity of the pelvis in its own frame: the gyroscope's, or without samples the mean of the last step."""
 
     velocity_m_s: Vector
     """Velocity of the pelvis in the start frame, averaged over the last control step."""
@@ -45,33 +66,50 @@ class Moment:
     fallen: bool
     """True if the robot has fallen."""
 
+    samples: Samples | None = None
+    """Readings since the last control step; `None` where they are not told."""
+
+    specific_force_m_s2: Vector | None = None
+    """Specific force at the IMU in the pelvis frame; `None` where it is not told."""
+
     @property
     def accelerometer_m_s2(self) -> Vector:
-        """Specific force of a pelvis at rest, in its own frame: gravity alone, without the acceleration of a gait."""
-        return resting_force(self.quaternion_wxyz)
+        """Specific force that the accelerometer measures; where it is not told, that of a pelvis at rest: gravity alone."""
+        return resting_force(self.quaternion_wxyz) if self.specific_force_m_s2 is None else self.specific_force_m_s2
 
     def until(self, later: Moment, share: float) -> Moment:
-        """Returns the moment between this one and `later`; `share` runs from 0 (this one) to 1 (`later`)."""
+        """Returns the moment between this one and `later`; `share` runs from 0 (this one) to 1 (`later`).
+
+        Sensors show the last sample before that moment. Without samples, joints are interpolated.
+        """
         if share >= 1.0:
             return later
+        joints = self.joints + share * (later.joints - self.joints)
+        gyro, force = later.gyro_rad_s, later.specific_force_m_s2
+        if later.samples is not None:
+            sample = int(share * len(later.samples.joints))
+            joints[[0, 1, 3]] = later.samples.joints[sample]
+            gyro, force = later.samples.gyro_rad_s[sample], later.samples.specific_force_m_s2[sample]
         aligned = later.quaternion_wxyz if self.quaternion_wxyz @ later.quaternion_wxyz >= 0 else -later.quaternion_wxyz
         mixed = self.quaternion_wxyz + share * (aligned - self.quaternion_wxyz)
         return Moment(
             time_s=self.time_s + share * (later.time_s - self.time_s),
-            joints=self.joints + share * (later.joints - self.joints),
+            joints=joints,
             quaternion_wxyz=mixed / math.sqrt(mixed @ mixed),
             position_m=self.position_m + share * (later.position_m - self.position_m),
-            gyro_rad_s=later.gyro_rad_s,
+            gyro_rad_s=gyro,
             velocity_m_s=later.velocity_m_s,
             fallen=later.fallen,
+            specific_force_m_s2=force,
         )
 
 
 def moment_of(state: Mapping[str, Any], before: Moment | None) -> Moment:
     """Returns the moment that a reply of `get_robot_state` describes.
 
-    Rates come from the difference to `before`. Under the assistance "paper" a reply has neither velocities nor torques nor
-    odometry: velocities come from differences, torques are zero and the pelvis seems to stand upright at its start.
+    Velocities and accelerations come from the difference to `before`. Under the assistance "paper" a reply has neither
+    velocities nor torques nor odometry: velocities come from differences, torques are zero and the pelvis seems to stand
+    upright at its start.
     """
     time_s = float(state["time_s"])
     step_s = STEP_S if before is None or time_s <= before.time_s else time_s - before.time_s
@@ -86,14 +124,21 @@ def moment_of(state: Mapping[str, Any], before: Moment | None) -> Moment:
     quaternion = np.array([1.0, 0.0, 0.0, 0.0] if pose is None else pose["quaternion_wxyz"])
     position = np.zeros(3) if pose is None else np.array(pose["position_m"])
     still = np.zeros(3)
+    samples = Samples.of(state["samples"]) if state.get("samples") else None
+    if samples is not None:
+        gyro = samples.gyro_rad_s[-1]
+    else:
+        gyro = still if before is None else rate_between(before.quaternion_wxyz, quaternion, step_s)
     return Moment(
         time_s=time_s,
         joints=np.stack([q, dq, ddq, tau]),
         quaternion_wxyz=quaternion,
         position_m=position,
-        gyro_rad_s=still if before is None else rate_between(before.quaternion_wxyz, quaternion, step_s),
+        gyro_rad_s=gyro,
         velocity_m_s=still if before is None else (position - before.position_m) / step_s,
         fallen=bool(state.get("fallen", False)),
+        samples=samples,
+        specific_force_m_s2=None if samples is None else samples.specific_force_m_s2[-1],
     )
 
 

@@ -37,6 +37,9 @@ class RobotSettings:
     released: bool = False
     """True if it begins with the mode released, so that `rt/lowcmd` drives it."""
 
+    joint_control: bool = False
+    """True if `rt/lowcmd` drives every motor with its own gains, and the simulator does not balance the robot."""
+
     camera_fps: float = 15.0
     """Pictures a second while a client watches; 0 for no cameras."""
 
@@ -53,7 +56,9 @@ class Robot:
         self.latest = self._previous = link.sense(None)
         self._sensed_s = time.monotonic()
         standing = standing_row(self.latest.joints[0], link.limits.pelvis_height_m[1])
-        self.commands = Commands(standing, link.limits, self.remarks, released=settings.released)
+        self.commands = Commands(
+            standing, link.limits, self.remarks, released=settings.released, joint_control=settings.joint_control
+        )
         self.services = Services(self.commands, lambda: self.latest.time_s)
 
     def begin(self, link: Link) -> None:
@@ -72,7 +77,12 @@ class Robot:
         self.stepped.set()
 
     def shown(self) -> Moment:
-        """Returns the moment to publish. The last control step is played back within the 20 ms after it."""
+        """Returns the moment to publish. The last control step is played back within the 20 ms after it.
+
+        A program that balances the robot gets the latest moment at once, which its next command can still answer.
+        """
         with self.lock:
             previous, latest, sensed_s = self._previous, self.latest, self._sensed_s
+        if self.settings.joint_control:
+            return latest
         return previous.until(latest, min(1.0, (time.monotonic() - sensed_s) / STEP_S))

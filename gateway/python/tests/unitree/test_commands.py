@@ -19,9 +19,9 @@ WAIST_YAW_COLUMN, WAIST_ROLL_COLUMN, LEFT_ELBOW_COLUMN = 28, 29, 3
 WAIST_YAW, WAIST_ROLL, LEFT_ELBOW, LEFT_KNEE, WEIGHT = 12, 13, 18, 3, 29
 
 
-def commands(*, released: bool = False) -> Commands:
+def commands(*, released: bool = False, joint_control: bool = False) -> Commands:
     """A robot whose joints rest at 0.1 rad."""
-    return Commands(np.full(35, 0.1), BaseRange(), Remarks("A"), released=released)
+    return Commands(np.full(35, 0.1), BaseRange(), Remarks("A"), released=released, joint_control=joint_control)
 
 
 def low(targets: dict[int, float], *, weight: float = 1.0, mode: int = 1, **fields: int) -> Record:
@@ -82,6 +82,40 @@ def test_a_disabled_motor_of_lowcmd_keeps_its_pose() -> None:
     robot = commands(released=True)
     robot.low_record(low({WAIST_YAW: 0.5}, mode=0))
     assert robot.row(0.0)[WAIST_YAW_COLUMN] == 0.1
+
+
+def test_joint_control_drives_every_motor_with_its_gains() -> None:
+    robot = commands(joint_control=True)
+    assert robot.drives() is None, "the mode is not released"
+    robot.select_mode(RELEASED)
+    assert robot.drives() is None, "no command has come"
+    record = low({LEFT_KNEE: 0.5, LEFT_ELBOW: -0.2})
+    record["motors"]["kd"][LEFT_KNEE], record["motors"]["tau"][LEFT_KNEE] = 2.0, -3.0
+    robot.low_record(record)
+    drives = robot.drives()
+    assert drives is not None and drives.shape == (5, 43)
+    # Joints of the right arm and of the hands come after the left arm in Tandem's order.
+    assert drives[:, LEFT_KNEE].tolist() == [0.5, 0.0, 60.0, 2.0, -3.0]
+    assert np.allclose(drives[:, 18], [-0.2, 0.0, 60.0, 0.0, 0.0])
+    assert np.allclose(drives[:, 22], [0.1, 0.0, 2.0, 0.06, 0.0]), "an idle finger keeps its pose"
+    assert not robot.remarks.made, "nothing is ignored"
+    robot.low_record(low({LEFT_KNEE: 0.5}, mode=0))
+    disabled = robot.drives()
+    assert disabled is not None and not disabled[:, LEFT_KNEE].any(), "a disabled motor is limp"
+    hand = blank(HAND_COMMAND)
+    hand["count"] = 7
+    hand["motors"]["q"][3:5], hand["motors"]["kp"][3:5], hand["motors"]["tau"][3:5] = 0.6, 1.5, 0.2
+    assert robot.hand_command("right", serialized(hand))
+    fingers = robot.drives()
+    assert fingers is not None and np.allclose(fingers[[0, 2, 4]][:, 41:43], [[0.6] * 2, [1.5] * 2, [0.2] * 2])
+    robot.select_mode(FACTORY_MODE)
+    assert robot.drives() is None
+
+
+def test_parallel_rods_cannot_be_driven() -> None:
+    robot = commands(released=True, joint_control=True)
+    robot.low_record(low({LEFT_KNEE: 0.5}, mode_pr=1))
+    assert robot.drives() is None and any("mode_pr 1" in remark for remark in robot.remarks.made)
 
 
 def test_what_is_ignored_is_said_once() -> None:

@@ -76,6 +76,25 @@ def test_the_torso_turns_as_the_difference_of_its_orientations() -> None:
     assert np.allclose(rate, rate_between(orientation, after, step_s), atol=1e-4)
 
 
+def test_samples_are_played_back_between_control_steps() -> None:
+    told = state(1.02, 0.3, 0.0)
+    rows = [[0.1 * (sample + 1)] * 43 for sample in range(4)]
+    told["samples"] = {
+        "joint_positions_rad": rows,
+        "joint_velocities_rad_s": rows,
+        "joint_torques_n_m": rows,
+        "gyro_rad_s": [[0.0, 0.0, float(sample)] for sample in range(4)],
+        "specific_force_m_s2": [[0.0, float(sample), 9.81] for sample in range(4)],
+    }
+    first = moment_of(state(1.0, 0.0, 0.0), None)
+    later = moment_of(told, first)
+    assert later.gyro_rad_s.tolist() == [0.0, 0.0, 3.0] and later.accelerometer_m_s2.tolist() == [0.0, 3.0, 9.81]
+    between = first.until(later, 0.3)
+    assert np.allclose(between.joints[[0, 1, 3]], 0.2) and between.gyro_rad_s[2] == 1.0
+    assert between.accelerometer_m_s2.tolist() == [0.0, 1.0, 9.81]
+    assert np.allclose(first.accelerometer_m_s2, [0.0, 0.0, 9.81]), "without samples, gravity alone"
+
+
 def test_a_reply_becomes_a_moment() -> None:
     first = moment_of(state(1.0, 0.1, 0.0), None)
     second = moment_of(state(1.02, 0.2, 0.01), first)

@@ -50,7 +50,7 @@ pub struct CollectArgs {
 /// Parses the level of disturbance.
 fn parse_level(text: &str) -> Result<f32, String> {
     let level = text.parse().ok().filter(|level| (0.0..=Variation::MAX_DISTURB).contains(level));
-    level.ok_or_else(|| format!("no level; give 0 to {}, as 1", Variation::MAX_DISTURB))
+    level.ok_or_else(|| format!("no level; give 0 to {}, for example 1", Variation::MAX_DISTURB))
 }
 
 /// Plays and records.

@@ -131,7 +131,7 @@ impl FromStr for ShardFlag {
             text.split_once('/').and_then(|(index, of)| Some((index.parse().ok()?, of.parse().ok()?)));
         match parts {
             Some((index, of)) if index < of => Ok(ShardFlag(Shard { index, of })),
-            _ => Err("no share; give I/N with I from 0 to N - 1, as 0/10".into()),
+            _ => Err("no share; give I/N with I from 0 to N - 1, for example 0/10".into()),
         }
     }
 }

@@ -105,8 +105,8 @@ fn parse_amount(text: &str) -> Result<f64, String> {
 fn parse_object(text: &str) -> Result<String, String> {
     match serde_json::from_str(text) {
         Ok(Value::Object(_)) => Ok(text.into()),
-        Ok(_) => Err("give a JSON object, as {\"top_k\": 40}".into()),
-        Err(error) => Err(format!("no JSON ({error}); give an object, as {{\"top_k\": 40}}")),
+        Ok(_) => Err("give a JSON object, for example {\"top_k\": 40}".into()),
+        Err(error) => Err(format!("no JSON ({error}); give an object, for example {{\"top_k\": 40}}")),
     }
 }
 
@@ -124,7 +124,9 @@ impl AgentFlags {
     pub fn parse_policy(text: &str) -> Result<AgentFlags, String> {
         let (model, options) = text.split_once('?').unwrap_or((text, ""));
         if model.trim().is_empty() {
-            return Err("no model; give one, as agent:MODEL or agent:MODEL?api=anthropic&max-usd=2".into());
+            return Err(
+                "no model; give one, for example agent:MODEL or agent:MODEL?api=anthropic&max-usd=2".into()
+            );
         }
         let options = options.split('&').filter(|option| !option.is_empty());
         let arguments =

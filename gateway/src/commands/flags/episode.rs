@@ -154,7 +154,9 @@ const MAX_SEEDS: u64 = 100_000;
 /// A text that names no seeds, or too many.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum SeedsError {
-    #[error("{0:?} names no seeds; give one, as 3, or a range with both ends included, as 0-9 or 0..9")]
+    #[error(
+        "{0:?} names no seeds; give one, for example 3, or a range with both ends included, for example 0-9 or 0..9"
+    )]
     NoSeeds(String),
     #[error("{text:?} names {seeds} seeds; give at most {MAX_SEEDS} in one command")]
     TooMany { text: String, seeds: u64 },

@@ -90,7 +90,7 @@ fn help() -> String {
 fn parse_policy(text: &str) -> Result<PolicyChoice, String> {
     if let Some(command) = text.strip_prefix(EXEC) {
         return match command.trim().is_empty() {
-            true => Err("no command; give one, as exec:\"python3 agent.py\"".into()),
+            true => Err("no command; give one, for example exec:\"python3 agent.py\"".into()),
             false => Ok(PolicyChoice::Program(command.into())),
         };
     }
@@ -99,7 +99,7 @@ fn parse_policy(text: &str) -> Result<PolicyChoice, String> {
     }
     if let Some(path) = text.strip_prefix(OPEN_LOOP) {
         return match path.is_empty() {
-            true => Err("no recording; give one, as open-loop:runs/demonstrations".into()),
+            true => Err("no recording; give one, for example open-loop:runs/demonstrations".into()),
             false => Ok(PolicyChoice::OpenLoop(path.into())),
         };
     }
@@ -163,7 +163,7 @@ impl PolicyFlags {
         let driving = self.driving()?;
         let (key_file, robots) = (self.policy_key_file, self.robot_models);
         if !robots.is_empty() && !matches!(self.policy, PolicyChoice::Agent(_)) {
-            return misplaced("--robot-model", "language models, as agent:MODEL");
+            return misplaced("--robot-model", "language models, for example agent:MODEL");
         }
         if key_file.is_some() && !matches!(self.policy, PolicyChoice::Remote(..)) {
             return misplaced("--policy-key-file", "policies at a server");
@@ -272,7 +272,7 @@ fn parse_partner(text: &str) -> Result<PartnerAddress, String> {
     match parse_policy(text)? {
         PolicyChoice::Remote(protocol, urls) => Ok(PartnerAddress(protocol, urls)),
         PolicyChoice::Player(_) | PolicyChoice::Program(_) | PolicyChoice::Agent(_) | PolicyChoice::OpenLoop(_) => Err(
-            "a partner is a policy at a server, as act:http://127.0.0.1:8500/act; people choose experts and programs on /operate without a flag"
+            "a partner is a policy at a server, for example act:http://127.0.0.1:8500/act; people choose experts and programs on /operate without a flag"
                 .into(),
         ),
     }
@@ -363,15 +363,15 @@ mod tests {
             assert!(refusal.contains(says), "{refusal}");
         };
         check(&["--policy", "expart"], "have: expert, no_words, idle, demonstration, exec:COMMAND");
-        check(&["--policy", "exec: "], "give one, as exec:");
-        check(&["--policy", "open-loop:"], "give one, as open-loop:runs/demonstrations");
+        check(&["--policy", "exec: "], "give one, for example exec:");
+        check(&["--policy", "open-loop:"], "give one, for example open-loop:runs/demonstrations");
         check(
             &["--policy", "open-loop:nowhere/episode.mcap"],
             "cannot read the recording nowhere/episode.mcap",
         );
         check(&["--policy", "open-loop:src"], "src holds no recording of an episode; give an episode.mcap");
         check(&["--policy", "open-loop:src", "--per-robot"], "--per-robot is for programs");
-        check(&["--policy", "agent:?api=openai"], "give one, as agent:MODEL");
+        check(&["--policy", "agent:?api=openai"], "give one, for example agent:MODEL");
         check(
             &["--policy", "agent:m?key=1"],
             "unexpected argument '--key' found; an option of agent: is one of api, base-url",
@@ -432,7 +432,7 @@ mod tests {
             assert!(refusal.contains(says), "{refusal}");
         };
         check(&["--partner", "act:http://a/act"], "act: needs --partner-map, a file or one of openpi");
-        check(&["--partner", "expert"], "a partner is a policy at a server, as act:http://");
+        check(&["--partner", "expert"], "a partner is a policy at a server, for example act:http://");
         check(&["--partner", "exec:true"], "a partner is a policy at a server");
         check(&["--partner-map", "openpi"], "--partner");
     }

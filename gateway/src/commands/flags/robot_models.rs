@@ -25,7 +25,7 @@ struct RobotModel {
 }
 
 fn parse_model(text: &str) -> Result<RobotModel, String> {
-    let example = "give a robot and its model, as B=MODEL or B=MODEL?api=anthropic&max-usd=2";
+    let example = "give a robot and its model, for example B=MODEL or B=MODEL?api=anthropic&max-usd=2";
     let (robot, model) = text.split_once('=').ok_or(example)?;
     if robot.is_empty() || robot.contains('?') {
         return Err(example.into());

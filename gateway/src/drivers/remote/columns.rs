@@ -7,7 +7,9 @@ use tandem_episodes::{
     rows::velocities,
     tasks::{self, Task},
 };
-use tandem_tools_spec::{ACTION_ROW_LEN, BASE_COLUMNS, ExtraInformation, Pose, RobotState};
+use tandem_tools_spec::{
+    ACTION_ROW_LEN, BASE_COLUMNS, DRIVE_ROW_LEN, ExtraInformation, Pose, RobotState, SensorSamples,
+};
 
 use super::poses::{POSE_LEN, RotationForm, pose_values};
 
@@ -15,7 +17,7 @@ use super::poses::{POSE_LEN, RotationForm, pose_values};
 type Block = (String, Range<usize>);
 
 /// Blocks of a robot's state, in the order of [`state_values`], except those of its wrists.
-const STATE: [(&str, Range<usize>); 14] = [
+const STATE: [(&str, Range<usize>); 17] = [
     ("left_leg", 0..6),
     ("right_leg", 6..12),
     ("waist", 12..15),
@@ -28,7 +30,10 @@ const STATE: [(&str, Range<usize>); 14] = [
     ("pelvis_in_start", STATE_PELVIS..STATE_MOMENT),
     ("episode", STATE_MOMENT..STATE_MOMENT + 1),
     ("step", STATE_MOMENT + 1..STATE_MOMENT + 2),
-    ("reset", STATE_MOMENT + 2..STATE_BASE),
+    ("reset", STATE_MOMENT + 2..STATE_RATES),
+    ("joint_velocities", STATE_RATES..STATE_GYRO),
+    ("gyro", STATE_GYRO..STATE_GYRO + 3),
+    ("specific_force", STATE_GYRO + 3..STATE_BASE),
     ("base_command", STATE_BASE..STATE_LEN),
 ];
 const JOINTS: usize = 43;
@@ -36,8 +41,10 @@ const STATE_WRISTS: [usize; 2] = [JOINTS, JOINTS + POSE_LEN];
 const STATE_GRAVITY: usize = JOINTS + 2 * POSE_LEN;
 const STATE_PELVIS: usize = STATE_GRAVITY + 3;
 const STATE_MOMENT: usize = STATE_PELVIS + 7;
+const STATE_RATES: usize = STATE_MOMENT + 3;
+const STATE_GYRO: usize = STATE_RATES + JOINTS;
 /// The base command is last.
-const STATE_BASE: usize = STATE_MOMENT + 3;
+const STATE_BASE: usize = STATE_GYRO + 6;
 const STATE_LEN: usize = STATE_BASE + 4;
 
 /// Blocks of an action row, in the order of `send_joint_chunk`.
@@ -53,8 +60,12 @@ const ACTION: [(&str, Range<usize>); 7] = [
 const ACTION_BASE: usize = 31;
 /// After a row, a policy may command wrist poses.
 const ACTION_WRISTS: [usize; 2] = [ACTION_ROW_LEN, ACTION_ROW_LEN + POSE_LEN];
+/// After these, it may command the setpoints of all motors, in the order of `send_joint_drives`.
+const ACTION_MOTORS: usize = ACTION_ROW_LEN + 2 * POSE_LEN;
 /// Number of columns that a policy may command.
-pub const ACTION_LEN: usize = ACTION_ROW_LEN + 2 * POSE_LEN;
+pub const ACTION_LEN: usize = ACTION_MOTORS + DRIVE_ROW_LEN;
+/// Blocks of motors' setpoints, each with the 43 joints.
+const MOTORS: [&str; 5] = ["motor_position", "motor_velocity", "motor_kp", "motor_kd", "motor_torque"];
 
 /// Names of the wrists, left before right throughout.
 pub const WRISTS: [&str; 2] = ["left_wrist", "right_wrist"];
@@ -71,8 +82,9 @@ const WRIST_PARTS: [(&str, Range<usize>); 6] = [
 /// Returns the full state of a robot, or `None` if a part of the state is withheld.
 ///
 /// The order is: joints in rad; the pose of each wrist in the pelvis frame; the direction of gravity; the
-/// pelvis by the robot's own odometry (x, y, z in m and w, x, y, z); the moment of the episode; the base
-/// command in force in the order of [`BASE_COLUMNS`].
+/// pelvis by the robot's own odometry (x, y, z in m and w, x, y, z); the moment of the episode; joint
+/// velocities, gyro and specific force, or zeros if they were not requested; the base command in force in
+/// the order of [`BASE_COLUMNS`].
 pub fn state_values(state: &RobotState, moment: &EpisodeMoment) -> Option<Vec<f64>> {
     let joints = state.joint_positions_rad.0.iter().map(|(_, angle_rad)| *angle_rad);
     let wrists = [&state.left_wrist, &state.right_wrist].into_iter();
@@ -84,7 +96,16 @@ pub fn state_values(state: &RobotState, moment: &EpisodeMoment) -> Option<Vec<f6
     let EpisodeMoment { episode, done_steps, is_first } = *moment;
     let moment = [episode.into(), done_steps, f64::from(is_first)];
     let sensed = joints.chain(wrists).chain(state.gravity_in_pelvis?).chain(pelvis);
-    Some(sensed.chain(moment).chain(base).collect())
+    Some(sensed.chain(moment).chain(rates(state.samples.as_ref())).chain(base).collect())
+}
+
+/// Returns the latest joint velocities, gyro and specific force.
+fn rates(samples: Option<&SensorSamples>) -> Vec<f64> {
+    let latest = samples.and_then(|samples| {
+        let rates = samples.joint_velocities_rad_s.last()?.iter().copied();
+        Some(rates.chain(*samples.gyro_rad_s.last()?).chain(*samples.specific_force_m_s2.last()?).collect())
+    });
+    latest.unwrap_or_else(|| vec![0.0; STATE_BASE - STATE_RATES])
 }
 
 /// Moment of an episode, for policies with memory at servers that may have several episodes at once.
@@ -161,6 +182,16 @@ pub fn hand(side: usize) -> Range<usize> {
     ACTION[2 + side].1.clone()
 }
 
+/// Returns the columns of all motors' setpoints among those that a policy may command.
+pub fn motors() -> Range<usize> {
+    ACTION_MOTORS..ACTION_LEN
+}
+
+/// Returns the columns of wrists' poses among those that a policy may command.
+pub fn wrists() -> Range<usize> {
+    ACTION_ROW_LEN..ACTION_MOTORS
+}
+
 /// Returns the columns of a wrist's position among those that a policy may command.
 pub fn wrist_position(side: usize) -> Range<usize> {
     ACTION_WRISTS[side]..ACTION_WRISTS[side] + 3
@@ -190,6 +221,8 @@ pub fn extra_columns(columns: &[usize]) -> Vec<ExtraInformation> {
     let extra = [
         (ExtraInformation::Gravity, STATE_GRAVITY..STATE_PELVIS),
         (ExtraInformation::Odometry, STATE_PELVIS..STATE_MOMENT),
+        (ExtraInformation::JointVelocities, STATE_RATES..STATE_GYRO),
+        (ExtraInformation::InertialReadings, STATE_GYRO..STATE_BASE),
     ];
     let named = |of: &Range<usize>| columns.iter().any(|column| of.contains(column));
     extra.into_iter().filter(|(_, of)| named(of)).map(|(what, _)| what).collect()
@@ -206,12 +239,13 @@ pub fn action_columns(names: &[String]) -> Result<Vec<usize>, String> {
 }
 
 /// Returns the name of column number `column` that a policy may command; for a wrist, the name of the
-/// part.
+/// part, and for a motor that of the block.
 pub fn action_name(column: usize) -> String {
     let single = action_singles().into_iter().find(|(_, at)| *at == column).map(|(name, _)| name);
     let parts = || wrist_blocks(ACTION_WRISTS).into_iter().filter(|(name, _)| !WRISTS.contains(&&**name));
     let part = || parts().find(|(_, columns)| columns.contains(&column)).map(|(name, _)| name);
-    single.or_else(part).unwrap_or_default()
+    let motor = || motor_blocks().find(|(_, columns)| columns.contains(&column)).map(|(name, _)| name);
+    single.or_else(part).or_else(motor).unwrap_or_default()
 }
 
 fn state_blocks() -> Vec<Block> {
@@ -221,7 +255,17 @@ fn state_blocks() -> Vec<Block> {
 
 fn action_blocks() -> Vec<Block> {
     let own = ACTION.iter().map(|(name, columns)| ((*name).to_owned(), columns.clone()));
-    own.chain(wrist_blocks(ACTION_WRISTS)).collect()
+    let all_motors = ("motors".to_owned(), motors());
+    own.chain(wrist_blocks(ACTION_WRISTS)).chain(motor_blocks()).chain([all_motors]).collect()
+}
+
+/// Yields the blocks of motors' setpoints.
+fn motor_blocks() -> impl Iterator<Item = Block> {
+    let first = |index: usize| ACTION_MOTORS + index * JOINTS;
+    MOTORS
+        .iter()
+        .enumerate()
+        .map(move |(index, name)| ((*name).to_owned(), first(index)..first(index) + JOINTS))
 }
 
 /// Returns the blocks of wrists whose columns begin at `starts`.
@@ -338,11 +382,24 @@ mod tests {
             let named = action_columns(&[format!("right_wrist{}", part.0)]).unwrap();
             assert_eq!(named, wrist_rotation(1, form).collect::<Vec<_>>());
         }
-        assert_eq!(action_columns(&names("right_wrist_rows_6d")).unwrap().last(), Some(&(ACTION_LEN - 1)));
+        assert_eq!(action_columns(&names("right_wrist_rows_6d")).unwrap().last(), Some(&(ACTION_MOTORS - 1)));
         let named =
             ["left_wrist", "right_wrist_rows_6d", "left_wrist_yaw_joint", "left_arm"].map(wrist_named);
         assert_eq!(named, [Some(0), Some(1), None, None]);
         assert_eq!(state_columns(&names("pelvis_in_start gravity")).map(|columns| columns.len()), Ok(10));
+    }
+
+    #[test]
+    fn motors_are_named_by_block() {
+        let all = action_columns(&names("motors")).unwrap();
+        assert_eq!(all, action_columns(&MOTORS.map(String::from)).unwrap());
+        assert_eq!((all.len(), &*action_name(all[86])), (215, "motor_kp"));
+        let rates = state_columns(&names("joint_velocities gyro specific_force")).unwrap();
+        assert_eq!((rates.len(), *rates.last().unwrap()), (49, STATE_BASE - 1));
+        assert_eq!(
+            extra_columns(&rates),
+            [ExtraInformation::JointVelocities, ExtraInformation::InertialReadings]
+        );
     }
 
     #[test]

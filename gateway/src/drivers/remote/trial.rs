@@ -243,6 +243,10 @@ impl<'a> MapTrial<'a> {
 
     /// Describes the columns that no key commands.
     fn held(&self) -> String {
+        if self.map.drives_motors() {
+            return "motors are driven without the robot's own controller: the policy balances the robot\n"
+                .into();
+        }
         let told = self.map.told_columns();
         let blocks = ["left_arm", "right_arm", "left_hand", "right_hand", "waist", "base_command"];
         let mut held = Vec::new();

@@ -2,6 +2,7 @@
 //!
 //! It begins with the operator's first request. It stands while the operator's command waits or is executed,
 //! and once nobody waits for the operator any more. Each operator has the whole limit of the protocol.
+//! An operator in real time, who commands once in a control step, thinks only beyond that step.
 
 use std::{
     sync::Arc,
@@ -17,14 +18,22 @@ use crate::hosting::{EpisodeThread, HostingError};
 #[derive(Debug, Default)]
 pub struct OperatorClock {
     spent: Duration,
-    /// Moment when it began to run; `None` while it stands.
+    /// Moment when it began to run, or will begin; `None` while it stands.
     since: Option<Instant>,
+    /// Time after a command that counts as pacing.
+    pace: Duration,
 }
 
 impl OperatorClock {
-    /// Runs from now on, if it does not yet.
+    /// Runs from now on, if it does not yet; for an operator in real time once its pacing is over.
     pub fn run(&mut self) {
-        self.since.get_or_insert_with(Instant::now);
+        let pace = self.pace;
+        self.since.get_or_insert_with(|| Instant::now() + pace);
+    }
+
+    /// Sets the time after a command that counts as pacing: a control step in real time, else none.
+    pub fn set_pace(&mut self, pace: Duration) {
+        self.pace = pace;
     }
 
     /// Stands from now on.
@@ -105,5 +114,19 @@ mod tests {
         assert!(spent > Duration::ZERO && clock.thought() == spent, "it stands");
         clock.add(Duration::from_secs(1));
         assert_eq!(clock.thought(), spent + Duration::from_secs(1));
+    }
+
+    #[test]
+    fn pacing_is_not_thinking() {
+        let mut clock = OperatorClock::default();
+        clock.set_pace(Duration::from_secs(60));
+        clock.run();
+        std::thread::sleep(Duration::from_millis(2));
+        assert_eq!(clock.thought(), Duration::ZERO);
+        clock.stop();
+        clock.set_pace(Duration::ZERO);
+        clock.run();
+        std::thread::sleep(Duration::from_millis(2));
+        assert!(clock.thought() >= Duration::from_millis(2));
     }
 }

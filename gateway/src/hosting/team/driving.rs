@@ -1,7 +1,8 @@
-//! Teleoperation in real time by people.
+//! Control in real time by people, and by programs that speak as their page does.
 //!
-//! A page sends up to 50 setpoints a second for its robot's wrists, fingers and base. Every control step,
-//! the latest setpoint becomes a `move_wrists` of one step by the operator of that robot. It goes through
+//! A page sends up to 50 setpoints a second for its robot's wrists, fingers and base; a program may send
+//! joint targets or setpoints of motors. Every control step, the latest setpoint becomes a command of one
+//! step by the operator of that robot. It goes through
 //! the team's rounds like any other command. So the world runs no faster than real time, and pauses while
 //! a person is away.
 //!
@@ -16,7 +17,10 @@ use std::{
 };
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use tandem_tools_spec::{Call, MoveWrists, ToolCall, WristMove};
+use tandem_tools_spec::{
+    Call, GetRobotState, JointChunk, JointDrives, MoveWrists, SendJointChunk, SendJointDrives, ToolCall,
+    WristMove,
+};
 use tokio::{
     sync::mpsc,
     time::{MissedTickBehavior, interval},
@@ -26,7 +30,7 @@ use super::{Team, Wheels};
 use crate::hosting::{Answer, EpisodeThread, HostingError};
 
 /// Duration of a control step.
-const TICK: Duration = Duration::from_millis(20);
+pub(super) const TICK: Duration = Duration::from_millis(20);
 
 /// Silence after which a person counts as away, for example because the page is hidden or the link is
 /// cut.
@@ -39,11 +43,34 @@ const WRIST_RAD_PER_STEP: f64 = 6.0 * 0.02;
 /// Number of answers that a page may lag behind.
 const KEPT_ANSWERS: usize = 64;
 
+/// Setpoint of a robot for one control step.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Setpoint {
+    /// Wrists, fingers and base.
+    Wrists(WristMove),
+    /// One row of joint targets and base.
+    Joints(JointChunk),
+    /// One row of motors' setpoints.
+    Drives(JointDrives),
+}
+
+impl Setpoint {
+    /// Returns the command of one control step.
+    pub fn call(self) -> ToolCall {
+        match self {
+            Setpoint::Wrists(entry) => MoveWrists { steps: 1, robots: vec![entry] }.into(),
+            Setpoint::Joints(chunk) => SendJointChunk { robots: vec![chunk] }.into(),
+            Setpoint::Drives(drives) => SendJointDrives { robots: vec![drives] }.into(),
+        }
+    }
+}
+
 /// A person's current request for a robot.
 #[derive(Debug, Clone)]
 pub struct Wish {
-    /// Wrist, finger and base setpoint.
-    pub wrist_move: WristMove,
+    pub setpoint: Setpoint,
+    /// True to receive the robot's state with the sensors of every physics step after each command.
+    pub tells_state: bool,
     /// True while time may pass.
     pub go: bool,
     /// Control steps that may pass while `go` is false, for single stepping.
@@ -66,7 +93,7 @@ pub struct Wheel {
     wish: Wish,
     said: Instant,
     /// Last setpoint that was commanded.
-    last: WristMove,
+    last: Setpoint,
     answers: mpsc::Sender<Result<Answer, HostingError>>,
 }
 
@@ -82,12 +109,13 @@ impl Driver {
     ) -> Result<(Driver, mpsc::Receiver<Result<Answer, HostingError>>), HostingError> {
         let seats = robots.iter().map(|robot| team.seat(robot)).collect::<Result<Vec<usize>, _>>()?;
         let (sender, answers) = mpsc::channel(KEPT_ANSWERS);
+        seats.iter().for_each(|seat| team.round().set_pace(*seat, TICK));
         let mut wheels = team.wheels();
         wheels.drivers += 1;
         let number = wheels.drivers;
         for (seat, robot) in seats.iter().zip(robots) {
-            let hold = WristMove::hold(robot);
-            let wish = Wish { wrist_move: hold.clone(), go: false, steps: 0 };
+            let hold = Setpoint::Wrists(WristMove::hold(robot));
+            let wish = Wish { setpoint: hold.clone(), tells_state: false, go: false, steps: 0 };
             let wheel = Wheel { number, wish, said: Instant::now(), last: hold, answers: sender.clone() };
             wheels.seats[*seat] = Some(wheel);
         }
@@ -107,7 +135,8 @@ impl Driver {
                 wheel.wish.go = wish.go;
                 wheel.wish.steps = wheel.wish.steps.saturating_add(wish.steps);
                 if place == 0 {
-                    wheel.wish.wrist_move = wish.wrist_move.clone();
+                    wheel.wish.setpoint = wish.setpoint.clone();
+                    wheel.wish.tells_state = wish.tells_state;
                 }
             }
         }
@@ -150,18 +179,24 @@ async fn turn(team: Arc<Team>, episode: Arc<EpisodeThread>) {
             }
             wheels.due(Instant::now())
         };
-        for (seat, wrist_move) in due {
+        for (seat, setpoint, tells_state) in due {
             let (team, episode) = (team.clone(), episode.clone());
             tokio::spawn(async move {
-                let robot = wrist_move.robot.clone();
-                let command = ToolCall::from(MoveWrists { steps: 1, robots: vec![wrist_move] });
-                let call = Call { short: true, ..command.into() };
-                let answer = team.call(&episode, &robot, call, None).await;
+                let robot = team.seats[seat].robot.clone();
+                let call = Call { short: true, ..setpoint.call().into() };
+                let mut answers = vec![team.call(&episode, &robot, call, None).await];
+                if tells_state {
+                    let state = ToolCall::from(GetRobotState { robot: robot.clone() });
+                    let call = Call { samples: true, ..state.into() };
+                    answers.push(team.call(&episode, &robot, call, None).await);
+                }
                 let mut wheels = team.wheels();
                 wheels.under_way[seat] = None;
                 if let Some(wheel) = &wheels.seats[seat] {
-                    // A page that does not read its answers misses some.
-                    let _ = wheel.answers.try_send(answer);
+                    for answer in answers {
+                        // A page that does not read its answers misses some.
+                        let _ = wheel.answers.try_send(answer);
+                    }
                 }
             });
         }
@@ -170,20 +205,25 @@ async fn turn(team: Arc<Team>, episode: Arc<EpisodeThread>) {
 
 impl Wheels {
     /// Returns the seats that command now, with their setpoints: those whose last command is answered and
-    /// whose time may pass.
-    fn due(&mut self, now: Instant) -> Vec<(usize, WristMove)> {
+    /// whose time may pass. The flag of each says whether its state is to be told.
+    fn due(&mut self, now: Instant) -> Vec<(usize, Setpoint, bool)> {
         let mut found = Vec::new();
         for (seat, (wheel, under_way)) in self.seats.iter_mut().zip(&mut self.under_way).enumerate() {
             let Some(wheel) = wheel else { continue };
             let is_there = now.duration_since(wheel.said) < AWAY_AFTER;
-            let Wish { go, steps, wrist_move } = &mut wheel.wish;
+            let Wish { setpoint, tells_state, go, steps } = &mut wheel.wish;
             if under_way.is_some() || !((*go && is_there) || *steps > 0) {
                 continue;
             }
             *steps = steps.saturating_sub(1);
-            wheel.last = within_speed(wrist_move, &wheel.last);
+            wheel.last = match (&*setpoint, &wheel.last) {
+                (Setpoint::Wrists(wanted), Setpoint::Wrists(last)) => {
+                    Setpoint::Wrists(within_speed(wanted, last))
+                }
+                (wanted, _) => wanted.clone(),
+            };
             *under_way = Some(now);
-            found.push((seat, wheel.last.clone()));
+            found.push((seat, wheel.last.clone(), *tells_state));
         }
         found
     }
@@ -231,13 +271,14 @@ mod tests {
 
     fn wheels(wish: Wish) -> Wheels {
         let (answers, _) = mpsc::channel(1);
-        let wheel = Wheel { number: 1, last: wish.wrist_move.clone(), wish, said: Instant::now(), answers };
+        let wheel = Wheel { number: 1, last: wish.setpoint.clone(), wish, said: Instant::now(), answers };
         Wheels { seats: vec![Some(wheel), None], under_way: vec![None; 2], ..Wheels::default() }
     }
 
     #[test]
     fn a_robot_moves_while_its_person_is_there_and_never_twice_in_a_step() {
-        let wish = |go, steps| Wish { wrist_move: WristMove::hold("A"), go, steps };
+        let setpoint = || Setpoint::Wrists(WristMove::hold("A"));
+        let wish = |go, steps| Wish { setpoint: setpoint(), tells_state: false, go, steps };
         let now = Instant::now();
         assert_eq!(wheels(wish(true, 0)).due(now).len(), 1);
         assert_eq!(wheels(wish(false, 0)).due(now).len(), 0);

@@ -34,8 +34,8 @@ use tokio::sync::{Semaphore, SemaphorePermit, oneshot};
 use super::{Answer, EpisodeThread, HostingError, durable::Keyed, episode::WAITING_CALLS};
 use crate::token::Token;
 pub use collection::{CollectedEpisode, Collection, CollectionProgress, CollectionStage};
-use driving::Wheel;
-pub use driving::{Driver, Wish};
+pub use driving::{Driver, Setpoint, Wish};
+use driving::{TICK, Wheel};
 pub use partner::PartnerPolicy;
 use planning::finish_all;
 pub use round::OperatorMemory;
@@ -293,9 +293,10 @@ impl Team {
     }
 
     /// Notes that the operator of `robot` sends control steps in real time: its partners' commands go on
-    /// over them.
+    /// over them, and the steps' own time is no thinking.
     pub fn pace(&self, robot: &str) -> Result<(), HostingError> {
         let seat = self.seat(robot)?;
+        self.round().set_pace(seat, TICK);
         self.wheels().paced.insert(seat);
         Ok(())
     }

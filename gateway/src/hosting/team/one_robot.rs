@@ -10,7 +10,8 @@ use tandem_episodes::{
     players::{Episode, LocalEpisode, PlayerError, PrivilegedEpisode},
 };
 use tandem_tools_spec::{
-    ActCall, ExtraInformation, MoveWrists, Observe, SendJointChunk, Tool as _, ToolCall, ToolReply, Wait,
+    ActCall, ExtraInformation, MoveWrists, Observe, SendJointChunk, SendJointDrives, Tool as _, ToolCall,
+    ToolReply, Wait,
 };
 use tokio::runtime::Handle;
 
@@ -74,6 +75,10 @@ impl OneRobot {
             ToolCall::Act(ActCall::SendJointChunk(SendJointChunk { mut robots })) => {
                 robots.retain(|chunk| chunk.robot == self.robot);
                 SendJointChunk { robots }.into()
+            }
+            ToolCall::Act(ActCall::SendJointDrives(SendJointDrives { mut robots })) => {
+                robots.retain(|drives| drives.robot == self.robot);
+                SendJointDrives { robots }.into()
             }
             other => other,
         }

@@ -149,6 +149,11 @@ impl Round {
         }
     }
 
+    /// Sets the time after each command of the operator on `seat` that counts as pacing.
+    pub fn set_pace(&mut self, seat: usize, pace: Duration) {
+        self.operators[seat].clock.set_pace(pace);
+    }
+
     /// Counts a request of the operator on `seat`, whose clock begins with its first.
     pub fn arrive(&mut self, seat: usize) {
         let operator = &mut self.operators[seat];

@@ -57,7 +57,7 @@ pub fn check(body: &[u8]) -> Result<(), RpcError> {
             .map_err(|message| RpcError { code: INVALID_PARAMS, message, id: id.cloned() }),
         // The client answers a request of the server.
         None if message.contains_key("result") || message.contains_key("error") => Ok(()),
-        _ => refuse(INVALID_REQUEST, id, "method has to be a text, as \"tools/call\""),
+        _ => refuse(INVALID_REQUEST, id, "method has to be a text, for example \"tools/call\""),
     }
 }
 

@@ -11,7 +11,7 @@ use axum::{
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use tandem_episodes::live::{LiveEvent, LiveScene, LiveStep};
-use tandem_tools_spec::{Disclosure, ToolReply, WristMove};
+use tandem_tools_spec::{Disclosure, JointChunk, JointDrives, LookReply, ToolReply};
 use tokio::{
     sync::{
         broadcast::error::{RecvError, TryRecvError},
@@ -22,7 +22,7 @@ use tokio::{
 
 use super::socket::{PageReader, PageSender, PageSocket, upgrade};
 use crate::{
-    hosting::{Answer, Caller, Driver, HostingError, LiveWatch, Wish},
+    hosting::{Answer, Caller, Driver, HostingError, LiveWatch, Setpoint, Wish},
     http::{app::AppState, problem::ApiError},
 };
 
@@ -45,13 +45,20 @@ const ANSWERS_PER_REPORT: usize = 10;
 #[derive(Debug, Clone)]
 pub struct DrivenRobots(pub Vec<String>);
 
-/// A message of a page.
+/// A message of a page, with one of three setpoints.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Word {
     /// An entry of `move_wrists`, without the robot's name.
     #[serde(rename = "move")]
-    wrist_move: Map<String, Value>,
+    wrist_move: Option<Map<String, Value>>,
+    /// A row of `send_joint_chunk`.
+    row: Option<Vec<f64>>,
+    /// A row of `send_joint_drives`.
+    drives: Option<Vec<f64>>,
+    /// True to receive the robot's state after each of its commands.
+    #[serde(default)]
+    states: bool,
     /// True while time may pass.
     go: bool,
     /// Number of control steps for single stepping.
@@ -139,12 +146,37 @@ pub async fn drive(
 /// Handles the messages of a page until it has gone. An unreadable message ends the connection.
 async fn hear(reader: &mut PageReader, robot: &str, driver: &Driver) -> io::Result<()> {
     while let Some(text) = reader.text().await? {
-        let Word { mut wrist_move, go, steps } = serde_json::from_str(&text)?;
-        wrist_move.insert("robot".into(), robot.into());
-        let wrist_move: WristMove = serde_json::from_value(Value::Object(wrist_move))?;
-        driver.say(&Wish { wrist_move, go, steps });
+        let Word { wrist_move, row, drives, states, go, steps } = serde_json::from_str(&text)?;
+        let setpoint = setpoint(robot, wrist_move, row, drives)?;
+        driver.say(&Wish { setpoint, tells_state: states, go, steps });
     }
     Ok(())
+}
+
+/// Reads the setpoint of a message for the robot called `robot`.
+///
+/// # Errors
+///
+/// If there is none or more than one, or it is not what the tool of its kind takes.
+fn setpoint(
+    robot: &str,
+    wrist_move: Option<Map<String, Value>>,
+    row: Option<Vec<f64>>,
+    drives: Option<Vec<f64>>,
+) -> io::Result<Setpoint> {
+    let setpoint = match (wrist_move, row, drives) {
+        (Some(mut entry), None, None) => {
+            entry.insert("robot".into(), robot.into());
+            Setpoint::Wrists(serde_json::from_value(Value::Object(entry))?)
+        }
+        (None, Some(row), None) => Setpoint::Joints(JointChunk { robot: robot.into(), rows: vec![row] }),
+        (None, None, Some(row)) => Setpoint::Drives(JointDrives { robot: robot.into(), rows: vec![row] }),
+        _ => return Err(io::Error::other("a message has one of move, row and drives")),
+    };
+    match setpoint.clone().call().validate() {
+        Ok(()) => Ok(setpoint),
+        Err(error) => Err(io::Error::other(error)),
+    }
 }
 
 /// The sending side of a page that drives.
@@ -239,6 +271,9 @@ impl DriversPage {
         own_answers: &mut OwnAnswers,
     ) -> io::Result<()> {
         let text = match answer {
+            Ok(Answer { reply: ToolReply::Look(LookReply::GetRobotState(state)), .. }) => {
+                json!({ "kind": "state", "state": state })
+            }
             Ok(answer) => {
                 let own = matches!(&answer.reply, ToolReply::Act(reply) if reply.robots.iter().any(|report| report.robot == self.robot));
                 if !own_answers.is_reported(own) && answer.heard.is_empty() {

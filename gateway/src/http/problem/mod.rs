@@ -79,7 +79,9 @@ pub enum ApiError {
     #[error("this server speaks HTTPS; ask for https:// in place of http://")]
     NotEncrypted,
     /// The body is not valid JSON.
-    #[error("the body is no JSON: {0}; send one JSON object, with finite numbers only, as {{\"steps\": 25}}")]
+    #[error(
+        "the body is no JSON: {0}; send one JSON object, with finite numbers only, for example {{\"steps\": 25}}"
+    )]
     MalformedJson(String),
     /// The body is not valid MessagePack.
     #[error("the body is no MessagePack: {0}; send one map with names for keys and finite numbers only")]
@@ -111,7 +113,7 @@ pub enum ApiError {
     Key,
     /// The body is JSON, but not an object.
     #[error(
-        "the body is {0}; send one JSON object, as {{\"steps\": 25}}, or no body where there is nothing to say"
+        "the body is {0}; send one JSON object, for example {{\"steps\": 25}}, or no body where there is nothing to say"
     )]
     NoObject(&'static str),
     /// The body took too long to arrive.
@@ -124,7 +126,9 @@ pub enum ApiError {
     #[error("the body could not be read: {0}; send it again")]
     BrokenBody(String),
     /// The body is too large.
-    #[error("the body is larger than {limit_bytes} bytes; send less, as fewer rows per send_joint_chunk")]
+    #[error(
+        "the body is larger than {limit_bytes} bytes; send less, for example fewer rows per send_joint_chunk"
+    )]
     BodyTooLarge {
         /// Limit in bytes.
         limit_bytes: usize,

@@ -106,6 +106,10 @@ impl Locomotion for ScriptedLegs {
         Sides::from_fn(|side: Side| std::array::from_fn(|i| drive(LEGS[side] + i)))
     }
 
+    fn let_go(&mut self) {
+        self.tick = 0;
+    }
+
     fn save(&self) -> Result<Vec<u8>, postcard::Error> {
         postcard::to_stdvec(&self.tick)
     }

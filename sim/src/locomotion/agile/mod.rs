@@ -161,6 +161,10 @@ impl Locomotion for Agile {
         offset_rad
     }
 
+    fn let_go(&mut self) {
+        self.state = None;
+    }
+
     fn save(&self) -> Result<Vec<u8>, postcard::Error> {
         postcard::to_stdvec(&self.state)
     }

@@ -144,6 +144,10 @@ impl Locomotion for Balance {
         Some(self.state.as_ref().is_some_and(|state| matches!(state.mode, Mode::Step(_))))
     }
 
+    fn let_go(&mut self) {
+        self.state = None;
+    }
+
     fn save(&self) -> Result<Vec<u8>, postcard::Error> {
         postcard::to_stdvec(&self.state)
     }

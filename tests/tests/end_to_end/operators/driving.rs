@@ -176,6 +176,43 @@ fn two_people_drive_in_real_time_and_the_recording_comes_to_the_same() {
     );
 }
 
+/// Programs drive by the same socket: by rows of joint targets, or by setpoints of all motors. After each
+/// command the robot's state comes, with the sensors of every physics step.
+#[test]
+fn a_program_drives_joints_and_motors_by_the_socket_and_is_told_the_state() {
+    let team = Team::start(json!({ "patience_s": 0.05 }));
+    let mut page = DriversSocket::open(&team, 0);
+    let mut state_after = |word: Value, steps: usize| {
+        let (began, mut states) = (Instant::now(), Vec::new());
+        while states.len() < steps {
+            assert!(began.elapsed() < Duration::from_secs(60), "no state comes");
+            page.socket.send(Message::text(word.to_string())).expect("a program that is heard");
+            let Ok(Message::Text(text)) = page.socket.read() else { continue };
+            let told: Value = serde_json::from_str(&text).expect("JSON");
+            assert_ne!(told["kind"], "refused", "{told}");
+            if told["kind"] == "state" {
+                states.push(told["state"].clone());
+            }
+        }
+        states.pop().expect("a state")
+    };
+    let mut row = vec![0.0; 35];
+    (row[28], row[34]) = (0.2, 0.75);
+    let turned = state_after(json!({ "row": row, "go": true, "states": true }), 40);
+    assert!((turned["joint_positions_rad"]["waist_yaw_joint"].as_f64().unwrap() - 0.2).abs() < 0.05);
+    let samples = &turned["samples"]["gyro_rad_s"];
+    assert_eq!(samples.as_array().map(Vec::len), Some(4), "{samples}");
+    assert_eq!(turned["fallen"], false);
+    let limp = state_after(json!({ "drives": vec![0.0; 215], "go": true, "states": true }), 100);
+    assert_eq!(limp["fallen"], true, "nobody balances it");
+    drop(page);
+    let (result, _) = team.verified();
+    let used = &result["operators"][0];
+    assert!(used["thinking_s"].as_f64().expect("its thinking") < 1.0, "pacing is no thinking: {used}");
+    let departures = result["departures"].as_array().expect("departures");
+    assert!(departures.contains(&json!("control: joint (A)")), "{departures:?}");
+}
+
 /// Replies for the idle robot come on the same socket, before or after those for the own robot.
 #[test]
 fn a_person_beside_a_robot_that_nobody_drives_is_told_how_it_goes() {

@@ -87,7 +87,7 @@ fn comments_of_functions_begin_with_a_verb() {
         functions.visit_file(&source.parse());
         found.append(&mut functions.found);
     }
-    expect_none(&found, "begin with a verb in the third person, as \"Returns\" or \"Parses\"");
+    expect_none(&found, "begin with a verb in the third person, for example \"Returns\" or \"Parses\"");
 }
 
 #[test]
@@ -116,4 +116,24 @@ fn comments_fit_their_lines() {
         }
     }
     expect_none(&found, &format!("comments have at most {MAX_COMMENT_COLUMNS} columns"));
+}
+
+/// Ways in which an example begins after a bare "as": a JSON value, a quotation, or a command line's value.
+const EXAMPLES: [&str; 6] = [", as [[", ", as {", ", as \\\"", ", as agent:", ", as act:", ", as B="];
+
+/// Texts that callers and users read, in errors, help and comments.
+#[test]
+fn examples_are_named_as_examples() {
+    let mut found = Vec::new();
+    for source in everywhere(&["rs", "py"]) {
+        if source.path.ends_with("tests/tests/tidy/words/mod.rs") {
+            continue;
+        }
+        for (number, line) in source.text.lines().enumerate() {
+            if EXAMPLES.iter().any(|example| line.contains(example)) {
+                found.push(format!("{}:{}: {}", source.path.display(), number + 1, line.trim()));
+            }
+        }
+    }
+    expect_none(&found, "write \"for example\" or \"such as\" before an example, not \"as\"");
 }

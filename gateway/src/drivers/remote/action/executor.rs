@@ -1,12 +1,13 @@
-//! Executes the actions of policies with the public commands: `send_joint_chunk`, or `move_wrists` for
-//! poses.
+//! Executes the actions of policies with the public commands: `send_joint_chunk`, `move_wrists` for poses,
+//! or `send_joint_drives` for setpoints of motors.
 
 use std::{iter, ops::Range};
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use tandem_episodes::players::{LocalEpisode, PlayerError};
 use tandem_tools_spec::{
-    CommandReply, JointChunk, MoveWrists, Pose, SendJointChunk, StopReason, ToolCall, ToolReply,
+    CommandReply, JointChunk, JointDrives, MoveWrists, Pose, SendJointChunk, SendJointDrives, StopReason,
+    ToolCall, ToolReply,
 };
 
 use super::{
@@ -36,6 +37,7 @@ pub struct Executor<'a> {
 #[derive(Clone, Debug, PartialEq)]
 pub enum PlannedCommand {
     Joints(SendJointChunk),
+    Drives(SendJointDrives),
     /// Every robot moves to its row with this index.
     Wrists {
         row: usize,
@@ -89,6 +91,9 @@ impl<'a> Executor<'a> {
     pub fn commands(&self, chunks: &[RobotRows], rows: Range<usize>) -> Vec<PlannedCommand> {
         let mut spans = spans(executed_rows(chunks), self.map.rate_hz());
         spans.retain(|span| rows.contains(&span.row));
+        if self.map.drives_motors() {
+            return self.drive_commands(chunks, &spans);
+        }
         match (self.map.moves_wrists(), self.map.chunk.between) {
             (false, between) => self.joint_commands(chunks, &spans, between),
             (true, Between::Interpolate) => {
@@ -128,10 +133,25 @@ impl<'a> Executor<'a> {
         (0..steps).step_by(self.most_steps).map(command).collect()
     }
 
+    /// Returns commands for motors, each row of which is held until the next.
+    fn drive_commands(&self, chunks: &[RobotRows], spans: &[RowSpan]) -> Vec<PlannedCommand> {
+        let rows: Vec<usize> =
+            spans.iter().flat_map(|span| iter::repeat_n(span.row, span.steps as usize)).collect();
+        let command = |rows: &[usize]| {
+            let part = |chunk: &RobotRows| JointDrives {
+                robot: chunk.robot.clone(),
+                rows: rows.iter().map(|row| chunk.rows[*row].motor_row.clone()).collect(),
+            };
+            PlannedCommand::Drives(SendJointDrives { robots: chunks.iter().map(part).collect() })
+        };
+        rows.chunks(self.most_steps).map(command).collect()
+    }
+
     /// Converts a command of [`Executor::commands`] to a call for the current state.
     pub fn call(&self, planned: PlannedCommand, chunks: &[RobotRows]) -> ToolCall {
         match planned {
             PlannedCommand::Joints(command) => command.into(),
+            PlannedCommand::Drives(command) => command.into(),
             PlannedCommand::Wrists { row, steps } => {
                 let told_columns = self.map.told_columns();
                 let entry = |(chunk, start_from_pelvis): (&RobotRows, &Isometry3<f64>)| {

@@ -11,7 +11,7 @@ pub use wrists::WristTarget;
 use tandem_tools_spec::ACTION_ROW_LEN;
 
 use super::{
-    columns::{ACTION_LEN, action_columns, action_name, held_row, sensed_pelvis, sensed_wrist},
+    columns::{ACTION_LEN, action_columns, action_name, held_row, motors, sensed_pelvis, sensed_wrist},
     error::RemoteError,
     map::{AnswerScope, PolicyMap, ROBOT},
     poses::pose_of,
@@ -33,6 +33,8 @@ pub struct ActionRow {
     pub row: Vec<f64>,
     /// Left and right wrist.
     pub wrists: [WristTarget; 2],
+    /// Row of `send_joint_drives`, if the policy drives motors; empty otherwise.
+    pub motor_row: Vec<f64>,
 }
 
 /// Some columns of every row of one robot in a reply.
@@ -153,8 +155,12 @@ fn action_row(
     if positions_m.flat_map(<[f64; 3]>::from).any(|value| value.abs() > LARGEST_VALUE) {
         return Err(RemoteError::Misfit(format!("a wrist is sent beyond {LARGEST_VALUE} m; expected m")));
     }
+    let motor_row = match map.drives_motors() {
+        true => read_motors(told_values, row)?,
+        false => Vec::new(),
+    };
     match whole.iter().position(|value| value.abs() > LARGEST_VALUE) {
-        None => Ok(ActionRow { row: whole, wrists }),
+        None => Ok(ActionRow { row: whole, wrists, motor_row }),
         Some(column) => {
             let name = action_name(column);
             Err(RemoteError::Misfit(format!(
@@ -163,6 +169,26 @@ fn action_row(
         }
     }
 }
+
+/// Returns the setpoints of motors in row number `row`.
+fn read_motors(told_values: &[f64], row: usize) -> Result<Vec<f64>, RemoteError> {
+    let setpoints = told_values[motors()].to_vec();
+    let gains = setpoints.len() * 2 / 5..setpoints.len() * 4 / 5;
+    let wrong = |(index, value): (usize, &f64)| {
+        value.abs() > LARGEST_SETPOINT || (*value < 0.0 && gains.contains(&index))
+    };
+    match setpoints.iter().enumerate().position(wrong) {
+        None => Ok(setpoints),
+        Some(index) => Err(RemoteError::Misfit(format!(
+            "in row {row}, a number of {} is {}; expected at most {LARGEST_SETPOINT} in size, and gains of at least 0",
+            action_name(motors().start + index),
+            setpoints[index]
+        ))),
+    }
+}
+
+/// Limit on the magnitude of motors' setpoints: more than any gain of a G1's motor.
+const LARGEST_SETPOINT: f64 = 10_000.0;
 
 /// Limit on the magnitude of values. Larger ones mean that the policy uses other units or has diverged.
 const LARGEST_VALUE: f64 = 1000.0;
@@ -309,6 +335,32 @@ mod tests {
         let row = &rows[1].row;
         assert_eq!((row[0], row[28], row[7]), (0.5 + 0.11, 0.18, 8.0));
         assert!((row[34] - (0.7 + 0.21)).abs() < 1e-12, "{row:?}");
+    }
+
+    #[test]
+    fn motors_are_driven_by_rows_of_all_joints() {
+        let own = map("[action]\n\"m\" = [\"motors\"]\n[chunk]\nrate_hz = 25.0");
+        let answer = keyed(&[("m", array(&[2, 215]))]);
+        let chunks = read(&own, &answer, &[1]).unwrap();
+        assert_eq!((chunks[0].rows[1].motor_row.len(), chunks[0].rows[1].motor_row[0]), (215, 2.15));
+        let executor = Executor::new(&own, 3, &PolicyObservation::blank(2));
+        let commands = executor.commands(&chunks, 0..2).into_iter();
+        let calls: Vec<_> = commands.map(|command| executor.call(command, &chunks)).collect();
+        assert_eq!(
+            calls.iter().map(|call| (call.name(), call.steps())).collect::<Vec<_>>(),
+            [("send_joint_drives", 3), ("send_joint_drives", 1)]
+        );
+        let negative = ReplyValue::Array { shape: vec![1, 215], values: vec![-1.0; 215] };
+        let text = read(&own, &keyed(&[("m", negative)]), &[0]).unwrap_err();
+        assert!(text.contains("in row 0, a number of motor_kp is -1"), "{text}");
+        let refused = |action: &str| {
+            let file = tempfile::NamedTempFile::new().unwrap();
+            std::fs::write(file.path(), format!("preset = \"openpi\"\n[action]\n\"m\" = [{action}]"))
+                .unwrap();
+            PolicyMap::find(&file.path().display().to_string()).unwrap_err().to_string()
+        };
+        assert!(refused("\"motor_position\", \"motor_kp\"").contains("does not tell \"motor_kd\""));
+        assert!(refused("\"motors\", \"waist\"").contains("give one or the other"));
     }
 
     #[test]

@@ -79,7 +79,11 @@ mod tests {
 
     #[test]
     fn rows_are_held_or_interpolated() {
-        let row = |value: f64| ActionRow { row: vec![value; 35], wrists: [WristTarget::default(); 2] };
+        let row = |value: f64| ActionRow {
+            row: vec![value; 35],
+            wrists: [WristTarget::default(); 2],
+            motor_row: Vec::new(),
+        };
         let rows = [row(1.0), row(2.0)];
         let played = |between: Between, column: usize| -> Vec<f64> {
             let rows = control_rows(&rows, &spans(2, 25.0), &[0.0; 35], between);

@@ -142,7 +142,8 @@ mod tests {
         let told =
             WristTarget { position_m: Some(Vector3::x() * 0.1), rotation: Some(quarter(Vector3::x())) };
         let target = told.resolved(frame, is_delta, &pelvis_from_wrist, &start_from_pelvis);
-        let row = ActionRow { row: vec![0.0; 35], wrists: [target, WristTarget::default()] };
+        let row =
+            ActionRow { row: vec![0.0; 35], wrists: [target, WristTarget::default()], motor_row: Vec::new() };
         let asked = wrist_move("A", &row, &[], frame, &start_from_pelvis);
         let rounded = |value: f64| (value * 1e6).round() / 1e6 + 0.0;
         assert_eq!((asked.right_position_m, asked.left_fingers_rad), (None, None));
@@ -170,7 +171,7 @@ mod tests {
     fn fingers_and_base_go_along() {
         let mut row = vec![0.0; 35];
         (row[14], row[20], row[31], row[34]) = (0.4, -0.5, 0.2, 0.7);
-        let row = ActionRow { row, wrists: [WristTarget::default(); 2] };
+        let row = ActionRow { row, wrists: [WristTarget::default(); 2], motor_row: Vec::new() };
         let asked = wrist_move("B", &row, &[14], WristFrame::Pelvis, &Isometry3::identity());
         let fingers_rad = asked.left_fingers_rad.unwrap();
         assert_eq!((fingers_rad[0], fingers_rad[6], asked.right_fingers_rad), (0.4, -0.5, None));

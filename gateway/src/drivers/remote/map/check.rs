@@ -7,8 +7,8 @@ use tandem_episodes::{rows::velocities, tasks};
 use super::{AnswerScope, CameraName, HistorySpan, PolicyMap, ROBOT, Scope, WristFrame};
 use crate::drivers::remote::{
     columns::{
-        WRISTS, action_columns, action_name, is_of_arm_or_waist, state_columns, wrist_named, wrist_position,
-        wrist_rotation,
+        WRISTS, action_columns, action_name, is_of_arm_or_waist, motors, state_columns, wrist_named,
+        wrist_position, wrist_rotation,
     },
     poses::RotationForm,
     values::path,
@@ -42,6 +42,7 @@ impl PolicyMap {
         }
         let told = self.check_action()?;
         self.check_wrists(&told)?;
+        self.check_motors(&told)?;
         self.check_delta(&told)?;
         let wrong = |size: &[u32; 2]| !size.iter().all(|side| (1..=LONGEST_SIDE_PX).contains(side));
         if let Some((key, _)) = self.images.iter().find(|(_, image)| image.size.as_ref().is_some_and(wrong)) {
@@ -100,6 +101,33 @@ impl PolicyMap {
                 )),
                 None => Ok(()),
             },
+        }
+    }
+
+    /// Refuses setpoints of motors without gains, and beside commands for the robot's controller.
+    fn check_motors(&self, told: &[usize]) -> Result<(), String> {
+        let Some(other) = told.iter().find(|column| !motors().contains(column)) else {
+            let lacking = |name: &&&str| {
+                action_columns(&[name.to_string()]).unwrap_or_default().iter().any(|one| !told.contains(one))
+            };
+            return match ["motor_position", "motor_kp", "motor_kd"].iter().find(lacking) {
+                Some(name) => Err(format!(
+                    "[action] drives motors and does not tell {name:?}; give motors, or every block"
+                )),
+                None if !self.chunk.delta.is_empty() => {
+                    Err("[chunk] delta: setpoints of motors are told as they are to be; leave delta out"
+                        .into())
+                }
+                None => Ok(()),
+            };
+        };
+        match told.iter().find(|column| motors().contains(column)) {
+            Some(motor) => Err(format!(
+                "[action] tells {:?} and {:?}; who drives motors drives all of them, so give one or the other",
+                action_name(*motor),
+                action_name(*other)
+            )),
+            None => Ok(()),
         }
     }
 

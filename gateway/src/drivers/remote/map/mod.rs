@@ -11,9 +11,9 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 use tandem_episodes::{CONTROL_HZ, MAX_TEXT_BYTES, read_text};
-use tandem_tools_spec::{ACTION_ROW_LEN, ExtraInformation};
+use tandem_tools_spec::ExtraInformation;
 
-use super::columns::{WRISTS, action_columns, extra_columns, state_columns};
+use super::columns::{WRISTS, action_columns, extra_columns, motors, state_columns, wrists};
 
 /// Built-in maps by name; each file is written out in full and explained.
 pub const PRESETS: [(&str, &str); 3] = [
@@ -296,7 +296,12 @@ impl PolicyMap {
 
     /// Returns true if the policy commands wrist poses.
     pub fn moves_wrists(&self) -> bool {
-        self.told_columns().iter().any(|column| *column >= ACTION_ROW_LEN)
+        self.told_columns().iter().any(|column| wrists().contains(column))
+    }
+
+    /// Returns true if the policy commands the setpoints of motors.
+    pub fn drives_motors(&self) -> bool {
+        self.told_columns().iter().any(|column| motors().contains(column))
     }
 
     /// Returns the columns that an answer commands, in no particular order.

@@ -3,8 +3,8 @@
 use tandem_sim::{BaseCommand, UPPER_JOINTS};
 use tandem_tools_spec::JointChunk;
 
-use super::columns::{self, Clamped};
-use super::motion::{Compliance, Motion};
+use crate::commands::columns::{self, Clamped};
+use crate::commands::motion::{Compliance, Motion};
 
 /// Trajectory with one row for each control step.
 pub struct JointTrajectory {
