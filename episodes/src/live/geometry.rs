@@ -56,7 +56,7 @@ fn part_row(part: &Part, mesh: usize) -> Value {
     };
     json!({
         "mesh": mesh, "carrier": carrier, "pose": pose_row(&part.carrier_from_mesh), "rgb": part.rgb,
-        "pattern": pattern, "second_rgb": second, "casts_shadow": part.casts_shadow,
+        "alpha": part.alpha, "pattern": pattern, "second_rgb": second, "casts_shadow": part.casts_shadow,
     })
 }
 

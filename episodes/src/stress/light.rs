@@ -1,7 +1,8 @@
 //! Light stress: the sun is elsewhere, stronger or weaker, and warmer or colder, and so is the sky.
 
-use tandem_sim::Vector;
-use tandem_sim::render::Light;
+use tandem_sim::mjcf::LightKind;
+use tandem_sim::render::{Light, Scenery};
+use tandem_sim::{Rotation, Vector};
 
 use super::{StressAxis, StressLevel, random};
 
@@ -13,7 +14,23 @@ const WARMTH: [f32; 3] = [0.08, 0.16, 0.28];
 const TURN_DEG: [f32; 3] = [40.0, 80.0, 140.0];
 const LOWER_DEG: [f32; 3] = [6.0, 14.0, 26.0];
 
-pub fn light(level: StressLevel, seed: u32) -> Light {
+/// Changes the light of a scenery: that of sun and sky, or that of the lights of the scene's file.
+pub fn relight(scenery: &mut Scenery, level: StressLevel, seed: u32) {
+    let plain = scenery.light;
+    scenery.light = light(level, seed);
+    let heading_rad = |light: &Light| light.sun_direction.y.atan2(light.sun_direction.x);
+    let turn = Rotation::from_rotation_z(heading_rad(&scenery.light) - heading_rad(&plain));
+    if let Some(lamps) = &mut scenery.lamps {
+        lamps.tint(scenery.light.sun_rgb / plain.sun_rgb);
+        for lamp in &mut lamps.lamps {
+            if lamp.light.kind == LightKind::Directional {
+                lamp.light.direction = turn * lamp.light.direction;
+            }
+        }
+    }
+}
+
+fn light(level: StressLevel, seed: u32) -> Light {
     let plain = Light::default();
     let mut random = random(StressAxis::Light, seed, 0);
     let mut sign = || if random.uniform([0.0, 1.0]) < 0.5 { -1.0 } else { 1.0 };

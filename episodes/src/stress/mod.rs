@@ -208,7 +208,7 @@ impl Stress {
 pub fn scenery(stress: Option<Stress>, seed: u32, world: &World) -> Scenery {
     let mut scenery = Scenery::of(world);
     match stress {
-        Some(Stress { axis: StressAxis::Light, level }) => scenery.light = light::light(level, seed),
+        Some(Stress { axis: StressAxis::Light, level }) => light::relight(&mut scenery, level, seed),
         Some(Stress { axis: StressAxis::Texture, level }) => texture::repaint(&mut scenery, level, seed),
         _ => {}
     }

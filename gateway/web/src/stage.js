@@ -9,6 +9,8 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { colour, robotColour } from "./dom.js";
 import { POSE, SIDES } from "./message.js";
 
+/** Alpha from which surfaces are solid, as in the server's images. */
+const SOLID_ALPHA = 0.995;
 const UP = new Vector3(0, 0, 1);
 /** Lengths of arrows. */
 const METRES_PER_NEWTON = 0.006;
@@ -94,19 +96,19 @@ export class Stage {
     this.scene.add(this.sun, this.sun.target);
   }
 
-  /** One mesh for all parts of a carrier that cast shadows, and one for all that do not. Returns the carriers that move. */
+  /** One mesh for all parts of a carrier that are alike in shadow and alpha. Returns the carriers that move. */
   build(meshes) {
     const groups = new Map();
     for (const part of this.head.parts) {
       const { kind, robot, link, object } = part.carrier;
-      const key = `${kind} ${robot} ${link} ${object} ${part.casts_shadow}`;
+      const key = `${kind} ${robot} ${link} ${object} ${part.casts_shadow} ${part.alpha}`;
       groups.set(key, [...(groups.get(key) ?? []), part]);
     }
     const carriers = [];
     for (const parts of groups.values()) {
       const plain = parts.filter((part) => part.pattern !== "checker");
       const checked = parts.filter((part) => part.pattern === "checker");
-      for (const [some, material] of [[plain, new MeshLambertMaterial({ vertexColors: true })], ...checked.map((part) => [[part], checker(part)])]) {
+      for (const [some, material] of [[plain, paintOf(parts[0])], ...checked.map((part) => [[part], checker(part)])]) {
         if (!some.length) continue;
         const mesh = new Mesh(merged(some, meshes), material);
         mesh.castShadow = some[0].casts_shadow;
@@ -334,6 +336,12 @@ function drawnBySoftware() {
   const name = names ? context.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
   context?.getExtension("WEBGL_lose_context")?.loseContext();
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
+}
+
+/** The material of a part without a pattern. What is blended keeps out as much light as in the server's images. */
+function paintOf({ alpha }) {
+  const blended = alpha < SOLID_ALPHA ? { transparent: true, depthWrite: false, opacity: 1 - (1 - alpha) ** 2 } : {};
+  return new MeshLambertMaterial({ vertexColors: true, ...blended });
 }
 
 /** Squares of half a metre in the world's ground plane, as the server draws them. */

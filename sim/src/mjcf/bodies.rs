@@ -43,6 +43,8 @@ pub struct BodyLink {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlacedBody {
     pub name: String,
+    /// Index among the bodies of the file; 0 is the world.
+    pub index: usize,
     pub link_from_body: DPose3,
     /// Indices of its geoms among the link's.
     pub geoms: Range<usize>,
@@ -169,6 +171,7 @@ impl Document {
         let geoms = self.geoms(id)?;
         link.bodies.push(PlacedBody {
             name: name.unwrap_or_default().into(),
+            index: id,
             link_from_body,
             geoms: link.geoms.len()..link.geoms.len() + geoms.len(),
         });

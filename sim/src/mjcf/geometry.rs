@@ -7,7 +7,7 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::prelude::SharedShape;
 
 use super::assets::surface::MappedShape;
-use super::{Document, Mesh, SurfaceImage, SurfacePattern, pose, vector};
+use super::{Document, Gloss, Mesh, SurfaceImage, SurfacePattern, pose, vector};
 use crate::SimError;
 use crate::dynamics::{Directions, Friction, Mask};
 
@@ -48,7 +48,9 @@ pub struct Geom {
     pub name: Option<String>,
     pub primitive: Primitive,
     pub body_from_geom: Pose,
+    /// Colour, and the share of light from behind that it keeps out.
     pub rgba: [f32; 4],
+    pub gloss: Gloss,
     pub material: Option<String>,
     /// The image of the material's texture, if it has one. `rgba` is its mean colour then.
     pub image: Option<SurfaceImage>,
@@ -64,8 +66,6 @@ pub struct Geom {
     pub pattern: Option<SurfacePattern>,
 }
 
-/// Maximum alpha of geoms that are not drawn. All others are drawn solid, since there is no transparency.
-const MAX_CLEAR_ALPHA: f32 = 0.5;
 const DEFAULT_DENSITY_KG_M3: f64 = 1000.0;
 const DEFAULT_RGBA: [f64; 4] = [0.5, 0.5, 0.5, 1.0];
 /// Dimensions of the slab as which a plane collides: its thickness, which nothing passes, and its reach
@@ -120,6 +120,7 @@ impl Geom {
             primitive,
             body_from_geom,
             rgba,
+            gloss: document.glosses.find(geom.material.as_deref()),
             material: geom.material.clone(),
             checker_rgb: material.and_then(|material| checker_rgb(document, material)),
             friction: friction(geom).map_err(|what| refuse(&what))?,
@@ -127,7 +128,7 @@ impl Geom {
             mass_kg: geom.mass.map(|m| m as f32),
             collides: touches.kinds != 0 || touches.touched != 0,
             touches,
-            drawn: document.looks.is_drawn(geom.group) && rgba[3] > MAX_CLEAR_ALPHA,
+            drawn: document.looks.is_drawn(geom.group) && rgba[3] > 0.0,
             pattern: geom.material.as_ref().and_then(|name| document.looks.patterns.get(name).copied()),
         })
     }

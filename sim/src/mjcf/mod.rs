@@ -11,12 +11,14 @@ mod frames;
 mod geometry;
 mod joints;
 mod key;
+mod lights;
 mod support;
 #[cfg(test)]
 mod tests;
 mod text;
 
 pub use assets::files::Mesh;
+pub use assets::gloss::Gloss;
 pub use assets::looks::SurfacePattern;
 pub use assets::surface::{SurfaceImage, TextureMapping};
 pub use assets::texture::{Texture, TextureLevel};
@@ -26,6 +28,7 @@ pub use frames::{MjcfCamera, Site};
 pub use geometry::{Geom, Primitive};
 pub use joints::{Actuator, ActuatorKind, AxisJoint, LinkJoint};
 pub use key::Key;
+pub use lights::{FileLight, FileLights, Headlight, LightKind, MAX_LIGHTS};
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -36,6 +39,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::SimError;
 use crate::user_file::{MAX_TEXT_BYTES, read_text};
+use assets::gloss::Glosses;
 use assets::kept;
 use assets::looks::Looks;
 use assets::surface::TextureRepeats;
@@ -65,7 +69,11 @@ pub struct Document {
     textures: BTreeMap<String, Arc<Texture>>,
     /// Textures that MuJoCo draws itself, by name.
     builtins: BTreeMap<String, Arc<Texture>>,
+    /// Image of the sky.
+    sky: Option<Arc<Texture>>,
     repeats: TextureRepeats,
+    glosses: Glosses,
+    lights: Option<FileLights>,
     looks: Looks,
     settings: FileSettings,
     /// All files that were read, each with a hash of its bytes.
@@ -127,13 +135,16 @@ impl Document {
             cameras: frames::cameras(&source)?,
             speed_limit_values: joints::speed_limits(&source)?,
             unread: UnreadRanges::of(&source)?,
+            lights: lights::lights(&source, &checked.bodies.iter().map(|one| one.body).collect::<Vec<_>>())?,
             checked,
             split: split_bodies,
             folder: folder.into(),
             meshes: BTreeMap::new(),
             textures: BTreeMap::new(),
             builtins: BTreeMap::new(),
+            sky: None,
             repeats: TextureRepeats::of(&source)?,
+            glosses: Glosses::of(&source)?,
             looks: Looks::of(&source)?,
             settings: FileSettings::of(&source)?,
             files: source.included(),
@@ -143,7 +154,6 @@ impl Document {
         document.read_meshes()?;
         document.read_textures()?;
         document.check_bodies()?;
-        document.note_transparency();
         document.note_joints();
         document.note_concave_meshes();
         Ok(document)
@@ -186,22 +196,6 @@ impl Document {
         &self.checked.approximated
     }
 
-    /// Notes the first geom that is partly transparent: it is drawn solid or not at all.
-    fn note_transparency(&mut self) {
-        let bodies = self.model.bodies.iter().zip(&self.checked.bodies);
-        let mut geoms = bodies.flat_map(|(entry, bytes)| entry.body.geoms.iter().zip(&bytes.geoms));
-        let assets = &self.model.assets;
-        let is_half = |(geom, _): &(&mjcf_rs::body::Geom, &usize)| {
-            let material = || assets.material(geom.material.as_ref()?)?.rgba;
-            geom.rgba.or_else(material).is_some_and(|[_, _, _, alpha]| alpha > 0.0 && alpha < 1.0)
-        };
-        if let Some((_, byte)) = geoms.find(is_half) {
-            let what = "it lets light through: here it is not drawn, or, above an alpha of 0.5, it is solid";
-            let line = self.source.line(*byte);
-            self.checked.approximated.push(format!("`{line}`: geom: {what}"));
-        }
-    }
-
     /// Returns the gravity of a scene in m/s^2, in the frame of the file.
     pub(crate) fn gravity_m_s2(&self) -> [f64; 3] {
         if self.settings.falls { self.model.option.gravity } else { [0.0; 3] }
@@ -232,6 +226,11 @@ impl Document {
             content += &format!("{:?}", self.settings);
         }
         xxh3_64(content.as_bytes())
+    }
+
+    /// Returns the image of the sky, or the six of a cube around the camera: the first texture of that type.
+    pub fn sky(&self) -> Option<&Arc<Texture>> {
+        self.sky.as_ref()
     }
 
     /// Returns the texture with this name, if it has an image.

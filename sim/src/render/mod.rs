@@ -16,7 +16,7 @@ pub use kind::RendererKind;
 pub use scene::camera::{Camera, Cameras, Intrinsics, LensFlaw};
 pub use scene::mesh::{TriangleMesh, Vertex};
 pub use scene::shared::SharedMesh;
-pub use scene::{Carrier, Part, PlacedScenery, Scenery, object_id, robot_rgba};
+pub use scene::{Carrier, Lamp, Lamps, Part, PlacedScenery, Scenery, object_id, robot_rgba};
 pub use shading::Light;
 pub use shading::pattern::Pattern;
 

@@ -5,7 +5,7 @@ use rapier3d::math::{Pose, Vector};
 use super::World;
 use crate::dynamics::{Collider, DPose3, DVec3, Directions, Friction, Mask};
 use crate::mechanism::{add_collider, rounded};
-use crate::mjcf::{Geom, Primitive};
+use crate::mjcf::{Geom, Gloss, Primitive};
 
 /// Cosine of the tilt below which a plane carries things that fall on it.
 const CARRIES_COSINE: f64 = 0.5;
@@ -44,6 +44,7 @@ impl World {
             primitive: Primitive::Plane { half_extents_m: [0.0; 2] },
             body_from_geom: Pose::from_translation(Vector::Z * bottom_m),
             rgba: [0.0; 4],
+            gloss: Gloss::default(),
             material: None,
             image: None,
             checker_rgb: None,

@@ -5,6 +5,7 @@ mod disturb;
 #[cfg(test)]
 mod foot_tests;
 mod ground;
+mod lights;
 mod objects;
 mod snapshot;
 mod step;
@@ -18,6 +19,7 @@ use std::sync::Arc;
 
 pub use contacts::RobotPress;
 pub use disturb::PlannedPush;
+pub use lights::{CarriedLight, SceneLights};
 pub use objects::{ObjectFile, ObjectModel, ObjectPart, ObjectPlacement, ObjectState};
 pub use snapshot::Snapshot;
 pub use step::{BodyTouch, HandContacts, ObjectStep, RobotStep, Step, Touch};
@@ -31,10 +33,11 @@ use rapier3d::math::Pose;
 use crate::body::{MotorSetpoints, RobotModel};
 use crate::dynamics::{DVec3, Diverged, Dynamics, LinkId, Settings};
 use crate::mechanism::{Machinery, precise};
-use crate::mjcf::{Document, MjcfCamera};
+use crate::mjcf::{Document, MjcfCamera, Texture};
 use crate::robot::{Robot, RobotCommand, RobotPlacement, Sensing};
 use crate::{CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, SimError, assets};
 use disturb::Push;
+use lights::scene_lights;
 use objects::{Furniture, Object};
 
 /// Specification of a world.
@@ -82,6 +85,8 @@ pub struct World {
     /// Geoms of the scene that do not move, world frame.
     fixed: Vec<crate::mjcf::Geom>,
     cameras: Vec<MjcfCamera>,
+    lights: Option<SceneLights>,
+    sky: Option<Arc<Texture>>,
     control_steps: u64,
     /// Pushes of the next control step.
     pushes: Vec<Push>,
@@ -144,6 +149,8 @@ impl World {
             machinery,
             fixed,
             cameras: scene.cameras.iter().map(|camera| camera.moved(world_from_scene)).collect(),
+            lights: scene_lights(scene, world_from_scene)?,
+            sky: scene.sky().cloned(),
             pushes: Vec::new(),
             planned_pushes: Vec::new(),
             control_steps: 0,
@@ -242,6 +249,16 @@ impl World {
     /// Returns the cameras of the scene's file, world frame.
     pub fn cameras(&self) -> &[MjcfCamera] {
         &self.cameras
+    }
+
+    /// Returns the lights of the scene's file; `None` if it states none.
+    pub fn lights(&self) -> Option<&SceneLights> {
+        self.lights.as_ref()
+    }
+
+    /// Returns the image of the sky in the scene's file, or the six of a cube around the camera.
+    pub fn sky(&self) -> Option<&Arc<Texture>> {
+        self.sky.as_ref()
     }
 
     /// Returns the position of a hinge (rad) or a slide (m) of an object, by its name in the file; the

@@ -1,5 +1,7 @@
 //! Images on surfaces: where their parts are, how often they repeat, and their means from afar.
 
+mod light;
+
 use std::path::Path;
 
 use tandem_sim::mjcf::Document;
@@ -24,6 +26,11 @@ fn drawn(kind: RendererKind, inside: &str, camera: &Camera) -> Frame {
         })
     });
     image.save(folder.path().join("four.png")).expect("an image");
+    let hole = image::RgbaImage::from_fn(64, 64, |x, y| {
+        let is_hole = (16..48).contains(&x) && (16..48).contains(&y);
+        image::Rgba([200, 30, 30, if is_hole { 0 } else { 255 }])
+    });
+    hole.save(folder.path().join("hole.png")).expect("an image");
     for (file, rgb) in [("red.png", RED), ("green.png", GREEN), ("blue.png", BLUE), ("grey.png", GREY)] {
         let plain = image::RgbImage::from_pixel(4, 4, image::Rgb(rgb));
         plain.save(folder.path().join(file)).expect("an image");

@@ -2,9 +2,8 @@
 
 use std::f32::consts::{FRAC_PI_3, PI};
 
-use tandem_sim::render::{
-    Camera, Carrier, Frame, Light, Part, Pattern, Scenery, TriangleMesh, cpu, encode_png,
-};
+use tandem_sim::mjcf::Gloss;
+use tandem_sim::render::{Camera, Carrier, Frame, Part, Pattern, Scenery, TriangleMesh, cpu, encode_png};
 use tandem_sim::{ObjectState, ObjectStep, Pose, Rotation, Step, Vector};
 
 const GREY: [f32; 3] = [0.6, 0.6, 0.6];
@@ -16,6 +15,8 @@ fn scenery(parts: Vec<(TriangleMesh, Pose)>) -> Scenery {
         carrier: Carrier::Room,
         carrier_from_mesh,
         rgb: GREY,
+        alpha: 1.0,
+        gloss: Gloss::default(),
         image: None,
         pattern: Pattern::Plain,
         id,
@@ -24,7 +25,7 @@ fn scenery(parts: Vec<(TriangleMesh, Pose)>) -> Scenery {
     Scenery {
         parts: parts.into_iter().zip(1..).map(part).collect(),
         focus_radius_m: 1.0,
-        light: Light::default(),
+        ..Scenery::default()
     }
 }
 

@@ -82,6 +82,7 @@ const DIMENSIONLESS: &[&str] = &[
     "rgba",
     "albedo",
     "colour",
+    "alpha",
     // Texture coordinates; also per metre.
     "uv",
     "uv_1_m",

@@ -95,4 +95,5 @@ def write_texture(model: Any, texture: int, out: Path, report: Report) -> str:
             report.drop("images of a cube's other five sides")
         pixels = sides[0]
     write_png(out / "textures" / f"texture_{texture}.png", pixels)
-    return f'<texture name="texture_{texture}" type="{kind}" file="texture_{texture}.png"/>'
+    alpha = ' nchannel="4"' if channels == 4 else ""
+    return f'<texture name="texture_{texture}" type="{kind}" file="texture_{texture}.png"{alpha}/>'

@@ -1,4 +1,4 @@
-"""Bodies with their joints, geoms and sites."""
+"""Bodies with their joints, geoms, sites, cameras and lights."""
 
 from __future__ import annotations
 
@@ -72,6 +72,7 @@ def content(model: Any, names: Names, report: Report, body: int) -> list[str]:
     rows = [row for geom in on_body(model, "geom", body) if (row := write_geom(model, names, report, geom))]
     rows += [write_site(model, names, site) for site in range(model.nsite) if model.site_bodyid[site] == body]
     rows += [write_camera(model, names, camera) for camera in range(model.ncam) if model.cam_bodyid[camera] == body]
+    rows += [write_light(model, light) for light in range(model.nlight) if model.light_bodyid[light] == body]
     return rows
 
 
@@ -151,3 +152,13 @@ def write_site(model: Any, names: Names, site: int) -> str:
 def write_camera(model: Any, names: Names, camera: int) -> str:
     row = f'<camera name="{escaped(names.of("camera", camera))}" pos="{numbers(model.cam_pos[camera])}"'
     return row + f' quat="{numbers(model.cam_quat[camera])}" fovy="{float(model.cam_fovy[camera]):.9g}"/>'
+
+
+def write_light(model: Any, light: int) -> str:
+    kind = mujoco.mjtLightType(int(model.light_type[light])).name[len("mjLIGHT_") :].lower()
+    switches = {"active": model.light_active[light], "castshadow": model.light_castshadow[light]}
+    row = f'<light type="{kind}" pos="{numbers(model.light_pos[light])}" dir="{numbers(model.light_dir[light])}"'
+    row += "".join(f' {name}="{"true" if value else "false"}"' for name, value in switches.items())
+    for name in ("ambient", "diffuse", "specular", "attenuation"):
+        row += f' {name}="{numbers(getattr(model, "light_" + name)[light])}"'
+    return row + f' cutoff="{float(model.light_cutoff[light]):.9g}" exponent="{float(model.light_exponent[light]):.9g}"/>'

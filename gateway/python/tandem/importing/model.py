@@ -18,6 +18,8 @@ from .report import Report
 
 #: Duration of the comparison between the source and the written file.
 SECONDS = 1.0
+#: MuJoCo's own headlight.
+HEADLIGHT = {"ambient": 0.1, "diffuse": 0.4, "specular": 0.5}
 FLAGS = {"contact": mujoco.mjtDisableBit.mjDSBL_CONTACT, "gravity": mujoco.mjtDisableBit.mjDSBL_GRAVITY}
 
 
@@ -31,6 +33,7 @@ def import_model(source: Path, out: Path) -> Report:
         "<mujoco>",
         '<compiler angle="radian" meshdir="meshes" texturedir="textures"/>',
         options(model, report),
+        headlight(model),
         custom(source.read_text(encoding="utf-8", errors="replace")),
         *write_assets(model, names, out, report),
         *write_bodies(model, names, report),
@@ -58,6 +61,16 @@ def options(model: Any, report: Report) -> str:
     return f'<option gravity="{numbers(model.opt.gravity)}">{flag}</option>'
 
 
+def headlight(model: Any) -> str:
+    """Returns the light at the camera, unless it is MuJoCo's own in a model without other lights."""
+    light = model.vis.headlight
+    usual = light.active and all(np.allclose(getattr(light, name), value) for name, value in HEADLIGHT.items())
+    if usual and not model.nlight:
+        return ""
+    colours = "".join(f' {name}="{numbers(getattr(light, name))}"' for name in HEADLIGHT)
+    return f'<visual><headlight{colours} active="{int(light.active)}"/></visual>'
+
+
 def custom(text: str) -> str:
     """Returns the drawn groups (1 and 2) for a file with robosuite's convention, which the compiler drops."""
     by_group = re.search(r'inertiagrouprange\s*=\s*"\s*0\s+0\s*"', text) and re.search(r'group\s*=\s*"1"', text)
@@ -72,7 +85,6 @@ def rest(model: Any, report: Report) -> None:
         ("<skin>", model.nskin),
         ("<sensor>", model.nsensor),
         ("<key>", model.nkey),
-        ("<light>", model.nlight),
         ("plugin", model.nplugin),
     ]:
         if times:

@@ -7,6 +7,8 @@ use roxmltree::Node;
 
 /// Maximum width and height; MuJoCo's own textures repeat and need no more.
 const MAX_SIDE: u32 = 1024;
+/// Maximum width and height of a sky without marks.
+const MAX_PLAIN_SKY_SIDE: u32 = 128;
 const DEFAULT_RGB_1: [f64; 3] = [0.8; 3];
 /// Share of the texels that `mark="random"` paints if a file does not give it.
 const DEFAULT_RANDOM_SHARE: f64 = 0.01;
@@ -37,7 +39,7 @@ enum Mark {
 }
 
 /// Returns the image of an element `<texture builtin=...>`, or the six of a cube in the order +x, -x, +y, -y,
-/// +z, -z. Returns none for other textures and for those of the sky.
+/// +z, -z. Returns none for other textures.
 pub(super) fn images(texture: &Node) -> Vec<RgbImage> {
     let kind = match texture.attribute("builtin") {
         Some("flat") => Kind::Flat,
@@ -67,7 +69,10 @@ pub(super) fn images(texture: &Node) -> Vec<RgbImage> {
         // One texel says all of a plain colour.
         Some("2d") if builtin.is_plain() => vec![builtin.flat_image(1, 1)],
         Some("2d") => vec![builtin.flat_image(width, height)],
-        Some("skybox") => Vec::new(),
+        // Plain gradients need few texels: the sky is blended between them.
+        Some("skybox") if builtin.mark == Mark::None => {
+            (0..6).map(|face| builtin.face(face, width.min(MAX_PLAIN_SKY_SIDE))).collect()
+        }
         _ => (0..6).map(|face| builtin.face(face, width)).collect(),
     }
 }
@@ -211,7 +216,7 @@ mod tests {
         let flat = drawn(r#"type="cube" builtin="flat" width="1" height="1""#);
         let reds: Vec<u8> = flat.iter().map(|face| face.get_pixel(0, 0).0[0]).collect();
         assert_eq!(reds, [255, 255, 255, 51, 255, 255]);
-        assert!(drawn(r#"type="skybox" builtin="gradient" width="4" height="4""#).is_empty());
+        assert_eq!(drawn(r#"type="skybox" builtin="gradient" width="4" height="24""#), gradient);
     }
 
     #[test]

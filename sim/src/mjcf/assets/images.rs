@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use image::{Rgb, RgbImage};
+use image::{DynamicImage, Rgb, RgbImage};
 use roxmltree::Node;
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -30,21 +30,29 @@ type Read = Vec<(PathBuf, u64)>;
 impl Document {
     /// Reads the images of textures that name files, and draws those that MuJoCo draws itself.
     pub(in crate::mjcf) fn read_textures(&mut self) -> Result<(), SimError> {
-        let (mut textures, mut builtins, mut read) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut textures, mut builtins, mut read, mut sky) = (Vec::new(), Vec::new(), Vec::new(), None);
         let xml = self.source.xml()?;
         for node in xml.descendants().filter(|node| node.has_tag_name("texture")) {
             let name = name(&node);
             let of_files = self.images_of_files(&node, &mut read)?;
-            if !of_files.is_empty() {
-                textures.push((name, Arc::new(Texture::of(&of_files))));
-                continue;
+            let drawn = if of_files.is_empty() { builtin::images(&node) } else { Vec::new() };
+            let found = match (of_files.is_empty(), drawn.is_empty()) {
+                (false, _) => Arc::new(of_files_texture(&node, of_files)),
+                (true, false) => Arc::new(Texture::of(&drawn)),
+                (true, true) => continue,
+            };
+            if node.attribute("type") == Some("skybox") {
+                sky.get_or_insert(found.clone());
             }
-            let drawn = builtin::images(&node);
-            if !drawn.is_empty() {
-                builtins.push((name, Arc::new(Texture::of(&drawn))));
+            // A builtin sky is no texture of a material.
+            match (drawn.is_empty(), node.attribute("type")) {
+                (true, _) => textures.push((name, found)),
+                (false, Some("skybox")) => {}
+                (false, _) => builtins.push((name, found)),
             }
         }
         drop(xml);
+        self.sky = sky;
         self.textures.extend(textures);
         self.builtins.extend(builtins);
         self.files.append(&mut read);
@@ -52,7 +60,7 @@ impl Document {
     }
 
     /// Returns the image of a texture's file, or six for the faces of a cube; none if it names no file.
-    fn images_of_files(&self, node: &Node, read: &mut Read) -> Result<Vec<RgbImage>, SimError> {
+    fn images_of_files(&self, node: &Node, read: &mut Read) -> Result<Vec<DynamicImage>, SimError> {
         let mut image = |file: &str| self.image_of_file(file, read);
         if let Some(file) = node.attribute("file") {
             let whole = image(file)?;
@@ -61,13 +69,13 @@ impl Document {
         if FACES.iter().all(|(attribute, _)| node.attribute(*attribute).is_none()) {
             return Ok(Vec::new());
         }
-        let blank = blank(node);
+        let blank = DynamicImage::from(blank(node));
         let face =
             |(attribute, _): &(&str, char)| node.attribute(*attribute).map_or(Ok(blank.clone()), &mut image);
         FACES.iter().map(face).collect()
     }
 
-    fn image_of_file(&self, file: &str, read: &mut Read) -> Result<RgbImage, SimError> {
+    fn image_of_file(&self, file: &str, read: &mut Read) -> Result<DynamicImage, SimError> {
         let asset = mjcf_rs::assets::Texture { file: Some(file.into()), ..Default::default() };
         let path = self.model.resolve_texture_file(&asset, &self.folder).unwrap_or_else(|| file.into());
         let path = self.source.beside_including(with_own_separators(path));
@@ -78,9 +86,20 @@ impl Document {
     }
 }
 
+/// Reduces the images of files. Their alpha counts if the texture states `nchannel="4"`, as in MuJoCo.
+fn of_files_texture(node: &Node, images: Vec<DynamicImage>) -> Texture {
+    let is_clear = |image: &DynamicImage| image.to_rgba8().pixels().any(|pixel| pixel.0[3] < u8::MAX);
+    if node.attribute("nchannel") == Some("4") && images.iter().any(is_clear) {
+        let images: Vec<_> = images.into_iter().map(DynamicImage::into_rgba8).collect();
+        return Texture::with_alpha(&images);
+    }
+    let images: Vec<_> = images.into_iter().map(DynamicImage::into_rgb8).collect();
+    Texture::of(&images)
+}
+
 /// Cuts the faces of a cube out of an image by `gridsize` and `gridlayout`; `None` without these. A face that
 /// the layout lacks has the colour `rgb1`.
-fn faces_of_grid(node: &Node, whole: &RgbImage) -> Option<Vec<RgbImage>> {
+fn faces_of_grid(node: &Node, whole: &DynamicImage) -> Option<Vec<DynamicImage>> {
     let mut sizes =
         node.attribute("gridsize")?.split_ascii_whitespace().map_while(|word| word.parse::<u32>().ok());
     let (rows, columns) =
@@ -93,9 +112,9 @@ fn faces_of_grid(node: &Node, whole: &RgbImage) -> Option<Vec<RgbImage>> {
     let face = |(_, letter): &(&str, char)| match letters.iter().position(|found| found == letter) {
         Some(cell) if (cell as u32) < rows * columns => {
             let (row, column) = (cell as u32 / columns, cell as u32 % columns);
-            image::imageops::crop_imm(whole, column * width, row * height, width, height).to_image()
+            whole.crop_imm(column * width, row * height, width, height)
         }
-        _ => blank(node),
+        _ => blank(node).into(),
     };
     Some(FACES.iter().map(face).collect())
 }

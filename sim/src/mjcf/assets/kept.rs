@@ -31,7 +31,11 @@ pub(in crate::mjcf) fn find(path: &Path) -> Option<Document> {
 
 /// Caches a document that has meshes or images. All others are fast to read.
 pub(in crate::mjcf) fn keep(path: &Path, document: &Document) {
-    if document.meshes.is_empty() && document.textures.is_empty() && document.builtins.is_empty() {
+    if document.meshes.is_empty()
+        && document.textures.is_empty()
+        && document.builtins.is_empty()
+        && document.sky.is_none()
+    {
         return;
     }
     let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);

@@ -155,12 +155,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_see_through_or_in_a_hidden_group_is_not_drawn() {
+    fn what_is_clear_or_in_a_hidden_group_is_not_drawn() {
         let drawn =
             |inside: &str| geoms(inside).expect("a room").iter().map(|geom| geom.drawn).collect::<Vec<_>>();
         let alphas = r#"<worldbody><geom size="1" rgba="1 0 0 0"/><geom size="1" rgba="1 0 0 0.5"/>
             <geom size="1" rgba="1 0 0 0.6"/><geom size="1" group="3"/></worldbody>"#;
-        assert_eq!(drawn(alphas), [false, false, true, false]);
+        assert_eq!(drawn(alphas), [false, true, true, false]);
         let groups = r#"<worldbody><geom size="1"/><geom size="1" group="1" contype="0" conaffinity="0"/>
             <geom size="1" group="3"/></worldbody>"#;
         assert_eq!(drawn(groups), [true, true, false]);

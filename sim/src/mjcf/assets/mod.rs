@@ -1,8 +1,9 @@
-//! Assets of a file and their appearance: meshes, images, patterns and groups, and a cache of documents.
+//! Assets of a file and their appearance: meshes, images, gloss, patterns and groups, and a cache of documents.
 
 mod builtin;
 mod concave;
 pub mod files;
+pub mod gloss;
 mod images;
 pub mod kept;
 pub mod looks;

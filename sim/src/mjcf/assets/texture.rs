@@ -5,7 +5,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use image::imageops::{FilterType, resize};
-use image::{ImageReader, RgbImage};
+use image::{DynamicImage, ImageBuffer, ImageReader, Pixel, RgbImage, RgbaImage};
 
 use crate::SimError;
 
@@ -19,6 +19,8 @@ pub struct Texture {
     pub levels: Vec<TextureLevel>,
     /// Mean of the file's sRGB values, each 0 to 1.
     pub mean_rgb: [f32; 3],
+    /// True if the fourth bytes of texels are alpha.
+    pub has_alpha: bool,
 }
 
 /// Image at one size.
@@ -28,7 +30,7 @@ pub struct TextureLevel {
     pub height: usize,
     /// Width and height once more.
     pub size_px: [f32; 2],
-    /// sRGB, row by row from the top left; the fourth byte is 0. Of a cube with six images, all of them in the
+    /// sRGB and alpha, row by row from the top left; without alpha, the fourth byte is 0. Of a cube with six images, all of them in the
     /// order +x, -x, +y, -y, +z, -z.
     pub texels: Vec<[u8; 4]>,
 }
@@ -46,21 +48,31 @@ impl Texture {
     /// # Errors
     ///
     /// Returns an error that names the file if the bytes are no image of a supported format.
-    pub(in crate::mjcf) fn decode(path: &Path, bytes: &[u8]) -> Result<RgbImage, SimError> {
+    pub(in crate::mjcf) fn decode(path: &Path, bytes: &[u8]) -> Result<DynamicImage, SimError> {
         let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
         let decoded = reader.map_err(|source| SimError::unreadable(path, source))?.decode();
-        let image =
-            decoded.map_err(|source| SimError::Texture { path: path.display().to_string(), source })?;
-        Ok(image.into_rgb8())
+        decoded.map_err(|source| SimError::Texture { path: path.display().to_string(), source })
     }
 
     /// Reduces an image of at least one pixel, or the six of a cube, to its levels. All get the size of the
     /// largest.
     pub(in crate::mjcf) fn of(images: &[RgbImage]) -> Texture {
-        let side = |pixels: fn(&RgbImage) -> u32| {
+        Texture::reduced(images, false)
+    }
+
+    /// Reduces images with alpha as [`Texture::of`] does.
+    pub(in crate::mjcf) fn with_alpha(images: &[RgbaImage]) -> Texture {
+        Texture::reduced(images, true)
+    }
+
+    fn reduced<P>(images: &[ImageBuffer<P, Vec<u8>>], has_alpha: bool) -> Texture
+    where
+        P: Pixel<Subpixel = u8> + 'static,
+    {
+        let side = |pixels: fn(&ImageBuffer<P, Vec<u8>>) -> u32| {
             images.iter().map(pixels).max().unwrap_or(1).next_power_of_two().min(MAX_SIDE)
         };
-        let (width, height) = (side(RgbImage::width), side(RgbImage::height));
+        let (width, height) = (side(ImageBuffer::width), side(ImageBuffer::height));
         let texels = images.iter().flat_map(|image| match image.dimensions() == (width, height) {
             true => texels(image),
             false => texels(&resize(image, width, height, FilterType::Triangle)),
@@ -69,7 +81,7 @@ impl Texture {
         while let Some(half) = levels.last().and_then(TextureLevel::halved) {
             levels.push(half);
         }
-        Texture { levels, mean_rgb: mean_rgb(images) }
+        Texture { levels, mean_rgb: mean_rgb(images), has_alpha }
     }
 
     /// Returns the number of images: 1, or 6 for a cube with one a face.
@@ -124,17 +136,21 @@ impl TextureLevel {
     }
 }
 
-fn texels(image: &RgbImage) -> Vec<[u8; 4]> {
-    image.pixels().map(|pixel| [pixel.0[0], pixel.0[1], pixel.0[2], 0]).collect()
+fn texels<P: Pixel<Subpixel = u8>>(image: &ImageBuffer<P, Vec<u8>>) -> Vec<[u8; 4]> {
+    let texel = |pixel: &P| {
+        let channels = pixel.channels();
+        [channels[0], channels[1], channels[2], channels.get(3).copied().unwrap_or(0)]
+    };
+    image.pixels().map(texel).collect()
 }
 
-fn mean_rgb(images: &[RgbImage]) -> [f32; 3] {
+fn mean_rgb<P: Pixel<Subpixel = u8>>(images: &[ImageBuffer<P, Vec<u8>>]) -> [f32; 3] {
     let (mut sum, mut count) = ([0.0f64; 3], 0);
     for image in images {
         let mut sum_of_image = [0.0f64; 3];
         for pixel in image.pixels() {
-            for (sum, value) in sum_of_image.iter_mut().zip(pixel.0) {
-                *sum += f64::from(value) / 255.0;
+            for (sum, value) in sum_of_image.iter_mut().zip(pixel.channels()) {
+                *sum += f64::from(*value) / 255.0;
             }
         }
         let pixels = image.pixels().len().max(1);
@@ -147,7 +163,7 @@ fn mean_rgb(images: &[RgbImage]) -> [f32; 3] {
 
 #[cfg(test)]
 mod tests {
-    use image::Rgb;
+    use image::{Rgb, Rgba};
 
     use super::*;
 
@@ -160,6 +176,14 @@ mod tests {
         assert_eq!(sizes, [(4, 2), (2, 1), (1, 1)]);
         assert_eq!(texture.levels[1].texels, [[180, 0, 40, 0]; 2], "half the light is 71 % of the value");
         assert_eq!(texture.mean_rgb, [0.5, 0.0, (40.0f64 / 255.0) as f32]);
+    }
+
+    #[test]
+    fn alpha_is_reduced_with_its_colours() {
+        let half = RgbaImage::from_fn(2, 2, |x, _| Rgba([10, 20, 30, if x == 0 { 255 } else { 0 }]));
+        let texture = Texture::with_alpha(&[half]);
+        assert!(texture.has_alpha);
+        assert_eq!(texture.levels[1].texels, [[10, 20, 30, 180]]);
     }
 
     #[test]

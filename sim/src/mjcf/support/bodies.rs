@@ -1,7 +1,7 @@
 //! Elements of `<worldbody>` and `<body>`, and their defaults.
 
 use super::{
-    AMOUNT, Attribute, CLASS, COLOR, Element, MAYBE, NAME, NUMBER, POSE, Sign, Support, Takes, USER,
+    AMOUNT, Attribute, BOOLEAN, CLASS, COLOR, Element, MAYBE, NAME, NUMBER, POSE, Sign, Support, Takes, USER,
     approximated, attribute, ignored, mapped, numbers, only, refused,
 };
 
@@ -104,10 +104,10 @@ pub(super) const ELEMENTS: &[Element] = &[
     Element {
         name: "light",
         within: TREE_OR_DEFAULT,
-        support: Support::Ignored,
-        kind: None,
-        attributes: &[],
-        note: "one sun with shadow lights every scene",
+        support: Support::Mapped,
+        kind: Some("light"),
+        attributes: &[&[NAME, CLASS], LIGHT],
+        note: "of a scene, its first seven; a scene without lights and headlight has a sun with shadow, and lights of robots and objects are ignored; of a frame around a light, pos and quat count",
     },
     Element {
         name: "plugin",
@@ -209,7 +209,7 @@ const GEOM: &[Attribute] = &[
         Support::Mapped,
         &["rgba"],
         COLOR,
-        "what has an alpha up to 0.5 is not drawn, all else is solid",
+        "with an alpha below 0.995 it is blended as in MuJoCo; depth and ids are those of what is behind",
     ),
     attribute(
         Support::Mapped,
@@ -227,6 +227,30 @@ const SITE: &[Attribute] = &[
     refused(&["fromto"], "state pos, a rotation and size"),
     refused(&["mesh"], "use another type"),
     ignored(&["group", "material", "rgba"], "sites are not drawn"),
+    USER,
+];
+
+const LIGHT: &[Attribute] = &[
+    mapped(&["pos"], numbers(3, 3)),
+    mapped(&["dir"], Takes::Direction(3)),
+    attribute(
+        Support::Mapped,
+        &["type"],
+        Takes::Word(&["spot", "directional", "point", "image"]),
+        "`image` gives no light",
+    ),
+    mapped(&["directional", "active"], BOOLEAN),
+    attribute(
+        Support::Mapped,
+        &["castshadow"],
+        BOOLEAN,
+        "directional lights: within 2.5 m of the robots; spots: up to 75 degrees from their direction, and so do points",
+    ),
+    mapped(&["ambient", "diffuse", "specular", "attenuation"], numbers(3, 3)),
+    mapped(&["cutoff", "exponent"], AMOUNT),
+    attribute(Support::Approximated, &["mode"], Takes::Only(&["fixed"]), "a light is fixed to its body"),
+    approximated(&["target"], "a light is fixed to its body"),
+    ignored(&["texture", "intensity", "range", "bulbradius"], "MuJoCo's renderer does not read them either"),
     USER,
 ];
 

@@ -26,7 +26,19 @@ pub(super) const ELEMENTS: &[Element] = &[
     element(Support::Mapped, "flag", &["option"], &[FLAG], ""),
     element(Support::Ignored, "size", &["mujoco"], &[], "memory is taken as it is needed"),
     element(Support::Ignored, "statistic", &["mujoco"], &[], "it is for MuJoCo's viewer"),
-    element(Support::Ignored, "visual", &["mujoco"], &[], "it is for MuJoCo's viewer"),
+    element(Support::Mapped, "visual", &["mujoco"], &[], ""),
+    element(
+        Support::Mapped,
+        "headlight",
+        &["visual"],
+        &[HEADLIGHT],
+        "of a scene; a scene with lights and without this has MuJoCo's own",
+    ),
+    viewer("global"),
+    viewer("quality"),
+    viewer("map"),
+    viewer("scale"),
+    viewer("rgba"),
     element(Support::Mapped, "custom", &["mujoco"], &[], ""),
     named(
         Support::Mapped,
@@ -69,9 +81,22 @@ pub(super) const ELEMENTS: &[Element] = &[
         &[&[NAME, CLASS], MESH],
         "files are OBJ, STL and MSH; they lie where the compiler says, or beside an included file",
     ),
-    named(Support::Mapped, "texture", &["asset"], "texture", &[&[NAME], TEXTURE], "images are PNG"),
+    named(
+        Support::Mapped,
+        "texture",
+        &["asset"],
+        "texture",
+        &[&[NAME], TEXTURE],
+        "images are PNG; the first of type `skybox` is drawn where no surface is",
+    ),
     named(Support::Mapped, "material", &["asset", "default"], "material", &[&[NAME, CLASS], MATERIAL], ""),
-    element(Support::Ignored, "layer", &["material"], &[], "of a material its colour and texture are taken"),
+    element(
+        Support::Ignored,
+        "layer",
+        &["material"],
+        &[],
+        "of a material its colour, texture and gloss are taken",
+    ),
     element(Support::Refused, "hfield", &["asset"], &[], "write a height field as boxes or as meshes"),
     element(Support::Refused, "skin", &["asset", "deformable"], &[], "nothing bends or stretches here"),
     element(Support::Refused, "model", &["asset"], &[], "include the file, or let MuJoCo save the whole"),
@@ -174,6 +199,10 @@ const fn named(
     Element { name, within, support, kind: Some(kind), attributes, note }
 }
 
+const fn viewer(name: &'static str) -> Element {
+    element(Support::Ignored, name, &["visual"], &[], "it is for MuJoCo's viewer")
+}
+
 const fn other_actuator(name: &'static str) -> Element {
     element(Support::Approximated, name, ACTUATORS, &[], "it does nothing; motor and position act")
 }
@@ -212,6 +241,9 @@ const COMPILER: &[Attribute] = &[
         "they change how MuJoCo computes, not what",
     ),
 ];
+
+const HEADLIGHT: &[Attribute] =
+    &[mapped(&["ambient", "diffuse", "specular"], numbers(3, 3)), mapped(&["active"], NUMBER)];
 
 const OPTION: &[Attribute] = &[
     attribute(
@@ -313,7 +345,12 @@ const MESH: &[Attribute] = &[
     refused(&["material"], "state it on the geoms"),
     ignored(&["content_type"], "the file's name says it"),
     ignored(&["normal", "texcoord"], "those of files are drawn"),
-    ignored(&["smoothnormal"], "faces without normals in their file are drawn flat"),
+    attribute(
+        Support::Approximated,
+        &["smoothnormal"],
+        Takes::Only(&["false"]),
+        "without normals in the file, edges of up to 37 degrees are smooth, and others sharp",
+    ),
 ];
 
 const TEXTURE: &[Attribute] = &[
@@ -332,10 +369,13 @@ const TEXTURE: &[Attribute] = &[
     mapped(&["fileright", "fileleft", "fileup", "filedown", "filefront", "fileback"], Takes::Text),
     mapped(&["gridsize"], numbers(2, 2)),
     mapped(&["gridlayout"], Takes::Text),
-    ignored(
-        &["class", "colorspace", "content_type", "hflip", "vflip", "nchannel"],
-        "images are drawn as they are; a sky is not",
+    attribute(
+        Support::Mapped,
+        &["nchannel"],
+        Takes::Word(&["1", "2", "3", "4"]),
+        "with `4`, the alpha of images is blended; in MuJoCo only if the material's alpha is below 0.995, too",
     ),
+    ignored(&["class", "colorspace", "content_type", "hflip", "vflip"], "images are drawn as they are"),
 ];
 
 const MATERIAL: &[Attribute] = &[
@@ -343,10 +383,13 @@ const MATERIAL: &[Attribute] = &[
     mapped(&["rgba"], COLOR),
     mapped(&["texrepeat"], numbers(1, 2)),
     mapped(&["texuniform"], BOOLEAN),
-    ignored(
-        &["emission", "specular", "shininess", "reflectance", "metallic", "roughness"],
-        "of a material its colour and texture are taken",
+    attribute(
+        Support::Mapped,
+        &["emission", "specular", "shininess"],
+        AMOUNT,
+        "in scenes with lights or a headlight",
     ),
+    ignored(&["reflectance", "metallic", "roughness"], "surfaces mirror nothing"),
 ];
 
 const EQUALITY: &[Attribute] = &[NAME, CLASS, mapped(&["active"], BOOLEAN), SOFTNESS];

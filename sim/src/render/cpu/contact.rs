@@ -98,7 +98,8 @@ impl ContactMap {
         layer: HeightLayer,
     ) {
         let mut batch = TriangleBatch::default();
-        for (number, part) in prepared.scenery.parts.iter().enumerate() {
+        let parts = prepared.scenery.parts.iter().enumerate();
+        for (number, part) in parts.filter(|(number, _)| !prepared.is_veil[*number]) {
             let (pose, geometry) = (placed.world_from_mesh[number], prepared.geometry(number));
             let (centre_m, around_m) = geometry.bounds;
             if layer != HeightLayer::of(part) || !self.concerns(layer, pose * centre_m, around_m) {

@@ -1,10 +1,13 @@
 //! The embedded renderer: a visibility buffer of triangle numbers, shaded afterwards, four samples a pixel.
 
+mod blend;
 pub mod contact;
+mod lamps;
 mod raster;
 mod shade;
 mod shadow;
 mod target;
+mod veil;
 mod view;
 mod workspace;
 
@@ -19,11 +22,13 @@ use crate::Step;
 use crate::render::blur::blurred;
 use crate::render::scene::prepared::Prepared;
 use crate::render::shading::srgb::SrgbTable;
-use crate::render::{Camera, Frame, PlacedScenery, Renderer, Scenery, Wanted};
+use crate::render::{Camera, Frame, Part, PlacedScenery, Renderer, Scenery, Wanted};
 use contact::ContactMap;
+use lamps::LitLamps;
 use shade::{Facet, Rays};
 use shadow::ShadowMap;
 use target::RenderTarget;
+use veil::Veils;
 use view::{Row, View};
 use workspace::Workspace;
 
@@ -43,6 +48,7 @@ struct LitState {
     /// State that shadow, contacts and facets belong to.
     placed: PlacedScenery,
     shadow: ShadowMap,
+    lamps: LitLamps,
     contact: ContactMap,
     facets: Vec<Facet>,
 }
@@ -52,6 +58,7 @@ impl LitState {
     fn forget(&mut self) {
         self.placed = PlacedScenery::default();
         self.shadow.forget();
+        self.lamps.forget();
         self.contact.forget();
     }
 }
@@ -63,6 +70,9 @@ struct Canvas {
     samples: RenderTarget,
     /// One sample a pixel, at its centre, from which depth and ids are read.
     centres: RenderTarget,
+    /// Blended surfaces at the samples, and at the centres.
+    veils: Veils,
+    veils_at_centres: Veils,
 }
 
 impl CpuRenderer {
@@ -140,7 +150,11 @@ impl WithSimd for StateDrawing<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
         let StateDrawing { state, prepared, placed } = self;
-        state.shadow.draw(simd, prepared, &placed);
+        let Scenery { light, lamps, .. } = &prepared.scenery;
+        match lamps {
+            None => state.shadow.draw(simd, prepared, &placed, light.sun_direction),
+            Some(lamps) => state.lamps.draw(simd, lamps, prepared, &placed),
+        }
         state.contact.draw(prepared, &placed);
         shade::place(&mut state.facets, prepared, &placed, &state.placed);
         state.placed = placed;
@@ -163,14 +177,17 @@ impl WithSimd for PictureDrawing<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Frame {
         let PictureDrawing { state, prepared, srgb, canvas, camera, wanted } = self;
-        let Canvas { row, samples, centres } = canvas;
+        let Canvas { row, samples, centres, veils, veils_at_centres } = canvas;
         let measured = (wanted == Wanted::All).then_some(&mut *centres);
         target::draw(simd, samples, measured, prepared, &state.placed, camera);
+        veils.draw(simd, samples, prepared, &state.placed, camera);
         let mut view = View {
             prepared,
             facets: &state.facets,
             target: samples,
+            veils,
             shadow: &state.shadow,
+            lamps: prepared.scenery.lamps.is_some().then_some(&state.lamps),
             contact: &state.contact,
             rays: Rays::new(camera),
         };
@@ -190,6 +207,10 @@ impl WithSimd for PictureDrawing<'_> {
             centres.finish_row(row);
             frame.depth_m.extend(centres.nearness_1_m(row).iter().map(|nearness| 1.0 / nearness));
             frame.ids.extend(centres.sheets(row).iter().map(|sheet| prepared.id(*sheet)));
+        }
+        if prepared.scenery.parts.iter().any(Part::is_cut_out) {
+            veils_at_centres.draw(simd, centres, prepared, &state.placed, camera);
+            veils_at_centres.measure(prepared, &state.facets, &Rays::new(camera), &mut frame);
         }
         frame
     }

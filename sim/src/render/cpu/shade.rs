@@ -5,10 +5,11 @@ use rapier3d::math::{Matrix, Pose, Vector};
 
 use super::contact::ContactMap;
 use super::shadow::ShadowMap;
+use crate::mjcf::Gloss;
 use crate::render::scene::prepared::{Prepared, Sheet};
 use crate::render::shading::image::Image;
 use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
-use crate::render::shading::{CONTACT, HIGHLIGHT, LAMP, SAMPLES};
+use crate::render::shading::{CONTACT, HIGHLIGHT, LAMP, SAMPLES, opacity};
 use crate::render::{Camera, Carrier, Light, Pattern, PlacedScenery};
 
 /// Number of points that are shaded together: enough to amortise a loop, few enough to fit the cache.
@@ -24,6 +25,7 @@ pub(super) struct Facet {
     pub normal: Vector,
     pub slope_1_m: Option<Matrix>,
     pub linear_rgb: [Vector; 2],
+    pub gloss: Gloss,
     pub pattern: Pattern,
     /// Map to the frame of the pattern, or to the coordinates of the image.
     pub pattern_from_world: Affine,
@@ -38,6 +40,8 @@ pub(super) struct Rays {
     first_ray: Vector,
     right_ray: Vector,
     down_ray: Vector,
+    /// Direction from what the camera looks at to the camera.
+    pub back_direction: Vector,
 }
 
 /// Adjacent pixels that show one sheet.
@@ -53,6 +57,8 @@ pub(super) struct Strip<'a> {
     pub count: usize,
     /// Share of the pixels that the sheet covers.
     pub share: f32,
+    /// Alpha of a blended part; `None` for a solid one.
+    pub alpha: Option<f32>,
 }
 
 /// Points that are shaded together. They are stored coordinate by coordinate and processed in branchless
@@ -60,15 +66,17 @@ pub(super) struct Strip<'a> {
 pub(super) struct Surfaces {
     count: usize,
     /// Points in the world; the directions are in the world, too.
-    point_m: Vectors,
+    pub point_m: Vectors,
     /// Rays from the camera to the points; rays and normals have any length.
-    ray: Vectors,
-    normal: Vectors,
-    albedo: Vectors,
+    pub ray: Vectors,
+    pub normal: Vectors,
+    pub albedo: Vectors,
+    /// Emission, specular strength and shininess, for lamps.
+    pub gloss: Vectors,
     /// Share of light that contact shadows leave.
     open_share: [f32; ROOM],
     /// The pixel of each point, and its weight there.
-    pixels: [u32; ROOM],
+    pub pixels: [u32; ROOM],
     pixel_share: [f32; ROOM],
     /// Place in the shadow map, and the cell there.
     texel: Vectors,
@@ -80,13 +88,13 @@ pub(super) struct Surfaces {
 }
 
 /// One vector per point.
-struct Vectors([[f32; ROOM]; 3]);
+pub(super) struct Vectors([[f32; ROOM]; 3]);
 
 impl Vectors {
     const ZERO: Vectors = Vectors([[0.0; ROOM]; 3]);
 
     #[inline(always)]
-    fn block(&self, at: usize) -> [Lanes; 3] {
+    pub(super) fn block(&self, at: usize) -> [Lanes; 3] {
         axes(
             #[inline(always)]
             |axis| *block(&self.0[axis], at),
@@ -112,7 +120,7 @@ fn block_mut<T, const N: usize>(values: &mut [T; ROOM], at: usize) -> &mut [T; N
 }
 
 #[inline(always)]
-fn dot(a: &[Lanes; 3], b: &[Lanes; 3], i: usize) -> f32 {
+pub(super) fn dot(a: &[Lanes; 3], b: &[Lanes; 3], i: usize) -> f32 {
     a[0][i] * b[0][i] + a[1][i] * b[1][i] + a[2][i] * b[2][i]
 }
 
@@ -143,6 +151,7 @@ fn place_part(facets: &mut [Facet], sheets: &[Sheet], prepared: &Prepared, numbe
         normal: Vector::ZERO,
         slope_1_m: None,
         linear_rgb: prepared.linear_rgb[number],
+        gloss: part.gloss,
         pattern: part.pattern,
         pattern_from_world: prepared.pattern_from_world(number, pose),
         carries: part.carrier == Carrier::Room,
@@ -167,7 +176,21 @@ impl Rays {
             first_ray: rotation * camera.unproject([0.0, 0.0], 1.0) + (right + down) * 0.5,
             right_ray: right,
             down_ray: down,
+            back_direction: rotation * Vector::Z,
         }
+    }
+
+    /// Returns the ray of a sample, and the steps to the next pixels to the right and down.
+    #[inline(always)]
+    pub(super) fn sample(&self, [x, y]: [usize; 2]) -> (Vector, [Vector; 2]) {
+        let ray = self.first_ray + self.right_ray * x as f32 + self.down_ray * y as f32;
+        (ray, [self.right_ray * SAMPLES as f32, self.down_ray * SAMPLES as f32])
+    }
+
+    /// Returns the point that is seen at the centre of a pixel.
+    pub(super) fn point_m(&self, [x, y]: [usize; 2], nearness_1_m: f32) -> Vector {
+        let (ray, _) = self.sample([x * SAMPLES, y * SAMPLES]);
+        self.eye_m + (ray + (self.right_ray + self.down_ray) * 0.5) / nearness_1_m
     }
 }
 
@@ -179,6 +202,7 @@ impl Surfaces {
             ray: Vectors::ZERO,
             normal: Vectors::ZERO,
             albedo: Vectors::ZERO,
+            gloss: Vectors::ZERO,
             open_share: [1.0; ROOM],
             pixels: [0; ROOM],
             pixel_share: [0.0; ROOM],
@@ -233,14 +257,17 @@ impl Surfaces {
             self.point_m.set(at, point_m);
             let normal = strip.facet.normals(&point_m);
             self.normal.set(at, normal);
-            self.albedo.set(
-                at,
-                match strip.image {
-                    None => strip.facet.albedo(&point_m),
-                    Some(image) => strip.facet.image_rgb(image, rays, [&ray, &point_m, &normal], &depth_m),
-                },
-            );
-            *block_mut(&mut self.pixel_share, at) = [strip.share; N];
+            let (albedo, alpha) = match strip.image {
+                None => (strip.facet.albedo(&point_m), [1.0; N]),
+                Some(image) => strip.facet.image_rgb(image, rays, [&ray, &point_m, &normal], &depth_m),
+            };
+            self.albedo.set(at, albedo);
+            let Gloss { emission_factor, specular_factor, shininess_factor } = strip.facet.gloss;
+            self.gloss.set(at, [[emission_factor; N], [specular_factor; N], [shininess_factor; N]]);
+            *block_mut(&mut self.pixel_share, at) = match strip.alpha {
+                None => [strip.share; N],
+                Some(of_part) => lanes(|i| strip.share * opacity(of_part * alpha[i])),
+            };
             *block_mut(&mut self.open_share, at) = [1.0; N];
             *block_mut(&mut self.pixels, at) = lanes::<u32, N>(|i| (strip.first_pixel + start + i) as u32);
             if strip.facet.carries {
@@ -248,6 +275,25 @@ impl Surfaces {
                 *block_mut(&mut self.open_share, at) = lanes::<f32, N>(|i| 1.0 - CONTACT * darkness[i]);
             }
         }
+    }
+
+    /// Adds the shares of all pushed points to those of their pixels.
+    pub(super) fn add_shares(&self, sum: &mut [f32]) {
+        for (pixel, share) in self.pixels.iter().zip(&self.pixel_share).take(self.count) {
+            sum[*pixel as usize] += share;
+        }
+    }
+
+    /// Clears the points and returns their number.
+    pub(super) fn take_count(&mut self) -> usize {
+        std::mem::take(&mut self.count)
+    }
+
+    /// Returns the points' weights in their pixels, less what contact shadows take.
+    #[inline(always)]
+    pub(super) fn shares(&self, at: usize) -> Lanes {
+        let (open, share) = (block(&self.open_share, at), block(&self.pixel_share, at));
+        lanes(|i| open[i] * share[i])
     }
 
     /// Adds the linear colours of all pushed points to those of their pixels, and clears the points.
@@ -358,7 +404,7 @@ impl Facet {
         )
     }
 
-    /// Returns the linear colours of the image on the surface, without light, of points that have rays,
+    /// Returns the linear colours of the image on the surface, without light, and its alpha, of points that have rays,
     /// places, normals and depths.
     #[inline(always)]
     fn image_rgb<const N: usize>(
@@ -367,7 +413,7 @@ impl Facet {
         rays: &Rays,
         [ray, point_m, normal]: [&[Lanes<N>; 3]; 3],
         depth_m: &Lanes<N>,
-    ) -> [Lanes<N>; 3] {
+    ) -> ([Lanes<N>; 3], Lanes<N>) {
         let at = self.pattern_from_world.map_lanes(point_m);
         let along_ray = self.pattern_from_world.derivatives(ray);
         let facing: Lanes<N> = lanes(|i| {
@@ -376,19 +422,20 @@ impl Facet {
         });
         let by = |step: Vector| self.image_step(step, [&along_ray, normal], &facing, depth_m);
         let (x, y) = (by(rays.right_ray * SAMPLES as f32), by(rays.down_ray * SAMPLES as f32));
-        let mut albedo = [[0.0; N]; 3];
+        let (mut albedo, mut alpha) = ([[0.0; N]; 3], [1.0; N]);
         for i in 0..N {
             let place = image.place(
                 [at[0][i], at[1][i], at[2][i]],
                 [x[0][i], x[1][i], x[2][i]],
                 [y[0][i], y[1][i], y[2][i]],
             );
-            let rgb = image.rgb(&place);
+            let (rgb, alpha_here) = image.rgb_and_alpha(&place);
+            alpha[i] = alpha_here;
             for (axis, albedo) in albedo.iter_mut().enumerate() {
                 albedo[i] = rgb[axis] * self.linear_rgb[0][axis];
             }
         }
-        albedo
+        (albedo, alpha)
     }
 
     /// Returns the differences of image coordinates between points and those that rays meet on the same

@@ -8,8 +8,8 @@ use rapier3d::math::Vector;
 use super::raster::{Grid, Outlines, SampleRows, TriangleBatch, larger, smaller, whole_f32};
 use crate::render::scene::prepared::Prepared;
 use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
-use crate::render::shading::{BIAS_M, FADE_TEXELS, NORMAL_OFFSET_M, TEXELS, sun_map};
-use crate::render::{Carrier, PlacedScenery, Scenery};
+use crate::render::shading::{BIAS_M, FADE_TEXELS, TEXELS, normal_offset_m, sun_map};
+use crate::render::{Carrier, PlacedScenery};
 
 /// Texels along each side of a cell. A point nearer than everything in its cell is in the sun, without a
 /// look at the texels.
@@ -26,6 +26,10 @@ const GRID: Grid = Grid { width: TEXELS, height: TEXELS, pitch_px: 1.0 };
 pub(super) struct ShadowMap {
     /// Centre of the map; `None` before the first.
     focus_m: Option<Vector>,
+    /// Direction to the sun.
+    sun_direction: Vector,
+    /// Offset of the lookup point along the normal.
+    normal_offset_m: f32,
     map_from_world: Affine,
     /// The room's shadows, which are valid while the focus stays.
     still: ShadowLayer,
@@ -53,13 +57,20 @@ impl ShadowMap {
         self.focus_m = None;
     }
 
-    /// Draws the shadows of everything that casts one.
+    /// Draws the shadows of everything that casts one, in the light of a sun in a direction.
     #[inline(always)]
-    pub(super) fn draw<S: Simd>(&mut self, simd: S, prepared: &Prepared, placed: &PlacedScenery) {
-        if self.focus_m != Some(placed.focus_m) {
-            self.focus_m = Some(placed.focus_m);
-            let Scenery { light, focus_radius_m, .. } = &prepared.scenery;
-            self.map_from_world = sun_map(light.sun_direction, placed.focus_m, *focus_radius_m);
+    pub(super) fn draw<S: Simd>(
+        &mut self,
+        simd: S,
+        prepared: &Prepared,
+        placed: &PlacedScenery,
+        sun_direction: Vector,
+    ) {
+        if self.focus_m != Some(placed.focus_m) || self.sun_direction != sun_direction {
+            (self.focus_m, self.sun_direction) = (Some(placed.focus_m), sun_direction);
+            let radius_m = prepared.scenery.focus_radius_m;
+            self.normal_offset_m = normal_offset_m(radius_m);
+            self.map_from_world = sun_map(sun_direction, placed.focus_m, radius_m);
             self.still.nearness_m.reset(GRID, 0.0);
             self.still.cells_m.resize(CELLS * CELLS + 1, [f32::NEG_INFINITY; 2]);
             self.moving = vec![0; CELLS];
@@ -103,8 +114,7 @@ impl ShadowMap {
             for moving in &mut self.moving[rows] {
                 *moving |= reached;
             }
-            let to_sun =
-                placed.world_from_mesh[number].rotation.inverse() * prepared.scenery.light.sun_direction;
+            let to_sun = placed.world_from_mesh[number].rotation.inverse() * self.sun_direction;
             geometry.faces.put_front(&mut self.front, [to_sun.x, to_sun.y, to_sun.z, 0.0]);
             for triangle in &self.front {
                 let corners =
@@ -124,10 +134,22 @@ impl ShadowMap {
     pub(super) fn texels(&self, points_m: &[Lanes; 3], normals: &[Lanes; 3]) -> [Lanes; 3] {
         let shifted: [Lanes; 3] = axes(
             #[inline(always)]
-            |axis| lanes(|i| points_m[axis][i] + normals[axis][i] * NORMAL_OFFSET_M),
+            |axis| lanes(|i| points_m[axis][i] + normals[axis][i] * self.normal_offset_m),
         );
         let [u, v, nearness_m] = self.map_from_world.map_lanes(&shifted);
         [lanes(|i| u[i] - 0.5), lanes(|i| v[i] - 0.5), lanes(|i| nearness_m[i] + BIAS_M)]
+    }
+
+    /// Returns the light at a point as [`ShadowMap::sunlit`] does.
+    pub(super) fn sunlit_at(&self, point_m: Vector, normal: Vector) -> f32 {
+        let [u, v, nearness_m] = self.map_from_world.map(point_m + normal * self.normal_offset_m);
+        let inside = 1.0..(TEXELS - 3) as f32;
+        let (u, v) = (u - 0.5, v - 0.5);
+        if !inside.contains(&u) || !inside.contains(&v) {
+            return 1.0;
+        }
+        let [[cell, ..], ..] = [ShadowMap::cells(&[[u; LANES], [v; LANES], [0.0; LANES]])];
+        self.sunlit([u, v, nearness_m + BIAS_M], cell)
     }
 
     /// Returns the cells of filters that begin at some texels.

@@ -34,6 +34,73 @@ pub(super) fn draw<S: Simd>(
     if let Some(centres) = &mut centres {
         centres.reset(Grid { width, height, pitch_px: SAMPLES as f64 });
     }
+    project(
+        prepared,
+        placed,
+        camera,
+        #[inline(always)]
+        |part| !prepared.is_veil[part],
+        #[inline(always)]
+        |outlines| fill(simd, samples, centres.as_deref_mut(), outlines),
+    );
+}
+
+/// Fills `samples` with the nearness of what casts shadows, as a lamp at the camera's place sees it.
+#[inline(always)]
+pub(super) fn draw_casting<S: Simd>(
+    simd: S,
+    samples: &mut RenderTarget,
+    prepared: &Prepared,
+    placed: &PlacedScenery,
+    camera: &Camera,
+) {
+    let (width, height) = (camera.width as usize * SAMPLES, camera.height as usize * SAMPLES);
+    samples.reset(Grid { width, height, pitch_px: 1.0 });
+    project(
+        prepared,
+        placed,
+        camera,
+        #[inline(always)]
+        |part| prepared.scenery.parts[part].casts_shadow,
+        #[inline(always)]
+        |outlines| samples.fill(simd, outlines),
+    );
+}
+
+/// Fills `layer` with the nearest blended surfaces in front of the solid ones and, if given, behind those of
+/// the layer before. Returns false if there are none.
+#[inline(always)]
+pub(super) fn draw_veils<S: Simd>(
+    simd: S,
+    layer: &mut RenderTarget,
+    solid: &RenderTarget,
+    before: Option<&RenderTarget>,
+    prepared: &Prepared,
+    placed: &PlacedScenery,
+    camera: &Camera,
+) -> bool {
+    layer.reset(solid.grid);
+    project(
+        prepared,
+        placed,
+        camera,
+        #[inline(always)]
+        |part| prepared.is_veil[part],
+        #[inline(always)]
+        |outlines| layer.fill_between(simd, outlines, solid, before),
+    );
+    layer.nearness_1_m.all_mut().iter().any(|nearness| *nearness > 0.0)
+}
+
+/// Calls `each` for the triangles of some parts, in batches.
+#[inline(always)]
+fn project(
+    prepared: &Prepared,
+    placed: &PlacedScenery,
+    camera: &Camera,
+    is_drawn: impl Fn(usize) -> bool,
+    mut each: impl FnMut(&Outlines),
+) {
     let camera_from_world = camera.world_from_camera.inverse();
     let lens = Lens::new(camera);
     let (mut corners, mut front): (Vec<[f32; 4]>, _) = (Vec::new(), Vec::new());
@@ -41,7 +108,7 @@ pub(super) fn draw<S: Simd>(
     for (number, part) in prepared.scenery.parts.iter().enumerate() {
         let camera_from_mesh = camera_from_world * placed.world_from_mesh[number];
         let geometry = prepared.geometry(number);
-        if !lens.sees(geometry.bounds, camera_from_mesh) {
+        if !is_drawn(number) || !lens.sees(geometry.bounds, camera_from_mesh) {
             continue;
         }
         let map = Affine::of(camera_from_mesh);
@@ -69,17 +136,17 @@ pub(super) fn draw<S: Simd>(
                 for i in 1..count - 1 {
                     let corners = [clipped[0], clipped[i], clipped[i + 1]];
                     if batch.is_full() {
-                        fill(simd, samples, centres.as_deref_mut(), &batch.take());
+                        each(&batch.take());
                     }
                     batch.push(corners.map(|p| lens.screen(p.to_array())), sheet);
                 }
             }
             if batch.is_full() {
-                fill(simd, samples, centres.as_deref_mut(), &batch.take());
+                each(&batch.take());
             }
         }
     }
-    fill(simd, samples, centres, &batch.take());
+    each(&batch.take());
 }
 
 /// Projection of a camera's frame to the image's samples.
@@ -179,6 +246,40 @@ impl RenderTarget {
                 let nearer = simd.greater_than_f32s(nearness, nearest[i]);
                 nearest[i] = simd.max_f32s(nearness, nearest[i]);
                 // A selection would be compiled to a masked store, which takes some processors 20 ns.
+                let change =
+                    simd.select_u32s(nearer, simd.xor_u32s(owner[i], simd.splat_u32s(sheet)), nothing);
+                owner[i] = simd.xor_u32s(owner[i], change);
+            },
+        );
+    }
+
+    /// Draws triangles into those samples for which they are the nearest in front of `solid` and behind
+    /// `before`.
+    #[inline(always)]
+    fn fill_between<S: Simd>(
+        &mut self,
+        simd: S,
+        outlines: &Outlines,
+        solid: &RenderTarget,
+        before: Option<&RenderTarget>,
+    ) {
+        let nearest = S::as_mut_simd_f32s(self.nearness_1_m.all_mut()).0;
+        let owner = S::as_mut_simd_u32s(self.sheet.all_mut()).0;
+        let behind = S::as_simd_f32s(solid.nearness_1_m.all()).0;
+        let front = before.map(|before| S::as_simd_f32s(before.nearness_1_m.all()).0);
+        let (nothing, none) = (simd.splat_u32s(0), simd.splat_f32s(0.0));
+        outlines.draw(
+            simd,
+            self.grid,
+            #[inline(always)]
+            |i, sheet, nearness| {
+                let in_front = simd.greater_than_f32s(nearness, behind[i]);
+                let mut nearness = simd.select_f32s(in_front, nearness, none);
+                if let Some(front) = front {
+                    nearness = simd.select_f32s(simd.less_than_f32s(nearness, front[i]), nearness, none);
+                }
+                let nearer = simd.greater_than_f32s(nearness, nearest[i]);
+                nearest[i] = simd.max_f32s(nearness, nearest[i]);
                 let change =
                     simd.select_u32s(nearer, simd.xor_u32s(owner[i], simd.splat_u32s(sheet)), nothing);
                 owner[i] = simd.xor_u32s(owner[i], change);

@@ -3,9 +3,11 @@
 use std::ops::Range;
 
 use super::contact::ContactMap;
+use super::lamps::LitLamps;
 use super::shade::{Facet, Rays, Strip, Surfaces};
 use super::shadow::ShadowMap;
 use super::target::RenderTarget;
+use super::veil::Veils;
 use crate::render::scene::prepared::{NOTHING, Prepared};
 use crate::render::shading::srgb::SrgbTable;
 use crate::render::shading::{OUTLINE, OUTLINE_DEPTH_STEP, SAMPLES, SKY};
@@ -23,21 +25,27 @@ pub(super) struct View<'a> {
     /// The facet of each sheet.
     pub facets: &'a [Facet],
     pub target: &'a mut RenderTarget,
+    pub veils: &'a Veils,
     pub shadow: &'a ShadowMap,
+    /// Lamps in place of the sun.
+    pub lamps: Option<&'a LitLamps>,
     pub contact: &'a ContactMap,
     pub rays: Rays,
 }
 
 /// Buffers that are reused from image to image.
 pub(super) struct Row {
-    surfaces: Surfaces,
+    pub surfaces: Surfaces,
     /// For each column of samples, non-zero if an edge is in it or to its right.
     edges: Vec<u32>,
     /// For each pixel, 1 if an edge is in it or beside it, otherwise 0. Behind the last are [`TOGETHER`]
     /// ones.
     mixed: Vec<u8>,
     /// Linear colours of the pixels so far: all red shares, all green, all blue.
-    sum_rgb: [Vec<f32>; 3],
+    pub sum_rgb: [Vec<f32>; 3],
+    /// The same for one layer of blended surfaces, and the shares of light that they keep out.
+    pub veil_rgb: [Vec<f32>; 3],
+    pub veil_alpha: Vec<f32>,
 }
 
 impl View<'_> {
@@ -58,6 +66,7 @@ impl View<'_> {
                 sum.resize(width, 0.0);
             }
             self.row(y, width, row);
+            self.blend_veils(y, width, row);
             srgb.encode(&row.sum_rgb, bytes);
         }
         rgb
@@ -79,7 +88,7 @@ impl View<'_> {
         let mut x = 0;
         while x < width {
             if row.surfaces.room() < PER_PIXEL {
-                row.surfaces.shade(&self.prepared.scenery.light, self.shadow, &mut row.sum_rgb);
+                self.shade(&mut row.surfaces, &mut row.sum_rgb);
             }
             if row.mixed[x] != 0 {
                 self.mixed(row, [x, y], rows);
@@ -91,13 +100,30 @@ impl View<'_> {
             self.show(row, x..end, [x * SAMPLES, y * SAMPLES], rows[0][x * SAMPLES], 1.0);
             x = end;
         }
-        row.surfaces.shade(&self.prepared.scenery.light, self.shadow, &mut row.sum_rgb);
+        self.shade(&mut row.surfaces, &mut row.sum_rgb);
+    }
+
+    /// Adds the colours of all pushed points.
+    #[inline(always)]
+    pub(super) fn shade(&self, surfaces: &mut Surfaces, sum_rgb: &mut [Vec<f32>; 3]) {
+        match self.lamps {
+            None => surfaces.shade(&self.prepared.scenery.light, self.shadow, sum_rgb),
+            Some(lamps) => surfaces.shade_by_lamps(lamps, self.rays.back_direction, sum_rgb),
+        }
     }
 
     /// Shows a sheet on neighbouring pixels that it covers, or on a share of them, sampled at the first
     /// one's `sample`.
     #[inline(always)]
     fn show(&self, row: &mut Row, pixels: Range<usize>, sample: [usize; 2], sheet: u32, share: f32) {
+        if let (NOTHING, Some(sky)) = (sheet, &self.prepared.sky) {
+            for (across, x) in pixels.enumerate() {
+                let (ray, steps) = self.rays.sample([sample[0] + across * SAMPLES, sample[1]]);
+                let rgb = sky.sky_rgb(ray, steps) * share;
+                row.sum_rgb.iter_mut().zip(rgb.to_array()).for_each(|(sum, value)| sum[x] += value);
+            }
+            return;
+        }
         if sheet == NOTHING {
             for (sum, sky) in row.sum_rgb.iter_mut().zip(SKY.to_array()) {
                 sum[pixels.clone()].iter_mut().for_each(|sum| *sum += sky * share);
@@ -113,6 +139,7 @@ impl View<'_> {
             first_pixel: pixels.start,
             count: pixels.len(),
             share,
+            alpha: None,
         };
         row.surfaces.push(&self.rays, self.contact, &strip);
     }
@@ -177,7 +204,14 @@ fn picked(row: &[u32], columns: [usize; SAMPLES + 1]) -> [u32; SAMPLES + 1] {
 
 impl Default for Row {
     fn default() -> Row {
-        Row { surfaces: Surfaces::new(), edges: Vec::new(), mixed: Vec::new(), sum_rgb: Default::default() }
+        Row {
+            surfaces: Surfaces::new(),
+            edges: Vec::new(),
+            mixed: Vec::new(),
+            sum_rgb: Default::default(),
+            veil_rgb: Default::default(),
+            veil_alpha: Vec::new(),
+        }
     }
 }
 

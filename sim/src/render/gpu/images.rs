@@ -21,6 +21,8 @@ pub(super) struct SceneImages {
     pub texels: Vec<u32>,
     /// Index of the head of each part's image in `texels`; 0 without an image.
     pub heads: Vec<u32>,
+    /// The same for the sky.
+    pub sky_head: u32,
 }
 
 impl SceneImages {
@@ -28,7 +30,7 @@ impl SceneImages {
     /// left out.
     pub(super) fn of(prepared: &Prepared, max_bytes: u64) -> SceneImages {
         let mut images: Vec<&Image> = Vec::new();
-        for image in prepared.images.iter().flatten() {
+        for image in prepared.images.iter().flatten().chain(&prepared.sky) {
             if !images.iter().any(|other| is_same(other, image)) {
                 images.push(image);
             }
@@ -55,7 +57,8 @@ impl SceneImages {
         let head =
             |image: &Image| placed.iter().find(|(other, _)| is_same(other, image)).map(|(_, head)| *head);
         let heads = prepared.images.iter().map(|image| image.as_ref().and_then(head).unwrap_or(0)).collect();
-        SceneImages { coordinates: coordinates(prepared), texels, heads }
+        let sky_head = prepared.sky.as_ref().and_then(head).unwrap_or(0);
+        SceneImages { coordinates: coordinates(prepared), texels, heads, sky_head }
     }
 }
 

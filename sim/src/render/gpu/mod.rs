@@ -16,7 +16,7 @@ use std::slice;
 use std::sync::{Arc, OnceLock};
 
 use wgpu::{
-    Buffer, Color, CommandEncoder, LoadOp, Operations, RenderPassColorAttachment,
+    Buffer, Color, CommandEncoder, LoadOp, Operations, RenderPass, RenderPassColorAttachment,
     RenderPassDepthStencilAttachment, RenderPassDescriptor, StoreOp, TextureView,
 };
 
@@ -26,7 +26,7 @@ use crate::render::scene::prepared::{NOTHING, Prepared};
 use crate::render::{Camera, Frame, PlacedScenery, Renderer, Scenery, Wanted, cpu};
 use device::{Gpu, GpuError};
 use scene::SceneBuffers;
-use targets::{Attachments, PictureBuffers, Targets};
+use targets::{Attachments, PictureBuffers, ShadowMaps, Targets, shadow_maps};
 pub(super) use together::colours;
 use together::{Asked, Region};
 
@@ -53,7 +53,7 @@ pub struct GpuRenderer {
     gpu: Arc<Gpu>,
     prepared: Prepared,
     scene: SceneBuffers,
-    shadow: TextureView,
+    shadow: ShadowMaps,
     /// Poses of the parts in the device's memory, which the shadow also belongs to.
     placed: Option<PlacedScenery>,
     contact: ContactMap,
@@ -86,7 +86,8 @@ fn open() -> Result<Arc<Gpu>, GpuError> {
 impl GpuRenderer {
     fn new(gpu: Arc<Gpu>, scenery: Scenery) -> GpuRenderer {
         let prepared = Prepared::new(scenery);
-        let (scene, shadow) = (SceneBuffers::new(&gpu, &prepared), targets::shadow_map(&gpu));
+        let lamps = prepared.scenery.lamps.as_ref().map_or(1, |lamps| lamps.lamps.len().max(1));
+        let (scene, shadow) = (SceneBuffers::new(&gpu, &prepared), shadow_maps(&gpu, lamps as u32));
         GpuRenderer {
             gpu,
             prepared,
@@ -114,41 +115,51 @@ impl GpuRenderer {
 
     /// Encodes the shadow that all views of a state share; there must be at least one view.
     fn encode_shadow(&self, encoder: &mut CommandEncoder) {
-        let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
-            depth_stencil_attachment: Some(nearest(&self.shadow)),
-            ..RenderPassDescriptor::default()
-        });
-        pass.set_pipeline(&self.gpu.passes.shadow);
-        pass.set_bind_group(0, self.scene.group(0), &[]);
-        pass.draw(0..self.scene.corners, 0..1);
+        let lights = self.placed.iter().flat_map(|placed| &placed.lights);
+        let mut casting: Vec<_> = lights
+            .enumerate()
+            .filter(|(_, light)| light.casts_shadow)
+            .map(|(number, _)| (number, self.scene.lamp_group(number)))
+            .collect();
+        if self.prepared.scenery.lamps.is_none() {
+            casting = vec![(0, self.scene.group(0))];
+        }
+        for (layer, group) in casting {
+            let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+                depth_stencil_attachment: Some(nearest(&self.shadow.layers[layer])),
+                ..RenderPassDescriptor::default()
+            });
+            pass.set_pipeline(&self.gpu.passes.shadow);
+            pass.set_bind_group(0, group, &[]);
+            pass.draw(0..self.scene.corners, 0..1);
+        }
     }
 
     /// Encodes the image of a view, which goes to `region` of the buffer of all images.
     fn encode(&mut self, encoder: &mut CommandEncoder, view: usize, region: &Region, drawn: &Buffer) {
         let size_px = [region.width, region.height];
         if !self.targets.as_ref().is_some_and(|targets| targets.fit(size_px, region.bytes, drawn)) {
-            self.targets = Some(Targets::new(&self.gpu, &self.shadow, size_px, region.bytes, drawn));
+            let has_veils = self.prepared.is_veil.contains(&true);
+            let shadow = &self.shadow.all;
+            self.targets = Some(Targets::new(&self.gpu, shadow, size_px, region.bytes, drawn, has_veils));
         }
-        let Some(Targets { samples, centres, group, .. }) = &self.targets else { return };
+        let Some(Targets { samples, centres, veils, group, .. }) = &self.targets else { return };
         let (passes, scene) = (&self.gpu.passes, self.scene.group(view));
         let (layers, resolve): (&[&Attachments], _) = match region.wanted {
             Wanted::All => (&[samples, centres], &passes.resolve),
             Wanted::Colours => (&[samples], &passes.resolve_colours),
         };
-        for Attachments { triangles, depth } in layers {
-            let nothing = Color { r: f64::from(NOTHING), ..Color::BLACK };
-            let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
-                color_attachments: &[Some(RenderPassColorAttachment {
-                    view: triangles,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: Operations { load: LoadOp::Clear(nothing), store: StoreOp::Store },
-                })],
-                depth_stencil_attachment: Some(nearest(depth)),
-                ..RenderPassDescriptor::default()
-            });
+        for attachments in layers {
+            let mut pass = marking(encoder, attachments);
             pass.set_pipeline(&passes.triangles);
             pass.set_bind_group(0, scene, &[]);
+            pass.draw(0..self.scene.corners, 0..1);
+        }
+        for (number, layer) in veils.iter().take(layers.len()).flat_map(|layers| layers.iter().enumerate()) {
+            let mut pass = marking(encoder, &layer.attachments);
+            pass.set_pipeline(if number == 0 { &passes.first_veils } else { &passes.next_veils });
+            pass.set_bind_group(0, scene, &[]);
+            pass.set_bind_group(2, &layer.peel, &[]);
             pass.draw(0..self.scene.corners, 0..1);
         }
         let mut pass = encoder.begin_compute_pass(&Default::default());
@@ -176,6 +187,24 @@ impl GpuRenderer {
     fn embedded(&mut self) -> &mut dyn Renderer {
         &mut **self.embedded.get_or_insert_with(|| cpu(self.prepared.scenery.clone()))
     }
+}
+
+/// Begins a pass that writes the numbers of triangles.
+fn marking<'a>(
+    encoder: &'a mut CommandEncoder,
+    Attachments { triangles, depth }: &Attachments,
+) -> RenderPass<'a> {
+    let nothing = Color { r: f64::from(NOTHING), ..Color::BLACK };
+    encoder.begin_render_pass(&RenderPassDescriptor {
+        color_attachments: &[Some(RenderPassColorAttachment {
+            view: triangles,
+            depth_slice: None,
+            resolve_target: None,
+            ops: Operations { load: LoadOp::Clear(nothing), store: StoreOp::Store },
+        })],
+        depth_stencil_attachment: Some(nearest(depth)),
+        ..RenderPassDescriptor::default()
+    })
 }
 
 /// Returns an attachment that keeps the nearest surface: depths are nearness, and start at none.

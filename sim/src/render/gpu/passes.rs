@@ -22,9 +22,14 @@ pub(super) struct Passes {
     pub scene: BindGroupLayout,
     /// Bindings of the first passes' results and of the image's destination.
     pub targets: BindGroupLayout,
+    /// Bindings of the nearness of solid surfaces, and of the layer of blended ones before.
+    pub peel: BindGroupLayout,
     pub shadow: RenderPipeline,
     /// Pass over samples, and over centres.
     pub triangles: RenderPipeline,
+    /// Pass over the nearest blended surfaces, and over those behind them.
+    pub first_veils: RenderPipeline,
+    pub next_veils: RenderPipeline,
     pub resolve: ComputePipeline,
     /// The same without depths and ids.
     pub resolve_colours: ComputePipeline,
@@ -45,17 +50,21 @@ impl Passes {
             device,
             ShaderStages::COMPUTE,
             &[
-                texture(TextureSampleType::Depth),
-                texture(TextureSampleType::Uint),
-                texture(TextureSampleType::Uint),
+                texture(TextureSampleType::Depth, TextureViewDimension::D2Array),
+                texture(TextureSampleType::Uint, TextureViewDimension::D2),
+                texture(TextureSampleType::Uint, TextureViewDimension::D2),
                 // Offset of this image in the buffer of all images.
                 BindingType::Buffer {
                     ty: BufferBindingType::Storage { read_only: false },
                     has_dynamic_offset: true,
                     min_binding_size: None,
                 },
+                texture(TextureSampleType::Uint, TextureViewDimension::D2Array),
+                texture(TextureSampleType::Uint, TextureViewDimension::D2Array),
             ],
         );
+        let depth = texture(TextureSampleType::Depth, TextureViewDimension::D2);
+        let peel = layout(device, ShaderStages::FRAGMENT, &[depth, depth]);
         let pipeline_layout = |groups: &[Option<&BindGroupLayout>]| {
             device.create_pipeline_layout(&PipelineLayoutDescriptor {
                 bind_group_layouts: groups,
@@ -64,6 +73,7 @@ impl Passes {
         };
         let drawing = pipeline_layout(&[Some(&scene)]);
         let resolving = pipeline_layout(&[Some(&scene), Some(&targets)]);
+        let peeling = pipeline_layout(&[Some(&scene), None, Some(&peel)]);
         let resolve = |entry_point: &str| {
             device.create_compute_pipeline(&ComputePipelineDescriptor {
                 label: None,
@@ -77,10 +87,13 @@ impl Passes {
         Passes {
             shadow: render_pipeline(device, &drawing, &module, "cast_shadow", None),
             triangles: render_pipeline(device, &drawing, &module, "see", Some("mark")),
+            first_veils: render_pipeline(device, &peeling, &module, "see_veils", Some("mark_first")),
+            next_veils: render_pipeline(device, &peeling, &module, "see_veils", Some("mark_next")),
             resolve: resolve("resolve"),
             resolve_colours: resolve("resolve_colours"),
             scene,
             targets,
+            peel,
         }
     }
 }
@@ -89,8 +102,8 @@ fn buffer(ty: BufferBindingType) -> BindingType {
     BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
 }
 
-fn texture(sample_type: TextureSampleType) -> BindingType {
-    BindingType::Texture { sample_type, view_dimension: TextureViewDimension::D2, multisampled: false }
+fn texture(sample_type: TextureSampleType, view_dimension: TextureViewDimension) -> BindingType {
+    BindingType::Texture { sample_type, view_dimension, multisampled: false }
 }
 
 /// Creates a layout with bindings numbered in their order.

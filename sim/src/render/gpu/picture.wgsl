@@ -23,6 +23,34 @@ struct View {
     to_sun: vec4f,
     from_below: vec4f,
     from_above: vec4f,
+    // Number of lamps, number of layers of blended surfaces, where the sky's head is in `texels` or 0, and the lamp
+    // that casts a shadow, if it is not the sun.
+    counts: vec4u,
+    // Offset along the normal of the sun's shadows, and whether lamps light the scenery.
+    extra: vec4f,
+    head_ambient: vec4f,
+    head_diffuse: vec4f,
+    head_specular: vec4f,
+    lamps: array<Lamp, MAX_LIGHTS>,
+}
+
+// A light of the scene's file in the world, as `FileLight` has it.
+struct Lamp {
+    // With 0 for a directional light, 1 for a spot, 2 for a point.
+    position: vec4f,
+    // With the cosine of the cutoff.
+    direction: vec4f,
+    // With the exponent.
+    ambient: vec4f,
+    // With the layer of its shadow, or -1.
+    diffuse: vec4f,
+    // With the width of a texel of its map at 1 m.
+    specular: vec4f,
+    attenuation: vec4f,
+    // Map of its shadows.
+    column: vec4f,
+    row: vec4f,
+    nearness: vec4f,
 }
 
 struct Part {
@@ -33,8 +61,10 @@ struct Part {
     // Linear colours, with the pattern between them and the axis of the mesh that its grain runs along.
     rgb: vec4f,
     second_rgb: vec4f,
-    // Id, whether it casts a shadow, whether things stand on it, and where its image's head is in `texels`; 0
-    // without an image.
+    // Emission, specular strength, shininess and alpha.
+    gloss: vec4f,
+    // Id; bits: it casts a shadow, is blended, is cut out by its image's alpha, its image has alpha; whether things
+    // stand on it; and where its image's head is in `texels`, 0 without an image.
     flags: vec4u,
 }
 
@@ -66,11 +96,19 @@ struct Coordinates {
 // +z, -z); then the levels, the largest first.
 @group(0) @binding(6) var<storage, read> texels: array<u32>;
 
-@group(1) @binding(0) var shadow: texture_depth_2d;
+// One layer for the sun, or for each lamp.
+@group(1) @binding(0) var shadow: texture_depth_2d_array;
 @group(1) @binding(1) var samples: texture_2d<u32>;
 @group(1) @binding(2) var centres: texture_2d<u32>;
 // Colours, then depths, then ids.
 @group(1) @binding(3) var<storage, read_write> picture: array<u32>;
+// Blended surfaces at samples and centres, the nearest first.
+@group(1) @binding(4) var veils: texture_2d_array<u32>;
+@group(1) @binding(5) var veil_centres: texture_2d_array<u32>;
+
+// Nearness of solid surfaces, and of the layer of blended ones before.
+@group(2) @binding(0) var solid: texture_depth_2d;
+@group(2) @binding(1) var before: texture_depth_2d;
 
 fn corner_m(number: u32) -> vec3f {
     return bitcast<vec3f>(corners[number].xyz);
@@ -100,8 +138,11 @@ fn on_sun_map(point_m: vec3f) -> vec3f {
 @vertex
 fn cast_shadow(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4f {
     let part = parts[corners[vertex].w];
-    if part.flags.y == 0u {
+    if (part.flags.y & 1u) == 0u {
         return vec4f(0.0, 0.0, 0.0, 1.0);
+    }
+    if view.counts.w != NOTHING {
+        return cast_by_lamp(view.lamps[view.counts.w], in_world(part, corner_m(vertex)));
     }
     let place = on_sun_map(in_world(part, corner_m(vertex))) / vec3f(TEXELS, TEXELS, 2.0 * SUN_DISTANCE_M);
     return vec4f(2.0 * place.x - 1.0, 1.0 - 2.0 * place.y, place.z, 1.0);
@@ -114,7 +155,20 @@ struct Seen {
 
 @vertex
 fn see(@builtin(vertex_index) vertex: u32) -> Seen {
+    return seen_if(vertex, 0u);
+}
+
+@vertex
+fn see_veils(@builtin(vertex_index) vertex: u32) -> Seen {
+    return seen_if(vertex, 2u);
+}
+
+// A corner, if its part is solid or blended.
+fn seen_if(vertex: u32, blended: u32) -> Seen {
     let part = parts[corners[vertex].w];
+    if (part.flags.y & 2u) != blended {
+        return Seen(vec4f(0.0, 0.0, 0.0, 1.0), vertex / 3u);
+    }
     let from_eye_m = in_world(part, corner_m(vertex)) - view.eye_m.xyz;
     let across = vec2f(dot(view.right.xyz, from_eye_m), dot(view.up.xyz, from_eye_m));
     let depth_m = -dot(view.back.xyz, from_eye_m);
@@ -123,6 +177,24 @@ fn see(@builtin(vertex_index) vertex: u32) -> Seen {
 
 @fragment
 fn mark(seen: Seen) -> @location(0) u32 {
+    return seen.triangle;
+}
+
+@fragment
+fn mark_first(seen: Seen) -> @location(0) u32 {
+    if seen.position.z <= textureLoad(solid, vec2i(seen.position.xy), 0) {
+        discard;
+    }
+    return seen.triangle;
+}
+
+@fragment
+fn mark_next(seen: Seen) -> @location(0) u32 {
+    let place = vec2i(seen.position.xy);
+    let z = seen.position.z;
+    if z <= textureLoad(solid, place, 0) || z >= textureLoad(before, place, 0) {
+        discard;
+    }
     return seen.triangle;
 }
 
@@ -138,7 +210,10 @@ fn nearness_1_m(triangle: u32, ray: vec3f) -> f32 {
 
 // 1 in the sun, 0 in the shadow: a bilinear filter three texels wide.
 fn sunlit(point_m: vec3f, normal: vec3f) -> f32 {
-    let place = on_sun_map(point_m + normal * NORMAL_OFFSET_M);
+    return on_map(on_sun_map(point_m + normal * view.extra.x), 0);
+}
+
+fn on_map(place: vec3f, layer: i32) -> f32 {
     let texel = place.xy - 0.5;
     if any(texel < vec2f(1.0)) || any(texel >= vec2f(TEXELS - 3.0)) {
         return 1.0;
@@ -151,7 +226,7 @@ fn sunlit(point_m: vec3f, normal: vec3f) -> f32 {
         let down = select(select(1.0, part.y, j == 2), 1.0 - part.y, j == -1);
         for (var i = -1; i <= 2; i++) {
             let across = select(select(1.0, part.x, i == 2), 1.0 - part.x, i == -1);
-            let occluder_m = textureLoad(shadow, vec2i(low) + vec2i(i, j), 0) * 2.0 * SUN_DISTANCE_M;
+            let occluder_m = textureLoad(shadow, vec2i(low) + vec2i(i, j), layer, 0) * 2.0 * SUN_DISTANCE_M;
             sum += select(0.0, across * down, nearness_m >= occluder_m);
         }
     }
@@ -265,17 +340,17 @@ fn on_cube(at: vec3f, by_x: vec3f, by_y: vec3f) -> ImagePlace {
     return ImagePlace(0.5 * place + 0.5, 0.5 * step_x * per_along, 0.5 * step_y * per_along, face);
 }
 
-// sRGB values of a texel, 0 to 1.
-fn values_of(texel: u32) -> vec3f {
-    return vec3f(vec3u(texel, texel >> 8u, texel >> 16u) & vec3u(255u)) / 255.0;
+// sRGB values and alpha of a texel, 0 to 1.
+fn values_of(texel: u32) -> vec4f {
+    return vec4f(vec4u(texel, texel >> 8u, texel >> 16u, texel >> 24u) & vec4u(255u)) / 255.0;
 }
 
 fn decoded(value: vec3f) -> vec3f {
     return select(pow((value + 0.055) / 1.055, vec3f(2.4)), value / 12.92, value <= vec3f(0.04045));
 }
 
-// sRGB values at a place on one level, whose first texel has this number.
-fn blend(first: u32, size: vec2u, place: vec2f, is_cube: bool) -> vec3f {
+// sRGB values and alpha at a place on one level, whose first texel has this number.
+fn blend(first: u32, size: vec2u, place: vec2f, is_cube: bool) -> vec4f {
     var at = place * vec2f(size) - 0.5;
     if is_cube {
         at = clamp(at, vec2f(0.0), vec2f(size - 1u));
@@ -299,7 +374,8 @@ fn stepped_log2(x: f32) -> f32 {
     return f32(bitcast<u32>(x)) / 8388608.0 - 127.0;
 }
 
-fn image_rgb(head: u32, place: ImagePlace) -> vec3f {
+// Linear colour and alpha.
+fn image_rgba(head: u32, place: ImagePlace) -> vec4f {
     var size = vec2u(texels[head], texels[head + 1u]);
     let images = texels[head + 3u];
     let is_cube = images != 0u;
@@ -317,16 +393,17 @@ fn image_rgb(head: u32, place: ImagePlace) -> vec3f {
     let nearer = blend(first + before * size.x * size.y, size, place.uv, is_cube);
     let share = clamp((fract(level) - 0.5) / BLENDED_SHARE + 0.5, 0.0, 1.0);
     if share == 0.0 {
-        return decoded(nearer);
+        return vec4f(decoded(nearer.xyz), nearer.w);
     }
     first += max(images, 1u) * size.x * size.y;
     size = max(size / 2u, vec2u(1u));
     let farther = blend(first + before * size.x * size.y, size, place.uv, is_cube);
-    return decoded(mix(nearer, farther, share));
+    let values = mix(nearer, farther, share);
+    return vec4f(decoded(values.xyz), values.w);
 }
 
-// Linear colour of the image on a triangle, where a ray meets it.
-fn image_at(triangle: u32, part: Part, ray: vec3f, depth_m: f32, normal: vec3f, from_corner_m: vec3f) -> vec3f {
+// Linear colour and alpha of the image on a triangle, where a ray meets it.
+fn image_at(triangle: u32, part: Part, ray: vec3f, depth_m: f32, normal: vec3f, from_corner_m: vec3f) -> vec4f {
     let step_x = turned_back(part, surface_step_m(ray, 2.0 * view.right_ray.xyz, depth_m, normal));
     let step_y = turned_back(part, surface_step_m(ray, 2.0 * view.down_ray.xyz, depth_m, normal));
     let rows = coordinates[triangle];
@@ -337,11 +414,12 @@ fn image_at(triangle: u32, part: Part, ray: vec3f, depth_m: f32, normal: vec3f, 
     if texels[part.flags.w + 3u] != 0u {
         place = on_cube(at, by_x, by_y);
     }
-    return part.rgb.xyz * image_rgb(part.flags.w, place);
+    let rgba = image_rgba(part.flags.w, place);
+    return vec4f(part.rgb.xyz * rgba.xyz, select(1.0, rgba.w, (part.flags.y & 8u) != 0u));
 }
 
-// Linear colour of what a ray sees.
-fn colour(triangle: u32, ray: vec3f) -> vec3f {
+// Linear colour of what a ray sees, and its alpha.
+fn colour(triangle: u32, ray: vec3f) -> vec4f {
     let part = part_of(triangle);
     let face = faces[triangle];
     let depth_m = 1.0 / nearness_1_m(triangle, ray);
@@ -352,20 +430,29 @@ fn colour(triangle: u32, ray: vec3f) -> vec3f {
     let outwards = normalize(turned(part, face.normal.xyz + bend * from_corner_m));
     let towards_eye = dot(outwards, eye_direction);
     let normal = outwards * select(1.0, -1.0, towards_eye < 0.0);
-    var base = albedo(part, point_m);
+    var base = vec3f(0.0);
+    var alpha = part.gloss.w;
     if part.flags.w != 0u {
-        base = image_at(triangle, part, ray, depth_m, normal, from_corner_m);
+        let rgba = image_at(triangle, part, ray, depth_m, normal, from_corner_m);
+        base = rgba.xyz;
+        alpha *= rgba.w;
+    } else {
+        base = albedo(part, point_m);
+    }
+    let open = select(1.0, 1.0 - CONTACT * darkness(point_m), part.flags.z != 0u);
+    if view.extra.y > 0.0 {
+        return vec4f(lit_by_lamps(part, base, point_m, normal, eye_direction) * open, alpha);
     }
     let ambient = mix(view.from_below.xyz, view.from_above.xyz, normal.z * 0.5 + 0.5);
     let unlit = base * (ambient + LAMP * abs(towards_eye));
-    let open = select(1.0, 1.0 - CONTACT * darkness(point_m), part.flags.z != 0u);
     let facing_sun = dot(normal, view.to_sun.xyz);
     if facing_sun <= 0.0 {
-        return unlit * open;
+        return vec4f(unlit * open, alpha);
     }
     let half_way = normalize(eye_direction + view.to_sun.xyz);
     let highlight = HIGHLIGHT * pow(max(dot(normal, half_way), 0.0), 40.0);
-    return (unlit + (base * view.sun.xyz + highlight) * (facing_sun * sunlit(point_m, normal))) * open;
+    let sunlight = (base * view.sun.xyz + highlight) * (facing_sun * sunlit(point_m, normal));
+    return vec4f((unlit + sunlight) * open, alpha);
 }
 
 fn ray_at(sample: vec2u) -> vec3f {
@@ -413,13 +500,57 @@ fn mean(pixel: vec2u, size: vec2u) -> vec3f {
         }
         if first {
             if triangles[i] == NOTHING {
-                sum += SKY * covered;
+                sum += sky_at(ray_at(pixel * 2u + vec2u(i % 2u, i / 2u))) * covered;
             } else {
-                sum += colour(triangles[i], ray_at(pixel * 2u + vec2u(i % 2u, i / 2u))) * covered;
+                sum += colour(triangles[i], ray_at(pixel * 2u + vec2u(i % 2u, i / 2u))).xyz * covered;
             }
         }
     }
-    return sum * (1.0 - OUTLINE * min(edges / 4.0, 1.0)) / 4.0;
+    return blended(pixel, sum * (1.0 - OUTLINE * min(edges / 4.0, 1.0)) / 4.0);
+}
+
+// Colour of a pixel with the blended surfaces over it.
+fn blended(pixel: vec2u, behind: vec3f) -> vec3f {
+    var sum = behind;
+    for (var layer = i32(view.counts.y) - 1; layer >= 0; layer--) {
+        var triangles: array<u32, 4>;
+        var veil = vec4f(0.0);
+        for (var i = 0u; i < 4u; i++) {
+            triangles[i] = textureLoad(veils, pixel * 2u + vec2u(i % 2u, i / 2u), layer, 0).x;
+        }
+        for (var i = 0u; i < 4u; i++) {
+            var covered = 0.0;
+            var first = triangles[i] != NOTHING;
+            for (var j = 0u; j < 4u; j++) {
+                let same = triangles[j] == triangles[i];
+                first = first && !(same && j < i);
+                covered += select(0.0, 0.25, same);
+            }
+            if first {
+                let seen = colour(triangles[i], ray_at(pixel * 2u + vec2u(i % 2u, i / 2u)));
+                let share = covered * (1.0 - (1.0 - seen.w) * (1.0 - seen.w));
+                veil += vec4f(seen.xyz, 1.0) * share;
+            }
+        }
+        if veil.w > 0.0 {
+            sum = decoded(mix(encoded(sum), encoded(veil.xyz / veil.w), veil.w));
+        }
+    }
+    return sum;
+}
+
+// The triangle that depth and id of a pixel are those of.
+fn measured(pixel: vec2u, ray: vec3f) -> u32 {
+    for (var layer = 0; layer < i32(view.counts.y); layer++) {
+        let triangle = textureLoad(veil_centres, pixel, layer, 0).x;
+        if triangle == NOTHING {
+            break;
+        }
+        if (part_of(triangle).flags.y & 4u) != 0u && colour(triangle, ray).w >= MIN_SEEN_ALPHA {
+            return triangle;
+        }
+    }
+    return textureLoad(centres, pixel, 0).x;
 }
 
 // Linear light to sRGB bytes, in the steps of the embedded renderer's table.
@@ -449,13 +580,13 @@ fn resolve(@builtin(global_invocation_id) place: vec3u) {
     let count = size.x * size.y;
     let i = pixel.y * size.x + pixel.x;
     picture[i] = bytes(mean(pixel, size));
-    let triangle = textureLoad(centres, pixel, 0).x;
+    // The pixel's centre is the corner between its samples.
+    let ray = ray_at(pixel * 2u) + 0.5 * (view.right_ray.xyz + view.down_ray.xyz);
+    let triangle = measured(pixel, ray);
     if triangle == NOTHING {
         picture[count + i] = INFINITY_BITS;
         picture[2u * count + i] = 0u;
     } else {
-        // The pixel's centre is the corner between its samples.
-        let ray = ray_at(pixel * 2u) + 0.5 * (view.right_ray.xyz + view.down_ray.xyz);
         picture[count + i] = bitcast<u32>(1.0 / nearness_1_m(triangle, ray));
         picture[2u * count + i] = part_of(triangle).flags.x;
     }

@@ -2,8 +2,9 @@
 
 use rapier3d::math::{Pose, Vector};
 
+use crate::mjcf::Gloss;
 use crate::render::cpu::CpuRenderer;
-use crate::render::{Camera, Carrier, Frame, Light, Part, Pattern, PlacedScenery, Scenery, TriangleMesh};
+use crate::render::{Camera, Carrier, Frame, Part, Pattern, PlacedScenery, Scenery, TriangleMesh};
 
 const SIDE_PX: u32 = 64;
 /// Maximum share of pixels with another id: on edges, renderers may decide differently.
@@ -18,6 +19,8 @@ pub fn scenery() -> Scenery {
         carrier: Carrier::Room,
         carrier_from_mesh: Pose::IDENTITY,
         rgb,
+        alpha: 1.0,
+        gloss: Gloss::default(),
         image: None,
         pattern,
         id,
@@ -25,12 +28,12 @@ pub fn scenery() -> Scenery {
     };
     let floor = part(TriangleMesh::plane([1.0, 1.0]), [0.8, 0.7, 0.6], Pattern::Checker([0.5, 0.4, 0.4]), 1);
     let ball = part(TriangleMesh::sphere(0.2), [0.7, 0.2, 0.2], Pattern::Plain, 2);
-    Scenery { parts: vec![floor, ball], focus_radius_m: 1.0, light: Light::default() }
+    Scenery { parts: vec![floor, ball], focus_radius_m: 1.0, ..Scenery::default() }
 }
 
 pub fn placed() -> PlacedScenery {
     let ball = Pose::from_translation(Vector::new(0.0, 0.0, 0.3));
-    PlacedScenery { world_from_mesh: vec![Pose::IDENTITY, ball], focus_m: Vector::ZERO }
+    PlacedScenery { world_from_mesh: vec![Pose::IDENTITY, ball], focus_m: Vector::ZERO, lights: Vec::new() }
 }
 
 pub fn camera() -> Camera {

@@ -7,15 +7,24 @@ use wgpu::{BindGroup, Buffer, BufferUsages};
 use super::device::Gpu;
 use super::images::SceneImages;
 use super::targets::bind;
+use crate::mjcf::{FileLight, LightKind, MAX_LIGHTS};
 use crate::render::cpu::contact::ContactMap;
 use crate::render::scene::bend::Bend;
-use crate::render::scene::prepared::Prepared;
-use crate::render::shading::{CONTACT_TEXELS, SAMPLES, sun_map};
-use crate::render::{Camera, Carrier, Part, Pattern, PlacedScenery};
+use crate::render::scene::prepared::{NOTHING, Prepared};
+use crate::render::shading::lamps::{lamp_map, lamp_view, tilted};
+use crate::render::shading::{CONTACT_TEXELS, SAMPLES, TEXELS, VEILS, normal_offset_m, sun_map};
+use crate::render::{Camera, Carrier, Part, Pattern, PlacedScenery, Scenery};
 
 /// Count of numbers in `picture.wgsl`'s `View`, and in its `Part`.
-const VIEW_NUMBERS: usize = 64;
-const PART_NUMBERS: usize = 24;
+const VIEW_NUMBERS: usize = 64 + 5 * 4 + MAX_LIGHTS * LAMP_NUMBERS;
+const PART_NUMBERS: usize = 28;
+/// Count of numbers in its `Lamp`.
+const LAMP_NUMBERS: usize = 36;
+/// Bits of `Part`'s flags.
+const CASTS_SHADOW: u32 = 1;
+const IS_VEIL: u32 = 2;
+const IS_CUT_OUT: u32 = 4;
+const HAS_ALPHA: u32 = 8;
 
 /// Group 0 of `picture.wgsl`, once for each view that is drawn at the same time.
 pub(super) struct SceneBuffers {
@@ -27,7 +36,10 @@ pub(super) struct SceneBuffers {
     texels: Buffer,
     /// Index of the head of each part's image in `texels`.
     heads: Vec<u32>,
+    sky_head: u32,
     views: Vec<SceneView>,
+    /// Views of the lamps that cast shadows.
+    lamps: Vec<SceneView>,
     /// Number of corners of all triangles.
     pub corners: u32,
 }
@@ -56,7 +68,9 @@ impl SceneBuffers {
             coordinates: initialised(gpu, images.coordinates.as_flattened(), BufferUsages::STORAGE),
             texels: initialised(gpu, &images.texels, BufferUsages::STORAGE),
             heads: images.heads,
+            sky_head: images.sky_head,
             views: Vec::new(),
+            lamps: Vec::new(),
             corners: corners.len() as u32,
         }
     }
@@ -66,7 +80,12 @@ impl SceneBuffers {
         &self.views[view].group
     }
 
-    fn add_view(&mut self, gpu: &Gpu) {
+    /// Returns the scene's bindings for the shadows of the lamp with this number.
+    pub(super) fn lamp_group(&self, lamp: usize) -> &BindGroup {
+        &self.lamps[lamp].group
+    }
+
+    fn new_view(&self, gpu: &Gpu) -> SceneView {
         let usage = BufferUsages::COPY_DST | BufferUsages::UNIFORM;
         let numbers = initialised(gpu, &[0; VIEW_NUMBERS], usage);
         let buffers = [
@@ -79,7 +98,7 @@ impl SceneBuffers {
             &self.texels,
         ];
         let group = bind(gpu, &gpu.passes.scene, buffers.map(|buffer| buffer.as_entire_binding()));
-        self.views.push(SceneView { numbers, group });
+        SceneView { numbers, group }
     }
 
     /// Uploads the pose of every part.
@@ -131,11 +150,74 @@ impl SceneBuffers {
             direction(light.below_rgb),
             direction(light.above_rgb),
         ];
+        let mut numbers = bits(numbers.as_flattened());
+        let lamps = placed.lights.len() as u32;
+        let layers = if prepared.is_veil.contains(&true) { VEILS as u32 } else { 0 };
+        numbers.extend([lamps, layers, self.sky_head, NOTHING]);
+        numbers.extend(bits(lighting(prepared).as_flattened()));
+        numbers.extend(placed.lights.iter().zip(0..).flat_map(|(light, number)| {
+            lamp(light, number, placed.focus_m, prepared.scenery.focus_radius_m).map(f32::to_bits)
+        }));
+        numbers.resize(VIEW_NUMBERS, 0);
         if view == self.views.len() {
-            self.add_view(gpu);
+            let view = self.new_view(gpu);
+            self.views.push(view);
         }
-        gpu.queue.write_buffer(&self.views[view].numbers, 0, &bytes(&bits(numbers.as_flattened())));
+        gpu.queue.write_buffer(&self.views[view].numbers, 0, &bytes(&numbers));
+        for lamp in 0..lamps {
+            if self.lamps.len() == lamp as usize {
+                let view = self.new_view(gpu);
+                self.lamps.push(view);
+            }
+            numbers[CASTER] = lamp;
+            gpu.queue.write_buffer(&self.lamps[lamp as usize].numbers, 0, &bytes(&numbers));
+        }
     }
+}
+
+/// Index of the lamp that casts a shadow, in `View`.
+const CASTER: usize = 67;
+
+/// Returns the numbers of `View` from `extra` to the headlight.
+fn lighting(prepared: &Prepared) -> [[f32; 4]; 4] {
+    let Scenery { lamps, focus_radius_m, .. } = &prepared.scenery;
+    let head = lamps.as_ref().map(|lamps| lamps.headlight).unwrap_or_default();
+    let rgb = |rgb: Vector| [rgb.x, rgb.y, rgb.z, 0.0];
+    [
+        [normal_offset_m(*focus_radius_m), f32::from(u8::from(lamps.is_some())), 0.0, 0.0],
+        rgb(head.ambient_rgb),
+        rgb(head.diffuse_rgb),
+        rgb(head.specular_rgb),
+    ]
+}
+
+/// Returns the numbers of a `Lamp`.
+fn lamp(light: &FileLight, number: u32, focus_m: Vector, radius_m: f32) -> [f32; LAMP_NUMBERS] {
+    let kind = match light.kind {
+        LightKind::Directional => 0.0,
+        LightKind::Spot => 1.0,
+        LightKind::Point => 2.0,
+    };
+    let map = match light.kind {
+        LightKind::Directional => sun_map(tilted(-light.direction), focus_m, radius_m),
+        LightKind::Spot | LightKind::Point => lamp_map(light),
+    };
+    let layer = if light.casts_shadow { number as f32 } else { -1.0 };
+    let texel_m = 2.0 * (0.5 * lamp_view(light).1).tan() / TEXELS as f32;
+    let with = |vector: Vector, fourth: f32| [vector.x, vector.y, vector.z, fourth];
+    let [column, row, nearness] = map.0.map(|(axis, constant)| with(axis, constant));
+    let rows = [
+        with(light.position_m, kind),
+        with(light.direction, light.cutoff_rad.cos()),
+        with(light.ambient_rgb, light.exponent_value),
+        with(light.diffuse_rgb, layer),
+        with(light.specular_rgb, texel_m),
+        with(Vector::from(light.attenuation_values), 0.0),
+        column,
+        row,
+        nearness,
+    ];
+    std::array::from_fn(|i| rows.as_flattened()[i])
 }
 
 fn initialised(gpu: &Gpu, numbers: &[u32], usage: BufferUsages) -> Buffer {
@@ -188,9 +270,16 @@ fn placed_part(
         [z.x, z.y, z.z, t.z],
         [first.x, first.y, first.z, pattern],
         [second.x, second.y, second.z, grain as f32],
+        [part.gloss.emission_factor, part.gloss.specular_factor, part.gloss.shininess_factor, part.alpha],
     ];
     let mut numbers = [0; PART_NUMBERS];
-    let flags = [part.id, part.casts_shadow.into(), (part.carrier == Carrier::Room).into(), image_head];
+    let has_alpha = part.image.as_ref().is_some_and(|image| image.texture.has_alpha);
+    let bit = |is_set: bool, bit: u32| if is_set { bit } else { 0 };
+    let bits = bit(part.casts_shadow, CASTS_SHADOW)
+        | bit(part.is_veil(), IS_VEIL)
+        | bit(part.is_cut_out(), IS_CUT_OUT)
+        | bit(has_alpha, HAS_ALPHA);
+    let flags = [part.id, bits, (part.carrier == Carrier::Room).into(), image_head];
     for (number, bits) in numbers.iter_mut().zip(rows.as_flattened().iter().map(|x| x.to_bits()).chain(flags))
     {
         *number = bits;

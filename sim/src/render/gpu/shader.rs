@@ -1,17 +1,19 @@
-//! The shader's text: the constants that renderers share, written out, then `picture.wgsl`.
+//! The shader's text: the constants that renderers share, written out, then `picture.wgsl` and `lamps.wgsl`.
 
 use rapier3d::math::Vector;
 
+use crate::mjcf::MAX_LIGHTS;
 use crate::render::cpu::contact::SINK_M;
 use crate::render::scene::camera::NEAR_M;
 use crate::render::scene::prepared::NOTHING;
 use crate::render::shading::image::BLENDED_SHARE;
+use crate::render::shading::lamps::{LAMP_BIAS_SHARE, LAMP_NORMAL_TEXELS, SHININESS};
 use crate::render::shading::pattern::{
     BANDS_PER_M, CHECKER_PER_M, LINES_PER_M, STRAY, TEXT_GAP, TEXT_PER_M, THREADS_PER_M, WORD_GAP,
     WORD_STRAY, WORDS_PER_M,
 };
 use crate::render::shading::{
-    BIAS_M, CONTACT, CONTACT_TEXELS, FADE_TEXELS, HIGHLIGHT, LAMP, NORMAL_OFFSET_M, OUTLINE,
+    BIAS_M, CONTACT, CONTACT_TEXELS, FADE_TEXELS, HIGHLIGHT, LAMP, MIN_SEEN_ALPHA, OUTLINE,
     OUTLINE_DEPTH_STEP, SKY, SRGB_STEPS, SUN_DISTANCE_M, TEXELS,
 };
 
@@ -19,7 +21,6 @@ pub(super) fn text() -> String {
     let numbers = [
         ("NEAR_M", NEAR_M),
         ("BIAS_M", BIAS_M),
-        ("NORMAL_OFFSET_M", NORMAL_OFFSET_M),
         ("SUN_DISTANCE_M", SUN_DISTANCE_M),
         ("TEXELS", TEXELS as f32),
         ("LAMP", LAMP),
@@ -40,12 +41,17 @@ pub(super) fn text() -> String {
         ("OUTLINE_DEPTH_STEP", OUTLINE_DEPTH_STEP),
         ("SRGB_STEPS", SRGB_STEPS as f32),
         ("BLENDED_SHARE", BLENDED_SHARE),
+        ("MIN_SEEN_ALPHA", MIN_SEEN_ALPHA),
+        ("SHININESS", SHININESS),
+        ("LAMP_NORMAL_TEXELS", LAMP_NORMAL_TEXELS),
+        ("LAMP_BIAS_SHARE", LAMP_BIAS_SHARE),
     ];
     let Vector { x, y, z } = SKY;
     let sky = format!("const SKY = vec3f({x:?}f, {y:?}f, {z:?}f);\n");
     let number = |(name, value): (&str, f32)| format!("const {name} = {value:?}f;\n");
     let bits = format!("const NOTHING = {NOTHING}u;\nconst INFINITY_BITS = {}u;\n", f32::INFINITY.to_bits());
     let texels = format!("const CONTACT_TEXELS = {CONTACT_TEXELS}u;\nconst SINK_M = {SINK_M:?}f;\n");
-    let constants = numbers.map(number).into_iter().chain([sky, bits, texels]);
-    constants.chain([include_str!("picture.wgsl").into()]).collect()
+    let lights = format!("const MAX_LIGHTS = {MAX_LIGHTS}u;\n");
+    let constants = numbers.map(number).into_iter().chain([sky, bits, texels, lights]);
+    constants.chain([include_str!("picture.wgsl").into(), include_str!("lamps.wgsl").into()]).collect()
 }

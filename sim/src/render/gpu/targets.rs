@@ -2,13 +2,13 @@
 
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, Buffer, BufferBinding,
-    BufferDescriptor, BufferSize, BufferUsages, Extent3d, TextureDescriptor, TextureDimension, TextureFormat,
-    TextureUsages, TextureView,
+    BufferDescriptor, BufferSize, BufferUsages, Extent3d, Texture, TextureDescriptor, TextureDimension,
+    TextureFormat, TextureUsages, TextureView, TextureViewDescriptor, TextureViewDimension,
 };
 
 use super::device::{Gpu, GpuError};
 use super::passes::{DEPTH, TRIANGLES};
-use crate::render::shading::{SAMPLES, TEXELS};
+use crate::render::shading::{SAMPLES, TEXELS, VEILS};
 
 /// Alignment of images in this buffer, in bytes.
 pub(super) const ALIGNMENT_BYTES: u64 = 256;
@@ -29,8 +29,17 @@ pub(super) struct Targets {
     drawn: Buffer,
     pub samples: Attachments,
     pub centres: Attachments,
+    /// Layers of blended surfaces at samples and at centres; empty without such parts.
+    pub veils: [Vec<VeilAttachments>; 2],
     /// Group 1 of `picture.wgsl`, with the first image in the buffer.
     pub group: BindGroup,
+}
+
+/// One layer of blended surfaces.
+pub(super) struct VeilAttachments {
+    pub attachments: Attachments,
+    /// Group 2 of `picture.wgsl`.
+    pub peel: BindGroup,
 }
 
 /// Triangle numbers and their nearness.
@@ -64,20 +73,28 @@ impl Targets {
         [width, height]: [u32; 2],
         bytes: u64,
         drawn: &Buffer,
+        has_veils: bool,
     ) -> Targets {
         let layer = |samples: u32| Attachments {
-            triangles: texture(gpu, TRIANGLES, width * samples, height * samples),
-            depth: texture(gpu, DEPTH, width * samples, height * samples),
+            triangles: one_layer(&texture(gpu, TRIANGLES, width * samples, height * samples, 1), 0),
+            depth: one_layer(&texture(gpu, DEPTH, width * samples, height * samples, 1), 0),
         };
         let (samples, centres) = (layer(SAMPLES as u32), layer(1));
+        let layers = if has_veils { VEILS as u32 } else { 0 };
+        let [(of_samples, all_of_samples), (of_centres, all_of_centres)] =
+            [(SAMPLES as u32, &samples), (1, &centres)]
+                .map(|(samples, solid)| veil_layers(gpu, solid, [width * samples, height * samples], layers));
         let resources = [
             BindingResource::TextureView(shadow),
             BindingResource::TextureView(&samples.triangles),
             BindingResource::TextureView(&centres.triangles),
             BindingResource::Buffer(BufferBinding { buffer: drawn, offset: 0, size: BufferSize::new(bytes) }),
+            BindingResource::TextureView(&all_of_samples),
+            BindingResource::TextureView(&all_of_centres),
         ];
         let group = bind(gpu, &gpu.passes.targets, resources);
-        Targets { width, height, bytes, drawn: drawn.clone(), samples, centres, group }
+        let veils = [of_samples, of_centres];
+        Targets { width, height, bytes, drawn: drawn.clone(), samples, centres, veils, group }
     }
 
     /// Returns true if such images can be drawn into these targets.
@@ -95,23 +112,68 @@ pub(super) fn check_size(gpu: &Gpu, [width, height]: [u32; 2]) -> Result<(), Gpu
     Ok(())
 }
 
-/// Creates the shadow's map.
-pub(super) fn shadow_map(gpu: &Gpu) -> TextureView {
-    texture(gpu, DEPTH, TEXELS as u32, TEXELS as u32)
+/// Maps of shadows: all layers, and each by itself.
+pub(super) struct ShadowMaps {
+    pub all: TextureView,
+    pub layers: Vec<TextureView>,
 }
 
-fn texture(gpu: &Gpu, format: TextureFormat, width: u32, height: u32) -> TextureView {
-    let texture = gpu.device.create_texture(&TextureDescriptor {
+/// Creates the maps of shadows.
+pub(super) fn shadow_maps(gpu: &Gpu, layers: u32) -> ShadowMaps {
+    let texture = texture(gpu, DEPTH, TEXELS as u32, TEXELS as u32, layers);
+    let layers = (0..layers).map(|number| one_layer(&texture, number)).collect();
+    ShadowMaps { all: array(&texture), layers }
+}
+
+/// Creates layers of blended surfaces in front of solid ones. Returns them, and all of their triangles; one
+/// texel without a layer.
+fn veil_layers(
+    gpu: &Gpu,
+    solid: &Attachments,
+    [width, height]: [u32; 2],
+    layers: u32,
+) -> (Vec<VeilAttachments>, TextureView) {
+    let (side_x, side_y) = if layers == 0 { (1, 1) } else { (width, height) };
+    let triangles = texture(gpu, TRIANGLES, side_x, side_y, layers.max(1));
+    let mut found: Vec<VeilAttachments> = Vec::new();
+    for number in 0..layers {
+        let depth = one_layer(&texture(gpu, DEPTH, width, height, 1), 0);
+        let before = found.last().map_or(&solid.depth, |before| &before.attachments.depth);
+        let nearness = [&solid.depth, before].map(BindingResource::TextureView);
+        let peel = bind(gpu, &gpu.passes.peel, nearness);
+        let attachments = Attachments { triangles: one_layer(&triangles, number), depth };
+        found.push(VeilAttachments { attachments, peel });
+    }
+    (found, array(&triangles))
+}
+
+/// Returns a view of one layer of a texture.
+fn one_layer(texture: &Texture, number: u32) -> TextureView {
+    texture.create_view(&TextureViewDescriptor {
+        dimension: Some(TextureViewDimension::D2),
+        base_array_layer: number,
+        array_layer_count: Some(1),
+        ..TextureViewDescriptor::default()
+    })
+}
+
+/// Returns a view of all layers of a texture, for example of a single one.
+fn array(texture: &Texture) -> TextureView {
+    let dimension = Some(TextureViewDimension::D2Array);
+    texture.create_view(&TextureViewDescriptor { dimension, ..TextureViewDescriptor::default() })
+}
+
+fn texture(gpu: &Gpu, format: TextureFormat, width: u32, height: u32, layers: u32) -> Texture {
+    gpu.device = gpu.device.create_texture(&TextureDescriptor {
         label: None,
-        size: Extent3d { width, height, depth_or_array_layers: 1 },
+        size: Extent3d { width, height, depth_or_array_layers: layers },
         mip_level_count: 1,
         sample_count: 1,
         dimension: TextureDimension::D2,
         format,
         usage: TextureUsages::RENDER_ATTACHMENT | TextureUsages::TEXTURE_BINDING,
         view_formats: &[],
-    });
-    texture.create_view(&Default::default())
+    })
 }
 
 /// Binds resources in their order.

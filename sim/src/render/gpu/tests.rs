@@ -140,6 +140,58 @@ fn images_on_surfaces_are_the_same() {
     }
 }
 
+/// Lights of each kind with their shadows, blended surfaces in front of one another, and a sky.
+const LIT: &str = r#"<asset>
+        <texture type="skybox" builtin="gradient" rgb1="0.3 0.5 0.7" rgb2="0.9 0.8 0.6" width="64" height="384"/>
+        <texture name="hole" type="2d" file="hole.png" nchannel="4"/>
+        <material name="hole" texture="hole"/>
+        <material name="shiny" rgba="0.7 0.2 0.2 1" specular="1" shininess="0.2" emission="0.1"/>
+    </asset>
+    <worldbody>
+        <light directional="true" dir="0.3 0.2 -1" diffuse="0.4 0.4 0.3"/>
+        <light pos="1.5 1.2 2.6" dir="0.2 0.2 -1" diffuse="0.6 0.5 0.5" cutoff="50" exponent="3"/>
+        <light type="point" pos="3 0.5 1" diffuse="0.1 0.1 0.3" castshadow="false"/>
+        <geom type="plane" size="4 4 1" rgba="0.8 0.8 0.7 1"/>
+        <geom type="box" size="0.3 0.2 0.4" pos="2.4 1.9 0.4" euler="0 0 40" material="shiny"/>
+        <geom type="sphere" size="0.25" pos="1.5 1.9 0.6" material="shiny"/>
+        <geom type="box" size="0.5 0.02 0.5" pos="1.8 1.2 0.8" euler="0 0 20" rgba="0.2 0.4 0.9 0.3"/>
+        <geom type="ellipsoid" size="0.2 0.3 0.4" pos="1.6 1.4 0.8" rgba="0.9 0.9 0.2 0.6"/>
+        <geom type="plane" size="0.4 0.4 1" pos="2.3 1 0.7" euler="60 0 0" material="hole"/>
+    </worldbody>"#;
+
+#[test]
+fn lights_of_files_blended_surfaces_and_skies_are_the_same() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let hole = image::RgbaImage::from_fn(32, 32, |x, y| {
+        image::Rgba([200, 120, 30, if x.abs_diff(16) + y.abs_diff(16) < 9 { 0 } else { 255 }])
+    });
+    hole.save(folder.path().join("hole.png")).expect("an image");
+    let file = folder.path().join("scene.xml");
+    std::fs::write(&file, format!("<mujoco>{LIT}</mujoco>")).expect("a scene");
+    let world = World::of_scene(Document::read(&file).expect("a scene")).expect("a world");
+    let (scenery, step) = (Scenery::of(&world), world.present());
+    assert!(scenery.lamps.as_ref().is_some_and(|lamps| lamps.lamps.len() == 3) && scenery.sky.is_some());
+    let Some(mut gpu) = gpu(scenery.clone()) else { return };
+    let mut embedded = cpu(scenery);
+    for eye_m in [Vector::new(0.3, -0.4, 1.3), Vector::new(3.6, 0.4, 1.6)] {
+        let camera = Camera {
+            world_from_camera: Pose::look_at_rh(eye_m, Vector::new(2.0, 1.6, 0.7), Vector::Z).inverse(),
+            vertical_fov_rad: 0.9,
+            width: 320,
+            height: 240,
+            blur_px: 0.0,
+        };
+        let (drawn, expected) = (gpu.render(&step, &camera), embedded.render(&step, &camera));
+        let psnr_db = psnr_db(&drawn, &expected);
+        assert!(psnr_db >= MIN_PSNR_DB, "{psnr_db:.1} dB");
+        assert!(depth_p99_m(&drawn, &expected) <= DEPTH_TOLERANCE_M);
+        let stray = drawn.ids.iter().zip(&expected.ids).filter(|(a, b)| a != b).count();
+        assert!(stray as f64 <= STRAY_IDS * expected.ids.len() as f64, "{stray} other ids");
+        assert_eq!(gpu.render_colours(&step, &camera), drawn.rgb);
+    }
+    assert_ne!(gpu.name(), embedded.name(), "the device did not fail");
+}
+
 #[test]
 fn a_picture_too_large_for_the_device_is_drawn_by_the_embedded_renderer() {
     let world = kitchen();

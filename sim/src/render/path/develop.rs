@@ -4,7 +4,7 @@ use rapier3d::math::Vector;
 
 use super::scene::{COATED, DIRECT, INDIRECT, LAYERS};
 use super::view::{PathView, SeenSurface};
-use crate::render::shading::SKY;
+use crate::render::shading::lamps::linear_light;
 
 /// Linear value from which bright tones are compressed, and the value that becomes white.
 const KNEE_VALUE: f32 = 0.5;
@@ -28,16 +28,20 @@ impl Negative<'_> {
     /// Returns the linear colour of a pixel: the mean over the surfaces that it shows.
     pub fn linear_rgb(&self, row: usize, column: usize) -> Vector {
         let around = self.view.look_around(row, column);
-        let sum_rgb: Vector = around.iter().map(|seen| self.seen_rgb(row, column, seen)).sum();
+        let of_point = |(uv_px, seen): &([f32; 2], SeenSurface)| {
+            let seen_rgb = match seen.id {
+                0 => self.view.sky_rgb(*uv_px),
+                _ => self.seen_rgb(row, column, seen),
+            };
+            self.view.veiled_rgb(*uv_px, seen_rgb, self.view.depth_m(seen))
+        };
+        let sum_rgb: Vector = around.iter().map(of_point).sum();
         sum_rgb / around.len() as f32
     }
 
     /// Returns the linear colour of a surface in a pixel, in the light of the pixel about it that shows it
     /// best.
     fn seen_rgb(&self, row: usize, column: usize, seen: &SeenSurface) -> Vector {
-        if seen.id == 0 {
-            return SKY;
-        }
         // Any light is better than none.
         let rank = |there: usize| match &self.guides[there] {
             SeenSurface { id: 0, .. } => -1.0,
@@ -57,13 +61,17 @@ impl Negative<'_> {
             }
         }
         let layers_rgb = self.light_rgb[best.1];
-        developed_rgb(seen.albedo, layers_rgb, self.exposure_factor)
+        let emitted_rgb = match self.view.scene.prepared.scenery.lamps {
+            Some(_) => seen.albedo * linear_light(Vector::splat(seen.gloss.emission_factor)),
+            None => Vector::ZERO,
+        };
+        developed_rgb(seen, layers_rgb, self.exposure_factor) + emitted_rgb
     }
 }
 
 /// Returns the linear colour of a surface in an image.
-pub fn developed_rgb(albedo: Vector, layers_rgb: [Vector; LAYERS], exposure_factor: f32) -> Vector {
-    let light_rgb = albedo * (layers_rgb[DIRECT] + layers_rgb[INDIRECT]) + layers_rgb[COATED];
+pub fn developed_rgb(seen: &SeenSurface, layers_rgb: [Vector; LAYERS], exposure_factor: f32) -> Vector {
+    let light_rgb = seen.albedo * (layers_rgb[DIRECT] + layers_rgb[INDIRECT]) + layers_rgb[COATED];
     toned_rgb(light_rgb * exposure_factor)
 }
 

@@ -98,7 +98,13 @@ mod tests {
         let guide = |number: usize| {
             let [x, y] = place(number);
             let id = if number % SIDE < SIDE / 2 { 1 } else { 2 };
-            SeenSurface { id, point_m: Vector::new(x, y, 0.0), normal: Vector::Z, albedo: Vector::ONE }
+            SeenSurface {
+                id,
+                point_m: Vector::new(x, y, 0.0),
+                normal: Vector::Z,
+                albedo: Vector::ONE,
+                ..SeenSurface::default()
+            }
         };
         let guides: Vec<SeenSurface> = (0..SIDE * SIDE).map(guide).collect();
         // Every other pixel is dark on the left, and every other one bright on the right.

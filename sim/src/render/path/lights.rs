@@ -6,7 +6,9 @@ use rapier3d::math::Vector;
 
 use super::directions::circle;
 use super::space::body::{Body, MetSides, TracedRay};
-use crate::render::{Carrier, Light, Scenery};
+use crate::mjcf::{FileLight, Headlight, LightKind};
+use crate::render::shading::lamps::{arriving, linear_light};
+use crate::render::{Carrier, Lamps, Light, PlacedScenery, Scenery};
 
 /// Half of the sides of a lamp, which faces down, and its greatest height.
 const LAMP_HALF_M: [f32; 2] = [0.9, 0.6];
@@ -31,15 +33,19 @@ const SKY_GAIN: f32 = 1.75;
 const SUN_RADIUS_TAN: f32 = 0.03;
 
 /// The light of a scenery.
+#[derive(Clone)]
 pub struct Lights {
     sources: Sources,
     light: Light,
 }
 
+#[derive(Clone)]
 enum Sources {
     /// Middles of the lamps.
     Lamps(Vec<Vector>),
     Sun,
+    /// Lights of the scene's file, and its headlight.
+    Stated(Vec<FileLight>, Headlight),
 }
 
 /// Light from a point of a source, if nothing is between.
@@ -60,8 +66,38 @@ impl Lights {
         Lights { sources, light }
     }
 
+    /// Returns the light of a state: lights of a file may move.
+    pub fn placed(&self, lamps: Option<&Lamps>, placed: &PlacedScenery) -> Lights {
+        match lamps {
+            None => self.clone(),
+            Some(lamps) => {
+                Lights { sources: Sources::Stated(placed.lights.clone(), lamps.headlight), light: self.light }
+            }
+        }
+    }
+
+    /// Returns the lights of the scene's file.
+    pub fn stated(&self) -> &[FileLight] {
+        match &self.sources {
+            Sources::Stated(lights, _) => lights,
+            Sources::Lamps(_) | Sources::Sun => &[],
+        }
+    }
+
+    /// Returns the light of the headlight on a surface, divided by pi, as [`Beam::rgb`].
+    pub fn headlight_rgb(&self, facing_share: f32) -> Vector {
+        match &self.sources {
+            Sources::Stated(_, headlight) => linear_light(headlight.diffuse_rgb) * facing_share.max(0.0),
+            Sources::Lamps(_) | Sources::Sun => Vector::ZERO,
+        }
+    }
+
     /// Returns the radiance of the sky in a direction.
     pub fn sky_rgb(&self, direction: Vector) -> Vector {
+        if let Sources::Stated(lights, headlight) = &self.sources {
+            let ambient_rgb = lights.iter().map(|light| light.ambient_rgb).sum::<Vector>();
+            return linear_light(headlight.ambient_rgb + ambient_rgb);
+        }
         let Light { below_rgb, above_rgb, .. } = self.light;
         if direction.z > 0.0 { above_rgb * SKY_GAIN } else { below_rgb }
     }
@@ -70,6 +106,7 @@ impl Lights {
     pub fn beam(&self, point_m: Vector, [u, v]: [f32; 2]) -> Beam {
         match &self.sources {
             Sources::Lamps(lamps_m) => self.lamp_beam(lamps_m, point_m, [u, v]),
+            Sources::Stated(lights, _) => stated_beam(lights, point_m, u),
             Sources::Sun => {
                 let [cosine, sine] = circle(v);
                 let [right, ahead] = super::directions::across(self.light.sun_direction);
@@ -101,6 +138,28 @@ impl Lights {
         let seen_share = direction.z.max(0.0) * area_m2 / (PI * reach_m * reach_m * probability);
         Beam { direction, reach_m, rgb: self.light.sun_rgb * (LAMP_GAIN * seen_share) }
     }
+}
+
+/// Draws a light of a file in proportion to its light at a point.
+fn stated_beam(lights: &[FileLight], point_m: Vector, draw_value: f32) -> Beam {
+    let weight = |light: &FileLight| light.diffuse_rgb.element_sum() * arriving(light, point_m).2;
+    let sum = lights.iter().map(weight).sum::<f32>();
+    let mut rest = draw_value * sum;
+    let mut drawn = lights.iter().filter(|light| weight(light) > 0.0).peekable();
+    while let Some(light) = drawn.next() {
+        let own = weight(light);
+        if rest < own || drawn.peek().is_none() {
+            let (direction, distance_m, share) = arriving(light, point_m);
+            let reach_m = match (light.casts_shadow, light.kind) {
+                (false, _) => 0.0,
+                (true, LightKind::Directional) => f32::INFINITY,
+                (true, LightKind::Spot | LightKind::Point) => distance_m,
+            };
+            return Beam { direction, reach_m, rgb: linear_light(light.diffuse_rgb * share) * (sum / own) };
+        }
+        rest -= own;
+    }
+    Beam { direction: Vector::Z, reach_m: 0.0, rgb: Vector::ZERO }
 }
 
 /// Returns the box around the walls of a room and everything of that height; `None` in the open.

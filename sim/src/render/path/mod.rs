@@ -45,6 +45,9 @@ pub(super) struct PathRenderer {
     prepared: Prepared,
     room: Body,
     movers: Vec<Mover>,
+    /// Blended parts, by their carriers.
+    veils: Vec<Mover>,
+    no_room: Body,
     lights: Lights,
     paths: SampleCount,
     srgb: SrgbTable,
@@ -62,23 +65,29 @@ impl PathRenderer {
     pub(super) fn new(scenery: Scenery) -> PathRenderer {
         let prepared = Prepared::new(scenery);
         let scenery = &prepared.scenery;
-        let of_room = |number: &usize| scenery.parts[*number].carrier == Carrier::Room;
+        let of_room =
+            |number: &usize| scenery.parts[*number].carrier == Carrier::Room && !prepared.is_veil[*number];
         let room = Body::of(scenery, (0..scenery.parts.len()).filter(of_room));
         let lights = Lights::of(scenery, &room);
-        let (movers, srgb) = (movers(scenery), SrgbTable::default());
-        PathRenderer { room, movers, lights, paths: PATHS, srgb, prepared }
+        let movers_of = |are_veils: bool| {
+            let is_mover = |number: &usize| {
+                let is_veil = prepared.is_veil[*number];
+                is_veil == are_veils && (is_veil || scenery.parts[*number].carrier != Carrier::Room)
+            };
+            movers(scenery, (0..scenery.parts.len()).filter(is_mover).collect())
+        };
+        let (movers, veils) = (movers_of(false), movers_of(true));
+        let (no_room, srgb) = (Body::of(scenery, std::iter::empty()), SrgbTable::default());
+        PathRenderer { room, movers, veils, no_room, lights, paths: PATHS, srgb, prepared }
     }
 
     /// Returns the scenery at its poses.
     fn scene(&self, placed: &PlacedScenery) -> Scene<'_> {
-        let poses = self
-            .movers
-            .iter()
-            .map(|mover| (&mover.body, placed.world_from_mesh[mover.first_part] * mover.mesh_from_carrier));
         Scene {
-            space: Space::new(&self.room, poses),
+            space: space(&self.room, &self.movers, placed),
+            veils: (!self.veils.is_empty()).then(|| space(&self.no_room, &self.veils, placed)),
             prepared: &self.prepared,
-            lights: &self.lights,
+            lights: self.lights.placed(self.prepared.scenery.lamps.as_ref(), placed),
             patterns: patterns(&self.prepared, placed),
         }
     }
@@ -114,24 +123,29 @@ impl PathRenderer {
         });
         let guides: Vec<SeenSurface> = pixels.iter().map(|pixel| pixel.seen).collect();
         let light_rgb = filtered(light_rgb, &guides, width, threads);
-        let light = &self.prepared.scenery.light;
-        let exposure_factor = exposure_factor(light, view.eye_m(), &guides, &light_rgb);
+        let exposure_factor = exposure_factor(&view, &guides, &light_rgb);
         let depth_m = pixels.iter().map(|pixel| pixel.depth_m).collect();
         Negative { view, depth_m, guides, light_rgb, width, exposure_factor }
     }
 }
 
-/// Returns the bodies of everything but the room.
-fn movers(scenery: &Scenery) -> Vec<Mover> {
+/// Returns a room and other bodies at their poses.
+fn space<'a>(room: &'a Body, movers: &'a [Mover], placed: &PlacedScenery) -> Space<'a> {
+    let pose = |mover: &Mover| placed.world_from_mesh[mover.first_part] * mover.mesh_from_carrier;
+    Space::new(room, movers.iter().map(|mover| (&mover.body, pose(mover))))
+}
+
+/// Returns the bodies of some parts, by their carriers.
+fn movers(scenery: &Scenery, parts: Vec<usize>) -> Vec<Mover> {
+    let carrier_of = |number: usize| scenery.parts[number].carrier;
     let mut carriers: Vec<(Carrier, usize)> = Vec::new();
-    for (number, part) in scenery.parts.iter().enumerate() {
-        let is_known = || carriers.iter().any(|(carrier, _)| *carrier == part.carrier);
-        if part.carrier != Carrier::Room && !is_known() {
-            carriers.push((part.carrier, number));
+    for number in &parts {
+        if !carriers.iter().any(|(carrier, _)| *carrier == carrier_of(*number)) {
+            carriers.push((carrier_of(*number), *number));
         }
     }
     let mover = |(carrier, first_part): (Carrier, usize)| {
-        let own = (0..scenery.parts.len()).filter(|number| scenery.parts[*number].carrier == carrier);
+        let own = parts.iter().copied().filter(|number| carrier_of(*number) == carrier);
         Mover {
             body: Body::of(scenery, own),
             first_part,

@@ -33,7 +33,9 @@ const REFLECTED_WIDTH_M: f32 = 0.02;
 pub struct Scene<'a> {
     pub space: Space<'a>,
     pub prepared: &'a Prepared,
-    pub lights: &'a Lights,
+    pub lights: Lights,
+    /// Blended surfaces, through which light goes.
+    pub veils: Option<Space<'a>>,
     /// Map from the world to the frame of each part's pattern, or to the coordinates of its image.
     pub patterns: Vec<Affine>,
 }
@@ -55,19 +57,26 @@ pub fn patterns(prepared: &Prepared, placed: &PlacedScenery) -> Vec<Affine> {
 impl Scene<'_> {
     /// Returns the linear colour of a surface, without light, as a mean over about `width_m`.
     pub fn albedo(&self, spot: &Spot, width_m: f32) -> Vector {
+        self.albedo_and_alpha(spot, width_m).0
+    }
+
+    /// Returns the linear colour of a surface, without light, and the alpha of its image.
+    pub fn albedo_and_alpha(&self, spot: &Spot, width_m: f32) -> (Vector, f32) {
         let (part, point_m) = (spot.part as usize, spot.point_m);
         let [first, second] = self.prepared.linear_rgb[part];
         if let Some(image) = &self.prepared.images[part] {
             let place = self.image_place(image, spot, width_m);
-            return first * Vector::from(image.rgb(&place));
+            let (rgb, alpha) = image.rgb_and_alpha(&place);
+            return (first * Vector::from(rgb), alpha);
         }
-        match self.prepared.scenery.parts[part].pattern {
+        let rgb = match self.prepared.scenery.parts[part].pattern {
             Pattern::Plain => first,
             pattern => {
                 let point_m = self.patterns[part].map(point_m).map(|coordinate_m| [coordinate_m]);
                 first + (second - first) * pattern.shares(point_m)[0]
             }
-        }
+        };
+        (rgb, 1.0)
     }
 
     fn image_place(&self, image: &Image, spot: &Spot, width_m: f32) -> ImagePlace {

@@ -8,6 +8,7 @@ use rapier3d::math::{Pose, Vector};
 use super::sequence::{PixelSeed, SampleCount};
 use super::view::PathView;
 use super::*;
+use crate::mjcf::Gloss;
 use crate::render::shading::SKY;
 use crate::render::{Cameras, Light, Part, Pattern, TriangleMesh, cpu};
 use crate::{ObjectPlacement, RobotPlacement, Step, World, WorldSpec};
@@ -105,6 +106,8 @@ fn red_wall() -> (Scenery, Camera) {
         carrier: Carrier::Room,
         carrier_from_mesh: Pose::from_translation(at_m),
         rgb,
+        alpha: 1.0,
+        gloss: Gloss::default(),
         image: None,
         pattern: Pattern::Plain,
         id: 1,
@@ -118,7 +121,7 @@ fn red_wall() -> (Scenery, Camera) {
     let down = Pose::from_translation(Vector::new(0.0, 0.0, 2.0));
     let camera =
         Camera { world_from_camera: down, vertical_fov_rad: 1.1, width: 48, height: 32, blur_px: 0.0 };
-    (Scenery { parts: vec![floor, wall], focus_radius_m: 1.25, light }, camera)
+    (Scenery { parts: vec![floor, wall], focus_radius_m: 1.25, light, ..Scenery::default() }, camera)
 }
 
 #[test]

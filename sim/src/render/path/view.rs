@@ -3,13 +3,16 @@
 
 use rapier3d::math::{Pose, Vector};
 
-use super::scene::{LAYERS, Scene};
+use super::scene::{DIRECT, LAYERS, Scene};
 use super::sequence::{PixelSeed, SampleCount};
 use super::space::Spot;
 use super::space::body::MetSides;
+use crate::mjcf::Gloss;
 use crate::render::scene::camera::NEAR_M;
-use crate::render::shading::SAMPLES;
-use crate::render::{Camera, Intrinsics};
+use crate::render::shading::lamps::{LitSurface, shown_rgb};
+use crate::render::shading::power::blended;
+use crate::render::shading::{LAMP, MIN_SEEN_ALPHA, SAMPLES, SKY, VEILS, opacity};
+use crate::render::{Camera, Intrinsics, Scenery};
 
 /// Points of a lamp to which each path of a pixel looks.
 const LAMP_POINTS: u32 = 2;
@@ -17,6 +20,10 @@ const LAMP_POINTS: u32 = 2;
 /// one; and the least such distance.
 const ASIDE_SHARE: f32 = 0.15;
 const MIN_ASIDE_M: f32 = 0.002;
+/// Share of the surfaces towards the rasterisers' sun that it reaches.
+const SUNLIT_SHARE: f32 = 0.92;
+/// Distance between blended surfaces on a ray, as a share of the distance on it.
+const LEAST_STEP_SHARE: f32 = 1e-5;
 /// Purposes of a pixel's numbers.
 const FOR_LAMPS: u32 = 0;
 const FOR_LIGHT: u32 = 1;
@@ -30,6 +37,7 @@ pub struct SeenSurface {
     pub point_m: Vector,
     pub normal: Vector,
     pub albedo: Vector,
+    pub gloss: Gloss,
 }
 
 /// The surface at the centre of a pixel.
@@ -66,13 +74,82 @@ impl<'a> PathView<'a> {
         }
     }
 
-    /// Finds the surfaces at points that are evenly spread over a pixel.
-    pub fn look_around(&self, row: usize, column: usize) -> [SeenSurface; SAMPLES * SAMPLES] {
+    /// Finds the surfaces at points that are evenly spread over a pixel, with their places in the image.
+    pub fn look_around(&self, row: usize, column: usize) -> [([f32; 2], SeenSurface); SAMPLES * SAMPLES] {
         let at_px = |pixel: usize, i: usize| pixel as f32 + (i as f32 + 0.5) / SAMPLES as f32 - 0.5;
         std::array::from_fn(|i| {
-            let met = self.spot([at_px(column, i % SAMPLES), at_px(row, i / SAMPLES)]);
-            met.map_or(SeenSurface::default(), |(_, spot)| self.seen(&spot))
+            let uv_px = [at_px(column, i % SAMPLES), at_px(row, i / SAMPLES)];
+            let met = self.spot(uv_px);
+            (uv_px, met.map_or(SeenSurface::default(), |(_, spot)| self.seen(&spot)))
         })
+    }
+
+    /// Returns the colour of the sky at a place in the image.
+    pub fn sky_rgb(&self, uv_px: [f32; 2]) -> Vector {
+        let Some(sky) = &self.scene.prepared.sky else { return SKY };
+        let pixel = 1.0 / self.lens.focal_px;
+        let steps = [Vector::X * pixel, Vector::NEG_Y * pixel];
+        sky.sky_rgb(self.ray(uv_px), steps.map(|step| self.world_from_camera.rotation * step))
+    }
+
+    /// Returns the colour at a place in the image where blended surfaces are in front of `behind_rgb`, which
+    /// is seen at a depth.
+    pub fn veiled_rgb(&self, uv_px: [f32; 2], behind_rgb: Vector, depth_m: f32) -> Vector {
+        let mut rgb = behind_rgb;
+        for spot in self.veils(uv_px, depth_m).iter().rev() {
+            let part = &self.scene.prepared.scenery.parts[spot.part as usize];
+            if !part.is_cut_out() {
+                let (_, alpha) = self.scene.albedo_and_alpha(spot, self.pixel_m(spot));
+                let own_rgb = self.rasterised_rgb(&self.seen(spot));
+                let share = opacity(part.alpha * alpha);
+                rgb =
+                    Vector::from_array(std::array::from_fn(|axis| blended(rgb[axis], own_rgb[axis], share)));
+            }
+        }
+        rgb
+    }
+
+    /// Returns the linear colour of a surface in an image of a rasteriser, with as much shadow as usual.
+    pub fn rasterised_rgb(&self, seen: &SeenSurface) -> Vector {
+        let SeenSurface { point_m, normal, albedo, gloss, .. } = *seen;
+        let Scenery { light, lamps, .. } = &self.scene.prepared.scenery;
+        let to_eye = (self.eye_m() - point_m).normalize_or_zero();
+        if let Some(lamps) = lamps {
+            let surface = LitSurface {
+                albedo,
+                gloss,
+                point_m,
+                normal,
+                eye_direction: to_eye,
+                back_direction: self.back(),
+            };
+            return shown_rgb(&lamps.headlight, self.scene.lights.stated(), &surface, |_| SUNLIT_SHARE);
+        }
+        let ambient_rgb = light.below_rgb + (light.above_rgb - light.below_rgb) * (normal.z * 0.5 + 0.5);
+        let sun_rgb = light.sun_rgb * (normal.dot(light.sun_direction).max(0.0) * SUNLIT_SHARE);
+        let lamp_rgb = Vector::splat(LAMP * to_eye.dot(normal).abs());
+        (albedo * (ambient_rgb + lamp_rgb + sun_rgb)).min(Vector::ONE)
+    }
+
+    /// Returns the depth of a surface that is seen.
+    pub fn depth_m(&self, seen: &SeenSurface) -> f32 {
+        if seen.id == 0 { f32::INFINITY } else { (self.eye_m() - seen.point_m).dot(self.back()) }
+    }
+
+    /// Returns the blended surfaces at a place in the image up to a depth, the nearest first.
+    fn veils(&self, uv_px: [f32; 2], most_m: f32) -> Vec<Spot> {
+        let mut found = Vec::new();
+        let Some(veils) = &self.scene.veils else { return found };
+        let (eye_m, ray) = (self.eye_m(), self.ray(uv_px));
+        let mut least_m = NEAR_M;
+        while let Some((depth_m, hit)) = veils.nearest(eye_m, ray, least_m, MetSides::Front) {
+            if depth_m >= most_m || found.len() == VEILS {
+                break;
+            }
+            found.push(veils.spot(eye_m, ray, &hit));
+            least_m = depth_m * (1.0 + LEAST_STEP_SHARE);
+        }
+        found
     }
 
     /// Computes the light at the centres of a row of pixels.
@@ -82,6 +159,7 @@ impl<'a> PathView<'a> {
             let ray = (spot.point_m - self.eye_m()).normalize();
             let seed = PixelSeed::of([column as u32, row as u32]);
             *layers_rgb = self.scene.lit_layers(spot, ray, seed, self.paths);
+            layers_rgb[DIRECT] += self.scene.lights.headlight_rgb(spot.normal.dot(self.back()));
         }
     }
 
@@ -90,12 +168,30 @@ impl<'a> PathView<'a> {
         self.world_from_camera.translation
     }
 
+    /// Returns the direction from what the camera looks at to the camera.
+    pub fn back(&self) -> Vector {
+        self.world_from_camera.rotation * Vector::Z
+    }
+
+    /// Returns the ray of a point of the image, to a depth of 1 m, so that distances along it are depths.
+    fn ray(&self, uv_px: [f32; 2]) -> Vector {
+        self.world_from_camera.rotation * self.lens.unproject(uv_px, 1.0)
+    }
+
     /// Returns the surface at a point of the image and its depth. The centre of the first pixel is (0, 0).
+    /// Images with alpha cut holes into it.
     pub fn spot(&self, uv_px: [f32; 2]) -> Option<(f32, Spot)> {
-        let eye_m = self.eye_m();
-        // To a depth of 1 m, so that distances along it are depths.
-        let ray = self.world_from_camera.rotation * self.lens.unproject(uv_px, 1.0);
-        let (depth_m, hit) = self.scene.space.nearest(eye_m, ray, NEAR_M, MetSides::Front)?;
+        let (eye_m, ray) = (self.eye_m(), self.ray(uv_px));
+        let solid = self.scene.space.nearest(eye_m, ray, NEAR_M, MetSides::Front);
+        let most_m = solid.as_ref().map_or(f32::INFINITY, |(depth_m, _)| *depth_m);
+        let is_seen = |spot: &Spot| {
+            let part = &self.scene.prepared.scenery.parts[spot.part as usize];
+            part.is_cut_out() && self.scene.albedo_and_alpha(spot, self.pixel_m(spot)).1 >= MIN_SEEN_ALPHA
+        };
+        if let Some(spot) = self.veils(uv_px, most_m).into_iter().find(is_seen) {
+            return Some(((eye_m - spot.point_m).dot(self.back()), spot));
+        }
+        let (depth_m, hit) = solid?;
         Some((depth_m, self.scene.space.spot(eye_m, ray, &hit)))
     }
 
@@ -110,6 +206,7 @@ impl<'a> PathView<'a> {
             point_m: spot.point_m,
             normal: spot.normal,
             albedo: self.scene.albedo(spot, self.pixel_m(spot)),
+            gloss: self.scene.prepared.scenery.parts[spot.part as usize].gloss,
         }
     }
 }

@@ -22,13 +22,14 @@ struct Placed {
     hull_m: Option<Vec<(Vector, f32)>>,
 }
 
-/// Removes triangles inside another mesh of the body. Each mesh has its pose in the frame of the body.
-pub fn take_out(meshes: &mut [(TriangleMesh, Pose)]) {
+/// Removes triangles inside another mesh of the body that is not clear. Each mesh has its pose in the frame
+/// of the body.
+pub fn take_out(meshes: &mut [(TriangleMesh, Pose)], is_clear: &[bool]) {
     let placed: Vec<Placed> =
         meshes.iter().map(|(mesh, body_from_mesh)| Placed::of(mesh, body_from_mesh)).collect();
     for (number, (mesh, _)) in meshes.iter_mut().enumerate() {
         let own = &placed[number];
-        let others = placed.iter().enumerate().filter(|(other, _)| *other != number);
+        let others = placed.iter().enumerate().filter(|(other, _)| *other != number && !is_clear[*other]);
         let around = others.filter(|(_, placed)| placed.reaches(own));
         let hulls: Vec<_> = around.filter_map(|(_, placed)| placed.hull_m.as_deref()).collect();
         let hides = |hull: &[(Vector, f32)], triangle: &[u32; 3]| {
@@ -79,7 +80,7 @@ mod tests {
     fn left<const N: usize>(meshes: [(TriangleMesh, f32); N]) -> Vec<usize> {
         let place = |(mesh, x_m)| (mesh, Pose::from_translation(Vector::new(x_m, 0.0, 0.0)));
         let mut meshes = meshes.map(place);
-        take_out(&mut meshes);
+        take_out(&mut meshes, &[false; N]);
         meshes.iter().map(|(mesh, _)| mesh.triangles.len()).collect()
     }
 

@@ -4,6 +4,7 @@ use std::f32::consts::{PI, TAU};
 
 use rapier3d::math::Vector;
 
+use super::smooth::smooth_normals;
 use crate::mjcf::{Mesh, Primitive};
 
 /// A corner of a triangle, in the mesh's frame.
@@ -146,9 +147,17 @@ impl TriangleMesh {
         mesh
     }
 
-    /// Returns the triangles of a file. They are flat where the file gives no normals.
+    /// Returns the triangles of a file. They are smooth where the file gives no normals, except for edges.
     fn of_file(file: &Mesh) -> TriangleMesh {
         let mut mesh = TriangleMesh::faceted(&file.vertices_m, &file.triangles);
+        let is_given = |normals: &[Vector; 3]| normals.iter().all(|normal| *normal != Vector::ZERO);
+        let smooth = match file.corner_normal.is_empty() || !file.corner_normal.iter().all(is_given) {
+            true => smooth_normals(file),
+            false => Vec::new(),
+        };
+        for (vertex, normal) in mesh.vertices.iter_mut().zip(smooth.as_flattened()) {
+            vertex.normal = *normal;
+        }
         for (vertex, normal) in mesh.vertices.iter_mut().zip(file.corner_normal.as_flattened()) {
             if *normal != Vector::ZERO {
                 vertex.normal = *normal;

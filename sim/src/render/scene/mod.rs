@@ -8,12 +8,17 @@ pub mod mesh;
 pub mod prepared;
 pub mod shared;
 pub mod sheets;
+mod smooth;
 mod visible;
+
+use std::sync::Arc;
 
 use rapier3d::math::{Pose, Vector};
 
-use crate::mjcf::{Geom, Primitive, SurfaceImage};
+use crate::mjcf::{FileLight, Geom, Gloss, Headlight, Primitive, SurfaceImage, Texture};
+use crate::render::shading::{MAX_CLEAR_ALPHA, SOLID_ALPHA};
 use crate::render::{Light, Pattern, SharedMesh};
+use crate::world::{CarriedLight, SceneLights};
 use crate::{Step, World};
 
 /// Shapes and colours of a world, made once.
@@ -23,6 +28,10 @@ pub struct Scenery {
     /// Radius around [`PlacedScenery::focus_m`] within which shadows are drawn: the smaller, the sharper.
     pub focus_radius_m: f32,
     pub light: Light,
+    /// Lights of the scene's file, in place of sun and sky.
+    pub lamps: Option<Lamps>,
+    /// Image around the camera where no surface is, or the six of a cube.
+    pub sky: Option<Arc<Texture>>,
 }
 
 /// One mesh that moves with its carrier.
@@ -33,12 +42,30 @@ pub struct Part {
     pub carrier_from_mesh: Pose,
     /// sRGB, 0 to 1. With an image it is the mean colour.
     pub rgb: [f32; 3],
+    /// Share of light from behind that the surface keeps out; below [`SOLID_ALPHA`] it is blended.
+    pub alpha: f32,
+    pub gloss: Gloss,
     /// Image on the surface, in place of a pattern.
     pub image: Option<SurfaceImage>,
     pub pattern: Pattern,
     /// Id in [`crate::render::Frame::ids`]; parts of one thing share one. 0 is the background.
     pub id: u32,
     pub casts_shadow: bool,
+}
+
+/// The lights of a scenery in place of its sun and sky.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lamps {
+    pub headlight: Headlight,
+    pub lamps: Vec<Lamp>,
+}
+
+/// A light with its carrier.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lamp {
+    pub carrier: Carrier,
+    /// The light in the frame of its carrier.
+    pub light: FileLight,
 }
 
 /// Carrier of a part, by its place in a [`Step`].
@@ -61,6 +88,8 @@ pub struct PlacedScenery {
     /// The point between the robots, around which shadows have to be sharp. It moves in steps, so that
     /// the room's shadows are seldom redrawn.
     pub focus_m: Vector,
+    /// Lights of the scene's file, in the world.
+    pub lights: Vec<FileLight>,
 }
 
 /// Ids: 0 the background, 1 the room, then robots, then objects.
@@ -69,6 +98,8 @@ const ROOM_ID: u32 = 1;
 const FOCUS_HEIGHT_M: f32 = 0.8;
 const FOCUS_STEP_M: f32 = 0.1;
 const FOCUS_RADIUS_M: f32 = 1.25;
+/// The same for lights of files: their scenes are seen as a whole.
+const LAMPS_FOCUS_RADIUS_M: f32 = 2.5;
 /// Height of the lamps that the light represents: walls and things that hang above them cast no shadow
 /// into the room.
 const LAMPS_M: f32 = 2.2;
@@ -76,13 +107,43 @@ const LAMPS_M: f32 = 2.2;
 const ACCENTS: [[f32; 4]; 3] = [[0.12, 0.35, 0.85, 1.0], [0.95, 0.48, 0.08, 1.0], [0.15, 0.62, 0.28, 1.0]];
 const ACCENT_MATERIAL: &str = "accent";
 
+impl Lamps {
+    /// Multiplies all light.
+    pub fn tint(&mut self, tint_rgb: Vector) {
+        let Headlight { ambient_rgb, diffuse_rgb, specular_rgb } = &mut self.headlight;
+        for rgb in [ambient_rgb, diffuse_rgb, specular_rgb] {
+            *rgb *= tint_rgb;
+        }
+        for Lamp { light, .. } in &mut self.lamps {
+            let FileLight { ambient_rgb, diffuse_rgb, specular_rgb, .. } = light;
+            for rgb in [ambient_rgb, diffuse_rgb, specular_rgb] {
+                *rgb *= tint_rgb;
+            }
+        }
+    }
+}
+
+impl Part {
+    /// Returns true if what is behind shows through.
+    pub fn is_veil(&self) -> bool {
+        self.alpha < SOLID_ALPHA || self.is_cut_out()
+    }
+
+    /// Returns true if the alpha of its image cuts it out.
+    pub fn is_cut_out(&self) -> bool {
+        self.alpha >= SOLID_ALPHA && self.image.as_ref().is_some_and(|image| image.texture.has_alpha)
+    }
+}
+
 impl Scenery {
     /// Collects everything in `world` that is drawn.
     pub fn of(world: &World) -> Scenery {
         let mut parts = Vec::new();
         add_parts(&mut parts, world.room(), Carrier::Room, ROOM_ID, |geom| geom.rgba);
-        for part in &mut parts {
-            part.casts_shadow &= top_m(part) < LAMPS_M;
+        if world.lights().is_none() {
+            for part in &mut parts {
+                part.casts_shadow &= top_m(part) < LAMPS_M;
+            }
         }
         let first_robot = ROOM_ID + 1;
         for (robot, id) in (0..world.robots().len()).zip(first_robot..) {
@@ -95,7 +156,9 @@ impl Scenery {
             let id = object_id(world, object);
             add_parts(&mut parts, &model.geoms, Carrier::Object(object), id, |geom| geom.rgba);
         }
-        Scenery { parts, focus_radius_m: FOCUS_RADIUS_M, light: Light::default() }
+        let lamps = world.lights().map(lamps);
+        let focus_radius_m = if lamps.is_some() { LAMPS_FOCUS_RADIUS_M } else { FOCUS_RADIUS_M };
+        Scenery { parts, focus_radius_m, light: Light::default(), lamps, sky: world.sky().cloned() }
     }
 
     /// Returns the poses of all parts after `step`, which must be a step of this scenery's world.
@@ -111,7 +174,9 @@ impl Scenery {
         }
         let world_from_mesh =
             self.parts.iter().map(|part| world_from_carrier(part.carrier) * part.carrier_from_mesh);
+        let lamps = self.lamps.iter().flat_map(|lamps| &lamps.lamps);
         PlacedScenery {
+            lights: lamps.map(|lamp| lamp.light.moved(&world_from_carrier(lamp.carrier))).collect(),
             world_from_mesh: world_from_mesh.collect(),
             focus_m: (Vector::new(middle_m.x, middle_m.y, FOCUS_HEIGHT_M) / FOCUS_STEP_M).round()
                 * FOCUS_STEP_M,
@@ -146,11 +211,13 @@ fn add_parts(
     parts.extend(meshes.filter_map(|(mesh, geom)| Some(part(geom, mesh?, carrier, rgba(geom), id))));
 }
 
-fn part(geom: &Geom, mesh: SharedMesh, carrier: Carrier, [r, g, b, _]: [f32; 4], id: u32) -> Part {
+fn part(geom: &Geom, mesh: SharedMesh, carrier: Carrier, [r, g, b, alpha]: [f32; 4], id: u32) -> Part {
     Part {
         mesh,
         carrier,
         carrier_from_mesh: geom.body_from_geom,
+        alpha,
+        gloss: geom.gloss,
         image: geom.image.clone(),
         rgb: geom.checker_rgb.map_or([r, g, b], |[first, _]| first),
         pattern: match geom.checker_rgb {
@@ -159,8 +226,17 @@ fn part(geom: &Geom, mesh: SharedMesh, carrier: Carrier, [r, g, b, _]: [f32; 4],
         },
         id,
         // Nothing is below a floor.
-        casts_shadow: !matches!(geom.primitive, Primitive::Plane { .. }),
+        casts_shadow: !matches!(geom.primitive, Primitive::Plane { .. }) && alpha > MAX_CLEAR_ALPHA,
     }
+}
+
+/// Returns the lights of a scene with their carriers.
+fn lamps(SceneLights { headlight, lights }: &SceneLights) -> Lamps {
+    let lamp = |CarriedLight { object, light }: &CarriedLight| Lamp {
+        carrier: object.map_or(Carrier::Room, Carrier::Object),
+        light: *light,
+    };
+    Lamps { headlight: *headlight, lamps: lights.iter().map(lamp).collect() }
 }
 
 /// Returns the height of the highest point of a part of the room.

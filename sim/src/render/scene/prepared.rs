@@ -22,6 +22,10 @@ pub struct Prepared {
     pub sheets: Vec<Sheet>,
     /// The image of each part.
     pub images: Vec<Option<Image>>,
+    /// Parts that show what is behind them.
+    pub is_veil: Vec<bool>,
+    /// Image of the sky.
+    pub sky: Option<Image>,
     /// The number of each triangle's sheet, with triangles counted part by part.
     pub sheet_of: Vec<u32>,
     /// Number of the first triangle of each part.
@@ -60,6 +64,8 @@ impl Prepared {
             ids: sheets.iter().map(id).collect(),
             sheets,
             images: scenery.parts.iter().map(|part| part.image.as_ref().map(Image::of)).collect(),
+            is_veil: scenery.parts.iter().map(Part::is_veil).collect(),
+            sky: scenery.sky.as_ref().map(Image::around),
             sheet_of,
             first,
             linear_rgb: scenery.parts.iter().map(colours).collect(),

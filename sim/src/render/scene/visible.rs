@@ -10,6 +10,7 @@ use super::hidden;
 use super::shared::SharedMesh;
 use crate::mjcf::{Geom, Primitive, TextureMapping};
 use crate::render::TriangleMesh;
+use crate::render::shading::SOLID_ALPHA;
 
 /// Maximum number of cached triangles, of about 200 bytes each. The meshes of the latest body are always
 /// kept.
@@ -55,7 +56,8 @@ fn made(geoms: &[&Geom]) -> Vec<Option<SharedMesh>> {
         (if uses_uvs(geom) { mesh } else { mesh.without_uvs() }, geom.body_from_geom)
     };
     let mut meshes: Vec<(TriangleMesh, Pose)> = geoms.iter().map(placed).collect();
-    hidden::take_out(&mut meshes);
+    let is_clear: Vec<bool> = geoms.iter().map(|geom| is_clear(geom)).collect();
+    hidden::take_out(&mut meshes, &is_clear);
     let shown = |(mesh, _): (TriangleMesh, Pose)| (!mesh.triangles.is_empty()).then(|| mesh.into());
     meshes.into_iter().map(shown).collect()
 }
@@ -63,6 +65,12 @@ fn made(geoms: &[&Geom]) -> Vec<Option<SharedMesh>> {
 /// Returns true if an image is mapped by the texture coordinates of the mesh.
 fn uses_uvs(geom: &Geom) -> bool {
     geom.image.as_ref().is_some_and(|image| image.mapping == TextureMapping::Corners)
+}
+
+/// Returns true if a geom does not hide what is inside of it.
+fn is_clear(geom: &Geom) -> bool {
+    let has_alpha = geom.image.as_ref().is_some_and(|image| image.texture.has_alpha);
+    geom.rgba[3] < SOLID_ALPHA || has_alpha
 }
 
 impl KeptBodies {
@@ -91,7 +99,8 @@ impl KeptBodies {
     }
 }
 
-/// Returns a hash of the shapes and poses of geoms, and of whether their texture coordinates are used.
+/// Returns a hash of the shapes and poses of geoms, and of whether they are clear and use texture
+/// coordinates.
 fn key(geoms: &[&Geom]) -> u128 {
     let mut content = Content(Xxh3::new());
     for geom in geoms {
@@ -99,7 +108,7 @@ fn key(geoms: &[&Geom]) -> u128 {
         content.points(&[translation]);
         content.numbers(&rotation.to_array());
         content.shape(&geom.primitive);
-        content.0.update(&[uses_uvs(geom).into()]);
+        content.0.update(&[u8::from(uses_uvs(geom)), u8::from(is_clear(geom))]);
     }
     content.0.digest128()
 }

@@ -67,6 +67,21 @@ impl Image {
         Image { texture: image.texture.clone(), from_mesh, is_cube, has_faces, last_level }
     }
 
+    /// Returns the image of a sky.
+    pub fn around(texture: &Arc<Texture>) -> Image {
+        let last_level = (texture.levels.len() - 1) as f32;
+        let has_faces = texture.images() > 1;
+        Image { texture: texture.clone(), from_mesh: None, is_cube: true, has_faces, last_level }
+    }
+
+    /// Returns the linear colour of the sky along a ray of the world, as a mean over about a step in x and y.
+    #[inline(always)]
+    pub fn sky_rgb(&self, ray: Vector, [x_step, y_step]: [Vector; 2]) -> Vector {
+        // The cube's y is up. Source: MuJoCo's `render_gl3.c`.
+        let on_cube = |ray: Vector| [ray.x, ray.z, -ray.y];
+        self.rgb(&self.place(on_cube(ray), on_cube(x_step), on_cube(y_step))).into()
+    }
+
     /// Returns the place on the image of three coordinates with their differences over a step in x and in y.
     #[inline(always)]
     pub fn place(&self, values: [f32; 3], x_step_values: [f32; 3], y_step_values: [f32; 3]) -> ImagePlace {
@@ -82,6 +97,12 @@ impl Image {
     /// Returns the linear colour at a place, as a mean over about a step in x and in y.
     #[inline(always)]
     pub fn rgb(&self, place: &ImagePlace) -> [f32; 3] {
+        self.rgb_and_alpha(place).0
+    }
+
+    /// Returns the linear colour at a place and its alpha, which is 1 for images without.
+    #[inline(always)]
+    pub fn rgb_and_alpha(&self, place: &ImagePlace) -> ([f32; 3], f32) {
         let levels = &self.texture.levels;
         let [width, height] = levels[0].size_px;
         let texels_2 = |[u, v]: [f32; 2]| (u * width) * (u * width) + (v * height) * (v * height);
@@ -96,10 +117,11 @@ impl Image {
             texel = lanes(|i| texel[i] + (farther[i] - texel[i]) * share);
         }
         let light = &*LIGHT;
-        axes(
+        let rgb = axes(
             #[inline(always)]
             |axis| light[index((texel[axis] * LIGHT_STEPS as f32).round_ties_even()) % LIGHT_VALUES],
-        )
+        );
+        (rgb, if self.texture.has_alpha { texel[3] / 255.0 } else { 1.0 })
     }
 }
 

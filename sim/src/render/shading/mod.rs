@@ -2,13 +2,24 @@
 //! several points at once. All colours are linear.
 
 pub mod image;
+pub mod lamps;
 pub mod lanes;
 pub mod pattern;
+pub mod power;
 pub mod srgb;
 
 use rapier3d::math::Vector;
 
 use lanes::Affine;
+
+/// Maximum number of blended surfaces in front of one another; those behind them are not drawn.
+pub const VEILS: usize = 4;
+/// Alpha from which surfaces are solid, as in MuJoCo.
+pub const SOLID_ALPHA: f32 = 0.995;
+/// Alpha up to which surfaces cast no shadow: they let half of the light through.
+pub const MAX_CLEAR_ALPHA: f32 = 0.5;
+/// Alpha of texels from which depth and ids are those of the surface.
+pub const MIN_SEEN_ALPHA: f32 = 0.5;
 
 /// Samples a pixel along each axis; a power of two, so that dividing by it is exact.
 pub const SAMPLES: usize = 2;
@@ -70,6 +81,12 @@ pub const CONTACT: f32 = 0.5;
 /// Steps of the table from linear light to sRGB bytes.
 pub const SRGB_STEPS: usize = 4096;
 
+/// Returns the offset of the lookup point for a shadow map of this radius: wide maps have large texels.
+pub fn normal_offset_m(radius_m: f32) -> f32 {
+    const USUAL_RADIUS_M: f32 = 1.25;
+    NORMAL_OFFSET_M * (radius_m / USUAL_RADIUS_M).max(1.0)
+}
+
 /// Returns the map from points of the world to the shadow map around a focus, for a sun in the direction
 /// `sun_direction`: column and row, counted from its corner, and nearness.
 pub fn sun_map(sun_direction: Vector, focus_m: Vector, radius_m: f32) -> Affine {
@@ -78,6 +95,13 @@ pub fn sun_map(sun_direction: Vector, focus_m: Vector, radius_m: f32) -> Affine 
     let down = sun_direction.cross(right) * -1.0;
     let about_focus = |axis: Vector, at_focus: f32| (axis, at_focus - axis.dot(focus_m));
     Affine([about_focus(right, half), about_focus(down, half), about_focus(sun_direction, SUN_DISTANCE_M)])
+}
+
+/// Returns the share of light that a surface of this alpha keeps out. MuJoCo draws blended surfaces twice.
+#[inline(always)]
+pub fn opacity(alpha: f32) -> f32 {
+    let clear = 1.0 - alpha;
+    1.0 - clear * clear
 }
 
 /// Converts sRGB, as used in files, to linear light.

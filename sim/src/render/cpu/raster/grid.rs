@@ -70,6 +70,11 @@ impl<T: Copy> SampleRows<T> {
     }
 
     /// Returns all numbers, row by row.
+    pub fn all(&self) -> &[T] {
+        &self.numbers
+    }
+
+    /// Returns all numbers, row by row.
     pub fn all_mut(&mut self) -> &mut [T] {
         &mut self.numbers
     }
