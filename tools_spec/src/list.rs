@@ -123,6 +123,7 @@ macro_rules! tools {
         /// The reply to a [`ToolCall`].
         #[derive(Debug, Clone, PartialEq, Serialize)]
         #[serde(untagged)]
+        #[allow(clippy::large_enum_variant, reason = "one reply at a time is on its way")]
         pub enum ToolReply {
             $( #[doc = concat!("To a [`", stringify!($call), "`].")] $group($reply), )*
         }

@@ -131,7 +131,7 @@ pub(super) fn lights(source: &MjcfText, bodies: &[usize]) -> Result<Option<FileL
     let in_tree = |node: &Node| node.ancestors().any(|one| one.has_tag_name("worldbody"));
     let found: Vec<Node> =
         xml.descendants().filter(|node| node.has_tag_name("light")).filter(in_tree).collect();
-    let headlight = xml.descendants().filter(|node| node.has_tag_name("headlight")).last();
+    let headlight = xml.descendants().rfind(|node| node.has_tag_name("headlight"));
     if found.is_empty() && headlight.is_none() {
         return Ok(None);
     }

@@ -45,6 +45,7 @@ const KEPT_ANSWERS: usize = 64;
 
 /// Setpoint of a robot for one control step.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "one setpoint a robot; wrists are the usual one")]
 pub enum Setpoint {
     /// Wrists, fingers and base.
     Wrists(WristMove),

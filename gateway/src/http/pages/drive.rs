@@ -55,7 +55,8 @@ struct Word {
     /// A row of `send_joint_chunk`.
     row: Option<Vec<f64>>,
     /// A row of `send_joint_drives`.
-    drives: Option<Vec<f64>>,
+    #[serde(rename = "drives")]
+    drive_row: Option<Vec<f64>>,
     /// True to receive the robot's state after each of its commands.
     #[serde(default)]
     states: bool,
@@ -146,8 +147,8 @@ pub async fn drive(
 /// Handles the messages of a page until it has gone. An unreadable message ends the connection.
 async fn hear(reader: &mut PageReader, robot: &str, driver: &Driver) -> io::Result<()> {
     while let Some(text) = reader.text().await? {
-        let Word { wrist_move, row, drives, states, go, steps } = serde_json::from_str(&text)?;
-        let setpoint = setpoint(robot, wrist_move, row, drives)?;
+        let Word { wrist_move, row, drive_row, states, go, steps } = serde_json::from_str(&text)?;
+        let setpoint = setpoint(robot, wrist_move, row, drive_row)?;
         driver.say(&Wish { setpoint, tells_state: states, go, steps });
     }
     Ok(())
@@ -162,9 +163,9 @@ fn setpoint(
     robot: &str,
     wrist_move: Option<Map<String, Value>>,
     row: Option<Vec<f64>>,
-    drives: Option<Vec<f64>>,
+    drive_row: Option<Vec<f64>>,
 ) -> io::Result<Setpoint> {
-    let setpoint = match (wrist_move, row, drives) {
+    let setpoint = match (wrist_move, row, drive_row) {
         (Some(mut entry), None, None) => {
             entry.insert("robot".into(), robot.into());
             Setpoint::Wrists(serde_json::from_value(Value::Object(entry))?)

@@ -15,8 +15,10 @@ use crate::render::shading::lamps::{lamp_map, lamp_view, tilted};
 use crate::render::shading::{CONTACT_TEXELS, SAMPLES, TEXELS, VEILS, normal_offset_m, sun_map};
 use crate::render::{Camera, Carrier, Part, Pattern, PlacedScenery, Scenery};
 
-/// Count of numbers in `picture.wgsl`'s `View`, and in its `Part`.
-const VIEW_NUMBERS: usize = 64 + 5 * 4 + MAX_LIGHTS * LAMP_NUMBERS;
+/// Count of vectors of `picture.wgsl`'s `View` before its counts.
+const CAMERA_VECTORS: usize = 16;
+/// Count of numbers in `View`, and in `Part`.
+const VIEW_NUMBERS: usize = 4 * CAMERA_VECTORS + 5 * 4 + MAX_LIGHTS * LAMP_NUMBERS;
 const PART_NUMBERS: usize = 28;
 /// Count of numbers in its `Lamp`.
 const LAMP_NUMBERS: usize = 36;
@@ -132,7 +134,7 @@ impl SceneBuffers {
         let map = sun_map(light.sun_direction, placed.focus_m, prepared.scenery.focus_radius_m);
         let [column, row, nearness] = map.0.map(|(axis, constant)| [axis.x, axis.y, axis.z, constant]);
         let [x_m, y_m] = contact.corner_m;
-        let numbers: [[f32; 4]; VIEW_NUMBERS / 4] = [
+        let numbers: [[f32; 4]; CAMERA_VECTORS] = [
             direction(rotation * Vector::X),
             direction(rotation * Vector::Y),
             direction(rotation * Vector::Z),

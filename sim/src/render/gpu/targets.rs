@@ -164,7 +164,7 @@ fn array(texture: &Texture) -> TextureView {
 }
 
 fn texture(gpu: &Gpu, format: TextureFormat, width: u32, height: u32, layers: u32) -> Texture {
-    gpu.device = gpu.device.create_texture(&TextureDescriptor {
+    gpu.device.create_texture(&TextureDescriptor {
         label: None,
         size: Extent3d { width, height, depth_or_array_layers: layers },
         mip_level_count: 1,
