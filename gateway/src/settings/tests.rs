@@ -59,7 +59,7 @@ fn settings_that_let_nobody_in_are_refused() {
         check(&format!("{limit} = 0"), &[limit, "at least 1"]);
     }
     for host in ["", "http://lab.example", "lab.example:8700", "lab..example", "a b"] {
-        check(&format!("allowed_host = [{host:?}]"), &["no name of a host", "as lab.example"]);
+        check(&format!("allowed_host = [{host:?}]"), &["no name of a host", "for example lab.example"]);
     }
     check("token_file = \"\"", &["token_file is set and empty", "openssl"]);
     check("token = \"\"", &["unknown field `token`", "`token_file`"]);

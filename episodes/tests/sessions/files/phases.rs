@@ -41,8 +41,8 @@ fn each_part_says_when_it_held_or_how_near_it_came() {
     assert_eq!((trace.number.as_str(), trace.id.as_str()), ("p1", "push"));
     let [condition] = &trace.conditions[..] else { panic!("one condition: {trace:?}") };
     let [pushed, released] = &condition.parts[..] else { panic!("two parts: {condition:?}") };
-    assert_eq!((pushed.place, pushed.text.as_str()), ([51, 9], "x_m(\"parcel\") >= line_m"));
-    let place = [51, 36];
+    assert_eq!((pushed.place, pushed.text.as_str()), ([50, 9], "x_m(\"parcel\") >= line_m"));
+    let place = [50, 36];
     assert_eq!((released.place, released.text.as_str()), (place, "released_for_s(\"parcel\") >= 0.2"));
     assert_eq!((condition.held.steps, condition.held.of, pushed.held.steps), (0, 50, 0));
     assert!((30..=50).contains(&released.held.steps), "{:?}", released.held);
@@ -62,8 +62,8 @@ fn terms_are_taken_apart_and_durations_are_counted() {
     assert_eq!((lasting.setting, at_end.setting), (PhaseSetting::Lasting, PhaseSetting::AtEnd));
     let texts: Vec<(&str, [usize; 2])> =
         lasting.parts.iter().map(|part| (part.text.as_str(), part.place)).collect();
-    let [one, other] = [("!fallen(\"A\")", [46, 16]), ("!fallen(\"B\")", [46, 32])];
-    assert_eq!(texts, [one, other, ("time_s() < 0.99", [51, 27])]);
+    let [one, other] = [("!fallen(\"A\")", [45, 16]), ("!fallen(\"B\")", [45, 32])];
+    assert_eq!(texts, [one, other, ("time_s() < 0.99", [50, 27])]);
     assert_eq!((lasting.held.of, lasting.held.steps, lasting.held.longest), (50, 49, 49));
     assert!((lasting.held.longest_s() - 0.96).abs() < 1e-9 && lasting.for_s == 1.0);
     assert_eq!((at_end.held.steps, at_end.parts[0].nearest), (0, None));

@@ -79,7 +79,7 @@ fn the_file_of_settings_and_all_that_it_names_are_tried() {
     );
     let config = write("settings.toml", &text);
     let flags = ["--config", &config, "--runs", "/dev/null/runs"];
-    expect_wrong(&found(&flags, "limits"), &["max_episodes is 0", "as 8"]);
+    expect_wrong(&found(&flags, "limits"), &["max_episodes is 0", "for example 8"]);
     expect_wrong(&found(&flags, "token"), &["other machines reach", "--token-file"]);
     expect_wrong(&found(&flags, "instructions"), &["handover.joint is empty"]);
     expect_wrong(&found(&flags, "locomotion"), &["no.onnx"]);

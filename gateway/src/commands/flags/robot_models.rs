@@ -134,8 +134,8 @@ mod tests {
     #[test]
     fn what_is_no_model_of_a_robot_is_told_what_is() {
         for (flags, says) in [
-            (&["--per-robot", "--robot-model", "claude"][..], "as B=MODEL"),
-            (&["--per-robot", "--robot-model", "m?api=anthropic"], "as B=MODEL"),
+            (&["--per-robot", "--robot-model", "claude"][..], "for example B=MODEL"),
+            (&["--per-robot", "--robot-model", "m?api=anthropic"], "for example B=MODEL"),
             (&["--per-robot", "--robot-model", "B="], "no model"),
             (&["--per-robot", "--robot-model", "B=m?key=1"], "unexpected argument '--key' found"),
             (&["--robot-model", "B=m"], "--per-robot"),
