@@ -118,7 +118,8 @@ impl FileLight {
             exponent_value: number("exponent", 10.0),
             casts_shadow: stated("castshadow") != Some("false"),
         };
-        let frames = node.ancestors().skip(1).take_while(|one| one.has_tag_name("frame"));
+        let is_body = |one: &Node| ["worldbody", "body"].contains(&one.tag_name().name());
+        let frames = node.ancestors().skip(1).take_while(|one| !is_body(one));
         frames.fold(light, |light, frame| light.moved(&pose(&frame)))
     }
 }

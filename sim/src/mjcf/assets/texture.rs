@@ -30,8 +30,8 @@ pub struct TextureLevel {
     pub height: usize,
     /// Width and height once more.
     pub size_px: [f32; 2],
-    /// sRGB and alpha, row by row from the top left; without alpha, the fourth byte is 0. Of a cube with six images, all of them in the
-    /// order +x, -x, +y, -y, +z, -z.
+    /// sRGB and alpha, row by row from the top left; without alpha, the fourth byte is 0. Of a cube with six
+    /// images, all of them in the order +x, -x, +y, -y, +z, -z.
     pub texels: Vec<[u8; 4]>,
 }
 

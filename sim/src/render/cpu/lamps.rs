@@ -35,7 +35,7 @@ enum LampShadow {
     Cone(Box<ConeShadow>),
 }
 
-/// What a spot or a point light shines on.
+/// Surfaces that a spot or a point light shines on.
 struct ConeShadow {
     seen: RenderTarget,
     map: Affine,
@@ -106,8 +106,8 @@ impl LitLamps {
 }
 
 impl Surfaces {
-    /// Adds the colours of all pushed points as [`Surfaces::shade`] does, in the light of lamps. `back_direction` is the
-    /// direction from what the camera looks at to the camera.
+    /// Adds the colours of all pushed points as [`Surfaces::shade`] does, in the light of lamps.
+    /// `back_direction` leads from the place at which the camera looks to the camera.
     #[inline(always)]
     pub(super) fn shade_by_lamps(
         &mut self,

@@ -278,9 +278,9 @@ impl Surfaces {
     }
 
     /// Adds the shares of all pushed points to those of their pixels.
-    pub(super) fn add_shares(&self, sum: &mut [f32]) {
+    pub(super) fn add_shares(&self, pixel_share: &mut [f32]) {
         for (pixel, share) in self.pixels.iter().zip(&self.pixel_share).take(self.count) {
-            sum[*pixel as usize] += share;
+            pixel_share[*pixel as usize] += share;
         }
     }
 
@@ -404,8 +404,8 @@ impl Facet {
         )
     }
 
-    /// Returns the linear colours of the image on the surface, without light, and its alpha, of points that have rays,
-    /// places, normals and depths.
+    /// Returns the linear colours of the image on the surface, without light, and its alpha, of points that
+    /// have rays, places, normals and depths.
     #[inline(always)]
     fn image_rgb<const N: usize>(
         &self,

@@ -23,7 +23,7 @@ const MIN_ASIDE_M: f32 = 0.002;
 /// Share of the surfaces towards the rasterisers' sun that it reaches.
 const SUNLIT_SHARE: f32 = 0.92;
 /// Distance between blended surfaces on a ray, as a share of the distance on it.
-const LEAST_STEP_SHARE: f32 = 1e-5;
+const MIN_STEP_SHARE: f32 = 1e-5;
 /// Purposes of a pixel's numbers.
 const FOR_LAMPS: u32 = 0;
 const FOR_LIGHT: u32 = 1;
@@ -147,7 +147,7 @@ impl<'a> PathView<'a> {
                 break;
             }
             found.push(veils.spot(eye_m, ray, &hit));
-            least_m = depth_m * (1.0 + LEAST_STEP_SHARE);
+            least_m = depth_m * (1.0 + MIN_STEP_SHARE);
         }
         found
     }

@@ -107,7 +107,8 @@ pub fn lamp_view(light: &FileLight) -> (Pose, f32) {
     (world_from_camera, 2.0 * half_rad)
 }
 
-/// Map from points of the world to a lamp's map of shadows: column and row, each times the depth, and depth.
+/// Returns the map from points of the world to a lamp's map of shadows: column and row, each times the
+/// depth, and depth.
 pub fn lamp_map(light: &FileLight) -> Affine {
     let (world_from_camera, field_rad) = lamp_view(light);
     let half = 0.5 * TEXELS as f32;

@@ -88,7 +88,10 @@ fn operators_meet_where_both_wait() {
 #[test]
 fn words_end_what_was_asked_to_end_by_them() {
     let team = Team::start(json!({ "talk": true, "patience_s": 5 }));
+    // B may have been held still meanwhile, and has to look before it commands again.
+    let look = || team.ask(1, "get_robot_state", json!({ "robot": "B" })).ok();
     let until_words = |tool: &str, arguments: serde_json::Value| {
+        look();
         std::thread::scope(|scope| {
             let plan = scope.spawn(|| team.ask(1, tool, arguments).ok());
             for _ in 0..2 {
@@ -129,6 +132,7 @@ fn words_end_what_was_asked_to_end_by_them() {
     let reply = until_words("send_plan", from("A"));
     assert!(reply["stopped"].is_null() && reply["executed_steps"].as_u64() < Some(80), "{reply}");
     for robot in ["B", "C"] {
+        look();
         team.ask(1, "send_plan", from(robot)).refused(422, &["heard_from", "the others are A"]);
     }
     team.verified();
