@@ -88,7 +88,10 @@ def model_parser() -> argparse.ArgumentParser:
         "--sampling-seed", type=int, metavar="N", help="seed of the sampling, for openai-chat [default: the endpoint's]"
     )
     model.add_argument(
-        "--extra-body", type=_object, metavar="JSON", help='further fields of requests, for example {"top_k": 40} [default: none]'
+        "--extra-body",
+        type=_object,
+        metavar="JSON",
+        help='further fields of requests, for example {"top_k": 40} [default: none]',
     )
     limits = flags.add_argument_group("limits, after which the episode is finished")
     limits.add_argument("--max-tokens-total", type=_count, metavar="N", help="tokens read and written [default: any number]")

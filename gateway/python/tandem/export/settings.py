@@ -68,7 +68,9 @@ class ExportSettings:
         if self.rate_hz not in RATES_HZ:
             raise TandemError(f"no rate of {self.rate_hz} Hz; have: {', '.join(map(str, RATES_HZ))}")
         if len(self.size) != 2 or any(side not in SIDES_PX for side in self.size):
-            raise TandemError(f"no size; give width and height in pixels, each {SIDES_PX[0]} to {SIDES_PX[-1]}, for example 320x240")
+            raise TandemError(
+                f"no size; give width and height in pixels, each {SIDES_PX[0]} to {SIDES_PX[-1]}, for example 320x240"
+            )
         if self.images == "video" and any(side % 2 for side in self.size):
             raise TandemError("films have an even number of pixels each way; give such a size, or images as png")
         if self.depth and self.version == "v2":
