@@ -122,7 +122,7 @@ def test_a_team_goes_on_with_the_same_models(server: tandem.Server, runs: Path, 
 
 
 REFUSED = {
-    "--robot-model other": "as B=MODEL",
+    "--robot-model other": "for example B=MODEL",
     "--robot-model B=m?key=1": "unrecognized arguments: --key=1",
     "--robot-model B=m?api=grpc": "invalid choice",
 }
