@@ -153,7 +153,7 @@ app = create_app(
     concurrency_config=ConcurrencyConfig(max_concurrent_envs=_WORLDS, session_timeout=_IDLE_S),
     state_cls=TandemState,
 )
-"""What a server of applications takes, for example `uvicorn openenv_tandem:app`."""
+"""Application for a server, for example `uvicorn openenv_tandem:app`."""
 
 
 def main() -> None:

@@ -41,7 +41,7 @@ def turning(time_s: float, _state: State, _y_m: float) -> Velocity:
 
 @dataclass
 class Case:
-    """What the robot is told."""
+    """Commands and disturbance of a trial."""
 
     name: str
     seconds: float
@@ -60,7 +60,7 @@ CASES = [
 
 @dataclass
 class Outcome:
-    """What came of a case."""
+    """Result of a trial."""
 
     stands: bool
     distance_m: float

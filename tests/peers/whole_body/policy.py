@@ -38,7 +38,7 @@ CONTROLLED = [
 
 @dataclass
 class State:
-    """What the policy observes, joints in the robot's order."""
+    """Observation of a policy; joints are in the robot's order."""
 
     quaternion_wxyz: NDArray[np.float64]
     gyro_rad_s: NDArray[np.float64]

@@ -6,7 +6,7 @@ use crate::SimError;
 use crate::mjcf::text::source::MjcfText;
 use crate::mjcf::text::stated::Classes;
 
-/// Emission and reflection of a material, as MuJoCo's renderer reads them.
+/// Emission and reflection of a material, in the meaning of MuJoCo's renderer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gloss {
     /// Light that the surface emits, as a multiple of its colour.
