@@ -42,7 +42,7 @@ pub struct Part {
     pub carrier_from_mesh: Pose,
     /// sRGB, 0 to 1. With an image it is the mean colour.
     pub rgb: [f32; 3],
-    /// Share of light from behind that the surface keeps out; below [`SOLID_ALPHA`] it is blended.
+    /// Share of light from behind that the surface keeps out; below `SOLID_ALPHA` it is blended.
     pub alpha: f32,
     pub gloss: Gloss,
     /// Image on the surface, in place of a pattern.
