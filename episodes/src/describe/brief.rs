@@ -75,7 +75,7 @@ const CARRYING: &str = " To push, and to carry together: grip, and lift what is 
     hold it, name each of them in every command, with compliance_n_s_m 250: the hands of one that is not \
     named stay stiff, and lead it away. To set down, bring the wrists down again by steps of 0.03 m with \
     compliance_n_s_m 250 once both stand: a thing has touched when force_n along z falls towards 0, as \
-    from -4.4 to -2.0. Open as you are, with compliance_n_s_m 250 and the wrist poses that the last reply \
+    from -4.4 to -2.0. Open as you are, with compliance_n_s_m 250 and the wrist poses that get_robot_state \
     tells, until grip is \"none\", and only then leave over the stops: a hand that turns stiff while it \
     holds pulls its robot from where it stands.";
 
