@@ -1,5 +1,6 @@
 //! `send_plan`: commands in sequence. Each runs until its steps are done, or until its expectation holds.
 
+use tandem_sim::Side;
 use tandem_tools_spec::{
     ActCall, CommandReply, PlanStep, PlannedCall, PoseFrame, SendPlan, SpecError, Tool as _,
 };
@@ -146,6 +147,11 @@ impl CommandList {
     /// Returns the tool of the last command that has been begun.
     pub fn tool(&self) -> &'static str {
         self.last_begun().map_or(SendPlan::NAME, |step| step.call.name())
+    }
+
+    /// Returns true while this wrist has not had its last target in the present command.
+    pub fn is_under_way(&self, robot: &str, side: Side) -> bool {
+        matches!(&self.current, Some(CurrentCommand::Until(pieces)) if pieces.is_under_way(robot, side))
     }
 
     /// Returns true if the last command asks for a short reply.

@@ -104,7 +104,7 @@ impl PlanRun {
             session.tell_in(frame, last);
         }
         if let PlanStage::Commands(list) = &self.stage {
-            self.progress.outcomes.add(list.place(), last);
+            self.progress.outcomes.add(list.place(), last, |robot, side| list.is_under_way(robot, side));
         }
         self.progress.is_new = false;
     }
