@@ -167,6 +167,14 @@ impl CommandList {
         }
     }
 
+    /// Returns the frame of the places of the last command, if it carries a load to some.
+    pub fn carried_in(&self) -> Option<PoseFrame> {
+        match &self.last_begun()?.call {
+            PlannedCall::WalkTo(walk) => walk.carries().then_some(walk.frame),
+            PlannedCall::Act(_) => None,
+        }
+    }
+
     fn last_begun(&self) -> Option<&PlanStep> {
         self.steps.get(self.begun.checked_sub(1)?)
     }
