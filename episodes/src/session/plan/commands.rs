@@ -53,7 +53,16 @@ impl Session {
             };
             match &step.call {
                 PlannedCall::Act(call) if step.until => drop(Pieces::new(call, self)?),
-                PlannedCall::Act(call) => drop(Command::read(call, &self.rules, &self.motions)?),
+                PlannedCall::Act(call) => {
+                    let read = Command::read(call, &self.rules, &self.motions);
+                    read.map_err(|error| match error {
+                        EpisodeError::TooManySteps { .. } => {
+                            refused(format!("{error}; with `until` up to {}", SendPlan::MAX_UNTIL_STEPS))
+                                .into()
+                        }
+                        error => error,
+                    })?;
+                }
                 PlannedCall::WalkTo(walk) => drop(self.walkers(walk, operator)?),
             }
             self.check_phase(step).map_err(refused)?;

@@ -33,8 +33,8 @@ pub const WELL_RAD: f64 = 0.023;
 /// Maximum number of further attempts after the first rest, and the displacement up to which a robot that
 /// stands walks by one pulse: its stop is predictable, so that it need not be steered.
 pub const ATTEMPTS: u32 = 5;
-const PULSE_M: f64 = 0.2;
-const PULSE_RAD: f64 = 0.3;
+const PULSE_M: f64 = 0.35;
+const PULSE_RAD: f64 = 0.5;
 /// Number of commands with all robots standing, after which their sway has ended.
 pub const CALM_COMMANDS: u32 = 2;
 /// Minimum approach within this many walks; with less, the robot is blocked.

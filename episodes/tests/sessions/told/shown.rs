@@ -55,7 +55,12 @@ fn an_object_is_found_by_its_name() {
     }
     assert_eq!(session.state_hash(), hash);
     assert_eq!(counted(&session, "object_pixels"), json!({ "A": 1, "B": 1 }));
-    assert!(seen_by(&mut session, "A", "target_pad").is_ok(), "underscores are spaces");
+    // Underscores are spaces. The pad is seen whole, so that the middle of its box is its own.
+    let pad = seen_by(&mut session, "A", "target_pad").unwrap();
+    let pad_m = facts.position_m("target_pad");
+    let off_m =
+        (pad.middle_m[0] - f64::from(pad_m.x - x_m)).hypot(pad.middle_m[1] - f64::from(pad_m.y - y_m));
+    assert!(!pad.cut_off && off_m < 0.01, "{off_m} m off: {pad:?}");
     let refused = seen_by(&mut session, "A", "vase").unwrap_err();
     assert!(refused.contains("no \"vase\"; have: bottle, target pad"), "{refused}");
     assert_eq!(counted(&session, "object_pixels"), json!({ "A": 2, "B": 1 }));
