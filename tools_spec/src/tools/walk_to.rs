@@ -20,7 +20,7 @@ const MAX_WAYPOINTS: usize = 10;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WalkTo {
-    /// Most steps, up to 1500: about 250, 150 a metre and 250 a quarter turn; with `carry` 300, 270 and 220.
+    /// Most steps, up to 1500: about 300, 170 a metre and 250 a quarter turn; with `carry` 300, 270 and 220.
     #[schemars(range(min = 1, max = MAX_STEPS))]
     pub steps: u32,
     /// Frame of places and headings.

@@ -24,6 +24,11 @@ const TURN_RAD_S: f64 = 0.4;
 const NEAR_M: f64 = 0.03;
 const NEAR_RAD: f64 = 0.04;
 const PASSED_M: f64 = 0.1;
+/// Number of walks without an approach after which a robot this close rests, and corrects its place from
+/// there: at low speeds the sway hides the rest of the way.
+const SLOW_WALKS: u32 = 4;
+const CLOSE_M: f64 = 0.15;
+const CLOSE_RAD: f64 = 0.3;
 /// Tolerances of a standing robot: within the first it has arrived, but corrections continue until the
 /// second.
 pub const THERE_M: f64 = 0.015;
@@ -226,7 +231,8 @@ impl Session {
             (walker.nearest_m, walker.walks) = (f64::INFINITY, 0);
         }
         let off = mean.missing_to(walker.places.front()?);
-        if walker.places.len() == 1 && off.is_within(NEAR_M, NEAR_RAD) {
+        let is_slow = walker.walks >= SLOW_WALKS && off.is_within(CLOSE_M, CLOSE_RAD);
+        if walker.places.len() == 1 && (is_slow || off.is_within(NEAR_M, NEAR_RAD)) {
             walker.stage = WalkerStage::Rests;
             return None;
         }

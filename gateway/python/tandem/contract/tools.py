@@ -244,7 +244,7 @@ class Tools(ABC):
         run out. It does not look: go round obstacles by `waypoints`.
 
         Args:
-            steps: Most steps, up to 1500: about 250, 150 a metre and 250 a quarter turn; with `carry` 300, 270 and
+            steps: Most steps, up to 1500: about 300, 170 a metre and 250 a quarter turn; with `carry` 300, 270 and
                 220.
             robots: One entry per robot that walks.
             frame: Frame of places and headings.
