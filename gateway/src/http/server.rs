@@ -254,7 +254,7 @@ fn is_hangup_ignored() -> bool {
     static IGNORED: OnceLock<bool> = OnceLock::new();
     *IGNORED.get_or_init(|| {
         #[allow(unsafe_code, reason = "no safe wrapper reads the action of a signal without replacing it")]
-        // SAFETY: zeros are a valid `sigaction`, and without a new action the call only writes to the old one.
+        // SAFETY: zeros are a valid `sigaction`; without a new action, the call only writes the old one.
         unsafe {
             let mut action: libc::sigaction = mem::zeroed();
             libc::sigaction(libc::SIGHUP, ptr::null(), &mut action) == 0

@@ -1,5 +1,5 @@
-//! Tests of signals. After SIGKILL in an episode, answers older than a second are readable on the disk; a server
-//! that SIGTERM ends while an episode starts leaves no partial file; one under `nohup` outlives SIGHUP.
+//! Tests of signals. After SIGKILL in an episode, answers older than a second are readable on the disk. A
+//! server that SIGTERM ends while an episode starts leaves no partial file. Under `nohup`, it outlives SIGHUP.
 
 use std::{
     path::Path,
