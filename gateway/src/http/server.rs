@@ -250,13 +250,16 @@ pub async fn shutdown_signal() -> ShutdownSignal {
 /// handler.
 #[cfg(unix)]
 fn is_hangup_ignored() -> bool {
-    use std::sync::OnceLock;
+    use std::{mem, ptr, sync::OnceLock};
     static IGNORED: OnceLock<bool> = OnceLock::new();
     *IGNORED.get_or_init(|| {
-        let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-        let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-        // SIGHUP is signal 1, the lowest bit.
-        mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).is_some_and(|mask| mask & 1 == 1)
+        #[allow(unsafe_code, reason = "no safe wrapper reads the action of a signal without replacing it")]
+        // SAFETY: zeros are a valid `sigaction`; without a new action, the call only writes the old one.
+        unsafe {
+            let mut action: libc::sigaction = mem::zeroed();
+            libc::sigaction(libc::SIGHUP, ptr::null(), &mut action) == 0
+                && action.sa_sigaction == libc::SIG_IGN
+        }
     })
 }
 

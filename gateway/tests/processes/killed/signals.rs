@@ -1,5 +1,5 @@
-//! Tests of SIGKILL in an episode: answers older than a second are readable on the disk. A test of
-//! SIGTERM while an episode starts: the server ends and leaves no partial file.
+//! Tests of signals. After SIGKILL in an episode, answers older than a second are readable on the disk. A
+//! server that SIGTERM ends while an episode starts leaves no partial file. Under `nohup`, it outlives SIGHUP.
 
 use std::{
     path::Path,
@@ -113,6 +113,25 @@ fn a_server_whose_terminal_is_gone_closes_its_recordings() {
     assert!(Command::new("kill").args(["-HUP", &server.id().to_string()]).status().expect("kill").success());
     assert!(server.ended().success());
     assert!(partials(runs.path()).is_empty());
+}
+
+#[test]
+fn a_server_that_nohup_started_outlives_its_terminal() {
+    let runs = tempfile::tempdir().expect("a temporary folder");
+    let mut program = Command::new("nohup");
+    program.arg(env!("CARGO_BIN_EXE_tandem"));
+    let mut server = Server::run(program, runs.path());
+    let id = server.id().to_string();
+    let signal =
+        |name: &str| assert!(Command::new("kill").args([name, &id]).status().expect("kill").success());
+    for seed in 0..3 {
+        signal("-HUP");
+        let start = json!({ "task": "handover", "seed": seed, "protocol": "agentic" });
+        let started = server.post("/v1/episodes", &start).expect("the server still runs");
+        server.tool(started["episode_id"].as_str().expect("an id"), "wait", &json!({ "steps": 1 }));
+    }
+    signal("-TERM");
+    assert!(server.ended().success());
 }
 
 #[test]
