@@ -7,11 +7,9 @@ use super::raster::whole_f32;
 use super::shade::{Surfaces, dot};
 use super::shadow::ShadowMap;
 use super::target::{RenderTarget, draw_casting};
-use crate::mjcf::{FileLight, Headlight, LightKind};
+use crate::mjcf::{FileLight, Headlight, LightKind, SHININESS};
 use crate::render::scene::prepared::Prepared;
-use crate::render::shading::lamps::{
-    LAMP_BIAS_SHARE, LAMP_NORMAL_TEXELS, SHININESS, lamp_map, lamp_view, tilted,
-};
+use crate::render::shading::lamps::{LAMP_BIAS_SHARE, LAMP_NORMAL_TEXELS, lamp_map, lamp_view, tilted};
 use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
 use crate::render::shading::power::{file_value, linear_value, power};
 use crate::render::shading::{SAMPLES, TEXELS};
@@ -136,14 +134,18 @@ impl Surfaces {
         for lamp in &lamps.lamps {
             sums.add(lamp, &point_m, count - at);
         }
-        let (albedo, shares) = (self.albedo.block(at), self.shares(at));
+        let (albedo, texture) = (self.albedo.block(at), self.texture.block(at));
+        let (metallic, shares) = (self.metallic(at), self.shares(at));
         axes(
             #[inline(always)]
             |axis| {
                 lanes(|i| {
                     let surface = file_value(albedo[axis][i]);
-                    let value = surface * (sums.lit[axis][i] + emission[i]) + sums.glossy[axis][i];
-                    linear_value(if value < 1.0 { value } else { 1.0 }) * shares[i]
+                    // An image multiplies the light, highlights and all, once this is limited.
+                    let most = file_value(texture[axis][i]);
+                    let tint = most + (surface - most) * metallic[i];
+                    let value = surface * (sums.lit[axis][i] + emission[i]) + sums.glossy[axis][i] * tint;
+                    linear_value(if value < most { value } else { most }) * shares[i]
                 })
             },
         )

@@ -53,16 +53,16 @@ fn encoded(linear: vec3f) -> vec3f {
     return select(curve, 12.92 * linear, linear <= vec3f(0.0031308));
 }
 
-// Linear colour of a surface.
-fn lit_by_lamps(part: Part, base: vec3f, point_m: vec3f, normal: vec3f, to_eye: vec3f) -> vec3f {
-    let exponent = part.gloss.z * SHININESS;
+// Linear colour of a surface, whose gloss is that of `gloss_at`; `image` is the colour of its image alone, or 1.
+fn lit_by_lamps(gloss: vec4f, base: vec3f, image: vec3f, point_m: vec3f, normal: vec3f, to_eye: vec3f) -> vec3f {
+    let exponent = gloss.z * SHININESS;
     let back = view.back.xyz;
     let facing_head = dot(normal, back);
-    var lit = vec3f(part.gloss.x) + view.head_ambient.xyz + view.head_diffuse.xyz * max(facing_head, 0.0);
+    var lit = vec3f(gloss.x) + view.head_ambient.xyz + view.head_diffuse.xyz * max(facing_head, 0.0);
     var glossy = vec3f(0.0);
     if facing_head > 0.0 {
         let shine = power(max(dot(normal, normalize(back + to_eye)), 0.0), exponent);
-        glossy = view.head_specular.xyz * (part.gloss.y * shine);
+        glossy = view.head_specular.xyz * (gloss.y * shine);
     }
     for (var i = 0u; i < view.counts.x; i++) {
         let lamp = view.lamps[i];
@@ -92,10 +92,12 @@ fn lit_by_lamps(part: Part, base: vec3f, point_m: vec3f, normal: vec3f, to_eye: 
         if facing > 0.0 {
             let shine = power(max(dot(normal, normalize(towards + to_eye)), 0.0), exponent);
             lit += lamp.diffuse.xyz * (share * facing);
-            glossy += lamp.specular.xyz * (share * part.gloss.y * shine);
+            glossy += lamp.specular.xyz * (share * gloss.y * shine);
         }
     }
-    return decoded(min(encoded(base) * lit + glossy, vec3f(1.0)));
+    let own = encoded(base);
+    let most = encoded(image);
+    return decoded(min(own * lit + glossy * mix(most, own, gloss.w), most));
 }
 
 // Colour where no surface is.

@@ -6,10 +6,8 @@ use rapier3d::math::{Pose, Vector};
 use super::TEXELS;
 use super::lanes::Affine;
 use super::power::{file_value, linear_value, power};
-use crate::mjcf::{FileLight, Gloss, Headlight, LightKind};
+use crate::mjcf::{FileLight, Gloss, Headlight, LightKind, SHININESS};
 
-/// Factor from shininess to the exponent of highlights.
-pub const SHININESS: f32 = 128.0;
 /// Maximum angle from the direction of a lamp in which it casts shadows.
 const MAX_SHADOW_RAD: f32 = 75.0 * std::f32::consts::PI / 180.0;
 /// Offset of the lookup point along the normal, in texels of a lamp's map at its distance, and the part of
@@ -21,6 +19,8 @@ pub const LAMP_BIAS_SHARE: f32 = 0.002;
 pub struct LitSurface {
     /// Linear colour.
     pub albedo: Vector,
+    /// Linear colour of the image alone, which multiplies all light; 1 without.
+    pub texture_rgb: Vector,
     pub gloss: Gloss,
     pub point_m: Vector,
     /// Unit vectors: outwards, to the eye, and from the camera's target to the camera.
@@ -77,8 +77,9 @@ pub fn shown_rgb(
         }
     }
     let shown = |axis: usize| {
-        let value = file_value(surface.albedo[axis]) * lit[axis] + glossy[axis];
-        linear_value(value.min(1.0))
+        let (own, most) = (file_value(surface.albedo[axis]), file_value(surface.texture_rgb[axis]));
+        let tint = most + (own - most) * surface.gloss.metallic_factor;
+        linear_value((own * lit[axis] + glossy[axis] * tint).min(most))
     };
     Vector::new(shown(0), shown(1), shown(2))
 }
