@@ -36,7 +36,9 @@ fn drawn(kind: RendererKind, inside: &str, camera: &Camera) -> Frame {
         let plain = image::RgbImage::from_pixel(4, 4, image::Rgb(rgb));
         plain.save(folder.path().join(file)).expect("an image");
     }
-    image::RgbImage::from_pixel(8, 8, image::Rgb(GREY)).save(folder.path().join("grey.jpg")).expect("an image");
+    image::RgbImage::from_pixel(8, 8, image::Rgb(GREY))
+        .save(folder.path().join("grey.jpg"))
+        .expect("an image");
     // Normals (0.6, 0, 0.8).
     let tilted = image::RgbImage::from_pixel(4, 4, image::Rgb([204, 128, 230]));
     tilted.save(folder.path().join("tilted.png")).expect("an image");

@@ -51,6 +51,13 @@ struct Sums {
     glossy: [Lanes; 3],
 }
 
+/// Colours of points in the values of files: their own, and those of their images alone, which are 1 without.
+struct LitColours {
+    own: [Lanes; 3],
+    most: [Lanes; 3],
+    metallic: Lanes,
+}
+
 impl LitLamps {
     pub(super) fn forget(&mut self) {
         self.lamps.clear();
@@ -129,23 +136,39 @@ impl Surfaces {
     fn lit_by_lamps(&self, at: usize, count: usize, lamps: &LitLamps, back_direction: Vector) -> [Lanes; 3] {
         let point_m = self.point_m.block(at);
         let [emission, specular, shininess] = self.gloss.block(at);
+        let (albedo, texture) = (self.albedo.block(at), self.texture.block(at));
+        let surface = LitColours {
+            own: axes(
+                #[inline(always)]
+                |axis| lanes(|i| file_value(albedo[axis][i])),
+            ),
+            most: axes(
+                #[inline(always)]
+                |axis| lanes(|i| file_value(texture[axis][i])),
+            ),
+            metallic: self.metallic(at),
+        };
         let mut sums = self.unlit(at, [specular, shininess]);
+        sums.lit = [emission; 3];
         sums.add_headlight(&lamps.headlight, back_direction);
-        for lamp in &lamps.lamps {
+        let casts_shadow = |lamp: &&LitLamp| !matches!(lamp.shadow, LampShadow::None);
+        for lamp in lamps.lamps.iter().filter(|lamp| !casts_shadow(lamp)) {
             sums.add(lamp, &point_m, count - at);
         }
-        let (albedo, texture) = (self.albedo.block(at), self.texture.block(at));
-        let (metallic, shares) = (self.metallic(at), self.shares(at));
+        let mut values = [[0.0; LANES]; 3];
+        sums.show(&surface, &mut values);
+        // MuJoCo limits the light of each lamp with shadows by itself.
+        for lamp in lamps.lamps.iter().filter(casts_shadow) {
+            sums.add(lamp, &point_m, count - at);
+            sums.show(&surface, &mut values);
+        }
+        let shares = self.shares(at);
         axes(
             #[inline(always)]
             |axis| {
                 lanes(|i| {
-                    let surface = file_value(albedo[axis][i]);
-                    // An image multiplies the light, highlights and all, once this is limited.
-                    let most = file_value(texture[axis][i]);
-                    let tint = most + (surface - most) * metallic[i];
-                    let value = surface * (sums.lit[axis][i] + emission[i]) + sums.glossy[axis][i] * tint;
-                    linear_value(if value < most { value } else { most }) * shares[i]
+                    let value = values[axis][i];
+                    linear_value(if value < 1.0 { value } else { 1.0 }) * shares[i]
                 })
             },
         )
@@ -176,6 +199,22 @@ impl Surfaces {
 }
 
 impl Sums {
+    /// Adds the colours that the light gives to surfaces, and clears it. An image multiplies the light,
+    /// highlights and all, once this is limited.
+    #[inline(always)]
+    fn show(&mut self, surface: &LitColours, values: &mut [Lanes; 3]) {
+        for axis in 0..3 {
+            let (own, most) = (&surface.own[axis], &surface.most[axis]);
+            let (lit, glossy) = (&self.lit[axis], &self.glossy[axis]);
+            values[axis] = lanes(|i| {
+                let tint = most[i] + (own[i] - most[i]) * surface.metallic[i];
+                let value = own[i] * lit[i] + glossy[i] * tint;
+                values[axis][i] + if value < most[i] { value } else { most[i] }
+            });
+        }
+        (self.lit, self.glossy) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+    }
+
     #[inline(always)]
     fn add_headlight(&mut self, headlight: &Headlight, back_direction: Vector) {
         let towards: [Lanes; 3] = axes(|axis| [back_direction[axis]; LANES]);

@@ -64,6 +64,10 @@ fn lit_by_lamps(gloss: vec4f, base: vec3f, image: vec3f, point_m: vec3f, normal:
         let shine = power(max(dot(normal, normalize(back + to_eye)), 0.0), exponent);
         glossy = view.head_specular.xyz * (gloss.y * shine);
     }
+    let own = encoded(base);
+    let most = encoded(image);
+    let tint = mix(most, own, gloss.w);
+    var shown = vec3f(0.0);
     for (var i = 0u; i < view.counts.x; i++) {
         let lamp = view.lamps[i];
         var towards = -lamp.direction.xyz;
@@ -88,16 +92,22 @@ fn lit_by_lamps(gloss: vec4f, base: vec3f, image: vec3f, point_m: vec3f, normal:
                 share *= in_cone(lamp, layer, point_m, normal);
             }
         }
-        lit += lamp.ambient.xyz * share;
+        var own_lit = lamp.ambient.xyz * share;
+        var own_glossy = vec3f(0.0);
         if facing > 0.0 {
             let shine = power(max(dot(normal, normalize(towards + to_eye)), 0.0), exponent);
-            lit += lamp.diffuse.xyz * (share * facing);
-            glossy += lamp.specular.xyz * (share * gloss.y * shine);
+            own_lit += lamp.diffuse.xyz * (share * facing);
+            own_glossy = lamp.specular.xyz * (share * gloss.y * shine);
+        }
+        // The light of each lamp with shadows is limited by itself.
+        if layer >= 0 {
+            shown += min(own * own_lit + own_glossy * tint, most);
+        } else {
+            lit += own_lit;
+            glossy += own_glossy;
         }
     }
-    let own = encoded(base);
-    let most = encoded(image);
-    return decoded(min(own * lit + glossy * mix(most, own, gloss.w), most));
+    return decoded(min(shown + min(own * lit + glossy * tint, most), vec3f(1.0)));
 }
 
 // Colour where no surface is.

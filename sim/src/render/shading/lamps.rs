@@ -64,24 +64,31 @@ pub fn shown_rgb(
         surface.gloss.specular_factor * power(surface.normal.dot(half_way).max(0.0), exponent)
     };
     let facing = surface.normal.dot(surface.back_direction).max(0.0);
+    let file_values = |rgb: Vector| Vector::new(file_value(rgb.x), file_value(rgb.y), file_value(rgb.z));
+    let (own, most) = (file_values(surface.albedo), file_values(surface.texture_rgb));
+    let tint = most + (own - most) * surface.gloss.metallic_factor;
+    let limited = |lit: Vector, glossy: Vector| (own * lit + glossy * tint).min(most);
     let mut lit = Vector::splat(surface.gloss.emission_factor) + ambient_rgb + diffuse_rgb * facing;
     let mut glossy = if facing > 0.0 { specular_rgb * shine(surface.back_direction) } else { Vector::ZERO };
+    let mut shown = Vector::ZERO;
     for (number, light) in lights.iter().enumerate() {
         let (towards, _, share) = arriving(light, surface.point_m);
         let share = if share > 0.0 { share * sunlit(number) } else { 0.0 };
         let facing = surface.normal.dot(towards);
-        lit += light.ambient_rgb * share;
+        let mut own_lit = light.ambient_rgb * share;
+        let mut own_glossy = Vector::ZERO;
         if facing > 0.0 && share > 0.0 {
-            lit += light.diffuse_rgb * (share * facing);
-            glossy += light.specular_rgb * (share * shine(towards));
+            own_lit += light.diffuse_rgb * (share * facing);
+            own_glossy = light.specular_rgb * (share * shine(towards));
+        }
+        // MuJoCo limits the light of each lamp with shadows by itself.
+        if light.casts_shadow {
+            shown += limited(own_lit, own_glossy);
+        } else {
+            (lit, glossy) = (lit + own_lit, glossy + own_glossy);
         }
     }
-    let shown = |axis: usize| {
-        let (own, most) = (file_value(surface.albedo[axis]), file_value(surface.texture_rgb[axis]));
-        let tint = most + (own - most) * surface.gloss.metallic_factor;
-        linear_value((own * lit[axis] + glossy[axis] * tint).min(most))
-    };
-    Vector::new(shown(0), shown(1), shown(2))
+    linear_light((shown + limited(lit, glossy)).min(Vector::ONE))
 }
 
 /// Returns the value of the file as linear light.

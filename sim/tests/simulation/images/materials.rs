@@ -50,12 +50,17 @@ fn an_image_limits_the_light_and_colours_highlights() {
     ] {
         check(&drawn(RendererKind::Cpu, &floor(material, sun), &overhead()), expected, what);
     }
+    // Lights with shadows add up beyond the image.
+    let two = floor(r#"texture="red"/>"#, WHITE).replace("castshadow=\"false\"", "");
+    let sun = &two[two.find("<light").expect("a light")..two.find("</worldbody>").expect("an end")];
+    let two = two.replace(sun, &format!("{sun}{}", sun.replace("1 1 1", "0.2 0.2 0.2")));
+    check(&drawn(RendererKind::Cpu, &two, &overhead()), [240, 36, 36], "two lights");
     // Without light in the file, colours are those of the image.
     let own = floor(r#"texture="light"/>"#, WHITE).replace(DARK, "");
     let unlit = &own[..own.find("<light").expect("a light")];
     let frame = drawn(RendererKind::Cpu, &format!("{unlit}</worldbody>"), &overhead());
     let [red, green, _] = pixel(&frame, [48, 48]).map(f32::from);
-    assert!((4.0..8.0).contains(&(red / green)), "{red} and {green}");
+    assert!((2.0..6.0).contains(&(red / green)), "{red} and {green}");
 }
 
 #[test]
@@ -76,7 +81,8 @@ fn layers_give_colour_opacity_and_notes() {
         <worldbody><geom size="1" material="m"/></worldbody></mujoco>"#;
     let notes = Document::parse("room.xml", text).expect("a room").approximations().join("\n");
     assert!(notes.contains(r#"`room.xml:2`: <layer role="emissive"> is not drawn"#), "{notes}");
-    let wrong = Document::parse("room.xml", &text.replace("emissive", "glow")).expect_err("a role").to_string();
+    let wrong =
+        Document::parse("room.xml", &text.replace("emissive", "glow")).expect_err("a role").to_string();
     assert!(wrong.contains("rgb, rgba, opacity, normal, roughness, metallic, orm"), "{wrong}");
 }
 
@@ -92,7 +98,8 @@ fn normals_of_a_layer_are_lit_as_slopes_are() {
     }
     let sun = |direction: &str| format!(r#"{WHITE} dir="{direction}""#);
     let traced = |material: &str, direction: &str| {
-        let beside = r#"<geom type="box" size="0.3 0.3 0.01" pos="0.8 0 0" rgba="0.5 0.5 0.5 1"/></worldbody>"#;
+        let beside =
+            r#"<geom type="box" size="0.3 0.3 0.01" pos="0.8 0 0" rgba="0.5 0.5 0.5 1"/></worldbody>"#;
         let scene = floor(material, &sun(direction)).replace("</worldbody>", beside);
         let frame = drawn(RendererKind::Path, &scene, &overhead());
         f32::from(pixel(&frame, [48, 48])[0]) / f32::from(pixel(&frame, [75, 48])[0])
@@ -137,17 +144,22 @@ fn path_tracing_mirrors_in_metal_in_its_own_colour() {
             </worldbody>"#
         );
         let frame = drawn(RendererKind::Path, &scene, &looking(Vector::new(0.0, -3.0, 1.2), Vector::Z * 0.5));
-        // The lower half of the ball, which mirrors the floor.
-        let lower = (46..58).flat_map(|row| (42..54).map(move |column| [column, row]));
-        let sum = lower.map(|at| pixel(&frame, at)).fold([0.0f32; 3], |sum, rgb| {
-            [0, 1, 2].map(|axis| sum[axis] + f32::from(rgb[axis]))
-        });
-        [sum[0], sum[1]].map(|value| value / 144.0)
+        // The middle of the ball, which is lit from above, and below it, where metal mirrors the floor.
+        [42..48, 54..60].map(|rows| {
+            let part = rows.flat_map(|row| (40..56).map(move |column| [column, row]));
+            part.map(|at| pixel(&frame, at)).fold([0.0f32; 2], |[red_sum, green_sum], [red, green, _]| {
+                [red_sum + f32::from(red), green_sum + f32::from(green)]
+            })
+        })
     };
     let [plain, metal] = [ball(""), ball(r#"metallic="1" roughness="0.3""#)];
-    let brightness = |[red, _]: [f32; 2]| red;
-    assert!(brightness(metal) > 1.1 * brightness(plain), "{metal:?} mirrors, {plain:?} does not");
-    assert!(metal[1] < 0.6 * metal[0], "{metal:?} is red");
+    assert!(plain[1][0] < plain[0][0], "{plain:?} is scattered light");
+    assert!(metal[1][0] > 2.0 * metal[0][0], "{metal:?} is mirrored");
+    let greenness = |[red, green]: [f32; 2]| green / red;
+    assert!(
+        greenness(metal[1]) < 0.7 * greenness(plain[1]),
+        "{metal:?} has one colour, {plain:?} a white coat"
+    );
 }
 
 #[test]
