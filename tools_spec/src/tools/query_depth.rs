@@ -92,7 +92,7 @@ pub struct SurfaceQuery {
     pub pixel: Option<[i64; 2]>,
     /// Its colour: for the nearest three.
     pub color: Option<Color>,
-    /// An object of `room`: for all that is seen of it.
+    /// An object of the task: for all that is seen of it.
     pub object: Option<String>,
 }
 
@@ -193,7 +193,9 @@ pub struct Surface {
     pub rgb: [u8; 3],
     /// The middle of its area, in metres in the frame of the reply.
     pub centroid_m: [f64; 3],
-    /// Extent along each axis of that frame, in metres.
+    /// The middle of its box along the axes of that frame: of a thing that is seen whole, its own.
+    pub middle_m: [f64; 3],
+    /// Size of that box along each axis, in metres.
     pub extent_m: [f64; 3],
     /// The four points of its outline that span the most of it in the picture, in the order of its outline:
     /// of a rectangle its corners.

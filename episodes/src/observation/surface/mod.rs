@@ -259,6 +259,7 @@ fn describe(
         to,
         rgb: color.map(|sum| (255.0 * f64::from(sum) / count).round() as u8),
         centroid_m: sum_m.map(|sum_m| coarse(sum_m / whole)),
+        middle_m: std::array::from_fn(|i| coarse(0.5 * (low_m[i] + high_m[i]))),
         extent_m: std::array::from_fn(|i| coarse(high_m[i] - low_m[i])),
         corners_m: corners(&outline).into_iter().map(corner_m).collect(),
         axis,
@@ -385,6 +386,8 @@ mod tests {
         );
         assert!(!square.cut_off && square.axis.is_none());
         assert!((square.extent_m[0] - 0.4).abs() < 1e-3 && square.extent_m[2].abs() < 1e-3, "{square:?}");
+        let off_m = |i: usize| (square.middle_m[i] - square.centroid_m[i]).abs();
+        assert!((0..3).all(|i| off_m(i) < 2e-3), "{square:?}");
         // The corners of the rotated square are each 0.2 m from its middle.
         assert_eq!(square.corners_m.len(), 4);
         for corner_m in &square.corners_m {

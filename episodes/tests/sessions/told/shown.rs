@@ -55,7 +55,12 @@ fn an_object_is_found_by_its_name() {
     }
     assert_eq!(session.state_hash(), hash);
     assert_eq!(counted(&session, "object_pixels"), json!({ "A": 1, "B": 1 }));
-    assert!(seen_by(&mut session, "A", "target_pad").is_ok(), "underscores are spaces");
+    // Underscores are spaces. The pad is seen whole, so that the middle of its box is its own.
+    let pad = seen_by(&mut session, "A", "target_pad").unwrap();
+    let pad_m = facts.position_m("target_pad");
+    let off_m =
+        (pad.middle_m[0] - f64::from(pad_m.x - x_m)).hypot(pad.middle_m[1] - f64::from(pad_m.y - y_m));
+    assert!(!pad.cut_off && off_m < 0.01, "{off_m} m off: {pad:?}");
     let refused = seen_by(&mut session, "A", "vase").unwrap_err();
     assert!(refused.contains("no \"vase\"; have: bottle, target pad"), "{refused}");
     assert_eq!(counted(&session, "object_pixels"), json!({ "A": 2, "B": 1 }));
@@ -92,6 +97,16 @@ fn an_object_is_all_of_its_parts() {
     let whole = pixels(robot, "lever door");
     let moving: u32 = parts.iter().map(|part| pixels(robot, part)).sum();
     assert!(0 < moving && moving < whole, "{moving} of {whole} pixels move");
+}
+
+/// The patch on the other shelf is an object of its own, 1.2 m from the basket.
+#[test]
+fn a_longer_name_is_another_object() {
+    let own = spec("co_carry", 2011, Protocol::Agentic).assisted(Assistance::Full);
+    let mut session = Session::start(&own, None).unwrap();
+    let basket = seen_by(&mut session, "A", "basket").unwrap();
+    let longest_m = basket.extent_m.into_iter().fold(0.0, f64::max);
+    assert!((0.4..0.8).contains(&longest_m), "{basket:?}");
 }
 
 fn observe(session: &mut Session, args: Value) -> Result<Observation, String> {

@@ -339,6 +339,47 @@ class HandReport:
 
 
 @dataclass(frozen=True)
+class HeldObject:
+    """An object in a hand."""
+
+    robot: str
+    """The robot, for example "A"."""
+
+    hand: str
+    """`left` or `right`."""
+
+    object: str
+    """The object."""
+
+    frame: PoseFrame
+    """Frame of `middle_m` and `axis`: "level", the robot's pelvis frame, but upright; after a walk that of its
+    places.
+    """
+
+    middle_m: tuple[float, float, float]
+    """Middle of the object, [x, y, z] in metres."""
+
+    axis: tuple[float, float, float]
+    """Direction of its own z axis, length 1: [0, 0, 1] when it is upright."""
+
+    lowest_m: float
+    """Height of its lowest point above the floor, in metres."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> HeldObject:
+        """Reads what JSON has."""
+        return HeldObject(
+            robot=value["robot"],
+            hand=value["hand"],
+            object=value["object"],
+            frame=value["frame"],
+            middle_m=tuple(value["middle_m"]),
+            axis=tuple(value["axis"]),
+            lowest_m=value["lowest_m"],
+        )
+
+
+@dataclass(frozen=True)
 class PhaseReached:
     """A phase of the task, and when it was reached."""
 
@@ -384,6 +425,9 @@ class PlanReply:
     there is one command.
     """
 
+    held: tuple[HeldObject, ...]
+    """Objects in hands after a walk with `carry`, in its frame; left out otherwise."""
+
     last: CommandReply
     """The reply to the last command that was carried out."""
 
@@ -396,6 +440,7 @@ class PlanReply:
             executed_steps=value["executed_steps"],
             stopped=value.get("stopped"),
             outcomes=tuple(value.get("outcomes", ())),
+            held=tuple(HeldObject.of(item) for item in value.get("held", ())),
             last=CommandReply.of(value["last"]),
         )
 

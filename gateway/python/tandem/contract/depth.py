@@ -162,8 +162,11 @@ class Surface:
     centroid_m: tuple[float, float, float]
     """The middle of its area, in metres in the frame of the reply."""
 
+    middle_m: tuple[float, float, float]
+    """The middle of its box along the axes of that frame: of a thing that is seen whole, its own."""
+
     extent_m: tuple[float, float, float]
-    """Extent along each axis of that frame, in metres."""
+    """Size of that box along each axis, in metres."""
 
     corners_m: tuple[tuple[float, float, float], ...]
     """The four points of its outline that span the most of it in the picture, in the order of its outline: of a
@@ -186,6 +189,7 @@ class Surface:
             to=tuple(value["to"]),
             rgb=tuple(value["rgb"]),
             centroid_m=tuple(value["centroid_m"]),
+            middle_m=tuple(value["middle_m"]),
             extent_m=tuple(value["extent_m"]),
             corners_m=tuple(tuple(item) for item in value["corners_m"]),
             axis=None if (got := value.get("axis")) is None else UprightAxis.of(got),

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
-from .commands import Budget, PhaseReached, Pose, PoseFrame, RobotFallen
+from .commands import Budget, HeldObject, PhaseReached, Pose, PoseFrame, RobotFallen
 
 Assistance: TypeAlias = Literal[
     "paper",
@@ -139,45 +139,6 @@ class HandReach:
             reachable=value["reachable"],
             position_error_m=value["position_error_m"],
             orientation_error_rad=value["orientation_error_rad"],
-        )
-
-
-@dataclass(frozen=True)
-class HeldObject:
-    """An object in a hand."""
-
-    robot: str
-    """The robot, for example "A"."""
-
-    hand: str
-    """`left` or `right`."""
-
-    object: str
-    """The object."""
-
-    frame: PoseFrame
-    """Frame of `middle_m` and `axis`: "level", the robot's pelvis frame, but upright."""
-
-    middle_m: tuple[float, float, float]
-    """Middle of the object, [x, y, z] in metres."""
-
-    axis: tuple[float, float, float]
-    """Direction of its own z axis, length 1: [0, 0, 1] when it is upright."""
-
-    lowest_m: float
-    """Height of its lowest point above the floor, in metres."""
-
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> HeldObject:
-        """Reads what JSON has."""
-        return HeldObject(
-            robot=value["robot"],
-            hand=value["hand"],
-            object=value["object"],
-            frame=value["frame"],
-            middle_m=tuple(value["middle_m"]),
-            axis=tuple(value["axis"]),
-            lowest_m=value["lowest_m"],
         )
 
 
