@@ -21,28 +21,11 @@ pub(super) struct ShownSurface<const N: usize> {
     pub gloss: [Lanes<N>; 4],
 }
 
-impl<const N: usize> ShownSurface<N> {
-    /// Returns a surface without an image.
-    #[inline(always)]
-    pub fn plain(albedo: [Lanes<N>; 3], normal: [Lanes<N>; 3], gloss: Gloss) -> ShownSurface<N> {
-        let Gloss { emission_factor, specular_factor, shininess_factor, metallic_factor, .. } = gloss;
-        let gloss = [emission_factor, specular_factor, shininess_factor, metallic_factor];
-        ShownSurface {
-            albedo,
-            texture: [[1.0; N]; 3],
-            alpha: [1.0; N],
-            normal,
-            gloss: gloss.map(|value| [value; N]),
-        }
-    }
-
-    fn set_gloss(&mut self, i: usize, gloss: Gloss) {
-        let Gloss { emission_factor, specular_factor, shininess_factor, metallic_factor, .. } = gloss;
-        let values = [emission_factor, specular_factor, shininess_factor, metallic_factor];
-        for (lanes, value) in self.gloss.iter_mut().zip(values) {
-            lanes[i] = value;
-        }
-    }
+/// Returns emission, specular strength, shininess and metallic share of several points.
+#[inline(always)]
+pub(super) fn gloss_lanes<const N: usize>(gloss: Gloss) -> [Lanes<N>; 4] {
+    let Gloss { emission_factor, specular_factor, shininess_factor, metallic_factor, .. } = gloss;
+    [emission_factor, specular_factor, shininess_factor, metallic_factor].map(|value| [value; N])
 }
 
 impl Facet {
@@ -63,7 +46,13 @@ impl Facet {
         });
         let by = |step: Vector| self.image_step(step, [&along_ray, normal], &facing, depth_m);
         let (x, y) = (by(rays.right_ray * SAMPLES as f32), by(rays.down_ray * SAMPLES as f32));
-        let mut shown = ShownSurface::plain([[0.0; N]; 3], *normal, self.gloss);
+        let mut shown = ShownSurface {
+            albedo: [[0.0; N]; 3],
+            texture: [[0.0; N]; 3],
+            alpha: [1.0; N],
+            normal: *normal,
+            gloss: gloss_lanes(self.gloss),
+        };
         for i in 0..N {
             let place = image.place(
                 [at[0][i], at[1][i], at[2][i]],
@@ -94,7 +83,8 @@ impl Facet {
         [ray, normal]: [Vector; 2],
     ) {
         if let Some(texture) = &image.gloss {
-            shown.set_gloss(i, self.gloss.at_texel(image.numbers(texture, place)));
+            let here: [Lanes<1>; 4] = gloss_lanes(self.gloss.at_texel(image.numbers(texture, place)));
+            shown.gloss.iter_mut().zip(here).for_each(|(lanes, [value])| lanes[i] = value);
         }
         if let Some(texture) = &image.relief {
             let towards_eye = normal.normalize_or_zero() * 1f32.copysign(-normal.dot(ray));

@@ -4,7 +4,7 @@
 use rapier3d::math::{Matrix, Pose, Vector};
 
 use super::contact::ContactMap;
-use super::images::ShownSurface;
+use super::images::gloss_lanes;
 use super::shadow::ShadowMap;
 use crate::mjcf::Gloss;
 use crate::render::scene::prepared::{Prepared, Sheet};
@@ -60,6 +60,8 @@ pub(super) struct Strip<'a> {
     pub share: f32,
     /// Alpha of a blended part; `None` for a solid one.
     pub alpha: Option<f32>,
+    /// True if lamps light the scenery, which need more of a surface than a sun does.
+    pub has_lamps: bool,
 }
 
 /// Points that are shaded together. They are stored coordinate by coordinate and processed in branchless
@@ -72,7 +74,7 @@ pub(super) struct Surfaces {
     pub ray: Vectors,
     pub normal: Vectors,
     pub albedo: Vectors,
-    /// Emission, specular strength and shininess, for lamps, and metallic shares.
+    /// Emission, specular strength and shininess, and metallic shares, for lamps.
     pub gloss: Vectors,
     metallic_share: [f32; ROOM],
     /// Colours of images alone, for lamps; 1 without.
@@ -261,18 +263,7 @@ impl Surfaces {
             );
             self.ray.set(at, ray);
             self.point_m.set(at, point_m);
-            let normal = strip.facet.normals(&point_m);
-            let shown = match strip.image {
-                None => ShownSurface::plain(strip.facet.albedo(&point_m), normal, strip.facet.gloss),
-                Some(image) => strip.facet.shown(image, rays, [&ray, &point_m, &normal], &depth_m),
-            };
-            let ShownSurface { albedo, texture, alpha, normal, gloss } = shown;
-            let [emission, specular, shininess, metallic] = gloss;
-            self.texture.set(at, texture);
-            self.normal.set(at, normal);
-            self.albedo.set(at, albedo);
-            self.gloss.set(at, [emission, specular, shininess]);
-            *block_mut(&mut self.metallic_share, at) = metallic;
+            let alpha = self.set_surface(at, rays, strip, [&ray, &point_m], &depth_m);
             *block_mut(&mut self.pixel_share, at) = match strip.alpha {
                 None => [strip.share; N],
                 Some(of_part) => lanes(|i| strip.share * opacity(of_part * alpha[i])),
@@ -284,6 +275,43 @@ impl Surfaces {
                 *block_mut(&mut self.open_share, at) = lanes::<f32, N>(|i| 1.0 - CONTACT * darkness[i]);
             }
         }
+    }
+
+    /// Sets the surface of points that have rays, places and depths. Returns its alpha.
+    #[inline(always)]
+    fn set_surface<const N: usize>(
+        &mut self,
+        at: usize,
+        rays: &Rays,
+        strip: &Strip<'_>,
+        [ray, point_m]: [&[Lanes<N>; 3]; 2],
+        depth_m: &Lanes<N>,
+    ) -> Lanes<N> {
+        let normal = strip.facet.normals(point_m);
+        let Some(image) = strip.image else {
+            self.normal.set(at, normal);
+            self.albedo.set(at, strip.facet.albedo(point_m));
+            if strip.has_lamps {
+                self.set_gloss(at, gloss_lanes::<N>(strip.facet.gloss));
+                self.texture.set(at, [[1.0; N]; 3]);
+            }
+            return [1.0; N];
+        };
+        let shown = strip.facet.shown(image, rays, [ray, point_m, &normal], depth_m);
+        self.normal.set(at, shown.normal);
+        self.albedo.set(at, shown.albedo);
+        if strip.has_lamps {
+            self.set_gloss(at, shown.gloss);
+            self.texture.set(at, shown.texture);
+        }
+        shown.alpha
+    }
+
+    #[inline(always)]
+    fn set_gloss<const N: usize>(&mut self, at: usize, gloss: [Lanes<N>; 4]) {
+        let [emission, specular, shininess, metallic] = gloss;
+        self.gloss.set(at, [emission, specular, shininess]);
+        *block_mut(&mut self.metallic_share, at) = metallic;
     }
 
     /// Adds the shares of all pushed points to those of their pixels.
