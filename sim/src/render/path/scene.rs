@@ -141,7 +141,7 @@ impl Scene<'_> {
     }
 
     /// Returns a surface with the normal of its relief, as a mean over about `width_m`.
-    pub fn with_relief(&self, spot: Spot, to_eye: Vector, width_m: f32) -> Spot {
+    pub fn with_relief(&self, spot: Spot, eye_direction: Vector, width_m: f32) -> Spot {
         let Some(image @ Image { relief: Some(texture), .. }) = &self.prepared.images[spot.part as usize]
         else {
             return spot;
@@ -154,7 +154,7 @@ impl Scene<'_> {
             }
         };
         let numbers = image.numbers(texture, &self.image_place(image, &spot, width_m));
-        Spot { normal: bent_normal(spot.normal, to_eye, gradients, numbers), ..spot }
+        Spot { normal: bent_normal(spot.normal, eye_direction, gradients, numbers), ..spot }
     }
 
     /// Adds the light of one point of a lamp to the layers of a seen point.

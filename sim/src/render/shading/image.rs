@@ -139,12 +139,17 @@ impl Image {
 /// Returns the unit normal of a relief on a surface with the normal `normal`, if it faces the eye. The gradients
 /// of the image's coordinates need no length. Source: Blinn 1978, for heights whose normals are given.
 #[inline(always)]
-pub fn bent_normal(normal: Vector, to_eye: Vector, gradients: [Vector; 2], numbers: [f32; 3]) -> Vector {
+pub fn bent_normal(
+    normal: Vector,
+    eye_direction: Vector,
+    [right, down]: [Vector; 2],
+    [x, y, z]: [f32; 3],
+) -> Vector {
     let along = |gradient: Vector| (gradient - normal * normal.dot(gradient)).normalize_or_zero();
-    let [right, down] = gradients.map(along);
-    let [x, y, z] = numbers.map(|number| 2.0 * number - 1.0);
+    let (right, down) = (along(right), along(down));
+    let [x, y, z] = [x, y, z].map(|number| 2.0 * number - 1.0);
     let bent = (right * x - down * y + normal * z.max(LEAST_UPRIGHT)).normalize_or(normal);
-    if bent.dot(to_eye) > 0.0 { bent } else { normal }
+    if bent.dot(eye_direction) > 0.0 { bent } else { normal }
 }
 
 /// Returns the values, 0 to 255, at a place, as a mean over about a step in x and in y.
