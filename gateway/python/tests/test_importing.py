@@ -91,6 +91,45 @@ def test_pictures_are_placed_on_surfaces_as_in_the_source(tmp_path: Path) -> Non
     assert text.count("\nvn ") == source.mesh_normal.shape[0]
 
 
+LAYERS = """<mujoco>
+  <asset>
+    <texture name="sky" type="skybox" builtin="gradient" rgb1="0.2 0.4 0.8" rgb2="1 1 1" width="8" height="48"/>
+    <texture name="die" type="cube" builtin="checker" mark="edge" rgb1="1 0 0" rgb2="0 0 1" width="4" height="4"/>
+    <texture name="paint" type="2d" file="four.png" colorspace="sRGB"/>
+    <texture name="rough" type="2d" file="four.png" nchannel="1"/>
+    <material name="die" texture="die"/>
+    <material name="worn" texrepeat="2 3" metallic="1" roughness="0.4">
+      <layer role="rgb" texture="paint"/>
+      <layer role="roughness" texture="rough"/>
+    </material>
+  </asset>
+  <worldbody>
+    <geom type="box" size="1 1 1" material="die"/>
+    <geom type="box" size="1 1 1" material="worn"/>
+  </worldbody>
+</mujoco>
+"""
+
+
+def test_skies_cubes_and_layers_are_those_of_the_source(tmp_path: Path) -> None:
+    import numpy as np
+
+    from tandem.importing.engine import mujoco
+    from tandem.importing.files import write_png
+
+    pixels: Any = np.arange(12)
+    write_png(tmp_path / "four.png", pixels.reshape(2, 2, 3) * 20)
+    (tmp_path / "scene.xml").write_text(LAYERS)
+    report = import_file(tmp_path / "scene.xml", tmp_path / "out")
+    assert (report.pictures, report.dropped) == (4, {})
+    source, written = (mujoco.MjModel.from_xml_path(str(tmp_path / file)) for file in ("scene.xml", "out/scene.xml"))
+    for name in ("tex_type", "tex_data", "tex_nchannel", "mat_texid", "mat_texrepeat", "mat_metallic", "mat_roughness"):
+        assert np.array_equal(getattr(source, name), getattr(written, name)), name
+    text = (tmp_path / "out" / "scene.xml").read_text()
+    assert 'type="skybox" file="texture_0.png" gridsize="6 1"' in text
+    assert text.count('colorspace="sRGB"') == 1
+
+
 def test_what_is_not_imported_says_what_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(tmp_path / "scene.usd"), str(tmp_path / "out")]) == 1
     assert "these are: .xml, .mjcf, .urdf" in capsys.readouterr().err

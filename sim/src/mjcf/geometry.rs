@@ -212,10 +212,7 @@ fn rgba(
     geom: &mjcf_rs::body::Geom,
     material: Option<&mjcf_rs::assets::Material>,
 ) -> [f32; 4] {
-    let texture = material.and_then(|material| {
-        let name = material.texture.as_ref()?;
-        Some(document.texture(name)?.mean_rgb)
-    });
+    let texture = material.and_then(|material| Some(document.colour_of(material)?.mean_rgb));
     let plain = if texture.is_some() { [1.0; 4] } else { DEFAULT_RGBA };
     let [r, g, b, a] =
         geom.rgba.or(material.and_then(|material| material.rgba)).unwrap_or(plain).map(|c| c as f32);

@@ -96,6 +96,13 @@ impl FileLight {
         }
     }
 
+    /// Returns the light shining at the first place of a body.
+    fn aimed(self, model: &mjcf_rs::Model, target: usize) -> FileLight {
+        let own_from_world = world_from_body(model, self.body).inverse();
+        let target_m = own_from_world * world_from_body(model, target).translation;
+        FileLight { direction: (target_m - self.position_m).normalize_or(self.direction), ..self }
+    }
+
     fn of<'a, 'i: 'a>(node: &Node<'a, 'i>, classes: &Classes<'a, 'i>, body: usize) -> FileLight {
         let stated = |name: &str| classes.stated(node, name);
         let rgb = |name: &str, usual: f32| vector(stated(name)).unwrap_or(Vector::splat(usual));
@@ -126,7 +133,11 @@ impl FileLight {
 
 /// Returns the lights of a file; `None` if it states none, nor a headlight. `bodies` has the places in the
 /// text at which the bodies begin; that of a body which was split is that of its last part.
-pub(super) fn lights(source: &MjcfText, bodies: &[usize]) -> Result<Option<FileLights>, SimError> {
+pub(super) fn lights(
+    source: &MjcfText,
+    model: &mjcf_rs::Model,
+    bodies: &[usize],
+) -> Result<Option<FileLights>, SimError> {
     let xml = source.xml()?;
     let classes = Classes::of(&xml);
     let in_tree = |node: &Node| node.ancestors().any(|one| one.has_tag_name("worldbody"));
@@ -142,7 +153,14 @@ pub(super) fn lights(source: &MjcfText, bodies: &[usize]) -> Result<Option<FileL
     let light = |node: &Node| {
         let carrier = node.ancestors().find(|one| one.has_tag_name("body"));
         let starts_there = |body: &Node| bodies.iter().rposition(|byte| *byte == body.range().start);
-        FileLight::of(node, &classes, carrier.as_ref().and_then(starts_there).unwrap_or(0))
+        let light = FileLight::of(node, &classes, carrier.as_ref().and_then(starts_there).unwrap_or(0));
+        let is_aimed = classes.stated(node, "mode").is_some_and(|mode| mode.starts_with("targetbody"));
+        let target = classes.stated(node, "target").filter(|_| is_aimed);
+        let is_target = |entry: &mjcf_rs::BodyEntry| entry.body.name.as_deref() == target;
+        match target.and_then(|_| model.bodies.iter().position(is_target)) {
+            Some(target) => light.aimed(model, target),
+            None => light,
+        }
     };
     let lights = found.iter().filter(is_drawn).take(MAX_LIGHTS).map(light).collect();
     Ok(Some(FileLights { headlight: Headlight::of(headlight.as_ref()), lights }))
@@ -153,6 +171,13 @@ impl Document {
     pub fn lights(&self) -> Option<&FileLights> {
         self.lights.as_ref()
     }
+}
+
+/// Returns the pose of a body with all joints at 0.
+fn world_from_body(model: &mjcf_rs::Model, body: usize) -> Pose {
+    let entry = &model.bodies[body];
+    let around = entry.parent.map_or(Pose::IDENTITY, |parent| world_from_body(model, parent));
+    around * super::pose(&entry.body.pose)
 }
 
 /// Returns the pose of a frame that is stated by `pos` and `quat`.
@@ -203,6 +228,20 @@ mod tests {
         assert!((spot.cutoff_rad - std::f32::consts::FRAC_PI_4).abs() < 1e-6);
         assert_eq!((sun.diffuse_rgb, sun.casts_shadow), (Vector::ONE, false));
         assert!((sun.direction - Vector::new(0.0, 0.6, -0.8)).length() < 1e-6);
+    }
+
+    #[test]
+    fn a_light_shines_at_the_first_place_of_its_target() {
+        let light = r#"<light mode="targetbody" target="cup" pos="0 0 2" dir="1 0 0"/>"#;
+        let bodies = r#"<body pos="3 0 0"><geom size="1"/><body name="cup" pos="1 0 2"><geom size="1"/></body></body>"#;
+        let body = |inside: &str| {
+            format!("<worldbody><body pos=\"1 0 0\"><geom size=\"1\"/>{inside}</body>{bodies}</worldbody>")
+        };
+        let direction = |light: &str| lights_of(&body(light)).expect("lights").lights[0].direction;
+        assert_eq!(direction(light), Vector::X);
+        let steep = direction(&light.replace("0 0 2", "0 0 5"));
+        assert!((steep - Vector::new(1.0, 0.0, -1.0).normalize()).length() < 1e-6, "{steep}");
+        assert_eq!(direction(&light.replace("cup", "nobody").replace("1 0 0", "0 1 0")), Vector::Y);
     }
 
     #[test]

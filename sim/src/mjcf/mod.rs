@@ -18,7 +18,7 @@ mod tests;
 mod text;
 
 pub use assets::files::Mesh;
-pub use assets::gloss::Gloss;
+pub use assets::gloss::{Gloss, MIN_ROUGHNESS, SHININESS, USUAL_EXPONENT};
 pub use assets::looks::SurfacePattern;
 pub use assets::surface::{SurfaceImage, TextureMapping};
 pub use assets::texture::{Texture, TextureLevel};
@@ -41,6 +41,7 @@ use crate::SimError;
 use crate::user_file::{MAX_TEXT_BYTES, read_text};
 use assets::gloss::Glosses;
 use assets::kept;
+use assets::layers::Layers;
 use assets::looks::Looks;
 use assets::surface::TextureRepeats;
 use joints::UnreadRanges;
@@ -71,6 +72,8 @@ pub struct Document {
     builtins: BTreeMap<String, Arc<Texture>>,
     /// Image of the sky.
     sky: Option<Arc<Texture>>,
+    /// Images of materials with layers.
+    layers: Layers,
     repeats: TextureRepeats,
     glosses: Glosses,
     lights: Option<FileLights>,
@@ -129,13 +132,15 @@ impl Document {
         let mut model = mjcf_rs::Model::from_str(&text, folder)
             .map_err(|source| SimError::Mjcf { file: file.into(), source })?;
         let split_bodies = split(&mut model, &mut checked.bodies);
+        let bodies: Vec<usize> = checked.bodies.iter().map(|one| one.body).collect();
+        let lights = lights::lights(&source, &model, &bodies)?;
         let mut document = Document {
             file: file.into(),
             model,
             cameras: frames::cameras(&source)?,
             speed_limit_values: joints::speed_limits(&source)?,
             unread: UnreadRanges::of(&source)?,
-            lights: lights::lights(&source, &checked.bodies.iter().map(|one| one.body).collect::<Vec<_>>())?,
+            lights,
             checked,
             split: split_bodies,
             folder: folder.into(),
@@ -143,6 +148,7 @@ impl Document {
             textures: BTreeMap::new(),
             builtins: BTreeMap::new(),
             sky: None,
+            layers: Layers::default(),
             repeats: TextureRepeats::of(&source)?,
             glosses: Glosses::of(&source)?,
             looks: Looks::of(&source)?,
@@ -153,6 +159,7 @@ impl Document {
         };
         document.read_meshes()?;
         document.read_textures()?;
+        document.read_layers()?;
         document.check_bodies()?;
         document.note_joints();
         document.note_concave_meshes();
@@ -221,6 +228,9 @@ impl Document {
         }
         if self.repeats != TextureRepeats::default() {
             content += &format!("{:?}", self.repeats);
+        }
+        if self.layers != Layers::default() {
+            content += &format!("{:?}", self.layers.names());
         }
         if self.settings != FileSettings::default() {
             content += &format!("{:?}", self.settings);

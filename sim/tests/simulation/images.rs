@@ -1,6 +1,7 @@
 //! Images on surfaces: where their parts are, how often they repeat, and their means from afar.
 
 mod light;
+mod materials;
 
 use std::path::Path;
 
@@ -35,6 +36,12 @@ fn drawn(kind: RendererKind, inside: &str, camera: &Camera) -> Frame {
         let plain = image::RgbImage::from_pixel(4, 4, image::Rgb(rgb));
         plain.save(folder.path().join(file)).expect("an image");
     }
+    image::RgbImage::from_pixel(8, 8, image::Rgb(GREY))
+        .save(folder.path().join("grey.jpg"))
+        .expect("an image");
+    // Normals (0.6, 0, 0.8).
+    let tilted = image::RgbImage::from_pixel(4, 4, image::Rgb([204, 128, 230]));
+    tilted.save(folder.path().join("tilted.png")).expect("an image");
     std::fs::write(folder.path().join("card.obj"), CARD).expect("a mesh");
     let file = folder.path().join("scene.xml");
     std::fs::write(&file, format!("<mujoco>{inside}</mujoco>")).expect("a scene");

@@ -13,13 +13,22 @@ from .names import Names
 from .report import Report
 
 MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
-#: Texture roles that give a material its colour.
-COLOURS = (mujoco.mjtTextureRole.mjTEXROLE_RGB, mujoco.mjtTextureRole.mjTEXROLE_RGBA)
+#: Names of the roles of a material's textures.
+ROLES = {
+    int(role): role.name[len("mjTEXROLE_") :].lower()
+    for role in mujoco.mjtTextureRole.__members__.values()
+    if role not in (mujoco.mjtTextureRole.mjTEXROLE_USER, mujoco.mjtTextureRole.mjNTEXROLE)
+}
+RGB = int(mujoco.mjtTextureRole.mjTEXROLE_RGB)
+#: Letters of a cube's faces in the order in which MuJoCo stores them.
+FACES = "RLUDFB"
+#: MuJoCo's number for images whose values are sRGB.
+SRGB = 2
 
 
 def write_assets(model: Any, names: Names, out: Path, report: Report) -> list[str]:
     used = sorted({int(mesh) for mesh, kind in zip(model.geom_dataid, model.geom_type, strict=True) if kind == MESH})
-    rows = [*meshes(model, used, out, report), *materials(model, names, out, report)]
+    rows = [*meshes(model, used, out, report), *textures(model, out, report), *materials(model, names)]
     if model.nhfield:
         report.drop("<hfield>", int(model.nhfield))
     return ["<asset>", *rows, "</asset>"] if rows else []
@@ -59,41 +68,55 @@ def meshes(model: Any, used: list[int], out: Path, report: Report) -> list[str]:
     return rows
 
 
-def materials(model: Any, names: Names, out: Path, report: Report) -> list[str]:
-    """Writes the materials and the images that give them their colours."""
-    rows: list[str] = []
-    written: set[int] = set()
-    for material in range(model.nmat):
-        texture = next((int(model.mat_texid[material, role]) for role in COLOURS if model.mat_texid[material, role] >= 0), -1)
-        picture = ""
-        if texture >= 0:
-            if texture not in written:
-                rows.append(write_texture(model, texture, out, report))
-                written.add(texture)
-            repeat = numbers(model.mat_texrepeat[material])
-            uniform = "true" if model.mat_texuniform[material] else "false"
-            picture = f' texture="texture_{texture}" texrepeat="{repeat}" texuniform="{uniform}"'
-        rgba = numbers(model.mat_rgba[material])
-        shine = "".join(
-            f' {name}="{numbers(getattr(model, "mat_" + name)[material])}"'
-            for name in ("emission", "specular", "shininess", "reflectance")
-        )
-        rows.append(f'<material name="{escaped(names.of("material", material))}" rgba="{rgba}"{picture}{shine}/>')
+def textures(model: Any, out: Path, report: Report) -> list[str]:
+    """Writes the images of materials, and the sky."""
+    used = {int(texture) for texture in model.mat_texid.flat if texture >= 0}
+    skies = [number for number, kind in enumerate(model.tex_type) if kind == mujoco.mjtTexture.mjTEXTURE_SKYBOX]
+    # MuJoCo draws the first one.
+    written = sorted(used | set(skies[:1]))
     report.pictures = len(written)
-    return rows
+    return [write_texture(model, texture, out) for texture in written]
 
 
-def write_texture(model: Any, texture: int, out: Path, report: Report) -> str:
+def materials(model: Any, names: Names) -> list[str]:
+    return [write_material(model, names, material) for material in range(model.nmat)]
+
+
+def write_material(model: Any, names: Names, material: int) -> str:
+    of_roles = {role: int(model.mat_texid[material, role]) for role in ROLES if model.mat_texid[material, role] >= 0}
+    row = f'<material name="{escaped(names.of("material", material))}" rgba="{numbers(model.mat_rgba[material])}"'
+    if of_roles:
+        uniform = "true" if model.mat_texuniform[material] else "false"
+        row += f' texrepeat="{numbers(model.mat_texrepeat[material])}" texuniform="{uniform}"'
+    for name in ("emission", "specular", "shininess", "reflectance"):
+        row += f' {name}="{numbers(getattr(model, "mat_" + name)[material])}"'
+    for name in ("metallic", "roughness"):
+        value = float(getattr(model, "mat_" + name)[material])
+        # Less than 0 states nothing.
+        row += f' {name}="{value:.9g}"' if value >= 0 else ""
+    if list(of_roles) == [RGB]:
+        row += f' texture="texture_{of_roles.pop(RGB)}"'
+    if not of_roles:
+        return row + "/>"
+    layers = "".join(f'<layer role="{ROLES[role]}" texture="texture_{texture}"/>' for role, texture in of_roles.items())
+    return f"{row}>{layers}</material>"
+
+
+def write_texture(model: Any, texture: int, out: Path) -> str:
     (out / "textures").mkdir(exist_ok=True)
     height, width, channels = (int(a[texture]) for a in (model.tex_height, model.tex_width, model.tex_nchannel))
     first = int(model.tex_adr[texture])
     pixels: Any = model.tex_data[first : first + height * width * channels].reshape(height, width, channels)
-    kind = "2d" if model.tex_type[texture] == mujoco.mjtTexture.mjTEXTURE_2D else "cube"
-    if kind == "cube" and height == 6 * width:
+    kind = mujoco.mjtTexture(int(model.tex_type[texture])).name[len("mjTEXTURE_") :].lower()
+    grid = ""
+    if kind != "2d" and height == 6 * width:
         sides = np.split(pixels, 6)
         if any((side != sides[0]).any() for side in sides[1:]):
-            report.drop("images of a cube's other five sides")
-        pixels = sides[0]
+            grid = f' gridsize="6 1" gridlayout="{FACES}"'
+        else:
+            pixels = sides[0]
     write_png(out / "textures" / f"texture_{texture}.png", pixels)
-    alpha = ' nchannel="4"' if channels == 4 else ""
-    return f'<texture name="texture_{texture}" type="{kind}" file="texture_{texture}.png"{alpha}/>'
+    alpha = f' nchannel="{channels}"' if channels != 3 else ""
+    # The first versions of MuJoCo 3.3 know no sRGB.
+    space = ' colorspace="sRGB"' if hasattr(model, "tex_colorspace") and model.tex_colorspace[texture] == SRGB else ""
+    return f'<texture name="texture_{texture}" type="{kind}" file="texture_{texture}.png"{grid}{alpha}{space}/>'

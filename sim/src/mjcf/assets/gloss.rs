@@ -15,6 +15,10 @@ pub struct Gloss {
     pub specular_factor: f32,
     /// Sharpness of highlights: their exponent is 128 times it.
     pub shininess_factor: f32,
+    /// Roughness of a surface that states it; its square is the width of the distribution of facets (GGX).
+    pub roughness_factor: Option<f32>,
+    /// Share of the surface that reflects as metal does, in its own colour.
+    pub metallic_factor: f32,
 }
 
 /// Gloss of materials, by their names, where it is not the default.
@@ -23,7 +27,47 @@ pub(in crate::mjcf) struct Glosses(BTreeMap<String, Gloss>);
 
 impl Default for Gloss {
     fn default() -> Gloss {
-        Gloss { emission_factor: 0.0, specular_factor: 0.5, shininess_factor: 0.5 }
+        Gloss {
+            emission_factor: 0.0,
+            specular_factor: 0.5,
+            shininess_factor: USUAL_EXPONENT / SHININESS,
+            roughness_factor: None,
+            metallic_factor: 0.0,
+        }
+    }
+}
+
+/// Least roughness; less would be a mirror.
+pub const MIN_ROUGHNESS: f32 = 0.05;
+/// Factor from shininess to the exponent of highlights.
+pub const SHININESS: f32 = 128.0;
+/// Exponent of the highlights of materials that state nothing.
+pub const USUAL_EXPONENT: f32 = 64.0;
+
+impl Gloss {
+    /// Returns the gloss with the highlights of a roughness: the exponent of as wide a distribution, and a
+    /// strength that keeps their light. Source: Walter et al. 2007, section 5.2 (exponent of Phong's facets).
+    #[inline(always)]
+    pub fn as_rough_as(self, roughness_factor: f32) -> Gloss {
+        let width = roughness_factor.clamp(MIN_ROUGHNESS, 1.0) * roughness_factor.clamp(MIN_ROUGHNESS, 1.0);
+        let exponent = (2.0 / (width * width) - 2.0).min(SHININESS);
+        Gloss {
+            specular_factor: self.specular_factor * (exponent + 2.0) / (USUAL_EXPONENT + 2.0),
+            shininess_factor: exponent / SHININESS,
+            roughness_factor: Some(roughness_factor),
+            ..self
+        }
+    }
+
+    /// Returns the gloss at a texel of a layer, with roughness and the metallic share as its second and third
+    /// number.
+    #[inline(always)]
+    pub fn at_texel(self, [_, roughness_share, metallic_share]: [f32; 3]) -> Gloss {
+        let of_metal = Gloss { metallic_factor: self.metallic_factor * metallic_share, ..self };
+        match self.roughness_factor {
+            Some(roughness_factor) => of_metal.as_rough_as(roughness_factor * roughness_share),
+            None => of_metal,
+        }
     }
 }
 
@@ -34,15 +78,30 @@ impl Glosses {
         let mut found = BTreeMap::new();
         for node in xml.descendants().filter(|node| node.has_tag_name("material")) {
             let Some(name) = node.attribute("name") else { continue };
-            let usual = Gloss::default();
-            let stated = |attribute: &str, usual: f32| {
-                let number = classes.stated(&node, attribute).and_then(|text| text.trim().parse().ok());
-                number.unwrap_or(usual)
+            let stated = |attribute: &str| -> Option<f32> {
+                classes.stated(&node, attribute).and_then(|text| text.trim().parse().ok())
             };
+            // MuJoCo's own value, -1, states nothing.
+            let amount = |attribute: &str| stated(attribute).filter(|value| *value >= 0.0);
+            let has_layer = |roles: [&str; 2]| {
+                let mut layers = node.children().filter(|child| child.has_tag_name("layer"));
+                layers.any(|layer| layer.attribute("role").is_some_and(|role| roles.contains(&role)))
+            };
+            let usual = Gloss::default();
+            let (is_rough, is_metal) = (has_layer(["roughness", "orm"]), has_layer(["metallic", "orm"]));
             let gloss = Gloss {
-                emission_factor: stated("emission", usual.emission_factor),
-                specular_factor: stated("specular", usual.specular_factor),
-                shininess_factor: stated("shininess", usual.shininess_factor),
+                emission_factor: stated("emission").unwrap_or(usual.emission_factor),
+                specular_factor: stated("specular").unwrap_or(usual.specular_factor),
+                shininess_factor: stated("shininess").unwrap_or(usual.shininess_factor),
+                roughness_factor: amount("roughness").or(is_rough.then_some(1.0)),
+                metallic_factor: amount("metallic").unwrap_or(if is_metal { 1.0 } else { 0.0 }).min(1.0),
+            };
+            let gloss = match gloss.roughness_factor {
+                // Layers give it point by point.
+                Some(roughness) if !is_rough && !is_metal && stated("shininess").is_none() => {
+                    gloss.as_rough_as(roughness)
+                }
+                _ => gloss,
             };
             if gloss != usual {
                 found.insert(name.into(), gloss);

@@ -61,7 +61,7 @@ impl Document {
 
     /// Returns the image of a texture's file, or six for the faces of a cube; none if it names no file.
     fn images_of_files(&self, node: &Node, read: &mut Read) -> Result<Vec<DynamicImage>, SimError> {
-        let mut image = |file: &str| self.image_of_file(file, read);
+        let mut image = |file: &str| self.image_of_file(node, file, read);
         if let Some(file) = node.attribute("file") {
             let whole = image(file)?;
             return Ok(faces_of_grid(node, &whole).unwrap_or_else(|| vec![whole]));
@@ -75,15 +75,55 @@ impl Document {
         FACES.iter().map(face).collect()
     }
 
-    fn image_of_file(&self, file: &str, read: &mut Read) -> Result<DynamicImage, SimError> {
+    fn image_of_file(&self, node: &Node, file: &str, read: &mut Read) -> Result<DynamicImage, SimError> {
         let asset = mjcf_rs::assets::Texture { file: Some(file.into()), ..Default::default() };
         let path = self.model.resolve_texture_file(&asset, &self.folder).unwrap_or_else(|| file.into());
         let path = self.source.beside_including(with_own_separators(path));
         let bytes = read_mesh_bytes(&path).map_err(|source| SimError::unreadable(&path, source))?;
         let image = Texture::decode(&path, &bytes)?;
+        let is_srgb = match node.attribute("colorspace") {
+            Some("sRGB") => true,
+            Some("linear") => false,
+            _ => states_srgb(&bytes),
+        };
         read.push((path, xxh3_64(&bytes)));
-        Ok(image)
+        // MuJoCo converts such an image to linear light, and draws that as if it were values of a file.
+        Ok(if is_srgb && self.lights.is_some() { decoded(image) } else { image })
     }
+}
+
+/// Returns true if a PNG file says that its values are sRGB.
+fn states_srgb(bytes: &[u8]) -> bool {
+    const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
+    /// Bytes of a chunk besides its content: its length, its name and its checksum.
+    const AROUND_BYTES: usize = 12;
+    let Some(mut rest) = bytes.strip_prefix(SIGNATURE) else { return false };
+    while let Some((length, after)) = rest.split_first_chunk::<4>() {
+        match after.first_chunk::<4>() {
+            Some(b"sRGB") => return true,
+            Some(b"IDAT") | None => return false,
+            Some(_) => {}
+        }
+        let chunk_bytes = (u32::from_be_bytes(*length) as usize).saturating_add(AROUND_BYTES);
+        rest = rest.get(chunk_bytes..).unwrap_or_default();
+    }
+    false
+}
+
+/// Returns an image whose values are the linear light of those of another.
+fn decoded(image: DynamicImage) -> DynamicImage {
+    let light: [u8; 256] = std::array::from_fn(|byte| {
+        let value = byte as f32 / 255.0;
+        let linear = if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) };
+        (255.0 * linear).round() as u8
+    });
+    let mut image = image.into_rgba8();
+    for pixel in image.pixels_mut() {
+        for value in &mut pixel.0[..3] {
+            *value = light[usize::from(*value)];
+        }
+    }
+    image.into()
 }
 
 /// Reduces the images of files. Their alpha counts if the texture states `nchannel="4"`, as in MuJoCo.

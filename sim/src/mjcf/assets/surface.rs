@@ -17,6 +17,10 @@ use crate::mjcf::text::stated::Classes;
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceImage {
     pub texture: Arc<Texture>,
+    /// Numbers at the same places: roughness in the second channel, metallic share in the third.
+    pub gloss: Option<Arc<Texture>>,
+    /// Normals at the same places in the frame of the surface, each 0 to 1 for -1 to 1; the second is upwards.
+    pub relief: Option<Arc<Texture>>,
     pub mapping: TextureMapping,
 }
 
@@ -78,7 +82,8 @@ impl TextureRepeats {
                 *factor = word.parse().unwrap_or(1.0);
             }
             repeat.is_uniform = classes.stated(&material, "texuniform") == Some("true");
-            if texture.is_some_and(|texture| drawn.contains_key(texture)) && repeat != ONCE {
+            let has_layers = material.children().any(|child| child.has_tag_name("layer"));
+            if (has_layers || texture.is_some_and(|texture| drawn.contains_key(texture))) && repeat != ONCE {
                 found.insert(name.into(), repeat);
             }
         }
@@ -93,13 +98,19 @@ impl SurfaceImage {
         material: &mjcf_rs::assets::Material,
         shape: impl FnOnce() -> MappedShape,
     ) -> Option<SurfaceImage> {
-        let name = material.texture.as_ref()?;
         let pattern = material.name.as_ref().and_then(|name| document.looks.patterns.get(name));
         if pattern == Some(&SurfacePattern::Tiles) {
             return None;
         }
+        let layers = document.layers.find(material);
+        let (gloss, relief) =
+            layers.map_or((None, None), |layers| (layers.gloss.clone(), layers.relief.clone()));
         // A single texel is a plain colour, which the geom has.
-        let texture = document.texture(name).filter(|texture| texture.levels[0].texels.len() > 1)?.clone();
+        let is_image = |texture: &&Arc<Texture>| {
+            texture.levels[0].texels.len() > 1 || gloss.is_some() || relief.is_some()
+        };
+        let texture = document.colour_of(material).filter(is_image)?.clone();
+        let name = layers.map_or(material.texture.as_deref(), |layers| layers.placing())?;
         let kind = document.model.assets.texture(name)?.type_.as_deref();
         let repeat = material.name.as_ref().and_then(|name| document.repeats.0.get(name));
         let repeat = repeat.copied().unwrap_or(ONCE);
@@ -109,7 +120,9 @@ impl SurfaceImage {
             Some("2d") => along(repeat, &shape),
             _ => cube(repeat, &shape),
         };
-        Some(SurfaceImage { texture, mapping })
+        // Without coordinates in the surface, normals have no direction.
+        let relief = relief.filter(|_| !matches!(mapping, TextureMapping::Cube { .. }));
+        Some(SurfaceImage { texture, gloss, relief, mapping })
     }
 }
 

@@ -5,7 +5,7 @@ use std::io::Cursor;
 use std::path::Path;
 
 use image::imageops::{FilterType, resize};
-use image::{DynamicImage, ImageBuffer, ImageReader, Pixel, RgbImage, RgbaImage};
+use image::{DynamicImage, ImageBuffer, ImageReader, Pixel, Rgb, RgbImage, RgbaImage};
 
 use crate::SimError;
 
@@ -33,6 +33,15 @@ pub struct TextureLevel {
     /// sRGB and alpha, row by row from the top left; without alpha, the fourth byte is 0. Of a cube with six
     /// images, all of them in the order +x, -x, +y, -y, +z, -z.
     pub texels: Vec<[u8; 4]>,
+}
+
+/// Meaning of the bytes of texels.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(in crate::mjcf) enum TexelMeaning {
+    /// sRGB values.
+    Light,
+    /// Numbers of a surface, for example its roughness.
+    Numbers,
 }
 
 impl std::fmt::Debug for Texture {
@@ -77,17 +86,52 @@ impl Texture {
             true => texels(image),
             false => texels(&resize(image, width, height, FilterType::Triangle)),
         });
-        let mut levels = vec![TextureLevel::new(width as usize, height as usize, texels.collect())];
-        while let Some(half) = levels.last().and_then(TextureLevel::halved) {
-            levels.push(half);
-        }
-        Texture { levels, mean_rgb: mean_rgb(images), has_alpha }
+        let whole = TextureLevel::new(width as usize, height as usize, texels.collect());
+        Texture { levels: levels(whole, TexelMeaning::Light), mean_rgb: mean_rgb(images), has_alpha }
+    }
+
+    /// Returns an image of a single texel.
+    pub(crate) fn plain(rgb: [u8; 3]) -> Texture {
+        Texture::of(&[RgbImage::from_pixel(1, 1, Rgb(rgb))])
+    }
+
+    /// Puts channels of images of one face together, at the size of the largest. A channel without an image
+    /// is full.
+    pub(in crate::mjcf) fn of_channels(
+        channels: [Option<(&Texture, usize)>; 4],
+        meaning: TexelMeaning,
+        mean_rgb: [f32; 3],
+    ) -> Texture {
+        let levels_of = channels.iter().flatten().map(|(texture, _)| &texture.levels[0]);
+        let side = |of: fn(&TextureLevel) -> usize| levels_of.clone().map(of).max().unwrap_or(1);
+        let (width, height) = (side(|level| level.width), side(|level| level.height));
+        let value = |channel: &Option<(&Texture, usize)>, index: usize| {
+            let Some((texture, number)) = channel else { return u8::MAX };
+            let level = &texture.levels[0];
+            // Sides are powers of two.
+            let (row, column) =
+                (index / width / (height / level.height), index % width / (width / level.width));
+            level.texels[row * level.width + column][*number]
+        };
+        let texels =
+            (0..width * height).map(|index| channels.each_ref().map(|channel| value(channel, index)));
+        let whole = TextureLevel::new(width, height, texels.collect());
+        Texture { levels: levels(whole, meaning), mean_rgb, has_alpha: meaning == TexelMeaning::Light }
     }
 
     /// Returns the number of images: 1, or 6 for a cube with one a face.
     pub fn images(&self) -> usize {
         self.levels[0].texels.len() / self.levels[0].image_texels()
     }
+}
+
+/// Returns a level and those of half its size, down to one texel.
+fn levels(whole: TextureLevel, meaning: TexelMeaning) -> Vec<TextureLevel> {
+    let mut levels = vec![whole];
+    while let Some(half) = levels.last().and_then(|level| level.halved(meaning)) {
+        levels.push(half);
+    }
+    levels
 }
 
 impl TextureLevel {
@@ -113,24 +157,28 @@ impl TextureLevel {
         self.width * self.height
     }
 
-    /// Returns the level of half the size; `None` if an image has a single texel. A texel has the mean light
-    /// of those that it replaces, by a gamma of 2.
-    fn halved(&self) -> Option<TextureLevel> {
+    /// Returns the level of half the size; `None` if an image has a single texel. A texel has the mean of those
+    /// that it replaces; of light, by a gamma of 2.
+    fn halved(&self, meaning: TexelMeaning) -> Option<TextureLevel> {
         let images = self.texels.len() / self.image_texels();
         if self.image_texels() == 1 {
             return None;
         }
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
         let (across, down) = (self.width / width, self.height / height);
+        let exponent = if meaning == TexelMeaning::Light { 2 } else { 1 };
         let texel = |index: usize| {
             let corner = index / width * down * self.width + index % width * across;
             let mut sum = [0; 4];
             for row in 0..down {
                 for texel in &self.texels[corner + row * self.width..][..across] {
-                    sum = std::array::from_fn(|axis| sum[axis] + u32::from(texel[axis]).pow(2));
+                    sum = std::array::from_fn(|axis| sum[axis] + u32::from(texel[axis]).pow(exponent));
                 }
             }
-            sum.map(|sum| (sum as f32 / (across * down) as f32).sqrt().round() as u8)
+            sum.map(|sum| {
+                let mean = sum as f32 / (across * down) as f32;
+                (if meaning == TexelMeaning::Light { mean.sqrt() } else { mean }).round() as u8
+            })
         };
         Some(TextureLevel::new(width, height, (0..images * width * height).map(texel).collect()))
     }
@@ -163,7 +211,7 @@ fn mean_rgb<P: Pixel<Subpixel = u8>>(images: &[ImageBuffer<P, Vec<u8>>]) -> [f32
 
 #[cfg(test)]
 mod tests {
-    use image::{Rgb, Rgba};
+    use image::Rgba;
 
     use super::*;
 

@@ -248,8 +248,13 @@ const LIGHT: &[Attribute] = &[
     ),
     mapped(&["ambient", "diffuse", "specular", "attenuation"], numbers(3, 3)),
     mapped(&["cutoff", "exponent"], AMOUNT),
-    attribute(Support::Approximated, &["mode"], Takes::Only(&["fixed"]), "a light is fixed to its body"),
-    approximated(&["target"], "a light is fixed to its body"),
+    attribute(
+        Support::Approximated,
+        &["mode"],
+        Takes::Only(&["fixed"]),
+        "a light is fixed to its body, and shines at the first place of its target",
+    ),
+    mapped(&["target"], Takes::Text),
     ignored(&["texture", "intensity", "range", "bulbradius"], "MuJoCo's renderer does not read them either"),
     USER,
 ];

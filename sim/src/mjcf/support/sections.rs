@@ -87,15 +87,15 @@ pub(super) const ELEMENTS: &[Element] = &[
         &["asset"],
         "texture",
         &[&[NAME], TEXTURE],
-        "images are PNG; the first of type `skybox` is drawn where no surface is",
+        "images are PNG or JPEG; the first of type `skybox` is drawn where no surface is",
     ),
     named(Support::Mapped, "material", &["asset", "default"], "material", &[&[NAME, CLASS], MATERIAL], ""),
     element(
-        Support::Ignored,
+        Support::Mapped,
         "layer",
         &["material"],
-        &[],
-        "of a material its colour, texture and gloss are taken",
+        &[&[mapped(&["texture"], Takes::NameOf("texture")), mapped(&["role"], Takes::Word(ROLES))]],
+        "`normal` and `opacity` on 2d images; `occlusion` and `emissive` are not drawn",
     ),
     element(Support::Refused, "hfield", &["asset"], &[], "write a height field as boxes or as meshes"),
     element(Support::Refused, "skin", &["asset", "deformable"], &[], "nothing bends or stretches here"),
@@ -375,7 +375,13 @@ const TEXTURE: &[Attribute] = &[
         Takes::Word(&["1", "2", "3", "4"]),
         "with `4`, the alpha of images is blended; in MuJoCo only if the material's alpha is below 0.995, too",
     ),
-    ignored(&["class", "colorspace", "content_type", "hflip", "vflip"], "images are drawn as they are"),
+    attribute(
+        Support::Mapped,
+        &["colorspace"],
+        Takes::Word(&["auto", "linear", "sRGB"]),
+        "in scenes with lights or a headlight, values of sRGB are converted to linear light, as in MuJoCo",
+    ),
+    ignored(&["class", "content_type", "hflip", "vflip"], "images are drawn as they are"),
 ];
 
 const MATERIAL: &[Attribute] = &[
@@ -389,8 +395,24 @@ const MATERIAL: &[Attribute] = &[
         AMOUNT,
         "in scenes with lights or a headlight",
     ),
-    ignored(&["reflectance", "metallic", "roughness"], "surfaces mirror nothing"),
+    attribute(
+        Support::Mapped,
+        &["roughness"],
+        NUMBER,
+        "by path tracing; elsewhere the highlights of materials without `shininess`",
+    ),
+    attribute(
+        Support::Mapped,
+        &["metallic"],
+        NUMBER,
+        "highlights, and in path tracing reflections, in the surface's colour",
+    ),
+    ignored(&["reflectance"], "surfaces mirror nothing"),
 ];
+
+/// Roles of a material's layers.
+const ROLES: &[&str] =
+    &["rgb", "rgba", "opacity", "normal", "roughness", "metallic", "orm", "occlusion", "emissive"];
 
 const EQUALITY: &[Attribute] = &[NAME, CLASS, mapped(&["active"], BOOLEAN), SOFTNESS];
 const CONNECT: &[Attribute] = &[

@@ -55,6 +55,7 @@ impl View<'_> {
                     count: 1,
                     share: covered as f32 / PER_PIXEL as f32,
                     alpha: Some(self.prepared.scenery.parts[part].alpha),
+                    has_lamps: self.lamps.is_some(),
                 };
                 row.surfaces.push(&self.rays, self.contact, &strip);
             }

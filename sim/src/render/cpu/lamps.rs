@@ -7,11 +7,9 @@ use super::raster::whole_f32;
 use super::shade::{Surfaces, dot};
 use super::shadow::ShadowMap;
 use super::target::{RenderTarget, draw_casting};
-use crate::mjcf::{FileLight, Headlight, LightKind};
+use crate::mjcf::{FileLight, Headlight, LightKind, SHININESS};
 use crate::render::scene::prepared::Prepared;
-use crate::render::shading::lamps::{
-    LAMP_BIAS_SHARE, LAMP_NORMAL_TEXELS, SHININESS, lamp_map, lamp_view, tilted,
-};
+use crate::render::shading::lamps::{LAMP_BIAS_SHARE, LAMP_NORMAL_TEXELS, lamp_map, lamp_view, tilted};
 use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
 use crate::render::shading::power::{file_value, linear_value, power};
 use crate::render::shading::{SAMPLES, TEXELS};
@@ -51,6 +49,13 @@ struct Sums {
     gloss: [Lanes; 2],
     lit: [Lanes; 3],
     glossy: [Lanes; 3],
+}
+
+/// Colours of points in the values of files: their own, and those of their images alone, which are 1 without.
+struct LitColours {
+    own: [Lanes; 3],
+    most: [Lanes; 3],
+    metallic: Lanes,
 }
 
 impl LitLamps {
@@ -131,18 +136,38 @@ impl Surfaces {
     fn lit_by_lamps(&self, at: usize, count: usize, lamps: &LitLamps, back_direction: Vector) -> [Lanes; 3] {
         let point_m = self.point_m.block(at);
         let [emission, specular, shininess] = self.gloss.block(at);
+        let (albedo, texture) = (self.albedo.block(at), self.texture.block(at));
+        let surface = LitColours {
+            own: axes(
+                #[inline(always)]
+                |axis| lanes(|i| file_value(albedo[axis][i])),
+            ),
+            most: axes(
+                #[inline(always)]
+                |axis| lanes(|i| file_value(texture[axis][i])),
+            ),
+            metallic: self.metallic(at),
+        };
         let mut sums = self.unlit(at, [specular, shininess]);
+        sums.lit = [emission; 3];
         sums.add_headlight(&lamps.headlight, back_direction);
-        for lamp in &lamps.lamps {
+        let casts_shadow = |lamp: &&LitLamp| !matches!(lamp.shadow, LampShadow::None);
+        for lamp in lamps.lamps.iter().filter(|lamp| !casts_shadow(lamp)) {
             sums.add(lamp, &point_m, count - at);
         }
-        let (albedo, shares) = (self.albedo.block(at), self.shares(at));
+        let mut values = [[0.0; LANES]; 3];
+        sums.show(&surface, &mut values);
+        // MuJoCo limits the light of each lamp with shadows by itself.
+        for lamp in lamps.lamps.iter().filter(casts_shadow) {
+            sums.add(lamp, &point_m, count - at);
+            sums.show(&surface, &mut values);
+        }
+        let shares = self.shares(at);
         axes(
             #[inline(always)]
             |axis| {
                 lanes(|i| {
-                    let surface = file_value(albedo[axis][i]);
-                    let value = surface * (sums.lit[axis][i] + emission[i]) + sums.glossy[axis][i];
+                    let value = values[axis][i];
                     linear_value(if value < 1.0 { value } else { 1.0 }) * shares[i]
                 })
             },
@@ -174,6 +199,22 @@ impl Surfaces {
 }
 
 impl Sums {
+    /// Adds the colours that the light gives to surfaces, and clears it. An image multiplies the light,
+    /// highlights and all, once this is limited.
+    #[inline(always)]
+    fn show(&mut self, surface: &LitColours, values: &mut [Lanes; 3]) {
+        for axis in 0..3 {
+            let (own, most) = (&surface.own[axis], &surface.most[axis]);
+            let (lit, glossy) = (&self.lit[axis], &self.glossy[axis]);
+            values[axis] = lanes(|i| {
+                let tint = most[i] + (own[i] - most[i]) * surface.metallic[i];
+                let value = own[i] * lit[i] + glossy[i] * tint;
+                values[axis][i] + if value < most[i] { value } else { most[i] }
+            });
+        }
+        (self.lit, self.glossy) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+    }
+
     #[inline(always)]
     fn add_headlight(&mut self, headlight: &Headlight, back_direction: Vector) {
         let towards: [Lanes; 3] = axes(|axis| [back_direction[axis]; LANES]);

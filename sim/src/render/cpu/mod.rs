@@ -2,6 +2,7 @@
 
 mod blend;
 pub mod contact;
+mod images;
 mod lamps;
 mod raster;
 mod shade;

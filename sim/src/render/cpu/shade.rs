@@ -4,6 +4,7 @@
 use rapier3d::math::{Matrix, Pose, Vector};
 
 use super::contact::ContactMap;
+use super::images::gloss_lanes;
 use super::shadow::ShadowMap;
 use crate::mjcf::Gloss;
 use crate::render::scene::prepared::{Prepared, Sheet};
@@ -38,8 +39,8 @@ pub(super) struct Rays {
     eye_m: Vector,
     /// The ray through the first sample, and the steps from one to the next.
     first_ray: Vector,
-    right_ray: Vector,
-    down_ray: Vector,
+    pub right_ray: Vector,
+    pub down_ray: Vector,
     /// Direction from what the camera looks at to the camera.
     pub back_direction: Vector,
 }
@@ -59,6 +60,8 @@ pub(super) struct Strip<'a> {
     pub share: f32,
     /// Alpha of a blended part; `None` for a solid one.
     pub alpha: Option<f32>,
+    /// True if lamps light the scenery, which need more of a surface than a sun does.
+    pub has_lamps: bool,
 }
 
 /// Points that are shaded together. They are stored coordinate by coordinate and processed in branchless
@@ -71,8 +74,11 @@ pub(super) struct Surfaces {
     pub ray: Vectors,
     pub normal: Vectors,
     pub albedo: Vectors,
-    /// Emission, specular strength and shininess, for lamps.
+    /// Emission, specular strength and shininess, and metallic shares, for lamps.
     pub gloss: Vectors,
+    metallic_share: [f32; ROOM],
+    /// Colours of images alone, for lamps; 1 without.
+    pub texture: Vectors,
     /// Share of light that contact shadows leave.
     open_share: [f32; ROOM],
     /// The pixel of each point, and its weight there.
@@ -203,6 +209,8 @@ impl Surfaces {
             normal: Vectors::ZERO,
             albedo: Vectors::ZERO,
             gloss: Vectors::ZERO,
+            metallic_share: [0.0; ROOM],
+            texture: Vectors::ZERO,
             open_share: [1.0; ROOM],
             pixels: [0; ROOM],
             pixel_share: [0.0; ROOM],
@@ -255,15 +263,7 @@ impl Surfaces {
             );
             self.ray.set(at, ray);
             self.point_m.set(at, point_m);
-            let normal = strip.facet.normals(&point_m);
-            self.normal.set(at, normal);
-            let (albedo, alpha) = match strip.image {
-                None => (strip.facet.albedo(&point_m), [1.0; N]),
-                Some(image) => strip.facet.image_rgb(image, rays, [&ray, &point_m, &normal], &depth_m),
-            };
-            self.albedo.set(at, albedo);
-            let Gloss { emission_factor, specular_factor, shininess_factor } = strip.facet.gloss;
-            self.gloss.set(at, [[emission_factor; N], [specular_factor; N], [shininess_factor; N]]);
+            let alpha = self.set_surface(at, rays, strip, [&ray, &point_m], &depth_m);
             *block_mut(&mut self.pixel_share, at) = match strip.alpha {
                 None => [strip.share; N],
                 Some(of_part) => lanes(|i| strip.share * opacity(of_part * alpha[i])),
@@ -275,6 +275,43 @@ impl Surfaces {
                 *block_mut(&mut self.open_share, at) = lanes::<f32, N>(|i| 1.0 - CONTACT * darkness[i]);
             }
         }
+    }
+
+    /// Sets the surface of points that have rays, places and depths. Returns its alpha.
+    #[inline(always)]
+    fn set_surface<const N: usize>(
+        &mut self,
+        at: usize,
+        rays: &Rays,
+        strip: &Strip<'_>,
+        [ray, point_m]: [&[Lanes<N>; 3]; 2],
+        depth_m: &Lanes<N>,
+    ) -> Lanes<N> {
+        let normal = strip.facet.normals(point_m);
+        let Some(image) = strip.image else {
+            self.normal.set(at, normal);
+            self.albedo.set(at, strip.facet.albedo(point_m));
+            if strip.has_lamps {
+                self.set_gloss(at, gloss_lanes::<N>(strip.facet.gloss));
+                self.texture.set(at, [[1.0; N]; 3]);
+            }
+            return [1.0; N];
+        };
+        let shown = strip.facet.shown(image, rays, [ray, point_m, &normal], depth_m);
+        self.normal.set(at, shown.normal);
+        self.albedo.set(at, shown.albedo);
+        if strip.has_lamps {
+            self.set_gloss(at, shown.gloss);
+            self.texture.set(at, shown.texture);
+        }
+        shown.alpha
+    }
+
+    #[inline(always)]
+    fn set_gloss<const N: usize>(&mut self, at: usize, gloss: [Lanes<N>; 4]) {
+        let [emission, specular, shininess, metallic] = gloss;
+        self.gloss.set(at, [emission, specular, shininess]);
+        *block_mut(&mut self.metallic_share, at) = metallic;
     }
 
     /// Adds the shares of all pushed points to those of their pixels.
@@ -294,6 +331,12 @@ impl Surfaces {
     pub(super) fn shares(&self, at: usize) -> Lanes {
         let (open, share) = (block(&self.open_share, at), block(&self.pixel_share, at));
         lanes(|i| open[i] * share[i])
+    }
+
+    /// Returns the metallic shares of points.
+    #[inline(always)]
+    pub(super) fn metallic(&self, at: usize) -> Lanes {
+        *block(&self.metallic_share, at)
     }
 
     /// Adds the linear colours of all pushed points to those of their pixels, and clears the points.
@@ -401,63 +444,6 @@ impl Facet {
         axes(
             #[inline(always)]
             |axis| lanes(|i| normal[axis][i] + (x[axis] * x_m[i] + y[axis] * y_m[i] + z[axis] * z_m[i])),
-        )
-    }
-
-    /// Returns the linear colours of the image on the surface, without light, and its alpha, of points that
-    /// have rays, places, normals and depths.
-    #[inline(always)]
-    fn image_rgb<const N: usize>(
-        &self,
-        image: &Image,
-        rays: &Rays,
-        [ray, point_m, normal]: [&[Lanes<N>; 3]; 3],
-        depth_m: &Lanes<N>,
-    ) -> ([Lanes<N>; 3], Lanes<N>) {
-        let at = self.pattern_from_world.map_lanes(point_m);
-        let along_ray = self.pattern_from_world.derivatives(ray);
-        let facing: Lanes<N> = lanes(|i| {
-            let facing = normal[0][i] * ray[0][i] + normal[1][i] * ray[1][i] + normal[2][i] * ray[2][i];
-            if facing == 0.0 { f32::INFINITY } else { facing }
-        });
-        let by = |step: Vector| self.image_step(step, [&along_ray, normal], &facing, depth_m);
-        let (x, y) = (by(rays.right_ray * SAMPLES as f32), by(rays.down_ray * SAMPLES as f32));
-        let (mut albedo, mut alpha) = ([[0.0; N]; 3], [1.0; N]);
-        for i in 0..N {
-            let place = image.place(
-                [at[0][i], at[1][i], at[2][i]],
-                [x[0][i], x[1][i], x[2][i]],
-                [y[0][i], y[1][i], y[2][i]],
-            );
-            let (rgb, alpha_here) = image.rgb_and_alpha(&place);
-            alpha[i] = alpha_here;
-            for (axis, albedo) in albedo.iter_mut().enumerate() {
-                albedo[i] = rgb[axis] * self.linear_rgb[0][axis];
-            }
-        }
-        (albedo, alpha)
-    }
-
-    /// Returns the differences of image coordinates between points and those that rays meet on the same
-    /// plane which are turned by `step_ray`. Points have derivatives of the coordinates along their rays,
-    /// normals, and scalar products of both.
-    #[inline(always)]
-    fn image_step<const N: usize>(
-        &self,
-        step_ray: Vector,
-        [along_ray, normal]: [&[Lanes<N>; 3]; 2],
-        facing: &Lanes<N>,
-        depth_m: &Lanes<N>,
-    ) -> [Lanes<N>; 3] {
-        let deeper: Lanes<N> = lanes(|i| {
-            (normal[0][i] * step_ray.x + normal[1][i] * step_ray.y + normal[2][i] * step_ray.z) / facing[i]
-        });
-        axes(
-            #[inline(always)]
-            |row| {
-                let along_step = self.pattern_from_world.0[row].0.dot(step_ray);
-                lanes(|i| (along_step - along_ray[row][i] * deeper[i]) * depth_m[i])
-            },
         )
     }
 

@@ -140,6 +140,7 @@ impl View<'_> {
             count: pixels.len(),
             share,
             alpha: None,
+            has_lamps: self.lamps.is_some(),
         };
         row.surfaces.push(&self.rays, self.contact, &strip);
     }

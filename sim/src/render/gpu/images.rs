@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use rapier3d::math::Vector;
 
-use crate::mjcf::TextureLevel;
+use crate::mjcf::{Texture, TextureLevel};
 use crate::render::scene::prepared::Prepared;
 use crate::render::shading::image::Image;
 use crate::render::shading::lanes::Affine;
@@ -19,56 +19,82 @@ pub(super) struct SceneImages {
     pub coordinates: Vec<[u32; COORDINATE_NUMBERS]>,
     /// Heads and texels of all images, after a number without meaning.
     pub texels: Vec<u32>,
-    /// Index of the head of each part's image in `texels`; 0 without an image.
-    pub heads: Vec<u32>,
+    pub heads: Vec<PartHeads>,
     /// The same for the sky.
     pub sky_head: u32,
 }
+
+/// Indices of the heads of a part's images in [`SceneImages::texels`]; 0 without one.
+#[derive(Clone, Copy, Default)]
+pub(super) struct PartHeads {
+    pub colour: u32,
+    pub gloss: u32,
+    pub relief: u32,
+}
+
+/// A texture, and true if its places are on a cube.
+type PlacedTexture<'a> = (&'a Arc<Texture>, bool);
 
 impl SceneImages {
     /// Collects the images of a scenery. If they have more than `max_bytes` bytes, their largest levels are
     /// left out.
     pub(super) fn of(prepared: &Prepared, max_bytes: u64) -> SceneImages {
-        let mut images: Vec<&Image> = Vec::new();
-        for image in prepared.images.iter().flatten().chain(&prepared.sky) {
-            if !images.iter().any(|other| is_same(other, image)) {
+        let mut images: Vec<PlacedTexture> = Vec::new();
+        for image in prepared.images.iter().flatten().chain(&prepared.sky).flat_map(textures) {
+            if !images.iter().any(|other| is_same(*other, image)) {
                 images.push(image);
             }
         }
         let size_of_all = |left_out: usize| {
-            let numbers = |image: &&Image| {
-                HEAD_NUMBERS + kept(image, left_out).iter().map(|level| level.texels.len()).sum::<usize>()
+            let numbers = |(texture, _): &PlacedTexture| {
+                HEAD_NUMBERS + kept(texture, left_out).iter().map(|level| level.texels.len()).sum::<usize>()
             };
             size_of::<u32>() as u64 * images.iter().map(numbers).sum::<usize>() as u64
         };
-        let most_levels = images.iter().map(|image| image.texture.levels.len()).max().unwrap_or(0);
+        let most_levels = images.iter().map(|(texture, _)| texture.levels.len()).max().unwrap_or(0);
         let left_out = (0..most_levels).find(|left_out| size_of_all(*left_out) < max_bytes);
         let (mut texels, mut placed) = (vec![0], Vec::new());
-        for image in images {
-            placed.push((image, texels.len() as u32));
-            let levels = kept(image, left_out.unwrap_or(most_levels));
+        for (texture, is_cube) in images {
+            placed.push(((texture, is_cube), texels.len() as u32));
+            let levels = kept(texture, left_out.unwrap_or(most_levels));
             let [width, height] = [levels[0].width, levels[0].height].map(|side| side as u32);
-            let faces = if image.is_cube { image.texture.images() } else { 0 };
+            let faces = if is_cube { texture.images() } else { 0 };
             texels.extend([width, height, levels.len() as u32, faces as u32]);
             texels.extend(
                 levels.iter().flat_map(|level| &level.texels).map(|texel| u32::from_le_bytes(*texel)),
             );
         }
-        let head =
-            |image: &Image| placed.iter().find(|(other, _)| is_same(other, image)).map(|(_, head)| *head);
-        let heads = prepared.images.iter().map(|image| image.as_ref().and_then(head).unwrap_or(0)).collect();
-        let sky_head = prepared.sky.as_ref().and_then(head).unwrap_or(0);
+        let head = |texture: Option<&Arc<Texture>>, is_cube: bool| {
+            let mut heads =
+                placed.iter().filter(|(other, _)| texture.is_some_and(|one| is_same(*other, (one, is_cube))));
+            heads.next().map_or(0, |(_, head)| *head)
+        };
+        let of_part = |image: &Option<Image>| {
+            image.as_ref().map_or(PartHeads::default(), |image| PartHeads {
+                colour: head(Some(&image.texture), image.is_cube),
+                gloss: head(image.gloss.as_ref(), image.is_cube),
+                relief: head(image.relief.as_ref(), image.is_cube),
+            })
+        };
+        let heads = prepared.images.iter().map(of_part).collect();
+        let sky_head = prepared.sky.as_ref().map_or(0, |sky| head(Some(&sky.texture), true));
         SceneImages { coordinates: coordinates(prepared), texels, heads, sky_head }
     }
 }
 
-fn is_same(one: &Image, other: &Image) -> bool {
-    Arc::ptr_eq(&one.texture, &other.texture) && one.is_cube == other.is_cube
+/// Returns the textures of an image.
+fn textures(image: &Image) -> impl Iterator<Item = PlacedTexture<'_>> {
+    let all = std::iter::once(&image.texture).chain(&image.gloss).chain(&image.relief);
+    all.map(|texture| (texture, image.is_cube))
 }
 
-/// Returns the levels of an image without the largest ones; the last one always stays.
-fn kept(image: &Image, left_out: usize) -> &[TextureLevel] {
-    let levels = &image.texture.levels;
+fn is_same((one, is_cube): PlacedTexture, (other, other_is_cube): PlacedTexture) -> bool {
+    Arc::ptr_eq(one, other) && is_cube == other_is_cube
+}
+
+/// Returns the levels of a texture without the largest ones; the last one always stays.
+fn kept(texture: &Texture, left_out: usize) -> &[TextureLevel] {
+    let levels = &texture.levels;
     &levels[left_out.min(levels.len() - 1)..]
 }
 

@@ -53,17 +53,21 @@ fn encoded(linear: vec3f) -> vec3f {
     return select(curve, 12.92 * linear, linear <= vec3f(0.0031308));
 }
 
-// Linear colour of a surface.
-fn lit_by_lamps(part: Part, base: vec3f, point_m: vec3f, normal: vec3f, to_eye: vec3f) -> vec3f {
-    let exponent = part.gloss.z * SHININESS;
+// Linear colour of a surface, whose gloss is that of `gloss_at`; `image` is the colour of its image alone, or 1.
+fn lit_by_lamps(gloss: vec4f, base: vec3f, image: vec3f, point_m: vec3f, normal: vec3f, to_eye: vec3f) -> vec3f {
+    let exponent = gloss.z * SHININESS;
     let back = view.back.xyz;
     let facing_head = dot(normal, back);
-    var lit = vec3f(part.gloss.x) + view.head_ambient.xyz + view.head_diffuse.xyz * max(facing_head, 0.0);
+    var lit = vec3f(gloss.x) + view.head_ambient.xyz + view.head_diffuse.xyz * max(facing_head, 0.0);
     var glossy = vec3f(0.0);
     if facing_head > 0.0 {
         let shine = power(max(dot(normal, normalize(back + to_eye)), 0.0), exponent);
-        glossy = view.head_specular.xyz * (part.gloss.y * shine);
+        glossy = view.head_specular.xyz * (gloss.y * shine);
     }
+    let own = encoded(base);
+    let most = encoded(image);
+    let tint = mix(most, own, gloss.w);
+    var shown = vec3f(0.0);
     for (var i = 0u; i < view.counts.x; i++) {
         let lamp = view.lamps[i];
         var towards = -lamp.direction.xyz;
@@ -88,14 +92,22 @@ fn lit_by_lamps(part: Part, base: vec3f, point_m: vec3f, normal: vec3f, to_eye: 
                 share *= in_cone(lamp, layer, point_m, normal);
             }
         }
-        lit += lamp.ambient.xyz * share;
+        var own_lit = lamp.ambient.xyz * share;
+        var own_glossy = vec3f(0.0);
         if facing > 0.0 {
             let shine = power(max(dot(normal, normalize(towards + to_eye)), 0.0), exponent);
-            lit += lamp.diffuse.xyz * (share * facing);
-            glossy += lamp.specular.xyz * (share * part.gloss.y * shine);
+            own_lit += lamp.diffuse.xyz * (share * facing);
+            own_glossy = lamp.specular.xyz * (share * gloss.y * shine);
+        }
+        // The light of each lamp with shadows is limited by itself.
+        if layer >= 0 {
+            shown += min(own * own_lit + own_glossy * tint, most);
+        } else {
+            lit += own_lit;
+            glossy += own_glossy;
         }
     }
-    return decoded(min(encoded(base) * lit + glossy, vec3f(1.0)));
+    return decoded(min(shown + min(own * lit + glossy * tint, most), vec3f(1.0)));
 }
 
 // Colour where no surface is.

@@ -66,6 +66,9 @@ struct Part {
     // Id; bits: it casts a shadow, is blended, is cut out by its image's alpha, its image has alpha; whether things
     // stand on it; and where its image's head is in `texels`, 0 without an image.
     flags: vec4u,
+    // Where the heads of the numbers for gloss and for normals are in `texels`, 0 without; bits of the roughness, -1
+    // without, and of the metallic share.
+    maps: vec4u,
 }
 
 struct Face {
@@ -376,6 +379,12 @@ fn stepped_log2(x: f32) -> f32 {
 
 // Linear colour and alpha.
 fn image_rgba(head: u32, place: ImagePlace) -> vec4f {
+    let values = image_values(head, place);
+    return vec4f(decoded(values.xyz), values.w);
+}
+
+// The values of an image's texels.
+fn image_values(head: u32, place: ImagePlace) -> vec4f {
     var size = vec2u(texels[head], texels[head + 1u]);
     let images = texels[head + 3u];
     let is_cube = images != 0u;
@@ -393,29 +402,67 @@ fn image_rgba(head: u32, place: ImagePlace) -> vec4f {
     let nearer = blend(first + before * size.x * size.y, size, place.uv, is_cube);
     let share = clamp((fract(level) - 0.5) / BLENDED_SHARE + 0.5, 0.0, 1.0);
     if share == 0.0 {
-        return vec4f(decoded(nearer.xyz), nearer.w);
+        return nearer;
     }
     first += max(images, 1u) * size.x * size.y;
     size = max(size / 2u, vec2u(1u));
     let farther = blend(first + before * size.x * size.y, size, place.uv, is_cube);
-    let values = mix(nearer, farther, share);
-    return vec4f(decoded(values.xyz), values.w);
+    return mix(nearer, farther, share);
 }
 
-// Linear colour and alpha of the image on a triangle, where a ray meets it.
-fn image_at(triangle: u32, part: Part, ray: vec3f, depth_m: f32, normal: vec3f, from_corner_m: vec3f) -> vec4f {
+// Place on the image of a triangle, where a ray meets it.
+fn place_at(triangle: u32, part: Part, ray: vec3f, depth_m: f32, normal: vec3f, from_corner_m: vec3f) -> ImagePlace {
     let step_x = turned_back(part, surface_step_m(ray, 2.0 * view.right_ray.xyz, depth_m, normal));
     let step_y = turned_back(part, surface_step_m(ray, 2.0 * view.down_ray.xyz, depth_m, normal));
     let rows = coordinates[triangle];
     let at = coordinates_of(triangle, from_corner_m) + vec3f(rows.u.w, rows.v.w, rows.w.w);
     let by_x = coordinates_of(triangle, step_x);
     let by_y = coordinates_of(triangle, step_y);
-    var place = ImagePlace(at.xy, by_x.xy, by_y.xy, 0u);
     if texels[part.flags.w + 3u] != 0u {
-        place = on_cube(at, by_x, by_y);
+        return on_cube(at, by_x, by_y);
     }
+    return ImagePlace(at.xy, by_x.xy, by_y.xy, 0u);
+}
+
+// Linear colour of the image of a part, and alpha.
+fn image_at(part: Part, place: ImagePlace) -> vec4f {
     let rgba = image_rgba(part.flags.w, place);
-    return vec4f(part.rgb.xyz * rgba.xyz, select(1.0, rgba.w, (part.flags.y & 8u) != 0u));
+    return vec4f(rgba.xyz, select(1.0, rgba.w, (part.flags.y & 8u) != 0u));
+}
+
+// How a surface shines: emission, specular strength, shininess and the metallic share.
+fn gloss_at(part: Part, place: ImagePlace) -> vec4f {
+    var gloss = vec4f(part.gloss.xyz, bitcast<f32>(part.maps.w));
+    if part.maps.x == 0u {
+        return gloss;
+    }
+    let numbers = image_values(part.maps.x, place);
+    gloss.w *= numbers.z;
+    let roughness = bitcast<f32>(part.maps.z);
+    if roughness >= 0.0 {
+        let width = pow(clamp(roughness * numbers.y, MIN_ROUGHNESS, 1.0), 2.0);
+        let exponent = min(2.0 / (width * width) - 2.0, SHININESS);
+        gloss.y *= (exponent + 2.0) / (USUAL_EXPONENT + 2.0);
+        gloss.z = exponent / SHININESS;
+    }
+    return gloss;
+}
+
+fn along_surface(gradient: vec3f, normal: vec3f) -> vec3f {
+    let along = gradient - normal * dot(normal, gradient);
+    return along / max(length(along), 1e-12);
+}
+
+// The normal of a part's relief, if it faces the eye.
+fn bent_normal(triangle: u32, part: Part, place: ImagePlace, normal: vec3f, to_eye: vec3f) -> vec3f {
+    if part.maps.y == 0u {
+        return normal;
+    }
+    let right = along_surface(turned(part, coordinates[triangle].u.xyz), normal);
+    let down = along_surface(turned(part, coordinates[triangle].v.xyz), normal);
+    let numbers = 2.0 * image_values(part.maps.y, place).xyz - 1.0;
+    let bent = normalize(right * numbers.x - down * numbers.y + normal * max(numbers.z, LEAST_UPRIGHT));
+    return select(normal, bent, dot(bent, to_eye) > 0.0);
 }
 
 // Linear colour of what a ray sees, and its alpha.
@@ -429,22 +476,28 @@ fn colour(triangle: u32, ray: vec3f) -> vec4f {
     let eye_direction = -normalize(ray);
     let outwards = normalize(turned(part, face.normal.xyz + bend * from_corner_m));
     let towards_eye = dot(outwards, eye_direction);
-    let normal = outwards * select(1.0, -1.0, towards_eye < 0.0);
+    var normal = outwards * select(1.0, -1.0, towards_eye < 0.0);
+    var gloss = vec4f(part.gloss.xyz, bitcast<f32>(part.maps.w));
     var base = vec3f(0.0);
+    var image = vec3f(1.0);
     var alpha = part.gloss.w;
     if part.flags.w != 0u {
-        let rgba = image_at(triangle, part, ray, depth_m, normal, from_corner_m);
-        base = rgba.xyz;
+        let place = place_at(triangle, part, ray, depth_m, normal, from_corner_m);
+        let rgba = image_at(part, place);
+        gloss = gloss_at(part, place);
+        normal = bent_normal(triangle, part, place, normal, eye_direction);
+        image = rgba.xyz;
+        base = part.rgb.xyz * image;
         alpha *= rgba.w;
     } else {
         base = albedo(part, point_m);
     }
     let open = select(1.0, 1.0 - CONTACT * darkness(point_m), part.flags.z != 0u);
     if view.extra.y > 0.0 {
-        return vec4f(lit_by_lamps(part, base, point_m, normal, eye_direction) * open, alpha);
+        return vec4f(lit_by_lamps(gloss, base, image, point_m, normal, eye_direction) * open, alpha);
     }
     let ambient = mix(view.from_below.xyz, view.from_above.xyz, normal.z * 0.5 + 0.5);
-    let unlit = base * (ambient + LAMP * abs(towards_eye));
+    let unlit = base * (ambient + LAMP * abs(dot(normal, eye_direction)));
     let facing_sun = dot(normal, view.to_sun.xyz);
     if facing_sun <= 0.0 {
         return vec4f(unlit * open, alpha);

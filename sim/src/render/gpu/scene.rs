@@ -5,9 +5,9 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{BindGroup, Buffer, BufferUsages};
 
 use super::device::Gpu;
-use super::images::SceneImages;
+use super::images::{PartHeads, SceneImages};
 use super::targets::bind;
-use crate::mjcf::{FileLight, LightKind, MAX_LIGHTS};
+use crate::mjcf::{FileLight, Gloss, LightKind, MAX_LIGHTS};
 use crate::render::cpu::contact::ContactMap;
 use crate::render::scene::bend::Bend;
 use crate::render::scene::prepared::{NOTHING, Prepared};
@@ -19,7 +19,7 @@ use crate::render::{Camera, Carrier, Part, Pattern, PlacedScenery, Scenery};
 const CAMERA_VECTORS: usize = 16;
 /// Count of numbers in `View`, and in `Part`.
 const VIEW_NUMBERS: usize = 4 * CAMERA_VECTORS + 5 * 4 + MAX_LIGHTS * LAMP_NUMBERS;
-const PART_NUMBERS: usize = 28;
+const PART_NUMBERS: usize = 32;
 /// Count of numbers in its `Lamp`.
 const LAMP_NUMBERS: usize = 36;
 /// Bits of `Part`'s flags.
@@ -36,8 +36,8 @@ pub(super) struct SceneBuffers {
     contacts: Buffer,
     coordinates: Buffer,
     texels: Buffer,
-    /// Index of the head of each part's image in `texels`.
-    heads: Vec<u32>,
+    /// Indices of the heads of each part's images in `texels`.
+    heads: Vec<PartHeads>,
     sky_head: u32,
     views: Vec<SceneView>,
     /// Views of the lamps that cast shadows.
@@ -255,7 +255,7 @@ fn placed_part(
     pose: Pose,
     [first, second]: [Vector; 2],
     grain: usize,
-    image_head: u32,
+    heads: PartHeads,
 ) -> [u32; PART_NUMBERS] {
     let (matrix, t) = (Matrix::from_quat(pose.rotation), pose.translation);
     let (x, y, z) = (matrix.row(0), matrix.row(1), matrix.row(2));
@@ -281,7 +281,10 @@ fn placed_part(
         | bit(part.is_veil(), IS_VEIL)
         | bit(part.is_cut_out(), IS_CUT_OUT)
         | bit(has_alpha, HAS_ALPHA);
-    let flags = [part.id, bits, (part.carrier == Carrier::Room).into(), image_head];
+    let flags = [part.id, bits, (part.carrier == Carrier::Room).into(), heads.colour];
+    let Gloss { roughness_factor, metallic_factor, .. } = part.gloss;
+    let shares = [roughness_factor.unwrap_or(-1.0), metallic_factor].map(f32::to_bits);
+    let flags = flags.into_iter().chain([heads.gloss, heads.relief]).chain(shares);
     for (number, bits) in numbers.iter_mut().zip(rows.as_flattened().iter().map(|x| x.to_bits()).chain(flags))
     {
         *number = bits;

@@ -2,12 +2,12 @@
 
 use rapier3d::math::Vector;
 
-use crate::mjcf::MAX_LIGHTS;
+use crate::mjcf::{MAX_LIGHTS, MIN_ROUGHNESS, SHININESS, USUAL_EXPONENT};
 use crate::render::cpu::contact::SINK_M;
 use crate::render::scene::camera::NEAR_M;
 use crate::render::scene::prepared::NOTHING;
-use crate::render::shading::image::BLENDED_SHARE;
-use crate::render::shading::lamps::{LAMP_BIAS_SHARE, LAMP_NORMAL_TEXELS, SHININESS};
+use crate::render::shading::image::{BLENDED_SHARE, LEAST_UPRIGHT};
+use crate::render::shading::lamps::{LAMP_BIAS_SHARE, LAMP_NORMAL_TEXELS};
 use crate::render::shading::pattern::{
     BANDS_PER_M, CHECKER_PER_M, LINES_PER_M, STRAY, TEXT_GAP, TEXT_PER_M, THREADS_PER_M, WORD_GAP,
     WORD_STRAY, WORDS_PER_M,
@@ -43,6 +43,9 @@ pub(super) fn text() -> String {
         ("BLENDED_SHARE", BLENDED_SHARE),
         ("MIN_SEEN_ALPHA", MIN_SEEN_ALPHA),
         ("SHININESS", SHININESS),
+        ("MIN_ROUGHNESS", MIN_ROUGHNESS),
+        ("USUAL_EXPONENT", USUAL_EXPONENT),
+        ("LEAST_UPRIGHT", LEAST_UPRIGHT),
         ("LAMP_NORMAL_TEXELS", LAMP_NORMAL_TEXELS),
         ("LAMP_BIAS_SHARE", LAMP_BIAS_SHARE),
     ];

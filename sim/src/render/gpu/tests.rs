@@ -145,6 +145,13 @@ const LIT: &str = r#"<asset>
         <texture type="skybox" builtin="gradient" rgb1="0.3 0.5 0.7" rgb2="0.9 0.8 0.6" width="64" height="384"/>
         <texture name="hole" type="2d" file="hole.png" nchannel="4"/>
         <material name="hole" texture="hole"/>
+        <texture name="bumps" type="2d" file="bumps.png"/>
+        <texture name="squares" type="2d" builtin="checker" rgb1="0.9 0.6 0.3" rgb2="0.3 0.3 0.9" width="8" height="8"/>
+        <material name="worn" rgba="1 0.9 0.8 1" roughness="0.6" metallic="0.7">
+            <layer role="rgb" texture="squares"/>
+            <layer role="orm" texture="bumps"/>
+            <layer role="normal" texture="bumps"/>
+        </material>
         <material name="shiny" rgba="0.7 0.2 0.2 1" specular="1" shininess="0.2" emission="0.1"/>
     </asset>
     <worldbody>
@@ -157,6 +164,8 @@ const LIT: &str = r#"<asset>
         <geom type="box" size="0.5 0.02 0.5" pos="1.8 1.2 0.8" euler="0 0 20" rgba="0.2 0.4 0.9 0.3"/>
         <geom type="ellipsoid" size="0.2 0.3 0.4" pos="1.6 1.4 0.8" rgba="0.9 0.9 0.2 0.6"/>
         <geom type="plane" size="0.4 0.4 1" pos="2.3 1 0.7" euler="60 0 0" material="hole"/>
+        <geom type="box" size="0.2 0.2 0.2" pos="2.9 1.3 0.2" euler="0 0 20" material="worn"/>
+        <geom type="cylinder" size="0.2 0.3" pos="1.1 1.4 0.3" material="worn"/>
     </worldbody>"#;
 
 #[test]
@@ -166,6 +175,10 @@ fn lights_of_files_blended_surfaces_and_skies_are_the_same() {
         image::Rgba([200, 120, 30, if x.abs_diff(16) + y.abs_diff(16) < 9 { 0 } else { 255 }])
     });
     hole.save(folder.path().join("hole.png")).expect("an image");
+    let bumps = image::RgbImage::from_fn(32, 32, |x, y| {
+        image::Rgb([100 + (x * 7 % 60) as u8, 100 + (y * 5 % 60) as u8, 225])
+    });
+    bumps.save(folder.path().join("bumps.png")).expect("an image");
     let file = folder.path().join("scene.xml");
     std::fs::write(&file, format!("<mujoco>{LIT}</mujoco>")).expect("a scene");
     let world = World::of_scene(Document::read(&file).expect("a scene")).expect("a world");

@@ -71,7 +71,8 @@ impl Negative<'_> {
 
 /// Returns the linear colour of a surface in an image.
 pub fn developed_rgb(seen: &SeenSurface, layers_rgb: [Vector; LAYERS], exposure_factor: f32) -> Vector {
-    let light_rgb = seen.albedo * (layers_rgb[DIRECT] + layers_rgb[INDIRECT]) + layers_rgb[COATED];
+    let light_rgb =
+        seen.albedo * (layers_rgb[DIRECT] + layers_rgb[INDIRECT]) + layers_rgb[COATED] * seen.coat_rgb();
     toned_rgb(light_rgb * exposure_factor)
 }
 

@@ -9,8 +9,9 @@ use super::lights::{Beam, Lights};
 use super::sequence::IndependentNumbers;
 use super::space::body::{MetSides, PointUv};
 use super::space::{Space, Spot};
+use crate::mjcf::Gloss;
 use crate::render::scene::prepared::Prepared;
-use crate::render::shading::image::{Image, ImagePlace};
+use crate::render::shading::image::{Image, ImagePlace, bent_normal};
 use crate::render::shading::lanes::Affine;
 use crate::render::{Pattern, PlacedScenery};
 
@@ -25,6 +26,8 @@ const MAX_PATH_VALUE: f32 = 6.0;
 /// of the distribution of its facets.
 const COAT: f32 = 0.04;
 const COAT_WIDTH_2: f32 = 0.015;
+/// Least roughness: what is smoother would show single paths.
+const MIN_COAT_ROUGHNESS: f32 = 0.2;
 
 /// Width of the spots that reflect light on others, for images on them.
 const REFLECTED_WIDTH_M: f32 = 0.02;
@@ -40,6 +43,15 @@ pub struct Scene<'a> {
     pub patterns: Vec<Affine>,
 }
 
+/// How a surface reflects, beyond its colour.
+#[derive(Clone, Copy)]
+pub struct Coat {
+    /// Reflectance along the normal.
+    base_share: f32,
+    /// Square of the width of the distribution of facets.
+    width_2_ratio: f32,
+}
+
 /// Layers of the light at a seen point. They are filtered separately.
 pub const LAYERS: usize = 3;
 /// Light of the lamps, that of everything else, both without the surface's colour, and the reflection in
@@ -52,6 +64,23 @@ pub const COATED: usize = 2;
 pub fn patterns(prepared: &Prepared, placed: &PlacedScenery) -> Vec<Affine> {
     let poses = placed.world_from_mesh.iter().enumerate();
     poses.map(|(part, pose)| prepared.pattern_from_world(part, *pose)).collect()
+}
+
+impl Coat {
+    /// Returns the clear coat of a surface that states nothing; otherwise a rougher one, or metal.
+    pub fn of(gloss: &Gloss) -> Coat {
+        let width_2_ratio = gloss.roughness_factor.map_or(COAT_WIDTH_2, |roughness| {
+            let squared = roughness.clamp(MIN_COAT_ROUGHNESS, 1.0) * roughness.clamp(MIN_COAT_ROUGHNESS, 1.0);
+            squared * squared
+        });
+        Coat { base_share: COAT + (1.0 - COAT) * gloss.metallic_factor, width_2_ratio }
+    }
+
+    /// Returns the share of light that is reflected. Source: Schlick 1994.
+    fn reflected(&self, cosine_value: f32) -> f32 {
+        let rest = 1.0 - cosine_value.clamp(0.0, 1.0);
+        self.base_share + (1.0 - self.base_share) * rest * rest * rest * rest * rest
+    }
 }
 
 impl Scene<'_> {
@@ -79,9 +108,18 @@ impl Scene<'_> {
         (rgb, 1.0)
     }
 
+    /// Returns the colour of the image on a surface of the colour `albedo`; 1 without.
+    pub fn texture_rgb(&self, spot: &Spot, albedo: Vector) -> Vector {
+        let part = spot.part as usize;
+        match self.prepared.images[part] {
+            Some(_) => albedo / self.prepared.linear_rgb[part][0].max(Vector::splat(f32::MIN_POSITIVE)),
+            None => Vector::ONE,
+        }
+    }
+
     fn image_place(&self, image: &Image, spot: &Spot, width_m: f32) -> ImagePlace {
         if image.from_mesh.is_none() {
-            let PointUv { uv, uv_1_m } = spot.uv;
+            let PointUv { uv, uv_1_m, .. } = spot.uv;
             let step_uv = uv_1_m * width_m;
             return ImagePlace { uv, x_step_uv: [step_uv, 0.0], y_step_uv: [0.0, step_uv], face: 0 };
         }
@@ -91,10 +129,39 @@ impl Scene<'_> {
         image.place(map.map(spot.point_m), by(across), by(spot.face_normal.cross(across)))
     }
 
+    /// Returns the gloss of a surface, as a mean over about `width_m`.
+    pub fn gloss(&self, spot: &Spot, width_m: f32) -> Gloss {
+        let gloss = self.prepared.scenery.parts[spot.part as usize].gloss;
+        match &self.prepared.images[spot.part as usize] {
+            Some(image @ Image { gloss: Some(texture), .. }) => {
+                gloss.at_texel(image.numbers(texture, &self.image_place(image, spot, width_m)))
+            }
+            _ => gloss,
+        }
+    }
+
+    /// Returns a surface with the normal of its relief, as a mean over about `width_m`.
+    pub fn with_relief(&self, spot: Spot, eye_direction: Vector, width_m: f32) -> Spot {
+        let Some(image @ Image { relief: Some(texture), .. }) = &self.prepared.images[spot.part as usize]
+        else {
+            return spot;
+        };
+        let gradients = match image.from_mesh {
+            None => spot.uv.gradients.map(Vector::from),
+            Some(_) => {
+                let [(right, _), (down, _), _] = self.patterns[spot.part as usize].0;
+                [right, down]
+            }
+        };
+        let numbers = image.numbers(texture, &self.image_place(image, &spot, width_m));
+        Spot { normal: bent_normal(spot.normal, eye_direction, gradients, numbers), ..spot }
+    }
+
     /// Adds the light of one point of a lamp to the layers of a seen point.
     pub fn light_directly(
         &self,
         spot: &Spot,
+        coat: Coat,
         view_ray: Vector,
         pair_values: [f32; 2],
         layers_rgb: &mut [Vector; LAYERS],
@@ -105,10 +172,10 @@ impl Scene<'_> {
             return;
         }
         let half_way = (beam.direction - view_ray).normalize();
-        let reflected = fresnel(half_way.dot(beam.direction));
+        let (reflected, width_2_ratio) = (coat.reflected(half_way.dot(beam.direction)), coat.width_2_ratio);
         let along_2 = half_way.dot(spot.normal).max(0.0).powi(2);
-        let spread = along_2 * (COAT_WIDTH_2 - 1.0) + 1.0;
-        let density = COAT_WIDTH_2 / (PI * spread * spread);
+        let spread = along_2 * (width_2_ratio - 1.0) + 1.0;
+        let density = width_2_ratio / (PI * spread * spread);
         layers_rgb[DIRECT] += lit_rgb * (1.0 - reflected);
         layers_rgb[COATED] += lit_rgb * (PI * density * reflected * 0.25);
     }
@@ -118,12 +185,13 @@ impl Scene<'_> {
     pub fn light_indirectly(
         &self,
         spot: &Spot,
+        coat: Coat,
         view_ray: Vector,
         [through, mirrored]: [[f32; 2]; 2],
         numbers: &mut IndependentNumbers,
         layers_rgb: &mut [Vector; LAYERS],
     ) {
-        let reflected = fresnel(-spot.normal.dot(view_ray));
+        let reflected = coat.reflected(-spot.normal.dot(view_ray));
         let direction = cosine_about(spot.normal, through);
         if direction.dot(spot.face_normal) > 0.0 {
             layers_rgb[INDIRECT] += self.arriving_rgb(spot.start_m, direction, numbers) * (1.0 - reflected);
@@ -131,7 +199,7 @@ impl Scene<'_> {
         // The less the coat reflects, the fewer paths follow it.
         let followed = (reflected * 5.0).min(1.0);
         if numbers.uniform() < followed {
-            let facet = facet_about(spot.normal, COAT_WIDTH_2, mirrored);
+            let facet = facet_about(spot.normal, coat.width_2_ratio, mirrored);
             let direction = view_ray - facet * (2.0 * view_ray.dot(facet));
             if direction.dot(spot.face_normal) > 0.0 {
                 let arriving_rgb = self.arriving_rgb(spot.start_m, direction, numbers);
@@ -185,10 +253,4 @@ impl Scene<'_> {
         }
         beam.rgb * facing
     }
-}
-
-/// Returns the share of light that the coat reflects. Source: Schlick 1994.
-fn fresnel(cosine_value: f32) -> f32 {
-    let rest = 1.0 - cosine_value.clamp(0.0, 1.0);
-    COAT + (1.0 - COAT) * rest * rest * rest * rest * rest
 }

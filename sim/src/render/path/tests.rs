@@ -5,6 +5,7 @@ use std::f32::consts::PI;
 
 use rapier3d::math::{Pose, Vector};
 
+use super::scene::Coat;
 use super::sequence::{PixelSeed, SampleCount};
 use super::view::PathView;
 use super::*;
@@ -145,7 +146,7 @@ fn a_red_wall_colours_the_floor_beside_it() {
 
 /// Returns some rows of an image of many paths through random points of each pixel, unfiltered.
 fn reference(view: &PathView, camera: &Camera, exposure_factor: f32) -> Vec<u8> {
-    let width = camera.width as usize;
+    let (width, coat) = (camera.width as usize, Coat::of(&Gloss::default()));
     let mut rgb = vec![0; camera.height as usize / REFERENCE_ROWS * width * 3];
     for_each_row(&mut rgb, width * 3, 2, |number, bytes| {
         let row = number * REFERENCE_ROWS;
@@ -159,7 +160,8 @@ fn reference(view: &PathView, camera: &Camera, exposure_factor: f32) -> Vec<u8> 
                 };
                 let ray = (spot.point_m - view.eye_m()).normalize();
                 let seed = PixelSeed::of([column as u32 + 512 * sample, row as u32 + 64]);
-                let [direct, indirect, coated] = view.scene.lit_layers(&spot, ray, seed, SampleCount(1));
+                let [direct, indirect, coated] =
+                    view.scene.lit_layers(&spot, coat, ray, seed, SampleCount(1));
                 lit_rgb += view.scene.albedo(&spot, 0.0) * (direct + indirect) + coated;
                 lit += 1.0;
             }

@@ -3,7 +3,7 @@
 
 use rapier3d::math::{Pose, Vector};
 
-use super::scene::{DIRECT, LAYERS, Scene};
+use super::scene::{Coat, DIRECT, LAYERS, Scene};
 use super::sequence::{PixelSeed, SampleCount};
 use super::space::Spot;
 use super::space::body::MetSides;
@@ -37,6 +37,8 @@ pub struct SeenSurface {
     pub point_m: Vector,
     pub normal: Vector,
     pub albedo: Vector,
+    /// Colour of its image alone; 1 without.
+    pub texture_rgb: Vector,
     pub gloss: Gloss,
 }
 
@@ -111,12 +113,13 @@ impl<'a> PathView<'a> {
 
     /// Returns the linear colour of a surface in an image of a rasteriser, with as much shadow as usual.
     pub fn rasterised_rgb(&self, seen: &SeenSurface) -> Vector {
-        let SeenSurface { point_m, normal, albedo, gloss, .. } = *seen;
+        let SeenSurface { point_m, normal, albedo, texture_rgb, gloss, .. } = *seen;
         let Scenery { light, lamps, .. } = &self.scene.prepared.scenery;
         let to_eye = (self.eye_m() - point_m).normalize_or_zero();
         if let Some(lamps) = lamps {
             let surface = LitSurface {
                 albedo,
+                texture_rgb,
                 gloss,
                 point_m,
                 normal,
@@ -158,8 +161,10 @@ impl<'a> PathView<'a> {
             let Some(spot) = &pixel.spot else { continue };
             let ray = (spot.point_m - self.eye_m()).normalize();
             let seed = PixelSeed::of([column as u32, row as u32]);
-            *layers_rgb = self.scene.lit_layers(spot, ray, seed, self.paths);
-            layers_rgb[DIRECT] += self.scene.lights.headlight_rgb(spot.normal.dot(self.back()));
+            let gloss = &pixel.seen.gloss;
+            *layers_rgb = self.scene.lit_layers(spot, Coat::of(gloss), ray, seed, self.paths);
+            let headlight_rgb = self.scene.lights.headlight_rgb(spot.normal.dot(self.back()));
+            layers_rgb[DIRECT] += headlight_rgb * (1.0 - gloss.metallic_factor);
         }
     }
 
@@ -188,11 +193,12 @@ impl<'a> PathView<'a> {
             let part = &self.scene.prepared.scenery.parts[spot.part as usize];
             part.is_cut_out() && self.scene.albedo_and_alpha(spot, self.pixel_m(spot)).1 >= MIN_SEEN_ALPHA
         };
+        let with_relief = |spot: Spot| self.scene.with_relief(spot, -ray, self.pixel_m(&spot));
         if let Some(spot) = self.veils(uv_px, most_m).into_iter().find(is_seen) {
-            return Some(((eye_m - spot.point_m).dot(self.back()), spot));
+            return Some(((eye_m - spot.point_m).dot(self.back()), with_relief(spot)));
         }
         let (depth_m, hit) = solid?;
-        Some((depth_m, self.scene.space.spot(eye_m, ray, &hit)))
+        Some((depth_m, with_relief(self.scene.space.spot(eye_m, ray, &hit))))
     }
 
     /// Returns the width of a pixel at the distance of a surface.
@@ -201,17 +207,24 @@ impl<'a> PathView<'a> {
     }
 
     fn seen(&self, spot: &Spot) -> SeenSurface {
+        let albedo = self.scene.albedo(spot, self.pixel_m(spot));
         SeenSurface {
             id: self.scene.prepared.scenery.parts[spot.part as usize].id,
             point_m: spot.point_m,
             normal: spot.normal,
-            albedo: self.scene.albedo(spot, self.pixel_m(spot)),
-            gloss: self.scene.prepared.scenery.parts[spot.part as usize].gloss,
+            albedo,
+            texture_rgb: self.scene.texture_rgb(spot, albedo),
+            gloss: self.scene.gloss(spot, self.pixel_m(spot)),
         }
     }
 }
 
 impl SeenSurface {
+    /// Returns the colour of what the surface reflects of white light: metal has its own.
+    pub fn coat_rgb(&self) -> Vector {
+        Vector::ONE + (self.albedo - Vector::ONE) * self.gloss.metallic_factor
+    }
+
     /// Returns 1 for a point of the same surface, less for another, and 0 for that of another thing.
     pub fn likeness(&self, other: &SeenSurface) -> f32 {
         if self.id != other.id {
@@ -231,6 +244,7 @@ impl Scene<'_> {
     pub fn lit_layers(
         &self,
         spot: &Spot,
+        coat: Coat,
         view_ray: Vector,
         seed: PixelSeed,
         paths: SampleCount,
@@ -239,13 +253,13 @@ impl Scene<'_> {
         let lamp_points = SampleCount(paths.0 * LAMP_POINTS);
         for sample in 0..lamp_points.0 {
             let pair_values = seed.spread(FOR_LAMPS, sample, lamp_points);
-            self.light_directly(spot, view_ray, pair_values, &mut layers_rgb);
+            self.light_directly(spot, coat, view_ray, pair_values, &mut layers_rgb);
         }
         let mut sum_rgb = layers_rgb.map(|rgb| rgb / LAMP_POINTS as f32);
         for sample in 0..paths.0 {
             let pairs = [FOR_LIGHT, FOR_COAT].map(|purpose| seed.spread(purpose, sample, paths));
             let mut numbers = seed.independent(FOR_LIGHT, sample);
-            self.light_indirectly(spot, view_ray, pairs, &mut numbers, &mut sum_rgb);
+            self.light_indirectly(spot, coat, view_ray, pairs, &mut numbers, &mut sum_rgb);
         }
         sum_rgb.map(|rgb| rgb / paths.0 as f32)
     }

@@ -158,7 +158,10 @@ impl Scenery {
         }
         let lamps = world.lights().map(lamps);
         let focus_radius_m = if lamps.is_some() { LAMPS_FOCUS_RADIUS_M } else { FOCUS_RADIUS_M };
-        Scenery { parts, focus_radius_m, light: Light::default(), lamps, sky: world.sky().cloned() }
+        // As in MuJoCo, nothing is behind a scene with lights that has no sky.
+        let dark = || lamps.is_some().then(|| Arc::new(Texture::plain([0; 3])));
+        let sky = world.sky().cloned().or_else(dark);
+        Scenery { parts, focus_radius_m, light: Light::default(), lamps, sky }
     }
 
     /// Returns the poses of all parts after `step`, which must be a step of this scenery's world.

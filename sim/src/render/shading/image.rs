@@ -12,6 +12,9 @@ use crate::mjcf::{SurfaceImage, Texture, TextureLevel, TextureMapping};
 #[derive(Clone)]
 pub struct Image {
     pub texture: Arc<Texture>,
+    /// Numbers at the same places, as in [`SurfaceImage`].
+    pub gloss: Option<Arc<Texture>>,
+    pub relief: Option<Arc<Texture>>,
     /// Map from the part's mesh to coordinates that [`Image::place`] takes; `None` if the mesh gives
     /// texture coordinates.
     pub from_mesh: Option<Affine>,
@@ -40,6 +43,8 @@ const LIGHT_VALUES: usize = 256 * LIGHT_STEPS;
 static LIGHT: LazyLock<[f32; LIGHT_VALUES]> =
     LazyLock::new(|| std::array::from_fn(|step| linear([step as f32 / (255 * LIGHT_STEPS) as f32; 3]).x));
 
+/// Least number along the surface's own normal in a relief.
+pub const LEAST_UPRIGHT: f32 = 0.05;
 /// Part of the way from one level to the next in which both are blended.
 pub const BLENDED_SHARE: f32 = 0.5;
 
@@ -64,14 +69,23 @@ impl Image {
         let is_cube = matches!(image.mapping, TextureMapping::Cube { .. });
         let has_faces = is_cube && image.texture.images() > 1;
         let last_level = (image.texture.levels.len() - 1) as f32;
-        Image { texture: image.texture.clone(), from_mesh, is_cube, has_faces, last_level }
+        Image {
+            texture: image.texture.clone(),
+            gloss: image.gloss.clone(),
+            relief: image.relief.clone(),
+            from_mesh,
+            is_cube,
+            has_faces,
+            last_level,
+        }
     }
 
     /// Returns the image of a sky.
     pub fn around(texture: &Arc<Texture>) -> Image {
         let last_level = (texture.levels.len() - 1) as f32;
         let has_faces = texture.images() > 1;
-        Image { texture: texture.clone(), from_mesh: None, is_cube: true, has_faces, last_level }
+        let texture = texture.clone();
+        Image { texture, gloss: None, relief: None, from_mesh: None, is_cube: true, has_faces, last_level }
     }
 
     /// Returns the linear colour of the sky along a ray of the world, as a mean over about a step in x and y.
@@ -103,19 +117,7 @@ impl Image {
     /// Returns the linear colour at a place and its alpha, which is 1 for images without.
     #[inline(always)]
     pub fn rgb_and_alpha(&self, place: &ImagePlace) -> ([f32; 3], f32) {
-        let levels = &self.texture.levels;
-        let [width, height] = levels[0].size_px;
-        let texels_2 = |[u, v]: [f32; 2]| (u * width) * (u * width) + (v * height) * (v * height);
-        let level = 0.5 * log2(texels_2(place.x_step_uv).max(texels_2(place.y_step_uv)));
-        let level = level.max(0.0).min(self.last_level);
-        let (whole, part) = (level.floor(), level - level.floor());
-        let share = ((part - 0.5) / BLENDED_SHARE + 0.5).clamp(0.0, 1.0);
-        let nearer = index(whole) + usize::from(share == 1.0);
-        let mut texel = blend(&levels[nearer], place, self.is_cube);
-        if share > 0.0 && share < 1.0 {
-            let farther = blend(&levels[nearer + 1], place, self.is_cube);
-            texel = lanes(|i| texel[i] + (farther[i] - texel[i]) * share);
-        }
+        let texel = texel(&self.texture.levels, self.last_level, place, self.is_cube);
         let light = &*LIGHT;
         let rgb = axes(
             #[inline(always)]
@@ -123,9 +125,52 @@ impl Image {
         );
         (rgb, if self.texture.has_alpha { texel[3] / 255.0 } else { 1.0 })
     }
+
+    /// Returns numbers of a texture at a place, each 0 to 1.
+    #[inline(always)]
+    pub fn numbers(&self, texture: &Texture, place: &ImagePlace) -> [f32; 3] {
+        let last_level = (texture.levels.len() - 1) as f32;
+        let place = ImagePlace { face: 0, ..*place };
+        let [first, second, third, _] = texel(&texture.levels, last_level, &place, self.is_cube);
+        [first / 255.0, second / 255.0, third / 255.0]
+    }
 }
 
-/// Returns the sRGB values, 0 to 255, at a place on one level, blended between four texels.
+/// Returns the unit normal of a relief on a surface with the normal `normal`, if it faces the eye. The gradients
+/// of the image's coordinates need no length. Source: Blinn 1978, for heights whose normals are given.
+#[inline(always)]
+pub fn bent_normal(
+    normal: Vector,
+    eye_direction: Vector,
+    [right, down]: [Vector; 2],
+    [x, y, z]: [f32; 3],
+) -> Vector {
+    let along = |gradient: Vector| (gradient - normal * normal.dot(gradient)).normalize_or_zero();
+    let (right, down) = (along(right), along(down));
+    let [x, y, z] = [x, y, z].map(|number| 2.0 * number - 1.0);
+    let bent = (right * x - down * y + normal * z.max(LEAST_UPRIGHT)).normalize_or(normal);
+    if bent.dot(eye_direction) > 0.0 { bent } else { normal }
+}
+
+/// Returns the values, 0 to 255, at a place, as a mean over about a step in x and in y.
+#[inline(always)]
+fn texel(levels: &[TextureLevel], last_level: f32, place: &ImagePlace, is_cube: bool) -> Lanes<4> {
+    let [width, height] = levels[0].size_px;
+    let texels_2 = |[u, v]: [f32; 2]| (u * width) * (u * width) + (v * height) * (v * height);
+    let level = 0.5 * log2(texels_2(place.x_step_uv).max(texels_2(place.y_step_uv)));
+    let level = level.max(0.0).min(last_level);
+    let (whole, part) = (level.floor(), level - level.floor());
+    let share = ((part - 0.5) / BLENDED_SHARE + 0.5).clamp(0.0, 1.0);
+    let nearer = index(whole) + usize::from(share == 1.0);
+    let mut texel = blend(&levels[nearer], place, is_cube);
+    if share > 0.0 && share < 1.0 {
+        let farther = blend(&levels[nearer + 1], place, is_cube);
+        texel = lanes(|i| texel[i] + (farther[i] - texel[i]) * share);
+    }
+    texel
+}
+
+/// Returns the values, 0 to 255, at a place on one level, blended between four texels.
 #[inline(always)]
 fn blend(level: &TextureLevel, place: &ImagePlace, is_cube: bool) -> Lanes<4> {
     let [u, v] = place.uv;

@@ -6,10 +6,8 @@ use rapier3d::math::{Pose, Vector};
 use super::TEXELS;
 use super::lanes::Affine;
 use super::power::{file_value, linear_value, power};
-use crate::mjcf::{FileLight, Gloss, Headlight, LightKind};
+use crate::mjcf::{FileLight, Gloss, Headlight, LightKind, SHININESS};
 
-/// Factor from shininess to the exponent of highlights.
-pub const SHININESS: f32 = 128.0;
 /// Maximum angle from the direction of a lamp in which it casts shadows.
 const MAX_SHADOW_RAD: f32 = 75.0 * std::f32::consts::PI / 180.0;
 /// Offset of the lookup point along the normal, in texels of a lamp's map at its distance, and the part of
@@ -21,6 +19,8 @@ pub const LAMP_BIAS_SHARE: f32 = 0.002;
 pub struct LitSurface {
     /// Linear colour.
     pub albedo: Vector,
+    /// Linear colour of the image alone, which multiplies all light; 1 without.
+    pub texture_rgb: Vector,
     pub gloss: Gloss,
     pub point_m: Vector,
     /// Unit vectors: outwards, to the eye, and from the camera's target to the camera.
@@ -64,23 +64,31 @@ pub fn shown_rgb(
         surface.gloss.specular_factor * power(surface.normal.dot(half_way).max(0.0), exponent)
     };
     let facing = surface.normal.dot(surface.back_direction).max(0.0);
+    let file_values = |rgb: Vector| Vector::new(file_value(rgb.x), file_value(rgb.y), file_value(rgb.z));
+    let (own, most) = (file_values(surface.albedo), file_values(surface.texture_rgb));
+    let tint = most + (own - most) * surface.gloss.metallic_factor;
+    let limited = |lit: Vector, glossy: Vector| (own * lit + glossy * tint).min(most);
     let mut lit = Vector::splat(surface.gloss.emission_factor) + ambient_rgb + diffuse_rgb * facing;
     let mut glossy = if facing > 0.0 { specular_rgb * shine(surface.back_direction) } else { Vector::ZERO };
+    let mut shown = Vector::ZERO;
     for (number, light) in lights.iter().enumerate() {
         let (towards, _, share) = arriving(light, surface.point_m);
         let share = if share > 0.0 { share * sunlit(number) } else { 0.0 };
         let facing = surface.normal.dot(towards);
-        lit += light.ambient_rgb * share;
+        let mut own_lit = light.ambient_rgb * share;
+        let mut own_glossy = Vector::ZERO;
         if facing > 0.0 && share > 0.0 {
-            lit += light.diffuse_rgb * (share * facing);
-            glossy += light.specular_rgb * (share * shine(towards));
+            own_lit += light.diffuse_rgb * (share * facing);
+            own_glossy = light.specular_rgb * (share * shine(towards));
+        }
+        // MuJoCo limits the light of each lamp with shadows by itself.
+        if light.casts_shadow {
+            shown += limited(own_lit, own_glossy);
+        } else {
+            (lit, glossy) = (lit + own_lit, glossy + own_glossy);
         }
     }
-    let shown = |axis: usize| {
-        let value = file_value(surface.albedo[axis]) * lit[axis] + glossy[axis];
-        linear_value(value.min(1.0))
-    };
-    Vector::new(shown(0), shown(1), shown(2))
+    linear_light((shown + limited(lit, glossy)).min(Vector::ONE))
 }
 
 /// Returns the value of the file as linear light.

@@ -81,6 +81,8 @@ pub struct BodyPoint {
 pub struct PointUv {
     pub uv: [f32; 2],
     pub uv_1_m: f32,
+    /// Directions in which each of them grows, of any length.
+    pub gradients: [Vec3A; 2],
 }
 
 impl Body {
@@ -157,20 +159,24 @@ impl Body {
         let face_normal = first_m.cross(second_m).normalize_or_zero();
         let normal = normal.normalize_or(face_normal);
         let uv = self.corner_uv.get(hit.triangle as usize);
-        let uv = uv.map(|uvs| PointUv::of(uvs, weights, first_m.cross(second_m).length()));
+        let uv = uv.map(|uvs| PointUv::of(uvs, weights, [first_m, second_m]));
         BodyPoint { part, point_m, curved_m, normal, face_normal, uv: uv.unwrap_or_default() }
     }
 }
 
 impl PointUv {
-    /// Blends the coordinates at the corners of a triangle with twice this area.
-    fn of([a, b, c]: &[[f32; 2]; 3], [at_a, at_b, at_c]: [f32; 3], twice_area_m2: f32) -> PointUv {
+    /// Blends the coordinates at the corners of a triangle with these edges.
+    fn of([a, b, c]: &[[f32; 2]; 3], [at_a, at_b, at_c]: [f32; 3], edges_m: [Vec3A; 2]) -> PointUv {
+        let face = edges_m[0].cross(edges_m[1]);
+        let twice_area_m2 = face.length();
+        let across = [edges_m[1].cross(face), face.cross(edges_m[0])];
         let edge = |to: &[f32; 2]| [to[0] - a[0], to[1] - a[1]];
         let (first, second) = (edge(b), edge(c));
         let twice_area = (first[0] * second[1] - first[1] * second[0]).abs();
         PointUv {
             uv: std::array::from_fn(|axis| a[axis] * at_a + b[axis] * at_b + c[axis] * at_c),
             uv_1_m: (twice_area / twice_area_m2.max(f32::MIN_POSITIVE)).sqrt(),
+            gradients: std::array::from_fn(|axis| across[0] * first[axis] + across[1] * second[axis]),
         }
     }
 }

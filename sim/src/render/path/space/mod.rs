@@ -151,7 +151,10 @@ impl Thing<'_> {
             curved_m: world_from_body * point.curved_m + self.body_in_world_m,
             normal: world_from_body * point.normal,
             face_normal: world_from_body * point.face_normal,
-            uv: point.uv,
+            uv: PointUv {
+                gradients: point.uv.gradients.map(|gradient| world_from_body * gradient),
+                ..point.uv
+            },
         }
     }
 

@@ -1,0 +1,119 @@
+//! Images on surfaces: colours, gloss and normals of points that are shaded together.
+
+use rapier3d::math::Vector;
+
+use super::shade::{Facet, Rays};
+use crate::mjcf::Gloss;
+use crate::render::shading::SAMPLES;
+use crate::render::shading::image::{Image, ImagePlace, bent_normal};
+use crate::render::shading::lanes::{Lanes, axes, lanes};
+
+/// Surface at several points, without light.
+pub(super) struct ShownSurface<const N: usize> {
+    /// Linear colours.
+    pub albedo: [Lanes<N>; 3],
+    /// Linear colours of the image alone; 1 without.
+    pub texture: [Lanes<N>; 3],
+    pub alpha: Lanes<N>,
+    /// Normals of any length.
+    pub normal: [Lanes<N>; 3],
+    /// Emission, specular strength, shininess and metallic share.
+    pub gloss: [Lanes<N>; 4],
+}
+
+/// Returns emission, specular strength, shininess and metallic share of several points.
+#[inline(always)]
+pub(super) fn gloss_lanes<const N: usize>(gloss: Gloss) -> [Lanes<N>; 4] {
+    let Gloss { emission_factor, specular_factor, shininess_factor, metallic_factor, .. } = gloss;
+    [emission_factor, specular_factor, shininess_factor, metallic_factor].map(|value| [value; N])
+}
+
+impl Facet {
+    /// Returns the surface with an image at points that have rays, places, normals and depths.
+    #[inline(always)]
+    pub(super) fn shown<const N: usize>(
+        &self,
+        image: &Image,
+        rays: &Rays,
+        [ray, point_m, normal]: [&[Lanes<N>; 3]; 3],
+        depth_m: &Lanes<N>,
+    ) -> ShownSurface<N> {
+        let at = self.pattern_from_world.map_lanes(point_m);
+        let along_ray = self.pattern_from_world.derivatives(ray);
+        let facing: Lanes<N> = lanes(|i| {
+            let facing = normal[0][i] * ray[0][i] + normal[1][i] * ray[1][i] + normal[2][i] * ray[2][i];
+            if facing == 0.0 { f32::INFINITY } else { facing }
+        });
+        let by = |step: Vector| self.image_step(step, [&along_ray, normal], &facing, depth_m);
+        let (x, y) = (by(rays.right_ray * SAMPLES as f32), by(rays.down_ray * SAMPLES as f32));
+        let mut shown = ShownSurface {
+            albedo: [[0.0; N]; 3],
+            texture: [[0.0; N]; 3],
+            alpha: [1.0; N],
+            normal: *normal,
+            gloss: gloss_lanes(self.gloss),
+        };
+        for i in 0..N {
+            let place = image.place(
+                [at[0][i], at[1][i], at[2][i]],
+                [x[0][i], x[1][i], x[2][i]],
+                [y[0][i], y[1][i], y[2][i]],
+            );
+            let (rgb, alpha_here) = image.rgb_and_alpha(&place);
+            shown.alpha[i] = alpha_here;
+            for axis in 0..3 {
+                shown.texture[axis][i] = rgb[axis];
+                shown.albedo[axis][i] = rgb[axis] * self.linear_rgb[0][axis];
+            }
+            if image.gloss.is_some() || image.relief.is_some() {
+                let here = |vectors: &[Lanes<N>; 3]| Vector::new(vectors[0][i], vectors[1][i], vectors[2][i]);
+                self.add_layers(&mut shown, i, image, &place, [here(ray), here(normal)]);
+            }
+        }
+        shown
+    }
+
+    /// Sets gloss and normal at one point of a surface whose image has layers for them.
+    fn add_layers<const N: usize>(
+        &self,
+        shown: &mut ShownSurface<N>,
+        i: usize,
+        image: &Image,
+        place: &ImagePlace,
+        [ray, normal]: [Vector; 2],
+    ) {
+        if let Some(texture) = &image.gloss {
+            let here: [Lanes<1>; 4] = gloss_lanes(self.gloss.at_texel(image.numbers(texture, place)));
+            shown.gloss.iter_mut().zip(here).for_each(|(lanes, [value])| lanes[i] = value);
+        }
+        if let Some(texture) = &image.relief {
+            let towards_eye = normal.normalize_or_zero() * 1f32.copysign(-normal.dot(ray));
+            let [(right, _), (down, _), _] = self.pattern_from_world.0;
+            let bent = bent_normal(towards_eye, -ray, [right, down], image.numbers(texture, place));
+            shown.normal.iter_mut().zip(bent.to_array()).for_each(|(lanes, value)| lanes[i] = value);
+        }
+    }
+
+    /// Returns the differences of image coordinates between points and those that rays meet on the same
+    /// plane which are turned by `step_ray`. Points have derivatives of the coordinates along their rays,
+    /// normals, and scalar products of both.
+    #[inline(always)]
+    fn image_step<const N: usize>(
+        &self,
+        step_ray: Vector,
+        [along_ray, normal]: [&[Lanes<N>; 3]; 2],
+        facing: &Lanes<N>,
+        depth_m: &Lanes<N>,
+    ) -> [Lanes<N>; 3] {
+        let deeper: Lanes<N> = lanes(|i| {
+            (normal[0][i] * step_ray.x + normal[1][i] * step_ray.y + normal[2][i] * step_ray.z) / facing[i]
+        });
+        axes(
+            #[inline(always)]
+            |row| {
+                let along_step = self.pattern_from_world.0[row].0.dot(step_ray);
+                lanes(|i| (along_step - along_ray[row][i] * deeper[i]) * depth_m[i])
+            },
+        )
+    }
+}
