@@ -6,7 +6,6 @@ use std::sync::Arc;
 use rapier3d::math::Vector;
 use roxmltree::Node;
 
-use super::looks::SurfacePattern;
 use super::texture::Texture;
 use crate::SimError;
 use crate::mjcf::Document;
@@ -87,17 +86,13 @@ impl TextureRepeats {
 }
 
 impl SurfaceImage {
-    /// Returns the image of a material on a shape; `None` if its texture has none, and for tiles.
+    /// Returns the image of a material on a shape; `None` if its texture has none.
     pub(in crate::mjcf) fn of(
         document: &Document,
         material: &mjcf_rs::assets::Material,
         shape: impl FnOnce() -> MappedShape,
     ) -> Option<SurfaceImage> {
         let name = material.texture.as_ref()?;
-        let pattern = material.name.as_ref().and_then(|name| document.looks.patterns.get(name));
-        if pattern == Some(&SurfacePattern::Tiles) {
-            return None;
-        }
         // A single texel is a plain colour, which the geom has.
         let texture = document.texture(name).filter(|texture| texture.levels[0].texels.len() > 1)?.clone();
         let kind = document.model.assets.texture(name)?.type_.as_deref();
