@@ -33,6 +33,11 @@ pub enum SimError {
     )]
     WithoutOnnx { path: String },
     #[error(
+        "controller `{name}` drives legs and waist alone; a velocity policy without `looped:` can drive all \
+         motors"
+    )]
+    NoMotorController { name: String },
+    #[error(
         "this build cannot draw on a graphics processor: that is an extra; build with `cargo build --release \
          --features gpu`"
     )]

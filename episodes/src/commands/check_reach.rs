@@ -6,7 +6,6 @@ use tandem_tools_spec::{CheckReach, HandReach, ReachReply};
 
 use super::motion::{Motion, Reach};
 use super::move_wrists::wrist_targets;
-use super::upper_body::STEPS_AHEAD_M;
 use crate::convert::coarse;
 
 /// Returns the reply to `check_reach`.
@@ -16,14 +15,15 @@ pub fn check_reach(args: &CheckReach, motion: &Motion) -> ReachReply {
         right: (args.right_position_m, args.right_quaternion_wxyz),
     };
     let targets = wrist_targets(halves, args.frame.unwrap_or_default(), motion);
-    let Reach { errors, joints_at_limit, ahead_m } = motion.reach(&targets, args.keep_waist.unwrap_or(false));
+    let Reach { errors, joints_at_limit, has_to_step } =
+        motion.reach(&targets, args.keep_waist.unwrap_or(false));
     let hands = Sides::from_fn(|side| errors[side].map(|error| hand_reach(error, &motion.tolerance(side))));
     ReachReply {
         robot: args.robot.clone(),
         reachable: hands.iter().flatten().all(|hand| hand.reachable),
         left: hands.left,
         right: hands.right,
-        needs_a_step: ahead_m > STEPS_AHEAD_M,
+        needs_a_step: has_to_step,
         joints_at_limit,
     }
 }

@@ -107,8 +107,8 @@ pub struct Reach {
     pub errors: Sides<Option<FrameError>>,
     /// Joints that would be at their limits.
     pub joints_at_limit: Vec<String>,
-    /// Forward displacement of the whole robot's centre of mass, compared with resting arms.
-    pub ahead_m: f64,
+    /// True if its joints move the robot's centre of mass beyond the limit, and farther than now.
+    pub has_to_step: bool,
 }
 
 /// Force at which the pair of hands moves at 1 m/s, or moment at which it turns at 1 rad/s; `None` if stiff.
@@ -461,7 +461,7 @@ impl Motion {
         let at_limit = tandem_ik::saturated(&configuration).into_iter();
         let at_limit = at_limit.filter(|joint| speeds_rad_s[*joint] > 0.0);
         let joints_at_limit = at_limit.map(|joint| self.body.model.joints()[joint].name.clone()).collect();
-        Reach { errors, joints_at_limit, ahead_m: self.ahead_m(&twin.state.upper_rad) }
+        Reach { errors, joints_at_limit, has_to_step: self.has_to_step(&twin.state.upper_rad) }
     }
 
     /// Returns the poses of `aims` with the yielding, in the pelvis frame; `None` for joints.

@@ -62,22 +62,22 @@ const GRASPING: &str = "Fingers that are stopped short of their targets press: a
     leave over the stops, the way you came; fingers that stay bent hook under a bar. Stand with the pelvis \
     stand_behind_m behind the places of both hands, and in the middle between them: nearer by, thighs and \
     knees push what stands on legs. Who carries with partners lets the hands give way (compliance_n_s_m \
-    250) from when the thing is lifted, by its legs while it is lifted, too, until it is over its goal; \
-    stiff hands lower it.";
+    250) from when the thing is lifted, by its legs while it is lifted, too, until it stands at its goal.";
 
 /// Text for policies that have `walk_to`. The tests `a_robot_pushes_a_trolley_by_one_call` and
 /// `two_robots_carry_a_basket_by_one_call` check it.
-const CARRYING: &str = " To push, and to carry together: grip, and lift what is to be lifted by 0.09 m with \
-    compliance_n_s_m 250; then call walk_to with carry, once, with every robot that holds the load, each \
-    with its own place: where it stands now, moved by what the load is to move, in its own start frame \
-    (room says how these lie to each other: a partner who faces you goes to its left where you go to your \
-    right). Hands keep their places to the robots and their height; about 300 steps and 270 a metre. As long as several \
-    hold it, name each of them in every command, with compliance_n_s_m 250: the hands of one that is not \
-    named stay stiff, and lead it away. To set down, bring the wrists down again by steps of 0.03 m with \
-    compliance_n_s_m 250 once both stand: a thing has touched when force_n along z falls towards 0, as \
-    from -4.4 to -2.0. Open as you are, with compliance_n_s_m 250 and the wrist poses that the last reply \
-    tells, until grip is \"none\", and only then leave over the stops: a hand that turns stiff while it \
-    holds pulls its robot from where it stands.";
+const CARRYING: &str = " To push, and to carry together: grip, and lift what is to be lifted by 0.09 m \
+    with compliance_n_s_m 250; then call walk_to with carry, once, with every robot that holds the load, \
+    each with its own place: where it stands now, moved by what the load is to move (with frame \"room\" \
+    by the same numbers for all; in start frames a partner who faces you goes to its left where you go to \
+    your right). Hands keep their places to the robots and their height; about 300 steps and 270 a metre. \
+    As long as several hold it, name each of them in every command, with compliance_n_s_m 250: the hands \
+    of one that is not named stay stiff, and lead it away. To set down, bring the wrists down again by \
+    steps of 0.03 m with compliance_n_s_m 250 once both stand: a thing has touched when force_n along z \
+    rises by 1.5 N or more (get_status with explain tells its height over the floor, lowest_m). Open as \
+    you are, with compliance_n_s_m 250 and the wrist poses that get_robot_state tells, until grip is \
+    \"none\", and only then leave over the stops: a hand that turns stiff while it holds pulls its robot \
+    from where it stands.";
 
 const NAMED_FRAMES: &str = " Tools that take `frame` know \"pelvis\"; \"level\", the same but upright: z \
     against gravity, x the way the robot faces (a robot that crouches or carries leans by up to 0.1 rad, \

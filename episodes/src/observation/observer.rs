@@ -38,6 +38,8 @@ pub struct Observer {
 struct NamedObject {
     /// Name in the description of the room. That of a part begins with the object's.
     name: String,
+    /// Name of the task's object that it belongs to; its own, if it is one.
+    owner: String,
     /// Id in [`Frame::ids`].
     id: u32,
 }
@@ -55,12 +57,16 @@ fn named_objects(spec: &EpisodeSpec, world: &World) -> Vec<NamedObject> {
     let is_part_of = |own: &str, object: &str| {
         own.strip_prefix(object).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
     };
+    let owner_of = |own: &str| {
+        let owners = spec.task.objects.iter().filter(|spot| is_part_of(own, &spot.name));
+        owners.map(|spot| &spot.name).max_by_key(|name| name.len())
+    };
     let models = world.object_models().enumerate();
-    let of_task =
-        models.filter(|(_, (own, _))| spec.task.objects.iter().any(|spot| is_part_of(own, &spot.name)));
-    of_task
-        .map(|(object, (own, _))| NamedObject { name: told_name(own), id: object_id(world, object) })
-        .collect()
+    let named = models.filter_map(|(object, (own, _))| {
+        let owner = told_name(owner_of(own)?);
+        Some(NamedObject { name: told_name(own), owner, id: object_id(world, object) })
+    });
+    named.collect()
 }
 
 /// Returns the renderer of the episode `spec`.
@@ -286,7 +292,10 @@ impl Observer {
     fn object_ids(&self, name: &str) -> Result<BTreeSet<u32>, EpisodeError> {
         let asked = told_name(name);
         let part = format!("{asked} ");
-        let is_it = |object: &&NamedObject| object.name == asked || object.name.starts_with(&part);
+        // An object of its own may have a longer name: a basket and a basket patch.
+        let is_it = |object: &&NamedObject| {
+            object.name == asked || object.name.starts_with(&part) && !object.owner.starts_with(&part)
+        };
         let ids: BTreeSet<u32> = self.objects.iter().filter(is_it).map(|object| object.id).collect();
         match ids.is_empty() {
             false => Ok(ids),

@@ -31,6 +31,10 @@ enum LocomotionPart {
     Bench {
         #[command(flatten)]
         locomotion: LocomotionFlag,
+        /// Let the policy drive all motors with its own gains, as `send_joint_drives` does, rather than legs and
+        /// waist alone. Cases of teams are left out.
+        #[arg(long, requires = "file")]
+        motors: bool,
         #[command(flatten)]
         sensing: SensingFlags,
         /// Robot: `g1_dex3` with the effort limits of Unitree's MJCF, `g1_dex3_urdf_efforts` with those of
@@ -52,15 +56,18 @@ enum LocomotionPart {
 
 /// Plays the cases, prints a line per case as it ends and a summary, and writes JSON if a file is named.
 pub fn run(args: LocomotionArgs) -> CommandResult {
-    let LocomotionPart::Bench { locomotion, sensing, robot, cases, seeds, json } = args.part;
+    let LocomotionPart::Bench { locomotion, motors, sensing, robot, cases, seeds, json } = args.part;
     let robot = match ROBOTS.contains(&robot.as_str()) {
         true => RobotFile::Embedded(robot),
         false => read_robot(Some(Path::new(&robot)))?,
     };
     println!("{}", CaseReport::HEAD);
     let (controller, sensing) = (locomotion.controller(), sensing.sensing());
-    let report =
-        bench::locomotion(&robot, &controller, sensing, &cases, &seeds.0, |case| println!("{case}"))?;
+    let done = |case: &CaseReport| println!("{case}");
+    let report = match motors {
+        true => bench::motors(&robot, &controller, sensing, &cases, &seeds.0, done)?,
+        false => bench::locomotion(&robot, &controller, sensing, &cases, &seeds.0, done)?,
+    };
     println!("{}", report.settings());
     if let Some(path) = json {
         std::fs::write(path, serde_json::to_string_pretty(&report)?)?;

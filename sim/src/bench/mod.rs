@@ -106,17 +106,36 @@ pub fn is_asked(filter: &str, case: &str) -> bool {
     filter.split(',').any(|word| case.contains(word))
 }
 
+/// Controller under test.
+#[derive(Clone, Copy, Debug)]
+pub enum Subject<'a> {
+    /// A base controller, under the arms' own drives.
+    Base(&'a LocomotionChoice),
+    /// A policy that drives all motors by itself.
+    Motors(&'a LocomotionChoice),
+}
+
+impl Subject<'_> {
+    /// Returns the name in reports; `motors:` marks a policy that drives all motors.
+    fn name(&self) -> String {
+        match self {
+            Subject::Base(choice) => choice.name(),
+            Subject::Motors(choice) => format!("motors:{}", choice.name()),
+        }
+    }
+}
+
 /// Runs every case that matches `filter`, on these seeds, with a robot named `robot` in the results.
 /// `done` is called after each case. Speeds, heights, loads and forces of the cases are those of a G1; a
 /// robot of another size has scaled ones.
 ///
 /// # Errors
 ///
-/// Returns an error if a world cannot be built or physics diverges.
+/// Returns an error if a world cannot be built, physics diverges, or the subject cannot drive the motors.
 pub fn run(
     robot: &str,
     model: &Arc<RobotModel>,
-    choice: &LocomotionChoice,
+    subject: Subject,
     sensing: Sensing,
     filter: &str,
     seeds: &RangeInclusive<u32>,
@@ -124,13 +143,13 @@ pub fn run(
 ) -> Result<LocomotionReport, SimError> {
     let mut cases = Vec::new();
     for case in CASES.iter().filter(|case| is_asked(filter, case.name)) {
-        let trials = over_seeds(seeds, |seed| trial::run(case, seed, model, choice.controller(), sensing));
+        let trials = over_seeds(seeds, |seed| trial::run(case, seed, model, subject, sensing));
         let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
         let report = summarise(case, &trials);
         done(&report);
         cases.push(report);
     }
-    Ok(LocomotionReport { robot: robot.into(), controller: choice.name(), sensing, cases })
+    Ok(LocomotionReport { robot: robot.into(), controller: subject.name(), sensing, cases })
 }
 
 /// Returns the result of `trial` for each of these seeds, running as many at once as there are processors.
@@ -257,7 +276,7 @@ mod tests {
         let report = run(
             DEFAULT_ROBOT,
             model(),
-            &LocomotionChoice::Balance,
+            Subject::Base(&LocomotionChoice::Balance),
             sensing,
             "no such case",
             &(0..=0),

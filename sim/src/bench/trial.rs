@@ -5,12 +5,13 @@ use std::sync::Arc;
 
 use rapier3d::math::Vector;
 
+use super::Subject;
 use super::cases::{Case, Disturbance, PULL_RISE_S, Plan, PulledHands, STOP_S, pulse};
 use super::measure::{SETTLE_S, Sample, Trial, measure};
 use super::motion::ArmMotion;
 use super::tour::{self, Leg};
 use crate::body::RobotModel;
-use crate::locomotion::{BaseCommand, BaseVelocity, Locomotion};
+use crate::locomotion::{BaseCommand, BaseVelocity};
 use crate::plane::{heading_rad, wrapped_rad};
 use crate::random::SplitMix64;
 use crate::robot::{RobotCommand, RobotTruth, Sensing};
@@ -25,14 +26,18 @@ pub(super) fn run(
     case: &Case,
     seed: u32,
     model: &Arc<RobotModel>,
-    locomotion: Box<dyn Locomotion>,
+    subject: Subject,
     sensing: Sensing,
 ) -> Result<Trial, SimError> {
     let case = &case.of_size(&model.scale);
     let placement = RobotPlacement { name: "A".into(), position_m: [0.0, 0.0], yaw_rad: 0.0 };
     let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
     let mut world = World::with_robot(&spec, model.clone())?;
-    world.set_locomotion(0, locomotion);
+    let (choice, mut motors) = match subject {
+        Subject::Base(choice) => (choice, None),
+        Subject::Motors(choice) => (choice, Some(choice.motor_controller()?)),
+    };
+    world.set_locomotion(0, choice.controller());
     world.set_sensing(sensing, seed);
     let mut random = SplitMix64(seed.into());
     let arms = ArmMotion::new(case.arms, model, &mut random);
@@ -70,7 +75,12 @@ pub(super) fn run(
             heading_rad,
             command: base,
         });
-        robot = world.control_step(&[RobotCommand { upper_rad, base }])?.robots.remove(0);
+        let command = RobotCommand { upper_rad, base };
+        if let Some(motors) = &mut motors {
+            let setpoints = motors.act(&world.robots()[0], &command);
+            world.drive_motors(0, &[setpoints]);
+        }
+        robot = world.control_step(&[command])?.robots.remove(0);
     }
     trial.power_w = work_j / (log.len() as f32 * DT_S);
     if !trial.fell {

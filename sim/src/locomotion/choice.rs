@@ -5,8 +5,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 #[cfg(feature = "onnx")]
-use super::{Agile, Network};
-use super::{Balance, BaseLimits, Locomotion};
+use super::{Agile, Network, agile::MotorPolicy};
+use super::{Balance, BaseLimits, Locomotion, MotorController};
 use crate::SimError;
 use crate::body::{BodyScale, RobotModel};
 
@@ -39,6 +39,21 @@ impl LocomotionChoice {
             LocomotionChoice::Balance => Box::new(Balance::default()),
             #[cfg(feature = "onnx")]
             LocomotionChoice::Onnx { network, looped } => Box::new(Agile::new(network.clone(), *looped)),
+        }
+    }
+
+    /// Creates a controller of all motors of one robot.
+    ///
+    /// # Errors
+    ///
+    /// Returns an error unless the choice is a policy without a loop.
+    pub fn motor_controller(&self) -> Result<Box<dyn MotorController>, SimError> {
+        match self {
+            #[cfg(feature = "onnx")]
+            LocomotionChoice::Onnx { network, looped: false } => {
+                Ok(Box::new(MotorPolicy::new(network.clone())))
+            }
+            _ => Err(SimError::NoMotorController { name: self.name() }),
         }
     }
 

@@ -13,7 +13,8 @@ pub use choice::LocomotionChoice;
 use serde::{Deserialize, Serialize};
 
 use crate::Sides;
-use crate::body::{BodyEstimate, BodyScale, JointDrive, LEG_JOINTS, WAIST_JOINTS};
+use crate::body::{BodyEstimate, BodyScale, JointDrive, LEG_JOINTS, MotorSetpoints, WAIST_JOINTS};
+use crate::robot::{Robot, RobotCommand};
 
 /// Setpoint of a policy for the base, in the robot's own heading frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -71,6 +72,12 @@ impl BaseLimits {
 
 /// Drives of both legs, from the hip to the ankle.
 pub type LegCommand = Sides<[JointDrive; LEG_JOINTS]>;
+
+/// A controller of all motors of a robot, with nothing under it; see [`crate::World::drive_motors`].
+pub trait MotorController {
+    /// Returns the setpoints of the next control step, by the robot's own sensors.
+    fn act(&mut self, robot: &Robot, command: &RobotCommand) -> MotorSetpoints;
+}
 
 /// A base controller. It observes only its own robot, and acts only through the joint drives of legs and
 /// waist.

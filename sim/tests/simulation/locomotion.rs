@@ -14,7 +14,7 @@ fn reports(word: &str, seeds: usize) -> Vec<bench::CaseReport> {
     let report = bench::run(
         DEFAULT_ROBOT,
         &Arc::new(robot.model),
-        &LocomotionChoice::Balance,
+        bench::Subject::Base(&LocomotionChoice::Balance),
         Sensing::default(),
         word,
         &(0..=seeds as u32 - 1),

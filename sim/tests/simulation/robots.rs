@@ -74,8 +74,8 @@ fn a_described_robot_stands_walks_and_squats() {
     assert!(model.scale.length_m(1.0) < 0.9, "its legs are shorter than a G1's: {:?}", model.scale);
     for case in ["stand", "forward_0.4", "squat", "push_40n"] {
         let robot = "walker";
-        let report =
-            bench::run(robot, &model, &LocomotionChoice::Balance, Sensing::default(), case, &(0..=0), |_| {});
+        let subject = bench::Subject::Base(&LocomotionChoice::Balance);
+        let report = bench::run(robot, &model, subject, Sensing::default(), case, &(0..=0), |_| {});
         let report = report.expect("a report");
         let found = report.cases.iter().find(|found| found.case == case).expect("the case");
         assert_eq!(found.survived, 1, "{found:?}");

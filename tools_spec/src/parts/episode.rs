@@ -337,7 +337,8 @@ pub struct HeldObject {
     pub hand: String,
     /// The object.
     pub object: String,
-    /// Frame of `middle_m` and `axis`: "level", the robot's pelvis frame, but upright.
+    /// Frame of `middle_m` and `axis`: "level", the robot's pelvis frame, but upright; after a walk that of its
+    /// places.
     pub frame: PoseFrame,
     /// Middle of the object, [x, y, z] in metres.
     pub middle_m: [f64; 3],

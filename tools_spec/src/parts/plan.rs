@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::command::CommandReply;
+use super::episode::HeldObject;
 
 /// The reply to `send_plan` and `walk_to`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -21,6 +22,9 @@ pub struct PlanReply {
     /// where there is one command.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outcomes: Vec<String>,
+    /// Objects in hands after a walk with `carry`, in its frame; left out otherwise.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub held: Vec<HeldObject>,
     /// The reply to the last command that was carried out.
     pub last: CommandReply,
 }

@@ -92,7 +92,7 @@ pub struct SurfaceQuery {
     pub pixel: Option<[i64; 2]>,
     /// Its colour: for the nearest three.
     pub color: Option<Color>,
-    /// An object of `room`: for all that is seen of it.
+    /// An object of the task, by its name: all that is seen of it.
     pub object: Option<String>,
 }
 

@@ -75,6 +75,13 @@ pub struct Waypoint {
     pub heading_rad: Option<f64>,
 }
 
+impl WalkTo {
+    /// Returns true if a robot carries or pushes a load.
+    pub fn carries(&self) -> bool {
+        self.robots.iter().any(|entry| entry.carry == Some(true))
+    }
+}
+
 impl Tool for WalkTo {
     type Reply = PlanReply;
     const NAME: &'static str = "walk_to";

@@ -15,7 +15,7 @@ use tandem_episodes::{Controller, EpisodeError, RobotFile, players::PlayerError,
 pub use tandem_ik::bench::Report as IkReport;
 use tandem_ik::bench::{TargetSet, run};
 use tandem_ik::{IkError, Model};
-use tandem_sim::bench;
+use tandem_sim::bench::{self, Subject};
 pub use tandem_sim::bench::{
     CaseReport, FallTrial, FallsCase, FallsReport, FloorEpisode, LocomotionReport, PhysicsCase,
     PhysicsReport, PicturesCase, PicturesReport,
@@ -68,7 +68,8 @@ pub fn locomotion(
 ) -> Result<LocomotionReport, BenchError> {
     let choice = controller.load()?;
     let model = robot.model().map_err(|error| Box::new(EpisodeError::from(error)))?;
-    let mut report = bench::run(&robot.kind(), &model, &choice, sensing, filter, seeds, &mut done)?;
+    let mut report =
+        bench::run(&robot.kind(), &model, Subject::Base(&choice), sensing, filter, seeds, &mut done)?;
     if !model.has_fingers() {
         return Ok(report);
     }
@@ -86,6 +87,25 @@ pub fn locomotion(
         report.cases.push(placed);
     })?;
     Ok(report)
+}
+
+/// Plays the cases of single robots whose names contain one of the words of `filter`, as [`locomotion`] does,
+/// with a velocity policy that drives all motors by its own gains.
+///
+/// # Errors
+///
+/// If a file cannot be read, a world cannot be built, or the controller is no policy from a file.
+pub fn motors(
+    robot: &RobotFile,
+    controller: &Controller,
+    sensing: Sensing,
+    filter: &str,
+    seeds: &RangeInclusive<u32>,
+    done: impl FnMut(&CaseReport),
+) -> Result<LocomotionReport, BenchError> {
+    let choice = controller.load()?;
+    let model = robot.model().map_err(|error| Box::new(EpisodeError::from(error)))?;
+    Ok(bench::run(&robot.kind(), &model, Subject::Motors(&choice), sensing, filter, seeds, done)?)
 }
 
 /// Times physics steps of one to three robots; calls `done` after each case.

@@ -1,5 +1,6 @@
 //! `send_plan`: commands in sequence. Each runs until its steps are done, or until its expectation holds.
 
+use tandem_sim::Side;
 use tandem_tools_spec::{
     ActCall, CommandReply, PlanStep, PlannedCall, PoseFrame, SendPlan, SpecError, Tool as _,
 };
@@ -148,6 +149,11 @@ impl CommandList {
         self.last_begun().map_or(SendPlan::NAME, |step| step.call.name())
     }
 
+    /// Returns true while this wrist has not had its last target in the present command.
+    pub fn is_under_way(&self, robot: &str, side: Side) -> bool {
+        matches!(&self.current, Some(CurrentCommand::Until(pieces)) if pieces.is_under_way(robot, side))
+    }
+
     /// Returns true if the last command asks for a short reply.
     pub fn is_short(&self) -> bool {
         self.last_begun().is_some_and(|step| step.short)
@@ -157,6 +163,14 @@ impl CommandList {
     pub fn frame(&self) -> Option<PoseFrame> {
         match &self.last_begun()?.call {
             PlannedCall::WalkTo(walk) => Some(walk.frame),
+            PlannedCall::Act(_) => None,
+        }
+    }
+
+    /// Returns the frame of the places of the last command, if it carries a load to some.
+    pub fn carried_in(&self) -> Option<PoseFrame> {
+        match &self.last_begun()?.call {
+            PlannedCall::WalkTo(walk) => walk.carries().then_some(walk.frame),
             PlannedCall::Act(_) => None,
         }
     }

@@ -104,7 +104,7 @@ impl PlanRun {
             session.tell_in(frame, last);
         }
         if let PlanStage::Commands(list) = &self.stage {
-            self.progress.outcomes.add(list.place(), last);
+            self.progress.outcomes.add(list.place(), last, |robot, side| list.is_under_way(robot, side));
         }
         self.progress.is_new = false;
     }
@@ -137,10 +137,16 @@ impl PlanRun {
         self.digest(session);
         let tool_calls = session.tool_calls;
         let PlanProgress { replies, executed_steps, outcomes, last, is_new: _ } = self.progress;
-        let (commands, is_short) = match self.stage {
+        let (commands, is_short) = match &self.stage {
             PlanStage::Commands(list) => (list.begun(), list.is_short()),
             PlanStage::Walk(_) => (replies, false),
         };
+        let carried_in = match &self.stage {
+            PlanStage::Commands(list) => list.carried_in(),
+            PlanStage::Walk(walk) => walk.carried_in(),
+        };
+        let operator = self.operator.as_deref();
+        let held = carried_in.map_or(Vec::new(), |frame| session.held(&session.facts(), operator, frame));
         let mut last = last.ok_or_else(|| SpecError::Invalid {
             tool: SendPlan::NAME,
             reason: "no command was made; give at least one".into(),
@@ -148,7 +154,8 @@ impl PlanRun {
         if is_short {
             shorten_report(&mut last);
         }
-        Ok(PlanReply { commands, tool_calls, executed_steps, stopped, outcomes: outcomes.lines(), last })
+        let outcomes = outcomes.lines();
+        Ok(PlanReply { commands, tool_calls, executed_steps, stopped, outcomes, held, last })
     }
 }
 

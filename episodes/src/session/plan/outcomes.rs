@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use tandem_sim::Side;
 use tandem_tools_spec::{BaseState, CommandReply, Grip, HandReport, HandState, RobotReport};
 
 /// Outcomes of the commands that have been begun, in their order.
@@ -23,14 +24,15 @@ struct PlanOutcome {
 const MIN_WALKED_M: f64 = 0.02;
 
 impl Outcomes {
-    /// Adds the reply to a command, or to a further piece of the last one.
-    pub fn add(&mut self, place: &str, reply: &CommandReply) {
+    /// Adds the reply to a command, or to a further piece of the last one. A wrist that `is_under_way` has not
+    /// had its last target.
+    pub fn add(&mut self, place: &str, reply: &CommandReply, is_under_way: impl Fn(&str, Side) -> bool) {
         if self.0.last().is_none_or(|last| last.place != place) {
             let (place, walked) = (place.into(), BTreeSet::new());
             self.0.push(PlanOutcome { place, steps: 0, walked, states: String::new() });
         }
         if let Some(outcome) = self.0.last_mut() {
-            outcome.add(reply);
+            outcome.add(reply, is_under_way);
         }
     }
 
@@ -50,21 +52,23 @@ impl Outcomes {
 }
 
 impl PlanOutcome {
-    fn add(&mut self, reply: &CommandReply) {
+    fn add(&mut self, reply: &CommandReply, is_under_way: impl Fn(&str, Side) -> bool) {
         self.steps += reply.executed_steps;
         let has_walked = |report: &&RobotReport| {
             let moved_m = report.base_motion.map_or(0.0, |motion| motion.forward_m.hypot(motion.left_m));
             moved_m > MIN_WALKED_M
         };
         self.walked.extend(reply.robots.iter().filter(has_walked).map(|report| report.robot.clone()));
-        let states = reply.robots.iter().filter_map(|report| self.state(report));
+        let states = reply.robots.iter().filter_map(|report| self.state(report, &is_under_way));
         self.states = states.collect::<Vec<String>>().join("; ");
     }
 
     /// Describes a robot; `None` if it stands where it was and no hand has a target or feels anything.
-    fn state(&self, report: &RobotReport) -> Option<String> {
-        let hands = [("left", &report.left), ("right", &report.right)];
-        let hands = hands.into_iter().filter_map(|(side, hand)| hand_state(side, hand));
+    fn state(&self, report: &RobotReport, is_under_way: impl Fn(&str, Side) -> bool) -> Option<String> {
+        let hands = [(Side::Left, &report.left), (Side::Right, &report.right)];
+        let hands = hands
+            .into_iter()
+            .filter_map(|(side, hand)| hand_state(side.name(), hand, is_under_way(&report.robot, side)));
         let base = report.base.and_then(|base| base.state).and_then(base_state);
         let in_room = report.pelvis_in_room.map(|pose| (pose, "room"));
         let pelvis = in_room.or(report.pelvis_in_start.map(|pose| (pose, "start")));
@@ -78,7 +82,7 @@ impl PlanOutcome {
 }
 
 /// Describes a hand: its wrist if that has a target, and its grip if it feels one. `None` without either.
-fn hand_state(side: &str, hand: &HandReport) -> Option<String> {
+fn hand_state(side: &str, hand: &HandReport, is_under_way: bool) -> Option<String> {
     let grip = match hand.grip {
         Some(Grip::TwoSided) => Some("grip two_sided"),
         Some(Grip::OneSided) => Some("grip one_sided"),
@@ -87,7 +91,7 @@ fn hand_state(side: &str, hand: &HandReport) -> Option<String> {
     };
     let state = match hand.state? {
         HandState::Idle => None,
-        HandState::Arrived => Some("arrived"),
+        HandState::Arrived => Some(if is_under_way { "on its way" } else { "arrived" }),
         HandState::Moving => Some("moving"),
         HandState::Blocked => Some("blocked"),
         HandState::OutOfReach => Some("out_of_reach"),
@@ -118,7 +122,7 @@ mod tests {
     fn a_hand_says_what_it_grips_with_a_target_or_without() {
         let check = |hand: Value, expected: Option<&str>| {
             let hand = serde_json::from_value(hand).unwrap();
-            assert_eq!(hand_state("left", &hand).as_deref(), expected);
+            assert_eq!(hand_state("left", &hand, false).as_deref(), expected);
         };
         let still = |grip: &str| json!({ "state": HandState::Idle, "grip": grip, "position_error_m": 0.02 });
         check(still("none"), None);
@@ -128,5 +132,7 @@ mod tests {
             json!({ "state": "blocked", "grip": "touching", "position_error_m": 0.031 }),
             Some("left blocked 0.031 m off grip touching"),
         );
+        let hand = serde_json::from_value(json!({ "state": "arrived", "grip": "none" })).unwrap();
+        assert_eq!(hand_state("left", &hand, true).as_deref(), Some("left on its way"));
     }
 }

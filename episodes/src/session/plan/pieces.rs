@@ -92,6 +92,13 @@ impl Pieces {
     pub fn is_way_done(&self) -> bool {
         self.done >= self.steps || !matches!(self.kind, PieceKind::Wrists(_))
     }
+
+    /// Returns true if this wrist has a target that it has not been given yet.
+    pub fn is_under_way(&self, robot: &str, side: Side) -> bool {
+        let PieceKind::Wrists(ways) = &self.kind else { return false };
+        self.done < self.steps
+            && ways.iter().any(|way| way.entry.robot == robot && way.wrists[side].is_some())
+    }
 }
 
 impl WristWay {

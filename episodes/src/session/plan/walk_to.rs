@@ -9,7 +9,7 @@ use tandem_tools_spec::{
 };
 
 use super::PlanAdvance;
-use super::way::{Corrections, Missing, Stand, WALK_STEPS};
+use super::way::{Corrections, Missing, Stand, WALK_S, WALK_STEPS};
 use crate::EpisodeError;
 use crate::commands;
 use crate::session::Session;
@@ -30,11 +30,11 @@ pub const THERE_M: f64 = 0.015;
 pub const THERE_RAD: f64 = 0.026;
 pub const WELL_M: f64 = 0.013;
 pub const WELL_RAD: f64 = 0.023;
-/// Maximum number of further attempts after the first rest, and the tolerance within which a single pulse
-/// is used.
+/// Maximum number of further attempts after the first rest, and the displacement up to which a robot that
+/// stands walks by one pulse: its stop is predictable, so that it need not be steered.
 pub const ATTEMPTS: u32 = 5;
-const PULSE_M: f64 = 0.1;
-const PULSE_RAD: f64 = 0.15;
+const PULSE_M: f64 = 0.2;
+const PULSE_RAD: f64 = 0.3;
 /// Number of commands with all robots standing, after which their sway has ended.
 pub const CALM_COMMANDS: u32 = 2;
 /// Minimum approach within this many walks; with less, the robot is blocked.
@@ -47,6 +47,11 @@ enum WalkerStage {
     Walks,
     /// A short walk from its standing place to its goal.
     Corrects,
+    /// The rest of such a walk.
+    Pulses {
+        velocity: [f64; 3],
+        commands: u32,
+    },
     Rests,
 }
 
@@ -88,8 +93,9 @@ impl WalkPlan {
         }
         if self.left_steps == 0 {
             let is_there = |walker: &Walker| session.missing_of(walker).is_within(THERE_M, THERE_RAD);
-            let why = (!self.walkers.iter().all(is_there))
-                .then(|| format!("the steps are used up; {}", session.how_far(&self.walkers)));
+            let why = (!self.walkers.iter().all(is_there)).then(|| {
+                format!("the steps are used up; {}{}", session.how_far(&self.walkers), self.rests(last))
+            });
             return PlanAdvance::Done(why);
         }
         let steps = self.left_steps.min(WALK_STEPS);
@@ -100,6 +106,18 @@ impl WalkPlan {
             true => ActCall::Walk(Walk { steps, robots: moves }),
             false => ActCall::Wait(Wait { steps }),
         })
+    }
+
+    /// Returns how far from their places robots that have not come to rest will stand; empty if all rest.
+    fn rests(&self, last: Option<&CommandReply>) -> String {
+        let reports = last.map_or(&[][..], |reply| &reply.robots);
+        let rest = |walker: &Walker| {
+            let report = reports.iter().find(|report| report.robot == walker.name)?;
+            let rests_m = Vector2::from(report.base?.comes_to_rest_m?);
+            let off_m = (walker.places.back()?.at_m - rests_m).norm();
+            Some(format!("; {} comes to rest {off_m:.3} m from it", walker.name))
+        };
+        self.walkers.iter().filter_map(rest).collect()
     }
 
     /// Processes the reply to a command. Returns the end of the plan if it was the last.
@@ -145,7 +163,7 @@ impl Session {
 
     fn walker(&self, entry: &Destination, frame: PoseFrame) -> Result<Walker, EpisodeError> {
         let robot = commands::find(&entry.robot, &self.motions)?;
-        Ok(Walker {
+        let mut walker = Walker {
             name: entry.robot.clone(),
             robot,
             places: self.places(robot, entry, frame).into(),
@@ -154,7 +172,13 @@ impl Session {
             nearest_m: f64::INFINITY,
             walks: 0,
             corrections: Corrections::default(),
-        })
+        };
+        let stands = self.present.robots[robot].sensed.is_stepping == Some(false);
+        if stands && walker.places.len() == 1 {
+            let off = self.missing_of(&walker);
+            walker.try_again(&off);
+        }
+        Ok(walker)
     }
 
     /// Returns the place of a robot by its odometry.
@@ -186,11 +210,12 @@ impl Session {
         match walker.stage {
             WalkerStage::Rests => return None,
             WalkerStage::Corrects => {
-                walker.stage = WalkerStage::Rests;
                 let missing = self.missing_of(walker);
-                let pulse = walker.corrections.pulse(&missing);
-                return Some(walker.walk(pulse));
+                let way = walker.corrections.pulse(&missing).map(|rate| rate * WALK_S);
+                let commands = pulse_commands(way);
+                return Some(walker.pulse(way.map(|way| way / (WALK_S * f64::from(commands))), commands));
             }
+            WalkerStage::Pulses { velocity, commands } => return Some(walker.pulse(velocity, commands)),
             WalkerStage::Walks => {}
         }
         let mean_m = walker.before_m.map_or(now.at_m, |before_m| 0.5 * (before_m + now.at_m));
@@ -230,7 +255,22 @@ pub fn all_stand(reply: &CommandReply) -> bool {
     states.flatten().all(|state| state == BaseState::Standing)
 }
 
+/// Returns the number of commands in which a robot goes this way, [ahead, left, turn], at usual speeds.
+fn pulse_commands([ahead_m, left_m, turn_rad]: [f64; 3]) -> u32 {
+    let time_s = (ahead_m.abs() / AHEAD_M_S).max(left_m.abs() / ASIDE_M_S).max(turn_rad.abs() / TURN_RAD_S);
+    (time_s / WALK_S).ceil().max(1.0) as u32
+}
+
 impl Walker {
+    /// Returns the first of this number of equal commands.
+    fn pulse(&mut self, velocity: [f64; 3], commands: u32) -> WalkMove {
+        self.stage = match commands {
+            0 | 1 => WalkerStage::Rests,
+            _ => WalkerStage::Pulses { velocity, commands: commands - 1 },
+        };
+        self.walk(velocity)
+    }
+
     /// Starts another attempt from the standing place, unless the robot is close enough to its goal.
     fn try_again(&mut self, off: &Missing) {
         (self.before_m, self.walks, self.nearest_m) = (None, 0, f64::INFINITY);

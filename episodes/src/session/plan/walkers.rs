@@ -38,6 +38,11 @@ impl Walkers {
         }
     }
 
+    /// Returns the frame of the places if a load is carried to them.
+    pub fn carried_in(&self) -> Option<PoseFrame> {
+        matches!(self.way, WalkersWay::Carrying(_)).then_some(self.frame)
+    }
+
     fn go_on(&mut self, session: &Session, last: Option<&CommandReply>) -> PlanAdvance {
         match &mut self.way {
             WalkersWay::Free(walk) => walk.advance(session, last),
@@ -68,7 +73,7 @@ impl Session {
             let reason = "`until_heard` is for operators, each of whom has a robot".into();
             return Err(SpecError::Invalid { tool: WalkTo::NAME, reason }.into());
         }
-        let way = match walk.robots.iter().any(|entry| entry.carry == Some(true)) {
+        let way = match walk.carries() {
             true => self.carry_plan(walk).map(WalkersWay::Carrying)?,
             false => self.walk_plan(walk).map(WalkersWay::Free)?,
         };

@@ -9,6 +9,7 @@ use crate::convert::isometry_from_sim;
 /// Control steps of one walk, about half a gait cycle. The pelvis sways once a cycle, so the mean of two
 /// moments half a cycle apart is free of the sway.
 pub const WALK_STEPS: u32 = 13;
+pub const WALK_S: f64 = WALK_STEPS as f64 / CONTROL_HZ;
 /// Length in metres that counts as much as a radian.
 const M_PER_RAD: f64 = 0.5;
 /// Fraction of earlier misses that a correction adds, and its limit.

@@ -8,8 +8,13 @@ use crate::convert::{coarse, isometry_to_sim};
 use crate::scoring::{Facts, ROBOT_NAMES};
 
 impl Session {
-    /// Returns what the hands of all robots hold, or those of an operator's robot.
-    pub(in crate::session) fn held(&self, facts: &Facts, operator: Option<&str>) -> Vec<HeldObject> {
+    /// Returns what the hands of all robots hold, or those of an operator's robot, in `frame`.
+    pub(in crate::session) fn held(
+        &self,
+        facts: &Facts,
+        operator: Option<&str>,
+        frame: PoseFrame,
+    ) -> Vec<HeldObject> {
         let own = |robot: &usize| operator.is_none_or(|operator| ROBOT_NAMES[*robot] == operator);
         let hands =
             (0..facts.robots.len()).filter(own).flat_map(|robot| Side::BOTH.map(|side| (robot, side)));
@@ -18,23 +23,29 @@ impl Session {
             let objects = objects.filter(move |object| facts.holds(robot, side, object));
             objects.map(move |object| (robot, side, object))
         });
-        held.map(|(robot, side, object)| self.held_object(facts, robot, side, object)).collect()
+        held.map(|(robot, side, object)| self.held_object(facts, (robot, side), object, frame)).collect()
     }
 
-    fn held_object(&self, facts: &Facts, robot: usize, side: Side, object: &str) -> HeldObject {
+    fn held_object(
+        &self,
+        facts: &Facts,
+        (robot, side): (usize, Side),
+        object: &str,
+        frame: PoseFrame,
+    ) -> HeldObject {
         let found = facts.object(object);
-        let level_from_pelvis = self.motions[robot].pelvis_from(PoseFrame::Level).inverse();
-        let level_from_world =
-            isometry_to_sim(&level_from_pelvis) * facts.robots[robot].pelvis_in_world.inverse();
-        let level_from_object = level_from_world * found.pose_in_world;
+        let frame_from_pelvis = self.motions[robot].pelvis_from(frame).inverse();
+        let frame_from_world =
+            isometry_to_sim(&frame_from_pelvis) * facts.robots[robot].pelvis_in_world.inverse();
+        let frame_from_object = frame_from_world * found.pose_in_world;
         let wire = |vector: Vector| vector.to_array().map(|part| coarse(part.into()));
         HeldObject {
             robot: ROBOT_NAMES[robot].into(),
             hand: side.name().into(),
             object: object.into(),
-            frame: PoseFrame::Level,
-            middle_m: wire(level_from_object * middle_m(&found.model)),
-            axis: wire(level_from_object.rotation * Vector::Z),
+            frame,
+            middle_m: wire(frame_from_object * middle_m(&found.model)),
+            axis: wire(frame_from_object.rotation * Vector::Z),
             lowest_m: coarse(facts.lowest_m(object).into()),
         }
     }
@@ -60,20 +71,21 @@ mod tests {
         let task = tasks::find("handover").unwrap();
         let session = Session::start(&EpisodeSpec::new(&task, 0, Protocol::Benchmark), None).unwrap();
         let mut facts = session.facts().grip(A, Side::Right, "bottle", Grip::Holding);
-        assert_eq!(session.held(&session.facts(), None), []);
+        let held = |facts: &Facts, operator| session.held(facts, operator, PoseFrame::Level);
+        assert_eq!(held(&session.facts(), None), []);
         let pelvis_in_world = facts.robots[A].pelvis_in_world;
         // The bottle stands ahead of A; its middle is half of its 0.3 m above its bottom.
         facts.object_mut("bottle").pose_in_world.translation =
             pelvis_in_world.translation + Vector::new(0.3, -0.1, 0.0);
         facts.object_mut("bottle").pose_in_world.rotation = Default::default();
-        let [held] = &session.held(&facts, None)[..] else { panic!("one thing is held") };
-        assert_eq!((&*held.robot, &*held.hand, &*held.object), ("A", "right", "bottle"));
-        for (found, expected) in held.middle_m.iter().zip([0.3, -0.1, 0.15]) {
-            assert!((found - expected).abs() < 0.01, "{held:?}");
+        let [found] = &held(&facts, None)[..] else { panic!("one thing is held") };
+        assert_eq!((&*found.robot, &*found.hand, &*found.object), ("A", "right", "bottle"));
+        for (along_m, expected_m) in found.middle_m.iter().zip([0.3, -0.1, 0.15]) {
+            assert!((along_m - expected_m).abs() < 0.01, "{found:?}");
         }
-        assert!((held.lowest_m - f64::from(pelvis_in_world.translation.z)).abs() < 0.002, "{held:?}");
-        assert!(held.axis[2] > 0.999, "{held:?}");
-        assert_eq!(session.held(&facts, Some("A")).len(), 1);
-        assert_eq!(session.held(&facts, Some("B")), []);
+        assert!((found.lowest_m - f64::from(pelvis_in_world.translation.z)).abs() < 0.002, "{found:?}");
+        assert!(found.axis[2] > 0.999, "{found:?}");
+        assert_eq!(held(&facts, Some("A")).len(), 1);
+        assert_eq!(held(&facts, Some("B")), []);
     }
 }

@@ -1,6 +1,6 @@
 //! Explanation of the next phase: the parts of its conditions that do not hold.
 
-use tandem_tools_spec::NextPhase;
+use tandem_tools_spec::{NextPhase, PoseFrame};
 
 use super::super::Session;
 use crate::conditions::ConditionPart;
@@ -22,7 +22,7 @@ impl Session {
             id: phase.id.clone(),
             number: Phase::number(index),
             lacks: lacks(task, &alike, index, self.scores.next_phase(), &facts),
-            held: self.held(&facts, operator),
+            held: self.held(&facts, operator, PoseFrame::Level),
         })
     }
 }

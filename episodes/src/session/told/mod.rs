@@ -5,7 +5,7 @@ mod short;
 
 pub use short::{shorten, shorten_report};
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 use tandem_tools_spec::{
@@ -55,7 +55,12 @@ impl ShownInformation {
             Answer::Reply(reply) => match &**reply {
                 ToolReply::Act(reply) => reply.robots.iter().for_each(|report| self.count_report(report)),
                 // The commands have been counted one by one.
-                ToolReply::Plan(_) => {}
+                ToolReply::Plan(plan) => {
+                    let holders: BTreeSet<&str> = plan.held.iter().map(|held| held.robot.as_str()).collect();
+                    holders
+                        .into_iter()
+                        .for_each(|robot| self.count(ExtraInformation::PhaseConditions, robot));
+                }
                 ToolReply::Look(LookReply::GetRobotState(state)) => self.count_state(state),
                 ToolReply::Look(LookReply::QueryDepth(depth)) => {
                     let by_name = depth.surfaces.iter().any(|found| found.joined_by == JoinedBy::Object);

@@ -94,6 +94,16 @@ fn an_object_is_all_of_its_parts() {
     assert!(0 < moving && moving < whole, "{moving} of {whole} pixels move");
 }
 
+/// The patch on the other shelf is an object of its own, 1.2 m from the basket.
+#[test]
+fn a_longer_name_is_another_object() {
+    let own = spec("co_carry", 2011, Protocol::Agentic).assisted(Assistance::Full);
+    let mut session = Session::start(&own, None).unwrap();
+    let basket = seen_by(&mut session, "A", "basket").unwrap();
+    let longest_m = basket.extent_m.into_iter().fold(0.0, f64::max);
+    assert!((0.4..0.8).contains(&longest_m), "{basket:?}");
+}
+
 fn observe(session: &mut Session, args: Value) -> Result<Observation, String> {
     match ask(session, "observe", args)? {
         ToolReply::Look(LookReply::Observe(seen)) => Ok(seen),

@@ -22,7 +22,11 @@ const BRIEFING: &str = "tandem://briefing";
 const PAGES: [(&str, &str, &str); 4] = [
     ("tandem://book/tools", "Tools and their replies", include_str!("../../../../docs/src/tools.md")),
     ("tandem://book/concepts", "Concepts", include_str!("../../../../docs/src/concepts.md")),
-    ("tandem://book/agents", "Language models", include_str!("../../../../docs/src/agents.md")),
+    (
+        "tandem://book/agents",
+        "Running language models (for programs that play with one; no player needs it)",
+        include_str!("../../../../docs/src/agents.md"),
+    ),
     (
         "tandem://book/operators",
         "An operator for each robot",

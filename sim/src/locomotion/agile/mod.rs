@@ -11,6 +11,7 @@
 //! them are added to the task's.
 
 mod joints;
+mod motors;
 mod network;
 mod place;
 #[cfg(test)]
@@ -20,6 +21,7 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
+pub(super) use motors::MotorPolicy;
 pub use network::Network;
 
 use super::{BaseCommand, BaseLimits, LegCommand, Locomotion};

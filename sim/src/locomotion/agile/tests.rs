@@ -9,6 +9,8 @@ use rten_onnx::onnx::{
 
 use super::network::Network;
 use super::*;
+use crate::body::{ARMS, HANDS};
+use crate::locomotion::LocomotionChoice;
 use crate::{RobotPlacement, SimError, World, WorldSpec};
 
 /// Indices of the controlled joints among the observed ones.
@@ -258,4 +260,27 @@ fn a_policy_drives_the_robot_and_snapshots_continue_bit_for_bit() {
     // The policy's waist target is ever further ahead of the waist, and the waist follows.
     let waist_rad = first.present().robots[0].sensed.joints.q_rad[WAIST + 1];
     assert!(waist_rad > 2e-3, "{waist_rad}");
+}
+
+/// At the motors the policy's joints have its own gains; the others keep their commands.
+#[test]
+fn a_policy_at_the_motors_leaves_arms_to_the_command() {
+    let network = Arc::new(read(limp(50.0)).unwrap());
+    let placement = RobotPlacement { name: "A".into(), position_m: [0.0, 0.0], yaw_rad: 0.0 };
+    let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
+    let world = World::new(&spec).unwrap();
+    let mut command = world.rest_command(0);
+    command.upper_rad[3] = 0.7;
+    let choice = LocomotionChoice::Onnx { network: network.clone(), looped: false };
+    let setpoints = choice.motor_controller().unwrap().act(&world.robots()[0], &command);
+    let q_rad = world.robots()[0].readings()[0].joints.q_rad;
+    let (knee, elbow, thumb) = (3, ARMS.left + 3, HANDS.left);
+    assert!((setpoints.q_rad[knee] - q_rad[knee] - 1e-3).abs() < 1e-5, "{}", setpoints.q_rad[knee]);
+    assert_eq!((setpoints.kp_n_m_rad[knee], setpoints.kd_n_m_s_rad[knee]), (50.0, 3.0));
+    assert_eq!(setpoints.q_rad[elbow], 0.7);
+    assert_eq!((setpoints.kp_n_m_rad[elbow], setpoints.kp_n_m_rad[thumb]), (80.0, 3.0));
+    for refused in [LocomotionChoice::Balance, LocomotionChoice::Onnx { network, looped: true }] {
+        let error = refused.motor_controller().map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(&refused.name()), "{error}");
+    }
 }
