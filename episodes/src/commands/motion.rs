@@ -198,7 +198,8 @@ impl Motion {
         UnitQuaternion::from_axis_angle(&Vector3::z_axis(), ahead.y.atan2(ahead.x))
     }
 
-    /// Advances the yielding of the hands by one control step. Without compliance, they return to their targets.
+    /// Advances the yielding of the hands by one control step. Without compliance, they return to their
+    /// targets.
     ///   dy/dt = F / c - l y,   |y| <= y_max
     pub(super) fn advance_yielding(&mut self, compliance: Compliance) {
         let Compliance { ahead_n_s_m, side_n_s_m, turn_n_m_s_rad } = compliance;
