@@ -18,16 +18,21 @@ pub enum EpisodeError {
     )]
     ForeignRobot { name: String, own: String },
     #[error(
-        "the episode stands at step {now} and not at {expected}; look again, then command with expected_step {now}"
+        "the episode stands at step {now} and not at {expected}; look again, then command with expected_step \
+         {now}"
     )]
     OtherStep { expected: u32, now: u32 },
     #[error(
-        "the {protocol} protocol gives no depth images; measure at pixels with query_depth, or start the episode under the benchmark protocol"
+        "the {protocol} protocol gives no depth images; measure at pixels with query_depth, or start the \
+         episode under the benchmark protocol"
     )]
     DepthImage { protocol: &'static str },
     #[error("{asked} control steps in one command; the {protocol} protocol allows 1 to {most}")]
     TooManySteps { asked: u32, most: u32, protocol: &'static str },
-    #[error("pixel [{u}, {v}] is outside the image; u goes from 0 to {}, v from 0 to {}", .width - 1, .height - 1)]
+    #[error(
+        "pixel [{u}, {v}] is outside the image; u goes from 0 to {}, v from 0 to {}",
+        .width - 1, .height - 1
+    )]
     PixelOutside { u: i64, v: i64, width: u32, height: u32 },
     #[error("{}", no_surface(query, seen))]
     NoSurface {
@@ -35,7 +40,11 @@ pub enum EpisodeError {
         /// Colours that are visible in part, where the query has one.
         seen: Vec<Color>,
     },
-    #[error("the episode has ended ({}); observe, get_robot_state, get_status and finish still answer; start_episode begins another", reason_text(*.reason))]
+    #[error(
+        "the episode has ended ({}); observe, get_robot_state, get_status and finish still answer; \
+         start_episode begins another",
+        reason_text(*.reason)
+    )]
     Ended {
         reason: EndReason,
         /// The result, in the form that the policy sees.
@@ -46,7 +55,8 @@ pub enum EpisodeError {
     #[error("the world cannot be built: {0}")]
     Sim(#[from] tandem_sim::SimError),
     #[error(
-        "the episode ends here: in step {step}, {source}; in another episode, command less effort or slower motion"
+        "the episode ends here: in step {step}, {source}; in another episode, command less effort or slower \
+         motion"
     )]
     Diverged { step: u64, source: tandem_sim::dynamics::Diverged },
     #[error("inverse kinematics cannot use the robot's file: {0}")]
@@ -54,7 +64,8 @@ pub enum EpisodeError {
     #[error("a picture cannot be encoded: {0}")]
     Picture(#[from] tandem_sim::render::PictureError),
     #[error(
-        "nobody has worded the task {task:?} in other words, which the stress words-1 to words-3 needs; have: {}; the other axes can be laid over every task",
+        "nobody has worded the task {task:?} in other words, which the stress words-1 to words-3 needs; \
+         have: {}; the other axes can be laid over every task",
         .have.join(", ")
     )]
     NoOtherWords { task: String, have: Vec<&'static str> },
@@ -124,13 +135,15 @@ pub enum RobotError {
     #[error(transparent)]
     Sim(#[from] tandem_sim::SimError),
     #[error(
-        "the robot {} has changed: it was {was} and is {now}, with the files that it names; an episode is replayed and resumed with the robot that it was played with",
+        "the robot {} has changed: it was {was} and is {now}, with the files that it names; an episode is \
+         replayed and resumed with the robot that it was played with",
         path.display()
     )]
     Changed { path: PathBuf, was: String, now: String },
     #[error(
-        "{task} needs hands that close, and the robot {robot} has none; give by --task-file a task whose conditions ask for no grip, for example \
-         gateway/examples/tasks/pass_the_parcel.toml, or by --robot a robot with thumbs and fingers"
+        "{task} needs hands that close, and the robot {robot} has none; give by --task-file a task whose \
+         conditions ask for no grip, for example gateway/examples/tasks/pass_the_parcel.toml, or by --robot \
+         a robot with thumbs and fingers"
     )]
     NoFingers { task: String, robot: String },
     #[error("the robot {robot} cannot have this base controller: {what}")]
@@ -143,21 +156,31 @@ pub enum SceneError {
     #[error(transparent)]
     Sim(#[from] tandem_sim::SimError),
     #[error(
-        "the scene {} has changed: it was {was} and is {now}, with the files that it names; an episode is replayed and resumed in the scene that it was played in",
+        "the scene {} has changed: it was {was} and is {now}, with the files that it names; an episode is \
+         replayed and resumed in the scene that it was played in",
         path.display()
     )]
     Changed { path: PathBuf, was: String, now: String },
     #[error(
-        "the scene {} has no site \"task\" on what never moves: give it one where the origin of {task} is to be, its z axis up; sites {} may place robots and objects one by one; have: {have}",
+        "the scene {} has no site \"task\" on what never moves: give it one where the origin of {task} is to \
+         be, its z axis up; sites {} may place robots and objects one by one; have: {have}",
         path.display(), .may.join(", ")
     )]
     NoPlace { path: PathBuf, task: String, may: Vec<String>, have: String },
-    #[error("site {site:?} of the scene {} is tilted by {tilt_deg:.1} degrees; its z axis has to be up", path.display())]
+    #[error(
+        "site {site:?} of the scene {} is tilted by {tilt_deg:.1} degrees; its z axis has to be up",
+        path.display()
+    )]
     Tilted { path: PathBuf, site: String, tilt_deg: f32 },
-    #[error("the scene {} has a body {name:?}, which is also the name of an object of {task}; rename it", path.display())]
+    #[error(
+        "the scene {} has a body {name:?}, which is also the name of an object of {task}; rename it",
+        path.display()
+    )]
     SameName { path: PathBuf, task: String, name: String },
     #[error(
-        "in the scene {}, {name} does not stay where {task} puts it, ({:.2}, {:.2}, {:.2}) m from site \"task\": in {trial_s:.0} s it goes {moved_m:.2} m; it needs something to stand on and nothing in its way; a site {site:?} puts it elsewhere",
+        "in the scene {}, {name} does not stay where {task} puts it, ({:.2}, {:.2}, {:.2}) m from site \
+         \"task\": in {trial_s:.0} s it goes {moved_m:.2} m; it needs something to stand on and nothing in \
+         its way; a site {site:?} puts it elsewhere",
         path.display(), .at_m[0], .at_m[1], .at_m[2]
     )]
     Unsteady {
@@ -170,7 +193,9 @@ pub enum SceneError {
         trial_s: f64,
     },
     #[error(
-        "in the scene {}, in a trial of {trial_s:.0} s, in which nobody acts, {source}; look there for shapes that begin within each other, masses of less than a gram, and springs or actuators that are too strong for what they move",
+        "in the scene {}, in a trial of {trial_s:.0} s, in which nobody acts, {source}; look there for \
+         shapes that begin within each other, masses of less than a gram, and springs or actuators that are \
+         too strong for what they move",
         path.display()
     )]
     Diverged { path: PathBuf, trial_s: f64, source: tandem_sim::dynamics::Diverged },
@@ -184,7 +209,8 @@ pub enum CheckpointError {
     #[error("{} is no checkpoint of an episode: {source}", path.display())]
     NotOne { path: PathBuf, source: serde_json::Error },
     #[error(
-        "the checkpoint {} was made by build {made_by} of {episode}; this is build {this}, and only the build that made a checkpoint goes on from it",
+        "the checkpoint {} was made by build {made_by} of {episode}; this is build {this}, and only the \
+         build that made a checkpoint goes on from it",
         path.display()
     )]
     OtherBuild { path: PathBuf, made_by: String, episode: String, this: &'static str },
@@ -201,7 +227,9 @@ pub enum CheckpointError {
     #[error("{0}")]
     Recording(String),
     #[error(
-        "{}, played again up to step {step}, goes elsewhere than was recorded: build {made_by} recorded it, this is build {this}, and builds may differ in their physics; begin again with the build that recorded it",
+        "{}, played again up to step {step}, goes elsewhere than was recorded: build {made_by} recorded it, \
+         this is build {this}, and builds may differ in their physics; begin again with the build that \
+         recorded it",
         path.display()
     )]
     OtherWay { path: PathBuf, step: u64, made_by: String, this: &'static str },
@@ -210,7 +238,8 @@ pub enum CheckpointError {
     #[error("the checkpoint holds the progress of other robots or objects than it says; make it again")]
     OtherContent,
     #[error(
-        "{} begins elsewhere than at its task's beginning, and holds no checkpoint of where; recordings that this version of Tandem makes have it",
+        "{} begins elsewhere than at its task's beginning, and holds no checkpoint of where; recordings that \
+         this version of Tandem makes have it",
         path.display()
     )]
     NoBeginning { path: PathBuf },

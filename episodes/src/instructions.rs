@@ -38,13 +38,15 @@ pub enum InstructionsError {
     #[error("cannot read the instructions {path}: {source}")]
     Read { path: PathBuf, source: std::io::Error },
     #[error(
-        "{path}: {source}; a file that works: {{\"handover\": {{\"joint\": \"...\", \"robots\": {{\"A\": \"...\", \"B\": \"...\"}}}}}}"
+        "{path}: {source}; a file that works: {{\"handover\": {{\"joint\": \"...\", \"robots\": {{\"A\": \
+         \"...\", \"B\": \"...\"}}}}}}"
     )]
     Parse { path: PathBuf, source: serde_json::Error },
     #[error("{path}: {reason}")]
     Unknown { path: PathBuf, reason: String },
     #[error(
-        "{path}: {place} is empty, and nobody would know what to do; write there what is to be done, or leave it out for the task's own words"
+        "{path}: {place} is empty, and nobody would know what to do; write there what is to be done, or \
+         leave it out for the task's own words"
     )]
     Empty { path: PathBuf, place: String },
 }

@@ -11,7 +11,10 @@ use std::{
 /// Error while a file of a run folder is written.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
-    #[error("cannot write {}: {source}; give a folder on a disk with space that may be written to", path.display())]
+    #[error(
+        "cannot write {}: {source}; give a folder on a disk with space that may be written to",
+        path.display()
+    )]
     Io { path: PathBuf, source: io::Error },
     #[error("the recording {} cannot be written: {source}", path.display())]
     Mcap { path: PathBuf, source: mcap::McapError },

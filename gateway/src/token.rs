@@ -41,7 +41,8 @@ pub enum TokenError {
     },
     /// The text does not have the form of a token.
     #[error(
-        "the token of {place} has to be {MIN_LENGTH} to {MAX_LENGTH} letters, digits and signs without spaces; `openssl rand -hex 32` makes one"
+        "the token of {place} has to be {MIN_LENGTH} to {MAX_LENGTH} letters, digits and signs without \
+         spaces; `openssl rand -hex 32` makes one"
     )]
     Form {
         /// Source of the text.
@@ -49,7 +50,8 @@ pub enum TokenError {
     },
     /// A setting is empty, so the user would wrongly expect a protected server.
     #[error(
-        "{setting} is set and empty; give a token by it (`openssl rand -hex 32` makes one), or unset it for a server without"
+        "{setting} is set and empty; give a token by it (`openssl rand -hex 32` makes one), or unset it for \
+         a server without"
     )]
     Empty {
         /// Name of the setting.

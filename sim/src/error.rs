@@ -28,15 +28,18 @@ pub enum SimError {
     #[error("{} things are not read:{}", .0.len(), listed(.0))]
     Several(Vec<SimError>),
     #[error(
-        "this build cannot read `{path}`: ONNX policies are an extra; build with `cargo build --release --features onnx`"
+        "this build cannot read `{path}`: ONNX policies are an extra; build with `cargo build --release \
+         --features onnx`"
     )]
     WithoutOnnx { path: String },
     #[error(
-        "controller `{name}` drives legs and waist alone; a velocity policy without `looped:` can drive all motors"
+        "controller `{name}` drives legs and waist alone; a velocity policy without `looped:` can drive all \
+         motors"
     )]
     NoMotorController { name: String },
     #[error(
-        "this build cannot draw on a graphics processor: that is an extra; build with `cargo build --release --features gpu`"
+        "this build cannot draw on a graphics processor: that is an extra; build with `cargo build --release \
+         --features gpu`"
     )]
     WithoutGpu,
     #[error(

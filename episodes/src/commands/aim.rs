@@ -1,4 +1,4 @@
-//! Aims of wrists.
+//! Aims of wrists, and the poses that they mean.
 
 use nalgebra::Isometry3;
 use serde::{Deserialize, Serialize};
@@ -12,6 +12,19 @@ pub enum Aim {
     World(Isometry3<f64>),
     /// A pose in the pelvis frame, which moves with the pelvis.
     Carried(Isometry3<f64>),
+}
+
+/// Poses of a wrist in the pelvis frame.
+#[derive(Clone, Copy, Debug)]
+pub struct WristPoses {
+    /// Target without yielding; `unyielded` if the arm keeps its joints.
+    pub target: Isometry3<f64>,
+    /// Target with yielding, which the arm follows; `commanded` if the arm keeps its joints.
+    pub yielded: Isometry3<f64>,
+    /// Pose under the joint targets, which include the yielding.
+    pub commanded: Isometry3<f64>,
+    /// The commanded pose without the yielding.
+    pub unyielded: Isometry3<f64>,
 }
 
 impl Aim {

@@ -24,7 +24,7 @@ pub use columns::{Clamped, TargetCounts, action_row, base_row};
 pub use joints::Executed;
 pub(crate) use joints::drive_row;
 pub use motion::{Motion, MotionState, RobotSheet};
-pub use report::{grip, report, tell_wrists_in, wrist_state};
+pub use report::{grip, report, report_wrists_in, wrist_state};
 pub use upper_body::{UpperBody, upper_body};
 
 use tandem_sim::RobotCommand;

@@ -11,7 +11,7 @@ use tandem_sim::{
 };
 use tandem_tools_spec::PoseFrame;
 
-use super::aim::Aim;
+use super::aim::{Aim, WristPoses};
 use super::columns;
 use super::footing::Footing;
 use super::upper_body::{STEPS_AHEAD_M, UpperBody, ahead_m};
@@ -166,10 +166,10 @@ impl Motion {
         if !self.state.setpoints.is_empty() {
             self.stay_where(sensed);
         }
-        let asked = self.asked_wrists();
+        let targets = self.yielded(&self.state.aims);
         let before = &self.state.approaches;
         self.state.approaches = Sides::from_fn(|side| {
-            let off = isometry_from_sim(&sensed.pelvis_from_wrist[side]).inv_mul(&asked[side]?);
+            let off = isometry_from_sim(&sensed.pelvis_from_wrist[side]).inv_mul(&targets[side]?);
             let turned_rad = if self.body.turns_hand[side] { off.rotation.angle() } else { 0.0 };
             let missing_m = off.translation.vector.norm() + M_PER_RAD * turned_rad;
             let lately_m = before[side].map_or(missing_m, |before| before.lately_m);
@@ -198,9 +198,10 @@ impl Motion {
         UnitQuaternion::from_axis_angle(&Vector3::z_axis(), ahead.y.atan2(ahead.x))
     }
 
-    /// Moves the yielding of the hands by one control step. Without compliance, they return to their targets.
+    /// Advances the yielding of the hands by one control step. Without compliance, they return to their
+    /// targets.
     ///   dy/dt = F / c - l y,   |y| <= y_max
-    pub(super) fn give_way(&mut self, compliance: Compliance) {
+    pub(super) fn advance_yielding(&mut self, compliance: Compliance) {
         let Compliance { ahead_n_s_m, side_n_s_m, turn_n_m_s_rad } = compliance;
         let MotionState { pull_n, turning_n_m, yielded_m, yielded_rad, .. } = &mut self.state;
         let one = |yielded: &mut f64, pull: f64, damping: Option<f64>, most: f64| {
@@ -218,20 +219,19 @@ impl Motion {
         let pelvis_from_world = self.state.world_from_pelvis.rotation.inverse();
         let up = pelvis_from_world * Vector3::z_axis();
         let turned = UnitQuaternion::from_axis_angle(&up, self.state.yielded_rad);
-        Translation3::from(self.yielded_m()) * Isometry3::rotation_wrt_point(turned, Point3::from(middle_m))
+        Translation3::from(self.yielding_m()) * Isometry3::rotation_wrt_point(turned, Point3::from(middle_m))
     }
 
     /// Returns the displacement of the wrists' midpoint by yielding, in the pelvis frame.
-    fn yielded_m(&self) -> Vector3<f64> {
+    fn yielding_m(&self) -> Vector3<f64> {
         let [ahead_m, left_m] = self.state.yielded_m;
         let level_m = self.heading() * Vector3::new(ahead_m, left_m, 0.0);
         self.state.world_from_pelvis.rotation.inverse() * level_m
     }
 
-    /// Returns the wrists' midpoint under the commanded joints without the yielding, in the pelvis frame.
-    fn commanded_middle_m(&self) -> Vector3<f64> {
-        let wrists = self.commanded_wrists();
-        0.5 * (wrists.left.translation.vector + wrists.right.translation.vector) - self.yielded_m()
+    /// Returns the midpoint of `commanded` wrists without the yielding, in the pelvis frame.
+    fn unyielded_middle_m(&self, commanded: &Sides<Isometry3<f64>>) -> Vector3<f64> {
+        middle_m(&commanded.left, &commanded.right) - self.yielding_m()
     }
 
     pub fn world_from_pelvis(&self) -> &Isometry3<f64> {
@@ -262,7 +262,7 @@ impl Motion {
     }
 
     /// Returns the state of an equal robot after `command`; the hands' poses follow from the joint targets.
-    pub fn told(&self, command: &RobotCommand, world_from_pelvis: Isometry3<f64>) -> MotionState {
+    pub fn state_after(&self, command: &RobotCommand, world_from_pelvis: Isometry3<f64>) -> MotionState {
         Motion::new(self.robot.clone(), &self.body, command, world_from_pelvis).state
     }
 
@@ -281,25 +281,28 @@ impl Motion {
 
     /// Returns the base command for a velocity (forward and left in m/s, yaw rate in rad/s) and a height.
     /// Without a height, the base keeps the previous one.
-    pub(super) fn base_asked(&self, velocity_command: [f64; 3], height_m: Option<f64>) -> BaseCommand {
+    pub(super) fn base_command(&self, velocity_command: [f64; 3], height_m: Option<f64>) -> BaseCommand {
         let [vx_m_s, vy_m_s, yaw_rate_rad_s] = velocity_command.map(|part| part as f32);
         let pelvis_height_m = height_m.map_or(self.state.base.pelvis_height_m, |height_m| height_m as f32);
         BaseCommand { vx_m_s, vy_m_s, yaw_rate_rad_s, pelvis_height_m }
     }
 
-    /// Returns the target wrist poses in the pelvis frame; without a target, those of the joint targets.
-    pub fn targets(&self) -> Sides<Isometry3<f64>> {
+    /// Returns the poses of the wrists that the present aims and joint targets mean.
+    pub fn wrists(&self) -> Sides<WristPoses> {
+        let MotionState { aims, world_from_pelvis, .. } = &self.state;
         let commanded = self.commanded_wrists();
-        let asked = self.in_pelvis(&self.state.aims);
-        Sides::from_fn(|side| asked[side].unwrap_or(commanded[side]))
-    }
-
-    /// Returns the target wrist poses like [`Motion::targets`], without the yielding.
-    pub fn told_wrists(&self) -> Sides<Isometry3<f64>> {
-        let as_told = self.yielding(self.commanded_middle_m()).inverse();
-        let commanded = self.commanded_wrists().map(|wrist| as_told * wrist);
-        let pelvis = &self.state.world_from_pelvis;
-        Sides::from_fn(|side| self.state.aims[side].in_pelvis(pelvis).unwrap_or(commanded[side]))
+        let unyielding = self.yielding(self.unyielded_middle_m(&commanded)).inverse();
+        let yielded = self.yielded(aims);
+        Sides::from_fn(|side| {
+            let commanded = commanded[side];
+            let unyielded = unyielding * commanded;
+            WristPoses {
+                target: aims[side].in_pelvis(world_from_pelvis).unwrap_or(unyielded),
+                yielded: yielded[side].unwrap_or(commanded),
+                commanded,
+                unyielded,
+            }
+        })
     }
 
     /// Begins a command with a report of its own.
@@ -307,19 +310,10 @@ impl Motion {
         self.state.footing.begin();
     }
 
-    /// Returns the target wrist poses in the pelvis frame; `None` without a target.
-    fn asked_wrists(&self) -> Sides<Option<Isometry3<f64>>> {
-        self.in_pelvis(&self.state.aims)
-    }
-
-    /// Returns the displacement of a hand by yielding, in the pelvis frame; `None` without any.
-    pub(super) fn given_way_m(&self, side: Side) -> Option<Vector3<f64>> {
-        let MotionState { yielded_m, yielded_rad, aims, .. } = &self.state;
-        let [ahead_m, left_m] = *yielded_m;
-        let most = ahead_m.abs().max(left_m.abs()).max(yielded_rad.abs());
-        let asked = aims[side].in_pelvis(&self.state.world_from_pelvis).filter(|_| most > MIN_REPORTED)?;
-        let given_way = self.asked_wrists()[side]?;
-        Some(given_way.translation.vector - asked.translation.vector)
+    /// Returns true if the hands have yielded by enough for reports.
+    pub(super) fn has_yielded(&self) -> bool {
+        let MotionState { yielded_m: [ahead_m, left_m], yielded_rad, .. } = &self.state;
+        ahead_m.abs().max(left_m.abs()).max(yielded_rad.abs()) > MIN_REPORTED
     }
 
     /// Returns true if a wrist approaches its target; `None` while this is unknown.
@@ -384,13 +378,6 @@ impl Motion {
         self.aim(Sides::both(Aim::Joints), Restraint::default(), PoseFrame::Pelvis);
     }
 
-    /// Returns aims of the current kinds that the commanded joints would meet without the yielding.
-    pub(super) fn arrived(&self) -> Sides<Aim> {
-        let as_told = self.yielding(self.commanded_middle_m()).inverse();
-        let commanded = self.commanded_wrists().map(|wrist| as_told * wrist);
-        Sides::from_fn(|side| self.state.aims[side].at(&self.state.world_from_pelvis, &commanded[side]))
-    }
-
     pub(super) fn set_joints(&mut self, upper_rad: [f64; UPPER_JOINTS]) {
         self.state.upper_rad = upper_rad;
         (self.state.aims, self.state.frame) = (Sides::both(Aim::Joints), PoseFrame::Pelvis);
@@ -405,7 +392,7 @@ impl Motion {
     }
 
     /// Returns the wrist poses under the commanded joints, in the pelvis frame.
-    pub(super) fn commanded_wrists(&self) -> Sides<Isometry3<f64>> {
+    fn commanded_wrists(&self) -> Sides<Isometry3<f64>> {
         let configuration = self.configuration();
         self.body.wrists.map(|wrist| configuration.root_from_frame(wrist))
     }
@@ -413,7 +400,7 @@ impl Motion {
     /// Moves the joint targets by one step towards `aims`; an arm without a target keeps its joints. Inverse
     /// kinematics starts at the commanded joints, so the sag under gravity does not accumulate.
     pub(super) fn follow(&mut self, aims: &Sides<Aim>) {
-        let targets = self.in_pelvis(aims);
+        let targets = self.yielded(aims);
         if targets == Sides::both(None) {
             return;
         }
@@ -464,8 +451,8 @@ impl Motion {
         twin.state.restraint = Restraint { keeps_waist, stands_fast: false };
         let aims = targets.map(|target| target.map_or(Aim::Joints, Aim::Carried));
         (0..GOING_STEPS).for_each(|_| twin.follow(&aims));
-        let mut asked = targets.by_side().filter(|(_, target)| target.is_some());
-        let configuration = match asked.all(|(side, _)| self.body.turns_hand[side]) {
+        let mut moved = targets.by_side().filter(|(_, target)| target.is_some());
+        let configuration = match moved.all(|(side, _)| self.body.turns_hand[side]) {
             true => self.body.posture(self.configuration(), &tasks, &speeds_rad_s),
             // The direct solution would sacrifice the position of a limited arm to the orientation.
             false => twin.configuration(),
@@ -478,19 +465,24 @@ impl Motion {
         Reach { errors, joints_at_limit, has_to_step: self.has_to_step(&twin.state.upper_rad) }
     }
 
-    fn in_pelvis(&self, aims: &Sides<Aim>) -> Sides<Option<Isometry3<f64>>> {
-        let asked = aims.map(|aim| aim.in_pelvis(&self.state.world_from_pelvis));
-        let middle_m = match (asked.left, asked.right) {
-            (Some(left), Some(right)) => 0.5 * (left.translation.vector + right.translation.vector),
-            (None, _) | (_, None) => self.commanded_middle_m(),
+    /// Returns the poses of `aims` with the yielding, in the pelvis frame; `None` for joints.
+    fn yielded(&self, aims: &Sides<Aim>) -> Sides<Option<Isometry3<f64>>> {
+        let targets = aims.map(|aim| aim.in_pelvis(&self.state.world_from_pelvis));
+        let middle_m = match (targets.left, targets.right) {
+            (Some(left), Some(right)) => middle_m(&left, &right),
+            (None, _) | (_, None) => self.unyielded_middle_m(&self.commanded_wrists()),
         };
         let yielding = self.yielding(middle_m);
-        asked.map(|asked| asked.map(|wrist| yielding * wrist))
+        targets.map(|target| target.map(|wrist| yielding * wrist))
     }
 
     fn configuration(&self) -> Configuration<'_> {
         configuration(&self.body, &self.state)
     }
+}
+
+fn middle_m(left: &Isometry3<f64>, right: &Isometry3<f64>) -> Vector3<f64> {
+    0.5 * (left.translation.vector + right.translation.vector)
 }
 
 fn configuration<'a>(body: &'a UpperBody, state: &MotionState) -> Configuration<'a> {

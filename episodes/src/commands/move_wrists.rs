@@ -34,7 +34,7 @@ impl WristTrajectory {
         let velocity =
             [entry.vx_m_s.unwrap_or(0.0), entry.vy_m_s.unwrap_or(0.0), entry.yaw_rate_rad_s.unwrap_or(0.0)];
         let base =
-            clamped.base(&motion.robot.base_limits, motion.base_asked(velocity, entry.pelvis_height_m));
+            clamped.base(&motion.robot.base_limits, motion.base_command(velocity, entry.pelvis_height_m));
         let to = aims(entry, motion);
         let mut fingers = |side: Side, asked_rad: &Option<[f64; HAND_JOINTS]>| {
             let first = columns::hand(side).start;
@@ -53,9 +53,10 @@ impl WristTrajectory {
             stands_fast: entry.stand_fast.unwrap_or(false),
         };
         motion.aim(to, restraint, entry.frame.unwrap_or_default());
+        let (pelvis, wrists) = (motion.world_from_pelvis(), motion.wrists());
         WristTrajectory {
             steps,
-            from: motion.arrived(),
+            from: Sides::from_fn(|side| to[side].at(pelvis, &wrists[side].unyielded)),
             to,
             compliance: Compliance {
                 ahead_n_s_m: entry.compliance_n_s_m,
@@ -71,7 +72,7 @@ impl WristTrajectory {
     /// Makes control step `step`, counted from 1.
     pub fn advance(&self, step: u32, motion: &mut Motion) {
         let part = f64::from(step) / f64::from(self.steps);
-        motion.give_way(self.compliance);
+        motion.advance_yielding(self.compliance);
         motion.walk(self.base);
         for side in Side::BOTH {
             if let Some(goal_rad) = &self.fingers_rad[side] {
@@ -110,7 +111,7 @@ pub fn wrist_targets(
     frame: PoseFrame,
     motion: &Motion,
 ) -> Sides<Option<Isometry3<f64>>> {
-    let present = motion.told_wrists();
+    let present = motion.wrists().map(|wrist| wrist.target);
     if frame == PoseFrame::Pelvis {
         // A conversion to another frame and back would change the omitted half by rounding.
         return Sides::from_fn(|side| wrist_target(halves[side].0, halves[side].1, &present[side]));

@@ -69,7 +69,7 @@ fn right_hand(carried: bool) -> WristMove {
 
 /// Returns the position of the right wrist under the commanded joints.
 fn wrist_in_world_m(motion: &Motion) -> Vector3<f64> {
-    (motion.world_from_pelvis() * motion.commanded_wrists().right).translation.vector
+    (motion.world_from_pelvis() * motion.wrists().right.commanded).translation.vector
 }
 
 /// Returns a robot whose right hand has arrived in front of its chest.
@@ -109,9 +109,9 @@ fn targets_are_of_the_pelvis_at_the_beginning_and_only_carried_ones_move_with_it
         let off_m = (wrist_in_world_m(&motion) - began_m - walked * step_m).norm();
         assert!(off_m < 3e-3, "{off_m} m off with carried {carried}");
         // The current target is reported in the frame of the moved pelvis.
-        let told_m = motion.targets().right.translation.vector;
+        let target_m = motion.wrists().right.yielded.translation.vector;
         let expected_m = Vector3::new(0.28, -0.24, 0.22) + (walked - 50.0) * step_m;
-        assert!((told_m - expected_m).norm() < 1e-9, "{told_m} with carried {carried}");
+        assert!((target_m - expected_m).norm() < 1e-9, "{target_m} with carried {carried}");
     }
 }
 
@@ -182,7 +182,7 @@ fn both_hands(soft: WristMove) -> (Motion, RobotAction) {
 }
 
 fn wrists_in_world(motion: &Motion) -> Sides<Isometry3<f64>> {
-    motion.commanded_wrists().map(|wrist| motion.world_from_pelvis() * wrist)
+    motion.wrists().map(|wrist| motion.world_from_pelvis() * wrist.commanded)
 }
 
 /// 10 N or 2 N m for a second, at 1 m/s for 250 N and 1 rad/s for 20 N m: 4 cm and 0.1 rad, minus the
@@ -276,15 +276,15 @@ fn reach_is_asked_of_the_named_arm_alone() {
 #[test]
 fn a_half_that_is_left_out_is_where_the_hand_is_to_be() {
     let mut motion = arrived();
-    let target = motion.targets().right;
+    let target = motion.wrists().right.yielded;
     let higher = WristMove { right_position_m: Some([0.28, -0.24, 0.3]), ..WristMove::hold("A") };
     play(action(higher, &motion), Vector3::zeros(), &mut motion);
-    let moved = motion.targets().right;
+    let moved = motion.wrists().right.yielded;
     assert!((moved.translation.vector - Vector3::new(0.28, -0.24, 0.3)).norm() < 1e-12);
     // The target is converted to the world frame and back; rounding to six decimals would be much coarser.
     assert!(moved.rotation.angle_to(&target.rotation) < 1e-12);
     let turned = WristMove { right_quaternion_wxyz: Some([0.8, 0.6, 0.0, 0.0]), ..WristMove::hold("A") };
     play(action(turned, &motion), Vector3::zeros(), &mut motion);
-    let off_m = (motion.targets().right.translation.vector - moved.translation.vector).norm();
+    let off_m = (motion.wrists().right.yielded.translation.vector - moved.translation.vector).norm();
     assert!(off_m < 1e-12, "{off_m} m");
 }

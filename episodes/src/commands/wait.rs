@@ -8,7 +8,7 @@ pub fn hold(motion: &mut Motion) {
     if motion.keep_driving() {
         return;
     }
-    motion.give_way(Compliance::NONE);
+    motion.advance_yielding(Compliance::NONE);
     motion.stand();
     motion.follow(&motion.state().aims.clone());
 }

@@ -35,7 +35,7 @@ impl WalkTrajectory {
     pub fn begin(entry: &WalkMove, motion: &mut Motion, clamped: &mut Clamped) -> WalkTrajectory {
         let velocity = [entry.vx_m_s, entry.vy_m_s, entry.yaw_rate_rad_s];
         let base =
-            clamped.base(&motion.robot.base_limits, motion.base_asked(velocity, entry.pelvis_height_m));
+            clamped.base(&motion.robot.base_limits, motion.base_command(velocity, entry.pelvis_height_m));
         motion.keep_joints();
         let [yaw, pitch] = [columns::waist().start, columns::waist().end - 1];
         let mut turn = |column: usize, asked_rad: f64, rate_rad_s: f64| WaistTurn {
@@ -61,7 +61,7 @@ impl WalkTrajectory {
             let most_rad = rate_rad_s * f64::from(step) / CONTROL_HZ;
             motion.turn_waist(*column, from_rad + (to_rad - from_rad).clamp(-most_rad, most_rad));
         }
-        motion.give_way(Compliance::NONE);
+        motion.advance_yielding(Compliance::NONE);
         motion.walk(self.base);
     }
 }

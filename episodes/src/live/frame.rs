@@ -64,15 +64,15 @@ fn hand(step: &Step, index: usize, side: Side, motion: &Motion, row: &mut Vec<f3
     let robot: &RobotStep = &step.robots[index];
     let world_from_wrist = robot.truth.world_from_wrist[side];
     row.extend(pose_row(&world_from_wrist));
-    let target = motion.targets()[side];
+    let wrist = motion.wrists()[side];
     // The robot aims in its estimated pelvis frame; the target is drawn in the true one.
-    let world_from_target = robot.truth.world_from_pelvis() * isometry_to_sim(&target);
+    let world_from_target = robot.truth.world_from_pelvis() * isometry_to_sim(&wrist.yielded);
     row.extend(pose_row(&world_from_target));
     let measured = isometry_from_sim(&robot.sensed.pelvis_from_wrist[side]);
-    let missing = measured.inverse() * target;
+    let missing = measured.inverse() * wrist.yielded;
     row.push(match motion.aims_at_pose(side) {
         false => 0.0,
-        true => state_number(wrist_state(side, &target, &measured, &robot.sensed, motion)),
+        true => state_number(wrist_state(side, &wrist, &measured, &robot.sensed, motion)),
     });
     row.push(missing.translation.vector.norm() as f32);
     row.push(missing.rotation.angle() as f32);

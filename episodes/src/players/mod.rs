@@ -65,7 +65,8 @@ pub enum PlayerError {
     #[error("no expert for task {task:?}; have: {}", .have.join(", "))]
     NoExpert { task: String, have: Vec<&'static str> },
     #[error(
-        "the seed chooses nothing in task {task:?}, so its robots have nothing to tell each other; play it with expert"
+        "the seed chooses nothing in task {task:?}, so its robots have nothing to tell each other; play it \
+         with expert"
     )]
     NothingToSay { task: String },
     #[error("the episode has ended")]

@@ -97,10 +97,10 @@ impl RecordedEpisode {
 }
 
 fn shown(motions: &[Motion], step: &Step) -> LiveStep {
-    let told = motions.iter().zip(&step.robots).map(|(motion, robot)| {
-        motion.told(&robot.command, isometry_from_sim(&robot.estimate.world_from_pelvis))
+    let states = motions.iter().zip(&step.robots).map(|(motion, robot)| {
+        motion.state_after(&robot.command, isometry_from_sim(&robot.estimate.world_from_pelvis))
     });
-    LiveStep::new(step.clone().into(), told.collect(), None)
+    LiveStep::new(step.clone().into(), states.collect(), None)
 }
 
 /// Returns the step of which a policy was shown images.

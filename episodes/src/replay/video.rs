@@ -29,7 +29,10 @@ pub enum VideoFormat {
 pub enum VideoError {
     #[error("{} is no film that can be made; give a file that ends in .webp, .gif or .mp4", .0.display())]
     Format(PathBuf),
-    #[error("no ffmpeg to make {} with ({source}); install one, or give a file that ends in .webp or .gif", path.display())]
+    #[error(
+        "no ffmpeg to make {} with ({source}); install one, or give a file that ends in .webp or .gif",
+        path.display()
+    )]
     NoFfmpeg { path: PathBuf, source: io::Error },
     #[error("ffmpeg made no {}: {says}", path.display())]
     Ffmpeg { path: PathBuf, says: String },

@@ -246,8 +246,8 @@ impl Session {
 /// Adds the commanded poses of wrists that have some, in the state's own frame.
 fn tell_targets(state: &mut RobotState, motion: &Motion) {
     let frame_from_pelvis = motion.pelvis_from(state.frame.unwrap_or_default()).inverse();
-    let wrists = motion.told_wrists();
+    let wrists = motion.wrists();
     let target =
-        |side: Side| motion.aims_at_pose(side).then(|| wire_pose(&(frame_from_pelvis * wrists[side])));
+        |side: Side| motion.aims_at_pose(side).then(|| wire_pose(&(frame_from_pelvis * wrists[side].target)));
     (state.left_wrist_target, state.right_wrist_target) = (target(Side::Left), target(Side::Right));
 }

@@ -5,7 +5,7 @@ use numpy::{Element, PyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use tandem_episodes::joint_names;
 use tandem_sim::{Pose, RobotCommand, RobotStep, UPPER, Vector};
-use tandem_tools_spec::{Assistance, BASE_COLUMNS};
+use tandem_tools_spec::{Assistance, BASE_COLUMNS, DRIVE_BLOCKS};
 
 /// Colours of an image: height by width by red, green, blue.
 pub type Colours<'py> = Bound<'py, PyArray3<u8>>;
@@ -83,6 +83,14 @@ pub fn action_columns() -> Vec<String> {
     let names = joint_names();
     let joints = UPPER.iter().map(|joint| format!("{}_rad", names[*joint]));
     joints.chain(BASE_COLUMNS.map(String::from)).collect()
+}
+
+/// Returns the names of the columns of a row of motor setpoints.
+#[pyfunction]
+pub fn setpoint_columns() -> Vec<String> {
+    let names = joint_names();
+    let of_block = |block: &'static str| names.iter().map(move |joint| format!("{joint}.{block}"));
+    DRIVE_BLOCKS.into_iter().flat_map(of_block).collect()
 }
 
 /// Returns the names of the columns of a full state.

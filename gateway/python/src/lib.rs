@@ -22,7 +22,7 @@ mod _native {
     use pyo3::prelude::*;
 
     #[pymodule_export]
-    use crate::arrays::{action_columns, state_columns};
+    use crate::arrays::{action_columns, setpoint_columns, state_columns};
     #[pymodule_export]
     use crate::episode::{NativeEpisode, Snapshot};
     #[pymodule_export]

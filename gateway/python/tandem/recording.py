@@ -144,6 +144,11 @@ class Recording:
         """Names of the columns of `actions`."""
         return tuple(_native.action_columns())
 
+    @property
+    def setpoint_columns(self) -> tuple[str, ...]:
+        """Names of the numbers of `motor_setpoints` in a step, block by block."""
+        return tuple(_native.setpoint_columns())
+
     @cached_property
     def row_layout(self) -> str:
         """JSON of the names, units and ranges of the columns of a robot's rows; `tandem.rows` reads it."""

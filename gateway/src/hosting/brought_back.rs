@@ -18,7 +18,7 @@ use super::{
     durable::{JournalReader, Lease, Leasing, LiveFolder, StartKey},
     hosted_episode::Beside,
     table::unknown,
-    team::{Team, TeamRules},
+    team::{Team, TeamRules, seat_again},
 };
 
 /// Maximum number of episodes kept awake, regardless of how long they have been idle. Each takes some
@@ -156,7 +156,7 @@ impl EpisodeTable {
         for episode in &episodes {
             if let Some(team) = episode.team().filter(|team| team.misses_partners()).cloned() {
                 let (thread, partner) = (episode.thread.clone(), self.partner());
-                tokio::spawn(async move { team.seat_again(&thread, partner).await });
+                tokio::spawn(async move { seat_again(&team, &thread, partner).await });
             }
         }
         for episode in episodes.iter().filter(|episode| !episode.thread.ended()) {

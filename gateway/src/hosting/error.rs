@@ -51,7 +51,9 @@ pub enum HostingError {
     },
     /// The episode was begun by another build; only that build restores the same state.
     #[error(
-        "this episode was begun by build {made_by} of the server and this is {this}, which would not bring it to the same state; start that build on the same runs folder to go on, or DELETE the episode; what was recorded is in {}", .folder.display()
+        "this episode was begun by build {made_by} of the server and this is {this}, which would not bring \
+         it to the same state; start that build on the same runs folder to go on, or DELETE the episode; \
+         what was recorded is in {}", .folder.display()
     )]
     OtherBuild {
         /// Build that began the episode.
@@ -90,7 +92,8 @@ pub enum HostingError {
     },
     /// The operator's command timed out, and it has not been notified yet.
     #[error(
-        "robot {robot:?} was held still from step {from_step} to {to_step}, because the others' patience ran out before a command came; look again, then command"
+        "robot {robot:?} was held still from step {from_step} to {to_step}, because the others' patience ran \
+         out before a command came; look again, then command"
     )]
     LateCommand {
         /// The operator's robot.
@@ -102,7 +105,8 @@ pub enum HostingError {
     },
     /// The operator has called finish.
     #[error(
-        "robot {robot:?} has finished and holds still until the others have, too; observe and get_status still answer"
+        "robot {robot:?} has finished and holds still until the others have, too; observe and get_status \
+         still answer"
     )]
     OperatorFinished {
         /// The operator's robot.
@@ -110,7 +114,8 @@ pub enum HostingError {
     },
     /// An operator commanded after its thinking time had run out.
     #[error(
-        "the operator of robot {robot:?} has thought for {limit_s} s, which is all that it may; its robot holds still, the others play on, and observe and get_status still answer"
+        "the operator of robot {robot:?} has thought for {limit_s} s, which is all that it may; its robot \
+         holds still, the others play on, and observe and get_status still answer"
     )]
     OperatorOutOfTime {
         /// The operator's robot.
@@ -120,7 +125,8 @@ pub enum HostingError {
     },
     /// A call came without an operator's token, but each robot of the episode has an operator.
     #[error(
-        "each robot of this episode is driven by its own operator; send its token, which the start of the episode returned, as Authorization: Bearer TOKEN"
+        "each robot of this episode is driven by its own operator; send its token, which the start of the \
+         episode returned, as Authorization: Bearer TOKEN"
     )]
     NeedsOperator,
     /// An operator's request concerns more than its robot.
@@ -130,17 +136,20 @@ pub enum HostingError {
     HostsBusiness,
     /// One policy controls all robots, so no other driver can take one of them.
     #[error(
-        "one policy directs all robots of this episode; start one and add \"operators\": \"per_robot\" for somebody else to drive one of them"
+        "one policy directs all robots of this episode; start one and add \"operators\": \"per_robot\" for \
+         somebody else to drive one of them"
     )]
     OnePolicy,
     /// A client tried to start an episode, but an evaluation in this process holds the only one.
     #[error(
-        "this server holds the one episode that an evaluation scores, and starts no other; play the one that your brief and the environment's TANDEM_EPISODE name"
+        "this server holds the one episode that an evaluation scores, and starts no other; play the one that \
+         your brief and the environment's TANDEM_EPISODE name"
     )]
     OneEpisode,
     /// A program of this process was to replace a person in a collection.
     #[error(
-        "in a collection people drive, and nobody else in their place; demonstrations of the expert are tandem collect's without --operators"
+        "in a collection people drive, and nobody else in their place; demonstrations of the expert are \
+         tandem collect's without --operators"
     )]
     PeopleDrive,
     /// No expert here can drive a robot of this task.
@@ -154,12 +163,14 @@ pub enum HostingError {
     },
     /// Talking is not enabled here.
     #[error(
-        "nobody hears you: operators talk in an episode that was started with operators \"per_robot\" and talk true"
+        "nobody hears you: operators talk in an episode that was started with operators \"per_robot\" and \
+         talk true"
     )]
     NoTalk,
     /// A recipient has too many unread messages.
     #[error(
-        "robot {robot:?} has {unheard} messages that its operator has not heard yet; say more after its next call"
+        "robot {robot:?} has {unheard} messages that its operator has not heard yet; say more after its next \
+         call"
     )]
     TooMuchSaid {
         /// Recipient's robot.
@@ -169,7 +180,8 @@ pub enum HostingError {
     },
     /// The idempotency key belongs to a different request.
     #[error(
-        "this Idempotency-Key came with another request before; a key stands for one request, so take a new one for each"
+        "this Idempotency-Key came with another request before; a key stands for one request, so take a new \
+         one for each"
     )]
     KeyUsed,
     /// No token could be made for an operator.

@@ -15,7 +15,7 @@ use super::{
     durable::{KeptAnswer, Keyed, KeyedNote},
     episode::HostMemory,
     idempotency_cache::{IdempotencyCache, IdempotentReply},
-    team::Team,
+    team::{OperatorHandle, Team},
 };
 
 /// The caller, identified by its token.
@@ -120,6 +120,11 @@ impl HostedEpisode {
     /// Returns the operators; `None` if one policy controls all robots.
     pub fn team(&self) -> Option<&Arc<Team>> {
         self.beside.team.as_ref()
+    }
+
+    /// Returns the operator of `robot`.
+    pub fn operator(&self, robot: &str) -> Result<OperatorHandle, HostingError> {
+        OperatorHandle::new(self.team().ok_or(HostingError::OnePolicy)?, &self.thread, robot)
     }
 
     /// Returns the id of the episode.
@@ -284,9 +289,9 @@ impl HostedEpisode {
         keyed: Option<Keyed>,
     ) -> Result<Answer, HostingError> {
         match (self.team(), robot, &call.tool) {
-            (Some(team), Some(robot), _) => {
+            (Some(_), Some(robot), _) => {
                 let asked = RefusedCall::of(&call);
-                let answer = team.call(&self.thread, &robot, call, keyed).await;
+                let answer = self.operator(&robot)?.call(call, keyed).await;
                 if let Err(refusal) = &answer
                     && refusal.is_of_the_team()
                 {
@@ -296,7 +301,7 @@ impl HostedEpisode {
             }
             (_, _, ToolCall::Talk(_)) => Err(HostingError::NoTalk),
             (_, _, ToolCall::Look(_) | ToolCall::Act(_) | ToolCall::Plan(_) | ToolCall::Manage(_)) => {
-                self.thread.ask(None, call, keyed, Box::new(|answer| answer)).await
+                self.thread.ask(None, call, keyed, |answer| answer).await
             }
         }
     }

@@ -24,7 +24,7 @@ use super::{
     hosted_episode::Beside,
     idempotency_cache::{IdempotencyCache, IdempotentReply},
     run_folder::{RunFolders, episode_name},
-    team::{Collection, PartnerPolicy, Team, TeamRules},
+    team::{Collection, OperatorHandle, PartnerPolicy, Team, TeamRules},
 };
 use crate::{metrics::Metrics, settings::Settings};
 
@@ -291,16 +291,12 @@ impl EpisodeTable {
         self.lock().episodes.get(id).cloned().ok_or_else(|| unknown(id))
     }
 
-    /// Returns an operator's episode, its team and the operator's robot. Brings the episode back if
-    /// necessary.
-    pub async fn own_robot<'a>(
-        self: &Arc<Self>,
-        caller: &'a Caller,
-    ) -> Result<(HostedEpisode, Arc<Team>, &'a str), HostingError> {
+    /// Returns the operator that calls. Brings its episode back if necessary.
+    pub async fn own_robot(self: &Arc<Self>, caller: &Caller) -> Result<OperatorHandle, HostingError> {
         let Caller::Operator { episode, robot } = caller else { return Err(HostingError::NeedsOperator) };
         let hosted = self.awake(episode).await?;
-        let team = hosted.team().cloned().ok_or(HostingError::NeedsOperator)?;
-        Ok((hosted, team, robot))
+        hosted.team().ok_or(HostingError::NeedsOperator)?;
+        hosted.operator(robot)
     }
 
     /// Checks that `who` may replace operators by the expert or a policy of this process. Only the client
@@ -314,11 +310,11 @@ impl EpisodeTable {
         }
     }
 
-    /// Returns the episode `id` and its operators. Brings the episode back if necessary.
-    pub async fn team(self: &Arc<Self>, id: &str) -> Result<(HostedEpisode, Arc<Team>), HostingError> {
+    /// Returns the episode `id`, whose robots have operators. Brings the episode back if necessary.
+    pub async fn with_operators(self: &Arc<Self>, id: &str) -> Result<HostedEpisode, HostingError> {
         let hosted = self.awake(id).await?;
-        let team = hosted.team().cloned().ok_or(HostingError::OnePolicy)?;
-        Ok((hosted, team))
+        hosted.team().ok_or(HostingError::OnePolicy)?;
+        Ok(hosted)
     }
 
     /// Returns the briefing of the episode `id` for `who`, with this server's instructions.

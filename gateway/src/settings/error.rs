@@ -30,7 +30,8 @@ pub enum SettingsError {
     Tls(#[from] TlsError),
     /// Other machines would reach a server without a token.
     #[error(
-        "other machines reach {listen}; give a token that every request has to send, by --token-file FILE or in TANDEM_TOKEN (`openssl rand -hex 32` makes one), or listen on 127.0.0.1"
+        "other machines reach {listen}; give a token that every request has to send, by --token-file FILE or \
+         in TANDEM_TOKEN (`openssl rand -hex 32` makes one), or listen on 127.0.0.1"
     )]
     Open {
         /// Address to serve on.
@@ -57,7 +58,8 @@ pub enum SettingsError {
     LiveAfter,
     /// An allowed host is not a host name.
     #[error(
-        "allowed_host {name:?} is no name of a host; give it alone, for example lab.example, without http:// and port"
+        "allowed_host {name:?} is no name of a host; give it alone, for example lab.example, without http:// \
+         and port"
     )]
     NoHost {
         /// Given text.

@@ -51,7 +51,10 @@ pub enum TlsError {
         path: PathBuf,
     },
     /// The certificate and the key do not match, or cannot be used.
-    #[error("the key in {} is not that of the certificate in {}: {source}; {MAKES_ONE}", .key.display(), .certificate.display())]
+    #[error(
+        "the key in {} is not that of the certificate in {}: {source}; {MAKES_ONE}",
+        .key.display(), .certificate.display()
+    )]
     Mismatch {
         /// Path of the certificate.
         certificate: PathBuf,

@@ -21,7 +21,8 @@ pub struct DynamicsState {
 /// Error of restoring a state that belongs to another world.
 #[derive(Debug, Error, PartialEq)]
 #[error(
-    "the state has other trees or equalities than this world; one taken from a world of the same making would fit"
+    "the state has other trees or equalities than this world; one taken from a world of the same making \
+     would fit"
 )]
 pub struct OtherWorld;
 

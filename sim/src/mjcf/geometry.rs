@@ -108,6 +108,9 @@ impl Geom {
             None => (pose(&geom.pose), vector(geom.size).y),
         };
         let material = geom.material.as_ref().and_then(|name| document.model.assets.material(name));
+        let pattern = geom.material.as_ref().and_then(|name| document.looks.patterns.get(name).copied());
+        let texture = material.and_then(|material| document.model.assets.texture(material.texture.as_ref()?));
+        let is_tiled = pattern == Some(SurfacePattern::Tiles);
         let rgba = rgba(document, geom, material);
         let touches = match document.settings.touches {
             true => Mask { kinds: geom.contype, touched: geom.conaffinity },
@@ -116,20 +119,22 @@ impl Geom {
         let primitive = primitive(document, geom, half_length_m).map_err(|what| refuse(&what))?;
         Ok(Geom {
             name: geom.name.clone(),
-            image: material.and_then(|material| SurfaceImage::of(document, material, || primitive.mapped())),
+            image: material
+                .filter(|_| !is_tiled)
+                .and_then(|material| SurfaceImage::of(document, material, || primitive.mapped())),
             primitive,
             body_from_geom,
             rgba,
             gloss: document.glosses.find(geom.material.as_deref()),
             material: geom.material.clone(),
-            checker_rgb: material.and_then(|material| checker_rgb(document, material)),
+            checker_rgb: texture.filter(|_| is_tiled).map(builtin_rgb),
             friction: friction(geom).map_err(|what| refuse(&what))?,
             density_kg_m3: geom.density.unwrap_or(DEFAULT_DENSITY_KG_M3) as f32,
             mass_kg: geom.mass.map(|m| m as f32),
             collides: touches.kinds != 0 || touches.touched != 0,
             touches,
             drawn: document.looks.is_drawn(geom.group) && rgba[3] > 0.0,
-            pattern: geom.material.as_ref().and_then(|name| document.looks.patterns.get(name).copied()),
+            pattern,
         })
     }
 
@@ -225,13 +230,6 @@ fn friction(geom: &mjcf_rs::body::Geom) -> Result<Friction, String> {
         .ok_or_else(|| format!("condim=\"{}\"; use 1, 3, 4 or 6", geom.condim))?;
     let [slide, spin_m, roll_m] = geom.friction;
     Ok(Friction { directions, slide, spin_m, roll_m, priority: geom.priority, left: 1.0 })
-}
-
-/// Returns the two colours of a material whose pattern is tiles.
-fn checker_rgb(document: &Document, material: &mjcf_rs::assets::Material) -> Option<[[f32; 3]; 2]> {
-    let pattern = document.looks.patterns.get(material.name.as_ref()?);
-    let texture = document.model.assets.texture(material.texture.as_ref()?)?;
-    (pattern == Some(&SurfacePattern::Tiles)).then(|| builtin_rgb(texture))
 }
 
 /// Returns the two colours of a builtin texture; MuJoCo's own if the file gives none.

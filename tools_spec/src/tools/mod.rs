@@ -30,7 +30,7 @@ pub use query_depth::{
 };
 pub use say::Say;
 pub use send_joint_chunk::{ACTION_ROW_LEN, JointChunk, SendJointChunk, action_row_layout};
-pub use send_joint_drives::{DRIVE_ROW_LEN, JointDrives, SendJointDrives};
+pub use send_joint_drives::{DRIVE_BLOCKS, DRIVE_ROW_LEN, JointDrives, SendJointDrives};
 pub use send_plan::{Expectation, PlannedCommand, SendPlan};
 pub use start_episode::{
     Brief, Briefing, Instruction, JointInfo, PhaseInfo, RobotInfo, RobotKind, StartEpisode, StartReply,

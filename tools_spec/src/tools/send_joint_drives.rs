@@ -11,7 +11,7 @@ use crate::parts::CommandReply;
 use crate::tool::Tool;
 
 /// The blocks of a row of setpoints, in order, each with a number for each joint.
-const DRIVE_BLOCKS: [&str; 5] =
+pub const DRIVE_BLOCKS: [&str; 5] =
     ["position_rad", "velocity_rad_s", "kp_n_m_rad", "kd_n_m_s_rad", "torque_n_m"];
 /// Numbers in a block: the 43 joints, in the order of `get_robot_state`.
 const DRIVE_JOINTS: usize = 43;

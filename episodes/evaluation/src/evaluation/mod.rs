@@ -37,7 +37,8 @@ pub enum EvaluationError {
     #[error("cannot write {path}: {source}; give a folder on a disk with space that may be written to")]
     Io { path: PathBuf, source: std::io::Error },
     #[error(
-        "{task} seed {seed} could not be recorded: {reason}; what was played before is kept, and the same command goes on from there"
+        "{task} seed {seed} could not be recorded: {reason}; what was played before is kept, and the same \
+         command goes on from there"
     )]
     Recording { task: String, seed: u32, reason: String },
     #[error("an episode cannot be written as JSON: {0}")]
@@ -45,15 +46,18 @@ pub enum EvaluationError {
     #[error("{0}")]
     OtherRun(Box<OtherRun>),
     #[error(
-        "{folder} is being played by another process, so nothing of it is deleted; wait for it, end it, or give --out (in Python `out`) for another folder"
+        "{folder} is being played by another process, so nothing of it is deleted; wait for it, end it, or \
+         give --out (in Python `out`) for another folder"
     )]
     InUse { folder: PathBuf },
     #[error(
-        "{path} does not say which run its folder holds ({reason}); give --out (in Python `out`) for another folder, or delete that file if all episodes there are of this run"
+        "{path} does not say which run its folder holds ({reason}); give --out (in Python `out`) for another \
+         folder, or delete that file if all episodes there are of this run"
     )]
     UnreadableRun { path: PathBuf, reason: String },
     #[error(
-        "{reason}, and run the same command again: of {planned} episodes {kept} are played and kept, and it goes on with the others"
+        "{reason}, and run the same command again: of {planned} episodes {kept} are played and kept, and it \
+         goes on with the others"
     )]
     PolicyAbsent { reason: String, kept: usize, planned: usize },
 }

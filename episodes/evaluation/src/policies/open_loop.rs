@@ -44,9 +44,15 @@ struct RecordedRows {
 pub enum OpenLoopError {
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    #[error("cannot read {}: {source}; give an episode.mcap, or a folder that `collect` wrote", path.display())]
+    #[error(
+        "cannot read {}: {source}; give an episode.mcap, or a folder that `collect` wrote",
+        path.display()
+    )]
     Read { path: PathBuf, source: std::io::Error },
-    #[error("{} holds no recording of an episode; give an episode.mcap, or a folder that `collect` wrote", .0.display())]
+    #[error(
+        "{} holds no recording of an episode; give an episode.mcap, or a folder that `collect` wrote",
+        .0.display()
+    )]
     Nothing(PathBuf),
     #[error("{} begins at a checkpoint; give a recording from its task's own beginning", .0.display())]
     BeginsLater(PathBuf),

@@ -40,12 +40,13 @@ pub enum TaskCheckError {
     #[error("{task} cannot be played: {source}")]
     Episode { task: String, source: Box<EpisodeError> },
     #[error(
-        "{task} goes wrong while nobody acts, with seed {seed}: {source}; look for shapes that begin within each other"
+        "{task} goes wrong while nobody acts, with seed {seed}: {source}; look for shapes that begin within \
+         each other"
     )]
     Diverged { task: String, seed: u32, source: tandem_sim::dynamics::Diverged },
     #[error(
-        "{task}: phase {phase} is reached {time_s:.2} s after the start with seed {seed}, and nobody has acted; ask for something \
-         that a robot has to do, as holds(...) or lift_m(...) >= 0.03"
+        "{task}: phase {phase} is reached {time_s:.2} s after the start with seed {seed}, and nobody has \
+         acted; ask for something that a robot has to do, as holds(...) or lift_m(...) >= 0.03"
     )]
     ReachedByNobody { task: String, phase: String, time_s: f64, seed: u32 },
     #[error(transparent)]

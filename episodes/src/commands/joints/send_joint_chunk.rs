@@ -34,7 +34,7 @@ impl JointTrajectory {
     /// Makes control step `step`, counted from 1.
     pub fn advance(&self, step: u32, motion: &mut Motion) {
         let row = &self.rows[step as usize - 1];
-        motion.give_way(Compliance::NONE);
+        motion.advance_yielding(Compliance::NONE);
         motion.walk(row.base);
         motion.set_joints(row.upper_rad);
     }

@@ -12,7 +12,7 @@ use tandem_tools_spec::{
 
 use feel::Felt;
 
-use super::aim::Aim;
+use super::aim::{Aim, WristPoses};
 use super::columns::{self, Clamped};
 use super::motion::{Motion, RobotSheet};
 use crate::convert::{coarse, coarse_pose, isometry_from_sim, rounded_to};
@@ -89,26 +89,27 @@ fn hand_report(
     frame: PoseFrame,
 ) -> HandReport {
     let (arm, hand) = (columns::arm(side), columns::hand(side));
-    let [asked, measured] = wrist_poses(side, sensed, motion);
-    let missing = measured.inverse() * asked;
+    let wrist = motion.wrists()[side];
+    let poses = wrist_poses(side, &wrist, sensed, motion);
+    let ([target, measured], [wire_target, wire_measured]) = (poses, wire_wrists(poses, frame, motion));
+    let missing = measured.inverse() * target;
+    let offset_m = wrist.yielded.translation.vector - wrist.target.translation.vector;
     let robot = &motion.robot;
     let force_n = sensed.hand_force_in_pelvis_n[side];
-    let state = wrist_state(side, &motion.targets()[side], &measured, sensed, motion);
+    let state = wrist_state(side, &wrist, &measured, sensed, motion);
     let Felt { grip, presses, touch } = feel::felt(side, sensed, &robot.model);
     let is_pushed = state == HandState::Blocked && force_n.length() > TOUCHED_N;
-    let [target_told, measured_told] = told_wrists(side, frame, sensed, motion);
     HandReport {
         state: Some(state),
         grip: Some(grip),
         presses,
         touches: touch.or(is_pushed.then_some(Touch::Something)),
-        target: Some(target_told),
-        measured: Some(measured_told),
+        target: Some(wire_target),
+        measured: Some(wire_measured),
         position_error_m: Some(coarse(missing.translation.vector.norm())),
         orientation_error_rad: Some(coarse(missing.rotation.angle())),
-        given_way_m: motion
-            .given_way_m(side)
-            .map(|offset_m| [offset_m.x, offset_m.y, offset_m.z].map(coarse)),
+        given_way_m: (motion.aims_at_pose(side) && motion.has_yielded())
+            .then(|| [offset_m.x, offset_m.y, offset_m.z].map(coarse)),
         fingers: Some(fingers(side, sensed, motion)),
         largest_effort: Some(largest_effort(side, sensed, motion)),
         force_n: Some(force_n.to_array().map(|part| rounded_to(1, part.into()))),
@@ -121,19 +122,18 @@ fn hand_report(
     }
 }
 
-/// Returns the pose that a wrist was asked for and the measured one, both in the pelvis frame. The yielding
-/// is reported separately; otherwise a repeated target would start from the yielded pose.
-fn wrist_poses(side: Side, sensed: &RobotSensed, motion: &Motion) -> [Isometry3<f64>; 2] {
-    let asked = motion.state().aims[side].in_pelvis(motion.world_from_pelvis());
-    let asked = asked.unwrap_or_else(|| motion.commanded_wrists()[side]);
-    [asked, isometry_from_sim(&sensed.pelvis_from_wrist[side])]
+/// Returns the target of a wrist and its measured pose, both in the pelvis frame; without a target, the
+/// commanded pose. The yielding is reported separately; otherwise a repeated target would start from the
+/// yielded pose.
+fn wrist_poses(side: Side, wrist: &WristPoses, sensed: &RobotSensed, motion: &Motion) -> [Isometry3<f64>; 2] {
+    let target = if motion.aims_at_pose(side) { wrist.target } else { wrist.commanded };
+    [target, isometry_from_sim(&sensed.pelvis_from_wrist[side])]
 }
 
-/// Returns the target and the measured pose of a wrist as a report in `frame` has them.
-fn told_wrists(side: Side, frame: PoseFrame, sensed: &RobotSensed, motion: &Motion) -> [WirePose; 2] {
+/// Converts the target and the measured pose of a wrist to those of a report in `frame`.
+fn wire_wrists(poses: [Isometry3<f64>; 2], frame: PoseFrame, motion: &Motion) -> [WirePose; 2] {
     let frame_from_pelvis = motion.pelvis_from(frame).inverse();
-    let [target, mut measured] =
-        wrist_poses(side, sensed, motion).map(|wrist| coarse_pose(&(frame_from_pelvis * wrist)));
+    let [target, mut measured] = poses.map(|wrist| coarse_pose(&(frame_from_pelvis * wrist)));
     let signs = target.quaternion_wxyz.iter().zip(&measured.quaternion_wxyz);
     if signs.map(|(one, other)| one * other).sum::<f64>() < 0.0 {
         measured.quaternion_wxyz = measured.quaternion_wxyz.map(|part| 0.0 - part);
@@ -146,23 +146,26 @@ fn pelvis_in_room(frame: PoseFrame, motion: &Motion) -> Option<WirePose> {
 }
 
 /// Converts the wrists of a report on the robot as it is now to `frame`.
-pub fn tell_wrists_in(frame: PoseFrame, report: &mut RobotReport, sensed: &RobotSensed, motion: &Motion) {
+pub fn report_wrists_in(frame: PoseFrame, report: &mut RobotReport, sensed: &RobotSensed, motion: &Motion) {
     report.frame = Some(frame).filter(|frame| *frame != PoseFrame::Pelvis);
     report.pelvis_in_room = pelvis_in_room(frame, motion);
+    let wrists = motion.wrists();
     for (side, hand) in [(Side::Left, &mut report.left), (Side::Right, &mut report.right)] {
-        let [target, measured] = told_wrists(side, frame, sensed, motion);
+        let poses = wrist_poses(side, &wrists[side], sensed, motion);
+        let [target, measured] = wire_wrists(poses, frame, motion);
         (hand.target, hand.measured) = (Some(target), Some(measured));
     }
 }
 
-/// Returns the state of a wrist with its target and measured pose, both in the pelvis frame.
+/// Returns the state of a wrist with these poses, which is at `measured` in the pelvis frame.
 pub fn wrist_state(
     side: Side,
-    target: &Isometry3<f64>,
+    wrist: &WristPoses,
     measured: &Isometry3<f64>,
     sensed: &RobotSensed,
     motion: &Motion,
 ) -> HandState {
+    let target = &wrist.yielded;
     let turns =
         || columns::arm(side).any(|column| sensed.joints.qd_rad_s[UPPER[column]].abs() > ARM_MOVES_RAD_S);
     if motion.state().aims[side] == Aim::Joints {
@@ -182,7 +185,7 @@ pub fn wrist_state(
         HandState::Arrived
     } else if motion.comes_nearer(side).unwrap_or_else(turns) {
         HandState::Moving
-    } else if is_near(&motion.commanded_wrists()[side], target, &tolerance, 1.0) {
+    } else if is_near(&wrist.commanded, target, &tolerance, 1.0) {
         HandState::Blocked
     } else {
         HandState::OutOfReach

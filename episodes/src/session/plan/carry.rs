@@ -187,7 +187,7 @@ impl Session {
                 motion.aims_at_pose(side) || commands::grip(side, sensed, motion) != Grip::None
             }),
             ways: self.places(robot, entry, frame).into_iter().map(way).collect(),
-            stand_from_wrist: self.motions[robot].told_wrists().map(|wrist| stand_from_pelvis * wrist),
+            stand_from_wrist: self.motions[robot].wrists().map(|wrist| stand_from_pelvis * wrist.target),
             before_m: None,
             empty: Sides::both(None),
             out_of_reach: None,

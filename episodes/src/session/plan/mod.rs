@@ -23,7 +23,7 @@ use super::Session;
 use super::journal::KeptRequest;
 use super::told::shorten_report;
 use crate::EpisodeError;
-use crate::commands::{Called, OperatorCall, tell_wrists_in};
+use crate::commands::{Called, OperatorCall, report_wrists_in};
 use crate::output::OutputError;
 use crate::recording::CallerRecord;
 use commands::CommandList;
@@ -264,7 +264,7 @@ impl Session {
     fn tell_in(&self, frame: PoseFrame, reply: &mut CommandReply) {
         for (motion, robot) in self.motions.iter().zip(&self.present.robots) {
             if let Some(report) = reply.robots.iter_mut().find(|report| report.robot == motion.robot.name) {
-                tell_wrists_in(frame, report, &robot.sensed, motion);
+                report_wrists_in(frame, report, &robot.sensed, motion);
             }
         }
     }

@@ -116,9 +116,9 @@ impl WristWay {
         };
         let frame_from_pelvis = motion.pelvis_from(frame).inverse();
         let targets = wrist_targets(halves, entry.frame.unwrap_or_default(), motion);
-        let from = motion.told_wrists();
+        let from = motion.wrists();
         let wrists = Sides::from_fn(|side| {
-            targets[side].map(|target| [frame_from_pelvis * from[side], frame_from_pelvis * target])
+            targets[side].map(|target| [frame_from_pelvis * from[side].target, frame_from_pelvis * target])
         });
         let present_rad = |side: Side| {
             let hand = &motion.upper_rad()[columns::hand(side)];

@@ -21,7 +21,6 @@ PRIVILEGED = "privileged."
 POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
 AXES = ("x", "y", "z")
 HANDS = ("left", "right")
-SETPOINTS = ("position_rad", "velocity_rad_s", "kp_n_m_rad", "kd_n_m_s_rad", "torque_n_m")
 PARTS = ("thumb", "fingers", "palm")
 BASE_VELOCITIES = ("vx_m_s", "vy_m_s", "yaw_rate_rad_s")
 
@@ -135,7 +134,7 @@ def columns(recording: Recording, view: View, contract: RowContract, rows: NDArr
     setpoints = {
         f"motor_setpoints{'' if view.name is not None else '.' + robot}": Column(
             np.ascontiguousarray(np.reshape(values, (len(rows), -1))),
-            tuple(f"{joint}.{block}" for block in SETPOINTS for joint in recording.joints),
+            recording.setpoint_columns,
         )
         for robot, values in _setpoints(recording, robots, rows).items()
     }

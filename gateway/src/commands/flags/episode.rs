@@ -155,7 +155,8 @@ const MAX_SEEDS: u64 = 100_000;
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum SeedsError {
     #[error(
-        "{0:?} names no seeds; give one, for example 3, or a range with both ends included, for example 0-9 or 0..9"
+        "{0:?} names no seeds; give one, for example 3, or a range with both ends included, for example 0-9 \
+         or 0..9"
     )]
     NoSeeds(String),
     #[error("{text:?} names {seeds} seeds; give at most {MAX_SEEDS} in one command")]

@@ -4,15 +4,7 @@
 //! and once nobody waits for the operator any more. Each operator has the whole limit of the protocol.
 //! An operator in real time, who commands once in a control step, thinks only beyond that step.
 
-use std::{
-    sync::Arc,
-    time::{Duration, Instant},
-};
-
-use tandem_tools_spec::EndReason;
-
-use super::Team;
-use crate::hosting::{EpisodeThread, HostingError};
+use std::time::{Duration, Instant};
 
 /// Thinking time of an operator.
 #[derive(Debug, Default)]
@@ -66,33 +58,6 @@ impl OperatorClock {
 /// Returns seconds to the millisecond, as replies have them.
 pub(super) fn to_ms(time: Duration) -> f64 {
     (time.as_secs_f64() * 1e3).round() / 1e3
-}
-
-impl Team {
-    /// Returns the seconds that the operator on `seat` may still think; `None` without a limit.
-    pub(super) fn clock_left_s(&self, seat: usize) -> Option<f64> {
-        Some(to_ms(self.rules.thinking_limit?.saturating_sub(self.round().thought(seat))))
-    }
-
-    /// Refuses a command of the operator on `seat` once its clock has run out. Its robot then holds still, as
-    /// if it had finished; the episode ends when nobody else plays.
-    pub(super) fn check_clock(
-        self: &Arc<Self>,
-        episode: &Arc<EpisodeThread>,
-        seat: usize,
-    ) -> Result<(), HostingError> {
-        let limit = self.rules.thinking_limit.filter(|limit| self.round().thought(seat) >= *limit);
-        let Some(limit) = limit else { return Ok(()) };
-        let others_play_on = self.round().finish(seat)?;
-        match others_play_on {
-            true => self.go_on(episode),
-            false => episode.end(EndReason::WallClockExhausted)?,
-        }
-        Err(HostingError::OperatorOutOfTime {
-            robot: self.seats[seat].robot.clone(),
-            limit_s: limit.as_secs(),
-        })
-    }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! The robot executes its own part of each command. The parts of the other robots take as long as in that
 //! command, but their own drivers decide what they do.
 
-use std::{sync::Arc, thread, time::Duration};
+use std::{thread, time::Duration};
 
 use tandem_episodes::{
     EpisodeError, Facts, Picture, TeamObservation,
@@ -15,32 +15,32 @@ use tandem_tools_spec::{
 };
 use tokio::runtime::Handle;
 
-use super::{Team, round::Company};
-use crate::hosting::{EpisodeThread, HostingError};
+use super::{
+    handle::OperatorHandle,
+    round::{Operator, Others},
+};
+use crate::hosting::HostingError;
 
 /// Interval between two checks whether the other operators are back.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
 /// A robot that a player of all robots drives.
 pub struct OneRobot {
-    pub team: Arc<Team>,
-    pub episode: Arc<EpisodeThread>,
-    pub seat: usize,
-    pub robot: String,
+    pub operator: OperatorHandle,
     pub runtime: Handle,
 }
 
 impl OneRobot {
     /// Waits until another operator plays, because time must not pass while nobody does. Returns false
     /// once all have finished or the episode has ended.
-    pub fn has_company(&self) -> bool {
+    pub fn wait_for_others(&self) -> bool {
         loop {
-            let company = self.team.round().company(self.seat);
-            match company {
-                _ if self.episode.ended() => return false,
-                Company::There => return true,
-                Company::Gone => return false,
-                Company::Away => thread::sleep(POLL_INTERVAL),
+            let others = self.operator.round().state_of_others(self.operator.seat);
+            match others {
+                _ if self.operator.episode.ended() => return false,
+                Others::There => return true,
+                Others::Gone => return false,
+                Others::Away => thread::sleep(POLL_INTERVAL),
             }
         }
     }
@@ -49,8 +49,7 @@ impl OneRobot {
     /// call repeated, because this player does not need the notice.
     pub fn ask(&self, call: ToolCall) -> Result<ToolReply, HostingError> {
         let ask = || -> Result<ToolReply, HostingError> {
-            let asked = self.team.call(&self.episode, &self.robot, call.clone().into(), None);
-            Ok(self.runtime.block_on(asked)?.reply)
+            Ok(self.runtime.block_on(self.operator.call(call.clone().into(), None))?.reply)
         };
         match ask() {
             Err(HostingError::LateCommand { .. }) => ask(),
@@ -58,26 +57,27 @@ impl OneRobot {
         }
     }
 
-    fn check_company(&self) -> Result<(), PlayerError> {
-        if self.has_company() { Ok(()) } else { Err(PlayerError::EpisodeOver) }
+    fn check_others(&self) -> Result<(), PlayerError> {
+        if self.wait_for_others() { Ok(()) } else { Err(PlayerError::EpisodeOver) }
     }
 
     /// Extracts this robot's part of a command for all robots.
     fn own_part(&self, call: ToolCall) -> ToolCall {
+        let own = self.operator.robot();
         match call {
             ToolCall::Act(ActCall::MoveWrists(MoveWrists { steps, mut robots })) => {
-                robots.retain(|entry| entry.robot == self.robot);
+                robots.retain(|entry| entry.robot == own);
                 match robots.is_empty() {
                     true => Wait { steps }.into(),
                     false => MoveWrists { steps, robots }.into(),
                 }
             }
             ToolCall::Act(ActCall::SendJointChunk(SendJointChunk { mut robots })) => {
-                robots.retain(|chunk| chunk.robot == self.robot);
+                robots.retain(|chunk| chunk.robot == own);
                 SendJointChunk { robots }.into()
             }
             ToolCall::Act(ActCall::SendJointDrives(SendJointDrives { mut robots })) => {
-                robots.retain(|drives| drives.robot == self.robot);
+                robots.retain(|drives| drives.robot == own);
                 SendJointDrives { robots }.into()
             }
             other => other,
@@ -97,7 +97,7 @@ fn refused(tool: &'static str, error: HostingError) -> PlayerError {
 
 impl Episode for OneRobot {
     fn call(&mut self, call: ToolCall) -> Result<ToolReply, PlayerError> {
-        self.check_company()?;
+        self.check_others()?;
         let tool = call.name();
         self.ask(self.own_part(call)).map_err(|error| refused(tool, error))
     }
@@ -105,7 +105,7 @@ impl Episode for OneRobot {
 
 impl PrivilegedEpisode for OneRobot {
     fn facts(&mut self) -> Result<Facts, PlayerError> {
-        self.episode.facts_blocking().map_err(|_| PlayerError::EpisodeOver)
+        self.operator.episode.facts_blocking().map_err(|_| PlayerError::EpisodeOver)
     }
 }
 
@@ -115,10 +115,13 @@ impl LocalEpisode for OneRobot {
         observe: &Observe,
         shown: &[ExtraInformation],
     ) -> Result<TeamObservation, PlayerError> {
-        self.check_company()?;
-        let seen =
-            self.episode.look_blocking(observe, shown).map_err(|error| refused(Observe::NAME, error))?;
-        self.team.round().has_looked(self.seat);
+        self.check_others()?;
+        let seen = self
+            .operator
+            .episode
+            .look_blocking(observe, shown)
+            .map_err(|error| refused(Observe::NAME, error))?;
+        self.operator.own(Operator::has_looked);
         Ok(seen)
     }
 
@@ -127,6 +130,6 @@ impl LocalEpisode for OneRobot {
     }
 
     fn third_person(&mut self) -> Result<Picture, PlayerError> {
-        self.episode.room_blocking().map_err(|error| refused(Observe::NAME, error))
+        self.operator.episode.room_blocking().map_err(|error| refused(Observe::NAME, error))
     }
 }

@@ -1,31 +1,42 @@
 //! The state of a round: the commands that operators have given for the next step.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 use tandem_episodes::OperatorCommand;
 use tandem_tools_spec::{Heard, OperatorUse, PartnerDid, Presence, PresenceState, ToolReply};
 use tokio::{sync::oneshot, task::AbortHandle};
 
-use super::clock::{OperatorClock, to_ms};
+use super::{
+    clock::{OperatorClock, to_ms},
+    setpoint::{Setpoint, Teleoperation},
+};
 use crate::hosting::{Answer, HostingError, durable::Keyed};
 
 /// Maximum number of unread messages for one operator.
 const MAX_UNHEARD: usize = 32;
 
-/// The operators before a step, by seat.
-#[derive(Debug)]
+/// The operators before a step.
+#[derive(Debug, Default)]
 pub struct Round {
-    operators: Vec<Operator>,
+    /// One operator for each robot, in the episode's order.
+    pub operators: Vec<Operator>,
     /// Number of steps that have been made.
-    number: u64,
+    pub number: u64,
     /// Handle that stops the patience timer; `None` while none is running.
     patience: Option<AbortHandle>,
+    /// Number of drivers up to now.
+    pub drivers: u64,
+    /// True while a task turns setpoints into commands.
+    pub turning: bool,
+    /// Number of plans under way.
+    pub plans: u32,
 }
 
-#[derive(Debug)]
-struct Operator {
-    robot: String,
+/// The operator of one robot, and what drives the robot in this process.
+#[derive(Debug, Default)]
+pub struct Operator {
+    pub robot: String,
     state: OperatorState,
     /// First and last step through which its robot was held without its knowledge.
     missed: Option<[u32; 2]>,
@@ -35,6 +46,16 @@ struct Operator {
     /// Number of its requests.
     requests: u32,
     clock: OperatorClock,
+    /// State of the driver in real time; `None` for a robot of a program.
+    pub teleoperation: Option<Teleoperation>,
+    /// Time at which the pending command of a driver was made.
+    pub under_way: Option<Instant>,
+    /// True for a program that sends one control step after another in real time.
+    pub paced: bool,
+    /// Expert or policy that drives.
+    pub partner: Option<PartnerKind>,
+    /// Partner that drove when the previous server ended; `None` once it drives again.
+    pub left: Option<PartnerKind>,
 }
 
 /// Driver of a robot that runs in this process.
@@ -59,19 +80,12 @@ pub struct OperatorMemory {
     thought: Duration,
     /// Partner that drove in its place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub partner: Option<PartnerKind>,
-}
-
-impl OperatorMemory {
-    /// Returns the partner that drove and has not finished.
-    pub fn left(&self) -> Option<PartnerKind> {
-        self.partner.filter(|_| !self.finished)
-    }
+    partner: Option<PartnerKind>,
 }
 
 /// State of the other operators, as seen by one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Company {
+pub enum Others {
     /// At least one plays.
     There,
     /// None has commanded within the others' patience.
@@ -80,8 +94,9 @@ pub enum Company {
     Gone,
 }
 
-#[derive(Debug)]
+#[derive(Debug, Default)]
 enum OperatorState {
+    #[default]
     Thinking,
     /// The operator has commanded; the step is not made yet.
     Waiting(Box<Pending>),
@@ -103,85 +118,41 @@ pub struct Pending {
 
 impl Round {
     /// Creates the first round, for the operators of `robots`.
-    pub fn new(robots: Vec<String>) -> Round {
-        let operator = |robot| Operator {
-            robot,
-            state: OperatorState::Thinking,
-            missed: None,
-            heard: Vec::new(),
-            said: 0,
-            requests: 0,
-            clock: OperatorClock::default(),
-        };
-        Round { operators: robots.into_iter().map(operator).collect(), number: 0, patience: None }
+    pub fn new<'a>(robots: impl Iterator<Item = &'a str>) -> Round {
+        let operator = |robot: &str| Operator { robot: robot.into(), ..Operator::default() };
+        Round { operators: robots.map(operator).collect(), ..Round::default() }
     }
 
-    /// Returns the state that has to be remembered, by seat.
+    /// Returns the state of each operator that has to be remembered.
     pub fn memory(&self) -> Vec<OperatorMemory> {
-        let memory = |operator: &Operator| OperatorMemory {
-            silent: matches!(operator.state, OperatorState::Silent),
-            finished: matches!(operator.state, OperatorState::Finished),
-            missed: operator.missed,
-            heard: operator.heard.clone(),
-            said: operator.said,
-            requests: operator.requests,
-            thought: operator.clock.spent(),
-            partner: None,
-        };
-        self.operators.iter().map(memory).collect()
+        self.operators.iter().map(Operator::memory).collect()
     }
 
     /// Restores what was remembered.
     pub fn restore(&mut self, memory: Vec<OperatorMemory>) {
-        for (operator, memory) in self.operators.iter_mut().zip(memory) {
-            let OperatorMemory { silent, finished, missed, heard, said, requests, thought, partner: _ } =
-                memory;
-            (operator.missed, operator.heard, operator.said) = (missed, heard, said);
-            operator.requests += requests;
-            operator.clock.add(thought);
-            match operator.state {
-                // It has already called again.
-                OperatorState::Waiting(_) | OperatorState::Acting => {}
-                _ if finished => operator.state = OperatorState::Finished,
-                _ if silent => operator.state = OperatorState::Silent,
-                _ => operator.state = OperatorState::Thinking,
-            }
-        }
+        self.operators.iter_mut().zip(memory).for_each(|(operator, memory)| operator.restore(memory));
     }
 
-    /// Sets the time after each command of the operator on `seat` that counts as pacing.
-    pub fn set_pace(&mut self, seat: usize, pace: Duration) {
-        self.operators[seat].clock.set_pace(pace);
+    /// Returns true if somebody in this process drives, or waits for others.
+    pub fn is_busy(&self) -> bool {
+        let drives = |operator: &Operator| {
+            operator.partner.or(operator.left).is_some() || operator.teleoperation.is_some()
+        };
+        self.operators.iter().any(drives) || self.may_begin()
     }
 
-    /// Counts a request of the operator on `seat`, whose clock begins with its first.
-    pub fn arrive(&mut self, seat: usize) {
-        let operator = &mut self.operators[seat];
-        operator.requests += 1;
-        if let OperatorState::Thinking = operator.state {
-            operator.clock.run();
-        }
-    }
-
-    /// Returns what the operator on `seat` has used up to now.
-    pub fn used(&self, seat: usize) -> OperatorUse {
-        let Operator { robot, requests, clock, .. } = &self.operators[seat];
-        OperatorUse { robot: robot.clone(), requests: *requests, thinking_s: to_ms(clock.thought()) }
+    /// Returns true where a command by the operator on `seat` goes on after a shorter one of a partner:
+    /// beside people and programs in real time, partners of this process and plans, whose commands are short.
+    pub fn goes_on(&self, seat: usize) -> bool {
+        self.operators[seat].partner.is_some()
+            || self.plans > 0
+            || self.operators.iter().any(|operator| operator.teleoperation.is_some())
+            || self.others(seat).any(|operator| operator.paced)
     }
 
     /// Returns what the operators on other seats than `seat` do.
     pub fn presence(&self, seat: usize) -> Vec<Presence> {
-        let others = self.operators.iter().enumerate().filter(|(other, _)| *other != seat);
-        others.map(|(_, operator)| operator.presence()).collect()
-    }
-
-    /// Returns the time that the operator on `seat` has thought.
-    pub fn thought(&self, seat: usize) -> Duration {
-        self.operators[seat].clock.thought()
-    }
-
-    pub fn number(&self) -> u64 {
-        self.number
+        self.others(seat).map(Operator::presence).collect()
     }
 
     /// Checks that the operator on `seat` may command now. One that kept silent is refused once, with the
@@ -202,39 +173,6 @@ impl Round {
             Some([from_step, to_step]) => Err(HostingError::LateCommand { robot, from_step, to_step }),
             None => Ok(()),
         }
-    }
-
-    pub fn command(&mut self, seat: usize, pending: Pending) {
-        let operator = &mut self.operators[seat];
-        operator.state = OperatorState::Waiting(pending.into());
-        operator.clock.stop();
-    }
-
-    /// Records that the operator on `seat` has looked at the current state.
-    pub fn has_looked(&mut self, seat: usize) {
-        let operator = &mut self.operators[seat];
-        operator.missed = None;
-        if let OperatorState::Silent = operator.state {
-            operator.state = OperatorState::Thinking;
-            operator.clock.run();
-        }
-    }
-
-    /// Refuses an operator that has finished.
-    pub fn check_plays(&self, seat: usize) -> Result<(), HostingError> {
-        let operator = &self.operators[seat];
-        match operator.state {
-            OperatorState::Finished => Err(HostingError::OperatorFinished { robot: operator.robot.clone() }),
-            OperatorState::Thinking
-            | OperatorState::Waiting(_)
-            | OperatorState::Acting
-            | OperatorState::Silent => Ok(()),
-        }
-    }
-
-    /// Stops waiting for the operator on `seat` until it calls again.
-    pub fn fall_silent(&mut self, seat: usize) {
-        self.operators[seat].fall_silent();
     }
 
     /// Lets the operator on `seat` leave. Returns true if others play on.
@@ -260,14 +198,19 @@ impl Round {
     }
 
     /// Returns the state of the operators on other seats than `seat`.
-    pub fn company(&self, seat: usize) -> Company {
-        let others = self.operators.iter().enumerate().filter(|(other, _)| *other != seat);
-        let states: Vec<&OperatorState> = others.map(|(_, operator)| &operator.state).collect();
-        if states.iter().all(|state| matches!(state, OperatorState::Finished)) {
-            return Company::Gone;
+    pub fn state_of_others(&self, seat: usize) -> Others {
+        let all = |of: fn(&OperatorState) -> bool| self.others(seat).all(|operator| of(&operator.state));
+        if all(|state| matches!(state, OperatorState::Finished)) {
+            Others::Gone
+        } else if all(|state| matches!(state, OperatorState::Finished | OperatorState::Silent)) {
+            Others::Away
+        } else {
+            Others::There
         }
-        let away = |state: &&OperatorState| matches!(state, OperatorState::Finished | OperatorState::Silent);
-        if states.iter().all(away) { Company::Away } else { Company::There }
+    }
+
+    fn others(&self, seat: usize) -> impl Iterator<Item = &Operator> {
+        self.operators.iter().enumerate().filter(move |(other, _)| *other != seat).map(|(_, other)| other)
     }
 
     /// Returns true if a step can be made: an operator has commanded, and no step is being made.
@@ -322,20 +265,12 @@ impl Round {
 
     /// Refuses a message that would exceed `MAX_UNHEARD` for one of its recipients.
     pub fn check_unheard(&self, from: usize) -> Result<(), HostingError> {
-        let others = self.operators.iter().enumerate().filter(|(seat, _)| *seat != from);
-        match others.map(|(_, other)| other).find(|other| other.heard.len() >= MAX_UNHEARD) {
+        match self.others(from).find(|other| other.heard.len() >= MAX_UNHEARD) {
             Some(other) => {
                 Err(HostingError::TooMuchSaid { robot: other.robot.clone(), unheard: MAX_UNHEARD })
             }
             None => Ok(()),
         }
-    }
-
-    /// Counts a message of the operator on `seat`, and returns the number of its earlier ones.
-    pub fn count_said(&mut self, seat: usize) -> u32 {
-        let said = &mut self.operators[seat].said;
-        *said += 1;
-        *said - 1
     }
 
     /// Delivers a message to all operators except `from`.
@@ -346,14 +281,107 @@ impl Round {
             }
         }
     }
-
-    /// Takes the unread messages of the operator on `seat`.
-    pub fn take_heard(&mut self, seat: usize) -> Vec<Heard> {
-        std::mem::take(&mut self.operators[seat].heard)
-    }
 }
 
 impl Operator {
+    fn memory(&self) -> OperatorMemory {
+        OperatorMemory {
+            silent: matches!(self.state, OperatorState::Silent),
+            finished: matches!(self.state, OperatorState::Finished),
+            missed: self.missed,
+            heard: self.heard.clone(),
+            said: self.said,
+            requests: self.requests,
+            thought: self.clock.spent(),
+            partner: self.partner.or(self.left),
+        }
+    }
+
+    fn restore(&mut self, memory: OperatorMemory) {
+        let OperatorMemory { silent, finished, missed, heard, said, requests, thought, partner } = memory;
+        (self.missed, self.heard, self.said) = (missed, heard, said);
+        self.requests += requests;
+        self.clock.add(thought);
+        self.left = partner.filter(|_| !finished);
+        match self.state {
+            // It has already called again.
+            OperatorState::Waiting(_) | OperatorState::Acting => {}
+            _ if finished => self.state = OperatorState::Finished,
+            _ if silent => self.state = OperatorState::Silent,
+            _ => self.state = OperatorState::Thinking,
+        }
+    }
+
+    /// Counts a request; the first starts its clock.
+    pub fn arrive(&mut self) {
+        self.requests += 1;
+        if let OperatorState::Thinking = self.state {
+            self.clock.run();
+        }
+    }
+
+    /// Sets the time after each command that counts as pacing.
+    pub fn set_pace(&mut self, pace: Duration) {
+        self.clock.set_pace(pace);
+    }
+
+    /// Returns the setpoint of its driver that is a command now, if the last command has been answered and
+    /// time may pass. The flag says whether the driver receives the robot's state.
+    pub fn due(&mut self, now: Instant) -> Option<(Setpoint, bool)> {
+        let teleoperation = self.teleoperation.as_mut().filter(|_| self.under_way.is_none())?;
+        let due = teleoperation.due(now)?;
+        self.under_way = Some(now);
+        Some(due)
+    }
+
+    /// Returns the requests and the time that it has used up to now.
+    pub fn used(&self) -> OperatorUse {
+        let thinking_s = to_ms(self.clock.thought());
+        OperatorUse { robot: self.robot.clone(), requests: self.requests, thinking_s }
+    }
+
+    /// Returns the time that it has thought.
+    pub fn thought(&self) -> Duration {
+        self.clock.thought()
+    }
+
+    /// Takes its command for the next step.
+    pub fn command(&mut self, pending: Pending) {
+        self.state = OperatorState::Waiting(pending.into());
+        self.clock.stop();
+    }
+
+    /// Records that it has looked at the current state.
+    pub fn has_looked(&mut self) {
+        self.missed = None;
+        if let OperatorState::Silent = self.state {
+            self.state = OperatorState::Thinking;
+            self.clock.run();
+        }
+    }
+
+    /// Refuses an operator that has finished.
+    pub fn check_plays(&self) -> Result<(), HostingError> {
+        match self.state {
+            OperatorState::Finished => Err(HostingError::OperatorFinished { robot: self.robot.clone() }),
+            OperatorState::Thinking
+            | OperatorState::Waiting(_)
+            | OperatorState::Acting
+            | OperatorState::Silent => Ok(()),
+        }
+    }
+
+    /// Counts a message of its own, and returns the number of its earlier ones.
+    pub fn count_said(&mut self) -> u32 {
+        self.said += 1;
+        self.said - 1
+    }
+
+    /// Takes the unread messages.
+    pub fn take_heard(&mut self) -> Vec<Heard> {
+        std::mem::take(&mut self.heard)
+    }
+
     fn presence(&self) -> Presence {
         let state = match self.state {
             OperatorState::Thinking | OperatorState::Silent if self.requests == 0 => PresenceState::Absent,
@@ -367,8 +395,8 @@ impl Operator {
         Presence { robot: self.robot.clone(), state, thinking_s }
     }
 
-    /// Lets nobody wait for it any more, if it thinks.
-    fn fall_silent(&mut self) {
+    /// Lets nobody wait for it any more until it calls again, if it thinks.
+    pub fn fall_silent(&mut self) {
         if let OperatorState::Thinking = self.state {
             self.state = OperatorState::Silent;
             self.clock.stop();

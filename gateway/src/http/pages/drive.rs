@@ -22,7 +22,7 @@ use tokio::{
 
 use super::socket::{PageReader, PageSender, PageSocket, upgrade};
 use crate::{
-    hosting::{Answer, Caller, Driver, HostingError, LiveWatch, Setpoint, Wish},
+    hosting::{Answer, Caller, Driver, DriverRequest, HostingError, LiveWatch, Setpoint},
     http::{app::AppState, problem::ApiError},
 };
 
@@ -126,10 +126,11 @@ pub async fn drive(
     request: Request,
 ) -> Result<Response, ApiError> {
     let Extension(DrivenRobots(robots)) = robots.ok_or(HostingError::NeedsOperator)?;
-    let (hosted, team, robot) = app.table.own_robot(&caller).await?;
-    let (watch, every_step) = hosted.thread.watch_driving(robot).await?;
-    let (driver, answers) = Driver::take(&team, &hosted.thread, &robots)?;
-    let (robot, disclosure) = (robot.to_owned(), app.settings.disclosure);
+    let operator = app.table.own_robot(&caller).await?;
+    let robot = operator.robot().to_owned();
+    let (watch, every_step) = operator.episode.watch_driving(&robot).await?;
+    let (driver, answers) = Driver::take(&operator, &robots)?;
+    let disclosure = app.settings.disclosure;
     upgrade(request, move |PageSocket { mut sender, mut reader }| async move {
         let _every_step = every_step;
         let driver = Arc::new(driver);
@@ -149,7 +150,7 @@ async fn hear(reader: &mut PageReader, robot: &str, driver: &Driver) -> io::Resu
     while let Some(text) = reader.text().await? {
         let Word { wrist_move, row, drive_row, states, go, steps } = serde_json::from_str(&text)?;
         let setpoint = setpoint(robot, wrist_move, row, drive_row)?;
-        driver.say(&Wish { setpoint, tells_state: states, go, steps });
+        driver.say(&DriverRequest { setpoint, tells_state: states, go, steps });
     }
     Ok(())
 }

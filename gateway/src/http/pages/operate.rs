@@ -79,8 +79,8 @@ async fn expert(
     body: Bytes,
 ) -> Result<StatusCode, ApiError> {
     let StandIn { episode, robot } = stand_in(&app, &who, &body)?;
-    let (hosted, team) = app.table.team(&episode).await?;
-    team.take_expert(&hosted.thread, &robot).await?;
+    let hosted = app.table.with_operators(&episode).await?;
+    hosted.operator(&robot)?.take_expert().await?;
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -90,8 +90,7 @@ async fn pace(
     State(app): State<AppState>,
     Extension(caller): Extension<Caller>,
 ) -> Result<StatusCode, ApiError> {
-    let (_, team, robot) = app.table.own_robot(&caller).await?;
-    team.pace(robot)?;
+    app.table.own_robot(&caller).await?.pace();
     Ok(StatusCode::NO_CONTENT)
 }
 
@@ -113,8 +112,9 @@ async fn policy(
     body: Bytes,
 ) -> Result<StatusCode, ApiError> {
     let StandIn { episode, robot } = stand_in(&app, &who, &body)?;
-    let (hosted, team) = app.table.team(&episode).await?;
-    team.take_policy(&hosted.thread, &robot, app.table.partner()?).await?;
+    let hosted = app.table.with_operators(&episode).await?;
+    let policy = app.table.partner()?;
+    hosted.operator(&robot)?.take_policy(policy).await?;
     Ok(StatusCode::NO_CONTENT)
 }
 

@@ -53,7 +53,8 @@ pub enum ApiError {
     },
     /// The body names an episode other than the one in the path.
     #[error(
-        "the path names episode {path:?} and the body {body}; leave episode_id out of the body or make them equal"
+        "the path names episode {path:?} and the body {body}; leave episode_id out of the body or make them \
+         equal"
     )]
     EpisodeMismatch {
         /// Id in the path.
@@ -69,7 +70,8 @@ pub enum ApiError {
     },
     /// The request is for another server.
     #[error(
-        "host {0:?} is not this server; use the address it prints at its start, or name the host in --allowed-host"
+        "host {0:?} is not this server; use the address it prints at its start, or name the host in \
+         --allowed-host"
     )]
     ForeignHost(String),
     /// The request comes from a foreign web page.
@@ -80,7 +82,8 @@ pub enum ApiError {
     NotEncrypted,
     /// The body is not valid JSON.
     #[error(
-        "the body is no JSON: {0}; send one JSON object, with finite numbers only, for example {{\"steps\": 25}}"
+        "the body is no JSON: {0}; send one JSON object, with finite numbers only, for example {{\"steps\": \
+         25}}"
     )]
     MalformedJson(String),
     /// The body is not valid MessagePack.
@@ -100,7 +103,8 @@ pub enum ApiError {
     },
     /// The server has no collection, or the caller is not part of it.
     #[error(
-        "nobody collects episodes by this server and token; tandem collect --operators N prints the links of those who do"
+        "nobody collects episodes by this server and token; tandem collect --operators N prints the links of \
+         those who do"
     )]
     NoCollection,
     /// A mark arrived while there is no episode to be marked.
@@ -113,7 +117,8 @@ pub enum ApiError {
     Key,
     /// The body is JSON, but not an object.
     #[error(
-        "the body is {0}; send one JSON object, for example {{\"steps\": 25}}, or no body where there is nothing to say"
+        "the body is {0}; send one JSON object, for example {{\"steps\": 25}}, or no body where there is \
+         nothing to say"
     )]
     NoObject(&'static str),
     /// The body took too long to arrive.
@@ -135,7 +140,8 @@ pub enum ApiError {
     },
     /// The content type is neither JSON nor MessagePack.
     #[error(
-        "content-type {0:?} is not read; send JSON with content-type: application/json, or MessagePack with application/msgpack"
+        "content-type {0:?} is not read; send JSON with content-type: application/json, or MessagePack with \
+         application/msgpack"
     )]
     ContentType(String),
     /// Too many requests are under way.

@@ -86,7 +86,8 @@ impl Dynamics {
 /// The step produced a number that is not finite or soon will not be. The state is that before the step.
 #[derive(Debug, Error, PartialEq)]
 #[error(
-    "physics diverged at link `{link}` of `{tree}`: a velocity came out as {speed:.3e} m/s or rad/s, which is not finite or soon will not be"
+    "physics diverged at link `{link}` of `{tree}`: a velocity came out as {speed:.3e} m/s or rad/s, which \
+     is not finite or soon will not be"
 )]
 pub struct Diverged {
     pub tree: String,

@@ -153,13 +153,15 @@ pub enum TreeError {
     #[error("tree `{tree}` has no link")]
     Empty { tree: String },
     #[error(
-        "link `{link}` of tree `{tree}`: its parent must be an earlier link; only the first link hangs on the world"
+        "link `{link}` of tree `{tree}`: its parent must be an earlier link; only the first link hangs on \
+         the world"
     )]
     Parent { tree: String, link: String },
     #[error("link `{link}` of tree `{tree}` has a free joint; only the first link of a tree may be free")]
     Free { tree: String, link: String },
     #[error(
-        "the joint of link `{link}` of tree `{tree}` moves nothing that has inertia; give the link a mass or the joint an armature"
+        "the joint of link `{link}` of tree `{tree}` moves nothing that has inertia; give the link a mass or \
+         the joint an armature"
     )]
     Massless { tree: String, link: String },
 }

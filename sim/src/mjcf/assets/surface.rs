@@ -6,7 +6,6 @@ use std::sync::Arc;
 use rapier3d::math::Vector;
 use roxmltree::Node;
 
-use super::looks::SurfacePattern;
 use super::texture::Texture;
 use crate::SimError;
 use crate::mjcf::Document;
@@ -92,16 +91,12 @@ impl TextureRepeats {
 }
 
 impl SurfaceImage {
-    /// Returns the image of a material on a shape; `None` if its texture has none, and for tiles.
+    /// Returns the image of a material on a shape; `None` if its texture has none.
     pub(in crate::mjcf) fn of(
         document: &Document,
         material: &mjcf_rs::assets::Material,
         shape: impl FnOnce() -> MappedShape,
     ) -> Option<SurfaceImage> {
-        let pattern = material.name.as_ref().and_then(|name| document.looks.patterns.get(name));
-        if pattern == Some(&SurfacePattern::Tiles) {
-            return None;
-        }
         let layers = document.layers.find(material);
         let (gloss, relief) =
             layers.map_or((None, None), |layers| (layers.gloss.clone(), layers.relief.clone()));

@@ -40,7 +40,8 @@ pub enum PolicyKeyError {
     },
     /// The text is not a valid key.
     #[error(
-        "the policy's key of {place} has to be one line of letters, digits and signs; unset it for a server that wants none"
+        "the policy's key of {place} has to be one line of letters, digits and signs; unset it for a server \
+         that wants none"
     )]
     Form {
         /// Source of the key.
@@ -48,7 +49,8 @@ pub enum PolicyKeyError {
     },
     /// The key would be sent unencrypted.
     #[error(
-        "a key would go unencrypted to {url}; give {protocol}:{encrypted}HOST, or unset {KEY_VARIABLE} for a server that wants none"
+        "a key would go unencrypted to {url}; give {protocol}:{encrypted}HOST, or unset {KEY_VARIABLE} for a \
+         server that wants none"
     )]
     Unencrypted {
         /// URL of the server.

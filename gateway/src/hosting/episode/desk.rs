@@ -1,0 +1,217 @@
+//! Jobs on the thread of an episode, which owns its session. Each is written to the episode's journal before
+//! it is answered.
+
+use std::{
+    sync::{Arc, atomic::Ordering::Relaxed},
+    time::Duration,
+};
+
+use serde_json::Value;
+use tandem_episodes::Session;
+use tandem_tools_spec::{Note, ResultReply};
+use tokio::sync::{mpsc, oneshot};
+
+use super::{panic_guard::PanicGuard, stage::Stage};
+use crate::hosting::{
+    Answer, HostingError,
+    durable::{Commit, Heading, JournalFile, KeptAnswer, Keyed, KeyedNote, Lease, Leasing},
+};
+
+/// A unit of work on an episode. No other job runs while it does. It gets the reason if the episode is not
+/// available.
+pub type Job = Box<dyn FnOnce(Result<&mut Desk, HostingError>) + Send>;
+
+/// Outcome of a job.
+pub type Outcome<T> = Result<T, HostingError>;
+
+/// A session and the journal to which it is written.
+pub struct Desk {
+    stage: Arc<Stage>,
+    session: PanicGuard,
+    log: Option<Log>,
+    /// True once the episode is to sleep.
+    sleeps: bool,
+    closing: Option<Closing>,
+}
+
+/// The journal of an episode that this process plays.
+pub struct Log {
+    pub file: JournalFile,
+    pub lease: Lease,
+    /// Memory that was written last.
+    pub memory: Value,
+}
+
+/// A request to close the episode.
+pub struct Closing {
+    /// True if the next server is to bring the episode back.
+    pub keep: bool,
+    pub reply: oneshot::Sender<Outcome<ResultReply>>,
+}
+
+/// Reason why the thread ended.
+pub enum Left {
+    /// The caller that asked for the end, and the result it receives once the place is free.
+    Closed(Option<(oneshot::Sender<Outcome<ResultReply>>, Box<Outcome<ResultReply>>)>),
+    Asleep,
+}
+
+impl Desk {
+    /// Begins to work on `session`, which is written to the journal `log`.
+    pub fn new(stage: Arc<Stage>, session: PanicGuard, log: Option<Log>) -> Desk {
+        Desk { stage, session, log, sleeps: false, closing: None }
+    }
+
+    /// Does jobs until one asks for the end or for sleep, or until all senders are gone.
+    pub fn work(mut self, mut inbox: mpsc::Receiver<Job>) -> Left {
+        self.stage.status.update(&self.session);
+        while let Some(job) = inbox.blocking_recv() {
+            job(Ok(&mut self));
+            if let Some(Closing { keep, reply }) = self.closing.take() {
+                return Left::Closed(Some((reply, Box::new(self.close(keep)))));
+            }
+            if self.sleeps {
+                // Jobs that have arrived by now are still done; later ones wake the episode up.
+                inbox.close();
+            }
+        }
+        if self.sleeps {
+            self.stage.memory.let_go();
+            return Left::Asleep;
+        }
+        // Nobody is left to receive the result.
+        let _ = self.close(true);
+        Left::Closed(None)
+    }
+
+    /// Runs `work` on the session.
+    pub fn on_session<T>(&mut self, work: impl FnOnce(&mut Session) -> Outcome<T>) -> Outcome<T> {
+        self.session.run(work).flatten()
+    }
+
+    /// Runs `work` on the session and writes what it has done to the journal.
+    pub fn run<T>(&mut self, work: impl FnOnce(&mut Session) -> Outcome<T>) -> Outcome<T> {
+        let done = self.on_session(work);
+        self.commit(None);
+        done
+    }
+
+    /// Lets the episode sleep after the jobs that have arrived by now, if it can be brought back.
+    pub fn sleep(&mut self) -> Outcome<()> {
+        if self.log.is_some() {
+            let thinking = self.session.run(|session| session.thinking()).unwrap_or_default();
+            self.stage.status.fall_asleep(thinking);
+            self.sleeps = true;
+        }
+        Ok(())
+    }
+
+    /// Closes the episode after this job.
+    pub fn close_after_this(&mut self, closing: Closing) {
+        self.closing = Some(closing);
+    }
+
+    /// Ends the episode if its policy's clock has run out, or if it has made no call for `idle`.
+    pub fn end_if_abandoned(&mut self, idle: Duration) -> Outcome<()> {
+        let goes_on = self.session.ended().is_none();
+        self.run(|session| {
+            session.end_if_abandoned(idle);
+            Ok(())
+        })?;
+        if goes_on && self.session.ended().is_some() {
+            tracing::info!("abandoned, and ended");
+        }
+        Ok(())
+    }
+
+    /// Records a note, which came with `key`.
+    pub fn note(&mut self, operator: Option<&str>, note: Note, key: Option<String>) -> Outcome<()> {
+        let keyed = key.map(|key| KeyedNote { key, note: note.clone() });
+        let kept = self.on_session(|session| Ok(session.note(operator, note)?));
+        self.commit_noted(None, keyed.filter(|_| kept.is_ok()));
+        kept
+    }
+
+    /// Writes to the journal what has been done and the answers to calls with a key.
+    pub fn commit<'a>(&mut self, answers: impl IntoIterator<Item = (&'a Keyed, &'a Answer)>) {
+        self.commit_noted(answers, None);
+    }
+
+    /// Does the same as [`Desk::commit`], with a recorded note that came with a key.
+    fn commit_noted<'a>(
+        &mut self,
+        answers: impl IntoIterator<Item = (&'a Keyed, &'a Answer)>,
+        noted: Option<KeyedNote>,
+    ) {
+        self.stage.status.update(&self.session);
+        let Some(log) = &mut self.log else { return };
+        let written = self
+            .session
+            .run(|session| session.take_journal())
+            .map_err(|panicked| panicked.to_string())
+            .flatten()
+            .and_then(|asked| {
+                let kept = answers.into_iter().map(|(keyed, answer)| KeptAnswer::new(keyed, answer));
+                let kept: Vec<KeptAnswer> =
+                    kept.collect::<Result<_, _>>().map_err(|error| error.to_string())?;
+                let now = self.stage.memory.memory();
+                let memory = (now != log.memory).then(|| now.clone());
+                log.memory = now;
+                log.lease.renew();
+                let commit = Commit { asked, answers: kept, notes: noted.into_iter().collect(), memory };
+                match commit.is_empty() {
+                    true => Ok(()),
+                    false => log.file.append(&commit).map_err(|error| error.to_string()),
+                }
+            });
+        if let Err(why) = written {
+            tracing::error!(why, "the journal ends here; the episode goes on, and is not brought back");
+            self.forget();
+        }
+    }
+
+    /// Starts the journal from which the episode can be brought back.
+    pub fn begin_journal(&mut self, heading: &Heading) -> Outcome<()> {
+        let Some(journals) = &self.stage.journals else { return Ok(()) };
+        let Some(path) = journals.journal(&self.stage.id) else { return Ok(()) };
+        let begun = journals.create().and_then(|()| match Lease::take(&path, &journals.url)? {
+            Leasing::Taken(lease) => {
+                let file = JournalFile::create(&path, heading, journals.durability)?;
+                Ok(Log { file, lease, memory: self.stage.memory.memory() })
+            }
+            Leasing::Held { url } => {
+                Err(std::io::Error::other(format!("{url} plays an episode of this name")))
+            }
+        });
+        match begun {
+            Ok(log) => {
+                // After a panic there is nothing to keep.
+                let _ = self.session.run(Session::keep_journal);
+                self.log = Some(log);
+                self.stage.status.durable.store(true, Relaxed);
+            }
+            Err(error) => {
+                tracing::warn!(%error, "no journal; a server that is started again does not bring it back")
+            }
+        }
+        Ok(())
+    }
+
+    /// Removes the journal.
+    fn forget(&mut self) {
+        self.stage.status.durable.store(false, Relaxed);
+        if let Some(Log { file, .. }) = self.log.take()
+            && let Err(error) = file.remove()
+        {
+            tracing::error!(%error, "the journal stays");
+        }
+    }
+
+    fn close(mut self, keep: bool) -> Outcome<ResultReply> {
+        if !keep {
+            self.forget();
+        }
+        let result = self.session.close();
+        result.inspect(|result| drop(self.stage.status.result.set(result.clone())))
+    }
+}

@@ -1,0 +1,145 @@
+//! The queue of jobs for the thread of an episode. A job wakes up an episode that sleeps.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tandem_episodes::Session;
+use tokio::sync::{mpsc, oneshot};
+
+use super::{
+    desk::{Desk, Job, Outcome},
+    stage::Stage,
+    work::{self, Opening},
+};
+use crate::hosting::HostingError;
+
+/// Maximum number of calls that may wait for one episode. A policy needs one at a time; a few more absorb
+/// a burst.
+pub const WAITING_CALLS: usize = 16;
+
+/// Sending end of the queue.
+#[derive(Debug)]
+pub struct JobQueue {
+    jobs: Mutex<mpsc::Sender<Job>>,
+    stage: Arc<Stage>,
+}
+
+impl JobQueue {
+    /// Creates the end of the channel `jobs`, whose thread plays the episode of `stage`.
+    pub fn new(stage: Arc<Stage>, jobs: mpsc::Sender<Job>) -> JobQueue {
+        JobQueue { jobs: Mutex::new(jobs), stage }
+    }
+
+    /// Returns true if the thread has ended.
+    pub fn is_closed(&self) -> bool {
+        self.lock().is_closed()
+    }
+
+    /// Does `work` in its turn, unless too many jobs are waiting already.
+    pub async fn work_unless_full<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&mut Desk) -> Outcome<T> + Send + 'static,
+    ) -> Outcome<T> {
+        let (job, outcome) = job(work);
+        self.send(job)?;
+        outcome.await.map_err(|_| HostingError::EpisodeStopped)?
+    }
+
+    /// Does `work` in its turn, however many jobs are waiting.
+    pub async fn work<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&mut Desk) -> Outcome<T> + Send + 'static,
+    ) -> Outcome<T> {
+        let (job, outcome) = job(work);
+        self.send_in_turn(job).await?;
+        outcome.await.map_err(|_| HostingError::EpisodeStopped)?
+    }
+
+    /// Runs `work` on the session in its turn.
+    pub async fn run<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&mut Session) -> Outcome<T> + Send + 'static,
+    ) -> Outcome<T> {
+        self.work(|desk| desk.run(work)).await
+    }
+
+    /// Runs `work` on the session, unless too many jobs are waiting already. For threads outside the
+    /// async runtime.
+    pub fn run_blocking<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&mut Session) -> Outcome<T> + Send + 'static,
+    ) -> Outcome<T> {
+        let (job, outcome) = job(|desk| desk.run(work));
+        self.send(job)?;
+        outcome.blocking_recv().map_err(|_| HostingError::EpisodeStopped)?
+    }
+
+    /// Queues a job, however many are waiting.
+    pub async fn send_in_turn(&self, mut job: Job) -> Result<(), HostingError> {
+        // The episode may fall asleep between the two.
+        while let Err(mpsc::error::SendError(unsent)) = self.sender()?.send(job).await {
+            job = unsent;
+        }
+        Ok(())
+    }
+
+    /// Queues a job if no other waits.
+    pub fn send_if_idle(&self, job: Job) {
+        let jobs = self.lock();
+        if jobs.capacity() == jobs.max_capacity() {
+            // An episode that has stopped meanwhile needs nothing any more.
+            let _ = jobs.try_send(job);
+        }
+    }
+
+    /// Queues a job. Blocks while the queue is full, so it must not be called from async code.
+    pub fn send_blocking(&self, job: Job) {
+        // An episode that has stopped meanwhile has ended.
+        if let Ok(jobs) = self.sender() {
+            let _ = jobs.blocking_send(job);
+        }
+    }
+
+    /// Queues a job, unless too many are waiting already.
+    pub fn send(&self, mut job: Job) -> Result<(), HostingError> {
+        loop {
+            job = match self.sender()?.try_send(job) {
+                Ok(()) => return Ok(()),
+                Err(mpsc::error::TrySendError::Full(_)) => {
+                    return Err(HostingError::TooManyWaiting { limit: WAITING_CALLS });
+                }
+                Err(mpsc::error::TrySendError::Closed(unsent)) => unsent,
+            };
+        }
+    }
+
+    /// Returns the queue of the thread. Starts the thread if the episode sleeps.
+    fn sender(&self) -> Result<mpsc::Sender<Job>, HostingError> {
+        self.stage.status.is_used();
+        let mut jobs = self.lock();
+        if jobs.is_closed() {
+            let sleep = self.stage.status.wake_up().ok_or(HostingError::EpisodeStopped)?;
+            let (awake, inbox) = mpsc::channel(WAITING_CALLS);
+            let opening = Opening::Again { thinking: sleep.thinking() };
+            if let Err(error) = work::spawn(self.stage.clone(), opening, inbox) {
+                self.stage.status.sleep_on(sleep);
+                return Err(error);
+            }
+            *jobs = awake;
+        }
+        Ok(jobs.clone())
+    }
+
+    fn lock(&self) -> MutexGuard<'_, mpsc::Sender<Job>> {
+        // Nothing panics while it holds the lock.
+        self.jobs.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Makes a job of `work`, and returns it with the receiver of its outcome.
+pub fn job<T: Send + 'static>(
+    work: impl FnOnce(&mut Desk) -> Outcome<T> + Send + 'static,
+) -> (Job, oneshot::Receiver<Outcome<T>>) {
+    let (reply, outcome) = oneshot::channel();
+    // What is done stays done if the caller has gone.
+    (Box::new(move |desk| drop(reply.send(desk.and_then(work)))), outcome)
+}

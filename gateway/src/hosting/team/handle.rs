@@ -1,0 +1,320 @@
+//! The operator of one robot of an episode. Its calls block until its robot's reply is there.
+
+use std::sync::{Arc, MutexGuard};
+
+use tandem_episodes::OperatorCall;
+use tandem_tools_spec::{
+    Call, EndReason, Finish, GetStatus, Heard, ManageCall, ManageReply, Partner, PartnerDid, TalkCall,
+    ToolCall, ToolReply,
+};
+use tokio::sync::oneshot;
+
+use super::{
+    Team,
+    clock::to_ms,
+    round::{Operator, Pending, Round},
+    setpoint::TICK,
+};
+use crate::hosting::{Answer, EpisodeThread, HostingError, durable::Keyed};
+
+/// The operator of one robot of an episode.
+#[derive(Debug, Clone)]
+pub struct OperatorHandle {
+    pub(super) team: Arc<Team>,
+    pub episode: Arc<EpisodeThread>,
+    /// Index of the robot.
+    pub(super) seat: usize,
+}
+
+impl OperatorHandle {
+    /// Returns the operator of `robot`.
+    pub fn new(
+        team: &Arc<Team>,
+        episode: &Arc<EpisodeThread>,
+        robot: &str,
+    ) -> Result<OperatorHandle, HostingError> {
+        Ok(OperatorHandle { team: team.clone(), episode: episode.clone(), seat: team.seat(robot)? })
+    }
+
+    /// Returns the name of the robot.
+    pub fn robot(&self) -> &str {
+        &self.team.seats[self.seat].robot
+    }
+
+    pub(super) fn round(&self) -> MutexGuard<'_, Round> {
+        self.team.round()
+    }
+
+    /// Calls `work` on the operator's part of the round.
+    pub(super) fn own<T>(&self, work: impl FnOnce(&mut Operator) -> T) -> T {
+        work(&mut self.round().operators[self.seat])
+    }
+
+    /// Answers a call.
+    pub async fn call(&self, call: Call, keyed: Option<Keyed>) -> Result<Answer, HostingError> {
+        self.team.check_robots(&call)?;
+        let call = OperatorCall::new(self.robot(), call)?;
+        self.own(Operator::arrive);
+        if let ToolCall::Act(_) | ToolCall::Plan(_) = &call.call().tool {
+            self.check_clock()?;
+        }
+        match &call.call().tool {
+            ToolCall::Act(_) => self.act(call, keyed).await,
+            ToolCall::Talk(TalkCall::Say(say)) => {
+                let words = Heard { from: self.robot().into(), text: say.text.clone(), step: 0, number: 0 };
+                self.say(call, words, keyed).await
+            }
+            ToolCall::Plan(plan) => {
+                let plan = plan.clone();
+                self.plan(call, plan, keyed).await
+            }
+            ToolCall::Manage(ManageCall::Finish(_)) => self.finish(keyed).await,
+            ToolCall::Look(_) | ToolCall::Manage(ManageCall::GetStatus(_)) => {
+                let _place = self.team.take_place(self.robot())?;
+                self.ask(call.into_call(), keyed, OperatorHandle::looked).await
+            }
+        }
+    }
+
+    /// Has the episode answer a call; `then` converts the answer for the operator.
+    async fn ask(
+        &self,
+        call: Call,
+        keyed: Option<Keyed>,
+        then: impl FnOnce(&OperatorHandle, Answer) -> Answer + Send + 'static,
+    ) -> Result<Answer, HostingError> {
+        let own = self.clone();
+        let then = move |answer| own.own_answer(then(&own, answer));
+        self.episode.ask(Some(self.robot()), call, keyed, then).await
+    }
+
+    /// Notes that the operator has looked, and adds to a status what the others do.
+    fn looked(&self, answer: Answer) -> Answer {
+        let mut round = self.round();
+        round.operators[self.seat].has_looked();
+        match answer.reply {
+            ToolReply::Manage(ManageReply::GetStatus(_)) => {
+                Answer { presence: round.presence(self.seat), ..answer }
+            }
+            _ => answer,
+        }
+    }
+
+    /// Sends a message to the others.
+    async fn say(
+        &self,
+        call: OperatorCall,
+        words: Heard,
+        keyed: Option<Keyed>,
+    ) -> Result<Answer, HostingError> {
+        if !self.team.talk {
+            return Err(HostingError::NoTalk);
+        }
+        self.round().check_unheard(self.seat)?;
+        let _place = self.team.take_place(self.robot())?;
+        self.ask(call.into_call(), keyed, move |own, answer| {
+            let mut round = own.round();
+            let said = round.operators[own.seat].count_said();
+            if own.team.rules.silence.is_none_or(|silence| silence.lets_hear(own.seat, said)) {
+                let step = answer.step.unwrap_or_default();
+                round.spread(own.seat, &Heard { step, number: said + 1, ..words });
+            }
+            answer
+        })
+        .await
+    }
+
+    /// Takes a command and answers when it has been executed.
+    ///
+    /// People and programs that drive in real time command one step each. Beside them, a longer command
+    /// continues over as many of their rounds as it has steps. Commands of an expert or a policy always do.
+    async fn act(&self, call: OperatorCall, keyed: Option<Keyed>) -> Result<Answer, HostingError> {
+        if call.call().steps() <= 1 || !self.goes_on() {
+            return self.act_once(call, keyed).await;
+        }
+        let own = self.clone();
+        self.finish_all(keyed, async move { own.act_on(call).await }).await
+    }
+
+    /// Takes a command that goes on after shorter ones of the others.
+    pub(super) async fn act_on(&self, mut left: OperatorCall) -> Result<Answer, HostingError> {
+        let (mut executed_steps, mut heard) = (0, Vec::new());
+        loop {
+            let is_cut_off = left.call().steps() > 1 && self.goes_on();
+            let part = if is_cut_off { left.clone().unseen() } else { left.clone() };
+            let mut answer = self.act_once(part, None).await?;
+            let rest = answer.cut_off_steps().and_then(|steps| Some((steps, left.rest(steps)?)));
+            match rest.filter(|_| self.goes_on()) {
+                Some((steps, rest)) => {
+                    left = rest;
+                    executed_steps += steps;
+                    heard.append(&mut answer.heard);
+                }
+                None => return Ok(answer.after(executed_steps, heard)),
+            }
+        }
+    }
+
+    /// Finishes what has begun, even if its caller leaves, and keeps the answer to a call with a key.
+    pub(super) async fn finish_all(
+        &self,
+        keyed: Option<Keyed>,
+        work: impl Future<Output = Result<Answer, HostingError>> + Send + 'static,
+    ) -> Result<Answer, HostingError> {
+        let episode = self.episode.clone();
+        let going_on = tokio::spawn(async move {
+            let answer = work.await?;
+            match keyed {
+                Some(keyed) => episode.keep_answer(keyed, answer).await,
+                None => Ok(answer),
+            }
+        });
+        going_on.await.map_err(|_| HostingError::EpisodeStopped)?
+    }
+
+    fn goes_on(&self) -> bool {
+        self.round().goes_on(self.seat)
+    }
+
+    /// Notes that the operator sends control steps in real time: its partners' commands go on over them, and
+    /// the steps' own time is no thinking.
+    pub fn pace(&self) {
+        self.own(|own| {
+            own.set_pace(TICK);
+            own.paced = true;
+        });
+    }
+
+    /// Takes a command and answers when the step has been made.
+    async fn act_once(&self, call: OperatorCall, keyed: Option<Keyed>) -> Result<Answer, HostingError> {
+        self.round().admit(self.seat)?;
+        // A command that cannot be executed is refused before the others depend on it.
+        let place = self.team.take_place(call.robot())?;
+        let command = self.episode.read_command(call).await?;
+        drop(place);
+        let (reply, answer) = oneshot::channel();
+        {
+            let mut round = self.round();
+            round.admit(self.seat)?;
+            round.operators[self.seat].command(Pending { command, keyed, reply });
+        }
+        self.go_on();
+        answer.await.map_err(|_| HostingError::EpisodeStopped)?
+    }
+
+    /// Lets the operator leave. The episode ends when nobody is left; until then its robot holds still,
+    /// and the answer is the episode's status.
+    async fn finish(&self, keyed: Option<Keyed>) -> Result<Answer, HostingError> {
+        let others_play_on = !self.episode.ended() && self.round().finish(self.seat)?;
+        let call: ToolCall = match others_play_on {
+            true => GetStatus::default().into(),
+            false => Finish {}.into(),
+        };
+        if others_play_on {
+            self.go_on();
+        }
+        let then = move |own: &OperatorHandle, answer| {
+            own.own(Operator::has_looked);
+            Answer { others_play_on, ..answer }
+        };
+        self.ask(call.into(), keyed, then).await
+    }
+
+    /// Refuses a command once the operator's clock has run out. Its robot then holds still, as if it had
+    /// finished; the episode ends when nobody else plays.
+    fn check_clock(&self) -> Result<(), HostingError> {
+        let limit = self.team.rules.thinking_limit;
+        let Some(limit) = limit.filter(|limit| self.own(|own| own.thought()) >= *limit) else {
+            return Ok(());
+        };
+        let others_play_on = self.round().finish(self.seat)?;
+        match others_play_on {
+            true => self.go_on(),
+            false => self.episode.end(EndReason::WallClockExhausted)?,
+        }
+        Err(HostingError::OperatorOutOfTime { robot: self.robot().into(), limit_s: limit.as_secs() })
+    }
+
+    /// Makes the step if no operator is awaited; otherwise starts the patience timer.
+    pub(super) fn go_on(&self) {
+        let mut round = self.round();
+        if !round.may_begin() {
+            return;
+        }
+        if round.awaited().is_empty() {
+            self.begin(&mut round);
+        } else if !round.is_timed() {
+            let (own, number) = (self.clone(), round.number);
+            let waiting = tokio::spawn(async move {
+                tokio::time::sleep(own.team.patience).await;
+                let mut round = own.round();
+                if round.number == number && round.may_begin() {
+                    round.lose_patience();
+                    own.begin(&mut round);
+                }
+            });
+            round.time(waiting.abort_handle());
+        }
+    }
+
+    fn begin(&self, round: &mut Round) {
+        let (own, pending) = (self.clone(), round.begin());
+        tokio::spawn(async move { own.execute(pending).await });
+    }
+
+    /// Makes the step with the operators that have commanded, and sends each its answer.
+    async fn execute(&self, pending: Vec<(usize, Pending)>) {
+        let (mut replies, mut commands, mut asked) = (Vec::new(), Vec::new(), Vec::new());
+        for (seat, Pending { command, keyed, reply }) in pending {
+            let operator = OperatorHandle { seat, ..self.clone() };
+            let used = operator.own(|own| own.used());
+            asked.push((operator, command.steps(), command.tool()));
+            commands.push((command.with_use(used), keyed));
+            replies.push(reply);
+        }
+        let team = self.team.clone();
+        let then = move |answers: Vec<Answer>| {
+            let did = team.round().end(answers.first());
+            let tools: Vec<(usize, &'static str)> =
+                asked.iter().map(|(operator, _, tool)| (operator.seat, *tool)).collect();
+            let tell = |((operator, asked_steps, _), answer): (&(OperatorHandle, u32, _), Answer)| {
+                let partners = operator.partners(&did, &tools);
+                Answer { partners, ..operator.own_answer(answer) }.cut_off_after(*asked_steps)
+            };
+            asked.iter().zip(answers).map(tell).collect()
+        };
+        match self.episode.together(commands, then).await {
+            Ok(answers) => {
+                for (reply, answer) in replies.into_iter().zip(answers) {
+                    // The step is recorded even if a caller has gone.
+                    let _ = reply.send(Ok(answer));
+                }
+            }
+            Err(error) => {
+                self.round().end(None);
+                let error = Arc::new(error);
+                for reply in replies {
+                    let _ = reply.send(Err(HostingError::Shared(error.clone())));
+                }
+            }
+        }
+        self.go_on();
+    }
+
+    /// Restricts an answer to what the operator may see, and adds what it has not heard yet.
+    fn own_answer(&self, answer: Answer) -> Answer {
+        let (heard, thought) = self.own(|own| (own.take_heard(), own.thought()));
+        let left_s = self.team.rules.thinking_limit.map(|limit| to_ms(limit.saturating_sub(thought)));
+        Answer { heard, ..answer.of_own_robot(self.robot()).with_clock_left(left_s) }
+    }
+
+    /// Returns the behaviour of the operator's partners, out of that of all robots in `did`.
+    fn partners(&self, did: &[PartnerDid], tools: &[(usize, &'static str)]) -> Vec<Partner> {
+        let others = self.team.seats.iter().zip(did).enumerate().filter(|(other, _)| *other != self.seat);
+        let partner = |(other, (who, did)): (usize, (&super::Seat, &PartnerDid))| {
+            let tool = tools.iter().find(|(seat, _)| *seat == other).map(|(_, tool)| (*tool).to_owned());
+            Partner { robot: who.robot.clone(), did: *did, tool }
+        };
+        others.map(partner).collect()
+    }
+}
