@@ -15,7 +15,7 @@ use crate::locomotion::{BaseCommand, BaseVelocity};
 use crate::plane::{heading_rad, wrapped_rad};
 use crate::random::SplitMix64;
 use crate::robot::{RobotCommand, RobotTruth, Sensing};
-use crate::{CONTROL_DT_S as DT_S, RobotPlacement, Side, SimError, World, WorldSpec};
+use crate::{CONTROL_DT_S as DT_S, RobotPlacement, Side, Sides, SimError, World, WorldSpec};
 
 const PUSH_S: f32 = 1.0;
 /// Start of pulls at a standing robot: its arms are held out by then.
@@ -60,33 +60,36 @@ pub(super) fn run(
         }
         let heading_rad =
             unwrap(heading_rad(&robot.truth.world_from_pelvis()), log.last().map_or(0.0, |s| s.heading_rad));
-        let base = if let Plan::Pulse(axis) = &case.plan {
-            pulse_command(pulse(*axis, seed, &model.scale), time_s, rest.base)
-        } else {
-            base_command(case, &world, &robot.truth, heading_rad, &legs, time_s, rest.base)
+        let base = match &case.plan {
+            Plan::Pulse(axis) => pulse_command(pulse(*axis, seed, &model.scale), time_s, rest.base),
+            _ => base_command(case, &world, &robot.truth, heading_rad, &legs, time_s, rest.base),
         };
         disturb(case, &mut world, seed, direction, &legs, time_s);
         let upper_rad = arms.at(&rest.upper_rad, time_s);
         work_j += robot.sensed.power_w() * DT_S;
-        log.push(Sample {
-            feet_m: feet.map(|link| robot.truth.world_from_link[link].translation),
-            pelvis_m: robot.truth.world_from_pelvis().translation,
-            pelvis_tilt_rad: (robot.truth.world_from_pelvis().rotation * Vector::Z).z.min(1.0).acos(),
-            heading_rad,
-            command: base,
-        });
-        let command = RobotCommand { upper_rad, base };
+        log.push(sample(&robot.truth, feet, heading_rad, base));
         if let Some(motors) = &mut motors {
-            let setpoints = motors.act(&world.robots()[0], &command);
+            let setpoints = motors.act(world.robots()[0].body(), &upper_rad, &base);
             world.drive_motors(0, &[setpoints]);
         }
-        robot = world.control_step(&[command])?.robots.remove(0);
+        robot = world.control_step(&[RobotCommand { upper_rad, base }])?.robots.remove(0);
     }
     trial.power_w = work_j / (log.len() as f32 * DT_S);
     if !trial.fell {
         measure(case, seed, &model.scale, &log, &legs, &mut trial);
     }
     Ok(trial)
+}
+
+fn sample(truth: &RobotTruth, feet: Sides<usize>, heading_rad: f32, command: BaseCommand) -> Sample {
+    let pelvis = truth.world_from_pelvis();
+    Sample {
+        feet_m: feet.map(|link| truth.world_from_link[link].translation),
+        pelvis_m: pelvis.translation,
+        pelvis_tilt_rad: (pelvis.rotation * Vector::Z).z.min(1.0).acos(),
+        heading_rad,
+        command,
+    }
 }
 
 /// Returns the command of a pulse that begins once the arms are held out.

@@ -13,8 +13,9 @@ pub use choice::LocomotionChoice;
 use serde::{Deserialize, Serialize};
 
 use crate::Sides;
-use crate::body::{BodyEstimate, BodyScale, JointDrive, LEG_JOINTS, MotorSetpoints, WAIST_JOINTS};
-use crate::robot::{Robot, RobotCommand};
+use crate::body::{
+    BodyEstimate, BodyScale, JointDrive, LEG_JOINTS, MotorSetpoints, UPPER_JOINTS, WAIST_JOINTS,
+};
 
 /// Setpoint of a policy for the base, in the robot's own heading frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,8 +76,14 @@ pub type LegCommand = Sides<[JointDrive; LEG_JOINTS]>;
 
 /// A controller of all motors of a robot, with nothing under it; see [`crate::World::drive_motors`].
 pub trait MotorController {
-    /// Returns the setpoints of the next control step, by the robot's own sensors.
-    fn act(&mut self, robot: &Robot, command: &RobotCommand) -> MotorSetpoints;
+    /// Returns the setpoints of the next control step. `upper_rad` are the targets of the joints above the hips,
+    /// in action order.
+    fn act(
+        &mut self,
+        body: &BodyEstimate,
+        upper_rad: &[f32; UPPER_JOINTS],
+        base: &BaseCommand,
+    ) -> MotorSetpoints;
 }
 
 /// A base controller. It observes only its own robot, and acts only through the joint drives of legs and

@@ -75,6 +75,11 @@ impl Robot {
         self.locomotion.limits(&self.model.scale)
     }
 
+    /// Returns the robot's estimate of its own body.
+    pub(crate) fn body(&self) -> &BodyEstimate {
+        &self.body
+    }
+
     pub(crate) fn set_locomotion(&mut self, locomotion: Box<dyn Locomotion>) {
         self.locomotion = locomotion;
     }

@@ -54,7 +54,9 @@ enum WalkerStage {
     Corrects,
     /// The rest of such a walk.
     Pulses {
-        velocity: [f64; 3],
+        vx_m_s: f64,
+        vy_m_s: f64,
+        yaw_rate_rad_s: f64,
         commands: u32,
     },
     Rests,
@@ -220,7 +222,9 @@ impl Session {
                 let commands = pulse_commands(way);
                 return Some(walker.pulse(way.map(|way| way / (WALK_S * f64::from(commands))), commands));
             }
-            WalkerStage::Pulses { velocity, commands } => return Some(walker.pulse(velocity, commands)),
+            WalkerStage::Pulses { vx_m_s, vy_m_s, yaw_rate_rad_s, commands } => {
+                return Some(walker.pulse([vx_m_s, vy_m_s, yaw_rate_rad_s], commands));
+            }
             WalkerStage::Walks => {}
         }
         let mean_m = walker.before_m.map_or(now.at_m, |before_m| 0.5 * (before_m + now.at_m));
@@ -269,12 +273,12 @@ fn pulse_commands([ahead_m, left_m, turn_rad]: [f64; 3]) -> u32 {
 
 impl Walker {
     /// Returns the first of this number of equal commands.
-    fn pulse(&mut self, velocity: [f64; 3], commands: u32) -> WalkMove {
+    fn pulse(&mut self, [vx_m_s, vy_m_s, yaw_rate_rad_s]: [f64; 3], commands: u32) -> WalkMove {
         self.stage = match commands {
             0 | 1 => WalkerStage::Rests,
-            _ => WalkerStage::Pulses { velocity, commands: commands - 1 },
+            _ => WalkerStage::Pulses { vx_m_s, vy_m_s, yaw_rate_rad_s, commands: commands - 1 },
         };
-        self.walk(velocity)
+        self.walk([vx_m_s, vy_m_s, yaw_rate_rad_s])
     }
 
     /// Starts another attempt from the standing place, unless the robot is close enough to its goal.

@@ -80,16 +80,7 @@ impl Agile {
     }
 
     fn observe(&self, body: &BodyEstimate, velocity_command: [f32; 3]) -> NetworkInputs {
-        let pelvis = body.world_from_pelvis().rotation;
-        let turning = pelvis.inverse() * body.pelvis_angular_velocity_rad_s;
-        let q_rad = less_waist_targets(body);
-        NetworkInputs {
-            quaternion_wxyz: [pelvis.w, pelvis.x, pelvis.y, pelvis.z],
-            angular_velocity_rad_s: turning.to_array(),
-            velocity_command,
-            q_rad: self.joints.observed.map(|joint| q_rad[joint]),
-            qd_rad_s: self.joints.observed.map(|joint| body.qd_rad_s[joint]),
-        }
+        observe(body, &less_waist_targets(body), velocity_command, &self.joints)
     }
 
     /// Creates a state that holds the present posture until the policy has run.
@@ -174,6 +165,24 @@ impl Locomotion for Agile {
     fn load(&mut self, state: &[u8]) -> Result<(), postcard::Error> {
         self.state = postcard::from_bytes(state)?;
         Ok(())
+    }
+}
+
+/// Returns the network's observation of a robot whose joints are at `q_rad`.
+fn observe(
+    body: &BodyEstimate,
+    q_rad: &[f32; JOINTS],
+    velocity_command: [f32; 3],
+    joints: &JointMap,
+) -> NetworkInputs {
+    let pelvis = body.world_from_pelvis().rotation;
+    let turning = pelvis.inverse() * body.pelvis_angular_velocity_rad_s;
+    NetworkInputs {
+        quaternion_wxyz: [pelvis.w, pelvis.x, pelvis.y, pelvis.z],
+        angular_velocity_rad_s: turning.to_array(),
+        velocity_command,
+        q_rad: joints.observed.map(|joint| q_rad[joint]),
+        qd_rad_s: joints.observed.map(|joint| body.qd_rad_s[joint]),
     }
 }
 

@@ -4,10 +4,10 @@
 use std::sync::Arc;
 
 use super::joints::JointMap;
-use super::network::{Network, NetworkInputs, RecurrentState};
-use crate::body::{MotorSetpoints, UPPER, joint_names};
-use crate::locomotion::MotorController;
-use crate::robot::{Robot, RobotCommand};
+use super::network::{Network, RecurrentState};
+use super::observe;
+use crate::body::{BodyEstimate, MotorSetpoints, UPPER, UPPER_JOINTS, joint_names};
+use crate::locomotion::{BaseCommand, MotorController};
 
 /// Gains (N m/rad, N m s/rad) of the joints that the policy does not control, by the first part of a name
 /// that occurs in theirs. LeRobot sends these to a G1.
@@ -38,28 +38,22 @@ impl MotorPolicy {
         }
         MotorPolicy { network, joints: JointMap::new(), memory, setpoints }
     }
-
-    fn observe(&self, robot: &Robot, command: &RobotCommand) -> NetworkInputs {
-        let pelvis = robot.estimate().world_from_pelvis.rotation;
-        let readings = robot.readings().last().expect("a robot has readings from its start");
-        let base = command.base;
-        NetworkInputs {
-            quaternion_wxyz: [pelvis.w, pelvis.x, pelvis.y, pelvis.z],
-            angular_velocity_rad_s: readings.gyro_rad_s.to_array(),
-            velocity_command: [base.vx_m_s, base.vy_m_s, base.yaw_rate_rad_s],
-            q_rad: self.joints.observed.map(|joint| readings.joints.q_rad[joint]),
-            qd_rad_s: self.joints.observed.map(|joint| readings.joints.qd_rad_s[joint]),
-        }
-    }
 }
 
 impl MotorController for MotorPolicy {
-    fn act(&mut self, robot: &Robot, command: &RobotCommand) -> MotorSetpoints {
+    fn act(
+        &mut self,
+        body: &BodyEstimate,
+        upper_rad: &[f32; UPPER_JOINTS],
+        base: &BaseCommand,
+    ) -> MotorSetpoints {
         for (column, joint) in UPPER.into_iter().enumerate() {
-            self.setpoints.q_rad[joint] = command.upper_rad[column];
+            self.setpoints.q_rad[joint] = upper_rad[column];
         }
+        let velocity_command = [base.vx_m_s, base.vy_m_s, base.yaw_rate_rad_s];
+        let observation = observe(body, &body.q_rad, velocity_command, &self.joints);
         // A network that ran when it was loaded will run again. If it ever fails, the last setpoints hold.
-        if let Ok((action, memory)) = self.network.run(&self.observe(robot, command), &self.memory)
+        if let Ok((action, memory)) = self.network.run(&observation, &self.memory)
             && action.usable()
         {
             for (index, joint) in self.joints.controlled.into_iter().enumerate() {

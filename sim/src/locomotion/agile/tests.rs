@@ -11,7 +11,7 @@ use super::network::Network;
 use super::*;
 use crate::body::{ARMS, HANDS};
 use crate::locomotion::LocomotionChoice;
-use crate::{RobotPlacement, SimError, World, WorldSpec};
+use crate::{RobotCommand, RobotPlacement, SimError, World, WorldSpec};
 
 /// Indices of the controlled joints among the observed ones.
 const CONTROLLED_OF_OBSERVED: [i64; 14] = [0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 13, 14, 17, 18];
@@ -269,11 +269,12 @@ fn a_policy_at_the_motors_leaves_arms_to_the_command() {
     let placement = RobotPlacement { name: "A".into(), position_m: [0.0, 0.0], yaw_rad: 0.0 };
     let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
     let world = World::new(&spec).unwrap();
-    let mut command = world.rest_command(0);
-    command.upper_rad[3] = 0.7;
+    let RobotCommand { mut upper_rad, base } = world.rest_command(0);
+    upper_rad[3] = 0.7;
+    let body = world.robots()[0].body();
     let choice = LocomotionChoice::Onnx { network: network.clone(), looped: false };
-    let setpoints = choice.motor_controller().unwrap().act(&world.robots()[0], &command);
-    let q_rad = world.robots()[0].readings()[0].joints.q_rad;
+    let setpoints = choice.motor_controller().unwrap().act(body, &upper_rad, &base);
+    let q_rad = body.q_rad;
     let (knee, elbow, thumb) = (3, ARMS.left + 3, HANDS.left);
     assert!((setpoints.q_rad[knee] - q_rad[knee] - 1e-3).abs() < 1e-5, "{}", setpoints.q_rad[knee]);
     assert_eq!((setpoints.kp_n_m_rad[knee], setpoints.kd_n_m_s_rad[knee]), (50.0, 3.0));
