@@ -52,12 +52,12 @@ enum WalkerStage {
     Walks,
     /// A short walk from its standing place to its goal.
     Corrects,
-    /// The rest of such a walk.
+    /// The rest of such a walk. Commands of other operators may cut its own short.
     Pulses {
         vx_m_s: f64,
         vy_m_s: f64,
         yaw_rate_rad_s: f64,
-        commands: u32,
+        left_steps: u32,
     },
     Rests,
 }
@@ -105,10 +105,11 @@ impl WalkPlan {
             });
             return PlanAdvance::Done(why);
         }
-        let steps = self.left_steps.min(WALK_STEPS);
         let moves: Vec<WalkMove> =
             self.walkers.iter_mut().filter_map(|walker| session.next_walk(walker)).collect();
         self.walks = !moves.is_empty();
+        let pulses = self.walkers.iter_mut().filter_map(|walker| walker.stage.pulse_steps().copied());
+        let steps = pulses.fold(self.left_steps.min(WALK_STEPS), u32::min);
         PlanAdvance::Make(match self.walks {
             true => ActCall::Walk(Walk { steps, robots: moves }),
             false => ActCall::Wait(Wait { steps }),
@@ -130,6 +131,9 @@ impl WalkPlan {
     /// Processes the reply to a command. Returns the end of the plan if it was the last.
     fn after(&mut self, session: &Session, reply: &CommandReply) -> Option<PlanAdvance> {
         self.left_steps = self.left_steps.saturating_sub(reply.executed_steps);
+        for left_steps in self.walkers.iter_mut().filter_map(|walker| walker.stage.pulse_steps()) {
+            *left_steps = left_steps.saturating_sub(reply.executed_steps);
+        }
         let stopped = |why: String| Some(PlanAdvance::Done(Some(why)));
         if let Some(walker) = self.walkers.iter().find(|walker| walker.walks > PATIENCE_WALKS) {
             let (name, far) = (&walker.name, session.how_far(&self.walkers));
@@ -219,11 +223,15 @@ impl Session {
             WalkerStage::Corrects => {
                 let missing = self.missing_of(walker);
                 let way = walker.corrections.pulse(&missing).map(|rate| rate * WALK_S);
-                let commands = pulse_commands(way);
-                return Some(walker.pulse(way.map(|way| way / (WALK_S * f64::from(commands))), commands));
+                walker.stage = WalkerStage::pulse(way);
+                return self.next_walk(walker);
             }
-            WalkerStage::Pulses { vx_m_s, vy_m_s, yaw_rate_rad_s, commands } => {
-                return Some(walker.pulse([vx_m_s, vy_m_s, yaw_rate_rad_s], commands));
+            WalkerStage::Pulses { left_steps: 0, .. } => {
+                walker.stage = WalkerStage::Rests;
+                return None;
+            }
+            WalkerStage::Pulses { vx_m_s, vy_m_s, yaw_rate_rad_s, .. } => {
+                return Some(walker.walk([vx_m_s, vy_m_s, yaw_rate_rad_s]));
             }
             WalkerStage::Walks => {}
         }
@@ -265,22 +273,31 @@ pub fn all_stand(reply: &CommandReply) -> bool {
     states.flatten().all(|state| state == BaseState::Standing)
 }
 
-/// Returns the number of commands in which a robot goes this way, [ahead, left, turn], at usual speeds.
-fn pulse_commands([ahead_m, left_m, turn_rad]: [f64; 3]) -> u32 {
-    let time_s = (ahead_m.abs() / AHEAD_M_S).max(left_m.abs() / ASIDE_M_S).max(turn_rad.abs() / TURN_RAD_S);
-    (time_s / WALK_S).ceil().max(1.0) as u32
+impl WalkerStage {
+    /// Returns the pulse that goes this way, [ahead, left, turn], at usual speeds.
+    fn pulse([ahead_m, left_m, turn_rad]: [f64; 3]) -> WalkerStage {
+        let time_s =
+            (ahead_m.abs() / AHEAD_M_S).max(left_m.abs() / ASIDE_M_S).max(turn_rad.abs() / TURN_RAD_S);
+        let walks = (time_s / WALK_S).ceil().max(1.0);
+        let time_s = walks * WALK_S;
+        WalkerStage::Pulses {
+            vx_m_s: ahead_m / time_s,
+            vy_m_s: left_m / time_s,
+            yaw_rate_rad_s: turn_rad / time_s,
+            left_steps: walks as u32 * WALK_STEPS,
+        }
+    }
+
+    /// Returns the control steps that are left of a pulse; `None` in other stages.
+    fn pulse_steps(&mut self) -> Option<&mut u32> {
+        match self {
+            WalkerStage::Pulses { left_steps, .. } => Some(left_steps),
+            WalkerStage::Walks | WalkerStage::Corrects | WalkerStage::Rests => None,
+        }
+    }
 }
 
 impl Walker {
-    /// Returns the first of this number of equal commands.
-    fn pulse(&mut self, [vx_m_s, vy_m_s, yaw_rate_rad_s]: [f64; 3], commands: u32) -> WalkMove {
-        self.stage = match commands {
-            0 | 1 => WalkerStage::Rests,
-            _ => WalkerStage::Pulses { vx_m_s, vy_m_s, yaw_rate_rad_s, commands: commands - 1 },
-        };
-        self.walk([vx_m_s, vy_m_s, yaw_rate_rad_s])
-    }
-
     /// Starts another attempt from the standing place, unless the robot is close enough to its goal.
     fn try_again(&mut self, off: &Missing) {
         (self.before_m, self.walks, self.nearest_m) = (None, 0, f64::INFINITY);
