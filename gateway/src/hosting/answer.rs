@@ -3,7 +3,7 @@
 use serde::Serialize;
 use tandem_episodes::{CallReply, Session};
 use tandem_tools_spec::{
-    Call, Heard, ManageReply, Observation, Partner, Presence, StopReason, TalkReply, ToolReply,
+    Call, Heard, ManageReply, Observation, Partner, PartnerDid, Presence, StopReason, TalkReply, ToolReply,
 };
 
 /// A tool's reply with the information that goes with every reply.
@@ -109,6 +109,21 @@ impl Answer {
         }
         let heard = heard_before.into_iter().chain(self.heard).collect();
         Answer { heard, ..self }
+    }
+
+    /// Reports partners that only fell silent in the last part of a command by what they did in the parts
+    /// before: two that wait for each other then both learn of it, whichever ends first.
+    pub fn with_partners_before(mut self, before: Vec<Partner>) -> Answer {
+        for earlier in before.into_iter().filter(|earlier| earlier.did == PartnerDid::Acted) {
+            let silent = self
+                .partners
+                .iter_mut()
+                .find(|now| now.robot == earlier.robot && now.did == PartnerDid::HeldSilent);
+            if let Some(silent) = silent {
+                *silent = earlier;
+            }
+        }
+        self
     }
 
     /// Reports a command of `asked_steps` as cut off by a partner if fewer steps were executed.

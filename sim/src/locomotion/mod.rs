@@ -76,8 +76,8 @@ pub type LegCommand = Sides<[JointDrive; LEG_JOINTS]>;
 
 /// A controller of all motors of a robot, with nothing under it; see [`crate::World::drive_motors`].
 pub trait MotorController {
-    /// Returns the setpoints of the next control step. `upper_rad` are the targets of the joints above the hips,
-    /// in action order.
+    /// Returns the setpoints of the next control step. `upper_rad` are the targets of the joints above the
+    /// hips, in action order.
     fn act(
         &mut self,
         body: &BodyEstimate,

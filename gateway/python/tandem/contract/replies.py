@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
-from .commands import Budget, HeldObject, PhaseReached, Pose, PoseFrame, RobotFallen
+from .commands import Budget, PhaseReached, Pose, PoseFrame, RobotFallen
+from .plans import HeldObject
 
 Assistance: TypeAlias = Literal[
     "paper",

@@ -22,7 +22,8 @@ from .arguments import (
     WristMove,
     plain,
 )
-from .commands import CommandReply, PlanReply, PoseFrame
+from .commands import CommandReply, PoseFrame
+from .plans import PlanReply
 from .depth import DepthReply
 from .replies import ReachReply, RobotState, StatusReply
 from .result import ResultReply

@@ -24,6 +24,9 @@ pub type Job = Box<dyn FnOnce(Result<&mut Desk, HostingError>) + Send>;
 /// Outcome of a job.
 pub type Outcome<T> = Result<T, HostingError>;
 
+/// Sender of an episode's result to the caller that has asked for its end.
+pub type ResultSender = oneshot::Sender<Outcome<ResultReply>>;
+
 /// A session and the journal to which it is written.
 pub struct Desk {
     stage: Arc<Stage>,
@@ -46,13 +49,13 @@ pub struct Log {
 pub struct Closing {
     /// True if the next server is to bring the episode back.
     pub keep: bool,
-    pub reply: oneshot::Sender<Outcome<ResultReply>>,
+    pub reply: ResultSender,
 }
 
 /// Reason why the thread ended.
 pub enum Left {
     /// The caller that asked for the end, and the result it receives once the place is free.
-    Closed(Option<(oneshot::Sender<Outcome<ResultReply>>, Box<Outcome<ResultReply>>)>),
+    Closed(Option<(ResultSender, Box<Outcome<ResultReply>>)>),
     Asleep,
 }
 

@@ -138,17 +138,18 @@ impl OperatorHandle {
 
     /// Takes a command that goes on after shorter ones of the others.
     pub(super) async fn act_on(&self, mut left: OperatorCall) -> Result<Answer, HostingError> {
-        let (mut executed_steps, mut heard) = (0, Vec::new());
+        let (mut executed_steps, mut heard, mut partners) = (0, Vec::new(), Vec::new());
         loop {
             let is_cut_off = left.call().steps() > 1 && self.goes_on();
             let part = if is_cut_off { left.clone().unseen() } else { left.clone() };
-            let mut answer = self.act_once(part, None).await?;
+            let mut answer = self.act_once(part, None).await?.with_partners_before(partners);
             let rest = answer.cut_off_steps().and_then(|steps| Some((steps, left.rest(steps)?)));
             match rest.filter(|_| self.goes_on()) {
                 Some((steps, rest)) => {
                     left = rest;
                     executed_steps += steps;
                     heard.append(&mut answer.heard);
+                    partners = answer.partners;
                 }
                 None => return Ok(answer.after(executed_steps, heard)),
             }

@@ -1,4 +1,5 @@
-//! Assets of a file and their appearance: meshes, images, layers of materials, gloss, patterns and groups, and a cache of documents.
+//! Assets of a file and their appearance: meshes, images, layers of materials, gloss, patterns and groups, and
+//! a cache of documents.
 
 mod builtin;
 mod concave;

@@ -2,8 +2,7 @@
 
 use rapier3d::math::Vector;
 
-use super::shade::{Facet, Rays};
-use crate::mjcf::Gloss;
+use super::shade::{Facet, Rays, gloss_lanes};
 use crate::render::shading::SAMPLES;
 use crate::render::shading::image::{Image, ImagePlace, bent_normal};
 use crate::render::shading::lanes::{Lanes, axes, lanes};
@@ -19,13 +18,6 @@ pub(super) struct ShownSurface<const N: usize> {
     pub normal: [Lanes<N>; 3],
     /// Emission, specular strength, shininess and metallic share.
     pub gloss: [Lanes<N>; 4],
-}
-
-/// Returns emission, specular strength, shininess and metallic share of several points.
-#[inline(always)]
-pub(super) fn gloss_lanes<const N: usize>(gloss: Gloss) -> [Lanes<N>; 4] {
-    let Gloss { emission_factor, specular_factor, shininess_factor, metallic_factor, .. } = gloss;
-    [emission_factor, specular_factor, shininess_factor, metallic_factor].map(|value| [value; N])
 }
 
 impl Facet {
@@ -61,9 +53,9 @@ impl Facet {
             );
             let (rgb, alpha_here) = image.rgb_and_alpha(&place);
             shown.alpha[i] = alpha_here;
-            for axis in 0..3 {
-                shown.texture[axis][i] = rgb[axis];
-                shown.albedo[axis][i] = rgb[axis] * self.linear_rgb[0][axis];
+            for (axis, value) in rgb.into_iter().enumerate() {
+                shown.texture[axis][i] = value;
+                shown.albedo[axis][i] = value * self.linear_rgb[0][axis];
             }
             if image.gloss.is_some() || image.relief.is_some() {
                 let here = |vectors: &[Lanes<N>; 3]| Vector::new(vectors[0][i], vectors[1][i], vectors[2][i]);

@@ -203,13 +203,13 @@ impl Sums {
     /// highlights and all, once this is limited.
     #[inline(always)]
     fn show(&mut self, surface: &LitColours, values: &mut [Lanes; 3]) {
-        for axis in 0..3 {
+        for (axis, sum) in values.iter_mut().enumerate() {
             let (own, most) = (&surface.own[axis], &surface.most[axis]);
             let (lit, glossy) = (&self.lit[axis], &self.glossy[axis]);
-            values[axis] = lanes(|i| {
+            *sum = lanes(|i| {
                 let tint = most[i] + (own[i] - most[i]) * surface.metallic[i];
                 let value = own[i] * lit[i] + glossy[i] * tint;
-                values[axis][i] + if value < most[i] { value } else { most[i] }
+                sum[i] + if value < most[i] { value } else { most[i] }
             });
         }
         (self.lit, self.glossy) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);

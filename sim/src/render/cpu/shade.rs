@@ -4,7 +4,6 @@
 use rapier3d::math::{Matrix, Pose, Vector};
 
 use super::contact::ContactMap;
-use super::images::gloss_lanes;
 use super::shadow::ShadowMap;
 use crate::mjcf::Gloss;
 use crate::render::scene::prepared::{Prepared, Sheet};
@@ -123,6 +122,13 @@ fn block(values: &[f32; ROOM], at: usize) -> &Lanes {
 #[inline(always)]
 fn block_mut<T, const N: usize>(values: &mut [T; ROOM], at: usize) -> &mut [T; N] {
     values[at..].first_chunk_mut().expect("there is room for a block after each point")
+}
+
+/// Returns emission, specular strength, shininess and metallic share of several points.
+#[inline(always)]
+pub(super) fn gloss_lanes<const N: usize>(gloss: Gloss) -> [Lanes<N>; 4] {
+    let Gloss { emission_factor, specular_factor, shininess_factor, metallic_factor, .. } = gloss;
+    [emission_factor, specular_factor, shininess_factor, metallic_factor].map(|value| [value; N])
 }
 
 #[inline(always)]

@@ -461,7 +461,7 @@ fn bent_normal(triangle: u32, part: Part, place: ImagePlace, normal: vec3f, to_e
     let right = along_surface(turned(part, coordinates[triangle].u.xyz), normal);
     let down = along_surface(turned(part, coordinates[triangle].v.xyz), normal);
     let numbers = 2.0 * image_values(part.maps.y, place).xyz - 1.0;
-    let bent = normalize(right * numbers.x - down * numbers.y + normal * max(numbers.z, LEAST_UPRIGHT));
+    let bent = normalize(right * numbers.x - down * numbers.y + normal * max(numbers.z, MIN_UPRIGHT_SHARE));
     return select(normal, bent, dot(bent, to_eye) > 0.0);
 }
 

@@ -6,7 +6,7 @@ use crate::mjcf::{MAX_LIGHTS, MIN_ROUGHNESS, SHININESS, USUAL_EXPONENT};
 use crate::render::cpu::contact::SINK_M;
 use crate::render::scene::camera::NEAR_M;
 use crate::render::scene::prepared::NOTHING;
-use crate::render::shading::image::{BLENDED_SHARE, LEAST_UPRIGHT};
+use crate::render::shading::image::{BLENDED_SHARE, MIN_UPRIGHT_SHARE};
 use crate::render::shading::lamps::{LAMP_BIAS_SHARE, LAMP_NORMAL_TEXELS};
 use crate::render::shading::pattern::{
     BANDS_PER_M, CHECKER_PER_M, LINES_PER_M, STRAY, TEXT_GAP, TEXT_PER_M, THREADS_PER_M, WORD_GAP,
@@ -45,7 +45,7 @@ pub(super) fn text() -> String {
         ("SHININESS", SHININESS),
         ("MIN_ROUGHNESS", MIN_ROUGHNESS),
         ("USUAL_EXPONENT", USUAL_EXPONENT),
-        ("LEAST_UPRIGHT", LEAST_UPRIGHT),
+        ("MIN_UPRIGHT_SHARE", MIN_UPRIGHT_SHARE),
         ("LAMP_NORMAL_TEXELS", LAMP_NORMAL_TEXELS),
         ("LAMP_BIAS_SHARE", LAMP_BIAS_SHARE),
     ];

@@ -43,7 +43,7 @@ pub struct Scene<'a> {
     pub patterns: Vec<Affine>,
 }
 
-/// How a surface reflects, beyond its colour.
+/// Reflection of a surface, beyond its colour.
 #[derive(Clone, Copy)]
 pub struct Coat {
     /// Reflectance along the normal.

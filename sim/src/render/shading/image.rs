@@ -44,7 +44,7 @@ static LIGHT: LazyLock<[f32; LIGHT_VALUES]> =
     LazyLock::new(|| std::array::from_fn(|step| linear([step as f32 / (255 * LIGHT_STEPS) as f32; 3]).x));
 
 /// Least number along the surface's own normal in a relief.
-pub const LEAST_UPRIGHT: f32 = 0.05;
+pub const MIN_UPRIGHT_SHARE: f32 = 0.05;
 /// Part of the way from one level to the next in which both are blended.
 pub const BLENDED_SHARE: f32 = 0.5;
 
@@ -136,8 +136,8 @@ impl Image {
     }
 }
 
-/// Returns the unit normal of a relief on a surface with the normal `normal`, if it faces the eye. The gradients
-/// of the image's coordinates need no length. Source: Blinn 1978, for heights whose normals are given.
+/// Returns the unit normal of a relief on a surface with the normal `normal`, if it faces the eye. The
+/// gradients of the image's coordinates need no length. Source: Blinn 1978, for heights whose normals are given.
 #[inline(always)]
 pub fn bent_normal(
     normal: Vector,
@@ -148,7 +148,7 @@ pub fn bent_normal(
     let along = |gradient: Vector| (gradient - normal * normal.dot(gradient)).normalize_or_zero();
     let (right, down) = (along(right), along(down));
     let [x, y, z] = [x, y, z].map(|number| 2.0 * number - 1.0);
-    let bent = (right * x - down * y + normal * z.max(LEAST_UPRIGHT)).normalize_or(normal);
+    let bent = (right * x - down * y + normal * z.max(MIN_UPRIGHT_SHARE)).normalize_or(normal);
     if bent.dot(eye_direction) > 0.0 { bent } else { normal }
 }
 

@@ -7,7 +7,7 @@ use tandem_tools_spec::TypedTool;
 
 use super::text::{Lines, docstring};
 use super::types::{Parameter, parameters, python_name, reading, reference, reply_type, without_null};
-use super::{OF_DEPTH, OF_OBSERVE, OF_RESULT, OF_START, described, is_method};
+use super::{OF_DEPTH, OF_OBSERVE, OF_PLANS, OF_RESULT, OF_START, described, is_method};
 
 /// The types of the contract, by what they are part of.
 pub struct Contract<'a> {
@@ -15,6 +15,8 @@ pub struct Contract<'a> {
     arguments: BTreeSet<String>,
     /// Replies to commands.
     commands: BTreeSet<String>,
+    /// Replies to plans and walks.
+    plans: BTreeSet<String>,
     /// Points and surfaces.
     depth: BTreeSet<String>,
     /// Replies of other tools of an episode.
@@ -31,6 +33,7 @@ impl<'a> Contract<'a> {
             types,
             arguments: BTreeSet::new(),
             commands: BTreeSet::new(),
+            plans: BTreeSet::new(),
             depth: BTreeSet::new(),
             replies: BTreeSet::new(),
             result: BTreeSet::new(),
@@ -46,13 +49,15 @@ impl<'a> Contract<'a> {
         let arguments = on_episode().flat_map(|tool| contract.reached(&tool.arguments)).collect();
         let (common, own): (Vec<&str>, Vec<&str>) =
             on_episode().map(|tool| tool.reply.as_str()).partition(|reply| is_common(reply));
-        let commands = all_of(common, &[]);
-        let depth = all_of(OF_DEPTH.to_vec(), &[&commands]);
+        let commands = all_of(common.into_iter().filter(|reply| *reply != OF_PLANS).collect(), &[]);
+        let plans = all_of(vec![OF_PLANS], &[&commands]);
+        let depth = all_of(OF_DEPTH.to_vec(), &[&commands, &plans]);
         let own = own.into_iter().filter(|reply| *reply != OF_RESULT);
-        let replies = all_of(own.chain(OF_OBSERVE).collect(), &[&commands, &depth]);
-        let result = all_of(vec![OF_RESULT], &[&commands, &depth, &replies]);
-        let start = all_of(OF_START.to_vec(), &[&commands, &depth, &replies, &result]);
-        Contract { arguments, commands, depth, replies, result, start, ..contract }
+        let replies = all_of(own.chain(OF_OBSERVE).collect(), &[&commands, &plans, &depth]);
+        let told = [&commands, &plans, &depth, &replies];
+        let result = all_of(vec![OF_RESULT], &told);
+        let start = all_of(OF_START.to_vec(), &[&told[..], &[&result]].concat());
+        Contract { arguments, commands, plans, depth, replies, result, start, ..contract }
     }
 
     /// Classes and names for choices that a schema refers to itself.
@@ -141,6 +146,11 @@ impl<'a> Contract<'a> {
         self.reply_module("What commands reply.", &self.commands)
     }
 
+    /// Returns the module of what plans and walks reply.
+    pub fn plans(&self) -> String {
+        self.reply_module("What plans and walks reply.", &self.plans)
+    }
+
     /// Returns the module of what is told of points and surfaces.
     pub fn depth(&self) -> String {
         self.reply_module("What query_depth replies.", &self.depth)
@@ -185,6 +195,7 @@ impl<'a> Contract<'a> {
     pub fn import(&self, lines: &mut Lines, names: Vec<String>) {
         for (module, own) in [
             ("commands", &self.commands),
+            ("plans", &self.plans),
             ("depth", &self.depth),
             ("replies", &self.replies),
             ("result", &self.result),

@@ -20,6 +20,8 @@ use types::Parameter;
 const OBSERVE: &str = "observe";
 /// Replies beside images.
 const OF_OBSERVE: [&str; 2] = ["RobotState", "CameraCalibration"];
+/// Replies to plans and walks.
+const OF_PLANS: &str = "PlanReply";
 /// Points and surfaces.
 const OF_DEPTH: [&str; 1] = ["DepthReply"];
 /// Results of episodes.
@@ -34,6 +36,7 @@ fn the_python_package_has_every_tool() {
     let modules = [
         ("arguments", contract.arguments()),
         ("commands", contract.commands()),
+        ("plans", contract.plans()),
         ("depth", contract.depth()),
         ("replies", contract.replies()),
         ("result", contract.result()),

@@ -1,0 +1,96 @@
+"""What plans and walks reply.
+
+Written by the tests of `tools_spec` from the one list of tools; not to be edited.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .commands import CommandReply, PoseFrame
+
+
+@dataclass(frozen=True)
+class HeldObject:
+    """An object in a hand."""
+
+    robot: str
+    """The robot, for example "A"."""
+
+    hand: str
+    """`left` or `right`."""
+
+    object: str
+    """The object."""
+
+    frame: PoseFrame
+    """Frame of `middle_m` and `axis`: "level", the robot's pelvis frame, but upright; after a walk that of its
+    places.
+    """
+
+    middle_m: tuple[float, float, float]
+    """Middle of the object, [x, y, z] in metres."""
+
+    axis: tuple[float, float, float]
+    """Direction of its own z axis, length 1: [0, 0, 1] when it is upright."""
+
+    lowest_m: float
+    """Height of its lowest point above the floor, in metres."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> HeldObject:
+        """Reads what JSON has."""
+        return HeldObject(
+            robot=value["robot"],
+            hand=value["hand"],
+            object=value["object"],
+            frame=value["frame"],
+            middle_m=tuple(value["middle_m"]),
+            axis=tuple(value["axis"]),
+            lowest_m=value["lowest_m"],
+        )
+
+
+@dataclass(frozen=True)
+class PlanReply:
+    """The reply to `send_plan` and `walk_to`."""
+
+    commands: int
+    """Commands that were carried out: of a plan, those that it lists; of a walk, each short one."""
+
+    tool_calls: int
+    """Tool calls of all robots up to now, as results count them: each command of a plan or walk is one, and each
+    slice of 5 steps with `until`. No budget limits them.
+    """
+
+    executed_steps: int
+    """Control steps of 20 ms that they took together."""
+
+    stopped: str | None
+    """Why no more were; null where all was done."""
+
+    outcomes: tuple[str, ...]
+    """A line for each command of a plan that was begun: its steps, and where that left the robots. Left out where
+    there is one command.
+    """
+
+    held: tuple[HeldObject, ...]
+    """Objects in hands after a walk with `carry`, in its frame; left out otherwise."""
+
+    last: CommandReply
+    """The reply to the last command that was carried out."""
+
+    @staticmethod
+    def of(value: Mapping[str, Any]) -> PlanReply:
+        """Reads what JSON has."""
+        return PlanReply(
+            commands=value["commands"],
+            tool_calls=value["tool_calls"],
+            executed_steps=value["executed_steps"],
+            stopped=value.get("stopped"),
+            outcomes=tuple(value.get("outcomes", ())),
+            held=tuple(HeldObject.of(item) for item in value.get("held", ())),
+            last=CommandReply.of(value["last"]),
+        )
