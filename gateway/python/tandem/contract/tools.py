@@ -23,8 +23,8 @@ from .arguments import (
     plain,
 )
 from .commands import CommandReply, PoseFrame
-from .plans import PlanReply
 from .depth import DepthReply
+from .plans import PlanReply
 from .replies import ReachReply, RobotState, StatusReply
 from .result import ResultReply
 

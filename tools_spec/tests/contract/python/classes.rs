@@ -195,8 +195,8 @@ impl<'a> Contract<'a> {
     pub fn import(&self, lines: &mut Lines, names: Vec<String>) {
         for (module, own) in [
             ("commands", &self.commands),
-            ("plans", &self.plans),
             ("depth", &self.depth),
+            ("plans", &self.plans),
             ("replies", &self.replies),
             ("result", &self.result),
         ] {
