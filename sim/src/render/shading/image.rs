@@ -137,7 +137,8 @@ impl Image {
 }
 
 /// Returns the unit normal of a relief on a surface with the normal `normal`, if it faces the eye. The
-/// gradients of the image's coordinates need no length. Source: Blinn 1978, for heights whose normals are given.
+/// gradients of the image's coordinates need no length. Source: Blinn 1978, for heights whose normals are
+/// given.
 #[inline(always)]
 pub fn bent_normal(
     normal: Vector,
