@@ -31,8 +31,8 @@ enum LocomotionPart {
     Bench {
         #[command(flatten)]
         locomotion: LocomotionFlag,
-        /// Let the policy drive all motors with its own gains, as `send_joint_drives` does, rather than legs
-        /// and waist alone. Cases of teams are left out.
+        /// Drive all motors by the policy, with its own gains, like `send_joint_drives`, rather than legs and
+        /// waist alone. Cases of teams are left out.
         #[arg(long, requires = "file")]
         motors: bool,
         #[command(flatten)]

@@ -1,4 +1,4 @@
-"""What tools are given.
+"""Arguments of tools.
 
 Written by the tests of `tools_spec` from the one list of tools; not to be edited.
 """

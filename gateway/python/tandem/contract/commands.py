@@ -1,4 +1,4 @@
-"""What commands reply.
+"""Replies to commands.
 
 Written by the tests of `tools_spec` from the one list of tools; not to be edited.
 """

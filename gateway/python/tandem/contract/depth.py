@@ -1,4 +1,4 @@
-"""What query_depth replies.
+"""Replies to query_depth.
 
 Written by the tests of `tools_spec` from the one list of tools; not to be edited.
 """

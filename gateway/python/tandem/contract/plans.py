@@ -1,4 +1,4 @@
-"""What plans and walks reply.
+"""Replies to plans and walks.
 
 Written by the tests of `tools_spec` from the one list of tools; not to be edited.
 """

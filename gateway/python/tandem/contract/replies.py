@@ -1,4 +1,4 @@
-"""What tools reply that are no commands.
+"""Replies to tools that are no commands.
 
 Written by the tests of `tools_spec` from the one list of tools; not to be edited.
 """

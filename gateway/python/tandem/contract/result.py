@@ -1,4 +1,4 @@
-"""What an episode came to.
+"""Results of episodes.
 
 Written by the tests of `tools_spec` from the one list of tools; not to be edited.
 """

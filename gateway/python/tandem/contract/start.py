@@ -1,4 +1,4 @@
-"""What a start replies, and what tasks there are.
+"""Replies to a start, and lists of tasks.
 
 Written by the tests of `tools_spec` from the one list of tools; not to be edited.
 """

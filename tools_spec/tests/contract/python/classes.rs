@@ -105,7 +105,7 @@ impl<'a> Contract<'a> {
 
     /// Returns the module of what tools are given.
     pub fn arguments(&self) -> String {
-        let mut lines = head("What tools are given.");
+        let mut lines = head("Arguments of tools.");
         lines.add(0, "from collections.abc import Mapping, Sequence");
         lines.add(0, "from dataclasses import dataclass, fields, is_dataclass");
         let defines = |name: &String| choices(&self.types[name]).is_some() && !self.is_replied(name);
@@ -143,32 +143,32 @@ impl<'a> Contract<'a> {
 
     /// Returns the module of what commands reply.
     pub fn commands(&self) -> String {
-        self.reply_module("What commands reply.", &self.commands)
+        self.reply_module("Replies to commands.", &self.commands)
     }
 
     /// Returns the module of what plans and walks reply.
     pub fn plans(&self) -> String {
-        self.reply_module("What plans and walks reply.", &self.plans)
+        self.reply_module("Replies to plans and walks.", &self.plans)
     }
 
     /// Returns the module of what is told of points and surfaces.
     pub fn depth(&self) -> String {
-        self.reply_module("What query_depth replies.", &self.depth)
+        self.reply_module("Replies to query_depth.", &self.depth)
     }
 
     /// Returns the module of what other tools of an episode reply.
     pub fn replies(&self) -> String {
-        self.reply_module("What tools reply that are no commands.", &self.replies)
+        self.reply_module("Replies to tools that are no commands.", &self.replies)
     }
 
     /// Returns the module of what an episode came to.
     pub fn result(&self) -> String {
-        self.reply_module("What an episode came to.", &self.result)
+        self.reply_module("Results of episodes.", &self.result)
     }
 
     /// Returns the module of what a start and a list of tasks reply.
     pub fn start(&self) -> String {
-        self.reply_module("What a start replies, and what tasks there are.", &self.start)
+        self.reply_module("Replies to a start, and lists of tasks.", &self.start)
     }
 
     fn reply_module(&self, about: &str, names: &BTreeSet<String>) -> String {
