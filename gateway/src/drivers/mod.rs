@@ -5,7 +5,6 @@ mod interruption;
 mod people;
 mod program;
 mod python;
-mod remote;
 
 use std::{fs, io, path::Path};
 
@@ -19,10 +18,6 @@ pub use interruption::with_last_words;
 pub use people::People;
 pub use program::Program;
 pub use python::{PythonError, PythonModule, PythonPart, interpreter};
-pub use remote::{
-    MapError, PRESETS, PolicyKey, PolicyKeyError, PolicyMap, PolicyProtocol, RemoteError, RemotePolicy,
-    preset, try_map,
-};
 
 /// Removes the result that an interrupted run has left.
 fn remove_old_result(path: &Path) -> Result<(), PlayError> {

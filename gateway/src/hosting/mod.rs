@@ -27,6 +27,5 @@ pub use idempotency_cache::IdempotentReply;
 pub use run_folder::{episode_name, look_at_runs_folder, try_runs_folder};
 pub use table::{EpisodeTable, Guests, Purpose};
 pub use team::{
-    CollectedEpisode, Collection, CollectionProgress, CollectionStage, Driver, DriverRequest, PartnerPolicy,
-    Setpoint,
+    CollectedEpisode, Collection, CollectionProgress, CollectionStage, Driver, DriverRequest, Setpoint,
 };

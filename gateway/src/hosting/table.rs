@@ -8,6 +8,7 @@ use std::{
 };
 
 use tandem_episodes::{EpisodeError, EpisodeSpec, RunFolder, build};
+use tandem_evaluation::policies::PartnerPolicy;
 use tandem_tools_spec::{
     Assistance, Briefing, Driving, EpisodeList, ResultReply, StartEpisode, StartReply, TaskList,
 };
@@ -24,7 +25,7 @@ use super::{
     hosted_episode::Beside,
     idempotency_cache::{IdempotencyCache, IdempotentReply},
     run_folder::{RunFolders, episode_name},
-    team::{Collection, OperatorHandle, PartnerPolicy, Team, TeamRules},
+    team::{Collection, OperatorHandle, Team, TeamRules},
 };
 use crate::{metrics::Metrics, settings::Settings};
 

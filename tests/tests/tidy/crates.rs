@@ -15,7 +15,8 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("tests/extras", &[]),
     ("episodes", &["tandem-sim", "tandem-ik", "tandem-tools-spec"]),
     ("episodes/evaluation", &["tandem-episodes", "tandem-sim", "tandem-ik", "tandem-tools-spec"]),
-    ("gateway", &["tandem-episodes", "tandem-evaluation", "tandem-tools-spec"]),
+    ("gateway/policies", &["tandem-episodes", "tandem-evaluation", "tandem-tools-spec"]),
+    ("gateway", &["tandem-policies", "tandem-episodes", "tandem-evaluation", "tandem-tools-spec"]),
     (
         "tests",
         &["tandem", "tandem-episodes", "tandem-evaluation", "tandem-ik", "tandem-sim", "tandem-tools-spec"],

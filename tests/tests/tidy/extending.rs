@@ -100,7 +100,8 @@ const STEPS: &[Step] = &[
     },
 ];
 
-const CRATES: [&str; 5] = ["tools_spec", "sim", "episodes", "episodes/evaluation", "gateway"];
+const CRATES: [&str; 6] =
+    ["tools_spec", "sim", "episodes", "episodes/evaluation", "gateway/policies", "gateway"];
 
 /// Texts in a file with their lines, including those in macros.
 #[derive(Default)]

@@ -52,6 +52,18 @@ const ORDER: &[(&str, &[&[&str]])] = &[
         ],
     ),
     (
+        "gateway/policies",
+        &[
+            &["error", "poses", "values"],
+            &["client", "columns"],
+            &["kept_client", "named_columns"],
+            &["map"],
+            &["request"],
+            &["action"],
+            &["policy_session", "trial"],
+        ],
+    ),
+    (
         "gateway",
         &[
             &["token", "metrics", "live_view"],

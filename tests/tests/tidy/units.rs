@@ -11,7 +11,8 @@ use super::{modules::modules, sources::expect_none};
 
 /// Crates in which numbers are physical. `ik` is left out: its vectors hold coordinates of any joint, in
 /// rad or m, and its costs and errors are weighted.
-const CRATES: [&str; 5] = ["tools_spec", "sim", "episodes", "episodes/evaluation", "gateway"];
+const CRATES: [&str; 6] =
+    ["tools_spec", "sim", "episodes", "episodes/evaluation", "gateway/policies", "gateway"];
 
 /// Files with coordinates of any joint, in rad or m as in `ik`, or with rows of a solver or a filter, which
 /// mix units.

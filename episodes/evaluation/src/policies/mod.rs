@@ -8,7 +8,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::Duration;
 
-use tandem_episodes::players::{InProcess, PlayerEntry, PlayerError};
+use tandem_episodes::players::{InProcess, LocalEpisode, PlayerEntry, PlayerError};
 use tandem_episodes::{EpisodeError, EpisodeSpec, RunFolder, Session, monotonic};
 use tandem_tools_spec::{EndReason, ResultReply};
 
@@ -33,6 +33,25 @@ pub trait Policy: Debug + Send + Sync {
     fn is_interrupted(&self) -> bool {
         false
     }
+}
+
+/// A remote policy that can drive one robot of an episode. It plays all robots, and its own does its
+/// part.
+pub trait PartnerPolicy: Debug + Send + Sync {
+    /// Returns the name by which people choose it and recordings name it.
+    fn name(&self) -> String;
+
+    /// Connects for an episode of `spec`, calls `connected` when that is done, and plays.
+    ///
+    /// # Errors
+    ///
+    /// Returns a [`PlayError`] if it cannot connect. The inner [`PlayerError`] says why the play ended.
+    fn play(
+        &self,
+        spec: &EpisodeSpec,
+        episode: &mut dyn LocalEpisode,
+        connected: &mut dyn FnMut(),
+    ) -> Result<Result<(), PlayerError>, PlayError>;
 }
 
 /// A wait of a policy, and its duration.

@@ -5,9 +5,10 @@ Written by the tests of `tools_spec` from the one list of tools; not to be edite
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Literal, TypeAlias
+
+from .reading import Reply
 
 BaseState: TypeAlias = Literal[
     "standing",
@@ -67,8 +68,8 @@ Touch: TypeAlias = Literal[
 """Contact of a hand, as far as it can feel that."""
 
 
-@dataclass(frozen=True)
-class BaseMotion:
+@dataclass(frozen=True, kw_only=True)
+class BaseMotion(Reply):
     """Motion of a pelvis during a command, along the robot's heading when it began."""
 
     forward_m: float
@@ -83,66 +84,44 @@ class BaseMotion:
     turned_rad: float
     """Turn in radians, counter-clockwise from above."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> BaseMotion:
-        """Reads what JSON has."""
-        return BaseMotion(
-            forward_m=value["forward_m"],
-            left_m=value["left_m"],
-            up_m=value["up_m"],
-            turned_rad=value["turned_rad"],
-        )
 
-
-@dataclass(frozen=True)
-class BaseReport:
+@dataclass(frozen=True, kw_only=True)
+class BaseReport(Reply):
     """Motion of a base, by its own controller and odometry."""
 
-    state: BaseState | None
+    state: BaseState | None = None
     """Standing or stepping, and the reason; left out where its controller does not distinguish them."""
 
     pelvis_height_m: float
     """Measured height of the pelvis over the floor, in metres."""
 
-    commanded_height_m: float | None
+    commanded_height_m: float | None = None
     """Commanded height, where the measured one is more than 2 cm off; left out otherwise."""
 
-    comes_to_rest_m: tuple[float, float] | None
+    comes_to_rest_m: tuple[float, float] | None = None
     """Predicted resting place of the pelvis if no further step is commanded, [x, y] in the start frame: to within
     3 cm after a walk of up to 2.5 s, 5 cm after a longer one. Only of a base that steps or settles.
     """
 
-    displaced_m: tuple[float, float] | None
+    displaced_m: tuple[float, float] | None = None
     """Displacement of a base that was commanded to stand from its resting place, [forward, left] in metres as it
     faced there: something pulled or pushed it. Left out below 2 cm.
     """
 
-    stepped: bool | None
+    stepped: bool | None = None
     """True where it took a step during the command though it was commanded to stand, after arms that reach far or
     what pulls at them; left out otherwise.
     """
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> BaseReport:
-        """Reads what JSON has."""
-        return BaseReport(
-            state=value.get("state"),
-            pelvis_height_m=value["pelvis_height_m"],
-            commanded_height_m=value.get("commanded_height_m"),
-            comes_to_rest_m=None if (got := value.get("comes_to_rest_m")) is None else tuple(got),
-            displaced_m=None if (got := value.get("displaced_m")) is None else tuple(got),
-            stepped=value.get("stepped"),
-        )
 
-
-@dataclass(frozen=True)
-class Budget:
+@dataclass(frozen=True, kw_only=True)
+class Budget(Reply):
     """Remaining budget of an episode."""
 
     steps_left: int
     """Control steps of 20 ms."""
 
-    wall_clock_left_s: float | None
+    wall_clock_left_s: float | None = None
     """Seconds that the policy may still spend between calls; the simulator's own time is not counted. Null where
     the protocol sets no limit.
     """
@@ -150,18 +129,9 @@ class Budget:
     steps_per_command: int
     """The most steps that one command may ask for."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> Budget:
-        """Reads what JSON has."""
-        return Budget(
-            steps_left=value["steps_left"],
-            wall_clock_left_s=value.get("wall_clock_left_s"),
-            steps_per_command=value["steps_per_command"],
-        )
 
-
-@dataclass(frozen=True)
-class CommandReply:
+@dataclass(frozen=True, kw_only=True)
+class CommandReply(Reply):
     """The reply to every command: `move_wrists`, `walk`, `send_joint_chunk` and `wait`. Lengths are told to the
     millimetre, angles and quaternions to a thousandth. What is marked so is left out where the call asked for a
     short reply.
@@ -179,7 +149,7 @@ class CommandReply:
     robots: tuple[RobotReport, ...]
     """One report per robot that the command named; after `wait`, one per robot of the episode."""
 
-    fallen: tuple[RobotFallen, ...]
+    fallen: tuple[RobotFallen, ...] = ()
     """Every robot of the episode; in a short reply those that have fallen. Left out where the assistance is
     "paper".
     """
@@ -190,22 +160,9 @@ class CommandReply:
     budget: Budget
     """Remaining budget of the episode."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> CommandReply:
-        """Reads what JSON has."""
-        return CommandReply(
-            executed_steps=value["executed_steps"],
-            stop_reason=value["stop_reason"],
-            time_s=value["time_s"],
-            robots=tuple(RobotReport.of(item) for item in value["robots"]),
-            fallen=tuple(RobotFallen.of(item) for item in value.get("fallen", ())),
-            phases=tuple(PhaseReached.of(item) for item in value["phases"]),
-            budget=Budget.of(value["budget"]),
-        )
 
-
-@dataclass(frozen=True)
-class Effort:
+@dataclass(frozen=True, kw_only=True)
+class Effort(Reply):
     """Effort of a joint."""
 
     joint: str
@@ -214,92 +171,75 @@ class Effort:
     share: float
     """Its torque as a share of its limit, from 0 to 1."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> Effort:
-        """Reads what JSON has."""
-        return Effort(
-            joint=value["joint"],
-            share=value["share"],
-        )
 
-
-@dataclass(frozen=True)
-class FingerReport:
+@dataclass(frozen=True, kw_only=True)
+class FingerReport(Reply):
     """Outcome of a command for the fingers of one hand. Angles are [thumb_0, thumb_1, thumb_2, middle_0, middle_1,
     index_0, index_1].
     """
 
-    state: HandState | None
+    state: HandState | None = None
     """State against their targets; left out where the assistance is "paper"."""
 
-    target_rad: tuple[float, float, float, float, float, float, float] | None
+    target_rad: tuple[float, float, float, float, float, float, float] | None = None
     """Joint angles that were asked for, in radians. Left out of a short reply."""
 
     measured_rad: tuple[float, float, float, float, float, float, float]
     """Joint angles that were measured, in radians."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> FingerReport:
-        """Reads what JSON has."""
-        return FingerReport(
-            state=value.get("state"),
-            target_rad=None if (got := value.get("target_rad")) is None else tuple(got),
-            measured_rad=tuple(value["measured_rad"]),
-        )
 
-
-@dataclass(frozen=True)
-class HandReport:
+@dataclass(frozen=True, kw_only=True)
+class HandReport(Reply):
     """Outcome of a command for one hand, at its last step."""
 
-    state: HandState | None
+    state: HandState | None = None
     """State of the wrist against its target; left out where the assistance is "paper"."""
 
-    grip: Grip | None
+    grip: Grip | None = None
     """Grip by the fingers' own torques; left out where the assistance is "paper"."""
 
-    presses: tuple[HandPart, ...]
+    presses: tuple[HandPart, ...] = ()
     """Parts of the hand that press, by the torques of the fingers' own drives; left out where none does, and where
     the assistance is "paper".
     """
 
-    touches: Touch | None
+    touches: Touch | None = None
     """Obstacle that the hand feels; left out where it feels none, and where the assistance is "paper"."""
 
-    target: Pose | None
+    target: Pose | None = None
     """The wrist pose that was asked for, in the pelvis frame as it is now, and not where the hand has given way to
     since; of an arm without a wrist target, the pose that its joint targets stand for. Left out of a short
     reply.
     """
 
-    measured: Pose | None
+    measured: Pose | None = None
     """The wrist pose that was measured, in the pelvis frame as it is now, its quaternion with the sign that is
     nearer to the target's. Left out of a short reply where the state is "arrived" or "idle".
     """
 
-    position_error_m: float | None
+    position_error_m: float | None = None
     """Distance from target to measured, in metres. Left out of a short reply where the state is "arrived" or
     "idle".
     """
 
-    orientation_error_rad: float | None
+    orientation_error_rad: float | None = None
     """Angle from target to measured, in radians; left out as the distance is."""
 
-    given_way_m: tuple[float, float, float] | None
+    given_way_m: tuple[float, float, float] | None = None
     """Yielding of the hand by the command's compliance: offset of the yielded target from `target`, [x, y, z] in
     metres in the pelvis frame, against which its state is reported. Left out where it has not yielded, and
     where the assistance is "paper".
     """
 
-    fingers: FingerReport | None
+    fingers: FingerReport | None = None
     """Its fingers; left out of a short reply where they have arrived."""
 
-    largest_effort: Effort | None
+    largest_effort: Effort | None = None
     """The joint of this arm and hand that works hardest; left out of a short reply where it works at less than
     four fifths of its limit or is of a finger, as of each that presses, and where the assistance is "paper".
     """
 
-    force_n: tuple[float, float, float] | None
+    force_n: tuple[float, float, float] | None = None
     """Force of the world on the hand in newtons, [x, y, z] in the pelvis frame, as the arm's own joints feel it: a
     hand that holds 0.5 kg feels about -4.9 along z, one that presses ahead on something a negative x. What
     moving the arm takes is not counted; an arm that hangs free may feel up to 5 N of its own friction. Left out
@@ -307,39 +247,19 @@ class HandReport:
     and where the assistance is "paper".
     """
 
-    joints_clamped: tuple[str, ...]
+    joints_clamped: tuple[str, ...] = ()
     """Joints of this arm and hand whose target lay beyond a limit and was moved to it; left out where there are
     none.
     """
 
-    joints_at_limit: tuple[str, ...]
+    joints_at_limit: tuple[str, ...] = ()
     """Joints of this arm that rest at a limit; left out where there are none, and of a short reply where the state
     is "arrived" or "idle".
     """
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> HandReport:
-        """Reads what JSON has."""
-        return HandReport(
-            state=value.get("state"),
-            grip=value.get("grip"),
-            presses=tuple(value.get("presses", ())),
-            touches=value.get("touches"),
-            target=None if (got := value.get("target")) is None else Pose.of(got),
-            measured=None if (got := value.get("measured")) is None else Pose.of(got),
-            position_error_m=value.get("position_error_m"),
-            orientation_error_rad=value.get("orientation_error_rad"),
-            given_way_m=None if (got := value.get("given_way_m")) is None else tuple(got),
-            fingers=None if (got := value.get("fingers")) is None else FingerReport.of(got),
-            largest_effort=None if (got := value.get("largest_effort")) is None else Effort.of(got),
-            force_n=None if (got := value.get("force_n")) is None else tuple(got),
-            joints_clamped=tuple(value.get("joints_clamped", ())),
-            joints_at_limit=tuple(value.get("joints_at_limit", ())),
-        )
 
-
-@dataclass(frozen=True)
-class PhaseReached:
+@dataclass(frozen=True, kw_only=True)
+class PhaseReached(Reply):
     """A phase of the task, and when it was reached."""
 
     id: str
@@ -351,18 +271,9 @@ class PhaseReached:
     time_s: float
     """Simulated seconds since the episode began."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> PhaseReached:
-        """Reads what JSON has."""
-        return PhaseReached(
-            id=value["id"],
-            number=value["number"],
-            time_s=value["time_s"],
-        )
 
-
-@dataclass(frozen=True)
-class Pose:
+@dataclass(frozen=True, kw_only=True)
+class Pose(Reply):
     """A pose in the frame that the field which holds it names."""
 
     position_m: tuple[float, float, float]
@@ -371,17 +282,9 @@ class Pose:
     quaternion_wxyz: tuple[float, float, float, float]
     """[w, x, y, z], norm 1."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> Pose:
-        """Reads what JSON has."""
-        return Pose(
-            position_m=tuple(value["position_m"]),
-            quaternion_wxyz=tuple(value["quaternion_wxyz"]),
-        )
 
-
-@dataclass(frozen=True)
-class RobotFallen:
+@dataclass(frozen=True, kw_only=True)
+class RobotFallen(Reply):
     """Fall of a robot."""
 
     robot: str
@@ -390,23 +293,15 @@ class RobotFallen:
     fallen: bool
     """True from the moment it fell."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> RobotFallen:
-        """Reads what JSON has."""
-        return RobotFallen(
-            robot=value["robot"],
-            fallen=value["fallen"],
-        )
 
-
-@dataclass(frozen=True)
-class RobotReport:
+@dataclass(frozen=True, kw_only=True)
+class RobotReport(Reply):
     """Outcome of a command for one robot."""
 
     robot: str
     """The robot, for example "A"."""
 
-    frame: PoseFrame | None
+    frame: PoseFrame | None = None
     """The frame of wrist poses: the command's, or that of a walk's places; left out for that of the pelvis."""
 
     left: HandReport
@@ -415,47 +310,30 @@ class RobotReport:
     right: HandReport
     """Its right arm and hand."""
 
-    base: BaseReport | None
+    base: BaseReport | None = None
     """Motion of its base; left out where the assistance is "paper"."""
 
-    pelvis_in_start: Pose | None
+    pelvis_in_start: Pose | None = None
     """Pose of its pelvis in the start frame by its own IMU and joints. The start frame is on the floor under the
     pelvis at the start of the episode, z up, x the robot's heading then. Drifts by up to 1 % of the way walked.
     Left out where the assistance is "paper".
     """
 
-    pelvis_in_room: Pose | None
+    pelvis_in_room: Pose | None = None
     """The same in the room frame, where `frame` is that; left out otherwise."""
 
-    base_motion: BaseMotion | None
+    base_motion: BaseMotion | None = None
     """Motion of the base during the command, by the same odometry. Left out where the assistance is "paper", and
     of a short reply where it is less than a centimetre and a hundredth of a radian.
     """
 
-    waist_joints_clamped: tuple[str, ...]
+    waist_joints_clamped: tuple[str, ...] = ()
     """Waist joints whose target lay beyond a limit and was moved to it; left out where there are none."""
 
-    waist_joints_at_limit: tuple[str, ...]
+    waist_joints_at_limit: tuple[str, ...] = ()
     """Waist joints that rest at a limit; left out where there are none."""
 
-    base_command_clamped: tuple[str, ...]
+    base_command_clamped: tuple[str, ...] = ()
     """Fields of the base command that lay beyond what locomotion accepts and were moved to it, as `vx_m_s`; left
     out where there are none.
     """
-
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> RobotReport:
-        """Reads what JSON has."""
-        return RobotReport(
-            robot=value["robot"],
-            frame=value.get("frame"),
-            left=HandReport.of(value["left"]),
-            right=HandReport.of(value["right"]),
-            base=None if (got := value.get("base")) is None else BaseReport.of(got),
-            pelvis_in_start=None if (got := value.get("pelvis_in_start")) is None else Pose.of(got),
-            pelvis_in_room=None if (got := value.get("pelvis_in_room")) is None else Pose.of(got),
-            base_motion=None if (got := value.get("base_motion")) is None else BaseMotion.of(got),
-            waist_joints_clamped=tuple(value.get("waist_joints_clamped", ())),
-            waist_joints_at_limit=tuple(value.get("waist_joints_at_limit", ())),
-            base_command_clamped=tuple(value.get("base_command_clamped", ())),
-        )

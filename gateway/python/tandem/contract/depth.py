@@ -5,11 +5,11 @@ Written by the tests of `tools_spec` from the one list of tools; not to be edite
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 from .commands import PoseFrame
+from .reading import Reply
 
 JoinedBy: TypeAlias = Literal[
     "color",
@@ -19,23 +19,23 @@ JoinedBy: TypeAlias = Literal[
 """By what pixels are joined to a surface. Neighbours are of about the same depth, except of an object."""
 
 
-@dataclass(frozen=True)
-class DepthReply:
+@dataclass(frozen=True, kw_only=True)
+class DepthReply(Reply):
     """The reply to `query_depth`."""
 
     robot: str
     """The robot whose camera measured."""
 
-    frame: PoseFrame | None
+    frame: PoseFrame | None = None
     """The frame of the points, where the call named another than that of the pelvis; left out otherwise."""
 
-    surfaces: tuple[Surface, ...]
+    surfaces: tuple[Surface, ...] = ()
     """The surfaces that were found: at a pixel the patch of its colour and, where that is more, the whole thing;
     of a colour up to three, the nearest first and what is of the room last; of an object one. Left out where
     none was asked for.
     """
 
-    fit: RegionFit | None
+    fit: RegionFit | None = None
     """Plane, edges and corners of the region; left out where `fit` was not asked for."""
 
     columns: tuple[str, str, str, str, str]
@@ -46,21 +46,9 @@ class DepthReply:
     seen. Of a surface none.
     """
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> DepthReply:
-        """Reads what JSON has."""
-        return DepthReply(
-            robot=value["robot"],
-            frame=value.get("frame"),
-            surfaces=tuple(Surface.of(item) for item in value.get("surfaces", ())),
-            fit=None if (got := value.get("fit")) is None else RegionFit.of(got),
-            columns=tuple(value["columns"]),
-            points=tuple(tuple(item) for item in value["points"]),
-        )
 
-
-@dataclass(frozen=True)
-class EdgeFit:
+@dataclass(frozen=True, kw_only=True)
+class EdgeFit(Reply):
     """A straight edge at which the plane ends within the region."""
 
     from_m: tuple[float, float, float]
@@ -75,19 +63,9 @@ class EdgeFit:
     points: int
     """Number of points that it was fitted to."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> EdgeFit:
-        """Reads what JSON has."""
-        return EdgeFit(
-            from_m=tuple(value["from_m"]),
-            to_m=tuple(value["to_m"]),
-            rms_m=value["rms_m"],
-            points=value["points"],
-        )
 
-
-@dataclass(frozen=True)
-class PlaneFit:
+@dataclass(frozen=True, kw_only=True)
+class PlaneFit(Reply):
     """The largest plane in a region of a picture."""
 
     point_m: tuple[float, float, float]
@@ -105,20 +83,9 @@ class PlaneFit:
     share: float
     """Their share of those that see anything."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> PlaneFit:
-        """Reads what JSON has."""
-        return PlaneFit(
-            point_m=tuple(value["point_m"]),
-            normal=tuple(value["normal"]),
-            rms_m=value["rms_m"],
-            pixels=value["pixels"],
-            share=value["share"],
-        )
 
-
-@dataclass(frozen=True)
-class RegionFit:
+@dataclass(frozen=True, kw_only=True)
+class RegionFit(Reply):
     """Result of `fit` in a region."""
 
     plane: PlaneFit
@@ -130,18 +97,9 @@ class RegionFit:
     corners_m: tuple[tuple[float, float, float], ...]
     """Corners, where two of them meet, in metres in the frame of the reply."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> RegionFit:
-        """Reads what JSON has."""
-        return RegionFit(
-            plane=PlaneFit.of(value["plane"]),
-            edges=tuple(EdgeFit.of(item) for item in value["edges"]),
-            corners_m=tuple(tuple(item) for item in value["corners_m"]),
-        )
 
-
-@dataclass(frozen=True)
-class Surface:
+@dataclass(frozen=True, kw_only=True)
+class Surface(Reply):
     """A surface as the camera sees it: only what is in view, and of a thing only its near side."""
 
     joined_by: JoinedBy
@@ -173,32 +131,15 @@ class Surface:
     rectangle its corners.
     """
 
-    axis: UprightAxis | None
+    axis: UprightAxis | None = None
     """Its axis, where it is upright and round; left out otherwise."""
 
     cut_off: bool
     """True if it goes on beyond the image."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> Surface:
-        """Reads what JSON has."""
-        return Surface(
-            joined_by=value["joined_by"],
-            pixels=value["pixels"],
-            from_=tuple(value["from"]),
-            to=tuple(value["to"]),
-            rgb=tuple(value["rgb"]),
-            centroid_m=tuple(value["centroid_m"]),
-            middle_m=tuple(value["middle_m"]),
-            extent_m=tuple(value["extent_m"]),
-            corners_m=tuple(tuple(item) for item in value["corners_m"]),
-            axis=None if (got := value.get("axis")) is None else UprightAxis.of(got),
-            cut_off=value["cut_off"],
-        )
 
-
-@dataclass(frozen=True)
-class UprightAxis:
+@dataclass(frozen=True, kw_only=True)
+class UprightAxis(Reply):
     """The axis of a thing that is upright and round, as a bottle."""
 
     bottom_m: tuple[float, float, float]
@@ -209,12 +150,3 @@ class UprightAxis:
 
     radius_m: float
     """The radius of most of it, in metres."""
-
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> UprightAxis:
-        """Reads what JSON has."""
-        return UprightAxis(
-            bottom_m=tuple(value["bottom_m"]),
-            top_m=tuple(value["top_m"]),
-            radius_m=value["radius_m"],
-        )

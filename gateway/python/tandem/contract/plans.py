@@ -5,15 +5,14 @@ Written by the tests of `tools_spec` from the one list of tools; not to be edite
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from .commands import CommandReply, PoseFrame
+from .reading import Reply
 
 
-@dataclass(frozen=True)
-class HeldObject:
+@dataclass(frozen=True, kw_only=True)
+class HeldObject(Reply):
     """An object in a hand."""
 
     robot: str
@@ -39,22 +38,9 @@ class HeldObject:
     lowest_m: float
     """Height of its lowest point above the floor, in metres."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> HeldObject:
-        """Reads what JSON has."""
-        return HeldObject(
-            robot=value["robot"],
-            hand=value["hand"],
-            object=value["object"],
-            frame=value["frame"],
-            middle_m=tuple(value["middle_m"]),
-            axis=tuple(value["axis"]),
-            lowest_m=value["lowest_m"],
-        )
 
-
-@dataclass(frozen=True)
-class PlanReply:
+@dataclass(frozen=True, kw_only=True)
+class PlanReply(Reply):
     """The reply to `send_plan` and `walk_to`."""
 
     commands: int
@@ -68,29 +54,16 @@ class PlanReply:
     executed_steps: int
     """Control steps of 20 ms that they took together."""
 
-    stopped: str | None
+    stopped: str | None = None
     """Why no more were; null where all was done."""
 
-    outcomes: tuple[str, ...]
+    outcomes: tuple[str, ...] = ()
     """A line for each command of a plan that was begun: its steps, and where that left the robots. Left out where
     there is one command.
     """
 
-    held: tuple[HeldObject, ...]
+    held: tuple[HeldObject, ...] = ()
     """Objects in hands after a walk with `carry`, in its frame; left out otherwise."""
 
     last: CommandReply
     """The reply to the last command that was carried out."""
-
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> PlanReply:
-        """Reads what JSON has."""
-        return PlanReply(
-            commands=value["commands"],
-            tool_calls=value["tool_calls"],
-            executed_steps=value["executed_steps"],
-            stopped=value.get("stopped"),
-            outcomes=tuple(value.get("outcomes", ())),
-            held=tuple(HeldObject.of(item) for item in value.get("held", ())),
-            last=CommandReply.of(value["last"]),
-        )

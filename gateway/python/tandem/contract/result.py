@@ -5,10 +5,10 @@ Written by the tests of `tools_spec` from the one list of tools; not to be edite
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
 
+from .reading import Reply
 from .replies import Assistance, EndReason, Protocol
 
 AgentEnding: TypeAlias = Literal[
@@ -27,11 +27,11 @@ AgentEnding: TypeAlias = Literal[
 """End of a language model's play."""
 
 
-@dataclass(frozen=True)
-class ModelEnding:
+@dataclass(frozen=True, kw_only=True)
+class ModelEnding(Reply):
     """End of a model's play, in its own words, too."""
 
-    robot: str | None
+    robot: str | None = None
     """The robot that it directed; left out where it directed all."""
 
     ending: AgentEnding
@@ -40,18 +40,9 @@ class ModelEnding:
     text: str
     """The words of the model or of its endpoint, as of a refusal; empty where there are none."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> ModelEnding:
-        """Reads what JSON has."""
-        return ModelEnding(
-            robot=value.get("robot"),
-            ending=value["ending"],
-            text=value["text"],
-        )
 
-
-@dataclass(frozen=True)
-class OperatorUse:
+@dataclass(frozen=True, kw_only=True)
+class OperatorUse(Reply):
     """Requests and thinking time of a robot's operator up to its last command."""
 
     robot: str
@@ -63,24 +54,15 @@ class OperatorUse:
     thinking_s: float
     """Wall clock that the operator has thought since its first request, while no step was made, in seconds."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> OperatorUse:
-        """Reads what JSON has."""
-        return OperatorUse(
-            robot=value["robot"],
-            requests=value["requests"],
-            thinking_s=value["thinking_s"],
-        )
 
-
-@dataclass(frozen=True)
-class ResultReply:
+@dataclass(frozen=True, kw_only=True)
+class ResultReply(Reply):
     """The reply to `finish`, and the content of `result.json`."""
 
     task: str
     """The task's id."""
 
-    seed: int | None
+    seed: int | None = None
     """The seed; left out for a policy whose assistance is "paper"."""
 
     protocol: Protocol
@@ -89,7 +71,7 @@ class ResultReply:
     phases: dict[str, float | None]
     """Times in simulated seconds at which phases were reached; null where one was not, or is not disclosed."""
 
-    success: bool | None
+    success: bool | None = None
     """True if every phase was reached; left out where phases are not disclosed, and in results of earlier
     versions.
     """
@@ -105,17 +87,17 @@ class ResultReply:
     included. Each command of a plan or walk is one, and each slice of 5 steps with `until`.
     """
 
-    requests: int | None
+    requests: int | None = None
     """Requests of the policy itself: like tool_calls, but a plan or a walk, whose commands are a call each, counts
     once. Left out in results of earlier versions.
     """
 
-    thinking_s: float | None
+    thinking_s: float | None = None
     """Wall clock that the policy has thought between its calls, in seconds; where each robot has its own operator,
     that of all operators together.
     """
 
-    operators: tuple[OperatorUse, ...]
+    operators: tuple[OperatorUse, ...] = ()
     """Use by each operator that has commanded, where each robot has its own; left out otherwise."""
 
     falls: int
@@ -124,76 +106,48 @@ class ResultReply:
     realtime_factor: float
     """Simulated seconds per second that the physics took."""
 
-    state_hash: str | None
+    state_hash: str | None = None
     """Hash of the whole physical state at the end, 16 hexadecimal digits; left out for a policy whose assistance
     is "paper".
     """
 
-    simulator_failure: str | None
+    simulator_failure: str | None = None
     """Failure of the simulator: its step, body and error; left out where it did not fail."""
 
-    assistance: Assistance | None
+    assistance: Assistance | None = None
     """Amount of information that the policy got."""
 
-    extra_information: tuple[str, ...]
+    extra_information: tuple[str, ...] = ()
     """Information that the policy got beyond the benchmark's own policies, for example "depth_images"; left out
     where it was none.
     """
 
-    extra_information_replies: dict[str, dict[str, int]]
+    extra_information_replies: dict[str, dict[str, int]] = field(default_factory=dict[str, dict[str, int]])
     """Number of replies with each of it, by its name and by the robot it was of; left out where it was none."""
 
-    joints_clamped_share: float | None
+    joints_clamped_share: float | None = None
     """Share of the joint targets that lay beyond the joints' limits by more than 0.01 rad, and were moved there;
     left out where none did.
     """
 
-    departures: tuple[str, ...]
+    departures: tuple[str, ...] = ()
     """Departures from the benchmark, for example "assistance: full"; left out where there was none."""
 
-    recording_failed: str | None
+    recording_failed: str | None = None
     """Why the recording is not complete; left out where it is."""
 
-    usage: Usage | None
+    usage: Usage | None = None
     """Usage that notes on the episode report; left out where there are none."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> ResultReply:
-        """Reads what JSON has."""
-        return ResultReply(
-            task=value["task"],
-            seed=value.get("seed"),
-            protocol=value["protocol"],
-            phases=value["phases"],
-            success=value.get("success"),
-            ended=value["ended"],
-            env_steps=value["env_steps"],
-            tool_calls=value["tool_calls"],
-            requests=value.get("requests"),
-            thinking_s=value.get("thinking_s"),
-            operators=tuple(OperatorUse.of(item) for item in value.get("operators", ())),
-            falls=value["falls"],
-            realtime_factor=value["realtime_factor"],
-            state_hash=value.get("state_hash"),
-            simulator_failure=value.get("simulator_failure"),
-            assistance=value.get("assistance"),
-            extra_information=tuple(value.get("extra_information", ())),
-            extra_information_replies=value.get("extra_information_replies", {}),
-            joints_clamped_share=value.get("joints_clamped_share"),
-            departures=tuple(value.get("departures", ())),
-            recording_failed=value.get("recording_failed"),
-            usage=None if (got := value.get("usage")) is None else Usage.of(got),
-        )
 
-
-@dataclass(frozen=True)
-class RobotUsage:
+@dataclass(frozen=True, kw_only=True)
+class RobotUsage(Reply):
     """Usage of the model of one robot."""
 
     robot: str
     """The robot that it directed."""
 
-    model: str | None
+    model: str | None = None
     """The model, as its latest note names it; left out where none does."""
 
     input_tokens: int
@@ -205,28 +159,15 @@ class RobotUsage:
     cached_tokens: int
     """Number of read tokens that came from a cache."""
 
-    usd: float | None
+    usd: float | None = None
     """Cost in US dollars; left out where no note has it."""
 
-    model_s: float | None
+    model_s: float | None = None
     """Seconds that it took; left out where no note has them."""
 
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> RobotUsage:
-        """Reads what JSON has."""
-        return RobotUsage(
-            robot=value["robot"],
-            model=value.get("model"),
-            input_tokens=value["input_tokens"],
-            output_tokens=value["output_tokens"],
-            cached_tokens=value["cached_tokens"],
-            usd=value.get("usd"),
-            model_s=value.get("model_s"),
-        )
 
-
-@dataclass(frozen=True)
-class Usage:
+@dataclass(frozen=True, kw_only=True)
+class Usage(Reply):
     """Sum of the usage in all notes of an episode."""
 
     notes: int
@@ -241,32 +182,17 @@ class Usage:
     cached_tokens: int
     """Number of read tokens that came from a cache."""
 
-    usd: float | None
+    usd: float | None = None
     """Cost in US dollars; left out where no note has it."""
 
-    model_s: float | None
+    model_s: float | None = None
     """Seconds that models took; left out where no note has them."""
 
-    models: tuple[str, ...]
+    models: tuple[str, ...] = ()
     """The models that notes name."""
 
-    robots: tuple[RobotUsage, ...]
+    robots: tuple[RobotUsage, ...] = ()
     """Parts of the sums that belong to one robot, of notes that name it; left out where none does."""
 
-    endings: tuple[ModelEnding, ...]
+    endings: tuple[ModelEnding, ...] = ()
     """Ends of the models' play: one for all robots, or one for each that has reported it."""
-
-    @staticmethod
-    def of(value: Mapping[str, Any]) -> Usage:
-        """Reads what JSON has."""
-        return Usage(
-            notes=value["notes"],
-            input_tokens=value["input_tokens"],
-            output_tokens=value["output_tokens"],
-            cached_tokens=value["cached_tokens"],
-            usd=value.get("usd"),
-            model_s=value.get("model_s"),
-            models=tuple(value.get("models", ())),
-            robots=tuple(RobotUsage.of(item) for item in value.get("robots", ())),
-            endings=tuple(ModelEnding.of(item) for item in value.get("endings", ())),
-        )

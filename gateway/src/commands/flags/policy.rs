@@ -4,19 +4,15 @@ use std::{error::Error, path::PathBuf, sync::Arc, time::Duration};
 
 use tandem_episodes::{EpisodeSpec, players};
 use tandem_evaluation::{
-    policies::{EpisodeOutput, OpenLoop, PlayError, PlayOutcome, Policy, PolicyWait},
+    policies::{EpisodeOutput, OpenLoop, PartnerPolicy, PlayError, PlayOutcome, Policy, PolicyWait},
     results::PolicyCard,
 };
+use tandem_policies::{PRESETS, PolicyKey, PolicyMap, PolicyProtocol, RemotePolicy};
 use tandem_tools_spec::{Driving, Operators};
 
 use super::agent::AgentFlags;
 use super::robot_models::{PolicyPrices, RobotModels};
-use crate::{
-    drivers::{
-        PRESETS, PolicyKey, PolicyMap, PolicyProtocol, Program, PythonModule, PythonPart, RemotePolicy,
-    },
-    hosting::PartnerPolicy,
-};
+use crate::drivers::{Program, PythonModule, PythonPart};
 
 /// Prefix of --policy that names a program.
 const EXEC: &str = "exec:";

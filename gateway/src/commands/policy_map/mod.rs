@@ -4,8 +4,9 @@ use std::process::ExitCode;
 
 use clap::{Subcommand, builder::PossibleValuesParser};
 
+use tandem_policies::{PRESETS, PolicyMap, preset, try_map};
+
 use super::{CommandResult, print};
-use crate::drivers::{PRESETS, PolicyMap, preset, try_map};
 
 /// Print a policy map to start from, or try one.
 #[derive(Debug, clap::Args)]

@@ -30,7 +30,7 @@ use crate::token::Token;
 pub use collection::{CollectedEpisode, Collection, CollectionProgress, CollectionStage};
 pub use driving::Driver;
 pub use handle::OperatorHandle;
-pub use partner::{PartnerPolicy, seat_again};
+pub use partner::seat_again;
 pub use round::OperatorMemory;
 use round::Round;
 pub use rules::TeamRules;

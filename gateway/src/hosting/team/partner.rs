@@ -4,13 +4,13 @@
 //! The expert plays its script for all robots, and its own robot does its part. If a step of the script
 //! does not succeed in time, the script gives up and begins again from the current state.
 
-use std::{fmt, sync::Arc, thread};
+use std::{sync::Arc, thread};
 
 use tandem_episodes::{
     EpisodeSpec,
-    players::{Episode, LocalEpisode, PlayerError, PrivilegedPlayer, experts::Expert},
+    players::{Episode, PlayerError, PrivilegedPlayer, experts::Expert},
 };
-use tandem_evaluation::policies::PlayError;
+use tandem_evaluation::policies::{PartnerPolicy, PlayError};
 use tandem_tools_spec::{Finish, Note, Wait};
 use tokio::{runtime::Handle, sync::oneshot};
 
@@ -24,25 +24,6 @@ use crate::hosting::{EpisodeThread, HostingError};
 
 /// Control steps for which the robot stands before the expert's script begins again.
 const PAUSE_STEPS: u32 = 25;
-
-/// A remote policy that can drive one robot of an episode. It plays all robots, and its own does its
-/// part.
-pub trait PartnerPolicy: fmt::Debug + Send + Sync {
-    /// Returns the name by which people choose it and recordings name it.
-    fn name(&self) -> String;
-
-    /// Connects for an episode of `spec`, calls `connected` when that is done, and plays.
-    ///
-    /// # Errors
-    ///
-    /// Returns a [`PlayError`] if it cannot connect. The inner [`PlayerError`] says why the play ended.
-    fn play(
-        &self,
-        spec: &EpisodeSpec,
-        episode: &mut dyn LocalEpisode,
-        connected: &mut dyn FnMut(),
-    ) -> Result<Result<(), PlayerError>, PlayError>;
-}
 
 impl OperatorHandle {
     /// Lets the expert of the task drive the robot until the episode ends or everybody else has finished.

@@ -6,8 +6,11 @@ use serde_json::{Map, Value};
 use tandem_tools_spec::TypedTool;
 
 use super::text::{Lines, docstring};
-use super::types::{Parameter, parameters, python_name, reading, reference, reply_type, without_null};
+use super::types::{Parameter, parameters, python_name, reference, reply_type};
 use super::{OF_DEPTH, OF_OBSERVE, OF_PLANS, OF_RESULT, OF_START, described, is_method};
+
+/// The class of all replies, which reads them.
+const BASE: &str = "Reply";
 
 /// The types of the contract, by what they are part of.
 pub struct Contract<'a> {
@@ -173,21 +176,21 @@ impl<'a> Contract<'a> {
 
     fn reply_module(&self, about: &str, names: &BTreeSet<String>) -> String {
         let mut lines = head(about);
-        lines.add(0, "from collections.abc import Mapping");
-        lines.add(0, "from dataclasses import dataclass");
-        let has_choices = names.iter().any(|name| choices(&self.types[name]).is_some());
-        lines.add(
-            0,
-            if has_choices { "from typing import Any, Literal, TypeAlias" } else { "from typing import Any" },
-        );
-        let named = names.iter().flat_map(|name| self.named_in(&self.types[name]));
-        let elsewhere: Vec<String> =
-            named.filter(|name| !names.contains(name) && self.plain(name).is_none()).collect();
-        if !elsewhere.is_empty() {
-            lines.add(0, "");
+        let mut types = Lines::default();
+        self.reply_types(&mut types, names);
+        let types = types.text();
+        let used = |name: &&str| types.contains(*name);
+        let dataclasses: Vec<&str> = ["dataclass", "field("].into_iter().filter(used).collect();
+        lines.add(0, &format!("from dataclasses import {}", dataclasses.join(", ").replace('(', "")));
+        let typing: Vec<&str> = ["Any", "Literal", "TypeAlias"].into_iter().filter(used).collect();
+        if !typing.is_empty() {
+            lines.add(0, &format!("from typing import {}", typing.join(", ")));
         }
-        self.import(&mut lines, elsewhere);
-        self.reply_types(&mut lines, names);
+        lines.add(0, "");
+        let named = names.iter().flat_map(|name| self.named_in(&self.types[name]));
+        let elsewhere = named.filter(|name| !names.contains(name) && self.plain(name).is_none());
+        self.import(&mut lines, elsewhere.chain([BASE.into()]).collect());
+        lines.add(0, types.trim_end());
         lines.text()
     }
 
@@ -197,6 +200,7 @@ impl<'a> Contract<'a> {
             ("commands", &self.commands),
             ("depth", &self.depth),
             ("plans", &self.plans),
+            ("reading", &BTreeSet::from([BASE.to_owned()])),
             ("replies", &self.replies),
             ("result", &self.result),
         ] {
@@ -231,36 +235,26 @@ impl<'a> Contract<'a> {
         let schema = &self.types[name];
         let required: Vec<&str> =
             schema["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
-        lines.add(0, "\n\n@dataclass(frozen=True)");
-        lines.add(0, &format!("class {name}:"));
+        lines.add(0, "\n\n@dataclass(frozen=True, kw_only=True)");
+        lines.add(0, &format!("class {name}({BASE}):"));
         docstring(lines, 1, &described(schema), &[]);
-        let mut readings = Vec::new();
         for (wire, field) in schema["properties"].as_object().into_iter().flatten() {
             let mut kind = reply_type(field, &|name| self.plain(name));
-            let is_class = |name: &str| self.is_class(name);
-            let read = match (required.contains(&wire.as_str()), field["type"].as_str()) {
-                (true, _) => reading(field, &format!("value[\"{wire}\"]"), &is_class),
-                (false, Some("array")) => reading(field, &format!("value.get(\"{wire}\", ())"), &is_class),
-                (false, Some("object")) => format!("value.get(\"{wire}\", {{}})"),
+            let default = match (required.contains(&wire.as_str()), field["type"].as_str()) {
+                (true, _) => String::new(),
+                (false, Some("array")) => " = ()".into(),
+                (false, Some("object")) => format!(" = field(default_factory={kind})"),
                 (false, _) => {
                     if !kind.ends_with("| None") {
                         kind.push_str(" | None");
                     }
-                    optional_reading(field, wire, &is_class)
+                    " = None".into()
                 }
             };
-            readings.push(format!("{}={read},", python_name(wire)));
             lines.add(0, "");
-            lines.add(1, &format!("{}: {kind}", python_name(wire)));
+            lines.add(1, &format!("{}: {kind}{default}", python_name(wire)));
             docstring(lines, 1, &described(field), &[]);
         }
-        lines.add(0, "");
-        lines.add(1, "@staticmethod");
-        lines.add(1, &format!("def of(value: Mapping[str, Any]) -> {name}:"));
-        lines.add(2, "\"\"\"Reads what JSON has.\"\"\"");
-        lines.add(2, &format!("return {name}("));
-        readings.iter().for_each(|reading| lines.add(3, reading));
-        lines.add(2, ")");
     }
 }
 
@@ -268,15 +262,6 @@ fn head(about: &str) -> Lines {
     let mut lines = Lines::default();
     lines.head(about);
     lines
-}
-
-/// Returns the code that reads a field that may be left out.
-fn optional_reading(field: &Value, wire: &str, is_class: &dyn Fn(&str) -> bool) -> String {
-    let got = format!("value.get(\"{wire}\")");
-    match reading(&without_null(field).0, "got", is_class) {
-        same if same == "got" => got,
-        read => format!("None if (got := {got}) is None else {read}"),
-    }
 }
 
 /// Returns the texts of a type that is one of several.

@@ -110,25 +110,6 @@ pub fn reply_type(schema: &Value, plain: &dyn Fn(&str) -> Option<String>) -> Str
     if may_be_null { format!("{kind} | None") } else { kind }
 }
 
-/// Returns the code that reads a reply from `value`; `is_class` says which names have classes.
-pub fn reading(schema: &Value, value: &str, is_class: &dyn Fn(&str) -> bool) -> String {
-    let (schema, may_be_null) = without_null(schema);
-    let read = match schema["type"].as_str() {
-        Some("array") => match reading(&schema["items"], "item", is_class) {
-            same if same == "item" => format!("tuple({value})"),
-            each => format!("tuple({each} for item in {value})"),
-        },
-        _ => match reference(&schema) {
-            Some(name) if is_class(name) => format!("{name}.of({value})"),
-            _ => value.to_owned(),
-        },
-    };
-    match may_be_null && read != value {
-        true => format!("None if {value} is None else {read}"),
-        false => read,
-    }
-}
-
 fn single(schema: &Value) -> String {
     match (reference(schema), schema["type"].as_str()) {
         (Some(name), _) => name.into(),

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use ureq::{Agent, Timeout, http::Response};
 
 use super::{PolicyAddress, PolicyClient, PolicyKey, encryption::for_requests};
-use crate::drivers::remote::{
+use crate::{
     error::{RemoteError, gist},
     values::{ReplyValue, RequestValue},
 };
@@ -160,7 +160,7 @@ fn from_json(value: Value) -> Result<ReplyValue, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drivers::remote::values::{Array, Elements};
+    use crate::values::{Array, Elements};
 
     #[test]
     fn arrays_are_written_and_read_as_json_numpy_does() {

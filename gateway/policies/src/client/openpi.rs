@@ -8,7 +8,7 @@ use super::{
     link::{Frame, PolicySocket, silent},
     msgpack::{Dialect, read_reply, written},
 };
-use crate::drivers::remote::{
+use crate::{
     error::{RemoteError, gist},
     values::{ReplyValue, RequestValue},
 };

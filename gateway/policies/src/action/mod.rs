@@ -10,10 +10,11 @@ pub use wrists::WristTarget;
 
 use tandem_tools_spec::ACTION_ROW_LEN;
 
-use super::{
-    columns::{ACTION_LEN, action_columns, action_name, held_row, motors, sensed_pelvis, sensed_wrist},
+use crate::{
+    columns::{ACTION_LEN, action_name, held_row, motors, sensed_pelvis, sensed_wrist},
     error::RemoteError,
     map::{AnswerScope, PolicyMap, ROBOT},
+    named_columns,
     poses::pose_of,
     request::{PolicyObservation, TaskInstructions},
     values::ReplyValue,
@@ -82,8 +83,7 @@ fn parts<'a>(
 ) -> Result<Vec<ColumnBlock<'a>>, RemoteError> {
     let mut parts = Vec::with_capacity(map.action.len());
     for (key, names) in &map.action {
-        // The map was checked when it was read.
-        let columns = action_columns(names).unwrap_or_default();
+        let columns = named_columns::joined(names);
         // Without a robot's name in the key, the columns of all robots are side by side.
         let apart = key.contains(ROBOT) || map.answer == AnswerScope::One;
         let (width, from) = match apart {

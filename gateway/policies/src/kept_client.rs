@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::client::PolicyClient;
+use crate::client::PolicyClient;
 
 /// Maximum time without a message to the server. Python's websockets pings after 20 s and closes after
 /// another 20 s.
@@ -99,7 +99,7 @@ mod tests {
     use std::sync::mpsc;
 
     use super::*;
-    use crate::drivers::remote::{
+    use crate::{
         error::RemoteError,
         values::{ReplyValue, RequestValue},
     };

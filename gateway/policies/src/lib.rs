@@ -7,6 +7,7 @@ mod columns;
 mod error;
 mod kept_client;
 mod map;
+mod named_columns;
 mod policy_session;
 mod poses;
 mod request;
@@ -25,10 +26,12 @@ use serde_json::json;
 use tandem_episodes::{
     EpisodeSpec,
     players::{LocalEpisode, PlayerError},
-    tasks::{Task, TaskWords},
+    tasks::Task,
 };
 use tandem_evaluation::{
-    policies::{EpisodeOutput, PlayError, PlayOutcome, Policy, PolicyWait, play_in_process},
+    policies::{
+        EpisodeOutput, PartnerPolicy, PlayError, PlayOutcome, Policy, PolicyWait, play_in_process,
+    },
     results::PolicyCard,
 };
 
@@ -38,7 +41,6 @@ pub use error::RemoteError;
 pub use map::{MapError, PRESETS, PolicyMap, preset};
 pub use trial::try_map;
 
-use crate::hosting::PartnerPolicy;
 use columns::EpisodeMoment;
 use map::AnswerScope;
 use policy_session::PolicySession;
@@ -94,8 +96,8 @@ impl RemotePolicy {
         let began = Instant::now();
         self.waits().push(began);
         let session = {
-            let (words, most_steps) =
-                (instructions(&spec.task, spec.task_words()), spec.rules().steps_per_command);
+            let words = TaskInstructions::of(&spec.task, spec.task_words());
+            let most_steps = spec.rules().steps_per_command;
             PolicySession::open(self.protocol, &self.servers, &self.map, words, most_steps)
         };
         let mut waits = self.waits();
@@ -168,14 +170,5 @@ impl PartnerPolicy for RemotePolicy {
         let mut session = self.open(spec)?;
         connected();
         Ok(session.play(episode, self.number_of(spec)))
-    }
-}
-
-fn instructions(task: &Task, words: TaskWords) -> TaskInstructions {
-    TaskInstructions {
-        task: task.id.clone(),
-        robots: task.robot_names().map(String::from).collect(),
-        per_robot: words.robots,
-        joint: words.joint,
     }
 }

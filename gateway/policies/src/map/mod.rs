@@ -11,9 +11,12 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 use tandem_episodes::{CONTROL_HZ, MAX_TEXT_BYTES, read_text};
-use tandem_tools_spec::ExtraInformation;
+use tandem_tools_spec::{ACTION_ROW_LEN, ExtraInformation};
 
-use super::columns::{WRISTS, action_columns, extra_columns, motors, state_columns, wrists};
+use crate::{
+    columns::{WRISTS, extra_columns, motors, wrists},
+    named_columns::{CommandRow, NamedColumns, StateRow, joined},
+};
 
 /// Built-in maps by name; each file is written out in full and explained.
 pub const PRESETS: [(&str, &str); 3] = [
@@ -39,9 +42,9 @@ pub struct PolicyMap {
     /// Time limit for an answer, in seconds; the first of an episode may take longer.
     pub reply_s: f64,
     pub images: BTreeMap<String, ImageKey>,
-    pub state: BTreeMap<String, Vec<String>>,
+    pub state: BTreeMap<String, Vec<NamedColumns<StateRow>>>,
     pub prompt: BTreeMap<String, PromptForm>,
-    pub action: BTreeMap<String, Vec<String>>,
+    pub action: BTreeMap<String, Vec<NamedColumns<CommandRow>>>,
     pub chunk: Chunk,
     /// History of observations; left out if a policy only gets the present one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -150,7 +153,7 @@ pub struct Chunk {
     pub between: Between,
     /// Columns that are differences to the state at the time of the request.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub delta: Vec<String>,
+    pub delta: Vec<NamedColumns<CommandRow>>,
     #[serde(default, skip_serializing_if = "is_default")]
     pub wrist_frame: WristFrame,
 }
@@ -275,14 +278,13 @@ impl PolicyMap {
         self.chunk.rate_hz.unwrap_or(CONTROL_HZ)
     }
 
-    /// Returns the columns of an answer that are differences. The map was checked when it was read.
+    /// Returns the columns of an answer that are differences.
     pub fn delta(&self) -> DeltaColumns {
-        let is_wrist = |name: &&String| WRISTS.contains(&name.as_str());
-        let (wrists, others): (Vec<&String>, Vec<&String>) = self.chunk.delta.iter().partition(is_wrist);
-        let others: Vec<String> = others.into_iter().cloned().collect();
+        let delta = &self.chunk.delta;
+        let of_row = joined(delta).into_iter().filter(|column| *column < ACTION_ROW_LEN);
         DeltaColumns {
-            row_columns: action_columns(&others).unwrap_or_default(),
-            wrists: WRISTS.map(|wrist| wrists.iter().any(|name| *name == wrist)),
+            row_columns: of_row.collect(),
+            wrists: WRISTS.map(|wrist| delta.iter().any(|named| named.name == wrist)),
         }
     }
 
@@ -306,15 +308,13 @@ impl PolicyMap {
 
     /// Returns the columns that an answer commands, in no particular order.
     pub fn told_columns(&self) -> Vec<usize> {
-        let all: Vec<String> = self.action.values().flatten().cloned().collect();
-        action_columns(&all).unwrap_or_default()
+        self.action.values().flat_map(|names| joined(names)).collect()
     }
 
-    /// Returns the extra information that the policy gets and the benchmark's own policies do not. The
-    /// map was checked when it was read.
+    /// Returns the extra information that the policy gets and the benchmark's own policies do not.
     pub fn shown(&self) -> Vec<ExtraInformation> {
-        let names: Vec<String> = self.state.values().flatten().cloned().collect();
-        let mut shown = extra_columns(&state_columns(&names).unwrap_or_default());
+        let columns: Vec<usize> = self.state.values().flat_map(|names| joined(names)).collect();
+        let mut shown = extra_columns(&columns);
         // A policy that gives poses in the start frame needs the robot's pose in it.
         if self.chunk.wrist_frame == WristFrame::Start && !shown.contains(&ExtraInformation::Odometry) {
             shown.push(ExtraInformation::Odometry);
@@ -328,7 +328,7 @@ impl PolicyMap {
     /// do not get.
     pub fn extra_information(&self) -> Vec<String> {
         let of_moment = [("episode", "episode number"), ("step", "clock")];
-        let is_named = |column: &str| self.state.values().flatten().any(|name| name == column);
+        let is_named = |column: &str| self.state.values().flatten().any(|named| named.name == column);
         let of_moment = of_moment.into_iter().filter(|(column, _)| is_named(column));
         let shown = self.shown().into_iter().map(|what| what.name().to_owned());
         shown.chain(of_moment.map(|(_, what)| what.to_owned())).collect()
@@ -371,7 +371,7 @@ mod tests {
     fn presets_can_be_followed_and_changed() {
         for (name, _) in PRESETS {
             let map = PolicyMap::find(name).unwrap();
-            let told: usize = map.action.values().map(|names| action_columns(names).unwrap().len()).sum();
+            let told = map.told_columns().len();
             // XPolicyLab has no keys for waist and base.
             let all = if name == "xpolicylab" { 28 } else { 35 };
             assert_eq!((told, map.extra_information()), (all, Vec::new()), "{name}");
@@ -380,7 +380,8 @@ mod tests {
             "preset = \"openpi\"\nreply_s = 5\n[chunk]\nexecute = 25\n[state]\n\"state\" = [\"left_arm\"]\n";
         let changed = read(own).unwrap();
         let preset = PolicyMap::find("openpi").unwrap();
-        let state = BTreeMap::from([("state".to_owned(), vec!["left_arm".to_owned()])]);
+        let left_arm = NamedColumns::try_from("left_arm".to_owned()).unwrap();
+        let state = BTreeMap::from([("state".to_owned(), vec![left_arm])]);
         let chunk = Chunk { execute: Some(25), ..Chunk::default() };
         assert_eq!(changed, PolicyMap { reply_s: 5.0, chunk, state, ..preset });
     }

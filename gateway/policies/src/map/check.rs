@@ -5,11 +5,12 @@ use std::collections::BTreeSet;
 use tandem_episodes::{rows::velocities, tasks};
 
 use super::{AnswerScope, CameraName, HistorySpan, PolicyMap, ROBOT, Scope, WristFrame};
-use crate::drivers::remote::{
+use crate::{
     columns::{
-        WRISTS, action_columns, action_name, is_of_arm_or_waist, motors, state_columns, wrist_named,
-        wrist_position, wrist_rotation,
+        WRISTS, action_name, is_of_arm_or_waist, motor_blocks, motors, wrist_named, wrist_position,
+        wrist_rotation,
     },
+    named_columns::NamedColumns,
     poses::RotationForm,
     values::path,
 };
@@ -30,15 +31,10 @@ const SHORTEST_REPLY_S: f64 = 0.001;
 impl PolicyMap {
     /// Checks that the map can be followed.
     pub(super) fn check(&self) -> Result<(), String> {
-        for names in self.state.values() {
-            state_columns(names)?;
-        }
-        for (table, keys) in [("state", &self.state), ("action", &self.action)] {
-            if let Some((key, _)) = keys.iter().find(|(_, names)| names.is_empty()) {
-                return Err(format!(
-                    "[{table}] has no column under {key:?}; name some, or leave the key out"
-                ));
-            }
+        let state = self.state.iter().map(|(key, names)| ("state", key, names.is_empty()));
+        let action = self.action.iter().map(|(key, names)| ("action", key, names.is_empty()));
+        if let Some((table, key, _)) = state.chain(action).find(|(_, _, is_empty)| *is_empty) {
+            return Err(format!("[{table}] has no column under {key:?}; name some, or leave the key out"));
         }
         let told = self.check_action()?;
         self.check_wrists(&told)?;
@@ -69,11 +65,13 @@ impl PolicyMap {
 
     /// Returns the columns that the policy commands. Refuses a column under two keys.
     fn check_action(&self) -> Result<Vec<usize>, String> {
-        let all: Vec<String> = self.action.values().flatten().cloned().collect();
-        let told = action_columns(&all)?;
-        match told.is_empty() {
-            true => Err("[action] tells no column".into()),
-            false => Ok(told),
+        let told = self.told_columns();
+        if told.is_empty() {
+            return Err("[action] tells no column".into());
+        }
+        match (0..told.len()).find(|index| told[..*index].contains(&told[*index])) {
+            None => Ok(told),
+            Some(index) => Err(format!("{:?} is told twice", action_name(told[index]))),
         }
     }
 
@@ -107,11 +105,12 @@ impl PolicyMap {
     /// Refuses setpoints of motors without gains, and beside commands for the robot's controller.
     fn check_motors(&self, told: &[usize]) -> Result<(), String> {
         let Some(other) = told.iter().find(|column| !motors().contains(column)) else {
-            let lacking = |name: &&&str| {
-                action_columns(&[name.to_string()]).unwrap_or_default().iter().any(|one| !told.contains(one))
-            };
-            return match ["motor_position", "motor_kp", "motor_kd"].iter().find(lacking) {
-                Some(name) => Err(format!(
+            let needed = ["motor_position", "motor_kp", "motor_kd"];
+            let lacking = motor_blocks().find(|(name, columns)| {
+                needed.contains(&name.as_str()) && columns.clone().any(|column| !told.contains(&column))
+            });
+            return match lacking {
+                Some((name, _)) => Err(format!(
                     "[action] drives motors and does not tell {name:?}; give motors, or every block"
                 )),
                 None if !self.chunk.delta.is_empty() => {
@@ -142,7 +141,7 @@ impl PolicyMap {
     /// Checks that differences are only used for columns that are commanded and that are positions.
     fn check_delta(&self, told: &[usize]) -> Result<(), String> {
         let wrists = self.told_wrists(told);
-        for name in &self.chunk.delta {
+        for NamedColumns { name, columns, .. } in &self.chunk.delta {
             if let Some(wrist) = wrist_named(name).map(|side| WRISTS[side]) {
                 match (name == wrist, wrists.contains(&wrist)) {
                     (false, _) => {
@@ -152,9 +151,7 @@ impl PolicyMap {
                     (true, true) => continue,
                 }
             }
-            for column in action_columns(std::slice::from_ref(name))
-                .map_err(|reason| format!("[chunk] delta: {reason}"))?
-            {
+            for column in columns.clone() {
                 let column_name = action_name(column);
                 if velocities().contains(&column) {
                     return Err(format!(
@@ -265,7 +262,7 @@ fn check_history(history: &HistorySpan) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drivers::remote::map::tests::read;
+    use crate::map::tests::read;
 
     fn check(text: &str, says: &str) {
         let told = read(&format!("preset = \"openpi\"\n{text}")).unwrap_err().to_string();

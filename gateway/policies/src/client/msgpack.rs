@@ -2,7 +2,7 @@
 
 use rmpv::{Value, decode, encode};
 
-use crate::drivers::remote::values::{Array, ReplyValue, RequestValue};
+use crate::values::{Array, ReplyValue, RequestValue};
 
 /// Encoding of an array; both are maps whose keys are bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -141,7 +141,7 @@ pub fn kind(value: &Value) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drivers::remote::values::Elements;
+    use crate::values::Elements;
 
     /// `msgpack_numpy.packb({"actions": np.float32([[1.5, -2]]), "n": np.float64(3)})` of openpi-client 0.1.2.
     const KNOWN: &[u8] = include_bytes!("known.msgpack");

@@ -10,12 +10,12 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::Protocol;
 
-use super::{
+use crate::{
     action::{Executor, RobotRows, chunks, executed_rows},
-    columns::{action_columns, action_name, is_of_arm_or_waist, state_columns, wrist_named},
+    columns::{action_name, is_of_arm_or_waist, row_blocks, wrist_named},
     error::RemoteError,
-    instructions,
     map::{AnswerScope, Between, CameraName, PolicyMap, ROBOT, WristFrame},
+    named_columns::{CommandRow, NamedColumns, joined},
     request::{PolicyObservation, TaskInstructions, request},
     values::{ReplyValue, RequestValue},
 };
@@ -56,7 +56,7 @@ struct KeyLine {
 impl<'a> MapTrial<'a> {
     /// Makes up an answer to every request and parses it as a policy's.
     fn new(map: &'a PolicyMap, task: &'a Task) -> Result<MapTrial<'a>, RemoteError> {
-        let (instructions, robots) = (instructions(task, TaskWords::of(task)), task.robots.len());
+        let (instructions, robots) = (TaskInstructions::of(task, TaskWords::of(task)), task.robots.len());
         let observation = PolicyObservation::blank(robots);
         let held_rows = observation.held_rows();
         let queries = map.queries(robots);
@@ -128,10 +128,7 @@ impl<'a> MapTrial<'a> {
                 CameraName::ThirdPerson => "the room, which results note as extra information".into(),
             },
             (_, Some((_, names)), _) => {
-                let width = |name: &String| {
-                    state_columns(std::slice::from_ref(name)).map_or(0, |columns| columns.len())
-                };
-                let widths = names.iter().map(|name| format!("{name} {}", width(name)));
+                let widths = names.iter().map(|named| format!("{} {}", named.name, named.columns.len()));
                 widths.collect::<Vec<_>>().join(", ")
             }
             (None, None, RequestValue::Text(text)) => format!("{text:?}"),
@@ -143,20 +140,20 @@ impl<'a> MapTrial<'a> {
     }
 
     /// Describes the columns of an answer under `key` and the joints that they command.
-    fn answer_lines(&self, key: &str, names: &[String]) -> Vec<KeyLine> {
+    fn answer_lines(&self, key: &str, names: &[NamedColumns<CommandRow>]) -> Vec<KeyLine> {
         let robots: Vec<&String> = self.asked.iter().map(|robot| &self.instructions.robots[*robot]).collect();
         let rows = self.map.chunk.rows.map_or("rows".to_owned(), |rows| rows.to_string());
         let line = |key: String, robots: &[&String]| {
             let mut from = 0;
             let mut content = Vec::new();
             for robot in robots {
-                for name in names {
-                    let width = action_columns(std::slice::from_ref(name)).map_or(0, |columns| columns.len());
+                for named in names {
+                    let (name, width) = (&named.name, named.columns.len());
                     let range =
                         if width == 1 { from.to_string() } else { format!("{from}-{}", from + width - 1) };
                     content.push(format!(
                         "{range} {name}{}{}",
-                        self.understood(name),
+                        self.understood(named),
                         of_robot(robot, robots)
                     ));
                     from += width;
@@ -172,12 +169,12 @@ impl<'a> MapTrial<'a> {
     }
 
     /// Describes how a column is interpreted if it is not an absolute target.
-    fn understood(&self, name: &str) -> String {
-        let columns = action_columns(&[name.to_owned()]).unwrap_or_default();
+    fn understood(&self, named: &NamedColumns<CommandRow>) -> String {
+        let columns = named.columns.clone();
         let delta = self.map.delta();
-        let Some(side) = wrist_named(name) else {
+        let Some(side) = wrist_named(&named.name) else {
             let added: Vec<usize> =
-                columns.iter().copied().filter(|column| delta.row_columns.contains(column)).collect();
+                columns.clone().filter(|column| delta.row_columns.contains(column)).collect();
             return match added.len() {
                 0 => String::new(),
                 all if all == columns.len() => " (added to what was observed)".into(),
@@ -248,12 +245,10 @@ impl<'a> MapTrial<'a> {
                 .into();
         }
         let told = self.map.told_columns();
-        let blocks = ["left_arm", "right_arm", "left_hand", "right_hand", "waist", "base_command"];
         let mut held = Vec::new();
-        for block in blocks {
-            let columns = action_columns(&[block.to_owned()]).unwrap_or_default();
-            let follows = self.map.moves_wrists() && columns.iter().all(|column| is_of_arm_or_waist(*column));
-            let open: Vec<usize> = columns.iter().copied().filter(|column| !told.contains(column)).collect();
+        for (block, columns) in row_blocks() {
+            let follows = self.map.moves_wrists() && columns.clone().all(is_of_arm_or_waist);
+            let open: Vec<usize> = columns.clone().filter(|column| !told.contains(column)).collect();
             match (follows, open.len()) {
                 (true, _) | (_, 0) => {}
                 (false, all) if all == columns.len() => held.push(block.to_owned()),
@@ -288,7 +283,7 @@ fn made_up_answer(map: &PolicyMap, instructions: &TaskInstructions, asked: &[usi
     let rows = map.chunk.rows.or(map.chunk.execute).unwrap_or(ROWS);
     let mut answer = ReplyValue::Map(Vec::new());
     for (key, names) in &map.action {
-        let width = action_columns(names).map_or(0, |columns| columns.len());
+        let width = joined(names).len();
         let table = |width: usize| ReplyValue::Array {
             shape: vec![rows, width],
             values: (0..rows * width).map(|index| (index % width + 1) as f64 / 100.0).collect(),
@@ -323,7 +318,7 @@ fn flatten<'a>(
 
 /// Formats a key in the same way as [`flatten`].
 fn parts(key: &str) -> String {
-    super::values::path(key).collect::<Vec<_>>().join(" > ")
+    crate::values::path(key).collect::<Vec<_>>().join(" > ")
 }
 
 fn kind(value: &RequestValue) -> String {
@@ -403,7 +398,7 @@ mod tests {
                 "begins with send_joint_chunk for A: {\"rows\":[[0.01,0.02,0.03,",
             ],
         );
-        for (name, _) in crate::drivers::PRESETS {
+        for (name, _) in crate::PRESETS {
             let told = try_map(&PolicyMap::find(name).unwrap()).unwrap();
             assert!(told.contains("3 robots: "), "{name}: {told}");
             // XPolicyLab has no keys for waist and base.

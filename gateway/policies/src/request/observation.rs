@@ -8,7 +8,7 @@ use tandem_episodes::{
 };
 use tandem_tools_spec::{ExtraInformation, Observe, Tool as _};
 
-use crate::drivers::remote::columns::{EpisodeMoment, blank_state_values, held_row, state_values};
+use crate::columns::{EpisodeMoment, blank_state_values, held_row, state_values};
 
 /// Observation of all robots at one moment.
 #[derive(Clone)]

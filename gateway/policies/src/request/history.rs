@@ -6,7 +6,7 @@ use tandem_episodes::players::{LocalEpisode, PlayerError};
 use tandem_tools_spec::ExtraInformation;
 
 use super::PolicyObservation;
-use crate::drivers::remote::{columns::EpisodeMoment, map::PolicyMap};
+use crate::{columns::EpisodeMoment, map::PolicyMap};
 
 /// Observations of an episode that a policy may still need.
 pub struct ObservationHistory {

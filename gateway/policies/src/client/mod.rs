@@ -12,7 +12,7 @@ use std::{fmt, time::Duration};
 
 pub use address::{PolicyAddress, PolicyKey, PolicyKeyError};
 
-use super::{
+use crate::{
     error::RemoteError,
     values::{ReplyValue, RequestValue},
 };

@@ -3,7 +3,7 @@
 use image::{RgbImage, imageops};
 use tandem_episodes::Picture;
 
-use crate::drivers::remote::{
+use crate::{
     map::{Fit, Layout},
     values::{Array, Elements},
 };

@@ -1,6 +1,6 @@
 //! Tables of numbers in a policy's reply.
 
-use crate::drivers::remote::{error::RemoteError, values::ReplyValue};
+use crate::{error::RemoteError, values::ReplyValue};
 
 /// Returns the numbers under `key`, which must be rows of `width` numbers.
 pub fn find<'a>(

@@ -15,7 +15,7 @@ use super::{
     spans::{RowSpan, control_rows, spans},
     wrists::wrist_move,
 };
-use crate::drivers::remote::{
+use crate::{
     columns::{held_row, sensed_pelvis},
     map::{Between, PolicyMap},
     poses::pose_of,

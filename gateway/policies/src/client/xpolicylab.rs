@@ -15,7 +15,7 @@ use super::{
     link::{Frame, PolicySocket, silent},
     msgpack::{Dialect, bytes_of, entry, kind, read, reply_value, request_value, text},
 };
-use crate::drivers::remote::{
+use crate::{
     error::{RemoteError, gist},
     values::{ReplyValue, RequestValue},
 };

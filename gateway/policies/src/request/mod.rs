@@ -7,11 +7,14 @@ mod picture;
 pub use history::ObservationHistory;
 pub use observation::{PolicyObservation, withheld};
 
-use tandem_episodes::Picture;
+use tandem_episodes::{
+    Picture,
+    tasks::{Task, TaskWords},
+};
 
-use super::{
-    columns::state_columns,
+use crate::{
     map::{CameraName, HistoryForm, ImageKey, PolicyMap, PromptForm, ROBOT, Scope, Words},
+    named_columns::joined,
     values::{Array, Elements, RequestValue},
 };
 
@@ -26,6 +29,18 @@ pub struct TaskInstructions {
     pub per_robot: Vec<String>,
     /// Joint instruction of all robots.
     pub joint: String,
+}
+
+impl TaskInstructions {
+    /// Collects the instructions of `task` in the words `words`.
+    pub fn of(task: &Task, words: TaskWords) -> TaskInstructions {
+        TaskInstructions {
+            task: task.id.clone(),
+            robots: task.robot_names().map(String::from).collect(),
+            per_robot: words.robots,
+            joint: words.joint,
+        }
+    }
 }
 
 /// Builds the request for robot number `robot`, or for all robots if it is `None`, from observations with
@@ -57,8 +72,7 @@ pub fn request(
         }
     }
     for (key, names) in &map.state {
-        // The map was checked when it was read.
-        let columns = state_columns(names).unwrap_or_default();
+        let columns = joined(names);
         for (key, index) in of_robots(key, map, instructions, robot) {
             let sensed = shown.iter().map(|moment| floats(&moment.robots[index].state_values, &columns));
             request.put(&key, over_time(sensed.collect(), map));

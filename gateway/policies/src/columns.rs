@@ -11,7 +11,7 @@ use tandem_tools_spec::{
     ACTION_ROW_LEN, BASE_COLUMNS, DRIVE_ROW_LEN, ExtraInformation, Pose, RobotState, SensorSamples,
 };
 
-use super::poses::{POSE_LEN, RotationForm, pose_values};
+use crate::poses::{POSE_LEN, RotationForm, pose_values};
 
 /// Some columns under one name.
 type Block = (String, Range<usize>);
@@ -210,9 +210,9 @@ pub fn wrist_named(name: &str) -> Option<usize> {
     WRISTS.iter().position(|wrist| is_of(wrist))
 }
 
-/// Returns the indices in [`state_values`] of the columns called `names`, in their order.
-pub fn state_columns(names: &[String]) -> Result<Vec<usize>, String> {
-    columns(names, &state_blocks(), &state_singles())
+/// Returns the indices in [`state_values`] of the columns called `name`.
+pub fn state_range(name: &str) -> Result<Range<usize>, String> {
+    range(name, &state_blocks(), &state_singles())
 }
 
 /// Returns the extra information in the state columns `columns` that the benchmark's own policies do not
@@ -228,14 +228,14 @@ pub fn extra_columns(columns: &[usize]) -> Vec<ExtraInformation> {
     extra.into_iter().filter(|(_, of)| named(of)).map(|(what, _)| what).collect()
 }
 
-/// Returns the indices of the columns called `names` among those that a policy may command, in their
-/// order.
-pub fn action_columns(names: &[String]) -> Result<Vec<usize>, String> {
-    let columns = columns(names, &action_blocks(), &action_singles())?;
-    match (0..columns.len()).find(|index| columns[..*index].contains(&columns[*index])) {
-        None => Ok(columns),
-        Some(index) => Err(format!("{:?} is told twice", action_name(columns[index]))),
-    }
+/// Returns the indices of the columns called `name` among those that a policy may command.
+pub fn action_range(name: &str) -> Result<Range<usize>, String> {
+    range(name, &action_blocks(), &action_singles())
+}
+
+/// Yields the blocks of an action row with their names, each column in one of them.
+pub fn row_blocks() -> impl Iterator<Item = (&'static str, Range<usize>)> {
+    ACTION.into_iter().filter(|(_, columns)| *columns != (0..ACTION_ROW_LEN))
 }
 
 /// Returns the name of column number `column` that a policy may command; for a wrist, the name of the
@@ -259,8 +259,8 @@ fn action_blocks() -> Vec<Block> {
     own.chain(wrist_blocks(ACTION_WRISTS)).chain(motor_blocks()).chain([all_motors]).collect()
 }
 
-/// Yields the blocks of motors' setpoints.
-fn motor_blocks() -> impl Iterator<Item = Block> {
+/// Yields the blocks of motors' setpoints, positions before velocities, kp, kd and torques.
+pub fn motor_blocks() -> impl Iterator<Item = Block> {
     let first = |index: usize| ACTION_MOTORS + index * JOINTS;
     MOTORS
         .iter()
@@ -279,17 +279,13 @@ fn wrist_blocks(starts: [usize; 2]) -> Vec<Block> {
     WRISTS.into_iter().zip(starts).flat_map(of_wrist).collect()
 }
 
-fn columns(names: &[String], blocks: &[Block], singles: &[(String, usize)]) -> Result<Vec<usize>, String> {
-    let mut found = Vec::new();
-    for name in names {
-        let block = blocks.iter().find(|(known, _)| known == name).map(|(_, columns)| columns.clone());
-        let single = singles.iter().find(|(known, _)| known == name).map(|(_, column)| *column..*column + 1);
-        found.extend(block.or(single).ok_or_else(|| {
-            let have: Vec<&str> = blocks.iter().map(|(name, _)| &**name).collect();
-            format!("no column {name:?}; have: {}, and joints and base columns by name", have.join(", "))
-        })?);
-    }
-    Ok(found)
+fn range(name: &str, blocks: &[Block], singles: &[(String, usize)]) -> Result<Range<usize>, String> {
+    let block = blocks.iter().find(|(known, _)| known == name).map(|(_, columns)| columns.clone());
+    let single = || singles.iter().find(|(known, _)| known == name).map(|(_, column)| *column..*column + 1);
+    block.or_else(single).ok_or_else(|| {
+        let have: Vec<&str> = blocks.iter().map(|(name, _)| &**name).collect();
+        format!("no column {name:?}; have: {}, and joints and base columns by name", have.join(", "))
+    })
 }
 
 fn state_singles() -> Vec<(String, usize)> {
@@ -317,24 +313,21 @@ mod tests {
     };
     use tandem_tools_spec::Protocol;
 
-    fn names(text: &str) -> Vec<String> {
-        text.split(' ').map(String::from).collect()
+    fn state_columns(names: &str) -> Vec<usize> {
+        names.split(' ').flat_map(|name| state_range(name).unwrap()).collect()
+    }
+
+    fn action_columns(names: &str) -> Vec<usize> {
+        names.split(' ').flat_map(|name| action_range(name).unwrap()).collect()
     }
 
     #[test]
     fn names_are_blocks_or_single_columns() {
-        assert_eq!(
-            state_columns(&names("waist left_knee_joint vx_m_s")),
-            Ok(vec![12, 13, 14, 3, STATE_BASE])
-        );
-        assert_eq!(action_columns(&names("pelvis_height_m waist_roll_joint")), Ok(vec![34, 29]));
-        assert_eq!(action_columns(&names("row")).map(|columns| columns.len()), Ok(35));
-        let text = action_columns(&names("left_leg")).unwrap_err();
+        assert_eq!(state_columns("waist left_knee_joint vx_m_s"), [12, 13, 14, 3, STATE_BASE]);
+        assert_eq!(action_columns("pelvis_height_m waist_roll_joint"), [34, 29]);
+        assert_eq!(action_columns("row").len(), 35);
+        let text = action_range("left_leg").unwrap_err();
         assert!(text.starts_with("no column \"left_leg\"; have: left_arm, "), "{text}");
-        let text = action_columns(&names("left_arm left_elbow_joint")).unwrap_err();
-        assert_eq!(text, "\"left_elbow_joint\" is told twice");
-        let text = action_columns(&names("right_wrist right_wrist_position")).unwrap_err();
-        assert_eq!(text, "\"right_wrist_position\" is told twice");
     }
 
     #[test]
@@ -346,8 +339,8 @@ mod tests {
             let expected = expected.iter().map(|column| column.name.replace("_joint_rad", "_joint"));
             assert_eq!(found.iter().map(name).collect::<Vec<_>>(), expected.collect::<Vec<_>>());
         };
-        check(&contract.state, state_columns(&names("joints base_command")).unwrap(), state_singles());
-        check(&contract.action, action_columns(&names("row")).unwrap(), action_singles());
+        check(&contract.state, state_columns("joints base_command"), state_singles());
+        check(&contract.action, action_columns("row"), action_singles());
     }
 
     #[test]
@@ -368,33 +361,33 @@ mod tests {
             }
         }
         assert_eq!(number(&tasks::cohub()[1], 42), 2_000_042);
-        let columns = state_columns(&names("episode step reset")).unwrap();
+        let columns = state_columns("episode step reset");
         assert_eq!(columns, [STATE_MOMENT, STATE_MOMENT + 1, STATE_MOMENT + 2]);
         assert_eq!(extra_columns(&columns), [], "no sensor of the robot's tells it");
     }
 
     #[test]
     fn wrists_are_named_by_part() {
-        let pose = action_columns(&names("left_wrist")).unwrap();
-        let parts = action_columns(&names("left_wrist_position left_wrist_quaternion")).unwrap();
+        let pose = action_columns("left_wrist");
+        let parts = action_columns("left_wrist_position left_wrist_quaternion");
         assert_eq!((pose.len(), &pose), (7, &parts));
         for (form, part) in RotationForm::ALL.into_iter().zip(&WRIST_PARTS[2..]) {
-            let named = action_columns(&[format!("right_wrist{}", part.0)]).unwrap();
+            let named = action_columns(&format!("right_wrist{}", part.0));
             assert_eq!(named, wrist_rotation(1, form).collect::<Vec<_>>());
         }
-        assert_eq!(action_columns(&names("right_wrist_rows_6d")).unwrap().last(), Some(&(ACTION_MOTORS - 1)));
+        assert_eq!(action_columns("right_wrist_rows_6d").last(), Some(&(ACTION_MOTORS - 1)));
         let named =
             ["left_wrist", "right_wrist_rows_6d", "left_wrist_yaw_joint", "left_arm"].map(wrist_named);
         assert_eq!(named, [Some(0), Some(1), None, None]);
-        assert_eq!(state_columns(&names("pelvis_in_start gravity")).map(|columns| columns.len()), Ok(10));
+        assert_eq!(state_columns("pelvis_in_start gravity").len(), 10);
     }
 
     #[test]
     fn motors_are_named_by_block() {
-        let all = action_columns(&names("motors")).unwrap();
-        assert_eq!(all, action_columns(&MOTORS.map(String::from)).unwrap());
+        let all = action_columns("motors");
+        assert_eq!(all, action_columns(&MOTORS.join(" ")));
         assert_eq!((all.len(), &*action_name(all[86])), (215, "motor_kp"));
-        let rates = state_columns(&names("joint_velocities gyro specific_force")).unwrap();
+        let rates = state_columns("joint_velocities gyro specific_force");
         assert_eq!((rates.len(), *rates.last().unwrap()), (49, STATE_BASE - 1));
         assert_eq!(
             extra_columns(&rates),

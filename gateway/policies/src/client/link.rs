@@ -13,7 +13,7 @@ use tungstenite::{
 };
 
 use super::{PolicyAddress, encryption::encrypted};
-use crate::drivers::remote::error::{RemoteError, gist};
+use crate::error::{RemoteError, gist};
 
 /// URL schemes of such servers; the encrypted one is last.
 pub const SCHEMES: [&str; 2] = ["ws://", "wss://"];

@@ -3,7 +3,7 @@
 use tandem_episodes::{CONTROL_HZ, rows::between_rows};
 
 use super::ActionRow;
-use crate::drivers::remote::map::Between;
+use crate::map::Between;
 
 /// A row with the number of control steps in which robots move to it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,7 +59,7 @@ pub fn control_rows(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::drivers::remote::action::WristTarget;
+    use crate::action::WristTarget;
 
     fn spanned(rows: usize, rate_hz: f64) -> Vec<(usize, u32)> {
         spans(rows, rate_hz).into_iter().map(|span| (span.row, span.steps)).collect()

@@ -9,7 +9,7 @@ use std::{
 
 use tandem_episodes::players::{LocalEpisode, PlayerError};
 
-use super::{
+use crate::{
     action::{Executor, RobotRows, chunks, executed_rows},
     client::{PolicyAddress, PolicyClient, PolicyProtocol},
     error::RemoteError,

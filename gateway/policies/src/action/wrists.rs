@@ -5,7 +5,7 @@ use tandem_episodes::rows::velocities;
 use tandem_tools_spec::WristMove;
 
 use super::ActionRow;
-use crate::drivers::remote::{
+use crate::{
     columns::{WRISTS, hand, wrist_position, wrist_rotation},
     map::WristFrame,
     poses::RotationForm,
