@@ -66,6 +66,7 @@ mod random;
 pub mod render;
 pub mod robot;
 mod sides;
+mod srgb;
 mod units;
 mod user_file;
 pub mod world;

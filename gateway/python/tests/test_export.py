@@ -139,8 +139,13 @@ def test_the_card_says_how_it_was_made(whole: Path, tmp_path: Path) -> None:
     told = ["--tasks=handover", "--seeds=2012", "--protocol=benchmark", "--spread=2", "--variety=1", "--disturb=0.5"]
     command = [sys.executable, "-m", "tandem", "collect", *told, "--no-reports", f"--out={varied}"]
     subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
-    (exported,) = export_lerobot(varied, tmp_path / "set", ExportSettings(cameras=(), rate_hz=10))
-    assert "ideal, spread 2, variety 1, disturb 0.5\n" in (exported.folder / "README.md").read_text()
+    settings = ExportSettings(cameras=(), rate_hz=10, license="cc-by-4.0")
+    (exported,) = export_lerobot(varied, tmp_path / "set", settings)
+    licensed = (exported.folder / "README.md").read_text()
+    assert "ideal, spread 2, variety 1, disturb 0.5\n" in licensed
+    assert licensed.startswith("---\nlicense: cc-by-4.0\ntask_categories:") and card.startswith("---\ntask_categories:")
+    with pytest.raises(tandem.TandemError, match=r"no licence 'CC BY'; .* for example cc-by-4\.0"):
+        ExportSettings(license="CC BY")
 
 
 def test_an_export_goes_on_and_disturbs_no_other(runs: Path, whole: Path, tmp_path: Path) -> None:

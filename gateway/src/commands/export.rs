@@ -80,6 +80,10 @@ struct LerobotArgs {
     /// Renderer of the images [default: that of the episode].
     #[arg(long, value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
     renderer: Option<RendererKind>,
+    /// Licence of the data set for its card, by the name that the Hugging Face Hub uses, for example cc-by-4.0
+    /// [default: none, so all rights stay with you].
+    #[arg(long, value_name = "NAME")]
+    license: Option<String>,
     /// Convert only episodes that reached their last phase.
     #[arg(long)]
     only_successful: bool,
@@ -113,8 +117,9 @@ impl LerobotArgs {
         let switches = switches.into_iter().filter(|(given, _)| *given).map(|(_, flag)| flag.into());
         let jobs = self.jobs.map(|jobs| format!("--jobs={jobs}"));
         let renderer = self.renderer.map(|kind| format!("--renderer={}", kind.name()));
+        let license = self.license.as_ref().map(|name| format!("--license={name}"));
         let paths = [runs, out].map(|path| path.display().to_string());
-        let given = texts.chain(switches).chain(renderer).chain(jobs);
+        let given = texts.chain(switches).chain(renderer).chain(license).chain(jobs);
         ["lerobot".into()].into_iter().chain(given).chain(["--".into()]).chain(paths).collect()
     }
 }

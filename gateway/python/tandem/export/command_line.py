@@ -38,6 +38,7 @@ def parser() -> argparse.ArgumentParser:
     lerobot.add_argument("--size", default="320x240", metavar="WIDTHxHEIGHT")
     lerobot.add_argument("--rate", type=int, choices=RATES_HZ, default=DEFAULT_DATA_RATE_HZ)
     lerobot.add_argument("--renderer", choices=get_args(Renderer))
+    lerobot.add_argument("--license", metavar="NAME")
     lerobot.add_argument("--only-successful", action="store_true")
     lerobot.add_argument("--only-good", action="store_true")
     lerobot.add_argument("--jobs", type=int, metavar="N")
@@ -86,6 +87,7 @@ def settings_of(given: argparse.Namespace) -> ExportSettings:
         size=(int(sides[0]), int(sides[1])),
         rate_hz=given.rate,
         renderer=given.renderer,
+        license=given.license,
     )
 
 

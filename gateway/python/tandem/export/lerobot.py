@@ -320,7 +320,9 @@ def _write_about(
         "plan": plan,
     }
     (whole / ABOUT_FILE).write_text(json.dumps(about, indent=2), encoding="utf-8")
+    license = plan["settings"].get("license")
     card = CARD.format(
+        license="" if license is None else f"license: {license}\n",
         task=sources[0].task,
         rows=rows,
         episodes=len(parts),
@@ -354,7 +356,7 @@ def _ranges(numbers: Sequence[int]) -> list[str]:
 
 
 CARD = """---
-task_categories:
+{license}task_categories:
 - robotics
 tags:
 - LeRobot

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from importlib import import_module
@@ -59,12 +60,17 @@ class ExportSettings:
     renderer: Renderer | None = None
     """Renderer of the images. None: that of each episode."""
 
+    license: str | None = None
+    """Licence in the card, by the name that the Hugging Face Hub uses, for example "cc-by-4.0". None: none."""
+
     def __post_init__(self) -> None:
         for name, kind in (("version", Version), ("view", View), ("images", Images), ("codec", Codec)):
             if (value := getattr(self, name)) not in get_args(kind):
                 raise TandemError(f"no {name} {value!r}; have: {', '.join(get_args(kind))}")
         if self.renderer is not None and self.renderer not in get_args(Renderer):
             raise TandemError(f"no renderer {self.renderer!r}; have: {', '.join(get_args(Renderer))}")
+        if self.license is not None and not re.fullmatch("[a-z0-9][a-z0-9.-]*", self.license):
+            raise TandemError(f"no licence {self.license!r}; give a name of the Hugging Face Hub, for example cc-by-4.0")
         if self.rate_hz not in RATES_HZ:
             raise TandemError(f"no rate of {self.rate_hz} Hz; have: {', '.join(map(str, RATES_HZ))}")
         if len(self.size) != 2 or any(side not in SIDES_PX for side in self.size):
@@ -86,8 +92,8 @@ class ExportSettings:
     def as_json(self) -> dict[str, Any]:
         """Returns the settings in the form for files."""
         settings = {**asdict(self), "cameras": list(self.cameras), "size": list(self.size)}
-        # Exports without it have settings as they were before there was a choice, and can be continued.
-        return {name: value for name, value in settings.items() if name != "renderer" or value is not None}
+        # Exports without these have settings as they were before there was a choice, and can be continued.
+        return {name: value for name, value in settings.items() if value is not None}
 
     def cameras_of(self, robots: Sequence[str]) -> tuple[str, ...]:
         """Returns the cameras for a recording with these robots, by their names in `Recording.picture`."""

@@ -12,6 +12,7 @@ use super::files::read_mesh_bytes;
 use super::texture::Texture;
 use crate::SimError;
 use crate::mjcf::Document;
+use crate::srgb::linear_light;
 use crate::user_file::with_own_separators;
 
 /// Attributes with the files of a cube's faces, +x, -x, +y, -y, +z and -z, and their letters in `gridlayout`.
@@ -113,9 +114,8 @@ fn states_srgb(bytes: &[u8]) -> bool {
 /// Returns an image whose values are the linear light of those of another.
 fn decoded(image: DynamicImage) -> DynamicImage {
     let light: [u8; 256] = std::array::from_fn(|byte| {
-        let value = byte as f32 / 255.0;
-        let linear = if value <= 0.040_45 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) };
-        (255.0 * linear).round() as u8
+        let linear_value = linear_light(byte as f32 / 255.0);
+        (255.0 * linear_value).round() as u8
     });
     let mut image = image.into_rgba8();
     for pixel in image.pixels_mut() {

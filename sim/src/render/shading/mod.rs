@@ -12,6 +12,8 @@ use rapier3d::math::Vector;
 
 use lanes::Affine;
 
+use crate::srgb::linear_light;
+
 /// Maximum number of blended surfaces in front of one another; those behind them are not drawn.
 pub const VEILS: usize = 4;
 /// Alpha from which surfaces are solid, as in MuJoCo.
@@ -106,6 +108,5 @@ pub fn opacity(alpha: f32) -> f32 {
 
 /// Converts sRGB, as used in files, to linear light.
 pub fn linear(rgb: [f32; 3]) -> Vector {
-    let decode = |v: f32| if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
-    Vector::from(rgb.map(decode))
+    Vector::from(rgb.map(linear_light))
 }
