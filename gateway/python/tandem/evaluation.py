@@ -416,7 +416,7 @@ def _evaluation(raw: dict[str, Any], folder: Path | None) -> Evaluation:
 def report(
     folders: str | PathLike[str] | Iterable[str | PathLike[str]],
     *,
-    format: Literal["html", "md", "csv", "json", "tex", "episodes.csv", "svg", "times.svg"] = "html",
+    format: Literal["html", "md", "csv", "json", "tex", "episodes.csv", "svg", "times.svg", "episodes.parquet"] = "html",
     out: str | PathLike[str] | None = None,
 ) -> Path:
     """Writes a report on the results of `evaluate`, `tandem evaluate`, `tandem collect` or servers, and returns its
@@ -425,7 +425,7 @@ def report(
     Args:
         folders: One or several; results of one policy are joined.
         format: A self-contained page, Markdown, a line for each rate, all figures, tables for LaTeX, a line for each
-            episode, a figure of the rates, or a figure of the times of phases.
+            episode, a figure of the rates or of the times of phases, or a row for each episode in Parquet.
         out: File to write. None: report.FORMAT in the first folder.
     """
     several = [folders] if isinstance(folders, str | PathLike) else list(folders)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -127,6 +128,19 @@ def test_a_callable_is_evaluated(tmp_path: Path) -> None:
         tandem.report(tmp_path / "nothing")
     with pytest.raises(tandem.TandemError, match="have: handover"):
         tandem.evaluate(walk_a_little, "handove", 2007)
+
+
+def test_episodes_are_rows_of_parquet(tmp_path: Path) -> None:
+    parquet: Any = pytest.importorskip("pyarrow.parquet")
+    kept = tandem.evaluate(walk_a_little, "handover", range(2007, 2010), protocol="benchmark", out=tmp_path)
+    head = tandem.report(tmp_path, format="episodes.csv").read_text().splitlines()[0]
+    table = parquet.read_table(tandem.report(tmp_path, format="episodes.parquet"))
+    assert table.column_names == head.split(",")
+    assert table["seed"].to_pylist() == [2007, 2008, 2009]
+    assert table["steps"].to_pylist() == [20, 10, 0]
+    assert table["counted"].to_pylist() == [True, True, False]
+    assert table["state_hash"].to_pylist() == [result.state_hash for result in kept.results]
+    assert (table["p1_s"].null_count, str(table["p1_s"].type)) == (3, "double")
 
 
 def test_a_scored_episode_cannot_be_undone_or_known_again(tmp_path: Path) -> None:

@@ -21,15 +21,38 @@ pub struct ReportArgs {
     #[arg(value_name = "DIR", required = true)]
     folders: Vec<PathBuf>,
     /// Format of the report: a self-contained page, Markdown, a line for each rate, all figures, tables for
-    /// LaTeX, a line for each episode, a figure of the rates, or a figure of the times of phases.
-    #[arg(long, default_value = ReportFormat::Html.name(), value_parser = one_of(ReportFormat::ALL, ReportFormat::name))]
-    format: ReportFormat,
+    /// LaTeX, a line for each episode, a figure of the rates or of the times of phases, or a row for each
+    /// episode in Parquet.
+    #[arg(long, default_value = ReportFormat::Html.name(), value_parser = one_of(FileFormat::all(), FileFormat::name))]
+    format: FileFormat,
     /// File to write [default: report.FORMAT in the first folder].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Maximum number of failures to show with images and moments, if episodes were recorded.
     #[arg(long, value_name = "N", default_value_t = 12)]
     failures: usize,
+}
+
+/// Format of the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum FileFormat {
+    Text(ReportFormat),
+    EpisodesParquet,
+}
+
+impl FileFormat {
+    fn all() -> [FileFormat; ReportFormat::ALL.len() + 1] {
+        std::array::from_fn(|index| {
+            ReportFormat::ALL.get(index).map_or(FileFormat::EpisodesParquet, |text| FileFormat::Text(*text))
+        })
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            FileFormat::Text(format) => format.name(),
+            FileFormat::EpisodesParquet => "episodes.parquet",
+        }
+    }
 }
 
 /// Reads the results and writes the report.
@@ -42,24 +65,21 @@ pub fn run(args: ReportArgs) -> CommandResult {
     report.header.made = Some(ReportOrigin::here(build()?));
     report.failure_moments = failure_moments(&loaded, args.failures, folder);
     let pictures = match args.format {
-        ReportFormat::Html => ReportPictures {
+        FileFormat::Text(ReportFormat::Html) => ReportPictures {
             films: film_places(&loaded).into_iter().map(film).collect(),
             failures: gallery(&loaded, args.failures),
             pictured_failures: pictured_failures(&loaded),
         },
-        ReportFormat::Markdown
-        | ReportFormat::Csv
-        | ReportFormat::Json
-        | ReportFormat::Tex
-        | ReportFormat::EpisodesCsv
-        | ReportFormat::Svg
-        | ReportFormat::TimesSvg => ReportPictures::default(),
+        FileFormat::Text(_) | FileFormat::EpisodesParquet => ReportPictures::default(),
     };
-    let text = report.write(args.format, &pictures)?;
-    write_whole(&path, text.as_bytes())?;
+    let content = match args.format {
+        FileFormat::Text(format) => report.write(format, &pictures)?.into_bytes(),
+        FileFormat::EpisodesParquet => report.episodes_parquet(),
+    };
+    write_whole(&path, &content)?;
     let films = pictures.films.iter().filter(|film| film.content.is_ok()).count();
     let films = if films > 0 { format!(", {films} films") } else { String::new() };
-    let size_mb = text.len() as f64 / 1e6;
+    let size_mb = content.len() as f64 / 1e6;
     let excluded = report.policies.iter().flat_map(|policy| &policy.excluded).map(|entry| entry.seeds.len());
     let excluded = match excluded.sum() {
         0 => String::new(),

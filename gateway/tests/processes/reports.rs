@@ -45,6 +45,9 @@ fn a_run_is_reported_in_every_format_and_its_links_lead_to_files() {
         assert!(!read(&format!("runs/a run/report.{format}")).is_empty(), "{format}");
     }
 
+    let printed = tandem(place.path(), &["report", "runs/a run", "--format", "episodes.parquet"]);
+    assert!(printed.contains("report.episodes.parquet: 1 episodes"), "{printed}");
+
     let report: Value = serde_json::from_str(&read("runs/a run/report.json")).expect("JSON");
     let process = &report["header"]["processes"][0];
     let command = "tandem evaluate --policy idle --out 'runs/a run' --tasks handover --seeds 2000 \

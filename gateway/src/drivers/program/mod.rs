@@ -133,8 +133,13 @@ impl Program {
         let exits = self.watch(&mut groups, episode).map_err(|error| lost("the program is lost", error))?;
         let statuses: io::Result<Vec<String>> = groups.into_iter().map(ProcessGroup::stop).collect();
         let statuses = statuses.map_err(|error| lost("the program is lost", error))?;
-        let found = exits.into_iter().zip(statuses);
-        Ok(found.map(|((exit, env_steps), status)| FoundProgram { exit, env_steps, status }).collect())
+        // Of several programs nobody knows whose call it was.
+        let refusal = episode.last_refusal().filter(|_| participants.len() == 1);
+        let found = exits.into_iter().zip(statuses).map(|((exit, env_steps), status)| {
+            let refusal = refusal.clone().filter(|_| exit == ProgramExit::Failed);
+            FoundProgram { exit, env_steps, status, refusal }
+        });
+        Ok(found.collect())
     }
 
     /// Waits until all programs have ended, one of them has failed, or their time is over. Returns the
@@ -189,12 +194,14 @@ impl Program {
 
     /// Returns the report on a program that left its episode early, with its last output.
     fn last_words(&self, found: &FoundProgram, so_far: &str, folder: &Path) -> Option<String> {
-        let FoundProgram { exit, status, .. } = found;
+        let FoundProgram { exit, status, refusal, .. } = found;
         match exit {
             ProgramExit::Left | ProgramExit::Failed => {
+                let refusal = refusal.as_ref().map(|why| format!("; the last call that was refused: {why}"));
+                let refusal = refusal.unwrap_or_default();
                 let words = last_lines(folder).map(|lines| format!("; its last words: {lines}"));
                 let words = words.unwrap_or_default();
-                Some(format!("the program ended {so_far}, before its episode did ({status}){words}"))
+                Some(format!("the program ended {so_far}, before its episode did ({status}){refusal}{words}"))
             }
             ProgramExit::TimedOut => Some(format!(
                 "the program was stopped {so_far}, when its {} s were over",
@@ -317,6 +324,8 @@ struct FoundProgram {
     env_steps: u32,
     /// Exit status as text.
     status: String,
+    /// Reason why its last refused call was refused, if it has failed.
+    refusal: Option<String>,
 }
 
 /// State of a program at the end of the wait, as far as its end is concerned.

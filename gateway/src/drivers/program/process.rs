@@ -4,7 +4,7 @@ use std::{
     fs::File,
     io::{self, Write},
     path::Path,
-    process::{Child, Command, ExitStatus, Stdio},
+    process::{Child, ExitStatus, Stdio},
     sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
     thread,
     time::{Duration, Instant},
@@ -56,10 +56,8 @@ impl ProcessGroup {
         folder: &Path,
     ) -> io::Result<ProcessGroup> {
         let output = |name: &str| File::create(folder.join(name));
-        let mut shell = Command::new(SHELL[0]);
+        let mut shell = shell(command);
         shell
-            .arg(SHELL[1])
-            .arg(command)
             .envs(environment.iter().map(|(name, value)| (name, value)))
             .stdin(Stdio::from(File::open(folder.join(BRIEF_FILE))?))
             .stdout(Stdio::piped())
@@ -178,7 +176,12 @@ mod system {
 
     use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 
-    pub const SHELL: [&str; 2] = ["sh", "-c"];
+    /// Creates the process of the shell that runs a command.
+    pub fn shell(command: &str) -> Command {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", command]);
+        shell
+    }
 
     /// Makes the command start in a process group of its own.
     pub fn in_own_group(command: &mut Command) {
@@ -191,8 +194,8 @@ mod system {
 
     /// Starts the guard, which ends the group once this process is gone.
     pub fn guard(id: u32) -> io::Result<Option<Child>> {
-        let mut shell = Command::new(SHELL[0]);
-        shell.args([SHELL[1], GUARD, "tandem-guard", &id.to_string()]);
+        let mut shell = shell(GUARD);
+        shell.args(["tandem-guard", &id.to_string()]);
         shell.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
         in_own_group(&mut shell);
         shell.spawn().map(Some)
@@ -232,9 +235,18 @@ mod system {
 
 #[cfg(not(unix))]
 mod system {
-    use std::{io, process::Child, process::Command};
+    use std::{
+        io,
+        os::windows::process::CommandExt,
+        process::{Child, Command, Stdio},
+    };
 
-    pub const SHELL: [&str; 2] = ["cmd", "/C"];
+    /// Creates the process of the shell that runs a command. It removes the outer quotes and nothing else.
+    pub fn shell(command: &str) -> Command {
+        let mut shell = Command::new("cmd");
+        shell.args(["/S", "/C"]).raw_arg(format!("\"{command}\""));
+        shell
+    }
 
     pub fn in_own_group(_: &mut Command) {}
 
@@ -246,13 +258,21 @@ mod system {
         Ok(child.try_wait()?.map(|status| status.success()))
     }
 
-    pub fn terminate(_: u32) {}
+    /// Kills the group, since a program without windows cannot be asked.
+    pub fn terminate(id: u32) {
+        kill_group(id);
+    }
 
     pub fn kill(child: &mut Child) {
         let _ = child.kill();
     }
 
-    pub fn kill_group(_: u32) {}
+    /// Kills a process that runs, and all that it has started.
+    pub fn kill_group(id: u32) {
+        let mut kill = Command::new("taskkill");
+        kill.args(["/T", "/F", "/PID", &id.to_string()]);
+        let _ = kill.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status();
+    }
 }
 
-use system::{SHELL, ended_well, guard, in_own_group, kill, kill_group, terminate};
+use system::{ended_well, guard, in_own_group, kill, kill_group, shell, terminate};

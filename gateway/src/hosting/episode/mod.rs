@@ -161,7 +161,8 @@ impl EpisodeThread {
         then: impl FnOnce(Answer) -> Answer + Send + 'static,
     ) -> Result<Answer, HostingError> {
         let operator = operator.map(str::to_owned);
-        self.queue
+        let answer = self
+            .queue
             .work_unless_full(move |desk| {
                 let answer = desk.on_session(|session| {
                     let reply = session.ask(operator.as_deref(), call)?;
@@ -170,7 +171,8 @@ impl EpisodeThread {
                 desk.commit(keyed.as_ref().zip(answer.as_ref().ok()));
                 answer
             })
-            .await
+            .await;
+        answer.inspect_err(|error| self.stage.status.refuse(error.to_string()))
     }
 
     /// Keeps an answer that was combined from several for repeated requests.
@@ -228,6 +230,7 @@ impl EpisodeThread {
     /// failure is ignored.
     pub async fn refused(&self, operator: Option<&str>, call: RefusedCall) {
         let (operator, RefusedCall { tool, arguments, problem }) = (operator.map(str::to_owned), call);
+        self.stage.status.refuse(problem.clone());
         let recorded = self.queue.run(move |session| {
             session.refused_before(operator.as_deref(), &tool, &arguments, &problem);
             Ok(())
@@ -363,6 +366,11 @@ impl EpisodeThread {
     /// Returns the control steps executed up to the last call, including the initial hold.
     pub fn env_steps(&self) -> u32 {
         self.stage.status.env_steps()
+    }
+
+    /// Returns the reason of the last refusal of a call.
+    pub fn last_refusal(&self) -> Option<String> {
+        self.stage.status.last_refusal()
     }
 
     /// Returns the specification of the episode.

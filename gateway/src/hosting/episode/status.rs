@@ -34,6 +34,8 @@ pub struct SharedStatus {
     there: AtomicBool,
     /// Time of the last request.
     used: Mutex<Instant>,
+    /// Reason why the last refused call was refused.
+    refusal: Mutex<Option<String>>,
 }
 
 /// Data of a sleeping episode.
@@ -56,6 +58,7 @@ impl Default for SharedStatus {
             sleep: Mutex::default(),
             there: AtomicBool::new(true),
             used: Mutex::new(Instant::now()),
+            refusal: Mutex::default(),
         }
     }
 }
@@ -117,6 +120,15 @@ impl SharedStatus {
 
     pub fn idle(&self) -> Duration {
         lock(&self.used).elapsed()
+    }
+
+    /// Records that a call was refused.
+    pub fn refuse(&self, why: String) {
+        *lock(&self.refusal) = Some(why);
+    }
+
+    pub fn last_refusal(&self) -> Option<String> {
+        lock(&self.refusal).clone()
     }
 
     /// Marks the episode as asleep; `thinking` is the time since the policy was last answered.

@@ -8,6 +8,7 @@ pub mod home;
 mod live;
 pub mod operate;
 pub mod qr;
+mod script;
 mod socket;
 mod taking_over;
 
@@ -22,11 +23,11 @@ use axum::{
 use serde::Deserialize;
 use serde_json::json;
 
+use self::script::script;
 use super::{app::AppState, problem::ApiError, watching::Watcher};
 
 const SHELL: &str = include_str!("../../../web/page.html");
 const STYLE: &str = include_str!("../../../web/style.css");
-const SCRIPT: &str = include_str!("../../../web/dist/page.js");
 const DOOR: &str = include_str!("door.html");
 
 /// Content security policy: everything comes from this server, nothing may be sent elsewhere, and no
@@ -105,21 +106,17 @@ async fn enter(
     Ok((StatusCode::NO_CONTENT, [(header::SET_COOKIE, cookie)]).into_response())
 }
 
-async fn script() -> Response {
-    asset("text/javascript; charset=utf-8", SCRIPT)
-}
-
 async fn style() -> Response {
     asset("text/css; charset=utf-8", STYLE)
 }
 
-fn asset(kind: &'static str, text: &'static str) -> Response {
+fn asset(kind: &'static str, content: impl IntoResponse) -> Response {
     let headers: [(HeaderName, HeaderValue); 2] = [
         (header::CONTENT_TYPE, HeaderValue::from_static(kind)),
         // Another build of the program has other files under the same names.
         (header::CACHE_CONTROL, HeaderValue::from_static("no-cache")),
     ];
-    (headers, text).into_response()
+    (headers, content).into_response()
 }
 
 /// Lists running and finished episodes, and evaluations.

@@ -55,6 +55,7 @@ fn agent() {
             drop(ureq::delete(&episode).header("authorization", &token).call().expect("it is deleted"));
         }
         Ok("leave") => eprintln!("it is too hard"),
+        Ok("ask_too_much") => drop(tool("wait", json!({ "steps": 1_000_000 })).expect("it waits long")),
         Ok("crash") if env::var("TANDEM_ROBOT").as_deref() != Ok("A") => {
             panic!("the planner has no plan");
         }
@@ -167,6 +168,16 @@ fn a_program_may_end_its_episode_in_any_way() {
         let note = played.note.expect("a note");
         assert!(note.starts_with(says), "{note}");
     }
+}
+
+/// Clients of HTTP tell only the status of a refusal.
+#[test]
+fn a_program_that_dies_of_a_refusal_is_told_why_it_was_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let played = play_one(&agent_command("ask_too_much"), LONG, folder.path());
+    let note = played.note.expect("a note");
+    let (_, refusal) = note.split_once("(exit status: 101); the last call that was refused: ").expect(&note);
+    assert!(refusal.contains("steps") && refusal.contains("; its last words: "), "{note}");
 }
 
 #[test]

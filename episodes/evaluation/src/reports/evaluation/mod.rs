@@ -69,7 +69,7 @@ pub struct EvaluationReport {
     pub skipped: Vec<String>,
 }
 
-/// Format of a report.
+/// Format of a report as a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReportFormat {
     Html,
@@ -163,6 +163,11 @@ impl EvaluationReport {
             ReportFormat::Svg => figure::rates_file(&self.tasks(), &self.policies),
             ReportFormat::TimesSvg => figure::times_file(&self.tasks(), &self.policies),
         })
+    }
+
+    /// Returns a row for each episode as a Parquet file.
+    pub fn episodes_parquet(&self) -> Vec<u8> {
+        episodes::parquet(&self.episodes)
     }
 
     /// Returns the tasks that any policy has played, in the order of the list of tasks, then those of files.

@@ -1,5 +1,7 @@
 //! One row for each episode, whether it counts or not, for further computation.
 
+mod parquet;
+
 use std::collections::BTreeMap;
 
 use serde::Serialize;
@@ -12,7 +14,7 @@ use super::policy::groups;
 use crate::results::PlayedEpisode;
 
 /// One episode.
-#[derive(Debug, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct EpisodeRow {
     pub policy: String,
     pub task: String,
@@ -88,42 +90,43 @@ impl EpisodeRow {
         }
     }
 
-    /// Returns the names and texts of the cells, with a column for each of `phases` phases.
-    fn cells(&self, phases: usize) -> Vec<(String, String)> {
+    /// Returns the cells by the names of their columns, with a column for each of `phases` phases.
+    fn cells(self, phases: usize) -> Vec<(String, Cell)> {
         let time_s = |phase: usize| {
             let number = Phase::number(phase);
             let time_s = self.phases_s.get(&number).copied().flatten();
-            (format!("{number}_s"), text(time_s))
+            (format!("{number}_s"), Cell::Number(time_s))
         };
-        let named = |(name, text): (&str, String)| (name.to_owned(), text);
+        let times_s: Vec<_> = (0..phases).map(time_s).collect();
         let before = [
-            ("policy", self.policy.clone()),
-            ("task", self.task.clone()),
-            ("seed", self.seed.to_string()),
-            ("protocol", self.protocol.name().into()),
-            ("assistance", self.assistance.name().into()),
-            ("start", self.start.clone()),
-            ("counted", self.counted.to_string()),
-            ("success", self.success.to_string()),
+            ("policy", Cell::Text(Some(self.policy))),
+            ("task", Cell::Text(Some(self.task))),
+            ("seed", Cell::Count(Some(self.seed.into()))),
+            ("protocol", Cell::Text(Some(self.protocol.name().into()))),
+            ("assistance", Cell::Text(Some(self.assistance.name().into()))),
+            ("start", Cell::Text(Some(self.start))),
+            ("counted", Cell::Flag(self.counted)),
+            ("success", Cell::Flag(self.success)),
         ];
         let after = [
-            ("ended", word(&self.ended)),
-            ("steps", self.steps.to_string()),
-            ("requests", self.requests.to_string()),
-            ("thinking_s", self.thinking_s.to_string()),
-            ("falls", self.falls.to_string()),
-            ("input_tokens", text(self.input_tokens)),
-            ("output_tokens", text(self.output_tokens)),
-            ("usd", text(self.usd)),
-            ("model_s", text(self.model_s)),
-            ("earlier_attempts", self.earlier_attempts.to_string()),
-            ("controller", self.controller.clone()),
-            ("build", self.build.clone()),
-            ("state_hash", text(self.state_hash.as_ref())),
-            ("ended_at", text(self.ended_at.as_ref())),
-            ("note", text(self.note.as_ref())),
+            ("ended", Cell::Text(Some(word(&self.ended)))),
+            ("steps", Cell::Count(Some(self.steps.into()))),
+            ("requests", Cell::Count(Some(self.requests.into()))),
+            ("thinking_s", Cell::Number(Some(self.thinking_s))),
+            ("falls", Cell::Count(Some(self.falls.into()))),
+            ("input_tokens", Cell::Count(self.input_tokens)),
+            ("output_tokens", Cell::Count(self.output_tokens)),
+            ("usd", Cell::Number(self.usd)),
+            ("model_s", Cell::Number(self.model_s)),
+            ("earlier_attempts", Cell::Count(Some(self.earlier_attempts as u64))),
+            ("controller", Cell::Text(Some(self.controller))),
+            ("build", Cell::Text(Some(self.build))),
+            ("state_hash", Cell::Text(self.state_hash)),
+            ("ended_at", Cell::Text(self.ended_at)),
+            ("note", Cell::Text(self.note)),
         ];
-        before.map(named).into_iter().chain((0..phases).map(time_s)).chain(after.map(named)).collect()
+        let named = |(name, cell): (&str, Cell)| (name.to_owned(), cell);
+        before.map(named).into_iter().chain(times_s).chain(after.map(named)).collect()
     }
 }
 
@@ -133,16 +136,49 @@ fn word(value: &impl Serialize) -> String {
     value.as_str().unwrap_or_default().to_owned()
 }
 
-fn text<T: ToString>(value: Option<T>) -> String {
-    value.map_or(String::new(), |value| value.to_string())
+/// Value of a cell.
+enum Cell {
+    Text(Option<String>),
+    Flag(bool),
+    Count(Option<u64>),
+    Number(Option<f64>),
+}
+
+impl Cell {
+    /// Returns the value in CSV.
+    fn text(&self) -> String {
+        match self {
+            Cell::Text(text) => quoted(text.as_deref().unwrap_or_default()),
+            Cell::Flag(flag) => flag.to_string(),
+            Cell::Count(count) => count.map_or(String::new(), |count| count.to_string()),
+            Cell::Number(number) => number.map_or(String::new(), |number| number.to_string()),
+        }
+    }
+}
+
+fn all_cells(rows: &[EpisodeRow]) -> Vec<Vec<(String, Cell)>> {
+    let phases = rows.iter().map(|row| row.phases_s.len()).max().unwrap_or_default();
+    rows.iter().map(|row| row.clone().cells(phases)).collect()
 }
 
 /// Returns a line for each episode; cells without a value are empty.
 pub fn csv(rows: &[EpisodeRow]) -> String {
-    let phases = rows.iter().map(|row| row.phases_s.len()).max().unwrap_or_default();
-    let cells: Vec<Vec<(String, String)>> = rows.iter().map(|row| row.cells(phases)).collect();
+    let cells = all_cells(rows);
     let line = |cells: Vec<String>| cells.join(",") + "\n";
     let head = cells.first().map(|row| line(row.iter().map(|(name, _)| name.clone()).collect()));
-    let lines = cells.iter().map(|row| line(row.iter().map(|(_, text)| quoted(text)).collect()));
+    let lines = cells.iter().map(|row| line(row.iter().map(|(_, cell)| cell.text()).collect()));
     head.into_iter().chain(lines).collect()
+}
+
+/// Returns the same table as a Parquet file; cells without a value are null.
+pub fn parquet(rows: &[EpisodeRow]) -> Vec<u8> {
+    let mut columns: Vec<(String, Vec<Cell>)> = Vec::new();
+    for row in all_cells(rows) {
+        columns.resize_with(row.len(), Default::default);
+        for (column, (name, cell)) in columns.iter_mut().zip(row) {
+            column.0 = name;
+            column.1.push(cell);
+        }
+    }
+    parquet::file(&columns, rows.len())
 }
