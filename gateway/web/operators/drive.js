@@ -15,22 +15,26 @@ import { Wheel, tokensOf } from "./wheel.js";
 
 const SAY_MS = 20;
 const HEIGHT_RANGE_M = [0.5, 0.78];
-/** Where drawing takes longer, it is made simpler: a hand is seen to move two frames after it has. */
+/** Time of a frame from which drawing is made simpler: a hand is seen to move two frames after it has. */
 const SLOW_FRAME_MS = 40;
 /** Control steps of a press of the step button. */
 const STEPS = 10;
 /** A command that is under way takes no longer. */
 const FINISH_AGAIN_MS = 300;
-/** How much of the height the robot's picture takes: below it are the robot's own hands, where they hang. */
+/** Share of the height that the robot's picture takes: below it are the robot's own hands, where they hang. */
 const PICTURE_SHARE = 0.7;
-/** What keys do that act once; Enter only step by step. @type {Record<string, string>} */
+/** Actions of the keys that act once; Enter acts only step by step. @type {Record<string, string>} */
 const KEYS = { 1: "left", 2: "right", o: "open", c: "close", h: "level", " ": "clutch", Enter: "step" };
 
 /** @typedef {import("../src/message.js").Side} Side */
 /** @typedef {import("./wheel.js").EpisodeSeat} EpisodeSeat */
 /** @typedef {import("./wheel.js").Ended} Ended */
-/** What there is once the scene has come: the robot's hands, its partners, and what draws them. */
-/** @typedef {{ hands: Hands, partners: { name: string, index: number }[], stage: Stage, headset: Headset, frame: import("../src/message.js").Frame }} Cockpit */
+/**
+ * Parts of the page that need the scene: the robot's hands, its partners, their drawing, and the newest step.
+ * @typedef {{
+ *   hands: Hands, partners: { name: string, index: number }[], stage: Stage, headset: Headset, frame: import("../src/message.js").Frame,
+ * }} Cockpit
+ */
 
 /**
  * Shows the page of `seat` and drives until the episode has ended. Returns its result, and what gives back what the page draws with;
@@ -64,9 +68,9 @@ class DrivePage {
   /** @type {number | null} */
   heightM = null;
   asksHeight = false;
-  /** Why the person's own robot stands still. @type {string | null} */
+  /** Reason for which the person's own robot stands still. @type {string | null} */
   paused = null;
-  /** Why time stands still for others. @type {string | null} */
+  /** Reason for which time stands still for others. @type {string | null} */
   waits = null;
   stepwise = false;
   steps = 0;
@@ -79,7 +83,7 @@ class DrivePage {
   pace = new Pace(SLOW_FRAME_MS);
   /** @type {Cockpit | null} */
   cockpit = null;
-  /** Whether a step has come that is not shown yet. */
+  /** True if a step has come that is not shown yet. */
   stale = false;
   /** Time of the last report. @type {number | null} */
   timeS = null;

@@ -4,7 +4,7 @@ import { element, reasonOf, say, words } from "../src/dom.js";
 import { SIDES, bySide } from "../src/message.js";
 import { byTouch } from "./touch.js";
 
-/** How a person drives. */
+/** Ways to drive by keyboard and mouse. */
 const WAYS = [
   ["Move a hand", "drag L or R; with Shift, or by the wheel, towards you and away; or arrow keys, Page Up and Page Down"],
   ["Turn it", "Ctrl and drag, or I K, J L, U M; Level points its fingers ahead"],
@@ -12,7 +12,7 @@ const WAYS = [
   ["Gamepad", "sticks walk and turn, triggers close the hands, bumpers rest the arms where they are"],
 ];
 
-/** The same by fingers. */
+/** Ways to drive by fingers. */
 const TOUCH_WAYS = [
   ["Move a hand", "drag L or R: across what you see, in and out of it, or turning it, as the buttons between the pads say"],
   ["Walk", "push the left pad; the right one turns, and lifts and lowers the body"],
@@ -41,7 +41,7 @@ export function nothing(main, why) {
  * }} Report
  */
 /**
- * What a person does beside driving.
+ * Acts of a person beside driving.
  * @typedef {{
  *   act: (action: string) => void, speak: (text: string) => Promise<{ heard?: { from: string, text: string }[] }>, finish: () => void, look: (view: string) => void,
  *   wear: () => void, stepwise: (on: boolean) => void,

@@ -3,9 +3,9 @@
 
 import { element } from "../src/dom.js";
 
-/** As far from its middle, in shares of its radius, a pad asks for nothing. */
+/** Distance from its middle, in shares of its radius, up to which a pad asks for nothing. */
 const DEAD_SHARE = 0.15;
-/** What dragging a handle does: along the picture, along the line of sight, or a turn. */
+/** Effects of dragging a handle: along the picture, along the line of sight, or a turn. */
 const DRAGS = { across: "Across", along: "In, out", turn: "Turn" };
 
 /** Tells whether fingers, and no mouse, are what a person points with. */

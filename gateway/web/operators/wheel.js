@@ -7,7 +7,7 @@ import { Refused, call, statusOf } from "./call.js";
 const RETRY_MS = 1000;
 
 /** @typedef {import("./main.js").Seat & { episode: string }} EpisodeSeat Seat of an episode that is known. */
-/** @typedef {{ ended: string, phases?: Record<string, number | null> }} Ended How an episode has ended, as its drivers hear it. */
+/** @typedef {{ ended: string, phases?: Record<string, number | null> }} Ended End of an episode, as its drivers hear it. */
 
 /** The socket of one page. */
 export class Wheel {

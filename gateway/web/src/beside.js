@@ -7,7 +7,7 @@ import { Pace, Stage } from "./stage.js";
 import { Targets } from "./targets.js";
 import { RecordedTime } from "./time.js";
 
-/** Where drawing both takes longer, it is made simpler. */
+/** Time of a frame of both from which drawing is made simpler. */
 const SLOW_FRAME_MS = 80;
 
 /** @typedef {import("./message.js").WatchedScene} WatchedScene */

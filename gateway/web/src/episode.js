@@ -13,7 +13,7 @@ import { Timeline } from "./timeline.js";
 const PLOTS_EVERY_MS = 250;
 const CAMERAS_EVERY_MS = 1000;
 const RECONNECT_MS = 2000;
-/** Where drawing takes longer, it is made simpler. */
+/** Time of a frame from which drawing is made simpler. */
 const SLOW_FRAME_MS = 60;
 
 /** @typedef {{ episode: string, run?: undefined, at?: undefined } | { run: string, at: number, episode?: undefined }} Wanted */
@@ -35,14 +35,14 @@ class EpisodePage {
   problem = element("p", { class: "bad", role: "alert" });
   cameras = element("div", { class: "pictures" });
   look = element("input", { type: "checkbox", id: "look", onchange: () => this.drawCameras() });
-  /** The pictures that were asked for last. */
+  /** Key of the pictures that were asked for last. */
   pictured = "";
-  /** Whether pictures are asked for now. */
+  /** True while a request for pictures is under way. */
   drawing = false;
-  /** Whether the server holds the episode no more. */
+  /** True once the server holds the episode no more. */
   closed = false;
   drawn = false;
-  /** Whether the same moment is to be shown anew. */
+  /** True if the same moment has to be shown anew. */
   again = false;
   plotsDue = true;
   /** @type {{ number: string, lacks: string[] } | undefined} */

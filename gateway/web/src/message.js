@@ -63,7 +63,7 @@ export const SIDES = ["left", "right"];
 export const HAND_STATES = ["joints", "moving", "arrived", "blocked", "out_of_reach"];
 
 /**
- * Where the numbers of a step are.
+ * Places of the numbers of a step in its row.
  * @typedef {{
  *   length: number,
  *   links: number[],

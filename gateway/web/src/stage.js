@@ -20,7 +20,7 @@ const FRUSTUM_M = 0.55;
 const GHOST_FROM_M = 0.01;
 /** Pixels of the page that one of the picture covers, at most, where drawing takes long. */
 const MOST_COARSENESS = 3;
-/** What has not moved for so long is drawn once more, as finely as the page is. */
+/** Time without motion after which a picture is drawn once more, as finely as the page is. */
 const STILL_MS = 300;
 const SOFTWARE_COARSENESS = 1.5;
 /** @type {Record<string, string>} */
@@ -31,7 +31,7 @@ const SKY_FROM_BELOW = 0x8d8678;
 /** @typedef {import("./message.js").Part} Part */
 /** @typedef {import("./message.js").Mesh} MeshNumbers */
 /** @typedef {import("./targets.js").Target} Target */
-/** @typedef {ReturnType<Stage["extrasOf"]>["hands"][number]} HandExtras What is drawn of a hand. */
+/** @typedef {ReturnType<Stage["extrasOf"]>["hands"][number]} HandExtras Drawing of a hand. */
 /** @typedef {(thing: import("three").Object3D, at: number) => void} Poser Puts a thing to the pose at a place of a row. */
 
 /** The drawing of one scene. */
@@ -61,7 +61,7 @@ export class Stage {
     this.isFine = false;
     this.view = "free";
     this.extras = { frustums: true, forces: true, targets: true };
-    /** How much of the height a robot's picture takes at most, at the top where it is less than all: what is below is shown, too. */
+    /** Largest share of the height that a robot's picture takes, at the top where it is less than 1; the scene goes on below it. */
     this.pictureShare = 1;
     this.robots = head.robots.map((robot, index) => this.extrasOf(robot, index));
     /** The space of a headset's wearer, with its camera; and the robot in whose place the wearer stands. */

@@ -54,8 +54,8 @@ export class Fingers {
 
   /**
    * Follows a hand for another while.
-   * @param {(number[] | null)[]} positions Where its 25 joints are, in metres, in the space of the headset; null where one is not seen.
-   * @param {Quaternion} wristTurn How its wrist is turned there.
+   * @param {(number[] | null)[]} positions Places of its 25 joints in metres, in the space of the headset; null where one is not seen.
+   * @param {Quaternion} wristTurn Orientation of its wrist there.
    * @param {number} passedS
    */
   follow(positions, wristTurn, passedS) {

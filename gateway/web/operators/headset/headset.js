@@ -9,7 +9,7 @@ import { Fingers, robotTurn } from "./fingers.js";
 const STICK_DEAD = 0.15;
 /** televuer's values of a trigger go from 10, let go, to 0, fully pressed. */
 const TRIGGER_LET_GO = 10;
-/** Where a controller of WebXR's `xr-standard` mapping has its buttons. */
+/** Numbers of the buttons of a controller in WebXR's `xr-standard` mapping. */
 const [TRIGGER, SQUEEZE, A, B] = [0, 1, 4, 5];
 /** A longer time between two pictures was a pause. */
 const MOST_PASSED_S = 0.1;
@@ -19,7 +19,7 @@ const dead = (/** @type {number | undefined} */ value) => (Math.abs(value ?? 0) 
 /** @typedef {import("../../src/message.js").Side} Side */
 /** @typedef {import("../hands.js").Pose} Pose */
 /**
- * What is read of one side: places of a hand's joints, or a controller.
+ * Readings of one side: places of a hand's joints, or a controller.
  * @typedef {{
  *   hand_pos?: (number[] | null)[], ctrl_triggerValue?: number, ctrl_squeeze?: boolean, ctrl_thumbstickValue?: [number, number],
  *   ctrl_aButton?: boolean, ctrl_bButton?: boolean,
@@ -49,7 +49,7 @@ function inPelvis(pose) {
 export class Headset {
   /** @type {XRSession | null} */
   session = null;
-  /** What was read last. @type {Record<Side, Read>} */
+  /** Latest readings. @type {Record<Side, Read>} */
   data = { left: {}, right: {} };
   /** Poses of a wearer's hand and of the robot's wrist when the one took hold of the other. @type {Record<Side, { from: Pose, hand: Pose } | null>} */
   held = { left: null, right: null };
