@@ -1,4 +1,4 @@
-// Requests by an operator, or as whoever starts episodes. Tokens go in a header: addresses are written to logs.
+// Requests by operators, and by people who start episodes. Tokens go in a header: addresses are written to logs.
 
 /** A refusal, in the server's words. */
 export class Refused extends Error {

@@ -1,5 +1,6 @@
 // A person in a headset, by WebXR: stands in the robot's place, sees the scene from its head in stereo, and moves its wrists by
-// controllers or by their own hands. What is read of a side has the names of Unitree's televuer without that of the side: `ctrl_squeeze`, `hand_pos` and so on.
+// controllers or by their own hands. The readings of a side have the names of Unitree's televuer, such as `ctrl_squeeze` and `hand_pos`
+// for its `left_ctrl_squeeze` and `left_hand_pos`.
 
 import { Matrix4, Quaternion, Vector3 } from "three";
 import { SIDES, bySide } from "../../src/message.js";
