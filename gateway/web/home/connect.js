@@ -37,7 +37,10 @@ export class Connect {
     this.show({});
   }
 
-  /** Takes over changes: task and seed, an episode that was started here, or that a token is needed. @param {Partial<Given>} changed */
+  /**
+   * Takes over changes: task and seed, an episode that was started here, or that a token is needed.
+   * @param {Partial<Given>} changed
+   */
   show(changed) {
     Object.assign(this.given, changed);
     const { task, episode, locked } = this.given;

@@ -8,7 +8,10 @@
  *   result: import("../src/message.js").Result,
  * }} FinishedEpisode
  */
-/** @typedef {Record<string, string>} Choice A value for each of `NAMES`; an empty one lets everything through. */
+/**
+ * A value for each of `NAMES`; an empty one lets everything through.
+ * @typedef {Record<string, string>} Choice
+ */
 
 /** @type {[string, string][]} */
 export const RESULTS = [
@@ -25,7 +28,10 @@ export const AGES = [
 ];
 export const NAMES = ["text", "task", "policy", "result", "age"];
 
-/** Returns an episode's policy for a list, or what is shown in place of one. @param {FinishedEpisode} episode */
+/**
+ * Returns an episode's policy for a list, or what is shown in place of one.
+ * @param {FinishedEpisode} episode
+ */
 export const policyOf = ({ policy }) => policy ?? "not named";
 
 /** Returns the number of phases, and of those that were reached. @param {FinishedEpisode} episode */
@@ -47,7 +53,11 @@ export function chosenIn(query) {
   return Object.fromEntries(NAMES.map((name) => [name, given.get(name) ?? ""]));
 }
 
-/** Returns the query of an address with a choice in it; other parameters stay. @param {string} query @param {Choice} choice */
+/**
+ * Returns the query of an address with a choice in it; other parameters stay.
+ * @param {string} query
+ * @param {Choice} choice
+ */
 export function withChoice(query, choice) {
   const params = new URLSearchParams(query);
   for (const name of NAMES) {

@@ -19,7 +19,10 @@ export class Finished {
     this.cards = new Map();
     this.choice = chosenIn(location.search);
     this.shown = PAGE_CARDS;
-    /** The episodes that are to be compared, two at most. @type {{ run: string, name: string, button: HTMLElement }[]} */
+    /**
+     * The episodes that are to be compared, two at most.
+     * @type {{ run: string, name: string, button: HTMLElement }[]}
+     */
     this.beside = [];
     this.count = element("p", { class: "soft", role: "status" });
     this.grid = element("div", { class: "cards" });
@@ -54,7 +57,9 @@ export class Finished {
 
   /** Makes the form of the filters, and its fields by name. */
   form() {
-    /** @type {(name: string, label: string, options: [string, string, ...unknown[]][]) => [string, HTMLElement, Field]} */
+    /**
+     * @type {(name: string, label: string, options: [string, string, ...unknown[]][]) => [string, HTMLElement, Field]}
+     */
     const select = (name, label, options) => {
       const field = element(
         "select",

@@ -4,8 +4,8 @@
 const TOKEN = "TANDEM_TOKEN";
 
 /**
- * Returns the ways to connect, each with its lines. `episode` is the id of one that this page has started; without
- * it, the lines start one.
+ * Returns the ways to connect, each with its lines. `episode` is the id of one that this page has started;
+ * without it, the lines start one.
  * @param {{ url: string, locked: boolean, task: string, seed: number, episode?: string }} given
  */
 export function waysToConnect({ url, locked, task, seed, episode }) {

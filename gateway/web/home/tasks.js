@@ -8,14 +8,17 @@ const CONTROL_HZ = 50;
 /** @typedef {{ protocol: string, episode_steps: number, wall_clock_s?: number | null }} Rules */
 /**
  * A task in the server's list.
- * @typedef {{ id: string, suite: string, instruction: string, robots: string[], phases: unknown[], protocols: Rules[] }} Task
+ * @typedef {{
+ *   id: string, suite: string, instruction: string, robots: string[], phases: unknown[], protocols: Rules[],
+ * }} Task
  */
 
 /** The section of tasks. */
 export class Tasks {
   /**
    * @param {{ value: string }} token the server's, as its field has it
-   * @param {(started: { episode: string, task: string, seed: number }) => void} onStart hears of an episode that was started
+   * @param {(started: { episode: string, task: string, seed: number }) => void} onStart hears of an episode
+   *   that was started
    */
   constructor(token, onStart) {
     this.token = token;
@@ -133,14 +136,21 @@ export class Tasks {
 
   /** Shows the picture of a task. @param {HTMLImageElement} picture @param {string} id */
   async draw(picture, id) {
-    const answer = await fetch(`/home/picture?task=${encodeURIComponent(id)}`, { headers: bearer(this.token.value) });
+    const headers = bearer(this.token.value);
+    const answer = await fetch(`/home/picture?task=${encodeURIComponent(id)}`, { headers });
     if (!answer.ok) return;
     picture.src = URL.createObjectURL(await answer.blob());
     await picture.decode().catch(() => null);
     URL.revokeObjectURL(picture.src);
   }
 
-  /** Starts an episode. @param {Task} task @param {HTMLButtonElement} press @param {HTMLElement} told @param {HTMLElement} done */
+  /**
+   * Starts an episode.
+   * @param {Task} task
+   * @param {HTMLButtonElement} press
+   * @param {HTMLElement} told
+   * @param {HTMLElement} done
+   */
   async start({ id }, press, told, done) {
     if (!this.seed.reportValidity()) return;
     const seed = Number(this.seed.value);

@@ -12,7 +12,11 @@ export class Refused extends Error {
 /** Returns the status of a refusal; null for any other error. @param {unknown} error */
 export const statusOf = (error) => (error instanceof Refused ? error.status : null);
 
-/** Returns the headers that carry a token; none without one. @param {string | null} token @returns {Record<string, string>} */
+/**
+ * Returns the headers that carry a token; none without one.
+ * @param {string | null} token
+ * @returns {Record<string, string>}
+ */
 export const bearer = (token) => (token ? { authorization: `Bearer ${token}` } : {});
 
 /**

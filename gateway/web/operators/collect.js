@@ -19,7 +19,11 @@ const sleep = (/** @type {number} */ ms) => new Promise((done) => setTimeout(don
  * }} Progress
  */
 
-/** Has the person of `seat` drive, mark and wait until all episodes are there. @param {HTMLElement} main @param {Seat} seat */
+/**
+ * Has the person of `seat` drive, mark and wait until all episodes are there.
+ * @param {HTMLElement} main
+ * @param {Seat} seat
+ */
 export async function collect(main, seat) {
   /** @type {Awaited<ReturnType<typeof drive>>} */
   let ended = null;
@@ -41,7 +45,12 @@ export async function collect(main, seat) {
   }
 }
 
-/** Asks how far the collection is, and again while the server cannot be reached. @param {HTMLElement} main @param {Seat} seat @returns {Promise<Progress>} */
+/**
+ * Asks how far the collection is, and again while the server cannot be reached.
+ * @param {HTMLElement} main
+ * @param {Seat} seat
+ * @returns {Promise<Progress>}
+ */
 async function ask(main, seat) {
   for (;;) {
     try {
@@ -105,7 +114,11 @@ const marked = (main, progress, seat, result) => new Promise((done) => {
       element("button", { type: "button", class: "large", onclick: () => say(false) }, "Bad")), refusal);
 });
 
-/** Shows the page of whoever runs the collection: a link for each person, and how far they are. @param {HTMLElement} main @param {Seat} seat */
+/**
+ * Shows the page of whoever runs the collection: a link for each person, and how far they are.
+ * @param {HTMLElement} main
+ * @param {Seat} seat
+ */
 export async function overview(main, seat) {
   const links = element("ul", { class: "links" });
   const progress = await ask(main, seat);

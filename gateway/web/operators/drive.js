@@ -90,7 +90,12 @@ class DrivePage {
   /** @type {(result: Ended) => void} */
   done = () => {};
 
-  /** @param {HTMLElement} main @param {EpisodeSeat} seat @param {string} root @param {import("./panel.js").Briefing} briefing */
+  /**
+   * @param {HTMLElement} main
+   * @param {EpisodeSeat} seat
+   * @param {string} root
+   * @param {import("./panel.js").Briefing} briefing
+   */
   constructor(main, seat, root, briefing) {
     this.seat = seat;
     this.root = root;
@@ -142,7 +147,10 @@ class DrivePage {
     return { result, leave };
   }
 
-  /** Takes in the scene, for the first time or after the link was lost. @param {import("../src/message.js").Scene} scene */
+  /**
+   * Takes in the scene, for the first time or after the link was lost.
+   * @param {import("../src/message.js").Scene} scene
+   */
   begin(scene) {
     if (this.cockpit) return;
     const robot = scene.head.robots.findIndex(({ name }) => name === this.seat.robot);
@@ -226,7 +234,11 @@ class DrivePage {
     }
   }
 
-  /** Draws what is newest, and when the episode is over, its end, until the page is left. @param {number} now @param {number} last */
+  /**
+   * Draws what is newest, and when the episode is over, its end, until the page is left.
+   * @param {number} now
+   * @param {number} last
+   */
   draw(now, last) {
     if (this.left) return;
     if (this.cockpit && !this.cockpit.headset.session) {
@@ -308,7 +320,10 @@ class DrivePage {
     }
   }
 
-  /** Finishes as the operator with a token; a command that is under way is answered first. @param {string} token */
+  /**
+   * Finishes as the operator with a token; a command that is under way is answered first.
+   * @param {string} token
+   */
   async finishAs(token) {
     while (!this.wheel.over) {
       try {
@@ -363,7 +378,11 @@ class DrivePage {
   }
 }
 
-/** Puts handles and partners' cursors to where they are seen. @param {ReturnType<typeof layOut>} panel @param {Cockpit} cockpit */
+/**
+ * Puts handles and partners' cursors to where they are seen.
+ * @param {ReturnType<typeof layOut>} panel
+ * @param {Cockpit} cockpit
+ */
 function point(panel, { hands, partners, stage, frame }) {
   for (const side of SIDES) panel.handle(side, stage.project(hands.handle(side)));
   for (const { name, index } of partners) {

@@ -78,7 +78,11 @@ export class Hands {
     this.turns[side] = turn;
   }
 
-  /** Returns the target pose of a wrist, or its own pose where it has none, in the pelvis frame. @param {Side} side @returns {Pose} */
+  /**
+   * Returns the target pose of a wrist, or its own pose where it has none, in the pelvis frame.
+   * @param {Side} side
+   * @returns {Pose}
+   */
   pose(side) {
     const { position, turn } = this.measured[side];
     return { position: (this.targets[side] ?? position).clone(), turn: (this.turns[side] ?? turn).clone() };
@@ -89,7 +93,10 @@ export class Hands {
     return way.clone().applyQuaternion(this.pelvis.turn.clone().invert());
   }
 
-  /** Returns the place of a handle in the world: in the palm of a hand that is where it is to be. @param {Side} side */
+  /**
+   * Returns the place of a handle in the world: in the palm of a hand that is where it is to be.
+   * @param {Side} side
+   */
   handle(side) {
     const { position, turn } = this.pose(side);
     const palm = new Vector3().fromArray(PALM_IN_WRIST_M).applyQuaternion(turn).add(position);

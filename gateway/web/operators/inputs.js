@@ -25,16 +25,26 @@ const BASE_KEYS = { w: [1, 0, 0], s: [-1, 0, 0], a: [0, 1, 0], d: [0, -1, 0], q:
 const WRIST_KEYS = {
   ArrowUp: [1, 0, 0], ArrowDown: [-1, 0, 0], ArrowLeft: [0, 1, 0], ArrowRight: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1],
 };
-/** Axes of the pelvis frame, about which a hand turns: fingers up and down, to the left and right, and about themselves. */
+/**
+ * Axes of the pelvis frame, about which a hand turns: fingers up and down, to the left and right, and about
+ * themselves.
+ */
 const ROTATION_KEYS = { i: [0, -1, 0], k: [0, 1, 0], j: [0, 0, 1], l: [0, 0, -1], u: [-1, 0, 0], m: [1, 0, 0] };
 /** @type {Record<string, number>} */
 const HEIGHT_KEYS = { r: 1, f: -1 };
 
 const within = (/** @type {Event} */ event, /** @type {string} */ what) => event.target instanceof Element && Boolean(event.target.closest(what));
-/** Tells whether a key is for what has the focus: texts and lists take all, buttons and boxes those by which they are pressed. */
+/**
+ * Tells whether a key is for what has the focus: texts and lists take all, buttons and boxes those by which
+ * they are pressed.
+ */
 const taken = (/** @type {KeyboardEvent} */ event) => within(event, "input:not([type=checkbox]), select, textarea") || ([" ", "Enter"].includes(event.key) && within(event, "button, input, a"));
 const nameOf = (/** @type {KeyboardEvent} */ event) => (event.key.length === 1 ? event.key.toLowerCase() : event.key);
-/** Sums the vectors of the keys that a table has. @param {Set<string>} keys @param {Record<string, number[]>} table */
+/**
+ * Sums the vectors of the keys that a table has.
+ * @param {Set<string>} keys
+ * @param {Record<string, number[]>} table
+ */
 const sum = (keys, table) =>
   [...keys].map((key) => table[key]).filter(Boolean).reduce((total, one) => total.map((value, axis) => value + one[axis]), [0, 0, 0]);
 
@@ -115,5 +125,9 @@ export function withHeadset(want, { base, height, triggers, fingers }) {
   };
 }
 
-/** Returns joint angles of the fingers of `hand` that are closed by a share. @param {Side} hand @param {number} share */
+/**
+ * Returns joint angles of the fingers of `hand` that are closed by a share.
+ * @param {Side} hand
+ * @param {number} share
+ */
 export const closedBy = (hand, share) => OPEN[hand].map((open, joint) => open + share * (CLOSED[hand][joint] - open));

@@ -15,14 +15,21 @@ export async function linkRow(name, href, token, text = "") {
   return element("li", {}, link, " ", copying(() => href, "Copy link"), text && element("div", { class: "soft" }, text), await code(href, token));
 }
 
-/** Says whom the links of this page are for, where they name this machine by an address that each machine calls itself by. */
+/**
+ * Says whom the links of this page are for, where they name this machine by an address that each machine calls
+ * itself by.
+ */
 export function nearby() {
   const isOwn = /^(localhost|127\.|\[::1\])/.test(location.hostname);
   return element("p", { class: "soft", hidden: !isOwn }, "They open in browsers of this machine alone. For people at others, start the server with ",
     element("code", {}, "--listen 0.0.0.0:8700"), " and open this page by the machine's name or address.");
 }
 
-/** Makes the QR code of a text, which is sent as a body: addresses are written to logs. @param {string} text @param {string} token */
+/**
+ * Makes the QR code of a text, which is sent as a body: addresses are written to logs.
+ * @param {string} text
+ * @param {string} token
+ */
 async function code(text, token) {
   const headers = { "content-type": "application/json", ...bearer(token) };
   const answer = await fetch("/operate/code", { method: "POST", headers, body: JSON.stringify({ text }), credentials: "omit" });

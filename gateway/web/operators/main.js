@@ -13,7 +13,11 @@ const KEPT = "tandem-operator";
  * @typedef {{ token: string, robot: string, episode?: string, still?: string, collection?: string }} Seat
  */
 
-/** Returns what the link gave: from the fragment, which browsers send to nobody; then from this tab, so that a page may be loaded again. @returns {Seat | null} */
+/**
+ * Returns what the link gave: from the fragment, which browsers send to nobody; then from this tab, so that a
+ * page may be loaded again.
+ * @returns {Seat | null}
+ */
 function seat() {
   const given = new URLSearchParams(location.hash.slice(1));
   if (given.has("token")) {

@@ -107,7 +107,11 @@ export function layOut(main, { robot, episode, collection }, briefing, pads, on)
     said: () => [status, facts].map((line) => line.textContent ?? ""),
     /** Shows where the robot's picture ends, if the view is the robot's. @param {boolean} shown */
     border: (shown) => { border.hidden = !shown; },
-    /** Takes over the camera of the robot, and the share of the height that its picture takes. @param {import("../src/message.js").CameraHead} camera @param {number} share */
+    /**
+     * Takes over the camera of the robot, and the share of the height that its picture takes.
+     * @param {import("../src/message.js").CameraHead} camera
+     * @param {number} share
+     */
     camera: (camera, share) => {
       place.style.setProperty("--seen", String(camera.width / camera.height));
       place.style.setProperty("--share", String(share));
@@ -130,7 +134,10 @@ export function layOut(main, { robot, episode, collection }, briefing, pads, on)
       say(facts, factsOf(reply, own));
       phases.show(new Map((reply.phases ?? []).map(({ number, time_s: timeS }) => [number, timeS])));
     },
-    /** Shows that the episode is over: what has come of it, and where it is found. @param {import("./wheel.js").Ended} result */
+    /**
+     * Shows that the episode is over: what has come of it, and where it is found.
+     * @param {import("./wheel.js").Ended} result
+     */
     ended: (result) => {
       phases.show(new Map(Object.entries(result.phases ?? {})), true);
       const isComplete = result.ended === "task_complete";
@@ -142,7 +149,10 @@ export function layOut(main, { robot, episode, collection }, briefing, pads, on)
       chat.close();
       if (!collection) after.replaceChildren(...whereFound(episode));
     },
-    /** Shows which hand is chosen, and whether time passes by itself. @param {{ hand: Side, paused: string | null, stepwise: boolean }} how */
+    /**
+     * Shows which hand is chosen, and whether time passes by itself.
+     * @param {{ hand: Side, paused: string | null, stepwise: boolean }} how
+     */
     label: ({ hand, paused, stepwise: steps }) => {
       say(pause, paused ? "Go on" : "Pause");
       step.hidden = !steps;
@@ -189,7 +199,11 @@ function whereFound(episode) {
   ];
 }
 
-/** Gives no focus to what is clicked, and takes it from a text that had it, so that keys drive; who comes by the keyboard gives it. @param {MouseEvent} event */
+/**
+ * Gives no focus to what is clicked, and takes it from a text that had it, so that keys drive; who comes by the
+ * keyboard gives it.
+ * @param {MouseEvent} event
+ */
 function keepKeys(event) {
   if (!(event.target instanceof Element) || !event.target.closest("button:not(.handle), input[type=checkbox], label")) return;
   event.preventDefault();
@@ -213,7 +227,11 @@ function put(thing, { x, y, ahead }, always, size) {
   thing.style.transform = `translate(${within((1 + u) / 2, size.width)}px, ${within((1 - v) / 2, size.height)}px) ${always ? "translate(-50%, -50%)" : "translate(-50%, .8rem)"}`;
 }
 
-/** Makes the list of what people say to each other, and its form. @param {string} robot @param {Acts["speak"]} speak */
+/**
+ * Makes the list of what people say to each other, and its form.
+ * @param {string} robot
+ * @param {Acts["speak"]} speak
+ */
 function talk(robot, speak) {
   const chat = element("ul", { class: "chat", "aria-live": "polite" });
   const text = element("input", { maxlength: 500, "aria-label": "Say to the others", placeholder: "Say to the others" });

@@ -10,13 +10,30 @@ const CONTROL_HZ = 50;
 const PATIENCE_S = 600;
 
 /** @typedef {import("../home/tasks.js").Task} Task */
-/** @typedef {{ episode_id: string, operators: { robot: string, token: string }[], instructions: { robot: string, instruction: string }[] }} Started An episode that has begun. */
-/** @typedef {{ run: string, at: number, task: string, seed: string, protocol: string }} Moment A moment of a finished episode. */
+/**
+ * An episode that has begun.
+ * @typedef {{
+ *   episode_id: string, operators: { robot: string, token: string }[],
+ *   instructions: { robot: string, instruction: string }[],
+ * }} Started
+ */
+/**
+ * A moment of a finished episode.
+ * @typedef {{ run: string, at: number, task: string, seed: string, protocol: string }} Moment
+ */
 
-/** Makes a field with its name before it and what it means below. @param {string} text @param {HTMLElement} field @param {HTMLElement | null} [help] */
+/**
+ * Makes a field with its name before it and what it means below.
+ * @param {string} text
+ * @param {HTMLElement} field
+ * @param {HTMLElement | null} [help]
+ */
 const labelled = (text, field, help = null) => element("p", {}, element("label", {}, element("span", {}, text), field), help);
 
-/** Lists who may drive a robot; `policy` is the learned one that the server was started with, if it was. @param {string | null} policy */
+/**
+ * Lists who may drive a robot; `policy` is the learned one that the server was started with, if it was.
+ * @param {string | null} policy
+ */
 const playersWith = (policy) => [
   ["person", "a person"], ["expert", "the task's expert, a script that sees everything"],
   ...(policy ? [["policy", `the learned policy ${policy}`]] : []),

@@ -29,7 +29,10 @@ export class Touch {
     this.choices.forEach((choice, index) => choice.setAttribute("aria-pressed", String(Object.keys(DRAGS)[index] === drag)));
   }
 
-  /** Returns what the pads ask for: shares ahead, to the left, round to the left, and up. A thumb that turns does not lift as well. */
+  /**
+   * Returns what the pads ask for: shares ahead, to the left, round to the left, and up. A thumb that turns
+   * does not lift as well.
+   */
   wanted() {
     const [right, down] = this.walk.at;
     const [clockwise, sinks] = this.turn.at;

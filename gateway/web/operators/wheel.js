@@ -7,7 +7,10 @@ import { Refused, call, statusOf } from "./call.js";
 const RETRY_MS = 1000;
 
 /** @typedef {import("./main.js").Seat & { episode: string }} EpisodeSeat Seat of an episode that is known. */
-/** @typedef {{ ended: string, phases?: Record<string, number | null> }} Ended End of an episode, as its drivers hear it. */
+/**
+ * End of an episode, as its drivers hear it.
+ * @typedef {{ ended: string, phases?: Record<string, number | null> }} Ended
+ */
 
 /** The socket of one page. */
 export class Wheel {
@@ -57,7 +60,10 @@ export class Wheel {
     }
   }
 
-  /** Says what the robot is to do from now on. What a slow link has not taken yet is better said later. @param {unknown} word */
+  /**
+   * Says what the robot is to do from now on. What a slow link has not taken yet is better said later.
+   * @param {unknown} word
+   */
   say(word) {
     if (this.socket?.readyState === WebSocket.OPEN && this.socket.bufferedAmount < 4096) this.socket.send(JSON.stringify(word));
   }
@@ -92,7 +98,10 @@ async function hasEnded({ episode, token }) {
   }
 }
 
-/** Lists the robots that a page drives or lets stand still, its own first, with their tokens. @param {EpisodeSeat} seat */
+/**
+ * Lists the robots that a page drives or lets stand still, its own first, with their tokens.
+ * @param {EpisodeSeat} seat
+ */
 function robotsOf({ robot, token, still }) {
   return [[robot, token], ...(still ? still.split(",").map((pair) => pair.split(".")) : [])];
 }
@@ -100,7 +109,11 @@ function robotsOf({ robot, token, still }) {
 /** Returns the tokens of these robots. @param {EpisodeSeat} seat */
 export const tokensOf = (seat) => robotsOf(seat).map(([, token]) => token);
 
-/** Has the browser keep a cookie for each of these robots: a socket is asked for without headers. Returns their names. @param {EpisodeSeat} seat */
+/**
+ * Has the browser keep a cookie for each of these robots: a socket is asked for without headers. Returns their
+ * names.
+ * @param {EpisodeSeat} seat
+ */
 async function enter(seat) {
   await Promise.all(tokensOf(seat).map((token) => call("/operate/enter", token, {}, { credentials: "same-origin" })));
   return robotsOf(seat).map(([robot]) => robot).join(",");

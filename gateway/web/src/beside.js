@@ -12,7 +12,12 @@ const SLOW_FRAME_MS = 80;
 
 /** @typedef {import("./message.js").WatchedScene} WatchedScene */
 
-/** Shows the episodes of two folders from a moment. @param {HTMLElement} main @param {string[]} runs @param {number} at */
+/**
+ * Shows the episodes of two folders from a moment.
+ * @param {HTMLElement} main
+ * @param {string[]} runs
+ * @param {number} at
+ */
 export async function besideEachOther(main, runs, at) {
   /** @type {Side[]} */
   const sides = [];

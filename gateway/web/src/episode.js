@@ -16,9 +16,15 @@ const RECONNECT_MS = 2000;
 /** Time of a frame from which drawing is made simpler. */
 const SLOW_FRAME_MS = 60;
 
-/** @typedef {{ episode: string, run?: undefined, at?: undefined } | { run: string, at: number, episode?: undefined }} Wanted */
+/**
+ * @typedef {{ episode: string, run?: undefined, at?: undefined } | { run: string, at: number, episode?: undefined }} Wanted
+ */
 
-/** Shows an episode that runs, or a finished one from a moment. @param {HTMLElement} main @param {Wanted} wanted */
+/**
+ * Shows an episode that runs, or a finished one from a moment.
+ * @param {HTMLElement} main
+ * @param {Wanted} wanted
+ */
 export async function episode(main, wanted) {
   const query = wanted.run === undefined ? `episode=${encodeURIComponent(wanted.episode)}` : `run=${encodeURIComponent(wanted.run)}`;
   const answer = await ask(`/watch/${wanted.run === undefined ? "scene" : "run"}?${query}`);
@@ -48,7 +54,12 @@ class EpisodePage {
   /** @type {{ number: string, lacks: string[] } | undefined} */
   next = undefined;
 
-  /** @param {HTMLElement} main @param {Wanted} wanted @param {string} query @param {import("./message.js").WatchedScene} scene */
+  /**
+   * @param {HTMLElement} main
+   * @param {Wanted} wanted
+   * @param {string} query
+   * @param {import("./message.js").WatchedScene} scene
+   */
   constructor(main, wanted, query, scene) {
     const { head, frames } = scene;
     /** Id of an episode that runs, or folder of a finished one. */
@@ -154,7 +165,10 @@ class EpisodePage {
     return element("div", { class: "scrubber" }, this.player.node, this.timeline.node);
   }
 
-  /** Makes the button that goes on from the moment that is shown, as an episode of its own whose robots people drive. */
+  /**
+   * Makes the button that goes on from the moment that is shown, as an episode of its own whose robots people
+   * drive.
+   */
   taking() {
     const go = () => {
       const { time } = this.time;
@@ -238,7 +252,10 @@ class EpisodePage {
     this.plotsDue = true;
   }
 
-  /** Shows what is to be seen after so many seconds more. Returns whether the scene was drawn anew. @param {number} seconds */
+  /**
+   * Shows what is to be seen after so many seconds more. Returns whether the scene was drawn anew.
+   * @param {number} seconds
+   */
   draw(seconds) {
     const { from, to, share, moved } = this.time.pass(seconds);
     if (moved || this.again || !this.drawn) {
@@ -266,7 +283,10 @@ class EpisodePage {
     return `/watch/camera?${this.query}&robot=${encodeURIComponent(robot)}&time_s=${time}`;
   }
 
-  /** Returns the pictures that are wanted: of a finished episode those that the policy was shown last, unless its reader wants all of this moment. */
+  /**
+   * Returns the pictures that are wanted: of a finished episode those that the policy was shown last, unless
+   * its reader wants all of this moment.
+   */
   wantedPictures() {
     const { time } = this.time;
     const at = (/** @type {string} */ name, /** @type {number} */ moment, /** @type {string} */ told) => ({ name, told, moment: moment.toFixed(2) });

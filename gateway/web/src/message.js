@@ -6,12 +6,21 @@
 /** @typedef {{ vertical_fov_rad: number, width: number, height: number }} CameraHead */
 /** A joint of a finger: its pose in the frame of the link before it, and its axis there. */
 /** @typedef {{ pose: number[], axis: number[], range_rad: [number, number] }} FingerJoint */
-/** @typedef {{ name: string, links: number, joints: string[], fingers: FingerJoint[][], camera: CameraHead }} RobotHead */
+/**
+ * @typedef {{ name: string, links: number, joints: string[], fingers: FingerJoint[][], camera: CameraHead }} RobotHead
+ */
 /** The body that carries a shape. */
-/** @typedef {{ kind: "room" } | { kind: "link", robot: number, link: number } | { kind: "object", object: number }} Carrier */
-/** @typedef {{ mesh: number, carrier: Carrier, pose: number[], rgb: Rgb, alpha: number, casts_shadow: boolean }} Shape */
+/**
+ * @typedef {{ kind: "room" } | { kind: "link", robot: number, link: number } | { kind: "object", object: number }} Carrier
+ */
+/**
+ * @typedef {{ mesh: number, carrier: Carrier, pose: number[], rgb: Rgb, alpha: number, casts_shadow: boolean }} Shape
+ */
 /** @typedef {Shape & { pattern: "checker", second_rgb: Rgb }} CheckedPart */
-/** @typedef {CheckedPart | Shape & { pattern: "plain" | "wood" | "fabric" | "print", second_rgb: null }} Part A shape of the scene. */
+/**
+ * A shape of the scene.
+ * @typedef {CheckedPart | Shape & { pattern: "plain" | "wood" | "fabric" | "print", second_rgb: null }} Part
+ */
 /** @typedef {[number, number, number]} Rgb */
 /** @typedef {{ positions: Float32Array, indices: Uint32Array, normals: Int8Array }} Mesh */
 
@@ -46,7 +55,11 @@
  *   input_tokens?: number, output_tokens?: number, cached_tokens?: number, usd?: number, seconds?: number,
  * }} Note
  */
-/** @typedef {{ kind: "note", entry: number, time_s: number, thought_s: number, note: Note, number?: undefined, seen?: undefined }} NoteEntry */
+/**
+ * @typedef {{
+ *   kind: "note", entry: number, time_s: number, thought_s: number, note: Note, number?: undefined, seen?: undefined,
+ * }} NoteEntry
+ */
 /** @typedef {CallEntry | NoteEntry} Entry */
 /** Header of a scene for those who watch. */
 /** @typedef {SceneHead & { story: Entry[], reached: PhaseReached[], result: Result | null }} WatchedHead */
@@ -133,7 +146,11 @@ export class Frame {
     };
   }
 
-  /** Returns the largest share of an effort limit among joints of a robot. @param {number} robot @param {number[]} wanted */
+  /**
+   * Returns the largest share of an effort limit among joints of a robot.
+   * @param {number} robot
+   * @param {number[]} wanted
+   */
   effort(robot, wanted) {
     const { efforts } = this.layout.robots[robot];
     let most = 0;

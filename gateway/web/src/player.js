@@ -45,7 +45,8 @@ export class Player {
       copying(() => this.address(), "Copy link to this moment"),
     );
     addEventListener("keydown", (event) => {
-      if (event.target instanceof Element && event.target.closest("input, select, button, summary, a, textarea")) return;
+      const { target } = event;
+      if (target instanceof Element && target.closest("input, select, button, summary, a, textarea")) return;
       if (event.key === " ") this.toggle();
       else if (event.key === "ArrowLeft") time.seek(time.time - STEP_S);
       else if (event.key === "ArrowRight") time.seek(time.time + STEP_S);

@@ -14,7 +14,10 @@ const HEIGHT = 84;
  * A plot of steps: a name, a unit, and a number of each robot's left and right.
  * @typedef {{ name: string, unit: string, least: number, of: (frame: Frame, robot: number, side: number, joints: Joints, targets: Targets | null) => number }} Plot
  */
-/** @typedef {Plot & { canvas: HTMLCanvasElement, now: HTMLElement, series: number[][][] }} DrawnPlot A plot with its lines by robot and side. */
+/**
+ * A plot with its lines by robot and side.
+ * @typedef {Plot & { canvas: HTMLCanvasElement, now: HTMLElement, series: number[][][] }} DrawnPlot
+ */
 
 /** @type {Plot[]} */
 const PLOTS = [
@@ -29,7 +32,10 @@ const PLOTS = [
 
 /** Plots of hands and joints. */
 export class Plots {
-  /** @param {import("./message.js").SceneHead} head @param {Targets | null} targets those of a finished episode */
+  /**
+   * @param {import("./message.js").SceneHead} head
+   * @param {Targets | null} targets those of a finished episode
+   */
   constructor(head, targets) {
     this.head = head;
     this.targets = targets;
@@ -68,7 +74,11 @@ export class Plots {
     for (const plot of this.plots) for (const line of plot.series.flat()) line.splice(0, from);
   }
 
-  /** Draws up to the present; with `cursor`, the whole episode and where it is looked at. @param {number | null} cursor @param {number[]} marks */
+  /**
+   * Draws up to the present; with `cursor`, the whole episode and where it is looked at.
+   * @param {number | null} cursor
+   * @param {number[]} marks
+   */
   draw(cursor, marks) {
     if (!this.times.length) return;
     const end = this.times[this.times.length - 1];
@@ -76,7 +86,13 @@ export class Plots {
     for (const plot of this.plots) this.drawOne(plot, begin, Math.max(end, begin + 1), cursor, marks);
   }
 
-  /** @param {DrawnPlot} plot @param {number} begin @param {number} end @param {number | null} cursor @param {number[]} marks */
+  /**
+   * @param {DrawnPlot} plot
+   * @param {number} begin
+   * @param {number} end
+   * @param {number | null} cursor
+   * @param {number[]} marks
+   */
   drawOne({ canvas, series, least, now, unit }, begin, end, cursor, marks) {
     const first = Math.max(0, this.times.findIndex((time) => time >= begin));
     const lines = series.flat().map((values, index) => ({ times: this.times, values, first, stroke: robotColour(Math.floor(index / 2)), dash: index % 2 ? [4, 3] : [] }));
@@ -137,7 +153,12 @@ export class BudgetPlots {
   }
 }
 
-/** Returns sums over the entries so far. @param {import("./message.js").Entry[]} story @param {(entry: import("./message.js").Entry) => number} of @returns {Point[]} */
+/**
+ * Returns sums over the entries so far.
+ * @param {import("./message.js").Entry[]} story
+ * @param {(entry: import("./message.js").Entry) => number} of
+ * @returns {Point[]}
+ */
 function sums(story, of) {
   let sum = 0;
   return story.map((entry) => [entry.time_s, sum += of(entry)]);
@@ -188,7 +209,12 @@ function drawLines(canvas, lines, { begin, end, least, cursor, marks }) {
   }
 }
 
-/** Returns the numbers of joints of a side and a kind. @param {string[]} joints @param {string} side @param {RegExp} kind */
+/**
+ * Returns the numbers of joints of a side and a kind.
+ * @param {string[]} joints
+ * @param {string} side
+ * @param {RegExp} kind
+ */
 function indices(joints, side, kind) {
   return joints.flatMap((name, index) => (name.startsWith(side) && kind.test(name) ? [index] : []));
 }

@@ -32,7 +32,10 @@ const SKY_FROM_BELOW = 0x8d8678;
 /** @typedef {import("./message.js").Mesh} MeshNumbers */
 /** @typedef {import("./targets.js").Target} Target */
 /** @typedef {ReturnType<Stage["extrasOf"]>["hands"][number]} HandExtras Drawing of a hand. */
-/** @typedef {(thing: import("three").Object3D, at: number) => void} Poser Puts a thing to the pose at a place of a row. */
+/**
+ * Puts a thing to the pose at a place of a row.
+ * @typedef {(thing: import("three").Object3D, at: number) => void} Poser
+ */
 
 /** The drawing of one scene. */
 export class Stage {
@@ -61,7 +64,10 @@ export class Stage {
     this.isFine = false;
     this.view = "free";
     this.extras = { frustums: true, forces: true, targets: true };
-    /** Largest share of the height that a robot's picture takes, at the top where it is less than 1; the scene goes on below it. */
+    /**
+     * Largest share of the height that a robot's picture takes, at the top where it is less than 1; the scene
+     * goes on below it.
+     */
     this.pictureShare = 1;
     this.robots = head.robots.map((robot, index) => this.extrasOf(robot, index));
     /** The space of a headset's wearer, with its camera; and the robot in whose place the wearer stands. */
@@ -117,7 +123,11 @@ export class Stage {
     return sun;
   }
 
-  /** Makes one mesh for all parts of a carrier that are alike in shadow and alpha. Returns the carriers that move. @param {MeshNumbers[]} meshes */
+  /**
+   * Makes one mesh for all parts of a carrier that are alike in shadow and alpha. Returns the carriers that
+   * move.
+   * @param {MeshNumbers[]} meshes
+   */
   build(meshes) {
     /** @type {Map<string, Part[]>} */
     const groups = new Map();
@@ -147,13 +157,20 @@ export class Stage {
     return carriers;
   }
 
-  /** Returns the place of a carrier's pose in a row, or null for the room. @param {import("./message.js").Carrier} carrier */
+  /**
+   * Returns the place of a carrier's pose in a row, or null for the room.
+   * @param {import("./message.js").Carrier} carrier
+   */
   placeOf(carrier) {
     if (carrier.kind === "link") return this.layout.links[carrier.robot] + carrier.link * POSE;
     return carrier.kind === "object" ? this.layout.objects + carrier.object * POSE : null;
   }
 
-  /** Adds to the scene the extras of a robot, and returns them. @param {import("./message.js").RobotHead} robot @param {number} index */
+  /**
+   * Adds to the scene the extras of a robot, and returns them.
+   * @param {import("./message.js").RobotHead} robot
+   * @param {number} index
+   */
   extrasOf(robot, index) {
     const paint = new Color(robotColour(index));
     const frustum = new LineSegments(frustumGeometry(robot.camera), new LineBasicMaterial({ color: paint, transparent: true, opacity: 0.75 }));
@@ -281,7 +298,11 @@ export class Stage {
     this.stale = true;
   }
 
-  /** Puts the wearer's space to the eye of the robot, upright, facing where the robot faces: nobody's neck is bent by a tilted camera. @param {Float32Array} pose */
+  /**
+   * Puts the wearer's space to the eye of the robot, upright, facing where the robot faces: nobody's neck is
+   * bent by a tilted camera.
+   * @param {Float32Array} pose
+   */
   placeRig(pose) {
     const ahead = new Vector3(0, 0, -1).applyQuaternion(new Quaternion().fromArray(pose, 3));
     const back = ahead.setZ(0).normalize().negate();
@@ -295,7 +316,11 @@ export class Stage {
     this.renderer.render(this.scene, this.rider);
   }
 
-  /** Returns where a point of the world is seen: x to the right and y up, from -1 to 1 within the place; and tells whether it is ahead. @param {Vector3} point */
+  /**
+   * Returns where a point of the world is seen: x to the right and y up, from -1 to 1 within the place; and
+   * tells whether it is ahead.
+   * @param {Vector3} point
+   */
   project(point) {
     const camera = this.camera();
     camera.updateMatrixWorld();
@@ -366,7 +391,11 @@ export class Pace {
     this.totalMs = 0;
   }
 
-  /** Takes in that another frame came `ms` after the last. Returns whether they come too slowly, once for `JUDGED_FRAMES`. @param {number} ms */
+  /**
+   * Takes in that another frame came `ms` after the last. Returns whether they come too slowly, once for
+   * `JUDGED_FRAMES`.
+   * @param {number} ms
+   */
   isSlow(ms) {
     if (ms > NOT_DRAWN_MS) return false;
     this.frames += 1;
@@ -388,13 +417,20 @@ function drawnBySoftware() {
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }
 
-/** Makes the material of a part without a pattern. What is blended keeps out as much light as in the server's images. @param {Part} part */
+/**
+ * Makes the material of a part without a pattern. What is blended keeps out as much light as in the server's
+ * images.
+ * @param {Part} part
+ */
 function paintOf({ alpha }) {
   const blended = alpha < SOLID_ALPHA ? { transparent: true, depthWrite: false, opacity: 1 - (1 - alpha) ** 2 } : {};
   return new MeshLambertMaterial({ vertexColors: true, ...blended });
 }
 
-/** Makes the material of squares of half a metre in the world's ground plane, as the server draws them. @param {import("./message.js").CheckedPart} part */
+/**
+ * Makes the material of squares of half a metre in the world's ground plane, as the server draws them.
+ * @param {import("./message.js").CheckedPart} part
+ */
 function checker(part) {
   const material = new MeshLambertMaterial({ vertexColors: true });
   const second = new Color().setRGB(...part.second_rgb, SRGBColorSpace);
@@ -410,7 +446,11 @@ function checker(part) {
   return material;
 }
 
-/** Returns parts of one carrier as one geometry in its frame, with their colours at the corners. @param {Part[]} parts @param {MeshNumbers[]} meshes */
+/**
+ * Returns parts of one carrier as one geometry in its frame, with their colours at the corners.
+ * @param {Part[]} parts
+ * @param {MeshNumbers[]} meshes
+ */
 function merged(parts, meshes) {
   const total = parts.reduce((sum, part) => sum + meshes[part.mesh].positions.length, 0);
   const positions = new Float32Array(total);
@@ -447,7 +487,10 @@ function merged(parts, meshes) {
   return geometry;
 }
 
-/** Returns the edges of what a camera sees, which looks along -z with y up. @param {import("./message.js").CameraHead} camera */
+/**
+ * Returns the edges of what a camera sees, which looks along -z with y up.
+ * @param {import("./message.js").CameraHead} camera
+ */
 function frustumGeometry({ vertical_fov_rad: fov, width, height }) {
   const y = FRUSTUM_M * Math.tan(fov / 2);
   const x = (y * width) / height;
@@ -469,7 +512,13 @@ function ghostGroup() {
   return { group, materials: [material, paint] };
 }
 
-/** Shows a force as an arrow. @param {ArrowHelper} helper @param {Vector3} at @param {number[]} force @param {boolean} wanted */
+/**
+ * Shows a force as an arrow.
+ * @param {ArrowHelper} helper
+ * @param {Vector3} at
+ * @param {number[]} force
+ * @param {boolean} wanted
+ */
 function arrow(helper, at, force, wanted) {
   const along = new Vector3().fromArray(force);
   const newtons = along.length();

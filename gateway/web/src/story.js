@@ -30,7 +30,10 @@ export class Story {
     this.thought = 0;
     /** @type {HTMLElement | undefined} */
     this.marked = undefined;
-    /** Takes a further command of people's into the item of those before it, if such a one was the last entry. @type {((entry: CallEntry) => void) | null} */
+    /**
+     * Takes a further command of people's into the item of those before it, if such a one was the last entry.
+     * @type {((entry: CallEntry) => void) | null}
+     */
     this.driven = null;
     this.list = element("ol", { class: "story" });
     this.none = element("p", { class: "soft" }, "No call yet.");
@@ -146,7 +149,12 @@ export class Story {
     return element("img", { alt: `What robot ${robot} saw`, title: `What robot ${robot} saw`, width: 160, height: 120, src, loading: later ? "lazy" : null });
   }
 
-  /** Shows a picture that the policy was shown with a call. @param {number} entry @param {number} robot @param {ArrayBuffer} png */
+  /**
+   * Shows a picture that the policy was shown with a call.
+   * @param {number} entry
+   * @param {number} robot
+   * @param {ArrayBuffer} png
+   */
   picture(entry, robot, png) {
     const seen = this.known.get(entry);
     if (!seen) return;
@@ -175,7 +183,10 @@ export class Story {
   }
 }
 
-/** Tells whether a call is one of the commands of a single step that people drive by. @param {CallEntry} call */
+/**
+ * Tells whether a call is one of the commands of a single step that people drive by.
+ * @param {CallEntry} call
+ */
 const isDriven = ({ ok, tool, reply }) => ok && tool === "together" && /"executed_steps":\s*1\D/.test(reply);
 
 const parsed = (/** @type {string} */ json) => {
@@ -186,7 +197,10 @@ const parsed = (/** @type {string} */ json) => {
   }
 };
 
-/** Writes a value as JSON for somebody to read: rows of numbers on one line, numbers to six digits, and nothing that is null. */
+/**
+ * Writes a value as JSON for somebody to read: rows of numbers on one line, numbers to six digits, and nothing
+ * that is null.
+ */
 const text = (/** @type {unknown} */ value) => (typeof value === "string" ? value
   : JSON.stringify(value, (_, inner) => readable(inner), 2).replace(/\[[-\d.,\se]+\]/g, (row) => row.replace(/\s+/g, " ")));
 const readable = (/** @type {unknown} */ value) => {

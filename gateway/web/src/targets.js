@@ -33,7 +33,12 @@ export class Targets {
     }
   }
 
-  /** Returns the target of a hand at a time, or null where no command was under way that had one. @param {number} time @param {number} robot @param {number} side */
+  /**
+   * Returns the target of a hand at a time, or null where no command was under way that had one.
+   * @param {number} time
+   * @param {number} robot
+   * @param {number} side
+   */
   at(time, robot, side) {
     const known = this.known[robot][side];
     let [low, high] = [0, known.length];

@@ -2,7 +2,10 @@
 
 /** @typedef {import("./message.js").Frame} Frame */
 
-/** Steps of a running episode come in bursts, as fast as they are simulated. They are shown within about so long. */
+/**
+ * Steps of a running episode come in bursts, as fast as they are simulated. They are shown within about so
+ * long.
+ */
 const BEHIND_S = 0.5;
 
 /** Shows the steps of a running episode one after the other. */
@@ -19,7 +22,10 @@ export class LiveTime {
     if (frame.time > last(this.frames).time) this.frames.push(frame);
   }
 
-  /** Returns the two steps and the share between them that are shown after `seconds` more. @param {number} seconds */
+  /**
+   * Returns the two steps and the share between them that are shown after `seconds` more.
+   * @param {number} seconds
+   */
   pass(seconds) {
     const end = last(this.frames).time;
     // The more there is to show, the faster it is shown, and never slower than it was.
@@ -57,7 +63,10 @@ export class RecordedTime {
     this.playing = playing;
   }
 
-  /** Returns the two steps and the share between them that are shown after `seconds` more. @param {number} seconds */
+  /**
+   * Returns the two steps and the share between them that are shown after `seconds` more.
+   * @param {number} seconds
+   */
   pass(seconds) {
     if (this.playing) {
       this.seek(this.time + seconds * this.speed);
@@ -69,7 +78,11 @@ export class RecordedTime {
   }
 }
 
-/** Returns the two frames around a time, and how far it is from the one to the other. @param {Frame[]} frames @param {number} time */
+/**
+ * Returns the two frames around a time, and how far it is from the one to the other.
+ * @param {Frame[]} frames
+ * @param {number} time
+ */
 function between(frames, time) {
   let low = 0;
   let high = frames.length - 1;

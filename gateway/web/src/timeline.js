@@ -4,7 +4,10 @@ import { colour, element, words } from "./dom.js";
 
 const ROW = 13;
 const CONTROL_HZ = 50;
-/** Rows of marks: name, colour, and a test for the entries in it. @type {{ name: string, colour: string, of: (entry: Stretch) => boolean }[]} */
+/**
+ * Rows of marks: name, colour, and a test for the entries in it.
+ * @type {{ name: string, colour: string, of: (entry: Stretch) => boolean }[]}
+ */
 const ROWS = [
   { name: "commands", colour: "--accent", of: (entry) => entry.kind === "call" && entry.ok && entry.number !== null && entry.steps > 0 },
   { name: "looks and questions", colour: "--soft", of: (entry) => entry.kind === "call" && entry.ok && entry.number !== null && !(entry.steps > 0) },
@@ -16,7 +19,11 @@ const ROWS = [
 
 /** The time line of a finished episode. */
 export class Timeline {
-  /** @param {import("./message.js").WatchedHead} head @param {import("./time.js").RecordedTime} time @param {import("./message.js").Frame[]} frames */
+  /**
+   * @param {import("./message.js").WatchedHead} head
+   * @param {import("./time.js").RecordedTime} time
+   * @param {import("./message.js").Frame[]} frames
+   */
   constructor(head, time, frames) {
     this.head = head;
     this.frames = frames;
@@ -38,7 +45,10 @@ export class Timeline {
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
   }
 
-  /** Makes the bands: each phase from where the one before it was reached to where it was, and where it never was, to the end. */
+  /**
+   * Makes the bands: each phase from where the one before it was reached to where it was, and where it never
+   * was, to the end.
+   */
   bands() {
     const { begin, end } = this.time;
     const reached = new Map(this.head.reached.map((phase) => [phase.number, phase.time_s]));

@@ -47,7 +47,12 @@ export class Board {
   }
 }
 
-/** Breaks a line into as many as its width takes. @param {CanvasRenderingContext2D} paper @param {string} line @param {number} width */
+/**
+ * Breaks a line into as many as its width takes.
+ * @param {CanvasRenderingContext2D} paper
+ * @param {string} line
+ * @param {number} width
+ */
 function broken(paper, line, width) {
   const lines = [];
   let current = "";

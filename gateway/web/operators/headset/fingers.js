@@ -16,7 +16,10 @@ import { Matrix4, Quaternion, Vector3 } from "three";
 
 /** @typedef {import("../../src/message.js").Side} Side */
 
-/** Joints of WebXR's hands, and the finger joints that follow each, in the order of commands: thumb, middle and index finger. */
+/**
+ * Joints of WebXR's hands, and the finger joints that follow each, in the order of commands: thumb, middle and
+ * index finger.
+ */
 const FINGERS = [{ tip: 4, chain: [0, 1, 2] }, { tip: 14, chain: [3, 4] }, { tip: 9, chain: [5, 6] }];
 /** Straight, the index finger of a Dex3-1 ends 0.21 m before the wrist, that of a grown person 0.18 m. */
 const SCALE = 1.15;
@@ -26,13 +29,20 @@ const DAMPING_M2 = 2e-5;
 const STEPS = 4;
 const DIFFERENCE_RAD = 1e-4;
 
-/** Axes of a G1's wrist (x to the fingers, z to the index finger's side) in those of WebXR (-z to the fingers, y to the back of the hand). */
+/**
+ * Axes of a G1's wrist (x to the fingers, z to the index finger's side) in those of WebXR (-z to the fingers, y
+ * to the back of the hand).
+ */
 const ROBOT_AXES = {
   left: turnOf([0, 0, -1], [0, 1, 0], [1, 0, 0]),
   right: turnOf([0, 0, -1], [0, -1, 0], [-1, 0, 0]),
 };
 
-/** Returns how a robot's wrist is turned that does as a person's wrist. @param {Side} side @param {Quaternion} turn */
+/**
+ * Returns how a robot's wrist is turned that does as a person's wrist.
+ * @param {Side} side
+ * @param {Quaternion} turn
+ */
 export const robotTurn = (side, turn) => turn.clone().multiply(ROBOT_AXES[side]);
 
 /** The fingers of one hand. */
@@ -71,7 +81,11 @@ export class Fingers {
     this.angles = this.angles.map((before, joint) => before + share * (this.sought[joint] - before));
   }
 
-  /** Turns the joints of one finger towards a tip at `goal`, in the frame of the wrist. @param {number[]} chain @param {Vector3} goal */
+  /**
+   * Turns the joints of one finger towards a tip at `goal`, in the frame of the wrist.
+   * @param {number[]} chain
+   * @param {Vector3} goal
+   */
   reach(chain, goal) {
     for (let step = 0; step < STEPS; step += 1) {
       const tip = this.tip(chain);
@@ -91,7 +105,10 @@ export class Fingers {
     }
   }
 
-  /** Returns the place of a fingertip in the frame of the wrist. The last link is as long as the one before. @param {number[]} chain */
+  /**
+   * Returns the place of a fingertip in the frame of the wrist. The last link is as long as the one before.
+   * @param {number[]} chain
+   */
   tip(chain) {
     const at = new Vector3();
     const turn = new Quaternion();
@@ -110,7 +127,11 @@ function turnOf(x, y, z) {
   return new Quaternion().setFromRotationMatrix(new Matrix4().makeBasis(i, j, k));
 }
 
-/** Solves a small positive definite system by elimination. @param {number[][]} matrix @param {number[]} right */
+/**
+ * Solves a small positive definite system by elimination.
+ * @param {number[][]} matrix
+ * @param {number[]} right
+ */
 function solve(matrix, right) {
   const rows = matrix.map((row, index) => [...row, right[index]]);
   const size = rows.length;

@@ -27,7 +27,12 @@ const dead = (/** @type {number | undefined} */ value) => (Math.abs(value ?? 0) 
  * }} Read
  */
 
-/** Returns the pose of a joint that is seen. @param {XRFrame} frame @param {XRJointSpace | undefined} joint @param {XRSpace} space */
+/**
+ * Returns the pose of a joint that is seen.
+ * @param {XRFrame} frame
+ * @param {XRJointSpace | undefined} joint
+ * @param {XRSpace} space
+ */
 const jointPose = (frame, joint, space) => (joint ? frame.getJointPose?.(joint, space) : undefined);
 
 /** Axes of WebXR (x right, y up, z back) in those of a pelvis (x ahead, y left, z up). */
@@ -52,7 +57,10 @@ export class Headset {
   session = null;
   /** Latest readings. @type {Record<Side, Read>} */
   data = { left: {}, right: {} };
-  /** Poses of a wearer's hand and of the robot's wrist when the one took hold of the other. @type {Record<Side, { from: Pose, hand: Pose } | null>} */
+  /**
+   * Poses of a wearer's hand and of the robot's wrist when the one took hold of the other.
+   * @type {Record<Side, { from: Pose, hand: Pose } | null>}
+   */
   held = { left: null, right: null };
   /** @type {Board | null} */
   board = null;
@@ -70,7 +78,11 @@ export class Headset {
     return (await navigator.xr?.isSessionSupported("immersive-vr").catch(() => false)) ?? false;
   }
 
-  /** Draws into the headset until its wearer leaves. `drawn` is called before every picture, and answers with lines for the wearer. @param {() => string[]} drawn */
+  /**
+   * Draws into the headset until its wearer leaves. `drawn` is called before every picture, and answers with
+   * lines for the wearer.
+   * @param {() => string[]} drawn
+   */
   async enter(drawn) {
     if (!navigator.xr) return;
     const session = await navigator.xr.requestSession("immersive-vr", { optionalFeatures: ["hand-tracking"] });
@@ -166,7 +178,10 @@ export class Headset {
     this.hands.place(side, position.clone().sub(from.position).add(hand.position), turned);
   }
 
-  /** Returns what sticks, buttons and triggers ask for, as keys and gamepads do, and the fingers of hands that are seen. */
+  /**
+   * Returns what sticks, buttons and triggers ask for, as keys and gamepads do, and the fingers of hands that
+   * are seen.
+   */
   wanted() {
     const { data } = this;
     const [left, right] = SIDES.map((side) => data[side].ctrl_thumbstickValue ?? [0, 0]);
