@@ -3,8 +3,12 @@
 import { copying, element, say, words } from "../src/dom.js";
 import { waysToConnect } from "./lines.js";
 
+/** @typedef {Parameters<typeof waysToConnect>[0]} Given */
+
+/** The section of lines to copy. */
 export class Connect {
   constructor() {
+    /** @type {Given} */
     this.given = { url: location.origin, locked: false, task: "handover", seed: 0 };
     this.about = element("p", { class: "soft", role: "status" });
     this.panels = waysToConnect(this.given).map(({ name, hint }) => {
@@ -33,7 +37,10 @@ export class Connect {
     this.show({});
   }
 
-  /** Takes over changes: task and seed, an episode that was started here, or that a token is needed. */
+  /**
+   * Takes over changes: task and seed, an episode that was started here, or that a token is needed.
+   * @param {Partial<Given>} changed
+   */
   show(changed) {
     Object.assign(this.given, changed);
     const { task, episode, locked } = this.given;

@@ -1,15 +1,34 @@
 // The lists of episodes, kept up to date.
 
-import { Refused, call } from "../operators/call.js";
-import { element, say } from "../src/dom.js";
+import { Refused, call, statusOf } from "../operators/call.js";
+import { element, reasonOf, say } from "../src/dom.js";
 
 const EVERY_MS = 1500;
+/** @type {RequestInit} */
 const WITH_COOKIE = { credentials: "same-origin" };
 
-/** In full for those with the watch link; for others the episodes that their token shows. */
+/**
+ * Lists of episodes and evaluations.
+ * @typedef {{
+ *   version?: string, held: import("./running.js").HeldEpisode[], asleep: string[],
+ *   evaluations: import("./running.js").Evaluation[], finished: import("./filters.js").FinishedEpisode[],
+ * }} Lists
+ */
+
+/** The lists, in full for those with the watch link; for others the episodes that their token shows. */
 export class Feed {
+  /**
+   * @param {import("./running.js").Running} running
+   * @param {import("./finished.js").Finished} finished
+   * @param {{ value: string }} token the server's, as its field has it
+   */
   constructor(running, finished, token) {
-    Object.assign(this, { running, finished, token, watches: true, shown: "" });
+    this.running = running;
+    this.finished = finished;
+    this.token = token;
+    this.watches = true;
+    this.lost = false;
+    this.shown = "";
     this.problem = element("p", { class: "bad", role: "alert" });
     this.version = element("span", { class: "soft" });
     this.door = this.makeDoor();
@@ -41,10 +60,11 @@ export class Feed {
       if (this.watches) this.finished.take(list.finished);
     } catch (error) {
       this.lost = true;
-      say(this.problem, `Not up to date: ${error.message}`);
+      say(this.problem, `Not up to date: ${reasonOf(error)}`);
     }
   }
 
+  /** Asks for the lists. @returns {Promise<Lists>} */
   async list() {
     if (this.watches) {
       try {
@@ -55,19 +75,18 @@ export class Feed {
         this.watches = false;
       }
     }
-    const none = { held: [], evaluations: [], finished: [] };
-    const held = await call("/v1/episodes", this.token.value).catch((error) => {
-      if (error.status === 401) return { episodes: [] };
+    const { episodes } = await call("/v1/episodes", this.token.value).catch((error) => {
+      if (statusOf(error) === 401) return { episodes: [] };
       throw error;
     });
-    return { ...none, held: held.episodes };
+    return { held: episodes, asleep: [], evaluations: [], finished: [] };
   }
 
   /** Asks for the watch link, in place of the finished episodes. */
   makeDoor() {
     const field = element("input", { name: "link", autocomplete: "off", required: true });
     const told = element("p", { class: "bad", role: "alert" });
-    const enter = async (event) => {
+    const enter = async (/** @type {Event} */ event) => {
       event.preventDefault();
       const key = field.value.trim().split("#").pop();
       const answer = await fetch("/watch", { method: "POST", headers: { authorization: `Bearer ${key}` } });

@@ -7,12 +7,22 @@ import { finishedCard } from "./finished_card.js";
 /** Cards that are shown at first, and more at each press. */
 const PAGE_CARDS = 12;
 
+/** @typedef {import("./filters.js").FinishedEpisode} FinishedEpisode */
+/** @typedef {HTMLInputElement | HTMLSelectElement} Field */
+
+/** The section of finished episodes. */
 export class Finished {
   constructor() {
+    /** @type {FinishedEpisode[]} */
     this.entries = [];
+    /** @type {Map<string, { key: string, card: HTMLElement }>} */
     this.cards = new Map();
     this.choice = chosenIn(location.search);
     this.shown = PAGE_CARDS;
+    /**
+     * The episodes that are to be compared, two at most.
+     * @type {{ run: string, name: string, button: HTMLElement }[]}
+     */
     this.beside = [];
     this.count = element("p", { class: "soft", role: "status" });
     this.grid = element("div", { class: "cards" });
@@ -29,7 +39,9 @@ export class Finished {
       },
       "Show more",
     );
-    this.fields = this.form();
+    const { filters, fields } = this.form();
+    this.filters = filters;
+    this.fields = fields;
     this.pair = element("div", { class: "pair", role: "status", hidden: true });
     this.node = element(
       "section",
@@ -43,7 +55,11 @@ export class Finished {
     );
   }
 
+  /** Makes the form of the filters, and its fields by name. */
   form() {
+    /**
+     * @type {(name: string, label: string, options: [string, string, ...unknown[]][]) => [string, HTMLElement, Field]}
+     */
     const select = (name, label, options) => {
       const field = element(
         "select",
@@ -59,6 +75,7 @@ export class Finished {
       placeholder: "task, seed, policy, folder",
       oninput: () => this.choose(),
     });
+    /** @type {[string, HTMLElement, Field][]} */
     const rows = [
       ["text", element("label", {}, element("span", {}, "Find"), text), text],
       select("task", "Task", []),
@@ -66,7 +83,7 @@ export class Finished {
       select("result", "Result", RESULTS),
       select("age", "Ended in", AGES),
     ];
-    this.filters = element(
+    const filters = element(
       "form",
       {
         class: "filters",
@@ -77,10 +94,10 @@ export class Finished {
       ...rows.map(([, label]) => label),
       element("button", { type: "button", onclick: () => this.clear() }, "Clear"),
     );
-    return Object.fromEntries(rows.map(([name, , field]) => [name, field]));
+    return { filters, fields: Object.fromEntries(rows.map(([name, , field]) => [name, field])) };
   }
 
-  /** Takes over a new list. */
+  /** Takes over a new list. @param {FinishedEpisode[]} entries */
   take(entries) {
     this.entries = entries;
     this.options("task", ({ result }) => result.task, words);
@@ -89,7 +106,12 @@ export class Finished {
     this.list();
   }
 
-  /** Offers the values that occur. One that was chosen by the address stays, although nothing has it. */
+  /**
+   * Offers the values that occur. One that was chosen by the address stays, although nothing has it.
+   * @param {string} name
+   * @param {(entry: FinishedEpisode) => string} valueOf
+   * @param {(value: string) => string} told
+   */
   options(name, valueOf, told) {
     const values = counted(this.entries, valueOf);
     const chosen = this.choice[name];
@@ -130,6 +152,7 @@ export class Finished {
         ? ""
         : `${found.length === all ? all : `${found.length} of ${all}`} ${all === 1 ? "episode" : "episodes"}`,
     );
+    /** @type {HTMLElement[]} */
     const cards = found.slice(0, this.shown).map((entry) => this.card(entry));
     this.more.hidden = found.length <= this.shown;
     if (!all)
@@ -151,6 +174,7 @@ export class Finished {
     if (!same) this.grid.replaceChildren(...cards);
   }
 
+  /** @param {FinishedEpisode} entry */
   card(entry) {
     const key = JSON.stringify(entry);
     const known = this.cards.get(entry.run);
@@ -160,6 +184,7 @@ export class Finished {
     return card;
   }
 
+  /** @param {FinishedEpisode} entry */
   besideButton(entry) {
     const name = `${words(entry.result.task)}, seed ${entry.result.seed}`;
     const button = element(

@@ -7,7 +7,11 @@ import { phasesOf } from "./filters.js";
 const CELL_PIXELS = 400;
 const CONTROL_HZ = 50;
 
-/** Makes the card of an episode, with `button` in its corner. */
+/**
+ * Makes the card of an episode, with `button` in its corner.
+ * @param {import("./filters.js").FinishedEpisode} entry
+ * @param {HTMLElement | null} button
+ */
 export function finishedCard(entry, button) {
   const { run, result, ended_unix_s: endedS, recorded, strip } = entry;
   const { all, reached } = phasesOf(entry);
@@ -58,7 +62,7 @@ export function finishedCard(entry, button) {
   );
 }
 
-/** A strip, as wide that a cell of it fills its card. */
+/** Makes the image of a strip, as wide that a cell of it fills its card. @param {string} src */
 function lastMoment(src) {
   const image = element("img", {
     src,

@@ -4,8 +4,8 @@
 const TOKEN = "TANDEM_TOKEN";
 
 /**
- * The ways to connect, each with its lines. `episode` is the id of one that this page has started; without
- * it, the lines start one.
+ * Returns the ways to connect, each with its lines. `episode` is the id of one that this page has started;
+ * without it, the lines start one.
  * @param {{ url: string, locked: boolean, task: string, seed: number, episode?: string }} given
  */
 export function waysToConnect({ url, locked, task, seed, episode }) {
@@ -62,6 +62,7 @@ export function waysToConnect({ url, locked, task, seed, episode }) {
   ];
 }
 
+/** @param {{ url: string, task: string, seed: number, episode?: string }} given */
 function python({ url, task, seed, episode }) {
   const begin = ["import tandem", "", `client = tandem.Client("${url}")`];
   if (episode)
@@ -80,7 +81,7 @@ function python({ url, task, seed, episode }) {
   );
 }
 
-const lines = (...some) => some.filter((line) => line !== null).join("\n");
+const lines = (/** @type {(string | null)[]} */ ...some) => some.filter((line) => line !== null).join("\n");
 
-/** A text as one word of a shell. */
+/** Quotes a text as one word of a shell. @param {string} text */
 const quoted = (text) => `'${text.replaceAll("'", "'\\''")}'`;

@@ -1,6 +1,6 @@
 // The start page at `/`, and the list of episodes at `/watch`.
 
-import { call } from "../operators/call.js";
+import { call, statusOf } from "../operators/call.js";
 import { element, say } from "../src/dom.js";
 import { Connect } from "./connect.js";
 import { Feed } from "./feed.js";
@@ -8,7 +8,10 @@ import { Finished } from "./finished.js";
 import { Running } from "./running.js";
 import { Tasks } from "./tasks.js";
 
-/** Shows the start page. */
+/** Links of the start page for servers on which a visitor may start episodes. */
+const STARTING = ["#tasks", "/operate"];
+
+/** Shows the start page. @param {HTMLElement} main */
 export function home(main) {
   document.title = "Tandem";
   const token = element("input", { type: "password", name: "token", autocomplete: "off" });
@@ -40,7 +43,7 @@ export function home(main) {
       lock.hidden = true;
       if (starts) tasks.take(list.tasks, front);
     } catch (error) {
-      if (error.status !== 401) throw error;
+      if (statusOf(error) !== 401) throw error;
       if (token.value) say(feed.problem, "That is not the server's token.");
       lock.hidden = false;
       connect.show({ locked: true });
@@ -60,7 +63,7 @@ export function home(main) {
   load().catch((error) => say(feed.problem, error.message));
 }
 
-/** Shows the list of episodes for those who have come by the watch link. */
+/** Shows the list of episodes for those who have come by the watch link. @param {HTMLElement} main */
 export function episodes(main) {
   document.title = "Tandem: episodes";
   const [running, finished] = [new Running(), new Finished()];
@@ -82,16 +85,17 @@ export function episodes(main) {
   feed.start();
 }
 
+/** @param {string | undefined} version @param {boolean} starts @param {HTMLElement} front */
 function hero(version, starts, front) {
   const links = [
     ["#running", "Running"],
-    starts ? ["#tasks", "Tasks"] : null,
+    ["#tasks", "Tasks"],
     ["#connect", "Connect"],
     ["#episodes", "Finished"],
-    starts ? ["/operate", "Operate"] : null,
+    ["/operate", "Operate"],
     ["/docs", "Interface"],
     ["/v1/openapi.json", "OpenAPI"],
-  ].filter(Boolean);
+  ].filter(([href]) => starts || !STARTING.includes(href));
   const actions = element(
     "p",
     { class: "actions" },

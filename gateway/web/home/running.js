@@ -6,8 +6,25 @@ const CONTROL_HZ = 50;
 /** Interval between two pictures of an episode that runs. */
 const PICTURE_MS = 2000;
 
+/**
+ * An episode that the server holds.
+ * @typedef {{
+ *   episode_id: string, task: string, seed: number | null, protocol: string, operators: string,
+ *   step: number, ended?: string | null,
+ * }} HeldEpisode
+ */
+/**
+ * An evaluation that another process plays.
+ * @typedef {{
+ *   folder: string, policies: string[], tasks: string[], played: number, succeeded: number, excluded: number,
+ *   planned: number | null, last_unix_s: number, runs: boolean,
+ * }} Evaluation
+ */
+
+/** The sections of held episodes and of evaluations. */
 export class Running {
   constructor() {
+    /** @type {Map<string, HeldCard>} */
     this.cards = new Map();
     this.none = element("p", { class: "soft" });
     this.grid = element("div", { class: "cards" });
@@ -28,16 +45,24 @@ export class Running {
     this.draw();
   }
 
-  /** Takes over a new list; `asleep` has the episodes that are put aside, and is null without the watch link. */
+  /**
+   * Takes over a new list; `asleep` has the episodes that are put aside, and is null without the watch link.
+   * @param {HeldEpisode[]} held
+   * @param {Evaluation[]} evaluations
+   * @param {Set<string> | null} asleep
+   */
   take(held, evaluations, asleep) {
     say(
       this.none,
       held.length ? "" : "None runs. An episode appears here by itself once a policy or a person starts it.",
     );
-    const cards = new Map(
-      held.map((entry) => [entry.episode_id, this.cards.get(entry.episode_id) ?? new HeldCard(entry)]),
-    );
-    for (const entry of held) cards.get(entry.episode_id).take(entry, asleep);
+    /** @type {Map<string, HeldCard>} */
+    const cards = new Map();
+    for (const entry of held) {
+      const card = this.cards.get(entry.episode_id) ?? new HeldCard(entry);
+      card.take(entry, asleep);
+      cards.set(entry.episode_id, card);
+    }
     if ([...cards.keys()].join() !== [...this.cards.keys()].join())
       this.grid.replaceChildren(...[...cards.values()].map(({ node }) => node));
     this.cards = cards;
@@ -53,8 +78,13 @@ export class Running {
 }
 
 class HeldCard {
+  /** @param {HeldEpisode} episode */
   constructor({ episode_id: id, task, seed, protocol, operators }) {
     this.source = `/watch/camera?episode=${encodeURIComponent(id)}&robot=third_person`;
+    /** The step of the newest picture, and that of the one that is shown. @type {number | null} */
+    this.wanted = null;
+    /** @type {number | null} */
+    this.drawn = null;
     this.state = badge("", "");
     this.time = element("div");
     this.picture = element("img", { alt: "" });
@@ -89,6 +119,7 @@ class HeldCard {
     );
   }
 
+  /** @param {HeldEpisode} episode @param {Set<string> | null} asleep */
   take({ episode_id: id, step, ended }, asleep) {
     const sleeps = asleep?.has(id);
     say(this.state, ended ? words(ended) : sleeps ? "put aside" : "runs");
@@ -110,7 +141,7 @@ class HeldCard {
   }
 }
 
-/** How far an evaluation is, which another process plays. */
+/** Makes the card of an evaluation. @param {Evaluation} evaluation */
 function evaluationCard({
   folder,
   policies,

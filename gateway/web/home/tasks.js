@@ -1,14 +1,28 @@
 // The tasks with their pictures, and the start of an episode.
 
-import { call } from "../operators/call.js";
-import { element, say, words } from "../src/dom.js";
+import { bearer, call } from "../operators/call.js";
+import { element, reasonOf, say, words } from "../src/dom.js";
 
 const CONTROL_HZ = 50;
 
+/** @typedef {{ protocol: string, episode_steps: number, wall_clock_s?: number | null }} Rules */
+/**
+ * A task in the server's list.
+ * @typedef {{
+ *   id: string, suite: string, instruction: string, robots: string[], phases: unknown[], protocols: Rules[],
+ * }} Task
+ */
+
+/** The section of tasks. */
 export class Tasks {
-  /** `onStart` is given the id, the task and the seed of an episode that was started. */
+  /**
+   * @param {{ value: string }} token the server's, as its field has it
+   * @param {(started: { episode: string, task: string, seed: number }) => void} onStart hears of an episode
+   *   that was started
+   */
   constructor(token, onStart) {
-    Object.assign(this, { token, onStart });
+    this.token = token;
+    this.onStart = onStart;
     this.seed = element("input", {
       type: "number",
       name: "seed",
@@ -44,7 +58,11 @@ export class Tasks {
     );
   }
 
-  /** Takes over the list of tasks, and asks for their pictures. The first one's is shown in `front`, too. */
+  /**
+   * Takes over the list of tasks, and asks for their pictures. The first one's is shown in `front`, too.
+   * @param {Task[]} tasks
+   * @param {HTMLImageElement} front
+   */
   take(tasks, front) {
     this.node.hidden = false;
     if (tasks.length) this.draw(front, tasks[0].id);
@@ -56,7 +74,7 @@ export class Tasks {
         for (const { isIntersecting, target } of changes) {
           if (!isIntersecting) continue;
           seen.unobserve(target);
-          cards.find(({ node }) => node === target).draw();
+          cards.find(({ node }) => node === target)?.draw();
         }
       },
       { rootMargin: "300px" },
@@ -64,6 +82,7 @@ export class Tasks {
     for (const { node } of cards) seen.observe(node);
   }
 
+  /** @param {Task} task */
   card(task) {
     const { id, suite, instruction, robots, phases, protocols } = task;
     const picture = element("img", { alt: "" });
@@ -75,7 +94,9 @@ export class Tasks {
         type: "button",
         class: "primary",
         "aria-label": `Start ${words(id)}`,
-        onclick: () => this.start(task, start, told, done),
+        onclick: () => {
+          this.start(task, start, told, done);
+        },
       },
       "Start",
     );
@@ -113,8 +134,9 @@ export class Tasks {
     return { node, draw: () => this.draw(picture, id) };
   }
 
+  /** Shows the picture of a task. @param {HTMLImageElement} picture @param {string} id */
   async draw(picture, id) {
-    const headers = this.token.value ? { authorization: `Bearer ${this.token.value}` } : {};
+    const headers = bearer(this.token.value);
     const answer = await fetch(`/home/picture?task=${encodeURIComponent(id)}`, { headers });
     if (!answer.ok) return;
     picture.src = URL.createObjectURL(await answer.blob());
@@ -122,6 +144,13 @@ export class Tasks {
     URL.revokeObjectURL(picture.src);
   }
 
+  /**
+   * Starts an episode.
+   * @param {Task} task
+   * @param {HTMLButtonElement} press
+   * @param {HTMLElement} told
+   * @param {HTMLElement} done
+   */
   async start({ id }, press, told, done) {
     if (!this.seed.reportValidity()) return;
     const seed = Number(this.seed.value);
@@ -145,7 +174,7 @@ export class Tasks {
       );
       this.onStart({ episode, task: id, seed });
     } catch (error) {
-      say(told, error.message);
+      say(told, reasonOf(error));
     }
     press.disabled = false;
   }

@@ -1,4 +1,4 @@
-// Requests as an operator, or as whoever starts episodes. Tokens go in a header: addresses are written to logs.
+// Requests by operators, and by people who start episodes. Tokens go in a header: addresses are written to logs.
 
 /** A refusal, in the server's words. */
 export class Refused extends Error {
@@ -9,9 +9,26 @@ export class Refused extends Error {
   }
 }
 
-/** Answers a request's JSON; without a body it is a GET. */
+/** Returns the status of a refusal; null for any other error. @param {unknown} error */
+export const statusOf = (error) => (error instanceof Refused ? error.status : null);
+
+/**
+ * Returns the headers that carry a token; none without one.
+ * @param {string | null} token
+ * @returns {Record<string, string>}
+ */
+export const bearer = (token) => (token ? { authorization: `Bearer ${token}` } : {});
+
+/**
+ * Sends a request, and returns the JSON of its answer; without a body it is a GET.
+ * @param {string} path
+ * @param {string | null} token
+ * @param {unknown} [body]
+ * @param {RequestInit} [options]
+ * @throws {Refused} in the server's words
+ */
 export async function call(path, token, body, options = { credentials: "omit" }) {
-  const headers = token ? { authorization: `Bearer ${token}` } : {};
+  const headers = bearer(token);
   if (body) headers["content-type"] = "application/json";
   const sent = body ? { method: "POST", body: JSON.stringify(body) } : {};
   const answer = await fetch(path, { ...sent, ...options, headers });

@@ -2,9 +2,10 @@
 // everybody is there, so that time stands still while a person's page is closed or out of view.
 
 import { Vector3 } from "three";
+import { reasonOf } from "../src/dom.js";
 import { SIDES } from "../src/message.js";
 import { Pace, Stage } from "../src/stage.js";
-import { call } from "./call.js";
+import { call, statusOf } from "./call.js";
 import { Hands } from "./hands.js";
 import { Headset } from "./headset/headset.js";
 import { CLOSED, OPEN, closedBy, listen, wanted, withHeadset } from "./inputs.js";
@@ -14,56 +15,116 @@ import { Wheel, tokensOf } from "./wheel.js";
 
 const SAY_MS = 20;
 const HEIGHT_RANGE_M = [0.5, 0.78];
-/** Where drawing takes longer, it is made simpler: a hand is seen to move two frames after it has. */
+/** Time of a frame from which drawing is made simpler: a hand is seen to move two frames after it has. */
 const SLOW_FRAME_MS = 40;
 /** Control steps of a press of the step button. */
 const STEPS = 10;
 /** A command that is under way takes no longer. */
 const FINISH_AGAIN_MS = 300;
-/** How much of the height the robot's picture takes: below it are the robot's own hands, where they hang. */
+/** Share of the height that the robot's picture takes: below it are the robot's own hands, where they hang. */
 const PICTURE_SHARE = 0.7;
+/** Actions of the keys that act once; Enter acts only step by step. @type {Record<string, string>} */
+const KEYS = { 1: "left", 2: "right", o: "open", c: "close", h: "level", " ": "clutch", Enter: "step" };
 
-/** Shows the page of `seat` and drives until the episode has ended. Returns its result, and what gives back what the page draws with. */
+/** @typedef {import("../src/message.js").Side} Side */
+/** @typedef {import("./wheel.js").EpisodeSeat} EpisodeSeat */
+/** @typedef {import("./wheel.js").Ended} Ended */
+/**
+ * Parts of the page that need the scene: the robot's hands, its partners, their drawing, and the newest step.
+ * @typedef {{
+ *   hands: Hands, partners: { name: string, index: number }[], stage: Stage, headset: Headset, frame: import("../src/message.js").Frame,
+ * }} Cockpit
+ */
+
+/**
+ * Shows the page of `seat` and drives until the episode has ended. Returns its result, and what gives back what the page draws with;
+ * null where there is nothing to drive.
+ * @param {HTMLElement} main
+ * @param {EpisodeSeat} seat
+ */
 export async function drive(main, seat) {
   const root = `/v1/episodes/${encodeURIComponent(seat.episode)}`;
   try {
     await call("/operate/enter", seat.token, {}, { credentials: "same-origin" });
   } catch (error) {
-    return nothing(main, error.status === 403 ? "This link drives no robot here." : error.message);
+    nothing(main, statusOf(error) === 403 ? "This link drives no robot here." : reasonOf(error));
+    return null;
   }
   const briefing = await call(`${root}/briefing`, seat.token).catch((error) => error);
-  if (briefing instanceof Error) return nothing(main, briefing.message);
+  if (briefing instanceof Error) {
+    nothing(main, briefing.message);
+    return null;
+  }
   return new DrivePage(main, seat, root, briefing).drive();
 }
 
 class DrivePage {
+  /** The hand that keys and buttons are for. @type {Side} */
+  hand = "right";
+  /** Finger joints to command. @type {Partial<Record<Side, number[]>>} */
+  fingers = {};
+  /** Shares by which triggers have closed the hands. @type {Partial<Record<Side, number>>} */
+  shares = {};
+  /** @type {number | null} */
+  heightM = null;
+  asksHeight = false;
+  /** Reason for which the person's own robot stands still. @type {string | null} */
+  paused = null;
+  /** Reason for which time stands still for others. @type {string | null} */
+  waits = null;
+  stepwise = false;
+  steps = 0;
+  finishing = false;
+  /** Robots whose people have been away for very long. @type {Set<string>} */
+  gone = new Set();
+  over = new AbortController();
+  left = false;
+  touch = new Touch();
+  pace = new Pace(SLOW_FRAME_MS);
+  /** @type {Cockpit | null} */
+  cockpit = null;
+  /** True if a step has come that is not shown yet. */
+  stale = false;
+  /** Time of the last report. @type {number | null} */
+  timeS = null;
+  /** @type {(result: Ended) => void} */
+  done = () => {};
+
+  /**
+   * @param {HTMLElement} main
+   * @param {EpisodeSeat} seat
+   * @param {string} root
+   * @param {import("./panel.js").Briefing} briefing
+   */
   constructor(main, seat, root, briefing) {
-    Object.assign(this, { seat, root, hand: "right", fingers: {}, shares: {}, heightM: null, paused: null, stepwise: false, steps: 0, gone: new Set(), over: new AbortController(), left: false, touch: new Touch() });
+    this.seat = seat;
+    this.root = root;
     this.panel = layOut(main, seat, briefing, this.touch.parts, {
       act: (action) => this.act(action),
       speak: (text) => call(`${root}/tools/say`, seat.token, { text }),
       finish: () => this.finish(),
-      look: (view) => { this.stage?.look(view === "robot" ? seat.robot : "free"); this.panel.border(view === "robot"); },
+      look: (view) => { this.cockpit?.stage.look(view === "robot" ? seat.robot : "free"); this.panel.border(view === "robot"); },
       wear: () => this.wear(),
       stepwise: (on) => { this.stepwise = on; this.label(); },
     });
     SIDES.forEach((side) => this.draggable(side));
-    this.label();
     this.wheel = new Wheel(seat, {
       scene: (scene) => this.begin(scene),
       frame: (frame) => this.see(frame),
       told: (message) => this.told(message),
       lost: (why) => this.panel.status(why),
     });
-  }
-
-  /** Drives until the episode is over. The last of it stays to be seen. */
-  drive() {
+    this.label();
+    /** The keys that are held. */
     this.keys = listen((key) => {
-      const action = { 1: "left", 2: "right", o: "open", c: "close", h: "level", " ": "clutch", Enter: this.stepwise ? "step" : null }[key];
+      const action = key === "Enter" && !this.stepwise ? undefined : KEYS[key];
       if (action) this.act(action);
       return Boolean(action);
     }, this.over.signal);
+  }
+
+  /** Drives until the episode is over. The last of it stays to be seen. */
+  async drive() {
     this.wheel.connect();
     let said = performance.now();
     const saying = setInterval(() => {
@@ -72,62 +133,70 @@ class DrivePage {
       said = now;
     }, SAY_MS);
     document.addEventListener("visibilitychange", () => this.say(0), { signal: this.over.signal });
-    this.pace = new Pace(SLOW_FRAME_MS);
     requestAnimationFrame((now) => this.draw(now, now));
-    return new Promise((done) => { this.done = done; }).then((result) => {
-      clearInterval(saying);
-      this.over.abort();
-      this.wheel.close();
-      const leave = () => {
-        this.left = true;
-        this.headset?.leave();
-        this.stage?.leave();
-      };
-      return { result, leave };
-    });
+    /** @type {Ended} */
+    const result = await new Promise((done) => { this.done = done; });
+    clearInterval(saying);
+    this.over.abort();
+    this.wheel.close();
+    const leave = () => {
+      this.left = true;
+      this.cockpit?.headset.leave();
+      this.cockpit?.stage.leave();
+    };
+    return { result, leave };
   }
 
-  /** The scene has come, for the first time or after the link was lost. */
+  /**
+   * Takes in the scene, for the first time or after the link was lost.
+   * @param {import("../src/message.js").Scene} scene
+   */
   begin(scene) {
-    if (this.stage) return;
+    if (this.cockpit) return;
     const robot = scene.head.robots.findIndex(({ name }) => name === this.seat.robot);
-    this.hands = new Hands(robot);
-    this.partners = scene.head.robots.map(({ name }, index) => ({ name, index })).filter(({ index }) => index !== robot);
-    this.stage = new Stage(this.panel.view, scene);
-    this.stage.pictureShare = PICTURE_SHARE;
+    const hands = new Hands(robot);
+    const partners = scene.head.robots.map(({ name }, index) => ({ name, index })).filter(({ index }) => index !== robot);
+    const stage = new Stage(this.panel.view, scene);
+    stage.pictureShare = PICTURE_SHARE;
     // What partners see is not what this person looks for.
-    this.stage.extras.frustums = false;
-    this.stage.look(this.seat.robot);
-    this.panel.border(true, scene.head.robots[robot].camera, PICTURE_SHARE);
-    this.headset = new Headset(this.stage, this.hands);
+    stage.extras.frustums = false;
+    stage.look(this.seat.robot);
+    this.panel.border(true);
+    this.panel.camera(scene.head.robots[robot].camera, PICTURE_SHARE);
+    this.cockpit = { hands, partners, stage, headset: new Headset(stage, hands), frame: scene.frames[0] };
     Headset.supported().then((supported) => this.panel.headset(supported));
     const scheme = matchMedia("(prefers-color-scheme: dark)");
-    scheme.addEventListener("change", () => this.stage.paint(), { signal: this.over.signal });
+    scheme.addEventListener("change", () => stage.paint(), { signal: this.over.signal });
   }
 
+  /** Takes in a step. @param {import("../src/message.js").Frame} frame */
   see(frame) {
-    this.frame = frame;
+    if (!this.cockpit) return;
+    const { hands } = this.cockpit;
+    this.cockpit.frame = frame;
     this.stale = true;
-    this.hands.see(frame);
-    this.heightM ??= frame.row[frame.layout.robots[this.hands.robot].base + 3];
+    hands.see(frame);
+    this.heightM ??= frame.row[frame.layout.robots[hands.robot].base + 3];
   }
 
-  /** Says what the robot is to do, after `passedS` more. */
+  /** Says what the robot is to do, after `passedS` more. @param {number} passedS */
   say(passedS) {
-    if (!this.hands) return;
-    const seen = !document.hidden || this.headset.session;
+    if (!this.cockpit) return;
+    const { hands, headset } = this.cockpit;
+    const seen = !document.hidden || Boolean(headset.session);
     const go = seen && !this.paused && !this.stepwise && !this.finishing;
     const own = wanted(this.keys, this.touch.wanted());
-    const want = this.headset.session ? withHeadset(own, this.headset.wanted()) : own;
-    const moves = (values) => values.some((value) => value !== 0);
+    const want = headset.session ? withHeadset(own, headset.wanted()) : own;
+    const moves = (/** @type {number[]} */ values) => values.some((value) => value !== 0);
     if (want.clutch) {
-      this.hands.letGo();
+      hands.letGo();
     } else {
-      if (moves(want.wristM_s)) this.hands.shift(this.hand, new Vector3(...want.wristM_s).multiplyScalar(passedS));
-      if (moves(want.wristRad_s)) this.hands.rotate(this.hand, new Vector3(...want.wristRad_s).multiplyScalar(passedS));
+      if (moves(want.wristM_s)) hands.shift(this.hand, new Vector3().fromArray(want.wristM_s).multiplyScalar(passedS));
+      if (moves(want.wristRad_s)) hands.rotate(this.hand, new Vector3().fromArray(want.wristRad_s).multiplyScalar(passedS));
     }
-    const move = this.hands.wrists();
-    for (const key of ["vx_m_s", "vy_m_s", "yaw_rate_rad_s"]) move[key] = want[key];
+    const { vx_m_s, vy_m_s, yaw_rate_rad_s } = want;
+    const move = hands.wrists();
+    Object.assign(move, { vx_m_s, vy_m_s, yaw_rate_rad_s });
     if (want.heightM_s !== 0 && this.heightM !== null) {
       const [least, most] = HEIGHT_RANGE_M;
       this.heightM = Math.max(least, Math.min(most, this.heightM + want.heightM_s * passedS));
@@ -149,44 +218,39 @@ class DrivePage {
 
   /** Puts the scene to where the newest step has it. */
   show() {
-    if (this.stale) this.stage.show(this.frame, this.frame, 1);
+    if (this.stale && this.cockpit) this.cockpit.stage.show(this.cockpit.frame, this.cockpit.frame, 1);
     this.stale = false;
   }
 
   /** Draws into a headset until its wearer leaves. */
   async wear() {
     try {
-      await this.headset.enter(() => {
+      await this.cockpit?.headset.enter(() => {
         this.show();
         return this.panel.said();
       });
     } catch (error) {
-      this.panel.status(`The headset cannot be used: ${error.message}`);
+      this.panel.status(`The headset cannot be used: ${reasonOf(error)}`);
     }
   }
 
-  /** Draws what is newest, and when the episode is over, its end, until the page is left. */
+  /**
+   * Draws what is newest, and when the episode is over, its end, until the page is left.
+   * @param {number} now
+   * @param {number} last
+   */
   draw(now, last) {
     if (this.left) return;
-    if (this.stage && !this.headset.session) {
+    if (this.cockpit && !this.cockpit.headset.session) {
+      const { stage } = this.cockpit;
       this.show();
-      if (this.stage.draw() && this.pace.isSlow(now - last)) this.stage.simplify();
-      if (!this.wheel.over) this.point();
+      if (stage.draw() && this.pace.isSlow(now - last)) stage.simplify();
+      if (!this.wheel.over) point(this.panel, this.cockpit);
     }
     requestAnimationFrame((next) => this.draw(next, now));
   }
 
-  /** Puts handles and partners' cursors to where they are seen. */
-  point() {
-    for (const side of SIDES) this.panel.handle(side, this.stage.project(this.hands.handle(side)));
-    for (const { name, index } of this.partners) {
-      SIDES.forEach((side, place) => {
-        const target = new Vector3().fromArray(this.frame.row, this.frame.hand(index, place).target);
-        this.panel.cursor(name, side, this.stage.project(target));
-      });
-    }
-  }
-
+  /** Takes in what the server says beside steps. @param {any} message */
   told(message) {
     if (message.kind === "waits") {
       const { for: robots } = message;
@@ -202,7 +266,7 @@ class DrivePage {
     if (message.kind !== "refused" && message.kind !== "ended" && message.kind !== "replaced") this.standing();
   }
 
-  /** Takes in the report on a command. */
+  /** Takes in the report on a command. @param {import("./panel.js").Report} report */
   report(report) {
     for (const { from, text } of report.heard ?? []) this.panel.heard(from, text);
     for (const { robot, did } of report.partners ?? []) {
@@ -213,25 +277,26 @@ class DrivePage {
         this.label();
       }
     }
-    this.time_s = report.time_s;
+    this.timeS = report.time_s;
     this.panel.facts(report, report.robots.find(({ robot }) => robot === this.seat.robot));
   }
 
   /** Says how things stand, until the episode is over. */
   standing() {
-    if (this.wheel.over) return undefined;
-    if (this.finishing) return this.panel.status("You have finished; the episode ends when everybody has.");
-    if (this.paused) return this.panel.status(this.paused);
-    if (this.waits) return this.panel.status(this.waits);
-    return this.panel.status(`${this.stepwise ? "Step by step" : "Running"}, ${(this.time_s ?? this.frame.time).toFixed(1)} s`);
+    if (this.wheel.over || !this.cockpit) return;
+    const time = `${(this.timeS ?? this.cockpit.frame.time).toFixed(1)} s`;
+    const running = `${this.stepwise ? "Step by step" : "Running"}, ${time}`;
+    const finished = this.finishing ? "You have finished; the episode ends when everybody has." : null;
+    this.panel.status(finished ?? this.paused ?? this.waits ?? running);
   }
 
+  /** @param {string} action */
   act(action) {
-    if (SIDES.includes(action)) this.hand = action;
+    if (action === "left" || action === "right") this.hand = action;
     if (action === "open") this.fingers[this.hand] = OPEN[this.hand];
     if (action === "close") this.fingers[this.hand] = CLOSED[this.hand];
-    if (action === "level") this.hands?.level(this.hand);
-    if (action === "clutch") this.hands?.letGo();
+    if (action === "level") this.cockpit?.hands.level(this.hand);
+    if (action === "clutch") this.cockpit?.hands.letGo();
     if (action === "step") this.steps += STEPS;
     if (action === "pause") this.paused = this.paused ? null : "Paused by you.";
     this.label();
@@ -239,7 +304,7 @@ class DrivePage {
 
   label() {
     this.panel.label(this);
-    if (this.frame) this.standing();
+    if (this.cockpit) this.standing();
   }
 
   /** Leaves the task, with the robots that stand still beside this one, which nobody else would have finish. */
@@ -251,33 +316,38 @@ class DrivePage {
       this.standing();
     } catch (error) {
       this.finishing = false;
-      this.panel.status(error.message);
+      this.panel.status(reasonOf(error));
     }
   }
 
-  /** Finishes as the operator with a token; a command that is under way is answered first. */
+  /**
+   * Finishes as the operator with a token; a command that is under way is answered first.
+   * @param {string} token
+   */
   async finishAs(token) {
     while (!this.wheel.over) {
       try {
         await call(`${this.root}/tools/finish`, token, {});
         return;
       } catch (error) {
-        if (error.status !== 409) throw error;
+        if (statusOf(error) !== 409) throw error;
         await new Promise((done) => setTimeout(done, FINISH_AGAIN_MS));
       }
     }
   }
 
   /**
-   * Dragging moves a wrist in the plane that faces the camera; with Shift, or by the wheel, along the line of sight. With Ctrl it turns the
+   * Lets a handle be dragged. Dragging moves a wrist in the plane that faces the camera; with Shift, or by the wheel, along the line of sight. With Ctrl it turns the
    * hand as a ball is turned that lies under the pointer, and the wheel turns it about the line of sight. Fingers choose by buttons.
+   * @param {Side} side
    */
   draggable(side) {
     const handle = this.panel.handles[side];
-    const drag = (right, down, away) => {
-      if (!this.hands) return;
-      this.hands.shift(side, this.hands.inPelvis(this.stage.way(this.hands.handle(side), right, down, away)));
-      this.panel.handle(side, this.stage.project(this.hands.handle(side)));
+    const drag = (/** @type {number} */ right, /** @type {number} */ down, /** @type {number} */ away) => {
+      if (!this.cockpit) return;
+      const { hands, stage } = this.cockpit;
+      hands.shift(side, hands.inPelvis(stage.way(hands.handle(side), right, down, away)));
+      this.panel.handle(side, stage.project(hands.handle(side)));
     };
     // Not every browser says of a finger how far it has moved.
     let [x, y] = [0, 0];
@@ -286,9 +356,10 @@ class DrivePage {
       [x, y] = [event.clientX, event.clientY];
       this.act(side);
     });
-    const turn = (right, down, round) => {
-      if (!this.hands) return;
-      this.hands.rotate(side, this.hands.inPelvis(this.stage.axis(right, down, round)));
+    const turn = (/** @type {number} */ right, /** @type {number} */ down, /** @type {number} */ round) => {
+      if (!this.cockpit) return;
+      const { hands, stage } = this.cockpit;
+      hands.rotate(side, hands.inPelvis(stage.axis(right, down, round)));
     };
     handle.addEventListener("contextmenu", (event) => event.preventDefault());
     handle.addEventListener("pointermove", (event) => {
@@ -304,5 +375,20 @@ class DrivePage {
       if (event.ctrlKey) turn(0, 0, -Math.sign(event.deltaY) * 0.1);
       else drag(0, 0, -Math.sign(event.deltaY) * 0.01);
     }, { passive: false });
+  }
+}
+
+/**
+ * Puts handles and partners' cursors to where they are seen.
+ * @param {ReturnType<typeof layOut>} panel
+ * @param {Cockpit} cockpit
+ */
+function point(panel, { hands, partners, stage, frame }) {
+  for (const side of SIDES) panel.handle(side, stage.project(hands.handle(side)));
+  for (const { name, index } of partners) {
+    SIDES.forEach((side, place) => {
+      const target = new Vector3().fromArray(frame.row, frame.hand(index, place).target);
+      panel.cursor(name, side, stage.project(target));
+    });
   }
 }

@@ -2,7 +2,7 @@
 // what the person said, at once, and not what the server has heard of it: on a slow link the hand follows its handle.
 
 import { Quaternion, Vector3 } from "three";
-import { POSE, SIDES } from "../src/message.js";
+import { POSE, SIDES, bySide } from "../src/message.js";
 
 /** A target is never further from its wrist: what is dragged against a table does not wind up. */
 const LEASH_M = 0.2;
@@ -10,16 +10,24 @@ const LEASH_RAD = 1;
 /** From a wrist to the middle of its palm, where a person takes hold of the hand. */
 const PALM_IN_WRIST_M = [0.1, 0, 0];
 
+/** @typedef {import("../src/message.js").Side} Side */
+/** @typedef {{ position: Vector3, turn: Quaternion }} Pose */
+
+/** The wrist targets of one robot. */
 export class Hands {
+  /** @type {Record<Side, Vector3 | null>} */
+  targets = { left: null, right: null };
+  /** @type {Record<Side, Quaternion | null>} */
+  turns = { left: null, right: null };
+
   /** @param {number} robot Its number in the scene. */
   constructor(robot) {
     this.robot = robot;
     this.pelvis = { position: new Vector3(), turn: new Quaternion() };
-    this.measured = Object.fromEntries(SIDES.map((side) => [side, { position: new Vector3(), turn: new Quaternion() }]));
-    this.letGo();
+    this.measured = bySide(() => ({ position: new Vector3(), turn: new Quaternion() }));
   }
 
-  /** Takes in a step. */
+  /** Takes in a step. @param {import("../src/message.js").Frame} frame */
   see(frame) {
     const { row, layout } = frame;
     readPose(row, layout.links[this.robot], this.pelvis);
@@ -32,65 +40,84 @@ export class Hands {
     });
   }
 
-  /** The wrists have no targets any more: their arms stay as they are. */
+  /** Takes the targets away: the arms stay as they are. */
   letGo() {
     this.targets = { left: null, right: null };
     this.turns = { left: null, right: null };
   }
 
-  /** Moves a target by a way in the pelvis frame. */
+  /** Moves a target by a way in the pelvis frame. @param {Side} side @param {Vector3} by */
   shift(side, by) {
     this.place(side, this.pose(side).position.add(by), this.turns[side]);
   }
 
-  /** Turns a target about an axis of the pelvis frame, as far as the leash lets it. @param {Vector3} by Its direction is the axis, its length the angle. */
+  /**
+   * Turns a target about an axis of the pelvis frame, as far as the leash lets it.
+   * @param {Side} side
+   * @param {Vector3} by Its direction is the axis, its length the angle.
+   */
   rotate(side, by) {
     const turn = new Quaternion().setFromAxisAngle(by.clone().normalize(), by.length()).multiply(this.pose(side).turn);
     if (turn.angleTo(this.measured[side].turn) < LEASH_RAD) this.place(side, this.pose(side).position, turn);
   }
 
-  /** Turns a target so that the fingers point ahead and the palm to the other hand. */
+  /** Turns a target so that the fingers point ahead and the palm to the other hand. @param {Side} side */
   level(side) {
     this.place(side, this.pose(side).position, new Quaternion());
   }
 
-  /** Puts a target to a place in the pelvis frame, no further than its leash; and turns it, if `turn` is given. */
+  /**
+   * Puts a target to a place in the pelvis frame, no further than its leash; and turns it, if `turn` is given.
+   * @param {Side} side
+   * @param {Vector3} to
+   * @param {Quaternion | null} [turn]
+   */
   place(side, to, turn = null) {
     const from = this.measured[side].position;
     this.targets[side] = to.clone().sub(from).clampLength(0, LEASH_M).add(from);
     this.turns[side] = turn;
   }
 
-  /** Where a wrist is to be, or is, and how it is turned, in the pelvis frame. */
+  /**
+   * Returns the target pose of a wrist, or its own pose where it has none, in the pelvis frame.
+   * @param {Side} side
+   * @returns {Pose}
+   */
   pose(side) {
     const { position, turn } = this.measured[side];
     return { position: (this.targets[side] ?? position).clone(), turn: (this.turns[side] ?? turn).clone() };
   }
 
-  /** A way in the world as one in the pelvis frame. */
+  /** Turns a way in the world into one in the pelvis frame. @param {Vector3} way */
   inPelvis(way) {
     return way.clone().applyQuaternion(this.pelvis.turn.clone().invert());
   }
 
-  /** Where a handle is, in the world: in the palm of a hand that is where it is to be. */
+  /**
+   * Returns the place of a handle in the world: in the palm of a hand that is where it is to be.
+   * @param {Side} side
+   */
   handle(side) {
     const { position, turn } = this.pose(side);
     const palm = new Vector3().fromArray(PALM_IN_WRIST_M).applyQuaternion(turn).add(position);
     return palm.applyQuaternion(this.pelvis.turn).add(this.pelvis.position);
   }
 
-  /** The part of a `move_wrists` entry that is about wrists. */
+  /** Returns the part of a `move_wrists` entry that is about wrists. @returns {Record<string, unknown>} */
   wrists() {
+    /** @type {Record<string, unknown>} */
     const move = { carried: true };
     for (const side of SIDES) {
-      if (this.targets[side]) move[`${side}_position_m`] = this.targets[side].toArray();
-      const turn = this.turns[side];
+      const { [side]: target } = this.targets;
+      const { [side]: turn } = this.turns;
+      if (target) move[`${side}_position_m`] = target.toArray();
       if (turn) move[`${side}_quaternion_wxyz`] = [turn.w, turn.x, turn.y, turn.z];
     }
     return move;
   }
 }
 
+/** @param {Float32Array} row @param {number} at @param {Pose} pose */
 function readPose(row, at, { position, turn }) {
   if (at + POSE > row.length) throw new Error("a row is too short");
   position.fromArray(row, at);

@@ -1,6 +1,18 @@
 // What a person wants of the robot, from keys, buttons and a gamepad.
 
+/** @typedef {import("../src/message.js").Side} Side */
+/** @typedef {Partial<Record<Side, number>>} Triggers Shares by which the fingers of hands are closed. */
+/**
+ * Wishes of a person: velocities of base, selected wrist and height, fingers by share or by joint, and whether the arms are to rest.
+ * @typedef {{
+ *   vx_m_s: number, vy_m_s: number, yaw_rate_rad_s: number, wristM_s: number[], wristRad_s: number[], heightM_s: number,
+ *   triggers: Triggers, fingers?: Partial<Record<Side, number[]>>, clutch: boolean,
+ * }} Wanted
+ */
+
+/** Joint angles of the fingers of open hands, in radians. */
 export const OPEN = { left: [0, -0.3, 0, 0, 0, 0, 0], right: [0, 0.3, 0, 0, 0, 0, 0] };
+/** Joint angles of the fingers of closed hands, in radians. */
 export const CLOSED = { left: [0, 0.75, 0.8, -1.1, -1.3, -1.1, -1.3], right: [0, -0.75, -0.8, 1.1, 1.3, 1.1, 1.3] };
 const WALK_M_S = 0.3;
 const TURN_RAD_S = 0.5;
@@ -13,19 +25,37 @@ const BASE_KEYS = { w: [1, 0, 0], s: [-1, 0, 0], a: [0, 1, 0], d: [0, -1, 0], q:
 const WRIST_KEYS = {
   ArrowUp: [1, 0, 0], ArrowDown: [-1, 0, 0], ArrowLeft: [0, 1, 0], ArrowRight: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1],
 };
-/** Axes of the pelvis frame, about which a hand turns: fingers up and down, to the left and right, and about themselves. */
+/**
+ * Axes of the pelvis frame, about which a hand turns: fingers up and down, to the left and right, and about
+ * themselves.
+ */
 const ROTATION_KEYS = { i: [0, -1, 0], k: [0, 1, 0], j: [0, 0, 1], l: [0, 0, -1], u: [-1, 0, 0], m: [1, 0, 0] };
+/** @type {Record<string, number>} */
 const HEIGHT_KEYS = { r: 1, f: -1 };
 
-const within = (event, what) => event.target instanceof Element && Boolean(event.target.closest(what));
-/** Whether a key is for what has the focus: texts and lists take all, buttons and boxes those by which they are pressed. */
-const taken = (event) => within(event, "input:not([type=checkbox]), select, textarea") || ([" ", "Enter"].includes(event.key) && within(event, "button, input, a"));
-const nameOf = (event) => (event.key.length === 1 ? event.key.toLowerCase() : event.key);
-const sum = (keys, table, length) =>
-  [...keys].map((key) => table[key]).filter(Boolean).reduce((total, one) => total.map((value, axis) => value + one[axis]), Array(length).fill(0));
+const within = (/** @type {Event} */ event, /** @type {string} */ what) => event.target instanceof Element && Boolean(event.target.closest(what));
+/**
+ * Tells whether a key is for what has the focus: texts and lists take all, buttons and boxes those by which
+ * they are pressed.
+ */
+const taken = (/** @type {KeyboardEvent} */ event) => within(event, "input:not([type=checkbox]), select, textarea") || ([" ", "Enter"].includes(event.key) && within(event, "button, input, a"));
+const nameOf = (/** @type {KeyboardEvent} */ event) => (event.key.length === 1 ? event.key.toLowerCase() : event.key);
+/**
+ * Sums the vectors of the keys that a table has.
+ * @param {Set<string>} keys
+ * @param {Record<string, number[]>} table
+ */
+const sum = (keys, table) =>
+  [...keys].map((key) => table[key]).filter(Boolean).reduce((total, one) => total.map((value, axis) => value + one[axis]), [0, 0, 0]);
 
-/** Listens to keys until `signal` aborts; `pressed(key)` hears of those that act once. */
+/**
+ * Listens to keys until `signal` aborts; `pressed(key)` hears of those that act once, and tells whether it has used the key. Returns
+ * the keys that are held.
+ * @param {(key: string) => boolean} pressed
+ * @param {AbortSignal} signal
+ */
 export function listen(pressed, signal) {
+  /** @type {Set<string>} */
   const keys = new Set();
   addEventListener("keydown", (event) => {
     if (taken(event) || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -40,9 +70,12 @@ export function listen(pressed, signal) {
   return keys;
 }
 
-const stick = (value) => (Math.abs(value ?? 0) < STICK_DEAD ? 0 : value);
+const stick = (/** @type {number | undefined} */ value) => (Math.abs(value ?? 0) < STICK_DEAD ? 0 : value ?? 0);
 
-/** The first gamepad: two sticks for the base, triggers for the fingers, either bumper for the clutch. */
+/**
+ * Reads the first gamepad: two sticks for the base, triggers for the fingers, either bumper for the clutch.
+ * @returns {{ base: number[], triggers: Triggers, clutch: boolean }}
+ */
 function gamepad() {
   const pad = [...(navigator.getGamepads?.() ?? [])].find((one) => one?.connected);
   if (!pad) return { base: [0, 0, 0], triggers: {}, clutch: false };
@@ -51,24 +84,34 @@ function gamepad() {
   return { base: [-y, -x, -turn], triggers: { left, right }, clutch: leftBumper + rightBumper > 0.5 };
 }
 
-/** What keys, gamepad and the pads for thumbs ask for now: velocities of base, selected wrist and height, triggers and clutch. */
+/**
+ * Reads what keys, gamepad and the pads for thumbs ask for now.
+ * @param {Set<string>} keys
+ * @param {{ base: number[], height: number }} thumbs
+ * @returns {Wanted}
+ */
 export function wanted(keys, thumbs) {
   const pad = gamepad();
-  const most = (value) => Math.max(-1, Math.min(1, value));
-  const base = sum(keys, BASE_KEYS, 3).map((value, axis) => most(value + pad.base[axis] + thumbs.base[axis]));
+  const most = (/** @type {number} */ value) => Math.max(-1, Math.min(1, value));
+  const base = sum(keys, BASE_KEYS).map((value, axis) => most(value + pad.base[axis] + thumbs.base[axis]));
   return {
     vx_m_s: base[0] * WALK_M_S,
     vy_m_s: base[1] * WALK_M_S,
     yaw_rate_rad_s: base[2] * TURN_RAD_S,
-    wristM_s: sum(keys, WRIST_KEYS, 3).map((value) => value * WRIST_M_S),
-    wristRad_s: sum(keys, ROTATION_KEYS, 3).map((value) => value * WRIST_RAD_S),
+    wristM_s: sum(keys, WRIST_KEYS).map((value) => value * WRIST_M_S),
+    wristRad_s: sum(keys, ROTATION_KEYS).map((value) => value * WRIST_RAD_S),
     heightM_s: HEIGHT_M_S * [...keys].reduce((total, key) => total + (HEIGHT_KEYS[key] ?? 0), thumbs.height),
     triggers: pad.triggers,
     clutch: pad.clutch,
   };
 }
 
-/** The same with what a headset's controllers ask for. */
+/**
+ * Adds what a headset's controllers ask for.
+ * @param {Wanted} want
+ * @param {ReturnType<import("./headset/headset.js").Headset["wanted"]>} worn
+ * @returns {Wanted}
+ */
 export function withHeadset(want, { base, height, triggers, fingers }) {
   const [ahead, left, turn] = base;
   return {
@@ -82,5 +125,9 @@ export function withHeadset(want, { base, height, triggers, fingers }) {
   };
 }
 
-/** Fingers of `hand` that are closed by a share. */
+/**
+ * Returns joint angles of the fingers of `hand` that are closed by a share.
+ * @param {Side} hand
+ * @param {number} share
+ */
 export const closedBy = (hand, share) => OPEN[hand].map((open, joint) => open + share * (CLOSED[hand][joint] - open));

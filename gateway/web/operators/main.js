@@ -7,7 +7,17 @@ import { start } from "./start.js";
 
 const KEPT = "tandem-operator";
 
-/** What the link gave: from the fragment, which browsers send to nobody; then from this tab, so that a page may be loaded again. */
+/**
+ * Place of a person: a robot of an episode or of a collection, or a collection for whoever runs it; `still` has the robots that stand
+ * still beside this one, with their tokens.
+ * @typedef {{ token: string, robot: string, episode?: string, still?: string, collection?: string }} Seat
+ */
+
+/**
+ * Returns what the link gave: from the fragment, which browsers send to nobody; then from this tab, so that a
+ * page may be loaded again.
+ * @returns {Seat | null}
+ */
 function seat() {
   const given = new URLSearchParams(location.hash.slice(1));
   if (given.has("token")) {
@@ -18,15 +28,16 @@ function seat() {
   return JSON.parse(sessionStorage.getItem(KEPT) ?? "null");
 }
 
-/** Shows what whoever comes is to see. */
+/** Shows what whoever comes is to see. @param {HTMLElement} main */
 export function operate(main) {
   // A second link pasted into the same tab changes the fragment alone.
   addEventListener("hashchange", () => location.hash.includes("token=") && (seat(), location.reload()));
   const asked = new URLSearchParams(location.search);
-  if (asked.has("run")) return start(main, Object.fromEntries(asked));
+  const run = asked.get("run");
+  if (run) return start(main, { run, at: Number(asked.get("at")), task: asked.get("task") ?? "", seed: asked.get("seed") ?? "", protocol: asked.get("protocol") ?? "" });
   if (asked.has("task")) return start(main, null, asked.get("task"));
   const held = seat();
   if (!held) return start(main);
   if (held.collection) return held.robot ? collect(main, held) : overview(main, held);
-  return drive(main, held);
+  return drive(main, { ...held, episode: held.episode ?? "" });
 }

@@ -1,10 +1,10 @@
 // What the page of a person who drives is made of.
 
-import { element, say, words } from "../src/dom.js";
-import { SIDES } from "../src/message.js";
+import { element, reasonOf, say, words } from "../src/dom.js";
+import { SIDES, bySide } from "../src/message.js";
 import { byTouch } from "./touch.js";
 
-/** How a person drives. */
+/** Ways to drive by keyboard and mouse. */
 const WAYS = [
   ["Move a hand", "drag L or R; with Shift, or by the wheel, towards you and away; or arrow keys, Page Up and Page Down"],
   ["Turn it", "Ctrl and drag, or I K, J L, U M; Level points its fingers ahead"],
@@ -12,7 +12,7 @@ const WAYS = [
   ["Gamepad", "sticks walk and turn, triggers close the hands, bumpers rest the arms where they are"],
 ];
 
-/** The same by fingers. */
+/** Ways to drive by fingers. */
 const TOUCH_WAYS = [
   ["Move a hand", "drag L or R: across what you see, in and out of it, or turning it, as the buttons between the pads say"],
   ["Walk", "push the left pad; the right one turns, and lifts and lowers the body"],
@@ -21,23 +21,52 @@ const TOUCH_WAYS = [
 /** No handle is nearer to the border. */
 const BORDER_PX = 32;
 
-/** There is nothing to drive, and why. */
+/** Says that there is nothing to drive, and why. @param {HTMLElement} main @param {string} why */
 export function nothing(main, why) {
   main.replaceChildren(element("h1", {}, "Nothing to drive"), element("p", { class: "bad", role: "alert" }, why),
     element("p", {}, "The link may be of another start of the server, or the episode has ended. ", element("a", { href: "/operate" }, "Start another")));
 }
 
-/** Lays the page out; answers with what changes it. `pads` are for thumbs; `on` hears what the person does beside driving. */
+/** @typedef {import("../src/message.js").Side} Side */
+/** @typedef {{ x: number, y: number, ahead: boolean }} Seen Place in the view, from -1 to 1. */
+/** @typedef {{ number: string, id: string, description: string }} PhaseInfo */
+/** @typedef {{ instructions: { robot: string, instruction: string }[], phases?: PhaseInfo[] }} Briefing */
+/** @typedef {Record<Side, { state?: string, grip?: string }>} OwnReport Report on the hands of a robot. */
+/**
+ * Report on a command.
+ * @typedef {{
+ *   time_s: number, budget: { steps_left: number }, robots: (OwnReport & { robot: string })[],
+ *   phases?: { number: string, id: string, time_s: number }[], heard?: { from: string, text: string }[],
+ *   partners?: { robot: string, did: string }[],
+ * }} Report
+ */
+/**
+ * Acts of a person beside driving.
+ * @typedef {{
+ *   act: (action: string) => void, speak: (text: string) => Promise<{ heard?: { from: string, text: string }[] }>, finish: () => void, look: (view: string) => void,
+ *   wear: () => void, stepwise: (on: boolean) => void,
+ * }} Acts
+ */
+
+/**
+ * Lays the page out; answers with what changes it. `pads` are for thumbs; `on` hears what the person does beside driving.
+ * @param {HTMLElement} main
+ * @param {import("./wheel.js").EpisodeSeat} seat
+ * @param {Briefing} briefing
+ * @param {HTMLElement[]} pads
+ * @param {Acts} on
+ */
 export function layOut(main, { robot, episode, collection }, briefing, pads, on) {
   const touch = byTouch();
   const part = briefing.instructions.find((entry) => entry.robot === robot)?.instruction ?? "";
   const status = element("p", { role: "status", class: "operate-status" }, "Connecting.");
-  const handles = Object.fromEntries(SIDES.map((side) => [side, element("button", { type: "button", class: `handle ${side}`, "aria-label": `${side} wrist: drag` }, side[0].toUpperCase())]));
+  const handles = bySide((side) => element("button", { type: "button", class: `handle ${side}`, "aria-label": `${side} wrist: drag` }, side[0].toUpperCase()));
   const border = element("div", { class: "operate-border", title: `what robot ${robot} sees` });
   const view = element("div", { class: "view" });
   const place = element("div", { class: "operate-view" }, view, border, ...Object.values(handles));
   const facts = element("p", { class: "soft" });
   const phases = new Phases(briefing.phases ?? []);
+  /** @type {(text: string, action: string, key?: string, title?: string) => HTMLButtonElement} */
   const button = (text, action, key, title) => element("button", { type: "button", title, onclick: () => on.act(action) }, key && !touch ? `${text} (${key})` : text);
   const pause = button("Pause", "pause");
   const step = button("Step", "step", "Enter");
@@ -66,41 +95,51 @@ export function layOut(main, { robot, episode, collection }, briefing, pads, on)
       element("div", {}, element("div", { class: "cockpit" }, place, ...thumbs), facts),
       element("div", { class: "side" }, controls, element("h2", {}, "Talk"), ...chat.elements),
       phases.node));
+  /** @type {Map<string, HTMLElement>} */
   const cursors = new Map();
   const size = { width: 0, height: 0 };
   new ResizeObserver(() => Object.assign(size, { width: place.clientWidth, height: place.clientHeight })).observe(place);
   return {
     view, handles,
     heard: chat.heard,
-    status: (said) => say(status, said),
-    /** How the episode stands, and what the hands do, as the page says it. */
-    said: () => [status.textContent, facts.textContent],
-    /** Shows where the robot's picture ends, if the view is the robot's. */
-    border: (shown, camera, share) => {
-      border.hidden = !shown;
-      if (!camera) return;
+    status: (/** @type {string} */ said) => say(status, said),
+    /** Returns how the episode stands, and what the hands do, as the page says it. */
+    said: () => [status, facts].map((line) => line.textContent ?? ""),
+    /** Shows where the robot's picture ends, if the view is the robot's. @param {boolean} shown */
+    border: (shown) => { border.hidden = !shown; },
+    /**
+     * Takes over the camera of the robot, and the share of the height that its picture takes.
+     * @param {import("../src/message.js").CameraHead} camera
+     * @param {number} share
+     */
+    camera: (camera, share) => {
       place.style.setProperty("--seen", String(camera.width / camera.height));
       place.style.setProperty("--share", String(share));
     },
-    headset: (supported) => { wear.hidden = !supported; },
-    handle: (side, at) => put(handles[side], at, true, size),
-    /** Where a partner wants a wrist to be. */
+    headset: (/** @type {boolean} */ supported) => { wear.hidden = !supported; },
+    handle: (/** @type {Side} */ side, /** @type {Seen} */ at) => put(handles[side], at, true, size),
+    /** Shows where a partner wants a wrist to be. @param {string} name @param {Side} side @param {Seen} at */
     cursor: (name, side, at) => {
       const key = name + side;
-      if (!cursors.has(key)) {
-        cursors.set(key, element("span", { class: "cursor", "aria-hidden": "true" }, `${name} ${side[0].toUpperCase()}`));
-        place.append(cursors.get(key));
+      let cursor = cursors.get(key);
+      if (!cursor) {
+        cursor = element("span", { class: "cursor", "aria-hidden": "true" }, `${name} ${side[0].toUpperCase()}`);
+        cursors.set(key, cursor);
+        place.append(cursor);
       }
-      put(cursors.get(key), at, false, size);
+      put(cursor, at, false, size);
     },
+    /** Shows a report on a command. @param {Report} reply @param {OwnReport | undefined} own */
     facts: (reply, own) => {
       say(facts, factsOf(reply, own));
       phases.show(new Map((reply.phases ?? []).map(({ number, time_s: timeS }) => [number, timeS])));
     },
-    /** The episode is over: what has come of it, and where it is found. */
+    /**
+     * Shows that the episode is over: what has come of it, and where it is found.
+     * @param {import("./wheel.js").Ended} result
+     */
     ended: (result) => {
-      const reached = Object.entries(result.phases ?? {}).filter(([, timeS]) => timeS !== null);
-      phases.show(new Map(reached), true);
+      phases.show(new Map(Object.entries(result.phases ?? {})), true);
       const isComplete = result.ended === "task_complete";
       status.classList.toggle("good", isComplete);
       say(status, isComplete ? "Done: the task is complete." : `The episode has ended: ${words(result.ended)}.`);
@@ -110,6 +149,10 @@ export function layOut(main, { robot, episode, collection }, briefing, pads, on)
       chat.close();
       if (!collection) after.replaceChildren(...whereFound(episode));
     },
+    /**
+     * Shows which hand is chosen, and whether time passes by itself.
+     * @param {{ hand: Side, paused: string | null, stepwise: boolean }} how
+     */
     label: ({ hand, paused, stepwise: steps }) => {
       say(pause, paused ? "Go on" : "Pause");
       step.hidden = !steps;
@@ -118,28 +161,36 @@ export function layOut(main, { robot, episode, collection }, briefing, pads, on)
   };
 }
 
-/** What is asked, phase by phase, where the server tells it. */
+/** The list of what is asked, phase by phase, where the server tells it. */
 class Phases {
+  /** @param {PhaseInfo[]} phases */
   constructor(phases) {
-    this.times = new Map(phases.map(({ number }) => [number, element("span", { class: "soft" }, "not yet")]));
-    this.rows = new Map(phases.map(({ number, id, description }) => [number, element("li", {},
-      element("span", { title: description }, `${number} ${words(id)}`, element("span", { class: "what soft" }, description)), this.times.get(number))]));
-    this.node = element("section", { hidden: phases.length === 0 }, element("h2", {}, "Phases"), element("ol", { class: "phases" }, ...this.rows.values()));
+    this.rows = phases.map(({ number, id, description }) => {
+      const time = element("span", { class: "soft" }, "not yet");
+      const row = element("li", {},
+        element("span", { title: description }, `${number} ${words(id)}`, element("span", { class: "what soft" }, description)), time);
+      return { number, row, time };
+    });
+    this.node = element("section", { hidden: phases.length === 0 }, element("h2", {}, "Phases"),
+      element("ol", { class: "phases" }, ...this.rows.map(({ row }) => row)));
   }
 
-  /** Those of `reached` have been, at these times; the others not yet, or, once it is `over`, never. */
+  /**
+   * Shows those of `reached` that have a time as done; the others not yet, or, once it is `over`, never.
+   * @param {Map<string, number | null>} reached
+   * @param {boolean} [over]
+   */
   show(reached, over = false) {
-    for (const [number, row] of this.rows) {
-      const timeS = reached.get(number);
-      row.classList.toggle("done", timeS !== undefined);
-      const time = this.times.get(number);
-      time.className = timeS === undefined ? "soft" : "good";
-      say(time, timeS === undefined ? (over ? "not reached" : "not yet") : `${timeS.toFixed(1)} s`);
+    for (const { number, row, time } of this.rows) {
+      const timeS = reached.get(number) ?? null;
+      row.classList.toggle("done", timeS !== null);
+      time.className = timeS === null ? "soft" : "good";
+      say(time, timeS === null ? (over ? "not reached" : "not yet") : `${timeS.toFixed(1)} s`);
     }
   }
 }
 
-/** Where an episode that is over is found again. */
+/** Says where an episode that is over is found again. @param {string} episode */
 function whereFound(episode) {
   return [
     element("p", {}, "Its recording is ", element("code", {}, episode), " in the server's folder of runs. ",
@@ -148,43 +199,57 @@ function whereFound(episode) {
   ];
 }
 
-/** What is clicked takes no focus, and a text that had it loses it, so that keys drive; who comes by the keyboard gives it. */
+/**
+ * Gives no focus to what is clicked, and takes it from a text that had it, so that keys drive; who comes by the
+ * keyboard gives it.
+ * @param {MouseEvent} event
+ */
 function keepKeys(event) {
-  if (!event.target.closest("button:not(.handle), input[type=checkbox], label")) return;
+  if (!(event.target instanceof Element) || !event.target.closest("button:not(.handle), input[type=checkbox], label")) return;
   event.preventDefault();
-  document.activeElement?.blur();
+  if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
 }
 
-/** Puts something where it is seen; a handle that lies outside of the picture is at its border, and other things are not shown. It is
- * moved by what needs no layout and no painting. */
+/**
+ * Puts something where it is seen; a handle that lies outside of the picture is at its border, and other things are not shown. It is
+ * moved by what needs no layout and no painting.
+ * @param {HTMLElement} thing
+ * @param {Seen} at
+ * @param {boolean} always
+ * @param {{ width: number, height: number }} size
+ */
 function put(thing, { x, y, ahead }, always, size) {
   const inside = ahead && Math.abs(x) <= 1 && Math.abs(y) <= 1;
   thing.hidden = !inside && !always;
   // What lies behind is seen mirrored.
   const [u, v] = ahead ? [x, y] : [-x, -Math.abs(y) - 1];
-  const within = (share, length) => Math.max(BORDER_PX, Math.min(length - BORDER_PX, share * length)).toFixed(1);
+  const within = (/** @type {number} */ share, /** @type {number} */ length) => Math.max(BORDER_PX, Math.min(length - BORDER_PX, share * length)).toFixed(1);
   thing.style.transform = `translate(${within((1 + u) / 2, size.width)}px, ${within((1 - v) / 2, size.height)}px) ${always ? "translate(-50%, -50%)" : "translate(-50%, .8rem)"}`;
 }
 
-/** What people say to each other. */
+/**
+ * Makes the list of what people say to each other, and its form.
+ * @param {string} robot
+ * @param {Acts["speak"]} speak
+ */
 function talk(robot, speak) {
   const chat = element("ul", { class: "chat", "aria-live": "polite" });
   const text = element("input", { maxlength: 500, "aria-label": "Say to the others", placeholder: "Say to the others" });
-  const heard = (from, said) => { chat.append(element("li", {}, element("strong", {}, `${from}: `), said)); chat.scrollTop = chat.scrollHeight; };
-  const submit = (event) => {
+  const heard = (/** @type {string} */ from, /** @type {string} */ said) => { chat.append(element("li", {}, element("strong", {}, `${from}: `), said)); chat.scrollTop = chat.scrollHeight; };
+  const submit = (/** @type {Event} */ event) => {
     event.preventDefault();
     const said = text.value.trim();
     if (!said) return;
     text.value = "";
     // Keys drive again.
     text.blur();
-    speak(said).then((reply) => { heard(robot, said); (reply.heard ?? []).forEach((word) => heard(word.from, word.text)); }, (error) => heard("not said", error.message));
+    speak(said).then((reply) => { heard(robot, said); (reply.heard ?? []).forEach((word) => heard(word.from, word.text)); }, (error) => heard("not said", reasonOf(error)));
   };
   const form = element("form", { onsubmit: submit, class: "tools" }, text, element("button", {}, "Say"));
   return { heard, elements: [chat, form], close: () => { form.hidden = true; } };
 }
 
-/** What the hands do, and what is left. */
+/** Says what the hands do, and what is left. @param {Report} reply @param {OwnReport | undefined} own */
 function factsOf(reply, own) {
   const hands = own ? SIDES.map((side) => {
     const { state: does, grip } = own[side];

@@ -1,7 +1,7 @@
 // The start of an episode whose robots people drive: what is played, and a link for each person.
 
-import { element, say, words } from "../src/dom.js";
-import { call } from "./call.js";
+import { element, reasonOf, say, words } from "../src/dom.js";
+import { call, statusOf } from "./call.js";
 import { linkRow, nearby } from "./links.js";
 
 const CONTROL_HZ = 50;
@@ -9,17 +9,43 @@ const CONTROL_HZ = 50;
 /** The longest that an episode may wait for somebody who is away. */
 const PATIENCE_S = 600;
 
-/** A field with its name before it and what it means below. */
+/** @typedef {import("../home/tasks.js").Task} Task */
+/**
+ * An episode that has begun.
+ * @typedef {{
+ *   episode_id: string, operators: { robot: string, token: string }[],
+ *   instructions: { robot: string, instruction: string }[],
+ * }} Started
+ */
+/**
+ * A moment of a finished episode.
+ * @typedef {{ run: string, at: number, task: string, seed: string, protocol: string }} Moment
+ */
+
+/**
+ * Makes a field with its name before it and what it means below.
+ * @param {string} text
+ * @param {HTMLElement} field
+ * @param {HTMLElement | null} [help]
+ */
 const labelled = (text, field, help = null) => element("p", {}, element("label", {}, element("span", {}, text), field), help);
 
-/** Who may drive a robot; `policy` is the learned one that the server was started with, if it was. */
+/**
+ * Lists who may drive a robot; `policy` is the learned one that the server was started with, if it was.
+ * @param {string | null} policy
+ */
 const playersWith = (policy) => [
   ["person", "a person"], ["expert", "the task's expert, a script that sees everything"],
   ...(policy ? [["policy", `the learned policy ${policy}`]] : []),
   ["program", "a program or an agent of yours"], ["still", "nobody: it stands still"],
 ];
 
-/** Shows the form: of a new episode, of the task `wanted` if one was chosen, or of one that goes on where `from`, a finished one, stood at a moment. */
+/**
+ * Shows the form: of a new episode, of the task `wanted` if one was chosen, or of one that goes on at a moment of a finished one.
+ * @param {HTMLElement} main
+ * @param {Moment | null} [from]
+ * @param {string | null} [wanted]
+ */
 export function start(main, from = null, wanted = null) {
   const task = element("select", { name: "task", required: true });
   const seed = element("input", { name: "seed", type: "number", min: 0, max: 4294967295, step: 1, value: 0, required: true });
@@ -29,9 +55,11 @@ export function start(main, from = null, wanted = null) {
   locked.hidden = true;
   const what = element("span", { class: "soft" });
   const players = element("div");
+  /** @type {string | null} */
   let policy = null;
   const refusal = element("p", { class: "bad", role: "alert" });
   const links = element("div");
+  /** @type {Task[]} */
   let tasks = [];
 
   const offer = () => {
@@ -49,8 +77,9 @@ export function start(main, from = null, wanted = null) {
       ({ tasks } = await call("/v1/tasks", token.value));
       ({ policy } = await call("/operate/policy", token.value));
     } catch (error) {
-      locked.hidden &&= error.status !== 401;
-      refusal.textContent = error.status === 401 ? "This server wants its token." : error.message;
+      const wantsToken = statusOf(error) === 401;
+      if (wantsToken) locked.hidden = false;
+      refusal.textContent = wantsToken ? "This server wants its token." : reasonOf(error);
       return;
     }
     const offered = from ? tasks.filter(({ id }) => id === from.task) : tasks;
@@ -61,10 +90,10 @@ export function start(main, from = null, wanted = null) {
   token.addEventListener("change", load);
 
   const press = element("button", { class: "large primary" }, "Start");
-  const begin = async (event) => {
+  const begin = async (/** @type {SubmitEvent} */ event) => {
     event.preventDefault();
     refusal.textContent = "";
-    const chosen = new FormData(event.target);
+    const chosen = new FormData(form);
     if (!["A", "B", "C"].some((robot) => chosen.get(robot) === "person")) {
       refusal.textContent = "Somebody has to drive a robot: choose a person for one of them. (The command tandem demo has experts play by themselves.)";
       return;
@@ -75,46 +104,50 @@ export function start(main, from = null, wanted = null) {
     const body = { task: task.value, seed: Number(seed.value), protocol: protocol.value, short: true, operators: "per_robot", patience_s: PATIENCE_S, talk: true };
     try {
       const started = from
-        ? await call("/watch/take_over", token.value, { run: from.run, time_s: Number(from.at), protocol: protocol.value }, { credentials: "same-origin" })
+        ? await call("/watch/take_over", token.value, { run: from.run, time_s: from.at, protocol: protocol.value }, { credentials: "same-origin" })
         : await call("/v1/episodes", token.value, body);
       links.replaceChildren(...await linksOf(started, chosen, token.value));
       links.scrollIntoView({ block: "nearest" });
     } catch (error) {
-      refusal.textContent = error.message;
+      refusal.textContent = reasonOf(error);
     }
     press.disabled = false;
     say(press, "Start");
   };
   const place = from
-    ? element("p", {}, `Goes on where ${from.run} stood at ${Number(from.at).toFixed(1)} s: ${words(from.task)}, seed ${from.seed}. It becomes an episode of its own, with a whole budget ahead.`)
+    ? element("p", {}, `Goes on where ${from.run} stood at ${from.at.toFixed(1)} s: ${words(from.task)}, seed ${from.seed}. It becomes an episode of its own, with a whole budget ahead.`)
     : null;
+  const form = element("form", { onsubmit: begin, class: "operate-form" }, place ?? labelled("Task", task, what),
+    from ? "" : labelled("Seed", seed, element("span", { class: "soft" }, "Says where things stand at the start: the same number, the same start.")),
+    labelled("Rules", protocol, element("span", { class: "soft" }, "The budget: seconds that pass in the world, and the minutes that you may take for them.")), players, locked, press, refusal);
   main.replaceChildren(
     element("p", {}, element("a", { href: "/" }, "Start page")),
     element("h1", {}, from ? "Take over" : "Operate robots together"),
     element("p", {}, "Each person drives one robot, on a page of their own. Time passes while everybody's page is open and in view, and stands still while one is away. If you are alone, let the expert drive the others."),
-    element("form", { onsubmit: begin, class: "operate-form" }, place ?? labelled("Task", task, what),
-      from ? "" : labelled("Seed", seed, element("span", { class: "soft" }, "Says where things stand at the start: the same number, the same start.")),
-      labelled("Rules", protocol, element("span", { class: "soft" }, "The budget: seconds that pass in the world, and the minutes that you may take for them.")), players, locked, press, refusal),
+    form,
     links);
   load();
 }
 
-/** What is left to a team by the rules of a protocol. */
+/** Says what is left to a team by the rules of a protocol. @param {import("../home/tasks.js").Rules} rules */
 function toldRules({ protocol, episode_steps: steps, wall_clock_s: clockS }) {
   return `${protocol}: ${(steps / CONTROL_HZ).toFixed(0)} s${clockS ? ` within ${(clockS / 60).toFixed(0)} minutes` : ""}`;
 }
 
-const robotCount = (task) => task?.robots?.length ?? 2;
+const robotCount = (/** @type {Task | undefined} */ task) => task?.robots?.length ?? 2;
 
 /**
- * The links of an episode that has begun, and what programs need. Whoever drives the first robot also lets those stand still that nobody
+ * Makes the links of an episode that has begun, and what programs need. Whoever drives the first robot also lets those stand still that nobody
  * drives.
+ * @param {Started} started the server's answer
+ * @param {FormData} chosen
+ * @param {string} hostToken
  */
 async function linksOf({ episode_id: episode, operators, instructions }, chosen, hostToken) {
-  const by = (player) => operators.filter(({ robot }) => chosen.get(robot) === player);
+  const by = (/** @type {string} */ player) => operators.filter(({ robot }) => chosen.get(robot) === player);
   const [people, still] = [by("person"), by("still")];
   for (const player of ["expert", "policy"]) await Promise.all(by(player).map(({ robot }) => call(`/operate/${player}`, hostToken, { episode, robot })));
-  const part = (robot) => instructions.find((entry) => entry.robot === robot)?.instruction ?? "";
+  const part = (/** @type {string} */ robot) => instructions.find((entry) => entry.robot === robot)?.instruction ?? "";
   const rows = people.map(({ robot, token }, index) => {
     const seat = new URLSearchParams({ episode, robot, token });
     if (index === 0 && still.length > 0) seat.set("still", still.map(({ robot: name, token: own }) => `${name}.${own}`).join(","));

@@ -3,17 +3,19 @@
 
 import { element } from "../src/dom.js";
 
-/** As far from its middle, in shares of its radius, a pad asks for nothing. */
+/** Distance from its middle, in shares of its radius, up to which a pad asks for nothing. */
 const DEAD_SHARE = 0.15;
-/** What dragging a handle does: along the picture, along the line of sight, or a turn. */
+/** Effects of dragging a handle: along the picture, along the line of sight, or a turn. */
 const DRAGS = { across: "Across", along: "In, out", turn: "Turn" };
 
-/** Whether fingers, and no mouse, are what a person points with. */
+/** Tells whether fingers, and no mouse, are what a person points with. */
 export const byTouch = () => matchMedia("(pointer: coarse)").matches;
 
+/** The two pads and the buttons between them. */
 export class Touch {
+  drag = "across";
+
   constructor() {
-    this.drag = "across";
     this.walk = new Pad("walk", "Walk: push to where the robot is to go", { up: "ahead", left: "◀", right: "▶", down: "back" });
     this.turn = new Pad("turn", "Turn to a side, or rise and sink", { up: "rise", left: "↺", right: "↻", down: "sink" });
     this.choices = Object.entries(DRAGS).map(([drag, text]) => element("button", { type: "button", onclick: () => this.choose(drag) }, text));
@@ -21,12 +23,16 @@ export class Touch {
     this.choose(this.drag);
   }
 
+  /** @param {string} drag */
   choose(drag) {
     this.drag = drag;
     this.choices.forEach((choice, index) => choice.setAttribute("aria-pressed", String(Object.keys(DRAGS)[index] === drag)));
   }
 
-  /** What the pads ask for: shares ahead, to the left, round to the left, and up. A thumb that turns does not lift as well. */
+  /**
+   * Returns what the pads ask for: shares ahead, to the left, round to the left, and up. A thumb that turns
+   * does not lift as well.
+   */
   wanted() {
     const [right, down] = this.walk.at;
     const [clockwise, sinks] = this.turn.at;
@@ -37,19 +43,22 @@ export class Touch {
 
 /** A round place on which a thumb says how far to the right and down, in shares of its radius. */
 class Pad {
+  at = [0, 0];
+
+  /** @param {string} name @param {string} label @param {Record<string, string>} signs */
   constructor(name, label, signs) {
-    this.at = [0, 0];
     this.knob = element("span", { class: "knob" });
     this.node = element("div", {
       class: `pad ${name}`, role: "group", "aria-label": label,
       onpointerdown: ({ pointerId, clientX, clientY }) => { this.node.setPointerCapture(pointerId); this.push(clientX, clientY); },
-      onpointermove: ({ pointerId, clientX, clientY }) => this.node.hasPointerCapture(pointerId) && this.push(clientX, clientY),
+      onpointermove: ({ pointerId, clientX, clientY }) => { if (this.node.hasPointerCapture(pointerId)) this.push(clientX, clientY); },
       // However it ends: lifted, or taken over by the system.
       onlostpointercapture: () => this.put([0, 0]),
       oncontextmenu: (event) => event.preventDefault(),
     }, ...Object.entries(signs).map(([place, sign]) => element("span", { class: place, "aria-hidden": "true" }, sign)), this.knob);
   }
 
+  /** @param {number} x @param {number} y */
   push(x, y) {
     const { left, top, width } = this.node.getBoundingClientRect();
     const radius = width / 2;
@@ -58,6 +67,7 @@ class Pad {
     this.put(length < DEAD_SHARE ? [0, 0] : at.map((value) => value / Math.max(length, 1)));
   }
 
+  /** @param {number[]} at */
   put(at) {
     this.at = at;
     this.knob.style.transform = `translate(${at.map((value) => `${(80 * value).toFixed(0)}%`).join(", ")})`;

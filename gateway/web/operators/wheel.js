@@ -2,20 +2,31 @@
 // of the commands come back.
 
 import { Frame, readScene } from "../src/message.js";
-import { Refused, call } from "./call.js";
+import { Refused, call, statusOf } from "./call.js";
 
 const RETRY_MS = 1000;
 
+/** @typedef {import("./main.js").Seat & { episode: string }} EpisodeSeat Seat of an episode that is known. */
+/**
+ * End of an episode, as its drivers hear it.
+ * @typedef {{ ended: string, phases?: Record<string, number | null> }} Ended
+ */
+
+/** The socket of one page. */
 export class Wheel {
+  /** @type {import("../src/message.js").Layout | null} */
+  layout = null;
+  over = false;
+  /** @type {WebSocket | undefined} */
+  socket = undefined;
+
   /**
-   * @param {{ episode: string, robot: string, token: string, still?: string }} seat
-   * @param {{ scene: (scene: ReturnType<typeof readScene>) => void, frame: (frame: Frame) => void, told: (message: any) => void, lost: (why: string) => void }} heard
+   * @param {EpisodeSeat} seat
+   * @param {{ scene: (scene: import("../src/message.js").Scene) => void, frame: (frame: Frame) => void, told: (message: any) => void, lost: (why: string) => void }} heard
    */
   constructor(seat, heard) {
     this.seat = seat;
     this.heard = heard;
-    this.over = false;
-    this.layout = null;
   }
 
   /** Opens the socket, and opens it again when it is lost, until the episode is over. */
@@ -23,17 +34,17 @@ export class Wheel {
     try {
       const robots = await enter(this.seat);
       if (this.over) return;
+      this.layout = null;
       this.socket = new WebSocket(`${location.origin.replace("http", "ws")}/operate/drive?robots=${robots}`);
+      this.socket.binaryType = "arraybuffer";
+      this.socket.onmessage = ({ data }) => this.hear(data);
+      this.socket.onclose = () => this.retry("The link is lost; time stands still.");
     } catch (error) {
       this.retry(error instanceof Refused ? error.message : "The server cannot be reached.");
-      return;
     }
-    this.layout = null;
-    this.socket.binaryType = "arraybuffer";
-    this.socket.onmessage = ({ data }) => this.hear(data);
-    this.socket.onclose = () => this.retry("The link is lost; time stands still.");
   }
 
+  /** Takes in a message. @param {string | ArrayBuffer} data */
   hear(data) {
     if (typeof data === "string") {
       const message = JSON.parse(data);
@@ -49,12 +60,15 @@ export class Wheel {
     }
   }
 
-  /** Says what the robot is to do from now on. What a slow link has not taken yet is better said later. */
+  /**
+   * Says what the robot is to do from now on. What a slow link has not taken yet is better said later.
+   * @param {unknown} word
+   */
   say(word) {
     if (this.socket?.readyState === WebSocket.OPEN && this.socket.bufferedAmount < 4096) this.socket.send(JSON.stringify(word));
   }
 
-  /** Tries again, unless the episode has ended meanwhile. */
+  /** Tries again, unless the episode has ended meanwhile. @param {string} why */
   async retry(why) {
     if (this.over) return;
     const ended = await hasEnded(this.seat);
@@ -74,25 +88,32 @@ export class Wheel {
   }
 }
 
-/** How the episode has ended, if it has. */
+/** Asks how the episode has ended; null if it has not. @param {EpisodeSeat} seat */
 async function hasEnded({ episode, token }) {
   try {
     const { ended } = await call(`/v1/episodes/${encodeURIComponent(episode)}/tools/get_status`, token, {});
     return ended ? String(ended.reason ?? ended) : null;
   } catch (error) {
-    return [401, 403, 404, 410].includes(error.status) ? "it is not held any more" : null;
+    return [401, 403, 404, 410].includes(statusOf(error) ?? 0) ? "it is not held any more" : null;
   }
 }
 
-/** The robots that a page drives or lets stand still, its own first, with their tokens. */
+/**
+ * Lists the robots that a page drives or lets stand still, its own first, with their tokens.
+ * @param {EpisodeSeat} seat
+ */
 function robotsOf({ robot, token, still }) {
   return [[robot, token], ...(still ? still.split(",").map((pair) => pair.split(".")) : [])];
 }
 
-/** The tokens of these robots. */
+/** Returns the tokens of these robots. @param {EpisodeSeat} seat */
 export const tokensOf = (seat) => robotsOf(seat).map(([, token]) => token);
 
-/** Has the browser keep a cookie for each of these robots: a socket is asked for without headers. */
+/**
+ * Has the browser keep a cookie for each of these robots: a socket is asked for without headers. Returns their
+ * names.
+ * @param {EpisodeSeat} seat
+ */
 async function enter(seat) {
   await Promise.all(tokensOf(seat).map((token) => call("/operate/enter", token, {}, { credentials: "same-origin" })));
   return robotsOf(seat).map(([robot]) => robot).join(",");

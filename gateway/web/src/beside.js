@@ -7,20 +7,24 @@ import { Pace, Stage } from "./stage.js";
 import { Targets } from "./targets.js";
 import { RecordedTime } from "./time.js";
 
-/** Where drawing both takes longer, it is made simpler. */
+/** Time of a frame of both from which drawing is made simpler. */
 const SLOW_FRAME_MS = 80;
 
-/** Shows the episodes of two folders from a moment. @param {string[]} runs */
+/** @typedef {import("./message.js").WatchedScene} WatchedScene */
+
+/**
+ * Shows the episodes of two folders from a moment.
+ * @param {HTMLElement} main
+ * @param {string[]} runs
+ * @param {number} at
+ */
 export async function besideEachOther(main, runs, at) {
+  /** @type {Side[]} */
   const sides = [];
-  for (const run of runs)
-    sides.push(
-      new Side(
-        run,
-        readScene(await (await ask(`/watch/run?run=${encodeURIComponent(run)}`)).arrayBuffer()),
-        at,
-      ),
-    );
+  for (const run of runs) {
+    const answer = await ask(`/watch/run?run=${encodeURIComponent(run)}`);
+    sides.push(new Side(run, /** @type {WatchedScene} */ (readScene(await answer.arrayBuffer())), at));
+  }
   document.title = `${sides.map(({ title }) => title).join(" beside ")}`;
   const clock = sides.map(({ time }) => time).reduce((one, other) => (one.end >= other.end ? one : other));
   const slider = element("input", {
@@ -45,15 +49,15 @@ export async function besideEachOther(main, runs, at) {
     element("div", { class: "beside" }, ...sides.map(({ node }) => node)),
     element("div", { class: "scrubber" }, player.node, element("div", { class: "track" }, slider)),
   );
-  for (const side of sides) side.begin();
-  turnTogether(sides.map(({ stage }) => stage));
+  const stages = sides.map((side) => side.begin());
+  turnTogether(stages);
   const pace = new Pace(SLOW_FRAME_MS);
   let last = performance.now();
-  const tick = (now) => {
+  const tick = (/** @type {number} */ now) => {
     const { moved } = clock.pass(Math.min((now - last) / 1000, 0.5));
-    const drawn = sides.map((side) => side.draw(clock.time, moved));
-    if (drawn.some(Boolean) && pace.isSlow(now - last)) for (const { stage } of sides) stage.simplify();
-    if (document.activeElement !== slider || clock.playing) slider.value = clock.time;
+    const drawn = sides.map((side, index) => side.draw(stages[index], clock.time, moved));
+    if (drawn.some(Boolean) && pace.isSlow(now - last)) for (const stage of stages) stage.simplify();
+    if (document.activeElement !== slider || clock.playing) slider.value = String(clock.time);
     player.show();
     last = now;
     requestAnimationFrame(tick);
@@ -63,12 +67,17 @@ export async function besideEachOther(main, runs, at) {
 
 /** One of the two. */
 class Side {
+  /** @param {string} run @param {WatchedScene} scene @param {number} at */
   constructor(run, scene, at) {
     const { head, frames } = scene;
-    Object.assign(this, { scene, head, time: new RecordedTime(frames, at), targets: new Targets(scene) });
+    this.scene = scene;
+    this.time = new RecordedTime(frames, at);
+    this.targets = new Targets(scene);
+    this.drawn = false;
+    this.reached = new Map(head.reached.map(({ number, time_s: timeS }) => [number, timeS]));
     this.title = `${words(head.task)}, seed ${head.seed}`;
     this.view = element("div", { class: "view" });
-    this.phases = element("ol", { class: "phases" }, ...head.phases.map((phase) => this.phase(phase)));
+    this.phases = head.phases.map((phase) => this.phase(phase));
     const done = head.reached.length === head.phases.length;
     this.node = element(
       "section",
@@ -79,14 +88,15 @@ class Side {
         element("h2", {}, element("a", { href: `/watch?run=${encodeURIComponent(run)}` }, this.title)),
         badge(head.result ? endOf(head.result) : "interrupted", done ? "good" : "bad"),
       ),
-      element("p", { class: "soft id" }, `${run}, ${head.protocol}, ${frames.at(-1).time.toFixed(1)} s`),
+      element("p", { class: "soft id" }, `${run}, ${head.protocol}, ${this.time.end.toFixed(1)} s`),
       this.view,
-      this.phases,
+      element("ol", { class: "phases" }, ...this.phases),
     );
   }
 
+  /** @param {import("./message.js").Phase} phase */
   phase({ number, id }) {
-    const at = this.head.reached.find((reached) => reached.number === number)?.time_s;
+    const at = this.reached.get(number);
     return element(
       "li",
       { "data-at": at ?? Infinity },
@@ -95,27 +105,33 @@ class Side {
     );
   }
 
-  /** Begins to draw; the view has to be in the page. */
+  /** Begins to draw; the view has to be in the page. Returns what it draws with. */
   begin() {
-    this.stage = new Stage(this.view, this.scene);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.stage.paint());
+    const stage = new Stage(this.view, this.scene);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => stage.paint());
+    return stage;
   }
 
-  /** Shows a moment of the clock; an episode that is over stays at its end. Returns whether it was drawn. */
-  draw(moment, moved) {
+  /**
+   * Shows a moment of the clock; an episode that is over stays at its end. Returns whether it was drawn.
+   * @param {Stage} stage
+   * @param {number} moment
+   * @param {boolean} moved
+   */
+  draw(stage, moment, moved) {
     if (moved || !this.drawn) {
       this.time.seek(moment);
       const { from, to, share } = this.time.pass(0);
-      this.stage.show(from, to, share, this.targets);
-      for (const phase of this.phases.children)
+      stage.show(from, to, share, this.targets);
+      for (const phase of this.phases)
         phase.classList.toggle("done", Number(phase.dataset.at) <= moment + 1e-6);
       this.drawn = true;
     }
-    return this.stage.draw();
+    return stage.draw();
   }
 }
 
-/** Lets the camera of each view follow that of the other. */
+/** Lets the camera of each view follow that of the other. @param {Stage[]} stages */
 function turnTogether(stages) {
   let following = false;
   stages.forEach(({ free, controls }, index) => {

@@ -1,36 +1,47 @@
 // Elements of a page. Texts are texts: nothing that comes from a policy becomes HTML.
 
+/** @typedef {string | number | boolean | null | undefined} Attribute */
+/** @typedef {Record<string, Attribute | ((event: any) => unknown)>} Properties */
+
 /**
- * Makes an element. Properties that begin with "on" are listeners, others are attributes; false and null leave them out.
- * @param {string} name @param {Record<string, unknown>} [properties] @param {...(Node | string | null)} children
+ * Makes an element. Properties whose names begin with "on" are listeners, others are attributes; false and null leave them out.
+ * @template {keyof HTMLElementTagNameMap} Name
+ * @param {Name} name
+ * @param {Properties} [properties]
+ * @param {...(Node | string | null | undefined)} children
+ * @returns {HTMLElementTagNameMap[Name]}
  */
 export function element(name, properties = {}, ...children) {
   const made = document.createElement(name);
   for (const [key, value] of Object.entries(properties)) {
-    if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
-    else if (value !== false && value !== null && value !== undefined) made.setAttribute(key, value === true ? "" : value);
+    if (typeof value === "function") made.addEventListener(key.slice(2), value);
+    else if (value !== false && value !== null && value !== undefined) made.setAttribute(key, value === true ? "" : String(value));
   }
   made.append(...children.filter((child) => child !== null && child !== undefined));
   return made;
 }
 
-/** Shows `text` where it is not shown yet. */
+/** Shows `text` where it is not shown yet. @param {Node} node @param {string} text */
 export function say(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
 
+/** Returns a name with blanks in place of underscores. @param {string} name */
 export const words = (name) => String(name).replaceAll("_", " ");
 
-/** How an episode ended: by the end of a model's play, where that says more, else by its own. */
+/**
+ * Says how an episode ended: by the end of a model's play, where that says more, else by its own.
+ * @param {import("./message.js").Result} result
+ */
 export function endOf(result) {
   const own = (result.usage?.endings ?? []).filter(({ ending }) => ending !== "success" && ending !== "finished");
   return own.map(({ robot, ending }) => (robot ? `${robot}: ` : "") + words(ending)).join(", ") || words(result.ended);
 }
 
-/** The colour that the style sheet calls `name`. */
+/** Returns the colour that the style sheet calls `name`. @param {string} name */
 export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-/** What a request is answered with; a refusal is thrown, in the server's words. */
+/** Asks the server, and returns its answer; throws a refusal, in the server's words. @param {string} path */
 export async function ask(path) {
   const answer = await fetch(path);
   if (answer.ok) return answer;
@@ -38,10 +49,16 @@ export async function ask(path) {
   throw new Error(problem.detail ?? `the server answers ${answer.status}`);
 }
 
-/** A small label of a state; `kind` is its colour. */
+/** Says why something failed. @param {unknown} error */
+export const reasonOf = (error) => (error instanceof Error ? error.message : String(error));
+
+/** Makes a small label of a state; `kind` is its colour. @param {string} text @param {string} kind */
 export const badge = (text, kind) => element("span", { class: `badge ${kind}` }, text);
 
-/** A button that copies a text. Browsers let pages copy that came over HTTPS or from their own machine; others get no button. */
+/**
+ * Makes a button that copies a text. Browsers let pages copy that came over HTTPS or from their own machine; others get no button.
+ * @param {() => string} text
+ */
 export function copying(text, label = "Copy") {
   if (!navigator.clipboard) return null;
   const copy = element("button", { type: "button", class: "small", onclick: () => {
@@ -51,5 +68,5 @@ export function copying(text, label = "Copy") {
   return copy;
 }
 
-/** Colours of robots, which are those of their accents. */
+/** Returns the colour of a robot, which is that of its accent. @param {number} robot */
 export const robotColour = (robot) => colour(["--a", "--b", "--c"][robot % 3]);

@@ -1,6 +1,6 @@
 // The page of one episode, running or finished.
 
-import { ask, badge, element, endOf, say, words } from "./dom.js";
+import { ask, badge, element, endOf, reasonOf, say, words } from "./dom.js";
 import { Frame, readScene } from "./message.js";
 import { Player } from "./player.js";
 import { BudgetPlots, Plots } from "./plots.js";
@@ -13,38 +13,82 @@ import { Timeline } from "./timeline.js";
 const PLOTS_EVERY_MS = 250;
 const CAMERAS_EVERY_MS = 1000;
 const RECONNECT_MS = 2000;
-/** Where drawing takes longer, it is made simpler. */
+/** Time of a frame from which drawing is made simpler. */
 const SLOW_FRAME_MS = 60;
 
-/** @param {HTMLElement} main @param {{ episode?: string, run?: string, at?: number }} wanted */
+/**
+ * @typedef {{ episode: string, run?: undefined, at?: undefined } | { run: string, at: number, episode?: undefined }} Wanted
+ */
+
+/**
+ * Shows an episode that runs, or a finished one from a moment.
+ * @param {HTMLElement} main
+ * @param {Wanted} wanted
+ */
 export async function episode(main, wanted) {
-  const query = wanted.run ? `run=${encodeURIComponent(wanted.run)}` : `episode=${encodeURIComponent(wanted.episode)}`;
-  const scene = readScene(await (await ask(`/watch/${wanted.run ? "run" : "scene"}?${query}`)).arrayBuffer());
+  const query = wanted.run === undefined ? `episode=${encodeURIComponent(wanted.episode)}` : `run=${encodeURIComponent(wanted.run)}`;
+  const answer = await ask(`/watch/${wanted.run === undefined ? "scene" : "run"}?${query}`);
+  const scene = /** @type {import("./message.js").WatchedScene} */ (readScene(await answer.arrayBuffer()));
   new EpisodePage(main, wanted, query, scene).begin();
 }
 
 class EpisodePage {
+  view = element("div", { class: "view" });
+  state = element("span");
+  facts = element("dl", { class: "facts" });
+  factsText = "";
+  phases = element("ol", { class: "phases" });
+  problem = element("p", { class: "bad", role: "alert" });
+  cameras = element("div", { class: "pictures" });
+  look = element("input", { type: "checkbox", id: "look", onchange: () => this.drawCameras() });
+  /** Key of the pictures that were asked for last. */
+  pictured = "";
+  /** True while a request for pictures is under way. */
+  drawing = false;
+  /** True once the server holds the episode no more. */
+  closed = false;
+  drawn = false;
+  /** True if the same moment has to be shown anew. */
+  again = false;
+  plotsDue = true;
+  /** @type {{ number: string, lacks: string[] } | undefined} */
+  next = undefined;
+
+  /**
+   * @param {HTMLElement} main
+   * @param {Wanted} wanted
+   * @param {string} query
+   * @param {import("./message.js").WatchedScene} scene
+   */
   constructor(main, wanted, query, scene) {
     const { head, frames } = scene;
-    Object.assign(this, { wanted, query, scene, head, recorded: Boolean(wanted.run) });
+    /** Id of an episode that runs, or folder of a finished one. */
+    this.id = wanted.run ?? wanted.episode;
+    this.query = query;
+    this.scene = scene;
+    this.head = head;
     document.title = `${words(head.task)}, seed ${head.seed}`;
     this.reached = new Map(head.reached.map((phase) => [phase.number, phase.time_s]));
     this.result = head.result;
-    this.time = this.recorded ? new RecordedTime(frames, wanted.at) : new LiveTime(frames[0]);
-    this.targets = this.recorded ? new Targets(scene) : null;
+    const recorded = wanted.run === undefined ? null : new RecordedTime(frames, wanted.at);
+    /** The time of a finished episode. */
+    this.recorded = recorded;
+    this.time = recorded ?? new LiveTime(frames[0]);
+    this.targets = recorded && new Targets(scene);
     this.plots = new Plots(head, this.targets);
-    this.story = new Story(head, this.recorded ? {
-      seek: (time) => { this.time.play(false); this.time.seek(time); },
+    this.story = new Story(head, recorded && {
+      seek: (time) => { recorded.play(false); recorded.seek(time); },
       picture: (robot, time) => this.cameraPath(robot, time),
-    } : null);
-    this.timeline = this.recorded ? new Timeline(head, this.time, frames) : null;
-    this.budget = this.recorded ? new BudgetPlots(head, frames) : null;
+    });
+    const timeline = recorded && new Timeline(head, recorded, frames);
+    this.timeline = timeline;
+    this.player = timeline && new Player(recorded, (way) => timeline.step(way));
+    this.budget = recorded && new BudgetPlots(head, frames);
     this.layOut(main);
     this.stage = new Stage(this.view, scene);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { this.stage.paint(); this.plotsDue = true; });
     for (const entry of head.story) this.story.add(entry);
     for (const frame of frames) this.plots.add(frame);
-    this.plotsDue = true;
     this.showPhases();
     this.showEnd();
   }
@@ -53,7 +97,7 @@ class EpisodePage {
     if (!this.recorded) this.connect();
     let last = performance.now();
     const pace = new Pace(SLOW_FRAME_MS);
-    const tick = (now) => {
+    const tick = (/** @type {number} */ now) => {
       const passed = Math.min((now - last) / 1000, 0.5);
       if (this.draw(passed) && pace.isSlow(now - last)) this.stage.simplify();
       last = now;
@@ -64,15 +108,9 @@ class EpisodePage {
     setInterval(() => this.drawCameras(), CAMERAS_EVERY_MS);
   }
 
+  /** @param {HTMLElement} main */
   layOut(main) {
     const { head } = this;
-    this.view = element("div", { class: "view" });
-    this.state = element("span");
-    this.facts = element("dl", { class: "facts" });
-    this.phases = element("ol", { class: "phases" });
-    this.problem = element("p", { class: "bad", role: "alert" });
-    this.cameras = element("div", { class: "pictures" });
-    this.look = element("input", { type: "checkbox", id: "look", onchange: () => this.drawCameras() });
     main.replaceChildren(
       element("header", { class: "top" },
         element("a", { href: "/watch" }, "All episodes"),
@@ -82,19 +120,19 @@ class EpisodePage {
       this.problem,
       element("div", { class: "columns" },
         element("section", { class: "stage", "aria-label": "The episode in three dimensions" },
-          this.tools(), this.view, this.recorded ? this.scrubber() : null, this.key()),
+          this.tools(), this.view, this.scrubber(), this.key()),
         element("section", { class: "side", "aria-label": "How it stands" },
           this.facts, this.recorded ? null : element("h2", {}, "Phases"), this.recorded ? null : this.phases,
           this.recorded ? element("h2", {}, "What happened") : null, this.recorded ? this.story.node : null,
           element("h2", {}, this.recorded ? "What the robots saw" : element("label", { for: "look" }, this.look, " What the robots see")),
           this.recorded ? element("p", { class: "soft" }, element("label", { for: "look" }, this.look, " drawn at this moment, whether the policy looked or not")) : null,
           this.cameras)),
-      ...(this.recorded ? [element("section", {}, element("h2", {}, "Budget"), this.budget.node)] : []),
+      ...(this.budget ? [element("section", {}, element("h2", {}, "Budget"), this.budget.node)] : []),
       element("section", {}, element("h2", {}, "Hands and joints"), this.plots.node),
       this.recorded ? this.files() : element("section", {}, element("h2", {}, "Calls and notes, the latest first"), this.story.node));
   }
 
-  /** Who looks, and what is shown beside the scene. */
+  /** Makes the choice of who looks, and of what is shown beside the scene. */
   tools() {
     const views = [["free", "Free camera"], ...this.head.robots.map(({ name }) => [name, `As robot ${name}`])];
     const choose = element("select", { "aria-label": "Camera", onchange: (event) => {
@@ -102,7 +140,9 @@ class EpisodePage {
       this.again = true;
     } },
       ...views.map(([value, text]) => element("option", { value }, text)));
-    const extras = [["targets", "targets"], ["forces", "forces"], ["frustums", "fields of view"]].map(([name, text]) =>
+    /** @type {["targets" | "forces" | "frustums", string][]} */
+    const shown = [["targets", "targets"], ["forces", "forces"], ["frustums", "fields of view"]];
+    const extras = shown.map(([name, text]) =>
       element("label", {}, element("input", { type: "checkbox", checked: true, onchange: (event) => {
         this.stage.extras[name] = event.target.checked;
         this.again = true;
@@ -118,17 +158,21 @@ class EpisodePage {
       element("span", {}, "in a robot's colour: the force that it feels"));
   }
 
+  /** Makes the controls of a finished episode's time; null while one runs. */
   scrubber() {
-    this.player = new Player(this.time, (way) => this.timeline.step(way));
+    if (!this.player || !this.timeline) return null;
     this.player.node.append(this.taking());
     return element("div", { class: "scrubber" }, this.player.node, this.timeline.node);
   }
 
-  /** Goes on from the moment that is shown, as an episode of its own whose robots people drive. */
+  /**
+   * Makes the button that goes on from the moment that is shown, as an episode of its own whose robots people
+   * drive.
+   */
   taking() {
     const go = () => {
       const { time } = this.time;
-      const from = new URLSearchParams({ run: this.wanted.run, at: time.toFixed(2), task: this.head.task, seed: this.head.seed, protocol: this.head.protocol });
+      const from = new URLSearchParams({ run: this.id, at: time.toFixed(2), task: this.head.task, seed: String(this.head.seed), protocol: this.head.protocol });
       location.assign(`/operate?${from}`);
     };
     return element("button", { class: "take", title: "People drive the robots from here on, in an episode of its own", onclick: go }, "Take over here");
@@ -164,8 +208,9 @@ class EpisodePage {
         this.showEnd();
         return;
       }
+      /** @type {import("../home/feed.js").Lists | null} */
       const still = await ask("/watch/episodes").then((answer) => answer.json()).catch(() => null);
-      if (still && !still.held.some(({ episode_id: id }) => id === this.wanted.episode)) {
+      if (still && !still.held.some(({ episode_id: id }) => id === this.id)) {
         say(this.problem, "The server holds this episode no more.");
         this.closed = true;
         this.showEnd();
@@ -176,6 +221,7 @@ class EpisodePage {
     });
   }
 
+  /** Takes in an event. @param {any} event */
   told(event) {
     if (event.kind === "call" || event.kind === "note") this.story.add(event);
     if (event.kind === "phase") {
@@ -192,6 +238,7 @@ class EpisodePage {
     }
   }
 
+  /** Takes in a step or a picture. @param {ArrayBuffer} data */
   shown(data) {
     const row = new Float32Array(data.slice(0, data.byteLength - (data.byteLength % 4)));
     if (row[0] === 2) {
@@ -199,13 +246,16 @@ class EpisodePage {
       return;
     }
     const frame = new Frame(row, this.scene.layout);
-    this.time.add(frame);
+    if (this.time instanceof LiveTime) this.time.add(frame);
     this.plots.add(frame);
     this.plots.trim();
     this.plotsDue = true;
   }
 
-  /** Shows what is to be seen after so many seconds more. Returns whether the scene was drawn anew. */
+  /**
+   * Shows what is to be seen after so many seconds more. Returns whether the scene was drawn anew.
+   * @param {number} seconds
+   */
   draw(seconds) {
     const { from, to, share, moved } = this.time.pass(seconds);
     if (moved || this.again || !this.drawn) {
@@ -215,11 +265,9 @@ class EpisodePage {
       this.again = false;
       if (this.recorded) this.plotsDue = true;
     }
-    if (this.recorded) {
-      this.timeline.show();
-      this.story.follow(this.time.time);
-      this.player.show();
-    }
+    this.timeline?.show();
+    if (this.recorded) this.story.follow(this.time.time);
+    this.player?.show();
     return this.stage.draw();
   }
 
@@ -230,14 +278,18 @@ class EpisodePage {
     this.budget?.draw(this.time.time, [...this.reached.values()]);
   }
 
+  /** @param {string} robot @param {number | string} time */
   cameraPath(robot, time) {
     return `/watch/camera?${this.query}&robot=${encodeURIComponent(robot)}&time_s=${time}`;
   }
 
-  /** Which pictures are wanted: of a finished episode those that the policy was shown last, unless its reader wants all of this moment. */
+  /**
+   * Returns the pictures that are wanted: of a finished episode those that the policy was shown last, unless
+   * its reader wants all of this moment.
+   */
   wantedPictures() {
     const { time } = this.time;
-    const at = (name, moment, told) => ({ name, told, moment: moment.toFixed(2) });
+    const at = (/** @type {string} */ name, /** @type {number} */ moment, /** @type {string} */ told) => ({ name, told, moment: moment.toFixed(2) });
     if (this.look.checked) return this.head.robots.map(({ name }) => at(name, time, ""));
     if (!this.recorded) return [];
     return this.head.robots.flatMap(({ name }) => {
@@ -246,7 +298,7 @@ class EpisodePage {
     });
   }
 
-  /** True pictures, drawn by the server as the robots see them. */
+  /** Shows true pictures, drawn by the server as the robots see them. */
   async drawCameras() {
     const wanted = this.wantedPictures();
     const key = JSON.stringify(wanted);
@@ -265,7 +317,7 @@ class EpisodePage {
       this.cameras.replaceChildren(...await Promise.all(pictures));
       if (!wanted.length && this.recorded) this.cameras.append(element("p", { class: "soft" }, "The policy has not looked yet."));
     } catch (error) {
-      this.cameras.replaceChildren(element("p", { class: "bad" }, error.message));
+      this.cameras.replaceChildren(element("p", { class: "bad" }, reasonOf(error)));
     }
     this.drawing = false;
   }
@@ -275,16 +327,12 @@ class EpisodePage {
       const at = this.reached.get(number);
       return element("li", { class: at === undefined ? "" : "done" },
         element("span", {}, `${number} ${words(id)}`, collaborative ? element("span", { class: "soft" }, " together") : null,
-          at === undefined && this.next?.number === number ? this.lacks() : null),
+          at === undefined && this.next?.number === number ? lacking(this.next.lacks) : null),
         element("span", { class: at === undefined ? "soft" : "good" }, at === undefined ? "not yet" : `${at.toFixed(2)} s`));
     }));
   }
 
-  /** What the next phase lacks, as the simulator measures it. */
-  lacks() {
-    return element("ul", { class: "lacks soft" }, ...this.next.lacks.map((lack) => element("li", {}, lack)));
-  }
-
+  /** @param {Frame} frame */
   showFacts(frame) {
     const facts = [["time", `${this.time.time.toFixed(1)} s`], ["step", `${Math.round(frame.step)}`]];
     const left = this.recorded ? this.head.episode_steps - frame.step : frame.stepsLeft;
@@ -298,12 +346,12 @@ class EpisodePage {
     this.facts.replaceChildren(...facts.map(([name, value]) => element("div", {}, element("dt", {}, name), element("dd", {}, value))));
   }
 
-  /** What has been used up to the moment that is shown. */
+  /** Says what has been used up to the moment that is shown. */
   soFar() {
     const told = this.head.story.filter((entry) => entry.time_s <= this.time.time + 1e-6);
     const calls = told.filter(({ kind, number }) => kind === "call" && number !== null).length;
     const facts = [["calls", `${calls}`], ["thought", `${(told.at(-1)?.thought_s ?? 0).toFixed(0)} s`]];
-    const sum = (of) => told.reduce((total, { note }) => total + ((note && of(note)) ?? 0), 0);
+    const sum = (/** @type {(note: import("./message.js").Note) => number | undefined} */ of) => told.reduce((total, { note }) => total + ((note && of(note)) ?? 0), 0);
     const [tokens, usd] = [sum((note) => (note.input_tokens ?? 0) + (note.output_tokens ?? 0)), sum((note) => note.usd)];
     if (tokens) facts.push(["tokens", tokens < 1e5 ? `${tokens}` : `${(tokens / 1000).toFixed(0)}k`]);
     if (usd) facts.push(["price", `$${usd.toFixed(usd < 0.1 ? 3 : 2)}`]);
@@ -312,13 +360,19 @@ class EpisodePage {
 
   showEnd() {
     const { result } = this;
-    if (!result && this.closed) return this.state.replaceChildren(badge("closed", ""));
-    if (!result) return this.state.replaceChildren(badge(this.recorded ? "interrupted" : "live", this.recorded ? "bad" : "live"));
+    if (!result) {
+      const [text, kind] = this.recorded ? ["interrupted", "bad"] : ["live", "live"];
+      this.state.replaceChildren(this.closed ? badge("closed", "") : badge(text, kind));
+      return;
+    }
     const missing = this.head.phases.length - this.reached.size;
     this.state.replaceChildren(badge(endOf(result), missing ? "bad" : "good"));
     if (this.closed) {
       say(this.problem, "");
-      this.state.append(" ", element("a", { href: `/watch?run=${encodeURIComponent(this.wanted.episode)}` }, "Look at it again"));
+      this.state.append(" ", element("a", { href: `/watch?run=${encodeURIComponent(this.id)}` }, "Look at it again"));
     }
   }
 }
+
+/** Lists what the next phase lacks, as the simulator measures it. @param {string[]} lacks */
+const lacking = (lacks) => element("ul", { class: "lacks soft" }, ...lacks.map((lack) => element("li", {}, lack)));

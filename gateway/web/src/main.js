@@ -6,15 +6,17 @@ import { element } from "./dom.js";
 import { episode } from "./episode.js";
 import { operate } from "../operators/main.js";
 
-const main = document.getElementById("main");
+const main = /** @type {HTMLElement} */ (document.getElementById("main"));
 const wanted = new URLSearchParams(location.search);
 
 const page = async () => {
   if (location.pathname.startsWith("/operate")) return operate(main);
   if (location.pathname === "/") return home(main);
-  if (wanted.has("episode")) return episode(main, { episode: wanted.get("episode") });
-  if (wanted.has("beside")) return besideEachOther(main, [wanted.get("run"), wanted.get("beside")], Number(wanted.get("at")) || 0);
-  if (wanted.has("run")) return episode(main, { run: wanted.get("run"), at: Number(wanted.get("at")) || 0 });
+  const [held, run, other] = ["episode", "run", "beside"].map((name) => wanted.get(name));
+  const at = Number(wanted.get("at")) || 0;
+  if (held) return episode(main, { episode: held });
+  if (run && other) return besideEachOther(main, [run, other], at);
+  if (run) return episode(main, { run, at });
   return episodes(main);
 };
 

@@ -1,15 +1,82 @@
 // What the server sends: scenes with their shapes, and steps as rows of numbers. `episodes/src/live/frame.rs` says what is in a row.
 
+/** @typedef {"left" | "right"} Side */
+/** @typedef {{ number: string, id: string, collaborative: boolean }} Phase */
+/** @typedef {{ number: string, time_s: number }} PhaseReached */
+/** @typedef {{ vertical_fov_rad: number, width: number, height: number }} CameraHead */
+/** A joint of a finger: its pose in the frame of the link before it, and its axis there. */
+/** @typedef {{ pose: number[], axis: number[], range_rad: [number, number] }} FingerJoint */
+/**
+ * @typedef {{ name: string, links: number, joints: string[], fingers: FingerJoint[][], camera: CameraHead }} RobotHead
+ */
+/** The body that carries a shape. */
+/**
+ * @typedef {{ kind: "room" } | { kind: "link", robot: number, link: number } | { kind: "object", object: number }} Carrier
+ */
+/**
+ * @typedef {{ mesh: number, carrier: Carrier, pose: number[], rgb: Rgb, alpha: number, casts_shadow: boolean }} Shape
+ */
+/** @typedef {Shape & { pattern: "checker", second_rgb: Rgb }} CheckedPart */
+/**
+ * A shape of the scene.
+ * @typedef {CheckedPart | Shape & { pattern: "plain" | "wood" | "fabric" | "print", second_rgb: null }} Part
+ */
+/** @typedef {[number, number, number]} Rgb */
+/** @typedef {{ positions: Float32Array, indices: Uint32Array, normals: Int8Array }} Mesh */
+
+/**
+ * Header of a scene, which `episodes/src/live/scene.rs` writes. `robot` is the one that the page drives, if it drives.
+ * @typedef {{
+ *   task: string, seed: number, protocol: string, instruction: string, assistance: string,
+ *   episode_steps: number, thinking_s: number | null, phases: Phase[], robots: RobotHead[], objects: string[],
+ *   third_person: { pose: number[], vertical_fov_rad: number },
+ *   meshes: [number, number][], parts: Part[], frames: number, robot?: string,
+ * }} SceneHead
+ */
+/**
+ * Result of an episode.
+ * @typedef {{
+ *   task: string, seed: number, protocol: string, ended: string, phases?: Record<string, number | null>,
+ *   env_steps: number, tool_calls: number, falls: number,
+ *   usage?: { endings?: { robot?: string | null, ending: string }[] } | null,
+ * }} Result
+ */
+/**
+ * A call of an episode, with its arguments and its reply in JSON. `number` is null for a call that does not count.
+ * @typedef {{
+ *   kind: "call", entry: number, number: number | null, time_s: number, thought_s: number, tool: string,
+ *   arguments: string, operator: string | null, ok: boolean, reply: string, seen: string[], note?: undefined,
+ * }} CallEntry
+ */
+/**
+ * Note of a policy. `episodes/src/recording/topics/notes.rs` describes its fields.
+ * @typedef {{
+ *   text: string, kind: string, robot?: string, model?: string,
+ *   input_tokens?: number, output_tokens?: number, cached_tokens?: number, usd?: number, seconds?: number,
+ * }} Note
+ */
+/**
+ * @typedef {{
+ *   kind: "note", entry: number, time_s: number, thought_s: number, note: Note, number?: undefined, seen?: undefined,
+ * }} NoteEntry
+ */
+/** @typedef {CallEntry | NoteEntry} Entry */
+/** Header of a scene for those who watch. */
+/** @typedef {SceneHead & { story: Entry[], reached: PhaseReached[], result: Result | null }} WatchedHead */
+/** @typedef {{ head: SceneHead, meshes: Mesh[], layout: Layout, frames: Frame[] }} Scene */
+/** @typedef {Scene & { head: WatchedHead }} WatchedScene */
+
 /** Numbers of a pose: x, y, z, and the quaternion x, y, z, w. */
 export const POSE = 7;
 const HEAD = 5;
 const HAND = POSE + POSE + 1 + 2 + 3 + 3;
 const BASE = 4;
+/** @type {Side[]} */
 export const SIDES = ["left", "right"];
 export const HAND_STATES = ["joints", "moving", "arrived", "blocked", "out_of_reach"];
 
 /**
- * Where the numbers of a step are.
+ * Places of the numbers of a step in its row.
  * @typedef {{
  *   length: number,
  *   links: number[],
@@ -18,10 +85,18 @@ export const HAND_STATES = ["joints", "moving", "arrived", "blocked", "out_of_re
  * }} Layout
  */
 
-/** @returns {Layout} */
+/**
+ * Makes a value for each side.
+ * @template Value
+ * @param {(side: Side, index: number) => Value} make
+ * @returns {Record<Side, Value>}
+ */
+export const bySide = (make) => ({ left: make("left", 0), right: make("right", 1) });
+
+/** Returns the layout of the rows of a scene. @param {SceneHead} head @returns {Layout} */
 export function layoutOf(head) {
   let at = HEAD;
-  const take = (numbers) => (at += numbers) - numbers;
+  const take = (/** @type {number} */ numbers) => (at += numbers) - numbers;
   const links = head.robots.map((robot) => take(robot.links * POSE));
   const objects = take(head.objects.length * POSE);
   const robots = head.robots.map((robot) => ({
@@ -48,13 +123,18 @@ export class Frame {
   get stepsLeft() { return this.row[3]; }
   get clockLeft() { return this.row[4]; }
 
+  /** Tells whether a robot has fallen. @param {number} robot */
   fallen(robot) { return this.row[this.layout.robots[robot].fallen] > 0; }
 
-  /** One hand of a robot: places of its poses in the row, and its numbers. */
+  /**
+   * Returns one hand of a robot: places of its poses in the row, and its numbers.
+   * @param {number} robot
+   * @param {number} side
+   */
   hand(robot, side) {
     const at = this.layout.robots[robot].hands[side];
     const rest = at + 2 * POSE;
-    const vector = (place) => [this.row[place], this.row[place + 1], this.row[place + 2]];
+    const vector = (/** @type {number} */ place) => [this.row[place], this.row[place + 1], this.row[place + 2]];
     return {
       wrist: at,
       target: at + POSE,
@@ -66,7 +146,11 @@ export class Frame {
     };
   }
 
-  /** The largest share of an effort limit among the joints of a robot whose names begin so, or do with none of them. */
+  /**
+   * Returns the largest share of an effort limit among joints of a robot.
+   * @param {number} robot
+   * @param {number[]} wanted
+   */
   effort(robot, wanted) {
     const { efforts } = this.layout.robots[robot];
     let most = 0;
@@ -78,9 +162,11 @@ export class Frame {
 /**
  * Reads the message of a scene.
  * @param {ArrayBuffer} message
+ * @returns {Scene}
  */
 export function readScene(message) {
   const size = new DataView(message).getUint32(0, true);
+  /** @type {SceneHead} */
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, size)));
   let at = 4 + size;
   const meshes = head.meshes.map(([vertices, triangles]) => {

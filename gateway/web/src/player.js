@@ -8,6 +8,7 @@ const STEP_S = 0.1;
 /** Time without a change after which the address gets the moment; browsers refuse frequent changes. */
 const SETTLED_MS = 400;
 
+/** The controls of a recorded time. */
 export class Player {
   /**
    * @param {import("./time.js").RecordedTime} time
@@ -17,7 +18,11 @@ export class Player {
     this.time = time;
     this.play = element("button", { class: "play", onclick: () => this.toggle() }, "Play");
     this.moment = element("output");
-    const call = (way, text, title) =>
+    /** @type {number | undefined} */
+    this.shown = undefined;
+    /** @type {number | undefined} */
+    this.settling = undefined;
+    const call = (/** @type {number} */ way, /** @type {string} */ text, /** @type {string} */ title) =>
       step && element("button", { title, "aria-label": title, onclick: () => step(way) }, text);
     const speed = element(
       "select",
@@ -40,7 +45,8 @@ export class Player {
       copying(() => this.address(), "Copy link to this moment"),
     );
     addEventListener("keydown", (event) => {
-      if (event.target.closest("input, select, button, summary, a, textarea")) return;
+      const { target } = event;
+      if (target instanceof Element && target.closest("input, select, button, summary, a, textarea")) return;
       if (event.key === " ") this.toggle();
       else if (event.key === "ArrowLeft") time.seek(time.time - STEP_S);
       else if (event.key === "ArrowRight") time.seek(time.time + STEP_S);
@@ -55,7 +61,7 @@ export class Player {
     this.time.play(!this.time.playing);
   }
 
-  /** The page's address with the moment that is shown. */
+  /** Returns the page's address with the moment that is shown. */
   address() {
     const url = new URL(location.href);
     url.searchParams.set("at", this.time.time.toFixed(2));

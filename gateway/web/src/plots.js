@@ -6,7 +6,20 @@ import { SIDES } from "./message.js";
 const LIVE_SPAN_S = 20;
 const HEIGHT = 84;
 
-/** What is plotted of a step: a name, a unit, and a number of each robot's left and right. */
+/** @typedef {import("./message.js").Frame} Frame */
+/** @typedef {import("./targets.js").Targets} Targets */
+/** @typedef {[number, number]} Point A moment and a value. */
+/** @typedef {{ arms: number[][], legs: number[][] }} Joints Numbers of a robot's joints, by side. */
+/**
+ * A plot of steps: a name, a unit, and a number of each robot's left and right.
+ * @typedef {{ name: string, unit: string, least: number, of: (frame: Frame, robot: number, side: number, joints: Joints, targets: Targets | null) => number }} Plot
+ */
+/**
+ * A plot with its lines by robot and side.
+ * @typedef {Plot & { canvas: HTMLCanvasElement, now: HTMLElement, series: number[][][] }} DrawnPlot
+ */
+
+/** @type {Plot[]} */
 const PLOTS = [
   { name: "Wrist error", unit: "mm", least: 20, of: (frame, robot, side, joints, targets) => {
     const error = frame.hand(robot, side).positionError;
@@ -17,11 +30,16 @@ const PLOTS = [
   { name: "Leg effort", unit: "% of limit", least: 50, of: (frame, robot, side, joints) => 100 * frame.effort(robot, joints.legs[side]) },
 ];
 
+/** Plots of hands and joints. */
 export class Plots {
-  /** @param {import("./targets.js").Targets | null} targets those of a finished episode */
+  /**
+   * @param {import("./message.js").SceneHead} head
+   * @param {Targets | null} targets those of a finished episode
+   */
   constructor(head, targets) {
     this.head = head;
     this.targets = targets;
+    /** @type {number[]} */
     this.times = [];
     this.joints = head.robots.map(({ joints }) => ({
       arms: SIDES.map((side) => indices(joints, side, /shoulder|elbow|wrist|hand/)),
@@ -30,7 +48,7 @@ export class Plots {
     this.plots = PLOTS.map((plot) => {
       const canvas = element("canvas", { height: HEIGHT, role: "img", "aria-label": `${plot.name} over time` });
       const now = element("span", { class: "soft" });
-      return { ...plot, canvas, now, series: head.robots.map(() => SIDES.map(() => [])) };
+      return { ...plot, canvas, now, series: head.robots.map(() => SIDES.map(() => /** @type {number[]} */ ([]))) };
     });
     const legend = element("p", { class: "legend" }, ...head.robots.map(({ name }, robot) =>
       element("span", {}, element("i", { class: `swatch robot${robot % 3}` }), name)), element("span", { class: "soft" }, "full line left, dashed right"));
@@ -38,9 +56,9 @@ export class Plots {
       element("figure", {}, element("figcaption", {}, element("b", {}, name), ` [${unit}] `, now), canvas))));
   }
 
-  /** Adds a step. */
+  /** Adds a step. @param {Frame} frame */
   add(frame) {
-    if (this.times.length && frame.time <= this.times.at(-1)) return;
+    if (this.times.length && frame.time <= this.times[this.times.length - 1]) return;
     this.times.push(frame.time);
     for (const plot of this.plots) {
       plot.series.forEach((sides, robot) => sides.forEach((line, side) => line.push(plot.of(frame, robot, side, this.joints[robot], this.targets))));
@@ -49,20 +67,32 @@ export class Plots {
 
   /** Forgets what a live plot shows no more. */
   trim() {
-    const from = this.times.findIndex((time) => time >= this.times.at(-1) - LIVE_SPAN_S);
+    const end = this.times[this.times.length - 1];
+    const from = this.times.findIndex((time) => time >= end - LIVE_SPAN_S);
     if (from < 500) return;
     this.times.splice(0, from);
     for (const plot of this.plots) for (const line of plot.series.flat()) line.splice(0, from);
   }
 
-  /** Draws up to the present; with `cursor`, the whole episode and where it is looked at. */
+  /**
+   * Draws up to the present; with `cursor`, the whole episode and where it is looked at.
+   * @param {number | null} cursor
+   * @param {number[]} marks
+   */
   draw(cursor, marks) {
     if (!this.times.length) return;
-    const end = this.times.at(-1);
+    const end = this.times[this.times.length - 1];
     const begin = cursor === null ? Math.max(this.times[0], end - LIVE_SPAN_S) : this.times[0];
     for (const plot of this.plots) this.drawOne(plot, begin, Math.max(end, begin + 1), cursor, marks);
   }
 
+  /**
+   * @param {DrawnPlot} plot
+   * @param {number} begin
+   * @param {number} end
+   * @param {number | null} cursor
+   * @param {number[]} marks
+   */
   drawOne({ canvas, series, least, now, unit }, begin, end, cursor, marks) {
     const first = Math.max(0, this.times.findIndex((time) => time >= begin));
     const lines = series.flat().map((values, index) => ({ times: this.times, values, first, stroke: robotColour(Math.floor(index / 2)), dash: index % 2 ? [4, 3] : [] }));
@@ -75,15 +105,17 @@ export class Plots {
 }
 
 /**
- * What an episode has taken up to each moment, of a finished one: each plot a number that grows or shrinks with calls and notes.
+ * Plots of what a finished episode has taken up to each moment: each a number that grows or shrinks with calls and notes.
  */
 export class BudgetPlots {
-  /** @param {import("./message.js").Frame[]} frames */
+  /** @param {import("./message.js").WatchedHead} head @param {Frame[]} frames */
   constructor(head, frames) {
-    const end = frames.at(-1).time;
+    const end = frames[frames.length - 1].time;
     this.span = [frames[0].time, end];
     const steps = head.episode_steps;
+    /** @type {Point[]} */
     const budget = frames.map((frame) => [frame.time, 100 * Math.max(0, 1 - frame.step / steps)]);
+    /** @type {{ name: string, unit: string, least: number, digits?: number, points: Point[] }[]} */
     const known = [
       { name: "Steps left", unit: "%", least: 100, points: budget },
       { name: "Calls", unit: "so far", least: 5, points: sums(head.story, (entry) => (entry.kind === "call" && entry.number !== null ? 1 : 0)) },
@@ -91,8 +123,10 @@ export class BudgetPlots {
       { name: "Tokens", unit: "thousands so far", least: 1, digits: 1, points: sums(head.story, ({ note }) => ((note?.input_tokens ?? 0) + (note?.output_tokens ?? 0)) / 1000) },
       { name: "Price", unit: "$ so far", least: 0.01, digits: 3, points: sums(head.story, ({ note }) => note?.usd ?? 0) },
     ];
-    if (head.thinking_s) {
-      const left = head.story.map((entry) => [entry.time_s, 100 * Math.max(0, 1 - entry.thought_s / head.thinking_s)]);
+    const { thinking_s: thinkingS } = head;
+    if (thinkingS) {
+      /** @type {Point[]} */
+      const left = head.story.map((entry) => [entry.time_s, 100 * Math.max(0, 1 - entry.thought_s / thinkingS)]);
       known.splice(1, 0, { name: "Time to think left", unit: "%", least: 100, points: [[this.span[0], 100], ...left] });
     }
     this.plots = known.filter(({ points }) => points.some(([, value]) => value > 0)).map((plot) => {
@@ -103,12 +137,13 @@ export class BudgetPlots {
       element("figure", {}, element("figcaption", {}, element("b", {}, name), ` [${unit}] `, now), canvas)));
   }
 
+  /** Draws the whole episode and where it is looked at. @param {number} cursor @param {number[]} marks */
   draw(cursor, marks) {
     const [begin, end] = this.span;
     for (const { canvas, now, name, points, least, digits } of this.plots) {
       // Between two moments nothing is taken, so each value holds until the next.
       const held = points.flatMap(([time, value], index) => (index ? [[time, points[index - 1][1]], [time, value]] : [[time, value]]));
-      if (held.length) held.push([end, held.at(-1)[1]]);
+      if (held.length) held.push([end, held[held.length - 1][1]]);
       const line = { times: held.map(([time]) => time), values: held.map(([, value]) => value), first: 0, stroke: colour("--accent"), dash: [] };
       drawLines(canvas, [line], { begin, end: Math.max(end, begin + 1), least, cursor, marks });
       const last = points.findLast(([time]) => time <= cursor + 1e-6);
@@ -118,12 +153,23 @@ export class BudgetPlots {
   }
 }
 
-/** Sums over the entries so far. */
+/**
+ * Returns sums over the entries so far.
+ * @param {import("./message.js").Entry[]} story
+ * @param {(entry: import("./message.js").Entry) => number} of
+ * @returns {Point[]}
+ */
 function sums(story, of) {
   let sum = 0;
   return story.map((entry) => [entry.time_s, sum += of(entry)]);
 }
 
+/**
+ * Draws lines over time.
+ * @param {HTMLCanvasElement} canvas
+ * @param {{ times: number[], values: number[], first: number, stroke: string, dash: number[] }[]} lines
+ * @param {{ begin: number, end: number, least: number, cursor: number | null, marks: number[] }} span
+ */
 function drawLines(canvas, lines, { begin, end, least, cursor, marks }) {
   const width = canvas.clientWidth;
   if (!width) return;
@@ -132,11 +178,12 @@ function drawLines(canvas, lines, { begin, end, least, cursor, marks }) {
   canvas.height = HEIGHT * scale;
   // Drawn by the processor: a graphics processor in software, which draws the scene, takes many times as long for lines.
   const context = canvas.getContext("2d", { willReadFrequently: true });
+  if (!context) return;
   context.scale(scale, scale);
   let most = least;
   for (const { values, first } of lines) for (let i = first; i < values.length; i += 1) most = Math.max(most, values[i]);
-  const x = (time) => ((time - begin) / (end - begin)) * (width - 34);
-  const y = (value) => HEIGHT - 4 - (value / most) * (HEIGHT - 12);
+  const x = (/** @type {number} */ time) => ((time - begin) / (end - begin)) * (width - 34);
+  const y = (/** @type {number} */ value) => HEIGHT - 4 - (value / most) * (HEIGHT - 12);
   context.fillStyle = context.strokeStyle = colour("--line");
   for (const time of marks) context.fillRect(x(time), 0, 1, HEIGHT);
   context.fillRect(0, y(0), width - 34, 1);
@@ -162,6 +209,12 @@ function drawLines(canvas, lines, { begin, end, least, cursor, marks }) {
   }
 }
 
+/**
+ * Returns the numbers of joints of a side and a kind.
+ * @param {string[]} joints
+ * @param {string} side
+ * @param {RegExp} kind
+ */
 function indices(joints, side, kind) {
   return joints.flatMap((name, index) => (name.startsWith(side) && kind.test(name) ? [index] : []));
 }

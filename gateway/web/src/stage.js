@@ -20,14 +20,26 @@ const FRUSTUM_M = 0.55;
 const GHOST_FROM_M = 0.01;
 /** Pixels of the page that one of the picture covers, at most, where drawing takes long. */
 const MOST_COARSENESS = 3;
-/** What has not moved for so long is drawn once more, as finely as the page is. */
+/** Time without motion after which a picture is drawn once more, as finely as the page is. */
 const STILL_MS = 300;
 const SOFTWARE_COARSENESS = 1.5;
+/** @type {Record<string, string>} */
 const STATE_COLOURS = { moving: "--accent", arrived: "--good", blocked: "--bad", out_of_reach: "--odd", joints: "--soft" };
 const SKY_FROM_BELOW = 0x8d8678;
 
+/** @typedef {import("./message.js").Frame} Frame */
+/** @typedef {import("./message.js").Part} Part */
+/** @typedef {import("./message.js").Mesh} MeshNumbers */
+/** @typedef {import("./targets.js").Target} Target */
+/** @typedef {ReturnType<Stage["extrasOf"]>["hands"][number]} HandExtras Drawing of a hand. */
+/**
+ * Puts a thing to the pose at a place of a row.
+ * @typedef {(thing: import("three").Object3D, at: number) => void} Poser
+ */
+
+/** The drawing of one scene. */
 export class Stage {
-  /** @param {HTMLElement} place @param {ReturnType<import("./message.js").readScene>} scene */
+  /** @param {HTMLElement} place @param {Omit<import("./message.js").Scene, "frames">} scene */
   constructor(place, { head, meshes, layout }) {
     this.head = head;
     this.layout = layout;
@@ -39,7 +51,7 @@ export class Stage {
     this.renderer.shadowMap.enabled = quick;
     place.append(this.renderer.domElement);
     this.scene = new Scene();
-    this.light(quick);
+    this.sun = this.light(quick);
     this.carriers = this.build(meshes);
     this.free = new PerspectiveCamera((head.third_person.vertical_fov_rad * 180) / Math.PI, 1, 0.02, 60);
     this.free.up.copy(UP);
@@ -48,11 +60,24 @@ export class Stage {
     this.controls = new OrbitControls(this.free, this.renderer.domElement);
     this.controls.maxDistance = 12;
     this.controls.addEventListener("change", () => { this.stale = true; });
+    this.centred = false;
+    this.isFine = false;
     this.view = "free";
     this.extras = { frustums: true, forces: true, targets: true };
-    /** How much of the height a robot's picture takes at most, at the top where it is less than all: what is below is shown, too. */
+    /**
+     * Largest share of the height that a robot's picture takes, at the top where it is less than 1; the scene
+     * goes on below it.
+     */
     this.pictureShare = 1;
     this.robots = head.robots.map((robot, index) => this.extrasOf(robot, index));
+    /** The space of a headset's wearer, with its camera; and the robot in whose place the wearer stands. */
+    this.rig = new Group();
+    this.rider = new PerspectiveCamera(60, 1, 0.02, 60);
+    this.rig.add(this.rider);
+    this.rig.visible = false;
+    this.scene.add(this.rig);
+    /** @type {number | null} */
+    this.ridden = null;
     this.stale = true;
     this.drawnAt = 0;
     this.sized = new ResizeObserver(() => this.resize());
@@ -85,35 +110,46 @@ export class Stage {
     this.stale = true;
   }
 
+  /** Adds lights to the scene. Returns the one that casts shadows, if any does. @param {boolean} casts */
   light(casts) {
     this.scene.add(new HemisphereLight(0xffffff, SKY_FROM_BELOW, 1.6), new AmbientLight(0xffffff, 0.35));
-    this.sun = new DirectionalLight(0xffffff, 2.1);
-    this.sun.castShadow = casts;
-    this.sun.shadow.mapSize.set(1024, 1024);
-    Object.assign(this.sun.shadow.camera, { left: -2.2, right: 2.2, top: 2.2, bottom: -2.2, near: 0.5, far: 9 });
-    this.sun.shadow.bias = -0.0015;
-    this.sun.shadow.normalBias = 0.02;
-    this.scene.add(this.sun, this.sun.target);
+    const sun = new DirectionalLight(0xffffff, 2.1);
+    sun.castShadow = casts;
+    sun.shadow.mapSize.set(1024, 1024);
+    Object.assign(sun.shadow.camera, { left: -2.2, right: 2.2, top: 2.2, bottom: -2.2, near: 0.5, far: 9 });
+    sun.shadow.bias = -0.0015;
+    sun.shadow.normalBias = 0.02;
+    this.scene.add(sun, sun.target);
+    return sun;
   }
 
-  /** One mesh for all parts of a carrier that are alike in shadow and alpha. Returns the carriers that move. */
+  /**
+   * Makes one mesh for all parts of a carrier that are alike in shadow and alpha. Returns the carriers that
+   * move.
+   * @param {MeshNumbers[]} meshes
+   */
   build(meshes) {
+    /** @type {Map<string, Part[]>} */
     const groups = new Map();
     for (const part of this.head.parts) {
-      const { kind, robot, link, object } = part.carrier;
-      const key = `${kind} ${robot} ${link} ${object} ${part.casts_shadow} ${part.alpha}`;
+      const key = `${JSON.stringify(part.carrier)} ${part.casts_shadow} ${part.alpha}`;
       groups.set(key, [...(groups.get(key) ?? []), part]);
     }
     const carriers = [];
+    /** @type {Mesh<BufferGeometry, MeshLambertMaterial>[]} */
+    this.shapes = [];
     for (const parts of groups.values()) {
       const plain = parts.filter((part) => part.pattern !== "checker");
       const checked = parts.filter((part) => part.pattern === "checker");
-      for (const [some, material] of [[plain, paintOf(parts[0])], ...checked.map((part) => [[part], checker(part)])]) {
-        if (!some.length) continue;
+      /** @type {[Part[], MeshLambertMaterial][]} */
+      const lots = checked.map((part) => [[part], checker(part)]);
+      if (plain.length) lots.unshift([plain, paintOf(parts[0])]);
+      for (const [some, material] of lots) {
         const mesh = new Mesh(merged(some, meshes), material);
         mesh.castShadow = some[0].casts_shadow;
         mesh.receiveShadow = true;
         this.scene.add(mesh);
+        this.shapes.push(mesh);
         const at = this.placeOf(some[0].carrier);
         if (at !== null) carriers.push({ mesh, at });
       }
@@ -121,12 +157,20 @@ export class Stage {
     return carriers;
   }
 
-  /** Where in a row the pose of a carrier is. */
-  placeOf({ kind, robot, link, object }) {
-    if (kind === "link") return this.layout.links[robot] + link * POSE;
-    return kind === "object" ? this.layout.objects + object * POSE : null;
+  /**
+   * Returns the place of a carrier's pose in a row, or null for the room.
+   * @param {import("./message.js").Carrier} carrier
+   */
+  placeOf(carrier) {
+    if (carrier.kind === "link") return this.layout.links[carrier.robot] + carrier.link * POSE;
+    return carrier.kind === "object" ? this.layout.objects + carrier.object * POSE : null;
   }
 
+  /**
+   * Adds to the scene the extras of a robot, and returns them.
+   * @param {import("./message.js").RobotHead} robot
+   * @param {number} index
+   */
   extrasOf(robot, index) {
     const paint = new Color(robotColour(index));
     const frustum = new LineSegments(frustumGeometry(robot.camera), new LineBasicMaterial({ color: paint, transparent: true, opacity: 0.75 }));
@@ -137,17 +181,24 @@ export class Stage {
       line.frustumCulled = false;
       const felt = new ArrowHelper(UP, new Vector3(), 0.1, paint);
       const contact = new ArrowHelper(UP, new Vector3(), 0.1, colour("--force"));
-      this.scene.add(ghost, line, felt, contact);
+      this.scene.add(ghost.group, line, felt, contact);
       return { ghost, line, felt, contact };
     });
     return { frustum, hands };
   }
 
-  /** Puts everything where it is a `share` of the way from one step to the next. */
+  /**
+   * Puts everything where it is a `share` of the way from one step to the next.
+   * @param {Frame} from
+   * @param {Frame} to
+   * @param {number} share
+   * @param {import("./targets.js").Targets | null} [targets] those of a finished episode
+   */
   show(from, to, share, targets) {
     const one = new Vector3();
     const turn = new Quaternion();
     const turnTo = new Quaternion();
+    /** @type {Poser} */
     const pose = (thing, at) => {
       thing.position.fromArray(from.row, at).lerp(one.fromArray(to.row, at), share);
       thing.quaternion.copy(turn.fromArray(from.row, at + 3)).slerp(turnTo.fromArray(to.row, at + 3), share);
@@ -175,27 +226,36 @@ export class Stage {
     this.stale = true;
   }
 
+  /**
+   * Shows a hand's target and forces.
+   * @param {HandExtras} extras
+   * @param {ReturnType<Frame["hand"]>} hand
+   * @param {Frame} from
+   * @param {Poser} pose
+   * @param {Target | null} [recorded] its target in a finished episode
+   */
   showHand({ ghost, line, felt, contact }, hand, from, pose, recorded) {
     const paint = new Color(colour(STATE_COLOURS[recorded?.state ?? hand.state] ?? "--soft"));
     const wrist = new Vector3().fromArray(from.row, hand.wrist);
     if (recorded) {
-      ghost.position.fromArray(recorded.pose);
-      ghost.quaternion.fromArray(recorded.pose, 3);
+      ghost.group.position.fromArray(recorded.pose);
+      ghost.group.quaternion.fromArray(recorded.pose, 3);
     } else {
-      pose(ghost, hand.target);
+      pose(ghost.group, hand.target);
     }
-    ghost.visible = line.visible = this.extras.targets && ghost.position.distanceTo(wrist) > GHOST_FROM_M;
-    ghost.traverse((part) => part.material?.color.copy(paint));
+    const { position } = ghost.group;
+    ghost.group.visible = line.visible = this.extras.targets && position.distanceTo(wrist) > GHOST_FROM_M;
+    for (const material of ghost.materials) material.color.copy(paint);
     line.material.color.copy(paint);
     const ends = line.geometry.getAttribute("position");
     ends.setXYZ(0, wrist.x, wrist.y, wrist.z);
-    ends.setXYZ(1, ghost.position.x, ghost.position.y, ghost.position.z);
+    ends.setXYZ(1, position.x, position.y, position.z);
     ends.needsUpdate = true;
     arrow(felt, wrist, hand.felt, this.extras.forces);
     arrow(contact, wrist, hand.contact, this.extras.forces);
   }
 
-  /** Looks with the free camera, or as a robot called `view` does. */
+  /** Looks with the free camera, or as a robot called `view` does. @param {string} view */
   look(view) {
     this.view = view;
     this.controls.enabled = view === "free";
@@ -214,7 +274,7 @@ export class Stage {
     return !isStill;
   }
 
-  /** The camera that looks now, as the place's size wants it. */
+  /** Returns the camera that looks now, as the place's size wants it. */
   camera() {
     const { clientWidth: width, clientHeight: height } = this.place;
     const robot = this.head.robots.find(({ name }) => name === this.view);
@@ -231,20 +291,18 @@ export class Stage {
     return camera;
   }
 
-  /** From now on a headset's wearer stands in the place of a robot, or, for null, nobody does. */
+  /** Puts a headset's wearer in the place of a robot, or, for null, nobody. @param {number | null} robot */
   ride(robot) {
     this.ridden = robot;
-    this.rig ??= new Group();
-    if (!this.rider) {
-      this.rider = new PerspectiveCamera(60, 1, 0.02, 60);
-      this.rig.add(this.rider);
-      this.scene.add(this.rig);
-    }
     this.rig.visible = robot !== null;
     this.stale = true;
   }
 
-  /** Puts the wearer's space to the eye of the robot, upright, facing where the robot faces: nobody's neck is bent by a tilted camera. */
+  /**
+   * Puts the wearer's space to the eye of the robot, upright, facing where the robot faces: nobody's neck is
+   * bent by a tilted camera.
+   * @param {Float32Array} pose
+   */
   placeRig(pose) {
     const ahead = new Vector3(0, 0, -1).applyQuaternion(new Quaternion().fromArray(pose, 3));
     const back = ahead.setZ(0).normalize().negate();
@@ -258,7 +316,11 @@ export class Stage {
     this.renderer.render(this.scene, this.rider);
   }
 
-  /** Where a point of the world is seen: x to the right and y up, from -1 to 1 within the place, and whether it is ahead. */
+  /**
+   * Returns where a point of the world is seen: x to the right and y up, from -1 to 1 within the place; and
+   * tells whether it is ahead.
+   * @param {Vector3} point
+   */
   project(point) {
     const camera = this.camera();
     camera.updateMatrixWorld();
@@ -267,16 +329,28 @@ export class Stage {
     return { x, y, ahead: seen.z < 0 };
   }
 
-  /** How far a point of the world moves where its picture moves by so many pixels to the right and down, and it goes away by so many metres. */
+  /**
+   * Returns how far a point of the world moves where its picture moves by pixels to the right and down, and it goes away by metres.
+   * @param {Vector3} point
+   * @param {number} right
+   * @param {number} down
+   * @param {number} away
+   */
   way(point, right, down, away) {
     const camera = this.camera();
     camera.updateMatrixWorld();
     const depth = Math.max(0.1, -point.clone().applyMatrix4(camera.matrixWorldInverse).z);
-    const metres = (2 * depth * Math.tan((camera.fov * Math.PI) / 360)) / camera.view.fullHeight;
+    const wholePixels = camera.view?.fullHeight ?? this.place.clientHeight;
+    const metres = (2 * depth * Math.tan((camera.fov * Math.PI) / 360)) / wholePixels;
     return new Vector3(right * metres, -down * metres, -away).applyQuaternion(camera.quaternion);
   }
 
-  /** The axis and angle, in the world, by which a ball turns that a pointer moves to the right and down, or round the line of sight. */
+  /**
+   * Returns the axis and angle, in the world, by which a ball turns that a pointer moves to the right and down, or round the line of sight.
+   * @param {number} right
+   * @param {number} down
+   * @param {number} round
+   */
   axis(right, down, round) {
     return new Vector3(down, right, round).applyQuaternion(this.camera().quaternion);
   }
@@ -298,7 +372,7 @@ export class Stage {
     }
     this.renderer.shadowMap.enabled = false;
     this.sun.castShadow = false;
-    this.scene.traverse((part) => { if (part.material) part.material.needsUpdate = true; });
+    for (const { material } of this.shapes) material.needsUpdate = true;
     this.stale = true;
   }
 }
@@ -308,7 +382,7 @@ const JUDGED_FRAMES = 20;
 /** A page in the background is not drawn, and so is not slow. */
 const NOT_DRAWN_MS = 1000;
 
-/** Says when drawing takes longer, over some frames, than `mostMs` a frame. */
+/** A judge that says when drawing takes longer, over some frames, than `mostMs` a frame. */
 export class Pace {
   /** @param {number} mostMs */
   constructor(mostMs) {
@@ -317,7 +391,11 @@ export class Pace {
     this.totalMs = 0;
   }
 
-  /** Another frame came `ms` after the last. Returns whether they come too slowly, once for so many. */
+  /**
+   * Takes in that another frame came `ms` after the last. Returns whether they come too slowly, once for
+   * `JUDGED_FRAMES`.
+   * @param {number} ms
+   */
   isSlow(ms) {
     if (ms > NOT_DRAWN_MS) return false;
     this.frames += 1;
@@ -329,22 +407,30 @@ export class Pace {
   }
 }
 
-/** Whether a processor draws in place of a graphics processor. */
+/** Tells whether a processor draws in place of a graphics processor. */
 function drawnBySoftware() {
   const context = document.createElement("canvas").getContext("webgl2");
-  const names = context?.getExtension("WEBGL_debug_renderer_info");
+  if (!context) return false;
+  const names = context.getExtension("WEBGL_debug_renderer_info");
   const name = names ? context.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
-  context?.getExtension("WEBGL_lose_context")?.loseContext();
+  context.getExtension("WEBGL_lose_context")?.loseContext();
   return /swiftshader|llvmpipe|softpipe|software|basic render/i.test(name);
 }
 
-/** The material of a part without a pattern. What is blended keeps out as much light as in the server's images. */
+/**
+ * Makes the material of a part without a pattern. What is blended keeps out as much light as in the server's
+ * images.
+ * @param {Part} part
+ */
 function paintOf({ alpha }) {
   const blended = alpha < SOLID_ALPHA ? { transparent: true, depthWrite: false, opacity: 1 - (1 - alpha) ** 2 } : {};
   return new MeshLambertMaterial({ vertexColors: true, ...blended });
 }
 
-/** Squares of half a metre in the world's ground plane, as the server draws them. */
+/**
+ * Makes the material of squares of half a metre in the world's ground plane, as the server draws them.
+ * @param {import("./message.js").CheckedPart} part
+ */
 function checker(part) {
   const material = new MeshLambertMaterial({ vertexColors: true });
   const second = new Color().setRGB(...part.second_rgb, SRGBColorSpace);
@@ -360,7 +446,11 @@ function checker(part) {
   return material;
 }
 
-/** Parts of one carrier as one geometry in its frame, with their colours at the corners. */
+/**
+ * Returns parts of one carrier as one geometry in its frame, with their colours at the corners.
+ * @param {Part[]} parts
+ * @param {MeshNumbers[]} meshes
+ */
 function merged(parts, meshes) {
   const total = parts.reduce((sum, part) => sum + meshes[part.mesh].positions.length, 0);
   const positions = new Float32Array(total);
@@ -397,7 +487,10 @@ function merged(parts, meshes) {
   return geometry;
 }
 
-/** The edges of what a camera sees, which looks along -z with y up. */
+/**
+ * Returns the edges of what a camera sees, which looks along -z with y up.
+ * @param {import("./message.js").CameraHead} camera
+ */
 function frustumGeometry({ vertical_fov_rad: fov, width, height }) {
   const y = FRUSTUM_M * Math.tan(fov / 2);
   const x = (y * width) / height;
@@ -406,18 +499,26 @@ function frustumGeometry({ vertical_fov_rad: fov, width, height }) {
   return new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(ends.flat()), 3));
 }
 
-/** A wrist's target: a ball, and axes that say how the hand is turned. */
+/** Makes a wrist's target: a ball, and axes that say how the hand is turned. */
 function ghostGroup() {
   const group = new Group();
   const material = new MeshBasicMaterial({ transparent: true, opacity: 0.55, depthTest: false });
   const ball = new Mesh(new SphereGeometry(0.022, 16, 12), material);
   const ends = new Float32Array([0, 0, 0, 0.1, 0, 0, 0, 0, 0, 0, 0.05, 0, 0, 0, 0, 0, 0, 0.05]);
-  const axes = new LineSegments(new BufferGeometry().setAttribute("position", new BufferAttribute(ends, 3)), new LineBasicMaterial({ depthTest: false }));
+  const paint = new LineBasicMaterial({ depthTest: false });
+  const axes = new LineSegments(new BufferGeometry().setAttribute("position", new BufferAttribute(ends, 3)), paint);
   group.add(ball, axes);
   group.renderOrder = ball.renderOrder = axes.renderOrder = 5;
-  return group;
+  return { group, materials: [material, paint] };
 }
 
+/**
+ * Shows a force as an arrow.
+ * @param {ArrowHelper} helper
+ * @param {Vector3} at
+ * @param {number[]} force
+ * @param {boolean} wanted
+ */
 function arrow(helper, at, force, wanted) {
   const along = new Vector3().fromArray(force);
   const newtons = along.length();

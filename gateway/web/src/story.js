@@ -9,18 +9,31 @@ const LEAST_THOUGHT_S = 0.5;
 /** Letters of a note or a refusal that are shown before its reader opens it. */
 const SHORT_NOTE = 280;
 
+/** @typedef {import("./message.js").Entry} Entry */
+/** @typedef {import("./message.js").CallEntry} CallEntry */
+/** @typedef {{ time: number, item: HTMLElement }} Item An entry of the list, and its moment. */
+
+/** The list of an episode's calls and notes. */
 export class Story {
   /**
+   * @param {import("./message.js").SceneHead} head
    * @param {{ seek: (time: number) => void, picture: (robot: string, time: number) => string } | null} recorded of a finished episode:
    *   takes the page to a moment, and says where a picture is
    */
   constructor(head, recorded) {
     this.head = head;
     this.recorded = recorded;
+    /** Pictures of the entries that are in the list, by number. @type {Map<number, HTMLElement | null>} */
     this.known = new Map();
+    /** @type {Item[]} */
     this.entries = [];
     this.thought = 0;
-    /** Takes a further command of people's into the item of those before it, if such a one was the last entry. */
+    /** @type {HTMLElement | undefined} */
+    this.marked = undefined;
+    /**
+     * Takes a further command of people's into the item of those before it, if such a one was the last entry.
+     * @type {((entry: CallEntry) => void) | null}
+     */
     this.driven = null;
     this.list = element("ol", { class: "story" });
     this.none = element("p", { class: "soft" }, "No call yet.");
@@ -28,11 +41,11 @@ export class Story {
     if (recorded) new ResizeObserver(() => this.bringIntoSight()).observe(this.node);
   }
 
-  /** A call or a note. */
+  /** Adds a call or a note. @param {Entry} entry */
   add(entry) {
     if (this.known.has(entry.entry)) return;
     this.none.hidden = true;
-    if (isDriven(entry)) {
+    if (entry.kind === "call" && isDriven(entry)) {
       if (this.driven) {
         this.known.set(entry.entry, null);
         this.thought = entry.thought_s;
@@ -58,21 +71,21 @@ export class Story {
       return;
     }
     this.list.prepend(item);
-    if (this.list.childElementCount > MOST_SHOWN) this.list.lastElementChild.remove();
+    if (this.list.childElementCount > MOST_SHOWN) this.list.lastElementChild?.remove();
   }
 
+  /** @param {CallEntry} entry */
   call(entry) {
     const asked = parsed(entry.arguments);
     const reply = entry.ok ? parsed(entry.reply) : entry.reply;
     const body = element("div", { class: "body" });
-    const head = element("summary", {},
-      element("span", { class: "number" }, entry.number === null ? "–" : `${entry.number}`),
-      element("code", {}, entry.tool),
-      element("span", {}, summary(entry, asked, reply)),
+    const number = element("span", { class: "number" }, entry.number === null ? "–" : `${entry.number}`);
+    const inShort = element("span", {}, summary(entry, asked, reply));
+    const head = element("summary", {}, number, element("code", {}, entry.tool), inShort,
       this.recorded ? null : this.when(entry));
     const details = element("details", { class: entry.ok ? "" : "refused" }, head, body);
     if (isDriven(entry)) {
-      this.goesOn(entry, [...head.children], body);
+      this.goesOn(entry, number, inShort, body);
       return this.recorded ? element("div", { class: "call" }, details, this.when(entry)) : details;
     }
     details.addEventListener("toggle", () => {
@@ -87,18 +100,27 @@ export class Story {
     return this.recorded ? element("div", { class: "call" }, details, this.when(entry)) : details;
   }
 
-  /** The commands of people, 50 a second, are one item, which grows. */
-  goesOn(first, [number, , told], body) {
+  /**
+   * Begins the item of people's commands, 50 a second, which grows.
+   * @param {CallEntry} first
+   * @param {HTMLElement} number
+   * @param {HTMLElement} told
+   * @param {HTMLElement} body
+   */
+  goesOn(first, number, told, body) {
     let count = 0;
-    this.driven = (entry) => {
+    /** @param {CallEntry} entry */
+    const driven = (entry) => {
       count += 1;
       number.textContent = count > 1 ? `${first.number}–${entry.number}` : `${entry.number}`;
       told.textContent = `people drive, up to ${entry.time_s.toFixed(1)} s: ${count} ${count > 1 ? "commands" : "command"} of a step`;
     };
-    this.driven(first);
+    driven(first);
+    this.driven = driven;
     body.append(element("p", { class: "soft" }, "What each robot was to do, 50 times a second. The recording has all of it."));
   }
 
+  /** @param {import("./message.js").NoteEntry} entry */
   note(entry) {
     const { note } = entry;
     const who = [note.robot ?? "", note.kind, note.model ?? ""].filter(Boolean).join(", ");
@@ -110,21 +132,29 @@ export class Story {
       used(note) ? element("p", { class: "soft" }, used(note)) : null);
   }
 
+  /** @param {Entry} entry */
   when(entry) {
     const told = `${entry.time_s.toFixed(1)} s`;
-    if (!this.recorded) return element("span", { class: "soft time" }, told);
-    const go = (event) => {
+    const { recorded } = this;
+    if (!recorded) return element("span", { class: "soft time" }, told);
+    const go = (/** @type {Event} */ event) => {
       event.preventDefault();
-      this.recorded.seek(entry.time_s);
+      recorded.seek(entry.time_s);
     };
     return element("button", { class: "time", title: "Go there", onclick: go }, told);
   }
 
+  /** @param {string} robot @param {string} src @param {boolean} later */
   image(robot, src, later) {
     return element("img", { alt: `What robot ${robot} saw`, title: `What robot ${robot} saw`, width: 160, height: 120, src, loading: later ? "lazy" : null });
   }
 
-  /** A picture that the policy was shown with a call. */
+  /**
+   * Shows a picture that the policy was shown with a call.
+   * @param {number} entry
+   * @param {number} robot
+   * @param {ArrayBuffer} png
+   */
   picture(entry, robot, png) {
     const seen = this.known.get(entry);
     if (!seen) return;
@@ -133,16 +163,13 @@ export class Story {
     seen.append(image);
   }
 
-  /** Marks what was told last at a moment. */
+  /** Marks what was told last at a moment. @param {number} time */
   follow(time) {
-    let last = null;
-    for (const entry of this.entries) {
-      if (entry.time > time + 1e-6) break;
-      last = entry;
-    }
-    if (last?.item === this.marked) return;
+    const next = this.entries.findIndex((entry) => entry.time > time + 1e-6);
+    const item = this.entries[(next < 0 ? this.entries.length : next) - 1]?.item;
+    if (item === this.marked) return;
     this.marked?.removeAttribute("aria-current");
-    this.marked = last?.item;
+    this.marked = item;
     if (!this.marked) return;
     this.marked.setAttribute("aria-current", "step");
     this.bringIntoSight();
@@ -156,10 +183,13 @@ export class Story {
   }
 }
 
-/** Whether an entry is one of the commands of a single step that people drive by. */
-const isDriven = ({ kind, ok, tool, reply }) => kind === "call" && ok && tool === "together" && /"executed_steps":\s*1\D/.test(reply);
+/**
+ * Tells whether a call is one of the commands of a single step that people drive by.
+ * @param {CallEntry} call
+ */
+const isDriven = ({ ok, tool, reply }) => ok && tool === "together" && /"executed_steps":\s*1\D/.test(reply);
 
-const parsed = (json) => {
+const parsed = (/** @type {string} */ json) => {
   try {
     return JSON.parse(json);
   } catch {
@@ -167,16 +197,20 @@ const parsed = (json) => {
   }
 };
 
-/** As JSON for somebody to read: rows of numbers on one line, numbers to six digits, and nothing that is null. */
-const text = (value) => (typeof value === "string" ? value
+/**
+ * Writes a value as JSON for somebody to read: rows of numbers on one line, numbers to six digits, and nothing
+ * that is null.
+ */
+const text = (/** @type {unknown} */ value) => (typeof value === "string" ? value
   : JSON.stringify(value, (_, inner) => readable(inner), 2).replace(/\[[-\d.,\se]+\]/g, (row) => row.replace(/\s+/g, " ")));
-const readable = (value) => {
+const readable = (/** @type {unknown} */ value) => {
   if (value === null) return undefined;
   return typeof value === "number" && !Number.isInteger(value) ? Number(value.toPrecision(6)) : value;
 };
 
-/** What a note says that was used. */
+/** Says what a note says that was used. @param {import("./message.js").Note} note */
 export function used({ input_tokens: input, output_tokens: output, cached_tokens: cached, usd, seconds }) {
+  /** @type {string[]} */
   const parts = [];
   if (input !== undefined) parts.push(`${input} tokens read${cached ? ` (${cached} from a cache)` : ""}, ${output} written`);
   if (usd !== undefined) parts.push(`$${usd.toFixed(usd < 0.1 ? 4 : 2)}`);
@@ -184,7 +218,7 @@ export function used({ input_tokens: input, output_tokens: output, cached_tokens
   return parts.join("; ");
 }
 
-/** A call in a few words. */
+/** Says a call in a few words. @param {CallEntry} call @param {any} asked @param {any} reply */
 function summary(call, asked, reply) {
   if (!call.ok) {
     // The example that follows is for the policy; it is told where the call is opened.
@@ -192,14 +226,14 @@ function summary(call, asked, reply) {
     return `refused: ${why.length > SHORT_NOTE ? `${why.slice(0, SHORT_NOTE)}...` : why}`;
   }
   const parts = [];
-  const robots = asked?.robots?.map?.((entry) => entry.robot ?? entry) ?? (asked?.robot ? [asked.robot] : []);
+  const robots = asked?.robots?.map?.((/** @type {any} */ entry) => entry.robot ?? entry) ?? (asked?.robot ? [asked.robot] : []);
   if (robots.length) parts.push(robots.join(" and "));
   if (asked?.text) parts.push(`“${asked.text}”`);
   if (reply?.commands !== undefined) parts.push(`${reply.commands} commands`);
   if (reply?.executed_steps !== undefined) parts.push(`${reply.executed_steps} steps`);
   if (reply?.stopped) parts.push(reply.stopped);
   if (reply?.stop_reason && reply.stop_reason !== "steps_done") parts.push(words(reply.stop_reason));
-  const states = reply?.robots?.flatMap?.(({ robot, left, right }) =>
+  const states = reply?.robots?.flatMap?.((/** @type {any} */ { robot, left, right }) =>
     [["left", left], ["right", right]].filter(([, hand]) => ["blocked", "out_of_reach"].includes(hand?.state)).map(([side, hand]) => `${robot} ${side} ${words(hand.state)}`)) ?? [];
   return [...parts, ...states].join(", ");
 }

@@ -7,15 +7,18 @@ import { POSE, SIDES } from "./message.js";
 /** The tools whose replies say where wrists were to be; people's commands are of the second. */
 const TELLING = ["move_wrists", "together"];
 
+/** @typedef {{ begin: number, end: number, pose: Float32Array, state: string }} Target */
+
+/** The wrist targets of a finished episode. */
 export class Targets {
-  /** @param {ReturnType<import("./message.js").readScene>} scene */
+  /** @param {import("./message.js").WatchedScene} scene */
   constructor({ head, layout, frames }) {
     /** By robot and side: targets in order, with the times between which they hold. */
-    this.known = head.robots.map(() => SIDES.map(() => []));
+    this.known = head.robots.map(() => SIDES.map(() => /** @type {Target[]} */ ([])));
     let begin = 0;
     let latest = 0;
     for (const call of head.story) {
-      const reply = call.ok && TELLING.includes(call.tool) ? JSON.parse(call.reply) : null;
+      const reply = call.kind === "call" && call.ok && TELLING.includes(call.tool) ? JSON.parse(call.reply) : null;
       while (frames[latest + 1]?.time <= call.time_s + 1e-6) latest += 1;
       const frame = frames[latest];
       for (const told of reply?.robots ?? []) {
@@ -30,7 +33,12 @@ export class Targets {
     }
   }
 
-  /** The target of a hand at a time, if a command was under way that had one. */
+  /**
+   * Returns the target of a hand at a time, or null where no command was under way that had one.
+   * @param {number} time
+   * @param {number} robot
+   * @param {number} side
+   */
   at(time, robot, side) {
     const known = this.known[robot][side];
     let [low, high] = [0, known.length];
@@ -42,7 +50,13 @@ export class Targets {
     return known[low]?.begin <= time ? known[low] : null;
   }
 
-  /** How far a wrist is from its target; `otherwise` where it has none. */
+  /**
+   * Returns the distance of a wrist from its target in metres; `otherwise` where it has none.
+   * @param {import("./message.js").Frame} frame
+   * @param {number} robot
+   * @param {number} side
+   * @param {number} otherwise
+   */
   error(frame, robot, side, otherwise) {
     const target = this.at(frame.time, robot, side);
     if (!target) return otherwise;
@@ -51,6 +65,12 @@ export class Targets {
   }
 }
 
+/**
+ * Returns a pose of a pelvis frame in the world.
+ * @param {Float32Array} row
+ * @param {number} pelvis place of the pelvis in the row
+ * @param {{ position_m: number[], quaternion_wxyz: number[] }} pose
+ */
 function inWorld(row, pelvis, { position_m: position, quaternion_wxyz: [w, x, y, z] }) {
   const turn = new Quaternion().fromArray(row, pelvis + 3);
   const at = new Vector3().fromArray(position).applyQuaternion(turn).add(new Vector3().fromArray(row, pelvis));

@@ -1,22 +1,33 @@
-// Which moment is shown: of a running episode the newest, a little late so that motion is smooth; of a finished one what its reader wants.
+// The moment that is shown: of a running episode the newest, a little late so that motion is smooth; of a finished one what its reader wants.
 
-/** Steps of a running episode come in bursts, as fast as they are simulated. They are shown within about so long. */
+/** @typedef {import("./message.js").Frame} Frame */
+
+/**
+ * Steps of a running episode come in bursts, as fast as they are simulated. They are shown within about so
+ * long.
+ */
 const BEHIND_S = 0.5;
 
 /** Shows the steps of a running episode one after the other. */
 export class LiveTime {
+  /** @param {Frame} first */
   constructor(first) {
+    /** @type {Frame[]} */
     this.frames = [first];
     this.time = first.time;
   }
 
+  /** Takes in a step. @param {Frame} frame */
   add(frame) {
-    if (frame.time > this.frames.at(-1).time) this.frames.push(frame);
+    if (frame.time > last(this.frames).time) this.frames.push(frame);
   }
 
-  /** The two steps and the share between them that are shown after `seconds` more. */
+  /**
+   * Returns the two steps and the share between them that are shown after `seconds` more.
+   * @param {number} seconds
+   */
   pass(seconds) {
-    const end = this.frames.at(-1).time;
+    const end = last(this.frames).time;
     // The more there is to show, the faster it is shown, and never slower than it was.
     const speed = Math.max(1, (end - this.time) / BEHIND_S);
     const before = this.time;
@@ -28,25 +39,34 @@ export class LiveTime {
 
 /** Goes to and fro in a finished episode. */
 export class RecordedTime {
+  /** @param {Frame[]} frames @param {number} [at] the moment at which it begins */
   constructor(frames, at) {
     this.frames = frames;
     this.begin = frames[0].time;
-    this.end = frames.at(-1).time;
+    this.end = last(frames).time;
+    this.time = this.begin;
+    this.moved = true;
     this.playing = false;
     this.speed = 1;
     this.seek(at || this.begin);
   }
 
+  /** Goes to a moment, or to the nearest that there is. @param {number} time */
   seek(time) {
     this.time = Math.min(Math.max(time, this.begin), this.end);
     this.moved = true;
   }
 
+  /** @param {boolean} playing */
   play(playing) {
     if (playing && this.time >= this.end) this.seek(this.begin);
     this.playing = playing;
   }
 
+  /**
+   * Returns the two steps and the share between them that are shown after `seconds` more.
+   * @param {number} seconds
+   */
   pass(seconds) {
     if (this.playing) {
       this.seek(this.time + seconds * this.speed);
@@ -58,7 +78,11 @@ export class RecordedTime {
   }
 }
 
-/** The two frames around a time, and how far it is from the one to the other. */
+/**
+ * Returns the two frames around a time, and how far it is from the one to the other.
+ * @param {Frame[]} frames
+ * @param {number} time
+ */
 function between(frames, time) {
   let low = 0;
   let high = frames.length - 1;
@@ -72,3 +96,6 @@ function between(frames, time) {
   const span = to.time - from.time;
   return { from, to, share: span > 0 ? (time - from.time) / span : 1 };
 }
+
+/** Returns the last of some frames, of which there is one at least. @param {Frame[]} frames */
+const last = (frames) => frames[frames.length - 1];

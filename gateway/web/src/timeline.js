@@ -4,7 +4,10 @@ import { colour, element, words } from "./dom.js";
 
 const ROW = 13;
 const CONTROL_HZ = 50;
-/** Rows of marks: what it is, its colour, and which entries are in it. */
+/**
+ * Rows of marks: name, colour, and a test for the entries in it.
+ * @type {{ name: string, colour: string, of: (entry: Stretch) => boolean }[]}
+ */
 const ROWS = [
   { name: "commands", colour: "--accent", of: (entry) => entry.kind === "call" && entry.ok && entry.number !== null && entry.steps > 0 },
   { name: "looks and questions", colour: "--soft", of: (entry) => entry.kind === "call" && entry.ok && entry.number !== null && !(entry.steps > 0) },
@@ -12,8 +15,15 @@ const ROWS = [
   { name: "notes", colour: "--odd", of: (entry) => entry.kind === "note" },
 ];
 
+/** @typedef {import("./message.js").Entry & { steps: number, from: number }} Stretch */
+
+/** The time line of a finished episode. */
 export class Timeline {
-  /** @param {import("./time.js").RecordedTime} time @param {import("./message.js").Frame[]} frames */
+  /**
+   * @param {import("./message.js").WatchedHead} head
+   * @param {import("./time.js").RecordedTime} time
+   * @param {import("./message.js").Frame[]} frames
+   */
   constructor(head, time, frames) {
     this.head = head;
     this.frames = frames;
@@ -35,7 +45,10 @@ export class Timeline {
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
   }
 
-  /** Each phase from where the one before it was reached to where it was, and where it never was, to the end. */
+  /**
+   * Makes the bands: each phase from where the one before it was reached to where it was, and where it never
+   * was, to the end.
+   */
   bands() {
     const { begin, end } = this.time;
     const reached = new Map(this.head.reached.map((phase) => [phase.number, phase.time_s]));
@@ -57,7 +70,7 @@ export class Timeline {
     return element("div", { class: "bands" }, ...bands);
   }
 
-  /** Where robots fell. */
+  /** Makes the marks of falls. */
   falls() {
     const { begin, end } = this.time;
     const marks = this.head.robots.flatMap(({ name }, robot) => {
@@ -74,6 +87,7 @@ export class Timeline {
     return this.rows.map(({ name, entries }) => `${entries.length} ${name}`).join(", ");
   }
 
+  /** @param {number} time */
   x(time) {
     const { begin, end } = this.time;
     return ((time - begin) / (end - begin)) * this.canvas.clientWidth;
@@ -88,6 +102,7 @@ export class Timeline {
     canvas.height = this.rows.length * ROW * scale;
     canvas.style.height = `${this.rows.length * ROW}px`;
     const context = canvas.getContext("2d");
+    if (!context) return;
     context.scale(scale, scale);
     this.rows.forEach(({ entries, colour: name }, row) => {
       context.fillStyle = colour("--line");
@@ -100,17 +115,18 @@ export class Timeline {
     });
   }
 
-  /** The entry below the pointer, or the nearest within a few pixels. */
+  /** Returns the entry below the pointer, or the nearest within a few pixels. @param {MouseEvent} event */
   under(event) {
     const { left, top, width } = this.canvas.getBoundingClientRect();
     const row = this.rows[Math.floor((event.clientY - top) / ROW)];
     if (!row || !width) return null;
     const x = event.clientX - left;
-    const away = ({ from, time_s: until }) => Math.max(this.x(from) - x, x - this.x(until), 0);
-    const nearest = row.entries.reduce((best, entry) => (best && away(best) <= away(entry) ? best : entry), null);
-    return nearest && away(nearest) < 8 ? nearest : null;
+    const away = (/** @type {Stretch} */ { from, time_s: until }) => Math.max(this.x(from) - x, x - this.x(until), 0);
+    const nearest = row.entries.reduce((best, entry) => (away(best) <= away(entry) ? best : entry));
+    return away(nearest) < 8 ? nearest : null;
   }
 
+  /** @param {MouseEvent} event */
   pointed(event) {
     const entry = this.under(event);
     this.canvas.style.cursor = entry ? "pointer" : "";
@@ -122,16 +138,20 @@ export class Timeline {
     this.hint.style.left = `${Math.min(this.x(entry.from), Math.max(0, width - 260))}px`;
   }
 
+  /** @param {MouseEvent} event */
   clicked(event) {
     const entry = this.under(event);
     this.time.play(false);
-    if (entry) return this.time.seek(entry.time_s);
+    if (entry) {
+      this.time.seek(entry.time_s);
+      return;
+    }
     const { left, width } = this.canvas.getBoundingClientRect();
     const { begin, end } = this.time;
-    return this.time.seek(begin + ((event.clientX - left) / width) * (end - begin));
+    this.time.seek(begin + ((event.clientX - left) / width) * (end - begin));
   }
 
-  /** Goes to the entry before or after the moment that is shown. */
+  /** Goes to the entry before or after the moment that is shown. @param {number} way -1 or 1 */
   step(way) {
     const now = this.time.time;
     const times = [...new Set(this.entries.map(({ time_s }) => time_s))];
@@ -141,11 +161,16 @@ export class Timeline {
   }
 
   show() {
-    if (document.activeElement !== this.slider || this.time.playing) this.slider.value = this.time.time;
+    if (document.activeElement !== this.slider || this.time.playing) this.slider.value = String(this.time.time);
   }
 }
 
-/** The entries with the time from which each lasted: a command for as long as its reply says, all else no time at all. */
+/**
+ * Returns the entries with the time from which each lasted: a command for as long as its reply says, all else no time at all.
+ * @param {import("./message.js").Entry[]} story
+ * @param {number} begin
+ * @returns {Stretch[]}
+ */
 function stretches(story, begin) {
   return story.map((entry) => {
     const steps = entry.kind === "call" && entry.number !== null && entry.ok ? executedSteps(entry.reply) : 0;
@@ -153,6 +178,7 @@ function stretches(story, begin) {
   });
 }
 
+/** @param {string} reply @returns {number} */
 function executedSteps(reply) {
   try {
     return JSON.parse(reply)?.executed_steps ?? 0;

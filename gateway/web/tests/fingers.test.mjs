@@ -3,11 +3,13 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { Quaternion, Vector3 } from "three";
 import { Fingers, robotTurn } from "../operators/headset/fingers.js";
+import { SIDES } from "../src/message.js";
 
 const SCALE = 1.15;
 const CHAINS = [[0, 1, 2], [3, 4], [5, 6]];
 const TIPS = [4, 14, 9];
 
+/** @returns {import("../src/message.js").FingerJoint} */
 const joint = (at, axis, low, high) => ({ pose: [...at, 0, 0, 0, 1], axis, range_rad: [low, high] });
 /** The right hand as the server tells of it, of `sim/assets/robots/g1_dex3/robot.xml`. */
 const RIGHT = [
@@ -24,7 +26,7 @@ const LEFT = RIGHT.map(({ pose: [x, y, z], axis: [i, j, k], range_rad: [low, hig
   (j === 1 ? joint([x, -y, z], [i, j, k], low, high) : joint([x, -y, z], [i, j, k], -high, -low)));
 const HANDS = { left: LEFT, right: RIGHT };
 
-/** A person's hand with the tips of a robot's whose joints are so, seen from a wrist that is somewhere, turned anyhow. */
+/** Returns a person's hand with the tips of a robot's whose joints are so, seen from a wrist that is somewhere, turned anyhow. */
 function personWith(side, angles, wrist, turn) {
   const robot = new Fingers(side, HANDS[side]);
   robot.sought = [...angles];
@@ -41,7 +43,7 @@ const somewhere = new Vector3(0.2, 1.1, -0.4);
 const turned = new Quaternion(0.3, -0.5, 0.2, 0.7).normalize();
 const grasp = { right: [0.2, -0.5, -0.6, 0.8, 0.9, 0.6, 0.7], left: [0.2, 0.5, 0.6, -0.8, -0.9, -0.6, -0.7] };
 
-for (const side of ["left", "right"]) {
+for (const side of SIDES) {
   test(`a ${side} hand whose tips are those of a Dex3 is followed to its joints`, () => {
     const fingers = new Fingers(side, HANDS[side]);
     const positions = personWith(side, grasp[side], somewhere, turned);

@@ -2,6 +2,7 @@
 // picture of it, and in the handle itself; on this machine, and over a link on which everything takes 100 ms each way. How it is run is said
 // in shared/browser.mjs; the machine has to be quiet.
 import assert from "node:assert/strict";
+import { once } from "node:events";
 import { connect, createServer } from "node:net";
 import { PATIENCE_MS, countDrawn, done, drawnRate, median, open, post, serve } from "./shared/browser.mjs";
 import { hear, places } from "./shared/rows.mjs";
@@ -26,7 +27,7 @@ function watchPointer() {
 const person = (origin = base, link = linkTo(a)) => open(origin + link, { before: [hear, watchPointer, countDrawn] });
 const running = (page) => page.getByRole("status").filter({ hasText: "Running" }).waitFor({ timeout: PATIENCE_MS });
 
-/** The medians of the times from drags of a person's right handle to the row that has the wrist moved, to a picture of it, and to the handle. */
+/** Returns the medians of the times from drags of a person's right handle to the row that has the wrist moved, to a picture of it, and to the handle. */
 async function latencies(page, drags) {
   const found = [];
   // From there the wrist is in sight, wherever it is.
@@ -42,7 +43,7 @@ async function latencies(page, drags) {
       const wrist = ({ row }) => [0, 1, 2].map((axis) => row[right + axis] - row[pelvis + axis]);
       const before = wrist(window.rows.at(-1));
       window.moves.length = 0;
-      const own = document.querySelector(".handle.right");
+      const own = /** @type {HTMLElement} */ (document.querySelector(".handle.right"));
       const place = own.style.transform;
       window.measured = new Promise((done, failed) => {
         let handleMs = null;
@@ -63,7 +64,8 @@ async function latencies(page, drags) {
     await page.mouse.up();
     await page.waitForTimeout(500);
   }
-  return Object.fromEntries(["rowMs", "drawnMs", "handleMs"].map((name) => [name, median(found.map((one) => one[name]))]));
+  const middle = (name) => median(found.map((one) => one[name]));
+  return { rowMs: middle("rowMs"), drawnMs: middle("drawnMs"), handleMs: middle("handleMs") };
 }
 const told = (where, { rowMs, drawnMs, handleMs }) => console.log(`${where}: from a drag to the row with the wrist moved ${rowMs.toFixed(0)} ms, to its picture ${drawnMs.toFixed(0)} ms, to the handle ${handleMs.toFixed(0)} ms (medians)`);
 
@@ -89,14 +91,16 @@ const again = await driver(base, "B", b.token);
 
 // A link on which everything takes 100 ms each way: the handle is where the person has it at once, and the wrist follows.
 const slow = createServer((near) => {
-  const far = connect(new URL(base).port, "127.0.0.1");
+  const far = connect(Number(new URL(base).port), "127.0.0.1");
   const pass = (from, to) => from.on("data", (data) => setTimeout(() => to.writable && to.write(data), SLOW_LINK_MS)).on("close", () => setTimeout(() => to.end(), SLOW_LINK_MS)).on("error", () => to.destroy());
   pass(near, far);
   pass(far, near);
 });
-await new Promise((ready) => slow.listen(0, "127.0.0.1", ready));
+slow.listen(0, "127.0.0.1");
+await once(slow, "listening");
+const { port } = /** @type {import("node:net").AddressInfo} */ (slow.address());
 await pageA.context().close();
-const slowA = await person(`http://127.0.0.1:${slow.address().port}`);
+const slowA = await person(`http://127.0.0.1:${port}`);
 await running(slowA);
 const late = await latencies(slowA, 7);
 told(`over ${SLOW_LINK_MS} ms each way`, late);

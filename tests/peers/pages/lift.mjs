@@ -36,8 +36,8 @@ function toldOf(robot) {
     const from = until - JSON.parse(reply).executed_steps / CONTROL_HZ;
     const [move] = own?.arguments.robots ?? [];
     if (!move) return [];
-    const { robot: _, ...rest } = move;
-    return [{ from, until, move: Object.fromEntries(Object.entries(rest).filter(([, value]) => value !== null)) }];
+    const said = Object.entries(move).filter(([name, value]) => name !== "robot" && value !== null);
+    return [{ from, until, move: Object.fromEntries(said) }];
   });
 }
 

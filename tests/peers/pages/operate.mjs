@@ -11,7 +11,7 @@ const { base, runs } = await serve();
 /** A gamepad of ours. */
 function pad() {
   window.pad = null;
-  navigator.getGamepads = () => (window.pad ? [window.pad] : []);
+  navigator.getGamepads = () => (window.pad ? [/** @type {Gamepad} */ (window.pad)] : []);
 }
 
 /** A person: a browser's context of their own. */
@@ -62,7 +62,7 @@ const reach = (offset) => pageA.evaluate(async ([goal, patienceMs]) => {
   const KEYS = [["ArrowUp", "ArrowDown"], ["ArrowLeft", "ArrowRight"], ["PageUp", "PageDown"]];
   const [KEY_M_S, SHARE, NEAR_M, STILL_M, STILL_S] = [0.2, 0.8, 0.012, 0.003, 0.3];
   const passed = (ms) => new Promise((done) => setTimeout(done, ms));
-  const now = () => posesIn(window.head, window.rows.at(-1).row);
+  const now = () => window.posesIn(window.head, window.rows.at(-1).row);
   const hold = async (key, ms) => {
     dispatchEvent(new KeyboardEvent("keydown", { key }));
     await passed(ms);
@@ -82,9 +82,10 @@ const reach = (offset) => pageA.evaluate(async ([goal, patienceMs]) => {
     await comeToRest();
     const { right, objects: { bottle } } = now();
     missing = goal.map((value, axis) => bottle.position[axis] + value - right.position[axis]);
-    const far = missing.map((value, axis) => [KEYS[axis][value > 0 ? 0 : 1], Math.abs(value)]).filter(([, way]) => way > NEAR_M);
+    const ways = missing.map((value, axis) => ({ key: KEYS[axis][value > 0 ? 0 : 1], way: Math.abs(value) }));
+    const far = ways.filter(({ way }) => way > NEAR_M);
     if (far.length === 0) return;
-    await Promise.all(far.map(([key, way]) => hold(key, 1000 * SHARE * Math.min(way, 0.15) / KEY_M_S)));
+    await Promise.all(far.map(({ key, way }) => hold(key, 1000 * SHARE * Math.min(way, 0.15) / KEY_M_S)));
   }
   throw new Error(`the wrist is still ${missing.map((value) => value.toFixed(3)).join(", ")} m away`);
 }, [offset, PATIENCE_MS]);

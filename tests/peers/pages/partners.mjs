@@ -2,9 +2,9 @@
 // behind `/act`: one of yours, or one made up here that raises A's right arm. How it is run is said in shared/browser.mjs.
 //
 //     node REPOSITORY/tests/peers/pages/partners.mjs REPOSITORY/target/release/tandem [ACT_URL MAP]
-import assert from "node:assert/strict";
-import { createServer } from "node:http";
 import { execFileSync } from "node:child_process";
+import { once } from "node:events";
+import { createServer } from "node:http";
 import { join } from "node:path";
 import { PATIENCE_MS, done, open, pictures, program, serve } from "./shared/browser.mjs";
 import { hear, inPages, poses } from "./shared/rows.mjs";
@@ -25,8 +25,10 @@ async function madeUp() {
       answer.end(JSON.stringify({ actions: rows }));
     });
   });
-  await new Promise((ready) => server.listen(0, "127.0.0.1", ready));
-  return [`http://127.0.0.1:${server.address().port}/act`, "openpi"];
+  server.listen(0, "127.0.0.1");
+  await once(server, "listening");
+  const { port } = /** @type {import("node:net").AddressInfo} */ (server.address());
+  return [`http://127.0.0.1:${port}/act`, "openpi"];
 }
 
 const given = process.argv.slice(3);
@@ -70,11 +72,11 @@ const { phases } = await end(expert);
 console.log(`beside the expert: grasp and lift at ${phases.p1.toFixed(1)} s`);
 
 const policy = await beside("policy", 1);
-const wrist = () => policy.page.evaluate(() => posesIn(window.head, window.rows.at(-1).row, "A").right.position);
+const wrist = () => policy.page.evaluate(() => window.posesIn(window.head, window.rows.at(-1).row, "A").right.position);
 const before = await wrist();
 if (given.length === 2) await policy.page.getByText("reached: grasp and lift").waitFor({ timeout: 2 * PATIENCE_MS });
 else await policy.page.waitForFunction((from) => {
-  const now = posesIn(window.head, window.rows.at(-1).row, "A").right.position;
+  const now = window.posesIn(window.head, window.rows.at(-1).row, "A").right.position;
   return Math.hypot(...now.map((value, axis) => value - from[axis])) > 0.05;
 }, before);
 const after = await wrist();

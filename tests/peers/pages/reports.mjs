@@ -15,7 +15,7 @@ await played("report", join(runs, "replayed"));
 
 const reader = await (await browser.newContext({ viewport: { width: 1400, height: 1000 } })).newPage();
 await reader.goto(pathToFileURL(join(runs, "replayed", "report.html")).href);
-const hrefs = await reader.locator('a[href*="/watch?run="]').evaluateAll((links) => [...new Set(links.map(({ href }) => href))]);
+const hrefs = await reader.locator('a[href*="/watch?run="]').evaluateAll((links) => [...new Set(links.map((/** @type {HTMLAnchorElement} */ { href }) => href))]);
 assert.ok(hrefs.length > 0, "no episode of the report has gone wrong, or none is linked");
 await reader.screenshot({ path: "report.png", fullPage: true });
 

@@ -63,7 +63,7 @@ assert(/–\s+move_wrists\s+refused: move_wrists: steps/.test(told[2]), told[2])
 assert(/^B, thought/.test(told[3]), told[3]);
 await page.click("text=All of it");
 assert.equal(await page.locator(".story .seen img").count(), 2);
-await page.waitForFunction(() => [...document.querySelectorAll(".story .seen img")].every((image) => image.naturalWidth === 320));
+await page.waitForFunction(() => [...document.querySelectorAll(/** @type {"img"} */ (".story .seen img"))].every((image) => image.naturalWidth === 320));
 assert.match(await page.locator(".bands").innerText(), /p1 grasp and lift/);
 assert.match(await page.locator(".track canvas").getAttribute("aria-label"), /6 commands, 1 looks and questions, 1 refused, 2 notes/);
 assert.doesNotMatch(await page.locator("main").innerText(), /\b(null|undefined|NaN)\b/);
@@ -114,7 +114,7 @@ const evaluation = spawn(program, ["evaluate", "--policy", "idle", "--tasks", "h
 process.on("exit", () => evaluation.kill());
 const card = page.locator(".card", { has: page.locator("progress") });
 await card.getByText("runs").waitFor();
-const [first, planned] = await card.locator("progress").evaluate(({ value, max }) => [value, max]);
+const [first, planned] = await card.locator("progress").evaluate((/** @type {HTMLProgressElement} */ { value, max }) => [value, max]);
 assert.ok(planned === 1000 && first < planned, `${first} of ${planned}`);
 await page.waitForFunction((before) => document.querySelector("progress").value > before, first);
 evaluation.kill();

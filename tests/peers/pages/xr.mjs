@@ -1,7 +1,6 @@
 // The page at /operate in an emulated Quest 3 (npm's iwer, in a headless Chromium): robot A's person wears it, moves both wrists by
 // squeezed controllers, walks by a stick, brings the right hand to the bottle, closes it by the trigger, lifts; then with tracked hands,
 // whose fingers the robot's follow; and pictures of what the headset shows. How it is run is said in shared/browser.mjs.
-import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { createRequire } from "node:module";
 import { join } from "node:path";

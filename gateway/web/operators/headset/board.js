@@ -9,12 +9,15 @@ const LINE_PIXELS = 44;
 const PLACE_M = [0, -0.52, -0.95];
 const TILT_RAD = -0.5;
 
+/** The board of one wearer. */
 export class Board {
   /** @param {import("three").Group} rig The space of the wearer. */
   constructor(rig) {
-    this.canvas = document.createElement("canvas");
-    [this.canvas.width, this.canvas.height] = PIXELS;
-    this.texture = new CanvasTexture(this.canvas);
+    const canvas = document.createElement("canvas");
+    [canvas.width, canvas.height] = PIXELS;
+    this.paper = canvas.getContext("2d");
+    this.texture = new CanvasTexture(canvas);
+    this.text = "";
     this.texture.colorSpace = SRGBColorSpace;
     // Seen before whatever is in its place, as the table is.
     const material = new MeshBasicMaterial({ map: this.texture, transparent: true, depthTest: false });
@@ -25,12 +28,12 @@ export class Board {
     rig.add(board);
   }
 
-  /** Shows lines; those that do not fit on one go on in the next. */
+  /** Shows lines; those that do not fit on one go on in the next. @param {string[]} lines */
   say(lines) {
     const text = lines.join("\n");
-    if (text === this.text) return;
+    const { paper } = this;
+    if (text === this.text || !paper) return;
     this.text = text;
-    const paper = this.canvas.getContext("2d");
     const [width, height] = PIXELS;
     paper.clearRect(0, 0, width, height);
     paper.fillStyle = "rgba(20, 24, 30, 0.7)";
@@ -44,7 +47,12 @@ export class Board {
   }
 }
 
-/** A line in as many as its width takes. */
+/**
+ * Breaks a line into as many as its width takes.
+ * @param {CanvasRenderingContext2D} paper
+ * @param {string} line
+ * @param {number} width
+ */
 function broken(paper, line, width) {
   const lines = [];
   let current = "";

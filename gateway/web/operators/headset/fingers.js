@@ -14,7 +14,12 @@
 
 import { Matrix4, Quaternion, Vector3 } from "three";
 
-/** Joints of WebXR's hands, and the finger joints that follow each, in the order of commands: thumb, middle and index finger. */
+/** @typedef {import("../../src/message.js").Side} Side */
+
+/**
+ * Joints of WebXR's hands, and the finger joints that follow each, in the order of commands: thumb, middle and
+ * index finger.
+ */
 const FINGERS = [{ tip: 4, chain: [0, 1, 2] }, { tip: 14, chain: [3, 4] }, { tip: 9, chain: [5, 6] }];
 /** Straight, the index finger of a Dex3-1 ends 0.21 m before the wrist, that of a grown person 0.18 m. */
 const SCALE = 1.15;
@@ -24,19 +29,27 @@ const DAMPING_M2 = 2e-5;
 const STEPS = 4;
 const DIFFERENCE_RAD = 1e-4;
 
-/** Axes of a G1's wrist (x to the fingers, z to the index finger's side) in those of WebXR (-z to the fingers, y to the back of the hand). */
+/**
+ * Axes of a G1's wrist (x to the fingers, z to the index finger's side) in those of WebXR (-z to the fingers, y
+ * to the back of the hand).
+ */
 const ROBOT_AXES = {
   left: turnOf([0, 0, -1], [0, 1, 0], [1, 0, 0]),
   right: turnOf([0, 0, -1], [0, -1, 0], [-1, 0, 0]),
 };
 
-/** How a robot's wrist is turned that does as a person's wrist. @param {"left" | "right"} side @param {Quaternion} turn */
+/**
+ * Returns how a robot's wrist is turned that does as a person's wrist.
+ * @param {Side} side
+ * @param {Quaternion} turn
+ */
 export const robotTurn = (side, turn) => turn.clone().multiply(ROBOT_AXES[side]);
 
+/** The fingers of one hand. */
 export class Fingers {
   /**
-   * @param {"left" | "right"} side
-   * @param {{ pose: number[], axis: number[], range_rad: [number, number] }[]} joints Of the hand, in the order of commands; each turns in
+   * @param {Side} side
+   * @param {import("../../src/message.js").FingerJoint[]} joints Those of the hand, in the order of commands; each turns in
    *   the frame of the one before it in its finger, and the first in that of the wrist.
    */
   constructor(side, joints) {
@@ -51,22 +64,28 @@ export class Fingers {
 
   /**
    * Follows a hand for another while.
-   * @param {(number[] | null)[]} positions Where its 25 joints are, in metres, in the space of the headset; null where one is not seen.
-   * @param {Quaternion} wristTurn How its wrist is turned there.
+   * @param {(number[] | null)[]} positions Places of its 25 joints in metres, in the space of the headset; null where one is not seen.
+   * @param {Quaternion} wristTurn Orientation of its wrist there.
+   * @param {number} passedS
    */
   follow(positions, wristTurn, passedS) {
     const [wrist] = positions;
     if (!wrist) return;
     const back = robotTurn(this.side, wristTurn).invert();
     for (const { tip, chain } of FINGERS) {
-      if (!positions[tip]) continue;
-      this.reach(chain, new Vector3(...positions[tip]).sub(new Vector3(...wrist)).applyQuaternion(back).multiplyScalar(SCALE));
+      const at = positions[tip];
+      if (!at) continue;
+      this.reach(chain, new Vector3().fromArray(at).sub(new Vector3().fromArray(wrist)).applyQuaternion(back).multiplyScalar(SCALE));
     }
     const share = 1 - Math.exp(-passedS / LOW_PASS_S);
     this.angles = this.angles.map((before, joint) => before + share * (this.sought[joint] - before));
   }
 
-  /** Turns the joints of one finger towards a tip at `goal`, in the frame of the wrist. */
+  /**
+   * Turns the joints of one finger towards a tip at `goal`, in the frame of the wrist.
+   * @param {number[]} chain
+   * @param {Vector3} goal
+   */
   reach(chain, goal) {
     for (let step = 0; step < STEPS; step += 1) {
       const tip = this.tip(chain);
@@ -86,7 +105,10 @@ export class Fingers {
     }
   }
 
-  /** Where the tip of a finger is, in the frame of the wrist. Its last link is as long as the one before. */
+  /**
+   * Returns the place of a fingertip in the frame of the wrist. The last link is as long as the one before.
+   * @param {number[]} chain
+   */
   tip(chain) {
     const at = new Vector3();
     const turn = new Quaternion();
@@ -95,16 +117,21 @@ export class Fingers {
       at.add(offset.clone().applyQuaternion(turn));
       turn.multiply(rest).multiply(new Quaternion().setFromAxisAngle(axis, this.sought[joint]));
     }
-    return at.add(this.joints[chain.at(-1)].at.clone().applyQuaternion(turn));
+    return at.add(this.joints[chain[chain.length - 1]].at.clone().applyQuaternion(turn));
   }
 }
 
+/** Returns the turn to a frame with these axes. @param {number[]} x @param {number[]} y @param {number[]} z */
 function turnOf(x, y, z) {
-  const axes = [x, y, z].map((axis) => new Vector3(...axis));
-  return new Quaternion().setFromRotationMatrix(new Matrix4().makeBasis(...axes));
+  const [i, j, k] = [x, y, z].map((axis) => new Vector3().fromArray(axis));
+  return new Quaternion().setFromRotationMatrix(new Matrix4().makeBasis(i, j, k));
 }
 
-/** Solves a small positive definite system by elimination. */
+/**
+ * Solves a small positive definite system by elimination.
+ * @param {number[][]} matrix
+ * @param {number[]} right
+ */
 function solve(matrix, right) {
   const rows = matrix.map((row, index) => [...row, right[index]]);
   const size = rows.length;

@@ -39,7 +39,11 @@ export const browser = await chromium.launch({
     "--disable-backgrounding-occluded-windows", "--disable-renderer-backgrounding"],
 });
 
-/** A page of a person who shares nothing with others. `before` runs in it before anything of its own does. */
+/**
+ * Opens the page of a person who shares nothing with others. `before` runs in it before anything of its own does.
+ * @param {string} link
+ * @param {import("playwright-core").BrowserContextOptions & { before?: any }} [options]
+ */
 export async function open(link, { before, ...options } = {}) {
   const context = await browser.newContext({ viewport: SIZE, ignoreHTTPSErrors: true, ...options });
   context.setDefaultTimeout(PATIENCE_MS);

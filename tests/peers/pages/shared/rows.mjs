@@ -4,8 +4,8 @@
 export function hear() {
   window.rows = [];
   window.WebSocket = class extends WebSocket {
-    constructor(...given) {
-      super(...given);
+    constructor(url, protocols = []) {
+      super(url, protocols);
       let told = false;
       this.addEventListener("message", ({ data }) => {
         if (typeof data === "string") return;
@@ -39,6 +39,7 @@ export function lengthOf({ robots, objects }) {
   return 5 + 7 * objects.length + robots.reduce((sum, { links, joints }) => sum + 7 * links + 1 + 7 + 4 + 46 + joints.length, 0);
 }
 
+/** @param {number[]} one @param {number[]} other */
 const times = ([a, b, c, d], [e, f, g, h]) => [a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g, a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e];
 const turned = (q, [x, y, z]) => times(times(q, [0, x, y, z]), [q[0], -q[1], -q[2], -q[3]]).slice(1);
 

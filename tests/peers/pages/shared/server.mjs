@@ -25,13 +25,15 @@ export async function run(words, last) {
   process.on("exit", () => running.kill());
   const ended = new Promise((done) => running.on("exit", done));
   let said = "";
-  await new Promise((resolve, failed) => {
+  /** @type {Promise<void>} */
+  const told = new Promise((resolve, failed) => {
     running.stdout.on("data", (data) => {
       said += data;
       if (last.test(said)) resolve();
     });
     ended.then((code) => failed(new Error(`${words[0]} ended with ${code}`)));
   });
+  await told;
   return { said, ended, process: running };
 }
 

@@ -15,7 +15,7 @@ export async function driver(base, robot, token) {
   const socket = new WebSocket(`${base.replace("http", "ws")}/operate/drive?robots=${robot}`, { headers: { cookie } });
   const own = { robot, head: null, row: null, told: [], rows: 0, said: 0, move: {}, go: true };
   socket.on("message", (data, binary) => {
-    if (!binary) own.told.push(JSON.parse(data));
+    if (!binary) own.told.push(JSON.parse(data.toString()));
     else if (own.head) [own.row, own.rows] = [rowOf(data), own.rows + 1];
     else own.begin(data);
   });
@@ -42,7 +42,7 @@ export async function driver(base, robot, token) {
 export async function watcher(base, episode, key) {
   const socket = new WebSocket(`${base.replace("http", "ws")}/watch/live?episode=${episode}`, { headers: { authorization: `Bearer ${key}` } });
   const own = { steps: 0, told: 0, bytes: 0, open: true };
-  socket.on("message", (data, binary) => {
+  socket.on("message", (/** @type {Buffer} */ data, binary) => {
     own[binary ? "steps" : "told"] += 1;
     own.bytes += data.length;
   });
