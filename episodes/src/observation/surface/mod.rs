@@ -251,11 +251,8 @@ fn describe(
             let end_m = frame_from_level * Point3::new(axis.at_m.x, axis.at_m.y, height_m);
             [end_m.x, end_m.y, end_m.z].map(coarse)
         };
-        UprightAxis {
-            bottom_m: end_m(axis.bottom_m),
-            top_m: end_m(axis.top_m),
-            radius_m: coarse(axis.radius_m),
-        }
+        let (bottom_m, top_m) = (end_m(axis.bottom_m), end_m(axis.top_m));
+        UprightAxis { bottom_m, top_m, radius_m: coarse(axis.radius_m) }
     });
     Surface {
         object: None,

@@ -162,7 +162,7 @@ fn two_robots_carry_a_basket_by_one_call() {
     assert!(!facts.robots.iter().any(|robot| robot.fallen));
 }
 
-/// Distance between the facing hands of two robots that hold one load.
+/// Returns the mean distance between the facing hands of two robots that hold one load.
 fn apart_m(session: &Session, [one, other]: [usize; 2]) -> f64 {
     let facts = session.facts();
     let wrist = |robot: usize, side: Side| {
@@ -175,7 +175,7 @@ fn apart_m(session: &Session, [one, other]: [usize; 2]) -> f64 {
     0.5 * (apart(Side::Left, Side::Right) + apart(Side::Right, Side::Left))
 }
 
-/// Distance between the pelvises of two robots, on the floor.
+/// Returns the distance between the pelvises of two robots on the floor.
 fn stand_apart_m(session: &Session, [one, other]: [usize; 2]) -> f64 {
     let facts = session.facts();
     let pelvis_m = |robot: usize| facts.robots[robot].pelvis_in_world.translation;

@@ -31,15 +31,15 @@ class DepthReply:
 
     surfaces: tuple[Surface, ...]
     """The surfaces that were found: at a pixel the patch of its colour and, where that is more, the whole thing;
-    of a colour up to three, the nearest first and what is of the room last; of an object one. Left out where
-    none was asked for.
+    of a colour up to three, the nearest first and what is of the room last; of an object one; of all one for
+    each that is seen. Left out where none was asked for.
     """
 
     fit: RegionFit | None
     """Plane, edges and corners of the region; left out where `fit` was not asked for."""
 
-    columns: tuple[str, str, str, str, str]
-    """Columns of `points`: "u", "v", "x_m", "y_m", "z_m"."""
+    columns: tuple[str, ...]
+    """Columns of `points`: "u", "v", "x_m", "y_m", "z_m". Left out of a short reply with surfaces."""
 
     points: tuple[tuple[float | None, float | None, float | None, float | None, float | None], ...]
     """One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where nothing is
@@ -54,8 +54,8 @@ class DepthReply:
             frame=value.get("frame"),
             surfaces=tuple(Surface.of(item) for item in value.get("surfaces", ())),
             fit=None if (got := value.get("fit")) is None else RegionFit.of(got),
-            columns=tuple(value["columns"]),
-            points=tuple(tuple(item) for item in value["points"]),
+            columns=tuple(value.get("columns", ())),
+            points=tuple(tuple(item) for item in value.get("points", ())),
         )
 
 
@@ -144,6 +144,9 @@ class RegionFit:
 class Surface:
     """A surface as the camera sees it: only what is in view, and of a thing only its near side."""
 
+    object: str | None
+    """The object, where the call asked for all; left out otherwise."""
+
     joined_by: JoinedBy
     """By what its pixels are joined."""
 
@@ -170,7 +173,7 @@ class Surface:
 
     corners_m: tuple[tuple[float, float, float], ...]
     """The four points of its outline that span the most of it in the picture, in the order of its outline: of a
-    rectangle its corners.
+    rectangle its corners. Left out of a short reply where there is an axis, and of all objects.
     """
 
     axis: UprightAxis | None
@@ -183,6 +186,7 @@ class Surface:
     def of(value: Mapping[str, Any]) -> Surface:
         """Reads what JSON has."""
         return Surface(
+            object=value.get("object"),
             joined_by=value["joined_by"],
             pixels=value["pixels"],
             from_=tuple(value["from"]),
@@ -191,7 +195,7 @@ class Surface:
             centroid_m=tuple(value["centroid_m"]),
             middle_m=tuple(value["middle_m"]),
             extent_m=tuple(value["extent_m"]),
-            corners_m=tuple(tuple(item) for item in value["corners_m"]),
+            corners_m=tuple(tuple(item) for item in value.get("corners_m", ())),
             axis=None if (got := value.get("axis")) is None else UprightAxis.of(got),
             cut_off=value["cut_off"],
         )

@@ -60,9 +60,9 @@ class PlanReply:
     commands: int
     """Commands that were carried out: of a plan, those that it lists; of a walk, each short one."""
 
-    tool_calls: int
+    tool_calls: int | None
     """Tool calls of all robots up to now, as results count them: each command of a plan or walk is one, and each
-    slice of 5 steps with `until`. No budget limits them.
+    slice of 5 steps with `until`. No budget limits them. Left out of a short reply.
     """
 
     executed_steps: int
@@ -87,7 +87,7 @@ class PlanReply:
         """Reads what JSON has."""
         return PlanReply(
             commands=value["commands"],
-            tool_calls=value["tool_calls"],
+            tool_calls=value.get("tool_calls"),
             executed_steps=value["executed_steps"],
             stopped=value.get("stopped"),
             outcomes=tuple(value.get("outcomes", ())),

@@ -213,7 +213,7 @@ class ReachReply:
 
 @dataclass(frozen=True)
 class RobotState:
-    """The reply to `get_robot_state`."""
+    """The reply to `get_robot_state`. A short one has poses to the millimetre and to a thousandth."""
 
     robot: str
     """The robot, for example "A"."""
@@ -253,24 +253,26 @@ class RobotState:
     """The same of the right wrist."""
 
     gravity_in_pelvis: tuple[float, float, float] | None
-    """The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright. Left out where the
-    assistance is "paper".
+    """The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright. Left out of a short reply
+    where it is within a hundredth of that, and where the assistance is "paper".
     """
 
     pelvis_in_start: Pose | None
     """Pose of its pelvis in the start frame by its own IMU and joints. The start frame is on the floor under the
     pelvis at the start of the episode, z up, x the robot's heading then. Drifts by up to 1 % of the way walked.
-    Left out where the assistance is "paper".
+    Left out of a short reply with `pelvis_in_room`, and where the assistance is "paper".
     """
 
     pelvis_in_room: Pose | None
     """The same in the room frame, where the call named that; left out otherwise."""
 
-    base_command: BaseCommand
-    """Base command in force."""
+    base_command: BaseCommand | None
+    """Base command in force; left out of a short reply where the robot stands as high as commanded."""
 
     fallen: bool | None
-    """True if the robot has fallen; left out where the assistance is "paper"."""
+    """True if the robot has fallen; left out of a short reply where it has not, and where the assistance is
+    "paper".
+    """
 
     samples: SensorSamples | None
     """Readings of its sensors in each physics step of the last control step, where the call asks for `samples`;
@@ -294,7 +296,7 @@ class RobotState:
             gravity_in_pelvis=None if (got := value.get("gravity_in_pelvis")) is None else tuple(got),
             pelvis_in_start=None if (got := value.get("pelvis_in_start")) is None else Pose.of(got),
             pelvis_in_room=None if (got := value.get("pelvis_in_room")) is None else Pose.of(got),
-            base_command=BaseCommand.of(value["base_command"]),
+            base_command=None if (got := value.get("base_command")) is None else BaseCommand.of(got),
             fallen=value.get("fallen"),
             samples=None if (got := value.get("samples")) is None else SensorSamples.of(got),
         )
@@ -339,7 +341,7 @@ class StatusReply:
     """The task's id."""
 
     seed: int | None
-    """The seed; left out where the assistance is "paper"."""
+    """The seed; left out of a short reply, and where the assistance is "paper"."""
 
     protocol: Protocol
     """The rules in force."""
@@ -354,7 +356,9 @@ class StatusReply:
     """Why the episode has ended; null while it goes on."""
 
     fallen: tuple[RobotFallen, ...]
-    """Every robot of the episode; left out where the assistance is "paper"."""
+    """Every robot of the episode; in a short reply those that have fallen. Left out where the assistance is
+    "paper".
+    """
 
     assistance: Assistance
     """Amount of information. With "paper", phases are disclosed once the episode has ended, which success does not
@@ -376,8 +380,8 @@ class StatusReply:
     """Remaining budget of the episode."""
 
     state_hash: str | None
-    """Hash of the whole physical state, 16 hexadecimal digits. Equal hashes mean equal states. Left out where the
-    assistance is "paper".
+    """Hash of the whole physical state, 16 hexadecimal digits. Equal hashes mean equal states. Left out of a short
+    reply, and where the assistance is "paper".
     """
 
     @staticmethod
