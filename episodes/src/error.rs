@@ -259,6 +259,9 @@ fn no_surface(query: &SurfaceQuery, seen: &[Color]) -> String {
                 seen.join(", ")
             )
         }
+        (None, Some(object), _) if object == SurfaceQuery::ALL => {
+            "the robot sees no object of the task from here; turn to where `room` has one by walk, with look_at_m or yaw_rate_rad_s".into()
+        }
         (None, Some(object), _) => format!(
             "the robot does not see the {object} from here; turn to where `room` has it by walk, with look_at_m or yaw_rate_rad_s, or go round what hides it"
         ),

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use crate::error::SpecError;
 use crate::list::{ActCall, EPISODE_TOOLS, LookCall, PlanCall, ToolCall, every_tool_spec};
-use crate::parts::{Assistance, Driving, Formats, Wording};
+use crate::parts::{Assistance, Driving, Formats, ImageFormat, Wording};
 use crate::schema::{ToolSpec, body_schema, plain_schema};
 use crate::strict_value::StrictValue;
 use crate::tool::{Tool, parse_args};
@@ -140,6 +140,14 @@ impl Call {
     /// Returns control steps of 20 ms that the call asks for; only commands ask for any.
     pub fn steps(&self) -> u32 {
         self.tool.steps()
+    }
+
+    /// Returns true for `observe` with `short`, which is among its arguments, by a reader of pictures. Programs
+    /// that ask for arrays get the numbers as they are.
+    pub fn looks_shortly(&self) -> bool {
+        let is_short =
+            matches!(&self.tool, ToolCall::Look(LookCall::Observe(args)) if args.short == Some(true));
+        is_short && self.formats.images != Some(ImageFormat::Rgb) && self.formats.depth.is_none()
     }
 
     /// Observations that name no robot become those of `robot`.
@@ -340,7 +348,7 @@ fn observe_properties() -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::parts::{DepthFormat, ImageFormat, Operators};
+    use crate::parts::{DepthFormat, Operators};
     use crate::tools::{GetStatus, MoveWrists, Say, Wait, WristMove};
 
     fn looking(robots: &[&str]) -> Look {
@@ -432,7 +440,11 @@ mod tests {
         check("wait", json!({ "steps": 5, "expected_step": -1 }), "wait: expected_step: ");
         check("wait", json!({ "steps": 5, "observe": { "robot": "A" } }), "unknown field `robot`");
         check("wait", json!({ "steps": 5, "observe": { "robots": [] } }), "at least one robot");
-        check("observe", json!({ "images": "jpeg" }), "unknown variant `jpeg`, expected `png` or `rgb`");
+        check(
+            "observe",
+            json!({ "images": "jpeg" }),
+            "unknown variant `jpeg`, expected one of `png`, `rgb`, `link`",
+        );
         check("get_status", json!({ "expected_step": 3 }), "unknown field `expected_step`");
         check("grasp", json!({}), "no tool \"grasp\"");
         let start = |field: &str, value: Value| {

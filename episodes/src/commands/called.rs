@@ -141,7 +141,7 @@ impl Called {
     pub(crate) fn take_surroundings(&mut self) -> Vec<Surroundings> {
         let take = |call: &mut Call, operator: Option<String>| {
             call.expected_step = None;
-            Surroundings { operator, then: call.then.take(), short: call.short }
+            Surroundings { operator, then: call.then.take(), short: call.short || call.looks_shortly() }
         };
         match self {
             Called::One(call) => vec![take(call, None)],

@@ -24,9 +24,9 @@ const ROOM_FRAME: &str = "The pelvis frames of different robots are unrelated, a
     with a lowered pelvis or far-reaching arms. Frame \"room\" is the same for all robots, as far as their \
     odometry is right.";
 
-const ODOMETRY: &str = "pelvis_in_start is where a robot's own IMU and joints have it: the pose of its pelvis \
-    in a frame that lies on the floor under where the pelvis was when the episode began, z up, x where the \
-    robot faced. It drifts by up to 1 % of the way walked. base_motion is the same over one command.";
+/// Text for policies whose frames `NAMED_FRAMES` describes.
+const ODOMETRY: &str = "pelvis_in_start is the pose of a robot's pelvis in its \"start\" frame by its own IMU and \
+    joints. It drifts by up to 1 % of the way walked. Replies to commands tell it of robots that have moved.";
 
 const CAMERA: &str = "The camera is in the head, above the waist: waist joints turn and tilt it, and wrist \
     targets may move the waist, so take camera_in_pelvis from the latest observe. Its axes are x right, y \
@@ -44,8 +44,8 @@ const HANDS: &str = "A wrist's x axis points along its fingers, and its z axis a
 /// Text for policies that receive the hands' sensor readings.
 const GRIP: &str = "A hand holds something, as phases ask for, while its thumb presses on one side of it and \
     fingers or palm press on the opposite one, within 60 degrees, each with 1.5 N or more, for 60 ms. grip \
-    is what the fingers' own drives feel of that: it says \"two_sided\" where both press, and presses says \
-    what does. Whether on opposite sides is not felt: a thing that only hangs in a bent hand, or a round \
+    is what the fingers' own drives feel of that: it says \"two_sided\" where both press, and else presses \
+    says what does. Whether on opposite sides is not felt: a thing that only hangs in a bent hand, or a round \
     one at the fingertips, is pressed on neighbouring sides, and not held. If it slips, or a phase is not \
     reached, open, bring the palm nearer, so that the thumb comes round, and close farther. Where it says \
     \"one_sided\", close by 0.2 rad more what presses does not name, mostly the thumb; where it says \
@@ -59,12 +59,15 @@ const GRASPING: &str = "Fingers that are stopped short of their targets press: a
     to 40 steps, fingers first around a bar, and hold still for 20. A hand that closes on a thing without \
     lying on it drags it, and is dragged: robots that are pulled so step and sink; then let the hand go \
     along (no wrist target, or compliance_n_s_m 250) and lay the palm on. To let go, ask for open_rad and \
-    leave over the stops, the way you came; fingers that stay bent hook under a bar. Stand with the pelvis \
-    stand_behind_m behind the places of both hands, and in the middle between them: nearer by, thighs and \
-    knees push what stands on legs. Who carries with partners lets the hands give way (compliance_n_s_m \
-    250) from when the thing is lifted, by its legs while it is lifted, too, until it stands at its goal.";
+    leave over the stops, the way you came; fingers that stay bent hook under a bar.";
 
-/// Text for policies that have `walk_to`. The tests `a_robot_pushes_a_trolley_by_one_call` and
+/// Text for tasks with a load that robots push, or carry together.
+const LOADS: &str = " Stand with the pelvis stand_behind_m behind the places of both hands, and in the middle \
+    between them: nearer by, thighs and knees push what stands on legs. Who carries with partners lets the \
+    hands give way (compliance_n_s_m 250) from when the thing is lifted, by its legs while it is lifted, \
+    too, until it stands at its goal.";
+
+/// The same for policies that have `walk_to`. The tests `a_robot_pushes_a_trolley_by_one_call` and
 /// `two_robots_carry_a_basket_by_one_call` check it.
 const CARRYING: &str = " To push, and to carry together: grip, and lift what is to be lifted by 0.09 m \
     with compliance_n_s_m 250; then call walk_to with carry, once, with every robot that holds the load, \
@@ -93,9 +96,9 @@ const WALKING: &str = "A robot that is told to walk gains way after 0.3 to 0.5 s
     walks it coasts: by 3 cm from 0.1 m/s, 8 cm from 0.2, 12 from 0.3 and 20 from 0.4, and by 0.09 rad \
     from turning at 0.5 rad/s; it stands after about a second. While it steps the pelvis sways by up to 4 \
     cm to each side, twice a second: mean over half a second what you steer by, or have walk_to do it. \
-    base.state says \"standing\", \"stepping\", \"settling\" (told to stop, or the pelvis still rises; \
-    comes_to_rest_m says where it will stand) or \"pushed\": it steps because its hands or a partner pull \
-    it, drifts and sinks by 10 cm. Then free what pulls: loosen wrist targets, give way with \
+    base.state says \"standing\" (a short reply then has no base), \"stepping\", \"settling\" (told to stop, \
+    or the pelvis still rises; comes_to_rest_m says where it will stand) or \"pushed\": it steps because its \
+    hands or a partner pull it, drifts and sinks by 10 cm. Then free what pulls: loosen wrist targets, give way with \
     compliance_n_s_m, or walk the way it is pulled. Arms that reach more than 0.35 m ahead make a robot \
     step, too: walk nearer instead, or ask for stand_fast.";
 
@@ -138,6 +141,13 @@ pub fn brief(wording: Wording, limits: &BaseLimits, kinds: Option<&[GripKind]>) 
     let is_full = assistance == Assistance::Full;
     let is_hinted = hints == Hints::On;
     let squats = limits.pelvis_height_m.min < limits.pelvis_height_m.max;
+    // A task with grips for small things alone has no load.
+    let has_loads = kinds.is_none_or(|kinds| kinds.iter().any(|kind| *kind != GripKind::Bottle));
+    let carrying = match (has_loads, is_full) {
+        (true, true) => [LOADS, CARRYING].concat(),
+        (true, false) => LOADS.into(),
+        (false, _) => String::new(),
+    };
     Brief {
         frames: [FRAMES, if squats { BENT_KNEES } else { "" }, if is_full { NAMED_FRAMES } else { "" }]
             .concat(),
@@ -147,9 +157,7 @@ pub fn brief(wording: Wording, limits: &BaseLimits, kinds: Option<&[GripKind]>) 
         camera: CAMERA.into(),
         hands: HANDS.into(),
         walking: (is_full && squats).then(|| WALKING.into()),
-        grasping: is_hinted.then(|| {
-            [if is_full { GRIP } else { "" }, GRASPING, if is_full { CARRYING } else { "" }].concat()
-        }),
+        grasping: is_hinted.then(|| [if is_full { GRIP } else { "" }, GRASPING, &carrying].concat()),
         grips: if is_hinted { grips(kinds) } else { Vec::new() },
     }
 }
@@ -232,6 +240,18 @@ mod tests {
         assert!(with.grasping.is_some());
         assert!(!with.grips.is_empty());
         assert_eq!(without, Brief { grasping: None, grips: Vec::new(), ..with });
+    }
+
+    #[test]
+    fn carrying_is_for_tasks_with_a_load() {
+        let speaks = |kinds: Option<&[GripKind]>, assistance: Assistance| {
+            let brief = super::brief(assistance.into(), &limits(), kinds);
+            brief.grasping.is_some_and(|text| text.contains("To push, and to carry together"))
+        };
+        assert!(speaks(None, Assistance::Full));
+        assert!(speaks(Some(&[GripKind::Bottle, GripKind::Bar]), Assistance::Full));
+        assert!(!speaks(Some(&[GripKind::Bottle]), Assistance::Full));
+        assert!(!speaks(None, Assistance::Paper));
     }
 
     #[test]

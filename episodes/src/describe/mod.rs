@@ -71,7 +71,7 @@ fn protocol_info(protocol: Protocol, task: &Task) -> ProtocolInfo {
 pub fn ending(disclosure: Disclosure) -> &'static str {
     match disclosure {
         Disclosure::Live => {
-            "Every reply tells the phases that are reached by then, and the last of them ends the episode."
+            "Replies tell phases once they are reached, and the last of them ends the episode."
         }
         Disclosure::End => {
             "Phases are told once the episode has ended: until then `phases` is empty, whatever has been reached. Success does not \

@@ -123,6 +123,7 @@ impl TeamObservation {
             states: self.robots.iter().map(|robot| robot.state.clone()).collect(),
             cameras: self.robots.iter().map(|robot| robot.calibration.clone()).collect(),
             images,
+            links: Vec::new(),
             depth_images,
             arrays,
         })

@@ -1,14 +1,14 @@
 //! The observer of an episode's world: renders its cameras, and measures depth at pixels.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{Isometry3, Point3};
 use tandem_sim::render::{Camera, Cameras, Frame, RenderRequest, Renderer, object_id};
 use tandem_sim::{Step, World};
 use tandem_tools_spec::{
-    Color, DepthReply, DepthRow, PixelRegion, PoseFrame, QueryDepth, RegionFit, SpecError, SurfaceQuery,
-    Tool as _,
+    Color, DepthReply, DepthRow, PixelRegion, PoseFrame, QueryDepth, RegionFit, SpecError, Surface,
+    SurfaceQuery, Tool as _,
 };
 
 use super::fit;
@@ -220,7 +220,7 @@ impl Observer {
             frame: Some(frame).filter(|frame| *frame != PoseFrame::Pelvis),
             surfaces: Vec::new(),
             fit: None,
-            columns: DepthReply::COLUMNS.map(String::from),
+            columns: DepthReply::COLUMNS.map(String::from).to_vec(),
             points: points.collect(),
         })
     }
@@ -265,9 +265,11 @@ impl Observer {
             frame_from_camera: pelvis_from_frame.inverse() * pelvis_from_camera,
             level_from_camera: pelvis_from_level.inverse() * pelvis_from_camera,
         };
-        let surfaces = match &query.object {
+        let surfaces = match query.object.as_deref() {
+            Some(SurfaceQuery::ALL) => self.each_object(&view, &poses),
             Some(object) => {
-                surface::of_things(&view, &self.object_ids(object)?, &poses).into_iter().collect()
+                let found = surface::of_things(&view, &[self.object_ids(object)?], &poses);
+                found.into_iter().map(|(_, surface)| surface).collect()
             }
             None => surface::find(&view, query, &poses),
         };
@@ -283,9 +285,20 @@ impl Observer {
             frame: Some(frame).filter(|frame| *frame != PoseFrame::Pelvis),
             surfaces,
             fit: None,
-            columns: DepthReply::COLUMNS.map(String::from),
+            columns: DepthReply::COLUMNS.map(String::from).to_vec(),
             points: Vec::new(),
         })
+    }
+
+    /// Returns the surface of each object of the task that is seen, with its parts.
+    fn each_object(&self, view: &RobotView, poses: &CameraPoses) -> Vec<Surface> {
+        let mut ids: BTreeMap<&str, BTreeSet<u32>> = BTreeMap::new();
+        for object in &self.objects {
+            ids.entry(&object.owner).or_default().insert(object.id);
+        }
+        let (names, ids): (Vec<&str>, Vec<BTreeSet<u32>>) = ids.into_iter().unzip();
+        let found = surface::of_things(view, &ids, poses).into_iter();
+        found.map(|(index, surface)| Surface { object: Some(names[index].into()), ..surface }).collect()
     }
 
     /// Returns the ids of an object and its parts, or of a part, by its name.

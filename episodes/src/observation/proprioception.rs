@@ -66,7 +66,7 @@ pub fn robot_state(own: &Proprioception, sheet: &RobotSheet, detail: Detail) -> 
         gravity_in_pelvis: Some(wire_vector(sensed.gravity_in_pelvis)),
         pelvis_in_start: Some(wire_pose_from_sim(&sensed.start_from_pelvis)),
         pelvis_in_room: None,
-        base_command: wire_base(base),
+        base_command: Some(wire_base(base)),
         fallen: Some(fallen),
         samples: None,
     }

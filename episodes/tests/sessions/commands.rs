@@ -142,7 +142,7 @@ fn height_persists_and_velocities_do_not() {
     };
     command(&mut session, Walk { steps: 2, robots: vec![walk] }.into());
     wait(&mut session, 1);
-    let base = state(&mut session, "B").base_command;
+    let base = state(&mut session, "B").base_command.expect("a command");
     assert_eq!((base.vx_m_s, base.vy_m_s, base.yaw_rate_rad_s), (0.0, 0.0, 0.0));
     assert!((base.pelvis_height_m - 0.66).abs() < 1e-6);
 }

@@ -83,6 +83,7 @@ pub fn play(session: &mut Session) {
 pub fn row(session: &mut Session, robot: &str) -> Vec<f64> {
     let columns = session.briefing().action_row;
     let state = state(session, robot);
-    let base = [0.0, 0.0, 0.0, state.base_command.pelvis_height_m];
+    let height_m = state.base_command.as_ref().map(|command| command.pelvis_height_m).expect("a command");
+    let base = [0.0, 0.0, 0.0, height_m];
     columns.iter().filter_map(|column| state.joint_positions_rad.get(column)).chain(base).collect()
 }

@@ -91,7 +91,7 @@ pub fn state_values(state: &RobotState, moment: &EpisodeMoment) -> Option<Vec<f6
     let wrists = wrists.flat_map(|pose| pose_values(pose.position_m, pose.quaternion_wxyz));
     let Pose { position_m, quaternion_wxyz } = state.pelvis_in_start?;
     let pelvis = position_m.into_iter().chain(quaternion_wxyz);
-    let base = &state.base_command;
+    let base = state.base_command.as_ref()?;
     let base = [base.vx_m_s, base.vy_m_s, base.yaw_rate_rad_s, base.pelvis_height_m];
     let EpisodeMoment { episode, done_steps, is_first } = *moment;
     let moment = [episode.into(), done_steps, f64::from(is_first)];

@@ -273,9 +273,9 @@ def _row_of(state: RobotState) -> dict[str, float]:
         row |= {f"gravity_{axis}": part for axis, part in zip("xyz", state.gravity_in_pelvis, strict=True)}
     if state.pelvis_in_start is not None:
         row |= _pose("pelvis_in_start", state.pelvis_in_start.position_m, state.pelvis_in_start.quaternion_wxyz)
-    base = state.base_command
-    row |= {"vx_m_s": base.vx_m_s, "vy_m_s": base.vy_m_s}
-    row |= {"yaw_rate_rad_s": base.yaw_rate_rad_s, "pelvis_height_m": base.pelvis_height_m}
+    if (base := state.base_command) is not None:
+        row |= {"vx_m_s": base.vx_m_s, "vy_m_s": base.vy_m_s}
+        row |= {"yaw_rate_rad_s": base.yaw_rate_rad_s, "pelvis_height_m": base.pelvis_height_m}
     if state.fallen is not None:
         row["fallen"] = float(state.fallen)
     return row

@@ -79,7 +79,7 @@ def test_a_state_has_the_numbers_of_its_columns() -> None:
         state = dict(zip(episode.state_columns, episode.state()[1].tolist(), strict=True))
     assert told.joint_positions_rad is not None
     assert all(math.isclose(state[f"{joint}_rad"], rad, abs_tol=6e-5) for joint, rad in told.joint_positions_rad.items())
-    assert told.pelvis_in_start is not None
+    assert told.pelvis_in_start is not None and told.base_command is not None
     assert math.isclose(state["pelvis_in_start_z_m"], told.pelvis_in_start.position_m[2], abs_tol=2e-6)
     assert state["pelvis_height_m"] == pytest.approx(told.base_command.pelvis_height_m)
     assert state["fallen"] == 0.0

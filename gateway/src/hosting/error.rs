@@ -41,6 +41,17 @@ pub enum HostingError {
         /// Id of both.
         id: String,
     },
+    /// The image of a link is not kept, or is of another operator's robot.
+    #[error(
+        "no image {name:?} of yours is kept, only the latest {kept} that replies of this episode linked to; \
+         observe again"
+    )]
+    NoImage {
+        /// Name in the link.
+        name: String,
+        /// Number of images that are kept.
+        kept: usize,
+    },
     /// Another server on the same runs folder plays the episode.
     #[error("episode {id:?} is played by {url:?}; ask there")]
     HeldElsewhere {
@@ -208,6 +219,7 @@ impl HostingError {
                     "is this the server that started it? start_episode (POST /v1/episodes) starts another",
                 )
             }
+            HostingError::NoImage { .. } => Refusal::new("no-image", "No such image", NotFound),
             HostingError::TooManyEpisodes { .. } => {
                 Refusal::new("too-many-episodes", "Too many episodes", TooMany)
                     .retry_after_s(10)
@@ -270,6 +282,7 @@ impl HostingError {
             | HostingError::Episode(EpisodeError::ForeignRobot { .. }) => true,
             HostingError::Episode(_)
             | HostingError::UnknownEpisode { .. }
+            | HostingError::NoImage { .. }
             | HostingError::TooManyEpisodes { .. }
             | HostingError::TooManyWaiting { .. }
             | HostingError::ShuttingDown

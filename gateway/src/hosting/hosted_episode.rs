@@ -6,8 +6,8 @@ use std::sync::Arc;
 use serde_json::Value;
 use tandem_episodes::{EpisodeError, teamwork};
 use tandem_tools_spec::{
-    Briefing, Call, EPISODE_TOOLS, EpisodeEntry, ManageReply, Note, Operators, ResultReply, SpecError,
-    StatusReply, TalkCall, ToolCall, ToolReply,
+    Briefing, Call, EPISODE_TOOLS, EpisodeEntry, Formats, ImageFormat, LookReply, ManageReply, Note,
+    Operators, ResultReply, SpecError, StatusReply, TalkCall, ToolCall, ToolReply,
 };
 
 use super::{
@@ -15,6 +15,7 @@ use super::{
     durable::{KeptAnswer, Keyed, KeyedNote},
     episode::HostMemory,
     idempotency_cache::{IdempotencyCache, IdempotentReply},
+    image_links::{ImageLinks, MAX_LINKED_IMAGES},
     team::{OperatorHandle, Team},
 };
 
@@ -59,6 +60,8 @@ pub struct Beside {
     /// Replies that may be requested again.
     replies: Arc<IdempotencyCache<Call, SharedAnswer>>,
     notes: IdempotencyCache<Note, SharedNote>,
+    /// Images to which replies link.
+    images: ImageLinks,
 }
 
 /// Outcome of a call, shared by its callers.
@@ -104,6 +107,7 @@ impl HostMemory for Beside {
         // Remaining entries would keep their memory in use.
         self.replies.clear();
         self.notes.clear();
+        self.images.clear();
     }
 
     fn is_busy(&self) -> bool {
@@ -208,6 +212,15 @@ impl HostedEpisode {
         })
     }
 
+    /// Returns the PNG file of an image to which a reply for `who` links.
+    pub fn image(&self, who: &Caller, name: &str) -> Result<Arc<[u8]>, HostingError> {
+        self.admit(who)?;
+        let kept = self.beside.images.find(name);
+        let own = kept.filter(|image| who.robot().is_none_or(|robot| robot == image.robot));
+        own.map(|image| image.png)
+            .ok_or_else(|| HostingError::NoImage { name: name.into(), kept: MAX_LINKED_IMAGES })
+    }
+
     /// Returns its entry in the list of episodes, without information that is hidden from policies.
     pub fn told_entry(&self) -> EpisodeEntry {
         EpisodeEntry { seed: self.thread.spec().told_seed(), ..self.entry() }
@@ -282,7 +295,29 @@ impl HostedEpisode {
         }
     }
 
+    /// Answers a call, with links in place of images where it asks for them.
     async fn answer(
+        self,
+        robot: Option<String>,
+        call: Call,
+        keyed: Option<Keyed>,
+    ) -> Result<Answer, HostingError> {
+        let (id, beside) = (self.id.clone(), self.beside.clone());
+        let has_links = |formats: Formats| formats.images == Some(ImageFormat::Link);
+        let [own, after] =
+            [has_links(call.formats), call.then.as_ref().is_some_and(|look| has_links(look.formats))];
+        let mut answer = self.answer_with_images(robot, call, keyed).await?;
+        let step = answer.step.unwrap_or_default();
+        if let (true, ToolReply::Look(LookReply::Observe(seen))) = (own, &mut answer.reply) {
+            beside.images.link(&id, step, seen);
+        }
+        if let (true, Some(seen)) = (after, &mut answer.observation) {
+            beside.images.link(&id, step, seen);
+        }
+        Ok(answer)
+    }
+
+    async fn answer_with_images(
         self,
         robot: Option<String>,
         call: Call,

@@ -10,6 +10,7 @@ mod episode;
 mod error;
 mod hosted_episode;
 mod idempotency_cache;
+mod image_links;
 mod run_folder;
 mod table;
 mod team;

@@ -10,6 +10,7 @@ Where `npx` is installed, the inspector is checked, too. What of an SDK is not i
 
 import asyncio
 import importlib.util
+import itertools
 import json
 import os
 import shutil
@@ -120,7 +121,11 @@ def field(value, *names):
     return next(getattr(value, name) for name in names if hasattr(value, name))
 
 
-async def play(list_tools, call, get_prompt, mcp_error):
+# Results are structured, too, at the second; clients check them against the output schemas.
+MCP_PATHS = ("/mcp", "/mcp?output=structured")
+
+
+async def play(path, list_tools, call, get_prompt, mcp_error):
     """The same episode by any client."""
     tools = {tool.name: tool for tool in (await list_tools()).tools}
     hints = tools["observe"].annotations
@@ -134,7 +139,9 @@ async def play(list_tools, call, get_prompt, mcp_error):
     assert kinds == ["text", "text", "image", "image"], kinds
     assert look.content[1].text == "2 images follow. Image 1: A. Image 2: B.", look.content[1]
     moved = await call("move_wrists", {**episode, "steps": 2, "robots": [{"robot": "A", "right_position_m": [0.3, -0.2, 0.1]}]})
-    assert json.loads(moved.content[0].text)["executed_steps"] == 2, moved
+    told = json.loads(moved.content[0].text)
+    assert told["executed_steps"] == 2, moved
+    assert field(moved, "structuredContent", "structured_content") == (told if "structured" in path else None), moved
     refused = await call("wait", {**episode, "steps": 0})
     assert field(refused, "isError", "is_error") and "at least 1" in refused.content[0].text, refused
     prompt = await get_prompt("play_task", {"task": "handover", "seed": "3"})
@@ -153,19 +160,20 @@ async def check_mcp_1(url):
     from mcp import ClientSession, McpError
     from mcp.client.streamable_http import streamablehttp_client
 
-    async with streamablehttp_client(f"{url}/mcp") as (read_stream, write_stream, _), ClientSession(read_stream, write_stream) as session:
-        told = await session.initialize()
-        print(f"    revision {told.protocolVersion}")
-        await play(session.list_tools, session.call_tool, session.get_prompt, McpError)
+    for path in MCP_PATHS:
+        async with streamablehttp_client(url + path) as (read_stream, write_stream, _), ClientSession(read_stream, write_stream) as session:
+            told = await session.initialize()
+            print(f"    revision {told.protocolVersion}")
+            await play(path, session.list_tools, session.call_tool, session.get_prompt, McpError)
 
 
 async def check_mcp_2(url):
     from mcp import Client, MCPError
 
-    for mode in ("auto", "legacy"):
-        async with Client(f"{url}/mcp", mode=mode) as client:
+    for mode, path in itertools.product(("auto", "legacy"), MCP_PATHS):
+        async with Client(url + path, mode=mode) as client:
             print(f"    revision {client.protocol_version}")
-            await play(client.list_tools, client.call_tool, client.get_prompt, MCPError)
+            await play(path, client.list_tools, client.call_tool, client.get_prompt, MCPError)
 
 
 def check_mcp(url):

@@ -18,13 +18,15 @@ pub struct CommandReply {
     pub stop_reason: StopReason,
     /// Simulated seconds since the episode began.
     pub time_s: f64,
-    /// One report per robot that the command named; after `wait`, one per robot of the episode.
+    /// One report per robot that the command named; after `wait`, one per robot of the episode. In a short
+    /// reply without robots that stand where they stood, whose hands have no target and feel nothing.
     pub robots: Vec<RobotReport>,
     /// Every robot of the episode; in a short reply those that have fallen. Left out where the assistance
     /// is "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fallen: Vec<RobotFallen>,
-    /// Every phase reached up to now, where the episode's assistance discloses it.
+    /// Every phase reached up to now, where the episode's assistance discloses it; in a short reply those
+    /// reached during the call.
     pub phases: Vec<PhaseReached>,
     /// Remaining budget of the episode.
     pub budget: Budget,
@@ -46,7 +48,7 @@ pub enum StopReason {
 }
 
 /// Outcome of a command for one robot.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotReport {
     /// The robot, for example "A".
     pub robot: String,
@@ -57,19 +59,22 @@ pub struct RobotReport {
     pub left: HandReport,
     /// Its right arm and hand.
     pub right: HandReport,
-    /// Motion of its base; left out where the assistance is "paper".
+    /// State of its base; left out of a short reply where it stands as commanded, and where the assistance is
+    /// "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base: Option<BaseReport>,
     /// Pose of its pelvis in the start frame by its own IMU and joints. The start frame is on the floor under
     /// the pelvis at the start of the episode, z up, x the robot's heading then. Drifts by up to 1 % of the
-    /// way walked. Left out where the assistance is "paper".
+    /// way walked. Left out of a short reply where the base has moved by less than a centimetre and a
+    /// hundredth of a radian, but not after `walk_to`, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pelvis_in_start: Option<Pose>,
-    /// The same in the room frame, where `frame` is that; left out otherwise.
+    /// The same in the room frame, where `frame` is that; left out otherwise. In a short reply it stands for
+    /// `pelvis_in_start`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pelvis_in_room: Option<Pose>,
-    /// Motion of the base during the command, by the same odometry. Left out where the assistance is "paper",
-    /// and of a short reply where it is less than a centimetre and a hundredth of a radian.
+    /// Motion of the base during the command, by the same odometry. Left out of a short reply, and where the
+    /// assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_motion: Option<BaseMotion>,
     /// Waist joints whose target lay beyond a limit and was moved to it; left out where there are none.
@@ -142,7 +147,7 @@ pub struct BaseMotion {
 }
 
 /// Outcome of a command for one hand, at its last step.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HandReport {
     /// State of the wrist against its target; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -150,11 +155,12 @@ pub struct HandReport {
     /// Grip by the fingers' own torques; left out where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grip: Option<Grip>,
-    /// Parts of the hand that press, by the torques of the fingers' own drives; left out where none does, and
-    /// where the assistance is "paper".
+    /// Parts of the hand that press, by the torques of the fingers' own drives; left out where none does, of a
+    /// short reply where the grip is "two_sided", and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub presses: Vec<HandPart>,
-    /// Obstacle that the hand feels; left out where it feels none, and where the assistance is "paper".
+    /// Obstacle that the hand feels; left out where it feels none, of a short reply where `grip` tells it, and
+    /// where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub touches: Option<Touch>,
     /// The wrist pose that was asked for, in the pelvis frame as it is now, and not where the hand has
@@ -178,7 +184,7 @@ pub struct HandReport {
     /// yielded, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub given_way_m: Option<[f64; 3]>,
-    /// Its fingers; left out of a short reply where they have arrived.
+    /// Its fingers; left out of a short reply where they have arrived or the grip is "two_sided".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fingers: Option<FingerReport>,
     /// The joint of this arm and hand that works hardest; left out of a short reply where it works at less

@@ -10,7 +10,8 @@ use crate::limits;
 /// Formats of an observation's images.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Formats {
-    /// "png", or "rgb" for the bytes of each pixel row by row, which come in `arrays` then. Null: "png".
+    /// "png"; "rgb" for the bytes of each pixel row by row, which come in `arrays` then; or "link" for the
+    /// paths of PNG files, which come in `links`. Null: "png".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub images: Option<ImageFormat>,
     /// Depth along the optical axis at every pixel, in `arrays`: "float16" for little-endian numbers in
@@ -33,6 +34,8 @@ pub enum ImageFormat {
     Png,
     /// Three bytes a pixel.
     Rgb,
+    /// A path under which the server gives the PNG file.
+    Link,
 }
 
 /// Format of depth images.

@@ -12,8 +12,9 @@ pub struct PlanReply {
     /// Commands that were carried out: of a plan, those that it lists; of a walk, each short one.
     pub commands: u32,
     /// Tool calls of all robots up to now, as results count them: each command of a plan or walk is one, and
-    /// each slice of 5 steps with `until`. No budget limits them.
-    pub tool_calls: u32,
+    /// each slice of 5 steps with `until`. No budget limits them. Left out of a short reply.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tool_calls: Option<u32>,
     /// Control steps of 20 ms that they took together.
     pub executed_steps: u32,
     /// Why no more were; null where all was done.

@@ -1,9 +1,11 @@
 //! Specifications of tools in the very form that the official SDKs of model hosts take.
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::spec::ToolSpec;
 use super::strict::SHORT;
+use crate::tool::Tool as _;
+use crate::tools::{Finish, Observe};
 
 /// Host whose form a specification has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,8 +93,42 @@ impl ToolSpec {
     }
 }
 
+impl ToolSpec {
+    /// Returns true if MCP clients may get its reply as structured content. Clients drop the pictures of a tool
+    /// that declares such content.
+    pub fn has_structure(&self) -> bool {
+        self.name != Observe::NAME
+    }
+
+    /// Returns the tool for MCP clients that want structured content: with an outline of its reply.
+    pub fn structured(&self) -> Value {
+        let mut tool = self.of_mcp();
+        if self.has_structure() {
+            tool["outputSchema"] = match self.name {
+                // An operator who leaves before the others gets a status in place of the result.
+                Finish::NAME => json!({ "type": "object" }),
+                _ => outline(&self.reply_schema),
+            };
+        }
+        tool
+    }
+}
+
+/// Returns the schema of an object with the types of its own fields alone.
+fn outline(schema: &Value) -> Value {
+    let kind = |of: &Value| match &of["type"] {
+        Value::Null => json!({}),
+        kind => json!({ "type": kind }),
+    };
+    let properties = schema["properties"].as_object().into_iter().flatten();
+    let properties: Map<String, Value> = properties.map(|(name, of)| (name.clone(), kind(of))).collect();
+    json!({ "type": "object", "properties": properties, "required": schema["required"] })
+}
+
 /// Required fields whose names say what they are.
 const PLAIN_NAMES: [&str; 3] = ["episode_id", "robot", "robots"];
+/// Fields whose names say what they are, beside those of the left hand and in the pelvis frame.
+const PLAIN_EVERYWHERE: [&str; 4] = ["right_position_m", "right_quaternion_wxyz", "vx_m_s", "yaw_rate_rad_s"];
 
 /// Drops what names say and what the server checks by itself: defaults, and that no other fields are known.
 fn slim(schema: &mut Value) {
@@ -108,8 +144,8 @@ fn slim(schema: &mut Value) {
             }
             let required = object.get("required").cloned().unwrap_or_default();
             let is_plain = |name: &str| {
-                PLAIN_NAMES.contains(&name)
-                    && required.as_array().is_some_and(|all| all.contains(&name.into()))
+                let is_required = required.as_array().is_some_and(|all| all.contains(&name.into()));
+                PLAIN_EVERYWHERE.contains(&name) || PLAIN_NAMES.contains(&name) && is_required
             };
             if let Some(Value::Object(properties)) = object.get_mut("properties") {
                 let plain = properties.iter_mut().filter(|(name, _)| is_plain(name));

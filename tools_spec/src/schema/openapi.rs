@@ -85,12 +85,20 @@ fn paths_without_tools() -> Map<String, Value> {
     let docs = page("docs", "This description as a page.");
     let metrics =
         text("metrics", "What the server has done and does, in the text format of Prometheus.", "text/plain");
+    let of_image = "The PNG file of a picture to which a reply links: one of the latest of its episode.";
+    let mut image = operation("episode_image", of_image, "200", Value::Null);
+    image["responses"]["200"]["content"] = json!({ "image/png": {} });
+    let name = json!({ "name": "name", "in": "path", "required": true, "schema": { "type": "string" } });
     let paths = [
         ("/", json!({ "get": home })),
         ("/healthz", json!({ "get": health })),
         ("/metrics", json!({ "get": metrics })),
         ("/docs", json!({ "get": docs })),
         ("/v1/tools", json!({ "get": list_tools(specs) })),
+        (
+            "/v1/episodes/{episode_id}/images/{name}",
+            json!({ "parameters": [episode_id(), name], "get": image }),
+        ),
         ("/v1/episodes/{episode_id}/tools", json!({ "parameters": [episode_id()], "get": of_episode })),
     ];
     paths.into_iter().map(|(path, methods)| (path.into(), methods)).collect()

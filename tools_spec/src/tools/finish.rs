@@ -100,7 +100,8 @@ pub struct ResultReply {
     /// out where it was none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub extra_information: Vec<String>,
-    /// Number of replies with each of it, by its name and by the robot it was of; left out where it was none.
+    /// Number of replies with each of it, by its name and by the robot it was of; left out where it was none,
+    /// and of a short reply.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub extra_information_replies: BTreeMap<String, BTreeMap<String, u32>>,
     /// Share of the joint targets that lay beyond the joints' limits by more than 0.01 rad, and were moved

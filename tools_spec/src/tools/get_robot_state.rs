@@ -45,7 +45,7 @@ impl Tool for GetRobotState {
     }
 }
 
-/// The reply to `get_robot_state`.
+/// The reply to `get_robot_state`. A short one has poses to the millimetre and to a thousandth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RobotState {
     /// The robot, for example "A".
@@ -78,21 +78,23 @@ pub struct RobotState {
     /// The same of the right wrist.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub right_wrist_target: Option<Pose>,
-    /// The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright. Left out where the
-    /// assistance is "paper".
+    /// The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright. Left out of a short
+    /// reply where it is within a hundredth of that, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gravity_in_pelvis: Option<[f64; 3]>,
     /// Pose of its pelvis in the start frame by its own IMU and joints. The start frame is on the floor under
     /// the pelvis at the start of the episode, z up, x the robot's heading then. Drifts by up to 1 % of the
-    /// way walked. Left out where the assistance is "paper".
+    /// way walked. Left out of a short reply with `pelvis_in_room`, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pelvis_in_start: Option<Pose>,
     /// The same in the room frame, where the call named that; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pelvis_in_room: Option<Pose>,
-    /// Base command in force.
-    pub base_command: BaseCommand,
-    /// True if the robot has fallen; left out where the assistance is "paper".
+    /// Base command in force; left out of a short reply where the robot stands as high as commanded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_command: Option<BaseCommand>,
+    /// True if the robot has fallen; left out of a short reply where it has not, and where the assistance is
+    /// "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fallen: Option<bool>,
     /// Readings of its sensors in each physics step of the last control step, where the call asks for

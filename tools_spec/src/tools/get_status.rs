@@ -34,7 +34,7 @@ impl Tool for GetStatus {
 pub struct StatusReply {
     /// The task's id.
     pub task: String,
-    /// The seed; left out where the assistance is "paper".
+    /// The seed; left out of a short reply, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u32>,
     /// The rules in force.
@@ -45,7 +45,8 @@ pub struct StatusReply {
     pub env_steps: u32,
     /// Why the episode has ended; null while it goes on.
     pub ended: Option<EndReason>,
-    /// Every robot of the episode; left out where the assistance is "paper".
+    /// Every robot of the episode; in a short reply those that have fallen. Left out where the assistance is
+    /// "paper".
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub fallen: Vec<RobotFallen>,
     /// Amount of information. With "paper", phases are disclosed once the episode has ended, which success
@@ -62,8 +63,8 @@ pub struct StatusReply {
     pub next_phase: Option<NextPhase>,
     /// Remaining budget of the episode.
     pub budget: Budget,
-    /// Hash of the whole physical state, 16 hexadecimal digits. Equal hashes mean equal states. Left out
-    /// where the assistance is "paper".
+    /// Hash of the whole physical state, 16 hexadecimal digits. Equal hashes mean equal states. Left out of
+    /// a short reply, and where the assistance is "paper".
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state_hash: Option<String>,
 }

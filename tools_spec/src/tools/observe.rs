@@ -73,6 +73,10 @@ pub struct Observation {
     /// The pictures, in the order of `cameras`. Over MCP they follow as image blocks and are left out here.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub images: Vec<CameraImage>,
+    /// Links to the pictures, in the order of `cameras`, where `images` was "link"; left out otherwise. Over
+    /// MCP they follow as links to resources, too.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub links: Vec<ImageLink>,
     /// Images of depth, in the same order, where `depth_image` was asked for; left out otherwise. Over MCP
     /// they follow the pictures as image blocks.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -116,6 +120,16 @@ pub struct CameraImage {
     pub robot: String,
     /// The picture.
     pub png_base64: Png,
+}
+
+/// Link to one picture.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ImageLink {
+    /// The robot whose head camera took it.
+    pub robot: String,
+    /// Path of the PNG file on this server, which gives it to who may play the episode. The latest 24 of an
+    /// episode are kept.
+    pub path: String,
 }
 
 impl Serialize for CameraImage {

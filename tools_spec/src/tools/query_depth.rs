@@ -92,11 +92,14 @@ pub struct SurfaceQuery {
     pub pixel: Option<[i64; 2]>,
     /// Its colour: for the nearest three.
     pub color: Option<Color>,
-    /// An object of the task: for all that is seen of it.
+    /// An object of the task: for all that is seen of it; "all": for each object.
     pub object: Option<String>,
 }
 
 impl SurfaceQuery {
+    /// Name that stands for every object of the task.
+    pub const ALL: &str = "all";
+
     fn validate(&self) -> Result<(), String> {
         let given = [self.pixel.is_some(), self.color.is_some(), self.object.is_some()];
         match given.iter().filter(|is_given| **is_given).count() {
@@ -181,6 +184,9 @@ pub struct UprightAxis {
 /// A surface as the camera sees it: only what is in view, and of a thing only its near side.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Surface {
+    /// The object, where the call asked for all; left out otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub object: Option<String>,
     /// By what its pixels are joined.
     pub joined_by: JoinedBy,
     /// Number of its pixels.
@@ -198,7 +204,8 @@ pub struct Surface {
     /// Size of that box along each axis, in metres.
     pub extent_m: [f64; 3],
     /// The four points of its outline that span the most of it in the picture, in the order of its outline:
-    /// of a rectangle its corners.
+    /// of a rectangle its corners. Left out of a short reply where there is an axis, and of all objects.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub corners_m: Vec<[f64; 3]>,
     /// Its axis, where it is upright and round; left out otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -255,17 +262,20 @@ pub struct DepthReply {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame: Option<PoseFrame>,
     /// The surfaces that were found: at a pixel the patch of its colour and, where that is more, the whole
-    /// thing; of a colour up to three, the nearest first and what is of the room last; of an object one.
+    /// thing; of a colour up to three, the nearest first and what is of the room last; of an object one; of all
+    /// one for each that is seen.
     /// Left out where none was asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub surfaces: Vec<Surface>,
     /// Plane, edges and corners of the region; left out where `fit` was not asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fit: Option<RegionFit>,
-    /// Columns of `points`: "u", "v", "x_m", "y_m", "z_m".
-    pub columns: [String; 5],
+    /// Columns of `points`: "u", "v", "x_m", "y_m", "z_m". Left out of a short reply with surfaces.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub columns: Vec<String>,
     /// One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where
     /// nothing is seen. Of a surface none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub points: Vec<DepthRow>,
 }
 

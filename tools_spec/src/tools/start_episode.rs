@@ -119,6 +119,8 @@ impl Briefing {
     /// Returns the short briefing.
     pub fn shortened(mut self) -> Briefing {
         self.action_row.clear();
+        self.status.fallen.retain(|entry| entry.fallen);
+        self.status.state_hash = None;
         self.kinds.iter_mut().for_each(|kind| kind.joints.clear());
         self
     }

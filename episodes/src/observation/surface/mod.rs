@@ -45,11 +45,16 @@ pub struct CameraPoses {
     pub level_from_camera: Isometry3<f64>,
 }
 
-/// Returns the surface of the things with these ids; `None` if no pixel sees them.
-pub fn of_things(view: &RobotView, ids: &BTreeSet<u32>, poses: &CameraPoses) -> Option<Surface> {
-    let seen = |pixel: &usize| ids.contains(&view.ids[*pixel]) && view.depth_m[*pixel].is_finite();
-    let pixels: Vec<usize> = (0..view.ids.len()).filter(seen).collect();
-    (!pixels.is_empty()).then(|| describe(view, &Relief::of(view), JoinedBy::Object, &pixels, poses))
+/// Returns the surfaces of these things, each with its ids, that pixels see, with their places in the list.
+pub fn of_things(view: &RobotView, things: &[BTreeSet<u32>], poses: &CameraPoses) -> Vec<(usize, Surface)> {
+    let relief = Relief::of(view);
+    let surface = |(index, ids): (usize, &BTreeSet<u32>)| {
+        let seen = |pixel: &usize| ids.contains(&view.ids[*pixel]) && view.depth_m[*pixel].is_finite();
+        let pixels: Vec<usize> = (0..view.ids.len()).filter(seen).collect();
+        let is_seen = !pixels.is_empty();
+        is_seen.then(|| (index, describe(view, &relief, JoinedBy::Object, &pixels, poses)))
+    };
+    things.iter().enumerate().filter_map(surface).collect()
 }
 
 /// Finds the surfaces of a query by pixel or colour.
@@ -246,13 +251,11 @@ fn describe(
             let end_m = frame_from_level * Point3::new(axis.at_m.x, axis.at_m.y, height_m);
             [end_m.x, end_m.y, end_m.z].map(coarse)
         };
-        UprightAxis {
-            bottom_m: end_m(axis.bottom_m),
-            top_m: end_m(axis.top_m),
-            radius_m: coarse(axis.radius_m),
-        }
+        let (bottom_m, top_m) = (end_m(axis.bottom_m), end_m(axis.top_m));
+        UprightAxis { bottom_m, top_m, radius_m: coarse(axis.radius_m) }
     });
     Surface {
+        object: None,
         joined_by,
         pixels: pixels.len() as u32,
         from,
@@ -368,13 +371,20 @@ mod tests {
         view.ids = (0..WIDTH * HEIGHT).map(id).collect();
         let still = Isometry3::identity();
         let poses = CameraPoses { frame_from_camera: still, level_from_camera: still };
-        let of = |ids: &[u32]| of_things(&view, &ids.iter().copied().collect(), &poses);
+        let each = |things: &[&[u32]]| {
+            let things: Vec<_> = things.iter().map(|ids| ids.iter().copied().collect()).collect();
+            of_things(&view, &things, &poses)
+        };
+        let of = |ids: &[u32]| each(&[ids]).pop().map(|(_, surface)| surface);
         let square = of(&[4, 5]).unwrap();
         let hidden = 17 + 19 + 21 + 19;
         assert_eq!((square.joined_by, square.pixels), (JoinedBy::Object, 221 - hidden));
         assert_eq!((square.from, square.to, square.cut_off), ([22, 10], [38, 30], false));
         assert!(of(&[4]).unwrap().pixels < square.pixels);
         assert_eq!(of(&[9]), None);
+        let found = each(&[&[9], &[4, 5], &[2]]);
+        assert_eq!(found.iter().map(|(index, _)| *index).collect::<Vec<_>>(), [1, 2]);
+        assert_eq!(found[0].1, square);
     }
 
     #[test]

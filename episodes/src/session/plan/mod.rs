@@ -21,7 +21,7 @@ use tandem_tools_spec::{
 
 use super::Session;
 use super::journal::KeptRequest;
-use super::told::shorten_report;
+use super::told::shorten_plan;
 use crate::EpisodeError;
 use crate::commands::{Called, OperatorCall, report_wrists_in};
 use crate::output::OutputError;
@@ -147,15 +147,16 @@ impl PlanRun {
         };
         let operator = self.operator.as_deref();
         let held = carried_in.map_or(Vec::new(), |frame| session.held(&session.facts(), operator, frame));
-        let mut last = last.ok_or_else(|| SpecError::Invalid {
+        let last = last.ok_or_else(|| SpecError::Invalid {
             tool: SendPlan::NAME,
             reason: "no command was made; give at least one".into(),
         })?;
+        let (tool_calls, outcomes) = (Some(tool_calls), outcomes.lines());
+        let mut reply = PlanReply { commands, tool_calls, executed_steps, stopped, outcomes, held, last };
         if is_short {
-            shorten_report(&mut last);
+            shorten_plan(&mut reply);
         }
-        let outcomes = outcomes.lines();
-        Ok(PlanReply { commands, tool_calls, executed_steps, stopped, outcomes, held, last })
+        Ok(reply)
     }
 }
 
@@ -206,7 +207,7 @@ impl Session {
         self.tell_plan(operator.as_deref(), &call.tool, reply.as_ref())?;
         let mut reply = reply?;
         if call.short {
-            shorten_report(&mut reply.last);
+            shorten_plan(&mut reply);
         }
         Ok(reply)
     }

@@ -36,18 +36,18 @@ impl Outcomes {
         }
     }
 
-    /// Returns a line for each command, for example "command 1 of 3, 25 steps: A left arrived, right blocked
-    /// 0.031 m off"; none for a single command.
+    /// Returns a line for each command, for example "1. 25 steps: A left arrived, right blocked 0.031 m off";
+    /// none for a single command.
     pub fn lines(self) -> Vec<String> {
         let Outcomes(outcomes) = self;
         if outcomes.len() < 2 {
             return Vec::new();
         }
-        let line = |PlanOutcome { place, steps, states, .. }: PlanOutcome| {
+        let line = |(index, PlanOutcome { steps, states, .. }): (usize, PlanOutcome)| {
             let states = if states.is_empty() { states } else { format!(": {states}") };
-            format!("{place}, {steps} steps{states}")
+            format!("{}. {steps} steps{states}", index + 1)
         };
-        outcomes.into_iter().map(line).collect()
+        outcomes.into_iter().enumerate().map(line).collect()
     }
 }
 

@@ -3,7 +3,7 @@
 
 mod short;
 
-pub use short::{shorten, shorten_report};
+pub use short::{shorten, shorten_plan};
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -10,6 +10,8 @@ use tandem_tools_spec::{Call, PlanReply, Protocol, ToolReply};
 use super::grips::{Trial, heading_rad, isometry, upright};
 use crate::common::*;
 
+const NAMES: [&str; 3] = ["A", "B", "C"];
+
 fn ask(session: &mut Session, tool: &str, args: Value) -> ToolReply {
     session.ask(None, Call::parse(tool, args).unwrap()).unwrap().reply
 }
@@ -45,14 +47,20 @@ fn is_done(session: &Session) -> bool {
     session.result().phases.0.iter().all(|(_, time_s)| time_s.is_some())
 }
 
-/// Raises both hands of both robots `times` times by `by_m`, with compliance and unchanged fingers.
+/// Raises both hands of A and B `times` times by `by_m`, with compliance and unchanged fingers.
 fn move_up(session: &mut Session, by_m: f64, times: u32) {
+    move_up_of(session, [A, B], by_m, times);
+}
+
+/// Raises both hands of these robots like [`move_up`].
+fn move_up_of(session: &mut Session, robots: [usize; 2], by_m: f64, times: u32) {
     for _ in 0..times {
         if is_done(session) {
             break;
         }
         let facts = session.facts();
-        let entry = |(robot, name): (usize, &&str)| {
+        let entry = |robot: usize| {
+            let name = NAMES[robot];
             let pelvis = isometry(&facts.robots[robot].pelvis_in_world);
             let level_from_pelvis = upright(&pelvis).inverse() * pelvis;
             let mut entry = json!({ "robot": name, "frame": "level", "compliance_n_s_m": 250 });
@@ -66,7 +74,7 @@ fn move_up(session: &mut Session, by_m: f64, times: u32) {
             }
             entry
         };
-        let robots: Vec<Value> = ["A", "B"].iter().enumerate().map(entry).collect();
+        let robots: Vec<Value> = robots.into_iter().map(entry).collect();
         ask(session, "move_wrists", json!({ "steps": 20, "robots": robots }));
     }
 }
@@ -152,4 +160,88 @@ fn two_robots_carry_a_basket_by_one_call() {
     assert!(off_m.truncate().length() < 0.15, "{off_m}");
     assert!(is_done(&session), "{:?}, set down {off_m} off", session.result().phases);
     assert!(!facts.robots.iter().any(|robot| robot.fallen));
+}
+
+/// Returns the mean distance between the facing hands of two robots that hold one load.
+fn apart_m(session: &Session, [one, other]: [usize; 2]) -> f64 {
+    let facts = session.facts();
+    let wrist = |robot: usize, side: Side| {
+        let robot = &facts.robots[robot];
+        isometry(&robot.pelvis_in_world) * isometry(&robot.wrist_in_pelvis[side])
+    };
+    let apart = |own: Side, its: Side| {
+        (wrist(one, own).translation.vector - wrist(other, its).translation.vector).norm()
+    };
+    0.5 * (apart(Side::Left, Side::Right) + apart(Side::Right, Side::Left))
+}
+
+/// Returns the distance between the pelvises of two robots on the floor.
+fn stand_apart_m(session: &Session, [one, other]: [usize; 2]) -> f64 {
+    let facts = session.facts();
+    let pelvis_m = |robot: usize| facts.robots[robot].pelvis_in_world.translation;
+    let apart = pelvis_m(one) - pelvis_m(other);
+    f64::from(apart.truncate().length())
+}
+
+/// Carries a load by three calls of `walk_to`, each by [x, y] of the room, and checks that it is held as after
+/// the lift.
+fn carry_in_three_legs(seed: u32, [one, other]: [&Trial; 2], (lift_m, leg_m): (f64, [f64; 2])) {
+    let robots = [one.robot, other.robot];
+    let names = robots.map(|robot| NAMES[robot]);
+    let mut session = start(one.task, seed, Protocol::Agentic);
+    one.take(&mut session);
+    other.take(&mut session);
+    move_up_of(&mut session, robots, lift_m / 3.0, 3);
+    let began = [apart_m(&session, robots), stand_apart_m(&session, robots)];
+    println!("{} {seed}: hands {:.3} m apart, robots {:.3}", one.task, began[0], began[1]);
+    for leg in 1..=3 {
+        let facts = session.facts();
+        let by_m = robots.map(|robot| {
+            let heading = heading_rad(&isometry(&facts.robots[robot].pelvis_in_world));
+            let (sine, cosine) = heading.sin_cos();
+            [cosine * leg_m[0] + sine * leg_m[1], cosine * leg_m[1] - sine * leg_m[0]]
+        });
+        let reply = carry(&mut session, &names, by_m, 1500);
+        let now = [apart_m(&session, robots), stand_apart_m(&session, robots)];
+        let hands = reply.last.robots.iter().flat_map(|report| [&report.left, &report.right]);
+        let most_n = hands
+            .filter_map(|hand| hand.force_n)
+            .map(|force_n| force_n[0].hypot(force_n[1]))
+            .fold(0.0, f64::max);
+        println!(
+            "leg {leg}, {} steps: hands {:.3}, robots {:.3}, up to {most_n:.1} N aside; {:?}",
+            reply.executed_steps, now[0], now[1], reply.stopped
+        );
+        assert_eq!(reply.stopped, None, "leg {leg}");
+        assert!(one.holds(&session) && other.holds(&session), "leg {leg}: all hands still hold it");
+        assert!((now[0] - began[0]).abs() < 0.02, "leg {leg}: hands were {:.3} apart: {now:?}", began[0]);
+        assert!((now[1] - began[1]).abs() < 0.03, "leg {leg}: robots were {:.3} apart: {now:?}", began[1]);
+        assert!(most_n < 15.0, "leg {leg}: {most_n} N");
+    }
+}
+
+/// Legs neither lose the squeeze of the hands nor add to it.
+#[test]
+fn a_load_is_held_alike_after_each_of_three_legs() {
+    let trial = |task, thing, object, robot, places, heading_rad| Trial {
+        thing,
+        task,
+        robot,
+        object,
+        places,
+        heading_rad,
+        walks: true,
+    };
+    let basket =
+        |robot, places, heading_rad| trial("co_carry", "rim of 24 mm", "basket", robot, places, heading_rad);
+    let table = |robot, places, heading_rad| {
+        trial("table_align", "edge of a plate", "office_table", robot, places, heading_rad)
+    };
+    let of_a: &[_] = &[(Side::Left, "a_left"), (Side::Right, "a_right")];
+    let of_b: &[_] = &[(Side::Left, "b_left"), (Side::Right, "b_right")];
+    let pi = std::f64::consts::PI;
+    for seed in [2012, 2301] {
+        carry_in_three_legs(seed, [&basket(A, of_a, 0.0), &basket(B, of_b, pi)], (0.09, [0.0, -0.35]));
+        carry_in_three_legs(seed, [&table(A, of_a, 0.0), &table(B, of_b, pi)], (0.09, [0.0, -0.4]));
+    }
 }

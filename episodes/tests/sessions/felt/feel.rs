@@ -309,7 +309,7 @@ fn targets_are_read_in_the_frame_that_they_name() {
 fn the_room_frame_is_the_same_for_all_robots() {
     let mut session = handover(2011);
     let mut wrist_m = |robot: usize, frame: PoseFrame| {
-        let look = Observe { short: Some(true), frame: Some(frame), ..Observe::of_all() };
+        let look = Observe { frame: Some(frame), ..Observe::of_all() };
         let ToolReply::Look(LookReply::Observe(seen)) = session.call(look.into()).unwrap() else { panic!() };
         assert_eq!(seen.states[robot].frame, Some(frame));
         seen.states[robot].right_wrist.position_m

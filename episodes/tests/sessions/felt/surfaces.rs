@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use serde_json::{Value, json};
 use tandem_episodes::{A, Session};
 use tandem_sim::Pose;
-use tandem_tools_spec::{Call, Color, DepthReply, JoinedBy, LookReply, Protocol, ToolReply};
+use tandem_tools_spec::{Call, Color, DepthReply, JoinedBy, LookReply, Protocol, Surface, ToolReply};
 
 use crate::common::*;
 
@@ -72,6 +72,19 @@ fn a_pixel_on_a_bottle_tells_of_all_of_it() {
     let size_m: f64 = told.split("its y, ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!((height_m - size_m).abs() < 0.02, "{height_m} m high, and it is {size_m}: {whole:?}");
     assert!(whole.extent_m[0] < 0.09 && whole.extent_m[1] < 0.09, "nothing of the counter: {whole:?}");
+}
+
+/// One call tells of every object that is seen, each as a call by its name does.
+#[test]
+fn all_objects_are_told_at_once() {
+    let mut session = start("handover", 2011, Protocol::Agentic);
+    let all = surfaces(&mut session, json!({ "object": "all" })).surfaces;
+    let names: Vec<&str> = all.iter().filter_map(|surface| surface.object.as_deref()).collect();
+    assert_eq!(names, ["bottle", "target pad"]);
+    for surface in &all {
+        let alone = surfaces(&mut session, json!({ "object": surface.object })).surfaces;
+        assert_eq!(alone, [Surface { object: None, ..surface.clone() }]);
+    }
 }
 
 /// For every visible colour, surfaces come nearest first, and walls and floors last.

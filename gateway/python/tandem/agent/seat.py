@@ -103,7 +103,9 @@ class Seat:
         for part in _parts(reply):
             phases = part.get("phases")
             if isinstance(phases, list):
-                self.phases = tuple(f"{phase['number']} {phase['id']}" for phase in listed(phases))
+                # A short reply tells the latest alone.
+                told = (f"{phase['number']} {phase['id']}" for phase in listed(phases))
+                self.phases += tuple(phase for phase in told if phase not in self.phases)
         pictures = _take_pictures(reply)
         text = json.dumps(reply, separators=(",", ":"), ensure_ascii=False)
         if len(text) > MAX_ANSWER_CHARACTERS:

@@ -184,7 +184,7 @@ class SurfaceQuery:
     """Its colour: for the nearest three."""
 
     object: str | None = None
-    """An object of the task: for all that is seen of it."""
+    """An object of the task: for all that is seen of it; "all": for each object."""
 
 
 @dataclass(frozen=True)

@@ -127,8 +127,7 @@ async fn turn(any: OperatorHandle) {
 
 /// Commands a setpoint and sends the driver the answer, with the robot's state if it is told.
 async fn command(operator: OperatorHandle, setpoint: Setpoint, tells_state: bool) {
-    let call = Call { short: true, ..setpoint.call().into() };
-    let mut answers = vec![operator.call(call, None).await];
+    let mut answers = vec![operator.call(setpoint.call().into(), None).await];
     if tells_state {
         let state = ToolCall::from(GetRobotState::of(operator.robot()));
         answers.push(operator.call(Call { samples: true, ..state.into() }, None).await);

@@ -29,8 +29,8 @@ use rmcp::{
 use serde::Serialize;
 use serde_json::Value;
 use tandem_tools_spec::{
-    Call, DepthImage, Format, ListTasks, LookReply, Observation, StartEpisode, TalkCall, Tool as _,
-    ToolReply, parse_args, parse_start,
+    Call, DepthImage, Format, ListTasks, LookReply, Observation, Observe, StartEpisode, TalkCall, Tool as _,
+    ToolReply, ToolSpec, parse_args, parse_start,
 };
 
 use super::{
@@ -46,16 +46,20 @@ const ACCEPTED: &str = "application/json, text/event-stream";
 /// Returns what a host tells its model about the server as a whole: only what `caller` can do.
 fn instructions(caller: &Caller) -> String {
     let begin = match caller {
-        Caller::Host => "Call list_tasks, then start_episode, then look".into(),
+        Caller::Host => "Call start_episode, whose tasks list_tasks names, then look".into(),
         // An operator's episode is already under way, and it cannot start another.
         Caller::Operator { episode, robot } => {
             format!("You are the operator of robot {robot} in the episode {episode}, which has begun. Look")
         }
     };
+    let whole = match caller {
+        Caller::Host => " The tools and start_episode tell all that a player needs.",
+        Caller::Operator { .. } => "",
+    };
     format!(
         "Simulated humanoids that must work together. {begin} with observe and act with move_wrists, walk, \
          send_joint_chunk or wait until the task is done, then call finish. Physics stands still between calls. \
-         Replies are short; `short: false` gives the whole one."
+         Replies are short; `short: false` gives the whole one.{whole}"
     )
 }
 
@@ -110,8 +114,12 @@ impl ServerHandler for McpServer {
         context: RequestContext<RoleServer>,
     ) -> Result<ListToolsResult, ErrorData> {
         let specs = self.app.tool_specs(caller_of(&context).unwrap_or(&Caller::Host));
+        let listed = |spec: &ToolSpec| match wants_structure(&context) {
+            true => spec.structured(),
+            false => spec.formatted(Format::Mcp),
+        };
         let tools: Result<Vec<Tool>, _> =
-            specs.iter().map(|spec| serde_json::from_value(spec.formatted(Format::Mcp))).collect();
+            specs.iter().map(|spec| serde_json::from_value(listed(spec))).collect();
         let tools = tools.map_err(|error| ErrorData::internal_error(error.to_string(), None))?;
         Ok(ListToolsResult::with_all_items(tools))
     }
@@ -176,7 +184,13 @@ impl ServerHandler for McpServer {
         };
         self.log_call(&request.name, episode.as_deref(), called.as_ref().err());
         let result = match called {
-            Ok(content) => CallToolResult::success(content),
+            Ok(content) => {
+                let structured = wants_structure(&context) && request.name != Observe::NAME;
+                let value = structured.then(|| structure(&content)).flatten();
+                let mut result = CallToolResult::success(content);
+                result.structured_content = value;
+                result
+            }
             // A refusal is returned as the tool's answer, which the model reads; protocol errors often
             // stay with the host.
             Err(error) => CallToolResult::error(refusal_blocks(&error)),
@@ -294,10 +308,13 @@ fn content(answer: &Answer) -> Result<Vec<ContentBlock>, ApiError> {
     };
     remove_images(&mut text);
     let mut content = json_block(&text)?;
-    content.push(ContentBlock::text(image_captions(seen)));
+    if !(seen.images.is_empty() && seen.depth_images.is_empty()) {
+        content.push(ContentBlock::text(image_captions(seen)));
+    }
     let depths = seen.depth_images.iter().map(|image| &image.png_base64);
     let files = seen.images.iter().map(|image| &image.png_base64).chain(depths);
     content.extend(files.map(|file| ContentBlock::image(file.to_base64(), "image/png")));
+    content.extend(seen.links.iter().map(|link| ContentBlock::resource_link(resources::image(link))));
     Ok(content)
 }
 
@@ -306,6 +323,18 @@ fn remove_images(seen: &mut Value) {
         seen.shift_remove("images");
         seen.shift_remove("depth_images");
     }
+}
+
+/// Returns true if the client asks for output schemas and structured content, which is the reply once more,
+/// by the query of its URL. A model would read both.
+fn wants_structure(context: &RequestContext<RoleServer>) -> bool {
+    let query = context.extensions.get::<Parts>().and_then(|parts| parts.uri.query());
+    query.into_iter().flat_map(|query| query.split('&')).any(|pair| pair == "output=structured")
+}
+
+/// Returns the JSON of a reply without images.
+fn structure(content: &[ContentBlock]) -> Option<Value> {
+    serde_json::from_str(&content.first()?.as_text()?.text).ok()
 }
 
 /// Returns the caller that the gate has identified.

@@ -67,6 +67,7 @@ fn hosting_refusals() -> Vec<HostingError> {
     let robot = || "A".to_owned();
     vec![
         HostingError::UnknownEpisode { id: "x".into() },
+        HostingError::NoImage { name: "7-A.png".into(), kept: 24 },
         HostingError::TooManyEpisodes { limit: 8 },
         HostingError::TooManyWaiting { limit: 16 },
         HostingError::ShuttingDown,

@@ -35,7 +35,7 @@ use idempotency::{IdempotencyKey, mark_replayed};
 const BY_ACCEPT: (header::HeaderName, &str) = (header::VARY, "accept");
 
 /// Returns every route: path, methods, handlers.
-fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>); 14] {
+fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>); 15] {
     [
         ("/", &["GET"], get(home)),
         ("/healthz", &["GET"], get(health)),
@@ -49,6 +49,7 @@ fn routes() -> [(&'static str, &'static [&'static str], MethodRouter<AppState>);
         ("/v1/episodes", &["GET", "POST"], get(episodes).post(start)),
         ("/v1/episodes/{id}", &["GET", "DELETE"], get(status).delete(remove)),
         ("/v1/episodes/{id}/briefing", &["GET"], get(briefing)),
+        ("/v1/episodes/{id}/images/{name}", &["GET"], get(image)),
         ("/v1/episodes/{id}/tools", &["GET"], get(episode_tools)),
         ("/v1/episodes/{id}/tools/{name}", &["POST"], post(call)),
         ("/v1/episodes/{id}/notes", &["POST"], post(note)),
@@ -197,6 +198,16 @@ async fn briefing(
     Path(id): Path<String>,
 ) -> Result<Response, ApiError> {
     encoding.write(StatusCode::OK, &app.table.briefing(&id, &caller).await?.over_http(&id))
+}
+
+/// Returns the PNG file of an image to which a reply links.
+async fn image(
+    State(app): State<AppState>,
+    Extension(caller): Extension<Caller>,
+    Path((id, name)): Path<(String, String)>,
+) -> Result<Response, ApiError> {
+    let png = app.table.hosted(&id)?.image(&caller, &name)?;
+    Ok(([(header::CONTENT_TYPE, "image/png")], png.to_vec()).into_response())
 }
 
 async fn call(

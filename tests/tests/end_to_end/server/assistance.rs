@@ -25,14 +25,13 @@ const FULL_FIELDS: [&str; 12] = [
 ];
 
 /// Words about information that only `full` gives.
-const FULL_WORDS: [&str; 9] = [
+const FULL_WORDS: [&str; 8] = [
     "torques",
     "fallen",
     "phases reached",
     "phases they are scored",
     "phases that are scored",
     "pelvis_in_start",
-    "base_motion",
     "is blocked",
     "close to close_rad",
 ];

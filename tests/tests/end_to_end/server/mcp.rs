@@ -1,6 +1,7 @@
 //! Tests of the MCP route from a host's side: JSON-RPC over HTTP, with images as separate blocks.
 
 use serde_json::{Value, json};
+use tandem::settings::Layer;
 use tandem_tests::TestServer;
 use tandem_tools_spec::{Format, Hints};
 
@@ -60,6 +61,122 @@ fn an_episode_can_be_played() {
     assert!(!text(&seen).contains("depth_images"));
     let files = [2, 3].map(|block: usize| seen["content"][block]["data"].as_str().expect("a file"));
     assert!(files[0] != files[1] && files[1].starts_with("iVBORw0KGgo"));
+}
+
+/// Returns true if `value` has one of the types of a schema's `type`, or if the schema has none.
+fn is_of_type(value: &Value, schema: &Value) -> bool {
+    let is = |kind: &Value| match kind.as_str().expect("a type") {
+        "null" => value.is_null(),
+        "boolean" => value.is_boolean(),
+        "integer" => value.is_i64() || value.is_u64(),
+        "number" => value.is_number(),
+        "string" => value.is_string(),
+        "array" => value.is_array(),
+        "object" => value.is_object(),
+        other => panic!("{other} is no type"),
+    };
+    match &schema["type"] {
+        Value::Null => true,
+        Value::Array(kinds) => kinds.iter().any(is),
+        kind => is(kind),
+    }
+}
+
+/// Clients that ask for it get schemas of replies, and the replies as values that fit them. A model would read
+/// both, so all other clients get neither.
+#[test]
+fn structured_content_fits_its_schema() {
+    let server = TestServer::with(Layer { max_episodes: Some(4), ..Layer::default() });
+    let rpc = |path: &str, method: &str, params: Value| {
+        let request = json!({ "jsonrpc": "2.0", "id": 1, "method": method, "params": params });
+        server.post(path, &request).ok()["result"].clone()
+    };
+    let structured = "/mcp?output=structured";
+    let listed = rpc(structured, "tools/list", json!({}));
+    let schemas = |name: &str| {
+        let mut tools = listed["tools"].as_array().into_iter().flatten();
+        tools.find(|tool| tool["name"] == name).expect("a tool")["outputSchema"].clone()
+    };
+    assert!(schemas("observe").is_null());
+    let started = json!({ "task": "handover", "seed": 0 });
+    let id = server.post("/v1/episodes", &started).ok()["episode_id"].clone();
+    let hand = json!({ "robot": "A", "right_position_m": [0.3, -0.2, 0.1] });
+    let wait = json!({ "tool": "wait", "arguments": { "steps": 2 } });
+    let still = json!({ "robot": "A", "vx_m_s": 0, "vy_m_s": 0, "yaw_rate_rad_s": 0 });
+    let calls = [
+        ("list_tasks", json!({})),
+        ("start_episode", started),
+        ("get_robot_state", json!({ "robot": "A", "frame": "room" })),
+        ("query_depth", json!({ "robot": "A", "pixels": [[160, 120]] })),
+        ("query_depth", json!({ "robot": "A", "surface": { "object": "bottle" } })),
+        ("check_reach", hand.clone()),
+        ("move_wrists", json!({ "steps": 2, "robots": [hand] })),
+        ("walk", json!({ "steps": 2, "robots": [still] })),
+        ("wait", json!({ "steps": 2 })),
+        ("send_plan", json!({ "commands": [wait, wait] })),
+        ("walk_to", json!({ "steps": 5, "robots": [{ "robot": "A", "to_m": [-0.2, 0.0] }] })),
+        ("get_status", json!({ "explain": true })),
+        ("finish", json!({})),
+    ];
+    for (name, mut args) in calls {
+        for short in [true, false] {
+            args["short"] = short.into();
+            if !["list_tasks", "start_episode"].contains(&name) {
+                args["episode_id"] = id.clone();
+            }
+            let ask = |path: &str| rpc(path, "tools/call", json!({ "name": name, "arguments": args }));
+            let reply = ask(structured);
+            let (value, schema) = (&reply["structuredContent"], schemas(name));
+            assert_eq!(*value, serde_json::from_str::<Value>(text(&reply)).expect("JSON"), "{name}");
+            for required in schema["required"].as_array().into_iter().flatten() {
+                assert!(value.get(required.as_str().expect("a name")).is_some(), "{name}: {required}");
+            }
+            for (field, value) in value.as_object().expect("an object") {
+                let kind = &schema["properties"][field];
+                assert!(is_of_type(value, kind), "{name}.{field} is {value}, not {kind}");
+            }
+            let is_read = ["list_tasks", "get_robot_state", "finish"].contains(&name);
+            assert!(!is_read || ask("/mcp").get("structuredContent").is_none(), "{name}");
+        }
+    }
+    let seen = json!({ "name": "observe", "arguments": { "episode_id": id, "robots": ["A"] } });
+    let seen = rpc(structured, "tools/call", seen);
+    assert!(seen.get("structuredContent").is_none() && seen["content"][2]["type"] == "image");
+}
+
+/// Images may come as links, over HTTP and MCP, for the callers who could see them inline.
+#[test]
+fn images_may_be_links() {
+    let server = TestServer::start();
+    let id = server.episode("benchmark");
+    let inline = server.tool(&id, "observe", &json!({})).ok();
+    let linked = server.tool(&id, "observe", &json!({ "images": "link" })).ok();
+    assert!(linked.get("images").is_none() && linked["cameras"] == inline["cameras"], "{linked}");
+    let get = |path: &str, token: &str| {
+        let bearer = format!("Bearer {token}");
+        let headers: &[(&str, &str)] = if token.is_empty() { &[] } else { &[("authorization", &bearer)] };
+        server.ask("GET", path, headers, b"")
+    };
+    let path = linked["links"][1]["path"].as_str().expect("a path");
+    let (status, headers, png) = get(path, "");
+    assert_eq!((status, headers["content-type"].to_str().expect("a text")), (200, "image/png"));
+    assert_eq!(json!(tandem_tools_spec::Png(png)), inline["images"][1]["png_base64"]);
+    server.get(&format!("/v1/episodes/{id}/images/7-A.png")).refused(404, &["7-A.png", "observe again"]);
+
+    let asked = json!({ "episode_id": id, "robots": ["B"], "images": "link" });
+    let seen = call(&server, "observe", asked);
+    let link = &seen["content"][1];
+    assert_eq!((&link["type"], &link["mimeType"]), (&json!("resource_link"), &json!("image/png")), "{seen}");
+    let read = rpc(&server, "resources/read", json!({ "uri": link["uri"] }));
+    assert_eq!(read["contents"][0]["blob"], inline["images"][1]["png_base64"]);
+
+    let start = json!({ "task": "handover", "seed": 0, "operators": "per_robot" });
+    let started = server.post("/v1/episodes", &start).ok();
+    let token = |robot: usize| started["operators"][robot]["token"].as_str().expect("a token");
+    let id = started["episode_id"].as_str().expect("an id");
+    let seen = server.tool_as(token(0), id, "observe", &json!({ "images": "link" })).ok();
+    let path = seen["links"][0]["path"].as_str().expect("a path");
+    assert_eq!((get(path, token(0)).0, get(path, token(1)).0), (200, 404));
 }
 
 /// JSON readers differ in which of two fields with the same name they use, so duplicates are refused.
@@ -169,7 +286,10 @@ fn instructions_say_what_the_caller_can_do() {
         answer["result"]["instructions"].as_str().expect("instructions").to_owned()
     };
     let (host, operator) = (instructions(&[]), instructions(&[("authorization", &bearer)]));
-    assert!(host.contains("Call list_tasks, then start_episode, then look with observe"), "{host}");
+    assert!(
+        host.contains("Call start_episode, whose tasks list_tasks names, then look with observe"),
+        "{host}"
+    );
     assert!(!operator.contains("start_episode") && !operator.contains("list_tasks"), "{operator}");
     let id = id.as_str().expect("an id");
     assert!(
