@@ -147,7 +147,9 @@ class CommandReply(Reply):
     """Simulated seconds since the episode began."""
 
     robots: tuple[RobotReport, ...]
-    """One report per robot that the command named; after `wait`, one per robot of the episode."""
+    """One report per robot that the command named; after `wait`, one per robot of the episode. In a short reply
+    without robots that stand where they stood, whose hands have no target and feel nothing.
+    """
 
     fallen: tuple[RobotFallen, ...] = ()
     """Every robot of the episode; in a short reply those that have fallen. Left out where the assistance is
@@ -155,7 +157,9 @@ class CommandReply(Reply):
     """
 
     phases: tuple[PhaseReached, ...]
-    """Every phase reached up to now, where the episode's assistance discloses it."""
+    """Every phase reached up to now, where the episode's assistance discloses it; in a short reply those reached
+    during the call.
+    """
 
     budget: Budget
     """Remaining budget of the episode."""
@@ -199,12 +203,14 @@ class HandReport(Reply):
     """Grip by the fingers' own torques; left out where the assistance is "paper"."""
 
     presses: tuple[HandPart, ...] = ()
-    """Parts of the hand that press, by the torques of the fingers' own drives; left out where none does, and where
-    the assistance is "paper".
+    """Parts of the hand that press, by the torques of the fingers' own drives; left out where none does, of a
+    short reply where the grip is "two_sided", and where the assistance is "paper".
     """
 
     touches: Touch | None = None
-    """Obstacle that the hand feels; left out where it feels none, and where the assistance is "paper"."""
+    """Obstacle that the hand feels; left out where it feels none, of a short reply where `grip` tells it, and
+    where the assistance is "paper".
+    """
 
     target: Pose | None = None
     """The wrist pose that was asked for, in the pelvis frame as it is now, and not where the hand has given way to
@@ -232,7 +238,7 @@ class HandReport(Reply):
     """
 
     fingers: FingerReport | None = None
-    """Its fingers; left out of a short reply where they have arrived."""
+    """Its fingers; left out of a short reply where they have arrived or the grip is "two_sided"."""
 
     largest_effort: Effort | None = None
     """The joint of this arm and hand that works hardest; left out of a short reply where it works at less than
@@ -311,20 +317,25 @@ class RobotReport(Reply):
     """Its right arm and hand."""
 
     base: BaseReport | None = None
-    """Motion of its base; left out where the assistance is "paper"."""
+    """State of its base; left out of a short reply where it stands as commanded, and where the assistance is
+    "paper".
+    """
 
     pelvis_in_start: Pose | None = None
     """Pose of its pelvis in the start frame by its own IMU and joints. The start frame is on the floor under the
     pelvis at the start of the episode, z up, x the robot's heading then. Drifts by up to 1 % of the way walked.
-    Left out where the assistance is "paper".
+    Left out of a short reply where the base has moved by less than a centimetre and a hundredth of a radian,
+    but not after `walk_to`, and where the assistance is "paper".
     """
 
     pelvis_in_room: Pose | None = None
-    """The same in the room frame, where `frame` is that; left out otherwise."""
+    """The same in the room frame, where `frame` is that; left out otherwise. In a short reply it stands for
+    `pelvis_in_start`.
+    """
 
     base_motion: BaseMotion | None = None
-    """Motion of the base during the command, by the same odometry. Left out where the assistance is "paper", and
-    of a short reply where it is less than a centimetre and a hundredth of a radian.
+    """Motion of the base during the command, by the same odometry. Left out of a short reply, and where the
+    assistance is "paper".
     """
 
     waist_joints_clamped: tuple[str, ...] = ()

@@ -31,17 +31,17 @@ class DepthReply(Reply):
 
     surfaces: tuple[Surface, ...] = ()
     """The surfaces that were found: at a pixel the patch of its colour and, where that is more, the whole thing;
-    of a colour up to three, the nearest first and what is of the room last; of an object one. Left out where
-    none was asked for.
+    of a colour up to three, the nearest first and what is of the room last; of an object one; of all one for
+    each that is seen. Left out where none was asked for.
     """
 
     fit: RegionFit | None = None
     """Plane, edges and corners of the region; left out where `fit` was not asked for."""
 
-    columns: tuple[str, str, str, str, str]
-    """Columns of `points`: "u", "v", "x_m", "y_m", "z_m"."""
+    columns: tuple[str, ...] = ()
+    """Columns of `points`: "u", "v", "x_m", "y_m", "z_m". Left out of a short reply with surfaces."""
 
-    points: tuple[tuple[float | None, float | None, float | None, float | None, float | None], ...]
+    points: tuple[tuple[float | None, float | None, float | None, float | None, float | None], ...] = ()
     """One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where nothing is
     seen. Of a surface none.
     """
@@ -102,6 +102,9 @@ class RegionFit(Reply):
 class Surface(Reply):
     """A surface as the camera sees it: only what is in view, and of a thing only its near side."""
 
+    object: str | None = None
+    """The object, where the call asked for all; left out otherwise."""
+
     joined_by: JoinedBy
     """By what its pixels are joined."""
 
@@ -126,9 +129,9 @@ class Surface(Reply):
     extent_m: tuple[float, float, float]
     """Size of that box along each axis, in metres."""
 
-    corners_m: tuple[tuple[float, float, float], ...]
+    corners_m: tuple[tuple[float, float, float], ...] = ()
     """The four points of its outline that span the most of it in the picture, in the order of its outline: of a
-    rectangle its corners.
+    rectangle its corners. Left out of a short reply where there is an axis, and of all objects.
     """
 
     axis: UprightAxis | None = None

@@ -46,9 +46,9 @@ class PlanReply(Reply):
     commands: int
     """Commands that were carried out: of a plan, those that it lists; of a walk, each short one."""
 
-    tool_calls: int
+    tool_calls: int | None = None
     """Tool calls of all robots up to now, as results count them: each command of a plan or walk is one, and each
-    slice of 5 steps with `until`. No budget limits them.
+    slice of 5 steps with `until`. No budget limits them. Left out of a short reply.
     """
 
     executed_steps: int

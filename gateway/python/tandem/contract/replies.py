@@ -157,7 +157,7 @@ class ReachReply(Reply):
 
 @dataclass(frozen=True, kw_only=True)
 class RobotState(Reply):
-    """The reply to `get_robot_state`."""
+    """The reply to `get_robot_state`. A short one has poses to the millimetre and to a thousandth."""
 
     robot: str
     """The robot, for example "A"."""
@@ -197,24 +197,26 @@ class RobotState(Reply):
     """The same of the right wrist."""
 
     gravity_in_pelvis: tuple[float, float, float] | None = None
-    """The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright. Left out where the
-    assistance is "paper".
+    """The direction of gravity in the pelvis frame, length 1: [0, 0, -1] when upright. Left out of a short reply
+    where it is within a hundredth of that, and where the assistance is "paper".
     """
 
     pelvis_in_start: Pose | None = None
     """Pose of its pelvis in the start frame by its own IMU and joints. The start frame is on the floor under the
     pelvis at the start of the episode, z up, x the robot's heading then. Drifts by up to 1 % of the way walked.
-    Left out where the assistance is "paper".
+    Left out of a short reply with `pelvis_in_room`, and where the assistance is "paper".
     """
 
     pelvis_in_room: Pose | None = None
     """The same in the room frame, where the call named that; left out otherwise."""
 
-    base_command: BaseCommand
-    """Base command in force."""
+    base_command: BaseCommand | None = None
+    """Base command in force; left out of a short reply where the robot stands as high as commanded."""
 
     fallen: bool | None = None
-    """True if the robot has fallen; left out where the assistance is "paper"."""
+    """True if the robot has fallen; left out of a short reply where it has not, and where the assistance is
+    "paper".
+    """
 
     samples: SensorSamples | None = None
     """Readings of its sensors in each physics step of the last control step, where the call asks for `samples`;
@@ -250,7 +252,7 @@ class StatusReply(Reply):
     """The task's id."""
 
     seed: int | None = None
-    """The seed; left out where the assistance is "paper"."""
+    """The seed; left out of a short reply, and where the assistance is "paper"."""
 
     protocol: Protocol
     """The rules in force."""
@@ -265,7 +267,9 @@ class StatusReply(Reply):
     """Why the episode has ended; null while it goes on."""
 
     fallen: tuple[RobotFallen, ...] = ()
-    """Every robot of the episode; left out where the assistance is "paper"."""
+    """Every robot of the episode; in a short reply those that have fallen. Left out where the assistance is
+    "paper".
+    """
 
     assistance: Assistance
     """Amount of information. With "paper", phases are disclosed once the episode has ended, which success does not
@@ -287,6 +291,6 @@ class StatusReply(Reply):
     """Remaining budget of the episode."""
 
     state_hash: str | None = None
-    """Hash of the whole physical state, 16 hexadecimal digits. Equal hashes mean equal states. Left out where the
-    assistance is "paper".
+    """Hash of the whole physical state, 16 hexadecimal digits. Equal hashes mean equal states. Left out of a short
+    reply, and where the assistance is "paper".
     """

@@ -123,7 +123,9 @@ class ResultReply(Reply):
     """
 
     extra_information_replies: dict[str, dict[str, int]] = field(default_factory=dict[str, dict[str, int]])
-    """Number of replies with each of it, by its name and by the robot it was of; left out where it was none."""
+    """Number of replies with each of it, by its name and by the robot it was of; left out where it was none, and
+    of a short reply.
+    """
 
     joints_clamped_share: float | None = None
     """Share of the joint targets that lay beyond the joints' limits by more than 0.01 rad, and were moved there;
