@@ -7,8 +7,8 @@ use nalgebra::{Isometry3, Point3};
 use tandem_sim::render::{Camera, Cameras, Frame, RenderRequest, Renderer, object_id};
 use tandem_sim::{Step, World};
 use tandem_tools_spec::{
-    Color, DepthReply, DepthRow, PixelRegion, PoseFrame, QueryDepth, RegionFit, SpecError, Surface,
-    SurfaceQuery, Tool as _,
+    Color, DepthReply, DepthRow, PixelRegion, PoseFrame, QueryDepth, SpecError, Surface, SurfaceQuery,
+    Tool as _,
 };
 
 use super::fit;
@@ -67,6 +67,18 @@ fn named_objects(spec: &EpisodeSpec, world: &World) -> Vec<NamedObject> {
         Some(NamedObject { name: told_name(own), owner, id: object_id(world, object) })
     });
     named.collect()
+}
+
+/// Returns a reply to `query_depth` without any measurement.
+fn no_depth(robot: &str, frame: PoseFrame) -> DepthReply {
+    DepthReply {
+        robot: robot.into(),
+        frame: Some(frame).filter(|frame| *frame != PoseFrame::Pelvis),
+        surfaces: Vec::new(),
+        fit: None,
+        columns: DepthReply::COLUMNS.map(String::from).to_vec(),
+        points: Vec::new(),
+    }
 }
 
 /// Returns the renderer of the episode `spec`.
@@ -215,17 +227,10 @@ impl Observer {
             let point_m = pelvis_from_frame.inverse() * Point3::from(point_m.to_array().map(f64::from));
             DepthRow::new(pixel, depth_m.is_finite().then_some([point_m.x, point_m.y, point_m.z].map(coarse)))
         });
-        Ok(DepthReply {
-            robot: name.into(),
-            frame: Some(frame).filter(|frame| *frame != PoseFrame::Pelvis),
-            surfaces: Vec::new(),
-            fit: None,
-            columns: DepthReply::COLUMNS.map(String::from).to_vec(),
-            points: points.collect(),
-        })
+        Ok(DepthReply { points: points.collect(), ..no_depth(name, frame) })
     }
 
-    /// Fits the plane in a region of the view of robot number `robot`.
+    /// Returns the reply to `query_depth` with the plane in a region of the view of robot number `robot`.
     ///
     /// # Errors
     ///
@@ -235,17 +240,19 @@ impl Observer {
         &mut self,
         step: &Arc<Step>,
         robot: usize,
+        name: &str,
         region: &PixelRegion,
-        pelvis_from_frame: Isometry3<f64>,
-    ) -> Result<RegionFit, EpisodeError> {
+        (frame, pelvis_from_frame): (PoseFrame, Isometry3<f64>),
+    ) -> Result<DepthReply, EpisodeError> {
         self.check_pixels(step, robot, &[region.from, region.to])?;
         let view = self.views(step, &[robot]).swap_remove(0);
         let pelvis_from_camera = isometry_from_sim(&step.robots[robot].sensed.pelvis_from_camera);
         let frame_from_camera = pelvis_from_frame.inverse() * pelvis_from_camera;
-        fit::fit(&view, [region.from, region.to], &frame_from_camera).ok_or_else(|| {
+        let fit = fit::fit(&view, [region.from, region.to], &frame_from_camera).ok_or_else(|| {
             let reason = "no plane fills a fifth of the region; name a smaller one on a flat surface".into();
-            SpecError::Invalid { tool: QueryDepth::NAME, reason }.into()
-        })
+            SpecError::Invalid { tool: QueryDepth::NAME, reason }
+        })?;
+        Ok(DepthReply { fit: Some(fit), ..no_depth(name, frame) })
     }
 
     /// Returns the reply to `query_depth` with a surface.
@@ -280,14 +287,7 @@ impl Observer {
             });
             return Err(EpisodeError::NoSurface { query: query.clone(), seen: seen.collect() });
         }
-        Ok(DepthReply {
-            robot: name.into(),
-            frame: Some(frame).filter(|frame| *frame != PoseFrame::Pelvis),
-            surfaces,
-            fit: None,
-            columns: DepthReply::COLUMNS.map(String::from).to_vec(),
-            points: Vec::new(),
-        })
+        Ok(DepthReply { surfaces, ..no_depth(name, frame) })
     }
 
     /// Returns the surface of each object of the task that is seen, with its parts.

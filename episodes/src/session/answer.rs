@@ -130,16 +130,12 @@ impl Session {
                         let level = motion.pelvis_from(PoseFrame::Level);
                         self.observer.surface(&self.present, robot, name, query, frame, &level)?
                     }
-                    None => {
-                        let fit = match (args.fit, &args.region) {
-                            (true, Some(region)) => {
-                                Some(self.observer.fit(&self.present, robot, region, frame.1)?)
-                            }
-                            _ => None,
-                        };
-                        let depth = self.observer.depth(&self.present, robot, name, &args.named(), frame)?;
-                        DepthReply { fit, ..depth }
-                    }
+                    None => match &args.region {
+                        Some(region) if args.fit => {
+                            self.observer.fit(&self.present, robot, name, region, frame)?
+                        }
+                        _ => self.observer.depth(&self.present, robot, name, &args.named(), frame)?,
+                    },
                 })
             }
             LookCall::CheckReach(args) => {

@@ -29,9 +29,7 @@ use tandem_episodes::{
     tasks::Task,
 };
 use tandem_evaluation::{
-    policies::{
-        EpisodeOutput, PartnerPolicy, PlayError, PlayOutcome, Policy, PolicyWait, play_in_process,
-    },
+    policies::{EpisodeOutput, PartnerPolicy, PlayError, PlayOutcome, Policy, PolicyWait, play_in_process},
     results::PolicyCard,
 };
 

@@ -141,7 +141,7 @@ pub struct PixelRegion {
     /// Its bottom right one, as [220, 170].
     #[schemars(extend("prefixItems" = limits::pixel_range()))]
     pub to: [i64; 2],
-    /// 10: every tenth pixel across and down.
+    /// 10: every tenth pixel across and down. Each is 30 bytes of the reply.
     #[schemars(range(min = 1, max = u32::MAX))]
     pub stride: u32,
 }

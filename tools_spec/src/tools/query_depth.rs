@@ -24,7 +24,7 @@ pub struct QueryDepth {
     pub pixels: Option<Vec<[i64; 2]>>,
     /// Pixels of a rectangle, row by row.
     pub region: Option<PixelRegion>,
-    /// True: also the largest plane in `region`, its straight edges and corners.
+    /// True: the largest plane in `region`, its straight edges and corners in place of points.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[schemars(extend("full_only" = true, "default" = false))]
     pub fit: bool,
@@ -270,11 +270,11 @@ pub struct DepthReply {
     /// Plane, edges and corners of the region; left out where `fit` was not asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fit: Option<RegionFit>,
-    /// Columns of `points`: "u", "v", "x_m", "y_m", "z_m". Left out of a short reply with surfaces.
+    /// Columns of `points`: "u", "v", "x_m", "y_m", "z_m". Left out of a short reply without points.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub columns: Vec<String>,
     /// One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where
-    /// nothing is seen. Of a surface none.
+    /// nothing is seen. Left out with surfaces or a fit.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub points: Vec<DepthRow>,
 }

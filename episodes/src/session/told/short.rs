@@ -74,7 +74,7 @@ fn coarsened(pose: &Pose) -> Pose {
 }
 
 fn shorten_depth(depth: &mut DepthReply) {
-    if !depth.surfaces.is_empty() {
+    if depth.points.is_empty() {
         depth.columns.clear();
     }
     let is_plain = |surface: &&mut Surface| surface.axis.is_some() || surface.object.is_some();
