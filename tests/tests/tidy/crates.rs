@@ -19,7 +19,15 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("gateway", &["tandem-policies", "tandem-episodes", "tandem-evaluation", "tandem-tools-spec"]),
     (
         "tests",
-        &["tandem", "tandem-episodes", "tandem-evaluation", "tandem-ik", "tandem-sim", "tandem-tools-spec"],
+        &[
+            "tandem",
+            "tandem-policies",
+            "tandem-episodes",
+            "tandem-evaluation",
+            "tandem-ik",
+            "tandem-sim",
+            "tandem-tools-spec",
+        ],
     ),
 ];
 

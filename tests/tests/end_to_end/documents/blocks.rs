@@ -7,10 +7,8 @@ use std::{
 };
 
 use serde_json::Value;
-use tandem::{
-    drivers::PolicyMap,
-    settings::{Layer, Settings},
-};
+use tandem::settings::{Layer, Settings};
+use tandem_policies::PolicyMap;
 use tandem_tests::skipped;
 
 use super::{

@@ -10,10 +10,8 @@ use std::{
 };
 
 use serde_json::{Value, json};
-use tandem::{
-    drivers::{PolicyMap, PolicyProtocol, RemotePolicy},
-    hosting::Guests,
-};
+use tandem::hosting::Guests;
+use tandem_policies::{PolicyMap, PolicyProtocol, RemotePolicy};
 use tandem_tests::TestServer;
 
 use super::{driving::DriversSocket, team::Team};

@@ -5,12 +5,12 @@
 use std::path::Path;
 
 use serde_json::Value;
-use tandem::drivers::{PolicyProtocol, RemotePolicy};
 use tandem_episodes::{
     Recorder, Recording,
     replay::{Verdict, verify},
 };
 use tandem_evaluation::results::PlayedEpisode;
+use tandem_policies::{PolicyProtocol, RemotePolicy};
 use tandem_tools_spec::EndReason;
 
 use super::{

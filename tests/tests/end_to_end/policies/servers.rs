@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, fs, path::Path, sync::Mutex};
 
 use rmpv::Value;
 use serde_json::json;
-use tandem::drivers::{PolicyMap, PolicyProtocol, RemotePolicy};
+use tandem_policies::{PolicyMap, PolicyProtocol, RemotePolicy};
 use tandem_tools_spec::EndReason;
 
 use super::{

@@ -4,9 +4,9 @@
 use std::{thread, time::Duration};
 
 use serde_json::json;
-use tandem::drivers::{PolicyMap, PolicyProtocol, RemotePolicy};
 use tandem_evaluation::evaluation::{EvaluationPlan, evaluate};
 use tandem_evaluation::policies::Policy;
+use tandem_policies::{PolicyMap, PolicyProtocol, RemotePolicy};
 use tandem_tools_spec::EndReason;
 
 use super::{

@@ -11,7 +11,7 @@ use std::{
 };
 
 use rmpv::Value;
-use tandem::drivers::{PolicyMap, PolicyProtocol, RemotePolicy};
+use tandem_policies::{PolicyMap, PolicyProtocol, RemotePolicy};
 use tandem_tools_spec::EndReason;
 
 use super::{
