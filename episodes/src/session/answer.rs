@@ -2,9 +2,9 @@
 
 use tandem_sim::{Pose, Side};
 use tandem_tools_spec::{
-    ActCall, Call, CommandReply, DepthReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall,
-    ManageReply, Observe, PoseFrame, RobotReport, RobotState, SpecError, StatusReply, StopReason, TalkCall,
-    TalkReply, ToolCall, ToolReply,
+    ActCall, Call, CommandReply, EndReason, Formats, Look, LookCall, LookReply, ManageCall, ManageReply,
+    Observe, PoseFrame, RobotReport, RobotState, SpecError, StatusReply, StopReason, TalkCall, TalkReply,
+    ToolCall, ToolReply,
 };
 
 use super::Session;
