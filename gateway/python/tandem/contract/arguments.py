@@ -151,7 +151,7 @@ class PixelRegion:
     """Its bottom right one, as [220, 170]."""
 
     stride: int
-    """10: every tenth pixel across and down."""
+    """10: every tenth pixel across and down. Each is 30 bytes of the reply."""
 
 
 @dataclass(frozen=True)
@@ -168,8 +168,8 @@ class PlannedCommand:
     """Conditions after it."""
 
     until: bool | None = None
-    """True: it ends once its `expects` hold (`arrived`: after `steps`); else the plan stops after `steps`, up to
-    1500. For move_wrists, walk, wait.
+    """True: it ends once its `expects` hold, with `arrived` never before all `steps`; else the plan stops then, up
+    to 1500. For move_wrists, walk, wait.
     """
 
 

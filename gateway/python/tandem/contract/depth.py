@@ -39,11 +39,11 @@ class DepthReply(Reply):
     """Plane, edges and corners of the region; left out where `fit` was not asked for."""
 
     columns: tuple[str, ...] = ()
-    """Columns of `points`: "u", "v", "x_m", "y_m", "z_m". Left out of a short reply with surfaces."""
+    """Columns of `points`: "u", "v", "x_m", "y_m", "z_m". Left out of a short reply without points."""
 
     points: tuple[tuple[float | None, float | None, float | None, float | None, float | None], ...] = ()
     """One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where nothing is
-    seen. Of a surface none.
+    seen. Left out with surfaces or a fit.
     """
 
 

@@ -74,7 +74,7 @@ class Tools(ABC):
             robot: The robot, for example "A".
             pixels: Pixels [u, v], column 0 to 319 from the left, row 0 to 239 from the top.
             region: Pixels of a rectangle, row by row.
-            fit: True: also the largest plane in `region`, its straight edges and corners.
+            fit: True: the largest plane in `region`, its straight edges and corners in place of points.
             surface: Returns middle, size, corners and, of an upright round thing, axis of a surface in place of
                 points.
             frame: Frame of the points.
