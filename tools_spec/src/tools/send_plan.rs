@@ -40,8 +40,8 @@ pub struct PlannedCommand {
     /// Conditions after it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub expects: Option<Expectation>,
-    /// True: it ends once its `expects` hold, with `arrived` never before all `steps`; else the plan stops then,
-    /// up to 1500. For move_wrists, walk, wait.
+    /// True: it ends once its `expects` hold, with `arrived`, or `holding` of fingers that move, not before all
+    /// `steps`; else the plan stops then, up to 1500. For move_wrists, walk, wait.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     #[schemars(extend("default" = false))]
     pub until: bool,

@@ -226,11 +226,13 @@ impl CurrentCommand {
         reply: &CommandReply,
         (news, words): (&PartnerNews, &Option<String>),
     ) -> CommandProgress {
-        let missing = |is_way_done: bool| unexpected(&step.expects, reply, PlanMoment { news, is_way_done });
+        let missing = |is_way_done: bool, are_fingers_done: bool| {
+            unexpected(&step.expects, reply, PlanMoment { news, is_way_done, are_fingers_done })
+        };
         match self {
-            CurrentCommand::Whole => CommandProgress::Over(missing(true)),
+            CurrentCommand::Whole => CommandProgress::Over(missing(true, true)),
             CurrentCommand::Until(mut pieces) => {
-                let missing = missing(pieces.is_way_done());
+                let missing = missing(pieces.is_way_done(), pieces.are_fingers_done());
                 match (missing, pieces.next_piece()) {
                     (None, _) => CommandProgress::Over(None),
                     (_, Some(_)) if words.is_some() => CommandProgress::Over(words.clone()),
@@ -247,7 +249,9 @@ impl CurrentCommand {
                 };
                 match next {
                     PlanAdvance::Make(call) => CommandProgress::Make(call, CurrentCommand::Walk(walkers)),
-                    PlanAdvance::Done(stopped) => CommandProgress::Over(stopped.or_else(|| missing(true))),
+                    PlanAdvance::Done(stopped) => {
+                        CommandProgress::Over(stopped.or_else(|| missing(true, true)))
+                    }
                 }
             }
         }

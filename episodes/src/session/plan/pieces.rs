@@ -93,6 +93,13 @@ impl Pieces {
         self.done >= self.steps || !matches!(self.kind, PieceKind::Wrists(_))
     }
 
+    /// Returns true once fingers have their last targets, or if the command moves none.
+    pub fn are_fingers_done(&self) -> bool {
+        let PieceKind::Wrists(ways) = &self.kind else { return true };
+        self.done >= self.steps
+            || ways.iter().all(|way| way.fingers_rad.left.is_none() && way.fingers_rad.right.is_none())
+    }
+
     /// Returns true if this wrist has a target that it has not been given yet.
     pub fn is_under_way(&self, robot: &str, side: Side) -> bool {
         let PieceKind::Wrists(ways) = &self.kind else { return false };
