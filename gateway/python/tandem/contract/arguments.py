@@ -168,8 +168,8 @@ class PlannedCommand:
     """Conditions after it."""
 
     until: bool | None = None
-    """True: it ends once its `expects` hold, with `arrived` never before all `steps`; else the plan stops then, up
-    to 1500. For move_wrists, walk, wait.
+    """True: it ends once its `expects` hold, with `arrived`, or `holding` of fingers that move, not before all
+    `steps`; else the plan stops then, up to 1500. For move_wrists, walk, wait.
     """
 
 
