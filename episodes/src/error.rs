@@ -162,6 +162,11 @@ pub enum SceneError {
     )]
     Changed { path: PathBuf, was: String, now: String },
     #[error(
+        "{name} is a body of the scene of {task}, so {task} takes place there; leave out the scene {}",
+        path.display()
+    )]
+    OwnScene { path: PathBuf, task: String, name: String },
+    #[error(
         "the scene {} has no site \"task\" on what never moves: give it one where the origin of {task} is to \
          be, its z axis up; sites {} may place robots and objects one by one; have: {have}",
         path.display(), .may.join(", ")

@@ -36,6 +36,7 @@ mod recording;
 pub mod replay;
 mod result_file;
 pub mod rows;
+mod scene_file;
 mod scoring;
 mod session;
 mod spec;
@@ -64,6 +65,7 @@ pub use recording::{
     RecoverError, Recovered, ShownPicture, ToolCallMessage, TranscriptEntry, Visibility, recover,
 };
 pub use result_file::{RESULT_FILE, write_result};
+pub use scene_file::SceneFile;
 pub use scoring::{
     A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, Predicate, RobotFacts, Scores, StepScore,
 };
@@ -72,9 +74,7 @@ pub use session::{
     JournalEntry, Outcome, PlanAdvance, PlanRun, Request, RunFiles, RunFolder, Session, build_world,
     monotonic,
 };
-pub use spec::{
-    Controller, EpisodeSpec, KeyedSeed, MomentStart, OwnRobot, PhaseStart, RobotFile, SceneFile, Start,
-};
+pub use spec::{Controller, EpisodeSpec, KeyedSeed, MomentStart, OwnRobot, PhaseStart, RobotFile, Start};
 pub use tandem_sim::{
     BaseLimits, CONTROL_HZ, LocomotionChoice, MAX_TEXT_BYTES, Sensing, SensorModel, SimError, StateSource,
     assets::{DEFAULT_ROBOT, ROBOTS, robot as embedded_robot},

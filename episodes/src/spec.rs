@@ -10,12 +10,13 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use tandem_sim::{
     BaseLimits, CONTROL_HZ, LocomotionChoice, RobotModel, RobotSource, Sensing, SensorModel, SimError,
-    StateSource, mjcf::Document, render::RendererKind,
+    StateSource, render::RendererKind,
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Operators, Protocol, Wording};
 
-use crate::error::{RobotError, SceneError};
+use crate::error::RobotError;
 use crate::protocol::{Rules, rules};
+use crate::scene_file::SceneFile;
 use crate::scoring::Phase;
 use crate::stress::{self, Stress};
 use crate::tasks::{Spread, Task, TaskOrigin, TaskWords};
@@ -96,14 +97,6 @@ pub enum RobotFile {
 pub struct OwnRobot {
     pub path: PathBuf,
     /// Hash of the robot's files when the episode was planned; see [`RobotSource::fingerprint`].
-    pub xxh3: String,
-}
-
-/// A scene in place of the task's own: an MJCF file with the files that it refers to.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SceneFile {
-    pub path: PathBuf,
-    /// Hash of the content when the episode was planned; see [`Document::fingerprint`].
     pub xxh3: String,
 }
 
@@ -358,40 +351,6 @@ impl RobotFile {
             RobotFile::File(own) => format!("{}-{}", self.name(), own.xxh3),
         }
     }
-}
-
-impl SceneFile {
-    /// Returns the scene that a file currently contains.
-    pub fn of(path: &Path) -> Result<SceneFile, SimError> {
-        SceneFile::with_approximations(path).map(|(scene, _)| scene)
-    }
-
-    /// Returns the scene that a file currently contains, and each deviation from MuJoCo in a line.
-    pub fn with_approximations(path: &Path) -> Result<(SceneFile, Vec<String>), SimError> {
-        let document = Document::read(path)?;
-        let xxh3 = fingerprint(&document);
-        // A replay may run in another folder.
-        let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
-        Ok((SceneFile { path, xxh3 }, document.approximations().to_vec()))
-    }
-
-    /// Reads the scene. Its file must be unchanged.
-    ///
-    /// # Errors
-    ///
-    /// An unreadable file, or [`SceneError::Changed`].
-    pub fn load(&self) -> Result<Document, SceneError> {
-        let document = Document::read(&self.path)?;
-        let now = fingerprint(&document);
-        match now == self.xxh3 {
-            true => Ok(document),
-            false => Err(SceneError::Changed { path: self.path.clone(), was: self.xxh3.clone(), now }),
-        }
-    }
-}
-
-fn fingerprint(document: &Document) -> String {
-    format!("{:016x}", document.fingerprint())
 }
 
 impl Controller {

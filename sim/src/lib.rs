@@ -90,5 +90,6 @@ pub use units::{CONTROL_DT_S, CONTROL_HZ, GRAVITY_M_S2, PHYSICS_DT_S, PHYSICS_ST
 pub use user_file::{MAX_TEXT_BYTES, read_bytes, read_text, with_own_separators};
 pub use world::{
     BodyTouch, HandContacts, ObjectFile, ObjectModel, ObjectPart, ObjectPlacement, ObjectState, ObjectStep,
-    PlannedPush, RobotPress, RobotStep, SceneSource, Snapshot, Step, Touch, World, WorldSpec,
+    Opening, OpeningKind, PlannedPush, RobotPress, RobotStep, SceneSource, Snapshot, Step, Touch, World,
+    WorldSpec,
 };

@@ -9,5 +9,7 @@ pub mod reports;
 pub mod results;
 pub mod statistics;
 mod task_check;
+mod task_draft;
 
 pub use task_check::{TaskCheck, TaskCheckError, check_task};
+pub use task_draft::{TaskDraft, TaskDraftError, draft_task};

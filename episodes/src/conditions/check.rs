@@ -4,7 +4,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use tandem_sim::Side;
+use tandem_sim::{ObjectModel, OpeningKind, Side};
 
 use super::functions::{FUNCTIONS, Function, Gives, Parameter};
 use super::meaning::{Argument, Meaning, Number, Truth};
@@ -255,6 +255,7 @@ impl Checker<'_> {
                     false => Err(unknown(node, "object", name, objects())),
                 }
             }
+            Parameter::Opening(kind) => self.opening(function, node, kind),
             Parameter::Site { of } => self.site(function, node, before.get(of)),
             Parameter::Number(_) => self.number(node).map(Argument::Number),
             Parameter::Numbers => {
@@ -270,6 +271,23 @@ impl Checker<'_> {
         let name = text(function, node, "a robot's name in quotes")?;
         let found = self.names.robots.iter().position(|robot| robot == name);
         found.ok_or_else(|| unknown(node, "robot", name, self.names.robots.iter().map(String::as_str)))
+    }
+
+    /// Returns an object that has a hinge or a slide, as `kind` says.
+    fn opening(&self, function: &Function, node: &Node, kind: OpeningKind) -> Result<Argument, Mistake> {
+        let name = self.argument(function, Parameter::Object, node, &[])?;
+        let opens = |object: &Arc<ObjectModel>| object.opening.as_ref().is_some_and(|one| one.kind == kind);
+        match &name {
+            Argument::Object(object) if !self.names.objects.get(object).is_some_and(opens) => {
+                let openings = self.names.objects.iter().filter(|(_, object)| opens(object));
+                let what = match kind {
+                    OpeningKind::Hinge => "object with a hinge",
+                    OpeningKind::Slide => "object with a slide",
+                };
+                Err(unknown(node, what, object, openings.map(|(name, _)| name.as_str())))
+            }
+            _ => Ok(name),
+        }
     }
 
     fn site(&self, function: &Function, node: &Node, of: Option<&Argument>) -> Result<Argument, Mistake> {

@@ -1,7 +1,7 @@
 //! The facts available to expressions, one row each: name, parameters, value, and the book's description.
 //! To add a fact, add its row here and its line in the book's table; a test compares the two.
 
-use tandem_sim::{Side, Vector};
+use tandem_sim::{OpeningKind, Side, Vector};
 
 use super::lacks;
 use super::meaning::{Argument, Fact, Measure, Statement};
@@ -28,6 +28,8 @@ pub enum Parameter {
     Side,
     /// Name of an object.
     Object,
+    /// Name of an object, or of a part of one, whose joint is of this kind.
+    Opening(OpeningKind),
     /// Name of a site on the object at argument `of`.
     Site {
         of: usize,
@@ -141,6 +143,12 @@ pub static FUNCTIONS: &[Function] = &[
     number("x_m", OBJECT, ANY, |f| f.facts.position_m(f.object(0)).x.into()).help("its origin in the world"),
     number("y_m", OBJECT, ANY, |f| f.facts.position_m(f.object(0)).y.into()).help("its origin in the world"),
     number("z_m", OBJECT, ANY, |f| f.facts.position_m(f.object(0)).z.into()).help("its origin in the world"),
+    number("opened_m", &[Parameter::Opening(OpeningKind::Slide)], ANY, |f| f.facts.opened(f.object(0)).into())
+        .help("how far its slide has moved from its place in the file, towards the farther end of its range"),
+    number("opened_deg", &[Parameter::Opening(OpeningKind::Hinge)], [-180.0, 180.0], |f| {
+        f.facts.opened(f.object(0)).to_degrees().into()
+    })
+    .help("the same of its hinge, from -180 to 180"),
     number("apart_m", TWO_OBJECTS, NOT_NEGATIVE, |f| f.facts.apart_m(f.object(0), f.object(1)).into())
         .help("distance of the objects' origins on the floor's plane"),
     number("turned_deg", TWO_OBJECTS, [-180.0, 180.0], |f| {
@@ -269,7 +277,7 @@ impl Parameter {
             Parameter::Robot => "robot",
             Parameter::Robots => "[robots]",
             Parameter::Side => "side",
-            Parameter::Object => "object",
+            Parameter::Object | Parameter::Opening(_) => "object",
             Parameter::Site { .. } => "site",
             Parameter::Number(name) => name,
             Parameter::Numbers => "[numbers]",

@@ -7,7 +7,7 @@ use crate::tasks;
 /// Returns the names of Handover: two robots and its objects.
 fn names() -> Names {
     let task = tasks::find("handover").unwrap();
-    let parts = task.objects.iter().flat_map(|spot| ObjectModel::parts(&spot.source(), &spot.name).unwrap());
+    let parts = task.objects.iter().flat_map(|spot| ObjectModel::parts(&spot.source, &spot.name).unwrap());
     Names {
         robots: task.robot_names().map(str::to_owned).collect(),
         objects: parts.map(|part| (part.name, Arc::new(part.model))).collect(),

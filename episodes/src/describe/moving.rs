@@ -71,7 +71,7 @@ mod tests {
     fn a_door_and_its_lever_are_told_by_where_their_far_ends_go() {
         let task = tasks::find("move_house").unwrap();
         let door = task.objects.iter().find(|spot| spot.name == "lever_door").unwrap();
-        let parts = ObjectModel::parts(&door.source(), &door.name).unwrap();
+        let parts = ObjectModel::parts(&door.source, &door.name).unwrap();
         assert_eq!(
             moving(door, &parts, &task.robots[0]),
             [
@@ -82,7 +82,7 @@ mod tests {
             ]
         );
         for other in &task.objects {
-            let parts = ObjectModel::parts(&other.source(), &other.name).unwrap();
+            let parts = ObjectModel::parts(&other.source, &other.name).unwrap();
             assert_eq!(moving(other, &parts, &task.robots[0]).is_empty(), other.name != "lever_door");
         }
     }

@@ -2,7 +2,7 @@
 //! robot, the furniture near them, and the start poses of partners.
 
 use tandem_sim::mjcf::Geom;
-use tandem_sim::{ObjectModel, ObjectPart, SimError, Vector, wrapped_rad};
+use tandem_sim::{ObjectPart, SimError, Vector, wrapped_rad};
 
 use super::extents::{corners_m, extent_m};
 use super::furniture::furniture;
@@ -22,10 +22,9 @@ const ROUND_M: f32 = 0.005;
 pub fn room(task: &Task, spread: Spread, fixed: &[Geom]) -> Result<Vec<String>, SimError> {
     let first = &task.robots[0];
     let line = |spot: &ObjectSpot| {
-        let parts = ObjectModel::parts(&spot.source(), &spot.name)?;
+        let parts = spot.parts()?;
         let [x_m, y_m, z_m] = size_m(&parts, spot.yaw_rad - first.yaw_rad).to_array();
-        let [spot_x_m, spot_y_m, _] = spot.position_m;
-        let places = places(task, [spot_x_m, spot_y_m]);
+        let places = places(task, middle_m(spot, &parts));
         let name = told_name(&spot.name);
         let whole = format!(
             "{name}, {x_m:.2} m along {}'s x, {y_m:.2} m along its y, {z_m:.2} m high{}: middle {places} (from the pelvis{})",
@@ -75,15 +74,29 @@ fn give_or_take(task: &Task, spot: &ObjectSpot, spread: Spread) -> String {
     if most_m < 0.005 { String::new() } else { format!(", give or take {most_m:.2} m") }
 }
 
+/// Returns the middle of an object: its origin, and that of its extent for a body of a scene, whose origin may
+/// be anywhere.
+fn middle_m(spot: &ObjectSpot, parts: &[ObjectPart]) -> [f32; 2] {
+    let [x_m, y_m, _] = spot.position_m;
+    let [low_m, high_m] = visible_m(parts, spot.yaw_rad);
+    let by_m = (low_m + high_m) * 0.5;
+    if spot.is_of_scene() && by_m.is_finite() { [x_m + by_m.x, y_m + by_m.y] } else { [x_m, y_m] }
+}
+
 /// Returns the size of an object of these parts along the axes of a frame with z up, in which the object has
 /// this yaw.
 fn size_m(parts: &[ObjectPart], yaw_rad: f32) -> Vector {
+    let [low_m, high_m] = visible_m(parts, yaw_rad);
+    high_m - low_m
+}
+
+/// Returns the lowest and highest coordinates of an object of these parts in such a frame at its origin.
+fn visible_m(parts: &[ObjectPart], yaw_rad: f32) -> [Vector; 2] {
     let corners = parts.iter().flat_map(|part| {
         let visible = part.model.geoms.iter().filter(|geom| geom.drawn || geom.collides);
         visible.flat_map(|geom| corners_m(geom, &part.object_from_part))
     });
-    let [low_m, high_m] = extent_m(corners, yaw_rad);
-    high_m - low_m
+    extent_m(corners, yaw_rad)
 }
 
 /// Returns the width and the neck of a round object in one piece whose top is less than half as wide as the

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::{ObjectFile, ObjectModel, RobotModel, SimError, Step};
+use tandem_sim::{ObjectFile, ObjectModel, Pose, RobotModel, SimError, Step};
 
 use super::facts::{Facts, ObjectFacts, RobotFacts};
 use super::grasps::ObjectGrasps;
@@ -13,6 +13,8 @@ use super::grasps::ObjectGrasps;
 pub struct FactsTracker {
     /// The model of each object from its file.
     models: Vec<Arc<ObjectModel>>,
+    /// Name of the object that carries each; `None` for those that the world does.
+    carriers: Vec<Option<String>>,
     robot: Arc<RobotModel>,
     memory: Vec<ObjectMemory>,
 }
@@ -40,7 +42,12 @@ impl FactsTracker {
         robot: &Arc<RobotModel>,
         start: &Step,
     ) -> Result<FactsTracker, SimError> {
-        let mut tracker = FactsTracker { models: Vec::new(), robot: robot.clone(), memory: Vec::new() };
+        let mut tracker = FactsTracker {
+            models: Vec::new(),
+            carriers: Vec::new(),
+            robot: robot.clone(),
+            memory: Vec::new(),
+        };
         for (name, file) in objects {
             for part in ObjectModel::parts(&file, name)? {
                 let at_start = start.object(&part.name);
@@ -50,6 +57,7 @@ impl FactsTracker {
                     name: part.name,
                 });
                 tracker.models.push(part.model.into());
+                tracker.carriers.push(part.carrier);
             }
         }
         Ok(tracker)
@@ -75,8 +83,14 @@ impl FactsTracker {
             hand_force_n: robot.hand_force_in_world_n(),
             fallen: robot.truth.fallen,
         });
-        let objects = self.memory.iter().zip(&self.models).filter_map(|(memory, model)| {
+        let objects = self.memory.iter().zip(&self.models).zip(&self.carriers);
+        let objects = objects.filter_map(|((memory, model), carrier)| {
             let state = step.object(&memory.name)?;
+            let carrier = match carrier {
+                Some(carrier) => step.object(carrier).map(|carrier| carrier.world_from_object),
+                None => Some(Pose::IDENTITY),
+            };
+            let opening = model.opening.as_ref().zip(carrier);
             Some(ObjectFacts {
                 name: memory.name.clone(),
                 model: model.clone(),
@@ -86,6 +100,7 @@ impl FactsTracker {
                 rest_height_m: memory.rest_height_m,
                 hands: memory.grasps.grips(),
                 untouched_s: memory.grasps.untouched_s(),
+                opened: opening.map(|(opening, carrier)| opening.opened(&carrier, &state.world_from_object)),
             })
         });
         Facts { time_s: step.time_s, robots: robots.collect(), objects: objects.collect() }

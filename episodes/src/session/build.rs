@@ -98,7 +98,7 @@ fn start_from_room(robots: &[RobotPlacement], index: usize) -> Isometry3<f64> {
 
 /// Returns the spec of the episode's world.
 fn world_spec(spec: &EpisodeSpec) -> Result<WorldSpec, EpisodeError> {
-    let own = own_spec(&spec.task, spec.world_seed(), spec.spread())?;
+    let own = own_spec(&spec.task, spec.world_seed(), spec.spread());
     match &spec.scene {
         None => Ok(own),
         Some(file) => Ok(elsewhere(own, &spec.task, &file.path, file.load()?)?),
@@ -119,33 +119,30 @@ fn add_distractors(
     Ok(())
 }
 
-fn own_spec(task: &Task, seed: u32, spread: Spread) -> Result<WorldSpec, SimError> {
+fn own_spec(task: &Task, seed: u32, spread: Spread) -> WorldSpec {
     let robots = task.robots.iter().map(|robot| RobotPlacement {
         name: robot.name.into(),
         position_m: robot.position_m,
         yaw_rad: robot.yaw_rad,
     });
-    let objects =
-        task.objects.iter().zip(task.start_poses(seed, spread)).map(|(spot, start)| ObjectPlacement {
+    let objects = task.objects.iter().zip(task.start_poses(seed, spread)).filter(|(spot, _)| {
+        // Bodies of the scene are there already, and some are moved.
+        !spot.is_of_scene() || task.randomize.iter().any(|offset| offset.objects.contains(&spot.name))
+    });
+    let objects = objects.map(|(spot, start)| {
+        let yaw = Rotation::from_rotation_z(start.yaw_rad);
+        let rotation = if spot.is_of_scene() { yaw * spot.turn } else { yaw };
+        ObjectPlacement {
             name: spot.name.clone(),
-            file: spot.source(),
-            world_from_object: Pose::from_parts(
-                start.position_m.into(),
-                Rotation::from_rotation_z(start.yaw_rad),
-            ),
-        });
-    let scene = match scene_of_file(task) {
-        None => task.scene.as_str().into(),
-        Some(document) => {
-            SceneSource::Read { document: Arc::new(document?), world_from_scene: Pose::IDENTITY }
+            file: spot.source.clone(),
+            world_from_object: Pose::from_parts(start.position_m.into(), rotation),
         }
+    });
+    let scene = match &task.scene_document {
+        None => task.scene.as_str().into(),
+        Some(document) => SceneSource::Read { document: document.clone(), world_from_scene: Pose::IDENTITY },
     };
-    Ok(WorldSpec { scene, robots: robots.collect(), objects: objects.collect() })
-}
-
-/// Returns the scene in the task's own file; `None` if the file has none.
-fn scene_of_file(task: &Task) -> Option<Result<Document, SimError>> {
-    task.scene_mjcf.as_deref().map(|mjcf| Document::parse_alone(&task.scene, mjcf))
+    WorldSpec { scene, robots: robots.collect(), objects: objects.collect() }
 }
 
 /// Places a task in another scene. The scene is moved so that its site `task` is at the origin; tasks and
@@ -156,6 +153,10 @@ fn elsewhere(
     path: &Path,
     mut document: Document,
 ) -> Result<WorldSpec, SceneError> {
+    if let Some(spot) = task.objects.iter().find(|spot| spot.is_of_scene()) {
+        let (path, task, name) = (path.into(), task.id.clone(), spot.name.clone());
+        return Err(SceneError::OwnScene { path, task, name });
+    }
     let sites = document.room_sites()?;
     let find = |name: &str| sites.iter().find(|site| site.name == name);
     let Some(origin) = find(TASK_SITE) else {
@@ -188,9 +189,9 @@ fn elsewhere(
         }
     }
     if document.cameras.iter().all(|camera| camera.name != THIRD_PERSON) {
-        let own = match scene_of_file(task) {
-            None => Document::parse(&task.scene, assets::scene(&task.scene)?)?,
-            Some(document) => document?,
+        let own = match &task.scene_document {
+            None => Document::parse(&task.scene, assets::scene(&task.scene)?)?.into(),
+            Some(document) => document.clone(),
         };
         let seen = own.cameras.iter().filter(|camera| camera.name == THIRD_PERSON);
         document.cameras.extend(seen.map(|camera| camera.moved(&world_from_scene.inverse())));

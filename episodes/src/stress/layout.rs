@@ -136,7 +136,7 @@ impl Places {
         for spot in &task.objects {
             let Some(state) = step.object(&spot.name) else { continue };
             let pose = state.world_from_object;
-            for part in ObjectModel::parts(&spot.source(), &spot.name)?.into_iter().take(1) {
+            for part in ObjectModel::parts(&spot.source, &spot.name)?.into_iter().take(1) {
                 let at_m = [pose.translation.x, pose.translation.y];
                 let reach_m = |direction: Vector| {
                     part.model.reach_m(&pose, direction) - direction.dot(pose.translation)

@@ -23,9 +23,11 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use tandem_sim::{ObjectFile, RobotModel, SimError, Step};
+use tandem_sim::mjcf::Document;
+use tandem_sim::{ObjectFile, ObjectModel, ObjectPart, Pose, RobotModel, Rotation, SimError, Step};
 
 use crate::conditions::{ConditionPart, OF_FINGERS, Truth};
+use crate::scene_file::SceneFile;
 use crate::scoring::{Phase, Scores};
 
 /// A task as its file defines it.
@@ -35,8 +37,8 @@ pub struct TaskDefinition {
     /// File name of the scene under `sim/assets/scenes`, or the name that messages use for a scene from
     /// the task's own files.
     pub scene: String,
-    /// MJCF of the scene; `None` for an embedded one.
-    pub scene_mjcf: Option<String>,
+    /// Scene from the task's own files; `None` for an embedded one.
+    pub scene_document: Option<Arc<Document>>,
     pub robots: Vec<RobotSpot>,
     pub objects: Vec<ObjectSpot>,
     /// Offsets drawn from the seed, in drawing order.
@@ -172,6 +174,9 @@ pub struct TaskSource {
     /// MJCF files that the task names, by file name; they are in the same folder.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub beside: BTreeMap<String, String>,
+    /// MJCF files that the task names and that name other files in turn, by file name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub by_hash: BTreeMap<String, SceneFile>,
 }
 
 /// Start pose of a robot, and its instruction.
@@ -194,8 +199,9 @@ pub struct ObjectSpot {
     pub file: String,
     pub position_m: [f32; 3],
     pub yaw_rad: f32,
-    /// MJCF of the object; `None` for an embedded one.
-    pub mjcf: Option<String>,
+    /// Orientation before the yaw; a body of a scene may lie or lean.
+    pub turn: Rotation,
+    pub source: ObjectFile,
 }
 
 /// Returns the name of an object, or of a part that moves on it, in texts for policies.
@@ -204,12 +210,22 @@ pub fn told_name(name: &str) -> String {
 }
 
 impl ObjectSpot {
-    /// Returns the source of the object's model.
-    pub fn source(&self) -> ObjectFile {
-        match &self.mjcf {
-            None => ObjectFile::Embedded(self.file.clone()),
-            Some(mjcf) => ObjectFile::Text { name: self.file.clone(), mjcf: mjcf.clone() },
+    /// Returns the object's parts in a frame at its origin that its yaw alone turns.
+    pub fn parts(&self) -> Result<Vec<ObjectPart>, SimError> {
+        let mut parts = ObjectModel::parts(&self.source, &self.name)?;
+        if self.is_of_scene() {
+            let turn = Pose::from_rotation(self.turn);
+            for part in &mut parts {
+                part.object_from_part = turn * part.object_from_part;
+                part.object_from_moved_part = part.object_from_moved_part.map(|moved| turn * moved);
+            }
         }
+        Ok(parts)
+    }
+
+    /// Returns true for a body of the task's scene.
+    pub fn is_of_scene(&self) -> bool {
+        matches!(self.source, ObjectFile::OfScene { .. })
     }
 }
 
@@ -217,7 +233,7 @@ impl TaskDefinition {
     /// Starts to score an episode of this task with robots of this model, from the state before the first
     /// control step.
     pub fn scores(&self, robot: &Arc<RobotModel>, start: &Step) -> Result<Scores, SimError> {
-        let objects = self.objects.iter().map(|spot| (spot.name.as_str(), spot.source()));
+        let objects = self.objects.iter().map(|spot| (spot.name.as_str(), spot.source.clone()));
         Scores::new(self.phases.clone(), objects, robot, start)
     }
 

@@ -1,6 +1,5 @@
 //! The available tasks: the benchmark's, those of our own suite, and those of files.
 
-use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
 use super::embedded::{COHUB_FILES, Embedded, TANDEM_PLUS_FILES};
@@ -21,7 +20,7 @@ fn read(files: &[Embedded]) -> Vec<Task> {
 ///
 /// If the file has a mistake.
 pub fn embedded_task(name: &str, text: &str) -> Task {
-    let source = TaskSource { name: name.into(), text: text.into(), beside: BTreeMap::new() };
+    let source = TaskSource { name: name.into(), text: text.into(), ..TaskSource::default() };
     task_of(source).unwrap_or_else(|error| panic!("a task of the program: {error}"))
 }
 

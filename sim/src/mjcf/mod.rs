@@ -12,6 +12,7 @@ mod geometry;
 mod joints;
 mod key;
 mod lights;
+mod scene_bodies;
 mod support;
 #[cfg(test)]
 mod tests;
@@ -29,6 +30,7 @@ pub use geometry::{Geom, Primitive};
 pub use joints::{Actuator, ActuatorKind, AxisJoint, LinkJoint};
 pub use key::Key;
 pub use lights::{FileLight, FileLights, Headlight, LightKind, MAX_LIGHTS};
+pub use scene_bodies::SceneBody;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -50,6 +52,13 @@ use text::plain::plain;
 use text::settings::FileSettings;
 use text::source::{self, MjcfText};
 use text::split::{Split, split};
+
+/// Files are equal if they have the same name and content.
+impl PartialEq for Document {
+    fn eq(&self, other: &Document) -> bool {
+        self.file == other.file && self.fingerprint() == other.fingerprint()
+    }
+}
 
 /// A parsed file. All its content is in effect; otherwise it would have been refused.
 #[derive(Clone, Debug)]
@@ -104,6 +113,11 @@ impl Document {
     pub fn parse_alone(file: &str, xml: &str) -> Result<Document, SimError> {
         source::refuse_files(file, xml)?;
         Document::parse(file, xml)
+    }
+
+    /// Returns true if MJCF text refers to other files. Text that is not XML refers to none.
+    pub fn names_files(xml: &str) -> bool {
+        source::names_files(xml)
     }
 
     /// Reads a file. Its includes, meshes and images are found relative to it.

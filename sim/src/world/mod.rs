@@ -20,7 +20,7 @@ use std::sync::Arc;
 pub use contacts::RobotPress;
 pub use disturb::PlannedPush;
 pub use lights::{CarriedLight, SceneLights};
-pub use objects::{ObjectFile, ObjectModel, ObjectPart, ObjectPlacement, ObjectState};
+pub use objects::{ObjectFile, ObjectModel, ObjectPart, ObjectPlacement, ObjectState, Opening, OpeningKind};
 pub use snapshot::Snapshot;
 pub use step::{BodyTouch, HandContacts, ObjectStep, RobotStep, Step, Touch};
 pub use watch::{

@@ -31,6 +31,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
         &[
             &["output", "locks", "html", "fingerprint", "scoring", "convert"],
             &["error", "conditions", "result_file"],
+            &["scene_file"],
             &["tasks"],
             &["variation", "words", "protocol"],
             &["stress"],
@@ -46,7 +47,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "episodes/evaluation",
         &[
-            &["batch", "results", "statistics", "task_check"],
+            &["batch", "results", "statistics", "task_check", "task_draft"],
             &["bench", "policies", "reports"],
             &["evaluation"],
         ],

@@ -30,7 +30,7 @@ description = "It is left."
 done = '{second}'
 "#
     );
-    let source = TaskSource { name: "box.toml".into(), text, beside: Default::default() };
+    let source = TaskSource { name: "box.toml".into(), text, ..TaskSource::default() };
     task_of(source).unwrap_or_else(|error| panic!("{error}"))
 }
 
@@ -96,11 +96,8 @@ done = '"{{way}}" == "left" ? time_s() > 100 : time_s() > 200'
         )
     };
     let notes = |joint: &str, description: &str| {
-        let source = TaskSource {
-            name: "way.toml".into(),
-            text: text(joint, description),
-            beside: Default::default(),
-        };
+        let source =
+            TaskSource { name: "way.toml".into(), text: text(joint, description), ..TaskSource::default() };
         let task = task_of(source).unwrap_or_else(|error| panic!("{error}"));
         check_task(&task, &[0], None).unwrap().notes
     };

@@ -79,7 +79,7 @@ fn has_what_it_needs(task: &Task) -> bool {
     let set = TaskSet::default();
     let Ok(own) = set.find(&task.id) else { return false };
     let has = |spot: &ObjectSpot| {
-        let same = |other: &ObjectSpot| other.name == spot.name && other.source() == spot.source();
+        let same = |other: &ObjectSpot| other.name == spot.name && other.source == spot.source;
         task.objects.iter().any(same)
     };
     task.robots.len() == own.robots.len() && own.objects.iter().all(has)

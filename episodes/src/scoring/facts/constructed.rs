@@ -26,6 +26,7 @@ impl Facts {
         let part = |world_from_object: Pose, part: ObjectPart| {
             let pose_in_world = world_from_object * part.object_from_part;
             ObjectFacts {
+                opened: part.model.opening.as_ref().map(|_| 0.0),
                 name: part.name,
                 model: part.model.into(),
                 pose_in_world,
@@ -39,7 +40,7 @@ impl Facts {
         let object = |spot: &crate::tasks::ObjectSpot| {
             let heading = Rotation::from_rotation_z(spot.yaw_rad);
             let world_from_object = Pose::from_parts(spot.position_m.into(), heading);
-            let parts = ObjectModel::parts(&spot.source(), &spot.name).unwrap();
+            let parts = ObjectModel::parts(&spot.source, &spot.name).unwrap();
             parts.into_iter().map(move |found| part(world_from_object, found))
         };
         Facts {

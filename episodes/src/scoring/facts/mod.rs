@@ -53,6 +53,9 @@ pub struct ObjectFacts {
     pub hands: Vec<Sides<Grip>>,
     /// Time for which no part of any robot has touched it.
     pub untouched_s: f64,
+    /// Motion of its hinge (rad) or slide (m) from the pose in the file, positive towards the farther end of
+    /// the range; `None` if it has neither.
+    pub opened: Option<f32>,
 }
 
 /// Contact of a hand with an object.
@@ -128,6 +131,11 @@ impl Facts {
     pub fn tilt_rad(&self, object: &str) -> f32 {
         let up_in_world = self.object(object).pose_in_world.rotation * Vector::Z;
         up_in_world.angle_between(Vector::Z)
+    }
+
+    /// Returns how far the hinge (rad) or the slide (m) of `object` has moved from its pose in the file.
+    pub fn opened(&self, object: &str) -> f32 {
+        self.object(object).opened.unwrap_or_default()
     }
 
     pub fn speed_m_s(&self, object: &str) -> f32 {

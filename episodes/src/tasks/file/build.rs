@@ -2,30 +2,26 @@
 //! only the first.
 
 use std::ops::RangeInclusive;
-use std::sync::Arc;
 
-use tandem_sim::mjcf::Document;
-use tandem_sim::{ObjectModel, assets};
 use toml::Spanned;
 
 use super::choices::{Choice, ways, with_options};
 use super::error::{Mistakes, TaskFileError};
 use super::phases;
-use super::reading::{Reading, place_in_file};
+use super::reading::Reading;
 use super::rewordings::in_words;
-use super::table::{Extent, ObjectTable, OffsetTable, RobotTable, TaskTable};
+use super::table::{Extent, OffsetTable, RobotTable, TaskTable};
 use crate::conditions::Names;
 use crate::scoring::{Phase, ROBOT_NAMES};
 use crate::tasks::embedded::origin_of;
 use crate::tasks::task::TaskFile;
 use crate::tasks::{ChosenOption, ObjectSpot, Offset, RobotSpot, TaskDefinition, TaskOrigin, TaskSource};
 
-const MAX_OBJECTS: usize = 64;
 const MAX_PHASES: usize = 12;
 /// Minimum distance between the robots' start positions: robots that start closer touch each other.
 const ROBOT_NAMES_APART_M: f64 = 0.35;
 /// Largest absolute value of a coordinate.
-const FARTHEST_M: f64 = 100.0;
+pub(super) const FARTHEST_M: f64 = 100.0;
 const DEFAULT_BENCHMARK_STEPS: u32 = 1000;
 /// The benchmark's budget under the agentic protocol.
 const DEFAULT_AGENTIC_STEPS: u32 = 6000;
@@ -50,7 +46,7 @@ fn parse(source: &TaskSource) -> Result<TaskTable, TaskFileError> {
     })
 }
 
-fn is_file(name: &str) -> bool {
+pub(super) fn is_file(name: &str) -> bool {
     name.ends_with(".xml")
 }
 
@@ -119,7 +115,7 @@ impl Reading<'_> {
         let robots = self.robots(&table.robots);
         let mut names =
             Names { robots: robots.iter().map(|robot| robot.name.to_owned()).collect(), ..Names::default() };
-        let objects = self.objects(&table.objects, &mut names);
+        let objects = self.objects(&table.objects, scene.as_ref(), &mut names);
         let randomize = self.offsets(&table.randomize, &objects, &names);
         if table.phases.as_ref().is_empty() || table.phases.as_ref().len() > MAX_PHASES {
             self.wrong(table.phases.span(), format!("a task has 1 to {MAX_PHASES} [[phases]]"));
@@ -127,11 +123,11 @@ impl Reading<'_> {
         let phases = phases::phases(self, table.terms, table.phases.into_inner(), &mut names);
         let rewordings = self.rewordings(&table.rewordings, &table.shared_instruction, &robots);
         let (phases, conditions): (Vec<_>, Vec<_>) = phases.into_iter().unzip();
-        let (scene, scene_mjcf) = scene?;
+        let (scene, scene_document) = scene?;
         Some(TaskDefinition {
             id: table.id.into_inner(),
             scene,
-            scene_mjcf,
+            scene_document,
             robots,
             objects,
             randomize,
@@ -162,74 +158,10 @@ impl Reading<'_> {
     }
 
     /// Checks that coordinates or angles are finite and within `most_value` of zero.
-    fn finite<T>(&mut self, given: &Spanned<T>, values: &[f64], most_value: f64) {
+    pub(super) fn finite<T>(&mut self, given: &Spanned<T>, values: &[f64], most_value: f64) {
         if values.iter().any(|value| !value.is_finite() || value.abs() > most_value) {
             self.wrong(given.span(), format!("a number here is at most {most_value} either way"));
         }
-    }
-
-    /// Returns the scene's display name for messages, and its MJCF unless the scene is built in.
-    fn scene(&mut self, table: &TaskTable) -> Option<(String, Option<String>)> {
-        let (at, (name, mjcf)) = match (&table.scene, &table.scene_mjcf) {
-            (Some(name), None) => (name.span(), self.named(name, assets::scene)?),
-            (None, Some(text)) => (text.span(), self.inline(text)),
-            (Some(_), Some(both)) => {
-                self.wrong(both.span(), "the scene is given twice; give scene or scene_mjcf");
-                return None;
-            }
-            (None, None) => {
-                let have = assets::scene("").err().map(|error| error.to_string()).unwrap_or_default();
-                let have = have.split_once("have: ").map_or("", |(_, have)| have);
-                let what = format!(
-                    "no scene; give scene = \"floor\" above the first [...], or scene = \"my_room.xml\", or scene_mjcf; \
-                     rooms that there are: {have}"
-                );
-                self.wrong(0..0, what);
-                return None;
-            }
-        };
-        if let Some(mjcf) = &mjcf
-            && let Err(error) = Document::parse_alone(&name, mjcf)
-        {
-            self.wrong_mjcf(at, error.to_string());
-        }
-        Some((name, mjcf))
-    }
-
-    /// Resolves the name of a scene or an object: a file beside the task file, or one embedded in the binary.
-    fn named(
-        &mut self,
-        name: &Spanned<String>,
-        embedded: impl Fn(&str) -> Result<&'static str, tandem_sim::SimError>,
-    ) -> Option<(String, Option<String>)> {
-        let text = name.as_ref().as_str();
-        if is_file(text) {
-            return match self.source.beside.get(text) {
-                Some(mjcf) => Some((text.to_owned(), Some(mjcf.clone()))),
-                None => {
-                    self.wrong(name.span(), format!("there is no {text} beside the task's file"));
-                    None
-                }
-            };
-        }
-        match embedded(text) {
-            Ok(_) => Some((text.to_owned(), None)),
-            Err(error) => {
-                let what = format!("{error}; or a file beside this one, whose name ends in .xml");
-                self.wrong(name.span(), what);
-                None
-            }
-        }
-    }
-
-    /// Returns inline MJCF from the task file. Padding lines before it make its mistakes carry the task
-    /// file's line numbers.
-    fn inline(&self, text: &Spanned<String>) -> (String, Option<String>) {
-        let mjcf = text.as_ref();
-        let at = place_in_file(&self.source.text, text);
-        let lines = self.source.text[..at].matches('\n').count();
-        let padding = if mjcf.starts_with("<?xml") { 0 } else { lines };
-        (self.source.name.clone(), Some("\n".repeat(padding) + mjcf))
     }
 
     fn robots(&mut self, tables: &Spanned<Vec<RobotTable>>) -> Vec<RobotSpot> {
@@ -269,58 +201,6 @@ impl Reading<'_> {
         tables.iter().zip(ROBOT_NAMES).map(spot).collect()
     }
 
-    fn objects(&mut self, tables: &[ObjectTable], names: &mut Names) -> Vec<ObjectSpot> {
-        let mut found: Vec<ObjectSpot> = Vec::new();
-        if let Some(beyond) = tables.get(MAX_OBJECTS) {
-            self.wrong(beyond.name.span(), format!("a task has at most {MAX_OBJECTS} objects"));
-        }
-        for table in tables.iter().take(MAX_OBJECTS) {
-            self.id(&table.name, "an object");
-            self.finite(&table.position_m, table.position_m.as_ref(), FARTHEST_M);
-            let name = table.name.as_ref().as_str();
-            if found.iter().any(|spot| spot.name == name) {
-                self.wrong(
-                    table.name.span(),
-                    format!("there is an object {name:?} already; give each its own name"),
-                );
-                continue;
-            }
-            let given = match (&table.file, &table.mjcf) {
-                (Some(_), Some(both)) => {
-                    self.wrong(both.span(), "the object is given twice; give file or mjcf");
-                    None
-                }
-                (None, Some(text)) => Some((text.span(), self.inline(text))),
-                (file, None) => {
-                    let file = file.as_ref().unwrap_or(&table.name);
-                    self.named(file, assets::object).map(|named| (file.span(), named))
-                }
-            };
-            let Some((at, (file, mjcf))) = given else {
-                names.mistaken_objects.insert(name.to_owned());
-                continue;
-            };
-            let spot = ObjectSpot {
-                name: name.to_owned(),
-                file,
-                position_m: table.position_m.as_ref().map(|value| value as f32),
-                yaw_rad: angle_rad(table.yaw_deg.as_ref()),
-                mjcf,
-            };
-            match ObjectModel::parts(&spot.source(), name) {
-                Ok(parts) => {
-                    names.objects.extend(parts.into_iter().map(|part| (part.name, Arc::new(part.model))));
-                }
-                Err(error) => {
-                    self.wrong_mjcf(at, error.to_string());
-                    names.mistaken_objects.insert(name.to_owned());
-                }
-            }
-            found.push(spot);
-        }
-        found
-    }
-
     fn offsets(&mut self, tables: &[OffsetTable], objects: &[ObjectSpot], names: &Names) -> Vec<Offset> {
         tables.iter().map(|table| self.offset(table, objects, names)).collect()
     }
@@ -329,7 +209,10 @@ impl Reading<'_> {
         let mut moved: Vec<String> = Vec::new();
         for name in table.objects.as_ref() {
             match objects.iter().find(|spot| spot.name == *name.as_ref()) {
-                Some(spot) => moved.push(spot.name.clone()),
+                Some(spot) => {
+                    self.can_be_moved(spot, name);
+                    moved.push(spot.name.clone());
+                }
                 None if names.mistaken_objects.contains(name.as_ref()) => {}
                 None => {
                     let have: Vec<&str> = objects.iter().map(|spot| spot.name.as_str()).collect();
@@ -376,7 +259,7 @@ impl Reading<'_> {
     }
 }
 
-fn angle_rad(given: Option<&Spanned<f64>>) -> f32 {
+pub(super) fn angle_rad(given: Option<&Spanned<f64>>) -> f32 {
     given.map_or(0.0, |given| rad(*given.as_ref()))
 }
 

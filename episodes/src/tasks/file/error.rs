@@ -8,6 +8,8 @@ use std::path::PathBuf;
 pub enum TaskFileError {
     #[error("cannot read the task's file {}: {source}", path.display())]
     Read { path: PathBuf, source: std::io::Error },
+    #[error(transparent)]
+    Mjcf(#[from] tandem_sim::SimError),
     #[error("{0}")]
     Mistakes(Mistakes),
     #[error("{name} is not the file that was recorded: its hash is {now}, and {was} was recorded")]

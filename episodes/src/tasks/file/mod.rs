@@ -14,17 +14,20 @@ mod rewordings;
 mod table;
 #[cfg(test)]
 mod tests;
+mod things;
 
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use tandem_sim::mjcf::Document;
 use tandem_sim::{MAX_TEXT_BYTES, read_text, with_own_separators};
 use xxhash_rust::xxh3::xxh3_64;
 
 pub use error::TaskFileError;
 
+use crate::scene_file::SceneFile;
 use crate::tasks::task::TaskFile;
 use crate::tasks::{self, Task, TaskDefinition, TaskSource};
 
@@ -42,10 +45,15 @@ pub fn read_task(path: &Path) -> Result<Task, TaskFileError> {
         read_text(path, MAX_TEXT_BYTES).map_err(|source| TaskFileError::Read { path: path.into(), source })
     };
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let mut source = TaskSource { name, text: read(path)?, beside: BTreeMap::new() };
+    let mut source = TaskSource { name, text: read(path)?, ..TaskSource::default() };
     let folder = path.parent().unwrap_or(Path::new("."));
     for file in build::files_beside(&source)? {
-        source.beside.insert(file.clone(), read(&with_own_separators(folder.join(&file)))?);
+        let path = with_own_separators(folder.join(&file));
+        let text = read(&path)?;
+        match Document::names_files(&text) {
+            true => drop(source.by_hash.insert(file, SceneFile::of(&path)?)),
+            false => drop(source.beside.insert(file, text)),
+        }
     }
     task_of(source)
 }
@@ -77,8 +85,13 @@ fn files_in_use() -> MutexGuard<'static, Vec<Weak<TaskFile>>> {
 }
 
 fn fingerprint(source: &TaskSource) -> String {
-    let TaskSource { name: _, text, beside } = source;
-    format!("{:016x}", xxh3_64(format!("{:?}", (text, beside)).as_bytes()))
+    let TaskSource { name: _, text, beside, by_hash } = source;
+    let hashes: BTreeMap<&String, &String> = by_hash.iter().map(|(name, file)| (name, &file.xxh3)).collect();
+    let content = match hashes.is_empty() {
+        true => format!("{:?}", (text, beside)),
+        false => format!("{:?}", (text, beside, hashes)),
+    };
+    format!("{:016x}", xxh3_64(content.as_bytes()))
 }
 
 /// JSON form of a task for `#[serde(with)]`: the id of a benchmark task, or the whole file of any other.

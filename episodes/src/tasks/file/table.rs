@@ -85,7 +85,10 @@ pub struct ObjectTable {
     pub file: Option<Spanned<String>>,
     /// Inline MJCF of the object.
     pub mjcf: Option<Spanned<String>>,
-    pub position_m: Spanned<[f64; 3]>,
+    /// True for a body of the scene, which has the object's name and is where the scene puts it.
+    #[serde(default)]
+    pub in_scene: bool,
+    pub position_m: Option<Spanned<[f64; 3]>>,
     #[serde(default)]
     pub yaw_deg: Option<Spanned<f64>>,
 }

@@ -5,6 +5,7 @@ use crate::EpisodeSpec;
 use crate::scoring::{A, Done, Facts, Grip};
 use crate::tasks::{TANDEM_PLUS, TaskSet, tandem_plus};
 use tandem_sim::Side::Right;
+use tandem_sim::mjcf::Document;
 use tandem_tools_spec::Protocol;
 
 const FILE: &str = r#"
@@ -56,7 +57,7 @@ near = 'coming(x_m("box"), 0.4, 1)'
 "#;
 
 fn source(text: &str) -> TaskSource {
-    TaskSource { name: "lift.toml".into(), text: text.into(), beside: BTreeMap::new() }
+    TaskSource { name: "lift.toml".into(), text: text.into(), ..TaskSource::default() }
 }
 
 fn load(text: &str) -> Result<Task, String> {
@@ -348,7 +349,7 @@ fn files_beside_it_belong_to_it() {
     let text = serde_json::to_string(&EpisodeSpec::new(&task, 0, Protocol::Benchmark)).unwrap();
     drop(folder);
     let read: EpisodeSpec = serde_json::from_str(&text).unwrap();
-    assert_eq!(read.task.scene_mjcf.as_deref(), Some(room));
+    assert_eq!(read.task.scene_document, Some(Document::parse_alone("room.xml", room).unwrap().into()));
     let mesh = source(&text.replace("floor", "room.xml"));
     let with_mesh = TaskSource {
         text: FILE.replace("scene = \"floor\"", "scene = \"room.xml\""),
@@ -357,4 +358,86 @@ fn files_beside_it_belong_to_it() {
     };
     let error = task_of(with_mesh).unwrap_err().to_string();
     assert!(error.contains("room.xml:1") && error.contains("names no other file"), "{error}");
+}
+
+/// A house with a chest of drawers and a mug; its chest is a mesh in a file of its own.
+fn house() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    write("tent.obj", "v 0 0 0\nv 0.3 0 0\nv 0 0.3 0\nv 0 0 0.3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
+    write(
+        "house.xml",
+        r#"<mujoco><asset><mesh name="tent" file="tent.obj"/></asset><worldbody>
+          <geom type="plane" size="5 5 1"/>
+          <body name="chest" pos="2 0 0"><geom type="mesh" mesh="tent"/>
+            <body name="drawer"><joint type="slide" axis="0 1 0" range="-0.3 0"/>
+              <geom type="box" size="0.1 0.1 0.1" pos="0 0 0.5"/></body>
+            <body name="door"><joint type="hinge" axis="0 0 1" range="0 1.5"/>
+              <geom type="box" size="0.1 0.1 0.1" pos="0 0 0.8"/></body>
+          </body>
+          <body name="Mug_1" pos="1 0 0.05"><freejoint/><geom type="box" size="0.05 0.05 0.05" mass="0.3"/></body>
+        </worldbody></mujoco>"#,
+    );
+    folder
+}
+
+/// Returns the task of a file in the house whose objects and condition are these.
+fn in_house(folder: &Path, objects: &str, done: &str) -> Result<Task, TaskFileError> {
+    let text = FILE.replace("scene = \"floor\"", "scene = \"house.xml\"");
+    let box_ = &text[text.find("[[objects]]").unwrap()..text.find("[terms]").unwrap()];
+    let phases = &text[text.find("[terms]").unwrap()..];
+    let one = "[[phases]]\nid = \"one\"\ndescription = \"It is done.\"\n";
+    let text = text.replace(box_, objects).replace(phases, &format!("{one}done = '{done}'\n"));
+    std::fs::write(folder.join("task.toml"), text).unwrap();
+    read_task(&folder.join("task.toml"))
+}
+
+fn bodies(names: &[&str]) -> String {
+    names.iter().map(|name| format!("[[objects]]\nname = \"{name}\"\nin_scene = true\n")).collect()
+}
+
+#[test]
+fn bodies_of_the_scene_are_objects_once_they_are_named() {
+    let house = house();
+    let objects = bodies(&["drawer", "door", "Mug_1"]) + "[[randomize]]\nobjects = [\"Mug_1\"]\nx_m = 0.2\n";
+    let done = r#"opened_m("drawer") > 0.1 && opened_deg("door") > 30 && lift_m("Mug_1") > 0.1"#;
+    let task = in_house(house.path(), &objects, done).unwrap_or_else(|error| panic!("{error}"));
+    let spec = EpisodeSpec::new(&task, 2000, Protocol::Benchmark);
+    let mut session = crate::Session::start(&spec, None).unwrap();
+    let before = session.facts();
+    let by_m = task.start_poses(2000, Default::default())[2].position_m[0] - 1.0;
+    assert!((before.position_m("Mug_1").x - 1.0 - by_m).abs() < 1e-6 && by_m.abs() > 1e-3, "{by_m}");
+    assert_eq!((before.opened("drawer"), before.opened("door")), (0.0, 0.0));
+    // The recorded task needs the files, unchanged.
+    let text = serde_json::to_string(&spec).unwrap();
+    assert!(!text.contains("freejoint"), "{text}");
+    let read: EpisodeSpec = serde_json::from_str(&text).unwrap();
+    assert_eq!(read.task, task);
+    session.close();
+    drop((session, read, task, spec));
+    let tent = house.path().join("tent.obj");
+    std::fs::write(&tent, std::fs::read_to_string(&tent).unwrap().replace("0.3", "0.4")).unwrap();
+    let error = serde_json::from_str::<EpisodeSpec>(&text).unwrap_err().to_string();
+    assert!(error.contains("house.xml has changed"), "{error}");
+}
+
+#[test]
+fn what_cannot_be_an_object_of_the_scene_is_refused_in_words() {
+    let house = house();
+    let lifted = r#"lift_m("Mug_1") > 0.1"#;
+    let moved = |name: &str| format!("[[randomize]]\nobjects = [\"{name}\"]\nx_m = 0.2\n");
+    let own = "[[objects]]\nname = \"door\"\nfile = \"cup\"\nposition_m = [0, 0, 1]\n";
+    for (objects, done, expected) in [
+        (bodies(&["mug"]), lifted, "no body \"mug\" that can move; have: chest, drawer, door, Mug_1"),
+        (bodies(&["Mug_1", "drawer"]) + &moved("drawer"), lifted, "drawer is not free"),
+        (bodies(&["Mug_1"]) + "position_m = [0, 0, 1]\n", lifted, "the scene has this body and its place"),
+        (bodies(&["Mug_1"]) + own, lifted, "the scene has a body \"door\"; in_scene = true"),
+        (bodies(&["Mug_1"]) + "[[objects]]\nname = \"cup\"\n", lifted, "no place; give position_m"),
+        (bodies(&["Mug_1"]), r#"opened_m("Mug_1") > 0.1"#, "no object with a slide \"Mug_1\""),
+        (bodies(&["drawer", "door"]), r#"opened_deg("drawer") > 1"#, "no object with a hinge \"drawer\""),
+        (bodies(&["door"]), r#"opened_deg("door") > 200"#, "never"),
+    ] {
+        let error = in_house(house.path(), &objects, done).unwrap_err().to_string();
+        assert!(error.contains(expected), "{expected}: {error}");
+    }
 }

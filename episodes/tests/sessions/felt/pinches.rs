@@ -1,8 +1,6 @@
 //! A test of replies on a pinch that is not scored as a grip: a round object between fingers that do not
 //! oppose each other.
 
-use std::collections::BTreeMap;
-
 use serde_json::{Value, json};
 use tandem_episodes::tasks::{Task, TaskSource};
 use tandem_episodes::{A, EpisodeSpec, Grip as Truth, Session, task_of};
@@ -37,7 +35,7 @@ const CLOSE_RAD: [f64; 7] = [-0.5, -0.9, -1.2, 1.3, 1.3, 1.3, 1.3];
 const PLACE_M: [f64; 2] = [0.16, 0.065];
 
 fn apple() -> Task {
-    let source = TaskSource { name: "hold_apple.toml".into(), text: TEXT.into(), beside: BTreeMap::new() };
+    let source = TaskSource { name: "hold_apple.toml".into(), text: TEXT.into(), ..TaskSource::default() };
     task_of(source).expect("a task")
 }
 

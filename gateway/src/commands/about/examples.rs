@@ -4,7 +4,7 @@ use std::{fs, io, path::Path, process::ExitCode};
 
 use crate::commands::CommandResult;
 
-/// Write the examples of the book (agents, a task, robots, servers, environments) into gateway/examples of the
+/// Write the examples of the book (agents, tasks, robots, servers, environments) into gateway/examples of the
 /// working folder, where the book's commands find them. Existing files are kept.
 #[derive(Debug, clap::Args)]
 pub struct ExamplesArgs {}
@@ -17,7 +17,7 @@ macro_rules! examples {
 }
 
 /// Every example, by its path in the folder, with its text.
-const EXAMPLES: [(&str, &str); 19] = examples! {
+const EXAMPLES: [(&str, &str); 30] = examples! {
     "agents/agent.py"
     "agents/claude.sh"
     "agents/codex.sh"
@@ -34,7 +34,18 @@ const EXAMPLES: [(&str, &str); 19] = examples! {
     "robots/walker.toml"
     "robots/walker.xml"
     "servers/lerobot_act.py"
+    "tasks/house/drawer.xml"
+    "tasks/house/meshes/kitchen_chest_carcass.obj"
+    "tasks/house/meshes/kitchen_chest_drawer.obj"
+    "tasks/house/meshes/kitchen_table.obj"
+    "tasks/house/meshes/kitchen_tin.obj"
+    "tasks/house/meshes/kitchen_tray.obj"
+    "tasks/house/meshes/living_table.obj"
+    "tasks/house/scene.xml"
+    "tasks/house/tray.xml"
+    "tasks/into_the_drawer.toml"
     "tasks/pass_the_parcel.toml"
+    "tasks/tray_to_the_living_room.toml"
     "training/openpi_config.py"
     "training/openpi_map.toml"
 };

@@ -1,4 +1,5 @@
-//! `tandem tasks`: the list of tasks; `tandem tasks check`: validation of the user's own task.
+//! `tandem tasks`: the list of tasks; `tandem tasks check`: validation of the user's own task;
+//! `tandem tasks new`: a task to start from.
 
 use std::{
     fmt::Write,
@@ -7,13 +8,13 @@ use std::{
 };
 
 use tandem_episodes::tasks::TaskSet;
-use tandem_episodes::{BodyScale, LocomotionChoice, create_private_folder, read_task};
-use tandem_evaluation::check_task;
+use tandem_episodes::{BodyScale, LocomotionChoice, create_private_folder, read_task, write_whole};
+use tandem_evaluation::{TaskDraft, check_task, draft_task};
 use tandem_tools_spec::TaskList;
 
 use crate::commands::{CommandResult, Seeds, print};
 
-/// List the tasks and their phases, or check a task of your own.
+/// List the tasks and their phases, or write and check a task of your own.
 #[derive(Debug, clap::Args)]
 #[command(args_conflicts_with_subcommands = true)]
 pub struct TasksArgs {
@@ -28,6 +29,7 @@ pub struct TasksArgs {
 #[derive(Debug, clap::Subcommand)]
 enum TasksAction {
     Check(CheckArgs),
+    New(NewArgs),
 }
 
 /// Check a task's file: every mistake with its line and column, everything that falls without any action, and
@@ -45,10 +47,23 @@ struct CheckArgs {
     out: Option<PathBuf>,
 }
 
+/// List what can be moved in a scene, and write a task in it to start from.
+#[derive(Debug, clap::Args)]
+struct NewArgs {
+    /// MJCF file with the scene.
+    #[arg(long, value_name = "FILE")]
+    from_scene: PathBuf,
+    /// TOML file to write, for example beside the scene. An existing file is kept.
+    #[arg(value_name = "OUT")]
+    out: PathBuf,
+}
+
 /// Prints the tasks in the form of `list_tasks`, or the findings for a file.
 pub fn run(args: TasksArgs) -> CommandResult {
-    if let Some(TasksAction::Check(args)) = args.action {
-        return check(args);
+    match args.action {
+        Some(TasksAction::Check(args)) => return check(args),
+        Some(TasksAction::New(args)) => return new(&args),
+        None => {}
     }
     let limits = LocomotionChoice::default().limits(&BodyScale::G1);
     let list = tandem_episodes::task_list(&TaskSet::default(), None, &limits);
@@ -93,6 +108,43 @@ fn check(args: CheckArgs) -> CommandResult {
     }
     print(&text)?;
     Ok(if found.falls.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Writes a draft of a task in a scene.
+fn new(args: &NewArgs) -> CommandResult {
+    if args.out.exists() {
+        return Err(format!("{} exists already; give another name", args.out.display()).into());
+    }
+    let scene_name = seen_from(&args.out, &args.from_scene);
+    if !scene_name.ends_with(".xml") {
+        return Err(format!("{scene_name} is no MJCF file, whose name ends in .xml").into());
+    }
+    let TaskDraft { bodies, text, notes } = draft_task(&args.from_scene, &scene_name, &id_of(&args.out))?;
+    write_whole(&args.out, text.as_bytes())?;
+    let mut told = bodies.join("\n") + "\n";
+    for note in notes {
+        let _ = writeln!(told, "note: {note}");
+    }
+    let out = args.out.display();
+    let _ = writeln!(told, "written: {out}; check it by `tandem tasks check {out}`");
+    print(&told)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Returns the path of a scene for a task file: relative to its folder, if the scene is in it or below.
+fn seen_from(task: &Path, scene: &Path) -> String {
+    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.into());
+    let (task, scene) = (absolute(task), absolute(scene));
+    let below = task.parent().and_then(|folder| scene.strip_prefix(folder).ok());
+    below.unwrap_or(&scene).to_string_lossy().replace('\\', "/")
+}
+
+/// Returns the id of a task by the name of its file.
+fn id_of(task: &Path) -> String {
+    const LONGEST_ID: usize = 40;
+    let stem = task.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+    let plain = |letter: char| if letter.is_ascii_alphanumeric() { letter } else { '_' };
+    stem.chars().map(plain).take(LONGEST_ID).collect()
 }
 
 fn told(list: &TaskList) -> String {

@@ -152,17 +152,26 @@ impl MjcfText {
     }
 }
 
+/// Returns true if a text names other files. A text that is not XML names none.
+pub(in crate::mjcf) fn names_files(xml: &str) -> bool {
+    roxmltree::Document::parse(xml).is_ok_and(|tree| naming(&tree).is_some())
+}
+
+/// Returns the first element that names a file.
+fn naming<'a, 'input>(tree: &'a roxmltree::Document<'input>) -> Option<Node<'a, 'input>> {
+    tree.descendants().find(|node| node.attributes().any(|one| one.name().starts_with("file")))
+}
+
 /// Refuses a text that names other files.
 pub(in crate::mjcf) fn refuse_files(file: &str, xml: &str) -> Result<(), SimError> {
     let tree =
         roxmltree::Document::parse(xml).map_err(|source| SimError::Xml { file: file.into(), source })?;
-    let Some(naming) = tree.descendants().find(|node| node.has_attribute("file")) else { return Ok(()) };
+    let Some(naming) = naming(&tree) else { return Ok(()) };
     let line = 1 + xml[..naming.range().start].matches('\n').count();
     let what = format!(
-        "{}: a text that is kept with a task names no other file ({:?}); use shapes such as box and cylinder, or give the \
-         scene by --scene",
-        describe(&naming),
-        naming.attribute("file").unwrap_or_default()
+        "{}: MJCF inside of another file names no other file; use shapes such as box and cylinder, or put it into a file of its \
+         own beside the task's",
+        describe(&naming)
     );
     Err(SimError::Unsupported { file: format!("{file}:{line}"), what })
 }

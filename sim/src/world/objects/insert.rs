@@ -5,9 +5,9 @@ use std::iter::successors;
 use rapier3d::math::Pose;
 
 use super::model::part_name;
-use super::{Object, ObjectModel, ObjectPlacement};
+use super::{Object, ObjectFile, ObjectModel, ObjectPlacement};
 use crate::SimError;
-use crate::dynamics::{Dynamics, Link, Tree, TreeId};
+use crate::dynamics::{DVec3, Dynamics, Link, Tree, TreeId};
 use crate::mechanism::{
     Machinery, PlacedTree, START, add_collider, add_equalities, begin, keep_apart, links, precise, rounded,
 };
@@ -62,12 +62,16 @@ pub(in crate::world) fn insert_scene(
 }
 
 /// Inserts an object file: one top-level body, which is a mark if no joint moves it. The body has the
-/// placement's name, and the links on it have their own after it.
+/// placement's name, and the links on it have their own after it. A free body of the scene is moved instead.
 pub(in crate::world) fn insert_object(
     dynamics: &mut Dynamics,
     placement: &ObjectPlacement,
     objects: &mut Vec<Object>,
 ) -> Result<(), SimError> {
+    if let ObjectFile::OfScene { .. } = placement.file {
+        move_object(dynamics, placement, objects);
+        return Ok(());
+    }
     let (document, tree) = ObjectModel::read(&placement.file)?;
     let world_from_file = precise(&placement.world_from_object);
     if tree.is_fixed() {
@@ -91,6 +95,14 @@ pub(in crate::world) fn insert_object(
     let placed = [PlacedTree { tree: &tree, id: Some(id), colliders: Vec::new() }];
     add_equalities(dynamics, &document, &placed, &world_from_file)?;
     keep_apart(dynamics, &document, &placed)
+}
+
+/// Moves a free body of the scene to its placement, at rest.
+fn move_object(dynamics: &mut Dynamics, placement: &ObjectPlacement, objects: &[Object]) {
+    if let Some(link) = objects.iter().find(|object| object.name == placement.name).and_then(|one| one.link) {
+        let world_from_body = precise(&placement.world_from_object);
+        dynamics.tree_mut(link.tree).set_base(world_from_body, DVec3::ZERO, DVec3::ZERO);
+    }
 }
 
 fn insert_moving(

@@ -4,6 +4,7 @@ mod insert;
 #[cfg(test)]
 mod joined_tests;
 mod model;
+mod opening;
 #[cfg(test)]
 mod site_tests;
 
@@ -11,13 +12,14 @@ use rapier3d::math::{Pose, Vector};
 use serde::{Deserialize, Serialize};
 
 pub use model::{ObjectFile, ObjectModel, ObjectPart};
+pub use opening::{Opening, OpeningKind};
 
 use crate::dynamics::{Dynamics, LinkId};
 use crate::mechanism::rounded;
 
 pub(super) use insert::{Furniture, insert_object, insert_scene};
 
-/// An object file put into the world.
+/// An object file put into the world, or a free body of the scene put elsewhere.
 #[derive(Clone, Debug)]
 pub struct ObjectPlacement {
     /// Name of the object in tasks.

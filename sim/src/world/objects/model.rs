@@ -1,18 +1,25 @@
 //! The model of an object from its file, independent of the world that it is put into.
 
-use rapier3d::math::{Pose, Rotation, Vector};
+use std::sync::Arc;
 
+use rapier3d::math::{Pose, Vector};
+
+use super::opening::{Opening, farthest};
 use crate::mechanism::{Solid, rounded};
-use crate::mjcf::{AxisJoint, BodyLink, BodyTree, Document, Geom, LinkJoint, Site};
+use crate::mjcf::{BodyLink, BodyTree, Document, Geom, LinkJoint, SceneBody, Site};
 use crate::{SimError, assets};
 
 /// Source of an object.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum ObjectFile {
     /// A file embedded in the binary, by its name in `assets/objects`.
     Embedded(String),
     /// MJCF that refers to no other files, and its name in messages.
     Text { name: String, mjcf: String },
+    /// A file that was read, with the files that it refers to.
+    Read(Arc<Document>),
+    /// A body of the scene, by its name there; see [`Document::scene_bodies`].
+    OfScene { scene: Arc<Document>, body: String },
 }
 
 impl From<&str> for ObjectFile {
@@ -30,6 +37,8 @@ pub struct ObjectModel {
     pub sites: Vec<Site>,
     /// Mass of this body alone, without the parts that move on it.
     pub mass_kg: f32,
+    /// Freedom of the body against the one that carries it; `None` unless it is a hinge or a slide.
+    pub opening: Option<Opening>,
     solid: Solid,
 }
 
@@ -43,7 +52,27 @@ pub struct ObjectPart {
     /// The same with its own joint at the end of its range that is farther from 0; `None` for a part whose
     /// joint has no range.
     pub object_from_moved_part: Option<Pose>,
+    /// Name in a world of the part that carries this one; `None` if the world does.
+    pub carrier: Option<String>,
     pub model: ObjectModel,
+}
+
+impl ObjectPart {
+    fn of_scene(scene: &Document, body: &str, name: &str) -> Result<ObjectPart, SimError> {
+        let SceneBody { link, carrier, .. } = scene.scene_body(body)?;
+        let mut model = ObjectModel::of(&link);
+        // A motion against a body without a name of its own could not be told.
+        if carrier.as_ref().is_some_and(|carrier| scene.scene_body(carrier).is_err()) {
+            model.opening = None;
+        }
+        Ok(ObjectPart {
+            name: name.into(),
+            object_from_part: Pose::IDENTITY,
+            object_from_moved_part: farthest(&link.joint),
+            carrier,
+            model,
+        })
+    }
 }
 
 impl ObjectModel {
@@ -54,6 +83,9 @@ impl ObjectModel {
     ///
     /// Returns an error if the file is not an object's.
     pub fn parts(file: &ObjectFile, name: &str) -> Result<Vec<ObjectPart>, SimError> {
+        if let ObjectFile::OfScene { scene, body } = file {
+            return Ok(vec![ObjectPart::of_scene(scene, body, name)?]);
+        }
         let (_, tree) = ObjectModel::read(file)?;
         let mut parts: Vec<ObjectPart> = Vec::with_capacity(tree.links.len());
         for link in &tree.links {
@@ -63,7 +95,12 @@ impl ObjectModel {
                 name: part_name(name, link),
                 object_from_part,
                 object_from_moved_part: farthest(&link.joint).map(|moved| object_from_part * moved),
-                model: ObjectModel::of(link),
+                carrier: link.parent.map(|carrier| parts[carrier].name.clone()),
+                // Where the file is placed is not known here.
+                model: match link.parent {
+                    Some(_) => ObjectModel::of(link),
+                    None => ObjectModel { opening: None, ..ObjectModel::of(link) },
+                },
             });
         }
         Ok(parts)
@@ -94,6 +131,9 @@ impl ObjectModel {
         let document = match file {
             ObjectFile::Embedded(name) => Document::parse(name, assets::object(name)?)?,
             ObjectFile::Text { name, mjcf } => Document::parse_alone(name, mjcf)?,
+            ObjectFile::Read(document) | ObjectFile::OfScene { scene: document, .. } => {
+                Document::clone(document)
+            }
         };
         let mut trees = document.trees()?.into_iter();
         // The first is the file's own world.
@@ -123,24 +163,8 @@ impl ObjectModel {
             geoms: link.geoms.clone(),
             sites: link.sites.clone(),
             mass_kg: link.mass.mass(),
+            opening: Opening::of(link),
             solid: Solid::of(&link.geoms),
-        }
-    }
-}
-
-/// Returns the pose of a part, in its own frame with the joint at 0, at the end of the joint's range that is
-/// farther from 0; `None` if there is no range.
-fn farthest(joint: &LinkJoint) -> Option<Pose> {
-    let end = |[low, high]: [f64; 2]| if low.abs() > high.abs() { low } else { high } as f32;
-    match joint {
-        LinkJoint::Fixed | LinkJoint::Free { .. } => None,
-        LinkJoint::Hinge(AxisJoint { axis, .. }) => {
-            let (anchor_m, direction) = (axis.anchor_m.as_vec3(), axis.direction.as_vec3());
-            let turned = Rotation::from_axis_angle(direction, end(axis.range?));
-            Some(Pose::from_parts(anchor_m - turned * anchor_m, turned))
-        }
-        LinkJoint::Slide(AxisJoint { axis, .. }) => {
-            Some(Pose::from_translation(axis.direction.as_vec3() * end(axis.range?)))
         }
     }
 }
