@@ -348,7 +348,7 @@ mod tests {
         let number = |task: &Task, seed: u32| EpisodeMoment::number_of(task, seed);
         let mut numbers = std::collections::BTreeSet::new();
         let folder = tempfile::tempdir().unwrap();
-        let text = include_str!("../../../examples/tasks/pass_the_parcel.toml");
+        let text = include_str!("../../examples/tasks/pass_the_parcel.toml");
         let own = [text.to_owned(), text.replace("parcel", "packet")].map(|text| {
             let path = folder.path().join("task.toml");
             std::fs::write(&path, text).unwrap();
