@@ -11,7 +11,7 @@ use super::pages::{BOOK, page, root};
 fn documents_weigh_objects_as_their_files_do() {
     for task in tasks::cohub() {
         let parts =
-            |spot: &ObjectSpot| ObjectModel::parts(&spot.source(), &spot.name).expect("an object of a task");
+            |spot: &ObjectSpot| ObjectModel::parts(&spot.source, &spot.name).expect("an object of a task");
         let file = |spot: &ObjectSpot| assets::object(&spot.file).expect("an object of a task");
         let all: Vec<ObjectPart> = task.objects.iter().flat_map(parts).collect();
         let whole_kg = |spot: &ObjectSpot| parts(spot).iter().map(|part| part.model.mass_kg).sum();
