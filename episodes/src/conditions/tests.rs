@@ -1,5 +1,7 @@
 //! Tests of conditions, valid and invalid.
 
+use tandem_sim::{ObjectFile, OpeningKind};
+
 use super::*;
 use crate::scoring::{A, Facts, Grip, Predicate};
 use crate::tasks;
@@ -13,6 +15,24 @@ fn names() -> Names {
         objects: parts.map(|part| (part.name, Arc::new(part.model))).collect(),
         ..Names::default()
     }
+}
+
+/// Returns the same names, with a bottle that a joint of this kind carries.
+fn names_with_joint(kind: OpeningKind) -> Names {
+    let joint = match kind {
+        OpeningKind::Hinge => "hinge",
+        OpeningKind::Slide => "slide",
+    };
+    let mjcf = format!(
+        r#"<mujoco><worldbody><body name="post"><geom size="0.1"/><body name="leaf">
+          <joint type="{joint}" axis="0 0 1" range="0 1"/><geom size="0.1" pos="0 0 0.5"/></body></body></worldbody></mujoco>"#
+    );
+    let post = ObjectFile::Text { name: "post.xml".into(), mjcf };
+    let parts = ObjectModel::parts(&post, "post").unwrap();
+    let leaf = parts.into_iter().find(|part| part.model.opening.is_some()).unwrap();
+    let mut names = names();
+    names.objects.insert("bottle".into(), Arc::new(leaf.model));
+    names
 }
 
 fn rest() -> Facts {
@@ -143,15 +163,20 @@ fn every_fact_can_be_asked_for_and_is_what_it_says() {
             functions::Parameter::Robot => "'A'",
             functions::Parameter::Robots => "['A', 'B']",
             functions::Parameter::Side => "'left'",
-            functions::Parameter::Object => "'bottle'",
+            functions::Parameter::Object | functions::Parameter::Opening(_) => "'bottle'",
             functions::Parameter::Site { .. } => "'grip_low'",
             functions::Parameter::Number(_) => "1",
             functions::Parameter::Numbers => "[1, 2]",
             functions::Parameter::Truth => "true",
         };
+        let joint = function.parameters.iter().find_map(|parameter| match parameter {
+            functions::Parameter::Opening(kind) => Some(*kind),
+            _ => None,
+        });
+        let names = joint.map_or_else(names, names_with_joint);
         let arguments: Vec<&str> = function.parameters.iter().map(argument).collect();
         let text = format!("{}({})", function.name, arguments.join(", "));
-        match term(&text, &names()).unwrap_or_else(|mistake| panic!("{text}: {mistake:?}")) {
+        match term(&text, &names).unwrap_or_else(|mistake| panic!("{text}: {mistake:?}")) {
             Meaning::Truth(truth) => {
                 let nearness = truth.nearness(&rest());
                 assert!((0.0..=1.0).contains(&nearness) && truth.always().is_none(), "{text}: {nearness}");

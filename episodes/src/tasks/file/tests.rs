@@ -403,7 +403,7 @@ fn bodies_of_the_scene_are_objects_once_they_are_named() {
     let done = r#"opened_m("drawer") > 0.1 && opened_deg("door") > 30 && lift_m("Mug_1") > 0.1"#;
     let task = in_house(house.path(), &objects, done).unwrap_or_else(|error| panic!("{error}"));
     let spec = EpisodeSpec::new(&task, 2000, Protocol::Benchmark);
-    let mut session = crate::Session::start(&spec, None).unwrap();
+    let session = crate::Session::start(&spec, None).unwrap();
     let before = session.facts();
     let by_m = task.start_poses(2000, Default::default())[2].position_m[0] - 1.0;
     assert!((before.position_m("Mug_1").x - 1.0 - by_m).abs() < 1e-6 && by_m.abs() > 1e-3, "{by_m}");
@@ -414,7 +414,7 @@ fn bodies_of_the_scene_are_objects_once_they_are_named() {
     let read: EpisodeSpec = serde_json::from_str(&text).unwrap();
     assert_eq!(read.task, task);
     session.close();
-    drop((session, read, task, spec));
+    drop((read, task, spec));
     let tent = house.path().join("tent.obj");
     std::fs::write(&tent, std::fs::read_to_string(&tent).unwrap().replace("0.3", "0.4")).unwrap();
     let error = serde_json::from_str::<EpisodeSpec>(&text).unwrap_err().to_string();
