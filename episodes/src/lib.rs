@@ -36,7 +36,6 @@ mod recording;
 pub mod replay;
 mod result_file;
 pub mod rows;
-mod scene_file;
 mod scoring;
 mod session;
 mod spec;
@@ -65,7 +64,6 @@ pub use recording::{
     RecoverError, Recovered, ShownPicture, ToolCallMessage, TranscriptEntry, Visibility, recover,
 };
 pub use result_file::{RESULT_FILE, write_result};
-pub use scene_file::SceneFile;
 pub use scoring::{
     A, B, C, Done, Facts, Grip, Milestone, ObjectFacts, Phase, Predicate, RobotFacts, Scores, StepScore,
 };
@@ -82,6 +80,6 @@ pub use tandem_sim::{
     joint_names, read_bytes, read_text,
     render::RendererKind,
 };
-pub use tasks::{TANDEM_PLUS, TaskFileError, read_task, tandem_plus, task_of};
+pub use tasks::{SceneFile, TANDEM_PLUS, TaskFileError, read_task, tandem_plus, task_of};
 pub use variation::Variation;
 pub use words::OwnWords;

@@ -16,10 +16,9 @@ use tandem_tools_spec::{Assistance, Disclosure, Hints, Operators, Protocol, Word
 
 use crate::error::RobotError;
 use crate::protocol::{Rules, rules};
-use crate::scene_file::SceneFile;
 use crate::scoring::Phase;
 use crate::stress::{self, Stress};
-use crate::tasks::{Spread, Task, TaskOrigin, TaskWords};
+use crate::tasks::{SceneFile, Spread, Task, TaskOrigin, TaskWords};
 use crate::variation::Variation;
 use crate::words::OwnWords;
 

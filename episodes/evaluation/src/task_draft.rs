@@ -33,7 +33,7 @@ pub struct TaskDraft {
     pub bodies: Vec<String>,
     /// The task's file.
     pub text: String,
-    /// What its author has to decide, a line each.
+    /// Decisions that are left to its author, a line each.
     pub notes: Vec<String>,
 }
 

@@ -100,7 +100,8 @@ impl FactsTracker {
                 rest_height_m: memory.rest_height_m,
                 hands: memory.grasps.grips(),
                 untouched_s: memory.grasps.untouched_s(),
-                opened: opening.map(|(opening, carrier)| opening.opened(&carrier, &state.world_from_object)),
+                opened_value: opening
+                    .map(|(opening, carrier)| opening.opened(&carrier, &state.world_from_object)),
             })
         });
         Facts { time_s: step.time_s, robots: robots.collect(), objects: objects.collect() }

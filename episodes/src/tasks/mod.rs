@@ -7,6 +7,7 @@
 mod embedded;
 mod file;
 mod randomize;
+mod scene_file;
 mod set;
 mod task;
 #[cfg(test)]
@@ -15,6 +16,7 @@ mod tests;
 pub use embedded::TANDEM_PLUS;
 pub use file::{TaskFileError, by_id_or_file, read_task, task_of};
 pub use randomize::{Offset, Spread, StartPose};
+pub use scene_file::SceneFile;
 pub use set::embedded_task;
 pub use set::{TaskSet, built_in, cohub, find, in_order, tandem_plus};
 pub use task::Task;
@@ -27,7 +29,6 @@ use tandem_sim::mjcf::Document;
 use tandem_sim::{ObjectFile, ObjectModel, ObjectPart, Pose, RobotModel, Rotation, SimError, Step};
 
 use crate::conditions::{ConditionPart, OF_FINGERS, Truth};
-use crate::scene_file::SceneFile;
 use crate::scoring::{Phase, Scores};
 
 /// A task as its file defines it.

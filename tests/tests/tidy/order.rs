@@ -31,7 +31,6 @@ const ORDER: &[(&str, &[&[&str]])] = &[
         &[
             &["output", "locks", "html", "fingerprint", "scoring", "convert"],
             &["error", "conditions", "result_file"],
-            &["scene_file"],
             &["tasks"],
             &["variation", "words", "protocol"],
             &["stress"],

@@ -26,7 +26,7 @@ impl Facts {
         let part = |world_from_object: Pose, part: ObjectPart| {
             let pose_in_world = world_from_object * part.object_from_part;
             ObjectFacts {
-                opened: part.model.opening.as_ref().map(|_| 0.0),
+                opened_value: part.model.opening.as_ref().map(|_| 0.0),
                 name: part.name,
                 model: part.model.into(),
                 pose_in_world,

@@ -55,7 +55,7 @@ pub struct ObjectFacts {
     pub untouched_s: f64,
     /// Motion of its hinge (rad) or slide (m) from the pose in the file, positive towards the farther end of
     /// the range; `None` if it has neither.
-    pub opened: Option<f32>,
+    pub opened_value: Option<f32>,
 }
 
 /// Contact of a hand with an object.
@@ -135,7 +135,7 @@ impl Facts {
 
     /// Returns how far the hinge (rad) or the slide (m) of `object` has moved from its pose in the file.
     pub fn opened(&self, object: &str) -> f32 {
-        self.object(object).opened.unwrap_or_default()
+        self.object(object).opened_value.unwrap_or_default()
     }
 
     pub fn speed_m_s(&self, object: &str) -> f32 {

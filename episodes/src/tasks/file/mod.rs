@@ -27,9 +27,8 @@ use xxhash_rust::xxh3::xxh3_64;
 
 pub use error::TaskFileError;
 
-use crate::scene_file::SceneFile;
 use crate::tasks::task::TaskFile;
-use crate::tasks::{self, Task, TaskDefinition, TaskSource};
+use crate::tasks::{self, SceneFile, Task, TaskDefinition, TaskSource};
 
 /// The files in use. Reading one takes about 5 ms for each of its variants, and the results of a run may
 /// refer to the same file thousands of times.

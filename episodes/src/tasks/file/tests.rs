@@ -360,7 +360,7 @@ fn files_beside_it_belong_to_it() {
     assert!(error.contains("room.xml:1") && error.contains("names no other file"), "{error}");
 }
 
-/// A house with a chest of drawers and a mug; its chest is a mesh in a file of its own.
+/// Writes a house with a chest of drawers and a mug; its chest is a mesh in a file of its own.
 fn house() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();

@@ -32,7 +32,7 @@ fn two_robots_put_a_tin_into_a_drawer() {
     for (steps, at_m) in [(40, [0.1, -0.26, 0.22]), (30, [0.18, -0.26, 0.22]), (30, [0.18, -0.26, 0.07])] {
         reach(&mut session, "A", steps, at_m);
     }
-    reach(&mut session, "A", 60, [0.18, 0.0, 0.07]);
+    reach(&mut session, "A", 50, [0.18, 0.0, 0.07]);
     let facts = session.facts();
     let opened_m = facts.opened("kitchen_chest_0_drawer");
     let moved_m = -facts.position_m("kitchen_chest_0_drawer").x;
@@ -40,9 +40,9 @@ fn two_robots_put_a_tin_into_a_drawer() {
     for (steps, at_m) in [(40, [0.1, 0.3, 0.22]), (30, [0.2, 0.3, 0.22]), (30, [0.2, 0.3, 0.07])] {
         reach(&mut session, "B", steps, at_m);
     }
-    reach(&mut session, "B", 60, [0.2, -0.02, 0.07]);
+    reach(&mut session, "B", 50, [0.2, -0.02, 0.07]);
     reach(&mut session, "B", 40, [0.1, 0.2, 0.22]);
-    reach(&mut session, "A", 60, [0.18, -0.26, 0.07]);
+    reach(&mut session, "A", 50, [0.18, -0.26, 0.07]);
     reach(&mut session, "A", 30, [0.1, -0.26, 0.22]);
     wait(&mut session, 50);
     let result = session.close();
