@@ -163,7 +163,7 @@ Policy: TypeAlias = Callable[[Episode], object] | Literal["expert", "idle"]
 
 def evaluate(
     policy: Policy,
-    tasks: str | Iterable[str] = "all",
+    tasks: str | Iterable[str] | None = None,
     seeds: int | Iterable[int] = range(10),
     jobs: int = 1,
     **settings: Unpack[EvaluationSettings],
@@ -175,7 +175,8 @@ def evaluate(
             exceptions end only the current episode, which is not counted. The first one is printed, and if the first
             three episodes end with the same one, the evaluation ends. The end of an episode is not such an exception.
             "expert" is the task's scripted expert, which sees object poses; "idle" holds still.
-        tasks: A task's id, or several; "all" for the benchmark's ten, "tandem+" for that suite.
+        tasks: A task's id, or several; "all" for the benchmark's ten, "tandem+" for that suite. None: "all". With
+            `task_file`, name its task, or others.
         seeds: A seed, or several.
         jobs: Number of parallel episodes, each on its own thread, on which the policy is called. Physics and rendering
             run in parallel; Python code of policies does not.
@@ -188,7 +189,7 @@ def evaluate(
 
 
 def collect(
-    tasks: str | Iterable[str] = "all",
+    tasks: str | Iterable[str] | None = None,
     seeds: int | Iterable[int] = range(10),
     jobs: int = 1,
     **settings: Unpack[EvaluationSettings],
@@ -197,7 +198,7 @@ def collect(
     are in the folder `episodes` of `out`. By default, `out` is a folder in runs/ that is named after all settings.
     """
     # Both are iterated twice.
-    tasks, seeds = task_ids(tasks), seed_list(seeds)
+    tasks, seeds = task_ids(tasks, settings), seed_list(seeds)
     return evaluate("expert", tasks, seeds, jobs, **demonstrations(tasks, seeds, settings))
 
 
@@ -230,7 +231,7 @@ class Plan:
     progress: Callable[[ResultReply], object] | None = None
 
     @staticmethod
-    def of(policy: Policy, tasks: str | Iterable[str], seeds: int | Iterable[int], settings: EvaluationSettings) -> Plan:
+    def of(policy: Policy, tasks: str | Iterable[str] | None, seeds: int | Iterable[int], settings: EvaluationSettings) -> Plan:
         """Creates the plan from an evaluation's arguments."""
         unknown = settings.keys() - EvaluationSettings.__annotations__.keys()
         if unknown:
@@ -260,7 +261,7 @@ class Plan:
                 instructions=None if instructions is None else Path(instructions),
             ),
             protocol=settings.get("protocol", "agentic"),
-            tasks=task_ids(tasks),
+            tasks=task_ids(tasks, settings),
             seeds=seed_list(seeds),
             record=settings.get("record", False),
             existing=_existing(settings),
@@ -381,12 +382,14 @@ def _existing(settings: EvaluationSettings) -> Literal["refuse", "resume_with_ne
     return "overwrite" if overwrite else "resume_with_new_build" if resume else "refuse"
 
 
-def task_ids(named: str | Iterable[str]) -> list[str]:
+def task_ids(named: str | Iterable[str] | None, settings: EvaluationSettings) -> list[str]:
     """Returns the ids of tasks that are named individually, or by their suite."""
-    if not isinstance(named, str):
+    if named is None and settings.get("task_file") is not None:
+        raise TandemError("a task file, and no `tasks`; name the file's task by its id, or others")
+    if not isinstance(named, str | None):
         return list(named)
-    suite = None if named == "all" else named
-    return [task.id for task in tasks().tasks if task.suite == suite] or [named]
+    suite = None if named in (None, "all") else named
+    return [task.id for task in tasks().tasks if task.suite == suite] or [str(named)]
 
 
 def seed_list(given: int | Iterable[int]) -> list[int]:

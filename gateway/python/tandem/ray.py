@@ -49,7 +49,7 @@ _COLOURS = "\x1b\\[[0-9;]*m"
 
 def evaluate(
     policy: Policy,
-    tasks: str | Iterable[str] = "all",
+    tasks: str | Iterable[str] | None = None,
     seeds: int | Iterable[int] = range(10),
     jobs: int | None = None,
     *,
@@ -96,7 +96,7 @@ def evaluate(
 
 
 def collect(
-    tasks: str | Iterable[str] = "all",
+    tasks: str | Iterable[str] | None = None,
     seeds: int | Iterable[int] = range(10),
     jobs: int | None = None,
     *,
@@ -105,7 +105,7 @@ def collect(
     **settings: Unpack[EvaluationSettings],
 ) -> Evaluation:
     """Does the same as `tandem.collect`, in the processes of a cluster; see `evaluate`."""
-    tasks, seeds = task_ids(tasks), seed_list(seeds)
+    tasks, seeds = task_ids(tasks, settings), seed_list(seeds)
     whole = demonstrations(tasks, seeds, settings)
     return evaluate("expert", tasks, seeds, jobs, retries=retries, task_options=task_options, **whole)
 

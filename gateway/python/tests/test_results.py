@@ -128,11 +128,13 @@ def test_a_callable_is_evaluated(tmp_path: Path) -> None:
         tandem.report(tmp_path / "nothing")
     with pytest.raises(tandem.TandemError, match="have: handover"):
         tandem.evaluate(walk_a_little, "handove", 2007)
+    with pytest.raises(tandem.TandemError, match="no `tasks`; name the file's task by its id"):
+        tandem.evaluate(walk_a_little, task_file="own.toml")
 
 
 def test_episodes_are_rows_of_parquet(tmp_path: Path) -> None:
     parquet: Any = pytest.importorskip("pyarrow.parquet")
-    kept = tandem.evaluate(walk_a_little, "handover", range(2007, 2010), protocol="benchmark", out=tmp_path)
+    kept = tandem.evaluate(walk_a_little, "handover", range(2007, 2010), protocol="benchmark", assistance="full", out=tmp_path)
     head = tandem.report(tmp_path, format="episodes.csv").read_text().splitlines()[0]
     table = parquet.read_table(tandem.report(tmp_path, format="episodes.parquet"))
     assert table.column_names == head.split(",")
