@@ -273,7 +273,7 @@ impl Checker<'_> {
         found.ok_or_else(|| unknown(node, "robot", name, self.names.robots.iter().map(String::as_str)))
     }
 
-    /// Returns an object that has a hinge or a slide, as `kind` says.
+    /// Returns the object that a node names. Its joint must be of this kind.
     fn opening(&self, function: &Function, node: &Node, kind: OpeningKind) -> Result<Argument, Mistake> {
         let name = self.argument(function, Parameter::Object, node, &[])?;
         let opens = |object: &Arc<ObjectModel>| object.opening.as_ref().is_some_and(|one| one.kind == kind);

@@ -25,8 +25,8 @@ const ROOM_FRAME: &str = "The pelvis frames of different robots are unrelated, a
     odometry is right.";
 
 /// Text for policies whose frames `NAMED_FRAMES` describes.
-const ODOMETRY: &str = "pelvis_in_start is the pose of a robot's pelvis in its \"start\" frame by its own IMU and \
-    joints. It drifts by up to 1 % of the way walked. Replies to commands tell it of robots that have moved.";
+const ODOMETRY: &str = "pelvis_in_start is the pose of a robot's pelvis in its \"start\" frame by its own \
+    IMU and joints. It drifts by up to 1 % of the way walked. Replies to commands tell it of robots that have moved.";
 
 const CAMERA: &str = "The camera is in the head, above the waist: waist joints turn and tilt it, and wrist \
     targets may move the waist, so take camera_in_pelvis from the latest observe. Its axes are x right, y \
@@ -98,8 +98,8 @@ const WALKING: &str = "A robot that is told to walk gains way after 0.3 to 0.5 s
     cm to each side, twice a second: mean over half a second what you steer by, or have walk_to do it. \
     base.state says \"standing\" (a short reply then has no base), \"stepping\", \"settling\" (told to stop, \
     or the pelvis still rises; comes_to_rest_m says where it will stand) or \"pushed\": it steps because its \
-    hands or a partner pull it, drifts and sinks by 10 cm. Then free what pulls: loosen wrist targets, give way with \
-    compliance_n_s_m, or walk the way it is pulled. Arms that reach more than 0.35 m ahead make a robot \
+    hands or a partner pull it, drifts and sinks by 10 cm. Then free what pulls: loosen wrist targets, \
+    give way with compliance_n_s_m, or walk the way it is pulled. Arms that reach more than 0.35 m ahead make a robot \
     step, too: walk nearer instead, or ask for stand_fast.";
 
 const TEAMWORK: &str = "Each robot has an operator of its own; your tools see and move your robot alone. Time \

@@ -42,7 +42,9 @@ impl Document {
         let what = if let Some(whole) = bodies.iter().find(is_part) {
             format!("body {name:?} is a part of {:?}, on which no joint moves it; name that", whole.link.name)
         } else if self.model.bodies.iter().any(|entry| entry.body.name.as_deref() == Some(name)) {
-            format!("body {name:?} has no joint and never moves; a fixed mark can lie there, as `target_pad`")
+            format!(
+                "body {name:?} has no joint and never moves; put a fixed mark there, for example `target_pad`"
+            )
         } else {
             let have: Vec<&str> = bodies.iter().map(|body| body.link.name.as_str()).collect();
             let have = if have.is_empty() { "none".into() } else { have.join(", ") };

@@ -226,13 +226,13 @@ impl CurrentCommand {
         reply: &CommandReply,
         (news, words): (&PartnerNews, &Option<String>),
     ) -> CommandProgress {
-        let missing = |is_way_done: bool, are_fingers_done: bool| {
-            unexpected(&step.expects, reply, PlanMoment { news, is_way_done, are_fingers_done })
-        };
+        let missing = |moment: PlanMoment| unexpected(&step.expects, reply, moment);
+        let done = PlanMoment { news, is_way_done: true, are_fingers_done: true };
         match self {
-            CurrentCommand::Whole => CommandProgress::Over(missing(true, true)),
+            CurrentCommand::Whole => CommandProgress::Over(missing(done)),
             CurrentCommand::Until(mut pieces) => {
-                let missing = missing(pieces.is_way_done(), pieces.are_fingers_done());
+                let (is_way_done, are_fingers_done) = (pieces.is_way_done(), pieces.are_fingers_done());
+                let missing = missing(PlanMoment { is_way_done, are_fingers_done, ..done });
                 match (missing, pieces.next_piece()) {
                     (None, _) => CommandProgress::Over(None),
                     (_, Some(_)) if words.is_some() => CommandProgress::Over(words.clone()),
@@ -249,9 +249,7 @@ impl CurrentCommand {
                 };
                 match next {
                     PlanAdvance::Make(call) => CommandProgress::Make(call, CurrentCommand::Walk(walkers)),
-                    PlanAdvance::Done(stopped) => {
-                        CommandProgress::Over(stopped.or_else(|| missing(true, true)))
-                    }
+                    PlanAdvance::Done(stopped) => CommandProgress::Over(stopped.or_else(|| missing(done))),
                 }
             }
         }

@@ -105,8 +105,8 @@ fn shorten_command(reply: &mut CommandReply) {
     shorten_report(reply, reply.executed_steps, false);
 }
 
-/// Shortens the reply to the last command of a call of so many control steps. It may tell the pelvises of
-/// robots that have not moved during that command.
+/// Shortens the reply to the last command of a call that took `executed_steps`. With `tells_pelvises`, it keeps
+/// the pelvises of robots that have not moved during that command.
 fn shorten_report(reply: &mut CommandReply, executed_steps: u32, tells_pelvises: bool) {
     reply.fallen.retain(|robot| robot.fallen);
     // Half a step before the first one, against rounding.

@@ -3,7 +3,6 @@
 use std::process::ExitCode;
 
 use clap::{Subcommand, builder::PossibleValuesParser};
-
 use tandem_policies::{PRESETS, PolicyMap, preset, try_map};
 
 use super::{CommandResult, print};
