@@ -3,6 +3,7 @@
 //! [`Scenery`] is everything visible, built once per world; a [`Step`] gives the poses; a [`Renderer`],
 //! chosen by [`RendererKind`], draws it. The embedded one has no system requirements.
 
+mod baked;
 mod blur;
 mod cpu;
 #[cfg(feature = "gpu")]

@@ -1,5 +1,6 @@
 //! Blending of layers of surfaces over the pixels of an image.
 
+use super::baked::StripLight;
 use super::shade::Strip;
 use super::target::RenderTarget;
 use super::view::{Row, View};
@@ -54,6 +55,7 @@ impl View<'_> {
                     first_pixel: x,
                     count: 1,
                     share: covered as f32 / PER_PIXEL as f32,
+                    light: StripLight::of(self.prepared, self.cubes, *sheet),
                     alpha: Some(self.prepared.scenery.parts[part].alpha),
                     has_lamps: self.lamps.is_some(),
                 };

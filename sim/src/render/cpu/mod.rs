@@ -1,5 +1,6 @@
 //! The embedded renderer: a visibility buffer of triangle numbers, shaded afterwards, four samples a pixel.
 
+mod baked;
 mod blend;
 pub mod contact;
 mod images;
@@ -20,10 +21,12 @@ use std::thread;
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::Step;
+use crate::render::baked::LightCube;
 use crate::render::blur::blurred;
 use crate::render::scene::prepared::Prepared;
 use crate::render::shading::srgb::SrgbTable;
 use crate::render::{Camera, Frame, Part, PlacedScenery, Renderer, Scenery, Wanted};
+use baked::place_cubes;
 use contact::ContactMap;
 use lamps::LitLamps;
 use shade::{Facet, Rays};
@@ -52,6 +55,8 @@ struct LitState {
     lamps: LitLamps,
     contact: ContactMap,
     facets: Vec<Facet>,
+    /// Light on each part that moves, by the parts' numbers.
+    cubes: Vec<LightCube>,
 }
 
 impl LitState {
@@ -80,7 +85,7 @@ impl CpuRenderer {
     pub(super) fn new(scenery: Scenery) -> CpuRenderer {
         static RENDERERS: AtomicU64 = AtomicU64::new(0);
         CpuRenderer {
-            prepared: Prepared::new(scenery),
+            prepared: Prepared::lit(scenery),
             srgb: SrgbTable::default(),
             number: RENDERERS.fetch_add(1, Ordering::Relaxed),
         }
@@ -158,6 +163,7 @@ impl WithSimd for StateDrawing<'_> {
         }
         state.contact.draw(prepared, &placed);
         shade::place(&mut state.facets, prepared, &placed, &state.placed);
+        place_cubes(&mut state.cubes, prepared, &placed, &state.placed);
         state.placed = placed;
     }
 }
@@ -185,6 +191,7 @@ impl WithSimd for PictureDrawing<'_> {
         let mut view = View {
             prepared,
             facets: &state.facets,
+            cubes: &state.cubes,
             target: samples,
             veils,
             shadow: &state.shadow,

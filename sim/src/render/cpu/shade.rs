@@ -3,6 +3,7 @@
 
 use rapier3d::math::{Matrix, Pose, Vector};
 
+use super::baked::StripLight;
 use super::contact::ContactMap;
 use super::shadow::ShadowMap;
 use crate::mjcf::Gloss;
@@ -59,6 +60,8 @@ pub(super) struct Strip<'a> {
     pub share: f32,
     /// Alpha of a blended part; `None` for a solid one.
     pub alpha: Option<f32>,
+    /// Baked light of the sheet.
+    pub light: StripLight<'a>,
     /// True if lamps light the scenery, which need more of a surface than a sun does.
     pub has_lamps: bool,
 }
@@ -78,6 +81,9 @@ pub(super) struct Surfaces {
     metallic_share: [f32; ROOM],
     /// Colours of images alone, for lamps; 1 without.
     pub texture: Vectors,
+    /// Baked light, and the share of it that things shadow.
+    pub baked: Vectors,
+    lamp_share: [f32; ROOM],
     /// Share of light that contact shadows leave.
     open_share: [f32; ROOM],
     /// The pixel of each point, and its weight there.
@@ -106,8 +112,17 @@ impl Vectors {
         )
     }
 
+    /// Returns the vectors of fewer points.
     #[inline(always)]
-    fn set<const N: usize>(&mut self, at: usize, values: [Lanes<N>; 3]) {
+    pub(super) fn read<const N: usize>(&self, at: usize) -> [Lanes<N>; 3] {
+        axes(
+            #[inline(always)]
+            |axis| lanes(|i| self.0[axis][at + i]),
+        )
+    }
+
+    #[inline(always)]
+    pub(super) fn set<const N: usize>(&mut self, at: usize, values: [Lanes<N>; 3]) {
         for (numbers, values) in self.0.iter_mut().zip(values) {
             *block_mut(numbers, at) = values;
         }
@@ -217,6 +232,8 @@ impl Surfaces {
             gloss: Vectors::ZERO,
             metallic_share: [0.0; ROOM],
             texture: Vectors::ZERO,
+            baked: Vectors::ZERO,
+            lamp_share: [0.0; ROOM],
             open_share: [1.0; ROOM],
             pixels: [0; ROOM],
             pixel_share: [0.0; ROOM],
@@ -270,6 +287,7 @@ impl Surfaces {
             self.ray.set(at, ray);
             self.point_m.set(at, point_m);
             let alpha = self.set_surface(at, rays, strip, [&ray, &point_m], &depth_m);
+            self.set_baked(at, strip, &point_m);
             *block_mut(&mut self.pixel_share, at) = match strip.alpha {
                 None => [strip.share; N],
                 Some(of_part) => lanes(|i| strip.share * opacity(of_part * alpha[i])),
@@ -320,6 +338,19 @@ impl Surfaces {
         *block_mut(&mut self.metallic_share, at) = metallic;
     }
 
+    #[inline(always)]
+    pub(super) fn set_lamp_share<const N: usize>(&mut self, at: usize, share: Lanes<N>) {
+        *block_mut(&mut self.lamp_share, at) = share;
+    }
+
+    /// Returns cosines to the sun, shares of its light, highlights, and shares of the baked light that things
+    /// shadow.
+    #[inline(always)]
+    pub(super) fn towards_sun(&self, at: usize) -> [Lanes; 4] {
+        [&self.sun_factor, &self.sunlit_share, &self.highlight_factor, &self.lamp_share]
+            .map(|values| *block(values, at))
+    }
+
     /// Adds the shares of all pushed points to those of their pixels.
     pub(super) fn add_shares(&self, pixel_share: &mut [f32]) {
         for (pixel, share) in self.pixels.iter().zip(&self.pixel_share).take(self.count) {
@@ -345,9 +376,16 @@ impl Surfaces {
         *block(&self.metallic_share, at)
     }
 
-    /// Adds the linear colours of all pushed points to those of their pixels, and clears the points.
+    /// Adds the linear colours of all pushed points to those of their pixels, and clears the points. `tint`
+    /// multiplies baked light; without, sun and sky light them.
     #[inline(always)]
-    pub(super) fn shade(&mut self, light: &Light, shadow: &ShadowMap, sum_rgb: &mut [Vec<f32>; 3]) {
+    pub(super) fn shade(
+        &mut self,
+        light: &Light,
+        tint: Option<[f32; 3]>,
+        shadow: &ShadowMap,
+        sum_rgb: &mut [Vec<f32>; 3],
+    ) {
         let count = std::mem::take(&mut self.count);
         for at in (0..count).step_by(LANES) {
             self.face(at, light, shadow);
@@ -357,11 +395,17 @@ impl Surfaces {
                 #[inline(always)]
                 |axis| self.texel.0[axis][i],
             );
-            self.sunlit_share[i] =
-                if self.sun_factor[i] > 0.0 { shadow.sunlit(texel, self.cell[i]) } else { 0.0 };
+            self.sunlit_share[i] = match tint {
+                _ if self.sun_factor[i] <= 0.0 => 0.0,
+                None => shadow.sunlit(texel, self.cell[i]),
+                Some(_) => shadow.lamplit(texel, self.cell[i]),
+            };
         }
         for at in (0..count).step_by(LANES) {
-            let colours = self.lit(at, light);
+            let colours = match tint {
+                None => self.lit(at, light),
+                Some(tint) => self.lit_by_baked(at, tint),
+            };
             let first = self.pixels[at];
             let beside =
                 (first..).zip(&self.pixels[at..at + LANES]).fold(true, |all, (i, pixel)| all & (i == *pixel));

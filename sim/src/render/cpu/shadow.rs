@@ -6,6 +6,7 @@ use pulp::Simd;
 use rapier3d::math::Vector;
 
 use super::raster::{Grid, Outlines, SampleRows, TriangleBatch, larger, smaller, whole_f32};
+use crate::render::baked::lamp_shadow;
 use crate::render::scene::prepared::Prepared;
 use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
 use crate::render::shading::{BIAS_M, FADE_TEXELS, TEXELS, normal_offset_m, sun_map};
@@ -175,6 +176,38 @@ impl ShadowMap {
             1.0 - (1.0 - lit) * (to_border / FADE_TEXELS).min(1.0)
         } else {
             1.0
+        }
+    }
+
+    /// Returns the light of a wide lamp in the sun's direction, as [`ShadowMap::sunlit`] does: things far from
+    /// a surface take less of it.
+    #[inline(always)]
+    pub(super) fn lamplit(&self, [u, v, nearness_m]: [f32; 3], cell: u32) -> f32 {
+        let [_, greatest_m] = self.all.cells_m[cell as usize];
+        if nearness_m >= greatest_m {
+            return 1.0;
+        }
+        let (mut blocked, mut distance_m) = (0.0, 0.0);
+        self.for_each_tap([u, v], |weight, occluder_m| {
+            let share = if nearness_m >= occluder_m { 0.0 } else { weight };
+            blocked += share;
+            distance_m += share * (occluder_m - nearness_m);
+        });
+        let last = (TEXELS - 1) as f32;
+        let to_border = u.min(last - u).min(v.min(last - v));
+        1.0 - lamp_shadow(blocked, distance_m) * (to_border / FADE_TEXELS).min(1.0)
+    }
+
+    /// Visits the taps of a filter with their weights, whose sum is 1.
+    #[inline(always)]
+    fn for_each_tap(&self, [u, v]: [f32; 2], mut visit: impl FnMut(f32, f32)) {
+        let (column, row) = (usize::from(u as u16), usize::from(v as u16));
+        let weights = |part: f32| [1.0 - part, 1.0, 1.0, part].map(|weight| weight / 3.0);
+        let (across, down) = (weights(u - column as f32), weights(v - row as f32));
+        for (down, occluders) in down.into_iter().zip(self.all.nearness_m.rows_from(row - 1, column - 1)) {
+            for (across, occluder_m) in across.into_iter().zip(occluders) {
+                visit(across * down, *occluder_m);
+            }
         }
     }
 

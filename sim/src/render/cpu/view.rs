@@ -2,12 +2,14 @@
 
 use std::ops::Range;
 
+use super::baked::StripLight;
 use super::contact::ContactMap;
 use super::lamps::LitLamps;
 use super::shade::{Facet, Rays, Strip, Surfaces};
 use super::shadow::ShadowMap;
 use super::target::RenderTarget;
 use super::veil::Veils;
+use crate::render::baked::LightCube;
 use crate::render::scene::prepared::{NOTHING, Prepared};
 use crate::render::shading::srgb::SrgbTable;
 use crate::render::shading::{OUTLINE, OUTLINE_DEPTH_STEP, SAMPLES, SKY};
@@ -24,6 +26,8 @@ pub(super) struct View<'a> {
     pub prepared: &'a Prepared,
     /// The facet of each sheet.
     pub facets: &'a [Facet],
+    /// Light on each part that moves.
+    pub cubes: &'a [LightCube],
     pub target: &'a mut RenderTarget,
     pub veils: &'a Veils,
     pub shadow: &'a ShadowMap,
@@ -107,7 +111,10 @@ impl View<'_> {
     #[inline(always)]
     pub(super) fn shade(&self, surfaces: &mut Surfaces, sum_rgb: &mut [Vec<f32>; 3]) {
         match self.lamps {
-            None => surfaces.shade(&self.prepared.scenery.light, self.shadow, sum_rgb),
+            None => {
+                let light = &self.prepared.scenery.light;
+                surfaces.shade(light, self.prepared.tint(), self.shadow, sum_rgb);
+            }
             Some(lamps) => surfaces.shade_by_lamps(lamps, self.rays.back_direction, sum_rgb),
         }
     }
@@ -140,6 +147,7 @@ impl View<'_> {
             count: pixels.len(),
             share,
             alpha: None,
+            light: StripLight::of(self.prepared, self.cubes, sheet),
             has_lamps: self.lamps.is_some(),
         };
         row.surfaces.push(&self.rays, self.contact, &strip);
@@ -155,7 +163,11 @@ impl View<'_> {
         let [above, here, below] = &seen;
         let ids = [self.ids(above), self.ids(here), self.ids(below)];
         let one_thing = ids.as_flattened().iter().all(|id| *id == ids[0][0]);
-        let edges = if one_thing { 0 } else { self.outlines(y, columns, &seen, &ids) };
+        let edges = if one_thing || self.prepared.baked.is_some() {
+            0
+        } else {
+            self.outlines(y, columns, &seen, &ids)
+        };
         let share = 1.0 - OUTLINE * (edges as f32 / (2 * SAMPLES) as f32).min(1.0);
         let sheets = [seen[0][0], seen[0][1], seen[1][0], seen[1][1]];
         for (i, sheet) in sheets.iter().enumerate() {

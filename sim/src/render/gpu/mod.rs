@@ -1,6 +1,7 @@
 //! The GPU renderer, by wgpu. It draws the same images as the embedded renderer, in the same steps: the
 //! triangle that each sample sees, then its colour. The two check each other.
 
+mod baked;
 mod device;
 mod images;
 mod passes;
@@ -85,7 +86,7 @@ fn open() -> Result<Arc<Gpu>, GpuError> {
 
 impl GpuRenderer {
     fn new(gpu: Arc<Gpu>, scenery: Scenery) -> GpuRenderer {
-        let prepared = Prepared::new(scenery);
+        let prepared = Prepared::lit(scenery);
         let lamps = prepared.scenery.lamps.as_ref().map_or(1, |lamps| lamps.lamps.len().max(1));
         let (scene, shadow) = (SceneBuffers::new(&gpu, &prepared), shadow_maps(&gpu, lamps as u32));
         GpuRenderer {

@@ -15,7 +15,7 @@ pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 pub(super) const TRIANGLES: TextureFormat = TextureFormat::R32Uint;
 
 /// Number of storage buffers of a scene.
-const SCENE_BUFFERS: usize = 6;
+const SCENE_BUFFERS: usize = 7;
 
 pub(super) struct Passes {
     /// Bindings of the scene and the view.

@@ -4,6 +4,7 @@ use rapier3d::math::{Matrix, Pose, Vector};
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{BindGroup, Buffer, BufferUsages};
 
+use super::baked;
 use super::device::Gpu;
 use super::images::{PartHeads, SceneImages};
 use super::targets::bind;
@@ -36,6 +37,7 @@ pub(super) struct SceneBuffers {
     contacts: Buffer,
     coordinates: Buffer,
     texels: Buffer,
+    baked: Buffer,
     /// Indices of the heads of each part's images in `texels`.
     heads: Vec<PartHeads>,
     sky_head: u32,
@@ -57,18 +59,23 @@ impl SceneBuffers {
         let parts = prepared.scenery.parts.iter();
         let corners: Vec<[u32; 4]> =
             parts.zip(0..).flat_map(|(part, number)| part_corners(part, number)).collect();
-        let bends = prepared.sheet_of.iter().map(|sheet| prepared.sheets[*sheet as usize].bend);
-        let firsts = corners.iter().step_by(3);
-        let faces: Vec<[u32; 16]> = bends.zip(firsts).map(|(bend, corner)| face(bend, *corner)).collect();
+        let triangles = prepared.sheet_of.iter().zip(corners.iter().step_by(3));
+        let faces: Vec<u32> = triangles
+            .flat_map(|(sheet, corner)| {
+                let bend = face(prepared.sheets[*sheet as usize].bend, *corner);
+                bend.into_iter().chain(baked::face_numbers(prepared, *sheet))
+            })
+            .collect();
         let images = SceneImages::of(prepared, gpu.device.limits().max_storage_buffer_binding_size);
         let written = BufferUsages::COPY_DST | BufferUsages::STORAGE;
         SceneBuffers {
             corner_numbers: initialised(gpu, corners.as_flattened(), BufferUsages::STORAGE),
-            faces: initialised(gpu, faces.as_flattened(), BufferUsages::STORAGE),
+            faces: initialised(gpu, &faces, BufferUsages::STORAGE),
             parts: initialised(gpu, &vec![0; prepared.scenery.parts.len() * PART_NUMBERS], written),
             contacts: initialised(gpu, &vec![0; 2 * CONTACT_TEXELS * CONTACT_TEXELS], written),
             coordinates: initialised(gpu, images.coordinates.as_flattened(), BufferUsages::STORAGE),
             texels: initialised(gpu, &images.texels, BufferUsages::STORAGE),
+            baked: initialised(gpu, &bits(baked::numbers(prepared).as_flattened()), written),
             heads: images.heads,
             sky_head: images.sky_head,
             views: Vec::new(),
@@ -98,6 +105,7 @@ impl SceneBuffers {
             &self.contacts,
             &self.coordinates,
             &self.texels,
+            &self.baked,
         ];
         let group = bind(gpu, &gpu.passes.scene, buffers.map(|buffer| buffer.as_entire_binding()));
         SceneView { numbers, group }
@@ -113,6 +121,10 @@ impl SceneBuffers {
             })
             .collect();
         gpu.queue.write_buffer(&self.parts, 0, &bytes(numbers.as_flattened()));
+        if let Some(light) = &prepared.baked {
+            let cubes = baked::part_cubes(light, prepared, placed);
+            gpu.queue.write_buffer(&self.baked, 0, &bytes(&bits(cubes.as_flattened().as_flattened())));
+        }
         gpu.queue.write_buffer(&self.contacts, 0, &bytes(&bits(contact.texel_values.as_flattened())));
     }
 
@@ -185,8 +197,9 @@ fn lighting(prepared: &Prepared) -> [[f32; 4]; 4] {
     let Scenery { lamps, focus_radius_m, .. } = &prepared.scenery;
     let head = lamps.as_ref().map(|lamps| lamps.headlight).unwrap_or_default();
     let rgb = |rgb: Vector| [rgb.x, rgb.y, rgb.z, 0.0];
+    let share = |is_so: bool| f32::from(u8::from(is_so));
     [
-        [normal_offset_m(*focus_radius_m), f32::from(u8::from(lamps.is_some())), 0.0, 0.0],
+        [normal_offset_m(*focus_radius_m), share(lamps.is_some()), share(prepared.baked.is_some()), 0.0],
         rgb(head.ambient_rgb),
         rgb(head.diffuse_rgb),
         rgb(head.specular_rgb),

@@ -1,8 +1,10 @@
-//! The shader's text: the constants that renderers share, written out, then `picture.wgsl` and `lamps.wgsl`.
+//! The shader's text: the constants that renderers share, written out, then those of `shaders/`.
 
 use rapier3d::math::Vector;
 
 use crate::mjcf::{MAX_LIGHTS, MIN_ROUGHNESS, SHININESS, USUAL_EXPONENT};
+use crate::render::Light;
+use crate::render::baked::{HALF_SHADOW_M, SURE_SLOPE};
 use crate::render::cpu::contact::SINK_M;
 use crate::render::scene::camera::NEAR_M;
 use crate::render::scene::prepared::NOTHING;
@@ -16,6 +18,13 @@ use crate::render::shading::{
     BIAS_M, CONTACT, CONTACT_TEXELS, FADE_TEXELS, HIGHLIGHT, LAMP, MIN_SEEN_ALPHA, OUTLINE,
     OUTLINE_DEPTH_STEP, SKY, SRGB_STEPS, SUN_DISTANCE_M, TEXELS,
 };
+
+/// Texts after the constants.
+const SHADERS: [&str; 3] = [
+    include_str!("shaders/picture.wgsl"),
+    include_str!("shaders/lamps.wgsl"),
+    include_str!("shaders/baked.wgsl"),
+];
 
 pub(super) fn text() -> String {
     let numbers = [
@@ -48,13 +57,17 @@ pub(super) fn text() -> String {
         ("MIN_UPRIGHT_SHARE", MIN_UPRIGHT_SHARE),
         ("LAMP_NORMAL_TEXELS", LAMP_NORMAL_TEXELS),
         ("LAMP_BIAS_SHARE", LAMP_BIAS_SHARE),
+        ("SURE_SLOPE", SURE_SLOPE),
+        ("HALF_SHADOW_M", HALF_SHADOW_M),
     ];
-    let Vector { x, y, z } = SKY;
-    let sky = format!("const SKY = vec3f({x:?}f, {y:?}f, {z:?}f);\n");
+    let vector = |(name, Vector { x, y, z }): (&str, Vector)| {
+        format!("const {name} = vec3f({x:?}f, {y:?}f, {z:?}f);\n")
+    };
+    let sky = [("SKY", SKY), ("USUAL_SUN", Light::default().sun_rgb)].map(vector).concat();
     let number = |(name, value): (&str, f32)| format!("const {name} = {value:?}f;\n");
     let bits = format!("const NOTHING = {NOTHING}u;\nconst INFINITY_BITS = {}u;\n", f32::INFINITY.to_bits());
     let texels = format!("const CONTACT_TEXELS = {CONTACT_TEXELS}u;\nconst SINK_M = {SINK_M:?}f;\n");
     let lights = format!("const MAX_LIGHTS = {MAX_LIGHTS}u;\n");
     let constants = numbers.map(number).into_iter().chain([sky, bits, texels, lights]);
-    constants.chain([include_str!("picture.wgsl").into(), include_str!("lamps.wgsl").into()]).collect()
+    constants.chain(SHADERS.map(String::from)).collect()
 }

@@ -163,7 +163,7 @@ fn stated_beam(lights: &[FileLight], point_m: Vector, draw_value: f32) -> Beam {
 }
 
 /// Returns the box around the walls of a room and everything of that height; `None` in the open.
-fn walls_m(scenery: &Scenery) -> Option<[Vector; 2]> {
+pub fn walls_m(scenery: &Scenery) -> Option<[Vector; 2]> {
     let mut box_m = None;
     for part in scenery.parts.iter().filter(|part| part.carrier == Carrier::Room) {
         let points_m = part.mesh.vertices.iter().map(|vertex| part.carrier_from_mesh * vertex.position_m);

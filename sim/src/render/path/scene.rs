@@ -167,7 +167,7 @@ impl Scene<'_> {
         layers_rgb: &mut [Vector; LAYERS],
     ) {
         let beam = self.lights.beam(spot.start_m, pair_values);
-        let lit_rgb = self.lit_rgb(spot, &beam);
+        let lit_rgb = self.lit_rgb(spot.start_m, spot.normal, &beam);
         if lit_rgb == Vector::ZERO {
             return;
         }
@@ -225,7 +225,7 @@ impl Scene<'_> {
             let spot = self.space.spot(start_m, direction, &hit);
             carried_rgb *= self.albedo(&spot, REFLECTED_WIDTH_M);
             let beam = self.lights.beam(spot.start_m, numbers.pair());
-            sum_rgb += carried_rgb * self.lit_rgb(&spot, &beam);
+            sum_rgb += carried_rgb * self.lit_rgb(spot.start_m, spot.normal, &beam);
             if bounce >= SURE_BOUNCES {
                 let survival = carried_rgb.max_element().min(MAX_SURVIVAL);
                 if numbers.uniform() >= survival {
@@ -242,12 +242,12 @@ impl Scene<'_> {
         sum_rgb.min(Vector::splat(MAX_PATH_VALUE))
     }
 
-    /// Returns the irradiance by a beam, divided by pi.
-    fn lit_rgb(&self, spot: &Spot, beam: &Beam) -> Vector {
-        let facing = spot.normal.dot(beam.direction);
+    /// Returns the irradiance by a beam at a point with a normal, divided by pi.
+    pub fn lit_rgb(&self, start_m: Vector, normal: Vector, beam: &Beam) -> Vector {
+        let facing = normal.dot(beam.direction);
         if facing <= 0.0
             || beam.rgb == Vector::ZERO
-            || self.space.is_blocked(spot.start_m, beam.direction, beam.reach_m)
+            || self.space.is_blocked(start_m, beam.direction, beam.reach_m)
         {
             return Vector::ZERO;
         }

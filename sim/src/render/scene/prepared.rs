@@ -1,14 +1,17 @@
 //! A scenery with precomputed constant data for drawing.
 
+use std::sync::Arc;
+
 use rapier3d::math::{Pose, Vector};
 
 use super::bend::Bend;
 use super::shared::MeshGeometry;
 use super::sheets::{MeshSheet, UvMap};
+use crate::render::baked::{BakedLight, RoomLight};
 use crate::render::shading::image::Image;
 use crate::render::shading::lanes::Affine;
 use crate::render::shading::linear;
-use crate::render::{Part, Pattern, Scenery};
+use crate::render::{Carrier, Light, Part, Pattern, Scenery};
 
 /// Limits of the factor by which an image's texels are multiplied: nearly black images stay so.
 const MIN_MEAN: f32 = 1e-6;
@@ -19,6 +22,8 @@ pub const NOTHING: u32 = u32::MAX;
 
 pub struct Prepared {
     pub scenery: Scenery,
+    /// Light of the room, for rasterisers; `None` in the light of a sun or of a file's lights.
+    pub baked: Option<Arc<BakedLight>>,
     pub sheets: Vec<Sheet>,
     /// The image of each part.
     pub images: Vec<Option<Image>>,
@@ -48,6 +53,17 @@ pub struct Sheet {
 }
 
 impl Prepared {
+    /// Prepares a scenery for a rasteriser, with the light of its room. Its shadows are in that light.
+    pub fn lit(mut scenery: Scenery) -> Prepared {
+        let baked = scenery.room_light.as_ref().map(RoomLight::get);
+        if baked.is_some() {
+            let room = scenery.parts.iter_mut().filter(|part| part.carrier == Carrier::Room);
+            room.for_each(|part| part.casts_shadow = false);
+        }
+        Prepared { baked, ..Prepared::new(scenery) }
+    }
+
+    /// Prepares a scenery without baked light.
     pub fn new(scenery: Scenery) -> Prepared {
         let (mut sheets, mut sheet_of, mut first) = (Vec::new(), Vec::new(), Vec::new());
         for (part, number) in scenery.parts.iter().zip(0..) {
@@ -62,6 +78,7 @@ impl Prepared {
         let id = |sheet: &Sheet| scenery.parts[sheet.part as usize].id;
         Prepared {
             ids: sheets.iter().map(id).collect(),
+            baked: None,
             sheets,
             images: scenery.parts.iter().map(|part| part.image.as_ref().map(Image::of)).collect(),
             is_veil: scenery.parts.iter().map(Part::is_veil).collect(),
@@ -72,6 +89,12 @@ impl Prepared {
             grain: scenery.parts.iter().map(grain).collect(),
             scenery,
         }
+    }
+
+    /// Returns the factor of baked light; `None` without such light.
+    pub fn tint(&self) -> Option<[f32; 3]> {
+        let usual = Light::default().sun_rgb;
+        self.baked.as_ref().map(|_| (self.scenery.light.sun_rgb / usual).to_array())
     }
 
     /// Returns the geometry of a part.

@@ -26,7 +26,7 @@ struct View {
     // Number of lamps, number of layers of blended surfaces, where the sky's head is in `texels` or 0, and the lamp
     // that casts a shadow, if it is not the sun.
     counts: vec4u,
-    // Offset along the normal of the sun's shadows, and whether lamps light the scenery.
+    // Offset along the normal of the sun's shadows, and whether lamps, or baked light, light the scenery.
     extra: vec4f,
     head_ambient: vec4f,
     head_diffuse: vec4f,
@@ -77,6 +77,10 @@ struct Face {
     bend_x: vec4f,
     bend_y: vec4f,
     bend_z: vec4f,
+    // Baked light: rows from the world to the texels of a map; kind, first number in `baked`, width and height.
+    light_u: vec4f,
+    light_v: vec4f,
+    light: vec4u,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -98,6 +102,10 @@ struct Coordinates {
 // Of each image: width, height, number of levels, and 0, or on a cube its number of images, 1 or 6 (+x, -x, +y, -y,
 // +z, -z); then the levels, the largest first.
 @group(0) @binding(6) var<storage, read> texels: array<u32>;
+
+// Baked light: the cubes of all parts, those of the room, and the texels of its maps; irradiance, and the share of it
+// that things shadow.
+@group(0) @binding(7) var<storage, read> baked: array<vec4f>;
 
 // One layer for the sun, or for each lamp.
 @group(1) @binding(0) var shadow: texture_depth_2d_array;
@@ -496,6 +504,10 @@ fn colour(triangle: u32, ray: vec3f) -> vec4f {
     if view.extra.y > 0.0 {
         return vec4f(lit_by_lamps(gloss, base, image, point_m, normal, eye_direction) * open, alpha);
     }
+    if view.extra.z > 0.0 {
+        let light = baked_light(corners[3u * triangle].w, face, point_m, normal);
+        return vec4f(lit_by_baked(light, base, point_m, normal, eye_direction) * open, alpha);
+    }
     let ambient = mix(view.from_below.xyz, view.from_above.xyz, normal.z * 0.5 + 0.5);
     let unlit = base * (ambient + LAMP * abs(dot(normal, eye_direction)));
     let facing_sun = dot(normal, view.to_sun.xyz);
@@ -559,7 +571,7 @@ fn mean(pixel: vec2u, size: vec2u) -> vec3f {
             }
         }
     }
-    return blended(pixel, sum * (1.0 - OUTLINE * min(edges / 4.0, 1.0)) / 4.0);
+    return blended(pixel, sum * (1.0 - OUTLINE * (1.0 - view.extra.z) * min(edges / 4.0, 1.0)) / 4.0);
 }
 
 // Colour of a pixel with the blended surfaces over it.

@@ -1,0 +1,204 @@
+//! Baking: the points of a room that are lit, and their light in the units of images.
+
+use std::collections::HashMap;
+
+use rapier3d::math::{Pose, Vector};
+
+use super::maps::FlatSheet;
+use super::probes::Probes;
+use super::{BakedLight, LightCube, LightMap, LightTexel, SheetLight, cube_light};
+use crate::render::path::irradiance::{Irradiance, SurfacePoint, irradiance};
+use crate::render::path::toned_rgb;
+use crate::render::scene::prepared::Prepared;
+use crate::render::{Carrier, Light, Scenery};
+
+/// Most texels of all maps; those of larger rooms are wider.
+const MAX_TEXELS: f32 = 50_000.0;
+/// Margin around the walls, beyond which the light is that of the border.
+const MARGIN_M: f32 = 0.5;
+/// Side of the cells that share a cube, for surfaces without a map.
+const CELL_M: f32 = 0.08;
+/// Share of the light of lamps that things can shadow.
+const SHADOWED_SHARE: f32 = 0.9;
+/// Number of corrections of the exposure; each takes the compression of bright tones into account.
+const CORRECTIONS: usize = 6;
+
+/// Light of the same surfaces without baking.
+struct PlainLight(Light);
+
+/// Returns the light of a room, whose walls are in a box.
+pub(super) fn bake(room: &Scenery, [low_m, high_m]: [Vector; 2]) -> BakedLight {
+    let box_m = [low_m - Vector::splat(MARGIN_M), high_m + Vector::splat(MARGIN_M)];
+    let prepared = Prepared::new(room.clone());
+    let flat: Vec<Option<FlatSheet>> = sheets(&prepared, box_m);
+    let count = |scale: f32| flat.iter().flatten().map(|sheet| texels(&sheet.map(0, scale))).sum::<f32>();
+    let mut texel_scale = 1.0;
+    while count(texel_scale) > MAX_TEXELS && texel_scale < 8.0 {
+        texel_scale *= 1.1;
+    }
+    let (mut maps, mut points): (Vec<LightMap>, Vec<SurfacePoint>) = (Vec::new(), Vec::new());
+    let sheet_map: Vec<Option<u32>> = flat
+        .iter()
+        .map(|sheet| {
+            let sheet = sheet.as_ref()?;
+            let map = sheet.map(points.len() as u32, texel_scale);
+            points.extend(sheet.points(&map));
+            maps.push(map);
+            Some(maps.len() as u32 - 1)
+        })
+        .collect();
+    let mapped = points.len();
+    let mut probes = Probes::over([low_m, high_m]);
+    points.extend(probes.points());
+    let found = irradiance(room.clone(), &points);
+    let exposed = Exposure::of(&PlainLight(room.light), &points[..mapped], &found[..mapped]);
+    let texel = |light: &Irradiance| (!light.is_inside).then(|| exposed.texel(light));
+    let mut texels: Vec<Option<LightTexel>> = found[..mapped].iter().map(texel).collect();
+    maps.iter().for_each(|map| finish(map, &mut texels));
+    let cube = |sides: &[Irradiance]| -> Option<LightCube> {
+        let sides: Vec<LightTexel> = sides.iter().filter_map(texel).collect();
+        sides.try_into().ok()
+    };
+    probes.set(found[mapped..].chunks_exact(6).map(cube).collect());
+    let (mut cells, mut cubes) = (HashMap::new(), Vec::new());
+    let middles_m = middles_m(&prepared);
+    let sheets = sheet_map.iter().zip(middles_m).map(|(map, middle_m)| match map {
+        Some(map) => SheetLight::Map(*map),
+        None => {
+            let cell = (middle_m / CELL_M).round();
+            SheetLight::Cube(*cells.entry(cell.to_array().map(|i| i as i32)).or_insert_with(|| {
+                cubes.push(probes.cube(cell * CELL_M));
+                cubes.len() as u32 - 1
+            }))
+        }
+    });
+    let sheets = sheets.collect();
+    // Where a whole map is inside of something, an edge may still show.
+    let texels = texels.into_iter().zip(&points).map(|(texel, point)| {
+        texel.unwrap_or_else(|| cube_light(&probes.cube(point.point_m), point.normal.to_array()))
+    });
+    let texels = texels.collect();
+    BakedLight { sheets, maps, texels, cubes, probes }
+}
+
+fn texels(map: &LightMap) -> f32 {
+    (map.width * map.height) as f32
+}
+
+/// Returns the flat sheets of a room, by the sheets' numbers; `None` for others.
+fn sheets(prepared: &Prepared, box_m: [Vector; 2]) -> Vec<Option<FlatSheet>> {
+    let corners = corners(prepared);
+    let sheets = prepared.sheets.iter().zip(corners).map(|(sheet, corners_m)| {
+        let part = &prepared.scenery.parts[sheet.part as usize];
+        // Reliefs need light from several directions.
+        let is_even = part.image.as_ref().is_none_or(|image| image.relief.is_none());
+        (sheet.bend.slope_1_m.is_none() && is_even)
+            .then(|| FlatSheet::of(&corners_m, sheet.bend.normal.normalize(), part.carrier_from_mesh, box_m))
+            .flatten()
+    });
+    sheets.collect()
+}
+
+/// Returns the corners of the triangles of each sheet, in its mesh's frame.
+fn corners(prepared: &Prepared) -> Vec<Vec<Vector>> {
+    let mut corners = vec![Vec::new(); prepared.sheets.len()];
+    for (number, part) in prepared.scenery.parts.iter().enumerate() {
+        for (triangle, sheet) in part.mesh.triangles.iter().zip(prepared.sheets_of(number)) {
+            let places_m = triangle.map(|corner| part.mesh.vertices[corner as usize].position_m);
+            corners[*sheet as usize].extend(places_m);
+        }
+    }
+    corners
+}
+
+/// Returns the middle of each sheet in the world.
+fn middles_m(prepared: &Prepared) -> Vec<Vector> {
+    let sheets = prepared.sheets.iter().zip(corners(prepared)).map(|(sheet, corners_m)| {
+        let part = &prepared.scenery.parts[sheet.part as usize];
+        debug_assert_eq!(part.carrier, Carrier::Room);
+        let pose: Pose = part.carrier_from_mesh;
+        pose * (corners_m.iter().sum::<Vector>() / corners_m.len().max(1) as f32)
+    });
+    sheets.collect()
+}
+
+/// Fills in the texels of a map that are inside of something from those beside them, and smooths noise.
+fn finish(map: &LightMap, texels: &mut [Option<LightTexel>]) {
+    let (width, height, first) = (map.width as usize, map.height as usize, map.first as usize);
+    let texels = &mut texels[first..first + width * height];
+    let around = |number: usize| {
+        let (column, row) = (number % width, number / width);
+        let rows = row.saturating_sub(1)..(row + 2).min(height);
+        rows.flat_map(move |row| {
+            (column.saturating_sub(1)..(column + 2).min(width)).map(move |column| row * width + column)
+        })
+    };
+    let mean = |before: &[Option<LightTexel>], number: usize| {
+        let (mut sum, mut weights) = ([0.0; 4], 0.0);
+        for beside in around(number) {
+            let Some(light) = before[beside] else { continue };
+            let weight = if beside == number {
+                4.0
+            } else if beside % width == number % width || beside / width == number / width {
+                2.0
+            } else {
+                1.0
+            };
+            weights += weight;
+            sum.iter_mut().zip(light).for_each(|(sum, value)| *sum += weight * value);
+        }
+        (weights > 0.0).then(|| sum.map(|value| value / weights))
+    };
+    let before = texels.to_vec();
+    for (number, texel) in texels.iter_mut().enumerate().filter(|(_, texel)| texel.is_some()) {
+        *texel = mean(&before, number);
+    }
+    while texels.contains(&None) && texels.iter().any(Option::is_some) {
+        let before = texels.to_vec();
+        for (number, texel) in texels.iter_mut().enumerate().filter(|(_, texel)| texel.is_none()) {
+            *texel = mean(&before, number);
+        }
+    }
+}
+
+/// From light to values of images: rooms are about as bright as without baked light.
+struct Exposure {
+    factor: f32,
+}
+
+impl Exposure {
+    fn of(plain: &PlainLight, points: &[SurfacePoint], found: &[Irradiance]) -> Exposure {
+        let lit = || points.iter().zip(found).filter(|(_, light)| !light.is_inside);
+        let wanted: f32 = lit().map(|(point, _)| plain.on(point.normal).element_sum()).sum();
+        let mut exposure = Exposure { factor: 1.0 };
+        for _ in 0..CORRECTIONS {
+            let drawn: f32 = lit().map(|(_, light)| exposure.rgb(light).element_sum()).sum();
+            if drawn > 0.0 {
+                exposure.factor *= wanted / drawn;
+            }
+        }
+        exposure
+    }
+
+    fn rgb(&self, light: &Irradiance) -> Vector {
+        toned_rgb((light.of_lamps_rgb + light.reflected_rgb) * self.factor)
+    }
+
+    fn texel(&self, light: &Irradiance) -> LightTexel {
+        let sum = (light.of_lamps_rgb + light.reflected_rgb).element_sum();
+        let Vector { x, y, z } = self.rgb(light);
+        [x, y, z, SHADOWED_SHARE * light.of_lamps_rgb.element_sum() / sum.max(f32::MIN_POSITIVE)]
+    }
+}
+
+impl PlainLight {
+    /// Returns the light of sun and sky on a surface, mostly in the sun.
+    fn on(&self, normal: Vector) -> Vector {
+        const SUNLIT_SHARE: f32 = 0.92;
+        const HEADLIGHT: f32 = 0.09;
+        let Light { sun_rgb, sun_direction, below_rgb, above_rgb } = self.0;
+        let sky_rgb = below_rgb + (above_rgb - below_rgb) * (normal.z * 0.5 + 0.5);
+        let sun_share = normal.dot(sun_direction).max(0.0) * SUNLIT_SHARE;
+        sky_rgb + sun_rgb * sun_share + Vector::splat(HEADLIGHT)
+    }
+}

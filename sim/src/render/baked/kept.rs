@@ -1,0 +1,149 @@
+//! Baked light that is kept: by the process for all renderers of a room, and on disk for the next process.
+
+use std::fs;
+use std::hash::{Hash, Hasher};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use rapier3d::math::{Pose, Vector};
+use xxhash_rust::xxh3::Xxh3Default;
+
+use super::BakedLight;
+use super::bake::bake;
+use crate::render::path::walls_m;
+use crate::render::{Part, Pattern, Scenery};
+
+/// Version of the method: another one gives other light.
+const VERSION: u32 = 1;
+/// Number of rooms whose light a process keeps, and that of files.
+const MAX_ROOMS: usize = 16;
+const MAX_FILES: usize = 100;
+/// Most texels of an image that are compared.
+const MAX_HASHED_TEXELS: usize = 4096;
+
+/// The light of a room, computed when a renderer first asks for it.
+#[derive(Clone, Debug)]
+pub struct RoomLight {
+    /// Hash of everything that the light depends on.
+    key: u64,
+    kept: Arc<OnceLock<Arc<BakedLight>>>,
+    room: Arc<Scenery>,
+    walls_m: [Vector; 2],
+}
+
+impl PartialEq for RoomLight {
+    fn eq(&self, other: &RoomLight) -> bool {
+        self.key == other.key
+    }
+}
+
+impl RoomLight {
+    /// Returns the light of a room without anything in it; `None` in the open, which has a sun.
+    pub fn of(room: Scenery) -> Option<RoomLight> {
+        static KEPT: Mutex<Vec<RoomLight>> = Mutex::new(Vec::new());
+        let walls_m = walls_m(&room)?;
+        let key = key(&room);
+        let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = kept.iter().find(|known| known.key == key) {
+            return Some(known.clone());
+        }
+        let light = RoomLight { key, kept: Arc::default(), room: Arc::new(room), walls_m };
+        if kept.len() == MAX_ROOMS {
+            kept.remove(0);
+        }
+        kept.push(light.clone());
+        Some(light)
+    }
+
+    /// Returns the light. The first call computes it, or reads it from disk.
+    pub fn get(&self) -> Arc<BakedLight> {
+        let find = || {
+            let path = folder().map(|folder| folder.join(format!("{:016x}.light", self.key)));
+            if let Some(light) = path.as_deref().and_then(read) {
+                return Arc::new(light);
+            }
+            let light = bake(&self.room, self.walls_m);
+            if let Some(path) = path {
+                write(&path, &light);
+            }
+            Arc::new(light)
+        };
+        self.kept.get_or_init(find).clone()
+    }
+}
+
+/// Returns the folder of the files: in the user's cache, where there is one.
+fn folder() -> Option<PathBuf> {
+    Some(dirs::cache_dir()?.join("tandem").join("light"))
+}
+
+fn read(path: &Path) -> Option<BakedLight> {
+    let bytes = fs::read(path).ok()?;
+    postcard::from_bytes(&bytes).ok()
+}
+
+/// Writes the light to a file, whole or not at all. A disk that is full costs only time.
+fn write(path: &Path, light: &BakedLight) {
+    let Some(folder) = path.parent() else { return };
+    let Ok(bytes) = postcard::to_allocvec(light) else { return };
+    let unfinished = path.with_extension(std::process::id().to_string());
+    let written = fs::create_dir_all(folder)
+        .and_then(|()| fs::write(&unfinished, bytes))
+        .and_then(|()| fs::rename(&unfinished, path));
+    if written.is_err() {
+        let _ = fs::remove_file(&unfinished);
+    }
+    remove_oldest(folder);
+}
+
+fn remove_oldest(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    let modified = |entry: fs::DirEntry| Some((entry.metadata().ok()?.modified().ok()?, entry.path()));
+    let mut files: Vec<_> = entries.flatten().filter_map(modified).collect();
+    files.sort();
+    for (_, path) in files.iter().take(files.len().saturating_sub(MAX_FILES)) {
+        let _ = fs::remove_file(path);
+    }
+}
+
+/// Returns the hash of a room and of the method.
+fn key(room: &Scenery) -> u64 {
+    let mut hasher = Xxh3Default::new();
+    VERSION.hash(&mut hasher);
+    for part in &room.parts {
+        hash_part(part, &mut hasher);
+    }
+    let light = &room.light;
+    for rgb in [light.sun_rgb, light.sun_direction, light.below_rgb, light.above_rgb] {
+        hash_vector(rgb, &mut hasher);
+    }
+    hasher.finish()
+}
+
+fn hash_part(part: &Part, hasher: &mut Xxh3Default) {
+    for vertex in &part.mesh.vertices {
+        hash_vector(vertex.position_m, hasher);
+        hash_vector(vertex.normal, hasher);
+        vertex.uv.map(f32::to_bits).hash(hasher);
+    }
+    part.mesh.triangles.hash(hasher);
+    let Pose { rotation, translation, .. } = part.carrier_from_mesh;
+    rotation.to_array().map(f32::to_bits).hash(hasher);
+    hash_vector(translation, hasher);
+    part.rgb.map(f32::to_bits).hash(hasher);
+    part.alpha.to_bits().hash(hasher);
+    part.casts_shadow.hash(hasher);
+    std::mem::discriminant(&part.pattern).hash(hasher);
+    if let Pattern::Checker(second) = part.pattern {
+        second.map(f32::to_bits).hash(hasher);
+    }
+    if let Some(image) = &part.image {
+        let small = image.texture.levels.iter().find(|level| level.texels.len() <= MAX_HASHED_TEXELS);
+        small.map(|level| &level.texels).hash(hasher);
+        format!("{:?}", image.mapping).hash(hasher);
+    }
+}
+
+fn hash_vector(vector: Vector, hasher: &mut Xxh3Default) {
+    vector.to_array().map(f32::to_bits).hash(hasher);
+}

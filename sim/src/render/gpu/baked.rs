@@ -1,0 +1,55 @@
+//! Baked light in a device's memory: the cubes of parts, those of the room, and the texels of its maps.
+
+use crate::render::baked::{BakedLight, LightCube, LightTexel, SheetLight};
+use crate::render::scene::prepared::Prepared;
+use crate::render::{Carrier, PlacedScenery};
+
+/// Count of numbers about light in `Face`.
+pub(super) const FACE_NUMBERS: usize = 12;
+/// Count of sides of a cube.
+const SIDES: u32 = 6;
+/// Kinds of light in `Face`.
+const ON_MAP: u32 = 1;
+const ON_CUBE: u32 = 2;
+const ON_PART: u32 = 3;
+
+/// Returns all numbers of `baked`; those of parts are not set.
+pub(super) fn numbers(prepared: &Prepared) -> Vec<LightTexel> {
+    let Some(baked) = &prepared.baked else { return Vec::new() };
+    let mut numbers = vec![LightTexel::default(); prepared.scenery.parts.len() * SIDES as usize];
+    numbers.extend_from_slice(baked.cubes.as_flattened());
+    numbers.extend_from_slice(&baked.texels);
+    numbers
+}
+
+/// Returns the numbers of `Face` about the light of a sheet.
+pub(super) fn face_numbers(prepared: &Prepared, sheet: u32) -> [u32; FACE_NUMBERS] {
+    let mut numbers = [0; FACE_NUMBERS];
+    let Some(baked) = &prepared.baked else { return numbers };
+    let first_cube = prepared.scenery.parts.len() as u32 * SIDES;
+    let light = match baked.sheets.get(sheet as usize) {
+        Some(SheetLight::Map(number)) => {
+            let map = &baked.maps[*number as usize];
+            let [u, v, _] = map.from_world().0.map(|(axis, constant)| [axis.x, axis.y, axis.z, constant]);
+            numbers[..8].copy_from_slice([u, v].map(|row| row.map(f32::to_bits)).as_flattened());
+            let first_texel = first_cube + baked.cubes.len() as u32 * SIDES;
+            [ON_MAP, first_texel + map.first, map.width, map.height]
+        }
+        Some(SheetLight::Cube(number)) => [ON_CUBE, first_cube + number * SIDES, 0, 0],
+        None => [ON_PART, 0, 0, 0],
+    };
+    numbers[8..].copy_from_slice(&light);
+    numbers
+}
+
+/// Returns the cubes of all parts in a state; those of the room are not used.
+pub(super) fn part_cubes(baked: &BakedLight, prepared: &Prepared, placed: &PlacedScenery) -> Vec<LightCube> {
+    let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).enumerate();
+    let cube = |(number, (part, pose)): (usize, (&crate::render::Part, &rapier3d::math::Pose))| match part
+        .carrier
+    {
+        Carrier::Room => LightCube::default(),
+        Carrier::Link { .. } | Carrier::Object(_) => baked.cube(*pose * prepared.geometry(number).bounds.0),
+    };
+    parts.map(cube).collect()
+}
