@@ -107,7 +107,7 @@ pub(super) const ELEMENTS: &[Element] = &[
         support: Support::Mapped,
         kind: Some("light"),
         attributes: &[&[NAME, CLASS], LIGHT],
-        note: "of a scene, its first seven; a scene without lights and headlight has a sun with shadow, and lights of robots and objects are ignored; of a frame around a light, pos and quat count",
+        note: "of a scene, its first seven; a scene without lights and headlight has lamps under its ceiling or a sun, and lights of robots and objects are ignored; of a frame around a light, pos and quat count",
     },
     Element {
         name: "plugin",

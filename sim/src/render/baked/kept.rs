@@ -79,7 +79,7 @@ fn folder() -> Option<PathBuf> {
 
 fn read(path: &Path) -> Option<BakedLight> {
     let bytes = fs::read(path).ok()?;
-    postcard::from_bytes(&bytes).ok()
+    postcard::from_bytes(&bytes).ok().filter(BakedLight::is_whole)
 }
 
 /// Writes the light to a file, whole or not at all. A disk that is full costs only time.

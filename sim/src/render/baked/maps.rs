@@ -16,7 +16,7 @@ const FLAT_M: f32 = 1e-3;
 pub struct LightMap {
     /// Map from the world to column and row: each is a scalar product plus a constant. The middle of the first
     /// texel is 0.
-    pub(super) axes: [([f32; 3], f32); 2],
+    pub axes: [[f32; 4]; 2],
     /// Number of the first texel.
     pub first: u32,
     /// Number of texels along each side, at least 2.
@@ -75,7 +75,7 @@ impl FlatSheet {
         let [width, height] = self.sides_m.map(count);
         let axis = |i: usize, count: f32| {
             let along = self.along[i] * (count / self.sides_m[i].max(FLAT_M));
-            (along.to_array(), -along.dot(self.corner_m) - 0.5)
+            [along.x, along.y, along.z, -along.dot(self.corner_m) - 0.5]
         };
         LightMap {
             axes: [axis(0, width), axis(1, height)],

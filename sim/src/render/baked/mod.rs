@@ -14,7 +14,6 @@ mod tests;
 use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
 
-use super::shading::lanes::Affine;
 pub use kept::RoomLight;
 pub use maps::LightMap;
 use probes::Probes;
@@ -55,6 +54,19 @@ pub enum SheetLight {
 }
 
 impl BakedLight {
+    /// Returns true if all numbers refer to something.
+    fn is_whole(&self) -> bool {
+        let is_map = |map: &LightMap| {
+            let end = u64::from(map.first) + u64::from(map.width) * u64::from(map.height);
+            map.width >= 2 && map.height >= 2 && end <= self.texels.len() as u64
+        };
+        let is_lit = |sheet: &SheetLight| match sheet {
+            SheetLight::Map(number) => (*number as usize) < self.maps.len(),
+            SheetLight::Cube(number) => (*number as usize) < self.cubes.len(),
+        };
+        self.maps.iter().all(is_map) && self.sheets.iter().all(is_lit) && self.probes.are_whole()
+    }
+
     /// Returns the light at a point in the room.
     pub fn cube(&self, point_m: Vector) -> LightCube {
         self.probes.cube(point_m)
@@ -62,10 +74,13 @@ impl BakedLight {
 }
 
 impl LightMap {
-    /// Returns the map from the world to the texels' columns and rows, of which the first is 0.
-    pub fn from_world(&self) -> Affine {
-        let [u, v] = self.axes.map(|([x, y, z], constant)| (Vector::new(x, y, z), constant));
-        Affine([u, v, (Vector::ZERO, 0.0)])
+    /// Returns the column and the row of a point of the world, in texels from the middle of the first one.
+    #[inline(always)]
+    pub fn place(&self, [x_m, y_m, z_m]: [f32; 3]) -> [f32; 2] {
+        self.axes.map(
+            #[inline(always)]
+            |[x, y, z, constant]| x * x_m + y * y_m + z * z_m + constant,
+        )
     }
 }
 
@@ -102,7 +117,10 @@ pub fn map_light(map: &LightMap, texels: &[LightTexel], [u, v]: [f32; 2]) -> Lig
     let (column, row) = (usize::from(u as u16).min(width - 2), usize::from(v as u16).min(height - 2));
     let (right, down) = (u - column as f32, v - row as f32);
     let first = map.first as usize + row * width + column;
-    let [upper, lower] = [&texels[first..first + 2], &texels[first + width..first + width + 2]];
+    let [upper, lower] = [first, first + width].map(|first| {
+        let beside: &[LightTexel; 2] = texels[first..].first_chunk().expect("a map has two columns and rows");
+        beside
+    });
     std::array::from_fn(|i| {
         let above = upper[0][i] + (upper[1][i] - upper[0][i]) * right;
         let below = lower[0][i] + (lower[1][i] - lower[0][i]) * right;

@@ -29,6 +29,13 @@ impl Probes {
         Probes { corner_m: low_m.to_array(), pitch_m, counts, cubes: Vec::new() }
     }
 
+    /// Returns true if there is a cube for each probe.
+    pub(super) fn are_whole(&self) -> bool {
+        self.counts.iter().all(|count| *count >= 2)
+            && self.counts.iter().try_fold(1usize, |all, count| all.checked_mul(*count))
+                == Some(self.cubes.len())
+    }
+
     /// Returns the points of all probes, six directions each.
     pub(super) fn points(&self) -> impl Iterator<Item = SurfacePoint> {
         let [columns, rows, layers] = self.counts;

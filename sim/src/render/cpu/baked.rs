@@ -1,9 +1,9 @@
 //! Baked light on pushed points.
 
-use super::shade::{Strip, Surfaces};
-use crate::render::baked::{LightCube, LightMap, LightTexel, SURE_SLOPE, SheetLight, cube_light, map_light};
+use super::shade::Surfaces;
+use crate::render::baked::{LightCube, LightMap, LightTexel, SURE_SLOPE, SheetLight, map_light};
 use crate::render::scene::prepared::Prepared;
-use crate::render::shading::lanes::{Affine, Lanes, axes, lanes};
+use crate::render::shading::lanes::{Lanes, axes, lanes};
 use crate::render::{Carrier, PlacedScenery};
 
 /// Source of a strip's light.
@@ -11,11 +11,7 @@ use crate::render::{Carrier, PlacedScenery};
 pub(super) enum StripLight<'a> {
     /// Sun and sky, or lamps of a file.
     Plain,
-    Map {
-        map: &'a LightMap,
-        from_world: Affine,
-        texels: &'a [LightTexel],
-    },
+    Map(&'a LightMap, &'a [LightTexel]),
     Cube(&'a LightCube),
 }
 
@@ -25,10 +21,7 @@ impl<'a> StripLight<'a> {
     pub(super) fn of(prepared: &'a Prepared, cubes: &'a [LightCube], sheet: u32) -> StripLight<'a> {
         let Some(baked) = &prepared.baked else { return StripLight::Plain };
         match baked.sheets.get(sheet as usize) {
-            Some(SheetLight::Map(number)) => {
-                let map = &baked.maps[*number as usize];
-                StripLight::Map { map, from_world: map.from_world(), texels: &baked.texels }
-            }
+            Some(SheetLight::Map(number)) => StripLight::Map(&baked.maps[*number as usize], &baked.texels),
             Some(SheetLight::Cube(number)) => StripLight::Cube(&baked.cubes[*number as usize]),
             None => StripLight::Cube(&cubes[prepared.sheets[sheet as usize].part as usize]),
         }
@@ -53,36 +46,65 @@ pub(super) fn place_cubes(
 }
 
 impl Surfaces {
-    /// Sets the baked light of points that have places and normals.
+    /// Sets the baked light of the first `count` points of a block that have places and normals. On maps it is
+    /// looked up at the first and the last one: texels are much wider than pixels.
     #[inline(always)]
-    pub(super) fn set_baked<const N: usize>(&mut self, at: usize, strip: &Strip, point_m: &[Lanes<N>; 3]) {
-        let lit: [LightTexel; N] = match strip.light {
+    pub(super) fn set_baked<const N: usize>(
+        &mut self,
+        at: usize,
+        count: usize,
+        light: &StripLight,
+        [x_m, y_m, z_m]: &[Lanes<N>; 3],
+    ) {
+        let lit = match light {
             StripLight::Plain => return,
-            StripLight::Map { map, from_world, texels } => {
-                let [u, v, _] = from_world.map_lanes(point_m);
-                std::array::from_fn(
+            StripLight::Map(map, texels) => {
+                let last = count.min(N) - 1;
+                let light = |i: usize| map_light(map, texels, map.place([x_m[i], y_m[i], z_m[i]]));
+                let first = light(0);
+                let other = if last == 0 { first } else { light(last) };
+                let per_step = 1.0 / last.max(1) as f32;
+                channels(
                     #[inline(always)]
-                    |i| map_light(map, texels, [u[i], v[i]]),
+                    |channel| {
+                        let step = (other[channel] - first[channel]) * per_step;
+                        lanes(|i| first[channel] + step * i as f32)
+                    },
                 )
             }
             StripLight::Cube(cube) => {
-                let (normal, ray): ([Lanes<N>; 3], [Lanes<N>; 3]) = (self.normal.read(at), self.ray.read(at));
-                let outwards: Lanes<N> = lanes(|i| {
-                    let (mut squared, mut towards) = (0.0, 0.0);
-                    for axis in 0..3 {
-                        squared += normal[axis][i] * normal[axis][i];
-                        towards -= normal[axis][i] * ray[axis][i];
-                    }
-                    (1.0 / f32::sqrt(squared)).copysign(towards)
-                });
-                std::array::from_fn(
+                let normal = self.outward_normals::<N>(at);
+                channels(
                     #[inline(always)]
-                    |i| cube_light(cube, axes(|axis| normal[axis][i] * outwards[i])),
+                    |channel| {
+                        let side = |axis: usize, i: usize| {
+                            let [ahead, behind] = [cube[2 * axis][channel], cube[2 * axis + 1][channel]];
+                            let along = normal[axis][i];
+                            along * along * if along < 0.0 { behind } else { ahead }
+                        };
+                        lanes(|i| side(0, i) + side(1, i) + side(2, i))
+                    },
                 )
             }
         };
-        self.baked.set::<N>(at, axes(|axis| lanes(|i| lit[i][axis])));
-        self.set_lamp_share::<N>(at, lanes(|i| lit[i][3]));
+        let [red, green, blue, lamps] = lit;
+        self.baked.set::<N>(at, [red, green, blue]);
+        self.set_lamp_share::<N>(at, lamps);
+    }
+
+    /// Returns the unit normals of points on the side of the camera.
+    #[inline(always)]
+    fn outward_normals<const N: usize>(&self, at: usize) -> [Lanes<N>; 3] {
+        let (normal, ray): ([Lanes<N>; 3], [Lanes<N>; 3]) = (self.normal.read(at), self.ray.read(at));
+        let product = |a: &[Lanes<N>; 3], b: &[Lanes<N>; 3], i: usize| {
+            a[0][i] * b[0][i] + a[1][i] * b[1][i] + a[2][i] * b[2][i]
+        };
+        let outwards: Lanes<N> =
+            lanes(|i| (1.0 / product(&normal, &normal, i).sqrt()).copysign(-product(&normal, &ray, i)));
+        axes(
+            #[inline(always)]
+            |axis| lanes(|i| normal[axis][i] * outwards[i]),
+        )
     }
 
     /// Returns the light on points, weighted by their shares. `tint` multiplies the baked light.
@@ -106,4 +128,10 @@ impl Surfaces {
             },
         )
     }
+}
+
+/// Computes the values of a light's channels.
+#[inline(always)]
+fn channels<T>(each: impl Fn(usize) -> T) -> [T; 4] {
+    [each(0), each(1), each(2), each(3)]
 }

@@ -287,7 +287,7 @@ impl Surfaces {
             self.ray.set(at, ray);
             self.point_m.set(at, point_m);
             let alpha = self.set_surface(at, rays, strip, [&ray, &point_m], &depth_m);
-            self.set_baked(at, strip, &point_m);
+            self.set_baked(at, strip.count - start, &strip.light, &point_m);
             *block_mut(&mut self.pixel_share, at) = match strip.alpha {
                 None => [strip.share; N],
                 Some(of_part) => lanes(|i| strip.share * opacity(of_part * alpha[i])),

@@ -30,8 +30,7 @@ pub(super) fn face_numbers(prepared: &Prepared, sheet: u32) -> [u32; FACE_NUMBER
     let light = match baked.sheets.get(sheet as usize) {
         Some(SheetLight::Map(number)) => {
             let map = &baked.maps[*number as usize];
-            let [u, v, _] = map.from_world().0.map(|(axis, constant)| [axis.x, axis.y, axis.z, constant]);
-            numbers[..8].copy_from_slice([u, v].map(|row| row.map(f32::to_bits)).as_flattened());
+            numbers[..8].copy_from_slice(map.axes.map(|row| row.map(f32::to_bits)).as_flattened());
             let first_texel = first_cube + baked.cubes.len() as u32 * SIDES;
             [ON_MAP, first_texel + map.first, map.width, map.height]
         }
@@ -45,11 +44,12 @@ pub(super) fn face_numbers(prepared: &Prepared, sheet: u32) -> [u32; FACE_NUMBER
 /// Returns the cubes of all parts in a state; those of the room are not used.
 pub(super) fn part_cubes(baked: &BakedLight, prepared: &Prepared, placed: &PlacedScenery) -> Vec<LightCube> {
     let parts = prepared.scenery.parts.iter().zip(&placed.world_from_mesh).enumerate();
-    let cube = |(number, (part, pose)): (usize, (&crate::render::Part, &rapier3d::math::Pose))| match part
-        .carrier
-    {
-        Carrier::Room => LightCube::default(),
-        Carrier::Link { .. } | Carrier::Object(_) => baked.cube(*pose * prepared.geometry(number).bounds.0),
-    };
-    parts.map(cube).collect()
+    parts
+        .map(|(number, (part, pose))| match part.carrier {
+            Carrier::Room => LightCube::default(),
+            Carrier::Link { .. } | Carrier::Object(_) => {
+                baked.cube(*pose * prepared.geometry(number).bounds.0)
+            }
+        })
+        .collect()
 }

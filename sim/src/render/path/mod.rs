@@ -66,7 +66,7 @@ struct Mover {
 
 impl PathRenderer {
     pub(super) fn new(scenery: Scenery) -> PathRenderer {
-        let prepared = Prepared::new(scenery);
+        let prepared = Prepared::lit(scenery);
         let scenery = &prepared.scenery;
         let of_room =
             |number: &usize| scenery.parts[*number].carrier == Carrier::Room && !prepared.is_veil[*number];

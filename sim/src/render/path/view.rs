@@ -8,6 +8,7 @@ use super::sequence::{PixelSeed, SampleCount};
 use super::space::Spot;
 use super::space::body::MetSides;
 use crate::mjcf::Gloss;
+use crate::render::baked::cube_light;
 use crate::render::scene::camera::NEAR_M;
 use crate::render::shading::lamps::{LitSurface, shown_rgb};
 use crate::render::shading::power::blended;
@@ -127,6 +128,10 @@ impl<'a> PathView<'a> {
                 back_direction: self.back(),
             };
             return shown_rgb(&lamps.headlight, self.scene.lights.stated(), &surface, |_| SUNLIT_SHARE);
+        }
+        if let (Some(baked), Some(tint)) = (&self.scene.prepared.baked, self.scene.prepared.tint()) {
+            let [red, green, blue, _] = cube_light(&baked.cube(point_m), normal.to_array());
+            return (albedo * Vector::new(red, green, blue) * Vector::from(tint)).min(Vector::ONE);
         }
         let ambient_rgb = light.below_rgb + (light.above_rgb - light.below_rgb) * (normal.z * 0.5 + 0.5);
         let sun_rgb = light.sun_rgb * (normal.dot(light.sun_direction).max(0.0) * SUNLIT_SHARE);
