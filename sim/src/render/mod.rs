@@ -10,6 +10,7 @@ mod gpu;
 mod kind;
 mod path;
 mod scene;
+mod sensor;
 mod shading;
 
 pub use kind::RendererKind;
@@ -17,6 +18,7 @@ pub use scene::camera::{Camera, Cameras, Intrinsics, LensFlaw};
 pub use scene::mesh::{TriangleMesh, Vertex};
 pub use scene::shared::SharedMesh;
 pub use scene::{Carrier, Lamp, Lamps, Part, PlacedScenery, Scenery, object_id, robot_rgba};
+pub use sensor::{CameraModel, CameraMotion, Distortion, Shot, View};
 pub use shading::Light;
 pub use shading::pattern::Pattern;
 
