@@ -9,8 +9,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use tandem_sim::{
-    BaseLimits, CONTROL_HZ, LocomotionChoice, RobotModel, RobotSource, Sensing, SensorModel, SimError,
-    StateSource,
+    BaseLimits, LocomotionChoice, RobotModel, RobotSource, Sensing, SensorModel, SimError, StateSource,
     render::{CameraModel, RendererKind},
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Operators, Protocol, Wording};
@@ -253,15 +252,7 @@ impl EpisodeSpec {
             thinking_limit_s.map(|limit_s| format!("thinking limit: {limit_s} s")),
             keyed_seed.as_ref().map(|keyed| format!("seed key: {}", keyed.key_fingerprint)),
             stress.map(|stress| format!("stress: {stress}")),
-            match start {
-                Start::Moment(MomentStart { before_s: Some(before_s), .. }) => {
-                    Some(format!("begun again {before_s} s before it went wrong"))
-                }
-                Start::Moment(MomentStart { before_s: None, control_step, .. }) => {
-                    Some(format!("taken over at {:.1} s", *control_step as f64 / CONTROL_HZ))
-                }
-                Start::Task | Start::Checkpoint(_) | Start::Phase(_) => None,
-            },
+            start.peculiarity(),
         ];
         found.into_iter().flatten().chain(variation.departures()).collect()
     }

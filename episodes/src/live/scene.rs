@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use serde_json::{Value, json};
 use tandem_sim::render::{
-    Cameras, Intrinsics, PictureError, Renderer, RendererKind, Scenery, View, encode_png,
+    CameraView, Cameras, Intrinsics, PictureError, Renderer, RendererKind, Scenery, encode_png,
 };
 use tandem_sim::{CONTROL_HZ, RobotModel, Side, Step, World};
 
@@ -102,7 +102,7 @@ impl LiveScene {
     /// Renders the view of robot `name` after `step` as a PNG file; `None` if there is no such robot. The
     /// name [`LiveScene::THIRD_PERSON`] is that of the room's camera. The episode does not wait for it.
     pub fn picture(&self, step: &Step, name: &str) -> Option<Result<Vec<u8>, PictureError>> {
-        let view: View = match self.robots.iter().position(|robot| robot.name == name) {
+        let view: CameraView = match self.robots.iter().position(|robot| robot.name == name) {
             Some(robot) => self.cameras.eye(step, robot),
             None if name == LiveScene::THIRD_PERSON => self.cameras.third_person().into(),
             None => return None,

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{Isometry3, Point3};
-use tandem_sim::render::{Camera, Cameras, Frame, RenderRequest, Renderer, View, object_id};
+use tandem_sim::render::{Camera, CameraView, Cameras, Frame, RenderRequest, Renderer, object_id};
 use tandem_sim::{Step, World};
 use tandem_tools_spec::{
     Color, DepthReply, DepthRow, PixelRegion, PoseFrame, QueryDepth, SpecError, Surface, SurfaceQuery,
@@ -48,7 +48,7 @@ struct NamedObject {
 struct DrawnStep {
     /// Held so that its address stays unique.
     step: Arc<Step>,
-    /// View of each robot, once rendered.
+    /// CameraView of each robot, once rendered.
     views: Vec<Option<Arc<RobotView>>>,
 }
 
@@ -118,12 +118,12 @@ impl Observer {
     }
 
     /// Renders views after `step`, in order.
-    pub fn render_all(&mut self, step: &Step, views: &[View]) -> Vec<Frame> {
-        View::render_all(views, &mut *self.renderer, step)
+    pub fn render_all(&mut self, step: &Step, views: &[CameraView]) -> Vec<Frame> {
+        CameraView::render_all(views, &mut *self.renderer, step)
     }
 
     /// Renders a view after `step`.
-    pub fn render(&mut self, step: &Step, view: &View) -> Frame {
+    pub fn render(&mut self, step: &Step, view: &CameraView) -> Frame {
         view.render(&mut *self.renderer, step)
     }
 
@@ -150,7 +150,7 @@ impl Observer {
     }
 
     /// Renders the colours of a view after `step`.
-    pub fn colours(&mut self, step: &Step, view: &View) -> Vec<u8> {
+    pub fn colours(&mut self, step: &Step, view: &CameraView) -> Vec<u8> {
         view.render_colours(&mut *self.renderer, step)
     }
 
@@ -163,11 +163,11 @@ impl Observer {
         };
         let missing: BTreeSet<usize> =
             robots.iter().copied().filter(|robot| views[*robot].is_none()).collect();
-        let eyes: Vec<View> = missing.iter().map(|robot| self.cameras.eye(step, *robot)).collect();
+        let eyes: Vec<CameraView> = missing.iter().map(|robot| self.cameras.eye(step, *robot)).collect();
         // If all have been rendered, the renderer need not even place the scenery.
         let frames = match eyes.is_empty() {
             true => Vec::new(),
-            false => View::render_all(&eyes, &mut *self.renderer, step),
+            false => CameraView::render_all(&eyes, &mut *self.renderer, step),
         };
         for ((robot, eye), frame) in missing.into_iter().zip(&eyes).zip(frames) {
             views[robot] = Some(Arc::new(RobotView::new(eye.intrinsics(), frame)));

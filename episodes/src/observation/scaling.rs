@@ -6,7 +6,7 @@ use fast_image_resize::{
     pixels::U8x3,
 };
 use image::{ImageBuffer, Rgb, RgbImage};
-use tandem_sim::render::{Camera, View};
+use tandem_sim::render::{Camera, CameraView};
 
 use super::Picture;
 
@@ -15,13 +15,13 @@ pub type Pixels<'a> = ImageBuffer<Rgb<u8>, &'a [u8]>;
 
 /// Returns the view that renders images of this size. A size of the same shape that is no larger gives the
 /// camera's own image, scaled: that is what a policy sees that requests this size.
-pub fn drawing_view(own: View, [width, height]: [u32; 2]) -> View {
+pub fn drawing_view(own: CameraView, [width, height]: [u32; 2]) -> CameraView {
     let camera = own.camera;
     let same_shape =
         u64::from(width) * u64::from(camera.height) == u64::from(height) * u64::from(camera.width);
     match same_shape && width <= camera.width {
         true => own,
-        false => View { camera: Camera { width, height, ..camera }, ..own },
+        false => CameraView { camera: Camera { width, height, ..camera }, ..own },
     }
 }
 

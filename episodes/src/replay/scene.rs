@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tandem_sim::Step;
-use tandem_sim::render::{Camera, Frame, View};
+use tandem_sim::render::{Camera, CameraView, Frame};
 
 use crate::EpisodeError;
 use crate::observation::{Observer, Picture, drawing_view, scaled_colours};
@@ -85,14 +85,14 @@ impl EpisodeRenderer {
 
     /// Returns the view of a camera after `step`, with the given image size or its own. The vertical angle
     /// stays the same, and the horizontal one follows the shape.
-    pub fn view(&self, of: EpisodeCamera, step: &Step, size: Option<PictureSize>) -> View {
+    pub fn view(&self, of: EpisodeCamera, step: &Step, size: Option<PictureSize>) -> CameraView {
         let view = match of {
             EpisodeCamera::ThirdPerson => self.observer.cameras.third_person().into(),
             EpisodeCamera::Egocentric(robot) => self.observer.cameras.eye(step, robot),
         };
         match size {
             Some(PictureSize { width, height }) => {
-                View { camera: Camera { width, height, ..view.camera }, ..view }
+                CameraView { camera: Camera { width, height, ..view.camera }, ..view }
             }
             None => view,
         }
@@ -112,7 +112,7 @@ impl EpisodeRenderer {
     }
 
     /// Renders a view after `step`.
-    pub fn draw(&mut self, step: &Step, view: &View) -> Frame {
+    pub fn draw(&mut self, step: &Step, view: &CameraView) -> Frame {
         self.observer.render(step, view)
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::{fs, io};
 
-use tandem_sim::render::{Frame, PictureError, View, encode_png};
+use tandem_sim::render::{CameraView, Frame, PictureError, encode_png};
 use tandem_sim::{CONTROL_HZ, Step};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
@@ -267,7 +267,7 @@ pub(super) fn moment<'a>(
         labels.push(format!("what {name} sees"));
         views.push(observer.cameras.eye(step, robot));
     }
-    for View { camera, .. } in &mut views {
+    for CameraView { camera, .. } in &mut views {
         (camera.width, camera.height) = (CELL_WIDTH as u32, CELL_HEIGHT as u32);
     }
     let frames = observer.render_all(step, &views).into_iter();

@@ -66,9 +66,7 @@ class Recording:
         camera: Model of the head cameras in its images. None: that of the episode.
     """
 
-    def __init__(
-        self, path: str | PathLike[str], *, renderer: Renderer | None = None, camera: Camera | None = None
-    ) -> None:
+    def __init__(self, path: str | PathLike[str], *, renderer: Renderer | None = None, camera: Camera | None = None) -> None:
         given = Path(path)
         self.path = given / "episode.mcap" if given.is_dir() else given
         """Path of the recording's file."""

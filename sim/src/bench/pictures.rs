@@ -7,7 +7,7 @@ use rapier3d::math::{Pose, Vector};
 use serde::Serialize;
 
 use super::{Spread, busy_since};
-use crate::render::{Camera, CameraModel, Cameras, Renderer, RendererKind, Scenery, View};
+use crate::render::{Camera, CameraModel, CameraView, Cameras, Renderer, RendererKind, Scenery};
 use crate::{ObjectPlacement, RobotPlacement, SimError, Step, World, WorldSpec};
 
 /// Times of all sets of images.
@@ -65,7 +65,7 @@ pub fn pictures(
     let small = |step: &Step| {
         let [width, height] = SMALL_PX;
         let eyes = (0..2).map(|robot| cameras.eye(step, robot));
-        eyes.map(|eye| View { camera: Camera { width, height, ..eye.camera }, ..eye }).collect()
+        eyes.map(|eye| CameraView { camera: Camera { width, height, ..eye.camera }, ..eye }).collect()
     };
     let room = |_: &Step| vec![cameras.third_person().into()];
     let mut cases = Vec::new();
@@ -84,16 +84,16 @@ pub fn pictures(
 }
 
 /// The views of a set of images.
-type Views<'a> = dyn Fn(&Step) -> Vec<View> + 'a;
+type Views<'a> = dyn Fn(&Step) -> Vec<CameraView> + 'a;
 
 /// Renderer of an image: all of it, or its colours alone, as learned policies use them.
-type Draw = fn(&mut dyn Renderer, &Step, &View);
+type Draw = fn(&mut dyn Renderer, &Step, &CameraView);
 
-fn whole(renderer: &mut dyn Renderer, step: &Step, view: &View) {
+fn whole(renderer: &mut dyn Renderer, step: &Step, view: &CameraView) {
     view.render(renderer, step);
 }
 
-fn colours(renderer: &mut dyn Renderer, step: &Step, view: &View) {
+fn colours(renderer: &mut dyn Renderer, step: &Step, view: &CameraView) {
     view.render_colours(renderer, step);
 }
 

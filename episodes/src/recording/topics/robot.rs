@@ -58,7 +58,7 @@ impl RobotTopics {
             hands: file.topic(&format!("/{}/hands", robot.name), &[])?,
             executed,
             setpoints: None,
-            lens: camera.lens((&robot.model.egocentric).into()),
+            lens: Intrinsics::from(&robot.model.egocentric).of_model(camera),
             camera: None,
         })
     }

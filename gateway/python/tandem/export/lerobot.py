@@ -343,7 +343,8 @@ def _played(spec: dict[str, Any]) -> str:
     """Describes how episodes were played. Disturbances are described in the last paragraph of the card."""
     variation = ", ".join(f"{name} {value:g}" for name, value in spec.get("variation", {}).items())
     camera = f", camera {spec['camera']}" if "camera" in spec else ""
-    return f"{spec['protocol']} protocol, sensors {spec['sensing']['sensors']}{camera}" + (f", {variation}" if variation else "")
+    sensors = f"sensors {spec['sensing']['sensors']}{camera}"
+    return f"{spec['protocol']} protocol, {sensors}" + (f", {variation}" if variation else "")
 
 
 def _ranges(numbers: Sequence[int]) -> list[str]:

@@ -2,8 +2,8 @@
 
 use rapier3d::math::{Pose, Vector};
 
+use super::lens::{CameraModel, Distortion};
 use crate::mjcf::MjcfCamera;
-use crate::render::sensor::{CameraModel, CameraMotion, Distortion, Shot, View};
 use crate::{Step, World};
 
 /// A pinhole camera with square pixels and the principal point in the middle; axes as in
@@ -56,6 +56,12 @@ impl Intrinsics {
             cy: 0.5 * height as f32 - 0.5,
             distortion: Distortion::NONE,
         }
+    }
+
+    /// Returns the intrinsics with the distortion of a model's lens.
+    pub fn of_model(self, model: CameraModel) -> Intrinsics {
+        let half_height_tan = 0.5 * self.height as f32 / self.focal_px;
+        Intrinsics { distortion: model.distortion(half_height_tan), ..self }
     }
 
     /// Returns the point in the camera's frame, with axes as in [`crate::mjcf::MjcfCamera`], that is
@@ -158,6 +164,16 @@ impl Cameras {
         self.model = (model, seed);
     }
 
+    /// Returns the model of the cameras in the robots' heads, and the seed of its noise.
+    pub fn model(&self) -> (CameraModel, u32) {
+        self.model
+    }
+
+    /// Returns the deviation of a robot's camera from its file.
+    pub fn lens(&self, robot: usize) -> LensFlaw {
+        self.heads[robot].1
+    }
+
     /// Returns true if the robots' images are those of ideal cameras.
     pub fn are_ideal(&self) -> bool {
         self.model.0.is_ideal()
@@ -178,30 +194,6 @@ impl Cameras {
                 Camera { blur_px: lens.blur_px, ..camera(head, world_from_camera * lens.camera_from_lens) }
             }
         }
-    }
-
-    /// Returns the view of a robot after `step`: the camera in its head, with the sensor of the model.
-    pub fn eye(&self, step: &Step, robot: usize) -> View {
-        let camera = self.egocentric(step, robot);
-        let (model, seed) = self.model;
-        let shot = match model {
-            CameraModel::Ideal => None,
-            CameraModel::D435i => Some(Shot {
-                seed: Shot::seed(seed, robot, step.control_step),
-                motion: self.motion(step, robot),
-            }),
-        };
-        View { camera, shot }
-    }
-
-    /// Returns the motion of a robot's camera in the control step that ended with `step`.
-    fn motion(&self, step: &Step, robot: usize) -> CameraMotion {
-        let truth = &step.robots[robot].truth;
-        let lens = self.heads[robot].1.camera_from_lens;
-        let before = truth.world_from_camera_before.map(|before| before * lens);
-        before.map_or(CameraMotion::STILL, |before| {
-            CameraMotion::between(&before, &(truth.world_from_camera * lens))
-        })
     }
 
     /// Returns the scene's camera that sees all robots.

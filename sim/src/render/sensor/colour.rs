@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use super::Shot;
 use super::lens::LensMap;
-use super::noise::Noise;
+use super::noise::PixelNoise;
 use super::warp::{LinearImage, Warp};
 use crate::render::shading::srgb::SrgbTable;
 use crate::srgb::linear_light;
@@ -37,7 +37,7 @@ const FILTERED: [f32; 3] = [0.25, 0.5, 0.25];
 
 /// Luminance of linear sRGB, after Rec. 709.
 const LUMINANCE: [f32; 3] = [0.2126, 0.7152, 0.0722];
-/// Every so manieth pixel is metered.
+/// One pixel of this many is metered.
 const METERED: usize = 5;
 
 static DECODED: LazyLock<[f32; 256]> =
@@ -45,9 +45,9 @@ static DECODED: LazyLock<[f32; 256]> =
 static ENCODER: LazyLock<SrgbTable> = LazyLock::new(SrgbTable::default);
 
 /// Light that falls on the sensor.
-pub struct Light {
+pub struct SensorLight {
     ideal: LinearImage,
-    mean_luminance: f32,
+    mean_value: f32,
 }
 
 /// Setting of the sensor.
@@ -58,12 +58,12 @@ pub struct Exposure {
 }
 
 impl Exposure {
-    /// Returns the setting that multiplies the light by `wanted`, as far as its limits allow: a long exposure
-    /// rather than gain.
-    fn of(wanted: f32) -> Exposure {
+    /// Returns the setting that multiplies the light by `wanted_factor`, as far as its limits allow: a long
+    /// exposure rather than gain.
+    fn of(wanted_factor: f32) -> Exposure {
         let light_1_s = WHITE_1_S / FULL_WELL;
-        let time_s = (wanted / light_1_s).clamp(EXPOSURE_S[0], EXPOSURE_S[1]);
-        Exposure { time_s, gain: (wanted / (light_1_s * time_s)).clamp(GAIN[0], GAIN[1]) }
+        let time_s = (wanted_factor / light_1_s).clamp(EXPOSURE_S[0], EXPOSURE_S[1]);
+        Exposure { time_s, gain: (wanted_factor / (light_1_s * time_s)).clamp(GAIN[0], GAIN[1]) }
     }
 
     /// Returns the factor from light to values of the image, of which 1 is saturated.
@@ -84,25 +84,24 @@ impl Exposure {
     }
 }
 
-impl Light {
+impl SensorLight {
     /// Converts an ideal image, three bytes a pixel.
-    pub fn of(rgb: &[u8], width: u32, height: u32) -> Light {
+    pub fn of(rgb: &[u8], width: u32, height: u32) -> SensorLight {
         let ideal = LinearImage::of(rgb, width as usize, height as usize, &DECODED);
-        let mean_luminance =
-            LUMINANCE.iter().zip(ideal.mean(METERED)).map(|(weight, mean)| weight * mean).sum();
-        Light { ideal, mean_luminance }
+        let mean_value = LUMINANCE.iter().zip(ideal.mean(METERED)).map(|(weight, mean)| weight * mean).sum();
+        SensorLight { ideal, mean_value }
     }
 
     /// Returns the exposure that the camera settles on in this light.
     pub fn exposure(&self) -> Exposure {
-        Exposure::of(MEAN_LUMINANCE / self.mean_luminance.max(1e-6))
+        Exposure::of(MEAN_LUMINANCE / self.mean_value.max(1e-6))
     }
 
     /// Returns the sensor's image, three bytes a pixel, sRGB.
     pub fn taken(&self, exposure: &Exposure, depth_m: &[f32], map: &LensMap, shot: &Shot) -> Vec<u8> {
         let (width, height) = (map.lens.width as usize, map.lens.height as usize);
         let (factor, variance) = (exposure.factor(), exposure.variance(map.lens.height));
-        let noise = Noise::new(shot.seed, 0);
+        let noise = PixelNoise::new(shot.seed, 0);
         let mut warp = Warp::new(map);
         let mut rgb = vec![0; 3 * width * height];
         let [mut values, mut drawn]: [[Vec<f32>; 3]; 2] =

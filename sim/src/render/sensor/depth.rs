@@ -4,7 +4,7 @@
 //! the reference: a pixel has no depth if the right one does not see the same point.
 
 use super::lens::LensMap;
-use super::noise::Noise;
+use super::noise::PixelNoise;
 
 /// Distance between the imagers.
 pub const BASELINE_M: f32 = 0.05;
@@ -24,7 +24,7 @@ const UNITS_1_M: f32 = 1000.0;
 
 /// Returns the depth that the camera measures; infinite where it measures none.
 pub fn taken(ideal_m: &[f32], map: &LensMap, seed: u64) -> Vec<f32> {
-    let noise = Noise::new(seed, 1);
+    let noise = PixelNoise::new(seed, 1);
     let width = map.lens.width as usize;
     let mut depth_m = map.nearest_of(ideal_m);
     for (row, depth_m) in depth_m.chunks_exact_mut(width).enumerate() {
@@ -50,10 +50,10 @@ fn hide(depth_m: &mut [f32], focal_px: f32) {
     }
 }
 
-/// Returns the measurement of a depth; `drawn` is its error in standard deviations.
+/// Returns the measurement of a depth; `drawn_deviation` is its error in standard deviations.
 #[inline(always)]
-fn measured_m(ideal_m: f32, drawn: f32) -> f32 {
-    let disparity_px = nearest_whole((DISPARITY_PX_M / ideal_m + NOISE_PX * drawn) * STEPS) / STEPS;
+fn measured_m(ideal_m: f32, drawn_deviation: f32) -> f32 {
+    let disparity_px = nearest_whole((DISPARITY_PX_M / ideal_m + NOISE_PX * drawn_deviation) * STEPS) / STEPS;
     let depth_m = nearest_whole(DISPARITY_PX_M / disparity_px * UNITS_1_M) / UNITS_1_M;
     // A disparity of zero has an infinite depth, a negative one 0.
     if depth_m >= RANGE_M[0] && depth_m <= RANGE_M[1] && ideal_m.is_finite() {

@@ -12,8 +12,8 @@ static MAPS: Mutex<Vec<Arc<LensMap>>> = Mutex::new(Vec::new());
 /// Rays and nearest pixels of a lens, pixel by pixel.
 pub struct LensMap {
     pub lens: Intrinsics,
-    /// Rays through the pixels as in [`super::Distortion`]: all x, then all y.
-    pub rays: [Vec<f32>; 2],
+    /// Rays through the pixels as in [`crate::render::Distortion`]: all x, then all y.
+    pub pixel_ray: [Vec<f32>; 2],
     /// Index of the nearest pixel of the ideal image.
     pub nearest: Vec<u32>,
 }
@@ -31,14 +31,14 @@ impl LensMap {
 
     fn new(lens: Intrinsics) -> LensMap {
         let Intrinsics { width, height, focal_px, cx, cy, distortion } = lens;
-        let mut map = LensMap { lens, rays: [Vec::new(), Vec::new()], nearest: Vec::new() };
+        let mut map = LensMap { lens, pixel_ray: [Vec::new(), Vec::new()], nearest: Vec::new() };
         for (row, column) in (0..height).flat_map(|row| (0..width).map(move |column| (row, column))) {
             let [x, y] =
                 distortion.undistorted([(column as f32 - cx) / focal_px, (row as f32 - cy) / focal_px]);
             // Before the first pixel, a cast gives that one.
             let [left, above] = [focal_px * x + cx, focal_px * y + cy].map(|px| (px + 0.5) as u32);
-            map.rays[0].push(x);
-            map.rays[1].push(y);
+            map.pixel_ray[0].push(x);
+            map.pixel_ray[1].push(y);
             map.nearest.push(above.min(height - 1) * width + left.min(width - 1));
         }
         map

@@ -6,7 +6,6 @@
 
 mod colour;
 mod depth;
-mod distortion;
 mod lens;
 mod motion;
 mod noise;
@@ -17,54 +16,16 @@ mod tests;
 
 use std::thread;
 
-use serde::{Deserialize, Serialize};
-
-use super::{Camera, Frame, Intrinsics, Renderer};
+use super::{Camera, CameraModel, Cameras, Frame, Intrinsics, Renderer};
 use crate::Step;
 
 use lens::LensMap;
 
-pub use distortion::Distortion;
 pub use motion::CameraMotion;
-
-/// Model of the cameras in the robots' heads.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum CameraModel {
-    /// A pinhole with a perfect sensor.
-    #[default]
-    Ideal,
-    /// The colour sensor and the stereo depth of an Intel RealSense D435i, the head camera of the G1.
-    D435i,
-}
-
-impl CameraModel {
-    pub const ALL: [CameraModel; 2] = [CameraModel::Ideal, CameraModel::D435i];
-
-    pub fn name(self) -> &'static str {
-        match self {
-            CameraModel::Ideal => "ideal",
-            CameraModel::D435i => "d435i",
-        }
-    }
-
-    /// Returns true for the default, which specs leave out.
-    pub fn is_ideal(&self) -> bool {
-        *self == CameraModel::Ideal
-    }
-
-    /// Returns the intrinsics of a camera of this model, whose lens is a pinhole but for the distortion.
-    pub fn lens(self, pinhole: Intrinsics) -> Intrinsics {
-        match self {
-            CameraModel::Ideal => pinhole,
-            CameraModel::D435i => Intrinsics { distortion: Distortion::d435i(&pinhole), ..pinhole },
-        }
-    }
-}
 
 /// A camera with the sensor behind its lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
+pub struct CameraView {
     pub camera: Camera,
     /// `None` for an ideal image.
     pub shot: Option<Shot>,
@@ -78,17 +39,17 @@ pub struct Shot {
     pub motion: CameraMotion,
 }
 
-impl From<Camera> for View {
-    fn from(camera: Camera) -> View {
-        View { camera, shot: None }
+impl From<Camera> for CameraView {
+    fn from(camera: Camera) -> CameraView {
+        CameraView { camera, shot: None }
     }
 }
 
-impl View {
+impl CameraView {
     /// Returns the intrinsics of the image, with the distortion of the camera's lens.
     pub fn intrinsics(&self) -> Intrinsics {
         let model = if self.shot.is_some() { CameraModel::D435i } else { CameraModel::Ideal };
-        model.lens(self.camera.intrinsics())
+        self.camera.intrinsics().of_model(model)
     }
 
     /// Renders the image after `step`.
@@ -96,7 +57,7 @@ impl View {
         self.take(renderer.render(step, &self.camera))
     }
 
-    /// Renders only the colours of the image after `step`, the same as [`View::render`] does. A sensor needs
+    /// Renders only the colours of the image after `step`, as [`CameraView::render`] does. A sensor needs
     /// the depth, too: what is near moves more in a moving camera's image.
     pub fn render_colours(&self, renderer: &mut dyn Renderer, step: &Step) -> Vec<u8> {
         match self.shot {
@@ -106,7 +67,7 @@ impl View {
     }
 
     /// Renders the images of several views after `step`, in their order.
-    pub fn render_all(views: &[View], renderer: &mut dyn Renderer, step: &Step) -> Vec<Frame> {
+    pub fn render_all(views: &[CameraView], renderer: &mut dyn Renderer, step: &Step) -> Vec<Frame> {
         let cameras: Vec<Camera> = views.iter().map(|view| view.camera).collect();
         let frames = renderer.render_all(step, &cameras);
         if views.iter().all(|view| view.shot.is_none()) {
@@ -128,6 +89,31 @@ impl View {
     }
 }
 
+impl Cameras {
+    /// Returns the view of a robot after `step`: the camera in its head, with the sensor of the model.
+    pub fn eye(&self, step: &Step, robot: usize) -> CameraView {
+        let (model, seed) = self.model();
+        let shot = match model {
+            CameraModel::Ideal => None,
+            CameraModel::D435i => Some(Shot {
+                seed: Shot::seed(seed, robot, step.control_step),
+                motion: self.motion(step, robot),
+            }),
+        };
+        CameraView { camera: self.egocentric(step, robot), shot }
+    }
+
+    /// Returns the motion of a robot's camera in the control step that ended with `step`.
+    fn motion(&self, step: &Step, robot: usize) -> CameraMotion {
+        let truth = &step.robots[robot].truth;
+        let lens = self.lens(robot).camera_from_lens;
+        let before = truth.world_from_camera_before.map(|before| before * lens);
+        before.map_or(CameraMotion::STILL, |before| {
+            CameraMotion::between(&before, &(truth.world_from_camera * lens))
+        })
+    }
+}
+
 impl Shot {
     /// Returns the seed of the image of a robot after a control step.
     pub fn seed(episode: u32, robot: usize, control_step: u64) -> u64 {
@@ -136,7 +122,7 @@ impl Shot {
 
     /// Returns the image that a D435i takes of what an ideal camera of these intrinsics sees.
     fn d435i(&self, ideal: Frame, lens: &Intrinsics) -> Frame {
-        let light = colour::Light::of(&ideal.rgb, ideal.width, ideal.height);
+        let light = colour::SensorLight::of(&ideal.rgb, ideal.width, ideal.height);
         let map = LensMap::of(lens);
         Frame {
             rgb: light.taken(&light.exposure(), &ideal.depth_m, &map, self),

@@ -26,9 +26,9 @@ impl CameraMotion {
         }
     }
 
-    /// Returns the velocity of the point at which the ray through `(x, y, 1)` is seen, x right and y down,
-    /// relative to the focal length: where the image of an earlier or later camera is to be read. Longuet-Higgins
-    /// and Prazdny 1980, for a world that stands still:
+    /// Returns the velocity at which the image of an earlier or later camera moves over this one, relative to
+    /// the focal length, where the ray through `(x, y, 1)` is seen, x right and y down. For a world that stands
+    /// still, by Longuet-Higgins and Prazdny 1980:
     ///
     ///   dx/dt = (vx - x vz) / z + wy (1 + x^2) - wz y - wx x y,
     ///   dy/dt = (vy - y vz) / z - wx (1 + y^2) + wz x + wy x y.

@@ -2,10 +2,11 @@
 
 use rapier3d::math::{Pose, Rotation, Vector};
 
-use super::colour::{Exposure, Light, READOUT_S};
+use super::colour::{Exposure, READOUT_S, SensorLight};
 use super::depth::{BASELINE_M, DISPARITY_PX_M, NOISE_PX, RANGE_M, STEPS};
 use super::*;
 use crate::CONTROL_DT_S;
+use crate::render::Distortion;
 use crate::srgb::linear_light;
 
 const WIDTH: usize = 320;
@@ -37,7 +38,7 @@ fn mean_and_deviation(values: impl Iterator<Item = f32> + Clone) -> [f64; 2] {
 
 #[test]
 fn a_ray_comes_back_from_the_distorted_image_and_edges_move_as_little_as_the_datasheet_says() {
-    let distortion = Distortion::d435i(&lens());
+    let distortion = lens().of_model(CameraModel::D435i).distortion;
     for [u, v] in [[0, 0], [319, 239], [319, 0], [160, 0], [0, 120], [200, 100]] {
         let ray = [(u as f32 - 159.5) / FOCAL_PX, (v as f32 - 119.5) / FOCAL_PX];
         let place = distortion.distorted(ray);
@@ -112,7 +113,7 @@ fn a_near_thing_has_a_hole_of_the_baseline_on_its_left() {
 fn colours_have_the_noise_of_their_electrons() {
     // So dark that the gain is at its limit.
     let grey = vec![20; 3 * WIDTH * HEIGHT];
-    let light = Light::of(&grey, WIDTH as u32, HEIGHT as u32);
+    let light = SensorLight::of(&grey, WIDTH as u32, HEIGHT as u32);
     let exposure = light.exposure();
     assert!((exposure.time_s, exposure.gain) == (0.033, 1983.0 / 128.0), "{exposure:?}");
     let shot = Shot { seed: 3, motion: CameraMotion::STILL };
@@ -136,7 +137,7 @@ fn colours_have_the_noise_of_their_electrons() {
 #[test]
 fn bright_scenes_are_exposed_for_less_long_and_dark_ones_with_gain() {
     let exposed =
-        |byte: u8| Light::of(&vec![byte; 3 * WIDTH * HEIGHT], WIDTH as u32, HEIGHT as u32).exposure();
+        |byte: u8| SensorLight::of(&vec![byte; 3 * WIDTH * HEIGHT], WIDTH as u32, HEIGHT as u32).exposure();
     for byte in [60, 120, 180, 250] {
         let exposure = exposed(byte);
         let mean = linear_light(f32::from(byte) / 255.0) * exposure.factor();
@@ -151,7 +152,7 @@ fn bright_scenes_are_exposed_for_less_long_and_dark_ones_with_gain() {
 /// of pixels in between, for a vertical edge at column 160.
 fn edge(depth_m: f32, motion: CameraMotion) -> Vec<[f32; 2]> {
     let ideal = each_pixel(|u, _| if u < 160 { [40; 3] } else { [200; 3] }).concat();
-    let light = Light::of(&ideal, WIDTH as u32, HEIGHT as u32);
+    let light = SensorLight::of(&ideal, WIDTH as u32, HEIGHT as u32);
     let exposure = light.exposure();
     let shot = Shot { seed: 3, motion };
     let taken = light.taken(&exposure, &vec![depth_m; WIDTH * HEIGHT], &LensMap::of(&lens()), &shot);
@@ -224,7 +225,7 @@ fn an_image_depends_on_seed_step_and_robot_alone() {
         depth_m: each_pixel(|u, _| 0.5 + 0.01 * u as f32),
         ids: each_pixel(|u, v| (u / 40 + v / 40) as u32),
     };
-    let lens = CameraModel::D435i.lens(lens());
+    let lens = lens().of_model(CameraModel::D435i);
     let taken = |seed: u64| Shot { seed, motion: CameraMotion::STILL }.d435i(ideal.clone(), &lens);
     let seeds =
         [(1, 0, 0), (2, 0, 0), (1, 1, 0), (1, 0, 1)].map(|(seed, robot, step)| Shot::seed(seed, robot, step));

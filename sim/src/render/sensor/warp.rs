@@ -15,7 +15,7 @@ const MAX_SAMPLES: i32 = 16;
 pub struct LinearImage {
     width: usize,
     height: usize,
-    colours: Vec<[f32; 4]>,
+    padded_rgb: Vec<[f32; 4]>,
 }
 
 /// Places in the ideal image of one row of pixels, and their velocities.
@@ -27,23 +27,28 @@ pub struct Warp<'a> {
 
 impl LinearImage {
     /// Converts an image, three bytes a pixel, by a table of linear light.
-    pub fn of(rgb: &[u8], width: usize, height: usize, decoded: &[f32; 256]) -> LinearImage {
-        let mut colours = Vec::with_capacity((width + 1) * (height + 1));
+    pub fn of(rgb: &[u8], width: usize, height: usize, decoded_values: &[f32; 256]) -> LinearImage {
+        let mut padded_rgb = Vec::with_capacity((width + 1) * (height + 1));
         let (pixels, _) = rgb.as_chunks::<3>();
         for row in pixels.chunks_exact(width) {
-            colours.extend(row.iter().map(|&[red, green, blue]| {
-                [decoded[red as usize], decoded[green as usize], decoded[blue as usize], 0.0]
+            padded_rgb.extend(row.iter().map(|&[red, green, blue]| {
+                [
+                    decoded_values[red as usize],
+                    decoded_values[green as usize],
+                    decoded_values[blue as usize],
+                    0.0,
+                ]
             }));
-            colours.extend(colours.last().copied());
+            padded_rgb.extend(padded_rgb.last().copied());
         }
-        colours.extend_from_within(colours.len() - (width + 1)..);
-        LinearImage { width, height, colours }
+        padded_rgb.extend_from_within(padded_rgb.len() - (width + 1)..);
+        LinearImage { width, height, padded_rgb }
     }
 
-    /// Returns the mean of every so manieth pixel.
+    /// Returns the mean of one pixel of `every`.
     pub fn mean(&self, every: usize) -> [f32; 3] {
         let mut sum = [0.0; 4];
-        let metered = || self.colours.iter().step_by(every);
+        let metered = || self.padded_rgb.iter().step_by(every);
         for colour in metered() {
             sum = std::array::from_fn(|lane| sum[lane] + colour[lane]);
         }
@@ -52,13 +57,13 @@ impl LinearImage {
 
     /// Reads between pixels. The border's pixels are repeated beyond it.
     #[inline(always)]
-    fn read(&self, x: f32, y: f32) -> [f32; 4] {
+    fn read(&self, [x, y]: [f32; 2]) -> [f32; 4] {
         let (x, y) = (x.max(0.0).min((self.width - 1) as f32), y.max(0.0).min((self.height - 1) as f32));
         let (left, above) = (x as i32, y as i32);
         let (right_part, below_part) = (x - left as f32, y - above as f32);
         let first = above as usize * (self.width + 1) + left as usize;
         let blended = |first: usize| -> [f32; 4] {
-            let [left, right] = [self.colours[first], self.colours[first + 1]];
+            let [left, right] = [self.padded_rgb[first], self.padded_rgb[first + 1]];
             std::array::from_fn(|lane| left[lane] + right_part * (right[lane] - left[lane]))
         };
         let (upper, lower) = (blended(first), blended(first + self.width + 1));
@@ -76,7 +81,7 @@ impl<'a> Warp<'a> {
     pub fn place_row(&mut self, row: usize, depth_m: &[f32], motion: &CameraMotion) {
         let Intrinsics { width, focal_px, cx, cy, .. } = self.map.lens;
         let pixels = row * width as usize..(row + 1) * width as usize;
-        let [xs, ys] = self.map.rays.each_ref().map(|axis| &axis[pixels.clone()]);
+        let [xs, ys] = self.map.pixel_ray.each_ref().map(|axis| &axis[pixels.clone()]);
         let nearest = &self.map.nearest[pixels];
         let ([places_x, places_y], [flow_x, flow_y]) = (&mut self.places_px, &mut self.flow_px_s);
         for (column, (x, y)) in xs.iter().zip(ys).enumerate() {
@@ -100,7 +105,7 @@ impl<'a> Warp<'a> {
         let [dx, dy] = [self.flow_px_s[0][column], self.flow_px_s[1][column]];
         let samples = ((dx.abs().max(dy.abs()) * time_s / SAMPLE_PX) as i32 + 1).min(MAX_SAMPLES);
         if samples == 1 {
-            return ideal.read(x + late_s * dx, y + late_s * dy);
+            return ideal.read([x + late_s * dx, y + late_s * dy]);
         }
         let share = 1.0 / samples as f32;
         let first_s = late_s + time_s * (0.5 * share - 0.5);
@@ -108,7 +113,7 @@ impl<'a> Warp<'a> {
         let [mut x, mut y] = [x + first_s * dx, y + first_s * dy];
         let mut sum = [0.0; 4];
         for _ in 0..samples {
-            let read = ideal.read(x, y);
+            let read = ideal.read([x, y]);
             sum = std::array::from_fn(|lane| sum[lane] + read[lane]);
             (x, y) = (x + step_x, y + step_y);
         }

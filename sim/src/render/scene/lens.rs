@@ -1,6 +1,41 @@
-//! Distortion of a lens, after Brown and Conrady.
+//! Models of cameras, and the distortion of their lenses after Brown and Conrady.
 
-use crate::render::Intrinsics;
+use serde::{Deserialize, Serialize};
+
+/// Model of the cameras in the robots' heads.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CameraModel {
+    /// A pinhole with a perfect sensor.
+    #[default]
+    Ideal,
+    /// The colour sensor and the stereo depth of an Intel RealSense D435i, the head camera of the G1.
+    D435i,
+}
+
+impl CameraModel {
+    pub const ALL: [CameraModel; 2] = [CameraModel::Ideal, CameraModel::D435i];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            CameraModel::Ideal => "ideal",
+            CameraModel::D435i => "d435i",
+        }
+    }
+
+    /// Returns true for the default, which specs leave out.
+    pub fn is_ideal(&self) -> bool {
+        *self == CameraModel::Ideal
+    }
+
+    /// Returns the distortion of the model's lens, if half its vertical angle has this tangent.
+    pub fn distortion(self, half_height_tan: f32) -> Distortion {
+        match self {
+            CameraModel::Ideal => Distortion::NONE,
+            CameraModel::D435i => Distortion::d435i(half_height_tan),
+        }
+    }
+}
 
 /// Coefficients of the distortion of an image, as OpenCV has them. The ray through (x, y, 1), x right and y
 /// down, is seen at
@@ -29,10 +64,10 @@ impl Distortion {
     /// Lens without distortion.
     pub const NONE: Distortion = Distortion { k1: 0.0, k2: 0.0, p1: 0.0, p2: 0.0 };
 
-    /// Returns the distortion of a D435i behind the lens with these intrinsics: a point is shifted by the
-    /// same part of the image's height as behind its own.
-    pub fn d435i(lens: &Intrinsics) -> Distortion {
-        let scale = D435I_HALF_HEIGHT / (0.5 * lens.height as f32 / lens.focal_px);
+    /// Returns the distortion of a D435i behind a lens of this vertical angle: a point is shifted by the same
+    /// part of the image's height as behind its own.
+    fn d435i(half_height_tan: f32) -> Distortion {
+        let scale = D435I_HALF_HEIGHT / half_height_tan;
         let squared = scale * scale;
         let Distortion { k1, k2, p1, p2 } = D435I;
         Distortion { k1: k1 * squared, k2: k2 * squared * squared, p1: p1 * scale, p2: p2 * scale }
@@ -55,13 +90,13 @@ impl Distortion {
         [ray[0] * outwards + aside[0], ray[1] * outwards + aside[1]]
     }
 
-    /// Returns the ray that is seen at a place of the image.
+    /// Returns the ray that is seen at a place of the image, `distorted_ray`.
     #[inline(always)]
-    pub fn undistorted(&self, place: [f32; 2]) -> [f32; 2] {
-        let mut ray = place;
+    pub fn undistorted(&self, distorted_ray: [f32; 2]) -> [f32; 2] {
+        let mut ray = distorted_ray;
         for _ in 0..ITERATIONS {
             let (outwards, aside) = self.shift(ray);
-            ray = [(place[0] - aside[0]) / outwards, (place[1] - aside[1]) / outwards];
+            ray = [(distorted_ray[0] - aside[0]) / outwards, (distorted_ray[1] - aside[1]) / outwards];
         }
         ray
     }
