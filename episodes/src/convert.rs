@@ -1,6 +1,7 @@
 //! Conversions between wire types and simulator or kinematics types.
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
+use tandem_sim::render::Distortion;
 use tandem_sim::{BaseCommand, BaseLimits, Pose, Rotation, Vector};
 use tandem_tools_spec as wire;
 
@@ -89,6 +90,16 @@ pub fn wire_limits(limits: &BaseLimits) -> wire::BaseLimits {
         yaw_rate_rad_s: range(limits.yaw_rate_rad_s),
         pelvis_height_m: range(limits.pelvis_height_m),
     }
+}
+
+/// Converts the distortion of a lens; `None` if there is none.
+pub fn wire_distortion(distortion: &Distortion) -> Option<wire::LensDistortion> {
+    let Distortion { k1, k2, p1, p2 } = *distortion;
+    (*distortion != Distortion::NONE).then(|| wire::LensDistortion {
+        model: "brown_conrady".into(),
+        // Rounding moves no pixel by a thousandth.
+        coefficients: [k1, k2, p1, p2, 0.0].map(|part| rounded_to(8, part.into())),
+    })
 }
 
 /// Converts a camera pose from MuJoCo's axes (x right, y up, looking along -z) to OpenCV's (x right, y

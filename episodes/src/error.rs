@@ -34,6 +34,11 @@ pub enum EpisodeError {
         .width - 1, .height - 1
     )]
     PixelOutside { u: i64, v: i64, width: u32, height: u32 },
+    #[error(
+        "the camera has no depth at pixel [{u}, {v}]: a D435i measures from 0.28 m to 10 m, and not what lies \
+         behind the left edge of something near; choose a pixel beside it"
+    )]
+    NoDepth { u: i64, v: i64 },
     #[error("{}", no_surface(query, seen))]
     NoSurface {
         query: SurfaceQuery,
@@ -97,6 +102,7 @@ impl EpisodeError {
             EpisodeError::PixelOutside { .. } => {
                 Refusal::new("pixel-outside", "Pixel outside the image", Invalid)
             }
+            EpisodeError::NoDepth { .. } => Refusal::new("no-depth", "No depth there", Conflict),
             EpisodeError::NoSurface { .. } => Refusal::new("no-surface", "No such surface", Conflict),
             EpisodeError::Ended { .. } => Refusal::new("ended", "Episode ended", Conflict),
             EpisodeError::Spec(error) => error.refusal(),

@@ -78,7 +78,7 @@ pub use tandem_sim::{
     assets::{DEFAULT_ROBOT, ROBOTS, robot as embedded_robot},
     body::BodyScale,
     joint_names, read_bytes, read_text,
-    render::RendererKind,
+    render::{CameraModel, RendererKind},
 };
 pub use tasks::{SceneFile, TANDEM_PLUS, TaskFileError, read_task, tandem_plus, task_of};
 pub use variation::Variation;

@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 use tandem_sim::{
-    BaseLimits, CONTROL_HZ, LocomotionChoice, RobotModel, RobotSource, Sensing, SensorModel, SimError,
-    StateSource, render::RendererKind,
+    BaseLimits, LocomotionChoice, RobotModel, RobotSource, Sensing, SensorModel, SimError, StateSource,
+    render::{CameraModel, RendererKind},
 };
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Operators, Protocol, Wording};
 
@@ -50,6 +50,9 @@ pub struct EpisodeSpec {
     pub sensing: Sensing,
     /// Renderer of the robots' images; it affects nothing else.
     pub renderer: RendererKind,
+    /// Model of the robots' cameras.
+    #[serde(default, skip_serializing_if = "CameraModel::is_ideal")]
+    pub camera: CameraModel,
     pub start: Start,
     /// Assistance of the policy. Recordings without this field had full assistance.
     #[serde(default)]
@@ -124,6 +127,7 @@ impl EpisodeSpec {
             locomotion: Controller::default(),
             sensing: Sensing::default(),
             renderer: RendererKind::default(),
+            camera: CameraModel::default(),
             start: Start::default(),
             assistance: Assistance::default(),
             disclosure: Assistance::default().disclosure(),
@@ -210,6 +214,7 @@ impl EpisodeSpec {
             locomotion,
             sensing: Sensing { state_estimate, sensors },
             renderer: _,
+            camera,
             start,
             assistance,
             disclosure,
@@ -242,19 +247,12 @@ impl EpisodeSpec {
             (*state_estimate != StateSource::default())
                 .then(|| format!("state estimate: {}", state_estimate.name())),
             (*sensors != SensorModel::default()).then(|| format!("sensors: {}", sensors.name())),
+            (!camera.is_ideal()).then(|| format!("camera: {}", camera.name())),
             instructions.as_ref().map(|words| format!("{INSTRUCTIONS}{}", words.xxh3)),
             thinking_limit_s.map(|limit_s| format!("thinking limit: {limit_s} s")),
             keyed_seed.as_ref().map(|keyed| format!("seed key: {}", keyed.key_fingerprint)),
             stress.map(|stress| format!("stress: {stress}")),
-            match start {
-                Start::Moment(MomentStart { before_s: Some(before_s), .. }) => {
-                    Some(format!("begun again {before_s} s before it went wrong"))
-                }
-                Start::Moment(MomentStart { before_s: None, control_step, .. }) => {
-                    Some(format!("taken over at {:.1} s", *control_step as f64 / CONTROL_HZ))
-                }
-                Start::Task | Start::Checkpoint(_) | Start::Phase(_) => None,
-            },
+            start.peculiarity(),
         ];
         found.into_iter().flatten().chain(variation.departures()).collect()
     }

@@ -18,9 +18,9 @@ use clap::{
 };
 use serde::Deserialize;
 use tandem_episodes::{
-    BaseLimits, Controller, EpisodeError, EpisodeSpec, Instructions, InstructionsError, LiveViewer,
-    MAX_TEXT_BYTES, RendererKind, RobotFile, RunFolder, SceneFile, Sensing, SensorModel, SimError,
-    StateSource, Visibility, read_task, read_text,
+    BaseLimits, CameraModel, Controller, EpisodeError, EpisodeSpec, Instructions, InstructionsError,
+    LiveViewer, MAX_TEXT_BYTES, RendererKind, RobotFile, RunFolder, SceneFile, Sensing, SensorModel,
+    SimError, StateSource, Visibility, read_task, read_text,
     stress::{Stress, StressAxis, StressLevel},
     tasks::{Task, TaskSet},
 };
@@ -109,6 +109,10 @@ pub struct Layer {
     /// `auto` (a GPU if there is one, otherwise `cpu`) [default: auto].
     #[arg(long, env = "TANDEM_RENDERER", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
     pub renderer: Option<RendererKind>,
+    /// Model of the robots' cameras: a pinhole with a perfect sensor, or the G1's own Intel RealSense D435i
+    /// with noise, motion blur, distortion and holes in its depth [default: ideal].
+    #[arg(long, env = "TANDEM_CAMERA", value_name = "NAME", value_parser = one_of(CameraModel::ALL, CameraModel::name))]
+    pub camera: Option<CameraModel>,
     /// Information for policies: `paper` as in the benchmark, with success reported at the end; `full` with
     /// all sensor values, phases as they are reached, and hints on grasping [default: full].
     #[arg(long, env = "TANDEM_ASSISTANCE", value_name = "WHAT", value_parser = one_of(Assistance::ALL, Assistance::name))]
@@ -191,6 +195,7 @@ impl Layer {
             stress: self.stress.or(next.stress),
             level: self.level.or(next.level),
             renderer: self.renderer.or(next.renderer),
+            camera: self.camera.or(next.camera),
             assistance: self.assistance.or(next.assistance),
             disclosure: self.disclosure.or(next.disclosure),
             hints: self.hints.or(next.hints),
@@ -283,6 +288,11 @@ impl Layer {
     pub fn renderer(&self) -> RendererKind {
         self.renderer.unwrap_or_default()
     }
+
+    /// Returns the model of the robots' cameras.
+    pub fn camera(&self) -> CameraModel {
+        self.camera.unwrap_or_default()
+    }
 }
 
 /// All settings, resolved.
@@ -320,6 +330,8 @@ pub struct Settings {
     pub base_limits: BaseLimits,
     /// Renderer of camera images.
     pub renderer: RendererKind,
+    /// Model of the robots' cameras.
+    pub camera: CameraModel,
     /// Amount of information that policies get.
     pub assistance: Assistance,
     /// Disclosure of success to policies.
@@ -370,6 +382,7 @@ impl Settings {
             sensing: self.sensing,
             stress: self.stress,
             renderer: self.renderer,
+            camera: self.camera,
             assistance: self.assistance,
             disclosure: self.disclosure,
             hints: self.hints,
@@ -417,6 +430,7 @@ impl Settings {
             sensing: layer.sensing(),
             stress: layer.stress(),
             renderer,
+            camera: layer.camera(),
             assistance,
             disclosure: layer.disclosure.unwrap_or(assistance.disclosure()),
             hints: layer.hints.unwrap_or(assistance.hints()),

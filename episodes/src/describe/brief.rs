@@ -1,5 +1,6 @@
 //! The brief: frames, cameras and hands in words, for policies. The numbers are those of the embedded robot.
 
+use tandem_sim::render::CameraModel;
 use tandem_tools_spec::{Assistance, BaseLimits, Brief, Hints, Wording};
 
 use super::grips::grips;
@@ -32,6 +33,14 @@ const CAMERA: &str = "The camera is in the head, above the waist: waist joints t
     targets may move the waist, so take camera_in_pelvis from the latest observe. Its axes are x right, y \
     down, z forward; the point (x, y, z) is seen at u = fx x / z + cx, v = fy y / z + cy, with (0, 0) the \
     middle of the top left pixel.";
+
+/// Text for robots with a real camera.
+const D435I: &str = " It is an Intel RealSense D435i behind a wider lens. Images have noise, and are blurred and \
+    sheared while the robot moves: stand still for a sharp one. By `distortion` in its calibration, things at the \
+    edge are seen up to 2 pixels further out; points of query_depth are right nevertheless. Depth errs by 2.5 mm at \
+    1 m, by 10 mm at 2 m (one standard deviation, of every pixel for itself, so take the middle of several). There is \
+    none nearer than 0.28 m, beyond 10 m, and on what lies behind the left edge of something near: ask for a pixel \
+    beside it.";
 
 const HANDS: &str = "A wrist's x axis points along its fingers, and its z axis across them; the right palm \
     faces along its y axis, the left palm against it. All in the wrist's frame, in metres, of a right hand \
@@ -136,7 +145,13 @@ pub fn teamwork(assistance: Assistance, may_talk: bool) -> String {
 }
 
 /// Returns the brief of an episode in its wording, for robots that follow base commands within `limits`.
-pub fn brief(wording: Wording, limits: &BaseLimits, kinds: Option<&[GripKind]>) -> Brief {
+/// The cameras are of model `camera`.
+pub fn brief(
+    wording: Wording,
+    limits: &BaseLimits,
+    camera: CameraModel,
+    kinds: Option<&[GripKind]>,
+) -> Brief {
     let Wording { assistance, hints, .. } = wording;
     let is_full = assistance == Assistance::Full;
     let is_hinted = hints == Hints::On;
@@ -154,7 +169,10 @@ pub fn brief(wording: Wording, limits: &BaseLimits, kinds: Option<&[GripKind]>) 
         partners: if is_full { ROOM_FRAME } else { PARTNERS }.into(),
         teamwork: None,
         odometry: is_full.then(|| ODOMETRY.into()),
-        camera: CAMERA.into(),
+        camera: match camera {
+            CameraModel::Ideal => CAMERA.into(),
+            CameraModel::D435i => [CAMERA, D435I].concat(),
+        },
         hands: HANDS.into(),
         walking: (is_full && squats).then(|| WALKING.into()),
         grasping: is_hinted.then(|| [if is_full { GRIP } else { "" }, GRASPING, &carrying].concat()),
@@ -235,7 +253,7 @@ mod tests {
 
     #[test]
     fn without_hints_there_is_geometry_only() {
-        let brief = |hints: Hints| super::brief(hints.into(), &limits(), None);
+        let brief = |hints: Hints| super::brief(hints.into(), &limits(), CameraModel::Ideal, None);
         let (with, without) = (brief(Hints::On), brief(Hints::Off));
         assert!(with.grasping.is_some());
         assert!(!with.grips.is_empty());
@@ -245,7 +263,7 @@ mod tests {
     #[test]
     fn carrying_is_for_tasks_with_a_load() {
         let speaks = |kinds: Option<&[GripKind]>, assistance: Assistance| {
-            let brief = super::brief(assistance.into(), &limits(), kinds);
+            let brief = super::brief(assistance.into(), &limits(), CameraModel::Ideal, kinds);
             brief.grasping.is_some_and(|text| text.contains("To push, and to carry together"))
         };
         assert!(speaks(None, Assistance::Full));
@@ -257,7 +275,8 @@ mod tests {
     #[test]
     fn bent_knees_are_those_of_our_own_controller() {
         let mut limits = limits();
-        let frames = |limits: &BaseLimits| brief(Assistance::Paper.into(), limits, None).frames;
+        let frames =
+            |limits: &BaseLimits| brief(Assistance::Paper.into(), limits, CameraModel::Ideal, None).frames;
         assert!(frames(&limits).contains("0.62 to 0.68 m"));
         // The limits of a policy from a file.
         limits.pelvis_height_m.min = limits.pelvis_height_m.max;
@@ -266,7 +285,8 @@ mod tests {
 
     #[test]
     fn nothing_is_said_of_what_is_not_told() {
-        let brief = serde_json::json!(brief(Assistance::Paper.into(), &limits(), None)).to_string();
+        let brief = serde_json::json!(brief(Assistance::Paper.into(), &limits(), CameraModel::Ideal, None))
+            .to_string();
         for word in ["pelvis_in_start", "base_motion", "grasping", "odometry", "walking", "level", "grip"] {
             assert!(!brief.contains(word), "{word}: {brief}");
         }

@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use serde_json::{Value, json};
 use tandem_sim::render::{
-    Camera, Cameras, Intrinsics, PictureError, Renderer, RendererKind, Scenery, encode_png,
+    CameraView, Cameras, Intrinsics, PictureError, Renderer, RendererKind, Scenery, encode_png,
 };
 use tandem_sim::{CONTROL_HZ, RobotModel, Side, Step, World};
 
@@ -12,6 +12,7 @@ use super::LiveStep;
 use super::frame::{self, RobotFrame};
 use super::geometry::{Geometry, pose_row};
 use crate::commands::Motion;
+use crate::observation::cameras;
 use crate::scoring::Phase;
 use crate::spec::EpisodeSpec;
 use crate::stress;
@@ -42,7 +43,7 @@ impl LiveScene {
     pub(crate) fn of(spec: &EpisodeSpec, world: &World, motions: &[Motion]) -> LiveScene {
         let scenery = stress::scenery(spec.stress, spec.world_seed(), world);
         let Geometry { meshes, parts, numbers } = Geometry::of(&scenery);
-        let cameras = stress::cameras(spec.stress, spec.world_seed(), world);
+        let cameras = cameras(spec, world);
         let third_person = cameras.third_person();
         let robots = motions.iter().map(robot_head).collect::<Vec<_>>();
         let objects: Vec<&str> = world.object_models().map(|(name, _)| name).collect();
@@ -101,9 +102,9 @@ impl LiveScene {
     /// Renders the view of robot `name` after `step` as a PNG file; `None` if there is no such robot. The
     /// name [`LiveScene::THIRD_PERSON`] is that of the room's camera. The episode does not wait for it.
     pub fn picture(&self, step: &Step, name: &str) -> Option<Result<Vec<u8>, PictureError>> {
-        let camera: Camera = match self.robots.iter().position(|robot| robot.name == name) {
-            Some(robot) => self.cameras.egocentric(step, robot),
-            None if name == LiveScene::THIRD_PERSON => self.cameras.third_person(),
+        let view: CameraView = match self.robots.iter().position(|robot| robot.name == name) {
+            Some(robot) => self.cameras.eye(step, robot),
+            None if name == LiveScene::THIRD_PERSON => self.cameras.third_person().into(),
             None => return None,
         };
         let mut drawing = self.drawing.lock().unwrap_or_else(PoisonError::into_inner);
@@ -112,7 +113,7 @@ impl LiveScene {
             Some(renderer) => renderer,
             none => none.insert(kind.renderer(scenery.take().unwrap_or_default())),
         };
-        let drawn = renderer.render(step, &camera);
+        let drawn = view.render(&mut **renderer, step);
         Some(encode_png(drawn.width, drawn.height, &drawn.rgb))
     }
 

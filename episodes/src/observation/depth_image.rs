@@ -38,14 +38,15 @@ fn range_m(depth_m: &[f32]) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
-    use tandem_sim::render::{Frame, Intrinsics};
+    use tandem_sim::render::{Distortion, Frame, Intrinsics};
 
     use super::*;
 
     fn grey(depth_m: Vec<f32>) -> (DepthImage, Vec<u8>) {
         let count = depth_m.len();
         let (width, height) = (count as u32, 1);
-        let intrinsics = Intrinsics { width, height, focal_px: 1.0, cx: 0.0, cy: 0.0 };
+        let distortion = Distortion::NONE;
+        let intrinsics = Intrinsics { width, height, focal_px: 1.0, cx: 0.0, cy: 0.0, distortion };
         let frame = Frame { width, height, rgb: vec![0; 3 * count], depth_m, ids: vec![1; count] };
         let image = depth_image("A", &RobotView::new(intrinsics, frame)).unwrap();
         let read = image::load_from_memory(&image.png_base64.0).unwrap();

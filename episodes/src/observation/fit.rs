@@ -285,7 +285,7 @@ fn corners_of(edges: &[Edge]) -> Vec<Vector2<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use tandem_sim::render::{Frame, Intrinsics};
+    use tandem_sim::render::{Distortion, Frame, Intrinsics};
 
     use super::*;
 
@@ -304,6 +304,7 @@ mod tests {
             focal_px: FOCAL_PX,
             cx: (WIDTH as f32 - 1.0) / 2.0,
             cy: (HEIGHT as f32 - 1.0) / 2.0,
+            distortion: Distortion::NONE,
         };
         let depth_m = (0..WIDTH * HEIGHT).map(|pixel| {
             let at = [(pixel % WIDTH) as f32, (pixel / WIDTH) as f32];

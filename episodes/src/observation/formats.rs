@@ -55,7 +55,7 @@ fn half_bits(value: f32) -> u16 {
 
 #[cfg(test)]
 mod tests {
-    use tandem_sim::render::{Frame, Intrinsics};
+    use tandem_sim::render::{Distortion, Frame, Intrinsics};
 
     use super::*;
 
@@ -83,7 +83,8 @@ mod tests {
 
     #[test]
     fn only_what_is_asked_for_comes() {
-        let intrinsics = Intrinsics { width: 2, height: 1, focal_px: 1.0, cx: 0.5, cy: 0.0 };
+        let distortion = Distortion::NONE;
+        let intrinsics = Intrinsics { width: 2, height: 1, focal_px: 1.0, cx: 0.5, cy: 0.0, distortion };
         let frame = Frame {
             width: 2,
             height: 1,

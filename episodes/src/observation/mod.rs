@@ -15,9 +15,9 @@ use tandem_sim::render::{Frame, Intrinsics, PictureError, encode_png};
 use tandem_tools_spec::{CameraCalibration, CameraImage, Formats, ImageFormat, Observation, Png, RobotState};
 
 pub use formats::check_formats;
-pub use observer::Observer;
+pub use observer::{Observer, cameras};
 pub use proprioception::{Detail, Proprioception, robot_state, samples, tell_state_in};
-pub use scaling::{drawing_camera, scaled_colours};
+pub use scaling::{drawing_view, scaled_colours};
 
 /// Observations of several robots at the same moment.
 #[derive(Clone, Debug)]

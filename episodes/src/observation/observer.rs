@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use nalgebra::{Isometry3, Point3};
-use tandem_sim::render::{Camera, Cameras, Frame, RenderRequest, Renderer, object_id};
+use tandem_sim::render::{Camera, CameraView, Cameras, Frame, RenderRequest, Renderer, object_id};
 use tandem_sim::{Step, World};
 use tandem_tools_spec::{
     Color, DepthReply, DepthRow, PixelRegion, PoseFrame, QueryDepth, SpecError, Surface, SurfaceQuery,
@@ -13,7 +13,7 @@ use tandem_tools_spec::{
 
 use super::fit;
 use super::proprioception::{Detail, Proprioception, calibration, robot_state};
-use super::scaling::{drawing_camera, scaled_colours};
+use super::scaling::{drawing_view, scaled_colours};
 use super::surface::{self, CameraPoses};
 use super::{Picture, RobotObservation, RobotView, TeamObservation};
 use crate::EpisodeError;
@@ -48,7 +48,7 @@ struct NamedObject {
 struct DrawnStep {
     /// Held so that its address stays unique.
     step: Arc<Step>,
-    /// View of each robot, once rendered.
+    /// CameraView of each robot, once rendered.
     views: Vec<Option<Arc<RobotView>>>,
 }
 
@@ -86,11 +86,18 @@ fn renderer(spec: &EpisodeSpec, world: &World) -> Box<dyn Renderer> {
     spec.renderer.renderer(stress::scenery(spec.stress, spec.world_seed(), world))
 }
 
+/// Returns the cameras of the episode `spec`.
+pub fn cameras(spec: &EpisodeSpec, world: &World) -> Cameras {
+    let mut cameras = stress::cameras(spec.stress, spec.world_seed(), world);
+    cameras.set_model(spec.camera, spec.world_seed());
+    cameras
+}
+
 impl Observer {
     /// Returns an observer of the world of the episode `spec`.
     pub fn new(spec: &EpisodeSpec, world: &World) -> Observer {
         let renderer = renderer(spec, world);
-        let cameras = stress::cameras(spec.stress, spec.world_seed(), world);
+        let cameras = cameras(spec, world);
         let objects = named_objects(spec, world);
         Observer { renderer, cameras, objects, drawn: None, for_recording: None }
     }
@@ -110,39 +117,41 @@ impl Observer {
         self.renderer.name()
     }
 
-    /// Renders the views of `cameras` after `step`, in order.
-    pub fn render_all(&mut self, step: &Step, cameras: &[Camera]) -> Vec<Frame> {
-        self.renderer.render_all(step, cameras)
+    /// Renders views after `step`, in order.
+    pub fn render_all(&mut self, step: &Step, views: &[CameraView]) -> Vec<Frame> {
+        CameraView::render_all(views, &mut *self.renderer, step)
     }
 
-    /// Renders the view of a camera after `step`.
-    pub fn render(&mut self, step: &Step, camera: &Camera) -> Frame {
-        self.renderer.render(step, camera)
+    /// Renders a view after `step`.
+    pub fn render(&mut self, step: &Step, view: &CameraView) -> Frame {
+        view.render(&mut *self.renderer, step)
     }
 
     /// Renders the colours of the view of robot number `robot` after `step`, in this size.
     pub fn eye(&mut self, step: &Step, robot: usize, size_px: [u32; 2]) -> Vec<u8> {
-        let camera = drawing_camera(self.cameras.egocentric(step, robot), size_px);
-        scaled_colours(self.colours(step, &camera), [camera.width, camera.height], size_px)
+        let view = drawing_view(self.cameras.eye(step, robot), size_px);
+        let Camera { width, height, .. } = view.camera;
+        scaled_colours(self.colours(step, &view), [width, height], size_px)
     }
 
-    /// Returns true if [`Observer::eyes`] is the faster way to render several worlds.
+    /// Returns true if [`Observer::eyes`] is the faster way to render several worlds, and possible: only ideal
+    /// images are rendered together.
     pub fn draws_together(&self) -> bool {
-        self.renderer.draws_together()
+        self.cameras.are_ideal() && self.renderer.draws_together()
     }
 
     /// Returns a request for the views of all robots after `step`, to be rendered together with other
     /// requests, and to be scaled to this size.
     pub fn eyes<'a>(&'a mut self, step: &'a Step, size_px: [u32; 2]) -> RenderRequest<'a> {
         let robots = 0..step.robots.len();
-        let cameras =
-            robots.map(|robot| drawing_camera(self.cameras.egocentric(step, robot), size_px)).collect();
+        let views = robots.map(|robot| drawing_view(self.cameras.eye(step, robot), size_px));
+        let cameras = views.map(|view| view.camera).collect();
         RenderRequest { renderer: &mut *self.renderer, step, cameras }
     }
 
-    /// Renders the colours of a camera's view after `step`.
-    pub fn colours(&mut self, step: &Step, camera: &Camera) -> Vec<u8> {
-        self.renderer.render_colours(step, camera)
+    /// Renders the colours of a view after `step`.
+    pub fn colours(&mut self, step: &Step, view: &CameraView) -> Vec<u8> {
+        view.render_colours(&mut *self.renderer, step)
     }
 
     /// Returns the views of these robots after `step`. Each view is rendered once; missing ones are
@@ -154,12 +163,14 @@ impl Observer {
         };
         let missing: BTreeSet<usize> =
             robots.iter().copied().filter(|robot| views[*robot].is_none()).collect();
-        let cameras: Vec<Camera> =
-            missing.iter().map(|robot| self.cameras.egocentric(step, *robot)).collect();
+        let eyes: Vec<CameraView> = missing.iter().map(|robot| self.cameras.eye(step, *robot)).collect();
         // If all have been rendered, the renderer need not even place the scenery.
-        let frames = if cameras.is_empty() { Vec::new() } else { self.renderer.render_all(step, &cameras) };
-        for ((robot, camera), frame) in missing.into_iter().zip(&cameras).zip(frames) {
-            views[robot] = Some(Arc::new(RobotView::new(camera.intrinsics(), frame)));
+        let frames = match eyes.is_empty() {
+            true => Vec::new(),
+            false => CameraView::render_all(&eyes, &mut *self.renderer, step),
+        };
+        for ((robot, eye), frame) in missing.into_iter().zip(&eyes).zip(frames) {
+            views[robot] = Some(Arc::new(RobotView::new(eye.intrinsics(), frame)));
         }
         robots.iter().filter_map(|robot| views[*robot].clone()).collect()
     }
@@ -171,11 +182,12 @@ impl Observer {
         step: &Arc<Step>,
         robot: usize,
     ) -> Arc<RobotView> {
-        let camera = self.cameras.egocentric(step, robot);
-        let (intrinsics, size_px) = (camera.intrinsics(), [camera.width, camera.height]);
+        let eye = self.cameras.eye(step, robot);
+        let (intrinsics, size_px) = (eye.intrinsics(), [eye.camera.width, eye.camera.height]);
         let (renderer, step) = (renderer.clone(), step.clone());
         let picture = Picture::drawn_later(size_px, move || {
-            renderer.lock().unwrap_or_else(PoisonError::into_inner).render_colours(&step, &camera)
+            let mut renderer = renderer.lock().unwrap_or_else(PoisonError::into_inner);
+            eye.render_colours(&mut **renderer, &step)
         });
         Arc::new(RobotView { intrinsics, picture: picture.into(), depth_m: Vec::new(), ids: Vec::new() })
     }
@@ -267,6 +279,9 @@ impl Observer {
     ) -> Result<DepthReply, EpisodeError> {
         self.check_pixels(step, robot, query.pixel.as_slice())?;
         let view = self.views(step, &[robot]).swap_remove(0);
+        if let Some([u, v]) = query.pixel.filter(|pixel| self.is_hole(&view, *pixel)) {
+            return Err(EpisodeError::NoDepth { u, v });
+        }
         let pelvis_from_camera = isometry_from_sim(&step.robots[robot].sensed.pelvis_from_camera);
         let poses = CameraPoses {
             frame_from_camera: pelvis_from_frame.inverse() * pelvis_from_camera,
@@ -288,6 +303,12 @@ impl Observer {
             return Err(EpisodeError::NoSurface { query: query.clone(), seen: seen.collect() });
         }
         Ok(DepthReply { surfaces, ..no_depth(name, frame) })
+    }
+
+    /// Returns true if a pixel of a view may see something, of which the camera has no depth.
+    fn is_hole(&self, view: &RobotView, [u, v]: [i64; 2]) -> bool {
+        let pixel = v as usize * view.picture.width as usize + u as usize;
+        !self.cameras.are_ideal() && !view.depth_m[pixel].is_finite()
     }
 
     /// Returns the surface of each object of the task that is seen, with its parts.
@@ -331,8 +352,8 @@ impl Observer {
 
     /// Renders the scene's camera that sees all robots.
     pub fn third_person(&mut self, step: &Step) -> Picture {
-        let camera = self.cameras.third_person();
-        let Frame { width, height, rgb, .. } = self.render(step, &camera);
+        let room = self.cameras.third_person().into();
+        let Frame { width, height, rgb, .. } = self.render(step, &room);
         Picture::new(width, height, rgb)
     }
 }

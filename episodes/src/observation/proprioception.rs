@@ -8,8 +8,8 @@ use tandem_tools_spec::{CameraCalibration, JointValues, Observe, PoseFrame, Robo
 use super::RobotObservation;
 use crate::commands::RobotSheet;
 use crate::convert::{
-    isometry_from_sim, opencv_axes, rounded, rounded_to, wire_base, wire_pose, wire_pose_from_sim,
-    wire_vector,
+    isometry_from_sim, opencv_axes, rounded, rounded_to, wire_base, wire_distortion, wire_pose,
+    wire_pose_from_sim, wire_vector,
 };
 
 /// Level of detail of a state.
@@ -95,7 +95,7 @@ pub fn samples(readings: &[SensorReadings]) -> SensorSamples {
 
 /// Returns the calibration of the head camera with these `intrinsics` of the robot called `name`.
 pub fn calibration(sensed: &RobotSensed, name: &str, intrinsics: &Intrinsics) -> CameraCalibration {
-    let Intrinsics { width, height, focal_px, cx, cy } = *intrinsics;
+    let Intrinsics { width, height, focal_px, cx, cy, distortion } = *intrinsics;
     let focal_px = rounded(focal_px.into());
     CameraCalibration {
         robot: name.into(),
@@ -107,6 +107,7 @@ pub fn calibration(sensed: &RobotSensed, name: &str, intrinsics: &Intrinsics) ->
         cy: cy.into(),
         camera_in_pelvis: wire_pose_from_sim(&opencv_axes(&sensed.pelvis_from_camera)),
         camera_in_frame: None,
+        distortion: wire_distortion(&distortion),
     }
 }
 

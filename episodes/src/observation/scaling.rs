@@ -6,18 +6,23 @@ use fast_image_resize::{
     pixels::U8x3,
 };
 use image::{ImageBuffer, Rgb, RgbImage};
-use tandem_sim::render::Camera;
+use tandem_sim::render::{Camera, CameraView};
 
 use super::Picture;
 
 /// An image, for the functions of the library `image`.
 pub type Pixels<'a> = ImageBuffer<Rgb<u8>, &'a [u8]>;
 
-/// Returns the camera that renders images of this size. A size of the same shape that is no larger gives
-/// the camera's own image, scaled: that is what a policy sees that requests this size.
-pub fn drawing_camera(own: Camera, [width, height]: [u32; 2]) -> Camera {
-    let same_shape = u64::from(width) * u64::from(own.height) == u64::from(height) * u64::from(own.width);
-    if same_shape && width <= own.width { own } else { Camera { width, height, ..own } }
+/// Returns the view that renders images of this size. A size of the same shape that is no larger gives the
+/// camera's own image, scaled: that is what a policy sees that requests this size.
+pub fn drawing_view(own: CameraView, [width, height]: [u32; 2]) -> CameraView {
+    let camera = own.camera;
+    let same_shape =
+        u64::from(width) * u64::from(camera.height) == u64::from(height) * u64::from(camera.width);
+    match same_shape && width <= camera.width {
+        true => own,
+        false => CameraView { camera: Camera { width, height, ..camera }, ..own },
+    }
 }
 
 /// Returns the colours of an image, scaled from the size in which it was rendered to another.

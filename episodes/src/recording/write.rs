@@ -84,7 +84,7 @@ impl Recorder {
         let robot_topics = header
             .robots
             .iter()
-            .map(|robot| RobotTopics::open(&mut file, robot, header.executes_otherwise))
+            .map(|robot| RobotTopics::open(&mut file, robot, header.spec.camera, header.executes_otherwise))
             .collect::<Result<_, _>>()?;
         let mut recorder = Recorder {
             steps: file.topic(topics::STEPS, &[])?,

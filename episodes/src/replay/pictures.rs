@@ -12,13 +12,14 @@ use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 use tandem_sim::render::{
-    Camera, DEPTH_UNIT_M, Frame, Intrinsics, PictureError, RendererKind, encode_depth_png,
+    Camera, CameraModel, DEPTH_UNIT_M, Frame, Intrinsics, PictureError, RendererKind, encode_depth_png,
 };
 use tandem_sim::{Pose, Step};
+use tandem_tools_spec::LensDistortion;
 
 use super::video::step_of_picture;
 use super::{EpisodeCamera, EpisodeRenderer, PictureSize, ReplayError};
-use crate::convert::opencv_axes;
+use crate::convert::{opencv_axes, wire_distortion};
 use crate::observation::Picture;
 use crate::output::{OutputError, create_private_folder, write_whole};
 use crate::recording::Recording;
@@ -40,11 +41,21 @@ pub struct PicturesPlan {
     pub depth: bool,
     /// The renderer; `None` for the one of the recorded episode.
     pub renderer: Option<RendererKind>,
+    /// The model of the head cameras; `None` for the one of the recorded episode.
+    pub camera: Option<CameraModel>,
 }
 
 impl Default for PicturesPlan {
     fn default() -> PicturesPlan {
-        PicturesPlan { rate_hz: 25, size: None, jobs: 1, cameras: Vec::new(), depth: true, renderer: None }
+        PicturesPlan {
+            rate_hz: 25,
+            size: None,
+            jobs: 1,
+            cameras: Vec::new(),
+            depth: true,
+            renderer: None,
+            camera: None,
+        }
     }
 }
 
@@ -60,10 +71,14 @@ impl PicturesPlan {
         }
     }
 
-    /// Returns the spec of the recording with the plan's renderer.
+    /// Returns the spec of the recording with the plan's renderer and model of cameras.
     fn spec(&self, recording: &Recording) -> EpisodeSpec {
         let spec = recording.spec.clone();
-        EpisodeSpec { renderer: self.renderer.unwrap_or(spec.renderer), ..spec }
+        EpisodeSpec {
+            renderer: self.renderer.unwrap_or(spec.renderer),
+            camera: self.camera.unwrap_or(spec.camera),
+            ..spec
+        }
     }
 }
 
@@ -120,6 +135,8 @@ struct CameraEntry {
     focal_px: f32,
     cx: f32,
     cy: f32,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    distortion: Option<LensDistortion>,
 }
 
 /// Pose of a camera, an entry of `poses.json`: x right, y down, z along the optical axis, as in OpenCV.
@@ -155,7 +172,7 @@ pub fn draw_all(
     let poses: Vec<CameraPose> = steps
         .iter()
         .flat_map(|step| views.iter().map(move |view| (step, *view)))
-        .map(|(step, view)| camera_pose(step, view.name(task), &scene.camera(view, step, plan.size)))
+        .map(|(step, view)| camera_pose(step, view.name(task), &scene.view(view, step, plan.size).camera))
         .collect();
     write_whole(&folder.join(POSES), &serde_json::to_vec(&poses).map_err(OutputError::from)?)?;
     let already_drawn = AtomicUsize::new(0);
@@ -216,8 +233,10 @@ fn prepare(
 ) -> Result<(), PicturesError> {
     let task = &recording.spec.task;
     let entry = |view: EpisodeCamera, step: &Step| {
-        let Intrinsics { width, height, focal_px, cx, cy } = scene.camera(view, step, plan.size).intrinsics();
-        CameraEntry { name: view.name(task).into(), width, height, focal_px, cx, cy }
+        let Intrinsics { width, height, focal_px, cx, cy, distortion } =
+            scene.view(view, step, plan.size).intrinsics();
+        let distortion = wire_distortion(&distortion);
+        CameraEntry { name: view.name(task).into(), width, height, focal_px, cx, cy, distortion }
     };
     let views = plan.views(task)?.into_iter();
     let state_hash = recording.state_hashes().last();
@@ -291,8 +310,8 @@ fn draw(
     if !plan.depth {
         return Ok(write_whole(&files.rgb, &scene.colours(view, step, plan.size).png()?)?);
     }
-    let camera = scene.camera(view, step, plan.size);
-    let Frame { width, height, rgb, depth_m, .. } = scene.draw(step, &camera);
+    let drawn = scene.view(view, step, plan.size);
+    let Frame { width, height, rgb, depth_m, .. } = scene.draw(step, &drawn);
     let picture = match plan.size {
         None => Picture::new(width, height, rgb),
         size => scene.colours(view, step, size),

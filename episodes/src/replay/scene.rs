@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use tandem_sim::Step;
-use tandem_sim::render::{Camera, Frame};
+use tandem_sim::render::{Camera, CameraView, Frame};
 
 use crate::EpisodeError;
-use crate::observation::{Observer, Picture, drawing_camera, scaled_colours};
+use crate::observation::{Observer, Picture, drawing_view, scaled_colours};
 use crate::session::build_world;
 use crate::spec::EpisodeSpec;
 use crate::tasks::Task;
@@ -83,33 +83,36 @@ impl EpisodeRenderer {
         Ok(EpisodeRenderer { observer: Observer::new(spec, &build_world(spec)?.world) })
     }
 
-    /// Returns the camera after `step`, with the given image size or its own. The vertical angle stays the
-    /// same, and the horizontal one follows the shape.
-    pub fn camera(&self, view: EpisodeCamera, step: &Step, size: Option<PictureSize>) -> Camera {
-        let camera = match view {
-            EpisodeCamera::ThirdPerson => self.observer.cameras.third_person(),
-            EpisodeCamera::Egocentric(robot) => self.observer.cameras.egocentric(step, robot),
+    /// Returns the view of a camera after `step`, with the given image size or its own. The vertical angle
+    /// stays the same, and the horizontal one follows the shape.
+    pub fn view(&self, of: EpisodeCamera, step: &Step, size: Option<PictureSize>) -> CameraView {
+        let view = match of {
+            EpisodeCamera::ThirdPerson => self.observer.cameras.third_person().into(),
+            EpisodeCamera::Egocentric(robot) => self.observer.cameras.eye(step, robot),
         };
         match size {
-            Some(PictureSize { width, height }) => Camera { width, height, ..camera },
-            None => camera,
+            Some(PictureSize { width, height }) => {
+                CameraView { camera: Camera { width, height, ..view.camera }, ..view }
+            }
+            None => view,
         }
     }
 
     /// Returns the image of a camera after `step`, in its own size or in another, without depth. A size of
     /// the same shape that is no larger gives the camera's own image, scaled. That is what a policy sees
     /// that requests this size.
-    pub fn colours(&mut self, view: EpisodeCamera, step: &Step, size: Option<PictureSize>) -> Picture {
-        let own = self.camera(view, step, None);
-        let [width, height] =
-            size.map_or([own.width, own.height], |PictureSize { width, height }| [width, height]);
-        let camera = drawing_camera(own, [width, height]);
-        let rgb = self.observer.colours(step, &camera);
-        Picture::new(width, height, scaled_colours(rgb, [camera.width, camera.height], [width, height]))
+    pub fn colours(&mut self, of: EpisodeCamera, step: &Step, size: Option<PictureSize>) -> Picture {
+        let own = self.view(of, step, None);
+        let own_px = [own.camera.width, own.camera.height];
+        let size_px = size.map_or(own_px, |PictureSize { width, height }| [width, height]);
+        let view = drawing_view(own, size_px);
+        let rgb = self.observer.colours(step, &view);
+        let drawn_px = [view.camera.width, view.camera.height];
+        Picture::new(size_px[0], size_px[1], scaled_colours(rgb, drawn_px, size_px))
     }
 
-    /// Renders the view of `camera` after `step`.
-    pub fn draw(&mut self, step: &Step, camera: &Camera) -> Frame {
-        self.observer.render(step, camera)
+    /// Renders a view after `step`.
+    pub fn draw(&mut self, step: &Step, view: &CameraView) -> Frame {
+        self.observer.render(step, view)
     }
 }

@@ -100,8 +100,8 @@ pub fn film(recording: &Recording, plan: &FilmPlan, path: &Path) -> Result<usize
         if index < step_of_picture(pictures, plan.rate_hz) {
             continue;
         }
-        let camera = scene.camera(plan.view, &step, plan.size);
-        let frame = scene.draw(&step, &camera);
+        let view = scene.view(plan.view, &step, plan.size);
+        let frame = scene.draw(&step, &view);
         let writer = match &mut writer {
             Some(writer) => writer,
             unbegun => unbegun.insert(FilmWriter::begin(format, &frame, played_hz, path)?),
@@ -144,8 +144,8 @@ pub fn short_film(recording: &Recording) -> Result<ShortFilm, VideoError> {
     for (index, step) in recording.steps().enumerate() {
         let step = step.map_err(ReplayError::from)?;
         if index % stride == 0 || index + 1 == steps {
-            let camera = scene.camera(EpisodeCamera::ThirdPerson, &step, Some(SHORT_SIZE));
-            let frame = scene.draw(&step, &camera);
+            let view = scene.view(EpisodeCamera::ThirdPerson, &step, Some(SHORT_SIZE));
+            let frame = scene.draw(&step, &view);
             encoder.add_frame(&frame.rgb, time_ms(pictures, SHORT_RATE_HZ)).map_err(failed)?;
             pictures += 1;
         }

@@ -169,9 +169,12 @@ impl Origin {
 
     /// Describes the information for the policy; it must match, since a policy keeps what it has read.
     fn told(&self) -> String {
-        let EpisodeSpec { assistance, disclosure, hints, instructions, .. } = &self.spec;
+        let EpisodeSpec { assistance, disclosure, hints, instructions, camera, .. } = &self.spec;
         let words = instructions.as_ref().map_or("of the task", |words| &words.xxh3);
-        format!("assistance {assistance}, phases told {disclosure}, hints {hints}, instructions {words}")
+        let camera = camera.name();
+        format!(
+            "assistance {assistance}, phases told {disclosure}, hints {hints}, instructions {words}, camera {camera}"
+        )
     }
 
     /// Describes the episode like [`Origin::episode`], without the protocol and the information for the

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::{fs, io};
 
-use tandem_sim::render::{Frame, PictureError, encode_png};
+use tandem_sim::render::{CameraView, Frame, PictureError, encode_png};
 use tandem_sim::{CONTROL_HZ, Step};
 use tandem_tools_spec::{Budget, PhaseReached, ResultReply};
 
@@ -262,15 +262,15 @@ pub(super) fn moment<'a>(
     names: impl Iterator<Item = &'a str>,
     observer: &mut Observer,
 ) -> Result<KeyMoment, PictureError> {
-    let (mut labels, mut cameras) = (vec!["the room".into()], vec![observer.cameras.third_person()]);
+    let (mut labels, mut views) = (vec!["the room".into()], vec![observer.cameras.third_person().into()]);
     for (robot, name) in names.enumerate() {
         labels.push(format!("what {name} sees"));
-        cameras.push(observer.cameras.egocentric(step, robot));
+        views.push(observer.cameras.eye(step, robot));
     }
-    for camera in &mut cameras {
+    for CameraView { camera, .. } in &mut views {
         (camera.width, camera.height) = (CELL_WIDTH as u32, CELL_HEIGHT as u32);
     }
-    let frames = observer.render_all(step, &cameras).into_iter();
+    let frames = observer.render_all(step, &views).into_iter();
     let view = |(label, Frame { width, height, rgb, .. }): (String, Frame)| {
         Ok(LabelledPicture { label, file: encode_png(width, height, &rgb)? })
     };

@@ -134,6 +134,7 @@ impl Session {
             brief: describe::brief(
                 self.spec().wording(),
                 &wire_limits(&self.motions[0].robot.base_limits),
+                self.spec().camera,
                 task.grips.as_deref(),
             ),
             action_row: action_row(&self.motions[0].robot.model),

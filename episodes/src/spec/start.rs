@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
+use tandem_sim::CONTROL_HZ;
 
 /// Start state of an episode.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -17,6 +18,21 @@ pub enum Start {
     Phase(PhaseStart),
     /// A moment of a recorded episode of the same task, seed, robot and controller, with the whole budget.
     Moment(MomentStart),
+}
+
+impl Start {
+    /// Describes a start at a chosen moment, for display after the policy's name; `None` for other starts.
+    pub(super) fn peculiarity(&self) -> Option<String> {
+        match self {
+            Start::Moment(MomentStart { before_s: Some(before_s), .. }) => {
+                Some(format!("begun again {before_s} s before it went wrong"))
+            }
+            Start::Moment(MomentStart { before_s: None, control_step, .. }) => {
+                Some(format!("taken over at {:.1} s", *control_step as f64 / CONTROL_HZ))
+            }
+            Start::Task | Start::Checkpoint(_) | Start::Phase(_) => None,
+        }
+    }
 }
 
 /// A moment of a recorded episode. All calls answered by then are replayed.

@@ -129,7 +129,7 @@ fn pictures_are_drawn_once_whatever_stops_the_run() {
     // The file holds the depth that the camera sees.
     let step = recording.steps().nth(5).unwrap().unwrap();
     let mut scene = EpisodeRenderer::of(&recording.spec).unwrap();
-    let camera = scene.camera(EpisodeCamera::Egocentric(0), &step, Some(SIZE));
+    let camera = scene.view(EpisodeCamera::Egocentric(0), &step, Some(SIZE));
     let seen = scene.draw(&step, &camera);
     for (mm, depth_m) in depth_mm.pixels().zip(&seen.depth_m) {
         let expected_m = if depth_m.is_finite() { *depth_m } else { 0.0 };
@@ -153,7 +153,7 @@ fn small_pictures_are_the_cameras_own_scaled() {
     let colours = scene.colours(view, &step, Some(small));
     assert_eq!((own.width, own.height, colours.width, colours.height), (320, 240, 160, 120));
     assert_eq!(colours.rgb(), own.scaled([160, 120]).into_raw());
-    let camera = scene.camera(view, &step, Some(small));
+    let camera = scene.view(view, &step, Some(small));
     assert_ne!(scene.draw(&step, &camera).rgb, colours.rgb());
 
     // The one requested camera, without depth.

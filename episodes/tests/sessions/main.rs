@@ -1,6 +1,7 @@
 //! Tests of sessions with real physics.
 
 mod at_rest;
+mod cameras;
 mod checkpoints;
 mod commands;
 mod common;

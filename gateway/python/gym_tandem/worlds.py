@@ -28,11 +28,12 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "action_type": ("joints", "wrists"),
     "reward_type": ("sparse", "dense"),
     "sensors": ("ideal", "g1"),
+    "camera": ("ideal", "d435i"),
     "renderer": ("auto", "cpu", "gpu", "path"),
 }
 """What options may be, the default first."""
 
-EPISODE_SETTINGS = ("renderer", "sensors", "stress", "level")
+EPISODE_SETTINGS = ("renderer", "sensors", "camera", "stress", "level")
 """Options that mean what they mean to `tandem.Episode`, which has the same defaults."""
 
 
@@ -65,6 +66,9 @@ class Options(TypedDict, total=False):
 
     sensors: Literal["ideal", "g1"]
     """What robots sense; "ideal"."""
+
+    camera: Literal["ideal", "d435i"]
+    """Model of the robots' cameras; "ideal"."""
 
     stress: StressAxis
     """What goes wrong, as for `tandem.Episode`; nothing where it is left out."""

@@ -78,6 +78,7 @@ class TandemEmbodiment(EmbodimentBase):
         look_every: int = 1,
         action_type: Literal["joints", "wrists"] = "joints",
         sensors: Literal["ideal", "g1"] = "ideal",
+        camera: Literal["ideal", "d435i"] = "ideal",
         renderer: Literal["auto", "cpu", "gpu", "path"] = "auto",
         record: str | None = None,
     ) -> None:
@@ -88,6 +89,7 @@ class TandemEmbodiment(EmbodimentBase):
             "look_every": look_every,
             "action_type": action_type,
             "sensors": sensors,
+            "camera": camera,
             "renderer": renderer,
             "record": record,
         }

@@ -36,6 +36,7 @@ class TandemEnvConfig(EnvConfig):
     action_type: str = "joints"
     reward_type: str = "sparse"
     sensors: str = "ideal"
+    camera: str = "ideal"
     renderer: str = "auto"
     render_mode: str = "rgb_array"
     features: dict[str, PolicyFeature] = field(default_factory=dict[str, PolicyFeature])
@@ -80,6 +81,7 @@ class TandemEnvConfig(EnvConfig):
             "action_type",
             "reward_type",
             "sensors",
+            "camera",
             "renderer",
             "render_mode",
         )

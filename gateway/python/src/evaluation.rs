@@ -101,6 +101,7 @@ fn plan_of<'a>(
         locomotion: settings.locomotion.clone(),
         sensing: settings.sensing,
         renderer: settings.renderer,
+        camera: settings.camera,
         assistance: settings.assistance,
         disclosure: settings.disclosure,
         hints: settings.hints,

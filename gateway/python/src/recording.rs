@@ -11,7 +11,7 @@ use serde_json::json;
 use tandem_episodes::replay::{EpisodeCamera, EpisodeRenderer, PictureSize};
 use tandem_episodes::rows::{ActionKind, STATE_COLUMNS, state_row};
 use tandem_episodes::{Grip, RecordedSetpoints, Recording, RecordingError};
-use tandem_sim::render::{Frame, RendererKind};
+use tandem_sim::render::{CameraModel, Frame, RendererKind};
 use tandem_sim::{CONTROL_DT_S, JOINTS, Side, Step};
 use tandem_tools_spec::{ACTION_ROW_LEN, DRIVE_ROW_LEN};
 
@@ -30,13 +30,23 @@ pub struct NativeRecording {
 
 #[pymethods]
 impl NativeRecording {
-    /// Reads a file and checks every byte. Images are drawn by the named renderer, or by the episode's.
+    /// Reads a file and checks every byte. Images are drawn by the named renderer with the named model of
+    /// the head cameras, or by the episode's.
     #[staticmethod]
-    fn read(py: Python, path: PathBuf, renderer: Option<&str>) -> PyResult<NativeRecording> {
-        let renderer = renderer.map(|name| found_renderer(py, name)).transpose()?;
+    fn read(
+        py: Python,
+        path: PathBuf,
+        renderer: Option<&str>,
+        camera: Option<&str>,
+    ) -> PyResult<NativeRecording> {
+        let renderer = renderer.map(|name| found(py, "renderer", RendererKind::ALL, RendererKind::name, name));
+        let renderer = renderer.transpose()?;
+        let camera = camera.map(|name| found(py, "camera model", CameraModel::ALL, CameraModel::name, name));
+        let camera = camera.transpose()?;
         let read = || {
             let mut recording = Recording::read(&path)?;
             recording.spec.renderer = renderer.unwrap_or(recording.spec.renderer);
+            recording.spec.camera = camera.unwrap_or(recording.spec.camera);
             let steps = recording.steps().collect::<Result<_, _>>()?;
             Ok(NativeRecording { recording, steps, renderer: Mutex::default() })
         };
@@ -139,8 +149,8 @@ impl NativeRecording {
         size: Option<(u32, u32)>,
     ) -> PyResult<(Colours<'py>, Depths<'py>)> {
         let draw = |renderer: &mut EpisodeRenderer, camera, step: &Step, size| {
-            let camera = renderer.camera(camera, step, size);
-            renderer.draw(step, &camera)
+            let view = renderer.view(camera, step, size);
+            renderer.draw(step, &view)
         };
         let Frame { width, height, rgb, depth_m, .. } = self.drawn(py, camera, step, size, draw)?;
         let (height, width) = (height as usize, width as usize);
@@ -162,10 +172,17 @@ impl NativeRecording {
     }
 }
 
-fn found_renderer(py: Python, name: &str) -> PyResult<RendererKind> {
-    let names = RendererKind::ALL.map(RendererKind::name).join(", ");
-    let found = RendererKind::ALL.into_iter().find(|kind| kind.name() == name);
-    found.ok_or_else(|| failed(py, &format!("no renderer {name:?}; have: {names}")))
+/// Finds one of `all` by its name.
+fn found<T: Copy, const N: usize>(
+    py: Python,
+    what: &str,
+    all: [T; N],
+    name_of: fn(T) -> &'static str,
+    name: &str,
+) -> PyResult<T> {
+    let names = all.map(name_of).join(", ");
+    let found = all.into_iter().find(|one| name_of(*one) == name);
+    found.ok_or_else(|| failed(py, &format!("no {what} {name:?}; have: {names}")))
 }
 
 impl NativeRecording {

@@ -30,6 +30,9 @@ StateEstimate: TypeAlias = Literal["estimator", "truth"]
 Sensors: TypeAlias = Literal["ideal", "g1"]
 """Sensor model of the robots: exact, or with the noise, bias and latency of a G1."""
 
+Camera: TypeAlias = Literal["ideal", "d435i"]
+"""Model of the robots' cameras: a pinhole with a perfect sensor, or the G1's own Intel RealSense D435i."""
+
 StressAxis: TypeAlias = Literal[
     "camera", "light", "texture", "layout", "mass", "friction", "sensors", "latency", "push", "words", "partner"
 ]
@@ -218,6 +221,7 @@ def settings_json(**settings: Any) -> str:
 
 __all__ = [
     "BaseEpisode",
+    "Camera",
     "EndReason",
     "Observation",
     "Renderer",

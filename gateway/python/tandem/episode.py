@@ -15,6 +15,7 @@ from . import _native
 from ._native import Snapshot
 from .base import (
     BaseEpisode,
+    Camera,
     Observation,
     Renderer,
     Sensors,
@@ -48,6 +49,7 @@ class Episode(BaseEpisode):
         renderer: Renderer of images.
         state_estimate: Source of the robots' own state.
         sensors: Sensor model of the robots.
+        camera: Model of the robots' cameras.
         stress: Disturbance; results name it.
         level: Level of the stress; 1 by default.
         scene: MJCF file of a scene in place of the task's own.
@@ -66,6 +68,7 @@ class Episode(BaseEpisode):
         renderer: Renderer = "auto",
         state_estimate: StateEstimate = "estimator",
         sensors: Sensors = "ideal",
+        camera: Camera = "ideal",
         stress: StressAxis | None = None,
         level: StressLevel | None = None,
         scene: str | PathLike[str] | None = None,
@@ -81,6 +84,7 @@ class Episode(BaseEpisode):
             renderer=renderer,
             state_estimate=state_estimate,
             sensors=sensors,
+            camera=camera,
             stress=stress,
             level=level,
             scene=None if scene is None else Path(scene),

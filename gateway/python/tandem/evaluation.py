@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypedDict
 import numpy as np
 
 from . import _native
-from .base import Renderer, Sensors, StateEstimate, StressAxis, StressLevel, integer, settings_json
+from .base import Camera, Renderer, Sensors, StateEstimate, StressAxis, StressLevel, integer, settings_json
 from .contract.replies import Assistance, Protocol
 from .contract.result import ResultReply
 from .contract.start import TaskList
@@ -136,6 +136,9 @@ class EvaluationSettings(TypedDict, total=False):
     sensors: Sensors
     """Sensor model of the robots."""
 
+    camera: Camera
+    """Model of the robots' cameras."""
+
     stress: StressAxis
     """Disturbance in every episode; results add it to the policy's name."""
 
@@ -181,8 +184,8 @@ def evaluate(
         jobs: Number of parallel episodes, each on its own thread, on which the policy is called. Physics and rendering
             run in parallel; Python code of policies does not.
         settings: `name`, `protocol`, `assistance`, `instructions`, `out`, `overwrite`, `resume_with_new_build`,
-            `record`, `progress`, `renderer`, `state_estimate`, `sensors`, `stress`, `level`, `scene`, `robot`,
-            `task_file`, `seed_key`: see `EvaluationSettings`.
+            `record`, `progress`, `renderer`, `state_estimate`, `sensors`, `camera`, `stress`, `level`, `scene`,
+            `robot`, `task_file`, `seed_key`: see `EvaluationSettings`.
     """
     plan = Plan.of(policy, tasks, seeds, settings)
     return plan.evaluated(lambda folder: plan.play(folder, jobs))
@@ -253,6 +256,7 @@ class Plan:
                 renderer=settings.get("renderer", "auto"),
                 state_estimate=settings.get("state_estimate", "estimator"),
                 sensors=settings.get("sensors", "ideal"),
+                camera=settings.get("camera", "ideal"),
                 stress=settings.get("stress"),
                 level=settings.get("level"),
                 scene=None if scene is None else Path(scene),

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
-from .base import Renderer
+from .base import Camera, Renderer
 from .contract.commands import PhaseReached
 from .contract.result import ResultReply
 
@@ -52,7 +52,8 @@ class Picture:
     """Height by width by red, green, blue (sRGB), from the top left pixel."""
 
     depth_m: NDArray[np.float32]
-    """Distance along the optical axis in metres, height by width; infinite without a surface."""
+    """Distance along the optical axis in metres, height by width; infinite without a surface, or where the camera has no
+    depth."""
 
 
 class Recording:
@@ -62,14 +63,15 @@ class Recording:
     Args:
         path: The file, or its folder.
         renderer: Renderer of its images. None: that of the episode.
+        camera: Model of the head cameras in its images. None: that of the episode.
     """
 
-    def __init__(self, path: str | PathLike[str], *, renderer: Renderer | None = None) -> None:
+    def __init__(self, path: str | PathLike[str], *, renderer: Renderer | None = None, camera: Camera | None = None) -> None:
         given = Path(path)
         self.path = given / "episode.mcap" if given.is_dir() else given
         """Path of the recording's file."""
 
-        self._native = _native.Recording.read(self.path, renderer)
+        self._native = _native.Recording.read(self.path, renderer, camera)
         self._about: dict[str, Any] = json.loads(self._native.about())
 
     @property

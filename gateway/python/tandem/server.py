@@ -7,7 +7,7 @@ from pathlib import Path
 from types import TracebackType
 
 from . import _native
-from .base import Renderer, Sensors, StateEstimate, StressAxis, StressLevel, settings_json
+from .base import Camera, Renderer, Sensors, StateEstimate, StressAxis, StressLevel, settings_json
 from .contract.replies import Assistance
 
 
@@ -43,6 +43,7 @@ def serve(
     renderer: Renderer = "auto",
     state_estimate: StateEstimate = "estimator",
     sensors: Sensors = "ideal",
+    camera: Camera = "ideal",
     stress: StressAxis | None = None,
     level: StressLevel | None = None,
     scene: str | PathLike[str] | None = None,
@@ -60,6 +61,7 @@ def serve(
         renderer: Renderer of images.
         state_estimate: Source of the robots' own state.
         sensors: Sensor model of the robots.
+        camera: Model of the robots' cameras.
         stress: Disturbance; results name it.
         level: Level of the stress; 1 by default.
         scene: MJCF file of a scene in place of the tasks' own.
@@ -76,6 +78,7 @@ def serve(
         renderer=renderer,
         state_estimate=state_estimate,
         sensors=sensors,
+        camera=camera,
         stress=stress,
         level=level,
         scene=None if scene is None else Path(scene),

@@ -72,6 +72,18 @@ def test_what_is_seen_is_the_same(server: tandem.Server) -> None:
         assert np.allclose(here.state(), there.state(), atol=6e-5)
 
 
+def test_a_real_camera_tells_its_lens_and_is_named() -> None:
+    episodes = [tandem.Episode("handover", 2000, renderer="cpu", camera=camera) for camera in ("ideal", "d435i")]
+    with episodes[0] as ideal, episodes[1] as real:
+        expected, seen = ideal.observe(), real.observe()
+        assert expected.cameras[0].distortion is None
+        lens = seen.cameras[0].distortion
+        assert lens is not None and lens.model == "brown_conrady" and len(lens.coefficients) == 5
+        assert not np.array_equal(expected.rgb["A"], seen.rgb["A"])
+        assert "camera: d435i" in real.finish().departures
+        assert ideal.state_hash == real.state_hash
+
+
 def test_a_state_has_the_numbers_of_its_columns() -> None:
     with tandem.Episode("handover", 2000) as episode:
         episode.wait(3)

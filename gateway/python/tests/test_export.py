@@ -303,6 +303,16 @@ def test_images_are_drawn_by_the_chosen_renderer(runs: Path, tmp_path: Path) -> 
     assert "renderer path" in (exported.folder / "README.md").read_text(encoding="utf-8")
 
 
+def test_images_are_those_of_the_chosen_cameras(runs: Path, tmp_path: Path) -> None:
+    folder = runs / "handover-2010"
+    ideal, real = (tandem.Recording(folder, camera=camera).picture("A", 5) for camera in (None, "d435i"))
+    assert np.isfinite(ideal.depth_m).all() and 0.5 < np.isfinite(real.depth_m).mean() < 1.0
+    assert not np.array_equal(ideal.rgb, real.rgb)
+    settings = ExportSettings(cameras=("A",), images="png", camera_model="d435i")
+    (exported,) = export_lerobot(folder, tmp_path / "set", settings)
+    assert "camera_model d435i" in (exported.folder / "README.md").read_text(encoding="utf-8")
+
+
 def test_what_cannot_be_exported_is_said(runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(tandem.TandemError, match="reached its last phase; all would"):
         export_lerobot(runs, tmp_path / "set", only_successful=True)
@@ -316,6 +326,8 @@ def test_what_cannot_be_exported_is_said(runs: Path, tmp_path: Path, capsys: pyt
         ExportSettings(cameras=(), depth=True)
     with pytest.raises(tandem.TandemError, match="have: auto, cpu, gpu, path"):
         ExportSettings(renderer="paint")  # pyright: ignore[reportArgumentType]
+    with pytest.raises(tandem.TandemError, match="have: ideal, d435i"):
+        ExportSettings(camera_model="fish")  # pyright: ignore[reportArgumentType]
     assert main(["lerobot", "--cameras=none", str(tmp_path / "nothing"), str(tmp_path / "set2")]) == 1
     assert "no episode.mcap in" in capsys.readouterr().err
     assert not (tmp_path / "set2").exists()

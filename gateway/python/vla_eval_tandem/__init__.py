@@ -52,6 +52,7 @@ class TandemBenchmark(StepBenchmark):
         look_every: int = 1,
         action_type: Literal["joints", "wrists"] = "joints",
         sensors: Literal["ideal", "g1"] = "ideal",
+        camera: Literal["ideal", "d435i"] = "ideal",
         record: str | None = None,
     ) -> None:
         super().__init__()
@@ -64,6 +65,7 @@ class TandemBenchmark(StepBenchmark):
             "look_every": look_every,
             "action_type": action_type,
             "sensors": sensors,
+            "camera": camera,
             "record": record,
             "renderer": self._renderer,
         }

@@ -3,7 +3,7 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Subcommand;
-use tandem_episodes::RendererKind;
+use tandem_episodes::{CameraModel, RendererKind};
 
 use super::CommandResult;
 use crate::drivers::{PythonModule, PythonPart};
@@ -80,6 +80,9 @@ struct LerobotArgs {
     /// Renderer of the images [default: that of the episode].
     #[arg(long, value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
     renderer: Option<RendererKind>,
+    /// Model of the head cameras [default: that of the episode].
+    #[arg(long, value_name = "NAME", value_parser = one_of(CameraModel::ALL, CameraModel::name))]
+    camera_model: Option<CameraModel>,
     /// Licence of the data set for its card, by the name that the Hugging Face Hub uses, for example cc-by-4.0
     /// [default: none, so all rights stay with you].
     #[arg(long, value_name = "NAME")]
@@ -117,9 +120,10 @@ impl LerobotArgs {
         let switches = switches.into_iter().filter(|(given, _)| *given).map(|(_, flag)| flag.into());
         let jobs = self.jobs.map(|jobs| format!("--jobs={jobs}"));
         let renderer = self.renderer.map(|kind| format!("--renderer={}", kind.name()));
+        let camera = self.camera_model.map(|model| format!("--camera-model={}", model.name()));
         let license = self.license.as_ref().map(|name| format!("--license={name}"));
         let paths = [runs, out].map(|path| path.display().to_string());
-        let given = texts.chain(switches).chain(renderer).chain(license).chain(jobs);
+        let given = texts.chain(switches).chain(renderer).chain(camera).chain(license).chain(jobs);
         ["lerobot".into()].into_iter().chain(given).chain(["--".into()]).chain(paths).collect()
     }
 }

@@ -12,7 +12,7 @@ use tandem_episodes::replay::{
     draw_all, film, verify,
 };
 use tandem_episodes::{
-    Checkpoint, EpisodeSpec, FAILED_STEP_FILE, Recording, RendererKind, Session, printable,
+    CameraModel, Checkpoint, EpisodeSpec, FAILED_STEP_FILE, Recording, RendererKind, Session, printable,
 };
 use tandem_tools_spec::ResultReply;
 
@@ -63,6 +63,9 @@ pub struct ReplayArgs {
     /// Renderer for --render [default: that of the episode].
     #[arg(long, value_name = "NAME", requires = "render", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
     renderer: Option<RendererKind>,
+    /// Model of the head cameras for --render [default: that of the episode].
+    #[arg(long, value_name = "NAME", requires = "render", value_parser = one_of(CameraModel::ALL, CameraModel::name))]
+    camera_model: Option<CameraModel>,
     /// Number of rendering threads.
     #[arg(long, default_value_t = 1, value_name = "N")]
     jobs: usize,
@@ -124,6 +127,7 @@ pub fn run(args: ReplayArgs) -> CommandResult {
                 cameras: args.cameras.clone(),
                 depth: !args.no_depth,
                 renderer: args.renderer,
+                camera: args.camera_model,
             };
             render(&recording, &plan, &folder_for(folder, path, args.recordings.len()))?;
         }
@@ -279,6 +283,7 @@ mod tests {
             cameras: vec![],
             no_depth: false,
             renderer: None,
+            camera_model: None,
         }
     }
 

@@ -7,7 +7,7 @@ use rapier3d::math::{Pose, Vector};
 use serde::Serialize;
 
 use super::{Spread, busy_since};
-use crate::render::{Camera, Cameras, Renderer, RendererKind, Scenery};
+use crate::render::{Camera, CameraModel, CameraView, Cameras, Renderer, RendererKind, Scenery};
 use crate::{ObjectPlacement, RobotPlacement, SimError, Step, World, WorldSpec};
 
 /// Times of all sets of images.
@@ -15,6 +15,8 @@ use crate::{ObjectPlacement, RobotPlacement, SimError, Step, World, WorldSpec};
 pub struct PicturesReport {
     /// Name of the renderer and its device.
     pub renderer: String,
+    /// Model of the cameras in the heads.
+    pub camera: CameraModel,
     pub cases: Vec<PicturesCase>,
 }
 
@@ -50,16 +52,22 @@ fn states(kind: RendererKind) -> usize {
 /// # Errors
 ///
 /// Returns an error if a world cannot be built or physics diverges.
-pub fn pictures(kind: RendererKind, mut done: impl FnMut(&PicturesCase)) -> Result<PicturesReport, SimError> {
+pub fn pictures(
+    kind: RendererKind,
+    camera: CameraModel,
+    mut done: impl FnMut(&PicturesCase),
+) -> Result<PicturesReport, SimError> {
     let world = World::new(&kitchen())?;
-    let cameras = Cameras::of(&world);
+    let mut cameras = Cameras::of(&world);
+    cameras.set_model(camera, 0);
     let renderer = kind.renderer(Scenery::of(&world)).name().to_owned();
-    let eyes = |step: &Step| (0..2).map(|robot| cameras.egocentric(step, robot)).collect();
+    let eyes = |step: &Step| (0..2).map(|robot| cameras.eye(step, robot)).collect();
     let small = |step: &Step| {
         let [width, height] = SMALL_PX;
-        (0..2).map(|robot| Camera { width, height, ..cameras.egocentric(step, robot) }).collect()
+        let eyes = (0..2).map(|robot| cameras.eye(step, robot));
+        eyes.map(|eye| CameraView { camera: Camera { width, height, ..eye.camera }, ..eye }).collect()
     };
-    let room = |_: &Step| vec![cameras.third_person()];
+    let room = |_: &Step| vec![cameras.third_person().into()];
     let mut cases = Vec::new();
     let sets: [(_, &Views, Draw); 4] = [
         ("eyes of both", &eyes, whole),
@@ -72,21 +80,21 @@ pub fn pictures(kind: RendererKind, mut done: impl FnMut(&PicturesCase)) -> Resu
         done(&case);
         cases.push(case);
     }
-    Ok(PicturesReport { renderer, cases })
+    Ok(PicturesReport { renderer, camera, cases })
 }
 
-/// The cameras of a set of images.
-type Views<'a> = dyn Fn(&Step) -> Vec<Camera> + 'a;
+/// The views of a set of images.
+type Views<'a> = dyn Fn(&Step) -> Vec<CameraView> + 'a;
 
 /// Renderer of an image: all of it, or its colours alone, as learned policies use them.
-type Draw = fn(&mut dyn Renderer, &Step, &Camera);
+type Draw = fn(&mut dyn Renderer, &Step, &CameraView);
 
-fn whole(renderer: &mut dyn Renderer, step: &Step, camera: &Camera) {
-    renderer.render(step, camera);
+fn whole(renderer: &mut dyn Renderer, step: &Step, view: &CameraView) {
+    view.render(renderer, step);
 }
 
-fn colours(renderer: &mut dyn Renderer, step: &Step, camera: &Camera) {
-    renderer.render_colours(step, camera);
+fn colours(renderer: &mut dyn Renderer, step: &Step, view: &CameraView) {
+    view.render_colours(renderer, step);
 }
 
 fn measure(
@@ -104,9 +112,9 @@ fn measure(
         let (mut busy, mut wall) = (Duration::ZERO, Duration::ZERO);
         for _ in 0..states(kind) {
             let step = world.control_step(&commands)?;
-            let (cameras, started) = (views(&step), Instant::now());
+            let (views, started) = (views(&step), Instant::now());
             let before = busy_since(started);
-            cameras.iter().for_each(|camera| draw(&mut *renderer, &step, camera));
+            views.iter().for_each(|view| draw(&mut *renderer, &step, view));
             busy += busy_since(started) - before;
             wall += started.elapsed();
         }
@@ -114,10 +122,10 @@ fn measure(
         busy_ms.push(each_ms(busy));
         wall_ms.push(each_ms(wall));
     }
-    let cameras = views(&world.present());
-    let Camera { width, height, .. } = cameras[0];
+    let views = views(&world.present());
+    let Camera { width, height, .. } = views[0].camera;
     let [busy_ms, wall_ms] = [busy_ms, wall_ms].map(|mut all| Spread::of(&mut all[1..]));
-    Ok(PicturesCase { name, pictures: cameras.len(), width, height, busy_ms, wall_ms })
+    Ok(PicturesCase { name, pictures: views.len(), width, height, busy_ms, wall_ms })
 }
 
 fn kitchen() -> WorldSpec {

@@ -11,13 +11,16 @@ mod gpu;
 mod kind;
 mod path;
 mod scene;
+mod sensor;
 mod shading;
 
 pub use kind::RendererKind;
 pub use scene::camera::{Camera, Cameras, Intrinsics, LensFlaw};
+pub use scene::lens::{CameraModel, Distortion};
 pub use scene::mesh::{TriangleMesh, Vertex};
 pub use scene::shared::SharedMesh;
 pub use scene::{Carrier, Lamp, Lamps, Part, PlacedScenery, Scenery, object_id, robot_rgba};
+pub use sensor::{CameraMotion, CameraView, Shot};
 pub use shading::Light;
 pub use shading::pattern::Pattern;
 

@@ -48,6 +48,10 @@ pub struct RobotTruth {
     pub world_from_wrist: Sides<Pose>,
     /// Pose of the camera; axes as in [`crate::mjcf::MjcfCamera`].
     pub world_from_camera: Pose,
+    /// The same one control step earlier; `None` before the first step and where it is not known. Recordings
+    /// leave it out, since the step before has it.
+    #[serde(skip)]
+    pub world_from_camera_before: Option<Pose>,
     /// True once the pelvis was below 0.4 m or tilted beyond 60 degrees. It stays true: nothing puts a
     /// robot back. It is the only field here that affects a robot and its policy: the legs lose power,
     /// and replies report it.
@@ -114,10 +118,18 @@ impl Robot {
                 .wrists
                 .each_ref()
                 .map(|wrist| world_from_link[wrist.link] * wrist.link_from_site),
-            world_from_camera: world_from_link[model.egocentric_link] * model.egocentric.body_from_camera,
+            world_from_camera: self.world_from_camera(dynamics),
+            world_from_camera_before: None,
             world_from_link,
             fallen: self.memory.fallen,
         }
+    }
+
+    /// Returns the pose of the camera as [`RobotTruth`] has it.
+    pub(crate) fn world_from_camera(&self, dynamics: &Dynamics) -> Pose {
+        let model = &self.model;
+        let world_from_head = dynamics.tree(self.tree).world_from_link(model.egocentric_link);
+        rounded(&world_from_head) * model.egocentric.body_from_camera
     }
 
     /// Returns the command of the last control step.

@@ -88,6 +88,8 @@ pub struct World {
     lights: Option<SceneLights>,
     sky: Option<Arc<Texture>>,
     control_steps: u64,
+    /// Pose of each robot's camera before the last control step; empty if that is not known.
+    cameras_before: Vec<Pose>,
     /// Pushes of the next control step.
     pushes: Vec<Push>,
     /// Pushes of later control steps, each with its steps.
@@ -154,6 +156,7 @@ impl World {
             pushes: Vec::new(),
             planned_pushes: Vec::new(),
             control_steps: 0,
+            cameras_before: Vec::new(),
         })
     }
 
@@ -179,6 +182,8 @@ impl World {
         mut advance: impl FnMut(&mut World) -> Result<(), Diverged>,
     ) -> Result<Step, Diverged> {
         assert_eq!(commands.len(), self.robots.len(), "one command per robot");
+        self.cameras_before =
+            self.robots.iter().map(|robot| robot.world_from_camera(&self.dynamics)).collect();
         for substep in 0..PHYSICS_STEPS_PER_CONTROL {
             self.drive(commands, substep);
             advance(self)?;

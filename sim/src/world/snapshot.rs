@@ -47,6 +47,7 @@ impl World {
             return Err(error);
         }
         self.control_steps = snapshot.control_steps;
+        self.cameras_before.clear();
         Ok(())
     }
 

@@ -123,7 +123,10 @@ impl World {
         RobotStep {
             sensed: robot.sensed(),
             estimate: robot.estimate(),
-            truth: robot.truth(&self.dynamics),
+            truth: RobotTruth {
+                world_from_camera_before: self.cameras_before.get(index).copied(),
+                ..robot.truth(&self.dynamics)
+            },
             command,
         }
     }

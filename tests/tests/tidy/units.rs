@@ -122,11 +122,16 @@ const DIMENSIONLESS: &[&str] = &[
     "seconds",
     // Corners in an image: column and row in pixels, then the interpolated values.
     "corners",
-    // A camera's intrinsics in pixels, with the names that every library uses.
+    // A camera's intrinsics in pixels, and its distortion, with the names that every library uses.
     "fx",
     "fy",
     "cx",
     "cy",
+    "k1",
+    "k2",
+    "p1",
+    "p2",
+    "coefficients",
 ];
 
 fn has_unit(name: &str) -> bool {

@@ -122,11 +122,11 @@ pub struct CameraArrays {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rgb: Option<Bytes>,
     /// Distances along the optical axis in metres, little-endian numbers of half precision, infinite where
-    /// nothing is; where `depth` was "float16". Base64 in JSON.
+    /// nothing is or the camera has no depth; where `depth` was "float16". Base64 in JSON.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_float16: Option<Bytes>,
-    /// The same in millimetres as a PNG of 16 bits, 0 where nothing is or it is further than 65.535 m;
-    /// where `depth` was "png16". Base64 in JSON.
+    /// The same in millimetres as a PNG of 16 bits, 0 where there is no depth or it exceeds 65.535 m; where
+    /// `depth` was "png16". Base64 in JSON.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_png16: Option<Bytes>,
 }

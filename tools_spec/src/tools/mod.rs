@@ -23,7 +23,9 @@ pub use get_robot_state::{GetRobotState, RobotState, SensorSamples};
 pub use get_status::{GetStatus, StatusReply};
 pub use list_tasks::{ListTasks, ProtocolInfo, TaskInfo, TaskList};
 pub use move_wrists::{MoveWrists, WristMove};
-pub use observe::{CameraCalibration, CameraImage, DepthImage, ImageLink, Observation, Observe};
+pub use observe::{
+    CameraCalibration, CameraImage, DepthImage, ImageLink, LensDistortion, Observation, Observe,
+};
 pub use query_depth::{
     Color, DepthReply, DepthRow, EdgeFit, JoinedBy, PlaneFit, QueryDepth, RegionFit, Surface, SurfaceQuery,
     UprightAxis,

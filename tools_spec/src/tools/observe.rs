@@ -87,9 +87,9 @@ pub struct Observation {
     pub arrays: Vec<CameraArrays>,
 }
 
-/// A pinhole camera without distortion: a point (x, y, z) in the camera's frame is seen at u = fx x / z +
-/// cx, v = fy y / z + cy. Axes: x right, y down, z forward (OpenCV's). Pixel (0, 0) is the top left one and
-/// its centre lies at u = v = 0.
+/// A pinhole camera: a point (x, y, z) in the camera's frame is seen at u = fx x / z + cx, v = fy y / z + cy.
+/// Axes: x right, y down, z forward (OpenCV's). Pixel (0, 0) is the top left one and its centre lies at u =
+/// v = 0.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CameraCalibration {
     /// The robot whose head carries it.
@@ -111,6 +111,19 @@ pub struct CameraCalibration {
     /// The same in the frame that the call named; left out where it named none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_in_frame: Option<Pose>,
+    /// Distortion of its lens; left out where it has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distortion: Option<LensDistortion>,
+}
+
+/// Distortion of a lens after Brown and Conrady: in place of x / z and y / z come x' and y' as OpenCV's
+/// `projectPoints` makes them. Points of query_depth are right without further ado.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LensDistortion {
+    /// Name of the model: "brown_conrady".
+    pub model: String,
+    /// Its coefficients, in the order of OpenCV: k1, k2, p1, p2, k3.
+    pub coefficients: [f64; 5],
 }
 
 /// One picture. In MessagePack, the file is called `png` and no base64.

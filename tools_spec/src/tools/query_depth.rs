@@ -274,7 +274,7 @@ pub struct DepthReply {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub columns: Vec<String>,
     /// One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where
-    /// nothing is seen. Left out with surfaces or a fit.
+    /// nothing is seen, or the camera has no depth. Left out with surfaces or a fit.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub points: Vec<DepthRow>,
 }

@@ -20,7 +20,7 @@ pub use tandem_sim::bench::{
     CaseReport, FallTrial, FallsCase, FallsReport, FloorEpisode, LocomotionReport, PhysicsCase,
     PhysicsReport, PicturesCase, PicturesReport,
 };
-use tandem_sim::render::RendererKind;
+use tandem_sim::render::{CameraModel, RendererKind};
 use tandem_sim::{Sensing, assets};
 
 use crate::batch::BatchError;
@@ -116,9 +116,10 @@ pub fn physics(done: impl FnMut(&PhysicsCase)) -> Result<PhysicsReport, BenchErr
 /// Times images of the kitchen; calls `done` after each set.
 pub fn pictures(
     renderer: RendererKind,
+    camera: CameraModel,
     done: impl FnMut(&PicturesCase),
 ) -> Result<PicturesReport, BenchError> {
-    Ok(bench::pictures(renderer, done)?)
+    Ok(bench::pictures(renderer, camera, done)?)
 }
 
 /// Solves the targets of a file, or 200 that are drawn from the robot's own joint ranges.

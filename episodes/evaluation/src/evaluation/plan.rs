@@ -8,7 +8,10 @@ use tandem_episodes::{
     Controller, EpisodeSpec, Instructions, KeyedSeed, MomentStart, Phase, PhaseStart, Recorder, RobotFile,
     SceneFile, Start, Variation, stress::Stress, tasks::Task,
 };
-use tandem_sim::{Sensing, render::RendererKind};
+use tandem_sim::{
+    Sensing,
+    render::{CameraModel, RendererKind},
+};
 use tandem_tools_spec::{Assistance, Disclosure, Hints, Protocol};
 
 use super::retry::FailedEpisode;
@@ -27,6 +30,8 @@ pub struct EvaluationPlan<'a> {
     /// Knowledge of the robots about themselves.
     pub sensing: Sensing,
     pub renderer: RendererKind,
+    /// Model of the robots' cameras.
+    pub camera: CameraModel,
     /// Level of assistance to policies.
     pub assistance: Assistance,
     /// Feedback to policies about their success, and whether success ends an episode.
@@ -149,6 +154,7 @@ impl EvaluationPlan<'_> {
             locomotion: self.locomotion.clone(),
             sensing: self.sensing,
             renderer: self.renderer,
+            camera: self.camera,
             assistance: self.assistance,
             disclosure: self.disclosure,
             hints: self.hints,
@@ -177,6 +183,7 @@ impl EvaluationPlan<'_> {
             robot: spec.robot.clone(),
             locomotion: spec.locomotion.clone(),
             sensing: spec.sensing,
+            camera: spec.camera,
             variation: spec.variation,
             stress: spec.stress,
             ..self.spec(&spec.task, spec.seed, start)

@@ -9,7 +9,8 @@ use tandem_episodes::{
     tasks::{self, Task},
     write_result,
 };
-use tandem_sim::{Sensing, dynamics::Diverged, render::RendererKind};
+use tandem_sim::render::{CameraModel, RendererKind};
+use tandem_sim::{Sensing, dynamics::Diverged};
 use tandem_tools_spec::{Assistance, Disclosure, EndReason, Hints, PhaseTimes, Protocol, ResultReply};
 
 use super::*;
@@ -93,6 +94,7 @@ pub(super) fn plan(tasks: Vec<Task>, seeds: Vec<u32>) -> EvaluationPlan<'static>
         locomotion: Controller::Balance,
         sensing: Sensing::default(),
         renderer: RendererKind::Cpu,
+        camera: CameraModel::Ideal,
         assistance: Assistance::Full,
         disclosure: Disclosure::Live,
         hints: Hints::On,
@@ -266,6 +268,7 @@ fn only_the_same_episode_of_the_same_build_is_taken_from_an_earlier_run() {
         ("disclosure", |played| played.spec.disclosure = Disclosure::End),
         ("hints", |played| played.spec.hints = Hints::Off),
         ("sensing", |played| played.spec.sensing = Sensing::TRUTH),
+        ("camera", |played| played.spec.camera = CameraModel::D435i),
         ("start", |played| played.spec.start = Start::Checkpoint("other".into())),
         ("robot", |played| played.spec.robot = RobotFile::Embedded("other".into())),
         ("policy", |played| played.policy = "idle".into()),

@@ -323,7 +323,7 @@ fn corners(outline: &[[i64; 2]]) -> Vec<[i64; 2]> {
 
 #[cfg(test)]
 mod tests {
-    use tandem_sim::render::{Frame, Intrinsics};
+    use tandem_sim::render::{Distortion, Frame, Intrinsics};
 
     use super::*;
 
@@ -341,9 +341,8 @@ mod tests {
             rgb.extend(if is_square || is_spot { [200, 30, 30] } else { [120, 120, 120] });
             depth_m.push(if is_square { 1.0 } else { 2.0 });
         }
-        let intrinsics =
-            Intrinsics { width: WIDTH as u32, height: HEIGHT as u32, focal_px: 50.0, cx: 29.5, cy: 19.5 };
-        let (width, height) = (WIDTH as u32, HEIGHT as u32);
+        let (width, height, distortion) = (WIDTH as u32, HEIGHT as u32, Distortion::NONE);
+        let intrinsics = Intrinsics { width, height, focal_px: 50.0, cx: 29.5, cy: 19.5, distortion };
         RobotView::new(intrinsics, Frame { width, height, rgb, depth_m, ids: vec![0; WIDTH * HEIGHT] })
     }
 

@@ -1,9 +1,8 @@
 //! The topics of one robot: joint states, commands, hand forces and camera images.
 
 use foxglove::messages::{CameraCalibration, CompressedImage, JointState, JointStates};
-use tandem_sim::{
-    MotorSetpoints, RobotCommand, RobotModel, RobotSensed, RobotStep, mjcf::MjcfCamera, render::Intrinsics,
-};
+use tandem_sim::render::{CameraModel, Distortion, Intrinsics};
+use tandem_sim::{MotorSetpoints, RobotCommand, RobotModel, RobotSensed, RobotStep};
 
 use super::messages::{ActionMessage, BaseCommandMessage, HandsMessage, Json, SetpointsMessage};
 use super::transforms::{EGOCENTRIC, robot_frame, rounded, timestamp};
@@ -28,6 +27,8 @@ pub struct RobotTopics {
     hands: Topic<Json<HandsMessage>>,
     /// Setpoints of motors; opened by the first ones.
     setpoints: Option<Topic<Json<SetpointsMessage>>>,
+    /// Intrinsics of its camera.
+    lens: Intrinsics,
     /// Opened by the first image.
     camera: Option<CameraTopics>,
 }
@@ -43,6 +44,7 @@ impl RobotTopics {
     pub fn open(
         file: &mut McapFile,
         robot: &RobotSheet,
+        camera: CameraModel,
         executes_otherwise: bool,
     ) -> Result<RobotTopics, OutputError> {
         let columns = action_row(&robot.model).join(",");
@@ -56,6 +58,7 @@ impl RobotTopics {
             hands: file.topic(&format!("/{}/hands", robot.name), &[])?,
             executed,
             setpoints: None,
+            lens: Intrinsics::from(&robot.model.egocentric).of_model(camera),
             camera: None,
         })
     }
@@ -127,7 +130,7 @@ impl RobotTopics {
                     calibration: file.topic(&format!("/{name}/egocentric/calibration"), &[])?,
                     last_s: time_s,
                 };
-                let calibration = calibration(&robot.model.egocentric, &frame_id, time_s);
+                let calibration = calibration(&self.lens, &frame_id, time_s);
                 file.write(&mut camera.calibration, time_s, &calibration)?;
                 unopened.insert(camera)
             }
@@ -160,8 +163,13 @@ fn joint_states(model: &RobotModel, time_s: f64, sensed: &RobotSensed) -> JointS
     JointStates { timestamp: Some(timestamp(time_s)), joints: joints.collect() }
 }
 
-fn calibration(camera: &MjcfCamera, frame_id: &str, time_s: f64) -> CameraCalibration {
-    let Intrinsics { width, height, focal_px, cx, cy } = camera.into();
+fn calibration(lens: &Intrinsics, frame_id: &str, time_s: f64) -> CameraCalibration {
+    let Intrinsics { width, height, focal_px, cx, cy, distortion } = *lens;
+    let Distortion { k1, k2, p1, p2 } = distortion;
+    let (distortion_model, d) = match distortion == Distortion::NONE {
+        true => Default::default(),
+        false => ("plumb_bob".into(), [k1, k2, p1, p2, 0.0].map(f64::from).to_vec()),
+    };
     let [focal_px, cx, cy] = [focal_px, cx, cy].map(f64::from);
     #[rustfmt::skip]
     let (k, p) = (
@@ -173,6 +181,8 @@ fn calibration(camera: &MjcfCamera, frame_id: &str, time_s: f64) -> CameraCalibr
         frame_id: frame_id.into(),
         width,
         height,
+        distortion_model,
+        d,
         k,
         p,
         ..CameraCalibration::default()

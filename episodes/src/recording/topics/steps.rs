@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use foxglove::{Encode, Schema, bytes::BufMut};
 use postcard::{de_flavors, ser_flavors};
 use serde::Deserialize;
-use tandem_sim::Step;
+use tandem_sim::{Pose, Step};
 
 use super::messages::{StepError, StepMessage, state_hash_text};
 use crate::output::OutputError;
@@ -134,6 +134,8 @@ impl StepEncoder {
 #[derive(Default)]
 pub struct StepDecoder {
     memory: StepMemory,
+    /// Number of the last step, and the pose of each robot's camera after it.
+    cameras: Option<(u64, Vec<Pose>)>,
     /// Set once a step could not be read; no later step can be decoded without it.
     lost: bool,
 }
@@ -146,6 +148,18 @@ impl StepDecoder {
         }
         let step = self.next(row);
         self.lost = step.is_err();
+        step.map(|step| self.with_cameras_before(step))
+    }
+
+    /// Completes a step with what the step before has.
+    fn with_cameras_before(&mut self, mut step: Step) -> Step {
+        let poses = step.robots.iter().map(|robot| robot.truth.world_from_camera).collect();
+        let before = self.cameras.replace((step.control_step, poses));
+        if let Some((_, poses)) = before.filter(|(number, _)| number + 1 == step.control_step) {
+            for (robot, pose) in step.robots.iter_mut().zip(poses) {
+                robot.truth.world_from_camera_before = Some(pose);
+            }
+        }
         step
     }
 

@@ -43,7 +43,7 @@ class DepthReply(Reply):
 
     points: tuple[tuple[float | None, float | None, float | None, float | None, float | None], ...] = ()
     """One row per pixel asked for, in the same order; of a region row by row. Millimetres; null where nothing is
-    seen. Left out with surfaces or a fit.
+    seen, or the camera has no depth. Left out with surfaces or a fit.
     """
 
 

@@ -62,9 +62,9 @@ class BaseCommand(Reply):
 
 @dataclass(frozen=True, kw_only=True)
 class CameraCalibration(Reply):
-    """A pinhole camera without distortion: a point (x, y, z) in the camera's frame is seen at u = fx x / z + cx, v
-    = fy y / z + cy. Axes: x right, y down, z forward (OpenCV's). Pixel (0, 0) is the top left one and its
-    centre lies at u = v = 0.
+    """A pinhole camera: a point (x, y, z) in the camera's frame is seen at u = fx x / z + cx, v = fy y / z + cy.
+    Axes: x right, y down, z forward (OpenCV's). Pixel (0, 0) is the top left one and its centre lies at u = v =
+    0.
     """
 
     robot: str
@@ -94,6 +94,9 @@ class CameraCalibration(Reply):
     camera_in_frame: Pose | None = None
     """The same in the frame that the call named; left out where it named none."""
 
+    distortion: LensDistortion | None = None
+    """Distortion of its lens; left out where it has none."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class HandReach(Reply):
@@ -107,6 +110,19 @@ class HandReach(Reply):
 
     orientation_error_rad: float
     """Angle left, in radians."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LensDistortion(Reply):
+    """Distortion of a lens after Brown and Conrady: in place of x / z and y / z come x' and y' as OpenCV's
+    `projectPoints` makes them. Points of query_depth are right without further ado.
+    """
+
+    model: str
+    """Name of the model: "brown_conrady"."""
+
+    coefficients: tuple[float, float, float, float, float]
+    """Its coefficients, in the order of OpenCV: k1, k2, p1, p2, k3."""
 
 
 @dataclass(frozen=True, kw_only=True)

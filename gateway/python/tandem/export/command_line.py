@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import get_args
 
-from ..base import Renderer
+from ..base import Camera, Renderer
 from ..errors import TandemError
 from ..rows import DEFAULT_DATA_RATE_HZ, RATES_HZ
 from .lerobot import export_lerobot
@@ -38,6 +38,7 @@ def parser() -> argparse.ArgumentParser:
     lerobot.add_argument("--size", default="320x240", metavar="WIDTHxHEIGHT")
     lerobot.add_argument("--rate", type=int, choices=RATES_HZ, default=DEFAULT_DATA_RATE_HZ)
     lerobot.add_argument("--renderer", choices=get_args(Renderer))
+    lerobot.add_argument("--camera-model", choices=get_args(Camera))
     lerobot.add_argument("--license", metavar="NAME")
     lerobot.add_argument("--only-successful", action="store_true")
     lerobot.add_argument("--only-good", action="store_true")
@@ -87,6 +88,7 @@ def settings_of(given: argparse.Namespace) -> ExportSettings:
         size=(int(sides[0]), int(sides[1])),
         rate_hz=given.rate,
         renderer=given.renderer,
+        camera_model=given.camera_model,
         license=given.license,
     )
 

@@ -342,7 +342,9 @@ def _write_about(
 def _played(spec: dict[str, Any]) -> str:
     """Describes how episodes were played. Disturbances are described in the last paragraph of the card."""
     variation = ", ".join(f"{name} {value:g}" for name, value in spec.get("variation", {}).items())
-    return f"{spec['protocol']} protocol, sensors {spec['sensing']['sensors']}" + (f", {variation}" if variation else "")
+    camera = f", camera {spec['camera']}" if "camera" in spec else ""
+    sensors = f"sensors {spec['sensing']['sensors']}{camera}"
+    return f"{spec['protocol']} protocol, {sensors}" + (f", {variation}" if variation else "")
 
 
 def _ranges(numbers: Sequence[int]) -> list[str]:

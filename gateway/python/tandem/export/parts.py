@@ -66,13 +66,13 @@ def make_parts(path: Path, source: str, folder: Path, settings: ExportSettings, 
     recording: Recording | None = None
     names = part_names(folder)
     if names is None:
-        recording = Recording(path, renderer=settings.renderer)
+        recording = Recording(path, renderer=settings.renderer, camera=settings.camera_model)
         names = [view.name or "joint" for view in views(recording, settings)]
     parts: list[Part] = []
     for index, name in enumerate(names):
         own = folder / name
         if not (own / PART_FILE).exists():
-            recording = recording or Recording(path, renderer=settings.renderer)
+            recording = recording or Recording(path, renderer=settings.renderer, camera=settings.camera_model)
             own.mkdir(parents=True, exist_ok=True)
             _make(recording, views(recording, settings)[index], source, own, settings, stop)
         parts.append(Part(own, json.loads((own / PART_FILE).read_text(encoding="utf-8"))))

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from importlib import import_module
 from typing import Any, Literal, TypeAlias, get_args
 
-from ..base import Renderer
+from ..base import Camera, Renderer
 from ..errors import TandemError
 from ..rows import DEFAULT_DATA_RATE_HZ, DEFAULT_SIZE_PX, EGOCENTRIC, RATES_HZ
 
@@ -60,6 +60,9 @@ class ExportSettings:
     renderer: Renderer | None = None
     """Renderer of the images. None: that of each episode."""
 
+    camera_model: Camera | None = None
+    """Model of the head cameras. None: that of each episode."""
+
     license: str | None = None
     """Licence in the card, by the name that the Hugging Face Hub uses, for example "cc-by-4.0". None: none."""
 
@@ -69,6 +72,8 @@ class ExportSettings:
                 raise TandemError(f"no {name} {value!r}; have: {', '.join(get_args(kind))}")
         if self.renderer is not None and self.renderer not in get_args(Renderer):
             raise TandemError(f"no renderer {self.renderer!r}; have: {', '.join(get_args(Renderer))}")
+        if self.camera_model is not None and self.camera_model not in get_args(Camera):
+            raise TandemError(f"no camera model {self.camera_model!r}; have: {', '.join(get_args(Camera))}")
         if self.license is not None and not re.fullmatch("[a-z0-9][a-z0-9.-]*", self.license):
             raise TandemError(f"no licence {self.license!r}; give a name of the Hugging Face Hub, for example cc-by-4.0")
         if self.rate_hz not in RATES_HZ:

@@ -12,7 +12,7 @@ use std::{
 use clap::Subcommand;
 use serde::Serialize;
 use serde_json::{Map, Value};
-use tandem_episodes::RendererKind;
+use tandem_episodes::{CameraModel, RendererKind};
 use tandem_evaluation::bench::{EnvReport, FallsCase, FallsReport, IkReport, PhysicsReport, PicturesReport};
 
 use super::CommandResult;
@@ -57,6 +57,9 @@ enum BenchPart {
         /// Renderer: `cpu`, `gpu`, `path`, or `auto`.
         #[arg(long, default_value = "cpu", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name))]
         renderer: RendererKind,
+        /// Model of the head cameras.
+        #[arg(long, default_value = CameraModel::default().name(), value_name = "NAME", value_parser = one_of(CameraModel::ALL, CameraModel::name))]
+        camera: CameraModel,
         /// Also write the cases to this file as JSON.
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
@@ -97,7 +100,7 @@ type Measure = fn() -> Result<Value, Box<dyn Error>>;
 /// Parts that `bench all` measures; a new part adds its line.
 const PARTS: [(&str, Measure); 6] = [
     ("physics", || Ok(serde_json::to_value(measure_physics()?)?)),
-    ("render", || Ok(serde_json::to_value(measure_pictures(RendererKind::Cpu)?)?)),
+    ("render", || Ok(serde_json::to_value(measure_pictures(RendererKind::Cpu, CameraModel::Ideal)?)?)),
     ("env", || Ok(serde_json::to_value(measure_env()?)?)),
     ("tools", || Ok(serde_json::to_value(measure_tools()?)?)),
     ("ik", || {
@@ -117,7 +120,9 @@ pub fn run(args: BenchArgs) -> CommandResult {
         BenchPart::Ik { targets, json } => ik(targets.as_deref(), json),
         BenchPart::Tools { json } => write(measure_tools()?, json.as_deref()),
         BenchPart::Physics { json } => write(measure_physics()?, json.as_deref()),
-        BenchPart::Render { renderer, json } => write(measure_pictures(renderer)?, json.as_deref()),
+        BenchPart::Render { renderer, camera, json } => {
+            write(measure_pictures(renderer, camera)?, json.as_deref())
+        }
         BenchPart::Env { json } => write(measure_env()?, json.as_deref()),
         BenchPart::Falls { episodes, cases, commands, json } => {
             let report = measure_falls(episodes, &cases)?;
@@ -201,9 +206,9 @@ fn measure_falls(episodes: usize, cases: &str) -> Result<FallsReport, Box<dyn Er
     })?)
 }
 
-fn measure_pictures(renderer: RendererKind) -> Result<PicturesReport, Box<dyn Error>> {
+fn measure_pictures(renderer: RendererKind, camera: CameraModel) -> Result<PicturesReport, Box<dyn Error>> {
     println!("{:14}{:>9}{:>11}{:>11}{:>11}", "pictures", "count", "size", "busy ms", "wall ms");
-    Ok(tandem_evaluation::bench::pictures(renderer, |case| {
+    Ok(tandem_evaluation::bench::pictures(renderer, camera, |case| {
         let size = format!("{}x{}", case.width, case.height);
         println!(
             "{:14}{:>9}{size:>11}{:>11.2}{:>11.2}",

@@ -91,6 +91,7 @@ impl PeopleFlags {
             locomotion: plan.locomotion.clone(),
             sensing: plan.sensing,
             renderer: plan.renderer,
+            camera: plan.camera,
             ..(*settings).clone()
         })
     }

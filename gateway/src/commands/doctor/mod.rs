@@ -97,13 +97,15 @@ fn specs(layer: &Layer) -> impl Iterator<Item = EpisodeSpec> {
     let scene = layer.scene.as_deref().map(SceneFile::of);
     let scene = scene.and_then(Result::ok);
     let robot = layer.read_robot().unwrap_or_default();
-    let (locomotion, sensing, renderer) = (layer.controller(), layer.sensing(), layer.renderer());
+    let (locomotion, sensing) = (layer.controller(), layer.sensing());
+    let (renderer, camera) = (layer.renderer(), layer.camera());
     tasks::cohub().iter().map(move |task| EpisodeSpec {
         scene: scene.clone(),
         robot: robot.clone(),
         locomotion: locomotion.clone(),
         sensing,
         renderer,
+        camera,
         ..EpisodeSpec::new(task, 0, Protocol::Benchmark)
     })
 }

@@ -129,6 +129,7 @@ impl EpisodeFlags {
             stress: None,
             thinking_limit_s: self.thinking_limit,
             renderer: self.world.renderer(),
+            camera: self.world.camera(),
             tasks,
             seeds,
             starts: Starts::Task,

@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use tandem_episodes::{
-    Controller, RendererKind, RobotFile, SceneFile, Sensing, SensorModel, SimError, StateSource, tasks::Task,
+    CameraModel, Controller, RendererKind, RobotFile, SceneFile, Sensing, SensorModel, SimError, StateSource,
+    tasks::Task,
 };
 
 use crate::settings::{Layer, SettingsError, one_of, read_robot, read_scene, read_task_file};
@@ -32,6 +33,11 @@ pub struct WorldFlags {
     #[arg(long, env = "TANDEM_RENDERER", value_name = "NAME", value_parser = one_of(RendererKind::ALL, RendererKind::name),
           default_value = RendererKind::default().name())]
     renderer: RendererKind,
+    /// Model of the robots' cameras: a pinhole with a perfect sensor, or the G1's own Intel RealSense D435i
+    /// with noise, motion blur, distortion and holes in its depth.
+    #[arg(long, env = "TANDEM_CAMERA", value_name = "NAME", value_parser = one_of(CameraModel::ALL, CameraModel::name),
+          default_value = CameraModel::default().name())]
+    camera: CameraModel,
 }
 
 impl WorldFlags {
@@ -65,6 +71,11 @@ impl WorldFlags {
         self.renderer
     }
 
+    /// Returns the model of the robots' cameras.
+    pub fn camera(&self) -> CameraModel {
+        self.camera
+    }
+
     /// Converts the flags to settings of a server.
     pub fn layer(self) -> Layer {
         Layer {
@@ -75,6 +86,7 @@ impl WorldFlags {
             state_estimate: Some(self.sensing.state_estimate),
             sensors: Some(self.sensing.sensors),
             renderer: Some(self.renderer),
+            camera: Some(self.camera),
             ..Layer::default()
         }
     }

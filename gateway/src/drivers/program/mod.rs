@@ -107,6 +107,7 @@ impl Program {
             sensing: spec.sensing,
             stress: spec.stress,
             renderer: spec.renderer,
+            camera: spec.camera,
             ..(*self.settings).clone()
         }))
     }

@@ -49,7 +49,7 @@ pub fn prompt(
         refused(format!("no task {:?}; have: {}", start.task, have.join(", ")))
     })?;
     let grips = tasks.find(&start.task).ok().and_then(|task| task.grips.as_deref());
-    let brief = brief(app.settings.wording(), &list.base_limits, grips);
+    let brief = brief(app.settings.wording(), &list.base_limits, app.settings.camera, grips);
     let text = text(info, &start, &brief, caller);
     let mut result = GetPromptResult::new(vec![PromptMessage::new_text(Role::User, text)]);
     result.description = Some(info.instruction.clone());

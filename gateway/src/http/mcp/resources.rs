@@ -86,7 +86,7 @@ pub async fn read(app: &AppState, caller: &Caller, uri: &str) -> Result<ReadReso
     let text = match (uri, caller) {
         (BRIEF, _) => {
             let limits = app.table.task_list().base_limits;
-            brief(app.settings.wording(), &limits, None).lines().join("\n\n")
+            brief(app.settings.wording(), &limits, app.settings.camera, None).lines().join("\n\n")
         }
         (BRIEFING, Caller::Operator { episode, .. }) => {
             let briefing = app.table.briefing(episode, caller).await.map_err(ApiError::from);

@@ -113,6 +113,7 @@ fn episode_refusals() -> Vec<EpisodeError> {
         EpisodeError::ForeignRobot { name: "B".into(), own: "A".into() },
         EpisodeError::DepthImage { protocol: "agentic" },
         EpisodeError::TooManySteps { asked: 60, most: 25, protocol: "agentic" },
+        EpisodeError::NoDepth { u: 10, v: 20 },
         EpisodeError::NoSurface {
             query: SurfaceQuery { pixel: None, color: Some(Color::Red), object: None },
             seen: vec![Color::Blue, Color::White],

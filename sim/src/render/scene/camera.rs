@@ -2,6 +2,7 @@
 
 use rapier3d::math::{Pose, Vector};
 
+use super::lens::{CameraModel, Distortion};
 use crate::mjcf::MjcfCamera;
 use crate::{Step, World};
 
@@ -26,10 +27,12 @@ pub struct LensFlaw {
     pub blur_px: f32,
 }
 
-/// Intrinsics of an image without distortion, in the convention of other libraries: the centre of pixel
-/// (0, 0) is at (0, 0). A point (x, y, z) in the camera's frame (x right, y down, z forward) is seen at
+/// Intrinsics of an image in the convention of other libraries: the centre of pixel (0, 0) is at (0, 0). A
+/// point (x, y, z) in the camera's frame (x right, y down, z forward) is seen at
 ///
-///   u = f x / z + cx,   v = f y / z + cy.
+///   u = f x' + cx,   v = f y' + cy,
+///
+/// with (x', y') of the [`Distortion`]: without any, (x / z, y / z).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intrinsics {
     pub width: u32,
@@ -38,6 +41,7 @@ pub struct Intrinsics {
     pub focal_px: f32,
     pub cx: f32,
     pub cy: f32,
+    pub distortion: Distortion,
 }
 
 impl Intrinsics {
@@ -50,12 +54,24 @@ impl Intrinsics {
             focal_px: 0.5 * height as f32 / (0.5 * vertical_fov_rad).tan(),
             cx: 0.5 * width as f32 - 0.5,
             cy: 0.5 * height as f32 - 0.5,
+            distortion: Distortion::NONE,
         }
+    }
+
+    /// Returns the intrinsics with the distortion of a model's lens.
+    pub fn of_model(self, model: CameraModel) -> Intrinsics {
+        let half_height_tan = 0.5 * self.height as f32 / self.focal_px;
+        Intrinsics { distortion: model.distortion(half_height_tan), ..self }
     }
 
     /// Returns the point in the camera's frame, with axes as in [`crate::mjcf::MjcfCamera`], that is
     /// seen at `uv_px` at a depth.
     pub fn unproject(&self, uv_px: [f32; 2], depth_m: f32) -> Vector {
+        if self.distortion != Distortion::NONE {
+            let place = [(uv_px[0] - self.cx) / self.focal_px, (uv_px[1] - self.cy) / self.focal_px];
+            let [x, y] = self.distortion.undistorted(place);
+            return Vector::new(x * depth_m, -y * depth_m, -depth_m);
+        }
         let scale = depth_m / self.focal_px;
         Vector::new((uv_px[0] - self.cx) * scale, (self.cy - uv_px[1]) * scale, -depth_m)
     }
@@ -77,6 +93,8 @@ pub struct Cameras {
     /// The camera in each robot's head, by robot.
     heads: Vec<(MjcfCamera, LensFlaw)>,
     third_person: Camera,
+    /// Model of the cameras in the heads, and the seed of its noise.
+    model: (CameraModel, u32),
 }
 
 /// Third-person view for scenes without one: from the side, a little above.
@@ -138,7 +156,27 @@ impl Cameras {
             },
         };
         let heads = world.robots().iter().map(|robot| (robot.model.egocentric.clone(), LensFlaw::NONE));
-        Cameras { heads: heads.collect(), third_person }
+        Cameras { heads: heads.collect(), third_person, model: (CameraModel::Ideal, 0) }
+    }
+
+    /// Puts the sensor of another model behind the lenses of the robots' heads; `seed` decides its noise.
+    pub fn set_model(&mut self, model: CameraModel, seed: u32) {
+        self.model = (model, seed);
+    }
+
+    /// Returns the model of the cameras in the robots' heads, and the seed of its noise.
+    pub fn model(&self) -> (CameraModel, u32) {
+        self.model
+    }
+
+    /// Returns the deviation of a robot's camera from its file.
+    pub fn lens(&self, robot: usize) -> LensFlaw {
+        self.heads[robot].1
+    }
+
+    /// Returns true if the robots' images are those of ideal cameras.
+    pub fn are_ideal(&self) -> bool {
+        self.model.0.is_ideal()
     }
 
     /// Gives the camera in the head of robot number `robot` another lens.

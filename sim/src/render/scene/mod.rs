@@ -4,6 +4,7 @@ pub mod bend;
 pub mod camera;
 pub mod faces;
 mod hidden;
+pub mod lens;
 pub mod mesh;
 pub mod prepared;
 pub mod shared;

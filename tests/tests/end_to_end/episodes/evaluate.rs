@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use serde_json::json;
 use tandem_episodes::replay::{Verdict, verify};
 use tandem_episodes::{
-    Controller, EpisodeSpec, Instructions, Recording, RendererKind, RobotFile, Sensing, Variation, players,
-    tasks,
+    CameraModel, Controller, EpisodeSpec, Instructions, Recording, RendererKind, RobotFile, Sensing,
+    Variation, players, tasks,
 };
 use tandem_evaluation::evaluation::{
     EpisodeEvent, EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate,
@@ -34,6 +34,7 @@ fn plan(jobs: usize, seeds: Vec<u32>) -> EvaluationPlan<'static> {
         stress: None,
         thinking_limit_s: None,
         renderer: RendererKind::Cpu,
+        camera: CameraModel::Ideal,
         tasks: vec![handover],
         seeds,
         starts: Starts::Task,

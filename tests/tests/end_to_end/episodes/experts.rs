@@ -7,8 +7,8 @@ use std::thread::available_parallelism;
 use tandem_episodes::players::{self, Episode, InProcess, PlayerError, PrivilegedEpisode, experts};
 use tandem_episodes::tasks::{self, Task};
 use tandem_episodes::{
-    A, B, C, Controller, EpisodeSpec, Facts, Instructions, RendererKind, RobotFile, Sensing, Session,
-    Variation, tandem_plus,
+    A, B, C, CameraModel, Controller, EpisodeSpec, Facts, Instructions, RendererKind, RobotFile, Sensing,
+    Session, Variation, tandem_plus,
 };
 use tandem_evaluation::evaluation::{EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate};
 use tandem_evaluation::policies::{EpisodeOutput, Policy};
@@ -45,6 +45,7 @@ fn solve(tasks: Vec<Task>, may_fail: usize) {
         stress: None,
         thinking_limit_s: None,
         renderer: RendererKind::Cpu,
+        camera: CameraModel::Ideal,
         tasks: tasks.clone(),
         seeds: SEEDS.into(),
         starts: Starts::Task,

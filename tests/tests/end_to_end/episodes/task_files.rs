@@ -2,7 +2,9 @@
 
 use tandem_episodes::players;
 use tandem_episodes::tasks::{self, Task};
-use tandem_episodes::{Controller, Instructions, RendererKind, RobotFile, Sensing, Variation, read_task};
+use tandem_episodes::{
+    CameraModel, Controller, Instructions, RendererKind, RobotFile, Sensing, Variation, read_task,
+};
 use tandem_evaluation::evaluation::{EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate};
 use tandem_tools_spec::{Assistance, PhaseTimes, Protocol};
 
@@ -26,6 +28,7 @@ fn played(task: &Task) -> Vec<(PhaseTimes, Option<String>)> {
         stress: None,
         thinking_limit_s: None,
         renderer: RendererKind::Cpu,
+        camera: CameraModel::Ideal,
         tasks: vec![task.clone()],
         seeds: SEEDS.into(),
         starts: Starts::Task,

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use tandem_episodes::{
-    Controller, Instructions, Recorder, Recording, RendererKind, RobotFile, Sensing, Variation, tasks,
+    CameraModel, Controller, Instructions, Recorder, Recording, RendererKind, RobotFile, Sensing, Variation,
+    tasks,
 };
 use tandem_evaluation::evaluation::{
     Evaluation, EvaluationPlan, ExistingRun, KeptFiles, Shard, Starts, evaluate,
@@ -28,6 +29,7 @@ pub fn plan(player: &dyn Policy, seeds: Vec<u32>, record: bool) -> EvaluationPla
         stress: None,
         thinking_limit_s: None,
         renderer: RendererKind::Cpu,
+        camera: CameraModel::Ideal,
         tasks: vec![tasks::find("handover").expect("a task")],
         seeds,
         starts: Starts::Task,

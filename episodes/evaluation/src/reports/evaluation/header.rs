@@ -48,6 +48,8 @@ pub struct RunSettings {
     pub controller: String,
     /// Renderers that were requested.
     pub renderers: Vec<String>,
+    /// Model of the robots' cameras.
+    pub camera: &'static str,
     pub state_estimate: &'static str,
     pub sensors: &'static str,
     pub build: String,
@@ -91,6 +93,7 @@ impl RunSettings {
             assistance: spec.assistance,
             controller: first.locomotion.clone(),
             renderers,
+            camera: spec.camera.name(),
             state_estimate: spec.sensing.state_estimate.name(),
             sensors: spec.sensing.sensors.name(),
             build: first.build.clone(),
@@ -127,13 +130,14 @@ pub fn settings(header: &ReportHeader) -> Table {
             "Assistance",
             "Controller",
             "Renderer",
+            "Camera",
             "State",
             "Sensors",
             "Build",
             "Played",
             "Episodes",
         ],
-        11,
+        12,
     );
     table.rows.extend(header.settings.iter().map(|of| {
         vec![
@@ -144,6 +148,7 @@ pub fn settings(header: &ReportHeader) -> Table {
             of.assistance.name().into(),
             of.controller.clone(),
             of.renderers.join(", "),
+            of.camera.into(),
             of.state_estimate.into(),
             of.sensors.into(),
             of.build.clone(),

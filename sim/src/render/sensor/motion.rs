@@ -1,0 +1,46 @@
+//! Motion of a camera, and of the image that it sees.
+
+use rapier3d::math::{Pose, Vector};
+
+use crate::CONTROL_DT_S;
+
+/// Velocity of a camera in its own frame, with axes as in [`crate::mjcf::MjcfCamera`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CameraMotion {
+    pub linear_m_s: Vector,
+    pub angular_rad_s: Vector,
+}
+
+impl CameraMotion {
+    /// Motion of a camera that stands still.
+    pub const STILL: CameraMotion = CameraMotion { linear_m_s: Vector::ZERO, angular_rad_s: Vector::ZERO };
+
+    /// Returns the mean motion in the control step between two poses.
+    pub fn between(world_from_before: &Pose, world_from_after: &Pose) -> CameraMotion {
+        let before_from_after = world_from_before.inverse() * *world_from_after;
+        let turn = before_from_after.rotation;
+        CameraMotion {
+            // In the frame after the step, like the image.
+            linear_m_s: turn.inverse() * before_from_after.translation / CONTROL_DT_S,
+            angular_rad_s: turn.to_scaled_axis() / CONTROL_DT_S,
+        }
+    }
+
+    /// Returns the velocity at which the image of an earlier or later camera moves over this one, relative to
+    /// the focal length, where the ray through `(x, y, 1)` is seen, x right and y down. For a world that stands
+    /// still, by Longuet-Higgins and Prazdny 1980:
+    ///
+    ///   dx/dt = (vx - x vz) / z + wy (1 + x^2) - wz y - wx x y,
+    ///   dy/dt = (vy - y vz) / z - wx (1 + y^2) + wz x + wy x y.
+    #[inline(always)]
+    pub(super) fn flow(&self, [x, y]: [f32; 2], inverse_depth_1_m: f32) -> [f32; 2] {
+        // From the axes of MJCF (y up, z back) to those of the image (y down, z forward).
+        let [vx, vy, vz] = [self.linear_m_s.x, -self.linear_m_s.y, -self.linear_m_s.z];
+        let [wx, wy, wz] = [self.angular_rad_s.x, -self.angular_rad_s.y, -self.angular_rad_s.z];
+        let xy = x * y;
+        [
+            (vx - x * vz) * inverse_depth_1_m + wy * (1.0 + x * x) - wz * y - wx * xy,
+            (vy - y * vz) * inverse_depth_1_m - wx * (1.0 + y * y) + wz * x + wy * xy,
+        ]
+    }
+}
