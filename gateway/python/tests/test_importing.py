@@ -75,10 +75,10 @@ def test_pictures_are_placed_on_surfaces_as_in_the_source(tmp_path: Path) -> Non
     import numpy as np
 
     from tandem.importing.engine import mujoco
-    from tandem.importing.files import write_png
+    from tandem.importing.files import png_bytes
 
     pixels: Any = np.arange(12)
-    write_png(tmp_path / "four.png", pixels.reshape(2, 2, 3) * 20)
+    (tmp_path / "four.png").write_bytes(png_bytes(pixels.reshape(2, 2, 3) * 20))
     faces = "f 1/1 3/3 2/2\nf 1/1 2/2 4/3\nf 2/2 3/3 4/1\nf 3/3 1/1 4/2\n"
     vertices = "v 0 0 1\nv 1 0 1\nv 0 1 1\nv 0 0 2\nvt 0 0.25\nvt 1 0.5\nvt 0 1\n"
     (tmp_path / "wedge.obj").write_text(vertices + faces)
@@ -115,10 +115,10 @@ def test_skies_cubes_and_layers_are_those_of_the_source(tmp_path: Path) -> None:
     import numpy as np
 
     from tandem.importing.engine import mujoco
-    from tandem.importing.files import write_png
+    from tandem.importing.files import png_bytes
 
     pixels: Any = np.arange(12)
-    write_png(tmp_path / "four.png", pixels.reshape(2, 2, 3) * 20)
+    (tmp_path / "four.png").write_bytes(png_bytes(pixels.reshape(2, 2, 3) * 20))
     (tmp_path / "scene.xml").write_text(LAYERS)
     report = import_file(tmp_path / "scene.xml", tmp_path / "out")
     assert (report.pictures, report.dropped) == (4, {})

@@ -10,6 +10,7 @@ import numpy as np
 
 from .assets import write_assets
 from .bodies import write_bodies
+from .collisions import colliding_meshes
 from .constraints import write_actuators, write_contacts, write_equalities
 from .engine import mujoco
 from .files import numbers
@@ -23,20 +24,25 @@ HEADLIGHT = {"ambient": 0.1, "diffuse": 0.4, "specular": 0.5}
 FLAGS = {"contact": mujoco.mjtDisableBit.mjDSBL_CONTACT, "gravity": mujoco.mjtDisableBit.mjDSBL_GRAVITY}
 
 
-def import_model(source: Path, out: Path) -> Report:
+def import_model(source: Path, out: Path, decompose: bool) -> Report:
     """Writes `scene.xml` for an MJCF or URDF file."""
-    model = mujoco.MjModel.from_xml_path(str(source))
-    written = out / "scene.xml"
+    text = source.read_text(encoding="utf-8", errors="replace")
+    return write_model(mujoco.MjModel.from_xml_path(str(source)), source, out / "scene.xml", decompose, custom(text))
+
+
+def write_model(model: Any, source: Path, written: Path, decompose: bool, custom: str = "") -> Report:
+    """Writes a compiled model as plain MJCF, with its meshes and images beside it."""
     report = Report(str(source), str(written))
     names = Names(model)
+    collisions = colliding_meshes(model, decompose, report)
     parts = [
         "<mujoco>",
         '<compiler angle="radian" meshdir="meshes" texturedir="textures"/>',
         options(model, report),
         headlight(model),
-        custom(source.read_text(encoding="utf-8", errors="replace")),
-        *write_assets(model, names, out, report),
-        *write_bodies(model, names, report),
+        custom,
+        *write_assets(model, names, written.parent, collisions, report),
+        *write_bodies(model, names, collisions, report),
         *write_contacts(model, names, report),
         *write_equalities(model, names, report),
         *write_actuators(model, names, report),
