@@ -16,7 +16,10 @@ MODELS = (".xml", ".mjcf", ".urdf")
 SDF = ".sdf"
 DIRECTIVES = (".yaml", ".yml")
 USD = (".usd", ".usda", ".usdc", ".usdz")
-NO_USD = "no converter from USD to MJCF exists on PyPI; let the program that wrote the file export MJCF, URDF, SDF or glTF"
+NO_USD = (
+    "no converter of USD scenes to MJCF works (usd2mjcf is empty, nvidia-srl-usd-to-urdf takes single robots); "
+    "let the program that wrote the file export MJCF, URDF, SDF or glTF"
+)
 #: Modules of the extra `import`.
 LIBRARIES = ("mujoco", "PIL", "scipy", "trimesh", "vhacdx", "yaml")
 FILE_HELP = "MJCF, URDF, SDF, Drake's directives (.dmd.yaml), or a mesh (" + ", ".join(MESHES) + ")"
@@ -73,7 +76,8 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"tandem import: {error}", file=sys.stderr)
         return 1
     failed = 0
-    for file in [] if given.check else given.files:
+    files: list[str] = [] if given.check else given.files
+    for file in files:
         out = Path(given.out) if len(given.files) == 1 else Path(given.out) / Path(file).stem
         try:
             print(import_file(file, out, given.decompose).told())

@@ -56,7 +56,12 @@ impl Friction {
     /// priority, otherwise the larger of each. They are multiplied by the `left` of both surfaces.
     /// Source: MuJoCo, "Contact parameters" in the chapter on modelling.
     pub fn between(a: &Friction, b: &Friction) -> Friction {
-        let Friction { directions, slide, spin_m, roll_m, priority, .. } = Friction::as_made(a, b);
+        Friction::as_made(a, b).worn(a, b)
+    }
+
+    /// Returns the friction between two surfaces as manufactured in their present states.
+    pub fn worn(&self, a: &Friction, b: &Friction) -> Friction {
+        let Friction { directions, slide, spin_m, roll_m, priority, .. } = *self;
         let left = a.left * b.left;
         Friction {
             directions,
@@ -68,7 +73,8 @@ impl Friction {
         }
     }
 
-    fn as_made(a: &Friction, b: &Friction) -> Friction {
+    /// Combines the friction of two colliders as manufactured.
+    pub fn as_made(a: &Friction, b: &Friction) -> Friction {
         match a.priority.cmp(&b.priority) {
             std::cmp::Ordering::Greater => *a,
             std::cmp::Ordering::Less => *b,

@@ -178,7 +178,7 @@ def in_world(scene: Scene, base: Frame, offset: Array) -> Array:
 def read_transform(stated: Any) -> Array:
     """Reads translation and rotation, which are fixed numbers: `!Rpy` and `!AngleAxis` have degrees."""
     translation = stated.get("translation") or [0.0, 0.0, 0.0]
-    rotation: Any = stated.get("rotation") or {}
+    rotation: Any = stated.get("rotation", {})
     if isinstance(translation, Tagged):
         raise ValueError(f"poses at random (!{translation.tag}) are not read; state numbers")
     by = str(getattr(rotation, "tag", "Rpy"))

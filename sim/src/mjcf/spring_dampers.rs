@@ -1,0 +1,56 @@
+//! Springs and dampers of joints that a file states by their time constant and damping ratio.
+
+use rapier3d::glamx::DPose3;
+use rapier3d::prelude::MassProperties;
+
+use super::bodies::{BodyTree, Place};
+use super::{Document, LinkJoint, pose};
+
+impl Document {
+    /// Sets stiffness k and damping d of the joints with a `springdamper` T z:
+    ///   k = M / (T z)^2,   d = 2 M / T,
+    /// M the inertia that the joint moves at the placed poses (kg m^2, or kg of a slide). Source: MuJoCo,
+    /// `springdamper` in the XML reference.
+    pub(super) fn set_spring_dampers(&self, trees: &mut [BodyTree], places: &[Place]) {
+        for (entry, place) in self.model.bodies.iter().zip(places) {
+            let stated = entry.body.joints.first().and_then(|joint| joint.springdamper);
+            let Some([time_s, ratio]) = stated.filter(|numbers| numbers.iter().all(|number| *number > 0.0))
+            else {
+                continue;
+            };
+            let tree = &mut trees[place.tree];
+            let moved = moved_inertia(tree, place.link);
+            if let LinkJoint::Hinge(joint) | LinkJoint::Slide(joint) = &mut tree.links[place.link].joint {
+                joint.axis.stiffness = moved / (time_s * ratio).powi(2);
+                joint.axis.damping = 2.0 * moved / time_s;
+            }
+        }
+    }
+}
+
+/// Returns the inertia that the joint of a link moves: of everything on the link, and the armature.
+fn moved_inertia(tree: &BodyTree, link: usize) -> f64 {
+    let mut of_link: Vec<Option<DPose3>> = vec![None; tree.links.len()];
+    of_link[link] = Some(DPose3::IDENTITY);
+    let mut moved = MassProperties::default();
+    for (index, one) in tree.links.iter().enumerate().skip(link) {
+        if index > link {
+            of_link[index] = one.parent.and_then(|parent| Some(of_link[parent]? * one.parent_from_link));
+        }
+        if let Some(link_from_one) = of_link[index] {
+            moved += one.mass.transform_by(&pose(&link_from_one));
+        }
+    }
+    match &tree.links[link].joint {
+        LinkJoint::Hinge(joint) => {
+            let axis = &joint.axis;
+            let direction = axis.direction.normalize().as_vec3();
+            let about_center = direction.dot(moved.reconstruct_inertia_matrix() * direction);
+            let away_m = moved.local_com - axis.anchor_m.as_vec3();
+            let inertia = about_center + moved.mass() * direction.cross(away_m).length_squared();
+            f64::from(inertia) + axis.armature
+        }
+        LinkJoint::Slide(joint) => f64::from(moved.mass()) + joint.axis.armature,
+        LinkJoint::Free { .. } | LinkJoint::Fixed => 0.0,
+    }
+}
