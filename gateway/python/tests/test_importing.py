@@ -22,18 +22,18 @@ SCENE = """<mujoco model="others">
   <option gravity="0 0 -1.62"/>
   <asset><hfield name="hill" nrow="2" ncol="2" size="1 1 1 1"/></asset>
   <worldbody>
-    <geom type="plane" size="5 5 0.1"/>
+    <geom name="floor" type="plane" size="5 5 0.1"/>
     <geom type="hfield" hfield="hill" pos="9 9 0"/>
     <body name="cabinet" pos="0 0 0.5">
       <geom type="box" size="0.3 0.2 0.3" mass="4"/>
       <body name="drawer" pos="0 -0.15 0">
         <joint name="rail" type="slide" axis="0 -1 0" range="0 0.3" damping="5"/>
-        <geom type="box" size="0.2 0.1 0.1" mass="2"/>
+        <geom name="lid" type="box" size="0.2 0.1 0.1" mass="2"/>
         <geom type="box" size="0.2 0.1 0.1" group="1" contype="0" conaffinity="0" rgba="1 0 0 1"/>
       </body>
     </body>
   </worldbody>
-  <contact><exclude body1="cabinet" body2="drawer"/></contact>
+  <contact><exclude body1="cabinet" body2="drawer"/><pair geom1="floor" geom2="lid" condim="1" friction="0.5"/></contact>
   <actuator><general name="puller" joint="rail" gainprm="7"/></actuator>
 </mujoco>
 """
@@ -48,6 +48,7 @@ def test_a_scene_is_written_plainly_with_a_report(tmp_path: Path) -> None:
         'name="drawn_groups" data="1 2"',
         'gravity="0 0 -1.62"',
         '<exclude body1="cabinet" body2="drawer"/>',
+        '<pair geom1="floor" geom2="lid" condim="1" friction="0.5',
         '<motor joint="rail" gear="7"',
         'limited="true" range="0 0.3"',
     ]:
@@ -381,3 +382,28 @@ def test_models_of_sdf_are_free_unless_they_are_static(tmp_path: Path) -> None:
     assert compiled(tmp_path / "free" / "scene.xml").body_mass.tolist() == pytest.approx([0.0, 0.3, 0.1])
     (tmp_path / "mug.sdf").write_text((tmp_path / "mug.sdf").read_text().replace('"mug">', '"mug"><static>true</static>'))
     assert import_file(tmp_path / "mug.sdf", tmp_path / "static").bodies == []
+
+
+URDF = """<robot name="arm">
+  <link name="base"><inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <visual><geometry><mesh filename="package://arm/meshes/wedge.ply"/></geometry></visual>
+    <visual><geometry><mesh filename="meshes/missing.dae"/></geometry></visual></link>
+  <link name="hand"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><mesh filename="meshes/wedge.obj"/></geometry></collision></link>
+  <joint name="wrist" type="revolute"><parent link="base"/><child link="hand"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+</robot>"""
+
+
+def test_meshes_of_urdf_are_found_in_packages(tmp_path: Path) -> None:
+    trimesh: Any = import_module("trimesh")
+    (tmp_path / "arm" / "meshes").mkdir(parents=True)
+    (tmp_path / "arm" / "meshes" / "wedge.obj").write_text(WEDGE)
+    trimesh.load(str(tmp_path / "arm" / "meshes" / "wedge.obj")).export(tmp_path / "arm" / "meshes" / "wedge.ply")
+    (tmp_path / "arm" / "arm.urdf").write_text(URDF)
+    report = import_file(tmp_path / "arm" / "arm.urdf", tmp_path / "out")
+    assert report.bodies == [{"name": "hand", "mass_kg": 1.0, "joints": ["hinge"]}]
+    assert len(report.dropped) == 1 and "there is no file meshes/missing.dae" in next(iter(report.dropped))
+    model = compiled(tmp_path / "out" / "scene.xml")
+    assert sorted(zip(model.geom_group.tolist(), model.geom_contype.tolist(), strict=True)) == [(0, 1), (1, 0)]
+    assert 'name="drawn_groups" data="1 2"' in (tmp_path / "out" / "scene.xml").read_text()

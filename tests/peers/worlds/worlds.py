@@ -41,8 +41,8 @@ READ = ("same", "other", "chaotic")
 KEPT = {".xml", ".obj", ".stl", ".msh", ".png", ".jpg", ".jpeg", ".bin", ".skn", ".mtl", ".ktx", ".dae", ".urdf"}
 
 
-def fetch(folder: Path) -> None:
-    for package in PACKAGES.read_text().split():
+def fetch(folder: Path, packages: Path) -> None:
+    for package in packages.read_text().split():
         download = [sys.executable, "-m", "pip", "download", "-q", "--no-deps", "--only-binary=:all:"]
         if subprocess.run([*download, "-d", str(folder / "wheels"), package], check=False).returncode:
             print(f"{package}: could not be fetched", file=sys.stderr)
@@ -245,13 +245,14 @@ def main() -> None:
     parser.add_argument("what", choices=["fetch", "compare", "show", "work"])
     parser.add_argument("path", type=Path)
     parser.add_argument("--settle", default=str(target / "release" / "examples" / "settle"))
+    parser.add_argument("--packages", type=Path, default=PACKAGES, help="list of the packages to fetch")
     parser.add_argument("--tsv", type=Path, default=Path("worlds.tsv"))
     parser.add_argument("--only", default="", help="files with this in their path")
     parser.add_argument("--jobs", type=int, default=2)
     given = parser.parse_args()
     match given.what:
         case "fetch":
-            fetch(given.path)
+            fetch(given.path, given.packages)
         case "compare":
             compare(given.path, given.settle, given.tsv, given.only, given.jobs)
         case "show":

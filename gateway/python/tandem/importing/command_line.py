@@ -40,7 +40,7 @@ def import_file(source: str | Path, out: str | Path, decompose: bool = False) ->
     source, out = Path(source), Path(out)
     kind = source.suffix.lower()
     if kind in MODELS:
-        from .model import import_model as read
+        from .compiled.model import import_model as read
     elif kind == SDF:
         from .objects import import_sdf as read
     elif kind in DIRECTIVES:

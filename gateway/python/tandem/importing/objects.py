@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from .compiled.model import write_model
 from .engine import mujoco
-from .model import write_model
 from .pieces.read import read_pieces
 from .pieces.weight import weighed
 from .report import Report
@@ -45,7 +45,8 @@ def import_mesh(source: Path, out: Path, decompose: bool) -> Report:
 
 def import_source(made: Source, source: Path, out: Path, written: str, decompose: bool) -> Report:
     model = mujoco.MjModel.from_xml_string(made.text, made.files)
-    report = write_model(model, source, out / written, decompose)
+    report = Report(str(source), str(out / written))
+    write_model(model, out / written, report, decompose)
     for what, times in made.notes.items():
         report.drop(what, times)
     return report

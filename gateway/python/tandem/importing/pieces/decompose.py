@@ -16,8 +16,9 @@ from ..files import Array
 
 #: Largest concavity that CoACD leaves; its default, which SceneSmith uses, too.
 THRESHOLD = 0.05
-#: Largest number of pieces of V-HACD.
+#: Largest number of pieces of V-HACD, and the number of voxels that it cuts.
 MAX_PIECES = 32
+RESOLUTION = 100_000
 
 
 def decomposed(vertices: Array, faces: Array) -> list[tuple[Array, Array]]:
@@ -25,12 +26,13 @@ def decomposed(vertices: Array, faces: Array) -> list[tuple[Array, Array]]:
     cut = by_coacd if find_spec("coacd") else by_vhacd
     points = np.ascontiguousarray(vertices, dtype=float)
     corners = np.ascontiguousarray(faces, dtype=np.int32)
-    key = hashlib.sha256(repr((cut.__name__, THRESHOLD, MAX_PIECES)).encode() + points.tobytes() + corners.tobytes())
+    settings = repr((cut.__name__, THRESHOLD, MAX_PIECES, RESOLUTION))
+    key = hashlib.sha256(settings.encode() + points.tobytes() + corners.tobytes())
     kept = cache_folder() / f"{key.hexdigest()}.npz"
     if not kept.is_file():
         pieces = cut(points, corners)
-        arrays = {f"v{number}": corners for number, (corners, _) in enumerate(pieces)}
-        arrays |= {f"f{number}": triangles for number, (_, triangles) in enumerate(pieces)}
+        arrays = {f"v{number}": v for number, (v, _) in enumerate(pieces)}
+        arrays |= {f"f{number}": f for number, (_, f) in enumerate(pieces)}
         kept.parent.mkdir(parents=True, exist_ok=True)
         unfinished = kept.with_suffix(f".{os.getpid()}.npz")
         np.savez_compressed(unfinished, **arrays)
@@ -49,7 +51,8 @@ def by_vhacd(points: Array, corners: Array) -> list[tuple[Array, Array]]:
     trimesh: Any = import_module("trimesh")
     mesh = trimesh.Trimesh(points, corners, process=False)
     # One thread, so that the same mesh gives the same pieces.
-    pieces: Any = trimesh.decomposition.convex_decomposition(mesh, maxConvexHulls=MAX_PIECES, asyncACD=False)
+    settings = {"maxConvexHulls": MAX_PIECES, "resolution": RESOLUTION, "asyncACD": False}
+    pieces: Any = trimesh.decomposition.convex_decomposition(mesh, **settings)
     return [(piece["vertices"], piece["faces"].reshape(-1, 3)) for piece in pieces]
 
 

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from ..files import Array
+from ..uri import resolved
 from .parts import WORLD, Frame, Model
 from .poses import identity, pose, rotation_about, rotation_rpy
 from .read import SCOPE, read_models
-from .uri import resolved
 
 
 @dataclass

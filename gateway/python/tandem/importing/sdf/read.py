@@ -15,10 +15,10 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ..files import Array
+from ..uri import resolved
 from .parts import WORLD, Axis, Frame, Joint, Link, Model
 from .poses import identity, inverse, pose, rotation_rpy
 from .shapes import read_shape
-from .uri import resolved
 
 MODEL_FRAME = "__model__"
 #: Separates the names of a nested model and of its parts.

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from ..files import Array
+from ..uri import resolved
 from .parts import Shape
-from .uri import resolved
 
 
 def read_shape(element: Any, place: Array, file: Path) -> Shape | None:

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..engine import mujoco
+from ..files import Array, escaped, numbers, obj_text, png_bytes
+from ..report import Report
 from .collisions import MESH, UNSEEN, Collision, is_replaced, triangles
-from .engine import mujoco
-from .files import Array, escaped, numbers, obj_text, png_bytes
 from .names import Names
-from .report import Report
 
 #: Names of the roles of a material's textures.
 ROLES = {

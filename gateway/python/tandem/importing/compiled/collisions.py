@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from .engine import mujoco
-from .files import Array
-from .pieces.decompose import decomposed
-from .pieces.weight import hull
-from .report import Report
+from ..engine import mujoco
+from ..files import Array
+from ..pieces.decompose import decomposed
+from ..pieces.weight import hull
+from ..report import Report
 
 MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 #: Share of its hull below which a mesh is called concave.

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from ..engine import mujoco
+from ..files import escaped, numbers
+from ..report import Report
 from .assets import mesh_name, piece_name
 from .collisions import UNSEEN, Collision, is_replaced
-from .engine import mujoco
-from .files import escaped, numbers
 from .names import Names
-from .report import Report
 
 Collisions = dict[int, Collision]
 #: Types of geoms, each with the number of values in its size.

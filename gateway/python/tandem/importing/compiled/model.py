@@ -8,31 +8,41 @@ from typing import Any
 
 import numpy as np
 
+from ..engine import mujoco
+from ..files import numbers
+from ..report import Report
+from ..urdf import urdf_source
 from .assets import write_assets
 from .bodies import write_bodies
 from .collisions import colliding_meshes
 from .constraints import write_actuators, write_contacts, write_equalities
-from .engine import mujoco
-from .files import numbers
 from .names import Names
-from .report import Report
 
 #: Duration of the comparison between the source and the written file.
 SECONDS = 1.0
 #: MuJoCo's own headlight.
 HEADLIGHT = {"ambient": 0.1, "diffuse": 0.4, "specular": 0.5}
+#: Groups that are drawn where group 0 has the shapes that collide, as in robosuite's files and in MuJoCo's models of URDF.
+DRAWN_VISUALS = '<custom><numeric name="drawn_groups" data="1 2"/></custom>'
 FLAGS = {"contact": mujoco.mjtDisableBit.mjDSBL_CONTACT, "gravity": mujoco.mjtDisableBit.mjDSBL_GRAVITY}
 
 
 def import_model(source: Path, out: Path, decompose: bool) -> Report:
     """Writes `scene.xml` for an MJCF or URDF file."""
-    text = source.read_text(encoding="utf-8", errors="replace")
-    return write_model(mujoco.MjModel.from_xml_path(str(source)), source, out / "scene.xml", decompose, custom(text))
+    report = Report(str(source), str(out / "scene.xml"))
+    if source.suffix.lower() == ".urdf":
+        text, files = urdf_source(source, report)
+        model = mujoco.MjModel.from_xml_string(text, files)
+        write_model(model, out / "scene.xml", report, decompose, DRAWN_VISUALS if (model.geom_group == 1).any() else "")
+    else:
+        text = source.read_text(encoding="utf-8", errors="replace")
+        model = mujoco.MjModel.from_xml_path(str(source))
+        write_model(model, out / "scene.xml", report, decompose, custom(text))
+    return report
 
 
-def write_model(model: Any, source: Path, written: Path, decompose: bool, custom: str = "") -> Report:
+def write_model(model: Any, written: Path, report: Report, decompose: bool, custom: str = "") -> None:
     """Writes a compiled model as plain MJCF, with its meshes and images beside it."""
-    report = Report(str(source), str(written))
     names = Names(model)
     collisions = colliding_meshes(model, decompose, report)
     parts = [
@@ -43,7 +53,7 @@ def write_model(model: Any, source: Path, written: Path, decompose: bool, custom
         custom,
         *write_assets(model, names, written.parent, collisions, report),
         *write_bodies(model, names, collisions, report),
-        *write_contacts(model, names, report),
+        *write_contacts(model, names, collisions, report),
         *write_equalities(model, names, report),
         *write_actuators(model, names, report),
         "</mujoco>",
@@ -51,7 +61,6 @@ def write_model(model: Any, source: Path, written: Path, decompose: bool, custom
     written.write_text("\n".join(part for part in parts if part) + "\n", encoding="utf-8")
     rest(model, report)
     report.after_1_s = compared(model, mujoco.MjModel.from_xml_path(str(written)), names)
-    return report
 
 
 def options(model: Any, report: Report) -> str:
@@ -80,7 +89,7 @@ def headlight(model: Any) -> str:
 def custom(text: str) -> str:
     """Returns the drawn groups (1 and 2) for a file with robosuite's convention, which the compiler drops."""
     by_group = re.search(r'inertiagrouprange\s*=\s*"\s*0\s+0\s*"', text) and re.search(r'group\s*=\s*"1"', text)
-    return '<custom><numeric name="drawn_groups" data="1 2"/></custom>' if by_group else ""
+    return DRAWN_VISUALS if by_group else ""
 
 
 def rest(model: Any, report: Report) -> None:
