@@ -54,3 +54,33 @@ fn moved_inertia(tree: &BodyTree, link: usize) -> f64 {
         LinkJoint::Free { .. } | LinkJoint::Fixed => 0.0,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::mjcf::Document;
+
+    /// Stiffness and damping of the same file in MuJoCo 4.0.0.
+    const EXPECTED: [[f64; 2]; 2] = [[8.39738443, 2.14973041], [50.0, 10.0]];
+
+    #[test]
+    fn springs_and_dampers_are_those_of_mujoco() {
+        let document = Document::parse(
+            "arm.xml",
+            r#"<mujoco><compiler angle="radian"/><worldbody><body name="a" pos="0 0 1">
+                 <joint name="h" axis="0 1 0" pos="0.1 0 0" armature="0.01" springdamper="0.2 0.8"/>
+                 <geom type="box" size="0.1 0.2 0.3" mass="2" pos="0.3 0 0"/>
+                 <body name="b" pos="0.5 0 0" euler="0 0 0.7">
+                   <joint name="s" type="slide" axis="1 0 0" springdamper="0.1 1"/>
+                   <geom type="sphere" size="0.1" mass="0.5" pos="0 0.1 0"/></body></body></worldbody></mujoco>"#,
+        )
+        .expect("an arm");
+        let trees = document.trees().expect("trees");
+        let axes: Vec<_> = trees[1].links.iter().filter_map(|link| link.joint.axis()).collect();
+        for (axis, expected) in axes.iter().zip(EXPECTED) {
+            let found = [axis.stiffness, axis.damping];
+            let near = found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-5 * b);
+            assert!(near, "{found:?} in place of {expected:?}");
+        }
+        assert_eq!(axes.len(), EXPECTED.len());
+    }
+}

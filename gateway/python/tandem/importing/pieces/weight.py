@@ -16,6 +16,15 @@ def hull(vertices: Array, faces: Array) -> Any:
     return trimesh.Trimesh(vertices, faces, process=False).convex_hull
 
 
+def hull_m3(vertices: Array, faces: Array) -> float:
+    """Returns the volume of the convex hull; 0 of a mesh that is flat."""
+    spatial: Any = import_module("scipy.spatial")
+    try:
+        return float(hull(vertices, faces).volume)
+    except spatial.QhullError:
+        return 0.0
+
+
 def closed(vertices: Array, faces: Array) -> Any:
     """Returns a mesh that encloses a volume as it is, and the hull of any other."""
     trimesh: Any = import_module("trimesh")
