@@ -49,6 +49,8 @@ class Report:
             )
         if pieces := sum(row["pieces"] for row in concave):
             lines.append(f"  {len(concave) - len(whole)} concave meshes collide as {pieces} convex pieces")
+        if "not_simulated" in self.after_1_s:
+            lines.append(f"  MuJoCo diverges within 1 s or is slow: {' and '.join(self.after_1_s['not_simulated'])} file")
         if "from_source_m" in self.after_1_s:
             far = self.after_1_s["from_source_m"]
             lines.append(f"  after 1 s in MuJoCo the farthest body is {1000 * far:.0f} mm from the source's")

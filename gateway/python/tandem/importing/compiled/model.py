@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,16 @@ from .names import Names
 
 #: Duration of the comparison between the source and the written file.
 SECONDS = 1.0
+#: Longest duration of the simulation of either.
+PATIENCE_S = 20.0
 #: MuJoCo's own headlight.
 HEADLIGHT = {"ambient": 0.1, "diffuse": 0.4, "specular": 0.5}
+#: Warnings of a simulation that MuJoCo then begins anew.
+DIVERGED = [
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+]
 #: Groups that are drawn where group 0 has the shapes that collide, as in robosuite's files and in MuJoCo's models of URDF.
 DRAWN_VISUALS = '<custom><numeric name="drawn_groups" data="1 2"/></custom>'
 FLAGS = {"contact": mujoco.mjtDisableBit.mjDSBL_CONTACT, "gravity": mujoco.mjtDisableBit.mjDSBL_GRAVITY}
@@ -106,25 +115,41 @@ def rest(model: Any, report: Report) -> None:
             report.drop(what, int(times))
 
 
-def played(model: Any) -> tuple[Any, Any]:
-    """Returns the positions of bodies at the beginning and after one second without commands."""
+def played(model: Any) -> tuple[Any, Any] | None:
+    """Returns the positions of bodies at the beginning and after one second without commands.
+
+    Returns `None` if MuJoCo diverges, or if it takes longer than `PATIENCE_S`.
+    """
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     begin = data.xpos.copy()
-    while data.time < SECONDS:
-        mujoco.mj_step(model, data)
+    # MuJoCo would write warnings to a file in the working folder.
+    mujoco.set_mju_user_warning(ignore)
+    ends = time.monotonic() + PATIENCE_S
+    try:
+        for _ in range(round(SECONDS / model.opt.timestep)):
+            mujoco.mj_step(model, data)
+            if time.monotonic() > ends or any(data.warning[kind].number for kind in DIVERGED):
+                return None
+    finally:
+        mujoco.set_mju_user_warning(None)
     return begin, data.xpos.copy()
+
+
+def ignore(warning: str) -> None:
+    """Does nothing about a warning of MuJoCo, which counts it, too."""
 
 
 def compared(source: Any, written: Any, names: Names) -> dict[str, Any]:
     """Returns how far (m) bodies move in one second, and how far they then are from those of the source."""
-    written.opt.timestep = source.opt.timestep
-    _, expected = played(source)
-    begin, found = played(written)
     moved = [body for body in range(1, written.nbody) if written.body_weldid[body]]
     if not moved:
         return {"from_begin_m": 0.0, "from_source_m": 0.0}
-    away = np.linalg.norm(found - expected, axis=1)
+    written.opt.timestep = source.opt.timestep
+    expected, found = played(source), played(written)
+    if expected is None or found is None:
+        return {"not_simulated": [name for name, end in (("source", expected), ("written", found)) if end is None]}
+    away = np.linalg.norm(found[1] - expected[1], axis=1)
     farthest = max(moved, key=lambda body: away[body])
-    come = max(float(np.linalg.norm(found[body] - begin[body])) for body in moved)
+    come = max(float(np.linalg.norm(found[1][body] - found[0][body])) for body in moved)
     return {"from_begin_m": come, "from_source_m": float(away[farthest]), "farthest": names.of("body", farthest)}
