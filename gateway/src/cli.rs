@@ -7,8 +7,8 @@ use clap::{CommandFactory, Parser, Subcommand};
 use crate::commands::{
     CommandResult,
     about::{completions, examples, man, tasks},
-    agent, bench, collect, demo, doctor, evaluate, export, import, leaderboard, locomotion, policy_map, recover,
-    replay, report, serve,
+    agent, bench, collect, demo, doctor, evaluate, export, import, leaderboard, locomotion, policy_map,
+    recover, replay, report, serve,
 };
 
 /// Physics of humanoids that must work together, behind an HTTP API.

@@ -1,7 +1,7 @@
 //! Equalities of a file between the links of its bodies, links that never touch, and pairs of geoms that do.
 
 use crate::SimError;
-use crate::dynamics::{ColliderId, DPose3, Dynamics, Equality, Friction, LinkId, TreeId};
+use crate::dynamics::{ColliderId, DPose3, Dynamics, Equality, LinkId, TreeId};
 use crate::mjcf::{BodyTree, Document, EqualityKind};
 
 /// A tree of a file and its id in dynamics; `None` for a part of the world.
@@ -119,23 +119,24 @@ pub(crate) fn pair_up(
 ) -> Result<(), SimError> {
     for pair in &document.pairs {
         let [a, b] = pair.geoms.each_ref().map(|name| paired(placed, name));
-        let ([Some((a, friction_a)), Some((b, friction_b))], true) = ([a, b], pair.geoms[0] != pair.geoms[1])
-        else {
+        let ([Some(a), Some(b)], true) = ([a, b], pair.geoms[0] != pair.geoms[1]) else {
             let [a, b] = &pair.geoms;
             let what = format!("pair of `{a}` and `{b}`; it takes two geoms that have an extent");
             return Err(document.unsupported(what));
         };
-        dynamics.let_touch(a, b, pair.friction(&friction_a, &friction_b));
+        dynamics.let_touch(a, b, pair.friction);
     }
     Ok(())
 }
 
-/// Returns the collider of the geom of this name, and its friction.
-fn paired(placed: &[PlacedTree], name: &str) -> Option<(ColliderId, Friction)> {
+/// Returns the collider of the geom of this name.
+fn paired(placed: &[PlacedTree], name: &str) -> Option<ColliderId> {
     placed.iter().find_map(|PlacedTree { tree, colliders, .. }| {
         let geoms = tree.links.iter().flat_map(|link| &link.geoms).zip(colliders);
-        let (geom, collider) = geoms.into_iter().find(|(geom, _)| geom.name.as_deref() == Some(name))?;
-        Some(((*collider)?, geom.friction))
+        geoms
+            .into_iter()
+            .find(|(geom, _)| geom.name.as_deref() == Some(name))
+            .and_then(|(_, collider)| *collider)
     })
 }
 

@@ -6,15 +6,16 @@ use super::text::stated::Classes;
 use crate::SimError;
 use crate::dynamics::{Directions, Friction};
 
-/// A `<pair>` of a file. What it does not state comes from the two geoms.
+/// A `<pair>` of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeomPair {
     pub geoms: [String; 2],
-    directions: Option<Directions>,
-    /// Coefficients of sliding, spin and roll; MuJoCo has two for sliding and two for rolling, of which the
-    /// first counts here.
-    friction: Option<[f64; 3]>,
+    /// Friction between the two, whatever their own.
+    pub friction: Friction,
 }
+
+/// MuJoCo's friction of a pair: two tangents, the spin about the normal, and the roll about the tangents.
+const FRICTION: [f64; 5] = [1.0, 1.0, 0.005, 0.0001, 0.0001];
 
 impl GeomPair {
     /// Reads the pairs of a file; none if the file disables contacts.
@@ -46,28 +47,24 @@ impl GeomPair {
             Some(words.filter_map(|word| word.parse().ok()).collect())
         };
         let condim = classes.stated(&node, "condim").and_then(|word| word.parse().ok());
+        let stated = numbers("friction").unwrap_or_default();
+        let at = |index: usize| stated.get(index).copied().unwrap_or(FRICTION[index]);
         Ok(GeomPair {
             geoms: [geom("geom1")?, geom("geom2")?],
-            directions: condim.and_then(Directions::from_condim),
-            // MuJoCo fills up with its own numbers.
-            friction: numbers("friction").map(|stated| {
-                let at = |index: usize, usual: f64| stated.get(index).copied().unwrap_or(usual);
-                [at(0, 1.0), at(2, 0.005), at(3, 0.0001)]
-            }),
+            // Friction is the same along both tangents here.
+            friction: Friction {
+                directions: condim.and_then(Directions::from_condim).unwrap_or(Directions::Slide),
+                slide: at(0).max(at(1)),
+                spin_m: at(2),
+                roll_m: at(3).max(at(4)),
+                priority: 0,
+                left: 1.0,
+            },
         })
     }
 
     /// Returns true if the geom of this name is one of the two.
     pub(super) fn has(&self, geom: &str) -> bool {
         self.geoms.iter().any(|name| name == geom)
-    }
-
-    /// Returns the friction between the two geoms, which have these by themselves.
-    pub fn friction(&self, a: &Friction, b: &Friction) -> Friction {
-        let by_themselves = Friction::as_made(a, b);
-        let own = [by_themselves.slide, by_themselves.spin_m, by_themselves.roll_m];
-        let [slide, spin_m, roll_m] = self.friction.unwrap_or(own);
-        let directions = self.directions.unwrap_or(by_themselves.directions);
-        Friction { directions, slide, spin_m, roll_m, ..by_themselves }
     }
 }

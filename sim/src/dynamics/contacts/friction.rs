@@ -59,7 +59,7 @@ impl Friction {
         Friction::as_made(a, b).worn(a, b)
     }
 
-    /// Returns the friction between two surfaces as manufactured in their present states.
+    /// Multiplies friction by the `left` of both surfaces.
     pub fn worn(&self, a: &Friction, b: &Friction) -> Friction {
         let Friction { directions, slide, spin_m, roll_m, priority, .. } = *self;
         let left = a.left * b.left;
@@ -73,8 +73,7 @@ impl Friction {
         }
     }
 
-    /// Combines the friction of two colliders as manufactured.
-    pub fn as_made(a: &Friction, b: &Friction) -> Friction {
+    fn as_made(a: &Friction, b: &Friction) -> Friction {
         match a.priority.cmp(&b.priority) {
             std::cmp::Ordering::Greater => *a,
             std::cmp::Ordering::Less => *b,

@@ -428,7 +428,7 @@ const PAIR: &[Attribute] = &[
         Support::Mapped,
         &["friction"],
         Takes::Numbers { least: 1, most: 5, sign: Sign::NotNegative },
-        "its first, third and fourth number: friction is the same in all directions",
+        "the same along both tangents: the larger of its first and of its last two numbers",
     ),
     approximated(&["solref", "solreffriction", "solimp"], "contacts are as soft as those of the geoms"),
     approximated(&["margin", "gap"], "contacts begin where surfaces meet"),

@@ -99,7 +99,7 @@ fn pairs_touch_whatever_their_masks_and_slide_by_their_own_friction() {
         (scene.into(), 4.5, 6.0),
         (pair(""), 0.0, 0.001),
         // s = (3 - 0.1 * 9.81) / 2
-        (pair(r#" friction="0.1""#), 0.98, 1.04),
+        (pair(r#" friction="0.1 0.1""#), 0.98, 1.04),
         (pair(r#" condim="1""#), 1.47, 1.53),
         (pair("").replace("<option", r#"<option><flag contact="disable"/></option><option"#), 4.5, 6.0),
     ] {
