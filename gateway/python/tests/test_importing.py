@@ -353,7 +353,7 @@ def test_directives_place_and_weld_models(tmp_path: Path) -> None:
     pairs = {(model.body(pair >> 16).name, model.body(pair & 0xFFFF).name) for pair in model.exclude_signature.tolist()}
     assert {tuple(sorted(pair)) for pair in pairs} >= {("shelf", "shelf/drawer"), ("shelf/door", "shelf/drawer")}
     assert report.dropped["<plugin> of a model"] == 1
-    assert report.dropped["inertia of a link, which are now those of its shapes"] == 3
+    assert report.dropped["inertia of a link; those of its shapes are used"] == 3
     assert report.after_1_s["from_source_m"] < 1e-3
 
 

@@ -64,7 +64,7 @@ class Source:
         if mass is None or (inertia is None and mass > 0.0):
             solids = [solid_of(shape) for shape in link.collisions or link.visuals if shape.kind != "plane"]
             volume, middle, second = weighed(solids)
-            self.notes[f"{'inertia' if mass else 'mass and inertia'} of a link, which are now those of its shapes"] += 1
+            self.notes[f"{'inertia' if mass else 'mass and inertia'} of a link; those of its shapes are used"] += 1
             center = center if mass is not None else middle
             mass = DENSITY_KG_M3 * volume if mass is None else mass
             inertia = second * mass / volume if volume else None

@@ -92,6 +92,6 @@ class Model:
         self.left_out[what] = self.left_out.get(what, 0) + 1
 
     def root(self) -> str:
-        """Returns the name of the first link that is no joint's child."""
+        """Returns the name of the first link that is no joint's child; of links in a circle, the first."""
         children = {joint.child for joint in self.joints.values() if joint.parent != WORLD}
-        return next(name for name in self.links if name not in children)
+        return next((name for name in self.links if name not in children), next(iter(self.links)))
