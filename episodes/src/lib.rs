@@ -57,6 +57,7 @@ pub use output::{
     OutputError, create_new_private_folder, create_private_folder, partial_path, printable, shell_word,
     write_whole,
 };
+pub use pages::{SIDES_FILE, draw_sides};
 pub use protocol::{Rules, rules};
 pub use recording::{
     Damage, Fault, FilePart, LeftOut, LiveChannel, LiveRecording, LiveViewer, MAX_RECORDING_BYTES,

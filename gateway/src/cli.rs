@@ -7,8 +7,8 @@ use clap::{CommandFactory, Parser, Subcommand};
 use crate::commands::{
     CommandResult,
     about::{completions, examples, man, tasks},
-    agent, bench, collect, demo, doctor, evaluate, export, leaderboard, locomotion, policy_map, recover,
-    replay, report, serve,
+    agent, bench, collect, demo, doctor, evaluate, export, import, leaderboard, locomotion, policy_map,
+    recover, replay, report, serve,
 };
 
 /// Physics of humanoids that must work together, behind an HTTP API.
@@ -34,6 +34,7 @@ enum CliCommand {
     Recover(recover::RecoverArgs),
     Replay(replay::ReplayArgs),
     Export(export::ExportArgs),
+    Import(import::ImportArgs),
     Report(report::ReportArgs),
     Leaderboard(leaderboard::LeaderboardArgs),
     Bench(bench::BenchArgs),
@@ -63,6 +64,7 @@ impl Cli {
             CliCommand::Recover(args) => recover::run(args),
             CliCommand::Replay(args) => replay::run(args),
             CliCommand::Export(args) => export::run(args),
+            CliCommand::Import(args) => import::run(args),
             CliCommand::Report(args) => report::run(args),
             CliCommand::Leaderboard(args) => leaderboard::run(args),
             CliCommand::Bench(args) => bench::run(args),

@@ -13,7 +13,7 @@ pub enum SimError {
     Read { path: String, source: std::io::Error },
     #[error("`{file}` is not valid MJCF: {source}")]
     Mjcf { file: String, source: mjcf_rs::ParseError },
-    #[error("`{file}` is not valid XML: {source}")]
+    #[error("`{file}` is not valid XML: {source}; `tandem import` converts files of other formats to MJCF")]
     Xml { file: String, source: roxmltree::Error },
     #[error("`{file}` does not describe a robot: {source}")]
     RobotDescription { file: String, source: Box<dyn std::error::Error + Send + Sync> },

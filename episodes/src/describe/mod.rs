@@ -9,6 +9,7 @@ mod relative;
 mod room;
 
 pub use brief::{brief, teamwork};
+pub use extents::{corners_m, extent_m};
 #[cfg(test)]
 pub use grips::grips;
 pub use room::room;

@@ -10,6 +10,7 @@ pub mod doctor;
 pub mod evaluate;
 pub mod export;
 mod flags;
+pub mod import;
 pub mod leaderboard;
 pub mod locomotion;
 mod logging;

@@ -22,6 +22,8 @@ pub enum PythonPart {
     Export,
     /// Logs of Inspect.
     Inspect,
+    /// Scenes and objects of other programs.
+    Import,
 }
 
 /// Reason why the Python part cannot run.
@@ -68,6 +70,7 @@ impl PythonPart {
         match self {
             PythonPart::Agent => "tandem.agent",
             PythonPart::Export | PythonPart::Inspect => "tandem.export",
+            PythonPart::Import => "tandem.importing",
         }
     }
 
@@ -77,6 +80,7 @@ impl PythonPart {
             PythonPart::Agent => "agents",
             PythonPart::Export => "lerobot",
             PythonPart::Inspect => "inspect",
+            PythonPart::Import => "import",
         }
     }
 
@@ -94,6 +98,7 @@ impl PythonPart {
             PythonPart::Agent => "agents are played",
             PythonPart::Export => "data sets are written",
             PythonPart::Inspect => "logs of Inspect are written",
+            PythonPart::Import => "files are imported",
         }
     }
 
@@ -102,6 +107,7 @@ impl PythonPart {
         match self {
             PythonPart::Agent => "tandem agent: ",
             PythonPart::Export | PythonPart::Inspect => "tandem export: ",
+            PythonPart::Import => "tandem import: ",
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Equalities of a file between the links of its bodies, and links that never touch.
+//! Equalities of a file between the links of its bodies, links that never touch, and pairs of geoms that do.
 
 use crate::SimError;
 use crate::dynamics::{ColliderId, DPose3, Dynamics, Equality, LinkId, TreeId};
@@ -8,7 +8,7 @@ use crate::mjcf::{BodyTree, Document, EqualityKind};
 pub(crate) struct PlacedTree<'a> {
     pub tree: &'a BodyTree,
     pub id: Option<TreeId>,
-    /// Colliders of the geoms, in their order; filled only for a tree that is part of the world.
+    /// Colliders of the geoms of all links, in their order.
     pub colliders: Vec<Option<ColliderId>>,
 }
 
@@ -109,6 +109,35 @@ pub(crate) fn keep_apart(
         }
     }
     Ok(())
+}
+
+/// Lets the geoms of the file's `<pair>`s touch.
+pub(crate) fn pair_up(
+    dynamics: &mut Dynamics,
+    document: &Document,
+    placed: &[PlacedTree],
+) -> Result<(), SimError> {
+    for pair in &document.pairs {
+        let [a, b] = pair.geoms.each_ref().map(|name| paired(placed, name));
+        let ([Some(a), Some(b)], true) = ([a, b], pair.geoms[0] != pair.geoms[1]) else {
+            let [a, b] = &pair.geoms;
+            let what = format!("pair of `{a}` and `{b}`; it takes two geoms that have an extent");
+            return Err(document.unsupported(what));
+        };
+        dynamics.let_touch(a, b, pair.friction);
+    }
+    Ok(())
+}
+
+/// Returns the collider of the geom of this name.
+fn paired(placed: &[PlacedTree], name: &str) -> Option<ColliderId> {
+    placed.iter().find_map(|PlacedTree { tree, colliders, .. }| {
+        let geoms = tree.links.iter().flat_map(|link| &link.geoms).zip(colliders);
+        geoms
+            .into_iter()
+            .find(|(geom, _)| geom.name.as_deref() == Some(name))
+            .and_then(|(_, collider)| *collider)
+    })
 }
 
 /// Body that an `<exclude>` names.

@@ -8,7 +8,7 @@ mod solid;
 use rapier3d::math::Pose;
 
 use equality::joint_link;
-pub(crate) use equality::{PlacedTree, add_equalities, keep_apart};
+pub(crate) use equality::{PlacedTree, add_equalities, keep_apart, pair_up};
 pub(crate) use machinery::{Machinery, START, begin};
 pub(crate) use solid::Solid;
 

@@ -67,9 +67,9 @@ impl BodyTree {
 
 /// The link that a body of the file became part of.
 #[derive(Clone, Copy)]
-struct Place {
-    tree: usize,
-    link: usize,
+pub(super) struct Place {
+    pub tree: usize,
+    pub link: usize,
     link_from_body: DPose3,
 }
 
@@ -106,6 +106,7 @@ impl Document {
             link.name = link.bodies[0].name.clone();
         }
         self.set_total_mass(&mut trees);
+        self.set_spring_dampers(&mut trees, &places);
         self.check_masses(&trees, &places)?;
         Ok(trees)
     }

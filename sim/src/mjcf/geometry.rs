@@ -59,7 +59,7 @@ pub struct Geom {
     pub friction: Friction,
     pub density_kg_m3: f32,
     pub mass_kg: Option<f32>,
-    /// True if its mask lets it touch anything.
+    /// True if its mask, or a pair, lets it touch anything.
     pub collides: bool,
     pub touches: Mask,
     pub drawn: bool,
@@ -131,7 +131,7 @@ impl Geom {
             friction: friction(geom).map_err(|what| refuse(&what))?,
             density_kg_m3: geom.density.unwrap_or(DEFAULT_DENSITY_KG_M3) as f32,
             mass_kg: geom.mass.map(|m| m as f32),
-            collides: touches.kinds != 0 || touches.touched != 0,
+            collides: touches.kinds != 0 || touches.touched != 0 || is_paired(document, geom),
             touches,
             drawn: document.looks.is_drawn(geom.group) && rgba[3] > 0.0,
             pattern,
@@ -163,6 +163,10 @@ impl Geom {
         };
         Some((body_from_shape, shape))
     }
+}
+
+fn is_paired(document: &Document, geom: &mjcf_rs::body::Geom) -> bool {
+    geom.name.as_ref().is_some_and(|name| document.pairs.iter().any(|pair| pair.has(name)))
 }
 
 /// Returns the shape of a geom; `half_length_m` is that of a shape between two ends.

@@ -307,9 +307,6 @@ impl Document {
         };
         let refuse = |what: &str| self.source.refuse_at(self.checked.bodies[body].joints[0], what);
         let name = joint.name.clone().unwrap_or_default();
-        if joint.springdamper.is_some_and(|numbers| numbers != [0.0; 2]) {
-            return Err(refuse("springdamper is not read; state stiffness and damping"));
-        }
         match joint.type_ {
             JointType::Free if entry.parent != Some(0) => {
                 Err(refuse("a free body lies in another; move it to the top level"))

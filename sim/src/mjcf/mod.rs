@@ -12,7 +12,9 @@ mod geometry;
 mod joints;
 mod key;
 mod lights;
+mod pairs;
 mod scene_bodies;
+mod spring_dampers;
 mod support;
 #[cfg(test)]
 mod tests;
@@ -30,6 +32,7 @@ pub use geometry::{Geom, Primitive};
 pub use joints::{Actuator, ActuatorKind, AxisJoint, LinkJoint};
 pub use key::Key;
 pub use lights::{FileLight, FileLights, Headlight, LightKind, MAX_LIGHTS};
+pub use pairs::GeomPair;
 pub use scene_bodies::SceneBody;
 
 use std::collections::BTreeMap;
@@ -88,6 +91,8 @@ pub struct Document {
     lights: Option<FileLights>,
     looks: Looks,
     settings: FileSettings,
+    /// Pairs of geoms that touch whatever their masks.
+    pub pairs: Vec<GeomPair>,
     /// All files that were read, each with a hash of its bytes.
     files: Vec<(PathBuf, u64)>,
     /// Fingerprint of a document that was read from a file; see [`Document::fingerprint`].
@@ -148,6 +153,7 @@ impl Document {
         let split_bodies = split(&mut model, &mut checked.bodies);
         let bodies: Vec<usize> = checked.bodies.iter().map(|one| one.body).collect();
         let lights = lights::lights(&source, &model, &bodies)?;
+        let settings = FileSettings::of(&source)?;
         let mut document = Document {
             file: file.into(),
             model,
@@ -166,7 +172,8 @@ impl Document {
             repeats: TextureRepeats::of(&source)?,
             glosses: Glosses::of(&source)?,
             looks: Looks::of(&source)?,
-            settings: FileSettings::of(&source)?,
+            pairs: GeomPair::all(&source, &settings)?,
+            settings,
             files: source.included(),
             known_fingerprint: None,
             source,

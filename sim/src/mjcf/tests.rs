@@ -243,7 +243,6 @@ fn what_is_refused_says_what_would_work() {
         let error = refusal(&inside);
         assert!(error.contains(told), "{error}");
     };
-    check(body(r#"<joint springdamper="1 1"/>"#), "state stiffness and damping");
     check(body(r#"<body name="b"><freejoint/></body>"#), "move it to the top level");
     check(body(r#"<geom size="1" condim="2"/>"#), "use 1, 3, 4 or 6");
     let coupled = r#"<equality><joint joint1="h" joint2="i"/></equality>"#;

@@ -5,8 +5,9 @@
     /tmp/peers/bin/python tests/peers/worlds/worlds.py fetch /tmp/packages
     /tmp/peers/bin/python tests/peers/worlds/worlds.py compare /tmp/packages --tsv /tmp/worlds.tsv
 
-`fetch` downloads the wheels in packages.txt without their dependencies, and unpacks their files. `compare` tries every file
-that MuJoCo reads by itself: directly and, if it is refused, after `python -m tandem.importing`. It prints the table in
+`fetch` downloads the wheels in packages.txt (or `--packages tests/peers/worlds/unseen.txt`, files that nobody had tried while
+the reader was written) without their dependencies, and unpacks their files. `compare` tries every file
+that MuJoCo reads by itself: directly and, if it is refused, after `tandem import`. It prints the table in
 docs/src/scenes.md. A file moves as in MuJoCo if no named body differs by more than NEAR_M and NEAR_DEG from MuJoCo after 1 s
 without commands. It is called chaotic if MuJoCo itself differs as much with half the time step. The build folder is
 CARGO_TARGET_DIR, if that is set.
@@ -38,11 +39,11 @@ NEAR_DEG = 20.0
 LIMIT_S = 60.0
 #: Outcomes of a file that is read: motion as in MuJoCo; other motion; other motion, but so has MuJoCo at another time step.
 READ = ("same", "other", "chaotic")
-KEPT = {".xml", ".obj", ".stl", ".msh", ".png", ".jpg", ".jpeg", ".bin", ".skn", ".mtl", ".ktx", ".dae", ".urdf"}
+KEPT = {".xml", ".obj", ".stl", ".msh", ".png", ".jpg", ".jpeg", ".bin", ".skn", ".mtl", ".ktx", ".dae", ".urdf", ".glb", ".gltf", ".ply"}
 
 
-def fetch(folder: Path) -> None:
-    for package in PACKAGES.read_text().split():
+def fetch(folder: Path, packages: Path) -> None:
+    for package in packages.read_text().split():
         download = [sys.executable, "-m", "pip", "download", "-q", "--no-deps", "--only-binary=:all:"]
         if subprocess.run([*download, "-d", str(folder / "wheels"), package], check=False).returncode:
             print(f"{package}: could not be fetched", file=sys.stderr)
@@ -191,14 +192,14 @@ def is_model(path: Path) -> bool:
     return bool(re.search(r"<mujoco\b(?!include)", head)) and "<mujocoinclude" not in head
 
 
-def compare(folder: Path, settle: str, tsv: Path, only: str, jobs: int) -> None:
+def compare(folder: Path, settle: str, tsv: Path, only: str, every: int, jobs: int) -> None:
     distinct: dict[tuple[str, str, bytes], Path] = {}
     for path in sorted((folder / "files").rglob("*.xml")):
         if only in str(path) and is_model(path):
             package = path.relative_to(folder / "files").parts[0]
             distinct.setdefault((package, path.name, path.read_bytes()), path)
     with tsv.open("w") as table, ThreadPoolExecutor(jobs) as pool:
-        trials = [pool.submit(tried, folder, settle, path) for path in distinct.values()]
+        trials = [pool.submit(tried, folder, settle, path) for path in list(distinct.values())[::every]]
         for trial in as_completed(trials):
             if row := trial.result():
                 table.write("\t".join(row).replace(str(folder), "") + "\n")
@@ -245,15 +246,17 @@ def main() -> None:
     parser.add_argument("what", choices=["fetch", "compare", "show", "work"])
     parser.add_argument("path", type=Path)
     parser.add_argument("--settle", default=str(target / "release" / "examples" / "settle"))
+    parser.add_argument("--packages", type=Path, default=PACKAGES, help="list of the packages to fetch")
     parser.add_argument("--tsv", type=Path, default=Path("worlds.tsv"))
     parser.add_argument("--only", default="", help="files with this in their path")
+    parser.add_argument("--every", type=int, default=1, help="try only every Nth file")
     parser.add_argument("--jobs", type=int, default=2)
     given = parser.parse_args()
     match given.what:
         case "fetch":
-            fetch(given.path)
+            fetch(given.path, given.packages)
         case "compare":
-            compare(given.path, given.settle, given.tsv, given.only, given.jobs)
+            compare(given.path, given.settle, given.tsv, given.only, given.every, given.jobs)
         case "show":
             show(given.path)
         case _:

@@ -1,10 +1,11 @@
 """Import of scenes, objects and robots from other programs as MJCF that Tandem reads.
 
     pip install "tandem-sim[import]"
-    python -m tandem.importing scene.xml imported
+    tandem import scene.xml imported
 
-MuJoCo's own compiler reads MJCF and URDF. The result is written as plain MJCF: bodies, joints, shapes, meshes and images, with
-a report of the parts that were left out. OBJ, STL, PLY, GLB and glTF files, read by trimesh, become one object each.
+MuJoCo's own compiler reads MJCF and URDF. SDF models, Drake's directives and meshes, read by trimesh, are written as MJCF for
+it. The result is written as plain MJCF: bodies, joints, shapes, meshes and images, with a report of the parts that were left
+out. A mesh becomes one object.
 """
 
 from __future__ import annotations

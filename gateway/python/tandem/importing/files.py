@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import struct
 import zlib
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,31 +20,32 @@ def escaped(text: str) -> str:
     return text.replace("&", "&amp;").replace("<", "&lt;").replace('"', "&quot;")
 
 
-def write_obj(
-    path: Path,
+def obj_text(
     vertices: Array,
     faces: Array,
     uv: tuple[Array, Array] | None = None,
     normals: tuple[Array, Array] | None = None,
-) -> None:
-    """Writes triangles, optionally with texture coordinates and normals.
+) -> str:
+    """Returns triangles as OBJ, optionally with texture coordinates and normals.
 
     Each of the two is a pair of values and, for each triangle, the indices of its corners' values.
     """
-    lines = [f"v {x:.8g} {y:.8g} {z:.8g}" for x, y, z in vertices]
-    lines += [f"vt {u:.6g} {v:.6g}" for u, v in uv[0]] if uv else []
-    lines += [f"vn {x:.5g} {y:.5g} {z:.5g}" for x, y, z in normals[0]] if normals else []
-    of_corners = [faces, uv[1] if uv else None, normals[1] if normals else None]
-    while of_corners[-1] is None:
-        of_corners.pop()
-    for triangle in range(len(faces)):
-        indices = [["", "", ""] if each is None else [str(corner + 1) for corner in each[triangle]] for each in of_corners]
-        lines.append("f " + " ".join("/".join(corner) for corner in zip(*indices, strict=True)))
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    lines = [f"v {x:.8g} {y:.8g} {z:.8g}" for x, y, z in vertices.tolist()]
+    lines += [f"vt {u:.6g} {v:.6g}" for u, v in uv[0].tolist()] if uv else []
+    lines += [f"vn {x:.5g} {y:.5g} {z:.5g}" for x, y, z in normals[0].tolist()] if normals else []
+    of_corners = [np.asarray(faces) + 1]
+    of_corners += [np.asarray(each[1]) + 1 for each in (uv, normals) if each]
+    between = "//" if normals and not uv else "/"
+    corner = between.join(["{}"] * len(of_corners))
+    row = f"f {corner} {corner} {corner}".format
+    # The indices of a corner are next to one another.
+    of_triangles: Any = np.stack(of_corners, axis=2)
+    lines += [row(*indices) for indices in of_triangles.reshape(len(faces), -1).tolist()]
+    return "\n".join(lines) + "\n"
 
 
-def write_png(path: Path, pixels: Array) -> None:
-    """Writes an image of shape (height, width, bytes), with 1 to 4 bytes per pixel."""
+def png_bytes(pixels: Array) -> bytes:
+    """Returns a PNG image of shape (height, width, bytes), with 1 to 4 bytes per pixel."""
     height, width, channels = pixels.shape
     kinds = {1: 0, 2: 4, 3: 2, 4: 6}
     header = struct.pack(">IIBBBBB", width, height, 8, kinds[channels], 0, 0, 0)
@@ -55,4 +55,4 @@ def write_png(path: Path, pixels: Array) -> None:
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
     data = chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows.tobytes(), 6)) + chunk(b"IEND", b"")
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + data)
+    return b"\x89PNG\r\n\x1a\n" + data

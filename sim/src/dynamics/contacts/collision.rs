@@ -5,6 +5,8 @@
 //! part of the state. Round shapes may turn by far less. Their place of contact runs ahead of a point
 //! that is carried along, and a force that acts behind that place accelerates the shape.
 
+use std::collections::BTreeMap;
+
 use pulp::{Arch, Simd, WithSimd};
 use rapier3d::math::Vector;
 use rapier3d::parry::bounding_volume::BoundingVolume;
@@ -40,6 +42,8 @@ pub struct Collision {
     pub candidates: Vec<Candidate>,
     /// Manifolds of the last step that have points, in the order of their colliders.
     pub manifolds: Vec<Manifold>,
+    /// Friction of pairs that have their own.
+    pair_friction: BTreeMap<[ColliderId; 2], Friction>,
     /// Manifolds of this step; [`Collision::commit`] makes them those of the last step.
     found: Vec<Manifold>,
     spare: Vec<ContactManifold<(), ()>>,
@@ -74,6 +78,13 @@ impl Collision {
         self.near.keep_colliders_apart(a, b);
     }
 
+    /// Lets two colliders touch whatever their masks, with this friction between them.
+    pub fn let_touch(&mut self, a: ColliderId, b: ColliderId, friction: Friction) {
+        let pair = [a.min(b), a.max(b)];
+        self.near.let_touch(pair);
+        self.pair_friction.insert(pair, friction);
+    }
+
     pub fn collider(&self, id: ColliderId) -> &Collider {
         &self.surfaces[id.index()].collider
     }
@@ -101,7 +112,8 @@ impl Collision {
             }
             let [first, second] = surfaces;
             let world_from_shapes = [first.beside(second), second.beside(first)];
-            let between = NearPair { colliders, surfaces, world_from_shapes, trees, settings };
+            let own_friction = self.pair_friction.get(&colliders);
+            let between = NearPair { colliders, surfaces, world_from_shapes, own_friction, trees, settings };
             let mut points = self.spare.pop().unwrap_or_default();
             let before = last.next_if(|manifold| manifold.colliders == colliders);
             between.find(before.map(|manifold| &manifold.points), &mut points);
@@ -158,6 +170,7 @@ struct NearPair<'a> {
     colliders: [ColliderId; 2],
     surfaces: [&'a Surface; 2],
     world_from_shapes: [DPose3; 2],
+    own_friction: Option<&'a Friction>,
     trees: &'a Trees,
     settings: &'a Settings,
 }
@@ -211,7 +224,8 @@ impl NearPair<'_> {
         let [first, second] = self.surfaces;
         let normal = (first.world_from_shape.rotation * manifold.local_n1.as_dvec3()).normalize();
         let (t1, t2) = normal.any_orthonormal_pair();
-        let friction = Friction::between(&first.collider.friction, &second.collider.friction);
+        let [a, b] = [&first.collider.friction, &second.collider.friction];
+        let friction = self.own_friction.map_or_else(|| Friction::between(a, b), |own| own.worn(a, b));
         let bodies = self.surfaces.map(|surface| surface.body);
         let mut number = 0;
         // Parry adds the nearest point to the corners of two faces in contact; it lies between them and

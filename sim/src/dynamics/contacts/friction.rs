@@ -56,7 +56,12 @@ impl Friction {
     /// priority, otherwise the larger of each. They are multiplied by the `left` of both surfaces.
     /// Source: MuJoCo, "Contact parameters" in the chapter on modelling.
     pub fn between(a: &Friction, b: &Friction) -> Friction {
-        let Friction { directions, slide, spin_m, roll_m, priority, .. } = Friction::as_made(a, b);
+        Friction::as_made(a, b).worn(a, b)
+    }
+
+    /// Multiplies friction by the `left` of both surfaces.
+    pub fn worn(&self, a: &Friction, b: &Friction) -> Friction {
+        let Friction { directions, slide, spin_m, roll_m, priority, .. } = *self;
         let left = a.left * b.left;
         Friction {
             directions,

@@ -25,13 +25,15 @@ pub struct NearPairs {
     events: Vec<BroadPhasePairEvent>,
 }
 
-/// Pairs of links and of colliders that never touch.
+/// Pairs of links and of colliders that never touch, and the exceptions.
 #[derive(Default)]
 struct Apart {
     /// Pairs of links, smaller first.
     links: BTreeSet<(LinkId, LinkId)>,
     /// Pairs of colliders, smaller first.
     colliders: BTreeSet<[ColliderId; 2]>,
+    /// Pairs of colliders, smaller first, that touch all the same.
+    together: BTreeSet<[ColliderId; 2]>,
 }
 
 impl NearPairs {
@@ -56,6 +58,10 @@ impl NearPairs {
 
     pub fn keep_colliders_apart(&mut self, a: ColliderId, b: ColliderId) {
         self.apart.colliders.insert([a.min(b), a.max(b)]);
+    }
+
+    pub fn let_touch(&mut self, pair: [ColliderId; 2]) {
+        self.apart.together.insert(pair);
     }
 
     /// Sets the bounds of a collider; [`NearPairs::update`] must follow.
@@ -94,8 +100,11 @@ fn in_order(pair: &ColliderPair) -> [ColliderId; 2] {
 }
 
 /// Returns true if two colliders may touch. As in MuJoCo, bodies of one tree that a joint connects do not
-/// collide. Neither do two that are kept apart or whose masks exclude each other.
+/// collide. Neither do two that are kept apart or whose masks exclude each other, unless they are let touch.
 fn may_touch(pair: [ColliderId; 2], surfaces: &[Surface], trees: &Trees, apart: &Apart) -> bool {
+    if apart.together.contains(&pair) {
+        return true;
+    }
     let [a, b] = pair.map(|id| &surfaces[id.index()]);
     if !a.collider.touches.meets(b.collider.touches) || apart.colliders.contains(&pair) {
         return false;

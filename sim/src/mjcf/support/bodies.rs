@@ -64,7 +64,12 @@ pub(super) const ELEMENTS: &[Element] = &[
         kind: Some("joint"),
         attributes: &[&[
             NAME,
-            only(&["align"], &["false", "auto"], "the frame of a free body is where the file has it"),
+            attribute(
+                Support::Approximated,
+                &["align"],
+                Takes::Only(&["false", "auto"]),
+                "the frame of a free body is where the file has it",
+            ),
             ignored(&["group"], "joints are not drawn"),
         ]],
         note: "of a body that stands in the worldbody",
@@ -137,7 +142,7 @@ const BODY: &[Attribute] = &[
         "it stays where it is: nothing is moved from outside",
     ),
     attribute(Support::Approximated, &["gravcomp"], Takes::Only(&["0"]), "everything has its whole weight"),
-    refused(&["sleep"], "bodies never sleep; leave it out"),
+    ignored(&["sleep"], "bodies never sleep"),
     ignored(&["simple", "fuse"], "they change how MuJoCo computes, not what"),
     USER,
 ];
@@ -156,7 +161,12 @@ const JOINT: &[Attribute] = &[
     mapped(&["stiffness", "damping", "frictionloss", "armature"], AMOUNT),
     mapped(&["springref"], NUMBER),
     attribute(Support::Mapped, &["ref"], NUMBER, "not in a robot's file"),
-    only(&["springdamper"], &["0 0"], "state stiffness and damping"),
+    attribute(
+        Support::Mapped,
+        &["springdamper"],
+        Takes::Numbers { least: 2, most: 2, sign: Sign::NotNegative },
+        "of the inertia that the joint moves at first; not in a robot's file",
+    ),
     attribute(Support::Approximated, &["margin"], Takes::Only(&["0"]), "a limit acts at the limit"),
     approximated(
         &["solreflimit", "solimplimit", "solreffriction", "solimpfriction"],
@@ -169,7 +179,12 @@ const JOINT: &[Attribute] = &[
         "of the form `-x x`; others are refused",
     ),
     mapped(&["actuatorfrclimited"], MAYBE),
-    only(&["actuatorgravcomp"], &["false"], "everything has its whole weight"),
+    attribute(
+        Support::Approximated,
+        &["actuatorgravcomp"],
+        Takes::Only(&["false"]),
+        "everything has its whole weight",
+    ),
     ignored(&["group"], "joints are not drawn"),
     USER,
 ];

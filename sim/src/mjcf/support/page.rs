@@ -16,7 +16,7 @@ every element and every attribute by the table below; nothing is dropped silentl
 * **ignored**: it has no effect on motion here, nor on what is drawn.
 * **refused**: a file that has it is not read. The message names file, line and the nearest element that has a name, and says
   what to write instead, for all that is refused of a file at once. Where the table gives values, those are what happens
-  anyway, and accepted. [`python -m tandem.importing`](scenes.md#files-that-are-refused) writes such files in what is read.
+  anyway, and accepted. [`tandem import`](scenes.md#files-of-other-programs) writes such files in what is read.
 
 Whatever is not in the table is refused too: a misspelt attribute, or one that a newer MuJoCo has. So are
 

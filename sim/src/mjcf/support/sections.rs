@@ -109,7 +109,14 @@ pub(super) const ELEMENTS: &[Element] = &[
         &[&[NAME, mapped(&["body1", "body2"], Takes::Text)]],
         "",
     ),
-    element(Support::Refused, "pair", &["contact", "default"], &[], "state friction on the geoms"),
+    named(
+        Support::Mapped,
+        "pair",
+        &["contact", "default"],
+        "pair",
+        &[&[NAME, CLASS], PAIR],
+        "the two geoms touch whatever their masks, joints and excludes; in a robot's file it does nothing",
+    ),
     element(Support::Refused, "deformable", &["mujoco"], &[], "nothing bends or stretches here"),
     element(Support::Refused, "tendon", &["mujoco"], &[], "couple joints with an equality"),
     element(Support::Ignored, "tendon", &["default"], &[], "there are no tendons"),
@@ -414,6 +421,18 @@ const MATERIAL: &[Attribute] = &[
 const ROLES: &[&str] =
     &["rgb", "rgba", "opacity", "normal", "roughness", "metallic", "orm", "occlusion", "emissive"];
 
+const PAIR: &[Attribute] = &[
+    mapped(&["geom1", "geom2"], Takes::NameOf("geom")),
+    mapped(&["condim"], Takes::Word(&["1", "3", "4", "6"])),
+    attribute(
+        Support::Mapped,
+        &["friction"],
+        Takes::Numbers { least: 1, most: 5, sign: Sign::NotNegative },
+        "the same along both tangents: the larger of its first and of its last two numbers",
+    ),
+    approximated(&["solref", "solreffriction", "solimp"], "contacts are as soft as those of the geoms"),
+    approximated(&["margin", "gap"], "contacts begin where surfaces meet"),
+];
 const EQUALITY: &[Attribute] = &[NAME, CLASS, mapped(&["active"], BOOLEAN), SOFTNESS];
 const CONNECT: &[Attribute] = &[
     mapped(&["body1", "body2"], Takes::Text),

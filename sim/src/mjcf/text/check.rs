@@ -35,7 +35,9 @@ pub(in crate::mjcf) fn check(source: &MjcfText) -> Result<Checked, SimError> {
     check_depth(source, &xml)?;
     let root = xml.root_element();
     if !root.has_tag_name("mujoco") {
-        let what = format!("an MJCF file is a <mujoco>, not a <{}>", root.tag_name().name());
+        let name = root.tag_name().name();
+        let what =
+            format!("an MJCF file is a <mujoco>, not a <{name}>; `tandem import` converts SDF and URDF");
         return Err(source.refuse(&root, what));
     }
     let mut check = Check {

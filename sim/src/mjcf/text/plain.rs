@@ -32,6 +32,8 @@ pub(in crate::mjcf) fn plain(text: &str, xml: &Document) -> String {
                 add_pose(&levels, &mut edits);
                 LISTS.iter().for_each(|list| add_list(&levels, list, &mut edits));
             }
+            // `mjcf-rs` takes only true and false.
+            "body" => edits.extend(node.attribute_node("sleep").map(|sleep| (sleep.range(), String::new()))),
             "general" | "motor" | "position" if within("actuator") => add_shared(&node, &classes, &mut edits),
             _ => {}
         }

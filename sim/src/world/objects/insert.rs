@@ -7,9 +7,10 @@ use rapier3d::math::Pose;
 use super::model::part_name;
 use super::{Object, ObjectFile, ObjectModel, ObjectPlacement};
 use crate::SimError;
-use crate::dynamics::{DVec3, Dynamics, Link, Tree, TreeId};
+use crate::dynamics::{ColliderId, DVec3, Dynamics, Link, Tree, TreeId};
 use crate::mechanism::{
-    Machinery, PlacedTree, START, add_collider, add_equalities, begin, keep_apart, links, precise, rounded,
+    Machinery, PlacedTree, START, add_collider, add_equalities, begin, keep_apart, links, pair_up, precise,
+    rounded,
 };
 use crate::mjcf::{BodyLink, BodyTree, Document, Geom, LinkJoint};
 use crate::owner::Owner;
@@ -47,7 +48,9 @@ pub(in crate::world) fn insert_scene(
         } else {
             let name = |link: &BodyLink| link.name.clone();
             let tree_links = links(tree, &world_from_file, &actuators);
-            Some(insert_moving(dynamics, tree, tree_links, name, &mut objects)?)
+            let (id, of_links) = insert_moving(dynamics, tree, tree_links, name, &mut objects)?;
+            colliders = of_links;
+            Some(id)
         };
         placed.push(PlacedTree { tree, id, colliders });
     }
@@ -58,6 +61,7 @@ pub(in crate::world) fn insert_scene(
         begin(dynamics, &placed, start, &world_from_file);
     }
     keep_apart(dynamics, scene, &placed)?;
+    pair_up(dynamics, scene, &placed)?;
     Ok(Furniture { fixed, objects, machinery })
 }
 
@@ -91,10 +95,11 @@ pub(in crate::world) fn insert_object(
     }
     let name = |link: &BodyLink| part_name(&placement.name, link);
     let tree_links = links(&tree, &world_from_file, &[]);
-    let id = insert_moving(dynamics, &tree, tree_links, name, objects)?;
-    let placed = [PlacedTree { tree: &tree, id: Some(id), colliders: Vec::new() }];
+    let (id, colliders) = insert_moving(dynamics, &tree, tree_links, name, objects)?;
+    let placed = [PlacedTree { tree: &tree, id: Some(id), colliders }];
     add_equalities(dynamics, &document, &placed, &world_from_file)?;
-    keep_apart(dynamics, &document, &placed)
+    keep_apart(dynamics, &document, &placed)?;
+    pair_up(dynamics, &document, &placed)
 }
 
 /// Moves a free body of the scene to its placement, at rest.
@@ -105,18 +110,20 @@ fn move_object(dynamics: &mut Dynamics, placement: &ObjectPlacement, objects: &[
     }
 }
 
+/// Inserts a tree as objects. Returns it with the colliders of its geoms.
 fn insert_moving(
     dynamics: &mut Dynamics,
     tree: &BodyTree,
     links: Vec<Link>,
     name: impl Fn(&BodyLink) -> String,
     objects: &mut Vec<Object>,
-) -> Result<TreeId, SimError> {
+) -> Result<(TreeId, Vec<Option<ColliderId>>), SimError> {
+    let mut colliders = Vec::new();
     let id = dynamics.add_tree(Tree::new(&name(&tree.links[0]), links)?);
     for (index, link) in tree.links.iter().enumerate() {
         let owner = Owner::Object(objects.len());
         for geom in &link.geoms {
-            add_collider(dynamics, geom, Some(id.link(index)), Some(owner));
+            colliders.push(add_collider(dynamics, geom, Some(id.link(index)), Some(owner)));
         }
         objects.push(Object {
             name: name(link),
@@ -129,7 +136,7 @@ fn insert_moving(
             dynamics.keep_apart(id.link(index), id.link(carrier));
         }
     }
-    Ok(id)
+    Ok((id, colliders))
 }
 
 /// Returns the link that carries another by several joints, if it can move. The two do not touch, as with a

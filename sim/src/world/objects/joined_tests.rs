@@ -87,3 +87,23 @@ fn a_body_with_two_joints_does_not_touch_what_carries_it() {
     ));
     assert!(one_m < 0.01 && two_m < 0.01, "{one_m} m and {two_m} m");
 }
+
+/// A box whose mask is not the floor's, in gravity that pulls it aside, too.
+#[test]
+fn pairs_touch_whatever_their_masks_and_slide_by_their_own_friction() {
+    let scene = r#"<option gravity="3 0 -9.81"/><worldbody><geom name="floor" type="plane" size="5 5 .1"/>
+        <body pos="0 0 0.1"><freejoint/>
+          <geom name="box" type="box" size=".1 .1 .1" contype="2" conaffinity="2" friction="1"/></body></worldbody>"#;
+    let pair = |rest: &str| format!(r#"{scene}<contact><pair geom1="box" geom2="floor"{rest}/></contact>"#);
+    for (scene, least_m, most_m) in [
+        (scene.into(), 4.5, 6.0),
+        (pair(""), 0.0, 0.001),
+        // s = (3 - 0.1 * 9.81) / 2
+        (pair(r#" friction="0.1 0.1""#), 0.98, 1.04),
+        (pair(r#" condim="1""#), 1.47, 1.53),
+        (pair("").replace("<option", r#"<option><flag contact="disable"/></option><option"#), 4.5, 6.0),
+    ] {
+        let moved_m = farthest_m(&scene);
+        assert!((least_m..=most_m).contains(&moved_m), "{moved_m} m in {scene}");
+    }
+}

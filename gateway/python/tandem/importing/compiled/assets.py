@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from .engine import mujoco
-from .files import Array, escaped, numbers, write_obj, write_png
+from ..engine import mujoco
+from ..files import Array, escaped, numbers, obj_text, png_bytes
+from ..report import Report
+from .collisions import MESH, UNSEEN, Collision, is_replaced, triangles
 from .names import Names
-from .report import Report
 
-MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 #: Names of the roles of a material's textures.
 ROLES = {
     int(role): role.name[len("mjTEXROLE_") :].lower()
@@ -26,9 +26,12 @@ FACES = "RLUDFB"
 SRGB = 2
 
 
-def write_assets(model: Any, names: Names, out: Path, report: Report) -> list[str]:
-    used = sorted({int(mesh) for mesh, kind in zip(model.geom_dataid, model.geom_type, strict=True) if kind == MESH})
-    rows = [*meshes(model, used, out, report), *textures(model, out, report), *materials(model, names)]
+def write_assets(model: Any, names: Names, out: Path, collisions: dict[int, Collision], report: Report) -> list[str]:
+    written = [geom for geom in range(model.ngeom) if model.geom_type[geom] == MESH]
+    written = [geom for geom in written if not is_replaced(model, collisions, geom) or model.geom_group[geom] < UNSEEN]
+    used = sorted({int(model.geom_dataid[geom]) for geom in written})
+    rows = [*meshes(model, used, out, report), *convex_pieces(collisions, out)]
+    rows += [*textures(model, out, report), *materials(model, names)]
     if model.nhfield:
         report.drop("<hfield>", int(model.nhfield))
     return ["<asset>", *rows, "</asset>"] if rows else []
@@ -44,8 +47,8 @@ def meshes(model: Any, used: list[int], out: Path, report: Report) -> list[str]:
     if used:
         (out / "meshes").mkdir(exist_ok=True)
     for mesh in used:
-        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-        face, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+        vertices, corners = triangles(model, mesh)
+        face, faces = model.mesh_faceadr[mesh], len(corners)
         uv: tuple[Array, Array] | None = None
         if model.mesh_texcoordadr[mesh] >= 0:
             begin = model.mesh_texcoordadr[mesh]
@@ -55,16 +58,27 @@ def meshes(model: Any, used: list[int], out: Path, report: Report) -> list[str]:
         begin = model.mesh_normaladr[mesh]
         normals = (model.mesh_normal[begin : begin + model.mesh_normalnum[mesh]], model.mesh_facenormal[face : face + faces])
         file = f"{mesh_name(mesh)}.obj"
-        write_obj(
-            out / "meshes" / file,
-            model.mesh_vert[first : first + count],
-            model.mesh_face[face : face + faces],
-            uv,
-            normals,
-        )
+        text = obj_text(vertices, corners, uv, normals)
+        (out / "meshes" / file).write_text(text, encoding="utf-8")
         rows.append(f'<mesh name="{mesh_name(mesh)}" file="{file}"/>')
         report.meshes += 1
-        report.triangles += int(faces)
+        report.triangles += faces
+    return rows
+
+
+def piece_name(mesh: int, piece: int) -> str:
+    return f"{mesh_name(mesh)}_{piece}"
+
+
+def convex_pieces(collisions: dict[int, Collision], out: Path) -> list[str]:
+    rows: list[str] = []
+    if any(collision.pieces for collision in collisions.values()):
+        (out / "meshes").mkdir(exist_ok=True)
+    for mesh, collision in collisions.items():
+        for number, (vertices, faces) in enumerate(collision.pieces):
+            name = piece_name(mesh, number)
+            (out / "meshes" / f"{name}.obj").write_text(obj_text(vertices, faces), encoding="utf-8")
+            rows.append(f'<mesh name="{name}" file="{name}.obj"/>')
     return rows
 
 
@@ -115,7 +129,7 @@ def write_texture(model: Any, texture: int, out: Path) -> str:
             grid = f' gridsize="6 1" gridlayout="{FACES}"'
         else:
             pixels = sides[0]
-    write_png(out / "textures" / f"texture_{texture}.png", pixels)
+    (out / "textures" / f"texture_{texture}.png").write_bytes(png_bytes(pixels))
     alpha = f' nchannel="{channels}"' if channels != 3 else ""
     # The first versions of MuJoCo 3.3 know no sRGB.
     space = ' colorspace="sRGB"' if hasattr(model, "tex_colorspace") and model.tex_colorspace[texture] == SRGB else ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .engine import mujoco
+from ..engine import mujoco
 
 OBJECTS = {
     "body": mujoco.mjtObj.mjOBJ_BODY,

@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from .assets import mesh_name
-from .engine import mujoco
-from .files import escaped, numbers
+from ..engine import mujoco
+from ..files import escaped, numbers
+from ..report import Report
+from .assets import mesh_name, piece_name
+from .collisions import UNSEEN, Collision, is_replaced
 from .names import Names
-from .report import Report
 
+Collisions = dict[int, Collision]
 #: Types of geoms, each with the number of values in its size.
 SHAPES = {
     int(mujoco.mjtGeom.mjGEOM_PLANE): ("plane", 3),
@@ -32,17 +34,19 @@ JOINTS = {
 NO_COLOUR = np.array([0.5, 0.5, 0.5, 1.0])
 
 
-def write_bodies(model: Any, names: Names, report: Report) -> list[str]:
+def write_bodies(model: Any, names: Names, collisions: Collisions, report: Report) -> list[str]:
     children: dict[int, list[int]] = {}
     for body in range(1, model.nbody):
         children.setdefault(int(model.body_parentid[body]), []).append(body)
-    rows = ["<worldbody>", *content(model, names, report, 0)]
+    rows = ["<worldbody>", *content(model, names, collisions, report, 0)]
     for body in children.get(0, []):
-        rows += write_body(model, names, report, children, body)
+        rows += write_body(model, names, collisions, report, children, body)
     return [*rows, "</worldbody>"]
 
 
-def write_body(model: Any, names: Names, report: Report, children: dict[int, list[int]], body: int) -> list[str]:
+def write_body(
+    model: Any, names: Names, collisions: Collisions, report: Report, children: dict[int, list[int]], body: int
+) -> list[str]:
     name, pos, quat = escaped(names.of("body", body)), numbers(model.body_pos[body]), numbers(model.body_quat[body])
     rows = [f'<body name="{name}" pos="{pos}" quat="{quat}">']
     if model.body_mocapid[body] >= 0:
@@ -57,9 +61,9 @@ def write_body(model: Any, names: Names, report: Report, children: dict[int, lis
     if joints:
         kinds = [JOINTS[int(model.jnt_type[joint])] for joint in on_body(model, "jnt", body)]
         report.bodies.append({"name": names.of("body", body), "mass_kg": mass, "joints": kinds})
-    rows += content(model, names, report, body)
+    rows += content(model, names, collisions, report, body)
     for child in children.get(body, []):
-        rows += write_body(model, names, report, children, child)
+        rows += write_body(model, names, collisions, report, children, child)
     return [*rows, "</body>"]
 
 
@@ -68,8 +72,8 @@ def on_body(model: Any, what: str, body: int) -> range:
     return range(first, first + count) if count else range(0)
 
 
-def content(model: Any, names: Names, report: Report, body: int) -> list[str]:
-    rows = [row for geom in on_body(model, "geom", body) if (row := write_geom(model, names, report, geom))]
+def content(model: Any, names: Names, collisions: Collisions, report: Report, body: int) -> list[str]:
+    rows = [row for geom in on_body(model, "geom", body) for row in write_geom(model, names, collisions, report, geom)]
     rows += [write_site(model, names, site) for site in range(model.nsite) if model.site_bodyid[site] == body]
     rows += [write_camera(model, names, camera) for camera in range(model.ncam) if model.cam_bodyid[camera] == body]
     rows += [write_light(model, light) for light in range(model.nlight) if model.light_bodyid[light] == body]
@@ -109,20 +113,38 @@ def first(value: Any) -> float:
     return float(np.ravel(value)[0])
 
 
-def write_geom(model: Any, names: Names, report: Report, geom: int) -> str:
+def write_geom(model: Any, names: Names, collisions: Collisions, report: Report, geom: int) -> list[str]:
+    """Returns the geom, and the convex pieces that collide in place of a concave mesh."""
     shape = SHAPES.get(int(model.geom_type[geom]))
     if shape is None:
         report.drop(f"geom of type {mujoco.mjtGeom(int(model.geom_type[geom])).name[7:].lower()}")
-        return ""
+        return []
     kind, sizes = shape
     size = np.abs(model.geom_size[geom][:sizes])
     if kind != "plane" and sizes and not np.all(size > 0):
         report.drop("geom with an extent of 0")
-        return ""
-    row = f'<geom type="{kind}" pos="{numbers(model.geom_pos[geom])}" quat="{numbers(model.geom_quat[geom])}"'
-    row += f' contype="{model.geom_contype[geom]}" conaffinity="{model.geom_conaffinity[geom]}"'
-    row += f' condim="{model.geom_condim[geom]}" priority="{model.geom_priority[geom]}"'
-    row += f' friction="{numbers(model.geom_friction[geom])}" group="{model.geom_group[geom]}"'
+        return []
+    if model.geom_margin[geom] or model.geom_gap[geom]:
+        report.drop("margin or gap of a geom")
+    place = f'<geom type="{kind}" pos="{numbers(model.geom_pos[geom])}" quat="{numbers(model.geom_quat[geom])}"'
+    # The body's inertial includes its mass.
+    place += ' mass="0"' if model.geom_bodyid[geom] and kind != "plane" else ""
+    touches = f' contype="{model.geom_contype[geom]}" conaffinity="{model.geom_conaffinity[geom]}"'
+    touches += f' condim="{model.geom_condim[geom]}" priority="{model.geom_priority[geom]}"'
+    touches += f' friction="{numbers(model.geom_friction[geom])}"'
+    mesh = int(model.geom_dataid[geom])
+    pieces = len(collisions[mesh].pieces) if is_replaced(model, collisions, geom) else 0
+    row = place + (' contype="0" conaffinity="0"' if pieces else touches) + looks(model, names, geom)
+    if kind == "mesh":
+        row += f' mesh="{mesh_name(mesh)}"'
+    elif sizes:
+        row += f' size="{numbers(size)}"'
+    unseen = [f'{place}{touches} group="{UNSEEN}" mesh="{piece_name(mesh, piece)}"/>' for piece in range(pieces)]
+    return [*([] if pieces and model.geom_group[geom] >= UNSEEN else [row + "/>"]), *unseen]
+
+
+def looks(model: Any, names: Names, geom: int) -> str:
+    row = f' group="{model.geom_group[geom]}"'
     if name := names.stated("geom", geom):
         row += f' name="{escaped(name)}"'
     material = int(model.geom_matid[geom])
@@ -130,15 +152,7 @@ def write_geom(model: Any, names: Names, report: Report, geom: int) -> str:
         row += f' material="{escaped(names.of("material", material))}"'
     if material < 0 or not np.allclose(model.geom_rgba[geom], NO_COLOUR):
         row += f' rgba="{numbers(model.geom_rgba[geom])}"'
-    if kind == "mesh":
-        row += f' mesh="{mesh_name(int(model.geom_dataid[geom]))}"'
-    elif sizes:
-        row += f' size="{numbers(size)}"'
-    if model.geom_margin[geom] or model.geom_gap[geom]:
-        report.drop("margin or gap of a geom")
-    # The body's inertial includes its mass.
-    weighs = ' mass="0"' if model.geom_bodyid[geom] and kind != "plane" else ""
-    return row + weighs + "/>"
+    return row
 
 
 def write_site(model: Any, names: Names, site: int) -> str:

@@ -6,23 +6,30 @@ from typing import Any
 
 import numpy as np
 
-from .engine import mujoco
-from .files import escaped, numbers
+from ..engine import mujoco
+from ..files import escaped, numbers
+from ..report import Report
+from .collisions import Collision, is_replaced
 from .names import Names
-from .report import Report
 
 BODY = int(mujoco.mjtObj.mjOBJ_BODY)
 BITS = 16
 
 
-def write_contacts(model: Any, names: Names, report: Report) -> list[str]:
+def write_contacts(model: Any, names: Names, collisions: dict[int, Collision], report: Report) -> list[str]:
     rows: list[str] = []
     for signature in model.exclude_signature:
         a, b = int(signature) >> BITS, int(signature) & (1 << BITS) - 1
         one, other = (escaped(names.of("body", body)) for body in (a, b))
         rows.append(f'<exclude body1="{one}" body2="{other}"/>')
-    if model.npair:
-        report.drop("<pair>", int(model.npair))
+    for pair in range(model.npair):
+        one, other = (int(geom[pair]) for geom in (model.pair_geom1, model.pair_geom2))
+        if any(is_replaced(model, collisions, geom) for geom in (one, other)):
+            report.drop("<pair> of a mesh that collides as convex pieces")
+            continue
+        geoms = f'geom1="{escaped(names.of("geom", one))}" geom2="{escaped(names.of("geom", other))}"'
+        friction = numbers(model.pair_friction[pair])
+        rows.append(f'<pair {geoms} condim="{model.pair_dim[pair]}" friction="{friction}"/>')
     return ["<contact>", *rows, "</contact>"] if rows else []
 
 

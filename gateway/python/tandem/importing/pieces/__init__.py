@@ -1,0 +1,3 @@
+"""Triangle meshes: reading of files with their materials, and convex decomposition."""
+
+from __future__ import annotations
