@@ -73,7 +73,7 @@ pub mod world;
 
 pub use body::{
     ARM_COLUMNS, ARM_JOINTS, BodyEstimate, HAND_COLUMNS, HAND_JOINTS, JOINTS, MotorSetpoints, RobotModel,
-    RobotSource, UPPER, UPPER_JOINTS, WAIST_COLUMN, joint_names,
+    RobotDraft, RobotSource, UPPER, UPPER_JOINTS, WAIST_COLUMN, joint_names,
 };
 pub use error::SimError;
 pub use estimate::{JointReadings, SensorReadings};

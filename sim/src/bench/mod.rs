@@ -7,6 +7,7 @@ mod measure;
 mod motion;
 mod physics;
 mod pictures;
+mod stand;
 mod tour;
 mod trial;
 
@@ -22,6 +23,7 @@ use serde::Serialize;
 pub use cases::{CASES, Case};
 pub use falls::{Broken, FALL_CASES, FallCase, FallPlace, FallTrial, FallsCase, FallsReport, FloorEpisode};
 pub use physics::{PhysicsCase, PhysicsReport, physics};
+pub use stand::{StandTrial, stand};
 pub use pictures::{PicturesCase, PicturesReport, pictures};
 
 use crate::SimError;

@@ -1,6 +1,7 @@
 //! Worlds from outside: physics, walking and images.
 
 mod allocation;
+mod described;
 mod falls;
 mod hand_forces;
 mod images;
