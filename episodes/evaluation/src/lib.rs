@@ -7,8 +7,8 @@ pub mod evaluation;
 pub mod policies;
 pub mod reports;
 pub mod results;
-pub mod statistics;
 mod robot_check;
+pub mod statistics;
 mod task_check;
 mod task_draft;
 

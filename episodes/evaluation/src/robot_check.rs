@@ -29,9 +29,12 @@ pub fn check_robot(robot: &RobotFile) -> Result<RobotCheck, RobotError> {
     let limits: Vec<String> =
         trial.at_limit.iter().map(|(joint, effort_n_m)| format!("{joint} ({effort_n_m} N m)")).collect();
     let falls = (trial.fallen || moved).then(|| {
-        let how = if trial.fallen { "it falls".into() } else { format!("it moves by {:.2} m", trial.moved_m) };
+        let how =
+            if trial.fallen { "it falls".into() } else { format!("it moves by {:.2} m", trial.moved_m) };
         let why = match limits.is_empty() {
-            true => "its joints are not at their limits of effort; look at soles, rest angles and masses".into(),
+            true => {
+                "its joints are not at their limits of effort; look at soles, rest angles and masses".into()
+            }
             false => format!("at their limits of effort are {}", limits.join(", ")),
         };
         format!("it cannot stand: {how} within a second without commands; {why}")
@@ -43,7 +46,11 @@ pub fn check_robot(robot: &RobotFile) -> Result<RobotCheck, RobotError> {
 fn lacks(model: &RobotModel) -> Vec<String> {
     let count = |parts: &[&str], side: Side| {
         let joints = model.joints.iter().filter(|joint| joint.exists());
-        joints.filter(|joint| parts.iter().any(|part| joint.name.starts_with(&format!("{}_{part}", side.name())))).count()
+        joints
+            .filter(|joint| {
+                parts.iter().any(|part| joint.name.starts_with(&format!("{}_{part}", side.name())))
+            })
+            .count()
     };
     let arms = Side::BOTH.map(|side| count(&["shoulder", "elbow", "wrist"], side));
     let mut lacks = Vec::new();

@@ -23,8 +23,8 @@ use serde::Serialize;
 pub use cases::{CASES, Case};
 pub use falls::{Broken, FALL_CASES, FallCase, FallPlace, FallTrial, FallsCase, FallsReport, FloorEpisode};
 pub use physics::{PhysicsCase, PhysicsReport, physics};
-pub use stand::{StandTrial, stand};
 pub use pictures::{PicturesCase, PicturesReport, pictures};
+pub use stand::{StandTrial, stand};
 
 use crate::SimError;
 use crate::body::RobotModel;

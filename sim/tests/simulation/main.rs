@@ -1,7 +1,6 @@
 //! Worlds from outside: physics, walking and images.
 
 mod allocation;
-mod described;
 mod falls;
 mod hand_forces;
 mod images;

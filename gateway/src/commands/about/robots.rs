@@ -17,13 +17,13 @@ pub struct RobotsArgs {
 
 #[derive(Debug, clap::Subcommand)]
 enum RobotsAction {
-    New(NewArgs),
+    New(NewRobotArgs),
 }
 
 /// Draft the description of a robot's MJCF file: which joint is which, guessed from the tree, the axes of its
 /// joints and their names.
 #[derive(Debug, clap::Args)]
-struct NewArgs {
+struct NewRobotArgs {
     /// MJCF file with the robot.
     #[arg(long, value_name = "FILE")]
     from_model: PathBuf,
@@ -34,7 +34,7 @@ struct NewArgs {
 
 /// Writes a draft of a description.
 pub fn run(args: &RobotsArgs) -> CommandResult {
-    let RobotsAction::New(NewArgs { from_model, out }) = &args.action;
+    let RobotsAction::New(NewRobotArgs { from_model, out }) = &args.action;
     if out.exists() {
         return Err(format!("{} exists already; give another name", out.display()).into());
     }

@@ -68,7 +68,9 @@ fn robot(layer: &Layer, path: &Path) -> Vec<Finding> {
             if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("xml")) {
                 let (file, out) = (path.display(), path.with_extension("toml"));
                 let draft = format!("tandem robots new --from-model {file} {}", out.display());
-                findings.push(Finding::Note(format!("a description says which joint is which; draft one by `{draft}`")));
+                findings.push(Finding::Note(format!(
+                    "a description says which joint is which; draft one by `{draft}`"
+                )));
             }
             return findings;
         }
@@ -80,10 +82,9 @@ fn robot(layer: &Layer, path: &Path) -> Vec<Finding> {
     match check_robot(&robot) {
         Ok(check) => {
             findings.extend(check.lacks.into_iter().map(Finding::Note));
-            findings.push(check.falls.map_or_else(
-                || Finding::Works("it stands for a second".into()),
-                Finding::Wrong,
-            ));
+            findings.push(
+                check.falls.map_or_else(|| Finding::Works("it stands for a second".into()), Finding::Wrong),
+            );
         }
         Err(error) => findings.push(Finding::Wrong(error.to_string())),
     }

@@ -88,7 +88,9 @@ fn sole_tilt(root_from_link: Rotation, geoms: &[Geom]) -> Rotation {
         along.map(|(_, area_m2)| area_m2).sum::<f32>()
     };
     let planes = faces.iter().map(|(normal, _)| (*normal, plane(*normal)));
-    let Some((normal, area_m2)) = planes.max_by(|a, b| a.1.total_cmp(&b.1)) else { return Rotation::IDENTITY };
+    let Some((normal, area_m2)) = planes.max_by(|a, b| a.1.total_cmp(&b.1)) else {
+        return Rotation::IDENTITY;
+    };
     let low_m = corners_m.iter().copied().fold(Vector::INFINITY, Vector::min);
     let high_m = corners_m.iter().copied().fold(Vector::NEG_INFINITY, Vector::max);
     let outline_m2 = (high_m.x - low_m.x) * (high_m.y - low_m.y);

@@ -14,7 +14,7 @@ use xxhash_rust::xxh3::xxh3_64;
 use super::description::{BodyFrame, HeadCamera, RobotDescription};
 use super::feet::{find_soles, level_frames};
 use super::joints::in_published_order;
-use super::limits::{FileLimits, limits_of_file};
+use super::limits::{FileLimits, JointSources, limits_of_file};
 use super::read::{PALM_IN_WRIST_M, assemble, camera, sites};
 use super::{BodyScale, JointModel, RobotModel};
 use crate::body::layout::{ARM_JOINTS, ARMS, LEG_JOINTS, LEGS, joint_names};
@@ -47,18 +47,18 @@ fn embedded(name: &str) -> Result<RobotModel, SimError> {
     RobotModel::parse(name, assets::robot(name)?)
 }
 
-pub(super) struct Fitting {
+struct Fitting {
     /// Name of the description in messages.
-    pub file: String,
-    pub description: RobotDescription,
-    pub like: Option<RobotModel>,
-    pub g1: RobotModel,
+    file: String,
+    description: RobotDescription,
+    like: Option<RobotModel>,
+    g1: RobotModel,
     /// All reasons to refuse the robot.
     refused: Vec<SimError>,
 }
 
 impl Fitting {
-    pub(super) fn wrong(&self, what: impl Into<String>) -> SimError {
+    fn wrong(&self, what: impl Into<String>) -> SimError {
         SimError::Unsupported { file: self.file.clone(), what: what.into() }
     }
 
@@ -117,9 +117,7 @@ impl Fitting {
         let tree = level_frames(document).map_err(|error| self.all_with(error))?;
         let joints = self.joints(document, &tree, &limits);
         let legs = joints.as_ref().is_some_and(|joints| self.check_legs(document, &tree, joints));
-        let soles = joints.as_ref().and_then(|joints| {
-            self.keep(find_soles(document, &tree, joints))
-        });
+        let soles = joints.as_ref().and_then(|joints| self.keep(find_soles(document, &tree, joints)));
         self.keep(camera(document, &tree));
         self.keep(sites(document, &tree, "wrist", "or an entry [left_wrist] or [right_wrist] here"));
         let (Some(joints), Some(soles), true, true) = (joints, soles, legs, self.refused.is_empty()) else {
@@ -141,8 +139,14 @@ impl Fitting {
         let notes = [
             (trees.len() > 2, "bodies beside the robot's are left out"),
             (trees[0].links.iter().any(|link| !link.geoms.is_empty()), "geoms in the worldbody are left out"),
-            (!document.model.equality.is_empty(), "equalities are left out: every joint of a robot has its motor"),
-            (!document.model.actuators.is_empty(), "gains of actuators are not used: they are a G1's at this robot's scale"),
+            (
+                !document.model.equality.is_empty(),
+                "equalities are left out: every joint of a robot has its motor",
+            ),
+            (
+                !document.model.actuators.is_empty(),
+                "gains of actuators are not used: they are a G1's at this robot's scale",
+            ),
             (is_fixed, "its root is free to move, as if it had a <freejoint>"),
         ];
         notes.iter().filter(|(holds, _)| *holds).for_each(|(_, what)| document.note(what));
@@ -184,7 +188,7 @@ impl Fitting {
             let file = &self.file;
             wrong.push(document.refuse_joint(
                 *body,
-                &format!("nothing in {file} says which joint `{name}` of {model} is: name it in [joints], or give it an angle in [held_rad]; a robot's joints are called: {have}"),
+                &format!("nothing says which joint `{name}` of {model} is: name it in [joints], or give it an angle in [held_rad] of {file}; a robot's joints are called: {have}"),
             ));
         }
         self.refused.extend(wrong);
@@ -287,18 +291,26 @@ impl Fitting {
         tree: &BodyTree,
         limits: &BTreeMap<String, FileLimits>,
     ) -> Option<Vec<JointModel>> {
-        let mut found = Vec::new();
+        let (mut found, mut refused) = (Vec::new(), Vec::new());
+        let sources = JointSources {
+            file: &self.file,
+            description: &self.description,
+            like: self.like.as_ref(),
+            g1: &self.g1,
+        };
         for (link, of) in tree.links.iter().enumerate().skip(1) {
             let body = of.bodies[0].index;
             let LinkJoint::Hinge(joint) = &of.joint else {
-                self.refused.push(document.refuse_joint(body, "is no hinge; use hinges, or hold it in [held_rad]"));
+                let what = "is no hinge; use hinges, or hold it in [held_rad]";
+                refused.push(document.refuse_joint(body, what));
                 continue;
             };
             let usual = FileLimits::default();
-            let (model, wrong) = self.joint(joint, link, of, limits.get(&joint.name).unwrap_or(&usual));
-            self.refused.extend(wrong.iter().map(|what| document.refuse_joint(body, what)));
+            let (model, wrong) = sources.joint(joint, link, of, limits.get(&joint.name).unwrap_or(&usual));
+            refused.extend(wrong.iter().map(|what| document.refuse_joint(body, what)));
             found.push(model);
         }
+        self.refused.extend(refused);
         let published = joint_names();
         found.retain(|joint| published.contains(&joint.name));
         self.check_efforts(&found);

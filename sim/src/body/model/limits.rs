@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use mjcf_rs::body::JointType;
 
-use super::fitted::Fitting;
+use super::description::RobotDescription;
 use super::{JointModel, RobotModel};
 use crate::SimError;
 use crate::mjcf::{Actuator, ActuatorKind, AxisJoint, BodyLink, Document};
@@ -66,7 +66,17 @@ fn rest_rad(document: &Document) -> Result<BTreeMap<String, f64>, SimError> {
     Ok(angles_rad)
 }
 
-impl Fitting {
+/// Sources of a joint's data beside its file.
+pub(super) struct JointSources<'a> {
+    /// Name of the description in messages.
+    pub file: &'a str,
+    pub description: &'a RobotDescription,
+    /// Robot that supplies limits that nothing else gives.
+    pub like: Option<&'a RobotModel>,
+    pub g1: &'a RobotModel,
+}
+
+impl JointSources<'_> {
     /// Returns a joint with the data of the file and the description, and the reasons to refuse it; its
     /// effort is 0 if neither has a limit. The parts that depend on the robot's size follow later.
     pub(super) fn joint(
@@ -78,8 +88,8 @@ impl Fitting {
     ) -> (JointModel, Vec<String>) {
         let (name, axis) = (&joint.name, &joint.axis);
         let alike = |robot: &RobotModel| robot.joints.iter().find(|other| other.name == *name).cloned();
-        let like = self.like.as_ref().and_then(alike);
-        let described = &self.description;
+        let like = self.like.and_then(alike);
+        let described = self.description;
         let mut wrong = Vec::new();
         if axis.range.is_none() {
             wrong.push(format!("needs a range, or one for `{name}` in [range_rad] of {}", self.file));

@@ -18,9 +18,9 @@ use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::prelude::MassProperties;
 
 use crate::body::layout::{ARM_JOINTS, ARMS, LEG_JOINTS, LEGS, WAIST, WAIST_JOINTS};
-use crate::{Side, Sides};
 use crate::mechanism::Solid;
 use crate::mjcf::{Geom, MjcfCamera};
+use crate::{Side, Sides};
 pub use draft::RobotDraft;
 pub use scale::BodyScale;
 pub use source::RobotSource;

@@ -73,8 +73,7 @@ pub(super) fn assemble(
 
 /// Returns the joints of a leg that exist, in the order of the tree; `first` is the first in published order.
 fn leg_chain(joints: &[JointModel], first: usize) -> Vec<usize> {
-    let mut chain: Vec<usize> =
-        (first..first + LEG_JOINTS).filter(|joint| joints[*joint].exists()).collect();
+    let mut chain: Vec<usize> = (first..first + LEG_JOINTS).filter(|joint| joints[*joint].exists()).collect();
     chain.sort_by_key(|joint| joints[*joint].link);
     chain
 }

@@ -65,9 +65,9 @@ impl<'a> Limbs<'a> {
     pub fn find(tree: &'a BodyTree) -> Limbs<'a> {
         let mut root_from_link: Vec<Pose> = Vec::new();
         for link in &tree.links {
-            let placed = link.parent.map_or(Pose::IDENTITY, |parent| {
-                root_from_link[parent] * pose(&link.parent_from_link)
-            });
+            let placed = link
+                .parent
+                .map_or(Pose::IDENTITY, |parent| root_from_link[parent] * pose(&link.parent_from_link));
             root_from_link.push(placed);
         }
         let published = joint_names();
@@ -143,7 +143,8 @@ impl<'a> Limbs<'a> {
         size: impl Fn(Side, Vector) -> f32,
     ) -> Option<(Sides<Vec<usize>>, Vec<usize>)> {
         let end = |side: Side| {
-            let on_side = leaves.iter().copied().filter(|leaf| self.origin_m(*leaf).y * side.sign() > MIN_ASIDE_M);
+            let on_side =
+                leaves.iter().copied().filter(|leaf| self.origin_m(*leaf).y * side.sign() > MIN_ASIDE_M);
             on_side.max_by(|a, b| size(side, self.origin_m(*a)).total_cmp(&size(side, self.origin_m(*b))))
         };
         let paths = Sides { left: self.path(end(Side::Left)?), right: self.path(end(Side::Right)?) };
@@ -164,7 +165,10 @@ impl<'a> Limbs<'a> {
                 leg.iter().copied().filter(|link| self.axis(*link).y.abs() > MIN_LATERAL).collect();
             let [hip, knee, ankle, ..] = lateral[..] else {
                 let side = side.name();
-                self.notes.push(format!("the {side} leg has {} joints that bend it: a hip, a knee and an ankle are needed", lateral.len()));
+                self.notes.push(format!(
+                    "the {side} leg has {} joints that bend it: a hip, a knee and an ankle are needed",
+                    lateral.len()
+                ));
                 continue;
             };
             let others = |part: &dyn Fn(usize) -> bool| -> Vec<usize> {

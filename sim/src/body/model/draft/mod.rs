@@ -45,7 +45,8 @@ impl RobotDraft {
         let trees = document.trees()?;
         let tree = main_tree(&document, &trees)?;
         let limbs = Limbs::find(tree);
-        let mut text = format!("# Drafted from {model_name}: check which joint is which, hands and camera.\n");
+        let mut text =
+            format!("# Drafted from {model_name}: check which joint is which, hands and camera.\n");
         // Writing to a string cannot fail.
         let _ = writeln!(text, "model = {model_name:?}");
         draft_joints(&mut text, &limbs);
@@ -64,12 +65,12 @@ impl RobotDraft {
 
 /// Writes the tables of joints that move and of those that are held.
 fn draft_joints(text: &mut String, limbs: &Limbs) {
-    let _ = writeln!(text, "\n[joints]");
-    for name in joint_names() {
-        let own = limbs.joints.get(&name).and_then(|link| limbs.link(*link).joint.name());
-        if let Some(own) = own.filter(|own| *own != name) {
-            let _ = writeln!(text, "{name} = {own:?}");
-        }
+    let own = |name: &String| limbs.link(*limbs.joints.get(name)?).joint.name();
+    let names = joint_names().into_iter().filter_map(|name| Some((own(&name)?, name)));
+    let renamed: Vec<String> =
+        names.filter(|(own, name)| own != name).map(|(own, name)| format!("{name} = {own:?}")).collect();
+    if !renamed.is_empty() {
+        let _ = writeln!(text, "\n[joints]\n{}", renamed.join("\n"));
     }
     let held: Vec<String> = limbs
         .others()

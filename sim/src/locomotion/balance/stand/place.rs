@@ -200,8 +200,8 @@ mod tests {
     use super::super::super::load::LadenRobot;
     use super::super::super::observer::ObservedPush;
     use super::*;
-    use crate::body::{ARMS, LEGS};
     use crate::body::posed::Posed;
+    use crate::body::{ARMS, LEGS};
 
     const DT_S: f32 = 1.0 / 200.0;
 

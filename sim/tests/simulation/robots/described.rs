@@ -44,7 +44,8 @@ fn read(mjcf: &str, description: &str) -> Result<RobotSource, String> {
     std::fs::write(folder.path().join("walker.xml"), mjcf).expect("a file");
     let path = folder.path().join("walker.toml");
     std::fs::write(&path, description).expect("a file");
-    RobotSource::read(&path).map_err(|error| error.to_string().replace(&folder.path().display().to_string(), ""))
+    RobotSource::read(&path)
+        .map_err(|error| error.to_string().replace(&folder.path().display().to_string(), ""))
 }
 
 #[track_caller]
@@ -87,15 +88,25 @@ fn legs_bend_whichever_way_their_motors_turn() {
         &text("walker.xml"),
         &[
             (r#"name="knee_r" axis="0 1 0" range="0 2.4""#, r#"name="knee_r" axis="0 -1 0" range="-2.4 0""#),
-            (r#"name="tip_l" axis="0 1 0" range="-0.9 0.6""#, r#"name="tip_l" axis="0 -1 0" range="-0.6 0.9""#),
-            (r#"name="tip_r" axis="0 1 0" range="-0.9 0.6""#, r#"name="tip_r" axis="0 -1 0" range="-0.6 0.9""#),
+            (
+                r#"name="tip_l" axis="0 1 0" range="-0.9 0.6""#,
+                r#"name="tip_l" axis="0 -1 0" range="-0.6 0.9""#,
+            ),
+            (
+                r#"name="tip_r" axis="0 1 0" range="-0.9 0.6""#,
+                r#"name="tip_r" axis="0 -1 0" range="-0.6 0.9""#,
+            ),
         ],
     );
     let usual = model(&text("walker.xml"), &text("walker.toml"));
     let turned = model(&turned, &text("walker.toml"));
     for (joint, sign) in [(0, 1.0), (3, 1.0), (4, -1.0), (6, 1.0), (9, -1.0), (10, -1.0)] {
         let (was, is) = (usual.joints[joint].rest_rad, turned.joints[joint].rest_rad);
-        assert!(was.abs() > 0.1 && (was * sign - is).abs() < 1e-3, "{}: {was}, {is}", usual.joints[joint].name);
+        assert!(
+            was.abs() > 0.1 && (was * sign - is).abs() < 1e-3,
+            "{}: {was}, {is}",
+            usual.joints[joint].name
+        );
     }
     check_survives(&turned, "forward_0.4");
 }
@@ -123,20 +134,24 @@ fn frames_of_bodies_do_not_matter() {
     // The foot's frame is turned by a quarter about x; the knee's joint is beside its body's origin.
     let turned = replaced(
         &text("walker.xml"),
-        &[
-            (
-                r#"<body name="foot_l" pos="0 0 -0.015">"#,
-                r#"<body name="foot_l" pos="0 0 -0.015" euler="1.5707963267948966 0 0">"#,
-            ),
-        ],
+        &[(
+            r#"<body name="foot_l" pos="0 0 -0.015">"#,
+            r#"<body name="foot_l" pos="0 0 -0.015" euler="1.5707963267948966 0 0">"#,
+        )],
     );
     let (before, rest) = turned.split_once(r#"<body name="foot_l""#).expect("a foot");
     let (foot, after) = rest.split_once("</body>").expect("its end");
     let foot = replaced(
         foot,
         &[
-            (r#"pos="0.02 0 -0.018" mass="0.55" diaginertia="0.0006 0.0014 0.0014""#, r#"pos="0.02 -0.018 0" mass="0.55" diaginertia="0.0006 0.0014 0.0014""#),
-            (r#"pos="0.025 0 -0.018" size="0.085 0.034 0.012""#, r#"pos="0.025 -0.018 0" size="0.085 0.012 0.034""#),
+            (
+                r#"pos="0.02 0 -0.018" mass="0.55" diaginertia="0.0006 0.0014 0.0014""#,
+                r#"pos="0.02 -0.018 0" mass="0.55" diaginertia="0.0006 0.0014 0.0014""#,
+            ),
+            (
+                r#"pos="0.025 0 -0.018" size="0.085 0.034 0.012""#,
+                r#"pos="0.025 -0.018 0" size="0.085 0.012 0.034""#,
+            ),
         ],
     );
     let turned = format!("{before}<body name=\"foot_l\"{foot}</body>{after}");
@@ -170,7 +185,9 @@ fn content_that_a_described_robot_does_not_use_is_left_out_with_a_note() {
     assert_eq!(with_more.mass_kg, usual.mass_kg);
     assert_eq!(with_more.links.len(), usual.links.len());
     let notes = with_more.approximations.join("\n");
-    for note in ["bodies beside", "geoms in the worldbody", "equalities are left out", "gains of actuators", "tendon"] {
+    for note in
+        ["bodies beside", "geoms in the worldbody", "equalities are left out", "gains of actuators", "tendon"]
+    {
         assert!(notes.contains(note), "{note}: {notes}");
     }
 }
@@ -183,7 +200,10 @@ fn a_robot_without_arms_is_read() {
     let mjcf = format!("{before}<body name=\"head\"{head}");
     let mjcf = without(&mjcf, &["body2=\"upper_"]);
     let description = text("walker.toml");
-    let (joints, camera) = (description.split("# The file has no key").next().expect("joints"), "[camera]\nbody = \"head\"\nposition_m = [0.07, 0, 0.06]\ndown_deg = 25\n");
+    let (joints, camera) = (
+        description.split("# The file has no key").next().expect("joints"),
+        "[camera]\nbody = \"head\"\nposition_m = [0.07, 0, 0.06]\ndown_deg = 25\n",
+    );
     let model = model(&mjcf, &(without(joints, &["shoulder", "elbow"]) + "\n" + camera));
     assert_eq!(model.joints.iter().filter(|joint| joint.exists()).count(), 13);
     check_survives(&model, "stand");
@@ -198,7 +218,10 @@ fn all_reasons_to_refuse_a_robot_come_at_once() {
             (r#"name="knee_l" axis="0 1 0" range="0 2.4""#, r#"name="knee_l" axis="0 1 0""#),
             (r#"name="swing_r" axis="0 1 0""#, r#"name="swing_r" axis="0 1 0" stiffness="3""#),
             (r#" actuatorfrcrange="-24 24""#, ""),
-            (r#"<geom class="shell" type="box" pos="0.025 0 -0.018" size="0.085 0.034 0.012" friction="0.7"/>"#, ""),
+            (
+                r#"<geom class="shell" type="box" pos="0.025 0 -0.018" size="0.085 0.034 0.012" friction="0.7"/>"#,
+                "",
+            ),
         ],
     );
     let described = replaced(
@@ -224,7 +247,9 @@ fn all_reasons_to_refuse_a_robot_come_at_once() {
     ] {
         assert!(error.contains(reason), "{reason}: {error}");
     }
-    let place = |joint: &str| format!("walker.xml:{}`", 1 + mjcf.lines().position(|line| line.contains(joint)).expect(joint));
+    let place = |joint: &str| {
+        format!("walker.xml:{}`", 1 + mjcf.lines().position(|line| line.contains(joint)).expect(joint))
+    };
     for joint in ["name=\"knee_l\"", "name=\"swing_r\"", "body name=\"foot_l\"", "name=\"bend_l\""] {
         assert!(error.contains(&place(joint)), "{}: {error}", place(joint));
     }
