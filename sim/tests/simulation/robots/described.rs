@@ -124,7 +124,7 @@ fn a_robot_whose_ankles_do_not_roll_stands_and_walks() {
     );
     let model = model(&mjcf, &without(&text("walker.toml"), &["ankle_roll"]));
     assert!(model.leg_chains.iter().all(|chain| chain.len() == 5));
-    check_survives(&model, "stand");
+    check_survives(&model, "stand_waving");
     check_survives(&model, "forward_0.4");
 }
 
@@ -206,7 +206,7 @@ fn a_robot_without_arms_is_read() {
     );
     let model = model(&mjcf, &(without(joints, &["shoulder", "elbow"]) + "\n" + camera));
     assert_eq!(model.joints.iter().filter(|joint| joint.exists()).count(), 13);
-    check_survives(&model, "stand");
+    check_survives(&model, "stand_waving");
 }
 
 /// All reasons come at once, each with the file and the line, or the entry, and what would be right.
