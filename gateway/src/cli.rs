@@ -6,7 +6,7 @@ use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::commands::{
     CommandResult,
-    about::{completions, examples, man, tasks},
+    about::{completions, examples, man, robots, tasks},
     agent, bench, collect, demo, doctor, evaluate, export, import, leaderboard, locomotion, policy_map,
     recover, replay, report, serve,
 };
@@ -31,6 +31,7 @@ enum CliCommand {
     PolicyMap(policy_map::PolicyMapArgs),
     Locomotion(locomotion::LocomotionArgs),
     Tasks(tasks::TasksArgs),
+    Robots(robots::RobotsArgs),
     Recover(recover::RecoverArgs),
     Replay(replay::ReplayArgs),
     Export(export::ExportArgs),
@@ -61,6 +62,7 @@ impl Cli {
             CliCommand::PolicyMap(args) => policy_map::run(args),
             CliCommand::Locomotion(args) => locomotion::run(args),
             CliCommand::Tasks(args) => tasks::run(args),
+            CliCommand::Robots(args) => robots::run(&args),
             CliCommand::Recover(args) => recover::run(args),
             CliCommand::Replay(args) => replay::run(args),
             CliCommand::Export(args) => export::run(args),

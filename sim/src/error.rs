@@ -71,10 +71,22 @@ const MAX_TOLD: usize = 40;
 
 impl SimError {
     /// Combines all errors of a file into one; `None` if there are none.
-    pub(crate) fn of_all(mut errors: Vec<SimError>) -> Option<SimError> {
-        match errors.len() {
-            0 | 1 => errors.pop(),
-            _ => Some(SimError::Several(errors)),
+    pub(crate) fn of_all(errors: Vec<SimError>) -> Option<SimError> {
+        (!errors.is_empty()).then(|| SimError::several(errors))
+    }
+
+    /// Combines errors into one.
+    pub(crate) fn several(errors: Vec<SimError>) -> SimError {
+        let mut all: Vec<SimError> = Vec::new();
+        for error in errors {
+            match error {
+                SimError::Several(errors) => all.extend(errors),
+                other => all.push(other),
+            }
+        }
+        match all.len() {
+            1 => all.remove(0),
+            _ => SimError::Several(all),
         }
     }
 

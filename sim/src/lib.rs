@@ -72,8 +72,8 @@ mod user_file;
 pub mod world;
 
 pub use body::{
-    ARM_COLUMNS, ARM_JOINTS, BodyEstimate, HAND_COLUMNS, HAND_JOINTS, JOINTS, MotorSetpoints, RobotModel,
-    RobotSource, UPPER, UPPER_JOINTS, WAIST_COLUMN, joint_names,
+    ARM_COLUMNS, ARM_JOINTS, BodyEstimate, HAND_COLUMNS, HAND_JOINTS, JOINTS, MotorSetpoints, RobotDraft,
+    RobotModel, RobotSource, UPPER, UPPER_JOINTS, WAIST_COLUMN, joint_names,
 };
 pub use error::SimError;
 pub use estimate::{JointReadings, SensorReadings};

@@ -212,10 +212,7 @@ fn capsules(model: &Model, robot: &RobotModel) -> Result<Vec<Capsule>, IkError> 
     let poses = robot.forward_kinematics(Pose::IDENTITY, &[0.0; JOINTS]);
     let (name, size) = (|link: usize| &robot.links[link].name, f64::from(robot.scale.length_m(1.0)));
     let numbers = |point_m: tandem_sim::Vector| point_m.to_array().map(f64::from);
-    let link_of = |side: Side, part: &str| {
-        robot.published_link(&format!("{}_{part}_link", side.name())).unwrap_or_default()
-    };
-    let shoulder = &robot.links[link_of(Side::Left, "shoulder_pitch")];
+    let shoulder = &robot.links[robot.shoulder(Side::Left)];
     let [x, y, z] = numbers(shoulder.parent_from_link.translation);
     let trunk = name(shoulder.parent.unwrap_or_default());
     let [ahead, across, up] = numbers(robot.egocentric.body_from_camera.translation);

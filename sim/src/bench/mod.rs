@@ -7,6 +7,7 @@ mod measure;
 mod motion;
 mod physics;
 mod pictures;
+mod stand;
 mod tour;
 mod trial;
 
@@ -23,6 +24,7 @@ pub use cases::{CASES, Case};
 pub use falls::{Broken, FALL_CASES, FallCase, FallPlace, FallTrial, FallsCase, FallsReport, FloorEpisode};
 pub use physics::{PhysicsCase, PhysicsReport, physics};
 pub use pictures::{PicturesCase, PicturesReport, pictures};
+pub use stand::{StandTrial, stand};
 
 use crate::SimError;
 use crate::body::RobotModel;

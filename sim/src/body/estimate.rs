@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rapier3d::math::{Pose, Vector};
 
-use super::{JOINTS, LEG_JOINTS, LEGS, RobotModel, SiteModel, WAIST_JOINTS};
+use super::{JOINTS, RobotModel, SiteModel, WAIST_JOINTS};
 use crate::{GRAVITY_M_S2, Side, Sides};
 
 /// A robot's estimate of its own body, which is all that a controller may use: joint readings, link
@@ -155,9 +155,9 @@ impl BodyEstimate {
         self.model.soles.each_ref().map(|sole| self.world_from_site(sole))
     }
 
-    /// Returns the pose of the ankle roll link, to which a sole belongs.
+    /// Returns the pose of the foot: the last link of a leg, to which the sole belongs.
     pub fn world_from_foot(&self, side: Side) -> Pose {
-        self.world_from_link[self.model.joints[LEGS[side] + LEG_JOINTS - 1].link]
+        self.world_from_link[self.model.soles[side].link]
     }
 
     /// Returns the origin and the unit axis of a joint in the world.

@@ -19,7 +19,9 @@ pub use layout::{
     ARM_COLUMNS, ARM_JOINTS, HAND_COLUMNS, HAND_JOINTS, JOINTS, UPPER, UPPER_JOINTS, WAIST_COLUMN,
     WAIST_JOINTS, joint_names,
 };
-pub use model::{BodyScale, HandLinks, JointModel, LinkModel, RobotModel, RobotSource, SiteModel};
+pub use model::{
+    BodyScale, HandLinks, JointModel, LinkModel, RobotDraft, RobotModel, RobotSource, SiteModel,
+};
 pub use motors::MotorSetpoints;
 
 pub(crate) use estimate::{KnownOfBody, LinkMotion, PelvisMotion};

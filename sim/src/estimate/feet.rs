@@ -134,22 +134,27 @@ fn ground_wrench(
     down_direction: Vector,
     torque_n_m: &[f32; JOINTS],
 ) -> GroundWrench {
-    let joints = &model.joints[LEGS[side]..LEGS[side] + LEG_JOINTS];
-    let foot_m = pelvis_from_link[joints[LEG_JOINTS - 1].link].translation;
+    let foot_m = pelvis_from_link[model.soles[side].link].translation;
     let mut jacobian = SMatrix::<f32, 6, 6>::zeros();
     let mut rest_n_m = SVector::<f32, 6>::zeros();
     // Mass and its moment from this joint on, from the foot up.
     let (mut mass_kg, mut moment_kg_m) = (0.0, Vector::ZERO);
-    for i in (0..LEG_JOINTS).rev() {
-        let pose = pelvis_from_link[joints[i].link];
-        let (origin_m, axis) = (pose.translation, pose.rotation * joints[i].axis);
-        let mass = &model.links[joints[i].link].mass;
+    for index in model.leg_chains[side].iter().rev() {
+        let (i, joint) = (index - LEGS[side], &model.joints[*index]);
+        let pose = pelvis_from_link[joint.link];
+        let (origin_m, axis) = (pose.translation, pose.rotation * joint.axis);
+        let mass = &model.links[joint.link].mass;
         mass_kg += mass.mass();
         moment_kg_m += pose * mass.local_com * mass.mass();
         let holding_n_m = -axis.dot((moment_kg_m - origin_m * mass_kg).cross(down_direction * GRAVITY_M_S2));
-        rest_n_m[i] = holding_n_m - torque_n_m[LEGS[side] + i];
+        rest_n_m[i] = holding_n_m - torque_n_m[*index];
         let linear = axis.cross(foot_m - origin_m);
         jacobian.set_column(i, &SVector::from([linear.x, linear.y, linear.z, axis.x, axis.y, axis.z]));
+    }
+    if let Some((origin_m, axis)) = model.sole_axis(side, pelvis_from_link[model.soles[side].link]) {
+        let linear = axis.cross(foot_m - origin_m);
+        let column = [linear.x, linear.y, linear.z, axis.x, axis.y, axis.z];
+        jacobian.set_column(LEG_JOINTS - 1, &SVector::from(column));
     }
     let normal = jacobian * jacobian.transpose() + SMatrix::identity() * WRENCH_DAMPING;
     let fitted = normal.cholesky().map_or_else(SVector::zeros, |factor| factor.solve(&(jacobian * rest_n_m)));

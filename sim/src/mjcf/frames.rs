@@ -69,13 +69,14 @@ impl MjcfCamera {
 const DEFAULT_FOVY_DEG: f32 = 45.0;
 const DEFAULT_RESOLUTION_PX: (u32, u32) = (320, 240);
 
-pub(super) fn cameras(source: &MjcfText) -> Result<Vec<MjcfCamera>, SimError> {
+/// Reads the cameras. One that the program uses is refused if it cannot be read, unless `may_lack`.
+pub(super) fn cameras(source: &MjcfText, may_lack: bool) -> Result<Vec<MjcfCamera>, SimError> {
     let xml = source.xml()?;
     let mut found = Vec::new();
     for node in xml.descendants().filter(|node| node.has_tag_name("camera")) {
         let is_used = node.attribute("name").is_some_and(|name| USED.contains(&name));
         match unreadable(&node) {
-            Some(what) if is_used => return Err(source.refuse(&node, what)),
+            Some(what) if is_used && !may_lack => return Err(source.refuse(&node, what)),
             Some(_) => {}
             None => found.push(camera(&node)),
         }

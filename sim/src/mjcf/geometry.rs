@@ -244,7 +244,7 @@ fn builtin_rgb(texture: &mjcf_rs::assets::Texture) -> [[f32; 3]; 2] {
 
 /// Returns the pose with z from the first to the second end point, centred between them, and half the
 /// distance.
-fn between(ends_m: [f64; 6]) -> (Pose, f32) {
+pub(super) fn between(ends_m: [f64; 6]) -> (Pose, f32) {
     let a = vector([ends_m[0], ends_m[1], ends_m[2]]);
     let b = vector([ends_m[3], ends_m[4], ends_m[5]]);
     let half = (b - a) * 0.5;

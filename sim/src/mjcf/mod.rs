@@ -13,6 +13,7 @@ mod joints;
 mod key;
 mod lights;
 mod pairs;
+mod robot_file;
 mod scene_bodies;
 mod spring_dampers;
 mod support;
@@ -107,7 +108,7 @@ impl Document {
     ///
     /// Returns an error if the text is not MJCF, or has elements or attributes that are refused.
     pub fn parse(file: &str, xml: &str) -> Result<Document, SimError> {
-        Document::parse_in(file, xml, Path::new("."))
+        Document::parse_in(file, xml, Path::new("."), &[])
     }
 
     /// Parses self-contained MJCF text, which may name no other file.
@@ -134,19 +135,26 @@ impl Document {
         if let Some(kept) = kept::find(path) {
             return Ok(kept);
         }
-        let file = path.display().to_string();
-        let xml = read_text(path, MAX_TEXT_BYTES)
-            .map_err(|source| SimError::Read { path: file.clone(), source })?;
-        let mut document = Document::parse_in(&file, &xml, path.parent().unwrap_or(Path::new(".")))?;
-        document.files.push((path.into(), xxh3_64(xml.as_bytes())));
-        document.known_fingerprint = Some(document.fingerprint());
+        let document = Document::read_without(path, &[])?;
         kept::keep(path, &document);
         Ok(document)
     }
 
-    fn parse_in(file: &str, xml: &str, folder: &Path) -> Result<Document, SimError> {
+    /// Reads a file anew, without refused elements that have a name in `left_out`.
+    fn read_without(path: &Path, left_out: &[&str]) -> Result<Document, SimError> {
+        let file = path.display().to_string();
+        let xml = read_text(path, MAX_TEXT_BYTES)
+            .map_err(|source| SimError::Read { path: file.clone(), source })?;
+        let folder = path.parent().unwrap_or(Path::new("."));
+        let mut document = Document::parse_in(&file, &xml, folder, left_out)?;
+        document.files.push((path.into(), xxh3_64(xml.as_bytes())));
+        document.known_fingerprint = Some(document.fingerprint());
+        Ok(document)
+    }
+
+    fn parse_in(file: &str, xml: &str, folder: &Path, left_out: &[&str]) -> Result<Document, SimError> {
         let source = MjcfText::read(file, xml, folder)?;
-        let mut checked = check::check(&source)?;
+        let mut checked = check::check(&source, left_out)?;
         let text = plain(&source.text, &source.xml()?);
         let mut model = mjcf_rs::Model::from_str(&text, folder)
             .map_err(|source| SimError::Mjcf { file: file.into(), source })?;
@@ -157,7 +165,7 @@ impl Document {
         let mut document = Document {
             file: file.into(),
             model,
-            cameras: frames::cameras(&source)?,
+            cameras: frames::cameras(&source, !left_out.is_empty())?,
             speed_limit_values: joints::speed_limits(&source)?,
             unread: UnreadRanges::of(&source)?,
             lights,
@@ -274,7 +282,7 @@ impl Document {
     }
 
     /// Returns the error that refuses a body, with its line and the names around it.
-    fn refuse_body(&self, body: usize, what: &str) -> SimError {
+    pub(crate) fn refuse_body(&self, body: usize, what: &str) -> SimError {
         self.source.refuse_at(self.checked.bodies[body].body, what)
     }
 

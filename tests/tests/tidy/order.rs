@@ -46,7 +46,7 @@ const ORDER: &[(&str, &[&[&str]])] = &[
     (
         "episodes/evaluation",
         &[
-            &["batch", "results", "statistics", "task_check", "task_draft"],
+            &["batch", "results", "robot_check", "statistics", "task_check", "task_draft"],
             &["bench", "policies", "reports"],
             &["evaluation"],
         ],

@@ -17,7 +17,7 @@ macro_rules! examples {
 }
 
 /// Every example, by its path in the folder, with its text.
-const EXAMPLES: [(&str, &str); 30] = examples! {
+const EXAMPLES: [(&str, &str); 34] = examples! {
     "agents/agent.py"
     "agents/claude.sh"
     "agents/codex.sh"
@@ -30,7 +30,11 @@ const EXAMPLES: [(&str, &str); 30] = examples! {
     "replicas/haproxy.cfg"
     "replicas/kubernetes.yaml"
     "robots/booster_t1.toml"
+    "robots/fourier_gr1.toml"
     "robots/g1_rubber_hands.toml"
+    "robots/unitree_g1.toml"
+    "robots/unitree_g1_dex3.toml"
+    "robots/unitree_h1_2.toml"
     "robots/walker.toml"
     "robots/walker.xml"
     "servers/lerobot_act.py"

@@ -3,4 +3,15 @@
 pub mod completions;
 pub mod examples;
 pub mod man;
+pub mod robots;
 pub mod tasks;
+
+use std::path::Path;
+
+/// Returns the path of a file for another one that names it: relative to its folder, if it is in it or below.
+fn seen_from(by: &Path, file: &Path) -> String {
+    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.into());
+    let (by, file) = (absolute(by), absolute(file));
+    let below = by.parent().and_then(|folder| file.strip_prefix(folder).ok());
+    below.unwrap_or(&file).to_string_lossy().replace('\\', "/")
+}

@@ -12,6 +12,7 @@ use tandem_episodes::{BodyScale, LocomotionChoice, create_private_folder, read_t
 use tandem_evaluation::{TaskDraft, check_task, draft_task};
 use tandem_tools_spec::TaskList;
 
+use super::seen_from;
 use crate::commands::{CommandResult, Seeds, print};
 
 /// List the tasks and their phases, or write and check a task of your own.
@@ -129,14 +130,6 @@ fn new(args: &NewArgs) -> CommandResult {
     let _ = writeln!(told, "written: {out}; check it by `tandem tasks check {out}`");
     print(&told)?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// Returns the path of a scene for a task file: relative to its folder, if the scene is in it or below.
-fn seen_from(task: &Path, scene: &Path) -> String {
-    let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.into());
-    let (task, scene) = (absolute(task), absolute(scene));
-    let below = task.parent().and_then(|folder| scene.strip_prefix(folder).ok());
-    below.unwrap_or(&scene).to_string_lossy().replace('\\', "/")
 }
 
 /// Returns the id of a task by the name of its file.

@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use tandem_episodes::{EpisodeError, RobotFile, SceneError, SceneFile};
+use tandem_evaluation::check_robot;
 
 use super::{Finding, Findings, specs, trial};
 use crate::{
@@ -58,16 +59,35 @@ fn check_token(layer: &Layer, token: Result<Option<Token>, String>) -> Result<St
     }
 }
 
-/// Reports the approximations in a robot's file, and the tasks that such robots can play.
+/// Reports the approximations in a robot's file, whether it stands, and the tasks that such robots can play.
 fn robot(layer: &Layer, path: &Path) -> Vec<Finding> {
-    let approximations = match RobotFile::with_approximations(path) {
-        Ok((_, approximations)) => approximations,
-        Err(error) => return vec![Finding::Wrong(error.to_string())],
+    let (robot, approximations) = match RobotFile::with_approximations(path) {
+        Ok(read) => read,
+        Err(error) => {
+            let mut findings = vec![Finding::Wrong(error.to_string())];
+            if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("xml")) {
+                let (file, out) = (path.display(), path.with_extension("toml"));
+                let draft = format!("tandem robots new --from-model {file} {}", out.display());
+                findings.push(Finding::Note(format!(
+                    "a description says which joint is which; draft one by `{draft}`"
+                )));
+            }
+            return findings;
+        }
     };
     let mut findings: Vec<Finding> =
         approximations.iter().map(|line| Finding::Note(format!("not quite as in MuJoCo: {line}"))).collect();
     // The first task shows for all ten whether hands and controller fit.
     findings.push(Finding::Works(format!("{} is read", path.display())));
+    match check_robot(&robot) {
+        Ok(check) => {
+            findings.extend(check.lacks.into_iter().map(Finding::Note));
+            findings.push(
+                check.falls.map_or_else(|| Finding::Works("it stands for a second".into()), Finding::Wrong),
+            );
+        }
+        Err(error) => findings.push(Finding::Wrong(error.to_string())),
+    }
     if let Some(Err(error @ EpisodeError::Robot(_))) = specs(layer).next().map(|spec| trial(&spec)) {
         findings.push(Finding::Note(error.to_string()));
     }

@@ -27,6 +27,9 @@ pub(super) struct RobotDescription {
     /// Rest angles of waist, arms and hands that differ from the MJCF's first key.
     #[serde(default)]
     pub rest_rad: BTreeMap<String, f32>,
+    /// Ranges of joints that differ from the MJCF's.
+    #[serde(default)]
+    pub range_rad: BTreeMap<String, [f64; 2]>,
     #[serde(default)]
     pub effort_n_m: BTreeMap<String, f32>,
     #[serde(default)]
@@ -57,6 +60,13 @@ pub(super) struct HeadCamera {
     pub body: String,
     pub position_m: [f32; 3],
     pub down_deg: f32,
+}
+
+impl BodyFrame {
+    /// Creates the frame of a body itself.
+    pub fn at(body: String) -> BodyFrame {
+        BodyFrame { body, position_m: [0.0; 3], quaternion_wxyz: along_the_body() }
+    }
 }
 
 fn along_the_body() -> [f64; 4] {

@@ -5,37 +5,41 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use mjcf_rs::Tristate;
 use mjcf_rs::body::JointType;
 use rapier3d::glamx::{DPose3, DQuat, DVec3};
 use rapier3d::math::{Matrix, Pose, Rotation, Vector};
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::description::{BodyFrame, HeadCamera, RobotDescription};
+use super::feet::{find_soles, level_frames};
 use super::joints::in_published_order;
-use super::read::{PALM_IN_WRIST_M, assemble, corners_m, only_tree};
-use super::{BodyScale, JointModel, RobotModel, SiteModel};
-use crate::body::layout::{LEG_JOINTS, LEGS, joint_names};
-use crate::mjcf::{AxisJoint, BodyTree, Document, LinkJoint, MjcfCamera};
+use super::limits::{FileLimits, JointSources, limits_of_file};
+use super::read::{PALM_IN_WRIST_M, assemble, camera, sites};
+use super::{BodyScale, JointModel, RobotModel};
+use crate::body::layout::{ARM_JOINTS, ARMS, LEG_JOINTS, LEGS, joint_names};
+use crate::mjcf::{BodyTree, Document, LinkJoint, MjcfCamera};
 use crate::user_file::with_own_separators;
-use crate::{Side, Sides, SimError, assets};
+use crate::{Side, SimError, assets};
 
 /// Reads a description and the MJCF that it names. In the returned document, joints, wrists and camera
 /// have the published names. The number is a fingerprint of both files.
 pub(super) fn read(path: &Path) -> Result<(RobotModel, Document, u64), SimError> {
     let (description, text) = RobotDescription::read(path)?;
     let folder = path.parent().unwrap_or(Path::new("."));
-    let mut document = Document::read(&with_own_separators(folder.join(&description.model)))?;
-    let fingerprint = xxh3_64(format!("{:016x}{text}", document.fingerprint()).as_bytes());
-    let fitting = Fitting {
+    let mjcf = with_own_separators(folder.join(&description.model));
+    let mut fitting = Fitting {
         file: path.display().to_string(),
         like: description.like.as_deref().map(embedded).transpose()?,
         g1: embedded(assets::DEFAULT_ROBOT)?,
         description,
+        refused: Vec::new(),
     };
-    fitting.check_names()?;
-    let said = fitting.rename_joints(&mut document)?;
-    fitting.add_frames(&mut document)?;
-    let model = fitting.robot(&document, &said)?;
+    fitting.check_names();
+    fitting.check_ranges();
+    let mut document = Document::read_robot(&mjcf).map_err(|error| fitting.all_with(error))?;
+    let fingerprint = xxh3_64(format!("{:016x}{text}", document.fingerprint()).as_bytes());
+    let model = fitting.fit(&mut document)?;
     Ok((model, document, fingerprint))
 }
 
@@ -49,50 +53,160 @@ struct Fitting {
     description: RobotDescription,
     like: Option<RobotModel>,
     g1: RobotModel,
-}
-
-/// Data of a joint that the MJCF gives in places other than the joint itself.
-#[derive(Default)]
-struct SaidElsewhere {
-    effort_range_n_m: Option<[f64; 2]>,
-    rest_rad: Option<f64>,
+    /// All reasons to refuse the robot.
+    refused: Vec<SimError>,
 }
 
 impl Fitting {
-    fn refuse(&self, what: impl Into<String>) -> SimError {
+    fn wrong(&self, what: impl Into<String>) -> SimError {
         SimError::Unsupported { file: self.file.clone(), what: what.into() }
     }
 
+    /// Adds a reason about an entry of the description.
+    fn refuse(&mut self, what: impl Into<String>) {
+        self.refused.push(self.wrong(what));
+    }
+
+    /// Returns all reasons with a last one.
+    fn all_with(&mut self, error: SimError) -> SimError {
+        self.refused.push(error);
+        SimError::several(std::mem::take(&mut self.refused))
+    }
+
+    /// Returns a value, or adds the reason for which there is none.
+    fn keep<T>(&mut self, tried: Result<T, SimError>) -> Option<T> {
+        tried.map_err(|error| self.refused.push(error)).ok()
+    }
+
     /// Checks that all joints for which the description gives names or numbers are published ones.
-    fn check_names(&self) -> Result<(), SimError> {
-        let RobotDescription { joints, rest_rad, effort_n_m, speed_limit_rad_s, .. } = &self.description;
+    fn check_names(&mut self) {
+        let d = &self.description;
+        let keys = |table: &'static str, keys: Vec<&String>| {
+            keys.into_iter().map(|key| (table, key.clone())).collect::<Vec<_>>()
+        };
+        let given = [
+            keys("joints", d.joints.keys().collect()),
+            keys("rest_rad", d.rest_rad.keys().collect()),
+            keys("range_rad", d.range_rad.keys().collect()),
+            keys("effort_n_m", d.effort_n_m.keys().collect()),
+            keys("speed_limit_rad_s", d.speed_limit_rad_s.keys().collect()),
+        ];
         let names = joint_names();
-        let tables =
-            [("rest_rad", rest_rad), ("effort_n_m", effort_n_m), ("speed_limit_rad_s", speed_limit_rad_s)];
-        let keys = tables.iter().flat_map(|(table, entries)| entries.keys().map(move |key| (*table, key)));
-        let given = joints.keys().map(|key| ("joints", key)).chain(keys);
-        for (table, key) in given {
-            if !names.contains(key) {
-                let have = names.join(", ");
-                return Err(
-                    self.refuse(format!("[{table}] has `{key}`; a robot's joints are called: {have}"))
-                );
-            }
+        let wrong: Vec<_> = given.into_iter().flatten().filter(|(_, key)| !names.contains(key)).collect();
+        for (index, (table, key)) in wrong.into_iter().enumerate() {
+            let have = if index == 0 { &*names.join(", ") } else { "see above" };
+            self.refuse(format!("[{table}] has `{key}`; a robot's joints are called: {have}"));
+        }
+    }
+
+    /// Checks that the ranges of the description are ranges.
+    fn check_ranges(&mut self) {
+        let ranges = self.description.range_rad.clone();
+        for (joint, [low_rad, high_rad]) in ranges.iter().filter(|(_, [low, high])| !(low < high)) {
+            self.refuse(format!("[range_rad] has {joint} = [{low_rad}, {high_rad}]; the lower end is first"));
+        }
+    }
+
+    /// Fits the document to the description, and returns its robot.
+    fn fit(&mut self, document: &mut Document) -> Result<RobotModel, SimError> {
+        let limits = self.keep(limits_of_file(document));
+        self.keep_robot(document)?;
+        self.check_joints_of(document);
+        let limits = self.rename_joints(document, limits.unwrap_or_default());
+        self.add_frames(document);
+        let tree = level_frames(document).map_err(|error| self.all_with(error))?;
+        let joints = self.joints(document, &tree, &limits);
+        let legs = joints.as_ref().is_some_and(|joints| self.check_legs(document, &tree, joints));
+        let soles = joints.as_ref().and_then(|joints| self.keep(find_soles(document, &tree, joints)));
+        self.keep(camera(document, &tree));
+        self.keep(sites(document, &tree, "wrist", "or an entry [left_wrist] or [right_wrist] here"));
+        let (Some(joints), Some(soles), true, true) = (joints, soles, legs, self.refused.is_empty()) else {
+            return Err(SimError::several(std::mem::take(&mut self.refused)));
+        };
+        let mut model = assemble(document, &tree, joints, soles)?;
+        model.bend_legs(&self.g1);
+        model.scale = BodyScale::between(&self.g1, &model);
+        self.derive_drives(&mut model);
+        Ok(model)
+    }
+
+    /// Leaves out everything in the file but the robot, with notes.
+    fn keep_robot(&mut self, document: &mut Document) -> Result<(), SimError> {
+        let trees = document.trees().map_err(|error| self.all_with(error))?;
+        let robot = main_tree(document, &trees).map_err(|error| self.all_with(error))?;
+        let root = robot.links[0].bodies[0].index;
+        let is_fixed = robot.links[0].joint == LinkJoint::Fixed;
+        let notes = [
+            (trees.len() > 2, "bodies beside the robot's are left out"),
+            (trees[0].links.iter().any(|link| !link.geoms.is_empty()), "geoms in the worldbody are left out"),
+            (
+                !document.model.equality.is_empty(),
+                "equalities are left out: every joint of a robot has its motor",
+            ),
+            (
+                !document.model.actuators.is_empty(),
+                "gains of actuators are not used: they are a G1's at this robot's scale",
+            ),
+            (is_fixed, "its root is free to move, as if it had a <freejoint>"),
+        ];
+        notes.iter().filter(|(holds, _)| *holds).for_each(|(_, what)| document.note(what));
+        document.keep_tree(root);
+        document.model.equality.clear();
+        if is_fixed {
+            document.free_root();
         }
         Ok(())
     }
 
-    /// Gives joints their published names, and makes held joints rigid. Returns the data that the file
-    /// gives outside the joints, by published name, and removes it from the document.
-    fn rename_joints(&self, document: &mut Document) -> Result<BTreeMap<String, SaidElsewhere>, SimError> {
-        let mut rest_rad = rest_rad(document)?;
-        let mut said = BTreeMap::new();
-        let efforts: BTreeMap<String, [f64; 2]> = document
-            .actuators()?
-            .into_iter()
-            .filter_map(|actuator| Some((actuator.joint, actuator.effort_range?)))
+    /// Checks that every joint of the file has a use or is held, and that every name of the description
+    /// is one of the file's joints.
+    fn check_joints_of(&mut self, document: &Document) {
+        let RobotDescription { model, joints, held_rad, .. } = &self.description;
+        let model = model.display();
+        let bodies = document.model.bodies.iter().enumerate();
+        let own: Vec<(usize, &str)> = bodies
+            .filter_map(|(body, entry)| Some((body, entry.body.joints.first()?)))
+            .filter(|(_, joint)| joint.type_ != JointType::Free)
+            .map(|(body, joint)| (body, joint.name.as_deref().unwrap_or_default()))
             .collect();
-        self.check_joints_of(document)?;
+        let named = joints.values().map(|name| ("joints", name));
+        let unknown: Vec<_> = named
+            .chain(held_rad.keys().map(|name| ("held_rad", name)))
+            .filter(|(_, name)| own.iter().all(|(_, own)| own != name))
+            .collect();
+        let have = own.iter().map(|(_, name)| *name).collect::<Vec<_>>().join(", ");
+        let mut wrong: Vec<SimError> = Vec::new();
+        for (table, name) in unknown {
+            let have = if wrong.is_empty() { &*have } else { "see above" };
+            let what = format!("[{table}] names `{name}`, and {model} has no such joint; it has: {have}");
+            wrong.push(self.wrong(what));
+        }
+        let published = joint_names();
+        let is_used = |name: &str| held_rad.contains_key(name) || published.contains(&self.published(name));
+        for (index, (body, name)) in own.iter().filter(|(_, name)| !is_used(name)).enumerate() {
+            let have = if index == 0 { &*published.join(", ") } else { "see above" };
+            let file = &self.file;
+            wrong.push(document.refuse_joint(
+                *body,
+                &format!("nothing says which joint `{name}` of {model} is: name it in [joints], or give it an angle in [held_rad] of {file}; a robot's joints are called: {have}"),
+            ));
+        }
+        self.refused.extend(wrong);
+    }
+
+    fn published(&self, own: &str) -> String {
+        let joints = &self.description.joints;
+        joints.iter().find(|(_, name)| *name == own).map_or(own, |(published, _)| published).into()
+    }
+
+    /// Gives joints their published names and their ranges, and makes held joints rigid. Returns the limits
+    /// by published name, and removes actuators and keys from the document.
+    fn rename_joints(
+        &self,
+        document: &mut Document,
+        mut limits: BTreeMap<String, FileLimits>,
+    ) -> BTreeMap<String, FileLimits> {
+        let mut renamed = BTreeMap::new();
         for body in document.model.bodies.iter_mut().map(|entry| &mut entry.body) {
             let Some(joint) = body.joints.first_mut().filter(|joint| joint.type_ != JointType::Free) else {
                 continue;
@@ -106,173 +220,131 @@ impl Fitting {
                 continue;
             }
             let published = self.published(&own);
+            let limits = limits.remove(&own).unwrap_or_default();
+            let given = self.description.range_rad.get(&published).copied().filter(|[low, high]| low < high);
+            if let Some(range) = given.or(limits.control_range_rad.filter(|_| joint.range.is_none())) {
+                (joint.range, joint.limited) = (Some(range), Tristate::True);
+            }
             joint.name = Some(published.clone());
             joint.damping = 0.0;
-            let elsewhere = SaidElsewhere {
-                effort_range_n_m: efforts.get(&own).copied(),
-                rest_rad: rest_rad.remove(&own),
-            };
-            said.insert(published, elsewhere);
-        }
-        for (name, elsewhere) in &mut said {
-            let own = self.description.joints.get(name).unwrap_or(name);
-            elsewhere.effort_range_n_m = elsewhere.effort_range_n_m.or(document.effort_range(own, None));
+            renamed.insert(published, limits);
         }
         document.model.actuators.clear();
         document.model.keyframes.clear();
-        Ok(said)
+        renamed
     }
 
-    fn published(&self, own: &str) -> String {
-        let joints = &self.description.joints;
-        joints.iter().find(|(_, name)| *name == own).map_or(own, |(published, _)| published).into()
-    }
-
-    /// Checks that every joint of the file has a use or is held, and that every name of the description
-    /// is one of the file's joints.
-    fn check_joints_of(&self, document: &Document) -> Result<(), SimError> {
-        let RobotDescription { model, joints, held_rad, .. } = &self.description;
-        let model = model.display();
-        let bodies = document.model.bodies.iter().flat_map(|entry| &entry.body.joints);
-        let own: Vec<&str> = bodies
-            .filter(|joint| joint.type_ != JointType::Free)
-            .map(|joint| joint.name.as_deref().unwrap_or_default())
-            .collect();
-        let named = joints.values().map(|name| ("joints", name));
-        if let Some((table, name)) = named
-            .chain(held_rad.keys().map(|name| ("held_rad", name)))
-            .find(|(_, name)| !own.contains(&name.as_str()))
-        {
-            let have = own.join(", ");
-            return Err(self
-                .refuse(format!("[{table}] names `{name}`, and {model} has no such joint; it has: {have}")));
-        }
-        let published = joint_names();
-        let useless = own
-            .iter()
-            .find(|name| !held_rad.contains_key(**name) && !published.contains(&self.published(name)));
-        if let Some(name) = useless {
-            let have = published.join(", ");
-            return Err(self.refuse(format!(
-                "nothing says which joint `{name}` of {model} is: name it in [joints], or give it an angle in [held_rad]; a robot's joints are called: {have}"
-            )));
-        }
-        Ok(())
-    }
-
-    /// Adds the wrists and the camera of the description.
-    fn add_frames(&self, document: &mut Document) -> Result<(), SimError> {
-        let RobotDescription { left_wrist, right_wrist, camera, .. } = &self.description;
-        for (side, frame) in [(Side::Left, left_wrist), (Side::Right, right_wrist)] {
-            let Some(BodyFrame { body, position_m, quaternion_wxyz: [w, x, y, z] }) = frame else { continue };
-            let rotation = DQuat::from_xyzw(*x, *y, *z, *w).normalize();
-            if !rotation.is_finite() {
-                return Err(self.refuse(format!("the quaternion of {}_wrist is 0 0 0 0", side.name())));
-            }
+    /// Adds the wrists and the camera of the description. A side without an arm has its wrist on the trunk.
+    fn add_frames(&mut self, document: &mut Document) {
+        for side in Side::BOTH {
             let name = format!("{}_wrist", side.name());
+            let given = match side {
+                Side::Left => self.description.left_wrist.take(),
+                Side::Right => self.description.right_wrist.take(),
+            };
+            let frame = match given {
+                Some(frame) => frame,
+                None if has_arm(document, side) => continue,
+                None => BodyFrame::at(document.model.bodies[1].body.name.clone().unwrap_or_default()),
+            };
+            let BodyFrame { body, position_m, quaternion_wxyz: [w, x, y, z] } = frame;
+            let rotation = DQuat::from_xyzw(x, y, z, w).normalize();
+            if !rotation.is_finite() {
+                self.refuse(format!("the quaternion of [{name}] is 0 0 0 0"));
+                continue;
+            }
             for entry in &mut document.model.bodies {
                 entry.body.sites.retain(|site| site.name.as_deref() != Some(&name));
             }
-            let pose = DPose3::from_parts(DVec3::from_array(*position_m), rotation);
-            let site = mjcf_rs::body::Site { name: Some(name), pose, ..Default::default() };
-            let found =
-                document.model.bodies.iter_mut().find(|entry| entry.body.name.as_deref() == Some(body));
-            found.ok_or_else(|| self.no_body(body))?.body.sites.push(site);
-        }
-        if let Some(camera) = camera {
-            if document.model.bodies.iter().all(|entry| entry.body.name.as_deref() != Some(&camera.body)) {
-                return Err(self.no_body(&camera.body));
+            let pose = DPose3::from_parts(DVec3::from_array(position_m), rotation);
+            let site = mjcf_rs::body::Site { name: Some(name.clone()), pose, ..Default::default() };
+            let bodies = &mut document.model.bodies;
+            match bodies.iter_mut().find(|entry| entry.body.name.as_deref() == Some(&body)) {
+                Some(entry) => entry.body.sites.push(site),
+                None => self.refuse_body(document, &name, &body),
             }
-            document.cameras.retain(|other| other.name != self.g1.egocentric.name);
-            document.cameras.push(head_camera(camera, &self.g1.egocentric));
         }
-        Ok(())
+        if let Some(camera) = &self.description.camera {
+            let (name, lens) = (camera.body.clone(), &self.g1.egocentric);
+            let camera = head_camera(camera, lens);
+            match document.model.body_id_by_name(&name) {
+                Some(_) => {
+                    document.cameras.retain(|other| other.name != camera.name);
+                    document.cameras.push(camera);
+                }
+                None => self.refuse_body(document, "camera", &name),
+            }
+        }
     }
 
-    fn no_body(&self, name: &str) -> SimError {
-        self.refuse(format!("{} has no body `{name}`", self.description.model.display()))
+    fn refuse_body(&mut self, document: &Document, entry: &str, name: &str) {
+        let have = document.model.bodies_iter().filter_map(|(_, entry)| entry.body.name.as_deref());
+        let have = have.collect::<Vec<_>>().join(", ");
+        let model = self.description.model.display();
+        self.refuse(format!("[{entry}]: {model} has no body `{name}`; it has: {have}"));
     }
 
-    fn robot(
-        &self,
+    /// Returns all joints in published order, or adds the reasons why they cannot be used.
+    fn joints(
+        &mut self,
         document: &Document,
-        said: &BTreeMap<String, SaidElsewhere>,
-    ) -> Result<RobotModel, SimError> {
-        let tree = only_tree(document)?;
-        let mut found = Vec::new();
-        for (link, of) in tree.links.iter().enumerate().skip(1) {
-            let LinkJoint::Hinge(joint) = &of.joint else {
-                return Err(
-                    self.refuse(format!("joint `{}` is no hinge", of.joint.name().unwrap_or_default()))
-                );
-            };
-            found.push(self.joint(joint, link, said.get(&joint.name))?);
-        }
-        let joints = in_published_order(found).map_err(|what| self.refuse(what))?;
-        let soles = LEGS.map(|first| sole(&tree, joints[first + LEG_JOINTS - 1].link));
-        let soles = match soles {
-            Sides { left: Some(left), right: Some(right) } => Sides { left, right },
-            Sides { .. } => return Err(self.refuse("needs geoms that collide on both feet, to stand on")),
+        tree: &BodyTree,
+        limits: &BTreeMap<String, FileLimits>,
+    ) -> Option<Vec<JointModel>> {
+        let (mut found, mut refused) = (Vec::new(), Vec::new());
+        let sources = JointSources {
+            file: &self.file,
+            description: &self.description,
+            like: self.like.as_ref(),
+            g1: &self.g1,
         };
-        let mut model = assemble(document, &tree, joints, soles)?;
-        model.bend_legs(&self.g1);
-        model.scale = BodyScale::between(&self.g1, &model);
-        self.derive_drives(&mut model);
-        Ok(model)
+        for (link, of) in tree.links.iter().enumerate().skip(1) {
+            let body = of.bodies[0].index;
+            let LinkJoint::Hinge(joint) = &of.joint else {
+                let what = "is no hinge; use hinges, or hold it in [held_rad]";
+                refused.push(document.refuse_joint(body, what));
+                continue;
+            };
+            let usual = FileLimits::default();
+            let (model, wrong) = sources.joint(joint, link, of, limits.get(&joint.name).unwrap_or(&usual));
+            refused.extend(wrong.iter().map(|what| document.refuse_joint(body, what)));
+            found.push(model);
+        }
+        self.refused.extend(refused);
+        let published = joint_names();
+        found.retain(|joint| published.contains(&joint.name));
+        self.check_efforts(&found);
+        self.keep(in_published_order(found).map_err(|what| self.wrong(what)))
     }
 
-    /// Returns a joint with the data of the file and the description; the parts that depend on the
-    /// robot's size follow later.
-    fn joint(
-        &self,
-        joint: &AxisJoint,
-        link: usize,
-        said: Option<&SaidElsewhere>,
-    ) -> Result<JointModel, SimError> {
-        let (name, axis) = (&joint.name, &joint.axis);
-        let refuse = |what: &str| self.refuse(format!("joint `{name}` {what}"));
-        let alike = |robot: &RobotModel| robot.joints.iter().find(|other| other.name == *name).cloned();
-        let like = self.like.as_ref().and_then(alike);
-        let [lower, upper] = axis.range.ok_or_else(|| refuse("needs a range"))?;
-        if axis.anchor_m != DVec3::ZERO {
-            return Err(refuse("turns beside its body's origin; put the body there"));
+    /// Checks that all joints have limits of effort.
+    fn check_efforts(&mut self, joints: &[JointModel]) {
+        let lacking = joints.iter().filter(|joint| joint.effort_n_m <= 0.0);
+        let lacking: Vec<String> = lacking.map(|joint| format!("`{}`", joint.name)).collect();
+        if !lacking.is_empty() {
+            let (model, joints) = (self.description.model.display(), lacking.join(", "));
+            self.refuse(format!(
+                "{model} has no limit of effort for {joints}: give them in [effort_n_m], or say whose joints they are like, as with like = \"g1_dex3\""
+            ));
         }
-        if axis.stiffness != 0.0 {
-            return Err(refuse("has a spring"));
+    }
+
+    /// Checks that nothing but the legs' own joints is between pelvis and feet.
+    fn check_legs(&mut self, document: &Document, tree: &BodyTree, joints: &[JointModel]) -> bool {
+        let mut wrong = Vec::new();
+        for leg in LEGS.map(|first| &joints[first..first + LEG_JOINTS]) {
+            let links: Vec<usize> = leg.iter().map(|joint| joint.link).collect();
+            let last = links.iter().copied().max().unwrap_or_default();
+            for link in std::iter::successors(Some(last), |link| tree.links[*link].parent) {
+                if link != 0 && !links.contains(&link) {
+                    let what = "is between the pelvis and a foot; only joints of the leg may be: hold it in [held_rad]";
+                    wrong.push(document.refuse_joint(tree.links[link].bodies[0].index, what));
+                }
+            }
         }
-        let of_file = match said.and_then(|said| said.effort_range_n_m) {
-            Some([low, high]) if low == -high => Some(high as f32),
-            Some(_) => return Err(refuse("is stronger one way; use a range of -x x")),
-            None => None,
-        };
-        let RobotDescription { effort_n_m, speed_limit_rad_s, rest_rad, .. } = &self.description;
-        let effort = effort_n_m.get(name).copied().or(of_file).or(like.as_ref().map(|like| like.effort_n_m));
-        let effort_n_m = effort.filter(|effort| *effort > 0.0).ok_or_else(|| {
-            refuse("has no limit of effort: give it one in [effort_n_m], or say whose joints it is like, as with like = \"g1_dex3\"")
-        })?;
-        let speed = speed_limit_rad_s.get(name).copied().or(like.as_ref().map(|like| like.speed_limit_rad_s));
-        let own_rest_rad =
-            rest_rad.get(name).copied().or(said.and_then(|said| said.rest_rad).map(|rest| rest as f32));
-        let g1_rest_rad = || alike(&self.g1).map_or(0.0, |g1| g1.rest_rad);
-        let (lower_rad, upper_rad) = (lower as f32, upper as f32);
-        let or_like = |own: f64, of: fn(&JointModel) -> f32| match &like {
-            Some(like) if own == 0.0 => of(like),
-            Some(_) | None => own as f32,
-        };
-        Ok(JointModel {
-            name: name.clone(),
-            link,
-            axis: axis.direction.as_vec3().normalize(),
-            lower_rad,
-            upper_rad,
-            armature_kg_m2: or_like(axis.armature, |like| like.armature_kg_m2),
-            friction_n_m: or_like(axis.friction_loss, |like| like.friction_n_m),
-            kp_n_m_rad: 0.0,
-            kd_n_m_s_rad: 0.0,
-            effort_n_m,
-            speed_limit_rad_s: speed.unwrap_or(f32::INFINITY),
-            rest_rad: own_rest_rad.unwrap_or_else(g1_rest_rad).clamp(lower_rad, upper_rad),
-        })
+        wrong.dedup_by_key(|error| error.to_string());
+        self.refused.extend(wrong);
+        self.refused.is_empty()
     }
 
     /// Sets gains, missing rotor inertias, and palms to those of a G1 of this weight and size.
@@ -291,29 +363,19 @@ impl Fitting {
     }
 }
 
-/// Returns the angles of the file's first key, by the file's joint names; empty without a key.
-fn rest_rad(document: &Document) -> Result<BTreeMap<String, f64>, SimError> {
-    let Some(key) = document.keys()?.into_iter().next() else { return Ok(BTreeMap::new()) };
-    let joints = document.model.bodies.iter().flat_map(|entry| &entry.body.joints);
-    let mut positions = key.positions.into_iter();
-    let mut angles_rad = BTreeMap::new();
-    for joint in joints {
-        if joint.type_ == JointType::Free {
-            positions.by_ref().take(7).for_each(drop);
-        } else if let Some(angle_rad) = positions.next() {
-            angles_rad.insert(joint.name.clone().unwrap_or_default(), angle_rad);
-        }
-    }
-    Ok(angles_rad)
+/// Returns the heaviest tree of a file, which is its robot.
+pub(super) fn main_tree<'a>(document: &Document, trees: &'a [BodyTree]) -> Result<&'a BodyTree, SimError> {
+    let mass_kg = |tree: &BodyTree| tree.links.iter().map(|link| link.mass.mass()).sum::<f32>();
+    let heaviest = trees.iter().skip(1).max_by(|a, b| mass_kg(a).total_cmp(&mass_kg(b)));
+    heaviest.ok_or_else(|| document.unsupported("it has no body; a robot is a body with all others on it"))
 }
 
-/// Returns the middle of the area that a foot stands on.
-fn sole(tree: &BodyTree, link: usize) -> Option<SiteModel> {
-    let corners_m = corners_m(&tree.links[link].geoms);
-    let low_m = corners_m.iter().copied().reduce(Vector::min)?;
-    let high_m = corners_m.iter().copied().reduce(Vector::max)?;
-    let middle_m = Vector::new(0.5 * (low_m.x + high_m.x), 0.5 * (low_m.y + high_m.y), low_m.z);
-    Some(SiteModel { link, link_from_site: Pose::from_translation(middle_m) })
+/// Returns true if the file has a joint of this arm.
+fn has_arm(document: &Document, side: Side) -> bool {
+    let names = joint_names();
+    let arm = &names[ARMS[side]..ARMS[side] + ARM_JOINTS];
+    let mut joints = document.model.bodies.iter().flat_map(|entry| &entry.body.joints);
+    joints.any(|joint| joint.name.as_ref().is_some_and(|name| arm.contains(name)))
 }
 
 /// Returns a camera with the lens of the G1's: its y axis points up, and it looks along -z.

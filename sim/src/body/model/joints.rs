@@ -4,7 +4,9 @@ use rapier3d::math::Vector;
 
 use super::JointModel;
 use crate::SimError;
-use crate::body::layout::{ARM_JOINTS, ARMS, HAND_JOINTS, HANDS, LEGS, WAIST, WAIST_JOINTS, joint_names};
+use crate::body::layout::{
+    ARM_JOINTS, ARMS, HAND_JOINTS, HANDS, LEG_JOINTS, LEGS, WAIST, WAIST_JOINTS, joint_names,
+};
 use crate::mjcf::{Actuator, ActuatorKind, AxisJoint, BodyTree, Document, LinkJoint};
 
 /// Returns the joints that the file's actuators move.
@@ -39,21 +41,40 @@ pub(super) fn in_published_order(mut found: Vec<JointModel>) -> Result<Vec<Joint
         let have = names.join(", ");
         return Err(format!("joint `{}` is none of a robot's; they are called: {have}", other.name));
     }
+    check_legs(&found, &names)?;
     let mut joints: Vec<JointModel> = Vec::with_capacity(names.len());
     for (index, name) in names.into_iter().enumerate() {
         let own = found.iter().position(|joint| joint.name == name);
-        if own.is_none() && index < WAIST {
-            return Err(format!("needs a joint `{name}`; only waist, arms and hands may lack joints"));
-        }
         let carrier = carrier(&joints, index);
         joints.push(own.map_or_else(|| JointModel::lacking(name, carrier), |own| found.swap_remove(own)));
     }
     Ok(joints)
 }
 
+/// Checks that both legs have all joints. They may both lack the ankle's roll.
+fn check_legs(found: &[JointModel], names: &[String]) -> Result<(), String> {
+    let lacks = |index: usize| found.iter().all(|joint| joint.name != names[index]);
+    let rolls = LEGS.map(|first| first + LEG_JOINTS - 1);
+    let both_lack_roll = lacks(rolls.left) && lacks(rolls.right);
+    let may_lack = |index: usize| both_lack_roll && (index == rolls.left || index == rolls.right);
+    let lacking: Vec<String> = (0..WAIST)
+        .filter(|index| lacks(*index) && !may_lack(*index))
+        .map(|index| format!("`{}`", names[index]))
+        .collect();
+    if lacking.is_empty() {
+        return Ok(());
+    }
+    let joints = if lacking.len() == 1 { "a joint" } else { "the joints" };
+    let have = "only waist, arms and hands may lack joints, and both ankles their roll";
+    Err(format!("needs {joints} {}; {have}", lacking.join(", ")))
+}
+
 /// Returns the link that carries a joint of the published order; `joints` are those before it.
 fn carrier(joints: &[JointModel], index: usize) -> usize {
-    let end = |first: usize, count: usize| joints[first + count - 1].link;
+    // The last of a group in the tree, whatever the order of its joints.
+    let end = |first: usize, count: usize| {
+        joints[first..first + count].iter().map(|joint| joint.link).max().unwrap_or_default()
+    };
     for (first, hand) in ARMS.into_iter().zip(HANDS) {
         if index == first {
             return end(WAIST, WAIST_JOINTS);

@@ -2,8 +2,11 @@
 //! self-collision pairs.
 
 mod description;
+mod draft;
+mod feet;
 mod fitted;
 mod joints;
+mod limits;
 mod read;
 mod scale;
 mod source;
@@ -14,9 +17,11 @@ use std::collections::BTreeSet;
 use rapier3d::math::{Pose, Rotation, Vector};
 use rapier3d::prelude::MassProperties;
 
-use crate::Sides;
+use crate::body::layout::{ARM_JOINTS, ARMS, LEG_JOINTS, LEGS, WAIST, WAIST_JOINTS};
 use crate::mechanism::Solid;
 use crate::mjcf::{Geom, MjcfCamera};
+use crate::{Side, Sides};
+pub use draft::RobotDraft;
 pub use scale::BodyScale;
 pub use source::RobotSource;
 
@@ -88,6 +93,8 @@ pub struct RobotModel {
     pub egocentric: MjcfCamera,
     pub egocentric_link: usize,
     pub mass_kg: f32,
+    /// Joints of each leg that the robot has, from the pelvis to the foot.
+    pub leg_chains: Sides<Vec<usize>>,
     /// Size relative to the robot for which the base controller's parameters were tuned.
     pub scale: BodyScale,
     /// Link pairs that never touch, smaller index first.
@@ -137,12 +144,32 @@ impl RobotModel {
         links.map(|(link, pose)| link.solid.reach_m(pose, direction)).fold(f32::NEG_INFINITY, f32::max)
     }
 
-    /// Returns the link with this name in the embedded robot's file: the pelvis, or the one that carries
-    /// the joint of that name.
+    /// Returns the joint at a leg's hip: pitch or roll, whichever is nearer to the foot. The thigh turns
+    /// about its origin.
+    pub fn hip(&self, side: Side) -> usize {
+        let [pitch, roll] = [LEGS[side], LEGS[side] + 1];
+        if self.joints[pitch].link > self.joints[roll].link { pitch } else { roll }
+    }
+
+    /// Returns the first link of an arm, whatever the order of its joints; the pelvis without an arm.
+    pub fn shoulder(&self, side: Side) -> usize {
+        let arm = self.joints[ARMS[side]..][..ARM_JOINTS].iter().filter(|joint| joint.exists());
+        arm.map(|joint| joint.link).min().unwrap_or_default()
+    }
+
+    /// Returns the axis about which a foot rolls if its ankle has no joint for it: along the middle of its
+    /// sole, with an origin there. No motor acts about it. `None` for an ankle that rolls.
+    pub fn sole_axis(&self, side: Side, foot: Pose) -> Option<(Vector, Vector)> {
+        let rolls = self.joints[LEGS[side] + LEG_JOINTS - 1].exists();
+        (!rolls).then(|| (foot * self.soles[side].link_from_site.translation, foot.rotation * Vector::X))
+    }
+
+    /// Returns the link with this name in the embedded robot's file: the pelvis, the trunk above the
+    /// waist, or the one that carries the joint of that name.
     pub fn published_link(&self, name: &str) -> Option<usize> {
         let joint = match name {
             "pelvis" => return Some(0),
-            "torso_link" => "waist_pitch_joint".into(),
+            "torso_link" => return self.joints[WAIST..][..WAIST_JOINTS].iter().map(|joint| joint.link).max(),
             other => other.replace("_link", "_joint"),
         };
         self.joints.iter().find(|candidate| candidate.name == joint).map(|found| found.link)

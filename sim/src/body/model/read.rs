@@ -7,7 +7,7 @@ use rapier3d::math::{Pose, Vector};
 
 use super::joints::joints_of_file;
 use super::{BodyScale, HandLinks, JointModel, LinkModel, RobotModel, SiteModel};
-use crate::body::layout::{HAND_JOINTS, HANDS, THUMB_JOINTS};
+use crate::body::layout::{HAND_JOINTS, HANDS, LEG_JOINTS, LEGS, THUMB_JOINTS};
 use crate::mechanism::Solid;
 use crate::mjcf::{BodyTree, Document, Geom, LinkJoint, MjcfCamera, pose};
 use crate::{Side, Sides, SimError};
@@ -54,6 +54,7 @@ pub(super) fn assemble(
     let (egocentric, egocentric_link) = camera(document, tree)?;
     let wrists = sites(document, tree, "wrist", "where tasks put the hand")?;
     Ok(RobotModel {
+        leg_chains: LEGS.map(|first| leg_chain(&joints, first)),
         mass_kg: links.iter().map(|link| link.mass.mass()).sum(),
         scale: BodyScale::G1,
         egocentric,
@@ -68,6 +69,13 @@ pub(super) fn assemble(
         joints,
         approximations: document.approximations().to_vec(),
     })
+}
+
+/// Returns the joints of a leg that exist, in the order of the tree; `first` is the first in published order.
+fn leg_chain(joints: &[JointModel], first: usize) -> Vec<usize> {
+    let mut chain: Vec<usize> = (first..first + LEG_JOINTS).filter(|joint| joints[*joint].exists()).collect();
+    chain.sort_by_key(|joint| joints[*joint].link);
+    chain
 }
 
 /// Returns the tree of a robot. Other content of the file would not be included when the robot is put
@@ -124,7 +132,7 @@ fn links(document: &Document, tree: &BodyTree, joints: &[JointModel]) -> Result<
 }
 
 /// Returns the camera in the head, and the link that carries it.
-fn camera(document: &Document, tree: &BodyTree) -> Result<(MjcfCamera, usize), SimError> {
+pub(super) fn camera(document: &Document, tree: &BodyTree) -> Result<(MjcfCamera, usize), SimError> {
     let camera = document.cameras.iter().find(|camera| camera.name == "egocentric");
     let needed = || document.unsupported("needs a <camera name=\"egocentric\"> in the head");
     let body = camera.and_then(|camera| tree.body(camera.body.as_deref()?));
@@ -134,7 +142,7 @@ fn camera(document: &Document, tree: &BodyTree) -> Result<(MjcfCamera, usize), S
 }
 
 /// Returns the sites `left_NAME` and `right_NAME`.
-fn sites(
+pub(super) fn sites(
     document: &Document,
     tree: &BodyTree,
     name: &str,

@@ -30,6 +30,8 @@ pub struct BodyScale {
     pub ankle_reach_m: [f32; 2],
 }
 
+/// Share of the hips' width from which feet count as spread.
+const SPREAD_SHARE: f32 = 0.1;
 /// Share of an ankle's effort available for holding the robot.
 const ANKLE_EFFORT_USED: f32 = 0.8;
 
@@ -52,7 +54,12 @@ impl BodyScale {
     pub(super) fn between(g1: &RobotModel, own: &RobotModel) -> BodyScale {
         let length_ratio = own.leg_m() / g1.leg_m();
         let [own_sole_m, g1_sole_m] = [own, g1].map(RobotModel::sole_half_extents_m);
-        let joint = |index: usize| own.joints[LEGS.left + index].effort_n_m;
+        let joint = |index: usize| {
+            let joint = &own.joints[LEGS.left + index];
+            if joint.exists() { joint.effort_n_m } else { 0.0 }
+        };
+        // A foot whose ankle does not roll stands on the middle of its sole.
+        let rolls = own.joints[LEGS.left + LEG_JOINTS - 1].exists();
         let weight_n = own.mass_kg * GRAVITY_M_S2;
         BodyScale {
             length_ratio,
@@ -61,7 +68,7 @@ impl BodyScale {
             higher_m: own.rest_height_m() - length_ratio * g1.rest_height_m(),
             hip_width_ratio: own.hip_width_m() / g1.hip_width_m(),
             sole_length_ratio: own_sole_m.x / g1_sole_m.x,
-            sole_width_ratio: own_sole_m.y / g1_sole_m.y,
+            sole_width_ratio: if rolls { own_sole_m.y / g1_sole_m.y } else { 0.0 },
             wider_sole_m: 2.0 * (own_sole_m.y - length_ratio * g1_sole_m.y),
             sole_in_foot_m: own.soles.left.link_from_site.translation * Vector::new(1.0, 0.0, 1.0),
             ankle_reach_m: [joint(4), joint(5)].map(|effort| ANKLE_EFFORT_USED * effort / weight_n),
@@ -151,14 +158,23 @@ impl RobotModel {
         poses[self.joints[LEGS.left + index].link].translation
     }
 
-    /// Returns the length of a leg from the hip's roll axis over the knee to the ankle.
+    /// Returns the length of a leg from the hip over the knee to the ankle.
     pub(super) fn leg_m(&self) -> f32 {
-        let [hip_m, knee_m, ankle_m] = [1, 3, LEG_JOINTS - 1].map(|i| self.leg_joint_m(i, &[0.0; JOINTS]));
+        let [hip_m, knee_m, ankle_m] =
+            [self.left_hip(), 3, LEG_JOINTS - 1].map(|i| self.leg_joint_m(i, &[0.0; JOINTS]));
         (knee_m - hip_m).length() + (ankle_m - knee_m).length()
     }
 
     fn hip_width_m(&self) -> f32 {
-        self.leg_joint_m(1, &[0.0; JOINTS]).y
+        let [hip_m, foot_m] =
+            [self.left_hip(), LEG_JOINTS - 1].map(|index| self.leg_joint_m(index, &[0.0; JOINTS]).y);
+        // Legs that spread below the hip stand as far apart as their feet.
+        if (foot_m - hip_m).abs() > SPREAD_SHARE * hip_m { foot_m } else { hip_m }
+    }
+
+    /// Returns the index of the hip's joint among those of the left leg.
+    pub(super) fn left_hip(&self) -> usize {
+        self.hip(Side::Left) - LEGS.left
     }
 
     /// Returns the height of the pelvis over the soles at rest.

@@ -3,6 +3,7 @@
 use rapier3d::math::{Pose, Vector};
 
 use super::RobotModel;
+use crate::Side;
 use crate::body::layout::{JOINTS, LEG_JOINTS, LEGS};
 
 /// Joints of a leg that bend it.
@@ -19,21 +20,21 @@ impl RobotModel {
         let wanted = g1.extension(&g1.rest_rad());
         let mut q_rad: [f32; JOINTS] = std::array::from_fn(|joint| self.joints[joint].rest_rad);
         LEGS.into_iter().for_each(|first| q_rad[first..first + LEG_JOINTS].fill(0.0));
-        let straight_rad = self.joints[LEGS.left + KNEE].lower_rad.max(0.0);
-        let (mut low_rad, mut high_rad) = (straight_rad, self.joints[LEGS.left + KNEE].upper_rad);
+        let [least_rad, most_rad] = self.knee_range_rad();
+        let (mut low_rad, mut high_rad) = (least_rad.max(0.0), most_rad);
         for _ in 0..HALVINGS {
             let middle_rad = 0.5 * (low_rad + high_rad);
-            set(&mut q_rad, KNEE, middle_rad);
+            self.bend(&mut q_rad, KNEE, middle_rad);
             if self.extension(&q_rad) > wanted { low_rad = middle_rad } else { high_rad = middle_rad }
         }
-        set(&mut q_rad, HIP, -0.5 * low_rad);
-        set(&mut q_rad, ANKLE, -0.5 * low_rad);
+        self.bend(&mut q_rad, HIP, -0.5 * low_rad);
+        self.bend(&mut q_rad, ANKLE, -0.5 * low_rad);
         // Newton's method, with finite differences for derivatives.
         for _ in 0..NEWTON_STEPS {
             let off = self.off_balance(&q_rad);
             let [by_hip, by_ankle] = [HIP, ANKLE].map(|index| {
                 let mut turned_rad = q_rad;
-                set(&mut turned_rad, index, q_rad[LEGS.left + index] + STEP_RAD);
+                self.bend(&mut turned_rad, index, self.bent_rad(&q_rad, index) + STEP_RAD);
                 (self.off_balance(&turned_rad) - off) / STEP_RAD
             });
             let determinant = by_hip.x * by_ankle.y - by_hip.y * by_ankle.x;
@@ -43,8 +44,8 @@ impl RobotModel {
             let hip_rad = (by_ankle.x * off.y - by_ankle.y * off.x) / determinant;
             let ankle_rad = (by_hip.y * off.x - by_hip.x * off.y) / determinant;
             for (index, change_rad) in [(HIP, hip_rad), (ANKLE, ankle_rad)] {
-                let angle_rad = q_rad[LEGS.left + index] + change_rad;
-                set(&mut q_rad, index, angle_rad);
+                let angle_rad = self.bent_rad(&q_rad, index) + change_rad;
+                self.bend(&mut q_rad, index, angle_rad);
             }
         }
         for first in LEGS {
@@ -58,9 +59,39 @@ impl RobotModel {
         }
     }
 
+    /// Returns the range of the left knee, bending backwards.
+    pub(super) fn knee_range_rad(&self) -> [f32; 2] {
+        let knee = &self.joints[LEGS.left + KNEE];
+        match self.bends_positively(Side::Left, KNEE) {
+            true => [knee.lower_rad, knee.upper_rad],
+            false => [-knee.upper_rad, -knee.lower_rad],
+        }
+    }
+
+    /// Sets a joint of both legs so that it is turned about the lateral axis, which points left.
+    fn bend(&self, q_rad: &mut [f32; JOINTS], index: usize, angle_rad: f32) {
+        for side in Side::BOTH {
+            let positive = self.bends_positively(side, index);
+            q_rad[LEGS[side] + index] = if positive { angle_rad } else { -angle_rad };
+        }
+    }
+
+    /// Returns the angle of the left leg's joint about the lateral axis.
+    fn bent_rad(&self, q_rad: &[f32; JOINTS], index: usize) -> f32 {
+        let angle_rad = q_rad[LEGS.left + index];
+        if self.bends_positively(Side::Left, index) { angle_rad } else { -angle_rad }
+    }
+
+    /// Returns true if the axis of a leg's joint points left with all joints at 0.
+    fn bends_positively(&self, side: Side, index: usize) -> bool {
+        let joint = &self.joints[LEGS[side] + index];
+        let poses = self.forward_kinematics(Pose::IDENTITY, &[0.0; JOINTS]);
+        (poses[joint.link].rotation * joint.axis).y >= 0.0
+    }
+
     /// Returns the extension of the left leg: distance from hip to ankle, as a share of its length.
     fn extension(&self, q_rad: &[f32]) -> f32 {
-        let [hip_m, ankle_m] = [1, LEG_JOINTS - 1].map(|index| self.leg_joint_m(index, q_rad));
+        let [hip_m, ankle_m] = [self.left_hip(), LEG_JOINTS - 1].map(|index| self.leg_joint_m(index, q_rad));
         (ankle_m - hip_m).length() / self.leg_m()
     }
 
@@ -75,8 +106,4 @@ impl RobotModel {
         let ahead = sole.rotation * Vector::X;
         Vector::new(com_m.x - sole.translation.x, (-ahead.z).atan2(ahead.x), 0.0)
     }
-}
-
-fn set(q_rad: &mut [f32; JOINTS], index: usize, angle_rad: f32) {
-    LEGS.into_iter().for_each(|first| q_rad[first + index] = angle_rad);
 }

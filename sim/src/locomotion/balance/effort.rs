@@ -239,13 +239,16 @@ pub(super) fn ground_force_n(
     })
 }
 
-/// Returns the Jacobian of an ankle roll link: linear over angular velocity per joint velocity of its leg.
+/// Returns the Jacobian of a foot: linear over angular velocity per joint velocity of its leg. Without an
+/// ankle's roll, the last column is that of rolling on the sole.
 fn foot_jacobian(body: &BodyEstimate, side: Side) -> SMatrix<f32, 6, 6> {
     let first = LEGS[side];
     let foot_m = body.world_from_foot(side).translation;
     let mut jacobian = SMatrix::<f32, 6, 6>::zeros();
+    let on_sole = body.model.sole_axis(side, body.world_from_foot(side));
     for i in 0..LEG_JOINTS {
-        let (origin, axis) = body.joint_axis(first + i);
+        let own = || body.joint_axis(first + i);
+        let (origin, axis) = on_sole.filter(|_| i + 1 == LEG_JOINTS).unwrap_or_else(own);
         let linear = axis.cross(foot_m - origin);
         jacobian.set_column(i, &SVector::from([linear.x, linear.y, linear.z, axis.x, axis.y, axis.z]));
     }
@@ -257,7 +260,7 @@ fn foot_jacobian(body: &BodyEstimate, side: Side) -> SMatrix<f32, 6, 6> {
 fn move_feet(body: &BodyEstimate, motion: &WantedMotion, effort: &Effort, qdd_rad_s2: &mut [f32; JOINTS]) {
     for side in Side::BOTH {
         let first = LEGS[side];
-        let foot = body.model.joints[first + 5].link;
+        let foot = body.model.soles[side].link;
         let jacobian = foot_jacobian(body, side);
         let (wanted, now) = (motion.feet[side], effort.links[foot]);
         let linear = wanted.linear_m_s2 - now.linear_m_s2;

@@ -11,6 +11,7 @@ pub(super) type LegAngles = [f32; LEG_JOINTS];
 /// Maximum change of a joint in one iteration, within which the linearisation holds.
 const MAX_STEP_RAD: f32 = 0.3;
 const DAMPING: f32 = 1e-5;
+const ANKLE_ROLL: usize = LEG_JOINTS - 1;
 
 /// Returns the rotation vector (axis times angle, shortest way) of a rotation.
 pub(super) fn rotation_vector_rad(rotation: Rotation) -> Vector {
@@ -20,7 +21,8 @@ pub(super) fn rotation_vector_rad(rotation: Rotation) -> Vector {
     if length < 1e-6 { sine * 2.0 } else { sine * (2.0 * length.atan2(q.w) / length) }
 }
 
-/// Returns joint origins, joint axes and foot pose for a pelvis pose and leg angles.
+/// Returns joint origins, joint axes and foot pose for a pelvis pose and leg angles. Without
+/// an ankle's roll, the last are those of its sole.
 fn forward(
     model: &RobotModel,
     side: Side,
@@ -30,17 +32,20 @@ fn forward(
     let mut frame = pelvis;
     let mut origins = [Vector::ZERO; LEG_JOINTS];
     let mut axes = [Vector::ZERO; LEG_JOINTS];
-    for i in 0..LEG_JOINTS {
-        let joint = &model.joints[LEGS[side] + i];
+    for index in &model.leg_chains[side] {
+        let (i, joint) = (index - LEGS[side], &model.joints[*index]);
         frame *= model.links[joint.link].parent_from_link;
         origins[i] = frame.translation;
         axes[i] = frame.rotation * joint.axis;
         frame *= Pose::from_rotation(Rotation::from_axis_angle(joint.axis, q_rad[i]));
     }
+    if let Some((origin, axis)) = model.sole_axis(side, frame) {
+        (origins[ANKLE_ROLL], axes[ANKLE_ROLL]) = (origin, axis);
+    }
     (origins, axes, frame)
 }
 
-/// Returns the leg angles that put the ankle roll link at `foot` (world) for a pelvis at `pelvis`
+/// Returns the leg angles that put the foot's link at `foot` (world) for a pelvis at `pelvis`
 /// (world), starting from `start_rad`:  (J^T J + damping I) dq = J^T e, with e = [position error m;
 /// rotation error rad].
 pub(super) fn inverse(

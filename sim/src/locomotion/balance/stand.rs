@@ -287,7 +287,7 @@ impl Stand {
         let leg_m = body.model.scale.length_m(LEG_M);
         let pelvis_m = body.world_from_pelvis().translation;
         let height_m = |side: Side| {
-            let hip_m = body.joint_axis(LEGS[side] + 1).0 - pelvis_m;
+            let hip_m = body.joint_axis(body.model.hip(side)).0 - pelvis_m;
             let foot_m = self.feet[side].translation;
             let away_m = flat(position_m + hip_m - foot_m).length().min(0.8 * leg_m);
             foot_m.z - hip_m.z + (leg_m * leg_m - away_m * away_m).sqrt()

@@ -270,7 +270,7 @@ impl Stepping {
         let pelvis_m = body.world_from_pelvis().translation;
         let remaining_s = scale.time_s((PERIOD_S - self.time_s).max(0.0));
         let height_m = |side: Side| {
-            let (hip_m, _) = body.joint_axis(LEGS[side] + 1);
+            let (hip_m, _) = body.joint_axis(body.model.hip(side));
             let now_m = flat(body.world_from_foot(side).translation - hip_m).length();
             let landing_m = if side == self.stance || self.shifting_s.is_some() {
                 0.0

@@ -30,7 +30,8 @@ pub(in crate::mjcf) struct BodyBytes {
     pub geoms: Vec<usize>,
 }
 
-pub(in crate::mjcf) fn check(source: &MjcfText) -> Result<Checked, SimError> {
+/// Checks a file. Refused elements with a name in `left_out` are only noted.
+pub(in crate::mjcf) fn check(source: &MjcfText, left_out: &[&str]) -> Result<Checked, SimError> {
     let xml = source.xml()?;
     check_depth(source, &xml)?;
     let root = xml.root_element();
@@ -44,6 +45,7 @@ pub(in crate::mjcf) fn check(source: &MjcfText) -> Result<Checked, SimError> {
         source,
         names: BTreeMap::new(),
         classes: BTreeSet::from(["main".into()]),
+        left_out,
         approximated: BTreeSet::new(),
         refused: Vec::new(),
         found: Checked { bodies: vec![BodyBytes::default()], ..Checked::default() },
@@ -85,6 +87,7 @@ struct Check<'a> {
     /// The names in use, by kind of element.
     names: BTreeMap<&'static str, BTreeSet<String>>,
     classes: BTreeSet<String>,
+    left_out: &'a [&'a str],
     /// Elements and attributes that have been reported.
     approximated: BTreeSet<(String, String)>,
     /// Reasons for which the file is refused.
@@ -152,6 +155,9 @@ impl Check<'_> {
             };
             match element.support {
                 Support::Ignored => {}
+                Support::Refused if self.left_out.contains(&name) => {
+                    self.approximate(&child, name, "", "it is left out");
+                }
                 Support::Refused => self.refuse(&child, format!("<{name}> is not read; {}", element.note)),
                 // The approximation does not depend on the content.
                 Support::Approximated => self.approximate(&child, name, "", element.note),

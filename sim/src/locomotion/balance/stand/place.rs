@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::ground::middle_m;
 use super::super::load::Load;
-use crate::body::{BodyEstimate, BodyScale, LEG_JOINTS, LEGS};
+use crate::body::{BodyEstimate, BodyScale};
 use crate::locomotion::BaseVelocity;
 use crate::plane::flat;
 
@@ -180,8 +180,8 @@ impl StandingPlace {
 /// heading frame.
 fn legs_m(body: &BodyEstimate, heading_rad: f32) -> Vector {
     let pelvis_m = body.world_from_pelvis().translation;
-    let links = LEGS.into_iter().flat_map(|first| &body.model.joints[first..first + LEG_JOINTS]);
-    let moment_kg_m: Vector = links
+    let joints = body.model.leg_chains.iter().flatten().map(|joint| &body.model.joints[*joint]);
+    let moment_kg_m: Vector = joints
         .map(|joint| {
             let mass = &body.model.links[joint.link].mass;
             (body.world_from_link[joint.link] * mass.local_com - pelvis_m) * mass.mass()
@@ -200,8 +200,8 @@ mod tests {
     use super::super::super::load::LadenRobot;
     use super::super::super::observer::ObservedPush;
     use super::*;
-    use crate::body::ARMS;
     use crate::body::posed::Posed;
+    use crate::body::{ARMS, LEGS};
 
     const DT_S: f32 = 1.0 / 200.0;
 

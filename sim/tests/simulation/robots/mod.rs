@@ -1,5 +1,7 @@
 //! Robots of files: those that lack joints, and those that a description builds from third-party MJCF.
 
+mod described;
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
