@@ -6,13 +6,12 @@
 
 mod assets;
 mod bodies;
-mod equality;
+mod constraints;
 mod frames;
 mod geometry;
 mod joints;
 mod key;
 mod lights;
-mod pairs;
 mod robot_file;
 mod scene_bodies;
 mod spring_dampers;
@@ -27,13 +26,12 @@ pub use assets::looks::SurfacePattern;
 pub use assets::surface::{SurfaceImage, TextureMapping};
 pub use assets::texture::{Texture, TextureLevel};
 pub use bodies::{BodyLink, BodyTree, PlacedBody};
-pub use equality::{EqualityConstraint, EqualityKind};
+pub use constraints::{EqualityConstraint, EqualityKind, GeomPair};
 pub use frames::{MjcfCamera, Site};
 pub use geometry::{Geom, Primitive};
 pub use joints::{Actuator, ActuatorKind, AxisJoint, LinkJoint};
 pub use key::Key;
 pub use lights::{FileLight, FileLights, Headlight, LightKind, MAX_LIGHTS};
-pub use pairs::GeomPair;
 pub use scene_bodies::SceneBody;
 
 use std::collections::BTreeMap;

@@ -20,7 +20,7 @@ const GENERALISED: [&str; 7] = [
     "sim/src/dynamics/",
     "sim/src/estimate/covariance.rs",
     "sim/src/mechanism/machinery.rs",
-    "sim/src/mjcf/equality.rs",
+    "sim/src/mjcf/constraints/equality.rs",
     "sim/src/mjcf/joints.rs",
     "sim/src/mjcf/key.rs",
     "sim/src/mjcf/support/",

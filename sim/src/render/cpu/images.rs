@@ -2,7 +2,8 @@
 
 use rapier3d::math::Vector;
 
-use super::shade::{Facet, Rays, gloss_lanes};
+use super::rays::Rays;
+use super::shade::{Facet, gloss_lanes};
 use crate::render::shading::SAMPLES;
 use crate::render::shading::image::{Image, ImagePlace, bent_normal};
 use crate::render::shading::lanes::{Lanes, axes, lanes};

@@ -6,6 +6,7 @@ pub mod contact;
 mod images;
 mod lamps;
 mod raster;
+mod rays;
 mod shade;
 mod shadow;
 mod target;
@@ -29,7 +30,8 @@ use crate::render::{Camera, Frame, Part, PlacedScenery, Renderer, Scenery, Wante
 use baked::place_cubes;
 use contact::ContactMap;
 use lamps::LitLamps;
-use shade::{Facet, Rays};
+use rays::Rays;
+use shade::Facet;
 use shadow::ShadowMap;
 use target::RenderTarget;
 use veil::Veils;

@@ -5,13 +5,14 @@ use rapier3d::math::{Matrix, Pose, Vector};
 
 use super::baked::StripLight;
 use super::contact::ContactMap;
+use super::rays::Rays;
 use super::shadow::ShadowMap;
 use crate::mjcf::Gloss;
 use crate::render::scene::prepared::{Prepared, Sheet};
 use crate::render::shading::image::Image;
 use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
 use crate::render::shading::{CONTACT, HIGHLIGHT, LAMP, SAMPLES, opacity};
-use crate::render::{Camera, Carrier, Light, Pattern, PlacedScenery};
+use crate::render::{Carrier, Light, Pattern, PlacedScenery};
 
 /// Number of points that are shaded together: enough to amortise a loop, few enough to fit the cache.
 /// Another number changes the last bits of images, since a strip ends where a batch does.
@@ -32,17 +33,6 @@ pub(super) struct Facet {
     pub pattern_from_world: Affine,
     /// True if it belongs to the room, and is darkened by things on it.
     pub carries: bool,
-}
-
-/// Origin and directions of the rays of an image's samples in the world, to a depth of 1 m.
-pub(super) struct Rays {
-    eye_m: Vector,
-    /// The ray through the first sample, and the steps from one to the next.
-    first_ray: Vector,
-    pub right_ray: Vector,
-    pub down_ray: Vector,
-    /// Direction from what the camera looks at to the camera.
-    pub back_direction: Vector,
 }
 
 /// Adjacent pixels that show one sheet.
@@ -190,34 +180,6 @@ fn place_part(facets: &mut [Facet], sheets: &[Sheet], prepared: &Prepared, numbe
         if let Some(uv) = sheet.uv {
             facet.pattern_from_world = uv.affine().after(pose.inverse());
         }
-    }
-}
-
-impl Rays {
-    pub(super) fn new(camera: &Camera) -> Rays {
-        let rotation = camera.world_from_camera.rotation;
-        let sample = 1.0 / (camera.focal_px() * SAMPLES as f32);
-        let (right, down) = (rotation * Vector::X * sample, rotation * Vector::NEG_Y * sample);
-        Rays {
-            eye_m: camera.world_from_camera.translation,
-            first_ray: rotation * camera.unproject([0.0, 0.0], 1.0) + (right + down) * 0.5,
-            right_ray: right,
-            down_ray: down,
-            back_direction: rotation * Vector::Z,
-        }
-    }
-
-    /// Returns the ray of a sample, and the steps to the next pixels to the right and down.
-    #[inline(always)]
-    pub(super) fn sample(&self, [x, y]: [usize; 2]) -> (Vector, [Vector; 2]) {
-        let ray = self.first_ray + self.right_ray * x as f32 + self.down_ray * y as f32;
-        (ray, [self.right_ray * SAMPLES as f32, self.down_ray * SAMPLES as f32])
-    }
-
-    /// Returns the point that is seen at the centre of a pixel.
-    pub(super) fn point_m(&self, [x, y]: [usize; 2], nearness_1_m: f32) -> Vector {
-        let (ray, _) = self.sample([x * SAMPLES, y * SAMPLES]);
-        self.eye_m + (ray + (self.right_ray + self.down_ray) * 0.5) / nearness_1_m
     }
 }
 

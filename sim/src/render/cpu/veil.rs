@@ -2,7 +2,8 @@
 
 use pulp::Simd;
 
-use super::shade::{Facet, Rays};
+use super::rays::Rays;
+use super::shade::Facet;
 use super::target::{RenderTarget, draw_veils};
 use crate::render::scene::prepared::Prepared;
 use crate::render::shading::{MIN_SEEN_ALPHA, VEILS};

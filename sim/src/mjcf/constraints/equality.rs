@@ -3,8 +3,8 @@
 use mjcf_rs::equality::Equality as Element;
 use rapier3d::glamx::{DPose3, DVec3};
 
-use super::Document;
 use crate::SimError;
+use crate::mjcf::Document;
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct EqualityConstraint {

@@ -1,10 +1,10 @@
 //! Pairs of geoms that touch whatever their masks say.
 
-use super::text::settings::FileSettings;
-use super::text::source::MjcfText;
-use super::text::stated::Classes;
 use crate::SimError;
 use crate::dynamics::{Directions, Friction};
+use crate::mjcf::text::settings::FileSettings;
+use crate::mjcf::text::source::MjcfText;
+use crate::mjcf::text::stated::Classes;
 
 /// A `<pair>` of a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +19,10 @@ const FRICTION: [f64; 5] = [1.0, 1.0, 0.005, 0.0001, 0.0001];
 
 impl GeomPair {
     /// Reads the pairs of a file; none if the file disables contacts.
-    pub(super) fn all(source: &MjcfText, settings: &FileSettings) -> Result<Vec<GeomPair>, SimError> {
+    pub(in crate::mjcf) fn all(
+        source: &MjcfText,
+        settings: &FileSettings,
+    ) -> Result<Vec<GeomPair>, SimError> {
         if !settings.touches {
             return Ok(Vec::new());
         }
@@ -64,7 +67,7 @@ impl GeomPair {
     }
 
     /// Returns true if the geom of this name is one of the two.
-    pub(super) fn has(&self, geom: &str) -> bool {
+    pub(in crate::mjcf) fn has(&self, geom: &str) -> bool {
         self.geoms.iter().any(|name| name == geom)
     }
 }
