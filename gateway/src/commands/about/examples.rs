@@ -17,7 +17,7 @@ macro_rules! examples {
 }
 
 /// Every example, by its path in the folder, with its text.
-const EXAMPLES: [(&str, &str); 34] = examples! {
+const EXAMPLES: [(&str, &str); 36] = examples! {
     "agents/agent.py"
     "agents/claude.sh"
     "agents/codex.sh"
@@ -29,11 +29,13 @@ const EXAMPLES: [(&str, &str); 34] = examples! {
     "environments/rollouts.py"
     "replicas/haproxy.cfg"
     "replicas/kubernetes.yaml"
+    "robots/apptronik_apollo.toml"
     "robots/booster_t1.toml"
     "robots/fourier_gr1.toml"
     "robots/g1_rubber_hands.toml"
     "robots/unitree_g1.toml"
     "robots/unitree_g1_dex3.toml"
+    "robots/unitree_h1.toml"
     "robots/unitree_h1_2.toml"
     "robots/walker.toml"
     "robots/walker.xml"
