@@ -119,11 +119,7 @@ fn points_of_a_distorted_image_are_right_and_holes_have_none() {
             camera.fy * (y * outwards + p1 * (rr + 2.0 * y * y) + 2.0 * p2 * x * y) + camera.cy,
         ]
     };
-    let pelvis_from_camera =
-        nalgebra::Isometry3::from_parts(nalgebra::Translation3::from(camera.camera_in_pelvis.position_m), {
-            let [w, i, j, k] = camera.camera_in_pelvis.quaternion_wxyz;
-            nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, i, j, k))
-        });
+    let pelvis_from_camera = isometry(&camera.camera_in_pelvis);
     let mut straight_off_px = 0.0f64;
     let (mut depths_m, mut pixels) = (Vec::new(), Vec::new());
     for row in &measured {
