@@ -25,7 +25,7 @@ fn a_header_names_commands_machines_and_settings() {
     };
     report.header.made = Some(origin);
     let write = |format| report.write(format, &ReportPictures::default()).unwrap();
-    let settings = "| agent | handover | 0-9 | benchmark | paper | balance | auto | estimator | ideal | \
+    let settings = "| agent | handover | 0-9 | benchmark | paper | balance | auto | ideal | estimator | ideal | \
                     0.1.0+test | 2026-11-28 | 10 |";
     let text = write(ReportFormat::Markdown);
     for part in [
