@@ -145,7 +145,13 @@ fn a_step_says_what_was_done_and_comes_back_from_its_bytes() {
     let executed: Vec<RobotCommand> = step.robots.iter().map(|robot| robot.command).collect();
     assert_eq!(executed, commands);
     let bytes = postcard::to_stdvec(&step).expect("a step is plain");
-    assert_eq!(postcard::from_bytes::<Step>(&bytes).expect("it was just written"), step);
+    assert_eq!(postcard::from_bytes::<Step>(&bytes).expect("it was just written"), alone(step));
+}
+
+/// Returns a step without the poses of the step before, which neither its bytes nor snapshots have.
+fn alone(mut step: Step) -> Step {
+    step.robots.iter_mut().for_each(|robot| robot.truth.world_from_camera_before = None);
+    step
 }
 
 #[test]
@@ -206,7 +212,7 @@ fn a_restored_world_continues_bit_for_bit() {
 
     let mut continued = world();
     continued.restore(&snapshot).expect("the same binary reads it");
-    assert_eq!(continued.present(), saved);
+    assert_eq!(continued.present(), alone(saved));
     run(&mut continued, &rest, 60);
     assert_eq!(continued.state_hash(), original.state_hash());
 }

@@ -47,7 +47,7 @@ pub(super) fn place_cubes(
 
 impl Surfaces {
     /// Sets the baked light of the first `count` points of a block that have places and normals. On maps it is
-    /// looked up at the first and the last one: texels are much wider than pixels.
+    /// looked up at the first, the last and one between: texels are much wider than pixels.
     #[inline(always)]
     pub(super) fn set_baked<const N: usize>(
         &mut self,
@@ -59,16 +59,21 @@ impl Surfaces {
         let lit = match light {
             StripLight::Plain => return,
             StripLight::Map(map, texels) => {
-                let last = count.min(N) - 1;
+                let (last, half) = (count.min(N) - 1, (count.min(N) - 1).min(N / 2));
                 let light = |i: usize| map_light(map, texels, map.place([x_m[i], y_m[i], z_m[i]]));
                 let first = light(0);
-                let other = if last == 0 { first } else { light(last) };
-                let per_step = 1.0 / last.max(1) as f32;
+                let middle = if half == 0 { first } else { light(half) };
+                let other = if last == half { middle } else { light(last) };
+                let [per_first, per_second] = [half, last - half].map(|steps| 1.0 / steps.max(1) as f32);
                 channels(
                     #[inline(always)]
                     |channel| {
-                        let step = (other[channel] - first[channel]) * per_step;
-                        lanes(|i| first[channel] + step * i as f32)
+                        let [from, over, to] = [first[channel], middle[channel], other[channel]];
+                        let [early, late] = [(over - from) * per_first, (to - over) * per_second];
+                        lanes(|i| match i.checked_sub(half) {
+                            None => from + early * i as f32,
+                            Some(beyond) => over + late * beyond as f32,
+                        })
                     },
                 )
             }
