@@ -117,7 +117,7 @@ pub fn cpu(scenery: Scenery) -> Box<dyn Renderer> {
 
 /// Creates the path tracer. It draws on all processor cores, and colours alone on the calling thread.
 pub fn path(scenery: Scenery) -> Box<dyn Renderer> {
-    Box::new(path::PathRenderer::new(scenery))
+    Box::new(path::PathRenderer::new(baked::lit(scenery)))
 }
 
 /// Error of encoding an image.

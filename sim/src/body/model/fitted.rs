@@ -2,6 +2,7 @@
 //! of the MJCF. Gains are the G1's, scaled to this robot's weight and size, whatever its actuators
 //! specify: the base controller relies on them.
 
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -102,7 +103,9 @@ impl Fitting {
     /// Checks that the ranges of the description are ranges.
     fn check_ranges(&mut self) {
         let ranges = self.description.range_rad.clone();
-        for (joint, [low_rad, high_rad]) in ranges.iter().filter(|(_, [low, high])| !(low < high)) {
+        for (joint, [low_rad, high_rad]) in
+            ranges.iter().filter(|(_, [low, high])| low.partial_cmp(high) != Some(Ordering::Less))
+        {
             self.refuse(format!("[range_rad] has {joint} = [{low_rad}, {high_rad}]; the lower end is first"));
         }
     }

@@ -5,11 +5,12 @@ use std::collections::HashMap;
 use rapier3d::math::{Pose, Vector};
 
 use super::maps::FlatSheet;
-use super::probes::Probes;
-use super::{BakedLight, LightCube, LightMap, LightTexel, SheetLight, cube_light};
-use crate::render::path::irradiance::{Irradiance, SurfacePoint, irradiance};
+use crate::render::path::irradiance::{Irradiance, irradiance};
 use crate::render::path::toned_rgb;
 use crate::render::scene::prepared::Prepared;
+use crate::render::shading::baked::{
+    BakedLight, LightCube, LightMap, LightTexel, Probes, SheetLight, SurfacePoint, cube_light,
+};
 use crate::render::{Carrier, Light, Scenery};
 
 /// Most texels of all maps; those of larger rooms are wider.
@@ -32,16 +33,16 @@ pub(super) fn bake(room: &Scenery, [low_m, high_m]: [Vector; 2]) -> BakedLight {
     let prepared = Prepared::new(room.clone());
     let flat: Vec<Option<FlatSheet>> = sheets(&prepared, box_m);
     let count = |scale: f32| flat.iter().flatten().map(|sheet| texels(&sheet.map(0, scale))).sum::<f32>();
-    let mut texel_scale = 1.0;
-    while count(texel_scale) > MAX_TEXELS && texel_scale < 8.0 {
-        texel_scale *= 1.1;
+    let mut texel_factor = 1.0;
+    while count(texel_factor) > MAX_TEXELS && texel_factor < 8.0 {
+        texel_factor *= 1.1;
     }
     let (mut maps, mut points): (Vec<LightMap>, Vec<SurfacePoint>) = (Vec::new(), Vec::new());
     let sheet_map: Vec<Option<u32>> = flat
         .iter()
         .map(|sheet| {
             let sheet = sheet.as_ref()?;
-            let map = sheet.map(points.len() as u32, texel_scale);
+            let map = sheet.map(points.len() as u32, texel_factor);
             points.extend(sheet.points(&map));
             maps.push(map);
             Some(maps.len() as u32 - 1)
@@ -51,7 +52,7 @@ pub(super) fn bake(room: &Scenery, [low_m, high_m]: [Vector; 2]) -> BakedLight {
     let mut probes = Probes::over([low_m, high_m]);
     points.extend(probes.points());
     let found = irradiance(room.clone(), &points);
-    let exposed = Exposure::of(&PlainLight(room.light), &points[..mapped], &found[..mapped]);
+    let exposed = RoomExposure::of(&PlainLight(room.light), &points[..mapped], &found[..mapped]);
     let texel = |light: &Irradiance| (!light.is_inside).then(|| exposed.texel(light));
     let mut texels: Vec<Option<LightTexel>> = found[..mapped].iter().map(texel).collect();
     maps.iter().for_each(|map| finish(map, &mut texels));
@@ -162,15 +163,15 @@ fn finish(map: &LightMap, texels: &mut [Option<LightTexel>]) {
 }
 
 /// From light to values of images: rooms are about as bright as without baked light.
-struct Exposure {
+struct RoomExposure {
     factor: f32,
 }
 
-impl Exposure {
-    fn of(plain: &PlainLight, points: &[SurfacePoint], found: &[Irradiance]) -> Exposure {
+impl RoomExposure {
+    fn of(plain: &PlainLight, points: &[SurfacePoint], found: &[Irradiance]) -> RoomExposure {
         let lit = || points.iter().zip(found).filter(|(_, light)| !light.is_inside);
         let wanted: f32 = lit().map(|(point, _)| plain.on(point.normal).element_sum()).sum();
-        let mut exposure = Exposure { factor: 1.0 };
+        let mut exposure = RoomExposure { factor: 1.0 };
         for _ in 0..CORRECTIONS {
             let drawn: f32 = lit().map(|(_, light)| exposure.rgb(light).element_sum()).sum();
             if drawn > 0.0 {

@@ -8,9 +8,9 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use rapier3d::math::{Pose, Vector};
 use xxhash_rust::xxh3::Xxh3Default;
 
-use super::BakedLight;
 use super::bake::bake;
 use crate::render::path::walls_m;
+use crate::render::shading::baked::BakedLight;
 use crate::render::{Part, Pattern, Scenery};
 
 /// Version of the method: another one gives other light.
@@ -21,55 +21,46 @@ const MAX_FILES: usize = 100;
 /// Most texels of an image that are compared.
 const MAX_HASHED_TEXELS: usize = 4096;
 
-/// The light of a room, computed when a renderer first asks for it.
-#[derive(Clone, Debug)]
-pub struct RoomLight {
+/// The light of a room, once it is known.
+#[derive(Clone)]
+struct KeptLight {
     /// Hash of everything that the light depends on.
     key: u64,
-    kept: Arc<OnceLock<Arc<BakedLight>>>,
-    room: Arc<Scenery>,
-    walls_m: [Vector; 2],
+    light: Arc<OnceLock<Arc<BakedLight>>>,
 }
 
-impl PartialEq for RoomLight {
-    fn eq(&self, other: &RoomLight) -> bool {
-        self.key == other.key
-    }
+/// Returns the light of a room without anything in it; `None` in the open, which has a sun. The first call
+/// computes it, or reads it from disk.
+pub(super) fn light_of(room: &Arc<Scenery>) -> Option<Arc<BakedLight>> {
+    let walls_m = walls_m(room)?;
+    let KeptLight { key, light } = kept(key(room));
+    let find = || {
+        let path = folder().map(|folder| folder.join(format!("{key:016x}.light")));
+        if let Some(light) = path.as_deref().and_then(read) {
+            return Arc::new(light);
+        }
+        let light = bake(room, walls_m);
+        if let Some(path) = path {
+            write(&path, &light);
+        }
+        Arc::new(light)
+    };
+    Some(light.get_or_init(find).clone())
 }
 
-impl RoomLight {
-    /// Returns the light of a room without anything in it; `None` in the open, which has a sun.
-    pub fn of(room: Scenery) -> Option<RoomLight> {
-        static KEPT: Mutex<Vec<RoomLight>> = Mutex::new(Vec::new());
-        let walls_m = walls_m(&room)?;
-        let key = key(&room);
-        let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = kept.iter().find(|known| known.key == key) {
-            return Some(known.clone());
-        }
-        let light = RoomLight { key, kept: Arc::default(), room: Arc::new(room), walls_m };
-        if kept.len() == MAX_ROOMS {
-            kept.remove(0);
-        }
-        kept.push(light.clone());
-        Some(light)
+/// Returns the place for the light of a room with a key.
+fn kept(key: u64) -> KeptLight {
+    static KEPT: Mutex<Vec<KeptLight>> = Mutex::new(Vec::new());
+    let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = kept.iter().find(|known| known.key == key) {
+        return known.clone();
     }
-
-    /// Returns the light. The first call computes it, or reads it from disk.
-    pub fn get(&self) -> Arc<BakedLight> {
-        let find = || {
-            let path = folder().map(|folder| folder.join(format!("{:016x}.light", self.key)));
-            if let Some(light) = path.as_deref().and_then(read) {
-                return Arc::new(light);
-            }
-            let light = bake(&self.room, self.walls_m);
-            if let Some(path) = path {
-                write(&path, &light);
-            }
-            Arc::new(light)
-        };
-        self.kept.get_or_init(find).clone()
+    let light = KeptLight { key, light: Arc::default() };
+    if kept.len() == MAX_ROOMS {
+        kept.remove(0);
     }
+    kept.push(light.clone());
+    light
 }
 
 /// Returns the folder of the files: in the user's cache, where there is one.
@@ -144,6 +135,6 @@ fn hash_part(part: &Part, hasher: &mut Xxh3Default) {
     }
 }
 
-fn hash_vector(vector: Vector, hasher: &mut Xxh3Default) {
-    vector.to_array().map(f32::to_bits).hash(hasher);
+fn hash_vector(values: Vector, hasher: &mut Xxh3Default) {
+    values.to_array().map(f32::to_bits).hash(hasher);
 }

@@ -1,9 +1,7 @@
 //! Light maps: rectangles of texels around the flat sheets of a room.
 
+use crate::render::shading::baked::{LightMap, SurfacePoint};
 use rapier3d::math::{Pose, Vector};
-use serde::{Deserialize, Serialize};
-
-use crate::render::path::irradiance::SurfacePoint;
 
 /// Side of a texel, and the most texels along a side of a map.
 const TEXEL_M: f32 = 0.08;
@@ -11,24 +9,11 @@ const MAX_SIDE: f32 = 160.0;
 /// Distance from a plane within which triangles are flat.
 const FLAT_M: f32 = 1e-3;
 
-/// A map's place among all texels.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct LightMap {
-    /// Map from the world to column and row: each is a scalar product plus a constant. The middle of the first
-    /// texel is 0.
-    pub axes: [[f32; 4]; 2],
-    /// Number of the first texel.
-    pub first: u32,
-    /// Number of texels along each side, at least 2.
-    pub width: u32,
-    pub height: u32,
-}
-
 /// A flat sheet in the world.
 pub(super) struct FlatSheet {
     normal: Vector,
     /// Directions along the sides of a rectangle around the sheet, its corner and its sides.
-    along: [Vector; 2],
+    sides_direction: [Vector; 2],
     corner_m: Vector,
     sides_m: [f32; 2],
 }
@@ -66,19 +51,19 @@ impl FlatSheet {
         let height_m = normal.dot(world_from_mesh * points_m[0]);
         let corner_m = normal * height_m + along[0] * low_m[0] + along[1] * low_m[1];
         let sides_m = [high_m[0] - low_m[0], high_m[1] - low_m[1]];
-        Some(FlatSheet { normal, along, corner_m, sides_m })
+        Some(FlatSheet { normal, sides_direction: along, corner_m, sides_m })
     }
 
-    /// Returns the map of the sheet with texels of about `texel_scale` times the usual size.
-    pub(super) fn map(&self, first: u32, texel_scale: f32) -> LightMap {
-        let count = |side_m: f32| (side_m / (TEXEL_M * texel_scale)).ceil().clamp(2.0, MAX_SIDE);
+    /// Returns the map of the sheet with texels of about `texel_factor` times the usual size.
+    pub(super) fn map(&self, first: u32, texel_factor: f32) -> LightMap {
+        let count = |side_m: f32| (side_m / (TEXEL_M * texel_factor)).ceil().clamp(2.0, MAX_SIDE);
         let [width, height] = self.sides_m.map(count);
         let axis = |i: usize, count: f32| {
-            let along = self.along[i] * (count / self.sides_m[i].max(FLAT_M));
+            let along = self.sides_direction[i] * (count / self.sides_m[i].max(FLAT_M));
             [along.x, along.y, along.z, -along.dot(self.corner_m) - 0.5]
         };
         LightMap {
-            axes: [axis(0, width), axis(1, height)],
+            axes_values: [axis(0, width), axis(1, height)],
             first,
             width: width as u32,
             height: height as u32,
@@ -88,7 +73,7 @@ impl FlatSheet {
     /// Returns the middles of the texels, row by row.
     pub(super) fn points(&self, map: &LightMap) -> impl Iterator<Item = SurfacePoint> {
         let middle = |i: u32, count: u32, side: usize| {
-            self.along[side] * ((i as f32 + 0.5) / count as f32 * self.sides_m[side])
+            self.sides_direction[side] * ((i as f32 + 0.5) / count as f32 * self.sides_m[side])
         };
         (0..map.height).flat_map(move |row| {
             (0..map.width).map(move |column| SurfacePoint {

@@ -1,4 +1,4 @@
-//! Baked light: light that the path tracer computes once for a room, and that rasterisers then look up.
+//! Baking: the path tracer computes the light of a room once, and rasterisers look it up.
 //!
 //! Flat surfaces of the room have light maps. Everything else is lit by cubes of light, which are read from
 //! a grid of probes: curved surfaces of the room place by place, and things that move part by part. Things
@@ -7,123 +7,20 @@
 mod bake;
 mod kept;
 mod maps;
-mod probes;
 #[cfg(test)]
 mod tests;
 
-use rapier3d::math::Vector;
-use serde::{Deserialize, Serialize};
+use super::scene::prepared::Prepared;
+use super::{Carrier, Scenery};
 
-pub use kept::RoomLight;
-pub use maps::LightMap;
-use probes::Probes;
-
-/// Cosine to the sun from which things shadow a surface wholly: shadows on what it grazes are uncertain.
-pub const SURE_SLOPE: f32 = 0.25;
-
-/// Distance of a thing at which it takes half of a lamp's light from what is behind it.
-pub const HALF_SHADOW_M: f32 = 0.45;
-
-/// Light at a point: irradiance divided by pi in linear red, green and blue, and the share of it that comes
-/// from the lamps, which things can shadow.
-pub type LightTexel = [f32; 4];
-
-/// Light on surfaces that face along +x, -x, +y, -y, +z and -z.
-pub type LightCube = [LightTexel; 6];
-
-/// The light of a room.
-#[derive(Debug, Serialize, Deserialize)]
-pub struct BakedLight {
-    /// Light of each sheet of the room, by the sheets' numbers.
-    pub sheets: Vec<SheetLight>,
-    pub maps: Vec<LightMap>,
-    /// Texels of all maps, map by map and row by row.
-    pub texels: Vec<LightTexel>,
-    /// Cubes of the room's surfaces without a map.
-    pub cubes: Vec<LightCube>,
-    probes: Probes,
-}
-
-/// Source of the light of a sheet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum SheetLight {
-    /// Number of its map.
-    Map(u32),
-    /// Number of its cube.
-    Cube(u32),
-}
-
-impl BakedLight {
-    /// Returns true if all numbers refer to something.
-    fn is_whole(&self) -> bool {
-        let is_map = |map: &LightMap| {
-            let end = u64::from(map.first) + u64::from(map.width) * u64::from(map.height);
-            map.width >= 2 && map.height >= 2 && end <= self.texels.len() as u64
-        };
-        let is_lit = |sheet: &SheetLight| match sheet {
-            SheetLight::Map(number) => (*number as usize) < self.maps.len(),
-            SheetLight::Cube(number) => (*number as usize) < self.cubes.len(),
-        };
-        self.maps.iter().all(is_map) && self.sheets.iter().all(is_lit) && self.probes.are_whole()
+/// Prepares a scenery for a renderer, with the light of its room, whose shadows are in that light.
+pub fn lit(mut scenery: Scenery) -> Prepared {
+    let baked = scenery.room.as_ref().and_then(kept::light_of);
+    if baked.is_some() {
+        let room = scenery.parts.iter_mut().filter(|part| part.carrier == Carrier::Room);
+        room.for_each(|part| part.casts_shadow = false);
     }
-
-    /// Returns the light at a point in the room.
-    pub fn cube(&self, point_m: Vector) -> LightCube {
-        self.probes.cube(point_m)
-    }
-}
-
-impl LightMap {
-    /// Returns the column and the row of a point of the world, in texels from the middle of the first one.
-    #[inline(always)]
-    pub fn place(&self, [x_m, y_m, z_m]: [f32; 3]) -> [f32; 2] {
-        self.axes.map(
-            #[inline(always)]
-            |[x, y, z, constant]| x * x_m + y * y_m + z * z_m + constant,
-        )
-    }
-}
-
-/// Returns the light on a surface with a normal.
-/// Source: McTaggart 2004, Half-Life 2 / Valve Source shading, ambient cubes.
-#[inline(always)]
-pub fn cube_light(cube: &LightCube, normal: [f32; 3]) -> LightTexel {
-    let mut light = [0.0; 4];
-    for (axis, along) in normal.into_iter().enumerate() {
-        let side = &cube[2 * axis + usize::from(along < 0.0)];
-        for (light, side) in light.iter_mut().zip(side) {
-            *light += along * along * side;
-        }
-    }
-    light
-}
-
-/// Returns the share of a lamp's light that things take: the share of the sun that they would hide, and that
-/// share times their distance. Lamps are wide, so shadows of what is far away are faint.
-#[inline(always)]
-pub fn lamp_shadow(blocked_share: f32, blocked_m: f32) -> f32 {
-    if blocked_share <= 0.0 {
-        return 0.0;
-    }
-    let ratio = blocked_m / (blocked_share * HALF_SHADOW_M);
-    blocked_share / (1.0 + ratio * ratio)
-}
-
-/// Returns the light at a place on a map, in texels from the middle of the first one.
-#[inline(always)]
-pub fn map_light(map: &LightMap, texels: &[LightTexel], [u, v]: [f32; 2]) -> LightTexel {
-    let (width, height) = (map.width as usize, map.height as usize);
-    let (u, v) = (u.clamp(0.0, (width - 1) as f32), v.clamp(0.0, (height - 1) as f32));
-    let (column, row) = (usize::from(u as u16).min(width - 2), usize::from(v as u16).min(height - 2));
-    let (right, down) = (u - column as f32, v - row as f32);
-    let first = map.first as usize + row * width + column;
-    let [upper, lower] = [first, first + width].map(|first| {
-        let beside: &[LightTexel; 2] = texels[first..].first_chunk().expect("a map has two columns and rows");
-        beside
-    });
-    std::array::from_fn(|i| {
-        let above = upper[0][i] + (upper[1][i] - upper[0][i]) * right;
-        let below = lower[0][i] + (lower[1][i] - lower[0][i]) * right;
-        above + (below - above) * down
-    })
+    let mut prepared = Prepared::new(scenery);
+    prepared.baked = baked;
+    prepared
 }

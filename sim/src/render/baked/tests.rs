@@ -5,9 +5,9 @@ use std::f32::consts::PI;
 use rapier3d::math::{Pose, Vector};
 
 use super::bake::bake;
-use super::*;
 use crate::mjcf::Gloss;
 use crate::render::path::walls_m;
+use crate::render::shading::baked::{BakedLight, LightMap, LightTexel, map_light};
 use crate::render::{Camera, Cameras, Carrier, Frame, Part, Pattern, Scenery, TriangleMesh, cpu, path};
 use crate::{RobotPlacement, World, WorldSpec};
 
@@ -162,7 +162,7 @@ fn images_are_near_to_path_tracing() {
         let cameras = Cameras::of(&world);
         let scenery = Scenery::of(&world);
         let mut renderers =
-            [path(scenery.clone()), cpu(scenery.clone()), cpu(Scenery { room_light: None, ..scenery })];
+            [path(scenery.clone()), cpu(scenery.clone()), cpu(Scenery { room: None, ..scenery })];
         let views = [cameras.egocentric(&step, 0), cameras.egocentric(&step, 1), cameras.third_person()];
         let (mut baked, mut plain) = (0.0, 0.0);
         for camera in views.map(|camera| Camera { width: 160, height: 120, ..camera }) {

@@ -1,19 +1,10 @@
 //! Baked light on pushed points.
 
-use super::shade::Surfaces;
-use crate::render::baked::{LightCube, LightMap, LightTexel, SURE_SLOPE, SheetLight, map_light};
+use super::shade::{StripLight, Surfaces};
 use crate::render::scene::prepared::Prepared;
+use crate::render::shading::baked::{LightCube, SURE_SLOPE, SheetLight, map_light};
 use crate::render::shading::lanes::{Lanes, axes, lanes};
 use crate::render::{Carrier, PlacedScenery};
-
-/// Source of a strip's light.
-#[derive(Clone, Copy)]
-pub(super) enum StripLight<'a> {
-    /// Sun and sky, or lamps of a file.
-    Plain,
-    Map(&'a LightMap, &'a [LightTexel]),
-    Cube(&'a LightCube),
-}
 
 impl<'a> StripLight<'a> {
     /// Returns the light of a sheet; `cubes` are those of the parts.
@@ -112,9 +103,9 @@ impl Surfaces {
         )
     }
 
-    /// Returns the light on points, weighted by their shares. `tint` multiplies the baked light.
+    /// Returns the light on points, weighted by their shares. `tint_rgb` multiplies the baked light.
     #[inline(always)]
-    pub(super) fn lit_by_baked(&self, at: usize, tint: [f32; 3]) -> [Lanes; 3] {
+    pub(super) fn lit_by_baked(&self, at: usize, tint_rgb: [f32; 3]) -> [Lanes; 3] {
         let (albedo, baked) = (self.albedo.block(at), self.baked.block(at));
         let [facing, sunlit, highlight, lamps] = self.towards_sun(at);
         let share = self.shares(at);
@@ -128,7 +119,7 @@ impl Surfaces {
             |axis| {
                 lanes(|i| {
                     let light = baked[axis][i] * (1.0 - lamp[i]);
-                    (albedo[axis][i] * light + gloss[i]) * tint[axis] * share[i]
+                    (albedo[axis][i] * light + gloss[i]) * tint_rgb[axis] * share[i]
                 })
             },
         )

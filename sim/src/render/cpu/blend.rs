@@ -1,7 +1,6 @@
 //! Blending of layers of surfaces over the pixels of an image.
 
-use super::baked::StripLight;
-use super::shade::Strip;
+use super::shade::{Strip, StripLight};
 use super::target::RenderTarget;
 use super::view::{Row, View};
 use crate::render::scene::prepared::NOTHING;

@@ -2,7 +2,7 @@
 
 use rapier3d::math::Vector;
 
-use super::rays::Rays;
+use super::raster::Rays;
 use super::shade::{Facet, gloss_lanes};
 use crate::render::shading::SAMPLES;
 use crate::render::shading::image::{Image, ImagePlace, bent_normal};

@@ -6,7 +6,6 @@ pub mod contact;
 mod images;
 mod lamps;
 mod raster;
-mod rays;
 mod shade;
 mod shadow;
 mod target;
@@ -22,15 +21,16 @@ use std::thread;
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::Step;
-use crate::render::baked::LightCube;
+use crate::render::baked::lit;
 use crate::render::blur::blurred;
 use crate::render::scene::prepared::Prepared;
+use crate::render::shading::baked::LightCube;
 use crate::render::shading::srgb::SrgbTable;
 use crate::render::{Camera, Frame, Part, PlacedScenery, Renderer, Scenery, Wanted};
 use baked::place_cubes;
 use contact::ContactMap;
 use lamps::LitLamps;
-use rays::Rays;
+use raster::Rays;
 use shade::Facet;
 use shadow::ShadowMap;
 use target::RenderTarget;
@@ -87,7 +87,7 @@ impl CpuRenderer {
     pub(super) fn new(scenery: Scenery) -> CpuRenderer {
         static RENDERERS: AtomicU64 = AtomicU64::new(0);
         CpuRenderer {
-            prepared: Prepared::lit(scenery),
+            prepared: lit(scenery),
             srgb: SrgbTable::default(),
             number: RENDERERS.fetch_add(1, Ordering::Relaxed),
         }

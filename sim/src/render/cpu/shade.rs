@@ -3,12 +3,12 @@
 
 use rapier3d::math::{Matrix, Pose, Vector};
 
-use super::baked::StripLight;
 use super::contact::ContactMap;
-use super::rays::Rays;
+use super::raster::Rays;
 use super::shadow::ShadowMap;
 use crate::mjcf::Gloss;
 use crate::render::scene::prepared::{Prepared, Sheet};
+use crate::render::shading::baked::{LightCube, LightMap, LightTexel};
 use crate::render::shading::image::Image;
 use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
 use crate::render::shading::{CONTACT, HIGHLIGHT, LAMP, SAMPLES, opacity};
@@ -33,6 +33,15 @@ pub(super) struct Facet {
     pub pattern_from_world: Affine,
     /// True if it belongs to the room, and is darkened by things on it.
     pub carries: bool,
+}
+
+/// Source of a strip's light.
+#[derive(Clone, Copy)]
+pub(super) enum StripLight<'a> {
+    /// Sun and sky, or lamps of a file.
+    Plain,
+    Map(&'a LightMap, &'a [LightTexel]),
+    Cube(&'a LightCube),
 }
 
 /// Adjacent pixels that show one sheet.
@@ -338,13 +347,13 @@ impl Surfaces {
         *block(&self.metallic_share, at)
     }
 
-    /// Adds the linear colours of all pushed points to those of their pixels, and clears the points. `tint`
+    /// Adds the linear colours of all pushed points to those of their pixels, and clears the points. `tint_rgb`
     /// multiplies baked light; without, sun and sky light them.
     #[inline(always)]
     pub(super) fn shade(
         &mut self,
         light: &Light,
-        tint: Option<[f32; 3]>,
+        tint_rgb: Option<[f32; 3]>,
         shadow: &ShadowMap,
         sum_rgb: &mut [Vec<f32>; 3],
     ) {
@@ -357,16 +366,16 @@ impl Surfaces {
                 #[inline(always)]
                 |axis| self.texel.0[axis][i],
             );
-            self.sunlit_share[i] = match tint {
+            self.sunlit_share[i] = match tint_rgb {
                 _ if self.sun_factor[i] <= 0.0 => 0.0,
                 None => shadow.sunlit(texel, self.cell[i]),
                 Some(_) => shadow.lamplit(texel, self.cell[i]),
             };
         }
         for at in (0..count).step_by(LANES) {
-            let colours = match tint {
+            let colours = match tint_rgb {
                 None => self.lit(at, light),
-                Some(tint) => self.lit_by_baked(at, tint),
+                Some(tint_rgb) => self.lit_by_baked(at, tint_rgb),
             };
             let first = self.pixels[at];
             let beside =

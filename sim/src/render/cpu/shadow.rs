@@ -6,8 +6,8 @@ use pulp::Simd;
 use rapier3d::math::Vector;
 
 use super::raster::{Grid, Outlines, SampleRows, TriangleBatch, larger, smaller, whole_f32};
-use crate::render::baked::lamp_shadow;
 use crate::render::scene::prepared::Prepared;
+use crate::render::shading::baked::lamp_shadow;
 use crate::render::shading::lanes::{Affine, LANES, Lanes, axes, lanes};
 use crate::render::shading::{BIAS_M, FADE_TEXELS, TEXELS, normal_offset_m, sun_map};
 use crate::render::{Carrier, PlacedScenery};

@@ -2,7 +2,7 @@
 
 use pulp::Simd;
 
-use super::rays::Rays;
+use super::raster::Rays;
 use super::shade::Facet;
 use super::target::{RenderTarget, draw_veils};
 use crate::render::scene::prepared::Prepared;

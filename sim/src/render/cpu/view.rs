@@ -2,16 +2,15 @@
 
 use std::ops::Range;
 
-use super::baked::StripLight;
 use super::contact::ContactMap;
 use super::lamps::LitLamps;
-use super::rays::Rays;
-use super::shade::{Facet, Strip, Surfaces};
+use super::raster::Rays;
+use super::shade::{Facet, Strip, StripLight, Surfaces};
 use super::shadow::ShadowMap;
 use super::target::RenderTarget;
 use super::veil::Veils;
-use crate::render::baked::LightCube;
 use crate::render::scene::prepared::{NOTHING, Prepared};
+use crate::render::shading::baked::LightCube;
 use crate::render::shading::srgb::SrgbTable;
 use crate::render::shading::{OUTLINE, OUTLINE_DEPTH_STEP, SAMPLES, SKY};
 

@@ -1,7 +1,7 @@
 //! Baked light in a device's memory: the cubes of parts, those of the room, and the texels of its maps.
 
-use crate::render::baked::{BakedLight, LightCube, LightTexel, SheetLight};
 use crate::render::scene::prepared::Prepared;
+use crate::render::shading::baked::{BakedLight, LightCube, LightTexel, SheetLight};
 use crate::render::{Carrier, PlacedScenery};
 
 /// Count of numbers about light in `Face`.
@@ -30,7 +30,7 @@ pub(super) fn face_numbers(prepared: &Prepared, sheet: u32) -> [u32; FACE_NUMBER
     let light = match baked.sheets.get(sheet as usize) {
         Some(SheetLight::Map(number)) => {
             let map = &baked.maps[*number as usize];
-            numbers[..8].copy_from_slice(map.axes.map(|row| row.map(f32::to_bits)).as_flattened());
+            numbers[..8].copy_from_slice(map.axes_values.map(|row| row.map(f32::to_bits)).as_flattened());
             let first_texel = first_cube + baked.cubes.len() as u32 * SIDES;
             [ON_MAP, first_texel + map.first, map.width, map.height]
         }

@@ -22,6 +22,7 @@ use wgpu::{
 };
 
 use crate::Step;
+use crate::render::baked::lit;
 use crate::render::cpu::contact::ContactMap;
 use crate::render::scene::prepared::{NOTHING, Prepared};
 use crate::render::{Camera, Frame, PlacedScenery, Renderer, Scenery, Wanted, cpu};
@@ -86,7 +87,7 @@ fn open() -> Result<Arc<Gpu>, GpuError> {
 
 impl GpuRenderer {
     fn new(gpu: Arc<Gpu>, scenery: Scenery) -> GpuRenderer {
-        let prepared = Prepared::lit(scenery);
+        let prepared = lit(scenery);
         let lamps = prepared.scenery.lamps.as_ref().map_or(1, |lamps| lamps.lamps.len().max(1));
         let (scene, shadow) = (SceneBuffers::new(&gpu, &prepared), shadow_maps(&gpu, lamps as u32));
         GpuRenderer {

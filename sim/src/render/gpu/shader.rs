@@ -4,10 +4,10 @@ use rapier3d::math::Vector;
 
 use crate::mjcf::{MAX_LIGHTS, MIN_ROUGHNESS, SHININESS, USUAL_EXPONENT};
 use crate::render::Light;
-use crate::render::baked::{HALF_SHADOW_M, SURE_SLOPE};
 use crate::render::cpu::contact::SINK_M;
 use crate::render::scene::camera::NEAR_M;
 use crate::render::scene::prepared::NOTHING;
+use crate::render::shading::baked::{HALF_SHADOW_M, SURE_SLOPE};
 use crate::render::shading::image::{BLENDED_SHARE, MIN_UPRIGHT_SHARE};
 use crate::render::shading::lamps::{LAMP_BIAS_SHARE, LAMP_NORMAL_TEXELS};
 use crate::render::shading::pattern::{

@@ -10,6 +10,8 @@ use super::rows::for_each_row;
 use super::scene::Scene;
 use super::sequence::{PixelSeed, SampleCount};
 use super::space::body::MetSides;
+use crate::render::scene::prepared::Prepared;
+use crate::render::shading::baked::SurfacePoint;
 use crate::render::{PlacedScenery, Scenery};
 
 /// Numbers of paths and of points of lamps for each point.
@@ -28,16 +30,6 @@ const FOR_INSIDE: u32 = 0;
 const FOR_LAMPS: u32 = 1;
 const FOR_LIGHT: u32 = 2;
 
-/// A point of a surface, in the world.
-#[derive(Clone, Copy)]
-pub struct SurfacePoint {
-    pub point_m: Vector,
-    /// Unit vector.
-    pub normal: Vector,
-    /// Place among other points. Neighbours complement each other.
-    pub seed: [u32; 2],
-}
-
 /// Irradiance at a point, divided by pi.
 #[derive(Clone, Copy, Default)]
 pub struct Irradiance {
@@ -53,7 +45,7 @@ pub fn irradiance(room: Scenery, points: &[SurfacePoint]) -> Vec<Irradiance> {
         world_from_mesh: room.parts.iter().map(|part| part.carrier_from_mesh).collect(),
         ..PlacedScenery::default()
     };
-    let renderer = PathRenderer::new(room);
+    let renderer = PathRenderer::new(Prepared::new(room));
     let scene = renderer.scene(&placed);
     let mut found = vec![Irradiance::default(); points.len()];
     let threads = thread::available_parallelism().map_or(1, usize::from);

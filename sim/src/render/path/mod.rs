@@ -65,8 +65,7 @@ struct Mover {
 }
 
 impl PathRenderer {
-    pub(super) fn new(scenery: Scenery) -> PathRenderer {
-        let prepared = Prepared::lit(scenery);
+    pub(super) fn new(prepared: Prepared) -> PathRenderer {
         let scenery = &prepared.scenery;
         let of_room =
             |number: &usize| scenery.parts[*number].carrier == Carrier::Room && !prepared.is_veil[*number];

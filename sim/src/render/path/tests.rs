@@ -53,12 +53,12 @@ fn views(world: &World, step: &Step) -> Vec<Camera> {
 fn an_image_is_the_same_on_any_number_of_threads() {
     let world = world("kitchen_084");
     let step = world.present();
-    let renderer = PathRenderer::new(Scenery::of(&world));
+    let renderer = PathRenderer::new(Prepared::new(Scenery::of(&world)));
     let scene = renderer.scene(&renderer.prepared.scenery.place(&step));
     for camera in views(&world, &step) {
         let alone = renderer.draw(&scene, &camera, 1);
         assert!([2, 5].iter().all(|threads| renderer.draw(&scene, &camera, *threads) == alone));
-        let mut another = PathRenderer::new(Scenery::of(&world));
+        let mut another = PathRenderer::new(Prepared::new(Scenery::of(&world)));
         assert!(another.render_colours(&step, &camera) == alone.rgb, "another renderer of the same scenery");
     }
 }
@@ -66,7 +66,8 @@ fn an_image_is_the_same_on_any_number_of_threads() {
 #[test]
 fn depth_and_ids_are_those_of_the_embedded_renderer() {
     let mut world = world("kitchen_084");
-    let (mut path, mut embedded) = (PathRenderer::new(Scenery::of(&world)), cpu(Scenery::of(&world)));
+    let (mut path, mut embedded) =
+        (PathRenderer::new(Prepared::new(Scenery::of(&world))), cpu(Scenery::of(&world)));
     let commands = [world.rest_command(0), world.rest_command(1)];
     // Twice, to verify that moved parts are at their new poses.
     for _ in 0..2 {
@@ -92,7 +93,7 @@ fn images_are_as_bright_as_those_of_the_embedded_renderer() {
         let world = world(scene);
         let step = world.present();
         let camera = &views(&world, &step)[0];
-        let traced = PathRenderer::new(Scenery::of(&world)).render(&step, camera);
+        let traced = crate::render::path(Scenery::of(&world)).render(&step, camera);
         let expected = cpu(Scenery::of(&world)).render(&step, camera);
         let mean = |frame: &Frame| frame.rgb.iter().map(|value| f64::from(*value)).sum::<f64>();
         let ratio = mean(&traced) / mean(&expected);
@@ -138,7 +139,8 @@ fn a_red_wall_colours_the_floor_beside_it() {
         };
         [redness(41), redness(6)]
     };
-    let [beside, away] = beside_and_away(PathRenderer::new(scenery.clone()).render(&step, &camera));
+    let [beside, away] =
+        beside_and_away(PathRenderer::new(Prepared::new(scenery.clone())).render(&step, &camera));
     assert!(beside > 1.05 * away, "{beside} beside the wall, {away} away from it");
     let [beside, away] = beside_and_away(cpu(scenery).render(&step, &camera));
     assert!((beside - away).abs() < 0.01, "without light that bounces: {beside} and {away}");
@@ -178,7 +180,7 @@ fn reference(view: &PathView, camera: &Camera, exposure_factor: f32) -> Vec<u8> 
 fn few_paths_and_the_filter_come_close_to_many() {
     let world = world("kitchen_084");
     let step = world.present();
-    let renderer = PathRenderer::new(Scenery::of(&world));
+    let renderer = PathRenderer::new(Prepared::new(Scenery::of(&world)));
     let scene = renderer.scene(&renderer.prepared.scenery.place(&step));
     let camera = Cameras::of(&world).egocentric(&step, 0);
     let view = PathView::new(&scene, &camera, SampleCount(1));

@@ -53,7 +53,7 @@ pub struct Distortion {
 /// A published calibration of a D435i's colour images of 640x480: the file `realsense_color_config.yaml` of
 /// VINS-Mono and its relatives. It shifts the image's edge by 1.2 %; Intel's datasheet states at most 1.5 %.
 const D435I: Distortion =
-    Distortion { k1: 0.092_615_504, k2: -0.180_824_39, p1: -6.548_41e-4, p2: -3.582_935e-4 };
+    Distortion { k1: 0.092_615_5, k2: -0.180_824_39, p1: -6.548_41e-4, p2: -3.582_935e-4 };
 /// Tangent of half the vertical angle of that calibration: 240 pixels by a focal length of 609.1.
 const D435I_HALF_HEIGHT: f32 = 240.0 / 609.095_8;
 

@@ -17,7 +17,6 @@ use std::sync::Arc;
 use rapier3d::math::{Pose, Vector};
 
 use crate::mjcf::{FileLight, Geom, Gloss, Headlight, Primitive, SurfaceImage, Texture};
-use crate::render::baked::RoomLight;
 use crate::render::shading::{MAX_CLEAR_ALPHA, SOLID_ALPHA};
 use crate::render::{Light, Pattern, SharedMesh};
 use crate::world::{CarriedLight, SceneLights};
@@ -32,8 +31,8 @@ pub struct Scenery {
     pub light: Light,
     /// Lights of the scene's file, in place of sun and sky.
     pub lamps: Option<Lamps>,
-    /// Light of the room's own lamps for rasterisers; `None` in the open, and with `lamps`.
-    pub room_light: Option<RoomLight>,
+    /// The room without anything in it, and in its own colours, for its light; `None` with `lamps`.
+    pub room: Option<Arc<Scenery>>,
     /// Image around the camera where no surface is, or the six of a cube.
     pub sky: Option<Arc<Texture>>,
 }
@@ -144,10 +143,8 @@ impl Scenery {
     pub fn of(world: &World) -> Scenery {
         let mut parts = Vec::new();
         add_parts(&mut parts, world.room(), Carrier::Room, ROOM_ID, |geom| geom.rgba);
-        let room_light = match world.lights() {
-            None => RoomLight::of(Scenery { parts: parts.clone(), ..Scenery::default() }),
-            Some(_) => None,
-        };
+        let room = || Arc::new(Scenery { parts: parts.clone(), ..Scenery::default() });
+        let room = world.lights().is_none().then(room);
         if world.lights().is_none() {
             for part in &mut parts {
                 part.casts_shadow &= top_m(part) < LAMPS_M;
@@ -169,7 +166,7 @@ impl Scenery {
         // As in MuJoCo, nothing is behind a scene with lights that has no sky.
         let dark = || lamps.is_some().then(|| Arc::new(Texture::plain([0; 3])));
         let sky = world.sky().cloned().or_else(dark);
-        Scenery { parts, focus_radius_m, light: Light::default(), lamps, room_light, sky }
+        Scenery { parts, focus_radius_m, light: Light::default(), lamps, room, sky }
     }
 
     /// Returns the poses of all parts after `step`, which must be a step of this scenery's world.

@@ -7,11 +7,11 @@ use rapier3d::math::{Pose, Vector};
 use super::bend::Bend;
 use super::shared::MeshGeometry;
 use super::sheets::{MeshSheet, UvMap};
-use crate::render::baked::{BakedLight, RoomLight};
+use crate::render::shading::baked::BakedLight;
 use crate::render::shading::image::Image;
 use crate::render::shading::lanes::Affine;
 use crate::render::shading::linear;
-use crate::render::{Carrier, Light, Part, Pattern, Scenery};
+use crate::render::{Light, Part, Pattern, Scenery};
 
 /// Limits of the factor by which an image's texels are multiplied: nearly black images stay so.
 const MIN_MEAN: f32 = 1e-6;
@@ -53,16 +53,6 @@ pub struct Sheet {
 }
 
 impl Prepared {
-    /// Prepares a scenery for a rasteriser, with the light of its room. Its shadows are in that light.
-    pub fn lit(mut scenery: Scenery) -> Prepared {
-        let baked = scenery.room_light.as_ref().map(RoomLight::get);
-        if baked.is_some() {
-            let room = scenery.parts.iter_mut().filter(|part| part.carrier == Carrier::Room);
-            room.for_each(|part| part.casts_shadow = false);
-        }
-        Prepared { baked, ..Prepared::new(scenery) }
-    }
-
     /// Prepares a scenery without baked light.
     pub fn new(scenery: Scenery) -> Prepared {
         let (mut sheets, mut sheet_of, mut first) = (Vec::new(), Vec::new(), Vec::new());

@@ -55,11 +55,7 @@ fn measured_m(ideal_m: f32, drawn_deviation: f32) -> f32 {
     let disparity_px = nearest_whole((DISPARITY_PX_M / ideal_m + NOISE_PX * drawn_deviation) * STEPS) / STEPS;
     let depth_m = nearest_whole(DISPARITY_PX_M / disparity_px * UNITS_1_M) / UNITS_1_M;
     // A disparity of zero has an infinite depth, a negative one 0.
-    if depth_m >= RANGE_M[0] && depth_m <= RANGE_M[1] && ideal_m.is_finite() {
-        depth_m
-    } else {
-        f32::INFINITY
-    }
+    if (RANGE_M[0]..=RANGE_M[1]).contains(&depth_m) && ideal_m.is_finite() { depth_m } else { f32::INFINITY }
 }
 
 /// Returns the nearest whole number; 0 for negative ones. `f32::round` calls a function on most processors.

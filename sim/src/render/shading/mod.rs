@@ -1,6 +1,7 @@
 //! Definitions that renderers share: the light, the shadow's map, outlines, patterns, and arithmetic on
 //! several points at once. All colours are linear.
 
+pub mod baked;
 pub mod image;
 pub mod lamps;
 pub mod lanes;

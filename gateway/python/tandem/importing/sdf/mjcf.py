@@ -18,7 +18,7 @@ from .tree import Body, below, trees
 #: Density of things whose mass nobody states.
 DENSITY_KG_M3 = 500.0
 #: Mass and inertia of moving links that have none, which MuJoCo does not take.
-LEAST_KG, LEAST_KG_M2 = 1e-3, 1e-6
+MIN_MASS_KG, MIN_INERTIA_KG_M2 = 1e-3, 1e-6
 #: Group of shapes that collide and are not drawn.
 UNSEEN = 3
 #: Extent below which a mesh has no hull, in metres.
@@ -68,16 +68,16 @@ class Source:
             center = center if mass is not None else middle
             mass = DENSITY_KG_M3 * volume if mass is None else mass
             inertia = second * mass / volume if volume else None
-        if mass <= LEAST_KG and moves:
-            self.notes[f"mass of a moving link below {1000 * LEAST_KG:g} g, which it has now"] += 1
-            mass, inertia = LEAST_KG, None
+        if mass <= MIN_MASS_KG and moves:
+            self.notes[f"mass of a moving link below {1000 * MIN_MASS_KG:g} g, which it has now"] += 1
+            mass, inertia = MIN_MASS_KG, None
         if mass <= 0.0:
             return ""
-        matrix: Any = np.eye(3) * LEAST_KG_M2 if inertia is None else inertia
+        matrix: Any = np.eye(3) * MIN_INERTIA_KG_M2 if inertia is None else inertia
         six = [matrix[0, 0], matrix[1, 1], matrix[2, 2], matrix[0, 1], matrix[0, 2], matrix[1, 2]]
         if np.linalg.eigvalsh(matrix)[0] <= 0.0:
             self.notes["inertia of a link that no body can have"] += 1
-            six = [*np.maximum(six[:3], LEAST_KG_M2), 0.0, 0.0, 0.0]
+            six = [*np.maximum(six[:3], MIN_INERTIA_KG_M2), 0.0, 0.0, 0.0]
         return f'<inertial pos="{numbers(center)}" mass="{mass:.9g}" fullinertia="{numbers(six)}"/>'
 
     def _visual(self, shape: Shape) -> list[str]:

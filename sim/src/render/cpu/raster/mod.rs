@@ -3,10 +3,12 @@
 mod batch;
 mod grid;
 mod large;
+mod rays;
 mod small;
 
 pub use batch::TriangleBatch;
 pub use grid::{Grid, SampleRows};
+pub use rays::Rays;
 
 use pulp::Simd;
 

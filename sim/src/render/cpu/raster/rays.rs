@@ -6,7 +6,7 @@ use crate::render::Camera;
 use crate::render::shading::SAMPLES;
 
 /// Origin and directions of the rays of an image's samples in the world, to a depth of 1 m.
-pub(super) struct Rays {
+pub struct Rays {
     pub eye_m: Vector,
     /// The ray through the first sample, and the steps from one to the next.
     pub first_ray: Vector,
@@ -17,7 +17,7 @@ pub(super) struct Rays {
 }
 
 impl Rays {
-    pub(super) fn new(camera: &Camera) -> Rays {
+    pub fn new(camera: &Camera) -> Rays {
         let rotation = camera.world_from_camera.rotation;
         let sample = 1.0 / (camera.focal_px() * SAMPLES as f32);
         let (right, down) = (rotation * Vector::X * sample, rotation * Vector::NEG_Y * sample);
@@ -32,13 +32,13 @@ impl Rays {
 
     /// Returns the ray of a sample, and the steps to the next pixels to the right and down.
     #[inline(always)]
-    pub(super) fn sample(&self, [x, y]: [usize; 2]) -> (Vector, [Vector; 2]) {
+    pub fn sample(&self, [x, y]: [usize; 2]) -> (Vector, [Vector; 2]) {
         let ray = self.first_ray + self.right_ray * x as f32 + self.down_ray * y as f32;
         (ray, [self.right_ray * SAMPLES as f32, self.down_ray * SAMPLES as f32])
     }
 
     /// Returns the point that is seen at the centre of a pixel.
-    pub(super) fn point_m(&self, [x, y]: [usize; 2], nearness_1_m: f32) -> Vector {
+    pub fn point_m(&self, [x, y]: [usize; 2], nearness_1_m: f32) -> Vector {
         let (ray, _) = self.sample([x * SAMPLES, y * SAMPLES]);
         self.eye_m + (ray + (self.right_ray + self.down_ray) * 0.5) / nearness_1_m
     }

@@ -3,15 +3,14 @@
 use rapier3d::math::Vector;
 use serde::{Deserialize, Serialize};
 
-use super::LightCube;
-use crate::render::path::irradiance::SurfacePoint;
+use super::{LightCube, SurfacePoint};
 
 /// Distance between probes, unless there would be too many.
 const PITCH_M: f32 = 0.3;
 const MAX_PROBES: f32 = 6000.0;
 
 #[derive(Debug, Default, Serialize, Deserialize)]
-pub(super) struct Probes {
+pub struct Probes {
     corner_m: [f32; 3],
     pitch_m: f32,
     counts: [usize; 3],
@@ -21,7 +20,7 @@ pub(super) struct Probes {
 
 impl Probes {
     /// Spreads probes over a box.
-    pub(super) fn over([low_m, high_m]: [Vector; 2]) -> Probes {
+    pub fn over([low_m, high_m]: [Vector; 2]) -> Probes {
         let size_m = high_m - low_m;
         let usual = size_m.element_product() / (PITCH_M * PITCH_M * PITCH_M);
         let pitch_m = PITCH_M * (usual / MAX_PROBES).max(1.0).cbrt();
@@ -30,14 +29,14 @@ impl Probes {
     }
 
     /// Returns true if there is a cube for each probe.
-    pub(super) fn are_whole(&self) -> bool {
+    pub fn are_whole(&self) -> bool {
         self.counts.iter().all(|count| *count >= 2)
             && self.counts.iter().try_fold(1usize, |all, count| all.checked_mul(*count))
                 == Some(self.cubes.len())
     }
 
     /// Returns the points of all probes, six directions each.
-    pub(super) fn points(&self) -> impl Iterator<Item = SurfacePoint> {
+    pub fn points(&self) -> impl Iterator<Item = SurfacePoint> {
         let [columns, rows, layers] = self.counts;
         (0..columns * rows * layers).flat_map(move |number| {
             let place = [number % columns, number / columns % rows, number / columns / rows];
@@ -52,7 +51,7 @@ impl Probes {
     }
 
     /// Fills in probes without light from those beside them.
-    pub(super) fn set(&mut self, mut cubes: Vec<Option<LightCube>>) {
+    pub fn set(&mut self, mut cubes: Vec<Option<LightCube>>) {
         let [columns, rows, _] = self.counts;
         let steps = [1, columns, columns * rows];
         let place = |number: usize| [number % columns, number / columns % rows, number / columns / rows];
@@ -74,7 +73,7 @@ impl Probes {
 
     /// Returns the light at a point, blended between the eight probes around it; beyond the grid, that at its
     /// border.
-    pub(super) fn cube(&self, point_m: Vector) -> LightCube {
+    pub fn cube(&self, point_m: Vector) -> LightCube {
         let [columns, rows, _] = self.counts;
         let (mut first, mut shares) = ([0; 3], [0.0; 3]);
         for axis in 0..3 {
@@ -86,9 +85,9 @@ impl Probes {
         let mut sum = LightCube::default();
         for corner in 0..8 {
             let upper: [usize; 3] = std::array::from_fn(|axis| corner >> axis & 1);
-            let weight = (0..3).map(|axis| if upper[axis] == 1 { shares[axis] } else { 1.0 - shares[axis] });
+            let share = (0..3).map(|axis| if upper[axis] == 1 { shares[axis] } else { 1.0 - shares[axis] });
             let [x, y, z]: [usize; 3] = std::array::from_fn(|axis| first[axis] + upper[axis]);
-            add(&mut sum, &self.cubes[x + columns * (y + rows * z)], weight.product());
+            add(&mut sum, &self.cubes[x + columns * (y + rows * z)], share.product());
         }
         sum
     }
@@ -100,10 +99,10 @@ fn mean(cubes: &[LightCube]) -> LightCube {
     sum
 }
 
-fn add(sum: &mut LightCube, cube: &LightCube, weight: f32) {
+fn add(sum: &mut LightCube, cube: &LightCube, share: f32) {
     for (sum, side) in sum.iter_mut().zip(cube) {
         for (sum, value) in sum.iter_mut().zip(side) {
-            *sum += value * weight;
+            *sum += value * share;
         }
     }
 }
