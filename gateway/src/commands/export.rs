@@ -25,7 +25,7 @@ pub struct ExportArgs {
 /// Formats of data sets and logs.
 #[derive(Debug, Subcommand)]
 enum ExportFormat {
-    Lerobot(LerobotArgs),
+    Lerobot(Box<LerobotArgs>),
     Inspect(InspectArgs),
 }
 
