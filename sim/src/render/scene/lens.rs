@@ -37,7 +37,7 @@ impl CameraModel {
     }
 }
 
-/// Coefficients of the distortion of an image, as OpenCV has them. The ray through (x, y, 1), x right and y
+/// Coefficients of the distortion of an image, in OpenCV's form. The ray through (x, y, 1), x right and y
 /// down, is seen at
 ///
 ///   x' = x (1 + k1 r^2 + k2 r^4) + 2 p1 x y + p2 (r^2 + 2 x^2),

@@ -12,7 +12,7 @@ use crate::srgb::linear_light;
 
 /// Rows of the sensor that become the image's.
 const SENSOR_ROWS: f32 = 1080.0;
-/// Time from one row of the sensor to the next: 1080 cycles of 72 MHz, as Linux's driver `ov2740` sets it.
+/// Time from one row of the sensor to the next: 1080 cycles of 72 MHz. Source: Linux's driver `ov2740`.
 const ROW_S: f32 = 15e-6;
 /// Time from the first row to the last.
 pub const READOUT_S: f32 = SENSOR_ROWS * ROW_S;
