@@ -39,7 +39,8 @@ impl NativeRecording {
         renderer: Option<&str>,
         camera: Option<&str>,
     ) -> PyResult<NativeRecording> {
-        let renderer = renderer.map(|name| found(py, "renderer", RendererKind::ALL, RendererKind::name, name));
+        let renderer =
+            renderer.map(|name| found(py, "renderer", RendererKind::ALL, RendererKind::name, name));
         let renderer = renderer.transpose()?;
         let camera = camera.map(|name| found(py, "camera model", CameraModel::ALL, CameraModel::name, name));
         let camera = camera.transpose()?;
