@@ -52,7 +52,6 @@
 //! ```
 
 pub mod assets;
-pub mod bench;
 pub mod body;
 pub mod dynamics;
 mod error;
@@ -78,7 +77,7 @@ pub use body::{
 pub use error::SimError;
 pub use estimate::{JointReadings, SensorReadings};
 pub use locomotion::{BaseCommand, BaseLimits, BaseVelocity, LocomotionChoice};
-pub use plane::{heading_rad, wrapped_rad};
+pub use plane::{flat, heading_rad, wrapped_rad};
 pub use random::SplitMix64;
 pub use rapier3d::math::{Pose, Rotation, Vector};
 pub use robot::{

@@ -17,6 +17,6 @@ pub fn wrapped_rad(angle_rad: f32) -> f32 {
 }
 
 /// Returns the horizontal part of a vector.
-pub(crate) fn flat(Vector { x, y, .. }: Vector) -> Vector {
+pub fn flat(Vector { x, y, .. }: Vector) -> Vector {
     Vector::new(x, y, 0.0)
 }

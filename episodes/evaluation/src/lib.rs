@@ -2,7 +2,6 @@
 //! training. A session and its recording know nothing of this crate.
 
 pub mod batch;
-pub mod bench;
 pub mod evaluation;
 pub mod policies;
 pub mod reports;

@@ -6,8 +6,8 @@ use std::{
 };
 
 use clap::Subcommand;
+use tandem_bench::CaseReport;
 use tandem_episodes::{DEFAULT_ROBOT, ROBOTS, RobotFile};
-use tandem_evaluation::bench::{self, CaseReport};
 
 use crate::settings::read_robot;
 
@@ -65,8 +65,8 @@ pub fn run(args: LocomotionArgs) -> CommandResult {
     let (controller, sensing) = (locomotion.controller(), sensing.sensing());
     let done = |case: &CaseReport| println!("{case}");
     let report = match motors {
-        true => bench::motors(&robot, &controller, sensing, &cases, &seeds.0, done)?,
-        false => bench::locomotion(&robot, &controller, sensing, &cases, &seeds.0, done)?,
+        true => tandem_bench::motors(&robot, &controller, sensing, &cases, &seeds.0, done)?,
+        false => tandem_bench::locomotion(&robot, &controller, sensing, &cases, &seeds.0, done)?,
     };
     println!("{}", report.settings());
     if let Some(path) = json {

@@ -15,9 +15,9 @@ pub(crate) const THUMB_JOINTS: usize = 3;
 
 /// First joint of each group in published order: left leg, right leg, waist, left arm, left hand, right
 /// arm, right hand.
-pub(crate) const LEGS: Sides<usize> = Sides { left: 0, right: 6 };
+pub const LEGS: Sides<usize> = Sides { left: 0, right: 6 };
 pub(crate) const WAIST: usize = 12;
-pub(crate) const ARMS: Sides<usize> = Sides { left: 15, right: 29 };
+pub const ARMS: Sides<usize> = Sides { left: 15, right: 29 };
 pub(crate) const HANDS: Sides<usize> = Sides { left: 22, right: 36 };
 
 /// First joint of each group in action order: left arm, right arm, left hand, right hand, waist.
@@ -31,7 +31,7 @@ const WAIST_NAMES: [&str; WAIST_JOINTS] = ["waist_yaw", "waist_roll", "waist_pit
 const ARM_NAMES: [&str; ARM_JOINTS] =
     ["shoulder_pitch", "shoulder_roll", "shoulder_yaw", "elbow", "wrist_roll", "wrist_pitch", "wrist_yaw"];
 /// True for the roll and yaw joints, which turn in opposite directions on the right and left arms.
-pub(crate) const MIRRORED_ARM: [bool; ARM_JOINTS] = [false, true, true, false, true, false, true];
+pub const MIRRORED_ARM: [bool; ARM_JOINTS] = [false, true, true, false, true, false, true];
 const HAND_NAMES: [&str; HAND_JOINTS] = [
     "hand_thumb_0",
     "hand_thumb_1",

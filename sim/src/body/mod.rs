@@ -16,8 +16,8 @@ mod tests;
 pub use estimate::BodyEstimate;
 pub use inverse_dynamics::{Acceleration, Effort};
 pub use layout::{
-    ARM_COLUMNS, ARM_JOINTS, HAND_COLUMNS, HAND_JOINTS, JOINTS, UPPER, UPPER_JOINTS, WAIST_COLUMN,
-    WAIST_JOINTS, joint_names,
+    ARM_COLUMNS, ARM_JOINTS, ARMS, HAND_COLUMNS, HAND_JOINTS, JOINTS, LEGS, MIRRORED_ARM, UPPER,
+    UPPER_JOINTS, WAIST_COLUMN, WAIST_JOINTS, joint_names,
 };
 pub use model::{
     BodyScale, HandLinks, JointModel, LinkModel, RobotDraft, RobotModel, RobotSource, SiteModel,
@@ -25,7 +25,7 @@ pub use model::{
 pub use motors::MotorSetpoints;
 
 pub(crate) use estimate::{KnownOfBody, LinkMotion, PelvisMotion};
-pub(crate) use layout::{ARMS, HANDS, LEG_JOINTS, LEGS, MIRRORED_ARM, WAIST};
+pub(crate) use layout::{HANDS, LEG_JOINTS, WAIST};
 
 /// Spring, damper and feedforward of one joint for one physics step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

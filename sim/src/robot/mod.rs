@@ -76,7 +76,7 @@ impl Robot {
     }
 
     /// Returns the robot's estimate of its own body.
-    pub(crate) fn body(&self) -> &BodyEstimate {
+    pub fn body(&self) -> &BodyEstimate {
         &self.body
     }
 

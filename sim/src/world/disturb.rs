@@ -126,13 +126,21 @@ impl World {
 
     /// Pushes like [`World::push`], at a point of the link that a hinge or slide of an object carries,
     /// in that link's frame.
-    pub(crate) fn push_object(&mut self, joint: &str, point_in_link_m: Vector, force_n: Vector) {
+    ///
+    /// # Panics
+    ///
+    /// Panics if no object has such a joint.
+    pub fn push_object(&mut self, joint: &str, point_in_link_m: Vector, force_n: Vector) {
         let link = self.jointed_link(joint);
         self.pushes.push(Push { link, point_in_link_m, force_n });
     }
 
     /// Sets a hinge of an object, by its name in the file.
-    pub(crate) fn set_object_hinge(&mut self, joint: &str, position_rad: f64, velocity_rad_s: f64) {
+    ///
+    /// # Panics
+    ///
+    /// Panics if no object has such a joint.
+    pub fn set_object_hinge(&mut self, joint: &str, position_rad: f64, velocity_rad_s: f64) {
         let link = self.jointed_link(joint);
         self.dynamics.tree_mut(link.tree).set_joint(link.link, position_rad, velocity_rad_s);
     }
@@ -143,13 +151,21 @@ impl World {
     }
 
     /// Moves a robot to a pose, at rest, with its joints unchanged.
-    pub(crate) fn put_robot(&mut self, robot: usize, world_from_pelvis: Pose) {
+    ///
+    /// # Panics
+    ///
+    /// Panics if there is no such robot.
+    pub fn put_robot(&mut self, robot: usize, world_from_pelvis: Pose) {
         let tree = self.dynamics.tree_mut(self.robots[robot].tree);
         tree.set_base(precise(&world_from_pelvis), DVec3::ZERO, DVec3::ZERO);
     }
 
     /// Returns true if a robot overlaps with anything else at its present pose.
-    pub(crate) fn overlaps(&mut self, robot: usize) -> bool {
+    ///
+    /// # Panics
+    ///
+    /// Panics if there is no such robot.
+    pub fn overlaps(&mut self, robot: usize) -> bool {
         let tree = self.robots[robot].tree;
         let before = self.dynamics.state();
         // A trial step finds the contacts, and is undone.
@@ -181,7 +197,7 @@ impl World {
     /// # Panics
     ///
     /// Panics if there is no such free object.
-    pub(crate) fn put_object(&mut self, name: &str, world_from_object: Pose) {
+    pub fn put_object(&mut self, name: &str, world_from_object: Pose) {
         let link = self.link_of(|object| object.name == name);
         let link = link.unwrap_or_else(|| panic!("no free object `{name}`"));
         let tree = self.dynamics.tree_mut(link.tree);

@@ -207,8 +207,10 @@ impl World {
         self.robots[robot].set_motors(setpoints);
     }
 
-    /// Sets the drives and forces on the robots and the scene's joints for the next physics step.
-    pub(crate) fn drive(&mut self, commands: &[RobotCommand], substep: u32) {
+    /// Sets the drives and forces on the robots and the scene's joints for physics step `substep` of a control
+    /// step. This, [`World::advance`] and [`World::sense`] are the parts of [`World::control_step`] that are
+    /// repeated.
+    pub fn drive(&mut self, commands: &[RobotCommand], substep: u32) {
         for (robot, command) in self.robots.iter_mut().zip(commands) {
             robot.drive(&mut self.dynamics, command, substep);
         }
@@ -219,12 +221,16 @@ impl World {
     }
 
     /// Runs one physics step.
-    pub(crate) fn advance(&mut self) -> Result<(), Diverged> {
+    ///
+    /// # Errors
+    ///
+    /// Returns an error if physics diverges.
+    pub fn advance(&mut self) -> Result<(), Diverged> {
         self.dynamics.step()
     }
 
     /// Reads the sensors of all robots.
-    pub(crate) fn sense(&mut self) {
+    pub fn sense(&mut self) {
         self.robots.iter_mut().for_each(|robot| robot.sense(&self.dynamics));
     }
 

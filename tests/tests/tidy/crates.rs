@@ -14,9 +14,16 @@ const ARROWS: &[(&str, &[&str])] = &[
     // The same sources with every extra.
     ("tests/extras", &[]),
     ("episodes", &["tandem-sim", "tandem-ik", "tandem-tools-spec"]),
-    ("episodes/evaluation", &["tandem-episodes", "tandem-sim", "tandem-ik", "tandem-tools-spec"]),
+    ("episodes/evaluation", &["tandem-episodes", "tandem-sim", "tandem-tools-spec"]),
+    (
+        "tests/bench",
+        &["tandem-evaluation", "tandem-episodes", "tandem-sim", "tandem-ik", "tandem-tools-spec"],
+    ),
     ("gateway/policies", &["tandem-episodes", "tandem-evaluation", "tandem-tools-spec"]),
-    ("gateway", &["tandem-policies", "tandem-episodes", "tandem-evaluation", "tandem-tools-spec"]),
+    (
+        "gateway",
+        &["tandem-bench", "tandem-policies", "tandem-episodes", "tandem-evaluation", "tandem-tools-spec"],
+    ),
     (
         "tests",
         &[

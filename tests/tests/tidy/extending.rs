@@ -50,7 +50,7 @@ const STEPS: &[Step] = &[
         folder: "sim/assets/scenes",
         extension: "xml",
         says: "<mujoco",
-        may: &["episodes/src/tasks/", "episodes/evaluation/src/bench/", "sim/src/bench/"],
+        may: &["episodes/src/tasks/", "tests/bench/src/"],
     },
     Step {
         what: "object",
@@ -62,8 +62,7 @@ const STEPS: &[Step] = &[
         may: &[
             "episodes/src/tasks/",
             "episodes/src/players/experts/",
-            "episodes/evaluation/src/bench/",
-            "sim/src/bench/",
+            "tests/bench/src/",
             "sim/src/mjcf/support/",
         ],
     },

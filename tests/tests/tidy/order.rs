@@ -23,7 +23,6 @@ const ORDER: &[(&str, &[&[&str]])] = &[
             &["robot"],
             &["world"],
             &["render"],
-            &["bench"],
         ],
     ),
     (
@@ -47,8 +46,16 @@ const ORDER: &[(&str, &[&[&str]])] = &[
         "episodes/evaluation",
         &[
             &["batch", "results", "robot_check", "statistics", "task_check", "task_draft"],
-            &["bench", "policies", "reports"],
+            &["policies", "reports"],
             &["evaluation"],
+        ],
+    ),
+    (
+        "tests/bench",
+        &[
+            &["error", "report", "seeds", "spread"],
+            &["env", "falls", "ik", "physics", "pictures", "single", "teams"],
+            &["controllers"],
         ],
     ),
     (

@@ -12,8 +12,8 @@ use std::{
 use clap::Subcommand;
 use serde::Serialize;
 use serde_json::{Map, Value};
+use tandem_bench::{EnvReport, FallsCase, FallsReport, IkReport, PhysicsReport, PicturesReport};
 use tandem_episodes::{CameraModel, RendererKind};
-use tandem_evaluation::bench::{EnvReport, FallsCase, FallsReport, IkReport, PhysicsReport, PicturesReport};
 
 use super::CommandResult;
 use crate::settings::one_of;
@@ -104,7 +104,7 @@ const PARTS: [(&str, Measure); 6] = [
     ("env", || Ok(serde_json::to_value(measure_env()?)?)),
     ("tools", || Ok(serde_json::to_value(measure_tools()?)?)),
     ("ik", || {
-        let report = tandem_evaluation::bench::ik(None)?;
+        let report = tandem_bench::ik(None)?;
         print_ik(&report);
         Ok(serde_json::to_value(report)?)
     }),
@@ -169,7 +169,7 @@ fn measure_tools() -> Result<ToolsReport, Box<dyn Error>> {
 
 fn measure_physics() -> Result<PhysicsReport, Box<dyn Error>> {
     println!("{:14}{:>7}{:>10}{:>11}", "case", "robots", "us/step", "real time");
-    Ok(tandem_evaluation::bench::physics(|case| {
+    Ok(tandem_bench::physics(|case| {
         println!(
             "{:14}{:>7}{:>10.1}{:>10.1}x",
             case.name, case.robots, case.median_step_us, case.realtime_factor
@@ -182,7 +182,7 @@ fn measure_env() -> Result<EnvReport, Box<dyn Error>> {
         "{:14}{:>7}{:>8}{:>9}{:>10}{:>10}{:>10}{:>10}",
         "task", "robots", "worlds", "threads", "steps/s", "of core", "busy", "reset ms"
     );
-    Ok(tandem_evaluation::bench::env(|case| {
+    Ok(tandem_bench::env(|case| {
         let busy = case.busy_of_core.map_or("-".into(), |share| format!("{:.2}", share.median));
         println!(
             "{:14}{:>7}{:>8}{:>9}{:>10.0}{:>10.2}{busy:>10}{:>10.1}",
@@ -199,7 +199,7 @@ fn measure_env() -> Result<EnvReport, Box<dyn Error>> {
 
 fn measure_falls(episodes: usize, cases: &str) -> Result<FallsReport, Box<dyn Error>> {
     let mut head = Some(FallsCase::HEAD);
-    Ok(tandem_evaluation::bench::falls(episodes, cases, |case| {
+    Ok(tandem_bench::falls(episodes, cases, |case| {
         head.take().into_iter().for_each(|head| println!("{head}"));
         println!("{case}");
         case.diverged_at.iter().for_each(|at| println!("    {at}"));
@@ -208,7 +208,7 @@ fn measure_falls(episodes: usize, cases: &str) -> Result<FallsReport, Box<dyn Er
 
 fn measure_pictures(renderer: RendererKind, camera: CameraModel) -> Result<PicturesReport, Box<dyn Error>> {
     println!("{:14}{:>9}{:>11}{:>11}{:>11}", "pictures", "count", "size", "busy ms", "wall ms");
-    Ok(tandem_evaluation::bench::pictures(renderer, camera, |case| {
+    Ok(tandem_bench::pictures(renderer, camera, |case| {
         let size = format!("{}x{}", case.width, case.height);
         println!(
             "{:14}{:>9}{size:>11}{:>11.2}{:>11.2}",
@@ -218,7 +218,7 @@ fn measure_pictures(renderer: RendererKind, camera: CameraModel) -> Result<Pictu
 }
 
 fn ik(targets: Option<&Path>, json: bool) -> CommandResult {
-    let report = tandem_evaluation::bench::ik(targets)?;
+    let report = tandem_bench::ik(targets)?;
     if json {
         println!("{}", serde_json::to_string_pretty(&WithMachine::here(report))?);
     } else {

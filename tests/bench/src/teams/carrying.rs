@@ -16,12 +16,13 @@ use tandem_episodes::{
     },
     tasks::{Task, embedded_task},
 };
-use tandem_sim::bench::{CaseReport, over_seeds};
 use tandem_sim::render::RendererKind;
 use tandem_sim::{Pose, Rotation, Sensing, Sides, Vector, heading_rad, wrapped_rad};
 use tandem_tools_spec::{Protocol, ToolCall, ToolReply};
 
-use super::BenchError;
+use crate::error::BenchError;
+use crate::report::CaseReport;
+use crate::seeds::over_seeds;
 
 /// A case: a way of the bar.
 pub struct CarryingCase {

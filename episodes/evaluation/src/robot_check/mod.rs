@@ -1,9 +1,13 @@
 //! The first look at a robot's file: what it can do, and whether it stands; and drafts of descriptions.
 
+mod stand;
+
 use std::path::Path;
 
 use tandem_episodes::{RobotError, RobotFile};
-use tandem_sim::{RobotDraft, RobotModel, Side, SimError, bench};
+use tandem_sim::{RobotDraft, RobotModel, Side, SimError};
+
+use stand::stand;
 
 /// Findings about a robot that was read.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -24,7 +28,7 @@ const MAX_MOVED_M: f32 = 0.1;
 /// Returns an error if the robot cannot be read, or its physics diverges.
 pub fn check_robot(robot: &RobotFile) -> Result<RobotCheck, RobotError> {
     let model = robot.model()?;
-    let trial = bench::stand(&model)?;
+    let trial = stand(&model)?;
     let moved = trial.moved_m > model.scale.length_m(MAX_MOVED_M);
     let limits: Vec<String> =
         trial.at_limit.iter().map(|(joint, effort_n_m)| format!("{joint} ({effort_n_m} N m)")).collect();

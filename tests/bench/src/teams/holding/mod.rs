@@ -14,12 +14,13 @@ use tandem_episodes::{
     Controller, EpisodeSpec, RobotFile, Session,
     players::{InProcess, PlayerError, experts::skills::HandMove},
 };
-use tandem_sim::bench::{CaseReport, is_asked, over_seeds};
 use tandem_sim::render::RendererKind;
 use tandem_sim::{BaseCommand, CONTROL_HZ, RobotCommand, Sensing, Side, Vector};
 use tandem_tools_spec::Protocol;
 
-use super::BenchError;
+use crate::error::BenchError;
+use crate::report::CaseReport;
+use crate::seeds::{is_asked, over_seeds};
 use disturbance::{ArmDisturbance, Disturber};
 use loads::{BAR, BASKET, LEGS, ROUND_TABLE, SharedLoad, TABLE};
 use measure::{HoldMeasure, HoldResult};

@@ -1,11 +1,10 @@
 //! Arm motion, drawn from the random numbers of a seed.
 
-use crate::Sides;
-use crate::body::{
+use tandem_sim::body::{
     ARM_COLUMNS, ARM_JOINTS, ARMS, HAND_COLUMNS, HAND_JOINTS, JointModel, MIRRORED_ARM, RobotModel,
     UPPER_JOINTS,
 };
-use crate::random::SplitMix64;
+use tandem_sim::{Sides, SplitMix64};
 
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Arms {

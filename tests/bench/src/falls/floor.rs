@@ -5,13 +5,15 @@
 use std::sync::Arc;
 
 use serde::Serialize;
+use tandem_sim::body::{BodyEstimate, BodyScale, JOINTS, JointDrive, JointModel, LEGS, UPPER};
+use tandem_sim::locomotion::{LegCommand, Locomotion};
+use tandem_sim::{
+    BaseCommand, BaseLimits, CONTROL_DT_S, PHYSICS_STEPS_PER_CONTROL, RobotCommand, RobotModel, Side, Sides,
+    SplitMix64, World,
+};
 
 use super::commands::Stagger;
 use super::{FallTrial, play};
-use crate::body::{BodyEstimate, BodyScale, JOINTS, JointDrive, JointModel, LEGS, RobotModel, UPPER};
-use crate::locomotion::{BaseCommand, BaseLimits, LegCommand, Locomotion};
-use crate::random::SplitMix64;
-use crate::{CONTROL_DT_S, PHYSICS_STEPS_PER_CONTROL, RobotCommand, Side, Sides, World};
 
 /// Commands of a robot alone on a floor.
 #[derive(Clone, Debug, Serialize)]

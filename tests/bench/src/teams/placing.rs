@@ -11,13 +11,14 @@ use tandem_episodes::{
     players::{InProcess, PlayerError},
     tasks::{Task, embedded_task},
 };
-use tandem_sim::bench::{CaseReport, is_asked, over_seeds};
 use tandem_sim::render::RendererKind;
 use tandem_sim::{Sensing, Side, Sides, SplitMix64};
 use tandem_tools_spec::{Assistance, Destination, PoseFrame, Protocol, ToolCall, WalkTo};
 
-use super::BenchError;
 use super::holding::loads::{BASKET, LEGS, ROUND_TABLE, SharedLoad, TABLE};
+use crate::error::BenchError;
+use crate::report::CaseReport;
+use crate::seeds::{is_asked, over_seeds};
 
 /// Task of a robot alone on a floor.
 static TASK: LazyLock<Task> = LazyLock::new(|| embedded_task("place.toml", include_str!("tasks/place.toml")));

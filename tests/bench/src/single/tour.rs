@@ -1,10 +1,7 @@
 //! The tour: waypoints in a square, reached one after the other under punches; and one leg of it, under
 //! a hard punch.
 
-use rapier3d::math::Vector;
-
-use crate::locomotion::{BaseCommand, BaseLimits};
-use crate::random::SplitMix64;
+use tandem_sim::{BaseCommand, BaseLimits, SplitMix64, Vector};
 
 /// Parameters of a tour.
 #[derive(Clone)]

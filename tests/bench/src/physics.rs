@@ -4,15 +4,15 @@
 use std::f32::consts::PI;
 use std::time::{Duration, Instant};
 
-use rapier3d::math::{Pose, Vector};
 use serde::Serialize;
-
-use super::Spread;
-use crate::body::{HAND_COLUMNS, HAND_JOINTS};
-use crate::{
-    ObjectPlacement, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, RobotCommand, RobotPlacement, SimError, World,
-    WorldSpec,
+use tandem_sim::body::{HAND_COLUMNS, HAND_JOINTS};
+use tandem_sim::{
+    ObjectPlacement, PHYSICS_DT_S, PHYSICS_STEPS_PER_CONTROL, Pose, RobotCommand, RobotPlacement, SimError,
+    Vector, World, WorldSpec,
 };
+
+use crate::error::BenchError;
+use crate::spread::Spread;
 
 /// Median times of all situations.
 #[derive(Clone, Debug, Serialize)]
@@ -61,7 +61,7 @@ const WALKING_M_S: f32 = -0.2;
 /// # Errors
 ///
 /// Returns an error if a world cannot be built or physics diverges.
-pub fn physics(mut done: impl FnMut(&PhysicsCase)) -> Result<PhysicsReport, SimError> {
+pub fn physics(mut done: impl FnMut(&PhysicsCase)) -> Result<PhysicsReport, BenchError> {
     let mut cases = Vec::new();
     for situation in [Situation::Standing, Situation::Walking, Situation::Holding] {
         for robots in 1..=MAX_ROBOTS {
@@ -207,7 +207,7 @@ mod tests {
     fn held_bottles_do_not_slip() {
         let (mut world, commands) = begin(Situation::Holding, MAX_ROBOTS).unwrap();
         let mut hold_s = |time_s: f32| {
-            for _ in 0..(time_s / crate::CONTROL_DT_S) as usize {
+            for _ in 0..(time_s / tandem_sim::CONTROL_DT_S) as usize {
                 world.control_step(&commands).unwrap();
             }
             (0..MAX_ROBOTS).map(|robot| held_m(&world, robot)).collect::<Vec<_>>()

@@ -3,19 +3,16 @@
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 
-use rapier3d::math::Vector;
+use tandem_sim::{
+    BaseCommand, BaseVelocity, CONTROL_DT_S as DT_S, RobotCommand, RobotModel, RobotPlacement, RobotTruth,
+    Sensing, Side, Sides, SimError, SplitMix64, Vector, World, WorldSpec, heading_rad, wrapped_rad,
+};
 
 use super::Subject;
 use super::cases::{Case, Disturbance, PULL_RISE_S, Plan, PulledHands, STOP_S, pulse};
 use super::measure::{SETTLE_S, Sample, Trial, measure};
 use super::motion::ArmMotion;
 use super::tour::{self, Leg};
-use crate::body::RobotModel;
-use crate::locomotion::{BaseCommand, BaseVelocity};
-use crate::plane::{heading_rad, wrapped_rad};
-use crate::random::SplitMix64;
-use crate::robot::{RobotCommand, RobotTruth, Sensing};
-use crate::{CONTROL_DT_S as DT_S, RobotPlacement, Side, Sides, SimError, World, WorldSpec};
 
 const PUSH_S: f32 = 1.0;
 /// Start of pulls at a standing robot: its arms are held out by then.

@@ -1,9 +1,10 @@
 //! The table of cases.
 
+use tandem_sim::BaseVelocity;
+use tandem_sim::body::BodyScale;
+
 use super::motion::Arms;
 use super::tour::Tour;
-use crate::body::BodyScale;
-use crate::locomotion::BaseVelocity;
 
 /// One situation; a seed draws its arm motion and directions.
 #[derive(Clone)]

@@ -2,13 +2,14 @@
 
 use std::f32::consts::{PI, TAU};
 
-use rapier3d::math::{Pose, Rotation, Vector};
+use tandem_sim::body::{ARM_COLUMNS, ARM_JOINTS};
+use tandem_sim::{
+    CONTROL_DT_S, ObjectPlacement, Pose, RobotCommand, RobotPlacement, Rotation, SimError, SplitMix64,
+    Vector, World, WorldSpec,
+};
 
 use super::commands::{Stagger, Staggering};
 use super::{FallTrial, floor, play};
-use crate::body::{ARM_COLUMNS, ARM_JOINTS};
-use crate::random::SplitMix64;
-use crate::{CONTROL_DT_S, ObjectPlacement, RobotPlacement, SimError, World, WorldSpec};
 
 /// One situation; a seed draws its commands and the initial poses.
 pub struct FallCase {
@@ -161,7 +162,7 @@ impl FallCase {
                 world.push_object(HINGE, EDGE_M, Vector::new(-cosine, -sine, 0.0) * SHUTTING_N);
             }
             // It stands at the door until it is struck; its arm motion is drawn.
-            vec![crate::RobotCommand { base: rest.base, ..robot.next(step) }]
+            vec![RobotCommand { base: rest.base, ..robot.next(step) }]
         })
     }
 }

@@ -10,12 +10,12 @@ use tandem_episodes::{
     rows::{ActionKind, STATE_COLUMNS},
     tasks::{self, Task},
 };
-use tandem_sim::bench::{Spread, busy_since};
+use tandem_evaluation::batch::{Autoreset, Batch, BatchError, BatchSpec, BatchStep, RewardKind, SeenArrays};
 use tandem_sim::{RobotCommand, World};
 use tandem_tools_spec::Protocol;
 
-use super::BenchError;
-use crate::batch::{Autoreset, Batch, BatchError, BatchSpec, BatchStep, RewardKind, SeenArrays};
+use crate::error::BenchError;
+use crate::spread::{Spread, busy_since};
 
 const WORLDS: usize = 8;
 const ROUNDS: usize = 5;

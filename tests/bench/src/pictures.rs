@@ -3,12 +3,12 @@
 use std::f32::consts::PI;
 use std::time::{Duration, Instant};
 
-use rapier3d::math::{Pose, Vector};
 use serde::Serialize;
+use tandem_sim::render::{Camera, CameraModel, CameraView, Cameras, Renderer, RendererKind, Scenery};
+use tandem_sim::{ObjectPlacement, Pose, RobotPlacement, SimError, Step, Vector, World, WorldSpec};
 
-use super::{Spread, busy_since};
-use crate::render::{Camera, CameraModel, CameraView, Cameras, Renderer, RendererKind, Scenery};
-use crate::{ObjectPlacement, RobotPlacement, SimError, Step, World, WorldSpec};
+use crate::error::BenchError;
+use crate::spread::{Spread, busy_since};
 
 /// Times of all sets of images.
 #[derive(Clone, Debug, Serialize)]
@@ -56,7 +56,7 @@ pub fn pictures(
     kind: RendererKind,
     camera: CameraModel,
     mut done: impl FnMut(&PicturesCase),
-) -> Result<PicturesReport, SimError> {
+) -> Result<PicturesReport, BenchError> {
     let world = World::new(&kitchen())?;
     let mut cameras = Cameras::of(&world);
     cameras.set_model(camera, 0);

@@ -1,14 +1,10 @@
 //! Measurements of a trial, from its log.
 
-use rapier3d::math::{Rotation, Vector};
+use tandem_sim::body::BodyScale;
+use tandem_sim::{BaseCommand, BaseVelocity, CONTROL_DT_S as DT_S, Rotation, Side, Sides, Vector, flat};
 
 use super::cases::{Case, Plan, STOP_S, pulse};
 use super::tour::Leg;
-use crate::CONTROL_DT_S as DT_S;
-use crate::body::BodyScale;
-use crate::locomotion::{BaseCommand, BaseVelocity};
-use crate::plane::flat;
-use crate::{Side, Sides};
 
 /// Time before commands and measurements begin, in which arms rise and loads swing out.
 pub(super) const SETTLE_S: f32 = 2.0;
@@ -17,7 +13,7 @@ const RAMP_S: f32 = 2.0;
 /// Height above its start from which on a foot is in the air.
 const LIFTED_M: f32 = 0.015;
 
-/// Result of a trial; see [`super::CaseReport`].
+/// Result of a trial; see [`crate::report::CaseReport`].
 #[derive(Clone, Debug, Default)]
 pub(super) struct Trial {
     pub fell: bool,

@@ -14,10 +14,10 @@ use tandem_episodes::{
 };
 use tandem_sim::{Pose, Vector};
 
-use crate::bench::carrying;
+use crate::teams::carrying;
 
 /// An object that a team holds. The team takes it from the start of the task that has the object.
-pub(in crate::bench) struct SharedLoad {
+pub(in crate::teams) struct SharedLoad {
     pub name: &'static str,
     pub object: &'static str,
     /// Robot, its two places on the object, and its heading in the object's frame.
@@ -35,7 +35,7 @@ pub(in crate::bench) struct SharedLoad {
 
 const TWO_THIRDS_RAD: f32 = 2.0 * PI / 3.0;
 
-pub(in crate::bench) const TABLE: SharedLoad = SharedLoad {
+pub(in crate::teams) const TABLE: SharedLoad = SharedLoad {
     name: "shared_table",
     object: "office_table",
     holders: &[(A, ["a_left", "a_right"], 0.0), (B, ["b_left", "b_right"], PI)],
@@ -46,7 +46,7 @@ pub(in crate::bench) const TABLE: SharedLoad = SharedLoad {
     way_m: [0.0, -0.3],
 };
 
-pub(in crate::bench) const ROUND_TABLE: SharedLoad = SharedLoad {
+pub(in crate::teams) const ROUND_TABLE: SharedLoad = SharedLoad {
     name: "shared_round_table",
     object: "round_table",
     holders: &[
@@ -61,7 +61,7 @@ pub(in crate::bench) const ROUND_TABLE: SharedLoad = SharedLoad {
     way_m: [0.3, 0.0],
 };
 
-pub(in crate::bench) const LEGS: SharedLoad = SharedLoad {
+pub(in crate::teams) const LEGS: SharedLoad = SharedLoad {
     name: "shared_legs",
     object: "console_table",
     holders: &[(B, ["b_left", "b_right"], PI), (C, ["c_left", "c_right"], 0.0)],
@@ -72,7 +72,7 @@ pub(in crate::bench) const LEGS: SharedLoad = SharedLoad {
     way_m: [0.3, 0.0],
 };
 
-pub(in crate::bench) const BASKET: SharedLoad = SharedLoad {
+pub(in crate::teams) const BASKET: SharedLoad = SharedLoad {
     name: "shared_basket",
     object: "basket",
     holders: &[(A, ["a_left", "a_right"], 0.0), (B, ["b_left", "b_right"], PI)],
@@ -83,7 +83,7 @@ pub(in crate::bench) const BASKET: SharedLoad = SharedLoad {
     way_m: [0.0, -0.3],
 };
 
-pub(in crate::bench) const BAR: SharedLoad = SharedLoad {
+pub(in crate::teams) const BAR: SharedLoad = SharedLoad {
     name: "shared_bar",
     object: "bar",
     holders: &[(A, ["a_left", "a_right"], 0.0), (B, ["b_left", "b_right"], 0.0)],
@@ -98,23 +98,23 @@ const PACE_M_S: f32 = 0.2;
 
 impl SharedLoad {
     /// Returns the task in which the object is carried.
-    pub(in crate::bench) fn task(&self) -> &Task {
+    pub(in crate::teams) fn task(&self) -> &Task {
         let has_it = |task: &&Task| task.objects.iter().any(|spot| spot.name == self.object);
         tasks::cohub().iter().find(has_it).unwrap_or(&carrying::TASK)
     }
 
     /// Returns the number of robots that hold the object.
-    pub(in crate::bench) fn team_size(&self) -> usize {
+    pub(in crate::teams) fn team_size(&self) -> usize {
         self.holders.len()
     }
 
     /// Returns the robots that hold the object.
-    pub(in crate::bench) fn team(&self) -> impl Iterator<Item = usize> {
+    pub(in crate::teams) fn team(&self) -> impl Iterator<Item = usize> {
         self.holders.iter().map(|(robot, ..)| *robot)
     }
 
     /// Takes the object and lifts it; if `carried`, walks a short way with it.
-    pub(in crate::bench) fn take(&self, episode: &mut InProcess, carried: bool) -> Result<(), PlayerError> {
+    pub(in crate::teams) fn take(&self, episode: &mut InProcess, carried: bool) -> Result<(), PlayerError> {
         self.with_team(episode, |commander, team| {
             if !carried {
                 return Ok(());
@@ -130,7 +130,7 @@ impl SharedLoad {
     }
 
     /// Takes the object, lifts it, and calls `then`.
-    pub(in crate::bench) fn with_team(
+    pub(in crate::teams) fn with_team(
         &self,
         episode: &mut InProcess,
         then: impl FnOnce(&mut Commander, &mut CarryTeam) -> Result<(), PlayerError>,

@@ -1,12 +1,11 @@
 //! Bench of falls: robots that stagger through the worlds of the tasks, and other causes of falls.
 
 use tandem_episodes::{EpisodeSpec, build_world, tasks};
-use tandem_sim::bench::{
-    FALL_CASES, FallCase, FallPlace, FallTrial, FallsCase, FallsReport, is_asked, over_seeds,
-};
 use tandem_tools_spec::Protocol;
 
-use super::BenchError;
+use super::{FALL_CASES, FallCase, FallPlace, FallTrial, FallsCase, FallsReport};
+use crate::error::BenchError;
+use crate::seeds::{is_asked, over_seeds};
 
 /// First seed; no table of results reports the seeds from here on.
 const FIRST_SEED: u32 = 2000;

@@ -4,17 +4,18 @@
 mod cases;
 mod commands;
 mod floor;
+mod in_tasks;
 
 use std::fmt;
 
 use serde::Serialize;
+use tandem_sim::dynamics::Diverged;
+use tandem_sim::world::{Extremes, Watch};
+use tandem_sim::{RobotCommand, World};
 
-pub use cases::{FALL_CASES, FallCase, FallPlace};
+use cases::{FALL_CASES, FallCase, FallPlace};
 pub use floor::FloorEpisode;
-
-use crate::dynamics::Diverged;
-use crate::world::{Extremes, Watch};
-use crate::{RobotCommand, World};
+pub use in_tasks::falls;
 
 /// Result of one trial.
 #[derive(Clone, Debug, Serialize)]
@@ -47,7 +48,7 @@ pub struct FallsCase {
     pub greatest: Extremes,
 }
 
-/// Number of episodes that exceeded each limit, see [`crate::world::Extremes`].
+/// Number of episodes that exceeded each limit, see [`tandem_sim::world::Extremes`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Broken {
     pub speed: usize,

@@ -2,10 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::body::{RobotModel, UPPER, UPPER_JOINTS};
-use crate::locomotion::{BaseCommand, BaseLimits};
-use crate::random::SplitMix64;
-use crate::{CONTROL_DT_S, RobotCommand, World};
+use tandem_sim::body::{UPPER, UPPER_JOINTS};
+use tandem_sim::{BaseCommand, BaseLimits, CONTROL_DT_S, RobotCommand, RobotModel, SplitMix64, World};
 
 /// Parameters of a robot's staggering.
 #[derive(Clone, Copy, Debug)]

@@ -2,14 +2,11 @@
 
 use std::sync::Arc;
 
-use crate::SimError;
-use crate::body::RobotModel;
-use crate::robot::RobotPlacement;
-use crate::world::{World, WorldSpec};
+use tandem_sim::{RobotModel, RobotPlacement, SimError, World, WorldSpec};
 
 /// Outcome of a second of standing.
 #[derive(Clone, Debug, PartialEq)]
-pub struct StandTrial {
+pub(super) struct StandTrial {
     pub fallen: bool,
     /// Distance by which the pelvis sank or rose, and moved aside.
     pub moved_m: f32,
@@ -27,7 +24,7 @@ const AT_LIMIT_SHARE: f32 = 0.98;
 /// # Errors
 ///
 /// Returns an error if the robot's physics diverges.
-pub fn stand(model: &Arc<RobotModel>) -> Result<StandTrial, SimError> {
+pub(super) fn stand(model: &Arc<RobotModel>) -> Result<StandTrial, SimError> {
     let placement = RobotPlacement { name: "A".into(), position_m: [0.0; 2], yaw_rad: 0.0 };
     let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: Vec::new() };
     let mut world = World::with_robot(&spec, model.clone())?;

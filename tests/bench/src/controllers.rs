@@ -1,0 +1,69 @@
+//! Cases of base controllers.
+
+use std::ops::RangeInclusive;
+
+use tandem_episodes::{Controller, EpisodeError, RobotFile};
+use tandem_sim::Sensing;
+
+use crate::error::BenchError;
+use crate::report::{CaseReport, LocomotionReport};
+use crate::seeds::is_asked;
+use crate::single::{self, Subject};
+use crate::teams::{carrying, holding, placing};
+
+/// Plays the cases whose names contain one of the words of `filter`, separated by commas, on these seeds.
+/// Single robots come first, then two that carry something between them, if they have fingers. Calls `done`
+/// after each case.
+///
+/// # Errors
+///
+/// If a file cannot be read, or a world cannot be built.
+pub fn locomotion(
+    robot: &RobotFile,
+    controller: &Controller,
+    sensing: Sensing,
+    filter: &str,
+    seeds: &RangeInclusive<u32>,
+    mut done: impl FnMut(&CaseReport),
+) -> Result<LocomotionReport, BenchError> {
+    let choice = controller.load()?;
+    let model = robot.model().map_err(|error| Box::new(EpisodeError::from(error)))?;
+    let mut report =
+        single::run(&robot.kind(), &model, Subject::Base(&choice), sensing, filter, seeds, &mut done)?;
+    if !model.has_fingers() {
+        return Ok(report);
+    }
+    for case in carrying::CASES.iter().filter(|case| is_asked(filter, case.name)) {
+        let carried = carrying::run(case, robot, controller, sensing, seeds)?;
+        done(&carried);
+        report.cases.push(carried);
+    }
+    holding::run(robot, controller, sensing, filter, seeds, &mut |held| {
+        done(&held);
+        report.cases.push(held);
+    })?;
+    placing::run(robot, controller, sensing, filter, seeds, &mut |placed| {
+        done(&placed);
+        report.cases.push(placed);
+    })?;
+    Ok(report)
+}
+
+/// Plays the cases of single robots whose names contain one of the words of `filter`, as [`locomotion`] does,
+/// with a velocity policy that drives all motors by its own gains.
+///
+/// # Errors
+///
+/// If a file cannot be read, a world cannot be built, or the controller is no policy from a file.
+pub fn motors(
+    robot: &RobotFile,
+    controller: &Controller,
+    sensing: Sensing,
+    filter: &str,
+    seeds: &RangeInclusive<u32>,
+    done: impl FnMut(&CaseReport),
+) -> Result<LocomotionReport, BenchError> {
+    let choice = controller.load()?;
+    let model = robot.model().map_err(|error| Box::new(EpisodeError::from(error)))?;
+    Ok(single::run(&robot.kind(), &model, Subject::Motors(&choice), sensing, filter, seeds, done)?)
+}

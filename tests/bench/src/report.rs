@@ -1,0 +1,114 @@
+//! Results of the cases of base controllers.
+
+use std::fmt;
+
+use serde::Serialize;
+use tandem_sim::Sensing;
+
+/// Results of all cases.
+#[derive(Clone, Debug, Serialize)]
+pub struct LocomotionReport {
+    /// Name in [`tandem_sim::assets::ROBOTS`], or of a file.
+    pub robot: String,
+    /// Name in recordings, with the loop if there is one.
+    pub controller: String,
+    #[serde(flatten)]
+    pub sensing: Sensing,
+    pub cases: Vec<CaseReport>,
+}
+
+/// One case over its seeds. A number is the worst of the robots that did not fall; velocity error and
+/// power are means. `None` if not measured in this case.
+#[derive(Clone, Debug, Serialize)]
+pub struct CaseReport {
+    pub case: String,
+    pub seeds: usize,
+    pub survived: usize,
+    /// Deviation of the mean velocity, as a share of the command: mean over the seeds.
+    #[serde(rename = "velocity_error")]
+    pub velocity_error_share: Option<f32>,
+    pub heading_error_deg: Option<f32>,
+    pub final_drift_m: Option<f32>,
+    pub sway_m: Option<f32>,
+    pub height_error_m: Option<f32>,
+    /// Time from the zero command until the pelvis stays slower than 0.1 m/s, and than 0.02 m/s.
+    pub standing_after_s: Option<f32>,
+    pub still_after_s: Option<f32>,
+    /// Number of times that a foot left the ground while the robot was to stand.
+    pub steps: Option<u32>,
+    /// Largest tilt of the pelvis of a walking robot.
+    pub pelvis_tilt_deg: Option<f32>,
+    /// Maximum tilt of a load carried by several robots.
+    pub load_tilt_deg: Option<f32>,
+    /// Drift of held objects after they came to rest: the mean of each second, horizontally.
+    pub load_drift_m: Option<f32>,
+    /// Mean absolute mechanical power of all joints.
+    pub power_w: f32,
+}
+
+impl LocomotionReport {
+    /// Returns a line on the settings of the measurement, for below the table.
+    pub fn settings(&self) -> String {
+        let Sensing { state_estimate, sensors } = self.sensing;
+        let (state_estimate, sensors) = (state_estimate.name(), sensors.name());
+        format!(
+            "robot {}, controller {}, state estimate {state_estimate}, sensors {sensors}",
+            self.robot, self.controller
+        )
+    }
+}
+
+impl CaseReport {
+    /// Column heads of [`CaseReport`]'s lines.
+    pub const HEAD: &str = "case                        alive  v err  heading    drift     sway   height  \
+                            stands  still  steps  pelvis   tilt     load  power";
+
+    /// Creates the report of a case without measurements.
+    pub fn of(case: &str, seeds: usize) -> CaseReport {
+        CaseReport {
+            case: case.into(),
+            seeds,
+            survived: 0,
+            velocity_error_share: None,
+            heading_error_deg: None,
+            final_drift_m: None,
+            sway_m: None,
+            height_error_m: None,
+            standing_after_s: None,
+            still_after_s: None,
+            steps: None,
+            pelvis_tilt_deg: None,
+            load_tilt_deg: None,
+            load_drift_m: None,
+            power_w: 0.0,
+        }
+    }
+}
+
+impl fmt::Display for CaseReport {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let show = |value: Option<f32>, scale: f32, unit: &str| {
+            value.map_or("-".into(), |value| format!("{:.1}{unit}", value * scale))
+        };
+        write!(
+            f,
+            "{:26} {:>2}/{:<2}  {:>5}  {:>7}  {:>7}  {:>7}  {:>7}  \
+             {:>6}  {:>5}  {:>5}  {:>6}  {:>5}  {:>7}  {:>5}",
+            self.case,
+            self.survived,
+            self.seeds,
+            show(self.velocity_error_share, 100.0, "%"),
+            show(self.heading_error_deg, 1.0, "°"),
+            show(self.final_drift_m, 100.0, "cm"),
+            show(self.sway_m, 100.0, "cm"),
+            show(self.height_error_m, 100.0, "cm"),
+            show(self.standing_after_s, 1.0, "s"),
+            show(self.still_after_s, 1.0, "s"),
+            self.steps.map_or("-".into(), |steps| steps.to_string()),
+            show(self.pelvis_tilt_deg, 1.0, "°"),
+            show(self.load_tilt_deg, 1.0, "°"),
+            show(self.load_drift_m, 100.0, "cm"),
+            show(Some(self.power_w), 1.0, "W"),
+        )
+    }
+}
