@@ -185,7 +185,9 @@ def test_what_an_expert_did_succeeds_step_for_step_and_is_rewarded(tmp_path: Pat
 def test_what_is_not_there_is_refused_with_what_is() -> None:
     with pytest.raises(ValueError, match="have: handover, pouring"):
         make("Handover", task="handove")
-    with pytest.raises(TypeError, match="no option camera; have: obs_type"):
+    with pytest.raises(TypeError, match="no option view; have: obs_type"):
+        make("Handover", view="A")
+    with pytest.raises(ValueError, match="no camera 'A'; have: ideal, d435i"):
         make("Handover", camera="A")
     with pytest.raises(Exception, match="have: sparse, dense"):
         make("Handover", reward_type="shaped")
