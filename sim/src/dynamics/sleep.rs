@@ -13,32 +13,14 @@ use super::Dynamics;
 use super::contacts::collision::Manifold;
 use super::contacts::{ContactPoint, colliders_of};
 use super::trees::TreeId;
+use super::trees::state::Rest;
 use super::trees::tree::Tree;
-
-/// Maximum velocity of a still body, m/s or rad/s along each of its degrees of freedom.
-const STILL: f64 = 0.002;
-/// Number of still steps after which a body may fall asleep.
-const STILL_STEPS: u32 = 40;
-
-/// State of a body that may sleep.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Rest {
-    /// Number of steps for which the body has been still, at most [`STILL_STEPS`].
-    still_steps: u32,
-    pub is_asleep: bool,
-}
 
 /// Contacts of sleeping bodies, in the order of their colliders.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct SleepingContacts {
     manifolds: Vec<Manifold>,
     pub(super) touches: Vec<ContactPoint>,
-}
-
-impl Rest {
-    fn count(&mut self, speed: f64) {
-        self.still_steps = if speed < STILL { (self.still_steps + 1).min(STILL_STEPS) } else { 0 };
-    }
 }
 
 impl Dynamics {
@@ -109,7 +91,7 @@ impl Dynamics {
             let Some(rest) = tree.rest.as_mut().filter(|rest| !rest.is_asleep) else { continue };
             let speeds = moving_v[range.clone()].iter().chain(&final_v[range]);
             rest.count(speeds.fold(0.0, |most, v| v.abs().max(most)));
-            is_ready |= rest.still_steps == STILL_STEPS;
+            is_ready |= rest.is_ready();
         }
         if is_ready {
             let sleepers = self.sleepers();
@@ -120,7 +102,7 @@ impl Dynamics {
     /// Returns the bodies that are ready to sleep and near nothing that is not.
     fn sleepers(&self) -> BTreeSet<TreeId> {
         let rest = |id: &TreeId| self.trees.all[id.index()].rest;
-        let is_ready = |id: &TreeId| rest(id).is_some_and(|rest| rest.still_steps == STILL_STEPS);
+        let is_ready = |id: &TreeId| rest(id).is_some_and(Rest::is_ready);
         let mut ready: BTreeSet<TreeId> = self
             .trees
             .ids()

@@ -7,8 +7,8 @@ use super::Dynamics;
 use super::contacts::ContactPoint;
 use super::contacts::collision::Manifold;
 use super::joints::equality::EqualityState;
-use super::sleep::{Rest, SleepingContacts};
-use super::trees::state::TreeState;
+use super::sleep::SleepingContacts;
+use super::trees::state::{Rest, TreeState};
 
 /// State of all trees, equalities and contacts, in full precision.
 #[derive(Clone, Debug, Serialize, Deserialize)]

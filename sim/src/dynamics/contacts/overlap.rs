@@ -78,7 +78,7 @@ impl<'a> Overlap<'a> {
         of_a.chain(of_b).chain(last)
     }
 
-    /// Returns the first of the least overlaps along normals. A search for outermost points takes long for hulls
+    /// Returns the first of the least overlaps along normals. The search for outermost points is slow for hulls
     /// of many corners. It is left out where points that were found for other normals already overlap by more.
     fn least(&self, normals: impl Iterator<Item = Vector>) -> Option<Along> {
         let mut known: [[Vector; 2]; REMEMBERED] = Default::default();

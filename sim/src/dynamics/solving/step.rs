@@ -47,7 +47,7 @@ impl Dynamics {
 
     /// Solves for the velocities at the end of the step, with the present set of bounded drives.
     fn solve(&mut self) {
-        let Dynamics { settings, trees, collision, solver, moving_v, final_v } = self;
+        let Dynamics { settings, trees, collision, solver, moving_v, final_v, sleeping: _ } = self;
         Arch::new().dispatch(Whitening { trees, w: &mut solver.w, settings });
         let candidates = &collision.candidates;
         solver.prepare(trees, candidates, settings);
