@@ -190,7 +190,7 @@ pub enum SceneError {
     SameName { path: PathBuf, task: String, name: String },
     #[error(
         "in the scene {}, {name} does not stay where {task} puts it, ({:.2}, {:.2}, {:.2}) m from site \
-         \"task\": in {trial_s:.0} s it goes {moved_m:.2} m; it needs something to stand on and nothing in \
+         \"task\": in {trial_s:.2} s it goes {moved_m:.2} m; it needs something to stand on and nothing in \
          its way; a site {site:?} puts it elsewhere",
         path.display(), .at_m[0], .at_m[1], .at_m[2]
     )]

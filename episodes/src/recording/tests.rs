@@ -364,7 +364,8 @@ fn the_scene_shows_every_drawn_geom() {
             "{}",
             entity.id
         );
-        assert_eq!(entity.triangles.len(), drawn(|p| matches!(p, Convex { .. } | Mesh(_))), "{}", entity.id);
+        assert_eq!(entity.triangles.len(), drawn(|p| matches!(p, Convex { .. })), "{}", entity.id);
+        assert_eq!(entity.models.len(), drawn(|p| matches!(p, Mesh(_))), "{}", entity.id);
         for list in &entity.triangles {
             assert!(list.indices.iter().all(|index| (*index as usize) < list.points.len()));
         }

@@ -28,7 +28,6 @@ use onlookers::Spectators;
 pub use plan::{PlanAdvance, PlanRun};
 pub use replay::BringBack;
 pub(crate) use replay::Replay;
-use run_files::moment;
 pub use run_files::{RunFiles, RunFolder};
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -245,7 +244,7 @@ impl Session {
         }
         let mut result = self.result();
         if let Some(files) = &mut self.files {
-            files.finish(&mut result, &self.origin.spec.task);
+            files.finish(&mut result, &self.origin.spec.task, &mut self.observer);
         }
         self.result = Some(result);
         self.show_end();
@@ -382,9 +381,8 @@ impl Session {
 
     /// Saves an image of this moment for the strip, if the episode is recorded.
     fn keep_picture(&mut self, caption: &str) {
-        if let Some(files) = self.files.as_mut().filter(|files| files.shows_moments()) {
-            let names = self.motions.iter().map(|motion| motion.robot.name.as_str());
-            files.keep(moment(caption, &self.present, names, &mut self.observer));
+        if let Some(files) = &mut self.files {
+            files.keep(caption, &self.present);
         }
     }
 

@@ -53,7 +53,8 @@ pub struct RunFiles {
     recorder: Option<RecorderThread>,
     /// First failure, except the recorder's.
     failed: Option<String>,
-    moments: Vec<KeyMoment>,
+    /// Moments of the strip. Their images are rendered when it is written.
+    moments: Vec<Moment>,
     /// Joint instruction of the robots.
     instruction: String,
     begin_s: f64,
@@ -158,16 +159,10 @@ impl RunFiles {
         }
     }
 
-    /// Returns true if moments are needed for the strip.
-    pub(super) fn shows_moments(&self) -> bool {
-        self.pages
-    }
-
-    /// Stores a moment for the strip.
-    pub(super) fn keep(&mut self, moment: Result<KeyMoment, PictureError>) {
-        match moment {
-            Ok(moment) => self.moments.push(moment),
-            Err(error) => self.note(Err(error)),
+    /// Stores a moment for the strip, if there will be one.
+    pub(super) fn keep(&mut self, caption: &str, step: &Arc<Step>) {
+        if self.pages {
+            self.moments.push(Moment { caption: caption.into(), step: step.clone() });
         }
     }
 
@@ -176,15 +171,16 @@ impl RunFiles {
         self.failed.as_deref().or_else(|| self.recorder.as_ref()?.failed())
     }
 
-    /// Closes the recording and writes the other files. `result` then names any failure.
-    pub(super) fn finish(&mut self, result: &mut ResultReply, task: &Task) {
+    /// Closes the recording and writes the other files. `result` then names any failure. The observer renders
+    /// the moments of the strip.
+    pub(super) fn finish(&mut self, result: &mut ResultReply, task: &Task, observer: &mut Observer) {
         let recorder = self.recorder.as_mut().and_then(RecorderThread::stop);
         result.recording_failed = self.failed().map(str::to_owned);
         if let Some(recorder) = recorder {
             self.note(recorder.finish(result).map(drop));
         }
         if self.pages {
-            let reported = self.report(result, task);
+            let reported = self.report(result, task, observer);
             self.note(reported);
         }
         result.recording_failed = self.failed().map(str::to_owned);
@@ -194,8 +190,10 @@ impl RunFiles {
         let _ = fs::remove_dir(&self.folder);
     }
 
-    fn report(&self, result: &ResultReply, task: &Task) -> Result<(), EpisodeError> {
-        write_whole(&self.folder.join(STRIP_FILE), &strip::png(&self.moments)?)?;
+    fn report(&self, result: &ResultReply, task: &Task, observer: &mut Observer) -> Result<(), EpisodeError> {
+        let moments = self.moments.iter().map(|moment| moment.render(task, observer));
+        let moments = moments.collect::<Result<Vec<_>, _>>()?;
+        write_whole(&self.folder.join(STRIP_FILE), &strip::png(&moments)?)?;
         let page = EpisodePage {
             task,
             instruction: &self.instruction,
@@ -205,7 +203,7 @@ impl RunFiles {
             begin_s: self.begin_s,
             rules: self.rules,
             budget_left: self.budget_left,
-            moments: &self.moments,
+            moments: &moments,
         };
         Ok(write_whole(&self.folder.join(PAGE_FILE), page.html().as_bytes())?)
     }
@@ -254,26 +252,29 @@ fn begin(folder: &RunFolder, session: &Session) -> Result<RecorderThread, Episod
     Ok(RecorderThread::start(recorder).map_err(failed)?)
 }
 
-/// Returns a moment for the strip: the views after `step` of the third-person camera and of the robots
-/// called `names`.
-pub(super) fn moment<'a>(
-    caption: &str,
-    step: &Step,
-    names: impl Iterator<Item = &'a str>,
-    observer: &mut Observer,
-) -> Result<KeyMoment, PictureError> {
-    let (mut labels, mut views) = (vec!["the room".into()], vec![observer.cameras.third_person().into()]);
-    for (robot, name) in names.enumerate() {
-        labels.push(format!("what {name} sees"));
-        views.push(observer.cameras.eye(step, robot));
+/// Moment for the strip.
+struct Moment {
+    caption: String,
+    step: Arc<Step>,
+}
+
+impl Moment {
+    /// Renders the views of the third-person camera and of the robots of `task`.
+    fn render(&self, task: &Task, observer: &mut Observer) -> Result<KeyMoment, PictureError> {
+        let Moment { caption, step } = self;
+        let (mut labels, mut views) = (vec!["the room".into()], vec![observer.cameras.third_person().into()]);
+        for (robot, name) in task.robot_names().enumerate() {
+            labels.push(format!("what {name} sees"));
+            views.push(observer.cameras.eye(step, robot));
+        }
+        for CameraView { camera, .. } in &mut views {
+            (camera.width, camera.height) = (CELL_WIDTH as u32, CELL_HEIGHT as u32);
+        }
+        let frames = observer.render_all(step, &views).into_iter();
+        let view = |(label, Frame { width, height, rgb, .. }): (String, Frame)| {
+            Ok(LabelledPicture { label, file: encode_png(width, height, &rgb)? })
+        };
+        let views = labels.into_iter().zip(frames).map(view).collect::<Result<_, PictureError>>()?;
+        Ok(KeyMoment { caption: [caption.clone(), format!("{:.1} s", step.time_s)], views })
     }
-    for CameraView { camera, .. } in &mut views {
-        (camera.width, camera.height) = (CELL_WIDTH as u32, CELL_HEIGHT as u32);
-    }
-    let frames = observer.render_all(step, &views).into_iter();
-    let view = |(label, Frame { width, height, rgb, .. }): (String, Frame)| {
-        Ok(LabelledPicture { label, file: encode_png(width, height, &rgb)? })
-    };
-    let views = labels.into_iter().zip(frames).map(view).collect::<Result<_, PictureError>>()?;
-    Ok(KeyMoment { caption: [caption.into(), format!("{:.1} s", step.time_s)], views })
 }

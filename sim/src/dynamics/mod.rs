@@ -17,6 +17,7 @@ mod contacts;
 mod energy_balance;
 mod joints;
 mod settings;
+mod sleep;
 mod snapshot;
 mod solving;
 #[cfg(test)]
@@ -39,6 +40,7 @@ pub use trees::tree::{Tree, TreeError};
 pub use trees::{LinkId, TreeId};
 
 use contacts::collision::Collision;
+use sleep::SleepingContacts;
 use solving::Solver;
 use trees::Trees;
 
@@ -48,6 +50,8 @@ pub struct Dynamics {
     trees: Trees,
     collision: Collision,
     solver: Solver,
+    /// Contacts that are left out of steps.
+    sleeping: SleepingContacts,
     /// Velocities of all trees by which positions move, and those at the end of the step.
     moving_v: Vec<f64>,
     final_v: Vec<f64>,
@@ -60,6 +64,7 @@ impl Dynamics {
             trees: Trees::default(),
             collision: Collision::default(),
             solver: Solver::default(),
+            sleeping: SleepingContacts::default(),
             moving_v: Vec::new(),
             final_v: Vec::new(),
         }
@@ -122,7 +127,11 @@ impl Dynamics {
         &self.trees.all[id.index()]
     }
 
+    /// Returns a tree to be changed. If it sleeps, it wakes.
     pub fn tree_mut(&mut self, id: TreeId) -> &mut Tree {
+        if self.trees.all[id.index()].is_asleep() {
+            self.wake(id);
+        }
         &mut self.trees.all[id.index()]
     }
 
@@ -151,16 +160,16 @@ impl Dynamics {
         })
     }
 
-    /// Returns all contact points of the last step.
-    pub fn touches(&self) -> &[ContactPoint] {
-        &self.solver.touches
+    /// Returns all contact points of the last step, and those of sleeping bodies.
+    pub fn touches(&self) -> impl Iterator<Item = &ContactPoint> {
+        self.solver.touches.iter().chain(&self.sleeping.touches)
     }
 
     /// Returns the contacts on a collider in the last step, point by point: the other collider and the
     /// force on this one (N, world axes), friction included.
     pub fn forces_on(&self, collider: ColliderId) -> impl Iterator<Item = (ColliderId, DVec3)> {
         let per_s = 1.0 / self.settings.dt_s;
-        self.touches().iter().filter_map(move |touch| match touch.colliders {
+        self.touches().filter_map(move |touch| match touch.colliders {
             [other, this] if this == collider => Some((other, touch.impulse_n_s * per_s)),
             [this, other] if this == collider => Some((other, touch.impulse_n_s * -per_s)),
             _ => None,

@@ -7,7 +7,8 @@ use super::Dynamics;
 use super::contacts::ContactPoint;
 use super::contacts::collision::Manifold;
 use super::joints::equality::EqualityState;
-use super::trees::state::TreeState;
+use super::sleep::SleepingContacts;
+use super::trees::state::{Rest, TreeState};
 
 /// State of all trees, equalities and contacts, in full precision.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -16,6 +17,9 @@ pub struct DynamicsState {
     equalities: Vec<EqualityState>,
     touches: Vec<ContactPoint>,
     manifolds: Vec<Manifold>,
+    /// State of bodies that may sleep.
+    rests: Vec<Rest>,
+    sleeping: SleepingContacts,
 }
 
 /// Error of restoring a state that belongs to another world.
@@ -26,7 +30,7 @@ pub struct DynamicsState {
 )]
 pub struct OtherWorld;
 
-/// [`DynamicsState`] by reference; both serialise to the same bytes.
+/// [`DynamicsState`] by reference, without that of bodies that may sleep.
 #[derive(Serialize)]
 struct PresentState<'a> {
     trees: Vec<TreeState>,
@@ -36,7 +40,8 @@ struct PresentState<'a> {
 }
 
 impl Dynamics {
-    /// Returns a view of the present state for immediate serialisation.
+    /// Returns a view of the present state for immediate serialisation. [`Dynamics::resting`] has the rest of
+    /// it.
     pub fn present(&self) -> impl Serialize {
         PresentState {
             trees: self.trees.all.iter().map(|tree| tree.state()).collect(),
@@ -52,6 +57,8 @@ impl Dynamics {
             equalities: self.solver.equalities.memory.clone(),
             touches: self.solver.touches.clone(),
             manifolds: self.collision.manifolds.clone(),
+            rests: self.rests(),
+            sleeping: self.sleeping.clone(),
         }
     }
 
@@ -64,6 +71,7 @@ impl Dynamics {
         let trees = &mut self.trees.all;
         let fits = trees.len() == state.trees.len()
             && self.solver.equalities.memory.len() == state.equalities.len()
+            && trees.iter().filter(|tree| tree.rest.is_some()).count() == state.rests.len()
             && trees.iter().zip(&state.trees).all(|(tree, state)| tree.fits(state));
         if !fits {
             return Err(OtherWorld);
@@ -74,6 +82,10 @@ impl Dynamics {
         self.solver.equalities.memory.clone_from(&state.equalities);
         self.solver.touches.clone_from(&state.touches);
         self.collision.manifolds.clone_from(&state.manifolds);
+        let may_sleep = self.trees.all.iter_mut().filter_map(|tree| tree.rest.as_mut());
+        may_sleep.zip(&state.rests).for_each(|(rest, state)| *rest = *state);
+        self.sleeping.clone_from(&state.sleeping);
+        self.collision.place_sleepers();
         Ok(())
     }
 }

@@ -84,7 +84,7 @@ impl World {
     /// force on the second (N, world).
     fn presses(&self) -> impl Iterator<Item = ([Option<Owner>; 2], Vector)> {
         let owner = |id: ColliderId| Owner::of_tag(self.dynamics.collider(id).tag);
-        self.dynamics.touches().iter().filter(|touch| touch.normal_impulse_n_s > 0.0).map(move |touch| {
+        self.dynamics.touches().filter(|touch| touch.normal_impulse_n_s > 0.0).map(move |touch| {
             let force_n = touch.normal * (touch.normal_impulse_n_s / f64::from(PHYSICS_DT_S));
             (touch.colliders.map(owner), force_n.as_vec3())
         })
@@ -109,7 +109,7 @@ impl World {
             let link = self.robots[robot].model.links[link].name.clone();
             Some(RobotPress { link, on, at_m: touch.point_m.as_vec3() })
         };
-        let pressed = self.dynamics.touches().iter().filter(|touch| touch.normal_impulse_n_s > 0.0);
+        let pressed = self.dynamics.touches().filter(|touch| touch.normal_impulse_n_s > 0.0);
         pressed.filter_map(press).collect()
     }
 

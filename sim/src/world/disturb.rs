@@ -175,7 +175,7 @@ impl World {
             a != b && [a, b].contains(&Some(tree))
         };
         let overlap = |touch: &ContactPoint| of_robot(touch) && touch.gap_m < -ALLOWED_OVERLAP_M;
-        let overlaps = stepped.is_err() || self.dynamics.touches().iter().any(overlap);
+        let overlaps = stepped.is_err() || self.dynamics.touches().any(overlap);
         self.dynamics.restore(&before).expect("a state of this world");
         overlaps
     }

@@ -114,8 +114,13 @@ impl World {
     /// Returns an error if a file of the specification cannot be used.
     pub fn with_robot(spec: &WorldSpec, model: Arc<RobotModel>) -> Result<World, SimError> {
         let mut world = match &spec.scene {
-            SceneSource::Embedded(name) => World::of_scene(Document::parse(name, assets::scene(name)?)?)?,
-            SceneSource::Read { document, world_from_scene } => World::furnished(document, world_from_scene)?,
+            SceneSource::Embedded(name) => {
+                let document = Document::parse(name, assets::scene(name)?)?;
+                World::furnished(&document, &Pose::IDENTITY, false)?
+            }
+            SceneSource::Read { document, world_from_scene } => {
+                World::furnished(document, world_from_scene, true)?
+            }
         };
         world.lay_ground();
         let dynamics = &mut world.dynamics;
@@ -135,15 +140,16 @@ impl World {
     ///
     /// Returns an error if the scene contains something unsupported.
     pub fn of_scene(scene: Document) -> Result<World, SimError> {
-        World::furnished(&scene, &Pose::IDENTITY)
+        World::furnished(&scene, &Pose::IDENTITY, true)
     }
 
-    /// Builds the world as [`World::of_scene`] does, with the scene's own origin at `world_from_scene`.
-    fn furnished(scene: &Document, world_from_scene: &Pose) -> Result<World, SimError> {
+    /// Builds the world as [`World::of_scene`] does, with the scene's own origin at `world_from_scene`. Its
+    /// free bodies sleep while they rest far from everything else, if they may.
+    fn furnished(scene: &Document, world_from_scene: &Pose, may_sleep: bool) -> Result<World, SimError> {
         let gravity_m_s2 = gravity_m_s2(scene, world_from_scene);
         let mut dynamics = Dynamics::new(Settings::new(f64::from(PHYSICS_DT_S), gravity_m_s2));
         let Furniture { fixed, objects, machinery } =
-            objects::insert_scene(&mut dynamics, scene, world_from_scene)?;
+            objects::insert_scene(&mut dynamics, scene, world_from_scene, may_sleep)?;
         Ok(World {
             dynamics,
             robots: Vec::new(),

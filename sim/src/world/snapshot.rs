@@ -70,6 +70,9 @@ impl World {
         // Serialising plain data to memory does not fail.
         let bytes = postcard::to_extend(&self.dynamics.present(), Vec::with_capacity(DYNAMICS_BYTES));
         hash.update(&bytes.unwrap_or_default());
+        if let Some(resting) = self.dynamics.resting() {
+            hash.update(&postcard::to_stdvec(&resting).unwrap_or_default());
+        }
         for robot in &self.robots {
             hash.update(&robot.save().unwrap_or_default());
         }

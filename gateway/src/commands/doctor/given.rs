@@ -106,7 +106,7 @@ fn scene(layer: &Layer, path: &Path) -> Vec<Finding> {
     let (mut playable, mut others) = (Vec::new(), Vec::new());
     for spec in specs(layer) {
         match trial(&spec) {
-            Ok(_) => playable.push(spec.task.id.clone()),
+            Ok(()) => playable.push(spec.task.id.clone()),
             Err(error) => {
                 let text = error.to_string();
                 // Without the site for the task's origin, no task has a place.

@@ -7,10 +7,10 @@ use std::{
     time::{Duration, Instant},
 };
 
-use tandem_episodes::{EpisodeError, EpisodeSpec};
+use tandem_episodes::{EpisodeError, EpisodeSpec, Session};
 use tandem_tools_spec::{Observe, ToolCall, Wait};
 
-use super::{Finding, Findings, trial};
+use super::{Finding, Findings};
 use crate::{hosting::look_at_runs_folder, settings::Layer};
 
 /// Number of control steps that the check of physics simulates.
@@ -40,7 +40,7 @@ pub fn check(layer: &Layer, spec: Option<EpisodeSpec>) -> Findings {
 /// Plays half a second of an episode, and renders all robots' cameras.
 fn physics(spec: &EpisodeSpec) -> Result<String, String> {
     let play = || {
-        let mut session = trial(spec)?;
+        let mut session = Session::start(spec, None)?;
         session.call(Wait { steps: TRIED_STEPS }.into())?;
         let simulated_s = session.present().time_s;
         let began = Instant::now();

@@ -7,7 +7,7 @@ mod machine;
 
 use std::{fmt::Write, process::ExitCode};
 
-use tandem_episodes::{EpisodeError, EpisodeSpec, SceneFile, Session, tasks};
+use tandem_episodes::{EpisodeError, EpisodeSpec, SceneFile, build_world, tasks};
 use tandem_tools_spec::Protocol;
 
 use super::{CommandResult, print, serve::ServeArgs};
@@ -87,7 +87,7 @@ fn examine(args: ServeArgs, token: Result<Option<Token>, String>) -> Findings {
     };
     findings.extend(given::check(&layer, token));
     findings.push(("renderer", Finding::of(layer.renderer().describe().map_err(|error| error.to_string()))));
-    findings.extend(machine::check(&layer, specs(&layer).find_map(|spec| trial(&spec).ok().map(|_| spec))));
+    findings.extend(machine::check(&layer, specs(&layer).find(|spec| trial(spec).is_ok())));
     findings.extend(around::check(&layer));
     findings
 }
@@ -110,9 +110,10 @@ fn specs(layer: &Layer) -> impl Iterator<Item = EpisodeSpec> {
     })
 }
 
-/// Builds an episode. In a custom scene this includes a second without commands.
-fn trial(spec: &EpisodeSpec) -> Result<Session, EpisodeError> {
-    Session::start(spec, None)
+/// Builds the world of an episode. In a custom scene this includes a second without commands, if it was not
+/// tried before.
+fn trial(spec: &EpisodeSpec) -> Result<(), EpisodeError> {
+    build_world(spec).map(drop)
 }
 
 #[cfg(test)]

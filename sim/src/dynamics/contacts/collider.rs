@@ -67,6 +67,8 @@ pub struct Surface {
     pub reach_m: f64,
     /// Bounds in the world frame, grown by `reach_m`.
     pub bounds: Aabb,
+    /// True if it was placed since its body fell asleep.
+    pub sleeps_there: bool,
 }
 
 /// Distance by whose whole multiples the shape of an endless collider is moved. The shape has to extend
@@ -101,6 +103,7 @@ impl Surface {
             world_from_shape: DPose3::IDENTITY,
             reach_m: 0.0,
             bounds: local,
+            sleeps_there: false,
             collider,
         };
         let spin_rad_s = body.map_or(0.0, |link| trees.spin_rad_s(link));
@@ -125,6 +128,11 @@ impl Surface {
             + turn.z_axis.abs() * self.half_m.z
             + DVec3::splat(self.reach_m);
         self.bounds = Aabb::new((middle_m - half_m).as_vec3(), (middle_m + half_m).as_vec3());
+    }
+
+    /// Returns true if nothing moves the surface, or its body sleeps.
+    pub fn is_still(&self, trees: &Trees) -> bool {
+        self.body.is_none_or(|link| trees.all[link.tree.index()].is_asleep())
     }
 
     /// Returns the vector from the centre of this surface to that of another, in the frame of this one.

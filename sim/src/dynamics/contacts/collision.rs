@@ -23,7 +23,7 @@ use super::overlap::Overlap;
 use super::{Candidate, ContactPoint, Impulses};
 use crate::dynamics::settings::Settings;
 use crate::dynamics::trees::spatial::rounded;
-use crate::dynamics::trees::{LinkId, Trees};
+use crate::dynamics::trees::{LinkId, TreeId, Trees};
 use crate::dynamics::{DPose3, DVec3};
 
 /// Angle by which a round shape turns before its points are searched anew, in rad. At the one degree
@@ -52,7 +52,7 @@ pub struct Collision {
 /// Parry's contact points of two colliders.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Manifold {
-    colliders: [ColliderId; 2],
+    pub(in crate::dynamics) colliders: [ColliderId; 2],
     points: ContactManifold<(), ()>,
 }
 
@@ -97,17 +97,42 @@ impl Collision {
         self.surfaces.iter_mut().map(|surface| &mut surface.collider)
     }
 
-    /// Collects the points that touch, or will touch within the step.
-    pub fn detect(&mut self, trees: &Trees, settings: &Settings) {
+    /// Places all surfaces, and finds the pairs that are near.
+    pub fn place_all(&mut self, trees: &Trees, settings: &Settings) {
         Arch::new().dispatch(Placing { collision: self, trees, settings });
         self.near.update(&self.surfaces, trees);
+    }
+
+    /// Places the surfaces of sleeping bodies, too, in the next step: their state was set.
+    pub fn place_sleepers(&mut self) {
+        self.surfaces.iter_mut().for_each(|surface| surface.sleeps_there = false);
+    }
+
+    /// Returns the trees that carry two colliders; `None` for one that nothing moves.
+    pub fn trees_of(&self, colliders: [ColliderId; 2]) -> [Option<TreeId>; 2] {
+        colliders.map(|id| self.surfaces[id.index()].body.map(|body| body.tree))
+    }
+
+    /// Returns pairs of different trees that have colliders whose bounds meet.
+    pub fn meeting_trees(&self) -> impl Iterator<Item = [TreeId; 2]> {
+        self.near.pairs.iter().filter_map(|pair| {
+            let [a, b] = pair.map(|id| &self.surfaces[id.index()]);
+            let trees = [a.body?.tree, b.body?.tree];
+            (trees[0] != trees[1] && a.bounds.intersects(&b.bounds)).then_some(trees)
+        })
+    }
+
+    /// Collects the points that touch, or will touch within the step. All surfaces must be placed.
+    pub fn detect(&mut self, trees: &Trees, settings: &Settings) {
         self.candidates.clear();
         self.spare.extend(self.found.drain(..).map(|manifold| manifold.points));
         let mut last = self.manifolds.iter().peekable();
         for &colliders in &self.near.pairs {
             while last.next_if(|manifold| manifold.colliders < colliders).is_some() {}
             let surfaces = colliders.map(|id| &self.surfaces[id.index()]);
-            if !surfaces[0].bounds.intersects(&surfaces[1].bounds) {
+            if surfaces.iter().all(|surface| surface.is_still(trees))
+                || !surfaces[0].bounds.intersects(&surfaces[1].bounds)
+            {
                 continue;
             }
             let [first, second] = surfaces;
@@ -137,6 +162,11 @@ impl Collision {
         let mut last = None;
         for (index, surface) in self.surfaces.iter_mut().enumerate() {
             let Some(body) = surface.body else { continue };
+            let is_asleep = trees.all[body.tree.index()].is_asleep();
+            if is_asleep && surface.sleeps_there {
+                continue;
+            }
+            surface.sleeps_there = is_asleep;
             // Colliders of one link are adjacent.
             let (pose, spin_rad_s) = match last {
                 Some((link, pose, spin_rad_s)) if link == body => (pose, spin_rad_s),

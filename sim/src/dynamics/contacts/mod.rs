@@ -45,6 +45,11 @@ pub struct Impulses {
     pub roll: DVec3,
 }
 
+/// Returns the colliders of a point, by which points are ordered.
+pub fn colliders_of(touch: &ContactPoint) -> [ColliderId; 2] {
+    touch.colliders
+}
+
 impl Impulses {
     /// Returns the impulses as lanes of a contact with these directions (normal, two tangents).
     pub fn lanes(&self, [_, t1, t2]: [DVec3; 3]) -> [f64; 6] {

@@ -15,6 +15,10 @@ use rapier3d::parry::shape::{PackedFeatureId, PolygonalFeature, PolygonalFeature
 
 /// Overlap along the normal below which the result is always close to the depth.
 const DEEP_M: f32 = 0.005;
+/// Number of outermost points that are remembered, and the overlap by which a normal must exceed the least one
+/// at these points to be left out. It is far above rounding.
+const REMEMBERED: usize = 16;
+const CERTAINLY_M: f32 = 0.0001;
 /// Difference in overlap that a replacement normal must win by.
 const CLEARLY_M: f32 = 0.001;
 
@@ -60,8 +64,7 @@ impl<'a> Overlap<'a> {
             return;
         }
         let last = before.filter(|before| !before.points.is_empty()).map(|before| before.local_n1);
-        let less = |best: Along, other: Along| if other.depth_m < best.depth_m { other } else { best };
-        let Some(least) = self.normals(last).map(|normal| self.along(normal)).reduce(less) else { return };
+        let Some(least) = self.least(self.normals(last)) else { return };
         // If the shapes are separated along this normal, its points would be those of a gap.
         if least.depth_m + CLEARLY_M < found_m && !(is_lost && least.depth_m < 0.0) {
             self.touch(&least, manifold);
@@ -73,6 +76,31 @@ impl<'a> Overlap<'a> {
         let of_a = face_normals(self.shapes[0]);
         let of_b = face_normals(self.shapes[1]).map(|normal| -(self.a_from_b.rotation * normal));
         of_a.chain(of_b).chain(last)
+    }
+
+    /// Returns the first of the least overlaps along normals. The search for outermost points is slow for hulls
+    /// of many corners. It is left out where points that were found for other normals already overlap by more.
+    fn least(&self, normals: impl Iterator<Item = Vector>) -> Option<Along> {
+        let mut known: [[Vector; 2]; REMEMBERED] = Default::default();
+        let mut found = 0;
+        let mut least: Option<Along> = None;
+        for normal in normals {
+            if let Some(least) = &least {
+                let known = &known[..found.min(REMEMBERED)];
+                let on_a = known.iter().map(|[on_a_m, _]| on_a_m.dot(normal)).fold(f32::MIN, f32::max);
+                let on_b = known.iter().map(|[_, on_b_m]| on_b_m.dot(normal)).fold(f32::MAX, f32::min);
+                if on_a - on_b + self.radii_m[0] + self.radii_m[1] > least.depth_m + CERTAINLY_M {
+                    continue;
+                }
+            }
+            let along = self.along(normal);
+            known[found % REMEMBERED] = [along.on_a_m, along.on_b_m];
+            found += 1;
+            if least.as_ref().is_none_or(|least| along.depth_m < least.depth_m) {
+                least = Some(along);
+            }
+        }
+        least
     }
 
     fn along(&self, normal: Vector) -> Along {
@@ -136,4 +164,37 @@ fn face_normals(shape: &dyn Shape) -> impl Iterator<Item = Vector> {
     };
     let hull = shape.as_convex_polyhedron().map_or(&[][..], |hull| hull.faces());
     axes.iter().flat_map(|axis| [*axis, -*axis]).chain(hull.iter().map(|face| face.normal))
+}
+
+#[cfg(test)]
+mod tests {
+    use rapier3d::math::Rotation;
+    use rapier3d::prelude::SharedShape;
+
+    use super::*;
+    use crate::dynamics::tests::bench::Random;
+
+    /// Normals that are left out never have the least overlap.
+    #[test]
+    fn the_least_overlap_is_that_of_a_search_along_all_normals() {
+        let mut random = Random(5);
+        let mut point = |scale_m: f64| (random.vector() * scale_m).as_vec3();
+        for _ in 0..40 {
+            let mut hull = |corners: usize| {
+                let points: Vec<Vector> = (0..corners).map(|_| point(1.0).normalize() * 0.2).collect();
+                SharedShape::convex_hull(&points).expect("points in space")
+            };
+            let shapes = [hull(200), hull(60)];
+            let slab = SharedShape::cuboid(50.0, 50.0, 1.0);
+            let turn = Rotation::from_scaled_axis(point(3.0));
+            let (beside, above) = (point(0.2), Vector::new(point(40.0).x, point(40.0).y, 1.15));
+            for (a, b, at) in [(&shapes[0], &shapes[1], beside), (&slab, &shapes[1], above)] {
+                let a_from_b = Pose::from_parts(at, turn);
+                let overlap = Overlap::of([&**a, &**b], &a_from_b).expect("shapes that Parry searches");
+                let all_m = overlap.normals(None).map(|normal| overlap.along(normal).depth_m);
+                let least_m = overlap.least(overlap.normals(None)).expect("faces").depth_m;
+                assert_eq!(least_m, all_m.fold(f32::MAX, f32::min));
+            }
+        }
+    }
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::dynamics::settings::{Pass, Settings};
 use crate::dynamics::trees::rows::{ConstraintRows, Whitened};
 use crate::dynamics::trees::spatial::ForceVector;
-use crate::dynamics::trees::{LinkId, Trees};
+use crate::dynamics::trees::{LinkId, TreeId, Trees};
 
 #[derive(Clone, Debug)]
 pub enum Equality {
@@ -61,6 +61,17 @@ impl Equalities {
         self.all.push(equality);
         self.memory.push(EqualityState { active, impulse: [DVec3::ZERO; 2] });
         EqualityId(self.all.len() - 1)
+    }
+
+    /// Returns true if an equality acts on a tree.
+    pub fn hold(&self, tree: TreeId) -> bool {
+        let is_held = |link: LinkId| link.tree == tree;
+        self.all.iter().any(|equality| match *equality {
+            Equality::Couple { follower, leader, .. } => is_held(follower) || leader.is_some_and(is_held),
+            Equality::Connect { a, b, .. } | Equality::Weld { a, b, .. } => {
+                is_held(a) || b.is_some_and(is_held)
+            }
+        })
     }
 
     pub fn set_active(&mut self, id: EqualityId, active: bool) {

@@ -15,8 +15,11 @@ impl Dynamics {
     ///
     /// # Errors
     ///
-    /// Returns [`Diverged`] if a velocity is no longer finite; all state then is as it was.
+    /// Returns [`Diverged`] if a velocity is no longer finite; all state then is as it was, but bodies may
+    /// have woken.
     pub fn step(&mut self) -> Result<(), Diverged> {
+        self.collision.place_all(&self.trees, &self.settings);
+        self.wake_near();
         self.collision.detect(&self.trees, &self.settings);
         self.trees.all.iter_mut().for_each(|tree| tree.begin_drives(self.settings.dt_s));
         self.solve();
@@ -28,7 +31,7 @@ impl Dynamics {
         self.solver.commit(&mut self.trees, self.settings.dt_s);
         self.collision.commit();
         let Settings { dt_s, gravity_m_s2, .. } = self.settings;
-        for (tree, range) in self.trees.ranges() {
+        for (tree, range) in self.trees.ranges().filter(|(tree, _)| !tree.is_asleep()) {
             let after = &self.final_v[range.clone()];
             tree.keep_efforts(dt_s, after);
             let due = tree.due(gravity_m_s2, dt_s, after, &self.solver.w[range.clone()]);
@@ -38,12 +41,13 @@ impl Dynamics {
                 tree.settle(&due);
             }
         }
+        self.fall_asleep();
         Ok(())
     }
 
     /// Solves for the velocities at the end of the step, with the present set of bounded drives.
     fn solve(&mut self) {
-        let Dynamics { settings, trees, collision, solver, moving_v, final_v } = self;
+        let Dynamics { settings, trees, collision, solver, moving_v, final_v, sleeping: _ } = self;
         Arch::new().dispatch(Whitening { trees, w: &mut solver.w, settings });
         let candidates = &collision.candidates;
         solver.prepare(trees, candidates, settings);
@@ -112,7 +116,7 @@ impl WithSimd for Whitening<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
         let Settings { dt_s, gravity_m_s2, .. } = *self.settings;
-        for tree in &mut self.trees.all {
+        for tree in self.trees.all.iter_mut().filter(|tree| !tree.is_asleep()) {
             tree.prepare(dt_s, gravity_m_s2);
         }
         self.trees.whiten(dt_s, self.w);

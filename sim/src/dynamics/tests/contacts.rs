@@ -121,12 +121,12 @@ fn dynamics_contacts_report_the_weight() {
     let centre_m = bench.position_m(body);
     bench.dynamics.tree_mut(body).push(0, centre_m, DVec3::new(4.0, 0.0, 0.0));
     bench.step();
-    let collider = bench.dynamics.touches()[0].colliders[1];
+    let collider = bench.dynamics.solver.touches[0].colliders[1];
     let force: DVec3 = bench.dynamics.forces_on(collider).map(|(_, force)| force).sum();
     assert!((force - DVec3::new(-4.0, 0.0, 2.0 * G_M_S2)).length() < 0.05, "{force}");
-    let normal: f64 = bench.dynamics.touches().iter().map(|touch| touch.normal_impulse_n_s).sum();
+    let normal: f64 = bench.dynamics.solver.touches.iter().map(|touch| touch.normal_impulse_n_s).sum();
     assert!((normal / DT_S - 2.0 * G_M_S2).abs() < 0.05);
-    assert_eq!(bench.dynamics.touches().len(), 4);
+    assert_eq!(bench.dynamics.solver.touches.len(), 4);
 }
 
 /// An endless floor carries a body at any distance just as it does at its centre.

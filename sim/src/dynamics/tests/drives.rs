@@ -96,7 +96,7 @@ fn check_efforts(
 ) -> bool {
     // For a fast tree, energy that the integration made is removed (see `energy`), which no drive did.
     let fast = |v: &[f64]| v.iter().any(|v| v.abs() > FAST_RAD / DT_S);
-    if !bench.dynamics.touches().is_empty() || fast(before) || fast(&bench.dynamics.tree(id).v) {
+    if !bench.dynamics.solver.touches.is_empty() || fast(before) || fast(&bench.dynamics.tree(id).v) {
         return false;
     }
     let tree = bench.dynamics.tree(id);

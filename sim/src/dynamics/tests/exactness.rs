@@ -49,7 +49,7 @@ fn dynamics_reruns_are_equal_to_the_bit() {
     first.run_s(2.0);
     second.run_s(2.0);
     assert_eq!(bits(&first), bits(&second));
-    assert!(!first.dynamics.touches().is_empty());
+    assert!(!first.dynamics.solver.touches.is_empty());
 }
 
 /// Contacts do not depend on pairs that were near before, or on the order in which they came near.
@@ -92,14 +92,14 @@ fn dynamics_divergence_is_an_error_and_changes_nothing() {
     let mut bench = scene();
     bench.run_s(0.5);
     let before: Vec<TreeState> = bench.dynamics.state().trees;
-    let touches = postcard::to_stdvec(bench.dynamics.touches()).unwrap();
+    let touches = postcard::to_stdvec(&bench.dynamics.solver.touches).unwrap();
     let body = super::super::TreeId(2);
     for bad in [f64::NAN, f64::INFINITY, 1e300] {
         bench.dynamics.tree_mut(body).push(0, DVec3::ZERO, DVec3::new(bad, 0.0, 0.0));
         let error = bench.dynamics.step().unwrap_err();
         assert!(error.to_string().contains(&error.tree), "{error}");
         assert_eq!(bench.dynamics.state().trees, before);
-        assert_eq!(postcard::to_stdvec(bench.dynamics.touches()).unwrap(), touches);
+        assert_eq!(postcard::to_stdvec(&bench.dynamics.solver.touches).unwrap(), touches);
     }
     bench.step();
 }

@@ -246,7 +246,8 @@ fn dynamics_blow_does_not_drive_a_light_link_beyond_its_range() {
         for _ in 0..60 {
             bench.step();
             farthest_rad = farthest_rad.max(bench.dynamics.tree(finger).joint_position(0));
-            deepest_m = bench.dynamics.touches().iter().fold(deepest_m, |most, touch| most.max(-touch.gap_m));
+            deepest_m =
+                bench.dynamics.solver.touches.iter().fold(deepest_m, |most, touch| most.max(-touch.gap_m));
         }
         assert!(farthest_rad > 0.25, "it was struck: {farthest_rad} rad");
         assert!(

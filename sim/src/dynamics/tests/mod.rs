@@ -1,6 +1,6 @@
 //! Closed forms, conservation, exactness.
 
-mod bench;
+pub mod bench;
 mod contacts;
 mod drives;
 mod energy_balance;

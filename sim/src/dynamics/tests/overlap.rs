@@ -148,6 +148,6 @@ fn dynamics_what_is_deepest_is_told_whichever_face_looks_there() {
     let below = bench.add(lone("foot", at, Mass::of_box(1.0, DVec3::new(0.1, 0.03, 0.02))));
     bench.add_shape(below.link(0), foot(), sliding(0.4));
     bench.step();
-    let deepest_m = bench.dynamics.touches().iter().map(|touch| -touch.gap_m).fold(0.0, f64::max);
+    let deepest_m = bench.dynamics.solver.touches.iter().map(|touch| -touch.gap_m).fold(0.0, f64::max);
     assert!((deepest_m - 0.0425).abs() < 0.001, "{deepest_m}");
 }

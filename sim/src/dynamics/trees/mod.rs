@@ -108,6 +108,10 @@ impl Trees {
         for index in &self.jointless {
             let (tree, offset) = (&mut self.all[*index], self.offset[*index]);
             let own_w = &mut w[offset..offset + tree.dofs()];
+            if tree.is_asleep() {
+                own_w.fill(0.0);
+                continue;
+            }
             tree.factor.factorise(&tree.layout);
             tree.factor.whiten(&tree.layout, dt_s, &tree.unconstrained, &mut tree.rhs, own_w);
         }
@@ -122,6 +126,10 @@ impl Trees {
         for index in &self.jointless {
             let (tree, offset) = (&self.all[*index], self.offset[*index]);
             let own = offset..offset + tree.dofs();
+            if tree.is_asleep() {
+                v[own].fill(0.0);
+                continue;
+            }
             tree.factor.unwhiten(&tree.layout, &w[own.clone()], &mut v[own]);
         }
     }

@@ -7,6 +7,7 @@ use super::factor::Factor;
 use super::layout::Layout;
 use super::link::{Drive, DriveLaw, Joint, Link, Mass};
 use super::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
+use super::state::Rest;
 
 /// Links joined into a tree. A robot is a tree with a free first link, a door one on a fixed first link,
 /// a lone object a tree of one free link.
@@ -38,6 +39,8 @@ pub struct Tree {
     pub(in crate::dynamics) effort: Vec<f64>,
     /// Impulses of dry friction in the last step, by link, with which the next begins.
     pub(in crate::dynamics) dry_friction: Vec<f64>,
+    /// State of a body that may sleep; `None` for all other trees.
+    pub(in crate::dynamics) rest: Option<Rest>,
     /// Velocities at the end of an unconstrained step, by degree of freedom.
     pub(in crate::dynamics) unconstrained: Vec<f64>,
     /// Origin of the spatial vectors, world frame: centre of mass of a free first link, origin of a
@@ -87,6 +90,7 @@ impl Tree {
             external: vec![ForceVector::default(); count],
             effort: vec![0.0; count],
             dry_friction: vec![0.0; count],
+            rest: None,
             unconstrained: vec![0.0; dofs],
             reference_m: DVec3::ZERO,
             parent_from_link_rotation: links
@@ -133,6 +137,12 @@ impl Tree {
     /// motion is integrated separately.
     pub(in crate::dynamics) fn is_lone(&self) -> bool {
         self.links.len() == 1 && matches!(self.links[0].joint, Joint::Free)
+    }
+
+    /// Returns true if the tree is left out of steps.
+    #[inline]
+    pub(in crate::dynamics) fn is_asleep(&self) -> bool {
+        self.rest.is_some_and(|rest| rest.is_asleep)
     }
 
     /// Replaces the mass of a link, from the next step on. It is part of the set-up, not of the state.

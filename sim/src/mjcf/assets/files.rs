@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 use mjcf_rs::assets::MeshInertia;
 use rapier3d::math::{Rotation, Vector};
 use rapier3d::prelude::{MassProperties, SharedShape};
-use xxhash_rust::xxh3::xxh3_64;
+use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 use crate::mjcf::{Document, pose, vector};
 use crate::{
@@ -35,6 +35,7 @@ pub struct Mesh {
     /// True if mass and inertia are those of the volume inside the triangles, and not of the hull.
     pub weighs_exactly: bool,
     hull: OnceLock<Option<SharedShape>>,
+    content: OnceLock<u128>,
 }
 
 impl PartialEq for Mesh {
@@ -60,6 +61,24 @@ impl Mesh {
     /// Returns the convex hull, which is computed once; `None` for points in one plane.
     pub(crate) fn hull(&self) -> Option<SharedShape> {
         self.hull.get_or_init(|| SharedShape::convex_hull(&self.vertices_m)).clone()
+    }
+
+    /// Returns a hash of the numbers of the mesh, which is computed once.
+    pub(crate) fn content_hash(&self) -> u128 {
+        *self.content.get_or_init(|| {
+            let mut hash = Xxh3::new();
+            let mut points = |points: &[Vector]| {
+                hash.update(&points.len().to_ne_bytes());
+                let numbers = points.iter().flat_map(|point| point.to_array());
+                numbers.for_each(|number| hash.update(&number.to_bits().to_ne_bytes()));
+            };
+            points(&self.vertices_m);
+            points(self.corner_normal.as_flattened());
+            let corners = self.triangles.iter().flatten().copied();
+            let uvs = self.corner_uv.as_flattened().as_flattened().iter().map(|uv| uv.to_bits());
+            corners.chain(uvs).for_each(|number| hash.update(&number.to_ne_bytes()));
+            hash.digest128()
+        })
     }
 
     /// Returns the mass properties at a density of 1.

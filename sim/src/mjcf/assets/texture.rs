@@ -23,6 +23,9 @@ pub struct Texture {
     pub has_alpha: bool,
 }
 
+/// No number is NaN, so equality is complete, and shared images are compared by their address.
+impl Eq for Texture {}
+
 /// Image at one size.
 #[derive(PartialEq)]
 pub struct TextureLevel {

@@ -142,7 +142,7 @@ const BODY: &[Attribute] = &[
         "it stays where it is: nothing is moved from outside",
     ),
     attribute(Support::Approximated, &["gravcomp"], Takes::Only(&["0"]), "everything has its whole weight"),
-    ignored(&["sleep"], "bodies never sleep"),
+    ignored(&["sleep"], "every free body of a scene may sleep at rest"),
     ignored(&["simple", "fuse"], "they change how MuJoCo computes, not what"),
     USER,
 ];

@@ -7,14 +7,17 @@
 mod bake;
 mod kept;
 mod maps;
+mod prepared;
 #[cfg(test)]
 mod tests;
+
+pub use prepared::lit;
 
 use super::scene::prepared::Prepared;
 use super::{Carrier, Scenery};
 
 /// Prepares a scenery for a renderer, with the light of its room, whose shadows are in that light.
-pub fn lit(mut scenery: Scenery) -> Prepared {
+fn prepare(mut scenery: Scenery) -> Prepared {
     let baked = scenery.room.as_ref().and_then(kept::light_of);
     if baked.is_some() {
         let room = scenery.parts.iter_mut().filter(|part| part.carrier == Carrier::Room);

@@ -15,6 +15,7 @@ mod workspace;
 
 use std::panic::resume_unwind;
 use std::slice;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 
@@ -42,7 +43,7 @@ use workspace::Workspace;
 /// while it draws. The shadows of its last state are reused the next time, unless too many other
 /// renderers have drawn in between.
 pub(super) struct CpuRenderer {
-    prepared: Prepared,
+    prepared: Arc<Prepared>,
     srgb: SrgbTable,
     /// Number of this renderer, unique in the process.
     number: u64,

@@ -53,7 +53,7 @@ const GROUP: u32 = 8;
 /// Renderer on a GPU; after a failure it draws on the calling thread.
 pub struct GpuRenderer {
     gpu: Arc<Gpu>,
-    prepared: Prepared,
+    prepared: Arc<Prepared>,
     scene: SceneBuffers,
     shadow: ShadowMaps,
     /// Poses of the parts in the device's memory, which the shadow also belongs to.

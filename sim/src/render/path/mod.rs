@@ -18,6 +18,7 @@ mod space;
 mod tests;
 mod view;
 
+use std::sync::Arc;
 use std::thread;
 
 use rapier3d::math::{Pose, Vector};
@@ -45,7 +46,7 @@ const PATHS: SampleCount = SampleCount(2);
 
 /// Renderer by path tracing.
 pub(super) struct PathRenderer {
-    prepared: Prepared,
+    prepared: Arc<Prepared>,
     room: Body,
     movers: Vec<Mover>,
     /// Blended parts, by their carriers.
@@ -65,7 +66,8 @@ struct Mover {
 }
 
 impl PathRenderer {
-    pub(super) fn new(prepared: Prepared) -> PathRenderer {
+    pub(super) fn new(prepared: impl Into<Arc<Prepared>>) -> PathRenderer {
+        let prepared = prepared.into();
         let scenery = &prepared.scenery;
         let of_room =
             |number: &usize| scenery.parts[*number].carrier == Carrier::Room && !prepared.is_veil[*number];

@@ -139,11 +139,7 @@ impl Content {
             }
             Primitive::Mesh(mesh) => {
                 self.kind(7, &[]);
-                self.points(&mesh.vertices_m);
-                let corners = mesh.triangles.iter().flatten();
-                corners.for_each(|corner| self.0.update(&corner.to_ne_bytes()));
-                self.points(mesh.corner_normal.as_flattened());
-                self.numbers(mesh.corner_uv.as_flattened().as_flattened());
+                self.0.update(&mesh.content_hash().to_ne_bytes());
             }
         }
     }

@@ -24,11 +24,13 @@ pub(in crate::world) struct Furniture {
 }
 
 /// Inserts a scene with its origin at `world_from_scene`. Bodies that no joint moves are its room, the
-/// links of the others become objects. All begin in the key `start`, if there is one.
+/// links of the others become objects. All begin in the key `start`, if there is one. Free bodies may sleep
+/// with `may_sleep`.
 pub(in crate::world) fn insert_scene(
     dynamics: &mut Dynamics,
     scene: &Document,
     world_from_scene: &Pose,
+    may_sleep: bool,
 ) -> Result<Furniture, SimError> {
     let world_from_file = precise(world_from_scene);
     let mut fixed = Vec::new();
@@ -56,6 +58,9 @@ pub(in crate::world) fn insert_scene(
     }
     // Welds hold bodies in their placed poses, whatever their initial state.
     add_equalities(dynamics, scene, &placed, &world_from_file)?;
+    if may_sleep {
+        placed.iter().filter_map(|tree| tree.id).for_each(|id| dynamics.let_sleep(id));
+    }
     let machinery = Machinery::of(scene, &placed)?;
     if let Some(start) = scene.keys()?.iter().find(|key| key.name == START) {
         begin(dynamics, &placed, start, &world_from_file);

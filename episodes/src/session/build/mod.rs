@@ -1,14 +1,16 @@
 //! Construction of an episode's world at rest, and of its robots' motions. The scene is the task's own,
 //! or another one in which sites give the places of the task's robots and objects.
 
+mod trial;
+
 use std::path::Path;
 use std::sync::Arc;
 
 use nalgebra::Isometry3;
 use tandem_sim::mjcf::{Document, Site};
 use tandem_sim::{
-    CONTROL_HZ, ObjectPlacement, Pose, Robot, RobotModel, RobotPlacement, Rotation, SceneSource, SimError,
-    Step, Vector, World, WorldSpec, assets, heading_rad,
+    ObjectPlacement, Pose, Robot, RobotModel, RobotPlacement, Rotation, SceneSource, SimError, Vector, World,
+    WorldSpec, assets, heading_rad,
 };
 
 use crate::EpisodeError;
@@ -24,9 +26,6 @@ const TASK_SITE: &str = "task";
 const THIRD_PERSON: &str = "third_person";
 /// Maximum tilt of a site.
 const LEVEL_RAD: f32 = 0.01;
-/// Trial of a user's scene: its duration, and the maximum displacement of robots and objects in it.
-const TRIAL_STEPS: u32 = 50;
-const STAYS_M: f32 = 0.03;
 
 /// A newly built episode.
 pub struct Built {
@@ -59,7 +58,7 @@ pub fn build_world(spec: &EpisodeSpec) -> Result<Built, EpisodeError> {
     }
     let mut world_spec = world_spec(spec)?;
     add_distractors(spec, &mut world_spec, &model)?;
-    try_scene(spec, &world_spec, &model)?;
+    trial::try_scene(spec, &world_spec, &model)?;
     let mut world = World::with_robot(&world_spec, model)?;
     if let Some(stress) = spec.stress {
         stress.alter(&mut world, &spec.task, spec.world_seed(), spec.rules().initial_hold_steps);
@@ -198,71 +197,6 @@ fn elsewhere(
     }
     spec.scene = SceneSource::Read { document: Arc::new(document), world_from_scene };
     Ok(spec)
-}
-
-/// Checks that a scene from a file has what the task needs, by a short trial with idle robots.
-fn try_scene(
-    spec: &EpisodeSpec,
-    world_spec: &WorldSpec,
-    model: &Arc<RobotModel>,
-) -> Result<(), EpisodeError> {
-    let Some(file) = &spec.scene else { return Ok(()) };
-    let (path, task) = (file.path.clone(), spec.task.id.clone());
-    let mut world = World::with_robot(world_spec, model.clone())?;
-    for spot in &spec.task.objects {
-        if world.object_models().filter(|(name, _)| *name == spot.name).count() > 1 {
-            return Err(SceneError::SameName { path, task, name: spot.name.clone() }.into());
-        }
-    }
-    let commands: Vec<_> = (0..world.robots().len()).map(|robot| world.rest_command(robot)).collect();
-    let start = places_m(&world.present(), &spec.task);
-    let mut end = start.clone();
-    let trial_s = f64::from(TRIAL_STEPS) / CONTROL_HZ;
-    for _ in 0..TRIAL_STEPS {
-        let present = world.control_step(&commands).map_err(|source| SceneError::Diverged {
-            path: path.clone(),
-            trial_s,
-            source,
-        })?;
-        end = places_m(&present, &spec.task);
-    }
-    let moved = start.iter().zip(&end).map(|(start, end)| (start, (end.at_m - start.at_m).length()));
-    match moved.into_iter().find(|(_, moved_m)| *moved_m > STAYS_M) {
-        None => Ok(()),
-        Some((Place { name, site, at_m }, moved_m)) => Err(SceneError::Unsteady {
-            path,
-            task,
-            name: name.clone(),
-            site: site.clone(),
-            at_m: at_m.to_array(),
-            moved_m,
-            trial_s,
-        }
-        .into()),
-    }
-}
-
-/// Place of a robot or an object of the task.
-#[derive(Clone)]
-struct Place {
-    /// Name in messages.
-    name: String,
-    /// Site of a scene that sets the place.
-    site: String,
-    at_m: Vector,
-}
-
-fn places_m(step: &Step, task: &Task) -> Vec<Place> {
-    let robots = step.robots.iter().zip(task.robot_names()).map(|(robot, name)| Place {
-        name: format!("robot {name}"),
-        site: robot_site(name),
-        at_m: robot.truth.world_from_pelvis().translation,
-    });
-    let objects = task.objects.iter().filter_map(|spot| {
-        let at_m = step.object(&spot.name)?.world_from_object.translation;
-        Some(Place { name: spot.name.clone(), site: spot.name.clone(), at_m })
-    });
-    robots.chain(objects).collect()
 }
 
 fn robot_site(name: &str) -> String {
