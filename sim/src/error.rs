@@ -22,7 +22,7 @@ pub enum SimError {
     #[error("mesh file `{path}` is of a kind that is not read; use .obj, .stl or .msh")]
     MeshKind { path: String },
     #[error("`{path}` is not a picture that can be read: {source}; use .png")]
-    Texture { path: String, source: image::ImageError },
+    Texture { path: String, source: Box<dyn std::error::Error + Send + Sync> },
     #[error("`{file}`: {what}")]
     Unsupported { file: String, what: String },
     #[error("{} things are not read:{}", .0.len(), listed(.0))]

@@ -6,6 +6,7 @@ import json
 from importlib import import_module
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -260,6 +261,42 @@ def test_an_object_looks_as_its_gltf_file(tmp_path: Path) -> None:
     assert [role for role in ("rgba", "orm", "normal") if f'<layer role="{role}"' in text] == ["rgba", "orm", "normal"]
 
 
+def test_layers_of_gltf_emit_light_and_keep_out_ambient_light(tmp_path: Path) -> None:
+    from PIL import Image
+
+    def image(*colour: int) -> Any:
+        return Image.new("RGB", (4, 4), colour)
+
+    both = {"occlusionTexture": image(90, 0, 0), "metallicRoughnessTexture": image(0, 120, 60)}
+    for number, (images, factor, emitted) in enumerate(
+        (
+            ({"emissiveTexture": image(255, 255, 0), **both}, [1.0, 0.5, 1.0], [255, 188, 0]),
+            (both, [0.0, 0.0, 0.2140411], [0, 0, 127]),
+            ({"emissiveTexture": image(255, 255, 0), **both}, None, None),
+        )
+    ):
+        source, out = tmp_path / f"{number}.glb", tmp_path / str(number)
+        card(images, emissiveFactor=factor).export(source)
+        import_file(source, out)
+        root: Any = ElementTree.parse(out / "object.xml").getroot()
+        files = {texture.get("name"): out / "textures" / texture.get("file") for texture in root.iter("texture")}
+        shown: dict[str, list[int]] = {}
+        for layer in root.iter("layer"):
+            picture: Any = Image.open(files[layer.get("texture")])
+            shown[layer.get("role")] = list(picture.convert("RGB").getpixel((0, 0)))
+        expected = {"orm": [255, 120, 60], "occlusion": [90, 90, 90]} | ({"emissive": emitted} if emitted else {})
+        assert {role: shown.get(role) for role in expected} == expected and len(shown) == len(expected)
+        assert (root.find("asset/material").get("emission") is None) == (emitted is not None), "the layer's own light"
+
+
+def test_images_of_ktx2_are_reported(tmp_path: Path) -> None:
+    card({"baseColorTexture": None}).export(tmp_path / "card.gltf")
+    text = (tmp_path / "card.gltf").read_text().replace('"asset":', '"images": [{"uri": "wood.ktx2"}], "asset":', 1)
+    (tmp_path / "card.gltf").write_text(text)
+    report = import_file(tmp_path / "card.gltf", tmp_path / "out")
+    assert report.dropped == {"image of KTX2 in a glTF file; PNG and JPEG are read": 1}
+
+
 CABINET = """<sdf version="1.7"><model name="cabinet">
   <link name="body">
     <inertial><mass>20</mass><pose>0 0 0.4 0 0 0</pose>
@@ -391,7 +428,7 @@ URDF = """<robot name="arm">
   <link name="hand"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
     <collision><geometry><mesh filename="meshes/wedge.obj"/></geometry></collision></link>
   <joint name="wrist" type="revolute"><parent link="base"/><child link="hand"/><axis xyz="0 0 1"/>
-    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+    <limit lower="-1" upper="1" effort="37" velocity="1"/></joint>
 </robot>"""
 
 
@@ -406,4 +443,6 @@ def test_meshes_of_urdf_are_found_in_packages(tmp_path: Path) -> None:
     assert len(report.dropped) == 1 and "there is no file meshes/missing.dae" in next(iter(report.dropped))
     model = compiled(tmp_path / "out" / "scene.xml")
     assert sorted(zip(model.geom_group.tolist(), model.geom_contype.tolist(), strict=True)) == [(0, 1), (1, 0)]
-    assert 'name="drawn_groups" data="1 2"' in (tmp_path / "out" / "scene.xml").read_text()
+    text = (tmp_path / "out" / "scene.xml").read_text()
+    assert 'name="drawn_groups" data="1 2"' in text
+    assert 'actuatorfrcrange="-37 37"' in text, "efforts of URDF limit actuators"

@@ -51,6 +51,7 @@ use assets::surface::TextureRepeats;
 use joints::UnreadRanges;
 use text::check::{self, Checked};
 use text::plain::plain;
+use text::replicate::written_out;
 use text::settings::FileSettings;
 use text::source::{self, MjcfText};
 use text::split::{Split, split};
@@ -151,7 +152,7 @@ impl Document {
     }
 
     fn parse_in(file: &str, xml: &str, folder: &Path, left_out: &[&str]) -> Result<Document, SimError> {
-        let source = MjcfText::read(file, xml, folder)?;
+        let source = written_out(MjcfText::read(file, xml, folder)?)?;
         let mut checked = check::check(&source, left_out)?;
         let text = plain(&source.text, &source.xml()?);
         let mut model = mjcf_rs::Model::from_str(&text, folder)

@@ -9,6 +9,8 @@ mod cpu;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod kind;
+#[cfg(test)]
+mod made;
 mod path;
 mod scene;
 mod sensor;

@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// Maximum size of a mesh or an image.
-const MAX_MESH_BYTES: u64 = 1 << 30;
+pub(in crate::mjcf) const MAX_FILE_BYTES: u64 = 1 << 30;
 /// Size of the header of a binary STL file, and of each triangle after it.
 const STL_HEAD_BYTES: usize = 84;
 const STL_TRIANGLE_BYTES: usize = 50;
@@ -153,7 +153,7 @@ impl Document {
 
 /// Reads the bytes of a file that an MJCF file names.
 pub(in crate::mjcf) fn read_mesh_bytes(path: &Path) -> io::Result<Vec<u8>> {
-    read_bytes(path, MAX_MESH_BYTES)
+    read_bytes(path, MAX_FILE_BYTES)
 }
 
 /// Refuses a file whose extension names no kind of mesh, whether it is there or not.

@@ -9,7 +9,7 @@ use crate::mjcf::text::stated::Classes;
 /// Emission and reflection of a material, in the meaning of MuJoCo's renderer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gloss {
-    /// Light that the surface emits, as a multiple of its colour.
+    /// Light that the surface emits, as a multiple of its colour, or of the light of its layer.
     pub emission_factor: f32,
     /// Strength of highlights.
     pub specular_factor: f32,
@@ -19,6 +19,10 @@ pub struct Gloss {
     pub roughness_factor: Option<f32>,
     /// Share of the surface that reflects as metal does, in its own colour.
     pub metallic_factor: f32,
+    /// Share of ambient light that reaches the surface.
+    pub ambient_factor: f32,
+    /// Share of the mirror image in the colour of a plane, or of the upper side of a box.
+    pub reflectance_factor: f32,
 }
 
 /// Gloss of materials, by their names, where it is not the default.
@@ -33,6 +37,8 @@ impl Default for Gloss {
             shininess_factor: USUAL_EXPONENT / SHININESS,
             roughness_factor: None,
             metallic_factor: 0.0,
+            ambient_factor: 1.0,
+            reflectance_factor: 0.0,
         }
     }
 }
@@ -59,14 +65,14 @@ impl Gloss {
         }
     }
 
-    /// Returns the gloss at a texel of a layer, with roughness and the metallic share as its second and third
-    /// number.
+    /// Returns the gloss at a texel of a layer, whose numbers are the share of ambient light, roughness and the
+    /// metallic share.
     #[inline(always)]
-    pub fn at_texel(self, [_, roughness_share, metallic_share]: [f32; 3]) -> Gloss {
-        let of_metal = Gloss { metallic_factor: self.metallic_factor * metallic_share, ..self };
+    pub fn at_texel(self, [ambient_factor, roughness_share, metallic_share]: [f32; 3]) -> Gloss {
+        let here = Gloss { metallic_factor: self.metallic_factor * metallic_share, ambient_factor, ..self };
         match self.roughness_factor {
-            Some(roughness_factor) => of_metal.as_rough_as(roughness_factor * roughness_share),
-            None => of_metal,
+            Some(roughness_factor) => here.as_rough_as(roughness_factor * roughness_share),
+            None => here,
         }
     }
 }
@@ -83,22 +89,26 @@ impl Glosses {
             };
             // MuJoCo's own value, -1, states nothing.
             let amount = |attribute: &str| stated(attribute).filter(|value| *value >= 0.0);
-            let has_layer = |roles: [&str; 2]| {
+            let has_layer = |roles: &[&str]| {
                 let mut layers = node.children().filter(|child| child.has_tag_name("layer"));
                 layers.any(|layer| layer.attribute("role").is_some_and(|role| roles.contains(&role)))
             };
             let usual = Gloss::default();
-            let (is_rough, is_metal) = (has_layer(["roughness", "orm"]), has_layer(["metallic", "orm"]));
+            let (is_rough, is_metal) = (has_layer(&["roughness", "orm"]), has_layer(&["metallic", "orm"]));
+            let has_numbers = is_rough || is_metal || has_layer(&["occlusion"]);
+            let usual_emission_factor = if has_layer(&["emissive"]) { 1.0 } else { usual.emission_factor };
             let gloss = Gloss {
-                emission_factor: stated("emission").unwrap_or(usual.emission_factor),
+                emission_factor: stated("emission").unwrap_or(usual_emission_factor),
                 specular_factor: stated("specular").unwrap_or(usual.specular_factor),
                 shininess_factor: stated("shininess").unwrap_or(usual.shininess_factor),
                 roughness_factor: amount("roughness").or(is_rough.then_some(1.0)),
                 metallic_factor: amount("metallic").unwrap_or(if is_metal { 1.0 } else { 0.0 }).min(1.0),
+                reflectance_factor: stated("reflectance").unwrap_or(usual.reflectance_factor).clamp(0.0, 1.0),
+                ..usual
             };
             let gloss = match gloss.roughness_factor {
                 // Layers give it point by point.
-                Some(roughness) if !is_rough && !is_metal && stated("shininess").is_none() => {
+                Some(roughness) if !has_numbers && stated("shininess").is_none() => {
                     gloss.as_rough_as(roughness)
                 }
                 _ => gloss,

@@ -1,4 +1,5 @@
-//! Layers of materials: textures with roles, put together to one image each for colour, gloss and relief.
+//! Layers of materials: textures with roles, put together to one image each for colour, gloss, relief and
+//! emitted light.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,11 +10,9 @@ use super::texture::{TexelMeaning, Texture};
 use crate::SimError;
 use crate::mjcf::Document;
 
-/// Roles of layers that have no effect, with the reason.
-const NOT_DRAWN: [(&str, &str); 2] =
-    [("occlusion", "corners are darkened by what is there"), ("emissive", "the material states emission")];
 /// Roles whose texture gives a material's images their places, the first that there is.
-const PLACING: [&str; 7] = ["rgb", "rgba", "orm", "roughness", "metallic", "normal", "opacity"];
+const PLACING: [&str; 9] =
+    ["rgb", "rgba", "orm", "roughness", "metallic", "normal", "opacity", "emissive", "occlusion"];
 
 /// Images of the materials that have layers, by the names of the materials.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -26,10 +25,12 @@ pub(in crate::mjcf) struct MaterialLayers {
     named: BTreeMap<String, String>,
     /// Colour, white without a layer for it, and opacity.
     colour: Arc<Texture>,
-    /// Roughness in the second channel, metallic share in the third.
+    /// Share of ambient light in the first channel, roughness in the second, metallic share in the third.
     pub gloss: Option<Arc<Texture>>,
     /// Normals in the frame of the surface, each 0 to 1 for -1 to 1.
     pub relief: Option<Arc<Texture>>,
+    /// Emitted light.
+    pub emitted: Option<Arc<Texture>>,
 }
 
 impl MaterialLayers {
@@ -73,19 +74,14 @@ impl Document {
         Ok(())
     }
 
-    /// Returns the reason for which a layer is not drawn.
+    /// Returns the note on a layer that is not drawn.
     fn note_on_layer(&self, layer: &Node) -> Option<String> {
-        let role = layer.attribute("role")?;
-        let reason = NOT_DRAWN.iter().find(|(other, _)| *other == role).map(|(_, reason)| *reason);
+        let role = layer.attribute("role").filter(|role| !matches!(*role, "rgb" | "rgba"))?;
         let has_faces = |name: &str| self.texture(name).is_some_and(|texture| texture.images() > 1);
-        let is_colour = role == "rgb" || role == "rgba";
-        let on_faces =
-            layer.attribute("texture").is_some_and(has_faces).then_some("it has an image for each face");
-        let reason = reason.or(on_faces.filter(|_| !is_colour))?;
-        Some(format!(
-            "`{}`: <layer role=\"{role}\"> is not drawn; {reason}",
-            self.source.line(layer.range().start)
-        ))
+        layer.attribute("texture").is_some_and(has_faces).then(|| {
+            let line = self.source.line(layer.range().start);
+            format!("`{line}`: <layer role=\"{role}\"> is not drawn; it has an image for each face")
+        })
     }
 
     fn of_layers(&self, named: BTreeMap<String, String>) -> MaterialLayers {
@@ -95,9 +91,10 @@ impl Document {
         let channel = |role: &str, number: usize| flat(role).map(|texture| (&**texture, number));
         let roughness = channel("roughness", 0).or(channel("orm", 1));
         let metallic = channel("metallic", 0).or(channel("orm", 2));
-        let is_glossy = roughness.is_some() || metallic.is_some();
+        let occlusion = channel("occlusion", 0).or(channel("orm", 0));
+        let is_glossy = occlusion.is_some() || roughness.is_some() || metallic.is_some();
         let gloss = is_glossy.then(|| {
-            Texture::of_channels([None, roughness, metallic, None], TexelMeaning::Numbers, [1.0; 3])
+            Texture::of_channels([occlusion, roughness, metallic, None], TexelMeaning::Numbers, [1.0; 3])
         });
         let normal = |number: usize| channel("normal", number);
         let relief = flat("normal").map(|_| {
@@ -113,7 +110,8 @@ impl Document {
             }
             _ => colour,
         };
-        MaterialLayers { named, colour, gloss: gloss.map(Arc::new), relief: relief.map(Arc::new) }
+        let emitted = flat("emissive").cloned();
+        MaterialLayers { named, colour, gloss: gloss.map(Arc::new), relief: relief.map(Arc::new), emitted }
     }
 
     /// Returns the image of a material's colour.

@@ -1,7 +1,6 @@
 //! Assets of a file and their appearance: meshes, images, layers of materials, gloss, patterns and groups, and
 //! a cache of documents.
 
-mod builtin;
 mod concave;
 pub mod files;
 pub mod gloss;

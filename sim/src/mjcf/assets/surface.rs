@@ -16,10 +16,13 @@ use crate::mjcf::text::stated::Classes;
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurfaceImage {
     pub texture: Arc<Texture>,
-    /// Numbers at the same places: roughness in the second channel, metallic share in the third.
+    /// Numbers at the same places: share of ambient light in the first channel, roughness in the second,
+    /// metallic share in the third.
     pub gloss: Option<Arc<Texture>>,
     /// Normals at the same places in the frame of the surface, each 0 to 1 for -1 to 1; the second is upwards.
     pub relief: Option<Arc<Texture>>,
+    /// Emitted light at the same places.
+    pub emitted: Option<Arc<Texture>>,
     pub mapping: TextureMapping,
 }
 
@@ -98,12 +101,12 @@ impl SurfaceImage {
         shape: impl FnOnce() -> MappedShape,
     ) -> Option<SurfaceImage> {
         let layers = document.layers.find(material);
-        let (gloss, relief) =
-            layers.map_or((None, None), |layers| (layers.gloss.clone(), layers.relief.clone()));
+        let gloss = layers.and_then(|layers| layers.gloss.clone());
+        let relief = layers.and_then(|layers| layers.relief.clone());
+        let emitted = layers.and_then(|layers| layers.emitted.clone());
+        let has_layers = gloss.is_some() || relief.is_some() || emitted.is_some();
         // A single texel is a plain colour, which the geom has.
-        let is_image = |texture: &&Arc<Texture>| {
-            texture.levels[0].texels.len() > 1 || gloss.is_some() || relief.is_some()
-        };
+        let is_image = |texture: &&Arc<Texture>| texture.levels[0].texels.len() > 1 || has_layers;
         let texture = document.colour_of(material).filter(is_image)?.clone();
         let name = layers.map_or(material.texture.as_deref(), |layers| layers.placing())?;
         let kind = document.model.assets.texture(name)?.type_.as_deref();
@@ -117,7 +120,7 @@ impl SurfaceImage {
         };
         // Without coordinates in the surface, normals have no direction.
         let relief = relief.filter(|_| !matches!(mapping, TextureMapping::Cube { .. }));
-        Some(SurfaceImage { texture, gloss, relief, mapping })
+        Some(SurfaceImage { texture, gloss, relief, emitted, mapping })
     }
 }
 

@@ -1,13 +1,8 @@
 //! Images of textures: reduced to powers of two, with mip levels down to one texel. A cube may have six
 //! images, one a face.
 
-use std::io::Cursor;
-use std::path::Path;
-
 use image::imageops::{FilterType, resize};
-use image::{DynamicImage, ImageBuffer, ImageReader, Pixel, Rgb, RgbImage, RgbaImage};
-
-use crate::SimError;
+use image::{ImageBuffer, Pixel, Rgb, RgbImage, RgbaImage};
 
 /// Maximum width and height of a kept image. The cameras of robots show no more of a surface.
 const MAX_SIDE: u32 = 1024;
@@ -55,17 +50,6 @@ impl std::fmt::Debug for Texture {
 }
 
 impl Texture {
-    /// Decodes an image file.
-    ///
-    /// # Errors
-    ///
-    /// Returns an error that names the file if the bytes are no image of a supported format.
-    pub(in crate::mjcf) fn decode(path: &Path, bytes: &[u8]) -> Result<DynamicImage, SimError> {
-        let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
-        let decoded = reader.map_err(|source| SimError::unreadable(path, source))?.decode();
-        decoded.map_err(|source| SimError::Texture { path: path.display().to_string(), source })
-    }
-
     /// Reduces an image of at least one pixel, or the six of a cube, to its levels. All get the size of the
     /// largest.
     pub(in crate::mjcf) fn of(images: &[RgbImage]) -> Texture {

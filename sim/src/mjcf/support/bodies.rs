@@ -35,6 +35,14 @@ pub(super) const ELEMENTS: &[Element] = &[
         note: "",
     },
     Element {
+        name: "replicate",
+        within: TREE,
+        support: Support::Mapped,
+        kind: None,
+        attributes: &[REPLICATE],
+        note: "excludes, pairs, equalities and actuators that name something in it are copied, too, behind all others; equalities with something outside are refused, because MuJoCo leaves them out",
+    },
+    Element {
         name: "inertial",
         within: &["body"],
         support: Support::Mapped,
@@ -124,7 +132,6 @@ pub(super) const ELEMENTS: &[Element] = &[
     },
     refused_in_tree("composite", "write its bodies out"),
     refused_in_tree("flexcomp", "nothing bends or stretches here"),
-    refused_in_tree("replicate", "write its copies out, or let MuJoCo save the file"),
     refused_in_tree("attach", "include the file, or let MuJoCo save the whole"),
 ];
 
@@ -133,6 +140,13 @@ const fn refused_in_tree(name: &'static str, note: &'static str) -> Element {
 }
 
 const CHILDCLASS: Attribute = mapped(&["childclass"], Takes::Class);
+
+const REPLICATE: &[Attribute] = &[
+    attribute(Support::Mapped, &["count"], AMOUNT, "at most 100000, and 16 MB of text"),
+    mapped(&["offset", "euler"], numbers(3, 3)),
+    attribute(Support::Mapped, &["sep"], Takes::Text, "between names and the numbers of copies"),
+    CHILDCLASS,
+];
 
 const BODY: &[Attribute] = &[
     attribute(

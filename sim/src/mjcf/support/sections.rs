@@ -87,7 +87,7 @@ pub(super) const ELEMENTS: &[Element] = &[
         &["asset"],
         "texture",
         &[&[NAME], TEXTURE],
-        "images are PNG or JPEG; the first of type `skybox` is drawn where no surface is",
+        "images are PNG, JPEG or KTX2 without block compression; the first of type `skybox` is drawn where no surface is",
     ),
     named(Support::Mapped, "material", &["asset", "default"], "material", &[&[NAME, CLASS], MATERIAL], ""),
     element(
@@ -95,7 +95,7 @@ pub(super) const ELEMENTS: &[Element] = &[
         "layer",
         &["material"],
         &[&[mapped(&["texture"], Takes::NameOf("texture")), mapped(&["role"], Takes::Word(ROLES))]],
-        "`normal` and `opacity` on 2d images; `occlusion` and `emissive` are not drawn",
+        "all roles but `rgb` and `rgba` on images that are no six of a cube; `normal` not on cubes at all",
     ),
     element(Support::Refused, "hfield", &["asset"], &[], "write a height field as boxes or as meshes"),
     element(Support::Refused, "skin", &["asset", "deformable"], &[], "nothing bends or stretches here"),
@@ -408,13 +408,13 @@ const MATERIAL: &[Attribute] = &[
         NUMBER,
         "by path tracing; elsewhere the highlights of materials without `shininess`",
     ),
+    attribute(Support::Mapped, &["metallic"], NUMBER, "highlights and reflections in the surface's colour"),
     attribute(
-        Support::Mapped,
-        &["metallic"],
-        NUMBER,
-        "highlights, and in path tracing reflections, in the surface's colour",
+        Support::Approximated,
+        &["reflectance"],
+        Takes::Only(&["0"]),
+        "path tracing alone draws the mirror image, on solid planes and upper sides of boxes, without shadows in it",
     ),
-    ignored(&["reflectance"], "surfaces mirror nothing"),
 ];
 
 /// Roles of a material's layers.

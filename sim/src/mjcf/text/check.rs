@@ -69,7 +69,8 @@ fn is_default(node: &Node) -> bool {
     node.has_tag_name("default")
 }
 
-fn check_depth(source: &MjcfText, xml: &roxmltree::Document) -> Result<(), SimError> {
+/// Refuses elements that are nested too deeply.
+pub(super) fn check_depth(source: &MjcfText, xml: &roxmltree::Document) -> Result<(), SimError> {
     let mut depths = vec![0; xml.descendants().count()];
     for node in xml.descendants().filter(Node::is_element) {
         let depth = node.parent_element().map_or(0, |parent| depths[parent.id().get_usize()] + 1);

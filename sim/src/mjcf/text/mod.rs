@@ -3,6 +3,7 @@
 
 pub mod check;
 pub mod plain;
+pub mod replicate;
 pub mod settings;
 pub mod source;
 pub mod split;

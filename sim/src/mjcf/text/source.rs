@@ -31,7 +31,7 @@ struct SourceFile {
 }
 
 /// A contiguous part of the text from one file.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 struct Piece {
     start: usize,
     file: usize,
@@ -47,6 +47,31 @@ impl MjcfText {
         source.files.push(SourceFile { name: file.into(), text: xml.into(), path: None });
         source.append(0, folder, false)?;
         Ok(source)
+    }
+
+    /// Returns the same files without any text of them.
+    pub(super) fn without_text(&self) -> MjcfText {
+        let (files, folder) = (self.files.clone(), self.folder.clone());
+        MjcfText { text: String::new(), files, pieces: Vec::new(), folder }
+    }
+
+    /// Appends a range of another text of the same files.
+    pub(super) fn push_of(&mut self, other: &MjcfText, range: Range<usize>) {
+        let first = other.pieces.partition_point(|piece| piece.start <= range.start).saturating_sub(1);
+        for piece in other.pieces[first..].iter().take_while(|piece| piece.start < range.end) {
+            let skipped = range.start.saturating_sub(piece.start);
+            let start = self.text.len() + piece.start.saturating_sub(range.start);
+            self.pieces.push(Piece { start, start_in_file: piece.start_in_file + skipped, ..*piece });
+        }
+        self.text.push_str(&other.text[range]);
+    }
+
+    /// Appends text that no file has, in the line of a byte of another text of the same files.
+    pub(super) fn push_made(&mut self, other: &MjcfText, byte: usize, text: &str) {
+        let piece = other.piece(byte);
+        let start_in_file = piece.start_in_file + byte - piece.start;
+        self.pieces.push(Piece { start: self.text.len(), start_in_file, ..*piece });
+        self.text.push_str(text);
     }
 
     /// Returns the included files, each with a hash of its text.
@@ -90,9 +115,14 @@ impl MjcfText {
 
     /// Returns the file and line of a byte of the text, for example `scene.xml:12`.
     pub fn line(&self, byte: usize) -> String {
-        let after = self.pieces.partition_point(|piece| piece.start <= byte);
-        let piece = &self.pieces[after.saturating_sub(1)];
+        let piece = self.piece(byte);
         self.files[piece.file].line(piece.start_in_file + byte - piece.start)
+    }
+
+    /// Returns the piece that a byte of the text is in.
+    fn piece(&self, byte: usize) -> &Piece {
+        let after = self.pieces.partition_point(|piece| piece.start <= byte);
+        &self.pieces[after.saturating_sub(1)]
     }
 
     /// Appends a file: the whole of it, or the content of its root element.
@@ -178,13 +208,14 @@ pub(in crate::mjcf) fn refuse_files(file: &str, xml: &str) -> Result<(), SimErro
 
 impl SourceFile {
     fn line(&self, byte: usize) -> String {
-        let before = &self.text.as_bytes()[..byte];
+        // Text that no file has may be longer than its line.
+        let before = &self.text.as_bytes()[..byte.min(self.text.len())];
         format!("{}:{}", self.name, 1 + before.iter().filter(|byte| **byte == b'\n').count())
     }
 }
 
 /// Returns the range of an element's content.
-fn inside(node: &Node) -> Option<Range<usize>> {
+pub(super) fn inside(node: &Node) -> Option<Range<usize>> {
     Some(node.first_child()?.range().start..node.last_child()?.range().end)
 }
 

@@ -24,14 +24,12 @@ const SHADOWED_SHARE: f32 = 0.9;
 /// Number of corrections of the exposure; each takes the compression of bright tones into account.
 const CORRECTIONS: usize = 6;
 
-/// Light of the same surfaces without baking.
-struct PlainLight(Light);
-
 /// Returns the light of a room, whose walls are in a box.
 pub(super) fn bake(room: &Scenery, [low_m, high_m]: [Vector; 2]) -> BakedLight {
     let box_m = [low_m - Vector::splat(MARGIN_M), high_m + Vector::splat(MARGIN_M)];
     let prepared = Prepared::new(room.clone());
-    let flat: Vec<Option<FlatSheet>> = sheets(&prepared, box_m);
+    let corners = corners(&prepared);
+    let flat: Vec<Option<FlatSheet>> = sheets(&prepared, &corners, box_m);
     let count = |scale: f32| flat.iter().flatten().map(|sheet| texels(&sheet.map(0, scale))).sum::<f32>();
     let mut texel_factor = 1.0;
     while count(texel_factor) > MAX_TEXELS && texel_factor < 8.0 {
@@ -52,7 +50,7 @@ pub(super) fn bake(room: &Scenery, [low_m, high_m]: [Vector; 2]) -> BakedLight {
     let mut probes = Probes::over([low_m, high_m]);
     points.extend(probes.points());
     let found = irradiance(room.clone(), &points);
-    let exposed = RoomExposure::of(&PlainLight(room.light), &points[..mapped], &found[..mapped]);
+    let exposed = RoomExposure::of(&room.light, &points[..mapped], &found[..mapped]);
     let texel = |light: &Irradiance| (!light.is_inside).then(|| exposed.texel(light));
     let mut texels: Vec<Option<LightTexel>> = found[..mapped].iter().map(texel).collect();
     maps.iter().for_each(|map| finish(map, &mut texels));
@@ -62,7 +60,7 @@ pub(super) fn bake(room: &Scenery, [low_m, high_m]: [Vector; 2]) -> BakedLight {
     };
     probes.set(found[mapped..].chunks_exact(6).map(cube).collect());
     let (mut cells, mut cubes) = (HashMap::new(), Vec::new());
-    let middles_m = middles_m(&prepared);
+    let middles_m = middles_m(&prepared, &corners);
     let sheets = sheet_map.iter().zip(middles_m).map(|(map, middle_m)| match map {
         Some(map) => SheetLight::Map(*map),
         None => {
@@ -87,14 +85,13 @@ fn texels(map: &LightMap) -> f32 {
 }
 
 /// Returns the flat sheets of a room, by the sheets' numbers; `None` for others.
-fn sheets(prepared: &Prepared, box_m: [Vector; 2]) -> Vec<Option<FlatSheet>> {
-    let corners = corners(prepared);
+fn sheets(prepared: &Prepared, corners: &[Vec<Vector>], box_m: [Vector; 2]) -> Vec<Option<FlatSheet>> {
     let sheets = prepared.sheets.iter().zip(corners).map(|(sheet, corners_m)| {
         let part = &prepared.scenery.parts[sheet.part as usize];
         // Reliefs need light from several directions.
         let is_even = part.image.as_ref().is_none_or(|image| image.relief.is_none());
         (sheet.bend.slope_1_m.is_none() && is_even)
-            .then(|| FlatSheet::of(&corners_m, sheet.bend.normal.normalize(), part.carrier_from_mesh, box_m))
+            .then(|| FlatSheet::of(corners_m, sheet.bend.normal.normalize(), part.carrier_from_mesh, box_m))
             .flatten()
     });
     sheets.collect()
@@ -113,8 +110,8 @@ fn corners(prepared: &Prepared) -> Vec<Vec<Vector>> {
 }
 
 /// Returns the middle of each sheet in the world.
-fn middles_m(prepared: &Prepared) -> Vec<Vector> {
-    let sheets = prepared.sheets.iter().zip(corners(prepared)).map(|(sheet, corners_m)| {
+fn middles_m(prepared: &Prepared, corners: &[Vec<Vector>]) -> Vec<Vector> {
+    let sheets = prepared.sheets.iter().zip(corners).map(|(sheet, corners_m)| {
         let part = &prepared.scenery.parts[sheet.part as usize];
         debug_assert_eq!(part.carrier, Carrier::Room);
         let pose: Pose = part.carrier_from_mesh;
@@ -168,9 +165,9 @@ struct RoomExposure {
 }
 
 impl RoomExposure {
-    fn of(plain: &PlainLight, points: &[SurfacePoint], found: &[Irradiance]) -> RoomExposure {
+    fn of(light: &Light, points: &[SurfacePoint], found: &[Irradiance]) -> RoomExposure {
         let lit = || points.iter().zip(found).filter(|(_, light)| !light.is_inside);
-        let wanted: f32 = lit().map(|(point, _)| plain.on(point.normal).element_sum()).sum();
+        let wanted: f32 = lit().map(|(point, _)| plain_rgb(light, point.normal).element_sum()).sum();
         let mut exposure = RoomExposure { factor: 1.0 };
         for _ in 0..CORRECTIONS {
             let drawn: f32 = lit().map(|(_, light)| exposure.rgb(light).element_sum()).sum();
@@ -192,14 +189,12 @@ impl RoomExposure {
     }
 }
 
-impl PlainLight {
-    /// Returns the light of sun and sky on a surface, mostly in the sun.
-    fn on(&self, normal: Vector) -> Vector {
-        const SUNLIT_SHARE: f32 = 0.92;
-        const HEADLIGHT: f32 = 0.09;
-        let Light { sun_rgb, sun_direction, below_rgb, above_rgb } = self.0;
-        let sky_rgb = below_rgb + (above_rgb - below_rgb) * (normal.z * 0.5 + 0.5);
-        let sun_share = normal.dot(sun_direction).max(0.0) * SUNLIT_SHARE;
-        sky_rgb + sun_rgb * sun_share + Vector::splat(HEADLIGHT)
-    }
+/// Returns the light of sun and sky on a surface, mostly in the sun, without baking.
+fn plain_rgb(light: &Light, normal: Vector) -> Vector {
+    const SUNLIT_SHARE: f32 = 0.92;
+    const HEADLIGHT: f32 = 0.09;
+    let Light { sun_rgb, sun_direction, below_rgb, above_rgb } = *light;
+    let sky_rgb = below_rgb + (above_rgb - below_rgb) * (normal.z * 0.5 + 0.5);
+    let sun_share = normal.dot(sun_direction).max(0.0) * SUNLIT_SHARE;
+    sky_rgb + sun_rgb * sun_share + Vector::splat(HEADLIGHT)
 }

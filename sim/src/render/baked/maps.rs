@@ -1,7 +1,8 @@
 //! Light maps: rectangles of texels around the flat sheets of a room.
 
-use crate::render::shading::baked::{LightMap, SurfacePoint};
 use rapier3d::math::{Pose, Vector};
+
+use crate::render::shading::baked::{LightMap, SurfacePoint};
 
 /// Side of a texel, and the most texels along a side of a map.
 const TEXEL_M: f32 = 0.08;

@@ -1,15 +1,12 @@
 //! Baked light: what it shows, that it is the same wherever it comes from, and how near it is to path tracing.
 
-use std::f32::consts::PI;
-
-use rapier3d::math::{Pose, Vector};
+use rapier3d::math::Vector;
 
 use super::bake::bake;
-use crate::mjcf::Gloss;
+use crate::render::made::{cuboid, world};
 use crate::render::path::walls_m;
 use crate::render::shading::baked::{BakedLight, LightMap, LightTexel, map_light};
-use crate::render::{Camera, Cameras, Carrier, Frame, Part, Pattern, Scenery, TriangleMesh, cpu, path};
-use crate::{RobotPlacement, World, WorldSpec};
+use crate::render::{Camera, Cameras, Frame, Part, Scenery, cpu, path};
 
 /// The rooms of the tasks that have walls.
 const ROOMS: [&str; 10] = [
@@ -32,21 +29,6 @@ const MIN_GAIN: f64 = 0.0;
 const HALF_M: f32 = 2.0;
 const HEIGHT_M: f32 = 2.6;
 
-fn part(half_m: Vector, at_m: Vector, rgb: [f32; 3]) -> Part {
-    Part {
-        mesh: TriangleMesh::cuboid(half_m).into(),
-        carrier: Carrier::Room,
-        carrier_from_mesh: Pose::from_translation(at_m),
-        rgb,
-        alpha: 1.0,
-        gloss: Gloss::default(),
-        image: None,
-        pattern: Pattern::Plain,
-        id: 1,
-        casts_shadow: true,
-    }
-}
-
 /// Returns a closed room with a red wall in the direction of x, and a table in the middle.
 fn room() -> Scenery {
     let (grey, thin_m) = ([0.7; 3], 0.05);
@@ -56,10 +38,10 @@ fn room() -> Scenery {
             if y == 0.0 { HALF_M } else { thin_m },
             0.5 * HEIGHT_M,
         );
-        part(half_m, Vector::new(x * HALF_M, y * HALF_M, 0.5 * HEIGHT_M), rgb)
+        cuboid(half_m, Vector::new(x * HALF_M, y * HALF_M, 0.5 * HEIGHT_M), rgb)
     };
-    let slab = |z_m: f32| part(Vector::new(HALF_M, HALF_M, thin_m), Vector::new(0.0, 0.0, z_m), grey);
-    let table = part(Vector::new(0.5, 0.5, 0.02), Vector::new(0.0, 0.0, 0.7), grey);
+    let slab = |z_m: f32| cuboid(Vector::new(HALF_M, HALF_M, thin_m), Vector::new(0.0, 0.0, z_m), grey);
+    let table = cuboid(Vector::new(0.5, 0.5, 0.02), Vector::new(0.0, 0.0, 0.7), grey);
     let walls = [(1.0, 0.0, [0.9, 0.1, 0.1]), (-1.0, 0.0, grey), (0.0, 1.0, grey), (0.0, -1.0, grey)];
     let mut parts: Vec<Part> = walls.into_iter().map(|(x, y, rgb)| wall(x, y, rgb)).collect();
     parts.extend([slab(-thin_m), slab(HEIGHT_M + thin_m), table]);
@@ -82,20 +64,6 @@ fn on_map(light: &BakedLight, point_m: Vector) -> LightTexel {
     let map = light.maps.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).expect("there are maps");
     let [u, v] = map.place(point_m.to_array());
     map_light(map, &light.texels, [u, v])
-}
-
-fn world(scene: &str) -> World {
-    let robot = |name: &str, position_m: [f32; 2], yaw_rad: f32| RobotPlacement {
-        name: name.into(),
-        position_m,
-        yaw_rad,
-    };
-    World::new(&WorldSpec {
-        scene: scene.into(),
-        robots: vec![robot("A", [0.0, 0.0], 0.0), robot("B", [0.74, -0.12], PI)],
-        objects: Vec::new(),
-    })
-    .expect("embedded files")
 }
 
 #[test]
@@ -157,7 +125,7 @@ fn similarity(one: &Frame, other: &Frame) -> f64 {
 fn images_are_near_to_path_tracing() {
     let mut sum = 0.0;
     for scene in ROOMS {
-        let world = world(scene);
+        let world = world(scene, Vec::new());
         let step = world.present();
         let cameras = Cameras::of(&world);
         let scenery = Scenery::of(&world);

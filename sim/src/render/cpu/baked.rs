@@ -126,6 +126,18 @@ impl Surfaces {
     }
 }
 
+impl Surfaces {
+    /// Returns the baked light that does not come from lamps. `tint_rgb` multiplies it.
+    #[inline(always)]
+    pub(super) fn reflected(&self, at: usize, tint_rgb: [f32; 3]) -> [Lanes; 3] {
+        let (baked, [_, _, _, lamps]) = (self.baked.block(at), self.towards_sun(at));
+        axes(
+            #[inline(always)]
+            |axis| lanes(|i| baked[axis][i] * (1.0 - lamps[i]) * tint_rgb[axis]),
+        )
+    }
+}
+
 /// Computes the values of a light's channels.
 #[inline(always)]
 fn channels<T>(each: impl Fn(usize) -> T) -> [T; 4] {

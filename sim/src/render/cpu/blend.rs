@@ -57,6 +57,7 @@ impl View<'_> {
                     light: StripLight::of(self.prepared, self.cubes, *sheet),
                     alpha: Some(self.prepared.scenery.parts[part].alpha),
                     has_lamps: self.lamps.is_some(),
+                    has_layers: self.prepared.has_layers,
                 };
                 row.surfaces.push(&self.rays, self.contact, &strip);
             }

@@ -1,12 +1,13 @@
-//! Images on surfaces: colours, gloss and normals of points that are shaded together.
+//! Colours, gloss, normals and light by layers of points that are shaded together.
 
 use rapier3d::math::Vector;
 
 use super::raster::Rays;
-use super::shade::{Facet, gloss_lanes};
+use super::shade::{Facet, Surfaces, block, block_mut, gloss_lanes};
 use crate::render::shading::SAMPLES;
 use crate::render::shading::image::{Image, ImagePlace, bent_normal};
 use crate::render::shading::lanes::{Lanes, axes, lanes};
+use crate::render::{Light, Pattern};
 
 /// Surface at several points, without light.
 pub(super) struct ShownSurface<const N: usize> {
@@ -19,9 +20,40 @@ pub(super) struct ShownSurface<const N: usize> {
     pub normal: [Lanes<N>; 3],
     /// Emission, specular strength, shininess and metallic share.
     pub gloss: [Lanes<N>; 4],
+    /// Shares of ambient light that reach the surface.
+    pub ambient: Lanes<N>,
+    /// Linear colours of emitted light.
+    pub emitted: [Lanes<N>; 3],
 }
 
 impl Facet {
+    /// Returns normals of any length.
+    #[inline(always)]
+    pub(super) fn normals<const N: usize>(&self, point_m: &[Lanes<N>; 3]) -> [Lanes<N>; 3] {
+        let normal = axes(|axis| [self.normal[axis]; N]);
+        let Some(slope_1_m) = &self.slope_1_m else { return normal };
+        let (x, y, z) = (slope_1_m.x_axis, slope_1_m.y_axis, slope_1_m.z_axis);
+        let [x_m, y_m, z_m] = point_m;
+        axes(
+            #[inline(always)]
+            |axis| lanes(|i| normal[axis][i] + (x[axis] * x_m[i] + y[axis] * y_m[i] + z[axis] * z_m[i])),
+        )
+    }
+
+    /// Returns the linear colours of the surface, without light.
+    #[inline(always)]
+    pub(super) fn albedo<const N: usize>(&self, point_m: &[Lanes<N>; 3]) -> [Lanes<N>; 3] {
+        let [first, second] = self.linear_rgb;
+        if self.pattern == Pattern::Plain {
+            return axes(|axis| [first[axis]; N]);
+        }
+        let share = self.pattern.shares(self.pattern_from_world.map_lanes(point_m));
+        axes(
+            #[inline(always)]
+            |axis| lanes(|i| first[axis] + (second[axis] - first[axis]) * share[i]),
+        )
+    }
+
     /// Returns the surface with an image at points that have rays, places, normals and depths.
     #[inline(always)]
     pub(super) fn shown<const N: usize>(
@@ -45,6 +77,8 @@ impl Facet {
             alpha: [1.0; N],
             normal: *normal,
             gloss: gloss_lanes(self.gloss),
+            ambient: [1.0; N],
+            emitted: [[0.0; N]; 3],
         };
         for i in 0..N {
             let place = image.place(
@@ -58,7 +92,7 @@ impl Facet {
                 shown.texture[axis][i] = value;
                 shown.albedo[axis][i] = value * self.linear_rgb[0][axis];
             }
-            if image.gloss.is_some() || image.relief.is_some() {
+            if image.changes_light() || image.relief.is_some() {
                 let here = |vectors: &[Lanes<N>; 3]| Vector::new(vectors[0][i], vectors[1][i], vectors[2][i]);
                 self.add_layers(&mut shown, i, image, &place, [here(ray), here(normal)]);
             }
@@ -66,7 +100,7 @@ impl Facet {
         shown
     }
 
-    /// Sets gloss and normal at one point of a surface whose image has layers for them.
+    /// Sets gloss, emitted light and normal at one point of a surface whose image has layers for them.
     fn add_layers<const N: usize>(
         &self,
         shown: &mut ShownSurface<N>,
@@ -76,8 +110,14 @@ impl Facet {
         [ray, normal]: [Vector; 2],
     ) {
         if let Some(texture) = &image.gloss {
-            let here: [Lanes<1>; 4] = gloss_lanes(self.gloss.at_texel(image.numbers(texture, place)));
+            let gloss = self.gloss.at_texel(image.numbers(texture, place));
+            let here: [Lanes<1>; 4] = gloss_lanes(gloss);
             shown.gloss.iter_mut().zip(here).for_each(|(lanes, [value])| lanes[i] = value);
+            shown.ambient[i] = gloss.ambient_factor;
+        }
+        if let Some(rgb) = image.emitted_rgb(place, &self.gloss) {
+            shown.gloss[0][i] = 0.0;
+            shown.emitted.iter_mut().zip(rgb).for_each(|(lanes, value)| lanes[i] = value);
         }
         if let Some(texture) = &image.relief {
             let towards_eye = normal.normalize_or_zero() * 1f32.copysign(-normal.dot(ray));
@@ -106,6 +146,52 @@ impl Facet {
             |row| {
                 let along_step = self.pattern_from_world.0[row].0.dot(step_ray);
                 lanes(|i| (along_step - along_ray[row][i] * deeper[i]) * depth_m[i])
+            },
+        )
+    }
+}
+
+impl Surfaces {
+    #[inline(always)]
+    pub(super) fn set_layers<const N: usize>(
+        &mut self,
+        at: usize,
+        ambient: Lanes<N>,
+        emitted: [Lanes<N>; 3],
+    ) {
+        *block_mut(&mut self.ambient_share, at) = ambient;
+        self.emitted.set(at, emitted);
+    }
+
+    /// Returns the shares of ambient light that reach points, and the linear colours that they emit.
+    #[inline(always)]
+    pub(super) fn layers(&self, at: usize) -> (Lanes, [Lanes; 3]) {
+        (*block(&self.ambient_share, at), self.emitted.block(at))
+    }
+
+    /// Adds what layers change in the colours of points that are lit without them. `ambient` is ambient light,
+    /// which they keep out.
+    #[inline(always)]
+    pub(super) fn add_layers(&self, at: usize, ambient: [Lanes; 3], colours: &mut [Lanes; 3]) {
+        let (albedo, (ambient_share, emitted)) = (self.albedo.block(at), self.layers(at));
+        let (lit_share, share) = (self.shares(at), block(&self.pixel_share, at));
+        for (axis, colour) in colours.iter_mut().enumerate() {
+            *colour = lanes(|i| {
+                let kept_out = albedo[axis][i] * ambient[axis][i] * (1.0 - ambient_share[i]);
+                colour[i] + emitted[axis][i] * share[i] - kept_out * lit_share[i]
+            });
+        }
+    }
+
+    /// Returns the light of the sky on points.
+    #[inline(always)]
+    pub(super) fn sky_light(&self, at: usize, light: &Light) -> [Lanes; 3] {
+        let [_, _, up] = self.normal.block(at);
+        axes(
+            #[inline(always)]
+            |axis| {
+                let (below, above) = (light.below_rgb[axis], light.above_rgb[axis]);
+                lanes(|i| below + (above - below) * (up[i] * 0.5 + 0.5))
             },
         )
     }

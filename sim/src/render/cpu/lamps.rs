@@ -47,6 +47,8 @@ struct Sums {
     to_eye: [Lanes; 3],
     /// Specular strength of the surface, and exponent of its highlights.
     gloss: [Lanes; 2],
+    /// Share of ambient light that reaches the surface.
+    ambient: Lanes,
     lit: [Lanes; 3],
     glossy: [Lanes; 3],
 }
@@ -148,7 +150,9 @@ impl Surfaces {
             ),
             metallic: self.metallic(at),
         };
-        let mut sums = self.unlit(at, [specular, shininess]);
+        let layers = self.has_layers.then(|| self.layers(at));
+        let ambient = layers.map_or([1.0; LANES], |(ambient, _)| ambient);
+        let mut sums = self.unlit(at, [specular, shininess], ambient);
         sums.lit = [emission; 3];
         sums.add_headlight(&lamps.headlight, back_direction);
         let casts_shadow = |lamp: &&LitLamp| !matches!(lamp.shadow, LampShadow::None);
@@ -161,6 +165,11 @@ impl Surfaces {
         for lamp in lamps.lamps.iter().filter(casts_shadow) {
             sums.add(lamp, &point_m, count - at);
             sums.show(&surface, &mut values);
+        }
+        if let Some((_, emitted)) = &layers {
+            for (values, emitted) in values.iter_mut().zip(emitted) {
+                *values = lanes(|i| values[i] + file_value(emitted[i]));
+            }
         }
         let shares = self.shares(at);
         axes(
@@ -176,7 +185,7 @@ impl Surfaces {
 
     /// Returns the orientation of points, without light.
     #[inline(always)]
-    fn unlit(&self, at: usize, [specular, shininess]: [Lanes; 2]) -> Sums {
+    fn unlit(&self, at: usize, [specular, shininess]: [Lanes; 2], ambient: Lanes) -> Sums {
         let (ray, normal) = (self.ray.block(at), self.normal.block(at));
         let per_ray: Lanes = lanes(|i| -1.0 / dot(&ray, &ray, i).sqrt());
         let per_normal: Lanes = lanes(|i| 1.0 / dot(&normal, &normal, i).sqrt());
@@ -192,6 +201,7 @@ impl Surfaces {
                 |axis| lanes(|i| ray[axis][i] * per_ray[i]),
             ),
             gloss: [specular, lanes(|i| shininess[i] * SHININESS)],
+            ambient,
             lit: [[0.0; LANES]; 3],
             glossy: [[0.0; LANES]; 3],
         }
@@ -243,7 +253,7 @@ impl Sums {
 
     /// Adds ambient, diffuse and specular light from a direction.
     #[inline(always)]
-    fn add_light(&mut self, [ambient, diffuse, specular]: [Vector; 3], towards: &[Lanes; 3], share: &Lanes) {
+    fn add_light(&mut self, [dim, diffuse, specular]: [Vector; 3], towards: &[Lanes; 3], share: &Lanes) {
         let half_way: [Lanes; 3] = axes(
             #[inline(always)]
             |axis| lanes(|i| towards[axis][i] + self.to_eye[axis][i]),
@@ -258,7 +268,7 @@ impl Sums {
         for axis in 0..3 {
             let lit: Lanes = lanes(|i| {
                 let facing = if facing[i] > 0.0 { facing[i] } else { 0.0 };
-                self.lit[axis][i] + (ambient[axis] + diffuse[axis] * facing) * share[i]
+                self.lit[axis][i] + (dim[axis] * self.ambient[i] + diffuse[axis] * facing) * share[i]
             });
             let glossy: Lanes = lanes(|i| self.glossy[axis][i] + specular[axis] * shine[i]);
             (self.lit[axis], self.glossy[axis]) = (lit, glossy);

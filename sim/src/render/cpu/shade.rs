@@ -63,6 +63,8 @@ pub(super) struct Strip<'a> {
     pub light: StripLight<'a>,
     /// True if lamps light the scenery, which need more of a surface than a sun does.
     pub has_lamps: bool,
+    /// True if layers of some surfaces change ambient light or emit light.
+    pub has_layers: bool,
 }
 
 /// Points that are shaded together. They are stored coordinate by coordinate and processed in branchless
@@ -78,6 +80,10 @@ pub(super) struct Surfaces {
     /// Emission, specular strength and shininess, and metallic shares, for lamps.
     pub gloss: Vectors,
     metallic_share: [f32; ROOM],
+    /// Shares of ambient light, and emitted light, by layers; without meaning unless `has_layers`.
+    pub ambient_share: [f32; ROOM],
+    pub emitted: Vectors,
+    pub has_layers: bool,
     /// Colours of images alone, for lamps; 1 without.
     pub texture: Vectors,
     /// Baked light, and the share of it that things shadow.
@@ -87,7 +93,7 @@ pub(super) struct Surfaces {
     open_share: [f32; ROOM],
     /// The pixel of each point, and its weight there.
     pub pixels: [u32; ROOM],
-    pixel_share: [f32; ROOM],
+    pub pixel_share: [f32; ROOM],
     /// Place in the shadow map, and the cell there.
     texel: Vectors,
     cell: [u32; ROOM],
@@ -129,12 +135,12 @@ impl Vectors {
 }
 
 #[inline(always)]
-fn block(values: &[f32; ROOM], at: usize) -> &Lanes {
+pub(super) fn block(values: &[f32; ROOM], at: usize) -> &Lanes {
     values[at..].first_chunk().expect("there is room for a block after each point")
 }
 
 #[inline(always)]
-fn block_mut<T, const N: usize>(values: &mut [T; ROOM], at: usize) -> &mut [T; N] {
+pub(super) fn block_mut<T, const N: usize>(values: &mut [T; ROOM], at: usize) -> &mut [T; N] {
     values[at..].first_chunk_mut().expect("there is room for a block after each point")
 }
 
@@ -202,6 +208,9 @@ impl Surfaces {
             albedo: Vectors::ZERO,
             gloss: Vectors::ZERO,
             metallic_share: [0.0; ROOM],
+            ambient_share: [1.0; ROOM],
+            emitted: Vectors::ZERO,
+            has_layers: false,
             texture: Vectors::ZERO,
             baked: Vectors::ZERO,
             lamp_share: [0.0; ROOM],
@@ -224,6 +233,7 @@ impl Surfaces {
 
     #[inline(always)]
     pub(super) fn push(&mut self, rays: &Rays, contact: &ContactMap, strip: &Strip<'_>) {
+        self.has_layers = strip.has_layers;
         if strip.count == 1 {
             self.push_blocks::<1>(rays, contact, strip);
         } else {
@@ -290,6 +300,9 @@ impl Surfaces {
                 self.set_gloss(at, gloss_lanes::<N>(strip.facet.gloss));
                 self.texture.set(at, [[1.0; N]; 3]);
             }
+            if strip.has_layers {
+                self.set_layers(at, [1.0; N], [[0.0; N]; 3]);
+            }
             return [1.0; N];
         };
         let shown = strip.facet.shown(image, rays, [ray, point_m, &normal], depth_m);
@@ -298,6 +311,9 @@ impl Surfaces {
         if strip.has_lamps {
             self.set_gloss(at, shown.gloss);
             self.texture.set(at, shown.texture);
+        }
+        if strip.has_layers {
+            self.set_layers(at, shown.ambient, shown.emitted);
         }
         shown.alpha
     }
@@ -373,10 +389,17 @@ impl Surfaces {
             };
         }
         for at in (0..count).step_by(LANES) {
-            let colours = match tint_rgb {
+            let mut colours = match tint_rgb {
                 None => self.lit(at, light),
                 Some(tint_rgb) => self.lit_by_baked(at, tint_rgb),
             };
+            if self.has_layers {
+                let ambient = match tint_rgb {
+                    None => self.sky_light(at, light),
+                    Some(tint_rgb) => self.reflected(at, tint_rgb),
+                };
+                self.add_layers(at, ambient, &mut colours);
+            }
             let first = self.pixels[at];
             let beside =
                 (first..).zip(&self.pixels[at..at + LANES]).fold(true, |all, (i, pixel)| all & (i == *pixel));
@@ -450,35 +473,6 @@ impl Surfaces {
                     (unlit + sunlight) * (open[i] * share[i])
                 })
             },
-        )
-    }
-}
-
-impl Facet {
-    /// Returns normals of any length.
-    #[inline(always)]
-    fn normals<const N: usize>(&self, point_m: &[Lanes<N>; 3]) -> [Lanes<N>; 3] {
-        let normal = axes(|axis| [self.normal[axis]; N]);
-        let Some(slope_1_m) = &self.slope_1_m else { return normal };
-        let (x, y, z) = (slope_1_m.x_axis, slope_1_m.y_axis, slope_1_m.z_axis);
-        let [x_m, y_m, z_m] = point_m;
-        axes(
-            #[inline(always)]
-            |axis| lanes(|i| normal[axis][i] + (x[axis] * x_m[i] + y[axis] * y_m[i] + z[axis] * z_m[i])),
-        )
-    }
-
-    /// Returns the linear colours of the surface, without light.
-    #[inline(always)]
-    fn albedo<const N: usize>(&self, point_m: &[Lanes<N>; 3]) -> [Lanes<N>; 3] {
-        let [first, second] = self.linear_rgb;
-        if self.pattern == Pattern::Plain {
-            return axes(|axis| [first[axis]; N]);
-        }
-        let share = self.pattern.shares(self.pattern_from_world.map_lanes(point_m));
-        axes(
-            #[inline(always)]
-            |axis| lanes(|i| first[axis] + (second[axis] - first[axis]) * share[i]),
         )
     }
 }

@@ -149,6 +149,7 @@ impl View<'_> {
             alpha: None,
             light: StripLight::of(self.prepared, self.cubes, sheet),
             has_lamps: self.lamps.is_some(),
+            has_layers: self.prepared.has_layers,
         };
         row.surfaces.push(&self.rays, self.contact, &strip);
     }

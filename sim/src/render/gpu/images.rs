@@ -30,6 +30,7 @@ pub(super) struct PartHeads {
     pub colour: u32,
     pub gloss: u32,
     pub relief: u32,
+    pub emitted: u32,
 }
 
 /// A texture, and true if its places are on a cube.
@@ -74,6 +75,7 @@ impl SceneImages {
                 colour: head(Some(&image.texture), image.is_cube),
                 gloss: head(image.gloss.as_ref(), image.is_cube),
                 relief: head(image.relief.as_ref(), image.is_cube),
+                emitted: head(image.emitted.as_ref(), image.is_cube),
             })
         };
         let heads = prepared.images.iter().map(of_part).collect();
@@ -84,8 +86,8 @@ impl SceneImages {
 
 /// Returns the textures of an image.
 fn textures(image: &Image) -> impl Iterator<Item = PlacedTexture<'_>> {
-    let all = std::iter::once(&image.texture).chain(&image.gloss).chain(&image.relief);
-    all.map(|texture| (texture, image.is_cube))
+    let all = [Some(&image.texture), image.gloss.as_ref(), image.relief.as_ref(), image.emitted.as_ref()];
+    all.into_iter().flatten().map(|texture| (texture, image.is_cube))
 }
 
 fn is_same((one, is_cube): PlacedTexture, (other, other_is_cube): PlacedTexture) -> bool {

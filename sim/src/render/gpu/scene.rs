@@ -13,6 +13,7 @@ use crate::render::cpu::contact::ContactMap;
 use crate::render::scene::bend::Bend;
 use crate::render::scene::prepared::{NOTHING, Prepared};
 use crate::render::shading::lamps::{lamp_map, lamp_view, tilted};
+use crate::render::shading::power::linear_value;
 use crate::render::shading::{CONTACT_TEXELS, SAMPLES, TEXELS, VEILS, normal_offset_m, sun_map};
 use crate::render::{Camera, Carrier, Part, Pattern, PlacedScenery, Scenery};
 
@@ -20,7 +21,7 @@ use crate::render::{Camera, Carrier, Part, Pattern, PlacedScenery, Scenery};
 const CAMERA_VECTORS: usize = 16;
 /// Count of numbers in `View`, and in `Part`.
 const VIEW_NUMBERS: usize = 4 * CAMERA_VECTORS + 5 * 4 + MAX_LIGHTS * LAMP_NUMBERS;
-const PART_NUMBERS: usize = 32;
+const PART_NUMBERS: usize = 36;
 /// Count of numbers in its `Lamp`.
 const LAMP_NUMBERS: usize = 36;
 /// Bits of `Part`'s flags.
@@ -295,9 +296,10 @@ fn placed_part(
         | bit(part.is_cut_out(), IS_CUT_OUT)
         | bit(has_alpha, HAS_ALPHA);
     let flags = [part.id, bits, (part.carrier == Carrier::Room).into(), heads.colour];
-    let Gloss { roughness_factor, metallic_factor, .. } = part.gloss;
+    let Gloss { emission_factor, roughness_factor, metallic_factor, .. } = part.gloss;
     let shares = [roughness_factor.unwrap_or(-1.0), metallic_factor].map(f32::to_bits);
-    let flags = flags.into_iter().chain([heads.gloss, heads.relief]).chain(shares);
+    let emitted = [heads.emitted, linear_value(emission_factor).to_bits()];
+    let flags = flags.into_iter().chain([heads.gloss, heads.relief]).chain(shares).chain(emitted);
     for (number, bits) in numbers.iter_mut().zip(rows.as_flattened().iter().map(|x| x.to_bits()).chain(flags))
     {
         *number = bits;

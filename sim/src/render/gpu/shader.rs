@@ -20,8 +20,10 @@ use crate::render::shading::{
 };
 
 /// Texts after the constants.
-const SHADERS: [&str; 3] = [
+const SHADERS: [&str; 5] = [
     include_str!("shaders/picture.wgsl"),
+    include_str!("shaders/shadows.wgsl"),
+    include_str!("shaders/surfaces.wgsl"),
     include_str!("shaders/lamps.wgsl"),
     include_str!("shaders/baked.wgsl"),
 ];

@@ -1,14 +1,13 @@
 //! The GPU renderer draws the same images as the embedded one. Software such as Mesa's is sufficient;
 //! without any, these tests report it and pass.
 
-use std::f32::consts::PI;
-
 use super::together::counts;
 use crate::mjcf::Document;
+use crate::render::made::{bottle, world};
 use crate::render::{
     Camera, Cameras, Frame, RenderRequest, Renderer, RendererKind, Scenery, cpu, render_colours_together,
 };
-use crate::{ObjectPlacement, Pose, RobotPlacement, Step, Vector, World, WorldSpec};
+use crate::{Pose, Step, Vector, World};
 
 #[path = "../../../../tests/src/skipped.rs"]
 mod skipped;
@@ -31,22 +30,7 @@ fn gpu(scenery: Scenery) -> Option<Box<dyn Renderer>> {
 }
 
 fn kitchen() -> World {
-    let robot = |name: &str, position_m: [f32; 2], yaw_rad: f32| RobotPlacement {
-        name: name.into(),
-        position_m,
-        yaw_rad,
-    };
-    let bottle = Pose::from_translation(Vector::new(0.30, -0.07, 0.80));
-    World::new(&WorldSpec {
-        scene: "kitchen_084".into(),
-        robots: vec![robot("A", [0.0, 0.0], 0.0), robot("B", [0.74, -0.12], PI)],
-        objects: vec![ObjectPlacement {
-            name: "bottle".into(),
-            file: "bottle".into(),
-            world_from_object: bottle,
-        }],
-    })
-    .expect("embedded files")
+    world("kitchen_084", vec![bottle()])
 }
 
 /// Returns every camera of the world, and one with an odd image size.
@@ -152,6 +136,10 @@ const LIT: &str = r#"<asset>
             <layer role="orm" texture="bumps"/>
             <layer role="normal" texture="bumps"/>
         </material>
+        <material name="screen" rgba="0.4 0.3 0.3 1" emission="0.7">
+            <layer role="emissive" texture="squares"/>
+            <layer role="occlusion" texture="bumps"/>
+        </material>
         <material name="shiny" rgba="0.7 0.2 0.2 1" specular="1" shininess="0.2" emission="0.1"/>
     </asset>
     <worldbody>
@@ -166,6 +154,7 @@ const LIT: &str = r#"<asset>
         <geom type="plane" size="0.4 0.4 1" pos="2.3 1 0.7" euler="60 0 0" material="hole"/>
         <geom type="box" size="0.2 0.2 0.2" pos="2.9 1.3 0.2" euler="0 0 20" material="worn"/>
         <geom type="cylinder" size="0.2 0.3" pos="1.1 1.4 0.3" material="worn"/>
+        <geom type="box" size="0.3 0.02 0.2" pos="2.6 2.2 1" euler="70 0 0" material="screen"/>
     </worldbody>"#;
 
 #[test]
@@ -179,11 +168,23 @@ fn lights_of_files_blended_surfaces_and_skies_are_the_same() {
         image::Rgb([100 + (x * 7 % 60) as u8, 100 + (y * 5 % 60) as u8, 225])
     });
     bumps.save(folder.path().join("bumps.png")).expect("an image");
-    let file = folder.path().join("scene.xml");
-    std::fs::write(&file, format!("<mujoco>{LIT}</mujoco>")).expect("a scene");
-    let world = World::of_scene(Document::read(&file).expect("a scene")).expect("a world");
-    let (scenery, step) = (Scenery::of(&world), world.present());
-    assert!(scenery.lamps.as_ref().is_some_and(|lamps| lamps.lamps.len() == 3) && scenery.sky.is_some());
+    let unlit: String = LIT.lines().filter(|line| !line.contains("<light")).collect();
+    let walls = r#"<geom type="box" size="0.1 4 1.2" pos="-2 0 1.2"/><geom type="box" size="0.1 4 1.2" pos="5 0 1.2"/></worldbody>"#;
+    let indoors = unlit.replace("</worldbody>", walls);
+    for (what, inside, lamps) in [("lights", LIT, 3), ("the sun", &unlit, 0), ("baked light", &indoors, 0)] {
+        let file = folder.path().join("scene.xml");
+        std::fs::write(&file, format!("<mujoco>{inside}</mujoco>")).expect("a scene");
+        let world = World::of_scene(Document::read(&file).expect("a scene")).expect("a world");
+        let scenery = Scenery::of(&world);
+        let found = scenery.lamps.as_ref().map_or(0, |lamps| lamps.lamps.len());
+        assert!(found == lamps && scenery.sky.is_some(), "{what}");
+        draws_the_same(&world, scenery, what);
+    }
+}
+
+/// Compares images of both renderers, if there is a GPU.
+fn draws_the_same(world: &World, scenery: Scenery, what: &str) {
+    let step = world.present();
     let Some(mut gpu) = gpu(scenery.clone()) else { return };
     let mut embedded = cpu(scenery);
     for eye_m in [Vector::new(0.3, -0.4, 1.3), Vector::new(3.6, 0.4, 1.6)] {
@@ -196,7 +197,7 @@ fn lights_of_files_blended_surfaces_and_skies_are_the_same() {
         };
         let (drawn, expected) = (gpu.render(&step, &camera), embedded.render(&step, &camera));
         let psnr_db = psnr_db(&drawn, &expected);
-        assert!(psnr_db >= MIN_PSNR_DB, "{psnr_db:.1} dB");
+        assert!(psnr_db >= MIN_PSNR_DB, "{what}: {psnr_db:.1} dB");
         assert!(depth_p99_m(&drawn, &expected) <= DEPTH_TOLERANCE_M);
         let stray = drawn.ids.iter().zip(&expected.ids).filter(|(a, b)| a != b).count();
         assert!(stray as f64 <= STRAY_IDS * expected.ids.len() as f64, "{stray} other ids");

@@ -31,7 +31,7 @@ impl Negative<'_> {
         let of_point = |(uv_px, seen): &([f32; 2], SeenSurface)| {
             let seen_rgb = match seen.id {
                 0 => self.view.sky_rgb(*uv_px),
-                _ => self.seen_rgb(row, column, seen),
+                _ => self.view.mirrored_rgb(self.seen_rgb(row, column, seen), seen),
             };
             self.view.veiled_rgb(*uv_px, seen_rgb, self.view.depth_m(seen))
         };
@@ -65,14 +65,14 @@ impl Negative<'_> {
             Some(_) => seen.albedo * linear_light(Vector::splat(seen.gloss.emission_factor)),
             None => Vector::ZERO,
         };
-        developed_rgb(seen, layers_rgb, self.exposure_factor) + emitted_rgb
+        developed_rgb(seen, layers_rgb, self.exposure_factor) + emitted_rgb + seen.emitted_rgb
     }
 }
 
 /// Returns the linear colour of a surface in an image.
 pub fn developed_rgb(seen: &SeenSurface, layers_rgb: [Vector; LAYERS], exposure_factor: f32) -> Vector {
-    let light_rgb =
-        seen.albedo * (layers_rgb[DIRECT] + layers_rgb[INDIRECT]) + layers_rgb[COATED] * seen.coat_rgb();
+    let light_rgb = seen.albedo * (layers_rgb[DIRECT] + layers_rgb[INDIRECT] * seen.gloss.ambient_factor)
+        + layers_rgb[COATED] * seen.coat_rgb();
     toned_rgb(light_rgb * exposure_factor)
 }
 

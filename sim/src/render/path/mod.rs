@@ -93,6 +93,7 @@ impl PathRenderer {
             prepared: &self.prepared,
             lights: self.lights.placed(self.prepared.scenery.lamps.as_ref(), placed),
             patterns: patterns(&self.prepared, placed),
+            upward_direction: placed.world_from_mesh.iter().map(|pose| pose.rotation * Vector::Z).collect(),
         }
     }
 

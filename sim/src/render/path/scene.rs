@@ -29,6 +29,8 @@ const COAT_WIDTH_2: f32 = 0.015;
 /// Least roughness: what is smoother would show single paths.
 const MIN_COAT_ROUGHNESS: f32 = 0.2;
 
+/// Least cosine between the normal of a mirror and its mesh's z.
+const MIN_MIRROR_COSINE: f32 = 0.999;
 /// Width of the spots that reflect light on others, for images on them.
 const REFLECTED_WIDTH_M: f32 = 0.02;
 
@@ -41,6 +43,8 @@ pub struct Scene<'a> {
     pub veils: Option<Space<'a>>,
     /// Map from the world to the frame of each part's pattern, or to the coordinates of its image.
     pub patterns: Vec<Affine>,
+    /// Direction of z in the mesh of each part.
+    pub upward_direction: Vec<Vector>,
 }
 
 /// Reflection of a surface, beyond its colour.
@@ -129,15 +133,26 @@ impl Scene<'_> {
         image.place(map.map(spot.point_m), by(across), by(spot.face_normal.cross(across)))
     }
 
-    /// Returns the gloss of a surface, as a mean over about `width_m`.
-    pub fn gloss(&self, spot: &Spot, width_m: f32) -> Gloss {
-        let gloss = self.prepared.scenery.parts[spot.part as usize].gloss;
-        match &self.prepared.images[spot.part as usize] {
-            Some(image @ Image { gloss: Some(texture), .. }) => {
-                gloss.at_texel(image.numbers(texture, &self.image_place(image, spot, width_m)))
-            }
-            _ => gloss,
+    /// Returns the gloss of a surface and the light that a layer emits, as means over about `width_m`.
+    pub fn gloss_and_emitted_rgb(&self, spot: &Spot, width_m: f32) -> (Gloss, Vector) {
+        let mut gloss = self.prepared.scenery.parts[spot.part as usize].gloss;
+        let image = self.prepared.images[spot.part as usize].as_ref();
+        let Some(image) = image.filter(|image| image.changes_light()) else { return (gloss, Vector::ZERO) };
+        let place = self.image_place(image, spot, width_m);
+        if let Some(texture) = &image.gloss {
+            gloss = gloss.at_texel(image.numbers(texture, &place));
         }
+        match image.emitted_rgb(&place, &gloss) {
+            Some(rgb) => (Gloss { emission_factor: 0.0, ..gloss }, rgb.into()),
+            None => (gloss, Vector::ZERO),
+        }
+    }
+
+    /// Returns the share of the mirror image in the colour of a surface.
+    pub fn mirror_share(&self, spot: &Spot) -> f32 {
+        let share = self.prepared.scenery.parts[spot.part as usize].gloss.reflectance_factor;
+        let is_upper = || self.upward_direction[spot.part as usize].dot(spot.normal) > MIN_MIRROR_COSINE;
+        if share > 0.0 && is_upper() { share } else { 0.0 }
     }
 
     /// Returns a surface with the normal of its relief, as a mean over about `width_m`.

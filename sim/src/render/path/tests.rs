@@ -1,8 +1,6 @@
 //! Path tracing: the same bits on any number of threads, the same depth and ids as the embedded renderer's,
 //! light that bounces, and little noise.
 
-use std::f32::consts::PI;
-
 use rapier3d::math::{Pose, Vector};
 
 use super::scene::Coat;
@@ -10,9 +8,10 @@ use super::sequence::{PixelSeed, SampleCount};
 use super::view::PathView;
 use super::*;
 use crate::mjcf::Gloss;
+use crate::render::made::{bottle, cuboid, world};
 use crate::render::shading::SKY;
-use crate::render::{Cameras, Light, Part, Pattern, TriangleMesh, cpu};
-use crate::{ObjectPlacement, RobotPlacement, Step, World, WorldSpec};
+use crate::render::{Cameras, Light, cpu};
+use crate::{Step, World};
 
 const DEPTH_TOLERANCE_M: f32 = 1e-4;
 /// Maximum share of pixels that may show another thing than the embedded renderer's.
@@ -24,24 +23,6 @@ const MIN_PSNR_DB: f64 = 32.0;
 const REFERENCE_PATHS: u32 = 512;
 const REFERENCE_ROWS: usize = 27;
 
-fn world(scene: &str) -> World {
-    let robot = |name: &str, position_m: [f32; 2], yaw_rad: f32| RobotPlacement {
-        name: name.into(),
-        position_m,
-        yaw_rad,
-    };
-    World::new(&WorldSpec {
-        scene: scene.into(),
-        robots: vec![robot("A", [0.0, 0.0], 0.0), robot("B", [0.74, -0.12], PI)],
-        objects: vec![ObjectPlacement {
-            name: "bottle".into(),
-            file: "bottle".into(),
-            world_from_object: Pose::from_translation(Vector::new(0.30, -0.07, 0.80)),
-        }],
-    })
-    .expect("embedded files")
-}
-
 /// Returns every camera of the world, at a size that is quick to draw.
 fn views(world: &World, step: &Step) -> Vec<Camera> {
     let cameras = Cameras::of(world);
@@ -51,7 +32,7 @@ fn views(world: &World, step: &Step) -> Vec<Camera> {
 
 #[test]
 fn an_image_is_the_same_on_any_number_of_threads() {
-    let world = world("kitchen_084");
+    let world = world("kitchen_084", vec![bottle()]);
     let step = world.present();
     let renderer = PathRenderer::new(Prepared::new(Scenery::of(&world)));
     let scene = renderer.scene(&renderer.prepared.scenery.place(&step));
@@ -65,7 +46,7 @@ fn an_image_is_the_same_on_any_number_of_threads() {
 
 #[test]
 fn depth_and_ids_are_those_of_the_embedded_renderer() {
-    let mut world = world("kitchen_084");
+    let mut world = world("kitchen_084", vec![bottle()]);
     let (mut path, mut embedded) =
         (PathRenderer::new(Prepared::new(Scenery::of(&world))), cpu(Scenery::of(&world)));
     let commands = [world.rest_command(0), world.rest_command(1)];
@@ -90,7 +71,7 @@ fn depth_and_ids_are_those_of_the_embedded_renderer() {
 #[test]
 fn images_are_as_bright_as_those_of_the_embedded_renderer() {
     for scene in ["kitchen_084", "gallery_136", "grocery_102", "home_098", "office_115", "floor"] {
-        let world = world(scene);
+        let world = world(scene, vec![bottle()]);
         let step = world.present();
         let camera = &views(&world, &step)[0];
         let traced = crate::render::path(Scenery::of(&world)).render(&step, camera);
@@ -103,20 +84,8 @@ fn images_are_as_bright_as_those_of_the_embedded_renderer() {
 
 /// Returns a grey floor and a red wall on its far side, seen from above the floor.
 fn red_wall() -> (Scenery, Camera) {
-    let part = |half_m: Vector, at_m: Vector, rgb: [f32; 3]| Part {
-        mesh: TriangleMesh::cuboid(half_m).into(),
-        carrier: Carrier::Room,
-        carrier_from_mesh: Pose::from_translation(at_m),
-        rgb,
-        alpha: 1.0,
-        gloss: Gloss::default(),
-        image: None,
-        pattern: Pattern::Plain,
-        id: 1,
-        casts_shadow: true,
-    };
-    let floor = part(Vector::new(3.0, 3.0, 0.05), Vector::new(0.0, 0.0, -0.05), [0.6, 0.6, 0.6]);
-    let wall = part(Vector::new(0.05, 3.0, 1.2), Vector::new(1.5, 0.0, 1.2), [0.9, 0.1, 0.1]);
+    let floor = cuboid(Vector::new(3.0, 3.0, 0.05), Vector::new(0.0, 0.0, -0.05), [0.6, 0.6, 0.6]);
+    let wall = cuboid(Vector::new(0.05, 3.0, 1.2), Vector::new(1.5, 0.0, 1.2), [0.9, 0.1, 0.1]);
     // White, so that all colour is from the wall, and faint, so that no tone is compressed.
     let faint_rgb = Vector::splat(0.4);
     let light = Light { sun_rgb: faint_rgb, below_rgb: faint_rgb, above_rgb: faint_rgb, ..Light::default() };
@@ -128,7 +97,7 @@ fn red_wall() -> (Scenery, Camera) {
 
 #[test]
 fn a_red_wall_colours_the_floor_beside_it() {
-    let step = world("floor").present();
+    let step = world("floor", Vec::new()).present();
     let (scenery, camera) = red_wall();
     // Red over blue on the floor 11 cm from the wall, and on the floor far from it.
     let beside_and_away = |frame: Frame| {
@@ -178,7 +147,7 @@ fn reference(view: &PathView, camera: &Camera, exposure_factor: f32) -> Vec<u8> 
 
 #[test]
 fn few_paths_and_the_filter_come_close_to_many() {
-    let world = world("kitchen_084");
+    let world = world("kitchen_084", vec![bottle()]);
     let step = world.present();
     let renderer = PathRenderer::new(Prepared::new(Scenery::of(&world)));
     let scene = renderer.scene(&renderer.prepared.scenery.place(&step));

@@ -25,6 +25,8 @@ const MIN_ASIDE_M: f32 = 0.002;
 const SUNLIT_SHARE: f32 = 0.92;
 /// Distance between blended surfaces on a ray, as a share of the distance on it.
 const MIN_STEP_SHARE: f32 = 1e-5;
+/// Distance from a mirror at which rays start that leave it.
+const OFF_MIRROR_M: f32 = 1e-3;
 /// Purposes of a pixel's numbers.
 const FOR_LAMPS: u32 = 0;
 const FOR_LIGHT: u32 = 1;
@@ -40,7 +42,11 @@ pub struct SeenSurface {
     pub albedo: Vector,
     /// Colour of its image alone; 1 without.
     pub texture_rgb: Vector,
+    /// Light of its own: the layer for it, beside the emission of its gloss.
+    pub emitted_rgb: Vector,
     pub gloss: Gloss,
+    /// Share of the mirror image in its colour.
+    pub mirror_share: f32,
 }
 
 /// The surface at the centre of a pixel.
@@ -89,10 +95,14 @@ impl<'a> PathView<'a> {
 
     /// Returns the colour of the sky at a place in the image.
     pub fn sky_rgb(&self, uv_px: [f32; 2]) -> Vector {
+        self.sky_along(self.ray(uv_px))
+    }
+
+    fn sky_along(&self, ray: Vector) -> Vector {
         let Some(sky) = &self.scene.prepared.sky else { return SKY };
         let pixel = 1.0 / self.lens.focal_px;
         let steps = [Vector::X * pixel, Vector::NEG_Y * pixel];
-        sky.sky_rgb(self.ray(uv_px), steps.map(|step| self.world_from_camera.rotation * step))
+        sky.sky_rgb(ray, steps.map(|step| self.world_from_camera.rotation * step))
     }
 
     /// Returns the colour at a place in the image where blended surfaces are in front of `behind_rgb`, which
@@ -114,13 +124,14 @@ impl<'a> PathView<'a> {
 
     /// Returns the linear colour of a surface in an image of a rasteriser, with as much shadow as usual.
     pub fn rasterised_rgb(&self, seen: &SeenSurface) -> Vector {
-        let SeenSurface { point_m, normal, albedo, texture_rgb, gloss, .. } = *seen;
+        let SeenSurface { point_m, normal, albedo, texture_rgb, emitted_rgb, gloss, .. } = *seen;
         let Scenery { light, lamps, .. } = &self.scene.prepared.scenery;
         let to_eye = (self.eye_m() - point_m).normalize_or_zero();
         if let Some(lamps) = lamps {
             let surface = LitSurface {
                 albedo,
                 texture_rgb,
+                emitted_rgb,
                 gloss,
                 point_m,
                 normal,
@@ -131,12 +142,33 @@ impl<'a> PathView<'a> {
         }
         if let (Some(baked), Some(tint)) = (&self.scene.prepared.baked, self.scene.prepared.tint()) {
             let [red, green, blue, _] = cube_light(&baked.cube(point_m), normal.to_array());
-            return (albedo * Vector::new(red, green, blue) * Vector::from(tint)).min(Vector::ONE);
+            let lit_rgb = albedo * Vector::new(red, green, blue) * Vector::from(tint);
+            return (lit_rgb + emitted_rgb).min(Vector::ONE);
         }
         let ambient_rgb = light.below_rgb + (light.above_rgb - light.below_rgb) * (normal.z * 0.5 + 0.5);
         let sun_rgb = light.sun_rgb * (normal.dot(light.sun_direction).max(0.0) * SUNLIT_SHARE);
         let lamp_rgb = Vector::splat(LAMP * to_eye.dot(normal).abs());
-        (albedo * (ambient_rgb + lamp_rgb + sun_rgb)).min(Vector::ONE)
+        let lit_rgb = albedo * (ambient_rgb * gloss.ambient_factor + lamp_rgb + sun_rgb);
+        (lit_rgb + emitted_rgb).min(Vector::ONE)
+    }
+
+    /// Returns the colour of a surface with its mirror image, in which things look as in an image of a
+    /// rasteriser.
+    pub fn mirrored_rgb(&self, own_rgb: Vector, seen: &SeenSurface) -> Vector {
+        if seen.mirror_share == 0.0 {
+            return own_rgb;
+        }
+        let ray = (seen.point_m - self.eye_m()).normalize();
+        let direction = ray - seen.normal * (2.0 * ray.dot(seen.normal));
+        let start_m = seen.point_m + seen.normal * OFF_MIRROR_M;
+        let mirrored_rgb = match self.scene.space.nearest(start_m, direction, 0.0, MetSides::Front) {
+            None => self.sky_along(direction),
+            Some((_, hit)) => {
+                self.rasterised_rgb(&self.seen(&self.scene.space.spot(start_m, direction, &hit)))
+            }
+        };
+        let blend = |axis: usize| blended(own_rgb[axis], mirrored_rgb[axis], seen.mirror_share);
+        Vector::from_array(std::array::from_fn(blend))
     }
 
     /// Returns the depth of a surface that is seen.
@@ -213,13 +245,16 @@ impl<'a> PathView<'a> {
 
     fn seen(&self, spot: &Spot) -> SeenSurface {
         let albedo = self.scene.albedo(spot, self.pixel_m(spot));
+        let (gloss, emitted_rgb) = self.scene.gloss_and_emitted_rgb(spot, self.pixel_m(spot));
         SeenSurface {
             id: self.scene.prepared.scenery.parts[spot.part as usize].id,
             point_m: spot.point_m,
             normal: spot.normal,
             albedo,
             texture_rgb: self.scene.texture_rgb(spot, albedo),
-            gloss: self.scene.gloss(spot, self.pixel_m(spot)),
+            emitted_rgb,
+            gloss,
+            mirror_share: self.scene.mirror_share(spot),
         }
     }
 }

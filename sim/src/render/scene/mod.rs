@@ -225,7 +225,7 @@ fn part(geom: &Geom, mesh: SharedMesh, carrier: Carrier, [r, g, b, alpha]: [f32;
         carrier,
         carrier_from_mesh: geom.body_from_geom,
         alpha,
-        gloss: geom.gloss,
+        gloss: Gloss { reflectance_factor: reflectance_factor(geom, alpha), ..geom.gloss },
         image: geom.image.clone(),
         rgb: geom.checker_rgb.map_or([r, g, b], |[first, _]| first),
         pattern: match geom.checker_rgb {
@@ -236,6 +236,12 @@ fn part(geom: &Geom, mesh: SharedMesh, carrier: Carrier, [r, g, b, alpha]: [f32;
         // Nothing is below a floor.
         casts_shadow: !matches!(geom.primitive, Primitive::Plane { .. }) && alpha > MAX_CLEAR_ALPHA,
     }
+}
+
+/// Returns the reflectance of a geom. As in MuJoCo, only solid planes and boxes mirror.
+fn reflectance_factor(geom: &Geom, alpha: f32) -> f32 {
+    let is_flat = matches!(geom.primitive, Primitive::Plane { .. } | Primitive::Box { .. });
+    if is_flat && alpha >= SOLID_ALPHA { geom.gloss.reflectance_factor } else { 0.0 }
 }
 
 /// Returns the lights of a scene with their carriers.

@@ -27,6 +27,8 @@ pub struct Prepared {
     pub sheets: Vec<Sheet>,
     /// The image of each part.
     pub images: Vec<Option<Image>>,
+    /// True if layers of images change ambient light or emit light.
+    pub has_layers: bool,
     /// Parts that show what is behind them.
     pub is_veil: Vec<bool>,
     /// Image of the sky.
@@ -65,12 +67,14 @@ impl Prepared {
             sheets.extend(geometry.sheets.iter().map(sheet));
         }
         first.push(sheet_of.len());
+        let images: Vec<_> = scenery.parts.iter().map(|part| part.image.as_ref().map(Image::of)).collect();
         let id = |sheet: &Sheet| scenery.parts[sheet.part as usize].id;
         Prepared {
             ids: sheets.iter().map(id).collect(),
             baked: None,
             sheets,
-            images: scenery.parts.iter().map(|part| part.image.as_ref().map(Image::of)).collect(),
+            has_layers: images.iter().flatten().any(Image::changes_light),
+            images,
             is_veil: scenery.parts.iter().map(Part::is_veil).collect(),
             sky: scenery.sky.as_ref().map(Image::around),
             sheet_of,

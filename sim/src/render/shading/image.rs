@@ -6,7 +6,8 @@ use rapier3d::math::Vector;
 
 use super::lanes::{Affine, Lanes, axes, lanes};
 use super::linear;
-use crate::mjcf::{SurfaceImage, Texture, TextureLevel, TextureMapping};
+use super::power::linear_value;
+use crate::mjcf::{Gloss, SurfaceImage, Texture, TextureLevel, TextureMapping};
 
 /// Image of a part, with the map to it.
 #[derive(Clone)]
@@ -15,6 +16,7 @@ pub struct Image {
     /// Numbers at the same places, as in [`SurfaceImage`].
     pub gloss: Option<Arc<Texture>>,
     pub relief: Option<Arc<Texture>>,
+    pub emitted: Option<Arc<Texture>>,
     /// Map from the part's mesh to coordinates that [`Image::place`] takes; `None` if the mesh gives
     /// texture coordinates.
     pub from_mesh: Option<Affine>,
@@ -73,6 +75,7 @@ impl Image {
             texture: image.texture.clone(),
             gloss: image.gloss.clone(),
             relief: image.relief.clone(),
+            emitted: image.emitted.clone(),
             from_mesh,
             is_cube,
             has_faces,
@@ -84,8 +87,16 @@ impl Image {
     pub fn around(texture: &Arc<Texture>) -> Image {
         let last_level = (texture.levels.len() - 1) as f32;
         let has_faces = texture.images() > 1;
-        let texture = texture.clone();
-        Image { texture, gloss: None, relief: None, from_mesh: None, is_cube: true, has_faces, last_level }
+        Image {
+            texture: texture.clone(),
+            gloss: None,
+            relief: None,
+            emitted: None,
+            from_mesh: None,
+            is_cube: true,
+            has_faces,
+            last_level,
+        }
     }
 
     /// Returns the linear colour of the sky along a ray of the world, as a mean over about a step in x and y.
@@ -118,12 +129,22 @@ impl Image {
     #[inline(always)]
     pub fn rgb_and_alpha(&self, place: &ImagePlace) -> ([f32; 3], f32) {
         let texel = texel(&self.texture.levels, self.last_level, place, self.is_cube);
-        let light = &*LIGHT;
-        let rgb = axes(
-            #[inline(always)]
-            |axis| light[index((texel[axis] * LIGHT_STEPS as f32).round_ties_even()) % LIGHT_VALUES],
-        );
-        (rgb, if self.texture.has_alpha { texel[3] / 255.0 } else { 1.0 })
+        (light_of(&texel), if self.texture.has_alpha { texel[3] / 255.0 } else { 1.0 })
+    }
+
+    /// Returns the linear colour of the light that the surface emits at a place; `None` without a layer for it.
+    #[inline(always)]
+    pub fn emitted_rgb(&self, place: &ImagePlace, gloss: &Gloss) -> Option<[f32; 3]> {
+        let texture = self.emitted.as_ref()?;
+        let last_level = (texture.levels.len() - 1) as f32;
+        let place = ImagePlace { face: 0, ..*place };
+        let factor = linear_value(gloss.emission_factor);
+        Some(light_of(&texel(&texture.levels, last_level, &place, self.is_cube)).map(|value| value * factor))
+    }
+
+    /// Returns true if it has numbers for ambient light, or emits light.
+    pub fn changes_light(&self) -> bool {
+        self.gloss.is_some() || self.emitted.is_some()
     }
 
     /// Returns numbers of a texture at a place, each 0 to 1.
@@ -151,6 +172,16 @@ pub fn bent_normal(
     let [x, y, z] = [x, y, z].map(|number| 2.0 * number - 1.0);
     let bent = (right * x - down * y + normal * z.max(MIN_UPRIGHT_SHARE)).normalize_or(normal);
     if bent.dot(eye_direction) > 0.0 { bent } else { normal }
+}
+
+/// Returns linear light of values from 0 to 255.
+#[inline(always)]
+fn light_of(texel: &Lanes<4>) -> [f32; 3] {
+    let light = &*LIGHT;
+    axes(
+        #[inline(always)]
+        |axis| light[index((texel[axis] * LIGHT_STEPS as f32).round_ties_even()) % LIGHT_VALUES],
+    )
 }
 
 /// Returns the values, 0 to 255, at a place, as a mean over about a step in x and in y.

@@ -21,6 +21,8 @@ pub struct LitSurface {
     pub albedo: Vector,
     /// Linear colour of the image alone, which multiplies all light; 1 without.
     pub texture_rgb: Vector,
+    /// Linear colour of emitted light, beside the emission of its gloss.
+    pub emitted_rgb: Vector,
     pub gloss: Gloss,
     pub point_m: Vector,
     /// Unit vectors: outwards, to the eye, and from the camera's target to the camera.
@@ -68,14 +70,16 @@ pub fn shown_rgb(
     let (own, most) = (file_values(surface.albedo), file_values(surface.texture_rgb));
     let tint = most + (own - most) * surface.gloss.metallic_factor;
     let limited = |lit: Vector, glossy: Vector| (own * lit + glossy * tint).min(most);
-    let mut lit = Vector::splat(surface.gloss.emission_factor) + ambient_rgb + diffuse_rgb * facing;
+    let ambient_share = surface.gloss.ambient_factor;
+    let mut lit =
+        Vector::splat(surface.gloss.emission_factor) + ambient_rgb * ambient_share + diffuse_rgb * facing;
     let mut glossy = if facing > 0.0 { specular_rgb * shine(surface.back_direction) } else { Vector::ZERO };
     let mut shown = Vector::ZERO;
     for (number, light) in lights.iter().enumerate() {
         let (towards, _, share) = arriving(light, surface.point_m);
         let share = if share > 0.0 { share * sunlit(number) } else { 0.0 };
         let facing = surface.normal.dot(towards);
-        let mut own_lit = light.ambient_rgb * share;
+        let mut own_lit = light.ambient_rgb * (share * ambient_share);
         let mut own_glossy = Vector::ZERO;
         if facing > 0.0 && share > 0.0 {
             own_lit += light.diffuse_rgb * (share * facing);
@@ -88,7 +92,8 @@ pub fn shown_rgb(
             (lit, glossy) = (lit + own_lit, glossy + own_glossy);
         }
     }
-    linear_light((shown + limited(lit, glossy)).min(Vector::ONE))
+    let emitted = file_values(surface.emitted_rgb);
+    linear_light((shown + limited(lit, glossy) + emitted).min(Vector::ONE))
 }
 
 /// Returns the value of the file as linear light.

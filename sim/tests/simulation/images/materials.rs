@@ -4,7 +4,7 @@ use tandem_sim::Vector;
 use tandem_sim::mjcf::Document;
 use tandem_sim::render::{Camera, Frame, RendererKind};
 
-use super::{GREEN, RED, drawn, looking, pixel};
+use super::{GREEN, GREY, RED, drawn, looking, pixel};
 
 const DARK: &str = r#"<visual><headlight active="0"/></visual>"#;
 /// Maximum difference of colours.
@@ -76,11 +76,15 @@ fn layers_give_colour_opacity_and_notes() {
     let alpha = f32::from(GREEN[0]) / 255.0;
     let share = 1.0 - (1.0 - alpha) * (1.0 - alpha);
     check(&frame, RED.map(|value| (f32::from(value) * share) as u8), "nothing is behind");
-    let text = r#"<mujoco><asset><texture name="t" type="2d" builtin="checker" width="2" height="2"/>
-        <material name="m"><layer role="emissive" texture="t"/><layer role="rgb" texture="t"/></material></asset>
-        <worldbody><geom size="1" material="m"/></worldbody></mujoco>"#;
+    let text = r#"<mujoco><asset><texture name="t" type="cube" builtin="gradient" width="2" height="2"/>
+        <material name="m" reflectance="0.2"><layer role="emissive" texture="t"/><layer role="rgb" texture="t"/>
+        </material></asset><worldbody><geom size="1" material="m"/></worldbody></mujoco>"#;
     let notes = Document::parse("room.xml", text).expect("a room").approximations().join("\n");
-    assert!(notes.contains(r#"`room.xml:2`: <layer role="emissive"> is not drawn"#), "{notes}");
+    assert!(
+        notes.contains(r#"`room.xml:2`: <layer role="emissive"> is not drawn; it has an image for"#),
+        "{notes}"
+    );
+    assert!(notes.contains("`room.xml:2`: material `m` has reflectance: path tracing alone"), "{notes}");
     let wrong =
         Document::parse("room.xml", &text.replace("emissive", "glow")).expect_err("a role").to_string();
     assert!(wrong.contains("rgb, rgba, opacity, normal, roughness, metallic, orm"), "{wrong}");
@@ -166,4 +170,85 @@ fn path_tracing_mirrors_in_metal_in_its_own_colour() {
 fn images_may_be_jpeg() {
     let scene = floor(r#"texture="grey"/>"#, WHITE).replace("grey.png", "grey.jpg");
     check(&drawn(RendererKind::Cpu, &scene, &overhead()), super::GREY, "a JPEG file");
+}
+
+const NO_LIGHT: &str = r#"diffuse="0 0 0""#;
+
+#[test]
+fn a_layer_emits_its_own_light() {
+    let emitting = |attributes: &str| {
+        format!(r#"{attributes} specular="0"><layer role="emissive" texture="red"/></material>"#)
+    };
+    for kind in [RendererKind::Cpu, RendererKind::Path] {
+        for (attributes, expected) in
+            [(r#"rgba="0 1 0 1""#, RED), (r#"emission="0.5""#, [100, 9, 9]), (r#"emission="0""#, [0; 3])]
+        {
+            let frame = drawn(kind, &floor(&emitting(attributes), NO_LIGHT), &overhead());
+            check(&frame, expected, &format!("{kind:?}, {attributes}"));
+        }
+    }
+    // It is added to other light.
+    let lit = floor(&emitting(r#"rgba="0 0.2 0 1""#), r#"diffuse="1 1 1""#);
+    check(&drawn(RendererKind::Cpu, &lit, &overhead()), [200, 81, 30], "a light");
+    let without_lights = |material: &str| {
+        let scene = floor(material, NO_LIGHT).replace(DARK, "");
+        let unlit = &scene[..scene.find("<light").expect("a light")];
+        pixel(&drawn(RendererKind::Cpu, &format!("{unlit}</worldbody>"), &overhead()), [48, 48])
+    };
+    let [plain, bright] = [r#"rgba="0 0.5 0 1"/>"#, &emitting(r#"rgba="0 0.5 0 1""#)].map(without_lights);
+    assert!(
+        bright[0] > plain[0] + 140 && bright[1] >= plain[1] && bright[1] < plain[1] + 20,
+        "{bright:?} and {plain:?}"
+    );
+}
+
+#[test]
+fn a_layer_keeps_out_ambient_light_alone() {
+    let of_role = |role: &str| format!(r#"specular="0"><layer role="{role}" texture="grey"/></material>"#);
+    for role in ["occlusion", "orm"] {
+        for (sun, expected) in [(r#"diffuse="0 0 0" ambient="1 1 1""#, GREY), (WHITE, [255; 3])] {
+            check(&drawn(RendererKind::Cpu, &floor(&of_role(role), sun), &overhead()), expected, role);
+        }
+    }
+    let ratio = |material: &str| {
+        let beside = r#"<geom type="box" size="0.3 0.3 0.01" pos="0.8 0 0" rgba="1 1 1 1"/></worldbody>"#;
+        let scene = floor(material, r#"diffuse="0.1 0.1 0.1" specular="0 0 0" ambient="0.5 0.5 0.5""#);
+        let frame = drawn(RendererKind::Path, &scene.replace("</worldbody>", beside), &overhead());
+        f32::from(pixel(&frame, [48, 48])[0]) / f32::from(pixel(&frame, [75, 48])[0])
+    };
+    let [shaded, open] =
+        [of_role("occlusion"), r#"rgba="1 1 1 1" specular="0"/>"#.into()].map(|material| ratio(&material));
+    assert!(shaded < 0.85 && open > 0.95, "{shaded} and {open}");
+}
+
+/// A red wall stands behind the place of the floor at which the camera looks.
+#[test]
+fn path_tracing_mirrors_in_planes_and_upper_sides_of_boxes() {
+    let wall = r#"<geom type="box" size="1 0.05 1" pos="0 1 1" rgba="0.8 0.1 0.1 1"/></worldbody>"#;
+    let (camera, sun) =
+        (looking(Vector::new(0.0, -1.5, 1.0), Vector::ZERO), format!(r#"{WHITE} dir="0 1 -1""#));
+    let seen = |kind: RendererKind, reflectance: &str, geom: &str| {
+        let scene =
+            floor(&format!(r#"rgba="0.5 0.5 0.5 1" specular="0" reflectance="{reflectance}"/>"#), &sun);
+        let scene = scene.replace(r#"type="plane" size="1 1 1""#, geom).replace("</worldbody>", wall);
+        pixel(&drawn(kind, &scene, &camera), [48, 48]).map(i32::from)
+    };
+    let plane = r#"type="plane" size="1 1 1""#;
+    for geom in [plane, r#"type="box" size="1 1 0.1" pos="0 0 -0.1""#] {
+        let [plain, half, whole] = ["0", "0.5", "1"].map(|share| seen(RendererKind::Path, share, geom));
+        assert!(whole[0] > 2 * whole[1], "{whole:?} is the wall");
+        for axis in 0..3 {
+            assert!(
+                (half[axis] - (plain[axis] + whole[axis]) / 2).abs() <= 3,
+                "{half:?}: {plain:?}, {whole:?}"
+            );
+        }
+        assert_eq!(seen(RendererKind::Cpu, "1", geom), seen(RendererKind::Cpu, "0", geom));
+    }
+    let upright = r#"type="box" size="1 0.1 1" pos="0 0 -0.1" euler="90 0 0""#;
+    assert_eq!(
+        seen(RendererKind::Path, "1", upright),
+        seen(RendererKind::Path, "0", upright),
+        "another side"
+    );
 }

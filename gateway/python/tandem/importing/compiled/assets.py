@@ -102,7 +102,9 @@ def write_material(model: Any, names: Names, material: int) -> str:
     if of_roles:
         uniform = "true" if model.mat_texuniform[material] else "false"
         row += f' texrepeat="{numbers(model.mat_texrepeat[material])}" texuniform="{uniform}"'
-    for name in ("emission", "specular", "shininess", "reflectance"):
+    # Without a number, a layer emits its own light.
+    of_number = () if "emissive" in map(ROLES.get, of_roles) and not model.mat_emission[material] else ("emission",)
+    for name in (*of_number, "specular", "shininess", "reflectance"):
         row += f' {name}="{numbers(getattr(model, "mat_" + name)[material])}"'
     for name in ("metallic", "roughness"):
         value = float(getattr(model, "mat_" + name)[material])

@@ -51,9 +51,9 @@ def write_body(
     rows = [f'<body name="{name}" pos="{pos}" quat="{quat}">']
     if model.body_mocapid[body] >= 0:
         report.drop("mocap: the body stays where it is")
-    moves = bool(model.body_weldid[body])
     mass = float(model.body_mass[body])
-    if moves and mass > 0:
+    # The root of a robot is fixed in its URDF, and free as a described robot.
+    if mass > 0:
         at = f'pos="{numbers(model.body_ipos[body])}" quat="{numbers(model.body_iquat[body])}"'
         rows.append(f'<inertial {at} mass="{mass:.9g}" diaginertia="{numbers(model.body_inertia[body])}"/>')
     joints = [write_joint(model, names, report, joint) for joint in on_body(model, "jnt", body)]
@@ -105,7 +105,18 @@ def write_joint(model: Any, names: Names, report: Report, joint: int) -> str:
         row += f' limited="true" range="{low:.9g} {high:.9g}"'
     elif model.jnt_limited[joint]:
         report.drop("range of a joint that has no end, or one number twice")
-    return row + "/>"
+    return row + effort_limit(model, report, joint) + "/>"
+
+
+def effort_limit(model: Any, report: Report, joint: int) -> str:
+    """Returns the attribute for the limit of the actuators' efforts on a joint: URDF's `effort`."""
+    low, high = (float(end) for end in model.jnt_actfrcrange[joint])
+    if not model.jnt_actfrclimited[joint]:
+        return ""
+    if not np.isclose(low, -high) or high <= 0 or not np.isfinite(high):
+        report.drop("actuatorfrcrange that is not the same both ways")
+        return ""
+    return f' actuatorfrcrange="{-high:.9g} {high:.9g}"'
 
 
 def first(value: Any) -> float:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..files import Array, escaped, numbers, obj_text, png_bytes
-from ..pieces.read import Look, Piece, read_pieces
+from ..pieces.read import Look, Piece, read_pieces, unread_images
 from ..pieces.weight import closed, solid, weighed
 from .directives import Scene, scoped
 from .parts import Axis, Joint, Link, Shape
@@ -98,6 +98,8 @@ class Source:
         key = (shape.file, shape.scale)
         if shape.file and key not in self._meshes:
             self._meshes[key] = []
+            if unread := unread_images(shape.file):
+                self.notes["image of KTX2 in a glTF file; PNG and JPEG are read"] += unread
             for piece in read_pieces(shape.file):
                 if len(piece.vertices) < 4:
                     self.notes["mesh of fewer than four corners"] += 1
@@ -120,7 +122,7 @@ class Source:
     def _material(self, look: Look, name: str) -> str:
         """Writes a material with its images, and returns its name."""
         name = escaped(name)
-        row = f'<material name="{name}" rgba="{numbers(look.rgba)}" emission="{look.emission:.9g}"'
+        row = f'<material name="{name}" rgba="{numbers(look.rgba)}"'
         for attribute, value in (("metallic", look.metallic), ("roughness", look.roughness)):
             row += f' {attribute}="{value:.9g}"' if value is not None else ""
         layers = ""

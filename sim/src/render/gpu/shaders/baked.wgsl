@@ -41,31 +41,16 @@ fn baked_light(part_number: u32, face: Face, point_m: vec3f, normal: vec3f) -> v
 // As `sunlit`, of a wide lamp in the sun's direction.
 fn lamplit(point_m: vec3f, normal: vec3f) -> f32 {
     let place = on_sun_map(point_m + normal * view.extra.x);
-    let texel = place.xy - 0.5;
-    if any(texel < vec2f(1.0)) || any(texel >= vec2f(TEXELS - 3.0)) {
+    let share = on_map_share(place);
+    if share <= 0.0 {
         return 1.0;
     }
-    let low = floor(texel);
-    let part = texel - low;
-    let nearness_m = place.z + BIAS_M;
-    var blocked = 0.0;
-    var blocked_m = 0.0;
-    for (var j = -1; j <= 2; j++) {
-        let down = select(select(1.0, part.y, j == 2), 1.0 - part.y, j == -1) / 3.0;
-        for (var i = -1; i <= 2; i++) {
-            let across = select(select(1.0, part.x, i == 2), 1.0 - part.x, i == -1) / 3.0;
-            let occluder_m = textureLoad(shadow, vec2i(low) + vec2i(i, j), 0, 0) * 2.0 * SUN_DISTANCE_M;
-            let share = select(across * down, 0.0, nearness_m >= occluder_m);
-            blocked += share;
-            blocked_m += share * (occluder_m - nearness_m);
-        }
-    }
-    if blocked <= 0.0 {
+    let sums = blocked(place, 0);
+    if sums.x <= 0.0 {
         return 1.0;
     }
-    let ratio = blocked_m / (blocked * HALF_SHADOW_M);
-    let border = min(texel, TEXELS - 1.0 - texel);
-    return 1.0 - blocked / (1.0 + ratio * ratio) * min(min(border.x, border.y) / FADE_TEXELS, 1.0);
+    let ratio = sums.y / (sums.x * HALF_SHADOW_M);
+    return 1.0 - sums.x / (1.0 + ratio * ratio) * share;
 }
 
 // Linear colour of a surface in baked light, which things shadow.
@@ -78,6 +63,10 @@ fn lit_by_baked(light: vec4f, base: vec3f, point_m: vec3f, normal: vec3f, eye_di
     let shadow = light.w * (1.0 - open) * min(facing_sun / SURE_SLOPE, 1.0);
     let half_way = normalize(eye_direction + view.to_sun.xyz);
     let highlight = HIGHLIGHT * pow(max(dot(normal, half_way), 0.0), 40.0) * facing_sun * open * light.w;
-    let tint = view.sun.xyz / USUAL_SUN;
-    return (base * light.xyz * (1.0 - shadow) + highlight) * tint;
+    return (base * light.xyz * (1.0 - shadow) + highlight) * baked_tint();
+}
+
+// Factor of baked light.
+fn baked_tint() -> vec3f {
+    return view.sun.xyz / USUAL_SUN;
 }

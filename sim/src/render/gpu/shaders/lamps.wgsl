@@ -53,19 +53,32 @@ fn encoded(linear: vec3f) -> vec3f {
     return select(curve, 12.92 * linear, linear <= vec3f(0.0031308));
 }
 
-// Linear colour of a surface, whose gloss is that of `gloss_at`; `image` is the colour of its image alone, or 1.
-fn lit_by_lamps(gloss: vec4f, base: vec3f, image: vec3f, point_m: vec3f, normal: vec3f, to_eye: vec3f) -> vec3f {
+// Surface in the light of lamps; linear colours.
+struct LampSurface {
+    // That of `gloss_at`.
+    gloss: vec4f,
+    base: vec3f,
+    // Colour of its image alone, or 1.
+    image: vec3f,
+    emitted: vec3f,
+    ambient_share: f32,
+}
+
+// Linear colour of a surface.
+fn lit_by_lamps(surface: LampSurface, point_m: vec3f, normal: vec3f, to_eye: vec3f) -> vec3f {
+    let gloss = surface.gloss;
     let exponent = gloss.z * SHININESS;
     let back = view.back.xyz;
     let facing_head = dot(normal, back);
-    var lit = vec3f(gloss.x) + view.head_ambient.xyz + view.head_diffuse.xyz * max(facing_head, 0.0);
+    let head_ambient = view.head_ambient.xyz * surface.ambient_share;
+    var lit = vec3f(gloss.x) + head_ambient + view.head_diffuse.xyz * max(facing_head, 0.0);
     var glossy = vec3f(0.0);
     if facing_head > 0.0 {
         let shine = power(max(dot(normal, normalize(back + to_eye)), 0.0), exponent);
         glossy = view.head_specular.xyz * (gloss.y * shine);
     }
-    let own = encoded(base);
-    let most = encoded(image);
+    let own = encoded(surface.base);
+    let most = encoded(surface.image);
     let tint = mix(most, own, gloss.w);
     var shown = vec3f(0.0);
     for (var i = 0u; i < view.counts.x; i++) {
@@ -92,7 +105,7 @@ fn lit_by_lamps(gloss: vec4f, base: vec3f, image: vec3f, point_m: vec3f, normal:
                 share *= in_cone(lamp, layer, point_m, normal);
             }
         }
-        var own_lit = lamp.ambient.xyz * share;
+        var own_lit = lamp.ambient.xyz * (share * surface.ambient_share);
         var own_glossy = vec3f(0.0);
         if facing > 0.0 {
             let shine = power(max(dot(normal, normalize(towards + to_eye)), 0.0), exponent);
@@ -107,7 +120,8 @@ fn lit_by_lamps(gloss: vec4f, base: vec3f, image: vec3f, point_m: vec3f, normal:
             glossy += own_glossy;
         }
     }
-    return decoded(min(shown + min(own * lit + glossy * tint, most), vec3f(1.0)));
+    let seen = shown + min(own * lit + glossy * tint, most) + encoded(surface.emitted);
+    return decoded(min(seen, vec3f(1.0)));
 }
 
 // Colour where no surface is.

@@ -69,6 +69,8 @@ struct Part {
     // Where the heads of the numbers for gloss and for normals are in `texels`, 0 without; bits of the roughness, -1
     // without, and of the metallic share.
     maps: vec4u,
+    // Where the head of the image for emitted light is in `texels`, 0 without; bits of the factor on it.
+    emitted: vec4u,
 }
 
 struct Face {
@@ -219,260 +221,6 @@ fn nearness_1_m(triangle: u32, ray: vec3f) -> f32 {
     return dot(across, ray) / dot(across, in_world(part, corner) - view.eye_m.xyz);
 }
 
-// 1 in the sun, 0 in the shadow: a bilinear filter three texels wide.
-fn sunlit(point_m: vec3f, normal: vec3f) -> f32 {
-    return on_map(on_sun_map(point_m + normal * view.extra.x), 0);
-}
-
-fn on_map(place: vec3f, layer: i32) -> f32 {
-    let texel = place.xy - 0.5;
-    if any(texel < vec2f(1.0)) || any(texel >= vec2f(TEXELS - 3.0)) {
-        return 1.0;
-    }
-    let low = floor(texel);
-    let part = texel - low;
-    let nearness_m = place.z + BIAS_M;
-    var sum = 0.0;
-    for (var j = -1; j <= 2; j++) {
-        let down = select(select(1.0, part.y, j == 2), 1.0 - part.y, j == -1);
-        for (var i = -1; i <= 2; i++) {
-            let across = select(select(1.0, part.x, i == 2), 1.0 - part.x, i == -1);
-            let occluder_m = textureLoad(shadow, vec2i(low) + vec2i(i, j), layer, 0) * 2.0 * SUN_DISTANCE_M;
-            sum += select(0.0, across * down, nearness_m >= occluder_m);
-        }
-    }
-    let border = min(texel, TEXELS - 1.0 - texel);
-    return 1.0 - (1.0 - sum / 9.0) * min(min(border.x, border.y) / FADE_TEXELS, 1.0);
-}
-
-// How dark contacts make a point of what carries things.
-fn darkness(point_m: vec3f) -> f32 {
-    let place = (point_m.xy - view.contact.xy) * view.contact.z - 0.5;
-    if any(place < vec2f(0.0)) || any(place >= vec2f(f32(CONTACT_TEXELS - 1u))) {
-        return 0.0;
-    }
-    let low = vec2u(place);
-    let part = place - vec2f(low);
-    let first = low.y * CONTACT_TEXELS + low.x;
-    let nearest = first + select(0u, CONTACT_TEXELS, part.y >= 0.5) + select(0u, 1u, part.x >= 0.5);
-    if abs(point_m.z - contacts[nearest].x) > SINK_M {
-        return 0.0;
-    }
-    let below = first + CONTACT_TEXELS;
-    return mix(
-        mix(contacts[first].y, contacts[first + 1u].y, part.x),
-        mix(contacts[below].y, contacts[below + 1u].y, part.x),
-        part.y,
-    );
-}
-
-// Up and down between 0 and 1 with a period of 1.
-fn wave(x: f32) -> f32 {
-    return abs(2.0 * fract(x) - 1.0);
-}
-
-// How much of the second colour there is at a point.
-fn second_share(part: Part, point_m: vec3f) -> f32 {
-    if part.rgb.w == 0.0 {
-        return 0.0;
-    }
-    if part.rgb.w == 1.0 {
-        let square = vec2i(floor(point_m.xy * CHECKER_PER_M));
-        return select(0.0, 1.0, ((square.x + square.y) & 1) == 0);
-    }
-    let in_mesh = turned_back(part, point_m - vec3f(part.x.w, part.y.w, part.z.w));
-    var p = in_mesh;
-    if part.second_rgb.w == 1.0 {
-        p = in_mesh.yzx;
-    } else if part.second_rgb.w == 2.0 {
-        p = in_mesh.zxy;
-    }
-    if part.rgb.w == 2.0 {
-        let across = p.y + p.z;
-        let band = wave(across * BANDS_PER_M + STRAY * wave(p.x * 1.1 + across));
-        return 0.7 * band * band + 0.3 * wave(across * LINES_PER_M + p.x);
-    }
-    if part.rgb.w == 4.0 {
-        let line = p.z * TEXT_PER_M;
-        let word = wave((p.x + p.y) * WORDS_PER_M + WORD_STRAY * floor(line));
-        return select(0.0, 1.0, wave(line) > TEXT_GAP && word > WORD_GAP);
-    }
-    let thread = p * THREADS_PER_M;
-    return wave(thread.x + thread.z) * wave(thread.y + thread.z);
-}
-
-fn albedo(part: Part, point_m: vec3f) -> vec3f {
-    return mix(part.rgb.xyz, part.second_rgb.xyz, second_share(part, point_m));
-}
-
-// Place on an image, and its derivatives in the picture's x and y.
-struct ImagePlace {
-    uv: vec2f,
-    by_x: vec2f,
-    by_y: vec2f,
-    // Number of the face of a cube.
-    face: u32,
-}
-
-fn coordinates_of(triangle: u32, direction: vec3f) -> vec3f {
-    let rows = coordinates[triangle];
-    return vec3f(dot(rows.u.xyz, direction), dot(rows.v.xyz, direction), dot(rows.w.xyz, direction));
-}
-
-// Step on a surface's plane for a step of the ray.
-fn surface_step_m(ray: vec3f, ray_step: vec3f, depth_m: f32, normal: vec3f) -> vec3f {
-    let towards = dot(normal, ray);
-    let along = select(dot(normal, ray_step) / towards, 0.0, towards == 0.0);
-    return (ray_step - ray * along) * depth_m;
-}
-
-fn on_cube(at: vec3f, by_x: vec3f, by_y: vec3f) -> ImagePlace {
-    let size = abs(at);
-    let sides = select(vec3f(1.0), vec3f(-1.0), at < vec3f(0.0));
-    var across = vec3f(sides.z, 0.0, 0.0);
-    var down = vec3f(0.0, -1.0, 0.0);
-    var along = vec3f(0.0, 0.0, sides.z);
-    var axis = 2u;
-    if size.x >= size.y && size.x >= size.z {
-        across = vec3f(0.0, 0.0, -sides.x);
-        along = vec3f(sides.x, 0.0, 0.0);
-        axis = 0u;
-    } else if size.y >= size.z {
-        across = vec3f(1.0, 0.0, 0.0);
-        down = vec3f(0.0, 0.0, sides.y);
-        along = vec3f(0.0, sides.y, 0.0);
-        axis = 1u;
-    }
-    let per_along = 1.0 / max(dot(along, at), 1e-30);
-    let place = vec2f(dot(across, at), dot(down, at)) * per_along;
-    let step_x = vec2f(dot(across, by_x), dot(down, by_x)) - place * dot(along, by_x);
-    let step_y = vec2f(dot(across, by_y), dot(down, by_y)) - place * dot(along, by_y);
-    let face = 2u * axis + select(0u, 1u, sides[axis] < 0.0);
-    return ImagePlace(0.5 * place + 0.5, 0.5 * step_x * per_along, 0.5 * step_y * per_along, face);
-}
-
-// sRGB values and alpha of a texel, 0 to 1.
-fn values_of(texel: u32) -> vec4f {
-    return vec4f(vec4u(texel, texel >> 8u, texel >> 16u, texel >> 24u) & vec4u(255u)) / 255.0;
-}
-
-fn decoded(value: vec3f) -> vec3f {
-    return select(pow((value + 0.055) / 1.055, vec3f(2.4)), value / 12.92, value <= vec3f(0.04045));
-}
-
-// sRGB values and alpha at a place on one level, whose first texel has this number.
-fn blend(first: u32, size: vec2u, place: vec2f, is_cube: bool) -> vec4f {
-    var at = place * vec2f(size) - 0.5;
-    if is_cube {
-        at = clamp(at, vec2f(0.0), vec2f(size - 1u));
-    }
-    let low = floor(at);
-    let share = at - low;
-    let corner = vec2i(low);
-    let left = vec2u(corner) & (size - 1u);
-    let right = vec2u(corner + 1) & (size - 1u);
-    let upper = first + left.y * size.x;
-    let lower = first + right.y * size.x;
-    return mix(
-        mix(values_of(texels[upper + left.x]), values_of(texels[upper + right.x]), share.x),
-        mix(values_of(texels[lower + left.x]), values_of(texels[lower + right.x]), share.x),
-        share.y,
-    );
-}
-
-// Binary logarithm, linear between powers of two.
-fn stepped_log2(x: f32) -> f32 {
-    return f32(bitcast<u32>(x)) / 8388608.0 - 127.0;
-}
-
-// Linear colour and alpha.
-fn image_rgba(head: u32, place: ImagePlace) -> vec4f {
-    let values = image_values(head, place);
-    return vec4f(decoded(values.xyz), values.w);
-}
-
-// The values of an image's texels.
-fn image_values(head: u32, place: ImagePlace) -> vec4f {
-    var size = vec2u(texels[head], texels[head + 1u]);
-    let images = texels[head + 3u];
-    let is_cube = images != 0u;
-    // Images before that of the face, on every level.
-    let before = select(0u, place.face, images > 1u);
-    let by_x = place.by_x * vec2f(size);
-    let by_y = place.by_y * vec2f(size);
-    let last = f32(texels[head + 2u] - 1u);
-    let level = clamp(0.5 * stepped_log2(max(dot(by_x, by_x), dot(by_y, by_y))), 0.0, last);
-    var first = head + 4u;
-    for (var i = 0u; i < u32(level); i++) {
-        first += max(images, 1u) * size.x * size.y;
-        size = max(size / 2u, vec2u(1u));
-    }
-    let nearer = blend(first + before * size.x * size.y, size, place.uv, is_cube);
-    let share = clamp((fract(level) - 0.5) / BLENDED_SHARE + 0.5, 0.0, 1.0);
-    if share == 0.0 {
-        return nearer;
-    }
-    first += max(images, 1u) * size.x * size.y;
-    size = max(size / 2u, vec2u(1u));
-    let farther = blend(first + before * size.x * size.y, size, place.uv, is_cube);
-    return mix(nearer, farther, share);
-}
-
-// Place on the image of a triangle, where a ray meets it.
-fn place_at(triangle: u32, part: Part, ray: vec3f, depth_m: f32, normal: vec3f, from_corner_m: vec3f) -> ImagePlace {
-    let step_x = turned_back(part, surface_step_m(ray, 2.0 * view.right_ray.xyz, depth_m, normal));
-    let step_y = turned_back(part, surface_step_m(ray, 2.0 * view.down_ray.xyz, depth_m, normal));
-    let rows = coordinates[triangle];
-    let at = coordinates_of(triangle, from_corner_m) + vec3f(rows.u.w, rows.v.w, rows.w.w);
-    let by_x = coordinates_of(triangle, step_x);
-    let by_y = coordinates_of(triangle, step_y);
-    if texels[part.flags.w + 3u] != 0u {
-        return on_cube(at, by_x, by_y);
-    }
-    return ImagePlace(at.xy, by_x.xy, by_y.xy, 0u);
-}
-
-// Linear colour of the image of a part, and alpha.
-fn image_at(part: Part, place: ImagePlace) -> vec4f {
-    let rgba = image_rgba(part.flags.w, place);
-    return vec4f(rgba.xyz, select(1.0, rgba.w, (part.flags.y & 8u) != 0u));
-}
-
-// How a surface shines: emission, specular strength, shininess and the metallic share.
-fn gloss_at(part: Part, place: ImagePlace) -> vec4f {
-    var gloss = vec4f(part.gloss.xyz, bitcast<f32>(part.maps.w));
-    if part.maps.x == 0u {
-        return gloss;
-    }
-    let numbers = image_values(part.maps.x, place);
-    gloss.w *= numbers.z;
-    let roughness = bitcast<f32>(part.maps.z);
-    if roughness >= 0.0 {
-        let width = pow(clamp(roughness * numbers.y, MIN_ROUGHNESS, 1.0), 2.0);
-        let exponent = min(2.0 / (width * width) - 2.0, SHININESS);
-        gloss.y *= (exponent + 2.0) / (USUAL_EXPONENT + 2.0);
-        gloss.z = exponent / SHININESS;
-    }
-    return gloss;
-}
-
-fn along_surface(gradient: vec3f, normal: vec3f) -> vec3f {
-    let along = gradient - normal * dot(normal, gradient);
-    return along / max(length(along), 1e-12);
-}
-
-// The normal of a part's relief, if it faces the eye.
-fn bent_normal(triangle: u32, part: Part, place: ImagePlace, normal: vec3f, to_eye: vec3f) -> vec3f {
-    if part.maps.y == 0u {
-        return normal;
-    }
-    let right = along_surface(turned(part, coordinates[triangle].u.xyz), normal);
-    let down = along_surface(turned(part, coordinates[triangle].v.xyz), normal);
-    let numbers = 2.0 * image_values(part.maps.y, place).xyz - 1.0;
-    let bent = normalize(right * numbers.x - down * numbers.y + normal * max(numbers.z, MIN_UPRIGHT_SHARE));
-    return select(normal, bent, dot(bent, to_eye) > 0.0);
-}
-
 // Linear colour of what a ray sees, and its alpha.
 fn colour(triangle: u32, ray: vec3f) -> vec4f {
     let part = part_of(triangle);
@@ -489,10 +237,20 @@ fn colour(triangle: u32, ray: vec3f) -> vec4f {
     var base = vec3f(0.0);
     var image = vec3f(1.0);
     var alpha = part.gloss.w;
+    var ambient_share = 1.0;
+    var emitted = vec3f(0.0);
     if part.flags.w != 0u {
         let place = place_at(triangle, part, ray, depth_m, normal, from_corner_m);
         let rgba = image_at(part, place);
-        gloss = gloss_at(part, place);
+        if part.maps.x != 0u {
+            let numbers = image_values(part.maps.x, place).xyz;
+            ambient_share = numbers.x;
+            gloss = gloss_at(part, numbers);
+        }
+        if part.emitted.x != 0u {
+            emitted = emitted_at(part, place);
+            gloss.x = 0.0;
+        }
         normal = bent_normal(triangle, part, place, normal, eye_direction);
         image = rgba.xyz;
         base = part.rgb.xyz * image;
@@ -502,22 +260,25 @@ fn colour(triangle: u32, ray: vec3f) -> vec4f {
     }
     let open = select(1.0, 1.0 - CONTACT * darkness(point_m), part.flags.z != 0u);
     if view.extra.y > 0.0 {
-        return vec4f(lit_by_lamps(gloss, base, image, point_m, normal, eye_direction) * open, alpha);
+        let surface = LampSurface(gloss, base, image, emitted, ambient_share);
+        return vec4f(lit_by_lamps(surface, point_m, normal, eye_direction) * open, alpha);
     }
     if view.extra.z > 0.0 {
         let light = baked_light(corners[3u * triangle].w, face, point_m, normal);
-        return vec4f(lit_by_baked(light, base, point_m, normal, eye_direction) * open, alpha);
+        let kept_out = base * light.xyz * ((1.0 - light.w) * (1.0 - ambient_share)) * baked_tint();
+        let lit = lit_by_baked(light, base, point_m, normal, eye_direction) - kept_out;
+        return vec4f(lit * open + emitted, alpha);
     }
     let ambient = mix(view.from_below.xyz, view.from_above.xyz, normal.z * 0.5 + 0.5);
-    let unlit = base * (ambient + LAMP * abs(dot(normal, eye_direction)));
+    let unlit = base * (ambient * ambient_share + LAMP * abs(dot(normal, eye_direction)));
     let facing_sun = dot(normal, view.to_sun.xyz);
     if facing_sun <= 0.0 {
-        return vec4f(unlit * open, alpha);
+        return vec4f(unlit * open + emitted, alpha);
     }
     let half_way = normalize(eye_direction + view.to_sun.xyz);
     let highlight = HIGHLIGHT * pow(max(dot(normal, half_way), 0.0), 40.0);
     let sunlight = (base * view.sun.xyz + highlight) * (facing_sun * sunlit(point_m, normal));
-    return vec4f((unlit + sunlight) * open, alpha);
+    return vec4f((unlit + sunlight) * open + emitted, alpha);
 }
 
 fn ray_at(sample: vec2u) -> vec3f {

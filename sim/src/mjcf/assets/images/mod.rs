@@ -1,19 +1,23 @@
 //! Images of textures: files, a file or a part of one for each face of a cube, and MuJoCo's builtin ones.
 
+mod builtin;
+mod ktx;
+
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use image::{DynamicImage, Rgb, RgbImage};
+use image::{DynamicImage, ImageReader, Rgb, RgbImage};
 use roxmltree::Node;
 use xxhash_rust::xxh3::xxh3_64;
 
-use super::builtin;
 use super::files::read_mesh_bytes;
 use super::texture::Texture;
 use crate::SimError;
 use crate::mjcf::Document;
 use crate::srgb::linear_light;
 use crate::user_file::with_own_separators;
+use ktx::KtxImages;
 
 /// Attributes with the files of a cube's faces, +x, -x, +y, -y, +z and -z, and their letters in `gridlayout`.
 const FACES: [(&str, char); 6] = [
@@ -62,35 +66,62 @@ impl Document {
 
     /// Returns the image of a texture's file, or six for the faces of a cube; none if it names no file.
     fn images_of_files(&self, node: &Node, read: &mut Read) -> Result<Vec<DynamicImage>, SimError> {
-        let mut image = |file: &str| self.image_of_file(node, file, read);
+        let mut images = |file: &str| self.images_of_file(node, file, read);
         if let Some(file) = node.attribute("file") {
-            let whole = image(file)?;
-            return Ok(faces_of_grid(node, &whole).unwrap_or_else(|| vec![whole]));
+            let images = images(file)?;
+            return Ok(faces_of_grid(node, &images[0]).unwrap_or(images));
         }
         if FACES.iter().all(|(attribute, _)| node.attribute(*attribute).is_none()) {
             return Ok(Vec::new());
         }
         let blank = DynamicImage::from(blank(node));
-        let face =
-            |(attribute, _): &(&str, char)| node.attribute(*attribute).map_or(Ok(blank.clone()), &mut image);
+        let face = |(attribute, _): &(&str, char)| match node.attribute(*attribute) {
+            Some(file) => Ok(images(file)?.swap_remove(0)),
+            None => Ok(blank.clone()),
+        };
         FACES.iter().map(face).collect()
     }
 
-    fn image_of_file(&self, node: &Node, file: &str, read: &mut Read) -> Result<DynamicImage, SimError> {
+    /// Returns the images of a file: at least one.
+    fn images_of_file(
+        &self,
+        node: &Node,
+        file: &str,
+        read: &mut Read,
+    ) -> Result<Vec<DynamicImage>, SimError> {
         let asset = mjcf_rs::assets::Texture { file: Some(file.into()), ..Default::default() };
         let path = self.model.resolve_texture_file(&asset, &self.folder).unwrap_or_else(|| file.into());
         let path = self.source.beside_including(with_own_separators(path));
         let bytes = read_mesh_bytes(&path).map_err(|source| SimError::unreadable(&path, source))?;
-        let image = Texture::decode(&path, &bytes)?;
+        let (images, says_srgb) = decode(&path, &bytes)?;
         let is_srgb = match node.attribute("colorspace") {
             Some("sRGB") => true,
             Some("linear") => false,
-            _ => states_srgb(&bytes),
+            _ => says_srgb,
         };
         read.push((path, xxh3_64(&bytes)));
         // MuJoCo converts such an image to linear light, and draws that as if it were values of a file.
-        Ok(if is_srgb && self.lights.is_some() { decoded(image) } else { image })
+        Ok(match is_srgb && self.lights.is_some() {
+            true => images.into_iter().map(decoded).collect(),
+            false => images,
+        })
     }
+}
+
+/// Decodes an image file: one image, or six of a cube in a KTX2 file. Returns true, too, if the file says that
+/// values are sRGB.
+///
+/// # Errors
+///
+/// Returns an error that names the file if the bytes are no image of a supported format.
+fn decode(path: &Path, bytes: &[u8]) -> Result<(Vec<DynamicImage>, bool), SimError> {
+    let refuse = |source| SimError::Texture { path: path.display().to_string(), source };
+    if let Some(KtxImages { faces, is_srgb }) = KtxImages::decode(bytes).map_err(refuse)? {
+        return Ok((faces, is_srgb));
+    }
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let decoded = reader.map_err(|source| SimError::unreadable(path, source))?.decode();
+    Ok((vec![decoded.map_err(|source| refuse(source.into()))?], states_srgb(bytes)))
 }
 
 /// Returns true if a PNG file says that its values are sRGB.
