@@ -167,13 +167,13 @@ async function looks() {
     </worldbody>
   </mujoco>`);
   const other = await serve("--scene", scene);
-  const begun = await Promise.all([2000, 2001].map((seed) => post(other.base, "/v1/episodes", { task: "handover", seed, protocol: "benchmark" })));
+  const begun = await Promise.all([2000, 2001].map((seed) => post(other.base, "/v1/episodes", { task: "table_align", seed, protocol: "benchmark" })));
   const viewer = await open(other.link);
   const received = [];
   for (const { episode_id: episode } of begun) {
     await viewer.goto(`${other.base}/watch?episode=${episode}`);
     await viewer.waitForSelector(".view canvas");
-    for (const extra of await viewer.locator(".tools input:checked").all()) await extra.uncheck();
+    for (const extra of await viewer.locator(".tools input").all()) await extra.uncheck();
     await viewer.selectOption(".tools select", "A");
     await viewer.waitForFunction(() => performance.getEntriesByType("resource").filter(({ name }) => name.includes("/texture?")).length === 3);
     received.push(await viewer.evaluate(() => performance.getEntriesByType("resource")

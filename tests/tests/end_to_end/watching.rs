@@ -416,7 +416,7 @@ fn images_on_surfaces_are_sent_once() {
     assert_eq!((hashes.len(), textures.len()), (6, 6));
     let parts = heads[0]["parts"].as_array().expect("parts");
     let shown: Vec<u64> = parts.iter().filter_map(|part| part["image"]["texture"].as_u64()).collect();
-    assert!(shown.len() > 5 && shown.iter().collect::<BTreeSet<_>>().len() == 5, "{shown:?}");
+    assert!(shown.len() >= 5 && shown.iter().collect::<BTreeSet<_>>().len() == 5, "{shown:?}");
     for texture in textures {
         let path = format!("/watch/texture?hash={}", texture["hash"].as_str().expect("a hash"));
         let key = format!("Bearer {}", server.watch_key());
