@@ -4,7 +4,9 @@
 
 mod frame;
 mod geometry;
+mod light;
 mod scene;
+mod textures;
 
 use std::sync::{Arc, OnceLock};
 
@@ -17,6 +19,7 @@ use crate::observation::Picture;
 use crate::recording::{NoteMessage, ToolCallMessage, ToolCallRecord, TranscriptEntry};
 
 pub use scene::LiveScene;
+pub use textures::{ImageFile, LiveTexture};
 
 /// Receiver of a session's events.
 pub trait Onlookers: Send {

@@ -1,6 +1,6 @@
 //! Constants of an episode for viewers: shapes, names and limits, and the renderer for the robots' images.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::{Value, json};
 use tandem_sim::render::{
@@ -11,6 +11,8 @@ use tandem_sim::{CONTROL_HZ, RobotModel, Side, Step, World};
 use super::LiveStep;
 use super::frame::{self, RobotFrame};
 use super::geometry::{Geometry, pose_row};
+use super::light::lights;
+use super::textures::{LiveTexture, SceneTextures};
 use crate::commands::Motion;
 use crate::observation::cameras;
 use crate::scoring::Phase;
@@ -21,6 +23,7 @@ use crate::stress;
 pub struct LiveScene {
     head: Value,
     numbers: Vec<u8>,
+    textures: Vec<Arc<LiveTexture>>,
     robots: Vec<RobotFrame>,
     cameras: Cameras,
     /// Motions of the viewer's own, set to the states of the episode's motions.
@@ -42,7 +45,9 @@ impl LiveScene {
     /// Returns the scene of the episode `spec`, which runs in `world` with the robots of `motions`.
     pub(crate) fn of(spec: &EpisodeSpec, world: &World, motions: &[Motion]) -> LiveScene {
         let scenery = stress::scenery(spec.stress, spec.world_seed(), world);
-        let Geometry { meshes, parts, numbers } = Geometry::of(&scenery);
+        let mut textures = SceneTextures::default();
+        let Geometry { meshes, parts, numbers } = Geometry::of(&scenery, &mut textures);
+        let sky = scenery.sky.as_ref().map(|sky| textures.number(sky));
         let cameras = cameras(spec, world);
         let third_person = cameras.third_person();
         let robots = motions.iter().map(robot_head).collect::<Vec<_>>();
@@ -58,7 +63,8 @@ impl LiveScene {
             "episode_steps": rules.episode_steps, "thinking_s": rules.thinking.map(|time| time.as_secs_f64()),
             "phases": phases.collect::<Vec<_>>(), "robots": robots, "objects": objects,
             "third_person": { "pose": pose_row(&third_person.world_from_camera), "vertical_fov_rad": third_person.vertical_fov_rad },
-            "meshes": meshes, "parts": parts,
+            "meshes": meshes, "parts": parts, "textures": textures.told(), "sky": sky,
+            "lights": scenery.lamps.as_ref().map(lights),
         });
         let frames = motions.iter().map(|motion| RobotFrame {
             name: motion.robot.name.clone(),
@@ -67,6 +73,7 @@ impl LiveScene {
         LiveScene {
             head,
             numbers,
+            textures: textures.found,
             robots: frames.collect(),
             cameras,
             motions: Mutex::new(motions.iter().map(Motion::another).collect()),
@@ -115,6 +122,11 @@ impl LiveScene {
         };
         let drawn = view.render(&mut **renderer, step);
         Some(encode_png(drawn.width, drawn.height, &drawn.rgb))
+    }
+
+    /// Returns the images on surfaces, for which pages ask by their hashes.
+    pub fn textures(&self) -> &[Arc<LiveTexture>] {
+        &self.textures
     }
 
     /// Yields the names of the robots.

@@ -12,7 +12,7 @@ use tandem_sim::render::PictureError;
 use super::ReplayError;
 use crate::commands::Motion;
 use crate::convert::isometry_from_sim;
-use crate::live::{LiveScene, LiveStep, told_transcript};
+use crate::live::{LiveScene, LiveStep, LiveTexture, told_transcript};
 use crate::recording::{Recording, TranscriptEntry};
 use crate::session::build_world;
 use crate::spec::EpisodeSpec;
@@ -78,6 +78,11 @@ impl RecordedEpisode {
     /// phases and the result; the steps follow at its end.
     pub fn message(&self) -> Arc<[u8]> {
         self.message.clone()
+    }
+
+    /// Returns the images on surfaces, for which the page asks by their hashes.
+    pub fn textures(&self) -> &[Arc<LiveTexture>] {
+        self.scene.textures()
     }
 
     /// Returns the image of robot `name` as a PNG file, in the step nearest to `time_s`. Candidates are the

@@ -12,7 +12,7 @@ use tokio::sync::Semaphore;
 
 use super::{
     problem::ApiError,
-    watching::{KnownEvaluations, MAX_WATCHERS, RecordingReader, TaskPictures, WatchKey},
+    watching::{KnownEvaluations, KnownTextures, MAX_WATCHERS, RecordingReader, TaskPictures, WatchKey},
 };
 use crate::{
     hosting::{Caller, EpisodeTable},
@@ -41,6 +41,8 @@ pub struct AppState {
     pub evaluations: KnownEvaluations,
     /// Pictures of the tasks for the start page.
     pub task_pictures: TaskPictures,
+    /// Images on surfaces of the scenes that pages draw.
+    pub textures: KnownTextures,
 }
 
 impl AppState {
@@ -48,8 +50,17 @@ impl AppState {
     pub fn new(table: Arc<EpisodeTable>, settings: Arc<Settings>, watch_key: WatchKey) -> AppState {
         let watchers = Arc::new(Semaphore::new(MAX_WATCHERS));
         let (recordings, films) = (RecordingReader::start(), RecordingReader::start());
-        let (evaluations, task_pictures) = (KnownEvaluations::default(), TaskPictures::default());
-        AppState { table, settings, watch_key, watchers, recordings, films, evaluations, task_pictures }
+        AppState {
+            table,
+            settings,
+            watch_key,
+            watchers,
+            recordings,
+            films,
+            evaluations: KnownEvaluations::default(),
+            task_pictures: TaskPictures::default(),
+            textures: KnownTextures::default(),
+        }
     }
 
     /// Returns the texts about tools for `caller`.

@@ -4,8 +4,8 @@
 import { Vector3 } from "three";
 import { reasonOf } from "../src/dom.js";
 import { SIDES } from "../src/message.js";
-import { Pace, Stage } from "../src/stage.js";
-import { call, statusOf } from "./call.js";
+import { Pace, Stage } from "../src/stage/stage.js";
+import { bearer, call, statusOf } from "./call.js";
 import { Hands } from "./hands.js";
 import { Headset } from "./headset/headset.js";
 import { CLOSED, OPEN, closedBy, listen, wanted, withHeadset } from "./inputs.js";
@@ -156,7 +156,8 @@ class DrivePage {
     const robot = scene.head.robots.findIndex(({ name }) => name === this.seat.robot);
     const hands = new Hands(robot);
     const partners = scene.head.robots.map(({ name }, index) => ({ name, index })).filter(({ index }) => index !== robot);
-    const stage = new Stage(this.panel.view, scene);
+    const stage = new Stage(this.panel.view, scene, (hash) =>
+      fetch(`/operate/texture?hash=${hash}`, { headers: bearer(this.seat.token), credentials: "omit" }));
     stage.pictureShare = PICTURE_SHARE;
     // What partners see is not what this person looks for.
     stage.extras.frustums = false;

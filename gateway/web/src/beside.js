@@ -1,9 +1,9 @@
 // Two finished episodes side by side on one clock.
 
-import { ask, badge, element, endOf, words } from "./dom.js";
+import { ask, badge, element, endOf, words, watchedTexture } from "./dom.js";
 import { readScene } from "./message.js";
 import { Player } from "./player.js";
-import { Pace, Stage } from "./stage.js";
+import { Pace, Stage } from "./stage/stage.js";
 import { Targets } from "./targets.js";
 import { RecordedTime } from "./time.js";
 
@@ -107,7 +107,7 @@ class Side {
 
   /** Begins to draw; the view has to be in the page. Returns what it draws with. */
   begin() {
-    const stage = new Stage(this.view, this.scene);
+    const stage = new Stage(this.view, this.scene, watchedTexture);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => stage.paint());
     return stage;
   }

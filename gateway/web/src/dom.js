@@ -49,6 +49,9 @@ export async function ask(path) {
   throw new Error(problem.detail ?? `the server answers ${answer.status}`);
 }
 
+/** Asks for an image on a surface of a scene that is watched. @param {string} hash */
+export const watchedTexture = (hash) => ask(`/watch/texture?hash=${hash}`);
+
 /** Says why something failed. @param {unknown} error */
 export const reasonOf = (error) => (error instanceof Error ? error.message : String(error));
 

@@ -1,10 +1,10 @@
 // The page of one episode, running or finished.
 
-import { ask, badge, element, endOf, reasonOf, say, words } from "./dom.js";
+import { ask, badge, element, endOf, reasonOf, say, words, watchedTexture } from "./dom.js";
 import { Frame, readScene } from "./message.js";
 import { Player } from "./player.js";
 import { BudgetPlots, Plots } from "./plots.js";
-import { Pace, Stage } from "./stage.js";
+import { Pace, Stage } from "./stage/stage.js";
 import { Story } from "./story.js";
 import { Targets } from "./targets.js";
 import { LiveTime, RecordedTime } from "./time.js";
@@ -85,7 +85,7 @@ class EpisodePage {
     this.player = timeline && new Player(recorded, (way) => timeline.step(way));
     this.budget = recorded && new BudgetPlots(head, frames);
     this.layOut(main);
-    this.stage = new Stage(this.view, scene);
+    this.stage = new Stage(this.view, scene, watchedTexture);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { this.stage.paint(); this.plotsDue = true; });
     for (const entry of head.story) this.story.add(entry);
     for (const frame of frames) this.plots.add(frame);

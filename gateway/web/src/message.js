@@ -13,8 +13,23 @@
 /**
  * @typedef {{ kind: "room" } | { kind: "link", robot: number, link: number } | { kind: "object", object: number }} Carrier
  */
+/** Emission and highlights of a surface; one that states nothing has none of this. */
 /**
- * @typedef {{ mesh: number, carrier: Carrier, pose: number[], rgb: Rgb, alpha: number, casts_shadow: boolean }} Shape
+ * @typedef {{ emission: number, specular: number, shininess: number, roughness: number | null, metallic: number }} Gloss
+ */
+/**
+ * Mapping from the points of a mesh to an image: by the mesh's own coordinates, along its z, or from the middle of a cube.
+ * @typedef {{ kind: "corners" }
+ *   | { kind: "along", scale_1_m: [number, number], centre_m: [number, number] }
+ *   | { kind: "cube", scale_1_m: number[], centre_m: number[] }} Mapping
+ */
+/** Image on a surface, with those of its gloss and its relief at the same places; by their numbers among `textures`. */
+/** @typedef {{ texture: number, gloss: number | null, relief: number | null, mapping: Mapping }} SurfaceImage */
+/**
+ * @typedef {{
+ *   mesh: number, carrier: Carrier, pose: number[], rgb: Rgb, alpha: number, casts_shadow: boolean,
+ *   gloss?: Gloss, image?: SurfaceImage,
+ * }} Shape
  */
 /** @typedef {Shape & { pattern: "checker", second_rgb: Rgb }} CheckedPart */
 /**
@@ -22,7 +37,18 @@
  * @typedef {CheckedPart | Shape & { pattern: "plain" | "wood" | "fabric" | "print", second_rgb: null }} Part
  */
 /** @typedef {[number, number, number]} Rgb */
-/** @typedef {{ positions: Float32Array, indices: Uint32Array, normals: Int8Array }} Mesh */
+/** @typedef {{ positions: Float32Array, indices: Uint32Array, normals: Int8Array, uvs: Float32Array | null }} Mesh */
+/** Image that a page asks for by its hash, or the six of a cube. */
+/** @typedef {{ hash: string, images: number, mean_rgb: Rgb, has_alpha: boolean }} TextureHead */
+/**
+ * Light of a scene's file. Its colours multiply those of the file as they are, and not as linear light.
+ * @typedef {{
+ *   kind: "directional" | "spot" | "point", carrier: Carrier, position_m: number[], direction: number[],
+ *   ambient: Rgb, diffuse: Rgb, specular: Rgb, attenuation: [number, number, number],
+ *   cutoff_rad: number, exponent: number, casts_shadow: boolean,
+ * }} Lamp
+ */
+/** @typedef {{ headlight: { ambient: Rgb, diffuse: Rgb, specular: Rgb }, lamps: Lamp[] }} Lights */
 
 /**
  * Header of a scene, which `episodes/src/live/scene.rs` writes. `robot` is the one that the page drives, if it drives.
@@ -30,7 +56,8 @@
  *   task: string, seed: number, protocol: string, instruction: string, assistance: string,
  *   episode_steps: number, thinking_s: number | null, phases: Phase[], robots: RobotHead[], objects: string[],
  *   third_person: { pose: number[], vertical_fov_rad: number },
- *   meshes: [number, number][], parts: Part[], frames: number, robot?: string,
+ *   meshes: [number, number, number?][], parts: Part[], textures: TextureHead[], sky: number | null, lights: Lights | null,
+ *   frames: number, robot?: string,
  * }} SceneHead
  */
 /**
@@ -169,14 +196,16 @@ export function readScene(message) {
   /** @type {SceneHead} */
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, size)));
   let at = 4 + size;
-  const meshes = head.meshes.map(([vertices, triangles]) => {
+  const meshes = head.meshes.map(([vertices, triangles, hasUvs]) => {
     const positions = new Float32Array(message, at, 3 * vertices);
     at += 12 * vertices;
     const indices = new Uint32Array(message, at, 3 * triangles);
     at += 12 * triangles;
     const normals = new Int8Array(message, at, 4 * vertices);
     at += 4 * vertices;
-    return { positions, indices, normals };
+    const uvs = hasUvs ? new Float32Array(message, at, 2 * vertices) : null;
+    if (uvs) at += 8 * vertices;
+    return { positions, indices, normals, uvs };
   });
   const layout = layoutOf(head);
   const frames = [];

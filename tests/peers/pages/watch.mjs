@@ -2,8 +2,12 @@
 // scrubbed and taken over, and an evaluation's card that fills. How it is run is said in shared/browser.mjs.
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
+import { writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { accessible, browser, done, open, post, program, serve } from "./shared/browser.mjs";
+import { accessible, browser, done, folder, open, post, program, serve, until } from "./shared/browser.mjs";
+
+/** Two pixels whose values differ by no more are alike; so many are, and so large a share of the view has each of the file's colours. */
+const [MOST_LEVELS_APART, LEAST_ALIKE, LEAST_SHARE] = [6, 0.8, 0.02];
 
 const { link, base, runs } = await serve();
 const call = (path, body) => post(base, path, body);
@@ -136,4 +140,81 @@ await page.waitForSelector(".top .good");
 await page.screenshot({ path: "demo-end.png" });
 const ended = await (await fetch(`${base}/v1/episodes/${again}`, { method: "DELETE" })).json();
 assert.equal(ended.state_hash, result.state_hash, "watched or not, the same calls lead to the same state");
+await looks();
 await done();
+
+/**
+ * A scene with images on its surfaces, in light that adds nothing to their colours: robot A's view is drawn in the page as it is by the
+ * server, in the colours of the file, and images come once for all episodes.
+ */
+async function looks() {
+  const scene = join(folder("scene"), "scene.xml");
+  const colours = { first: [204, 77, 26], second: [26, 128, 179], wall: [128, 204, 51] };
+  const rgb = (values) => values.map((value) => value / 255).join(" ");
+  writeFileSync(scene, `<mujoco>
+    <visual><headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/></visual>
+    <asset>
+      <texture name="squares" type="2d" builtin="checker" rgb1="${rgb(colours.first)}" rgb2="${rgb(colours.second)}" width="64" height="64"/>
+      <texture name="faces" type="cube" builtin="gradient" rgb1="${rgb(colours.wall)}" rgb2="${rgb(colours.wall)}" width="64" height="64"
+        mark="edge" markrgb="0 0 0"/>
+      <material name="squares" texture="squares" texuniform="true" texrepeat="1 1"/>
+      <material name="faces" texture="faces"/>
+    </asset>
+    <worldbody>
+      <geom type="plane" size="4 4 0.1" material="squares"/>
+      <geom type="box" size="0.1 2.5 1" pos="2 0 1" material="faces"/>
+      <site name="task" pos="0 0 0"/>
+    </worldbody>
+  </mujoco>`);
+  const other = await serve("--scene", scene);
+  const begun = await Promise.all([2000, 2001].map((seed) => post(other.base, "/v1/episodes", { task: "table_align", seed, protocol: "benchmark" })));
+  const viewer = await open(other.link);
+  const received = [];
+  for (const { episode_id: episode } of begun) {
+    await viewer.goto(`${other.base}/watch?episode=${episode}`);
+    await viewer.waitForSelector(".view canvas");
+    for (const extra of await viewer.locator(".tools input").all()) await extra.uncheck();
+    await viewer.selectOption(".tools select", "A");
+    await viewer.waitForFunction(() => performance.getEntriesByType("resource").filter(({ name }) => name.includes("/texture?")).length === 3);
+    received.push(await viewer.evaluate(() => performance.getEntriesByType("resource")
+      .filter(({ name }) => name.includes("/texture?")).map((entry) => [entry.name, /** @type {PerformanceResourceTiming} */ (entry).transferSize])));
+  }
+  const [[...first], [...second]] = received.map((entries) => entries.toSorted());
+  assert.deepEqual(first.map(([name]) => name), second.map(([name]) => name), "the same images");
+  assert.ok(first.every(([, bytes]) => bytes > 0) && second.every(([, bytes]) => bytes === 0), `images come once: ${received}`);
+  const compare = () => compared(viewer, `/watch/camera?episode=${begun[1].episode_id}&robot=A`, colours);
+  await until("robot A's view as the server draws it", async () => (await compare()).alike, LEAST_ALIKE);
+  const drawn = await compare();
+  console.log(`looks: ${JSON.stringify(drawn)}`);
+  for (const [name, [page, server]] of Object.entries(drawn.colours)) {
+    assert.ok(server > LEAST_SHARE && Math.abs(page / server - 1) < 0.1, `${name} is ${page} of the page and ${server} of the server's image`);
+  }
+  await viewer.context().close();
+}
+
+/**
+ * Compares what a page draws of a robot's view with the server's image. Returns the share of pixels that are alike, and for each colour its
+ * shares of both.
+ */
+async function compared(page, path, colours) {
+  const shown = (await page.locator(".view").screenshot()).toString("base64");
+  return page.evaluate(async ({ shown, path, colours, most }) => {
+    const pixels = async (file) => {
+      const image = await createImageBitmap(file);
+      const paper = new OffscreenCanvas(320, 240).getContext("2d");
+      const scale = Math.min(image.width / 320, image.height / 240);
+      const [width, height] = [320 * scale, 240 * scale];
+      paper.drawImage(image, (image.width - width) / 2, (image.height - height) / 2, width, height, 0, 0, 320, 240);
+      const { data } = paper.getImageData(0, 0, 320, 240);
+      return Array.from({ length: 320 * 240 }, (_, at) => [...data.subarray(4 * at, 4 * at + 3)]);
+    };
+    const own = await pixels(new Blob([Uint8Array.from(atob(shown), (letter) => letter.charCodeAt(0))]));
+    const server = await pixels(await (await fetch(path)).blob());
+    const near = (one, other) => one.every((value, axis) => Math.abs(value - other[axis]) <= most);
+    const share = (all, of) => all.filter(of).length / all.length;
+    return {
+      alike: own.filter((pixel, at) => near(pixel, server[at])).length / own.length,
+      colours: Object.fromEntries(Object.entries(colours).map(([name, rgb]) => [name, [own, server].map((all) => share(all, (pixel) => near(pixel, rgb)))])),
+    };
+  }, { shown, path, colours, most: MOST_LEVELS_APART });
+}

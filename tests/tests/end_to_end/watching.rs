@@ -1,5 +1,6 @@
 //! Tests of viewers: they need the link alone, see the episode, and change nothing.
 
+use std::collections::BTreeSet;
 use std::net::TcpStream;
 use std::sync::Mutex;
 
@@ -14,6 +15,8 @@ use tungstenite::{Message, WebSocket, client::IntoClientRequest};
 use crate::policies::plans::{plan, play};
 
 const TOKEN: &str = "correct-horse-battery-staple";
+/// Handover in a kitchen with images on its surfaces.
+const KITCHEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../episodes/tests/scenes/kitchen/handover.xml");
 
 /// Returns calls of 0.1 s each that move both robots.
 fn calls() -> Vec<(&'static str, Value)> {
@@ -47,7 +50,10 @@ fn scene(message: &[u8]) -> (Value, Vec<f32>) {
     let size = u32::from_le_bytes(message[..4].try_into().expect("four bytes")) as usize;
     let head: Value = serde_json::from_slice(&message[4..4 + size]).expect("JSON");
     let meshes = head["meshes"].as_array().expect("meshes");
-    let bytes = meshes.iter().map(|mesh| 16 * mesh[0].as_u64().unwrap() + 12 * mesh[1].as_u64().unwrap());
+    let bytes = meshes.iter().map(|mesh| {
+        let [vertices, triangles, has_uvs] = [0, 1, 2].map(|at| mesh[at].as_u64().unwrap_or_default());
+        (16 + 8 * has_uvs) * vertices + 12 * triangles
+    });
     let begin = 4 + size + bytes.sum::<u64>() as usize;
     (head, numbers(&message[begin..]))
 }
@@ -395,4 +401,53 @@ fn notes_and_refusals_are_seen_as_they_come() {
     ];
     assert_eq!(kinds, expected);
     assert_eq!((&told[1]["note"]["text"], &told[3]["ok"]), (&json!("I wait."), &json!(false)));
+}
+
+/// Images on surfaces come by their hashes: once, however many parts show them, for all episodes in a scene.
+#[test]
+fn images_on_surfaces_are_sent_once() {
+    let server = TestServer::with(Layer { scene: Some(KITCHEN.into()), ..Layer::default() });
+    let ids = [server.episode("benchmark"), server.episode("benchmark")];
+    let heads = ids.each_ref().map(|id| scene(&get(&server, &format!("/watch/scene?episode={id}")).1).0);
+    let textures = heads[0]["textures"].as_array().expect("images");
+    assert_eq!(heads[0]["textures"], heads[1]["textures"]);
+    let hashes: BTreeSet<&str> = textures.iter().filter_map(|texture| texture["hash"].as_str()).collect();
+    // The images of floor, walls, island and mug, the grid, and the sky.
+    assert_eq!((hashes.len(), textures.len()), (6, 6));
+    let parts = heads[0]["parts"].as_array().expect("parts");
+    let shown: Vec<u64> = parts.iter().filter_map(|part| part["image"]["texture"].as_u64()).collect();
+    assert!(shown.len() >= 5 && shown.iter().collect::<BTreeSet<_>>().len() == 5, "{shown:?}");
+    for texture in textures {
+        let path = format!("/watch/texture?hash={}", texture["hash"].as_str().expect("a hash"));
+        let key = format!("Bearer {}", server.watch_key());
+        let (status, headers, bytes) = server.ask("GET", &path, &[("authorization", &key)], b"");
+        assert_eq!(
+            (status, &headers["cache-control"]),
+            (200, &"private, max-age=31536000, immutable".parse().unwrap())
+        );
+        let pixels = image::load_from_memory(&bytes).expect("an image").into_rgb8();
+        for (axis, mean) in texture["mean_rgb"].as_array().expect("a colour").iter().enumerate() {
+            let sum: f64 = pixels.pixels().map(|pixel| f64::from(pixel.0[axis]) / 255.0).sum();
+            let difference = sum / pixels.pixels().len() as f64 - mean.as_f64().expect("a number");
+            assert!(difference.abs() < 0.01, "{path} has another colour than its scene tells: {difference}");
+        }
+        assert_eq!(server.ask("GET", &path, &[], b"").0, 403, "{path} is for watchers");
+        let for_operators = path.replace("/watch", "/operate");
+        assert_eq!(server.ask("GET", &for_operators, &[], b"").2, bytes, "an open server needs no token");
+    }
+    assert_eq!(get(&server, "/watch/texture?hash=0123").0, 404);
+    server.delete(&format!("/v1/episodes/{}", ids[0])).ok();
+    let (recorded, _) = scene(&get(&server, &format!("/watch/run?run={}", ids[0])).1);
+    assert_eq!(recorded["textures"], heads[0]["textures"]);
+}
+
+#[test]
+fn a_room_without_images_sends_none() {
+    let server = TestServer::start();
+    let id = server.episode("benchmark");
+    let (head, _) = scene(&get(&server, &format!("/watch/scene?episode={id}")).1);
+    assert_eq!((&head["textures"], &head["sky"], &head["lights"]), (&json!([]), &Value::Null, &Value::Null));
+    let parts = head["parts"].as_array().expect("parts");
+    assert!(parts.len() > 100 && parts.iter().all(|part| part.get("image").is_none()));
+    assert!(head["meshes"].as_array().expect("meshes").iter().all(|mesh| mesh.get(2).is_none()));
 }

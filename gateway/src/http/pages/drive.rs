@@ -130,6 +130,7 @@ pub async fn drive(
     let robot = operator.robot().to_owned();
     let (watch, every_step) = operator.episode.watch_driving(&robot).await?;
     let (driver, answers) = Driver::take(&operator, &robots)?;
+    app.textures.add(watch.view.scene.textures());
     let disclosure = app.settings.disclosure;
     upgrade(request, move |PageSocket { mut sender, mut reader }| async move {
         let _every_step = every_step;

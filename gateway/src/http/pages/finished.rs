@@ -117,7 +117,12 @@ pub fn folder_of(app: &AppState, run: String) -> Result<PathBuf, ApiError> {
 /// Returns the data with which a page draws a finished episode.
 pub async fn run(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
     let folder = folder(&app, &wanted)?;
-    let message = app.recordings.read(move |last| Ok(last.open(&folder)?.message()));
+    let textures = app.textures.clone();
+    let message = app.recordings.read(move |last| {
+        let opened = last.open(&folder)?;
+        textures.add(opened.episode.textures());
+        Ok(opened.message())
+    });
     Ok(([(header::CONTENT_TYPE, "application/octet-stream")], message.await?).into_response())
 }
 

@@ -32,6 +32,7 @@ fn thread(app: &AppState, wanted: &Wanted) -> Result<Arc<EpisodeThread>, ApiErro
 /// Returns the scene; its header has the calls and phases up to now.
 pub async fn scene(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Result<Response, ApiError> {
     let LiveWatch { view, .. } = thread(&app, &wanted)?.watch().await?;
+    app.textures.add(view.scene.textures());
     let message = blocking(move || {
         let story: Vec<&Value> = view.entries.iter().map(|entry| &entry.told).collect();
         let more = json!({

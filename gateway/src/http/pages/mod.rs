@@ -38,6 +38,9 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; i
 /// Path of the pages; everything below it is for watchers.
 pub const WATCH: &str = "/watch";
 
+/// Time for which browsers keep an image on a surface: its address changes with its content.
+const KEEP_TEXTURE: &str = "private, max-age=31536000, immutable";
+
 /// Requested episode, robot and moment.
 #[derive(Debug, Deserialize)]
 struct Wanted {
@@ -49,6 +52,12 @@ struct Wanted {
     file: Option<String>,
 }
 
+/// Requested image on a surface.
+#[derive(Debug, Deserialize)]
+struct WantedTexture {
+    hash: String,
+}
+
 /// Returns the routes of the pages.
 pub fn router() -> Router<AppState> {
     let inside = Router::new()
@@ -58,6 +67,7 @@ pub fn router() -> Router<AppState> {
         .route("/watch/scene", get(live::scene))
         .route("/watch/live", get(live::live))
         .route("/watch/camera", get(camera))
+        .route("/watch/texture", get(texture))
         .route("/watch/run", get(finished::run))
         .route("/watch/film", get(finished::film))
         .route("/watch/file", get(finished::file))
@@ -145,6 +155,17 @@ async fn camera(State(app): State<AppState>, Query(wanted): Query<Wanted>) -> Re
     };
     let headers = [(header::CONTENT_TYPE, "image/png"), (header::CACHE_CONTROL, "no-store")];
     Ok((headers, png).into_response())
+}
+
+/// Returns an image on the surfaces of a scene that a page draws.
+async fn texture(
+    State(app): State<AppState>,
+    Query(WantedTexture { hash }): Query<WantedTexture>,
+) -> Result<Response, ApiError> {
+    let texture = app.textures.find(&hash).ok_or(ApiError::NoTexture { hash })?;
+    let file = blocking(move || texture.file().map_err(|failed| ApiError::Reply(failed.into()))).await?;
+    let headers = [(header::CONTENT_TYPE, file.media_type), (header::CACHE_CONTROL, KEEP_TEXTURE)];
+    Ok((headers, file.bytes).into_response())
 }
 
 /// Runs slow work on a thread for blocking work.

@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 use super::{
     POLICY, collecting,
     drive::{self, DRIVE, ENTER},
-    script, style,
+    script, style, texture,
 };
 use crate::{
     hosting::{Caller, HostingError},
@@ -36,6 +36,7 @@ pub fn router() -> Router<AppState> {
         .route(OPERATE, get(page))
         .route("/operate/page.css", get(style))
         .route("/operate/page.js", get(script))
+        .route("/operate/texture", get(texture))
         .route("/operate/collection", get(collecting::progress))
         .route("/operate/mark", post(collecting::mark))
         .route("/operate/code", post(collecting::code))

@@ -42,6 +42,7 @@ fn own_refusals() -> Vec<ApiError> {
         ApiError::NoToken,
         ApiError::NoWatcher,
         ApiError::NoRun { run: "expert/handover-seed0".into() },
+        ApiError::NoTexture { hash: "0123".into() },
         ApiError::NoCollection,
         ApiError::NothingToMark,
         ApiError::Key,

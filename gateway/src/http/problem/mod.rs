@@ -101,6 +101,14 @@ pub enum ApiError {
         /// Requested name.
         run: String,
     },
+    /// No scene that a page draws has an image with that hash.
+    #[error(
+        "no scene has an image {hash:?} on its surfaces; the head of GET /watch/scene lists their hashes"
+    )]
+    NoTexture {
+        /// Requested hash.
+        hash: String,
+    },
     /// The server has no collection, or the caller is not part of it.
     #[error(
         "nobody collects episodes by this server and token; tandem collect --operators N prints the links of \
@@ -264,6 +272,9 @@ impl ApiError {
             ApiError::NoToken => Problem::new("no-token", "No token", StatusCode::UNAUTHORIZED),
             ApiError::NoWatcher => Refusal::new("no-watcher", "Not by the link", Forbidden).into(),
             ApiError::NoRun { .. } => Refusal::new("no-run", "No such finished episode", NotFound).into(),
+            ApiError::NoTexture { .. } => {
+                Refusal::new("no-texture", "No such image on a surface", NotFound).into()
+            }
             ApiError::NoCollection => Refusal::new("no-collection", "No collection", NotFound).into(),
             ApiError::NothingToMark => {
                 Problem::new("nothing-to-mark", "Nothing to mark", StatusCode::CONFLICT)

@@ -1,6 +1,6 @@
 // What the wearer of a headset is told, on a board below the line of sight: how the episode stands, what the hands do, what is left.
 
-import { CanvasTexture, Mesh, MeshBasicMaterial, PlaneGeometry, SRGBColorSpace } from "three";
+import { CanvasTexture, Mesh, MeshBasicMaterial, NoColorSpace, PlaneGeometry, SRGBColorSpace } from "three";
 
 const WIDTH_M = 0.9;
 const PIXELS = [1024, 192];
@@ -11,14 +11,17 @@ const TILT_RAD = -0.5;
 
 /** The board of one wearer. */
 export class Board {
-  /** @param {import("three").Group} rig The space of the wearer. */
-  constructor(rig) {
+  /**
+   * @param {import("three").Group} rig The space of the wearer.
+   * @param {boolean} isLitByFile True in a scene whose colours are no linear light.
+   */
+  constructor(rig, isLitByFile) {
     const canvas = document.createElement("canvas");
     [canvas.width, canvas.height] = PIXELS;
     this.paper = canvas.getContext("2d");
     this.texture = new CanvasTexture(canvas);
     this.text = "";
-    this.texture.colorSpace = SRGBColorSpace;
+    this.texture.colorSpace = isLitByFile ? NoColorSpace : SRGBColorSpace;
     // Seen before whatever is in its place, as the table is.
     const material = new MeshBasicMaterial({ map: this.texture, transparent: true, depthTest: false });
     const board = new Mesh(new PlaneGeometry(WIDTH_M, (WIDTH_M * PIXELS[1]) / PIXELS[0]), material);

@@ -65,7 +65,7 @@ export class Headset {
   /** @type {Board | null} */
   board = null;
 
-  /** @param {import("../../src/stage.js").Stage} stage @param {import("../hands.js").Hands} hands */
+  /** @param {import("../../src/stage/stage.js").Stage} stage @param {import("../hands.js").Hands} hands */
   constructor(stage, hands) {
     this.stage = stage;
     this.hands = hands;
@@ -93,7 +93,7 @@ export class Headset {
     this.session = session;
     const left = new Promise((done) => { session.addEventListener("end", done); });
     this.stage.ride(this.hands.robot);
-    const board = this.board ?? new Board(this.stage.rig);
+    const board = this.board ?? new Board(this.stage.rig, this.stage.isLitByFile);
     this.board = board;
     let last = performance.now();
     renderer.setAnimationLoop((now, frame) => {

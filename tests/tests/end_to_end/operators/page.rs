@@ -25,9 +25,15 @@ fn everybody_may_read_the_page_and_nobody_acts_without_a_link() {
     for path in ["page.css", "page.js"] {
         assert_eq!(server.ask("GET", &format!("/operate/{path}"), &[], b"").0, 200, "{path}");
     }
-    for path in
-        ["/operate/", "/operate/other.js", "/operate/drive", "/operate/collection", "/operated", "/v1/tasks"]
-    {
+    for path in [
+        "/operate/",
+        "/operate/other.js",
+        "/operate/drive",
+        "/operate/texture",
+        "/operate/collection",
+        "/operated",
+        "/v1/tasks",
+    ] {
         assert_eq!(server.get(path).status, 401, "{path}");
     }
     let forged = [("authorization", "Bearer 0123456789abcdef0123456789abcdef01234567")];

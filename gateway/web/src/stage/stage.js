@@ -1,16 +1,16 @@
 // An episode in three dimensions: the shapes that the server draws robots' pictures of, put where a step has them.
 
 import {
-  AmbientLight, ArrowHelper, BufferAttribute, BufferGeometry, Color, DirectionalLight, Group, HemisphereLight, Line, LineBasicMaterial,
-  LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial, PerspectiveCamera, Quaternion, SRGBColorSpace, Scene, SphereGeometry,
-  Vector3, WebGLRenderer,
+  ArrowHelper, BufferAttribute, BufferGeometry, Color, Group, Line, LineBasicMaterial, LineSegments, LinearSRGBColorSpace, Matrix4, Mesh,
+  MeshBasicMaterial, PerspectiveCamera, Quaternion, Scene, SphereGeometry, Vector3, WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { colour, robotColour } from "./dom.js";
-import { POSE, SIDES } from "./message.js";
+import { colour, robotColour } from "../dom.js";
+import { addSky, lightByFile, lightRoom, shineOf } from "./light.js";
+import { POSE, SIDES } from "../message.js";
+import { Surfaces } from "./surfaces.js";
+import { Textures } from "./textures.js";
 
-/** Alpha from which surfaces are solid, as in the server's images. */
-const SOLID_ALPHA = 0.995;
 const UP = new Vector3(0, 0, 1);
 /** Lengths of arrows. */
 const METRES_PER_NEWTON = 0.006;
@@ -25,12 +25,9 @@ const STILL_MS = 300;
 const SOFTWARE_COARSENESS = 1.5;
 /** @type {Record<string, string>} */
 const STATE_COLOURS = { moving: "--accent", arrived: "--good", blocked: "--bad", out_of_reach: "--odd", joints: "--soft" };
-const SKY_FROM_BELOW = 0x8d8678;
 
-/** @typedef {import("./message.js").Frame} Frame */
-/** @typedef {import("./message.js").Part} Part */
-/** @typedef {import("./message.js").Mesh} MeshNumbers */
-/** @typedef {import("./targets.js").Target} Target */
+/** @typedef {import("../message.js").Frame} Frame */
+/** @typedef {import("../targets.js").Target} Target */
 /** @typedef {ReturnType<Stage["extrasOf"]>["hands"][number]} HandExtras Drawing of a hand. */
 /**
  * Puts a thing to the pose at a place of a row.
@@ -39,20 +36,30 @@ const SKY_FROM_BELOW = 0x8d8678;
 
 /** The drawing of one scene. */
 export class Stage {
-  /** @param {HTMLElement} place @param {Omit<import("./message.js").Scene, "frames">} scene */
-  constructor(place, { head, meshes, layout }) {
+  /**
+   * @param {HTMLElement} place
+   * @param {Omit<import("../message.js").Scene, "frames">} scene
+   * @param {import("./textures.js").TextureSource} source gives images on surfaces.
+   */
+  constructor(place, { head, meshes, layout }, source) {
     this.head = head;
     this.layout = layout;
     this.place = place;
-    // Where a processor draws, smooth edges and shadows take two thirds of the time.
+    // Where a processor draws, smooth edges and shadows take two thirds of the time, and reflections twice the rest.
     const quick = !drawnBySoftware();
     this.coarseness = quick ? 1 : SOFTWARE_COARSENESS;
     this.renderer = new WebGLRenderer({ antialias: quick, powerPreference: "high-performance" });
     this.renderer.shadowMap.enabled = quick;
     place.append(this.renderer.domElement);
     this.scene = new Scene();
-    this.sun = this.light(quick);
-    this.carriers = this.build(meshes);
+    /** True if the file's lights multiply its colours as they are: then nothing is linear light. */
+    this.isLitByFile = head.lights !== null;
+    if (this.isLitByFile) this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    this.light = head.lights ? lightByFile(this.scene, head.lights, quick) : lightRoom(this.renderer, this.scene, quick);
+    this.textures = new Textures(head.textures, source, this.isLitByFile);
+    /** @type {import("./surfaces.js").Surface[]} */
+    this.shapes = [];
+    this.carriers = this.build(meshes, quick);
     this.free = new PerspectiveCamera((head.third_person.vertical_fov_rad * 180) / Math.PI, 1, 0.02, 60);
     this.free.up.copy(UP);
     this.free.position.fromArray(head.third_person.pose);
@@ -88,16 +95,22 @@ export class Stage {
 
   /** Takes over the colours of the page. */
   paint() {
-    this.scene.background = new Color(colour("--sky"));
+    this.scene.background = this.paper(colour("--sky"));
     this.robots.forEach(({ frustum, hands }, index) => {
-      const paint = new Color(robotColour(index));
+      const paint = this.paper(robotColour(index));
       frustum.material.color.copy(paint);
       for (const { felt, contact } of hands) {
         felt.setColor(paint);
-        contact.setColor(new Color(colour("--force")));
+        contact.setColor(this.paper(colour("--force")));
       }
     });
     this.stale = true;
+  }
+
+  /** Returns a colour of the page in the colours of the scene. @param {string} css */
+  paper(css) {
+    const made = new Color(css);
+    return this.isLitByFile ? made.convertLinearToSRGB() : made;
   }
 
   /** Takes over the size of the place; in fine pixels where nothing moves. */
@@ -110,56 +123,32 @@ export class Stage {
     this.stale = true;
   }
 
-  /** Adds lights to the scene. Returns the one that casts shadows, if any does. @param {boolean} casts */
-  light(casts) {
-    this.scene.add(new HemisphereLight(0xffffff, SKY_FROM_BELOW, 1.6), new AmbientLight(0xffffff, 0.35));
-    const sun = new DirectionalLight(0xffffff, 2.1);
-    sun.castShadow = casts;
-    sun.shadow.mapSize.set(1024, 1024);
-    Object.assign(sun.shadow.camera, { left: -2.2, right: 2.2, top: 2.2, bottom: -2.2, near: 0.5, far: 9 });
-    sun.shadow.bias = -0.0015;
-    sun.shadow.normalBias = 0.02;
-    this.scene.add(sun, sun.target);
-    return sun;
-  }
-
   /**
-   * Makes one mesh for all parts of a carrier that are alike in shadow and alpha. Returns the carriers that
-   * move.
-   * @param {MeshNumbers[]} meshes
+   * Adds all shapes to the scene, and its sky. Returns what moves with a carrier, lights included.
+   * @param {import("../message.js").Mesh[]} meshes
+   * @param {boolean} quick False where a processor draws.
    */
-  build(meshes) {
-    /** @type {Map<string, Part[]>} */
-    const groups = new Map();
-    for (const part of this.head.parts) {
-      const key = `${JSON.stringify(part.carrier)} ${part.casts_shadow} ${part.alpha}`;
-      groups.set(key, [...(groups.get(key) ?? []), part]);
+  build(meshes, quick) {
+    const { head, light } = this;
+    const surfaces = new Surfaces(this.textures, head.lights && shineOf(head.lights), quick, () => { this.stale = true; });
+    const made = surfaces.make(head.parts, meshes);
+    for (const { mesh } of made) this.scene.add(mesh);
+    this.shapes = made.map(({ mesh }) => mesh);
+    if (head.sky !== null) {
+      this.textures.cube(head.sky).then((sky) => { addSky(this.scene, sky); this.stale = true; }, (error) => console.warn(error));
     }
+    /** @type {{ thing: import("three").Object3D, at: number }[]} */
     const carriers = [];
-    /** @type {Mesh<BufferGeometry, MeshLambertMaterial>[]} */
-    this.shapes = [];
-    for (const parts of groups.values()) {
-      const plain = parts.filter((part) => part.pattern !== "checker");
-      const checked = parts.filter((part) => part.pattern === "checker");
-      /** @type {[Part[], MeshLambertMaterial][]} */
-      const lots = checked.map((part) => [[part], checker(part)]);
-      if (plain.length) lots.unshift([plain, paintOf(parts[0])]);
-      for (const [some, material] of lots) {
-        const mesh = new Mesh(merged(some, meshes), material);
-        mesh.castShadow = some[0].casts_shadow;
-        mesh.receiveShadow = true;
-        this.scene.add(mesh);
-        this.shapes.push(mesh);
-        const at = this.placeOf(some[0].carrier);
-        if (at !== null) carriers.push({ mesh, at });
-      }
+    for (const { thing, carrier } of [...made.map(({ mesh, carrier }) => ({ thing: mesh, carrier })), ...light.carried]) {
+      const at = this.placeOf(carrier);
+      if (at !== null) carriers.push({ thing, at });
     }
     return carriers;
   }
 
   /**
    * Returns the place of a carrier's pose in a row, or null for the room.
-   * @param {import("./message.js").Carrier} carrier
+   * @param {import("../message.js").Carrier} carrier
    */
   placeOf(carrier) {
     if (carrier.kind === "link") return this.layout.links[carrier.robot] + carrier.link * POSE;
@@ -168,11 +157,11 @@ export class Stage {
 
   /**
    * Adds to the scene the extras of a robot, and returns them.
-   * @param {import("./message.js").RobotHead} robot
+   * @param {import("../message.js").RobotHead} robot
    * @param {number} index
    */
   extrasOf(robot, index) {
-    const paint = new Color(robotColour(index));
+    const paint = this.paper(robotColour(index));
     const frustum = new LineSegments(frustumGeometry(robot.camera), new LineBasicMaterial({ color: paint, transparent: true, opacity: 0.75 }));
     this.scene.add(frustum);
     const hands = SIDES.map(() => {
@@ -180,7 +169,7 @@ export class Stage {
       const line = new Line(new BufferGeometry().setAttribute("position", new BufferAttribute(new Float32Array(6), 3)), new LineBasicMaterial());
       line.frustumCulled = false;
       const felt = new ArrowHelper(UP, new Vector3(), 0.1, paint);
-      const contact = new ArrowHelper(UP, new Vector3(), 0.1, colour("--force"));
+      const contact = new ArrowHelper(UP, new Vector3(), 0.1, this.paper(colour("--force")));
       this.scene.add(ghost.group, line, felt, contact);
       return { ghost, line, felt, contact };
     });
@@ -192,7 +181,7 @@ export class Stage {
    * @param {Frame} from
    * @param {Frame} to
    * @param {number} share
-   * @param {import("./targets.js").Targets | null} [targets] those of a finished episode
+   * @param {import("../targets.js").Targets | null} [targets] those of a finished episode
    */
   show(from, to, share, targets) {
     const one = new Vector3();
@@ -203,7 +192,7 @@ export class Stage {
       thing.position.fromArray(from.row, at).lerp(one.fromArray(to.row, at), share);
       thing.quaternion.copy(turn.fromArray(from.row, at + 3)).slerp(turnTo.fromArray(to.row, at + 3), share);
     };
-    for (const { mesh, at } of this.carriers) pose(mesh, at);
+    for (const { thing, at } of this.carriers) pose(thing, at);
     const middle = new Vector3();
     this.robots.forEach((robot, index) => {
       const { camera } = this.layout.robots[index];
@@ -221,8 +210,7 @@ export class Stage {
       this.controls.update();
       this.centred = true;
     }
-    this.sun.target.position.set(middle.x, middle.y, 0.6);
-    this.sun.position.set(middle.x - 0.9, middle.y - 1.3, 4.6);
+    this.light.follow(middle);
     this.stale = true;
   }
 
@@ -235,7 +223,7 @@ export class Stage {
    * @param {Target | null} [recorded] its target in a finished episode
    */
   showHand({ ghost, line, felt, contact }, hand, from, pose, recorded) {
-    const paint = new Color(colour(STATE_COLOURS[recorded?.state ?? hand.state] ?? "--soft"));
+    const paint = this.paper(colour(STATE_COLOURS[recorded?.state ?? hand.state] ?? "--soft"));
     const wrist = new Vector3().fromArray(from.row, hand.wrist);
     if (recorded) {
       ghost.group.position.fromArray(recorded.pose);
@@ -365,13 +353,13 @@ export class Stage {
 
   /** Draws less, where drawing takes long: first no shadows, then fewer pixels. */
   simplify() {
-    if (!this.sun.castShadow) {
+    if (!this.light.casting.some(({ castShadow }) => castShadow)) {
       this.coarseness = Math.min(MOST_COARSENESS, this.coarseness * 1.5);
       this.resize();
       return;
     }
     this.renderer.shadowMap.enabled = false;
-    this.sun.castShadow = false;
+    for (const light of this.light.casting) light.castShadow = false;
     for (const { material } of this.shapes) material.needsUpdate = true;
     this.stale = true;
   }
@@ -418,78 +406,8 @@ function drawnBySoftware() {
 }
 
 /**
- * Makes the material of a part without a pattern. What is blended keeps out as much light as in the server's
- * images.
- * @param {Part} part
- */
-function paintOf({ alpha }) {
-  const blended = alpha < SOLID_ALPHA ? { transparent: true, depthWrite: false, opacity: 1 - (1 - alpha) ** 2 } : {};
-  return new MeshLambertMaterial({ vertexColors: true, ...blended });
-}
-
-/**
- * Makes the material of squares of half a metre in the world's ground plane, as the server draws them.
- * @param {import("./message.js").CheckedPart} part
- */
-function checker(part) {
-  const material = new MeshLambertMaterial({ vertexColors: true });
-  const second = new Color().setRGB(...part.second_rgb, SRGBColorSpace);
-  material.onBeforeCompile = (shader) => {
-    shader.uniforms.second = { value: second };
-    shader.vertexShader = shader.vertexShader
-      .replace("#include <common>", "#include <common>\nvarying vec3 vPlace;")
-      .replace("#include <project_vertex>", "#include <project_vertex>\nvPlace = (modelMatrix * vec4(transformed, 1.0)).xyz;");
-    shader.fragmentShader = shader.fragmentShader
-      .replace("#include <common>", "#include <common>\nvarying vec3 vPlace;\nuniform vec3 second;")
-      .replace("#include <color_fragment>", "#include <color_fragment>\nif (mod(floor(vPlace.x * 2.0) + floor(vPlace.y * 2.0), 2.0) == 0.0) diffuseColor.rgb = second;");
-  };
-  return material;
-}
-
-/**
- * Returns parts of one carrier as one geometry in its frame, with their colours at the corners.
- * @param {Part[]} parts
- * @param {MeshNumbers[]} meshes
- */
-function merged(parts, meshes) {
-  const total = parts.reduce((sum, part) => sum + meshes[part.mesh].positions.length, 0);
-  const positions = new Float32Array(total);
-  const normals = new Float32Array(total);
-  const colours = new Float32Array(total);
-  const indices = [];
-  const point = new Vector3();
-  const turn = new Quaternion();
-  let first = 0;
-  for (const part of parts) {
-    const mesh = meshes[part.mesh];
-    const paint = new Color().setRGB(...part.rgb, SRGBColorSpace);
-    const corners = mesh.positions.length / 3;
-    turn.fromArray(part.pose, 3);
-    for (let corner = 0; corner < corners; corner += 1) {
-      const at = 3 * (first + corner);
-      point.fromArray(mesh.positions, 3 * corner).applyQuaternion(turn);
-      point.x += part.pose[0];
-      point.y += part.pose[1];
-      point.z += part.pose[2];
-      point.toArray(positions, at);
-      point.set(mesh.normals[4 * corner], mesh.normals[4 * corner + 1], mesh.normals[4 * corner + 2]).normalize();
-      point.applyQuaternion(turn).toArray(normals, at);
-      paint.toArray(colours, at);
-    }
-    for (const corner of mesh.indices) indices.push(first + corner);
-    first += corners;
-  }
-  const geometry = new BufferGeometry();
-  geometry.setAttribute("position", new BufferAttribute(positions, 3));
-  geometry.setAttribute("normal", new BufferAttribute(normals, 3));
-  geometry.setAttribute("color", new BufferAttribute(colours, 3));
-  geometry.setIndex(indices);
-  return geometry;
-}
-
-/**
  * Returns the edges of what a camera sees, which looks along -z with y up.
- * @param {import("./message.js").CameraHead} camera
+ * @param {import("../message.js").CameraHead} camera
  */
 function frustumGeometry({ vertical_fov_rad: fov, width, height }) {
   const y = FRUSTUM_M * Math.tan(fov / 2);
