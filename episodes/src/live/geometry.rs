@@ -93,7 +93,7 @@ fn gloss_row(gloss: &Gloss) -> Value {
 }
 
 fn image_row(image: &SurfaceImage, textures: &mut SceneTextures) -> Value {
-    let SurfaceImage { texture, gloss, relief, mapping } = image;
+    let SurfaceImage { texture, gloss, relief, emitted, mapping } = image;
     let mapping = match mapping {
         TextureMapping::Corners => json!({ "kind": "corners" }),
         TextureMapping::Along { scale_1_m, centre_m } => {
@@ -106,7 +106,8 @@ fn image_row(image: &SurfaceImage, textures: &mut SceneTextures) -> Value {
     let mut number = |texture| textures.number(texture);
     json!({
         "texture": number(texture), "gloss": gloss.as_ref().map(&mut number),
-        "relief": relief.as_ref().map(&mut number), "mapping": mapping,
+        "relief": relief.as_ref().map(&mut number), "emitted": emitted.as_ref().map(&mut number),
+        "mapping": mapping,
     })
 }
 

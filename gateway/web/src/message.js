@@ -23,8 +23,8 @@
  *   | { kind: "along", scale_1_m: [number, number], centre_m: [number, number] }
  *   | { kind: "cube", scale_1_m: number[], centre_m: number[] }} Mapping
  */
-/** Image on a surface, with those of its gloss and its relief at the same places; by their numbers among `textures`. */
-/** @typedef {{ texture: number, gloss: number | null, relief: number | null, mapping: Mapping }} SurfaceImage */
+/** Image on a surface, with those of its gloss, its relief and its emitted light at the same places; by their numbers among `textures`. */
+/** @typedef {{ texture: number, gloss: number | null, relief: number | null, emitted: number | null, mapping: Mapping }} SurfaceImage */
 /**
  * @typedef {{
  *   mesh: number, carrier: Carrier, pose: number[], rgb: Rgb, alpha: number, casts_shadow: boolean,

@@ -89,7 +89,10 @@ export class Surfaces {
     const material = this.plain(part, gloss, { vertexColors: true, alphaTest: hasHoles ? LEAST_ALPHA : 0, ...blending });
     /** @type {string[]} */
     const additions = [];
-    if (gloss.emission) material.emissive.copy(this.own(part.rgb)).multiplyScalar(gloss.emission);
+    const emitted = image?.emitted ?? null;
+    // Without a file's lights only layers emit light.
+    if (emitted !== null) material.emissive.setScalar(gloss.emission);
+    else if (this.shine !== null) material.emissive.copy(this.own(part.rgb)).multiplyScalar(gloss.emission);
     if (isBlended || hasHoles) additions.push("diffuseColor.a = 1.0 - (1.0 - diffuseColor.a) * (1.0 - diffuseColor.a);");
     if (image) {
       this.cover(material, image, additions);
@@ -138,11 +141,13 @@ export class Surfaces {
     patch(material, additions);
     const isCube = image.mapping.kind === "cube";
     const numbers = (/** @type {number | null} */ number) => (number === null ? null : this.textures.numbers(number));
-    // The lights of a file make no surface brighter than its image.
-    const most = (/** @type {string} */ rgb) => (this.shine === null ? "" : `outgoingLight = min(outgoingLight, ${rgb});`);
+    // The lights of a file make no surface brighter than its image, and what it emits by a layer.
+    const glow = image.emitted === null ? "" : " + totalEmissiveRadiance";
+    const most = (/** @type {string} */ rgb) => (this.shine === null ? "" : `outgoingLight = min(outgoingLight, ${rgb}${glow});`);
     try {
-      const [texture, gloss, relief] = await Promise.all([
-        isCube ? this.textures.cube(image.texture) : this.textures.colour(image.texture), isCube ? null : numbers(image.gloss), numbers(image.relief)]);
+      const [texture, gloss, relief, emitted] = await Promise.all([
+        isCube ? this.textures.cube(image.texture) : this.textures.colour(image.texture), isCube ? null : numbers(image.gloss), numbers(image.relief),
+        isCube || image.emitted === null ? null : this.textures.colour(image.emitted)]);
       if (isCube) {
         const lines = ["vec4 ofCube = texture(cube, vPlace);", "diffuseColor *= ofCube;", ...additions];
         const uniforms = { cube: { value: texture } };
@@ -157,7 +162,7 @@ export class Surfaces {
         material.normalScale.set(1, -1);
       }
       if (gloss && material instanceof MeshPhysicalMaterial) material.roughnessMap = material.metalnessMap = gloss;
-      if (material.emissive.getHex() && !isCube) material.emissiveMap = texture;
+      if (material.emissive.getHex() && !isCube) material.emissiveMap = emitted ?? texture;
       material.color.set(1, 1, 1);
       material.needsUpdate = true;
       this.changed();
