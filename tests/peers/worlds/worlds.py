@@ -9,14 +9,16 @@
 the reader was written) without their dependencies, and unpacks their files. `compare` tries every file
 that MuJoCo reads by itself: directly and, if it is refused, after `tandem import`. It prints the table in
 docs/src/scenes.md. A file moves as in MuJoCo if no named body differs by more than NEAR_M and NEAR_DEG from MuJoCo after 1 s
-without commands. It is called chaotic if MuJoCo itself differs as much with half the time step. The build folder is
-CARGO_TARGET_DIR, if that is set.
+without commands. It is called chaotic if MuJoCo itself differs as much with half the time step, and forced if it begins with
+a joint beyond its range or with bodies that overlap: soft limits and contacts then throw bodies as far as their stiffness
+decides. The build folder is CARGO_TARGET_DIR, if that is set.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import re
 import select
@@ -36,9 +38,13 @@ sys.path.insert(0, str(ROOT / "gateway" / "python" / "tandem"))
 
 NEAR_M = 0.06
 NEAR_DEG = 20.0
-LIMIT_S = 60.0
-#: Outcomes of a file that is read: motion as in MuJoCo; other motion; other motion, but so has MuJoCo at another time step.
-READ = ("same", "other", "chaotic")
+#: A file begins beyond its limits from this angle of a joint, and from this depth of a contact, on.
+BEYOND_DEG = 1.0
+OVERLAP_M = 0.005
+LIMIT_S = 300.0
+#: Outcomes of a file that is read: motion as in MuJoCo; other motion, but so has MuJoCo at another time step; other motion from
+#: a start beyond limits; other motion.
+READ = ("same", "chaotic", "forced", "other")
 KEPT = {".xml", ".obj", ".stl", ".msh", ".png", ".jpg", ".jpeg", ".bin", ".skn", ".mtl", ".ktx", ".dae", ".urdf", ".glb", ".gltf", ".ply"}
 
 
@@ -63,6 +69,12 @@ def reference(path: Path, step: float = 1.0) -> dict[str, Any]:
     model.opt.timestep *= step
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
+    beyond_rad = 0.0
+    for joint in range(model.njnt):
+        if model.jnt_limited[joint] and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE:
+            at_rad, (low_rad, high_rad) = data.qpos[model.jnt_qposadr[joint]], model.jnt_range[joint]
+            beyond_rad = max(beyond_rad, float(low_rad - at_rad), float(at_rad - high_rad))
+    overlap_m = max((float(-contact.dist) for contact in data.contact[: data.ncon]), default=0.0)
     while data.time < 1.0:
         mujoco.mj_step(model, data)
     bodies: dict[str, Any] = {}
@@ -72,7 +84,8 @@ def reference(path: Path, step: float = 1.0) -> dict[str, Any]:
             welded = [other for other in range(1, model.nbody) if model.body_weldid[other] == body]
             mass = float(sum(model.body_mass[other] for other in welded))
             bodies[name] = {"mass_kg": mass, "end": [*map(float, data.xpos[body]), *map(float, data.xquat[body])]}
-    return {"bodies": bodies, "warnings": int(sum(warning.number for warning in data.warning))}
+    is_forced = beyond_rad > math.radians(BEYOND_DEG) or overlap_m > OVERLAP_M
+    return {"bodies": bodies, "is_forced": is_forced}
 
 
 def run(command: list[str]) -> tuple[dict[str, Any] | None, str]:
@@ -146,8 +159,6 @@ def imported(path: Path, out: Path) -> dict[str, Any]:
 
 def apart(found: list[float], expected: list[float]) -> tuple[float, float]:
     """Returns the distance (m) and the angle (deg) between two poses."""
-    import math
-
     distance = math.dist(found[:3], expected[:3])
     cosine = min(1.0, abs(sum(a * b for a, b in zip(found[3:], expected[3:], strict=True))))
     return distance, math.degrees(2.0 * math.acos(cosine))
@@ -182,7 +193,7 @@ def outcome(settle: str, path: Path, source: Path, expected: dict[str, Any]) -> 
         return kind, error.replace("\n", " | ")[:400]
     word, far_m, far_deg, off = compared(found, expected)
     if word == "other":
-        word = "chaotic" if is_chaotic(source, expected) else "other"
+        word = "chaotic" if is_chaotic(source, expected) else "forced" if expected["is_forced"] else "other"
     seconds = found["loaded_s"] + found["drawn_s"]
     return word, f"{1000 * far_m:.0f} mm {far_deg:.0f} deg, mass off by {100 * off:.1f} %, {seconds:.2f} s"
 
@@ -231,11 +242,11 @@ def show(tsv: Path) -> None:
         row["files"] += 1
         row[native if native in READ else f"imported {after}"] += 1
     total = sum(counts.values(), Counter())
-    read = "as in MuJoCo | chaotic | otherwise"
-    print(f"| package | files | read: {read} | imported: {read} | neither |")
-    print("|---|---|---|---|---|---|---|---|---|")
+    print("| package | files | read, as in MuJoCo | imported, as in MuJoCo | chaotic | forced | otherwise | neither |")
+    print("|---|---|---|---|---|---|---|---|")
     for name, row in [*sorted(counts.items()), ("all", total)]:
-        cells = [row[word] for word in ("same", "chaotic", "other", "imported same", "imported chaotic", "imported other")]
+        same = [row["same"], row["imported same"]]
+        cells = [*same, *(row[word] + row[f"imported {word}"] for word in READ[1:])]
         cells = [row["files"], *cells, row["files"] - sum(cells)]
         print(f"| {name} | " + " | ".join(str(cell) for cell in cells) + " |")
 
