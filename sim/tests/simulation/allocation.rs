@@ -96,5 +96,5 @@ fn dynamics_allocates_nothing_after_the_first_steps() {
         dynamics.step().unwrap();
         assert_eq!(ALLOCATIONS.with(Cell::get), before);
     }
-    assert!(!dynamics.touches().is_empty());
+    assert!(dynamics.touches().next().is_some());
 }

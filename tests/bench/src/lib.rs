@@ -10,7 +10,7 @@ mod physics;
 mod pictures;
 mod report;
 mod seeds;
-mod single;
+pub mod single;
 mod spread;
 mod teams;
 

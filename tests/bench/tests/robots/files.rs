@@ -1,17 +1,16 @@
 //! Robots of files: those that lack joints, and those that a description builds from third-party MJCF.
 
-mod described;
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use tandem_bench::single::{Subject, run};
 use tandem_sim::assets::{self, DEFAULT_ROBOT};
 use tandem_sim::{
-    JOINTS, LocomotionChoice, RobotModel, RobotPlacement, RobotSource, Sensing, World, WorldSpec, bench,
+    JOINTS, LocomotionChoice, RobotModel, RobotPlacement, RobotSource, Sensing, World, WorldSpec,
 };
 
 fn walker() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../gateway/examples/robots/walker.toml")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../gateway/examples/robots/walker.toml")
 }
 
 /// Returns the embedded robot's file without its fingers: the lines of 29 joints remain.
@@ -76,8 +75,8 @@ fn a_described_robot_stands_walks_and_squats() {
     assert!(model.scale.length_m(1.0) < 0.9, "its legs are shorter than a G1's: {:?}", model.scale);
     for case in ["stand", "forward_0.4", "squat", "push_40n"] {
         let robot = "walker";
-        let subject = bench::Subject::Base(&LocomotionChoice::Balance);
-        let report = bench::run(robot, &model, subject, Sensing::default(), case, &(0..=0), |_| {});
+        let subject = Subject::Base(&LocomotionChoice::Balance);
+        let report = run(robot, &model, subject, Sensing::default(), case, &(0..=0), |_| {});
         let report = report.expect("a report");
         let found = report.cases.iter().find(|found| found.case == case).expect("the case");
         assert_eq!(found.survived, 1, "{found:?}");

@@ -2,19 +2,20 @@
 
 use std::sync::Arc;
 
+use tandem_bench::CaseReport;
+use tandem_bench::single::{Subject, run};
 use tandem_sim::assets::DEFAULT_ROBOT;
 use tandem_sim::{
     BaseCommand, LocomotionChoice, RobotCommand, RobotPlacement, RobotSource, Sensing, World, WorldSpec,
-    bench,
 };
 
 /// Runs the cases whose names contain this word.
-fn reports(word: &str, seeds: usize) -> Vec<bench::CaseReport> {
+fn reports(word: &str, seeds: usize) -> Vec<CaseReport> {
     let robot = RobotSource::embedded(DEFAULT_ROBOT).unwrap();
-    let report = bench::run(
+    let report = run(
         DEFAULT_ROBOT,
         &Arc::new(robot.model),
-        bench::Subject::Base(&LocomotionChoice::Balance),
+        Subject::Base(&LocomotionChoice::Balance),
         Sensing::default(),
         word,
         &(0..=seeds as u32 - 1),
@@ -23,7 +24,7 @@ fn reports(word: &str, seeds: usize) -> Vec<bench::CaseReport> {
     report.unwrap().cases
 }
 
-fn report(case: &str, seeds: usize) -> bench::CaseReport {
+fn report(case: &str, seeds: usize) -> CaseReport {
     let mut reports = reports(case, seeds);
     assert_eq!(reports.len(), 1, "`{case}` names one case");
     reports.remove(0)
