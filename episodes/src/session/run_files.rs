@@ -54,7 +54,7 @@ pub struct RunFiles {
     /// First failure, except the recorder's.
     failed: Option<String>,
     /// Moments of the strip. Their images are rendered when it is written.
-    moments: Vec<Moment>,
+    moments: Vec<StripMoment>,
     /// Joint instruction of the robots.
     instruction: String,
     begin_s: f64,
@@ -162,7 +162,7 @@ impl RunFiles {
     /// Stores a moment for the strip, if there will be one.
     pub(super) fn keep(&mut self, caption: &str, step: &Arc<Step>) {
         if self.pages {
-            self.moments.push(Moment { caption: caption.into(), step: step.clone() });
+            self.moments.push(StripMoment { caption: caption.into(), step: step.clone() });
         }
     }
 
@@ -253,15 +253,15 @@ fn begin(folder: &RunFolder, session: &Session) -> Result<RecorderThread, Episod
 }
 
 /// Moment for the strip.
-struct Moment {
+struct StripMoment {
     caption: String,
     step: Arc<Step>,
 }
 
-impl Moment {
+impl StripMoment {
     /// Renders the views of the third-person camera and of the robots of `task`.
     fn render(&self, task: &Task, observer: &mut Observer) -> Result<KeyMoment, PictureError> {
-        let Moment { caption, step } = self;
+        let StripMoment { caption, step } = self;
         let (mut labels, mut views) = (vec!["the room".into()], vec![observer.cameras.third_person().into()]);
         for (robot, name) in task.robot_names().enumerate() {
             labels.push(format!("what {name} sees"));

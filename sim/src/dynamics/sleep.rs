@@ -13,7 +13,7 @@ use super::Dynamics;
 use super::contacts::collision::Manifold;
 use super::contacts::{ContactPoint, colliders_of};
 use super::trees::TreeId;
-use super::trees::state::Rest;
+use super::trees::rest::Rest;
 use super::trees::tree::Tree;
 
 /// Contacts of sleeping bodies, in the order of their colliders.

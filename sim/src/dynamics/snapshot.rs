@@ -8,7 +8,8 @@ use super::contacts::ContactPoint;
 use super::contacts::collision::Manifold;
 use super::joints::equality::EqualityState;
 use super::sleep::SleepingContacts;
-use super::trees::state::{Rest, TreeState};
+use super::trees::rest::Rest;
+use super::trees::state::TreeState;
 
 /// State of all trees, equalities and contacts, in full precision.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -50,7 +50,7 @@ const STEPS: &[Step] = &[
         folder: "sim/assets/scenes",
         extension: "xml",
         says: "<mujoco",
-        may: &["episodes/src/tasks/", "tests/bench/src/"],
+        may: &["episodes/src/tasks/", "episodes/evaluation/src/robot_check/", "tests/bench/src/"],
     },
     Step {
         what: "object",
