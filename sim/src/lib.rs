@@ -1,7 +1,7 @@
 //! Physics of the robots and their rooms: MJCF loading, dynamics, balance control, cameras and renderers.
 //!
 //! The modules, each of which uses only those before it: [`dynamics`], [`mjcf`], [`body`], [`estimate`]
-//! and [`locomotion`], [`robot`], [`world`], then [`render`] and [`mod@bench`].
+//! and [`locomotion`], [`robot`], [`world`] and [`render`].
 //!
 //! Units are SI, z is up, frames are right-handed, quaternions are written `wxyz`. One [`World`] is
 //! stepped by one thread. The same binary, specification and commands give the same
