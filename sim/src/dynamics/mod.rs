@@ -16,6 +16,7 @@
 mod contacts;
 mod energy_balance;
 mod joints;
+mod rest;
 mod settings;
 mod sleep;
 mod snapshot;

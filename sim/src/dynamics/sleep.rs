@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 use super::Dynamics;
 use super::contacts::collision::Manifold;
 use super::contacts::{ContactPoint, colliders_of};
+use super::rest::Rest;
 use super::trees::TreeId;
-use super::trees::rest::Rest;
 use super::trees::tree::Tree;
 
 /// Contacts of sleeping bodies, in the order of their colliders.

@@ -7,8 +7,8 @@ use super::Dynamics;
 use super::contacts::ContactPoint;
 use super::contacts::collision::Manifold;
 use super::joints::equality::EqualityState;
+use super::rest::Rest;
 use super::sleep::SleepingContacts;
-use super::trees::rest::Rest;
 use super::trees::state::TreeState;
 
 /// State of all trees, equalities and contacts, in full precision.

@@ -8,7 +8,6 @@ mod free_spin;
 mod kinematics;
 mod layout;
 pub mod link;
-pub mod rest;
 pub mod rows;
 pub mod spatial;
 pub mod state;

@@ -6,8 +6,8 @@ use thiserror::Error;
 use super::factor::Factor;
 use super::layout::Layout;
 use super::link::{Drive, DriveLaw, Joint, Link, Mass};
-use super::rest::Rest;
 use super::spatial::{ForceVector, Inertia, MotionVector, Symmetric};
+use crate::dynamics::rest::Rest;
 
 /// Links joined into a tree. A robot is a tree with a free first link, a door one on a fixed first link,
 /// a lone object a tree of one free link.
