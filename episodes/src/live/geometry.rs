@@ -72,8 +72,9 @@ fn part_row(part: &Part, mesh: usize, textures: &mut SceneTextures) -> Value {
         Pattern::Print => ("print", None),
     };
     let mut row = json!({
-        "mesh": mesh, "carrier": carrier_row(part.carrier), "pose": pose_row(&part.carrier_from_mesh), "rgb": part.rgb,
-        "alpha": part.alpha, "pattern": pattern, "second_rgb": second, "casts_shadow": part.casts_shadow,
+        "mesh": mesh, "carrier": carrier_row(part.carrier), "pose": pose_row(&part.carrier_from_mesh),
+        "rgb": part.rgb, "alpha": part.alpha, "pattern": pattern, "second_rgb": second,
+        "casts_shadow": part.casts_shadow,
     });
     if part.gloss != Gloss::default() {
         row["gloss"] = gloss_row(&part.gloss);

@@ -379,7 +379,7 @@ impl Session {
         }
     }
 
-    /// Saves an image of this moment for the strip, if the episode is recorded.
+    /// Saves this moment for the strip, if the episode is recorded.
     fn keep_picture(&mut self, caption: &str) {
         if let Some(files) = &mut self.files {
             files.keep(caption, &self.present);
