@@ -57,6 +57,7 @@ pub mod dynamics;
 mod error;
 pub mod estimate;
 pub mod locomotion;
+mod mass;
 mod mechanism;
 pub mod mjcf;
 mod owner;

@@ -187,7 +187,7 @@ impl Session {
         if let Some(folder) = folder {
             self.files = Some(RunFiles::create(folder, self));
         }
-        self.keep_picture("start");
+        self.keep_moment("start");
         self.hold(hold_steps)?;
         match self.origin.spec.start {
             Start::Task => self.keep_checkpoint(&Phase::number(0)),
@@ -240,7 +240,7 @@ impl Session {
         // No thinking time is charged any more.
         self.clock.pause();
         if !self.scores.complete() {
-            self.keep_picture("end");
+            self.keep_moment("end");
         }
         let mut result = self.result();
         if let Some(files) = &mut self.files {
@@ -325,7 +325,7 @@ impl Session {
         if scored.reached {
             self.phases_reached(reached_before);
         } else if self.scores.next_phase().underway() && !was_underway {
-            self.keep_picture("together");
+            self.keep_moment("together");
         }
         Ok(())
     }
@@ -358,7 +358,7 @@ impl Session {
     fn phases_reached(&mut self, first: usize) {
         let reached = self.reached();
         for phase in &reached[first..] {
-            self.keep_picture(&format!("{} {}", phase.number, phase.id.replace('_', " ")));
+            self.keep_moment(&format!("{} {}", phase.number, phase.id.replace('_', " ")));
             if let Some(files) = &mut self.files {
                 files.phase(phase);
             }
@@ -380,7 +380,7 @@ impl Session {
     }
 
     /// Saves this moment for the strip, if the episode is recorded.
-    fn keep_picture(&mut self, caption: &str) {
+    fn keep_moment(&mut self, caption: &str) {
         if let Some(files) = &mut self.files {
             files.keep(caption, &self.present);
         }

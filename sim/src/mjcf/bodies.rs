@@ -10,7 +10,7 @@ use rapier3d::math::{Matrix, Pose, Vector};
 use rapier3d::prelude::MassProperties;
 
 use super::{Document, Geom, LinkJoint, Primitive, Site, pose, vector};
-use crate::SimError;
+use crate::{SimError, mass};
 
 /// A top-level body with everything on it.
 #[derive(Clone, Debug)]
@@ -186,10 +186,10 @@ impl Document {
                     .zip(groups)
                     .filter(|(_, group)| self.settings.inertia_groups.contains(group));
                 let masses = weighing.map(|(geom, _)| mass_of_geom(geom));
-                masses.fold(MassProperties::default(), |sum, part| sum + part)
+                masses.fold(MassProperties::default(), mass::sum)
             }
         };
-        link.mass += mass.transform_by(&on_link);
+        link.mass = mass::sum(link.mass, mass.transform_by(&on_link));
         link.geoms.extend(
             geoms.into_iter().map(|geom| Geom { body_from_geom: on_link * geom.body_from_geom, ..geom }),
         );
@@ -222,8 +222,7 @@ fn stated_mass(inertial: &Inertial) -> MassProperties {
             Matrix::from_cols(vector([xx, xy, xz]), vector([xy, yy, yz]), vector([xz, yz, zz]))
         }
     };
-    MassProperties::with_inertia_matrix(Vector::ZERO, inertial.mass as f32, inertia)
-        .transform_by(&pose(&inertial.pose))
+    mass::with_inertia(inertial.mass as f32, inertia).transform_by(&pose(&inertial.pose))
 }
 
 /// Returns the mass properties of a uniformly filled geom, in its body's frame. As in MuJoCo, a geom has
@@ -238,7 +237,9 @@ fn mass_of_geom(geom: &Geom) -> MassProperties {
         | Primitive::Capsule { .. }
         | Primitive::Cylinder { .. }
         | Primitive::Box { .. }
-        | Primitive::Convex { .. } => shape.mass_properties(1.0).transform_by(&body_from_shape),
+        | Primitive::Convex { .. } => {
+            mass::at_unit_density(|density| shape.mass_properties(density)).transform_by(&body_from_shape)
+        }
         Primitive::Mesh(ref mesh) => {
             mesh.mass_properties().unwrap_or_default().transform_by(&geom.body_from_geom)
         }

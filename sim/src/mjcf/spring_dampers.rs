@@ -5,6 +5,7 @@ use rapier3d::prelude::MassProperties;
 
 use super::bodies::{BodyTree, Place};
 use super::{Document, LinkJoint, pose};
+use crate::mass;
 
 impl Document {
     /// Sets stiffness k and damping d of the joints with a `springdamper` T z:
@@ -38,7 +39,7 @@ fn moved_inertia(tree: &BodyTree, link: usize) -> f64 {
             of_link[index] = one.parent.and_then(|parent| Some(of_link[parent]? * one.parent_from_link));
         }
         if let Some(link_from_one) = of_link[index] {
-            moved += one.mass.transform_by(&pose(&link_from_one));
+            moved = mass::sum(moved, one.mass.transform_by(&pose(&link_from_one)));
         }
     }
     match &tree.links[link].joint {

@@ -7,11 +7,11 @@ use rapier3d::math::{Pose, Vector};
 use rapier3d::prelude::{AngVector, MassProperties};
 
 use super::World;
-use crate::Side;
 use crate::dynamics::{ContactPoint, DVec3, Dynamics, LinkId, Mass};
 use crate::locomotion::Locomotion;
 use crate::mechanism::{precise, rounded};
 use crate::owner::Owner;
+use crate::{Side, mass};
 
 /// Overlap that counts as contact: resting contacts are a little deeper than zero.
 const ALLOWED_OVERLAP_M: f64 = 0.002;
@@ -120,7 +120,7 @@ impl World {
         let robot = &self.robots[robot];
         let wrist = robot.model.hands[side].wrist;
         let load = MassProperties::new(point_in_wrist_m, mass_kg, AngVector::splat(1e-4 * mass_kg));
-        let whole = robot.model.links[wrist].mass + load;
+        let whole = mass::sum(robot.model.links[wrist].mass, load);
         self.dynamics.tree_mut(robot.tree).set_mass(wrist, Mass::from_rapier(&whole));
     }
 

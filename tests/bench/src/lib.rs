@@ -21,5 +21,5 @@ pub use falls::{FallTrial, FallsCase, FallsReport, FloorEpisode, falls};
 pub use ik::ik;
 pub use physics::{PhysicsCase, PhysicsReport, physics};
 pub use pictures::{PicturesCase, PicturesReport, pictures};
-pub use report::{CaseReport, LocomotionReport};
+pub use report::{CaseFigures, CaseReport, LocomotionReport};
 pub use tandem_ik::bench::Report as IkReport;

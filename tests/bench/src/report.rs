@@ -17,14 +17,21 @@ pub struct LocomotionReport {
     pub cases: Vec<CaseReport>,
 }
 
-/// One case over its seeds. A number is the worst of the robots that did not fall; velocity error and
-/// power are means. `None` if not measured in this case.
-#[derive(Clone, Debug, Serialize)]
+/// One case over its seeds.
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct CaseReport {
     pub case: String,
     pub seeds: usize,
     pub survived: usize,
-    /// Deviation of the mean velocity, as a share of the command: mean over the seeds.
+    #[serde(flatten)]
+    pub figures: CaseFigures,
+}
+
+/// Figures of a trial or, over all seeds of a case, the worst of the robots that did not fall; velocity error
+/// and power are means. `None` if not measured in this case.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct CaseFigures {
+    /// Deviation of the mean velocity, as a share of the command.
     #[serde(rename = "velocity_error")]
     pub velocity_error_share: Option<f32>,
     pub heading_error_deg: Option<f32>,
@@ -62,27 +69,6 @@ impl CaseReport {
     /// Column heads of [`CaseReport`]'s lines.
     pub const HEAD: &str = "case                        alive  v err  heading    drift     sway   height  \
                             stands  still  steps  pelvis   tilt     load  power";
-
-    /// Creates the report of a case without measurements.
-    pub fn of(case: &str, seeds: usize) -> CaseReport {
-        CaseReport {
-            case: case.into(),
-            seeds,
-            survived: 0,
-            velocity_error_share: None,
-            heading_error_deg: None,
-            final_drift_m: None,
-            sway_m: None,
-            height_error_m: None,
-            standing_after_s: None,
-            still_after_s: None,
-            steps: None,
-            pelvis_tilt_deg: None,
-            load_tilt_deg: None,
-            load_drift_m: None,
-            power_w: 0.0,
-        }
-    }
 }
 
 impl fmt::Display for CaseReport {
@@ -90,6 +76,7 @@ impl fmt::Display for CaseReport {
         let show = |value: Option<f32>, scale: f32, unit: &str| {
             value.map_or("-".into(), |value| format!("{:.1}{unit}", value * scale))
         };
+        let figures = &self.figures;
         write!(
             f,
             "{:26} {:>2}/{:<2}  {:>5}  {:>7}  {:>7}  {:>7}  {:>7}  \
@@ -97,18 +84,18 @@ impl fmt::Display for CaseReport {
             self.case,
             self.survived,
             self.seeds,
-            show(self.velocity_error_share, 100.0, "%"),
-            show(self.heading_error_deg, 1.0, "°"),
-            show(self.final_drift_m, 100.0, "cm"),
-            show(self.sway_m, 100.0, "cm"),
-            show(self.height_error_m, 100.0, "cm"),
-            show(self.standing_after_s, 1.0, "s"),
-            show(self.still_after_s, 1.0, "s"),
-            self.steps.map_or("-".into(), |steps| steps.to_string()),
-            show(self.pelvis_tilt_deg, 1.0, "°"),
-            show(self.load_tilt_deg, 1.0, "°"),
-            show(self.load_drift_m, 100.0, "cm"),
-            show(Some(self.power_w), 1.0, "W"),
+            show(figures.velocity_error_share, 100.0, "%"),
+            show(figures.heading_error_deg, 1.0, "°"),
+            show(figures.final_drift_m, 100.0, "cm"),
+            show(figures.sway_m, 100.0, "cm"),
+            show(figures.height_error_m, 100.0, "cm"),
+            show(figures.standing_after_s, 1.0, "s"),
+            show(figures.still_after_s, 1.0, "s"),
+            figures.steps.map_or("-".into(), |steps| steps.to_string()),
+            show(figures.pelvis_tilt_deg, 1.0, "°"),
+            show(figures.load_tilt_deg, 1.0, "°"),
+            show(figures.load_drift_m, 100.0, "cm"),
+            show(Some(figures.power_w), 1.0, "W"),
         )
     }
 }

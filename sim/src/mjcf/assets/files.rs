@@ -12,7 +12,7 @@ use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 use crate::mjcf::{Document, pose, vector};
 use crate::{
-    SimError,
+    SimError, mass,
     user_file::{read_bytes, with_own_separators},
 };
 
@@ -83,10 +83,15 @@ impl Mesh {
 
     /// Returns the mass properties at a density of 1.
     pub(crate) fn mass_properties(&self) -> Option<MassProperties> {
-        let of_hull = || Some(self.hull()?.mass_properties(1.0));
+        let of_hull =
+            || self.hull().map(|hull| mass::at_unit_density(|density| hull.mass_properties(density)));
         let exact = self
             .weighs_exactly
-            .then(|| MassProperties::from_trimesh(1.0, &self.vertices_m, &self.triangles))
+            .then(|| {
+                mass::at_unit_density(|density| {
+                    MassProperties::from_trimesh(density, &self.vertices_m, &self.triangles)
+                })
+            })
             // A surface with holes may enclose no volume.
             .filter(|exact| exact.mass() > 0.0);
         exact.or_else(of_hull)

@@ -13,8 +13,6 @@ use crate::render::shading::baked::{
 };
 use crate::render::{Carrier, Light, Scenery};
 
-/// Most texels of all maps; those of larger rooms are wider.
-const MAX_TEXELS: f32 = 50_000.0;
 /// Margin around the walls, beyond which the light is that of the border.
 const MARGIN_M: f32 = 0.5;
 /// Side of the cells that share a cube, for surfaces without a map.
@@ -29,12 +27,8 @@ pub(super) fn bake(room: &Scenery, [low_m, high_m]: [Vector; 2]) -> BakedLight {
     let box_m = [low_m - Vector::splat(MARGIN_M), high_m + Vector::splat(MARGIN_M)];
     let prepared = Prepared::new(room.clone());
     let corners = corners(&prepared);
-    let flat: Vec<Option<FlatSheet>> = sheets(&prepared, &corners, box_m);
-    let count = |scale: f32| flat.iter().flatten().map(|sheet| texels(&sheet.map(0, scale))).sum::<f32>();
-    let mut texel_factor = 1.0;
-    while count(texel_factor) > MAX_TEXELS && texel_factor < 8.0 {
-        texel_factor *= 1.1;
-    }
+    let mut flat: Vec<Option<FlatSheet>> = sheets(&prepared, &corners, box_m);
+    let texel_factor = FlatSheet::fit(&mut flat);
     let (mut maps, mut points): (Vec<LightMap>, Vec<SurfacePoint>) = (Vec::new(), Vec::new());
     let sheet_map: Vec<Option<u32>> = flat
         .iter()
@@ -78,10 +72,6 @@ pub(super) fn bake(room: &Scenery, [low_m, high_m]: [Vector; 2]) -> BakedLight {
     });
     let texels = texels.collect();
     BakedLight { sheets, maps, texels, cubes, probes }
-}
-
-fn texels(map: &LightMap) -> f32 {
-    (map.width * map.height) as f32
 }
 
 /// Returns the flat sheets of a room, by the sheets' numbers; `None` for others.

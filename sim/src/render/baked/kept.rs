@@ -14,7 +14,7 @@ use crate::render::shading::baked::BakedLight;
 use crate::render::{Part, Pattern, Scenery};
 
 /// Version of the method: another one gives other light.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 /// Number of rooms whose light a process keeps, and that of files.
 const MAX_ROOMS: usize = 16;
 const MAX_FILES: usize = 100;

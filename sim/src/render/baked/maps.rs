@@ -6,6 +6,10 @@ use crate::render::shading::baked::{LightMap, SurfacePoint};
 
 /// Side of a texel, and the most texels along a side of a map.
 const TEXEL_M: f32 = 0.08;
+/// Most texels of all maps of a room, the factor by which they grow until they are that few, and its limit.
+const MAX_TEXELS: f32 = 50_000.0;
+const TEXEL_GROWTH: f32 = 1.1;
+const MAX_TEXEL_FACTOR: f32 = 8.0;
 const MAX_SIDE: f32 = 160.0;
 /// Distance from a plane within which triangles are flat.
 const FLAT_M: f32 = 1e-3;
@@ -55,6 +59,21 @@ impl FlatSheet {
         Some(FlatSheet { normal, sides_direction: along, corner_m, sides_m })
     }
 
+    /// Returns the size of texels, as a factor on the usual size, at which the maps of a room have few enough
+    /// of them. With larger texels, sheets that are small beside the growth become `None`: a mesh may have more
+    /// triangles than all maps have texels.
+    pub(super) fn fit(sheets: &mut [Option<FlatSheet>]) -> f32 {
+        let mut texel_factor = 1.0;
+        while texels(sheets, texel_factor) > MAX_TEXELS && texel_factor < MAX_TEXEL_FACTOR {
+            texel_factor *= TEXEL_GROWTH;
+            let min_side_m = TEXEL_M * (texel_factor - 1.0);
+            for sheet in sheets.iter_mut() {
+                sheet.take_if(|sheet| sheet.sides_m[0].max(sheet.sides_m[1]) < min_side_m);
+            }
+        }
+        texel_factor
+    }
+
     /// Returns the map of the sheet with texels of about `texel_factor` times the usual size.
     pub(super) fn map(&self, first: u32, texel_factor: f32) -> LightMap {
         let count = |side_m: f32| (side_m / (TEXEL_M * texel_factor)).ceil().clamp(2.0, MAX_SIDE);
@@ -83,5 +102,48 @@ impl FlatSheet {
                 seed: [map.first + column, row],
             })
         })
+    }
+}
+
+/// Returns the number of texels in the maps of sheets.
+fn texels(sheets: &[Option<FlatSheet>], texel_factor: f32) -> f32 {
+    let maps = sheets.iter().flatten().map(|sheet| sheet.map(0, texel_factor));
+    maps.map(|map| (map.width * map.height) as f32).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns squares with sides of `side_m`.
+    fn squares(count: usize, side_m: f32) -> impl Iterator<Item = Option<FlatSheet>> {
+        let corners =
+            [Vector::ZERO, Vector::X * side_m, Vector::Y * side_m, Vector::new(side_m, side_m, 0.0)];
+        let box_m = [Vector::splat(-100.0), Vector::splat(100.0)];
+        (0..count).map(move |_| FlatSheet::of(&corners, Vector::Z, Pose::IDENTITY, box_m))
+    }
+
+    fn count(sheets: &[Option<FlatSheet>]) -> usize {
+        sheets.iter().flatten().count()
+    }
+
+    #[test]
+    fn rooms_with_few_texels_keep_all_maps() {
+        let mut room: Vec<_> = squares(6, 4.0).chain(squares(500, 0.02)).collect();
+        assert_eq!(FlatSheet::fit(&mut room), 1.0);
+        assert_eq!(count(&room), 506);
+    }
+
+    #[test]
+    fn large_rooms_have_larger_texels_and_small_sheets_have_none() {
+        let mut large: Vec<_> = squares(24, 10.0).collect();
+        let texel_factor = FlatSheet::fit(&mut large);
+        assert!(texel_factor > 1.5 && texels(&large, texel_factor) <= MAX_TEXELS, "{texel_factor}");
+        assert_eq!(count(&large), 24);
+
+        let mut detailed: Vec<_> = squares(6, 4.0).chain(squares(100_000, 0.02)).collect();
+        let texel_factor = FlatSheet::fit(&mut detailed);
+        assert!(texels(&detailed, texel_factor) <= MAX_TEXELS);
+        assert_eq!(count(&detailed), 6, "walls keep their maps, triangles do not");
     }
 }

@@ -5,6 +5,7 @@ use tandem_sim::{BaseCommand, BaseVelocity, CONTROL_DT_S as DT_S, Rotation, Side
 
 use super::cases::{Case, Plan, STOP_S, pulse};
 use super::tour::Leg;
+use crate::report::CaseFigures;
 
 /// Time before commands and measurements begin, in which arms rise and loads swing out.
 pub(super) const SETTLE_S: f32 = 2.0;
@@ -12,22 +13,6 @@ pub(super) const SETTLE_S: f32 = 2.0;
 const RAMP_S: f32 = 2.0;
 /// Height above its start from which on a foot is in the air.
 const LIFTED_M: f32 = 0.015;
-
-/// Result of a trial; see [`crate::report::CaseReport`].
-#[derive(Clone, Debug, Default)]
-pub(super) struct Trial {
-    pub fell: bool,
-    pub velocity_error_share: Option<f32>,
-    pub heading_error_deg: Option<f32>,
-    pub final_drift_m: Option<f32>,
-    pub sway_m: Option<f32>,
-    pub height_error_m: Option<f32>,
-    pub standing_after_s: Option<f32>,
-    pub still_after_s: Option<f32>,
-    pub steps: Option<u32>,
-    pub pelvis_tilt_deg: Option<f32>,
-    pub power_w: f32,
-}
 
 /// One control step of the log.
 pub(super) struct Sample {
@@ -48,7 +33,7 @@ pub(super) fn measure(
     scale: &BodyScale,
     log: &[Sample],
     legs: &[Leg],
-    trial: &mut Trial,
+    figures: &mut CaseFigures,
 ) {
     let at = |time_s: f32| ((time_s / DT_S) as usize).min(log.len() - 1);
     let (start, end) = (at(SETTLE_S), log.len() - 1);
@@ -59,43 +44,43 @@ pub(super) fn measure(
                 low = low.min(sample.pelvis_m);
                 high = high.max(sample.pelvis_m);
             }
-            trial.sway_m = Some((high.x - low.x).max(high.y - low.y));
-            trial.final_drift_m = Some(flat(log[end].pelvis_m - log[0].pelvis_m).length());
-            trial.heading_error_deg = Some((log[end].heading_rad - log[0].heading_rad).abs().to_degrees());
-            trial.steps = Some(steps(log));
+            figures.sway_m = Some((high.x - low.x).max(high.y - low.y));
+            figures.final_drift_m = Some(flat(log[end].pelvis_m - log[0].pelvis_m).length());
+            figures.heading_error_deg = Some((log[end].heading_rad - log[0].heading_rad).abs().to_degrees());
+            figures.steps = Some(steps(log));
         }
         Plan::Move(velocity) => {
             let stop = at(case.duration_s - STOP_S);
             let walk = &log[at(SETTLE_S + RAMP_S)..stop];
-            trial.velocity_error_share = Some(velocity_error(walk, *velocity));
+            figures.velocity_error_share = Some(velocity_error(walk, *velocity));
             let turned_rad = velocity.yaw_rate_rad_s * (stop - start) as f32 * DT_S;
-            trial.heading_error_deg =
+            figures.heading_error_deg =
                 Some((log[end].heading_rad - log[start].heading_rad - turned_rad).abs().to_degrees());
-            trial.height_error_m = Some(walking_height_error_m(walk));
-            trial.pelvis_tilt_deg =
+            figures.height_error_m = Some(walking_height_error_m(walk));
+            figures.pelvis_tilt_deg =
                 walk.iter().map(|sample| sample.pelvis_tilt_rad.to_degrees()).reduce(f32::max);
-            trial.standing_after_s = Some(slower_after_s(&log[stop..], 0.1));
-            trial.still_after_s = Some(slower_after_s(&log[stop..], 0.02));
+            figures.standing_after_s = Some(slower_after_s(&log[stop..], 0.1));
+            figures.still_after_s = Some(slower_after_s(&log[stop..], 0.02));
         }
         Plan::Pulse(axis) => {
             let (velocity, pulse_s) = pulse(*axis, seed, scale);
             let stop = at(SETTLE_S + pulse_s);
             let [off_m, off_rad] = off_pulse(&log[start], &log[end], velocity, pulse_s);
-            trial.final_drift_m = Some(off_m);
-            trial.heading_error_deg = Some(off_rad.to_degrees());
-            trial.standing_after_s = Some(slower_after_s(&log[stop..], 0.1));
-            trial.still_after_s = Some(slower_after_s(&log[stop..], 0.02));
+            figures.final_drift_m = Some(off_m);
+            figures.heading_error_deg = Some(off_rad.to_degrees());
+            figures.standing_after_s = Some(slower_after_s(&log[stop..], 0.1));
+            figures.still_after_s = Some(slower_after_s(&log[stop..], 0.02));
         }
         Plan::Tour(tour) => {
             let error_m = |leg: usize| {
                 let last = at((leg + 1) as f32 * tour.leg_s - DT_S);
                 flat(log[last].pelvis_m - legs[leg].target_m).length()
             };
-            trial.final_drift_m = Some((0..legs.len()).map(error_m).sum::<f32>() / legs.len() as f32);
+            figures.final_drift_m = Some((0..legs.len()).map(error_m).sum::<f32>() / legs.len() as f32);
         }
     }
     if let Plan::Squat { .. } = &case.plan {
-        trial.height_error_m = squat_error_m(case, |time_s| &log[at(time_s)]);
+        figures.height_error_m = squat_error_m(case, |time_s| &log[at(time_s)]);
     }
 }
 

@@ -11,10 +11,9 @@ use std::sync::Arc;
 
 use tandem_sim::{LocomotionChoice, RobotModel, Sensing, SimError};
 
-use crate::report::{CaseReport, LocomotionReport};
+use crate::report::{CaseFigures, CaseReport, LocomotionReport};
 use crate::seeds::{is_asked, over_seeds};
 use cases::{CASES, Case};
-use measure::Trial;
 
 /// Controller under test.
 #[derive(Clone, Copy, Debug)]
@@ -62,16 +61,17 @@ pub fn run(
     Ok(LocomotionReport { robot: robot.into(), controller: subject.name(), sensing, cases })
 }
 
-fn summarise(case: &Case, trials: &[Trial]) -> CaseReport {
-    let standing: Vec<&Trial> = trials.iter().filter(|trial| !trial.fell).collect();
-    let worst =
-        |value: fn(&Trial) -> Option<f32>| standing.iter().filter_map(|trial| value(trial)).reduce(f32::max);
-    let mean = |value: fn(&Trial) -> Option<f32>| {
+/// Summarises the trials of a case, of which those that fell are `None`.
+fn summarise(case: &Case, trials: &[Option<CaseFigures>]) -> CaseReport {
+    let standing: Vec<&CaseFigures> = trials.iter().flatten().collect();
+    let worst = |value: fn(&CaseFigures) -> Option<f32>| {
+        standing.iter().filter_map(|trial| value(trial)).reduce(f32::max)
+    };
+    let mean = |value: fn(&CaseFigures) -> Option<f32>| {
         let values: Vec<f32> = standing.iter().filter_map(|trial| value(trial)).collect();
         (!values.is_empty()).then(|| values.iter().sum::<f32>() / values.len() as f32)
     };
-    CaseReport {
-        survived: standing.len(),
+    let figures = CaseFigures {
         velocity_error_share: mean(|trial| trial.velocity_error_share),
         heading_error_deg: worst(|trial| trial.heading_error_deg),
         final_drift_m: worst(|trial| trial.final_drift_m),
@@ -82,8 +82,9 @@ fn summarise(case: &Case, trials: &[Trial]) -> CaseReport {
         steps: standing.iter().filter_map(|trial| trial.steps).max(),
         pelvis_tilt_deg: worst(|trial| trial.pelvis_tilt_deg),
         power_w: mean(|trial| Some(trial.power_w)).unwrap_or(0.0),
-        ..CaseReport::of(case.name, trials.len())
-    }
+        ..CaseFigures::default()
+    };
+    CaseReport { case: case.name.into(), seeds: trials.len(), survived: standing.len(), figures }
 }
 
 #[cfg(test)]

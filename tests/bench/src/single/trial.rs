@@ -10,22 +10,23 @@ use tandem_sim::{
 
 use super::Subject;
 use super::cases::{Case, Disturbance, PULL_RISE_S, Plan, PulledHands, STOP_S, pulse};
-use super::measure::{SETTLE_S, Sample, Trial, measure};
+use super::measure::{SETTLE_S, Sample, measure};
 use super::motion::ArmMotion;
 use super::tour::{self, Leg};
+use crate::report::CaseFigures;
 
 const PUSH_S: f32 = 1.0;
 /// Start of pulls at a standing robot: its arms are held out by then.
 const PULLS_AT_S: f32 = 4.0;
 
-/// Runs until the time is up or the robot has fallen.
+/// Runs until the time is up; `None` if the robot falls.
 pub(super) fn run(
     case: &Case,
     seed: u32,
     model: &Arc<RobotModel>,
     subject: Subject,
     sensing: Sensing,
-) -> Result<Trial, SimError> {
+) -> Result<Option<CaseFigures>, SimError> {
     let case = &case.of_size(&model.scale);
     let placement = RobotPlacement { name: "A".into(), position_m: [0.0, 0.0], yaw_rad: 0.0 };
     let spec = WorldSpec { scene: "floor".into(), robots: vec![placement], objects: vec![] };
@@ -47,13 +48,11 @@ pub(super) fn run(
     let feet = world.robots()[0].model.soles.each_ref().map(|sole| sole.link);
     let mut robot = world.present().robots.remove(0);
     let mut log: Vec<Sample> = Vec::new();
-    let mut trial = Trial::default();
     let mut work_j = 0.0;
     for step in 0..(case.duration_s / DT_S) as usize {
         let time_s = step as f32 * DT_S;
-        trial.fell = robot.truth.fallen;
-        if trial.fell {
-            break;
+        if robot.truth.fallen {
+            return Ok(None);
         }
         let heading_rad =
             unwrap(heading_rad(&robot.truth.world_from_pelvis()), log.last().map_or(0.0, |s| s.heading_rad));
@@ -71,11 +70,9 @@ pub(super) fn run(
         }
         robot = world.control_step(&[RobotCommand { upper_rad, base }])?.robots.remove(0);
     }
-    trial.power_w = work_j / (log.len() as f32 * DT_S);
-    if !trial.fell {
-        measure(case, seed, &model.scale, &log, &legs, &mut trial);
-    }
-    Ok(trial)
+    let mut figures = CaseFigures { power_w: work_j / (log.len() as f32 * DT_S), ..CaseFigures::default() };
+    measure(case, seed, &model.scale, &log, &legs, &mut figures);
+    Ok(Some(figures))
 }
 
 fn sample(truth: &RobotTruth, feet: Sides<usize>, heading_rad: f32, command: BaseCommand) -> Sample {

@@ -21,7 +21,7 @@ use tandem_sim::{Pose, Rotation, Sensing, Sides, Vector, heading_rad, wrapped_ra
 use tandem_tools_spec::{Protocol, ToolCall, ToolReply};
 
 use crate::error::BenchError;
-use crate::report::CaseReport;
+use crate::report::{CaseFigures, CaseReport};
 use crate::seeds::over_seeds;
 
 /// A case: a way of the bar.
@@ -72,15 +72,15 @@ pub fn run(
     let trials = trials.into_iter().collect::<Result<Vec<_>, _>>()?;
     let done: Vec<&CarryResult> = trials.iter().flatten().collect();
     let worst = |value: fn(&CarryResult) -> f32| done.iter().map(|carried| value(carried)).reduce(f32::max);
-    Ok(CaseReport {
-        survived: done.len(),
+    let figures = CaseFigures {
         heading_error_deg: worst(|carried| carried.heading_error_deg),
         final_drift_m: worst(|carried| carried.final_drift_m),
         sway_m: worst(|carried| carried.off_way_m),
         load_tilt_deg: worst(|carried| carried.tilt_deg),
         power_w: done.iter().map(|carried| carried.power_w).sum::<f32>() / done.len().max(1) as f32,
-        ..CaseReport::of(case.name, trials.len())
-    })
+        ..CaseFigures::default()
+    };
+    Ok(CaseReport { case: case.name.into(), seeds: trials.len(), survived: done.len(), figures })
 }
 
 /// Result for a bar that was carried to the end of its way.

@@ -17,7 +17,7 @@ use tandem_tools_spec::{Assistance, Destination, PoseFrame, Protocol, ToolCall, 
 
 use super::holding::loads::{BASKET, LEGS, ROUND_TABLE, SharedLoad, TABLE};
 use crate::error::BenchError;
-use crate::report::CaseReport;
+use crate::report::{CaseFigures, CaseReport};
 use crate::seeds::{is_asked, over_seeds};
 
 /// Task of a robot alone on a floor.
@@ -74,13 +74,13 @@ pub fn run(
         let worst = |value: fn(&PlaceResult) -> f64| {
             placed.iter().map(|placed| value(placed) as f32).reduce(f32::max)
         };
-        done(CaseReport {
-            survived: placed.len(),
+        let figures = CaseFigures {
             heading_error_deg: worst(|placed| placed.off_rad.to_degrees()),
             final_drift_m: worst(|placed| placed.off_m),
             load_drift_m: load.and(worst(|placed| placed.squeezed_m)),
-            ..CaseReport::of(&name, trials.len())
-        });
+            ..CaseFigures::default()
+        };
+        done(CaseReport { case: name, seeds: trials.len(), survived: placed.len(), figures });
     }
     Ok(())
 }

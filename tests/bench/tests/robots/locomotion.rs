@@ -37,11 +37,14 @@ fn walks_as_commanded_and_stops() {
         assert_eq!(report.survived, 1, "{report:?}");
         // The bench prints 0.4 to 2.3 %, 0.0 to 0.4 degrees, 0.6 to 0.9 s and 1.1 to 1.5 s; tilts of 0.9
         // to 3.2 degrees.
-        assert!(report.velocity_error_share.unwrap() < 0.03, "{report:?}");
-        assert!(report.heading_error_deg.unwrap() < 1.0, "{report:?}");
-        assert!(report.standing_after_s.unwrap() < 1.0 && report.still_after_s.unwrap() < 1.7, "{report:?}");
+        assert!(report.figures.velocity_error_share.unwrap() < 0.03, "{report:?}");
+        assert!(report.figures.heading_error_deg.unwrap() < 1.0, "{report:?}");
+        assert!(
+            report.figures.standing_after_s.unwrap() < 1.0 && report.figures.still_after_s.unwrap() < 1.7,
+            "{report:?}"
+        );
         let upright_deg = if case.ends_with("2kg") { 5.0 } else { 3.0 };
-        assert!(report.pelvis_tilt_deg.unwrap() < upright_deg, "{report:?}");
+        assert!(report.figures.pelvis_tilt_deg.unwrap() < upright_deg, "{report:?}");
     }
 }
 
@@ -52,8 +55,8 @@ fn short_commands_move_the_base_by_speed_times_time() {
     assert_eq!(reports.len(), 6, "three axes, with empty hands and with 2 kg");
     for report in reports {
         assert_eq!(report.survived, report.seeds, "{report:?}");
-        assert!(report.final_drift_m.is_some_and(|off_m| off_m <= 0.015), "{report:?}");
-        assert!(report.heading_error_deg.is_some_and(|off_deg| off_deg <= 0.5), "{report:?}");
+        assert!(report.figures.final_drift_m.is_some_and(|off_m| off_m <= 0.015), "{report:?}");
+        assert!(report.figures.heading_error_deg.is_some_and(|off_deg| off_deg <= 0.5), "{report:?}");
     }
 }
 
@@ -112,9 +115,9 @@ fn keeps_its_place_while_its_hands_are_pulled() {
         [("stand_pull_15n", 0.08), ("stand_pull_25n_both_hands", 0.15), ("stand_pull_25n_one_hand", 0.07)]
     {
         let report = report(case, 10);
-        assert_eq!((report.survived, report.steps), (10, Some(0)), "{report:?}");
-        assert!(report.final_drift_m.unwrap() < drift_m, "{report:?}");
-        assert!(report.heading_error_deg.unwrap() < 3.0, "{report:?}");
+        assert_eq!((report.survived, report.figures.steps), (10, Some(0)), "{report:?}");
+        assert!(report.figures.final_drift_m.unwrap() < drift_m, "{report:?}");
+        assert!(report.figures.heading_error_deg.unwrap() < 3.0, "{report:?}");
     }
 }
 
@@ -124,9 +127,12 @@ fn keeps_its_place_while_its_hands_are_pulled() {
 fn goes_back_to_its_place_after_it_was_pulled_away() {
     let report = report("stand_pull_40n", 10);
     assert!(report.survived >= 9, "{report:?}");
-    assert!(report.steps.unwrap() > 0 && report.sway_m.unwrap() > 0.2, "it is pulled away: {report:?}");
-    assert!(report.final_drift_m.unwrap() < 0.10, "{report:?}");
-    assert!(report.heading_error_deg.unwrap() < 10.0, "{report:?}");
+    assert!(
+        report.figures.steps.unwrap() > 0 && report.figures.sway_m.unwrap() > 0.2,
+        "it is pulled away: {report:?}"
+    );
+    assert!(report.figures.final_drift_m.unwrap() < 0.10, "{report:?}");
+    assert!(report.figures.heading_error_deg.unwrap() < 10.0, "{report:?}");
 }
 
 fn walking() -> (World, RobotCommand) {

@@ -19,7 +19,7 @@ use tandem_sim::{BaseCommand, CONTROL_HZ, RobotCommand, Sensing, Side, Vector};
 use tandem_tools_spec::Protocol;
 
 use crate::error::BenchError;
-use crate::report::CaseReport;
+use crate::report::{CaseFigures, CaseReport};
 use crate::seeds::{is_asked, over_seeds};
 use disturbance::{ArmDisturbance, Disturber};
 use loads::{BAR, BASKET, LEGS, ROUND_TABLE, SharedLoad, TABLE};
@@ -117,16 +117,16 @@ pub fn run(
 
 fn report(name: &str, seeds: usize, held: &[&HoldResult]) -> CaseReport {
     let worst = |value: fn(&HoldResult) -> f32| held.iter().map(|held| value(held)).reduce(f32::max);
-    CaseReport {
-        survived: held.len(),
+    let figures = CaseFigures {
         final_drift_m: worst(|held| held.drift_m),
         sway_m: worst(|held| held.late_drift_m),
         load_drift_m: worst(|held| held.load_drift_m),
         standing_after_s: worst(|held| held.standing_after_s),
         load_tilt_deg: worst(|held| held.tilt_deg),
         power_w: held.iter().map(|held| held.power_w).sum::<f32>() / held.len().max(1) as f32,
-        ..CaseReport::of(name, seeds)
-    }
+        ..CaseFigures::default()
+    };
+    CaseReport { case: name.into(), seeds, survived: held.len(), figures }
 }
 
 impl Setup {
